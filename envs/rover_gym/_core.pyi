@@ -2188,7 +2188,7 @@ class EpisodeRun:
         """
     def step(
         self,
-        simulation: Simulation,
+        simulation: Simulation | RoverGrainSimulation,
         action: npt.ArrayLike,
         normals: npt.ArrayLike | None = None,
         *,
@@ -2200,7 +2200,8 @@ class EpisodeRun:
         after a whole physics step, whose state stays; the episode then stays as before the call.
 
         Args:
-            simulation: The rover of this episode.
+            simulation: The rover of this episode, a `Simulation`, or a `RoverGrainSimulation` where
+                it drives among grains.
             action: Torques, then steering, within [-1, 1], (n_actions,).
             normals: A standard normal number for each entry of the observation, (size,), where the
                 rules have noise.
@@ -2895,20 +2896,51 @@ class SoilSimulation:
 
 @final
 class Drum:
+    """A drum that turns about its axis, which lies along z, between two ends at rest.
+
+    Args:
+        radius: Inner radius, m.
+        length: Distance between the ends, m.
+        rate: Angular velocity about +z, rad/s.
+        centre: Its middle, (3,), m; the origin by default.
+
+    Raises:
+        TerrainError: A number is not finite, or the radius or length is not positive.
+    """
+
     def __new__(
         cls, radius: float, length: float, rate: float = 0.0, *, centre: npt.ArrayLike | None = None
     ) -> Drum: ...
     @property
-    def radius(self) -> float: ...
+    def radius(self) -> float:
+        """Inner radius, m."""
     @property
-    def length(self) -> float: ...
+    def length(self) -> float:
+        """Distance between the ends, m."""
     @property
-    def rate(self) -> float: ...
+    def rate(self) -> float:
+        """Angular velocity about +z, rad/s."""
     @property
-    def centre(self) -> tuple[float, float, float]: ...
+    def centre(self) -> tuple[float, float, float]:
+        """Its middle, m."""
 
 @final
 class Silo:
+    """An upright tube, open above, perhaps on a flat floor with a round hole.
+
+    Without a floor it has no end. What falls through the hole is free.
+
+    Args:
+        radius: Inner radius, m.
+        floor: Height of the floor, m; no floor by default.
+        hole: Radius of the hole in the middle of the floor, m; 0 for none.
+        axis: Place (x, z) of the axis, (2,), m; the origin by default.
+
+    Raises:
+        TerrainError: A number is not finite, the radius is not positive, or the hole is as wide as
+            the tube.
+    """
+
     def __new__(
         cls,
         radius: float,
@@ -2918,13 +2950,17 @@ class Silo:
         axis: npt.ArrayLike | None = None,
     ) -> Silo: ...
     @property
-    def radius(self) -> float: ...
+    def radius(self) -> float:
+        """Inner radius, m."""
     @property
-    def floor(self) -> float | None: ...
+    def floor(self) -> float | None:
+        """Height of the floor, m, or None."""
     @property
-    def hole(self) -> float: ...
+    def hole(self) -> float:
+        """Radius of the hole, m."""
     @property
-    def axis(self) -> tuple[float, float]: ...
+    def axis(self) -> tuple[float, float]:
+        """Place (x, z) of the axis, m."""
 
 @final
 class GrainContacts:
@@ -2953,7 +2989,10 @@ class GrainContacts:
         """Gaps at the start of the step, (n,), m; negative where bodies overlap."""
     @property
     def impulses(self) -> _Array:
-        """Impulses on the first body along n, t, b of `frames`, (n, 3), N s."""
+        """Impulses on the first body along n, t, b of `frames`, (n, 3), N s.
+
+        Cohesion is part of the normal ones, which are negative where a contact bears tension.
+        """
     @property
     def velocities(self) -> _Array:
         """Velocities of the first body against the second after the step along n, t, b, (n, 3), m/s."""
@@ -3000,10 +3039,19 @@ class GrainSimulation:
             floor, or a piston with the velocity that `set_state` gives it; none by default. They
             may overlap one another and walls.
         walls: A point of each wall and the normal to its free side, (m, 6), m; none by default.
+        wall_velocity: Velocities of the walls, (m, 3), m/s; at rest by default. A wall is in its
+            place at time 0.
+        vessel: A `Drum` or a `Silo` around the balls; none by default.
         terrain: A `Plane`, `SphereField`, `HeightField`, `TriangleMesh` or `Union`, or a list of
-            them, below the balls; none by default. Where it knows no ground, balls fall.
+            them, below the balls; none by default. Where it knows no ground, balls fall. Balls
+            have a vessel or a terrain, not both.
         friction: Coulomb's coefficient between balls.
-        wall_friction: Coulomb's coefficient of balls on walls and terrain.
+        wall_friction: Coulomb's coefficient of balls on walls, vessel and terrain.
+        cohesion: Attraction of bodies that touch, N: the pull that breaks their contact. The law of
+            a contact is 0 <= u_N + gap/h, p_N + h cohesion >= 0, one of them 0; friction is bounded
+            by friction (p_N + h cohesion).
+        cohesion_range: Gap up to which the attraction acts, m; 1% of the smallest radius by
+            default, at most 20%.
         restitution: Newton's coefficient of all contacts, in [0, 1].
         gravity: Gravity, (3,), m/s²; (0, -9.81, 0) by default.
         time_step: Time step, s.
@@ -3025,8 +3073,8 @@ class GrainSimulation:
         ModelError: A radius or mass is not finite and positive.
         StateError: Positions have a wrong shape or an entry that is not finite, or balls, walls or
             terrain overlap.
-        TerrainError: A wall has no direction, or `terrain` is not a terrain.
-        OptionError: An option is out of its range.
+        TerrainError: A wall has no direction, or `terrain` or `vessel` is none.
+        OptionError: An option is out of its range, or both `terrain` and `vessel` are given.
     """
 
     def __new__(
@@ -3086,9 +3134,11 @@ class GrainSimulation:
     def terrain(self) -> _Terrain | None:
         """The terrain below the balls, or None."""
     @property
-    def vessel(self) -> Drum | Silo | None: ...
+    def vessel(self) -> Drum | Silo | None:
+        """The vessel around the balls, or None."""
     @property
-    def walls(self) -> _Array: ...
+    def walls(self) -> _Array:
+        """A point of each wall now and the normal to its free side, (m, 6), m."""
     @property
     def settings(self) -> dict[str, Any]:
         """The options of contacts, gravity and solver, by the names of the arguments."""
@@ -3234,10 +3284,9 @@ class RoverGrainSimulation:
         """
     @property
     def wheel_gaps(self) -> npt.NDArray[np.float64]:
-        """Gap of each wheel now to the nearest grain or the terrain, (n_wheels,), m, positive when
-        apart.
+        """Gap of each wheel now to the nearest grain or the terrain, (n_wheels,), m.
 
-        A wheel with nothing within its diameter has the gap to the terrain.
+        Positive when apart. A wheel without a grain within its radius has the gap to the terrain.
         """
     def penetration(self) -> float:
         """Deepest overlap now, m: of grains with anything, and of the rover with grains."""
@@ -3361,7 +3410,26 @@ def arrange_balls(
     back: float = 0.0,
     bottom: float = 0.0,
     seed: int = 0,
-) -> _Array: ...
+) -> _Array:
+    """Places balls of given radii in loose layers over a rectangle, without overlap.
+
+    Each has a place as wide as the largest ball, and they fill the layers in the order given.
+
+    Args:
+        radius: Radii, (n,), m.
+        width: Width of the rectangle along x, m.
+        depth: Width of the rectangle along z, m.
+        left: Smallest x, m.
+        back: Smallest z, m.
+        bottom: Height of the lower edge, m.
+        seed: Seed of the random numbers; equal seeds give equal places.
+
+    Returns:
+        Centres, (n, 3), m.
+
+    Raises:
+        ModelError: A number is not finite or out of its range, or a ball does not fit.
+    """
 
 @final
 class SolverReport:

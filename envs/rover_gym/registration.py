@@ -34,6 +34,7 @@ ENVIRONMENTS: Mapping[str, Registration] = {
     "RoverHills-v0": Registration(
         "rover_gym.env:RoverEnv", "rover_gym.vector:RoverVectorEnv", arguments={"terrain": "hills"}
     ),
+    "RoverGrains-v0": Registration("rover_gym.env:RoverGrainsEnv"),
 }
 
 

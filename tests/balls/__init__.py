@@ -46,21 +46,25 @@ class MovingBalls:
         self.kinematic = grid[:, 1] == 0
         self.size = 2.0 * radius * np.array(shape)
         self.time, self.time_step = 0.0, 0.002
-        self.terrain, self.grains, self.rover = None, self, None
+        self.terrain = self.vessel = self.rover = None
+        self.grains = self
         self.settings: dict[str, Any] = {"gravity": [0.0, -9.81, 0.0], "time_step": self.time_step, "tolerance": 1e-4}
 
     @property
     def position(self) -> Array:
+        """(n, 3) m."""
         wave = self._rest[:, 0] - self.time * 0.5 * self.size[0]
         down = np.exp(-((wave / (0.1 * self.size[0])) ** 2)) * self._depth
         return self._rest - np.outer(down * 2.0 * self.radius.mean(), [0.0, 1.0, 0.0])
 
     @property
     def asleep(self) -> npt.NDArray[np.bool_]:
+        """(n,)."""
         return ~self._depth
 
     @property
     def walls(self) -> Array:
+        """(5, 6) of the box."""
         x, _, z = self.size
         return np.array(
             [
@@ -73,13 +77,16 @@ class MovingBalls:
         )
 
     def step(self, n: int = 1) -> Report:
+        """Moves on in time."""
         self.time += n * self.time_step
         return Report()
 
     def energy(self) -> Energy:
+        """Energy, J."""
         return Energy(0.1 + self.time, 9.81 * float(self.mass @ self.position[:, 1]))
 
     def penetration(self) -> float:
+        """Overlap, m."""
         return 1e-6
 
 
@@ -119,8 +126,10 @@ class RoverOnMovingBalls:
         self.rover = Raised(rover, Plane())
 
     def step(self, n: int = 1) -> Report:
+        """Moves on in time."""
         self.rover.step(n)
         return self.grains.step(n)
 
     def penetration(self) -> float:
+        """Overlap, m."""
         return 1e-6

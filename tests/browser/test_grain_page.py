@@ -1,4 +1,4 @@
-"""The page of balls in a real browser: it loads offline, shows balls and rover, and spends little script on a picture."""
+"""The page of balls in a real browser: it loads offline, shows balls and rover, and a picture costs little script."""
 
 import base64
 import json
@@ -154,7 +154,8 @@ def test_it_plays_and_the_wheel_of_the_mouse_zooms(shown: BallsShown) -> None:
     go_to(browser, 0.1)
     far = coarse(picture(browser))
     browser.execute_script(
-        "document.querySelector('#root canvas').dispatchEvent(new WheelEvent('wheel', {deltaY: -400, cancelable: true}))"
+        "const turn = new WheelEvent('wheel', {deltaY: -400, cancelable: true});"
+        "document.querySelector('#root canvas').dispatchEvent(turn);"
     )
     go_to(browser, 0.1)
     near = coarse(picture(browser))

@@ -517,7 +517,7 @@ def test_all_formats_are_written_and_named(recording: Path, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("arguments", "culprit"),
     [
-        ([], "--html, --vrml or --gltf"),
+        ([], "--html, --vrml, --gltf or --film"),
         (["--vrml", "out.wrl", "--fps", "0"], "fps"),
         (["--vrml", "out.wrl", "--fps", "nan"], "fps"),
         (["--vrml", "taken/below/out.wrl"], "taken"),

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from rover_gym.mechanics import SoilSimulation
+from rover_gym.mechanics import GrainSimulation, SoilSimulation
 
 GRAVITY = 9.81
 
@@ -55,18 +55,18 @@ class Ledger:
 
 
 class Watched:
-    """A soil that is stepped under watch.
+    """Disks or balls that are stepped under watch.
 
     Args:
-        sim: The soil.
+        sim: The simulation.
         has_energy: False where kinematic disks move and do work: the energy is not looked at then.
     """
 
-    def __init__(self, sim: SoilSimulation, *, has_energy: bool = True) -> None:
+    def __init__(self, sim: SoilSimulation | GrainSimulation, *, has_energy: bool = True) -> None:
         self.sim = sim
         self.ledger = Ledger()
         #: Impulse of kinematic disks on the free ones in the last step, N s.
-        self.from_kinematic = np.zeros(2)
+        self.from_kinematic = np.zeros(len(sim.settings["gravity"]))
         self._has_energy = has_energy
         self._look()
 
@@ -97,7 +97,7 @@ class Watched:
     def step(self, n: int = 1) -> None:
         """Takes n steps, one by one."""
         for _ in range(n):
-            before = self.sim.momentum()[:2]
+            before = self.sim.momentum()[: len(self._gravity)]
             report = self.sim.step()
             self._enter(report.residual, is_converged=report.is_converged)
             self._weigh(before)
@@ -128,8 +128,8 @@ class Watched:
         self.from_kinematic = impulse[by_kinematic].sum(axis=0) - impulse[on_second].sum(axis=0)
         outside = impulse[on_first].sum(axis=0) - impulse[on_second].sum(axis=0)
         pull = self.sim.time_step * float(self._mass.sum()) * self._gravity
-        error = np.abs(self.sim.momentum()[:2] - before - outside - pull).max()
-        speeds = np.abs(self.sim.velocity[self._free, :2]).max(axis=1)
+        error = np.abs(self.sim.momentum()[: len(pull)] - before - outside - pull).max()
+        speeds = np.abs(self.sim.velocity[self._free, : len(pull)]).max(axis=1)
         scale = float(np.abs(impulse).sum() + np.abs(pull).sum() + self._mass @ speeds)
         if scale > 0.0:
             self.ledger.momentum = max(self.ledger.momentum, float(error) / scale)

@@ -31,6 +31,9 @@ SET_BY = {
     "torques": ("torque", "--torque"),
     "wheels": ("wheel", "--wheel"),
     "position": ("start", "--start"),
+    "count": ("balls", "--balls"),
+    "radius_min": ("radius", "--radius"),
+    "radius_max": ("radius", "--radius"),
     "options.position": ("start", "--start"),
     "options.goal": ("goal", "--goal"),
 }

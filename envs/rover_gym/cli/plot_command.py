@@ -18,7 +18,7 @@ def plot(
         Path,
         typer.Argument(
             metavar="RUN",
-            help="A trajectory that `rover drive --output`, `rover report`, `rover planar soil` or `rover grains` saved.",
+            help="What `rover drive --output`, `rover report`, `rover planar soil` or `rover grains` saved.",
         ),
     ],
     output: Annotated[

@@ -22,14 +22,15 @@ def replay(
     run: Annotated[
         Path,
         typer.Argument(
-            help="A trajectory that `rover drive --output`, `rover report`, `rover planar soil` or `rover grains` wrote."
+            help="What `rover drive --output`, `rover report`, `rover planar soil` or `rover grains` saved."
         ),
     ],
     html: Annotated[Path | None, typer.Option(dir_okay=False, help="Page for the browser; needs no network.")] = None,
     vrml: Annotated[Path | None, typer.Option(dir_okay=False, help="VRML97 file, usually .wrl.")] = None,
     gltf: Annotated[Path | None, typer.Option(dir_okay=False, help="Binary glTF 2.0 file, usually .glb.")] = None,
     film: Annotated[
-        Path | None, typer.Option(dir_okay=False, help="Video of a run of `rover grains`, .mp4, drawn without a browser.")
+        Path | None,
+        typer.Option(dir_okay=False, help="Video of a run of `rover grains`, .mp4; needs no browser."),
     ] = None,
     fps: Annotated[float, typer.Option(help="Frames per second, at most as many as were recorded.")] = 25.0,
     follow: Annotated[

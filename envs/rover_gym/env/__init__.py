@@ -2,6 +2,7 @@
 
 from rover_gym.env.arguments import ARGUMENTS, Argument, RoverArguments
 from rover_gym.env.env_snapshot import EnvSnapshot
+from rover_gym.env.grains_env import BedDraw, GrainsEnvSnapshot, RoverGrainsEnv
 from rover_gym.env.observation import ObservationField, ObservationLayout
 from rover_gym.env.randomisation import Domain
 from rover_gym.env.rocks import HeightScan, Rocks
@@ -13,14 +14,17 @@ from rover_gym.env.wheels import drive_signs, wheel_centres
 __all__ = [
     "ARGUMENTS",
     "Argument",
+    "BedDraw",
     "Domain",
     "EnvSnapshot",
+    "GrainsEnvSnapshot",
     "HeightScan",
     "ObservationField",
     "ObservationLayout",
     "Rocks",
     "RoverArguments",
     "RoverEnv",
+    "RoverGrainsEnv",
     "Start",
     "Task",
     "drive_signs",

@@ -20,7 +20,7 @@ from rover_gym.env.randomisation import Domain
 from rover_gym.env.rocks import Rocks
 from rover_gym.env.start import Start
 from rover_gym.env.task import Task, make_task
-from rover_gym.mechanics import EpisodeRun, Plane, Simulation, standard_normals
+from rover_gym.mechanics import EpisodeRun, Plane, RoverGrainSimulation, Simulation, standard_normals
 from rover_gym.rendering.render_options import RENDER_MODES, RenderOptions
 from rover_gym.validation import Range
 
@@ -318,12 +318,16 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
             raise ResetNeeded(NOT_RUNNING)
         if self.task.is_noisy:
             normals, after = standard_normals(row_of(self.np_random)[None], self.task.layout.size)
-            result = self._episode.step(self._simulation, action, normals[0], has_scan=self.has_scan)
+            result = self._episode.step(self._moving(), action, normals[0], has_scan=self.has_scan)
             set_row(self.np_random, after[0])
         else:
-            result = self._episode.step(self._simulation, action, has_scan=self.has_scan)
+            result = self._episode.step(self._moving(), action, has_scan=self.has_scan)
         observation, reward, terminated, info = result
         return observation, reward, terminated, False, info
+
+    def _moving(self) -> Simulation | RoverGrainSimulation:
+        """What a control period moves."""
+        return self._simulation
 
     def complete_observation(self) -> npt.NDArray[np.float32]:
         """The last observation, with the heights that it lacks where `has_scan` was off; takes the scan if it must.

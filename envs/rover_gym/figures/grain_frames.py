@@ -12,6 +12,7 @@ from rover_gym.extras import MissingExtraError, require
 from rover_gym.rendering import FrameRenderer, VideoWriter
 from rover_gym.rendering.appearance import GROUND_COLOUR, ROCK_COLOUR
 from rover_gym.replay.grain_eye import eye_path, start_view
+from rover_gym.replay.vessel_meshes import vessel_meshes, vessel_poses
 from rover_gym.replay.wall_polygons import wall_polygons, wall_poses
 
 if TYPE_CHECKING:
@@ -61,11 +62,15 @@ class GrainFilm:
         self._run, self._set_pose = run, set_pose
         self._balls = BallsActor(run.radius, run.kinematic)
         self._walls = []
-        for colour, vertices, triangles in wall_polygons(run, GROUND_COLOUR, ROCK_COLOUR):
-            wall = actor_of(mesh(vertices, triangles, np.broadcast_to(np.array(colour), vertices.shape)))
+        walls = wall_polygons(run, GROUND_COLOUR, ROCK_COLOUR)
+        vessel = vessel_meshes(run, ROCK_COLOUR, GROUND_COLOUR)
+        for colour, vertices, triangles in walls + vessel:
+            wall = actor_of(mesh(vertices, triangles, np.broadcast_to(np.array(colour), vertices.shape), smooth=False))
             wall.GetProperty().BackfaceCullingOn()  # a wall hides nothing that is behind it
             self._walls.append(wall)
-        self._poses, self._path, self._view = wall_poses(run), eye_path(run), start_view(run)
+        of_vessel = np.repeat(vessel_poses(run)[:, None], len(vessel), axis=1)
+        self._poses = np.concatenate((wall_poses(run), of_vessel), axis=1)
+        self._path, self._view = eye_path(run), start_view(run)
         actors = [self._balls.actor, *self._walls]
         width, height = size
         if run.rover is None:
@@ -83,15 +88,14 @@ class GrainFilm:
             self._set_pose(wall, _matrix(pose))
         if run.rover is None:
             eye, target = (np.array(place) + self._path[row] for place in self._view[:2])
-            image: npt.NDArray[np.uint8] = self._renderer.render(eye, target, self._view.angle)
-            return image
+            return np.asarray(self._renderer.render(eye, target, self._view.angle))
         rover, solver = run.rover, run.trajectory.attributes.get("solver", {})
         names = rover.model.solid_names
         solids = dict(zip(names, zip(rover.positions[row], rover.rotations[row], strict=True), strict=True))
         gravity = np.array(solver.get("gravity", (0.0, -9.81, 0.0)))
         turn = rover.rotations[row, names.index("trunk") if "trunk" in names else 0]
-        image = self._renderer.render(_Shown(float(run.time[row]), run.trajectory["q"][row], gravity, turn, solids))
-        return image
+        shown = _Shown(float(run.time[row]), run.trajectory["q"][row], gravity, turn, solids)
+        return np.asarray(self._renderer.render(shown))
 
     def __enter__(self) -> GrainFilm:
         return self

@@ -64,7 +64,10 @@ def wheel_forces(figure: Sheet, run: GrainRun) -> None:
     forces = run.wheel_forces
     along = np.einsum("nwi,ni->nw", forces, ahead), np.einsum("nwi,ni->nw", forces, right)
     for axes, values, name in zip(
-        panels, (forces[..., 1], *along), ("load", "thrust,\npositive forward", "side force,\nto the right"), strict=True
+        panels,
+        (forces[..., 1], *along),
+        ("load", "thrust,\npositive forward", "side force,\nto the right"),
+        strict=True,
     ):
         plot_raw_and_smooth(axes, style, run.time, values, style.names)
         axes.axhline(0.0, color=DARK, linewidth=0.6)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 POINTS = 400  # of a section
 SMOOTHED_CELLS = 4.0  # edge of the square over which a section is smoothed: two balls
+MAP_CELLS = 5  # edge of the square over which a map is smoothed
 FINEST = 600  # cells along a map, at most
 
 
@@ -35,8 +36,8 @@ def surfaces_of_run(run: GrainRun) -> tuple[SurfaceMap, SurfaceMap]:
 
 
 def rut_maps(figure: Sheet, run: GrainRun) -> None:
-    """Height before, height after, and the change, with the wheels' ways."""
-    before, after = surfaces_of_run(run)
+    """Height before, height after, and the change, with the wheels' ways; means over squares of two balls."""
+    before, after = (surface.smoothed(MAP_CELLS) for surface in surfaces_of_run(run))
     panels = figure.subplots(3, 1, sharex=True, sharey=True)
     known = 1e3 * np.concatenate((before.heights.ravel(), after.heights.ravel()))
     low, high = np.nanquantile(known, (0.01, 0.995))

@@ -1,15 +1,44 @@
-"""Granular ground in space: beds of balls, the rover among them, and recordings."""
+"""Granular ground in space: beds of balls, scenes on them and in vessels, and recordings.
 
+>>> from rover_gym.grains import settled_balls
+>>> bed = settled_balls(200, 0.2, 0.2, radius_min=0.009, radius_max=0.011)
+>>> 0.02 < bed.surface < 0.04
+True
+"""
+
+from rover_gym.grains.ball_bed import BallBed, box_walls, settle, settled_balls
+from rover_gym.grains.bed_scenes import penetration_depths, rover_on_bed, striking_sphere, with_wheel_width
 from rover_gym.grains.grain_recording import GrainSampler, describe_grains, record_grains
 from rover_gym.grains.grain_run import GrainRun, read_grain_run
 from rover_gym.grains.grain_surface import SurfaceMap, surface_map
+from rover_gym.grains.sizes import even_radii, lognormal_radii, sieved_radii
+from rover_gym.grains.tiling import tiled
+from rover_gym.grains.vessel_scenes import column, drum, outflow, run_out, silo, slopes
 
 __all__ = [
+    "BallBed",
     "GrainRun",
     "GrainSampler",
     "SurfaceMap",
+    "box_walls",
+    "column",
     "describe_grains",
+    "drum",
+    "even_radii",
+    "lognormal_radii",
+    "outflow",
+    "penetration_depths",
     "read_grain_run",
     "record_grains",
+    "rover_on_bed",
+    "run_out",
+    "settle",
+    "settled_balls",
+    "sieved_radii",
+    "silo",
+    "slopes",
+    "striking_sphere",
     "surface_map",
+    "tiled",
+    "with_wheel_width",
 ]

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.grains.stored_vessel import stored_vessel
 from rover_gym.mechanics import GrainSimulation, RoverGrainSimulation, RoverModel, Simulation
 from rover_gym.record.channels import Channel
 from rover_gym.record.facts import row_count
@@ -32,11 +33,6 @@ ROWS_PER_FLUSH = 16
 def _both(sim: GrainSimulation | RoverGrainSimulation) -> tuple[GrainSimulation, Simulation | None]:
     """The balls, and the rover among them."""
     return (sim, None) if isinstance(sim, GrainSimulation) else (sim.grains, sim.rover)
-
-
-def _walls(grains: GrainSimulation) -> Array:
-    """(n_walls, 6) a point of each wall now and the normal to its free side."""
-    return np.asarray(getattr(grains, "walls", np.empty((0, 6))), dtype=np.float64).reshape(-1, 6)
 
 
 class StoredPlaces:
@@ -75,9 +71,7 @@ class GrainSampler:
         self.channels: tuple[Channel, ...] = (
             Channel("time", "s", "time since the run's start"),
             Channel("position", "m", "centre of each ball: x forward, y up, z right", (n, 3), packed=True),
-            Channel(
-                "walls", "m, 1", "a point of each wall and the normal to its free side", _walls(self._grains).shape
-            ),
+            Channel("walls", "m, 1", "a point of each wall and the normal to its free side", self._grains.walls.shape),
             Channel("n_asleep", "1", "number of balls that sleep"),
             Channel("kinetic_energy", "J", "kinetic energy of all"),
             Channel("potential_energy", "J", "potential energy, zero with all mass centres at height 0"),
@@ -122,7 +116,7 @@ class GrainSampler:
         row: dict[str, npt.ArrayLike] = {
             "time": grains.time,
             "position": self._places.of(grains.position),
-            "walls": _walls(grains),
+            "walls": grains.walls,
             "n_asleep": int(np.count_nonzero(grains.asleep)),
             "kinetic_energy": sum(energy.kinetic for energy in energies),
             "potential_energy": sum(energy.potential for energy in energies),
@@ -189,7 +183,11 @@ def _rover_channels(model: RoverModel) -> tuple[Channel, ...]:
 
 
 def describe_grains(
-    sim: GrainSimulation | RoverGrainSimulation, title: str, scene: Mapping[str, Any] | None = None, *, seed: int | str = "none"
+    sim: GrainSimulation | RoverGrainSimulation,
+    title: str,
+    scene: Mapping[str, Any] | None = None,
+    *,
+    seed: int | str = "none",
 ) -> dict[str, Any]:
     """The attributes of a recording, taken from the simulation at its start.
 
@@ -206,6 +204,7 @@ def describe_grains(
             **(scene or {}),
             "kind": KIND,
             "resolution": StoredPlaces(grains.radius).resolution,
+            "vessel": stored_vessel(grains.vessel),
             **({} if rover is None else {"model": rover.model.to_dict()}),
         },
         "grain_radius": np.asarray(grains.radius, dtype=np.float64),

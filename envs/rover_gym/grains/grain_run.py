@@ -6,16 +6,18 @@ run.positions[-1, :, 1].max()
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.grains.grain_recording import KIND
 from rover_gym.grains.grain_surface import SurfaceMap, surface_map
+from rover_gym.grains.stored_vessel import checked_vessel
 from rover_gym.mechanics import Plane, RoverModel
 from rover_gym.record.rover_run import LARGEST, RoverRun, check_rows, check_time, film_rows, title_of
 from rover_gym.record.trajectory import Trajectory, read_frames, read_trajectory
@@ -41,6 +43,7 @@ class GrainRun:
         kinematic: (n_balls,) whether no force moves the ball.
         terrain: The fixed ground; None if there is none but the walls.
         model: The rover; None without one.
+        vessel: The drum or silo around the balls, by the names of its properties, with its `kind`; None without one.
         title: Title of the run.
     """
 
@@ -52,6 +55,7 @@ class GrainRun:
     kinematic: npt.NDArray[np.bool_]
     terrain: Terrain | None
     model: RoverModel | None
+    vessel: Mapping[str, Any] | None
     title: str
 
     @property
@@ -181,7 +185,7 @@ def grain_run_of(trajectory: Trajectory, path: str | Path) -> GrainRun:
     check_time(trajectory, path)
     scene = trajectory.attributes["scene"]
     radius, mass, kinematic = (_of_balls(trajectory, path, name) for name in ("radius", "mass", "kinematic"))
-    if not len(radius) or not ((radius > 0.0) & (radius <= LARGEST)).all() or not len(radius) == len(mass):
+    if not len(radius) or not ((radius > 0.0) & (radius <= LARGEST)).all() or len(radius) != len(mass):
         refuse(RecordingError, f"{path}: grain_radius", len(radius), "must be a positive radius for each of the balls")
     if len(kinematic) != len(radius):
         refuse(RecordingError, f"{path}: grain_kinematic", len(kinematic), "must have an entry for each of the balls")
@@ -189,6 +193,8 @@ def grain_run_of(trajectory: Trajectory, path: str | Path) -> GrainRun:
     if "model" in scene:
         with sound(path, "scene.model"):
             model = RoverModel.from_dict(scene["model"])
+    with sound(path, "scene.vessel"):
+        vessel = checked_vessel(scene.get("vessel"))
     _check(trajectory, path, model)
     return GrainRun(
         path=Path(path),
@@ -199,6 +205,7 @@ def grain_run_of(trajectory: Trajectory, path: str | Path) -> GrainRun:
         kinematic=kinematic > 0.0,
         terrain=Plane() if model is not None and trajectory.terrain is None else trajectory.terrain,
         model=model,
+        vessel=vessel,
         title=title_of(trajectory),
     )
 

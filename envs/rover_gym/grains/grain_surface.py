@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -32,14 +32,12 @@ class SurfaceMap:
     @property
     def x(self) -> Array:
         """(n_x,) middles of the cells, m."""
-        result: Array = self.origin[0] + self.cell * np.arange(self.heights.shape[1])
-        return result
+        return np.asarray(self.origin[0] + self.cell * np.arange(self.heights.shape[1]), dtype=np.float64)
 
     @property
     def z(self) -> Array:
         """(n_z,) middles of the cells, m."""
-        result: Array = self.origin[1] + self.cell * np.arange(self.heights.shape[0])
-        return result
+        return np.asarray(self.origin[1] + self.cell * np.arange(self.heights.shape[0]), dtype=np.float64)
 
     def at(self, places: npt.ArrayLike, width: float = 0.0) -> Array:
         """Mean height about places.
@@ -64,6 +62,23 @@ class SurfaceMap:
                 total += np.nan_to_num(found)
                 known += np.isfinite(found)
         return np.divide(total, known, out=np.full_like(total, np.nan), where=known > 0)
+
+    def smoothed(self, cells: int) -> SurfaceMap:
+        """The map of mean heights over squares of an odd number of cells; nan does not count, and stays."""
+        known = np.isfinite(self.heights)
+        total, count = (_box_sum(values, cells) for values in (np.where(known, self.heights, 0.0), known * 1.0))
+        means = np.divide(total, count, out=np.full_like(total, np.nan), where=known)
+        return replace(self, heights=means)
+
+
+def _box_sum(values: Array, cells: int) -> Array:
+    """Sums over squares about each entry."""
+    half = cells // 2
+    padded = np.pad(values, ((half + 1, half), (half + 1, half)))
+    sums = padded.cumsum(axis=0).cumsum(axis=1)
+    n = 2 * half + 1
+    result: Array = sums[n:, n:] - sums[:-n, n:] - sums[n:, :-n] + sums[:-n, :-n]
+    return result
 
 
 def surface_map(

@@ -161,7 +161,7 @@ class _Reader:
         self._room = LARGEST_PACKING * self._size
         self._check(field, data, least_dimensions=1, single=True)
         wanted = np.arange(len(data)) if rows is None else np.asarray(rows, dtype=np.int64).reshape(-1)
-        if len(wanted) and not (0 <= wanted[0] and wanted[-1] < len(data) and (np.diff(wanted) > 0).all()):
+        if len(wanted) and not (wanted[0] >= 0 and wanted[-1] < len(data) and (np.diff(wanted) > 0).all()):
             refuse_field(self._path, f"{field}, rows", wanted[-1], f"must increase, from 0 to less than {len(data)}")
         shape = (len(wanted), *data.shape[1:])
         if 4 * math.prod(shape) > MOST_BYTES:

@@ -31,8 +31,12 @@ def start_view(run: GrainRun) -> StartView:
     if run.rover is not None:
         view = first_view(run.rover)
         return StartView(view.eye.tolist(), view.target.tolist(), view.field_of_view)
-    first = run.positions_of(run.rows[:1])[0].astype(np.float64)
-    low, high = np.quantile(first, 0.01, axis=0), np.quantile(first, 0.99, axis=0)
+    shown = run.positions_of(np.unique(run.rows[[0, run.n_frames // 2, -1]])).astype(np.float64)
+    ends = np.quantile(shown, 0.01, axis=1), np.quantile(shown, 0.99, axis=1)
+    low, high = ends[0].min(axis=0), ends[1].max(axis=0)
+    if run.vessel is not None and run.vessel["kind"] == "drum":
+        reach = np.array([run.vessel["radius"], run.vessel["radius"], 0.5 * run.vessel["length"]])
+        low, high = run.vessel["centre"] - reach, run.vessel["centre"] + reach
     middle, size = 0.5 * (low + high), float(np.linalg.norm(high - low)) + 2.0 * float(run.radius.max())
     eye = middle + 1.1 * size / np.tan(FIELD_OF_VIEW) * np.array([-0.42, 0.45, 0.79])
     return StartView(eye.tolist(), middle.tolist(), FIELD_OF_VIEW)

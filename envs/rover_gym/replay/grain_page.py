@@ -45,6 +45,7 @@ from rover_gym.replay.scenery import (
     spheres,
     surfaces,
 )
+from rover_gym.replay.vessel_meshes import vessel_meshes, vessel_poses
 from rover_gym.replay.wall_polygons import wall_polygons, wall_poses
 
 if TYPE_CHECKING:
@@ -119,8 +120,8 @@ def _page(title: str, scene: dict[str, Any], blobs: dict[str, bytes], curves: di
     for name, value in (("scene", scene), ("curves", curves)):
         data = json.dumps(value, separators=(",", ":")).replace("<", "\\u003c")  # no closing tag may end it early
         yield f'<script type="application/json" id="{name}">{data}</script>\n'
-    for name, data in blobs.items():
-        packed = base64.b64encode(zlib.compress(data, 6)).decode()
+    for name, content in blobs.items():
+        packed = base64.b64encode(zlib.compress(content, 6)).decode()
         yield f'<script type="application/octet-stream" id="{name}">{packed}</script>\n'
     for name in ("grain_frames.js", "grain_view.js", "grain_player.js", "panel.js"):
         yield f"<script>{text(name)}</script>\n"
@@ -169,7 +170,10 @@ def _meshes(run: GrainRun) -> tuple[list[tuple[int, Mesh]], Array]:
     meshes += [(-1, mesh) for mesh in _ground(run)]
     of_walls = wall_polygons(run, GROUND_COLOUR, ROCK_COLOUR)
     meshes += [(poses.shape[1] + i, mesh) for i, mesh in enumerate(of_walls)]
-    return meshes, shortened(np.concatenate((poses, wall_poses(run)), axis=1), 16)
+    last = poses.shape[1] + len(of_walls)
+    meshes += [(last, mesh) for mesh in vessel_meshes(run, ROCK_COLOUR, GROUND_COLOUR)]
+    poses = np.concatenate((poses, wall_poses(run), vessel_poses(run)[:, None]), axis=1)
+    return meshes, shortened(poses, 16)
 
 
 def _ground(run: GrainRun) -> list[Mesh]:

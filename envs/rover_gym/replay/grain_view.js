@@ -137,8 +137,8 @@ void main() {
       float a = 0.7854 * float(i) + 0.3927 * float(ring);
       vec2 aside = wide * vec2(cos(a), sin(a)) / size;
       vec2 before = (here - vec2(away(at + aside), away(at - aside))) / depth;
-      vec2 counts = clamp(before, -1.0, 1.0) / (1.0 + 4.0 * max(abs(before) - 2.0, 0.0));
-      hidden += max(0.0, counts.x + counts.y);
+      vec2 counts = clamp(before, -1.0, 1.0) / (1.0 + 6.0 * max(abs(before) - 1.0, 0.0));
+      hidden += (ring == 0 ? 1.0 : 0.7) * max(0.0, counts.x + counts.y);
     }
   }
   pixel = vec4(texture(picture, at).rgb * exp(-0.11 * hidden), 1.0);

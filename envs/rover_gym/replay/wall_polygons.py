@@ -92,10 +92,12 @@ def _cut(point: Array, normal: Array, low: Array, high: Array) -> Array:
     corners = low + corner * (high - low)
     far = corners @ normal - shift
     found = [corners[i] for i in range(8) if abs(far[i]) <= 1e-9]
-    for i in range(8):
-        for k in range(i + 1, 8):
-            if np.abs(corner[i] - corner[k]).sum() == 1.0 and far[i] * far[k] < 0.0 and min(abs(far[[i, k]])) > 1e-9:
-                found.append(corners[i] + far[i] / (far[i] - far[k]) * (corners[k] - corners[i]))
+    edges = [(i, k) for i in range(8) for k in range(i) if np.abs(corner[i] - corner[k]).sum() == 1.0]
+    found += [
+        corners[i] + far[i] / (far[i] - far[k]) * (corners[k] - corners[i])
+        for i, k in edges
+        if far[i] * far[k] < 0.0 and min(abs(far[i]), abs(far[k])) > 1e-9
+    ]
     if len(found) < 3:
         return np.empty((0, 3))
     points = np.array(found)

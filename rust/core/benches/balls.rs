@@ -227,7 +227,11 @@ fn report() {
     let asked: Vec<f64> = std::env::args().filter_map(|a| a.parse().ok()).collect();
     let whole = |x: &f64| *x >= 100.0;
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // counts
-    let counts: Vec<usize> = asked.iter().filter(|x| whole(x)).map(|x| *x as usize).collect();
+    let counts: Vec<usize> = asked
+        .iter()
+        .filter(|x| whole(x))
+        .map(|x| *x as usize)
+        .collect();
     let counts = if counts.is_empty() {
         vec![2000, 20_000]
     } else {

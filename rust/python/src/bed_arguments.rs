@@ -139,12 +139,14 @@ pub struct StepArguments<'py> {
     pub tolerance: Given<'py>,
     pub max_iterations: Given<'py>,
     pub stabilisation: Given<'py>,
+    /// Whether what slides along a surface goes into it, as along the inside of a curve.
+    pub is_hollow: bool,
     pub penetration_tolerance: Given<'py>,
 }
 
 /// What is struck away meets others that were not forecast, and goes into them.
-fn usual_stabilisation(restitution: f64) -> &'static str {
-    if restitution > 0.0 {
+fn usual_stabilisation(restitution: f64, is_hollow: bool) -> &'static str {
+    if restitution > 0.0 || is_hollow {
         "projection"
     } else {
         "none"
@@ -184,7 +186,7 @@ impl StepArguments<'_> {
         options.solver.max_sweeps = (self.max_iterations).count(2000, option, "max_iterations")?;
         let stabilisation = match self.stabilisation.some() {
             Some(given) => text(&given, option, "stabilisation")?,
-            None => usual_stabilisation(restitution).to_owned(),
+            None => usual_stabilisation(restitution, self.is_hollow).to_owned(),
         };
         options.stabilisation =
             choice::<Stabilisation>("stabilisation", &stabilisation, &STABILISATIONS)?;

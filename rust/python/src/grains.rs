@@ -64,8 +64,8 @@ type Packed<'py> = (
 ///         gravity that of 9.81 m/s².
 ///     max_iterations: Largest number of sweeps of the contact solver in a step.
 ///     stabilisation: "projection" moves overlapping bodies apart, which may add energy by lifting
-///         those above; "none" leaves them. By default "none" without restitution and "projection"
-///         with it.
+///         those above; "none" leaves them. By default "none", but "projection" with restitution
+///         or in a vessel: a step along the inside of a curve leads into it.
 ///     penetration_tolerance: Overlap that projection leaves alone, m; 0.5% of the smallest radius
 ///         by default.
 ///     sleep: Whether balls at rest far from anything that moves are left out of the step.
@@ -152,6 +152,7 @@ impl GrainSimulation {
                 tolerance,
                 max_iterations,
                 stabilisation,
+                is_hollow: vessel.is_some(),
                 penetration_tolerance,
             },
             sleep,

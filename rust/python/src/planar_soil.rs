@@ -169,6 +169,7 @@ impl SoilSimulation {
             tolerance,
             max_iterations,
             stabilisation,
+            is_hollow: false,
             penetration_tolerance,
         };
         let options = steps.options(&disks, USUAL)?;

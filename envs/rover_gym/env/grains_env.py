@@ -1,0 +1,269 @@
+"""`RoverGrains-v0`: drive a rover through a pit of grains. The class docstring is the environment's card."""
+
+from __future__ import annotations
+
+import copy
+import functools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Unpack
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium.error import ResetNeeded
+
+from rover_gym.env.arguments import RoverArguments
+from rover_gym.env.env_snapshot import EnvSnapshot, check_snapshot
+from rover_gym.env.episode_scene import EpisodeScene
+from rover_gym.env.rover_env import NOT_RUNNING, RoverEnv
+from rover_gym.mechanics import (
+    GrainSimulation,
+    GrainSnapshot,
+    OptionError,
+    RoverGrainSimulation,
+    RoverModel,
+    Simulation,
+    StateError,
+)
+from rover_gym.validation import flag, number, refuse, span, whole
+
+if TYPE_CHECKING:
+    from rover_gym.grains.pit import Pit, PitFill
+    from rover_gym.rendering import FrameRenderer
+
+#: The built-in rover's wheels: thin discs would cut into the grains.
+WHEEL_RADIUS, WHEEL_WIDTH = 0.25, 0.2
+#: Coulomb's coefficient between grains, and of grains on the ground.
+GRAIN_FRICTION = 0.5
+#: Speed below which a grain may sleep, m/s: a twentieth of what a free one gains in a control period.
+SLEEP_SPEED = 0.02
+#: Arguments of `RoverEnv` with another default.
+DEFAULTS = {"goal_distance": (4.5, 5.5), "heading_deg": (-5.0, 5.0), "goal_bearing_deg": (-5.0, 5.0)}
+#: A height far above all grains, m.
+FAR = 1e4
+#: Most beds that are settled.
+MOST_BEDS = 1000
+
+
+@dataclass(frozen=True)
+class BedDraw:
+    """The bed of an episode: its number, and whether it is mirrored along x and along z."""
+
+    number: int
+    along_x: bool
+    along_z: bool
+
+
+@dataclass(frozen=True)
+class GrainsEnvSnapshot:
+    """The state from which a `RoverGrainsEnv` continues bit for bit; picklable."""
+
+    rover: EnvSnapshot
+    bed: BedDraw
+    grains: GrainSnapshot
+
+
+class RoverGrainsEnv(RoverEnv):
+    """Drive the rover of `Rover-v0` through a pit of grains to a goal beyond it.
+
+    Action, observation, reward, end and info are those of `Rover-v0`, whose card describes them. What differs:
+
+    ## Ground
+
+    Level solid ground with a pit, 2.4 m long, 2.0 m wide and 0.09 m deep, 0.9 m ahead of the start, filled to the
+    brim with some 1770 balls of 30 to 40 mm radius, which roll, slide and are pushed aside. Grains meet one another,
+    the ground and the rover with exact contact and Coulomb friction, and forces go both ways within the step.
+
+    The built-in rover weighs 960 kg: on its wheels of 0.10 m it would sink into loose grains down to its trunk. Here it
+    has wheels of 0.25 m radius and 0.20 m width unless `model` says otherwise.
+
+    ## Observation
+
+    `wheel_gap` and `wheel_contact` count grains as ground. The forces of a wheel are sums over all grains and ground
+    that it touches; the contact's normal is the mean of their normals, weighted by their normal forces. There is no
+    height scan.
+
+    ## Start
+
+    The rover starts at the origin. Goal, heading and bearing are drawn as in `Rover-v0`, by default 4.5 to 5.5 m away,
+    straight ahead within 5 degrees. Each reset draws one of `n_beds` beds and mirrors it at random along and across the
+    pit, so that there are four times as many. Beds are settled when they are first drawn, some ten seconds each, and
+    shared by all environments of a process.
+
+    ## Arguments
+
+    Those of `Rover-v0`, but for `terrain`, `difficulty`, `rock_abundance`, `max_rock_radius`, `slope_deg`,
+    `hill_slope_deg` and `height_scan`, and in addition:
+
+    | name            | default        | unit  | meaning                                                        |
+    |-----------------|----------------|-------|----------------------------------------------------------------|
+    | pit             | `Pit()`        |       | the pit, a `rover_gym.grains.Pit`                              |
+    | grain_radius    | (0.03, 0.04) | m     | range of the grains' radii                                     |
+    | grain_density   | 2600           | kg/m³ | density of the grains                                          |
+    | grain_tolerance | 0.001          |       | relative residual to which a step's contact problem is solved  |
+    | n_beds          | 2              |       | how many beds episodes are drawn from                          |
+    | sleep           | True           |       | whether grains at rest far from the rover are left out         |
+
+    `friction` is that of the rover on ground and grains; between grains it is 0.5.
+
+    ## Version history
+
+    - v0: numbers may change until the first release.
+    """
+
+    def __init__(
+        self,
+        *,
+        pit: Pit | None = None,
+        grain_radius: float | tuple[float, float] = (0.03, 0.04),
+        grain_density: float = 2600.0,
+        grain_tolerance: float = 1e-3,
+        n_beds: int = 2,
+        sleep: bool = True,
+        **arguments: Unpack[RoverArguments],
+    ) -> None:
+        from rover_gym.grains.bed_scenes import with_wheel_width  # noqa: PLC0415 - other environments need no grains
+        from rover_gym.grains.pit import Pit  # noqa: PLC0415
+
+        for name in ("terrain", "difficulty", "rock_abundance", "max_rock_radius", "slope_deg", "hill_slope_deg"):
+            if arguments.get(name) is not None:
+                refuse(OptionError, name, arguments.get(name), "is not for RoverGrainsEnv, whose ground is its pit")
+        if arguments.get("height_scan") not in (None, False):
+            refuse(OptionError, "height_scan", arguments.get("height_scan"), "does not see grains, and is not offered")
+        if pit is None:
+            pit = Pit()
+        elif not isinstance(pit, Pit):
+            refuse(OptionError, "pit", pit, "must be a rover_gym.grains.Pit")
+        self.pit = pit
+        self.grain_radius = span("grain_radius", grain_radius, above=0.0)
+        self.grain_density = number("grain_density", grain_density, above=0.0)
+        self.grain_tolerance = number("grain_tolerance", grain_tolerance, above=0.0, at_most=1.0)
+        self.n_beds = whole("n_beds", n_beds, at_least=1, at_most=MOST_BEDS, error=OptionError)
+        self.sleep = flag("sleep", sleep)
+        if arguments.get("model") is None:
+            arguments["model"] = with_wheel_width(RoverModel().replace(wheel_radius=WHEEL_RADIUS), WHEEL_WIDTH)
+        for name, value in DEFAULTS.items():
+            arguments.setdefault(name, value)  # type: ignore[misc] # names of arguments
+        arguments["terrain"] = pit.terrain
+        super().__init__(**arguments)
+        self._among: RoverGrainSimulation | None = None
+        self._bed: BedDraw
+
+    @property
+    def grains(self) -> GrainSimulation:
+        """The grains of the episode; read them, but do not step them."""
+        self._running()
+        return self._link().grains
+
+    @property
+    def bed(self) -> BedDraw:
+        """The bed of the episode as it was drawn."""
+        self._running()
+        return self._bed
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
+        """Starts an episode, as `RoverEnv.reset` does.
+
+        Raises:
+            OptionError: As `RoverEnv.reset`.
+            StateError: As `RoverEnv.reset`, or a part of the rover is in a grain.
+            TerrainError: As `RoverEnv.reset`.
+        """
+        names = ("_simulation", "_episode", "_scene", "_np_random", "_np_random_seed", "_bed", "_among")
+        before = {name: getattr(self, name) for name in names if hasattr(self, name)}
+        generator = self._np_random
+        state = {} if generator is None else copy.deepcopy(generator.bit_generator.state)
+        try:
+            observation, info = super().reset(seed=seed, options=options)
+            number, along_x, along_z = self.np_random.integers(0, (self.n_beds, 2, 2)).tolist()
+            self._bed = BedDraw(number, bool(along_x), bool(along_z))
+            self._among = self._put(self._simulation, self._bed)
+        except Exception:
+            for name, value in before.items():
+                setattr(self, name, value)
+            if generator is not None:
+                generator.bit_generator.state = state
+            raise
+        return observation, info
+
+    def _put(self, rover: Simulation, bed: BedDraw) -> RoverGrainSimulation:
+        """The rover among the grains of a bed."""
+        return RoverGrainSimulation(rover, self._grains(rover, bed), wheel_friction=rover.friction)
+
+    def _grains(self, rover: Simulation, bed: BedDraw) -> GrainSimulation:
+        """The grains of a bed, in the steps of a rover."""
+        fill = _settled(self.pit, self.grain_radius, self.grain_density, bed.number)
+        return fill.mirrored(along_x=bed.along_x, along_z=bed.along_z).simulation(
+            friction=GRAIN_FRICTION,
+            wall_friction=GRAIN_FRICTION,
+            gravity=rover.gravity,
+            time_step=rover.time_step,
+            tolerance=self.grain_tolerance,
+            sleep=self.sleep,
+            sleep_speed=SLEEP_SPEED,
+        )
+
+    def _link(self) -> RoverGrainSimulation:
+        if self._among is None:
+            raise ResetNeeded(NOT_RUNNING)
+        return self._among
+
+    def _moving(self) -> RoverGrainSimulation:
+        return self._link()
+
+    def make_renderer(self, scene: EpisodeScene) -> FrameRenderer:
+        """Creates a renderer with this environment's `render_options`; the caller must close it."""
+        from rover_gym.rendering.ball_actors import BallsActor  # noqa: PLC0415 - only rendering needs it
+
+        renderer = super().make_renderer(scene)
+        self._balls = BallsActor(self.grains.radius)
+        renderer.add(self._balls.actor)
+        self._drawn = self._bed.number
+        return renderer
+
+    def render(self) -> npt.NDArray[np.uint8] | None:
+        """Renders the present state as `RoverEnv.render` does, with the grains."""
+        if self._renderer is not None and self._drawn != self.bed.number:
+            self._renderer.close()
+            self._renderer = None
+        if self.render_mode is not None:
+            scene = self._running()
+            if self._renderer is None:
+                self._renderer = self.make_renderer(scene)
+            self._balls.place(self.grains.position)
+        return super().render()
+
+    def snapshot(self) -> GrainsEnvSnapshot:  # type: ignore[override]
+        """Returns the state of the environment and of its random generator, for `restore`."""
+        return GrainsEnvSnapshot(rover=super().snapshot(), bed=self._bed, grains=self._link().grains.snapshot())
+
+    def restore(self, snapshot: GrainsEnvSnapshot) -> None:  # type: ignore[override]
+        """Restores a snapshot of an environment with the same arguments, which then continues bit for bit.
+
+        Raises:
+            StateError: The value is no snapshot, is damaged, or comes from an environment with other arguments; nothing
+                has changed.
+        """
+        if not isinstance(snapshot, GrainsEnvSnapshot):
+            refuse(StateError, "snapshot", snapshot, "must come from RoverGrainsEnv.snapshot()")
+        if not snapshot.bed.number < self.n_beds:
+            refuse(StateError, "snapshot.bed", snapshot.bed, f"must be one of this environment's {self.n_beds} beds")
+        check_snapshot(self.task, snapshot.rover)
+        scene = snapshot.rover.scene
+        grains = self._grains(self.task.simulate(scene.terrain, scene.domain), snapshot.bed)
+        grains.restore(snapshot.grains)
+        super().restore(snapshot.rover)
+        # Together while the rover is far away: what runs may overlap more than what starts.
+        rover = self._simulation
+        at, away = rover.snapshot(), np.zeros(self.model.nq)
+        away[1] = FAR
+        rover.set_state(away)
+        self._bed, self._among = snapshot.bed, RoverGrainSimulation(rover, grains, wheel_friction=rover.friction)
+        rover.restore(at)
+
+
+@functools.lru_cache(maxsize=8)
+def _settled(pit: Pit, radius: tuple[float, float], density: float, number: int) -> PitFill:
+    """Bed number k of all environments of a process with this pit and these grains."""
+    return pit.fill(*radius, density=density, seed=number, time_step=4e-3)

@@ -1,0 +1,225 @@
+"""Grains in space from Python: what is refused, closed forms, vessels, beds and their sizes."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rover_gym import OptionError, Plane, RoverGymError, SphereField
+from rover_gym.grains import BallBed, even_radii, lognormal_radii, settled_balls, sieved_radii, tiled
+from rover_gym.mechanics import Drum, GrainSimulation, GrainSnapshot, Silo, arrange_balls, ball_packing
+
+G = 9.81
+FLOOR = [[0.0, 0.0, 0.0, 0.0, 1.0, 0.0]]
+TIGHT = {"tolerance": 1e-9, "time_step": 1e-3}
+
+
+def one(**options: Any) -> GrainSimulation:
+    """A ball of 0.1 m and 2 kg at the origin, its lowest point at height 0."""
+    return GrainSimulation([0.1], [2.0], [[0.0, 0.1, 0.0]], **{**TIGHT, **options})
+
+
+def test_a_ball_rests_on_a_floor_and_its_contact_bears_its_weight() -> None:
+    ball = one(walls=FLOOR)
+    ball.step(20)
+    contacts = ball.contacts
+    assert len(contacts) == 1
+    np.testing.assert_array_equal(contacts.bodies, [[0, -1]])
+    np.testing.assert_allclose(contacts.world_impulses, [[0.0, 2.0 * G * 1e-3, 0.0]], atol=1e-9)
+    np.testing.assert_allclose(contacts.normals, [[0.0, 1.0, 0.0]])
+    np.testing.assert_allclose(contacts.frames[0] @ contacts.frames[0].T, np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(contacts.points, [[0.0, 0.0, 0.0]], atol=1e-7)
+    assert ball.energy().potential == pytest.approx(2.0 * G * 0.1, rel=1e-6)
+
+
+def test_a_ball_that_slides_comes_to_roll_at_five_sevenths() -> None:
+    ball = one(walls=FLOOR, wall_friction=0.3)
+    ball.set_state([[0.0, 0.1, 0.0]], [[0.7, 0.0, -1.4]], [[0.0, 0.0, 0.0]])
+    ball.step(500)
+    np.testing.assert_allclose(ball.velocity, [[0.5, 0.0, -1.0]], atol=1e-6)
+    np.testing.assert_allclose(ball.spin, [[-10.0, 0.0, -5.0]], atol=1e-5)
+    assert ball.momentum()[:3] == pytest.approx([1.0, 0.0, -2.0], abs=1e-5)
+
+
+@pytest.mark.parametrize("ground", [Plane(), [Plane()], SphereField([[0.0, -5.0, 0.0]], [5.0])])
+def test_a_ball_rests_on_a_terrain(ground: Any) -> None:
+    ball = one(terrain=ground)
+    ball.step(50)
+    np.testing.assert_allclose(ball.position, [[0.0, 0.1, 0.0]], atol=1e-6)
+    assert ball.terrain is not None
+
+
+def test_walls_move_and_say_where_they_are() -> None:
+    ball = one(walls=FLOOR, wall_velocity=[[0.0, 0.25, 0.0]])
+    ball.step(400)
+    np.testing.assert_allclose(ball.position, [[0.0, 0.2, 0.0]], atol=1e-6)
+    np.testing.assert_allclose(ball.walls, [[0.0, 0.1, 0.0, 0.0, 1.0, 0.0]], atol=1e-12)
+
+
+def test_vessels_hold_balls() -> None:
+    drum = one(vessel=Drum(0.5, 0.4, 3.0, centre=[0.0, 0.5, 0.0]), wall_friction=0.4)
+    drum.step(200)
+    assert drum.position[0, 0] > 0.01, "the barrel turns to the right below"
+    silo = one(vessel=Silo(0.3, floor=0.0, hole=0.15))
+    silo.step(200)
+    assert silo.position[0, 1] < 0.0, "through the hole"
+    assert repr(drum.vessel) == "Drum(radius=0.5, length=0.4, rate=3)"
+    assert repr(silo.vessel) == "Silo(radius=0.3, floor=0, hole=0.15)"
+
+
+def test_cohesion_shows_in_the_impulses() -> None:
+    ball = one(walls=[[0.0, 0.2, 0.0, 0.0, -1.0, 0.0]], cohesion=25.0)
+    ball.step(100)
+    np.testing.assert_allclose(ball.position, [[0.0, 0.1, 0.0]], atol=1e-6)
+    np.testing.assert_allclose(ball.contacts.impulses[0], [-2.0 * G * 1e-3, 0.0, 0.0], atol=1e-9)
+    assert ball.settings["cohesion"] == 25.0
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"radius": [-0.1]}, "radius[0]"),
+        ({"mass": [0.0]}, "mass[0]"),
+        ({"mass": [1.0, 1.0]}, "mass"),
+        ({"position": [[0.0, 0.1]]}, "position"),
+        ({"position": [[0.0, np.nan, 0.0]]}, "position[0]"),
+        ({"position": [[0.0, 0.05, 0.0]], "walls": FLOOR}, "position[0]"),
+        ({"position": [[0.0, 0.05, 0.0]], "terrain": Plane()}, "position[0]"),
+        ({"walls": [[0.0, 0.0, 0.0, 0.0, 0.0, 0.0]]}, "normal"),
+        ({"wall_velocity": [[0.0, 0.0, 1.0]]}, "wall_velocity"),
+        ({"vessel": Plane()}, "vessel"),
+        ({"vessel": Silo(0.5), "terrain": Plane()}, "vessel"),
+        ({"friction": -0.1}, "friction"),
+        ({"cohesion": -1.0}, "cohesion"),
+        ({"cohesion": 1.0, "cohesion_range": 1.0}, "cohesion_range"),
+        ({"gravity": [0.0, -9.81]}, "gravity"),
+        ({"time_step": 0.0}, "time_step"),
+        ({"sleep_speed": -1.0}, "sleep_speed"),
+        ({"restitution": 2.0}, "restitution"),
+    ],
+)
+def test_what_cannot_be_is_refused_by_name(change: dict[str, Any], field: str) -> None:
+    given: dict[str, Any] = {"radius": [0.1], "mass": [2.0], "position": [[0.0, 0.1, 0.0]], **change}
+    with pytest.raises(RoverGymError, match=r".") as caught:
+        GrainSimulation(given.pop("radius"), given.pop("mass"), given.pop("position"), **given)
+    assert caught.value.field == field
+
+
+def test_a_refused_state_changes_nothing() -> None:
+    ball = one(walls=FLOOR)
+    ball.step(3)
+    before = ball.snapshot()
+    for state in ([[0.0, 0.0, 0.0]], [[0.0, 0.1]], [[0.0, 0.1, 0.0]] * 2, [[np.inf, 0.1, 0.0]]):
+        with pytest.raises(RoverGymError):
+            ball.set_state(state)
+    with pytest.raises(RoverGymError, match="spin"):
+        ball.set_state([[0.0, 0.1, 0.0]], None, [[0.0, np.nan, 0.0]])
+    assert ball.snapshot() == before
+
+
+@pytest.fixture(scope="module")
+def bed() -> BallBed:
+    return settled_balls(150, 0.14, 0.12, radius_min=0.009, radius_max=0.011)
+
+
+def test_a_snapshot_continues_bit_for_bit_and_balls_can_be_taken(bed: BallBed) -> None:
+    sim = bed.simulation(walls=bed.walls[:4])
+    sim.step(20)
+    taken = GrainSnapshot.from_bytes(sim.snapshot().to_bytes())
+    sim.step(20)
+    other = bed.simulation(walls=bed.walls[:4])
+    other.restore(taken)
+    other.step(20)
+    np.testing.assert_array_equal(sim.position, other.position)
+    np.testing.assert_array_equal(sim.spin, other.spin)
+    high = sim.position[:, 1] > np.median(sim.position[:, 1])
+    left = sim.position[~high]
+    sim.remove(high)
+    np.testing.assert_array_equal(sim.position, left)
+    with pytest.raises(RoverGymError):
+        sim.restore(taken)
+
+
+def test_a_weaker_gravity_gives_the_same_motion_slower_to_the_bit(bed: BallBed) -> None:
+    """Froude's law: a quarter of the gravity and twice the time, with steps twice as long."""
+    ways = []
+    for slow in (1.0, 2.0):
+        sim = bed.simulation(walls=bed.walls[:4], gravity=[0.0, -G / slow**2, 0.0], time_step=2e-3 * slow)
+        sim.step(40)
+        ways.append(sim.position)
+        speed = slow * np.abs(sim.velocity).max()
+        assert speed > 0.1
+    np.testing.assert_array_equal(ways[0], ways[1])
+
+
+def test_packings_repeat_and_do_not_overlap() -> None:
+    radius, mass, position = ball_packing(
+        100, radius_min=0.01, radius_max=0.02, mass=0.1, width=0.2, depth=0.1, left=-0.1, bottom=0.3, seed=4
+    )
+    assert GrainSimulation(radius, mass, position).penetration() == 0.0
+    np.testing.assert_allclose(mass / radius**3, 0.1 / 0.015**3)
+    assert (position[:, 1] - radius).min() >= 0.3
+    radius = lognormal_radii(100, 0.01, 0.3, seed=2)
+    placed = arrange_balls(radius, width=0.2, depth=0.1, seed=4)
+    np.testing.assert_array_equal(placed, arrange_balls(radius, width=0.2, depth=0.1, seed=4))
+    assert GrainSimulation(radius, radius**3, placed).penetration() == 0.0
+
+
+def test_a_sieve_curve_is_found_again_in_the_mass() -> None:
+    openings, passing = [1e-3, 2e-3, 4e-3], [0.0, 0.4, 1.0]
+    diameter = 2.0 * sieved_radii(200_000, openings, passing, seed=1)
+    mass = diameter**3
+    assert diameter.min() >= 1e-3
+    assert diameter.max() <= 4e-3
+    assert mass[diameter < 2e-3].sum() / mass.sum() == pytest.approx(0.4, abs=0.01)
+    assert mass[diameter < 2e-3 * 2**0.5].sum() / mass.sum() == pytest.approx(0.7, abs=0.01)
+    radius = lognormal_radii(20_000, 0.01, 0.2, seed=3)
+    assert np.median(radius) == pytest.approx(0.01, rel=0.01)
+    assert np.log(radius).std() == pytest.approx(0.2, rel=0.03)
+
+
+def test_mirrored_tiles_nearly_stay_at_rest(bed: BallBed) -> None:
+    large = tiled(bed, 3, 2)
+    assert len(large.radius) == 6 * len(bed.radius)
+    sim = large.simulation()
+    assert sim.penetration() < 0.01 * bed.radius.min()
+    before = sim.position
+    sim.step(25)
+    moved = np.linalg.norm(sim.position - before, axis=1) / bed.radius.min()
+    assert np.median(moved) < 0.05
+    assert np.quantile(moved, 0.9) < 0.2
+    assert large.surface == pytest.approx(bed.surface, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("call", "field"),
+    [
+        (lambda _: settled_balls(0, 0.1, 0.1, radius_min=0.01, radius_max=0.01), "count"),
+        (lambda _: settled_balls(10, 0.01, 0.1, radius_min=0.01, radius_max=0.01), "width"),
+        (lambda _: settled_balls(10, 0.1, -0.1, radius_min=0.01, radius_max=0.01), "depth"),
+        (lambda _: settled_balls(10, 0.1, 0.1, radius_min=-0.01, radius_max=0.01), "radius_min"),
+        (lambda _: settled_balls(10, 0.1, 0.1, radius_min=0.01, radius_max=0.001), "radius_max"),
+        (lambda _: settled_balls(10, 0.1, 0.1), "radius_min"),
+        (lambda _: settled_balls(2, 0.1, 0.1, radius=[0.01]), "radius"),
+        (lambda _: settled_balls(1, 0.1, 0.1, radius=[0.01], radius_min=0.01), "radius"),
+        (lambda _: settled_balls(1, 0.1, 0.1, radius=[0.01], gravity=[0.0, 0.0, 0.0]), "gravity"),
+        (lambda bed: tiled(bed, 0, 1), "along"),
+        (lambda bed: tiled(bed, 1000, 1000), "along"),
+        (lambda _: even_radii(1, 1.0, float("nan")), "radius_max"),
+        (lambda _: lognormal_radii(1, 0.01, 2.0), "deviation"),
+        (lambda _: sieved_radii(1, [1.0, 1.0], [0.0, 1.0]), "diameters"),
+        (lambda _: sieved_radii(1, [1.0, 2.0], [0.5, 1.0]), "passing"),
+        (lambda _: sieved_radii(1, [1.0, 2.0, 3.0], [0.0, 1.0]), "passing"),
+    ],
+)
+def test_beds_that_cannot_be_are_refused_by_name(call: Callable[[BallBed], object], field: str, bed: BallBed) -> None:
+    with pytest.raises(OptionError) as caught:
+        call(bed)
+    assert caught.value.field == field
+
+
+def test_memory_is_told_before_it_is_taken(bed: BallBed, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("os.sysconf", lambda _: 100)
+    with pytest.raises(OptionError, match=r"needs about 15 MB of memory, 0 MB are free"):
+        tiled(bed, 20, 1)

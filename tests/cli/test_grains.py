@@ -1,0 +1,114 @@
+"""`rover grains`, and what `rover replay` and `rover plot` make of its runs."""
+
+import subprocess
+from pathlib import Path
+
+import imageio_ffmpeg
+import numpy as np
+import pytest
+from balls import MovingBalls, RoverOnMovingBalls
+from matplotlib.image import imread
+from typer.testing import CliRunner
+
+from rover_gym.cli import app
+from rover_gym.figures.grain_frames import draw_grains
+from rover_gym.figures.grain_run_figures import GRAIN_DRAWINGS, slip_of_wheels
+from rover_gym.grains import read_grain_run, record_grains
+from rover_gym.rendering.appearance import SAND_COLOUR
+
+
+def rover(*arguments: str) -> str:
+    result = CliRunner().invoke(app, list(arguments))
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+@pytest.mark.parametrize(
+    ("command", "options", "said"),
+    [
+        ("collapse", ["--balls", "80", "--radius", "0.01"], "its edge went"),
+        ("silo", ["--balls", "60", "--radius", "0.01", "--hole", "0.04"], "left the silo"),
+        ("drum", ["--balls", "40", "--radius", "0.01"], "slope"),
+        ("sphere", ["--balls", "100", "--radius", "0.012"], "deepest"),
+        ("rover", ["--balls", "150", "--radius", "0.05", "--width", "1.5", "--depth", "1"], "load of all wheels"),
+    ],
+)
+def test_a_run_is_recorded_and_its_result_told(command: str, options: list[str], said: str, tmp_path: Path) -> None:
+    output = rover("grains", command, *options, "--time-step", "0.002", "--duration", "0.1", "--output", str(tmp_path))
+    assert said in output
+    assert "rows not converged" in output
+    run = read_grain_run(tmp_path / f"{command}.h5")
+    assert run.trajectory.attributes["complete"]
+    assert run.time[-1] == pytest.approx(0.1, abs=0.02)
+    assert run.trajectory["penetration"].max() < 0.01 * run.radius.min()
+    assert (run.model is not None) == (command == "rover")
+
+
+@pytest.mark.parametrize(
+    ("command", "options", "field"),
+    [
+        ("collapse", ["--radius", "-1"], "--radius"),
+        ("collapse", ["--tube", "0.01"], "--tube"),
+        ("silo", ["--hole", "0"], "--hole"),
+        ("drum", ["--balls", "100000"], "--balls"),
+        ("rover", ["--width", "0.5", "--balls", "30", "--radius", "0.05"], "--width"),
+        ("rover", ["--wheel-width", "0"], "--wheel-width"),
+    ],
+)
+def test_bad_options_end_with_one_line(command: str, options: list[str], field: str, tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["grains", command, *options, "--output", str(tmp_path)])
+    assert result.exit_code == 2
+    assert f"error: {field}" in result.output
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A run with a rover and one without."""
+    folder = tmp_path_factory.mktemp("runs")
+    record_grains(RoverOnMovingBalls(), 1.0, folder / "rover.h5")
+    record_grains(MovingBalls((16, 4, 10)), 1.0, folder / "bed.h5")
+    return {"rover": folder / "rover.h5", "bed": folder / "bed.h5"}
+
+
+@pytest.mark.parametrize("name", ["rover", "bed"])
+def test_a_run_is_plotted(name: str, runs: dict[str, Path], tmp_path: Path) -> None:
+    output = rover("plot", str(runs[name]), "--output", str(tmp_path))
+    of_wheels = {"wheel-forces", "sinkage-and-slip"}
+    expected = set(GRAIN_DRAWINGS) - (set() if name == "rover" else of_wheels)
+    assert {path.stem for path in tmp_path.glob("*.png")} == expected
+    assert output.count("figure: ") == len(expected)
+
+
+def test_the_slip_of_rolling_wheels_is_small(runs: dict[str, Path]) -> None:
+    """The rover of the fixture drives on a firm plane."""
+    slip = slip_of_wheels(read_grain_run(runs["rover"]))
+    assert slip.shape == (26, 6)
+    assert np.nanmax(np.abs(slip[13:])) < 0.05
+
+
+@pytest.mark.parametrize("name", ["rover", "bed"])
+def test_a_run_is_filmed(name: str, runs: dict[str, Path], tmp_path: Path) -> None:
+    film = tmp_path / "run.mp4"
+    rover("replay", str(runs[name]), "--film", str(film), "--fps", "5")
+    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(film), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    pixels = subprocess.run(command, capture_output=True, check=True).stdout
+    frames = np.frombuffer(pixels, np.uint8).astype(int).reshape(-1, 540, 960, 3)
+    assert len(frames) == 6
+    assert (np.abs(frames[0] - frames[-1]).max(axis=-1) > 40).mean() > 0.002  # it moves
+
+
+def test_a_frame_shows_sand(runs: dict[str, Path], tmp_path: Path) -> None:
+    image = imread(draw_grains(read_grain_run(runs["bed"]), tmp_path / "bed.png", row=3))[..., :3]
+    ratio = image / np.maximum(image.max(axis=-1, keepdims=True), 1e-6)
+    near = np.abs(ratio - np.array(SAND_COLOUR) / max(SAND_COLOUR)).max(axis=-1) < 0.06
+    assert near.mean() > 0.05
+
+
+def test_a_run_is_replayed_as_a_page_and_not_as_other_files(runs: dict[str, Path], tmp_path: Path) -> None:
+    page = tmp_path / "run.html"
+    assert f"page: {page}" in rover("replay", str(runs["bed"]), "--html", str(page))
+    assert 40_000 < page.stat().st_size < 2_000_000
+    refused = CliRunner().invoke(app, ["replay", str(runs["bed"]), "--gltf", str(tmp_path / "run.glb")])
+    assert refused.exit_code == 2
+    assert "error: --gltf" in refused.output

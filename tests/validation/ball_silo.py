@@ -1,0 +1,123 @@
+"""Discharge of a silo through a hole, and the load on the bottom of one.
+
+Sources: Beverloo, Leniger, van de Velde 1961, *The flow of granular solids through orifices*, Chem. Eng. Sci. 15,
+260-269: W = C rho_b sqrt(g) (D - k d)^(5/2), C about 0.58, k about 1.4, rho_b the bulk density; Janssen 1895.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rover_gym.mechanics import Silo
+from validation.balls import DENSITY, DIAMETER, free, loose, settle
+from validation.watch import GRAVITY, Ledger
+
+FRICTION = 0.5
+FRACTION = 0.57  # of a filling, where a unit of mass is needed
+TUBE = 6.0 * DIAMETER  # its radius
+HOLES = (4.0, 5.0, 6.0, 7.0)  # their diameters, in diameters of a ball
+
+
+def filled(count: int, tube: float, seed: int, ledger: Ledger) -> Any:
+    """Balls at rest in a closed silo."""
+    square = np.sqrt(2.0) * (tube - DIAMETER) + DIAMETER
+    sample = loose(count, square, seed, left=-0.5 * square)
+    watched = sample.watched(vessel=Silo(tube, floor=0.0), stabilisation="projection", friction=FRICTION)
+    settle(watched, speed=0.02, most=1.2)
+    ledger.merge(watched.ledger)
+    return free(watched.sim.radius, watched.sim.position)
+
+
+def bulk(position: np.ndarray, radius: np.ndarray, tube: float) -> float:
+    """Bulk density in the middle heights of a filling, kg/m³."""
+    low, high = 3.0 * DIAMETER, float(np.quantile(position[:, 1], 0.9)) - 2.0 * DIAMETER
+    within = (position[:, 1] > low) & (position[:, 1] < high)
+    volume = np.pi * tube**2 * (high - low)
+    return float(DENSITY * 4.0 / 3.0 * np.pi * (radius[within] ** 3).sum() / volume)
+
+
+def discharge(count: int, hole: float, seed: int, ledger: Ledger, *, duration: float = 0.5) -> dict[str, Any]:
+    """Opens a hole of `hole` diameters.
+
+    Returns:
+        rate: Mass per time through the hole over the last two thirds of the time, kg/s; scaled: over rho_b sqrt(g)
+        d^(5/2).
+    """
+    balls = filled(count, TUBE, seed, ledger)
+    density = bulk(balls.position, balls.radius, TUBE)
+    vessel = Silo(TUBE, floor=0.0, hole=0.5 * hole * DIAMETER)
+    watched = balls.watched(vessel=vessel, stabilisation="projection", friction=FRICTION)
+    sim = watched.sim
+    lost, times = [0.0], [0.0]
+    for k in range(30):
+        watched.step(round(duration / 30 / sim.time_step))
+        gone = sim.position[:, 1] < -2.0 * DIAMETER
+        lost.append(lost[-1] + float(sim.mass[gone].sum()))
+        times.append((k + 1) * duration / 30)
+        watched.remove(gone)
+    ledger.merge(watched.ledger)
+    steady = slice(10, None)
+    rate = float(np.polyfit(times[steady], lost[steady], 1)[0])
+    return {
+        "hole": hole,
+        "seed": seed,
+        "rate": rate,
+        "bulk": density,
+        "scaled": rate / (density * np.sqrt(GRAVITY) * DIAMETER**2.5),
+    }
+
+
+def beverloo(runs: list[dict[str, Any]]) -> dict[str, float]:
+    """C and k of a straight line through scaled^(2/5), and the exponent that k = 1.4 gives."""
+    hole = np.array([run["hole"] for run in runs])
+    scaled = np.array([run["scaled"] for run in runs])
+    slope, intercept = np.polyfit(hole, scaled**0.4, 1)
+    (exponent, _), covariance = np.polyfit(np.log(hole - 1.4), np.log(scaled), 1, cov=True)
+    return {
+        "C": float(slope**2.5),
+        "k": float(-intercept / slope),
+        "exponent": float(exponent),
+        "error": float(np.sqrt(covariance[0, 0])),
+    }
+
+
+def borne(count: int, seed: int, ledger: Ledger, *, tube: float = 4.0 * DIAMETER) -> dict[str, float]:
+    """What a bottom that sinks slowly bears of a filling in a rough tube, over the weight of a tube's width of it."""
+    balls = filled(count, tube, seed, ledger)
+    speed, floor = 1.0 * DIAMETER, [[0.0, 0.0, 0.0, 0.0, 1.0, 0.0]]
+    watched = balls.watched(
+        vessel=Silo(tube),
+        stabilisation="projection",
+        walls=floor,
+        wall_velocity=[[0.0, -speed, 0.0]],
+        friction=FRICTION,
+        has_energy=False,
+    )
+    sim = watched.sim
+    loads = []
+    for k in range(60):
+        watched.step(20)
+        contacts = sim.contacts
+        on_floor = (contacts.bodies[:, 1] < 0) & (contacts.normals[:, 1] > 0.5)
+        if k >= 20:
+            loads.append(float(contacts.world_impulses[on_floor, 1].sum()) / sim.time_step / GRAVITY)
+    ledger.merge(watched.ledger)
+    unit = FRACTION * DENSITY * np.pi * tube**2 * 2.0 * tube
+    return {"seed": seed, "filling": float(sim.mass.sum()) / unit, "borne": float(np.mean(loads)) / unit}
+
+
+def saturation(runs: list[dict[str, float]]) -> float:
+    """Janssen's m, in units of a filling as high as wide: borne = m (1 - exp(-filling/m)), least squares."""
+    filling, load = (np.array([run[name] for run in runs]) for name in ("filling", "borne"))
+    masses = np.geomspace(0.1, 10.0, 2000)[:, None]
+    errors = ((masses * -np.expm1(-filling / masses) - load) ** 2).sum(axis=1)
+    return float(masses[errors.argmin(), 0])
+
+
+def measure(ledger: Ledger) -> dict[str, object]:
+    """Holes of several widths, and fillings of several heights."""
+    runs = [discharge(1800, hole, seed, ledger) for hole in HOLES for seed in (0, 1)]
+    loads = [borne(count, seed, ledger) for count in (150, 300, 600, 1000) for seed in (0, 1)]
+    return {"runs": runs, "fit": beverloo(runs), "loads": loads, "saturation": saturation(loads)}

@@ -1,0 +1,88 @@
+"""Initial samples of balls in space, under watch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.grains import even_radii
+from rover_gym.grains.ball_bed import box_walls
+from rover_gym.mechanics import GrainSimulation, arrange_balls
+from validation.watch import GRAVITY, Watched
+
+Array = npt.NDArray[np.float64]
+
+#: Mean radius, m; radii are drawn evenly within `SPREAD` of it.
+RADIUS, SPREAD = 0.005, 0.15
+DIAMETER = 2.0 * RADIUS
+#: kg/m³.
+DENSITY = 2600.0
+#: s; sqrt(d/g) is 32 ms.
+TIME_STEP = 1e-3
+#: Of the contact solver: at the default, 1e-3, overlaps reach 1% of a radius where a column falls.
+TOLERANCE = 3e-4
+
+
+@dataclass(frozen=True)
+class Balls:
+    """Balls at rest: radii (n,) m, centres (n, 3) m, and which are kinematic (n,)."""
+
+    radius: Array
+    position: Array
+    kinematic: npt.NDArray[np.bool_]
+
+    def __add__(self, other: Balls) -> Balls:
+        names = ("radius", "position", "kinematic")
+        return Balls(*(np.concatenate([getattr(self, n), getattr(other, n)]) for n in names))
+
+    def watched(self, *, friction: float = 0.5, has_energy: bool = True, density: object = DENSITY, **o: Any) -> Watched:
+        """A simulation of them; friction with walls is the same as among balls unless given."""
+        mass = 4.0 / 3.0 * np.pi * np.asarray(density) * self.radius**3
+        options = {"wall_friction": friction, "time_step": TIME_STEP, "tolerance": TOLERANCE} | o
+        sim = GrainSimulation(
+            self.radius, mass, self.position, kinematic=self.kinematic, friction=friction, **options
+        )
+        return Watched(sim, has_energy=has_energy)
+
+
+def free(radius: Array, position: Array) -> Balls:
+    """Balls that are not kinematic."""
+    return Balls(radius, position, np.zeros(len(radius), dtype=bool))
+
+
+def loose(count: int, width: float, seed: int, *, left: float = 0.0) -> Balls:
+    """Balls in loose layers over a square, none of which touch."""
+    radius = even_radii(count, RADIUS * (1.0 - SPREAD), RADIUS * (1.0 + SPREAD), seed)
+    position = arrange_balls(radius, width=width, depth=width, left=left, back=left, seed=seed)
+    return free(radius, position)
+
+
+def glued_disc(reach: float, seed: int) -> Balls:
+    """A rough floor: kinematic balls at random heights in a square array, their tops at height 0 or less."""
+    random = np.random.default_rng(seed)
+    place = np.arange(-reach, reach, 1.05 * DIAMETER)
+    x, z = (a.ravel() for a in np.meshgrid(place, place))
+    within = np.hypot(x, z) < reach
+    x, z = x[within], z[within]
+    y = -RADIUS * (1.0 + random.uniform(0.0, 0.3, len(x)))
+    return Balls(np.full(len(x), RADIUS), np.stack([x, y, z], axis=1), np.ones(len(x), dtype=bool))
+
+
+def settle(watched: Watched, *, speed: float = 0.01, most: float = 2.0) -> None:
+    """Steps until the free balls' root mean square speed is below `speed` times sqrt(9.81 DIAMETER), or `most` s."""
+    sim = watched.sim
+    mass = float(sim.mass[~sim.kinematic].sum())
+    elapsed = 0.0
+    while elapsed < most:
+        watched.step(round(0.05 / sim.time_step))
+        elapsed += 0.05
+        if elapsed > 0.15 and np.sqrt(2.0 * sim.energy().kinetic / mass) < speed * np.sqrt(GRAVITY * DIAMETER):
+            break
+
+
+def box(width: float) -> Array:
+    """A floor and four walls."""
+    return box_walls(width, width)
