@@ -23,7 +23,7 @@ from rover_gym.grains.lab.wheel import WheelPoint
 from rover_gym.mechanics import OptionError
 from rover_gym.soil.soil_trials import Pull
 from rover_gym.soil.traction import Traction, fit_traction
-from rover_gym.validation import refuse
+from rover_gym.validation import number, refuse
 
 Array = npt.NDArray[np.float64]
 
@@ -98,19 +98,22 @@ class Strength:
     cohesion_error: float
 
 
-def fit_pressure(points: Sequence[PlatePoint], *, first: float = 0.0) -> PressureLaw:
+def fit_pressure(points: Sequence[PlatePoint], *, surface: float | None = None) -> PressureLaw:
     """Fits the law to the logarithms of pressures by least squares.
 
     Args:
         points: Of a plate test.
-        first: Depth from which points count, m: near the surface single balls bear the plate.
+        surface: Depth in the table from which z counts, m. By default z counts from the first point that bears: single
+            balls that stand out bear a plate before it comes to the mean surface.
 
     Raises:
-        OptionError: There are fewer than three points below `first` with a positive pressure.
+        OptionError: There are fewer than three points below that with a positive pressure.
     """
-    rows = np.array([(p.depth, p.pressure) for p in points if p.depth > max(first, 0.0) and p.pressure > 0.0])
+    bearing = [(p.depth, p.pressure) for p in points if p.pressure > 0.0]
+    zero = (bearing[0][0] if bearing else 0.0) if surface is None else number("surface", surface)
+    rows = np.array([(depth - zero, pressure) for depth, pressure in bearing if depth > zero])
     if len(rows) < 3:
-        refuse(OptionError, "points", len(rows), "must be three or more with a positive pressure below `first`")
+        refuse(OptionError, "points", len(rows), "must be three or more with a positive pressure below the surface")
     columns = np.stack((np.ones(len(rows)), np.log(rows[:, 0])), axis=1)
     found, errors, rms = _line(columns, np.log(rows[:, 1]))
     k = math.exp(found[0])

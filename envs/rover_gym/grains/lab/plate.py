@@ -16,7 +16,7 @@ import numpy as np
 
 from rover_gym.grains.ball_bed import BallBed
 from rover_gym.grains.lab.disc import check_room, describe_disc
-from rover_gym.grains.lab.rig import CLEARANCE, Rig, clear_height, ground, larger_than_grains, step_count
+from rover_gym.grains.lab.rig import Rig, clear_height, ground, larger_than_grains, step_count
 from rover_gym.mechanics import OptionError
 from rover_gym.validation import number, refuse, whole
 

@@ -24,7 +24,7 @@ import numpy as np
 
 from rover_gym.grains.ball_bed import BallBed
 from rover_gym.grains.lab.disc import check_room, describe_disc
-from rover_gym.grains.lab.rig import CLEARANCE, Rig, clear_height, fall, ground, larger_than_grains, step_count
+from rover_gym.grains.lab.rig import Rig, clear_height, fall, ground, larger_than_grains, step_count
 from rover_gym.mechanics import OptionError
 from rover_gym.validation import number, refuse, whole
 
@@ -62,7 +62,7 @@ def shear_test(
 ) -> list[ShearPoint]:
     """Lowers the disc on the middle of the bed until the grains bear it, and turns it.
 
-    The vanes are as high as the largest ball.
+    The vanes are half as high as the largest ball, so that they soon sink in and the disc bears.
 
     Args:
         bed: Balls at rest.
@@ -95,8 +95,8 @@ def shear_test(
         refuse(OptionError, "samples", samples, f"must be at most the {steps} steps of the way")
     area = np.pi * radius**2
     load = sigma * area
-    machine = describe_disc(bed, radius, surface, load / fall(grains), vanes=vanes, vane_height=largest)
-    top = clear_height(bed, 0.5 * bed.width, 0.5 * bed.depth, radius) + largest
+    machine = describe_disc(bed, radius, surface, load / fall(grains), vanes=vanes, vane_height=0.5 * largest)
+    top = clear_height(bed, 0.5 * bed.width, 0.5 * bed.depth, radius) + 0.5 * largest
     rig = Rig(bed, machine, {"press": top}, tool_friction=friction, **options)
     rig.lower("press", speed, load, {"disc": 0.0})
     arm = 2.0 / 3.0 * radius
