@@ -105,12 +105,14 @@ def measure(ledger: Ledger) -> dict[str, Any]:
 def summary(runs: list[dict[str, Any]]) -> dict[str, Any]:
     """Means by size, their extrapolation to balls of radius 0, and RMS errors against the measurements."""
     radii = sorted({run["radius"] for run in runs})
-    means = {
-        radius: np.mean([_values(run) for run in runs if run["radius"] == radius], axis=0) for radius in radii
-    }
+    means = {radius: np.mean([_values(run) for run in runs if run["radius"] == radius], axis=0) for radius in radii}
     fine, coarse = radii
     share = fine / (coarse - fine)
-    found = {"coarse": means[coarse], "fine": means[fine], "extrapolated": means[fine] + share * (means[fine] - means[coarse])}
+    found = {
+        "coarse": means[coarse],
+        "fine": means[fine],
+        "extrapolated": means[fine] + share * (means[fine] - means[coarse]),
+    }
     measured = np.array(MEASURED)
     return {
         "rms": {

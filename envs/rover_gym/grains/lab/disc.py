@@ -90,8 +90,13 @@ def describe_disc(
 
 
 def check_room(bed: BallBed, radius: float) -> None:
-    """Refuses a disc that leaves less than two of the largest balls to the nearest wall."""
-    most = 0.5 * min(bed.width, bed.depth) - 4.0 * float(np.max(bed.radius))
+    """Refuses a disc that leaves less than the largest ball to the nearest wall."""
+    most = 0.5 * min(bed.width, bed.depth) - 2.0 * float(np.max(bed.radius))
     if radius > most:
-        refuse(OptionError, "radius", radius, f"must be at most {most:.3g} m on a bed {bed.width:.3g} m long and "
-               f"{bed.depth:.3g} m wide, to leave two balls to the walls")
+        refuse(
+            OptionError,
+            "radius",
+            radius,
+            f"must be at most {most:.3g} m on a bed {bed.width:.3g} m long and "
+            f"{bed.depth:.3g} m wide, to leave a ball to the walls",
+        )

@@ -178,10 +178,10 @@ def fit_pull(points: Sequence[WheelPoint]) -> Traction:
 
 def _line(columns: Array, values: Array) -> tuple[Array, list[float], float]:
     """Least squares: coefficients, their standard errors (nan without a degree of freedom) and the RMS deviation."""
-    found, *_ = np.linalg.lstsq(columns, values, rcond=None)
+    found = np.asarray(np.linalg.lstsq(columns, values, rcond=None)[0], dtype=np.float64)
     left = columns @ found - values
-    freedom = len(values) - columns.shape[1]
+    rms, freedom = float(np.sqrt(np.mean(left**2))), len(values) - columns.shape[1]
     if freedom < 1:
-        return found, [math.nan] * columns.shape[1], float(np.sqrt(np.mean(left**2)))
+        return found, [math.nan] * columns.shape[1], rms
     covariance = float(left @ left) / freedom * np.linalg.inv(columns.T @ columns)
-    return found, np.sqrt(np.diag(covariance)).tolist(), float(np.sqrt(np.mean(left**2)))
+    return found, [float(error) for error in np.sqrt(np.diag(covariance))], rms

@@ -1,7 +1,7 @@
 """The shear test: shear stress under a loaded disc with vanes that is turned, against displacement.
 
-This is the rotary test of a bevameter. The vanes hold the grains between them, so the bed shears in grains and not along the
-disc. With a shear stress τ that is the same everywhere under a disc of radius R the moment is
+This is the rotary test of a bevameter. The vanes hold the grains between them, so the bed shears in grains and not
+along the disc. With a shear stress τ that is the same everywhere under a disc of radius R the moment is
 
     T = 2 π R³ τ / 3,
 
@@ -87,8 +87,8 @@ def shear_test(
     samples, vanes = whole("samples", samples, at_least=1), whole("vanes", vanes, at_least=2, at_most=64)
     friction = number("disc_friction", disc_friction, at_least=0.0)
     surface, largest = bed.surface, 2.0 * float(bed.radius.max())
-    if surface < 4.0 * largest:
-        refuse(OptionError, "bed", surface, f"must be at least four of the largest balls high, {4.0 * largest:.3g} m")
+    if surface < 2.0 * largest:
+        refuse(OptionError, "bed", surface, f"must be at least two of the largest balls high, {2.0 * largest:.3g} m")
     grains = ground(bed, **options)
     steps = step_count("displacement", displacement / speed, grains.time_step)
     if steps < samples:
