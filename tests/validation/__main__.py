@@ -12,7 +12,18 @@ from typing import Any
 
 from rich.console import Console
 
-from validation import balance, collapse, drawing, findings, hourglass, janssen, packing, repose
+from validation import (
+    balance,
+    collapse,
+    drawing,
+    findings,
+    hourglass,
+    janssen,
+    packing,
+    plate_on_balls,
+    repose,
+    wheel_on_balls,
+)
 from validation.watch import Ledger
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -25,6 +36,8 @@ PARTS: dict[str, ModuleType] = {
     "janssen": janssen,
     "hourglass": hourglass,
     "balance": balance,
+    "wheel_on_balls": wheel_on_balls,
+    "plate_on_balls": plate_on_balls,
 }
 
 
