@@ -11,7 +11,7 @@ import pytest
 from balls import MovingBalls, RoverOnMovingBalls
 
 from rover_gym import OptionError, RoverModel
-from rover_gym.grains import read_grain_run, record_grains, surface_map
+from rover_gym.grains import SurfaceMap, read_grain_run, record_grains, surface_map
 from rover_gym.mechanics import GrainSimulation, ball_packing
 from rover_gym.record import RecordingError, read_frames
 
@@ -158,3 +158,15 @@ def test_the_surface_is_the_highest_point_over_each_cell() -> None:
     assert surface.at([0.0, 0.0], width=0.1) < 1.2
     with pytest.raises(OptionError, match="cell"):
         surface_map([[0.0, 0.0, 0.0], [1e3, 0.0, 1e3]], [0.01, 0.01], cell=1e-3)
+
+
+def test_a_smoothed_surface_is_the_mean_over_squares() -> None:
+    rng = np.random.default_rng(1)
+    heights = rng.uniform(0.0, 1.0, (9, 12))
+    heights[4, 5] = np.nan
+    heights[:4, :4] = np.nan
+    smooth = SurfaceMap(heights, (0.0, 0.0), 0.1).smoothed(3).heights
+    assert smooth.shape == heights.shape
+    assert smooth[4, 5] == pytest.approx(np.nanmean(heights[3:6, 4:7]))
+    assert smooth[6, 8] == pytest.approx(heights[5:8, 7:10].mean())
+    assert np.isnan(smooth[1, 1])

@@ -1,4 +1,4 @@
-"""Scenes of balls: beds are dense and at rest, columns spread, silos empty, drums tilt, spheres sink, a rover stands."""
+"""Scenes of balls: beds come to rest, columns spread, silos empty, drums tilt, spheres sink, and a rover stands."""
 
 from pathlib import Path
 

@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 from rover_gym.cli import app
 
 BED = ["--balls", "250", "--ball-radius", "0.013", "--width", "0.27", "--depth", "0.2", "--speed", "0.2"]
+STRESSES = ["--normal-stress", "1000", "--normal-stress", "3000"]
 
 
 @pytest.mark.parametrize(
@@ -17,12 +18,18 @@ BED = ["--balls", "250", "--ball-radius", "0.013", "--width", "0.27", "--depth",
         ("plate", ["--radius", "0.04", "--sinkage", "0.01", "--samples", "6"], ["plate.csv"], 6, "N/m^(n+2)"),
         (
             "shear",
-            [*["--radius", "0.04", "--displacement", "0.01", "--samples", "5", "--normal-stress", "1000", "--normal-stress", "3000"]],
+            ["--radius", "0.04", "--displacement", "0.01", "--samples", "5", *STRESSES],
             ["shear-1000Pa.csv", "shear-3000Pa.csv"],
             5,
             "friction angle",
         ),
-        ("wheel", [*["--slip", "0", "--slip", "0.3", "--run-in", "0.01", "--distance", "0.02"]], ["wheel.csv"], 2, "slip 0.3"),
+        (
+            "wheel",
+            ["--slip", "0", "--slip", "0.3", "--run-in", "0.01", "--distance", "0.02"],
+            ["wheel.csv"],
+            2,
+            "slip 0.3",
+        ),
     ],
 )
 def test_a_test_writes_its_tables(

@@ -8,6 +8,7 @@ use rover_core::integrator::{
     StepReport, WarmStart,
 };
 use rover_core::nalgebra::{SVector, Vector3};
+use rover_core::problem::FrictionContactProblem;
 use rover_core::simulation::GrainSimulation;
 use rover_core::solver::SolverOptions;
 use rover_core::spatial::space::{axis, body_velocities};
@@ -420,6 +421,64 @@ fn bed(count: usize) -> Heap<3> {
     options.solver.velocity_tolerance = 1e-3;
     options.solver.max_sweeps = 2000;
     Heap::new(scene, options, q)
+}
+
+/// Balls that fall in a box, long enough for several slabs and several threads.
+fn falling(steps: usize) -> Heap<3> {
+    let mut heap = bed(1000);
+    heap.options.time_step = 2e-3;
+    heap.options.solver.tolerance = 1e-3;
+    heap.options.solver.velocity_tolerance = 1e-2;
+    heap.step(steps);
+    heap
+}
+
+#[test]
+fn any_number_of_threads_gives_balls_the_same_bits() {
+    let bits = |heap: &Heap<3>| -> Vec<u64> {
+        let numbers = heap.q.iter().chain(&heap.v);
+        numbers.map(|x| x.to_bits()).collect()
+    };
+    let alone = falling(60);
+    assert!(alone.parts.pairs().slabs.iter().any(|slab| *slab >= 2));
+    assert!(alone.parts.pairs().round.len() > 2000);
+    for threads in [1, 2, 3] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let together = pool.build().expect("threads").install(|| falling(60));
+        assert!(bits(&together) == bits(&alone), "{threads} threads");
+    }
+}
+
+#[test]
+fn contacts_that_rest_between_sweeps_obey_the_law_within_the_tolerance() {
+    let mut heap = falling(60);
+    for _ in 0..20 {
+        let before = heap.energy();
+        let report = heap.step(1);
+        assert!(report.is_converged());
+        let (pairs, p) = (heap.parts.pairs(), heap.scratch.impulses());
+        let mut y = vec![0.0; pairs.n_coordinates];
+        pairs.add_impulses(p, &mut y);
+        let mut change = vec![0.0; p.len()];
+        pairs.local(&y, &mut change);
+        // The operator block by block and the pairs are two ways to the same velocities.
+        let q = vec![0.0; p.len()];
+        let mu = vec![0.5; p.len() / 3];
+        let problem =
+            FrictionContactProblem::from_assembled_sparse(heap.parts.operator(), &q, &mu);
+        let mut u = vec![0.0; p.len()];
+        problem.operator().multiply_add(p, &q, &mut u);
+        let largest = u.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
+        for (u, change) in u.iter().zip(&change) {
+            assert!((u - change).abs() < 1e-10 * largest);
+        }
+        for p in p.chunks_exact(3) {
+            assert!(p[1].hypot(p[2]) <= 0.5 * p[0] * (1.0 + 1e-14));
+        }
+        assert!(heap.energy() <= before + 1e-12 * before.abs());
+    }
+    let deepest = heap.scene.penetration(&heap.q, heap.time);
+    assert!(deepest < 0.01 * heap.scene.grains.smallest(), "{deepest} m");
 }
 
 #[test]

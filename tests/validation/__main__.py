@@ -1,4 +1,4 @@
-"""Measures all parts, or some: `python -m validation [collapse packing repose janssen hourglass balance]`.
+"""Measures all parts, or some: `python -m validation [collapse packing ... ball_silo]`.
 
 Writes `docs/validation/*.json` and pictures, and the tables of `docs/validation.md` from all that is there.
 """
@@ -14,6 +14,12 @@ from rich.console import Console
 
 from validation import (
     balance,
+    ball_balance,
+    ball_collapse,
+    ball_drawing,
+    ball_impact,
+    ball_packing,
+    ball_silo,
     collapse,
     drawing,
     findings,
@@ -36,9 +42,15 @@ PARTS: dict[str, ModuleType] = {
     "janssen": janssen,
     "hourglass": hourglass,
     "balance": balance,
+    "ball_packing": ball_packing,
+    "ball_balance": ball_balance,
+    "ball_impact": ball_impact,
+    "ball_collapse": ball_collapse,
+    "ball_silo": ball_silo,
     "wheel_on_balls": wheel_on_balls,
     "plate_on_balls": plate_on_balls,
 }
+PICTURES = drawing.PICTURES | ball_drawing.PICTURES
 
 
 def _cpu_seconds() -> float:
@@ -103,8 +115,8 @@ def main() -> None:
         for name in PARTS
         if (FOLDER / f"{name}.json").exists()
     }
-    for name in parts.keys() & drawing.PICTURES.keys():
-        drawing.PICTURES[name](parts[name], FOLDER / f"{name}.png")
+    for name in parts.keys() & PICTURES.keys():
+        PICTURES[name](parts[name], FOLDER / f"{name}.png")
     text, found = page(parts)
     target = DOCS / "validation.md"
     head = target.read_text(encoding="utf-8").split(MARK)[0]

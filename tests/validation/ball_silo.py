@@ -16,7 +16,7 @@ from validation.watch import GRAVITY, Ledger
 
 FRICTION = 0.5
 FRACTION = 0.57  # of a filling, where a unit of mass is needed
-TUBE = 6.0 * DIAMETER  # its radius
+TUBE = 6.0 * DIAMETER  # radius of the silo
 HOLES = (4.0, 5.0, 6.0, 7.0)  # their diameters, in diameters of a ball
 
 
@@ -38,16 +38,18 @@ def bulk(position: np.ndarray, radius: np.ndarray, tube: float) -> float:
     return float(DENSITY * 4.0 / 3.0 * np.pi * (radius[within] ** 3).sum() / volume)
 
 
-def discharge(count: int, hole: float, seed: int, ledger: Ledger, *, duration: float = 0.5) -> dict[str, Any]:
+def discharge(
+    count: int, hole: float, seed: int, ledger: Ledger, *, duration: float = 0.5, tube: float = TUBE
+) -> dict[str, Any]:
     """Opens a hole of `hole` diameters.
 
     Returns:
         rate: Mass per time through the hole over the last two thirds of the time, kg/s; scaled: over rho_b sqrt(g)
         d^(5/2).
     """
-    balls = filled(count, TUBE, seed, ledger)
-    density = bulk(balls.position, balls.radius, TUBE)
-    vessel = Silo(TUBE, floor=0.0, hole=0.5 * hole * DIAMETER)
+    balls = filled(count, tube, seed, ledger)
+    density = bulk(balls.position, balls.radius, tube)
+    vessel = Silo(tube, floor=0.0, hole=0.5 * hole * DIAMETER)
     watched = balls.watched(vessel=vessel, stabilisation="projection", friction=FRICTION)
     sim = watched.sim
     lost, times = [0.0], [0.0]
@@ -86,7 +88,7 @@ def beverloo(runs: list[dict[str, Any]]) -> dict[str, float]:
 def borne(count: int, seed: int, ledger: Ledger, *, tube: float = 4.0 * DIAMETER) -> dict[str, float]:
     """What a bottom that sinks slowly bears of a filling in a rough tube, over the weight of a tube's width of it."""
     balls = filled(count, tube, seed, ledger)
-    speed, floor = 1.0 * DIAMETER, [[0.0, 0.0, 0.0, 0.0, 1.0, 0.0]]
+    speed, floor = 2.0 * DIAMETER, [[0.0, 0.0, 0.0, 0.0, 1.0, 0.0]]
     watched = balls.watched(
         vessel=Silo(tube),
         stabilisation="projection",
@@ -97,11 +99,11 @@ def borne(count: int, seed: int, ledger: Ledger, *, tube: float = 4.0 * DIAMETER
     )
     sim = watched.sim
     loads = []
-    for k in range(60):
+    for k in range(30):
         watched.step(20)
         contacts = sim.contacts
         on_floor = (contacts.bodies[:, 1] < 0) & (contacts.normals[:, 1] > 0.5)
-        if k >= 20:
+        if k >= 10:
             loads.append(float(contacts.world_impulses[on_floor, 1].sum()) / sim.time_step / GRAVITY)
     ledger.merge(watched.ledger)
     unit = FRACTION * DENSITY * np.pi * tube**2 * 2.0 * tube
@@ -119,5 +121,5 @@ def saturation(runs: list[dict[str, float]]) -> float:
 def measure(ledger: Ledger) -> dict[str, object]:
     """Holes of several widths, and fillings of several heights."""
     runs = [discharge(1800, hole, seed, ledger) for hole in HOLES for seed in (0, 1)]
-    loads = [borne(count, seed, ledger) for count in (150, 300, 600, 1000) for seed in (0, 1)]
+    loads = [borne(count, seed, ledger) for count in (150, 400, 800) for seed in (0, 1)]
     return {"runs": runs, "fit": beverloo(runs), "loads": loads, "saturation": saturation(loads)}

@@ -38,13 +38,13 @@ class Balls:
         names = ("radius", "position", "kinematic")
         return Balls(*(np.concatenate([getattr(self, n), getattr(other, n)]) for n in names))
 
-    def watched(self, *, friction: float = 0.5, has_energy: bool = True, density: object = DENSITY, **o: Any) -> Watched:
+    def watched(
+        self, *, friction: float = 0.5, has_energy: bool = True, density: object = DENSITY, **o: Any
+    ) -> Watched:
         """A simulation of them; friction with walls is the same as among balls unless given."""
         mass = 4.0 / 3.0 * np.pi * np.asarray(density) * self.radius**3
         options = {"wall_friction": friction, "time_step": TIME_STEP, "tolerance": TOLERANCE} | o
-        sim = GrainSimulation(
-            self.radius, mass, self.position, kinematic=self.kinematic, friction=friction, **options
-        )
+        sim = GrainSimulation(self.radius, mass, self.position, kinematic=self.kinematic, friction=friction, **options)
         return Watched(sim, has_energy=has_energy)
 
 

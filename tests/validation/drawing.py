@@ -16,7 +16,7 @@ from validation.wheel_on_balls import MEASURED
 OURS, PAPER, OTHER = "#d1361f", "#2f6db3", "#5b6770"
 
 
-def _finish(axes: Axes) -> None:
+def finish(axes: Axes) -> None:
     axes.grid(which="major", color="#dddddd", linewidth=0.7)
     axes.set_axisbelow(True)
     for side in ("top", "right"):
@@ -52,7 +52,7 @@ def collapse(data: dict[str, Any], path: Path) -> None:
     axes.set_xlabel("aspect ratio a = H$_0$/R$_0$")
     axes.set_ylabel("run-out (R - R$_0$)/R$_0$")
     axes.legend(frameon=False, fontsize=8.5)
-    _finish(axes)
+    finish(axes)
     limit = data["limit"]
     inverse = np.array([0.0, 0.1])
     line = f"{limit['value']:.2f} ± {limit['error']:.2f} at 0"
@@ -64,7 +64,7 @@ def collapse(data: dict[str, Any], path: Path) -> None:
     sizes.set_ylabel("run-out / a, at a = 2")
     sizes.set_ylim(bottom=0.0)
     sizes.legend(frameon=False, fontsize=8.5)
-    _finish(sizes)
+    finish(sizes)
     figure.tight_layout()
     figure.savefig(path)
     plt.close(figure)
@@ -79,7 +79,7 @@ def packing(data: dict[str, Any], path: Path) -> None:
             runs = [r for r in data["poured"] + data["shaken"] if r["shakes"] == shakes]
             axes.plot([r["friction"] for r in runs], [r[name] for r in runs], marker, color=colour, label=label)
         axes.set_xlabel("friction µ")
-        _finish(axes)
+        finish(axes)
     panels[0].axhspan(0.81, 0.84, color=PAPER, alpha=0.12, label="0.81 to 0.84")
     panels[0].set_ylabel("packing fraction")
     panels[0].legend(frameon=False, fontsize=8.5)
@@ -110,7 +110,7 @@ def repose(data: dict[str, Any], path: Path) -> None:
     right.set_ylabel("angle of repose, degrees")
     right.set_ylim(bottom=0.0)
     for axes in (left, right):
-        _finish(axes)
+        finish(axes)
     figure.tight_layout()
     figure.savefig(path)
     plt.close(figure)
@@ -140,7 +140,7 @@ def janssen(data: dict[str, Any], path: Path) -> None:
     axes.set_xlabel("mass of the filling, in fillings as high as wide")
     axes.set_ylabel("mass that the bottom bears")
     axes.legend(frameon=False, fontsize=8.5)
-    _finish(axes)
+    finish(axes)
     figure.tight_layout()
     figure.savefig(path)
     plt.close(figure)
@@ -186,7 +186,7 @@ def hourglass(data: dict[str, Any], path: Path) -> None:
     right.legend(frameon=False, fontsize=8.5)
     for axes in (left, right):
         axes.set_xlabel("opening D, diameters d")
-        _finish(axes)
+        finish(axes)
     figure.tight_layout()
     figure.savefig(path)
     plt.close(figure)

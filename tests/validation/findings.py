@@ -202,6 +202,69 @@ def balance(data: dict[str, Any]) -> Iterator[Finding]:
     yield Finding("energy kept at e = 0.9, step 1 against 0.02 ms", "the same, 5%", "", error, 0.0, 0.05, digits=".3f")
 
 
+LUBE = "Lube et al. 2004"
+
+
+def ball_packing(data: dict[str, Any]) -> Iterator[Finding]:
+    """Packing fractions and contacts of balls."""
+    means = {row["friction"]: row for row in data["means"]}
+    smooth, rough = means[0.0], means[max(means)]
+    for quantity, row, name, expected, low, high, source in (
+        ("packing fraction, no friction", smooth, "fraction", "0.64 ± 0.01", 0.63, 0.65, "random close packing"),
+        ("contacts, no friction", smooth, "coordination", "6 ± 0.1", 5.9, 6.1, "isostatic, 3d"),
+        ("packing fraction, µ 1", rough, "fraction", "0.55 to 0.60", 0.55, 0.60, "Jaeger and Nagel 1992"),
+        ("contacts, µ 1", rough, "coordination", "towards 4", 4.0, 4.7, "Silbert 2010"),
+    ):
+        what = f"balls: {quantity}, ± {row[name + '_error']:.3f}"
+        yield Finding(what, expected, source, row[name], low, high, digits=".3f")
+    rises = np.diff([[row["fraction"], row["coordination"]] for row in data["means"]], axis=0)
+    yield Finding("balls: largest rise of both with µ", "none", "", float(rises.max()), -10.0, 0.0, digits=".3f")
+
+
+def ball_balance(data: dict[str, Any]) -> Iterator[Finding]:
+    """Energy, momentum and similarity of balls."""
+    grown = max(row["grown"] for row in data["boxes"])
+    yield Finding("balls: growth of the energy in a box, e = 0, any µ", "0", "proof in soil.md", grown, 0.0, 1e-12)
+    error = max(row["momentum_error"] for row in data["clouds"])
+    yield Finding("balls: momentum of two clouds that meet", "0", "exact", error, 0.0, 1e-12, digits=".1e")
+    apart = max(row["difference"] for row in data["froude"])
+    what = "balls: places under 1/4 and 1/16 of the gravity, times doubled and quadrupled"
+    yield Finding(what, "the same bits", "Froude", apart, 0.0, 0.0, digits=".0f")
+
+
+def ball_impact(data: dict[str, Any]) -> Iterator[Finding]:
+    """Depth of a sphere in a bed."""
+    source, found = "Uehara et al. 2003", data["exponent"]
+    ratio = np.array([run["depth"] / run["law"] for run in data["runs"]])
+    what = f"balls: depth of a sphere over the law, mean, ± {ratio.std(ddof=1) / np.sqrt(len(ratio)):.2f}"
+    yield Finding(what, "1 ± 25%", source, float(ratio.mean()), 0.75, 1.25)
+    what = f"balls: exponent of the whole drop, ± {found['error']:.2f}"
+    yield Finding(what, "1/3 ± 0.1", source, found["value"], 0.23, 0.43)
+
+
+def ball_collapse(data: dict[str, Any]) -> Iterator[Finding]:
+    """Run-out of columns."""
+    limit = data["limit"]
+    what = f"balls: run-out over the law at a = 1, balls ever smaller, ± {limit['error']:.2f}"
+    yield Finding(what, "1 ± 20%", LUBE, limit["value"], 0.8, 1.2)
+    tall = [run for run in data["runs"] if run["aspect"] > 1.7]
+    ratio = float(np.mean([run["run_out"] / np.sqrt(run["aspect"]) for run in tall]))
+    yield Finding("balls: run-out / a^0.5, a ≥ 1.7, 1000 balls", "1.6 ± 25%", LUBE, ratio, 1.2, 2.0)
+
+
+def ball_silo(data: dict[str, Any]) -> Iterator[Finding]:
+    """Discharge and load of a silo."""
+    fit = data["fit"]
+    what = f"balls: exponent of D - 1.4 d, ± {fit['error']:.2f}"
+    yield Finding(what, "2.5 ± 0.25", BEVERLOO, fit["exponent"], 2.25, 2.75)
+    yield Finding("balls: Beverloo's C", "0.58 ± 0.1", BEVERLOO, fit["C"], 0.48, 0.68)
+    yield Finding("balls: Beverloo's k", "1.4 ± 0.5", BEVERLOO, fit["k"], 0.9, 1.9)
+    mass = data["saturation"]
+    off = [row["borne"] / (mass * -np.expm1(-row["filling"] / mass)) - 1.0 for row in data["loads"]]
+    what = "balls: silo, load farthest from Janssen's law"
+    yield Finding(what, "0 ± 20%", "Janssen 1895", max(off, key=abs), -0.2, 0.2)
+
+
 def wheel_on_balls(data: dict[str, Any]) -> Iterator[Finding]:
     """RMS errors against measurements beside those of the measurements' authors' tuned model."""
     source = "wheel on sand, 3D terramechanics 2022"
@@ -253,6 +316,11 @@ PARTS = {
     "janssen": janssen,
     "hourglass": hourglass,
     "balance": balance,
+    "ball_packing": ball_packing,
+    "ball_balance": ball_balance,
+    "ball_impact": ball_impact,
+    "ball_collapse": ball_collapse,
+    "ball_silo": ball_silo,
     "wheel_on_balls": wheel_on_balls,
     "plate_on_balls": plate_on_balls,
 }

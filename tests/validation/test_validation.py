@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from validation import findings
+from validation import ball_balance, ball_collapse, ball_impact, ball_packing, ball_silo, findings
 from validation.balance import cloud, free_cloud
 from validation.collapse import heap, power, run_out
 from validation.hourglass import beverloo, discharge
@@ -125,3 +125,42 @@ def test_a_number_out_of_its_range_is_marked() -> None:
     inside, outside = (findings.Finding("x", "1", "y", number, 0.9, 1.1) for number in (1.0, float("nan")))
     assert inside.holds
     assert "**outside**" in outside.row()
+
+
+def test_balls_pack_as_rigid_spheres_do() -> None:
+    ledger = Ledger()
+    smooth, rough = (ball_packing.bed(330, mu, 0, ledger, diameters=7.0) for mu in (0.0, 1.0))
+    assert smooth["fraction"] == pytest.approx(0.62, abs=0.03)
+    assert smooth["coordination"] == pytest.approx(6.0, abs=0.5)
+    assert rough["fraction"] < smooth["fraction"] - 0.03
+    assert 3.9 < rough["coordination"] < 4.9
+    held(ledger)
+
+
+def test_balls_keep_momentum_gain_no_energy_and_obey_froude() -> None:
+    ledger = Ledger()
+    runs = [ball_balance.cloud(80, friction, 0, ledger, steps=60) for friction in (0.0, 0.5)]
+    assert max(run["grown"] for run in runs) == pytest.approx(0.0, abs=1e-12)
+    assert min(run["lost"] for run in runs) > 0.1
+    assert ball_balance.meeting(80, 0.5, 0, ledger)["momentum_error"] == pytest.approx(0.0, abs=1e-12)
+    assert ball_balance.similar(60, 2.0, 0, steps=80)["difference"] == pytest.approx(0.0, abs=0.0)
+    held(ledger)
+
+
+def test_a_sphere_sinks_the_deeper_the_faster_it_strikes_balls() -> None:
+    ledger = Ledger()
+    width = 0.08
+    balls = ball_impact.bed(350, width, 0, ledger)
+    slow, fast = (ball_impact.depth(balls, width, drop, ledger) for drop in (0.02, 0.2))
+    assert 0.002 < slow["depth"] < fast["depth"]
+    assert slow["depth"] == pytest.approx(slow["law"], rel=0.5)
+    held(ledger)
+
+
+def test_columns_of_balls_run_out_and_a_silo_of_them_flows() -> None:
+    ledger = Ledger()
+    run = ball_collapse.run_out(150, 1.0, 0, ledger)
+    assert run["run_out"] == pytest.approx(ball_collapse.lube(run["aspect"]), rel=0.4)
+    flows = ball_silo.discharge(300, 5.0, 0, ledger, duration=0.15, tube=0.03)
+    assert flows["rate"] > 0.2
+    held(ledger)

@@ -64,10 +64,13 @@ class SurfaceMap:
         return np.divide(total, known, out=np.full_like(total, np.nan), where=known > 0)
 
     def smoothed(self, cells: int) -> SurfaceMap:
-        """The map of mean heights over squares of an odd number of cells; nan does not count, and stays."""
+        """The map of mean heights over squares of an odd number of cells.
+
+        Cells without a ball do not count; where they are most of a square, the mean is nan.
+        """
         known = np.isfinite(self.heights)
         total, count = (_box_sum(values, cells) for values in (np.where(known, self.heights, 0.0), known * 1.0))
-        means = np.divide(total, count, out=np.full_like(total, np.nan), where=known)
+        means = np.divide(total, count, out=np.full_like(total, np.nan), where=count > 0.5 * cells**2)
         return replace(self, heights=means)
 
 

@@ -157,7 +157,8 @@ def _rows_in_drum(wall: float, length: float, largest: float) -> Array:
     along = pitch * np.arange(np.floor(length / pitch))
     y, x, z = np.meshgrid(steps, steps, along - along.mean(), indexing="ij")
     places = np.stack((x.ravel(), y.ravel(), z.ravel()), axis=1)
-    return places[np.hypot(places[:, 0], places[:, 1]) <= half]
+    inside: Array = places[np.hypot(places[:, 0], places[:, 1]) <= half]
+    return inside
 
 
 def _filled(

@@ -241,11 +241,15 @@ fn report() {
     for count in counts {
         let times = steps_of.map_or(vec![1e-3, 2e-3, 4e-3], |h| vec![1e-3 * h]);
         for h in times {
+            let only = std::env::var("BALLS_ONLY").ok();
             for (name, motion) in [
                 ("rest", Motion::Rest),
                 ("tilt", Motion::Tilt),
                 ("plough", Motion::Plough),
             ] {
+                if only.as_ref().is_some_and(|only| only != name) {
+                    continue;
+                }
                 let mut run = scene(count, motion, h, 1e-3);
                 // In motion for 0.15 s; then 0.1 s, or less if there are many.
                 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // counts

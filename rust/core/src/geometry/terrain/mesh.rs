@@ -171,6 +171,19 @@ impl TriangleMesh {
         self.hinge(other, l).walls[1]
     }
 
+    /// Whether a place is farther than `reach` in front of a triangle's plane, or beside it.
+    fn is_beyond(&self, t: usize, place: &Vector3<f64>, reach: f64) -> bool {
+        let n = &self.normals[t];
+        let is_beside = |k: usize| {
+            let [a, b] = self.ends(t, k);
+            let out = (b - a).cross(n);
+            let distance = out.dot(&(place - a));
+            distance > 0.0 && distance * distance > reach * reach * out.norm_squared()
+        };
+        let [a, _] = self.ends(t, 0);
+        n.dot(&(place - a)) > reach || (0..3).any(is_beside)
+    }
+
     fn face(&self, t: usize) -> Face {
         let [a, _] = self.ends(t, 0);
         Face {
@@ -316,6 +329,9 @@ impl Terrain for TriangleMesh {
     ) {
         let m = narrow(self.triangles.len());
         self.tree.visit_near(centre, reach, |t, _| {
+            if self.is_beyond(t as usize, centre, reach) {
+                return;
+            }
             visit(t, &Primitive::Face(self.face(t as usize)));
             for k in 0..3 {
                 if let Some(edge) = self.edge(t as usize, k) {

@@ -1,14 +1,13 @@
 //! Sweeps that are extrapolated, judged and kept from adding energy, whatever a sweep visits.
 //!
 //! The next sweep starts not from the impulses p_k but from `p_k + β (p_k − p_{k−1})`, with β from
-//! Nesterov's sequence. The sequence restarts when the change per sweep grows.
+//! Nesterov's sequence. Where the change per sweep grows the sequence goes back, to its start or, for
+//! balls, part of the way ([`Relaxation::KEPT`]). That saves sweeps in most problems and may never
+//! end in a wedged one, so it ends after a while.
 
 use crate::problem::{Residual, passive_share};
 use crate::solver::options::SolverOptions;
 use crate::solver::report::{SolveReport, SolveStatus};
-
-/// Sweeps after which the residual is computed, whatever the change per sweep.
-const PATIENCE: usize = 50;
 
 /// Quality of an answer.
 pub(super) struct Measured {
@@ -26,10 +25,20 @@ impl Measured {
     }
 }
 
+/// Sweeps after which a problem counts as hard: every short cut ends then.
+const HARD: usize = 150;
+
 /// Contacts that are swept.
 pub(super) trait Relaxation {
-    /// One sweep from the impulses extrapolated by `share`; the square of its change, N² s².
-    fn sweep(&mut self, share: f64) -> f64;
+    /// Fraction of Nesterov's sequence that is kept when the change per sweep grows.
+    const KEPT: f64;
+
+    /// Sweeps after which the residual is computed, whatever the change per sweep.
+    const PATIENCE: usize;
+
+    /// One sweep from the impulses extrapolated by `share`; the square of its change, N² s². In a
+    /// hard problem it visits every contact.
+    fn sweep(&mut self, share: f64, is_hard: bool) -> f64;
 
     /// The residual as [`crate::problem::evaluate_into`] defines it, with the velocities summed
     /// anew from the impulses.
@@ -41,8 +50,8 @@ pub(super) trait Relaxation {
 
 /// Sweeps until the answer is within the tolerances. The impulses are those of the last
 /// measurement.
-pub(super) fn accelerate(
-    contacts: &mut impl Relaxation,
+pub(super) fn accelerate<R: Relaxation>(
+    contacts: &mut R,
     options: &SolverOptions,
     report: &mut SolveReport,
 ) {
@@ -52,14 +61,16 @@ pub(super) fn accelerate(
     let (mut rate, mut last_look) = (f64::INFINITY, 0);
     loop {
         if report.iterations < options.max_sweeps {
-            let change = contacts.sweep(share);
+            let is_hard = report.iterations >= HARD;
+            let change = contacts.sweep(share, is_hard);
             report.iterations += 1;
             if change > last_change {
-                t = 1.0;
+                let kept = if is_hard { 0.0 } else { R::KEPT };
+                t = 1.0 + kept * (t - 1.0);
             }
             last_change = change;
             let is_due = rate * change.sqrt() <= 1.0
-                || report.iterations - last_look >= PATIENCE
+                || report.iterations - last_look >= R::PATIENCE
                 || report.iterations == 1
                 || report.iterations == options.max_sweeps;
             if !is_due {

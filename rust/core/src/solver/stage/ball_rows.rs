@@ -193,6 +193,17 @@ impl BallRow {
         dot(&change, &change)
     }
 
+    /// Takes its part of velocities extrapolated by `share` back; the impulse stays.
+    #[inline]
+    pub(super) fn take_back(&mut self, share: f64, balls: &mut [Ball]) {
+        let mut back = [0.0; 3];
+        for k in 0..3 {
+            back[k] = -share * (self.p[k] - self.before[k]);
+        }
+        self.add(&back, balls);
+        self.before = self.p;
+    }
+
     /// As [`crate::law::coulomb::violation`] has it.
     #[inline(always)]
     pub(super) fn judge(&self, balls: &[Ball]) -> Judged {

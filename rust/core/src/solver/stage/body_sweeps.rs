@@ -81,7 +81,7 @@ impl Swept<3> for BodyPairs<3> {
         u: &mut [f64],
         sweeps: &mut BodySweeps,
     ) -> SolveReport {
-        sweeps.balls.fit(self, q, mu, p);
+        sweeps.balls.fit(self, (q, mu, p), options);
         let mut report = unsolved();
         let mut solve = BallSolve {
             sweeps: &mut sweeps.balls,

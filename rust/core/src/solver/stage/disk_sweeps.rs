@@ -176,7 +176,10 @@ pub(super) struct DiskSolve<'a> {
 }
 
 impl Relaxation for DiskSolve<'_> {
-    fn sweep(&mut self, share: f64) -> f64 {
+    const KEPT: f64 = 0.0;
+    const PATIENCE: usize = 50;
+
+    fn sweep(&mut self, share: f64, _is_hard: bool) -> f64 {
         self.sweeps.sweep(self.pairs, share)
     }
 

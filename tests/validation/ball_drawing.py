@@ -1,0 +1,118 @@
+"""Pictures of the validation of balls."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from validation.ball_collapse import lube
+from validation.drawing import OTHER, OURS, PAPER, finish
+
+
+def packing(data: dict[str, Any], path: Path) -> None:
+    """Packing fraction and contacts against friction."""
+    figure = Figure(figsize=(9.2, 3.8), dpi=110)
+    left, right = figure.subplots(1, 2)
+    friction = [row["friction"] for row in data["means"]]
+    for axes, name, lines in (
+        (left, "fraction", ((0.64, "random close, 0.64"), (0.55, "random loose, 0.55"))),
+        (right, "coordination", ((6.0, "isostatic, 6"), (4.0, "isostatic with friction, 4"))),
+    ):
+        for (value, label), style in zip(lines, ("-", "--"), strict=True):
+            axes.axhline(value, color=PAPER, linestyle=style, linewidth=1.2, label=label)
+        axes.plot([r["friction"] for r in data["poured"]], [r[name] for r in data["poured"]], ".", color=OTHER)
+        values, errors = ([row[key] for row in data["means"]] for key in (name, f"{name}_error"))
+        axes.errorbar(friction, values, errors, fmt="o", color=OURS, capsize=3, label="900 balls, 3 beds")
+        axes.set_xlabel("friction µ")
+        axes.legend(frameon=False, fontsize=8.5)
+        finish(axes)
+    left.set_ylabel("packing fraction")
+    right.set_ylabel("contacts that bear load")
+    figure.tight_layout()
+    figure.savefig(path)
+
+
+def impact(data: dict[str, Any], path: Path) -> None:
+    """Depth of a sphere against the law."""
+    figure = Figure(figsize=(5.2, 4.2), dpi=110)
+    axes = figure.subplots()
+    densities = sorted({run["density"] for run in data["runs"]})
+    for density, marker in zip(densities, "vo^", strict=False):
+        runs = [run for run in data["runs"] if run["density"] == density]
+        share = density / densities[len(densities) // 2]
+        law, depth = ([1e3 * run[name] for run in runs] for name in ("law", "depth"))
+        axes.plot(law, depth, marker, color=OURS, markersize=5, label=f"{share:g} times the density")
+    top = 1.15e3 * max(max(run["law"], run["depth"]) for run in data["runs"])
+    axes.plot([0.0, top], [0.0, top], color=PAPER, label="equal")
+    axes.set_xlabel(r"0.14/µ ($\rho_p/\rho_g$)$^{1/2}$ D$^{2/3}$ H$^{1/3}$, mm (Uehara et al. 2003)")
+    axes.set_ylabel("depth of the sphere, mm")
+    axes.legend(frameon=False, fontsize=8.5)
+    finish(axes)
+    figure.tight_layout()
+    figure.savefig(path)
+
+
+def collapse(data: dict[str, Any], path: Path) -> None:
+    """Run-out against aspect ratio, and against the size of the balls."""
+    figure = Figure(figsize=(9.2, 3.9), dpi=110)
+    left, right = figure.subplots(1, 2)
+    aspect = np.linspace(0.3, 5.5, 200)
+    for span in (aspect[aspect < 1.7], aspect[aspect >= 1.7]):
+        label = "Lube et al. 2004: 1.24 a, 1.6 a$^{1/2}$" if span[0] < 1.0 else None
+        left.plot(span, [lube(a) for a in span], color=PAPER, label=label)
+    runs = data["runs"]
+    left.plot([r["aspect"] for r in runs], [r["run_out"] for r in runs], "o", color=OURS, label="1000 balls")
+    left.set_xlabel("aspect ratio a = H$_0$/R$_0$")
+    left.set_ylabel("run-out (R - R$_0$)/R$_0$")
+    limit = data["limit"]
+    near = data["sizes"] + [r for r in runs if 0.8 < r["aspect"] < 1.4]
+    inverse = np.array([0.0, 1.1 * max(1.0 / r["grains"] for r in near)])
+    label = f"{limit['value']:.2f} ± {limit['error']:.2f} at 0"
+    right.plot(inverse, limit["value"] + limit["slope"] * inverse, "--", color=OURS, linewidth=1.2, label=label)
+    right.plot([1.0 / r["grains"] for r in near], [r["run_out"] / lube(r["aspect"]) for r in near], "o", color=OURS)
+    right.axhline(1.0, color=PAPER)
+    right.set_xlabel("diameter of a ball over R$_0$")
+    right.set_ylabel("run-out over the law, a = 1")
+    for axes in (left, right):
+        axes.set_ylim(bottom=0.0)
+        axes.legend(frameon=False, fontsize=8.5)
+        finish(axes)
+    figure.tight_layout()
+    figure.savefig(path)
+
+
+def silo(data: dict[str, Any], path: Path) -> None:
+    """Discharge against the hole, and load against filling."""
+    figure = Figure(figsize=(9.2, 3.9), dpi=110)
+    left, right = figure.subplots(1, 2)
+    hole = np.linspace(1.4, 1.05 * max(run["hole"] for run in data["runs"]), 100)
+    left.plot(hole, (0.58 * (hole - 1.4) ** 2.5) ** 0.4, color=PAPER, label="Beverloo: C 0.58, k 1.4")
+    fit = data["fit"]
+    label = f"C {fit['C']:.2f}, k {fit['k']:.2f}"
+    left.plot(hole, fit["C"] ** 0.4 * (hole - fit["k"]), "--", color=OURS, linewidth=1.2, label=label)
+    left.plot([r["hole"] for r in data["runs"]], [r["scaled"] ** 0.4 for r in data["runs"]], "o", color=OURS)
+    left.set_xlabel("width of the hole, diameters of a ball")
+    left.set_ylabel(r"(W / $\rho_b$ g$^{1/2}$ d$^{5/2}$)$^{2/5}$")
+    loads, mass = data["loads"], data["saturation"]
+    filling = np.linspace(0.0, 1.1 * max(row["filling"] for row in loads), 100)
+    right.plot(filling, filling, color=OTHER, linewidth=1.0, label="whole weight")
+    right.plot(filling, mass * -np.expm1(-filling / mass), color=PAPER, label=f"Janssen, saturating at {mass:.2f}")
+    right.plot([r["filling"] for r in loads], [r["borne"] for r in loads], "o", color=OURS)
+    right.set_xlabel("filling, in fillings as high as wide")
+    right.set_ylabel("load on the bottom")
+    for axes in (left, right):
+        axes.legend(frameon=False, fontsize=8.5)
+        finish(axes)
+    figure.tight_layout()
+    figure.savefig(path)
+
+
+PICTURES = {
+    "ball_packing": packing,
+    "ball_impact": impact,
+    "ball_collapse": collapse,
+    "ball_silo": silo,
+}
