@@ -25,6 +25,7 @@ from validation import (
     findings,
     hourglass,
     janssen,
+    lab_drawing,
     packing,
     plate_on_balls,
     repose,
@@ -50,7 +51,7 @@ PARTS: dict[str, ModuleType] = {
     "wheel_on_balls": wheel_on_balls,
     "plate_on_balls": plate_on_balls,
 }
-PICTURES = drawing.PICTURES | ball_drawing.PICTURES
+PICTURES = drawing.PICTURES | ball_drawing.PICTURES | lab_drawing.PICTURES
 
 
 def _cpu_seconds() -> float:
