@@ -29,7 +29,7 @@ MOST_STEPS = 10_000_000  # of one run: more would not finish
 
 
 class Rig:
-    """A tool on a bed, moved joint by joint.
+    """A tool on a bed, moved joint by joint. The bed's floor bears the tool too.
 
     Args:
         bed: Balls at rest.
@@ -101,18 +101,12 @@ class Rig:
             load: N.
             driven: Set-points of the other driven joints.
         """
-        place = self.place(joint)
-        least = float(self.both.grains.radius.max())
-        borne = 0.0
-        while borne < load and place > least - CLEARANCE - self._reach(joint):
+        place, borne = self.place(joint), 0.0
+        while borne < load:  # the floor bears any
             place -= speed * self.time_step
             force, _ = self.step({**driven, joint: place})
             borne = float(force[1])
         self.both.rover.release(joint)
-
-    def _reach(self, joint: str) -> float:
-        """Height of the tool's origin over the joint's coordinate, m: the floor is met below minus it."""
-        return float(self.both.rover.poses()[self._tool][0][1]) - self.place(joint)
 
 
 def ground(bed: BallBed, **options: Any) -> GrainSimulation:

@@ -88,6 +88,8 @@ def wheel_test(
 ) -> list[WheelPoint]:
     """Drives a wheel over the bed once for each slip, each time over the untouched bed.
 
+    A wheel that sinks to the floor rolls on it: look at the sinkage.
+
     Args:
         bed: Balls at rest.
         slips: From −1, a locked wheel, to below 1.
