@@ -10,13 +10,13 @@ The package consists of the subpackages below. Each one may import those above i
     models         models from and to URDF and MJCF files
     rendering      images of a rover: frames and video
     record         trajectories in HDF5
+    soil           granular soil of disks, in the plane
     grains         granular ground of balls, in space
     env            `Rover-v0`: its card, arguments and control period
     vector         batches of rovers, for Gymnasium and for stable-baselines3
     policy         the baseline, trained policies and their evaluation
     planning       the cheapest model that a scene permits
     planar         the planar systems: a ball, a two-wheel rover
-    soil           granular soil of disks, in the plane
     reproduction   the experiments of the 2010 report
     replay         saved runs for the browser, VRML and glTF
     figures        figures of saved runs

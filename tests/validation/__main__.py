@@ -25,8 +25,11 @@ from validation import (
     findings,
     hourglass,
     janssen,
+    lab_drawing,
     packing,
+    plate_on_balls,
     repose,
+    wheel_on_balls,
 )
 from validation.watch import Ledger
 
@@ -45,8 +48,10 @@ PARTS: dict[str, ModuleType] = {
     "ball_impact": ball_impact,
     "ball_collapse": ball_collapse,
     "ball_silo": ball_silo,
+    "wheel_on_balls": wheel_on_balls,
+    "plate_on_balls": plate_on_balls,
 }
-PICTURES = drawing.PICTURES | ball_drawing.PICTURES
+PICTURES = drawing.PICTURES | ball_drawing.PICTURES | lab_drawing.PICTURES
 
 
 def _cpu_seconds() -> float:

@@ -265,6 +265,28 @@ def ball_silo(data: dict[str, Any]) -> Iterator[Finding]:
     yield Finding(what, "0 ± 20%", "Janssen 1895", max(off, key=abs), -0.2, 0.2)
 
 
+def wheel_on_balls(data: dict[str, Any]) -> Iterator[Finding]:
+    """RMS errors against measurements beside those of the measurements' authors' tuned model."""
+    source = "wheel on sand, 3D terramechanics 2022"
+    for name, unit, factor, authors in (
+        ("pull", "N", 1.0, 6.8),
+        ("lateral", "N", 1.0, 7.3),
+        ("sinkage", "mm", 1e3, 7.5),
+    ):
+        for size in ("coarse", "fine", "extrapolated"):
+            error = factor * data["rms"][size][name]
+            what = f"RMS error of a wheel's {name}, {size} balls"
+            yield Finding(what, f"{authors:g} {unit}: the authors' model", source, error, 0.0, authors, unit, ".1f")
+
+
+def plate_on_balls(data: dict[str, Any]) -> Iterator[Finding]:
+    """Whether the finest balls agree with the next."""
+    coarse, fine = data["means"][-2:]
+    change = abs(fine["pressure"] / coarse["pressure"] - 1.0)
+    what = "pressure under a plate, change from the next to the finest balls"
+    yield Finding(what, "below a quarter", "", change, 0.0, 0.25)
+
+
 def everywhere(ledgers: dict[str, dict[str, float]]) -> Iterator[Finding]:
     """What must hold in every step of all parts."""
     for part, ledger in ledgers.items():
@@ -299,6 +321,8 @@ PARTS = {
     "ball_impact": ball_impact,
     "ball_collapse": ball_collapse,
     "ball_silo": ball_silo,
+    "wheel_on_balls": wheel_on_balls,
+    "plate_on_balls": plate_on_balls,
 }
 
 

@@ -1,0 +1,221 @@
+"""`rover grains plate|shear|wheel`: the virtual laboratory on a bed of balls, with tables and fitted laws."""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.table import Table
+
+from rover_gym.cli.console import LARGEST_SEED, check_folder, console, plain_errors, progress_bar, say_path
+
+if TYPE_CHECKING:
+    from rover_gym.grains.ball_bed import BallBed
+
+EARTH = 9.81  # m/s^2
+
+Balls = Annotated[int, typer.Option(min=1, max=1_000_000, help="Number of balls.")]
+BallRadius = Annotated[float, typer.Option(help="Mean radius of the balls, m; radii differ by a fifth.")]
+Width = Annotated[float, typer.Option(help="Length of the bed along x, m.")]
+Depth = Annotated[float, typer.Option(help="Width of the bed across, m.")]
+Friction = Annotated[float, typer.Option(help="Friction coefficient between balls.")]
+ToolFriction = Annotated[float, typer.Option(help="Friction coefficient between the tool and balls.")]
+Gravity = Annotated[float, typer.Option(min=1e-3, max=1e3, help="Gravity, m/s^2.")]
+Speed = Annotated[float, typer.Option(help="Speed of the tool, m/s.")]
+Samples = Annotated[int, typer.Option(min=4, max=10_000, help="Rows of the table.")]
+TimeStep = Annotated[float, typer.Option(help="Time step, s.")]
+Tolerance = Annotated[float, typer.Option(help="Largest relative residual of the contact solver.")]
+Seed = Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the balls' radii and places.")]
+Output = Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)]
+
+FOLDER = Path("runs/grains")
+SPREAD = 0.2  # of the radii about their mean
+
+
+@plain_errors
+def plate(
+    *,
+    radius: Annotated[float, typer.Option(help="Radius of the plate, m.")] = 0.04,
+    sinkage: Annotated[float, typer.Option(help="Depth to which the plate is pushed, m.")] = 0.02,
+    balls: Balls = 1500,
+    ball_radius: BallRadius = 0.007,
+    width: Width = 0.2,
+    depth: Depth = 0.2,
+    friction: Friction = 0.5,
+    tool_friction: ToolFriction = 0.5,
+    gravity: Gravity = EARTH,
+    speed: Speed = 0.05,
+    samples: Samples = 25,
+    time_step: TimeStep = 2e-3,
+    tolerance: Tolerance = 3e-3,
+    seed: Seed = 0,
+    output: Output = FOLDER,
+) -> None:
+    """Push a round plate into a bed of balls; write pressure against depth and fit k zⁿ."""
+    from rover_gym.grains.lab import fit_pressure, plate_test, write_table  # noqa: PLC0415 - h5py is slow to load
+
+    check_folder("output", output)
+    options = _options(friction, gravity, time_step, tolerance)
+    bed = _bed(balls, ball_radius, width, depth, seed, friction, gravity)
+    with console().status("pushing the plate"):
+        points = plate_test(
+            bed, radius, depth=sinkage, speed=speed, samples=samples, plate_friction=tool_friction, **options
+        )
+    output.mkdir(parents=True, exist_ok=True)
+    say_path("table", write_table(points, output / "plate.csv"))
+    law = fit_pressure(points)
+    _say(
+        "pressure k zⁿ from the first contact",
+        {"k": f"{law.k:.3g} ± {law.k_error:.2g} N/m^(n+2)", "n": f"{law.n:.2f} ± {law.n_error:.2f}"},
+    )
+
+
+@plain_errors
+def shear(
+    *,
+    normal_stress: Annotated[list[float], typer.Option(help="Normal stress, Pa; may be given several times.")] = [  # noqa: B006 - typer copies it
+        2000.0,
+        4000.0,
+    ],
+    radius: Annotated[float, typer.Option(help="Radius of the disc, m.")] = 0.05,
+    displacement: Annotated[float, typer.Option(help="Mean displacement of the disc's area, m.")] = 0.02,
+    balls: Balls = 1500,
+    ball_radius: BallRadius = 0.007,
+    width: Width = 0.2,
+    depth: Depth = 0.2,
+    friction: Friction = 0.5,
+    tool_friction: ToolFriction = 0.5,
+    gravity: Gravity = EARTH,
+    speed: Speed = 0.05,
+    samples: Samples = 25,
+    time_step: TimeStep = 2e-3,
+    tolerance: Tolerance = 3e-3,
+    seed: Seed = 0,
+    output: Output = FOLDER,
+) -> None:
+    """Turn a loaded disc with vanes on a bed of balls; write shear stress against displacement and fit its laws."""
+    from rover_gym.grains.lab import fit_shear, fit_strength, shear_test, write_table  # noqa: PLC0415 - h5py is slow
+
+    check_folder("output", output)
+    options = _options(friction, gravity, time_step, tolerance)
+    bed = _bed(balls, ball_radius, width, depth, seed, friction, gravity)
+    laws, rows = [], {}
+    for stress in normal_stress:
+        with console().status(f"shearing under {stress:g} Pa"):
+            points = shear_test(
+                bed,
+                stress,
+                radius=radius,
+                displacement=displacement,
+                speed=speed,
+                samples=samples,
+                disc_friction=tool_friction,
+                **options,
+            )
+        output.mkdir(parents=True, exist_ok=True)
+        say_path("table", write_table(points, output / f"shear-{stress:g}Pa.csv"))
+        law = fit_shear(points)
+        laws.append(law)
+        scale = f"K {1e3 * law.scale:.2g} ± {1e3 * law.scale_error:.1g} mm"
+        rows[f"{law.normal_stress:.0f} Pa"] = f"limit {law.limit:.0f} ± {law.limit_error:.0f} Pa, {scale}"
+    if len({law.normal_stress for law in laws}) > 1:
+        strength = fit_strength(laws)
+        angle, error = math.degrees(strength.friction_angle), math.degrees(strength.friction_angle_error)
+        rows["friction angle"] = f"{angle:.1f}" + (f" ± {error:.1f}" if math.isfinite(error) else "") + " degrees"
+        rows["cohesion"] = f"{strength.cohesion:.0f} Pa"
+    _say("shear stress, limit (1 - exp(-j / K))", rows)
+
+
+@plain_errors
+def wheel(
+    *,
+    slip: Annotated[list[float], typer.Option(help="Slip, from -1 to below 1; may be given several times.")] = [  # noqa: B006 - typer copies it
+        0.0,
+        0.25,
+        0.5,
+        0.75,
+    ],
+    slip_angle: Annotated[float, typer.Option(help="Angle between the wheel's plane and its travel, degrees.")] = 0.0,
+    load: Annotated[float, typer.Option(help="Weight on the wheel, N.")] = 24.0,
+    radius: Annotated[float, typer.Option(help="Radius of the wheel, m.")] = 0.058,
+    wheel_width: Annotated[float, typer.Option(help="Width of the wheel, m.")] = 0.05,
+    run_in: Annotated[float, typer.Option(help="Travel that is not measured, m.")] = 0.05,
+    distance: Annotated[float, typer.Option(help="Travel that is measured, m.")] = 0.1,
+    balls: Balls = 1500,
+    ball_radius: BallRadius = 0.008,
+    width: Width = 0.33,
+    depth: Depth = 0.16,
+    friction: Friction = 0.5,
+    tool_friction: ToolFriction = 0.5,
+    gravity: Gravity = EARTH,
+    speed: Speed = 0.05,
+    time_step: TimeStep = 2e-3,
+    tolerance: Tolerance = 3e-3,
+    seed: Seed = 0,
+    output: Output = FOLDER,
+) -> None:
+    """Drive a wheel over a bed of balls; write pull, lateral force, torque and sinkage against slip."""
+    from rover_gym.grains.lab import fit_pull, wheel_test, write_table  # noqa: PLC0415 - h5py is slow to load
+
+    check_folder("output", output)
+    options = _options(friction, gravity, time_step, tolerance)
+    bed = _bed(balls, ball_radius, width, depth, seed, friction, gravity)
+    with progress_bar() as bar:
+        task = bar.add_task("wheel", total=len(slip), state="")
+        points = wheel_test(
+            bed,
+            slip,
+            slip_angle=math.radians(slip_angle),
+            load=load,
+            radius=radius,
+            width=wheel_width,
+            speed=speed,
+            run_in=run_in,
+            distance=distance,
+            wheel_friction=tool_friction,
+            progress=lambda done: bar.update(task, completed=done, state=f"{done} of {len(slip)}"),
+            **options,
+        )
+    output.mkdir(parents=True, exist_ok=True)
+    say_path("table", write_table(points, output / "wheel.csv"))
+    rows = {
+        f"slip {p.slip:g}": f"pull {p.pull:.2f} ± {p.pull_error:.2f} N,"
+        f" lateral {p.lateral:.2f} ± {p.lateral_error:.2f} N,"
+        f" torque {p.torque:.3f} N m, sinkage {1e3 * p.sinkage:.1f} mm"
+        for p in points
+    }
+    slips = {p.slip for p in points}
+    if len(slips) >= 4 and sum(s >= 0.5 for s in slips) >= 2:
+        fit = fit_pull(points)
+        rows["A, s₀, K"] = ", ".join(f"{e.value:.3f}" for e in (fit.limit, fit.free_slip, fit.scale))
+    _say(f"wheel on {balls} balls", rows)
+
+
+def _options(friction: float, gravity: float, time_step: float, tolerance: float) -> dict[str, Any]:
+    """The options of `GrainSimulation`."""
+    return {"friction": friction, "gravity": (0.0, -gravity, 0.0), "time_step": time_step, "tolerance": tolerance}
+
+
+def _bed(
+    balls: int, ball_radius: float, width: float, depth: float, seed: int, friction: float, gravity: float
+) -> "BallBed":
+    from rover_gym.grains.ball_bed import settled_balls  # noqa: PLC0415 - h5py is slow to load
+
+    with console().status("settling the bed"):
+        return settled_balls(
+            balls,
+            width,
+            depth,
+            radius_min=(1.0 - SPREAD) * ball_radius,
+            radius_max=(1.0 + SPREAD) * ball_radius,
+            seed=seed,
+            friction=friction,
+            gravity=(0.0, -gravity, 0.0),
+        )
+
+
+def _say(title: str, rows: dict[str, str]) -> None:
+    table = Table(title=title, show_header=False, title_justify="left")
+    for name, value in rows.items():
+        table.add_row(name, value)
+    console().print(table)

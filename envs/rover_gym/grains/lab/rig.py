@@ -1,0 +1,151 @@
+"""A test rig on a bed: a tool on driven joints, the forces of the grains on it, and its checks.
+
+Driven joints follow set-points that move, held by an implicit controller so stiff that they lag by micrometres. Its
+stiffness goes with mass over the step squared, so a rig keeps its motion exactly where times are scaled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.grains.ball_bed import BallBed
+from rover_gym.mechanics import GrainSimulation, OptionError, Plane, RoverGrainSimulation, RoverModel, Simulation
+from rover_gym.validation import number, refuse
+
+Array = npt.NDArray[np.float64]
+
+TIME_STEP = 2e-3  # s
+#: Relative residual of the contacts: means over many steps do not need the tenth of it.
+TOLERANCE = 3e-3
+#: Stiffness of a driven joint, in masses (or inertias) over the step squared.
+HOLD = 100.0
+#: Distance at which a tool starts above the balls, in radii of the largest.
+CLEARANCE = 1e-3
+MOST_STEPS = 10_000_000  # of one run: more would not finish
+
+
+class Rig:
+    """A tool on a bed, moved joint by joint. The bed's floor bears the tool too.
+
+    Args:
+        bed: Balls at rest.
+        machine: The machine, as `RoverModel.from_dict` takes it. Its last solid is the tool.
+        start: Coordinates at which it starts, by joint, m and rad.
+        tool_friction: Coulomb's coefficient between the tool and grains.
+        **options: Options of `GrainSimulation`; `time_step` and `tolerance` are those of this module by default.
+
+    Raises:
+        OptionError: Gravity does not point down, or an option is out of its range.
+        ModelError: The machine is not valid.
+        StateError: The tool is in a ball.
+    """
+
+    def __init__(
+        self, bed: BallBed, machine: dict[str, Any], start: Mapping[str, float], *, tool_friction: float, **options: Any
+    ) -> None:
+        grains = ground(bed, **options)
+        model = RoverModel.from_dict(machine)
+        tool = Simulation(
+            model,
+            Plane(),
+            gravity=grains.settings["gravity"],
+            friction=tool_friction,
+            time_step=grains.time_step,
+        )
+        joints = model.dof_names
+        tool.set_state([start.get(name, 0.0) for name in joints], np.zeros(len(joints)))
+        self.both = RoverGrainSimulation(tool, grains, wheel_friction=tool_friction)
+        self.time_step = float(grains.time_step)
+        self.steps = self.unconverged = 0
+        self._index = {name: i for i, name in enumerate(joints)}
+        self._tool = model.solid_names[-1]
+        # Diagonal of the mass matrix: what a joint moves.
+        self._moved = np.diag(model.mass_matrix(tool.q))
+
+    def place(self, joint: str) -> float:
+        """Coordinate of a joint, m or rad."""
+        return float(self.both.rover.q[self._index[joint]])
+
+    def step(self, set_points: Mapping[str, float]) -> tuple[Array, Array]:
+        """Takes a step with the driven joints at these set-points at its end.
+
+        Returns:
+            Mean force of the grains on the machine, (3,), N, and moment about the tool's origin, (3,), N m.
+        """
+        rover = self.both.rover
+        for joint, place in set_points.items():
+            stiffness = HOLD * float(self._moved[self._index[joint]]) / self.time_step**2
+            rover.hold(joint, [place], stiffness=stiffness, damping=0.0)
+        report = self.both.step()
+        self.steps += 1
+        self.unconverged += not report.is_converged
+        contacts = rover.contacts
+        if len(contacts) == 0:
+            return np.zeros(3), np.zeros(3)
+        forces = np.einsum("ci,cij->cj", contacts.impulses, contacts.frames) / self.time_step
+        arms = contacts.points - rover.poses()[self._tool][0]
+        return forces.sum(axis=0), np.cross(arms, forces).sum(axis=0)
+
+    def lower(self, joint: str, speed: float, load: float, driven: Mapping[str, float]) -> None:
+        """Lowers the tool along a joint until the grains bear the load, and lets go of that joint.
+
+        A load that is let fall instead sinks in by twice as much.
+
+        Args:
+            joint: A joint whose coordinate grows upwards.
+            speed: m/s.
+            load: N.
+            driven: Set-points of the other driven joints.
+        """
+        place, borne = self.place(joint), 0.0
+        while borne < load:  # the floor bears any
+            place -= speed * self.time_step
+            force, _ = self.step({**driven, joint: place})
+            borne = float(force[1])
+        self.both.rover.release(joint)
+
+
+def ground(bed: BallBed, **options: Any) -> GrainSimulation:
+    """The bed as a simulation with the laboratory's options.
+
+    Raises:
+        OptionError: Gravity does not point down.
+    """
+    grains = bed.simulation(**{"time_step": TIME_STEP, "tolerance": TOLERANCE, **options})
+    gravity = grains.settings["gravity"]
+    if gravity[0] != 0.0 or gravity[2] != 0.0 or gravity[1] >= 0.0:
+        refuse(OptionError, "gravity", tuple(gravity), "must point down")
+    return grains
+
+
+def fall(grains: GrainSimulation) -> float:
+    """Gravity, m/s², positive."""
+    return -float(grains.settings["gravity"][1])
+
+
+def step_count(field: str, duration: float, time_step: float) -> int:
+    """Number of steps in a time, at least one; raises an OptionError naming `field` above the limit."""
+    steps = duration / time_step
+    if not steps <= MOST_STEPS:
+        refuse(OptionError, field, duration, f"must take at most {MOST_STEPS} steps of {time_step:g} s")
+    return max(1, round(steps))
+
+
+def larger_than_grains(field: str, value: object, bed: BallBed) -> float:
+    """A radius or width of a tool, m, at least the diameter of the largest ball."""
+    length = number(field, value, above=0.0)
+    largest = 2.0 * float(bed.radius.max())
+    if length < largest:
+        refuse(OptionError, field, value, f"must be at least the largest ball's diameter, {largest:g} m")
+    return length
+
+
+def clear_height(bed: BallBed, x: float, z: float, reach: float) -> float:
+    """Height above which an upright tool clears the balls within a distance, m."""
+    near = np.hypot(bed.position[:, 0] - x, bed.position[:, 2] - z) < reach + bed.radius
+    heights = (bed.position[:, 1] + bed.radius)[near]
+    return float(heights.max(initial=0.0)) + CLEARANCE * float(bed.radius.max())

@@ -1,0 +1,36 @@
+"""Tables of the laboratory as CSV files."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rover_gym.mechanics import OptionError
+from rover_gym.validation import refuse
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+
+def write_table(points: Sequence[DataclassInstance], path: str | Path) -> Path:
+    """Writes points of one test, a line each under the names of their fields; numbers keep all their digits.
+
+    Args:
+        points: Points of one kind, at least one.
+        path: File to write.
+
+    Raises:
+        OptionError: There is no point.
+        OSError: The file cannot be written.
+    """
+    if not points:
+        refuse(OptionError, "points", points, "must be one or more")
+    path = Path(path)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, [field.name for field in fields(points[0])], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(asdict(point) for point in points)
+    return path
