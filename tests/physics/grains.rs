@@ -447,7 +447,7 @@ fn any_number_of_threads_gives_balls_the_same_bits() {
     assert!(alone.parts.pairs().round.len() > 1000);
     for threads in [1, 2, 3] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
-        let together = pool.build().expect("threads").install(|| falling());
+        let together = pool.build().expect("threads").install(falling);
         assert!(bits(&together) == bits(&alone), "{threads} threads");
     }
 }

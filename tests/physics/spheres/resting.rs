@@ -19,7 +19,9 @@ const G: f64 = 9.81;
 fn primitive(contact: &Contact) -> u32 {
     match contact.key.opposite {
         Opposite::Ground(primitive) => primitive,
-        Opposite::Part(_) | Opposite::Stop => panic!("a lone wheel touches only the ground"),
+        Opposite::Part(_) | Opposite::Grain(_) | Opposite::Stop => {
+            panic!("a lone wheel touches only the ground")
+        }
     }
 }
 

@@ -2,8 +2,8 @@
 //!
 //! Both keep their own simulation, with state, commands, contacts and snapshots. A step moves both
 //! as one system: the balls by the law of [`crate::system::grains`], the rover's contacts with them
-//! by [`AmongGrains`], and its contacts with the ground by its own law. It is taken with the options
-//! of the bed.
+//! by [`AmongGrains`], and its contacts with the ground by its own law. It is taken with the
+//! options of the bed.
 
 use super::active_contact::ActiveContact;
 use super::grains::GrainSimulation;
@@ -130,7 +130,7 @@ impl RoverInGrains {
         let mut deepest = bed.penetration();
         let parts = Part::all(rover.model());
         visit_near(rover, bed, parts, 0.0, |_, _, gap| {
-            deepest = deepest.max(-gap)
+            deepest = deepest.max(-gap);
         });
         deepest
     }
@@ -337,7 +337,7 @@ impl RoverInGrains {
                         position: rover.scene.position(&rover.parts, contact),
                         impulse,
                         velocity,
-                    })
+                    });
                 }
             }
         }

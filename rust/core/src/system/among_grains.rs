@@ -1,7 +1,7 @@
 //! A multibody tree among balls: the contacts of its wheels, boxes and balls with the grains.
 //!
-//! The law is that of the grains ([`super::grains`]): frames are those of the start of the step, and
-//! a pair may close by its gap. Both sides are pushed at the same point, that of the grain's
+//! The law is that of the grains ([`super::grains`]): frames are those of the start of the step,
+//! and a pair may close by its gap. Both sides are pushed at the same point, that of the grain's
 //! surface, so the impulses conserve linear and angular momentum. All contacts of a step, among
 //! grains and of the tree, are one problem, solved on the bodies' velocities
 //! ([`crate::problem::BodyPairs`]): forces go both ways within the step.

@@ -74,8 +74,8 @@ pub type ContactOf<A, B, K> = Of<
 
 /// Contacts between two systems.
 ///
-/// Both systems are placed, and their own contacts found and assembled, before the coupling is asked
-/// for the same. Local vectors hold its own contacts alone.
+/// Both systems are placed, and their own contacts found and assembled, before the coupling is
+/// asked for the same. Local vectors hold its own contacts alone.
 pub trait Coupling<A: MechanicalSystem, B: MechanicalSystem> {
     /// A contact between them.
     type Contact: UnilateralContact + Clone;

@@ -55,8 +55,8 @@ pub struct BodyPairs<const D: usize> {
     /// Number of factor coordinates.
     pub n_coordinates: usize,
     /// Slab of each round body, by the place of its coordinates, in space: slabs lie side by side,
-    /// thick enough that most contacts are within one or between neighbours. Empty: one slab. Sweeps
-    /// visit slabs on several threads; the answer depends on the slabs alone.
+    /// thick enough that most contacts are within one or between neighbours. Empty: one slab.
+    /// Sweeps visit slabs on several threads; the answer depends on the slabs alone.
     pub slabs: Vec<u32>,
 }
 

@@ -1,9 +1,9 @@
 //! Sweeps that are extrapolated, judged and kept from adding energy, whatever a sweep visits.
 //!
 //! The next sweep starts not from the impulses p_k but from `p_k + β (p_k − p_{k−1})`, with β from
-//! Nesterov's sequence. Where the change per sweep grows the sequence goes back, to its start or, for
-//! balls, part of the way ([`Relaxation::KEPT`]). That saves sweeps in most problems and may never
-//! end in a wedged one, so it ends after a while.
+//! Nesterov's sequence. Where the change per sweep grows the sequence goes back, to its start or,
+//! for balls, part of the way ([`Relaxation::KEPT`]). That saves sweeps in most problems and may
+//! never end in a wedged one, so it ends after a while.
 
 use crate::problem::{Residual, passive_share};
 use crate::solver::options::SolverOptions;
@@ -112,4 +112,19 @@ fn next_share(t: &mut f64) -> f64 {
     let share = (*t - 1.0) / next;
     *t = next;
     share
+}
+
+/// Projects the tangential part of an impulse onto the friction disc of a nonnegative radius.
+#[inline]
+pub(super) fn draw_in<const D: usize>(p: &mut [f64; D], limit: f64) {
+    if D == 2 {
+        p[1] = p[1].min(limit).max(-limit);
+        return;
+    }
+    let square = p[1] * p[1] + p[2] * p[2];
+    if square > limit * limit {
+        let share = limit / square.sqrt();
+        p[1] *= share;
+        p[2] *= share;
+    }
 }

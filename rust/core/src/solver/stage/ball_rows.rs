@@ -11,7 +11,7 @@
 //! the normal and the tangent plane, so that with all others fixed the law's answer is a clamp of
 //! the normal part and a shortening of the tangential one.
 
-#![allow(clippy::inline_always)] // a visit is one piece of code: calls would cost as much as its sums
+#![allow(clippy::inline_always)] // a visit is one piece of code: calls cost as much as sums
 
 use crate::law::signorini;
 use crate::problem::{BodyPairs, RoundPair};

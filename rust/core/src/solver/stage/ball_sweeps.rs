@@ -2,10 +2,10 @@
 //!
 //! The balls stand in slabs ([`BodyPairs::slabs`]), each next to its neighbours in memory. A slab's
 //! block of contacts are those among its own balls and with the next slab's. Blocks of even slabs
-//! share no ball, nor do those of odd ones: a sweep visits all even blocks at the same time and then
-//! all odd ones, on as many threads as there are. Contacts that reach farther, and those of the
-//! machine, follow one by one. The order within a block, and so every bit of the answer, depends on
-//! the slabs alone and not on the threads.
+//! share no ball, nor do those of odd ones: a sweep visits all even blocks at the same time and
+//! then all odd ones, on as many threads as there are. Contacts that reach farther, and those of
+//! the machine, follow one by one. The order within a block, and so every bit of the answer,
+//! depends on the slabs alone and not on the threads.
 //!
 //! A contact whose impulse has stopped changing rests for some sweeps. Its part of the extrapolated
 //! velocities is taken back when it comes to rest, so that velocities and impulses still belong
@@ -15,9 +15,8 @@
 
 #![allow(clippy::inline_always)] // a visit is one piece of code
 
-use super::accelerated::{Measured, Relaxation};
+use super::accelerated::{Measured, Relaxation, draw_in};
 use super::ball_rows::{Ball, BallRow, MachineRow, mass_of, to_frame};
-use super::body_sweeps::draw_in;
 use crate::law::coulomb::violation;
 use crate::problem::{BodyPairs, Magnitudes, Violations};
 use crate::solver::options::SolverOptions;
@@ -449,8 +448,8 @@ fn extrapolate(balls: &mut [Ball], before: &mut [Ball], share: f64, is_parallel:
 }
 
 impl Relaxation for BallSolve<'_> {
-    /// Beds in flow take 5 to 30% fewer sweeps than with a new start; with 0.7 slow flow takes more,
-    /// with 0.85 some solves never end.
+    /// Beds in flow take 5 to 30% fewer sweeps than with a new start; with 0.7 slow flow takes
+    /// more, with 0.85 some solves never end.
     const KEPT: f64 = 0.5;
     const PATIENCE: usize = 20;
 

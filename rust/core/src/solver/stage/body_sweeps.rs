@@ -17,7 +17,7 @@
 //! Source: Jean 1999 and Moreau 1999 (the sweep); Nesterov 1983, O'Donoghue
 //! and Candès 2015 (extrapolation with restart).
 
-use super::accelerated::accelerate;
+use super::accelerated::{accelerate, draw_in};
 use super::ball_sweeps::{BallSolve, BallSweeps};
 use super::disk_sweeps::{DiskSolve, DiskSweeps};
 use crate::problem::BodyPairs;
@@ -154,20 +154,5 @@ fn unsolved() -> SolveReport {
         method: Method::GaussSeidel,
         stage: Stage::BodySweeps,
         rungs: Rungs::default(),
-    }
-}
-
-/// Projects the tangential part of an impulse onto the friction disc of a nonnegative radius.
-#[inline]
-pub(super) fn draw_in<const D: usize>(p: &mut [f64; D], limit: f64) {
-    if D == 2 {
-        p[1] = p[1].min(limit).max(-limit);
-        return;
-    }
-    let square = p[1] * p[1] + p[2] * p[2];
-    if square > limit * limit {
-        let share = limit / square.sqrt();
-        p[1] *= share;
-        p[2] *= share;
     }
 }

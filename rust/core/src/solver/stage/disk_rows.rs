@@ -1,10 +1,12 @@
 //! Contact rows of [`super::disk_sweeps`]: all data that a visit reads and writes, side by side.
 
-use super::body_sweeps::draw_in;
-use super::disk_sweeps::Velocity;
+use super::accelerated::draw_in;
 use crate::problem::{BodyPairs, RoundPair};
 use crate::solver::local::one_contact::solve_one_contact;
 use crate::spatial::space::{body_velocities, dot};
+
+/// Numbers of a body: its velocity, that of its rim, and a zero as padding.
+pub(super) type Velocity = [f64; 4];
 
 /// A contact among disks with all data that a sweep reads and writes: two cache lines.
 #[derive(Clone, Copy, Debug)]

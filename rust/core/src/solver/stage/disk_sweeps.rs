@@ -4,16 +4,13 @@
 //! the one before it.
 
 use super::accelerated::{Measured, Relaxation};
-use super::disk_rows::{MachineRow, Row};
+use super::disk_rows::{MachineRow, Row, Velocity};
 use crate::law::coulomb::violation;
 use crate::problem::{BodyPairs, Magnitudes, Violations};
 use crate::spatial::space::{body_velocities, dot};
 
 /// Places of the list that are visited in turn.
 const PLACES: usize = 4;
-
-/// Numbers of a body: its velocity, that of its rim, and a zero as padding.
-pub(super) type Velocity = [f64; 4];
 
 /// Scratch.
 #[derive(Clone, Debug, Default)]
