@@ -6,20 +6,21 @@ from typing import Any
 from matplotlib.ticker import NullFormatter
 
 from validation.drawing import OTHER, OURS, PAPER, finish, plt
-from validation.wheel_on_balls import MEASURED
+from validation.wheel_on_balls import measurements
 
 
 def wheel_on_balls(data: dict[str, Any], path: Path) -> None:
     """Pull, lateral force and sinkage against slip beside the measurements."""
     figure, panels = plt.subplots(1, 3, figsize=(11.4, 4.0), dpi=110, layout="constrained")
     names = (("pull", "pull, N", 1.0), ("lateral", "lateral force, N", 1.0), ("sinkage", "sinkage, mm", 1e3))
-    runs = sorted(data["runs"], key=lambda run: run["radius"])
+    runs, sand = sorted(data["runs"], key=lambda run: run["radius"]), measurements()
     for column, (axes, (name, label, factor)) in enumerate(zip(panels, names, strict=True)):
         for degrees, style in ((0, "-"), (45, "--")):
             rows = [i for i, point in enumerate(runs[0]["points"]) if point["degrees"] == degrees]
             slips = [runs[0]["points"][i]["slip"] for i in rows]
-            measured = [factor * MEASURED[i][column] for i in rows]
-            axes.plot(slips, measured, style, color=PAPER, marker="o", label=f"sand, {degrees}° slip angle")
+            if sand:
+                measured = [factor * sand[i][column] for i in rows]
+                axes.plot(slips, measured, style, color=PAPER, marker="o", label=f"sand, {degrees}° slip angle")
             for run, colour in zip(runs, (OURS, OTHER), strict=False):
                 values = [factor * run["points"][i][name] for i in rows]
                 errors = [factor * run["points"][i][f"{name}_error"] for i in rows]

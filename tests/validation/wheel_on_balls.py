@@ -6,9 +6,12 @@ nothing is fitted to the wheel's forces. Two sizes of balls are extrapolated to 
 
 from __future__ import annotations
 
+import csv
 import math
+import os
 import time
 from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -35,16 +38,36 @@ POINTS = (
     (45, -0.2, 21.9),
     (45, 0.5, 21.9),
 )
-#: Means of three runs of the smooth wheel at `POINTS`, of the public data beside "3D terramechanics" (MIT licence,
-#: copyright 2022): drawbar pull and lateral force, N, and sinkage, m.
-MEASURED = (
-    (-24.13, 0.0, 0.0324),
-    (-1.34, 0.0, 0.0144),
-    (0.97, 0.0, 0.0227),
-    (-8.82, 15.70, 0.0277),
-    (0.10, 8.21, 0.0261),
-)
+#: Names the file of the measurements, `wheel_on_sand.csv` of the public data beside "3D terramechanics" (Carnegie
+#: Mellon University, MIT licence, copyright 2022). Without it nothing is compared.
+FILE = "WHEEL_ON_SAND"
 QUANTITIES = ("pull", "lateral", "sinkage")
+
+
+def measurements() -> list[list[float]]:
+    """Pull and lateral force, N, and sinkage, m, measured at `POINTS`; empty without the file.
+
+    Means of the smooth wheel's runs at the rim speed whose slip is nearest.
+    """
+    path = os.environ.get(FILE)
+    if not path:
+        return []
+    with Path(path).open(encoding="utf-8", newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["wheel"] == "smooth"]
+    found = []
+    for angle, slip, _ in POINTS:
+        groups: dict[str, list[dict[str, str]]] = {}
+        for row in rows:
+            if float(row["slip_angle_deg"]) == angle:
+                groups.setdefault(row["nominal_rim_speed_mm_s"], []).append(row)
+        runs = min(groups.values(), key=lambda runs: abs(_mean(runs, "slip") - slip))
+        pull, lateral = _mean(runs, "drawbar_N"), _mean(runs, "lateral_N") if angle else 0.0
+        found.append([pull, lateral, _mean(runs, "sinkage_mm") / 1e3])
+    return found
+
+
+def _mean(rows: list[dict[str, str]], column: str) -> float:
+    return float(np.mean([float(row[column]) for row in rows]))
 
 
 def bed_of(radius: float, count: int, seed: int) -> BallBed:
@@ -111,11 +134,12 @@ def summary(runs: list[dict[str, Any]]) -> dict[str, Any]:
         "fine": means[fine],
         "extrapolated": means[fine] + share * (means[fine] - means[coarse]),
     }
-    measured = np.array(MEASURED)
+    measured = measurements()
     return {
         "rms": {
             name: dict(zip(QUANTITIES, np.sqrt(np.mean((values - measured) ** 2, axis=0)).tolist(), strict=True))
             for name, values in found.items()
+            if measured
         },
         "values": {name: values.tolist() for name, values in found.items()},
     }
