@@ -3208,6 +3208,7 @@ class GrainSimulation:
             StateError: The snapshot belongs to other grains or is damaged. Nothing has changed.
         """
 
+@final
 class RoverGrainSnapshot:
     """Everything that a rover among grains needs to continue bit for bit. Picklable."""
 
