@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from rover_gym.grains.stored_vessel import stored_vessel
 from rover_gym.mechanics import GrainSimulation, RoverGrainSimulation, RoverModel, Simulation
-from rover_gym.record.channels import Channel
+from rover_gym.record.channels import Channel, state_channels
 from rover_gym.record.facts import row_count
 from rover_gym.record.recorder import Recorder
 from rover_gym.validation import number
@@ -154,21 +154,7 @@ def _rover_channels(model: RoverModel) -> tuple[Channel, ...]:
     wheels = tuple(model.wheel_names)
     n = len(wheels)
     return (
-        Channel(
-            "q",
-            "m, rad",
-            "public coordinates: trunk x, y (up), z (m); roll, heading, pitch, joint angles (rad);"
-            " trunk attitude R = Ry(heading) Rz(pitch) Rx(roll)",
-            (model.nq,),
-            tuple(model.dof_names),
-        ),
-        Channel(
-            "v",
-            "m/s, rad/s",
-            "trunk origin's velocity, world (m/s); trunk's angular velocity, world (rad/s); joint rates (rad/s)",
-            (model.nv,),
-            ("v_x", "v_y", "v_z", "omega_x", "omega_y", "omega_z", *model.dof_names[6:]),
-        ),
+        *state_channels(model),
         Channel(
             "wheel_forces",
             "N",

@@ -32,6 +32,27 @@ class Channel:
     packed: bool = False
 
 
+def state_channels(model: RoverModel) -> tuple[Channel, Channel]:
+    """The channels `q` and `v` of every recording of a rover."""
+    return (
+        Channel(
+            "q",
+            "m, rad",
+            "public coordinates: trunk x, y (up), z (m); roll, heading, pitch, joint angles (rad);"
+            " trunk attitude R = Ry(heading) Rz(pitch) Rx(roll)",
+            (model.nq,),
+            tuple(model.dof_names),
+        ),
+        Channel(
+            "v",
+            "m/s, rad/s",
+            "trunk origin's velocity, world (m/s); trunk's angular velocity, world (rad/s); joint rates (rad/s)",
+            (model.nv,),
+            ("v_x", "v_y", "v_z", "omega_x", "omega_y", "omega_z", *model.dof_names[6:]),
+        ),
+    )
+
+
 class RoverSampler:
     """Samples rows from a simulation.
 
@@ -45,21 +66,7 @@ class RoverSampler:
         self._wheel_solids = [wheel["solid"] for wheel in model.to_dict()["wheels"]]
         self.channels = (
             Channel("time", "s", "time since the run's start"),
-            Channel(
-                "q",
-                "m, rad",
-                "public coordinates: trunk x, y (up), z (m); roll, heading, pitch, joint angles (rad);"
-                " trunk attitude R = Ry(heading) Rz(pitch) Rx(roll)",
-                (model.nq,),
-                tuple(model.dof_names),
-            ),
-            Channel(
-                "v",
-                "m/s, rad/s",
-                "trunk origin's velocity, world (m/s); trunk's angular velocity, world (rad/s); joint rates (rad/s)",
-                (model.nv,),
-                ("v_x", "v_y", "v_z", "omega_x", "omega_y", "omega_z", *model.dof_names[6:]),
-            ),
+            *state_channels(model),
             Channel("wheel_gaps", "m", "distance from wheel to ground, negative where they overlap", (n,), wheels),
             Channel(
                 "wheel_forces",
