@@ -41,6 +41,7 @@ pub mod lanes;
 pub mod law;
 pub mod multibody;
 pub mod planar;
+mod pool;
 pub mod problem;
 pub mod quantity;
 pub mod scalar;

@@ -12,7 +12,7 @@ use rover_core::system::grains::{
 use crate::arguments::{Given, flags, text};
 use crate::arrays::{array, vector};
 use crate::errors::{BorderError, Kind, Value};
-use crate::options::{STABILISATIONS, choice, name_of};
+use crate::options::{GRAIN_STABILISATIONS, choice, name_of};
 use crate::planar_ground::quantity;
 
 /// An error of the grains on its way to Python.
@@ -142,12 +142,16 @@ pub struct StepArguments<'py> {
     /// Whether what slides along a surface goes into it, as along the inside of a curve.
     pub is_hollow: bool,
     pub penetration_tolerance: Given<'py>,
+    pub threads: Given<'py>,
 }
 
-/// What is struck away meets others that were not forecast, and goes into them.
-fn usual_stabilisation(restitution: f64, is_hollow: bool) -> &'static str {
+/// What is struck away meets others that were not forecast, and goes into them. Under a machine
+/// balls sink into the ground by what the solver's tolerance allows.
+fn usual_stabilisation(dimension: usize, restitution: f64, is_hollow: bool) -> &'static str {
     if restitution > 0.0 || is_hollow {
         "projection"
+    } else if dimension == 3 {
+        "push_out"
     } else {
         "none"
     }
@@ -184,12 +188,13 @@ impl StepArguments<'_> {
         options.restitution = restitution;
         options.solver.tolerance = tolerance;
         options.solver.max_sweeps = (self.max_iterations).count(2000, option, "max_iterations")?;
+        options.solver.threads = self.threads.count(1, option, "threads")?;
         let stabilisation = match self.stabilisation.some() {
             Some(given) => text(&given, option, "stabilisation")?,
-            None => usual_stabilisation(restitution, self.is_hollow).to_owned(),
+            None => usual_stabilisation(D, restitution, self.is_hollow).to_owned(),
         };
         options.stabilisation =
-            choice::<Stabilisation>("stabilisation", &stabilisation, &STABILISATIONS)?;
+            choice::<Stabilisation>("stabilisation", &stabilisation, &GRAIN_STABILISATIONS)?;
         options.solver.velocity_tolerance =
             usual.speed * tolerance * speed_scale(options.gravity.norm(), usual_weight);
         if let Some(depth) = (self.penetration_tolerance).maybe(option, "penetration_tolerance")? {
@@ -240,7 +245,7 @@ pub fn settings<'py>(
     settings.set_item("time_step", options.time_step)?;
     settings.set_item("tolerance", options.solver.tolerance)?;
     settings.set_item("max_iterations", options.solver.max_sweeps)?;
-    let stabilisation = name_of(options.stabilisation, &STABILISATIONS);
+    let stabilisation = name_of(options.stabilisation, &GRAIN_STABILISATIONS);
     settings.set_item("stabilisation", stabilisation)?;
     settings.set_item("penetration_tolerance", options.penetration_tolerance)?;
     Ok(settings)

@@ -63,15 +63,18 @@ type Packed<'py> = (
 ///         to 25 times that, in units of the root of gravity times the smallest radius; without
 ///         gravity that of 9.81 m/s².
 ///     max_iterations: Largest number of sweeps of the contact solver in a step.
-///     stabilisation: "projection" moves overlapping bodies apart, which may add energy by lifting
-///         those above; "none" leaves them. By default "none", but "projection" with restitution
-///         or in a vessel: a step along the inside of a curve leads into it.
-///     penetration_tolerance: Overlap that projection leaves alone, m; 0.5% of the smallest radius
-///         by default.
+///     stabilisation: "projection" moves overlapping bodies apart, "push_out" lets them part by a
+///         fifth of their excessive overlap in each step; both may add energy by lifting those
+///         above. "none" leaves overlaps. By default "push_out", but "projection" with
+///         restitution or in a vessel: a step along the inside of a curve leads into it.
+///     penetration_tolerance: Overlap that stabilisation leaves alone, m; 0.5% of the smallest
+///         radius by default.
 ///     sleep: Whether balls at rest far from anything that moves are left out of the step.
 ///     sleep_speed: Speed below which a ball is at rest, m/s; 5e-4 by default.
 ///     sleep_distance: Distance within which nothing may move for a ball to sleep, m; 0.2 by
 ///         default.
+///     threads: Number of threads that solve the contact problem. The answer does not depend on
+///         it; below some thousands of balls a second one gains little.
 ///
 /// Raises:
 ///     ModelError: A radius or mass is not finite and positive.
@@ -105,8 +108,8 @@ impl GrainSimulation {
         friction = Given::MISSING, wall_friction = Given::MISSING, cohesion = Given::MISSING, cohesion_range = Given::MISSING, restitution = Given::MISSING,
         gravity = None, time_step = Given::MISSING, tolerance = Given::MISSING, max_iterations = Given::MISSING,
         stabilisation = Given::MISSING, penetration_tolerance = Given::MISSING,
-        sleep = Given::MISSING, sleep_speed = Given::MISSING, sleep_distance = Given::MISSING),
-        text_signature = "(radius, mass, position, *, kinematic=None, walls=None, wall_velocity=None, vessel=None, terrain=None, friction=0.5, wall_friction=0.5, cohesion=0.0, cohesion_range=None, restitution=0.0, gravity=None, time_step=0.002, tolerance=0.001, max_iterations=2000, stabilisation=None, penetration_tolerance=None, sleep=False, sleep_speed=None, sleep_distance=None)")]
+        sleep = Given::MISSING, sleep_speed = Given::MISSING, sleep_distance = Given::MISSING, threads = Given::MISSING),
+        text_signature = "(radius, mass, position, *, kinematic=None, walls=None, wall_velocity=None, vessel=None, terrain=None, friction=0.5, wall_friction=0.5, cohesion=0.0, cohesion_range=None, restitution=0.0, gravity=None, time_step=0.002, tolerance=0.001, max_iterations=2000, stabilisation=None, penetration_tolerance=None, sleep=False, sleep_speed=None, sleep_distance=None, threads=1)")]
     fn new(
         radius: &Bound<'_, PyAny>,
         mass: &Bound<'_, PyAny>,
@@ -130,6 +133,7 @@ impl GrainSimulation {
         sleep: Given<'_>,
         sleep_speed: Given<'_>,
         sleep_distance: Given<'_>,
+        threads: Given<'_>,
     ) -> PyResult<Self> {
         let gravity = gravity.map(|g| triple(g, Kind::Option, "gravity"));
         let balls = BallArguments {
@@ -154,6 +158,7 @@ impl GrainSimulation {
                 stabilisation,
                 is_hollow: vessel.is_some(),
                 penetration_tolerance,
+                threads,
             },
             sleep,
             sleep_speed,

@@ -36,6 +36,12 @@ pub const STABILISATIONS: [(&str, Stabilisation); 2] = [
     ("projection", Stabilisation::Projection),
     ("none", Stabilisation::None),
 ];
+/// Stabilisations of grains by name.
+pub const GRAIN_STABILISATIONS: [(&str, Stabilisation); 3] = [
+    ("projection", Stabilisation::Projection),
+    ("push_out", Stabilisation::PushOut),
+    ("none", Stabilisation::None),
+];
 
 /// The word that stands for a value.
 pub fn name_of<T: PartialEq + Copy>(value: T, choices: &[(&'static str, T)]) -> &'static str {

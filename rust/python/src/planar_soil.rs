@@ -171,6 +171,7 @@ impl SoilSimulation {
             stabilisation,
             is_hollow: false,
             penetration_tolerance,
+            threads: Given::MISSING,
         };
         let options = steps.options(&disks, USUAL)?;
         let lines = bed_arguments::walls(walls)?;

@@ -24,6 +24,10 @@ pub enum Stabilisation {
     /// Projection of the position onto gap ≥ 0 if penetration exceeds `penetration_tolerance`.
     #[default]
     Projection,
+    /// Among grains only, elsewhere as `None`: a pair that overlaps by more than
+    /// `penetration_tolerance` parts by a fifth of the excess in each step. It is part of the
+    /// velocity law, and adds at most the pair's normal impulse times that speed to the energy.
+    PushOut,
 }
 
 /// Step, scheme, laws and tolerances.
@@ -128,6 +132,9 @@ impl StepOptions {
             (0.0..=1.0).contains(&self.forecast),
             "in [0, 1]",
         )?;
+        let threads = self.solver.threads;
+        let is_count = (1..=1024).contains(&threads);
+        demand("threads", threads as f64, is_count, "from 1 to 1024")?;
         let depth = self.penetration_tolerance;
         demand(
             "penetration_tolerance",

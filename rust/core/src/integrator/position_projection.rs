@@ -24,7 +24,7 @@ pub(super) fn project<S: MechanicalSystem>(
     ws: &mut ScratchOf<S>,
     report: &mut StepReport,
 ) -> bool {
-    if options.stabilisation == Stabilisation::None {
+    if options.stabilisation != Stabilisation::Projection {
         return false;
     }
     let d = S::DIMENSION.components();

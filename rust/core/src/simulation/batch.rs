@@ -6,12 +6,12 @@
 use rayon::ThreadPool;
 
 use super::error::BatchError;
-use super::pool::Pool;
 use super::reading::{Look, ReadingLayout, ReadingScratch};
 use super::rover::{Placement, RoverSimulation};
 use super::turns::{Bench, Done, Turn, take_turns};
 use crate::integrator::StepError;
 use crate::multibody::Model;
+use crate::pool::Pool;
 
 /// Rovers with the threads that step them.
 pub struct Batch {
@@ -147,7 +147,7 @@ impl Batch {
     /// # Errors
     /// `Threads`, as [`Self::step`].
     pub fn pool(&mut self) -> Result<Option<&ThreadPool>, BatchError> {
-        self.pool.as_mut().map(Pool::of_this_process).transpose()
+        Ok(self.pool.as_mut().map(Pool::of_this_process).transpose()?)
     }
 
     /// Gives every rover its commands, takes `n` steps and writes the readings (n_rovers × size of

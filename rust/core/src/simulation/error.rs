@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use crate::integrator::OptionsError;
+use crate::pool::PoolError;
 
 /// A torque or set-point that is refused.
 #[derive(Debug, Error, Clone, PartialEq)]
@@ -118,4 +119,10 @@ pub enum SnapshotError {
     /// Not finite, or with contacts that the model cannot have.
     #[error("snapshot: its contents are damaged")]
     Damaged,
+}
+
+impl From<PoolError> for BatchError {
+    fn from(PoolError { count, reason }: PoolError) -> Self {
+        Self::Threads { count, reason }
+    }
 }

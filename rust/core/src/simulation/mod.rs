@@ -17,7 +17,6 @@ pub mod fleet;
 pub mod grains;
 pub mod ordinary;
 pub mod planar;
-mod pool;
 pub mod profile;
 pub mod reading;
 pub mod rover;

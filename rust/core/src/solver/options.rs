@@ -104,6 +104,9 @@ pub struct SolverOptions {
     pub budget: u64,
     /// Most contacts for which `Auto` starts with Newton, without Gauss–Seidel first; default 32.
     pub direct_contacts: usize,
+    /// Threads for sweeps over thousands of balls, the only solver that uses any; default 1. The
+    /// answer does not depend on them.
+    pub threads: usize,
 }
 
 impl SolverOptions {
@@ -133,6 +136,7 @@ impl Default for SolverOptions {
             regularisation: 1e-6,
             budget: Self::DEFAULT_BUDGET,
             direct_contacts: 32,
+            threads: 1,
         }
     }
 }

@@ -25,8 +25,12 @@ impl Measured {
     }
 }
 
-/// Sweeps after which a problem counts as hard: every short cut ends then.
+/// Sweeps after which a problem counts as hard: every short cut ends then, and leaps begin.
 const HARD: usize = 150;
+
+/// Sweeps from one leap to the next, and those over which the drift is measured.
+const LEAP: usize = 20;
+const DRIFT: usize = 5;
 
 /// Contacts that are swept.
 pub(super) trait Relaxation {
@@ -46,6 +50,14 @@ pub(super) trait Relaxation {
 
     /// Multiplies all impulses.
     fn scale(&mut self, share: f64);
+
+    /// Remembers the impulses from which [`Self::leap`] measures their drift.
+    fn anchor(&mut self) {}
+
+    /// Goes on along the drift as far as energy falls; whether it has.
+    fn leap(&mut self) -> bool {
+        false
+    }
 }
 
 /// Sweeps until the answer is within the tolerances. The impulses are those of the last
@@ -69,6 +81,14 @@ pub(super) fn accelerate<R: Relaxation>(
                 t = 1.0 + kept * (t - 1.0);
             }
             last_change = change;
+            if is_hard {
+                let since = report.iterations - HARD;
+                if since % LEAP == LEAP - DRIFT {
+                    contacts.anchor();
+                } else if since >= LEAP && since % LEAP == 0 && contacts.leap() {
+                    (t, last_change) = (1.0, f64::INFINITY);
+                }
+            }
             let is_due = rate * change.sqrt() <= 1.0
                 || report.iterations - last_look >= R::PATIENCE
                 || report.iterations == 1

@@ -39,7 +39,7 @@ pub(super) struct BallRow {
     pub q: [f64; 3],
     pub p: [f64; 3],
     /// p of the previous sweep.
-    before: [f64; 3],
+    pub before: [f64; 3],
 }
 
 #[inline(always)]
@@ -242,7 +242,8 @@ pub(super) struct MachineRow {
     pub q: [f64; 3],
     pub mu: f64,
     pub p: [f64; 3],
-    before: [f64; 3],
+    /// p of the previous sweep.
+    pub before: [f64; 3],
 }
 
 impl MachineRow {

@@ -11,11 +11,13 @@
 //! velocities is taken back when it comes to rest, so that velocities and impulses still belong
 //! together.
 //!
-//! Threads are those of the pool that the caller runs in; outside a pool there is one.
+//! Threads are those of the pool that the caller runs in; outside a pool there is one. In a problem
+//! that is hard the impulses leap along their drift ([`super::ball_leap`]).
 
 #![allow(clippy::inline_always)] // a visit is one piece of code
 
 use super::accelerated::{Measured, Relaxation, draw_in};
+use super::ball_leap::Anchor;
 use super::ball_rows::{Ball, BallRow, MachineRow, mass_of, to_frame};
 use crate::law::coulomb::violation;
 use crate::problem::{BodyPairs, Magnitudes, Violations};
@@ -94,6 +96,7 @@ pub(super) struct BallSweeps {
     own: Vec<f64>,
     own_before: Vec<f64>,
     data: Magnitudes,
+    anchor: Anchor,
     is_parallel: bool,
 }
 
@@ -506,6 +509,37 @@ impl Relaxation for BallSolve<'_> {
             work: sums.work,
             free: sums.free,
         }
+    }
+
+    fn anchor(&mut self) {
+        let BallSweeps {
+            rows,
+            machine,
+            balls,
+            own,
+            anchor,
+            ..
+        } = &mut *self.sweeps;
+        anchor.set((rows, machine), balls, own);
+    }
+
+    fn leap(&mut self) -> bool {
+        let BallSweeps {
+            rows,
+            machine,
+            balls,
+            own,
+            anchor,
+            before,
+            own_before,
+            ..
+        } = &mut *self.sweeps;
+        let leapt = anchor.leap((rows, machine), balls, own);
+        if leapt {
+            before.clone_from(balls);
+            own_before.clone_from(own);
+        }
+        leapt
     }
 
     fn scale(&mut self, share: f64) {

@@ -20,6 +20,7 @@
 use super::accelerated::{accelerate, draw_in};
 use super::ball_sweeps::{BallSolve, BallSweeps};
 use super::disk_sweeps::{DiskSolve, DiskSweeps};
+use super::helpers::Helpers;
 use crate::problem::BodyPairs;
 use crate::solver::options::{Method, SolverOptions};
 use crate::solver::report::{Rung, Rungs, SolveReport, SolveStatus, Stage};
@@ -32,6 +33,7 @@ const UNITS: u64 = 30;
 pub struct BodySweeps {
     disks: DiskSweeps,
     balls: BallSweeps,
+    helpers: Helpers,
 }
 
 /// Contacts that the sweeps support: among disks, and among balls.
@@ -81,15 +83,18 @@ impl Swept<3> for BodyPairs<3> {
         u: &mut [f64],
         sweeps: &mut BodySweeps,
     ) -> SolveReport {
-        sweeps.balls.fit(self, (q, mu, p), options);
-        let mut report = unsolved();
-        let mut solve = BallSolve {
-            sweeps: &mut sweeps.balls,
-            pairs: self,
-        };
-        accelerate(&mut solve, options, &mut report);
-        sweeps.balls.write(self, p, u);
-        report
+        let BodySweeps { balls, helpers, .. } = sweeps;
+        helpers.run(options.threads, || {
+            balls.fit(self, (q, mu, p), options);
+            let mut report = unsolved();
+            let mut solve = BallSolve {
+                sweeps: balls,
+                pairs: self,
+            };
+            accelerate(&mut solve, options, &mut report);
+            balls.write(self, p, u);
+            report
+        })
     }
 }
 

@@ -6,6 +6,7 @@
 
 mod accelerated;
 pub(super) mod admm;
+mod ball_leap;
 mod ball_rows;
 mod ball_sweeps;
 pub(super) mod body_sweeps;
@@ -13,6 +14,7 @@ mod disk_rows;
 mod disk_sweeps;
 pub(super) mod gauss_seidel;
 pub(super) mod guided;
+mod helpers;
 pub(super) mod newton;
 mod pivot_rules;
 pub(crate) mod pivoting;

@@ -14,7 +14,7 @@ use super::scene::GrainScene;
 use super::slabs::Slabs;
 use crate::contact::Activation;
 use crate::geometry::Facing;
-use crate::integrator::{MechanicalSystem, Start, StepOptions};
+use crate::integrator::{MechanicalSystem, Stabilisation, Start, StepOptions};
 use crate::problem::{
     BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem, RoundPair,
 };
@@ -553,6 +553,9 @@ where
     }
 }
 
+/// Share of an excessive overlap by which a pair parts in a step, see [`Stabilisation::PushOut`].
+const PUSHED_OUT: f64 = 0.2;
+
 /// Newton's law for a pair that collides within the step; any other pair may close by its gap
 /// (`gap_start`, m).
 ///
@@ -560,6 +563,10 @@ where
 /// [`crate::law::newton_impact`]: here s is what the gap allows.
 pub(in crate::system) fn gap_law(options: &StepOptions, gap_start: f64, u_N_before: f64) -> f64 {
     let h = options.time_step;
+    let excess = gap_start + options.penetration_tolerance;
+    if excess < 0.0 && options.stabilisation == Stabilisation::PushOut {
+        return PUSHED_OUT * excess / h;
+    }
     let gap = gap_start.max(0.0);
     let rebound = options.restitution * u_N_before;
     let slow = 2.0 * options.gravity.norm() * h;

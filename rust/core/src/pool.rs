@@ -2,10 +2,19 @@
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::error::BatchError;
+/// Threads that the operating system did not start.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("threads: {count} could not be started ({reason})")]
+pub(crate) struct PoolError {
+    /// Requested number; 0 stands for one per core.
+    pub count: usize,
+    /// Message of the operating system.
+    pub reason: String,
+}
 
 /// Threads of one process.
-pub(super) struct Pool {
+#[derive(Debug)]
+pub(crate) struct Pool {
     /// None only where a child process could not start its own.
     threads: Option<ThreadPool>,
     count: usize,
@@ -16,8 +25,8 @@ impl Pool {
     /// Starts `count` threads.
     ///
     /// # Errors
-    /// `Threads`.
-    pub(super) fn start(count: usize) -> Result<Self, BatchError> {
+    /// The operating system does not start them.
+    pub(crate) fn start(count: usize) -> Result<Self, PoolError> {
         Ok(Self {
             threads: Some(start(count)?),
             count,
@@ -25,11 +34,16 @@ impl Pool {
         })
     }
 
+    /// How many there are; 0 stands for one per core.
+    pub(crate) fn count(&self) -> usize {
+        self.count
+    }
+
     /// The threads, restarted if the process is a child of the one that started them.
     ///
     /// # Errors
-    /// `Threads`.
-    pub(super) fn of_this_process(&mut self) -> Result<&ThreadPool, BatchError> {
+    /// The operating system does not start them.
+    pub(crate) fn of_this_process(&mut self) -> Result<&ThreadPool, PoolError> {
         self.forget_a_parents();
         let threads = match self.threads.take() {
             Some(threads) => threads,
@@ -54,9 +68,9 @@ impl Drop for Pool {
     }
 }
 
-fn start(count: usize) -> Result<ThreadPool, BatchError> {
+fn start(count: usize) -> Result<ThreadPool, PoolError> {
     let built = ThreadPoolBuilder::new().num_threads(count).build();
-    built.map_err(|error| BatchError::Threads {
+    built.map_err(|error| PoolError {
         count,
         reason: error.to_string(),
     })
