@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
 
-from rover_gym.grains.ball_bed import BallBed, box_walls, check_memory
+from rover_gym.grains.ball_bed import BallBed, box_walls, check_memory, settled_balls
+from rover_gym.grains.sizes import MOST_BALLS
 from rover_gym.mechanics import OptionError
-from rover_gym.validation import whole
+from rover_gym.validation import number, refuse, whole
 
 MOST_TILES = 10_000
+#: Share of the room in a shallow bed that settled balls fill, up to the tops of the uppermost.
+PACKING = 0.5
 
 
 def tiled(bed: BallBed, along: int, across: int) -> BallBed:
@@ -47,3 +53,39 @@ def tiled(bed: BallBed, along: int, across: int) -> BallBed:
         width,
         depth,
     )
+
+
+def settled_track(
+    length: float,
+    across: float,
+    layers: float,
+    *,
+    tile: float = 1.0,
+    radius_min: float,
+    radius_max: float,
+    **options: Any,
+) -> BallBed:
+    """A long shallow bed out of one settled tile.
+
+    Args:
+        length: Least length along x, m; whole tiles are laid.
+        across: Width along z, m.
+        layers: Depth of the bed in mean diameters, about.
+        tile: Length of the settled tile, m.
+        radius_min: Smallest radius, m, of radii drawn evenly;
+        radius_max: and the largest.
+        **options: Those of `settled_balls` and `GrainSimulation`.
+
+    Raises:
+        OptionError: A number is out of its range, or the bed would not fit into the memory.
+    """
+    length, across = number("length", length, above=0.0), number("across", across, above=0.0)
+    layers, tile = number("layers", layers, above=0.0), number("tile", tile, above=0.0, at_most=length)
+    mean = 0.5 * (number("radius_min", radius_min, above=0.0) + number("radius_max", radius_max, above=0.0))
+    along = math.ceil(length / tile - 1e-9)
+    count = PACKING * tile * across * layers * 2.0 * mean / (4.0 / 3.0 * math.pi * mean**3)
+    if not 1.0 <= count <= MOST_BALLS:
+        refuse(OptionError, "tile", tile, f"makes a tile of {count:.3g} balls, not 1 to {MOST_BALLS}")
+    check_memory("length", along * round(count))
+    settled = settled_balls(round(count), tile, across, radius_min=radius_min, radius_max=radius_max, **options)
+    return tiled(settled, along, 1)
