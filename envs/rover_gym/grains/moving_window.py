@@ -21,9 +21,9 @@ Numbers = npt.NDArray[np.int64]
 T = TypeVar("T", np.float64, np.bool_)
 
 #: Thickness of the border, in diameters of the largest ball: what it carries lies on balls and never beside them.
-BORDER = 2.0
+BORDER = 3.0
 #: How far a ball may run out over the border before it gets one of its own, in the same diameters.
-STRAY = 0.5
+STRAY = 1.5
 #: Least reach, in the same diameters.
 LEAST_REACH = 2.0
 
@@ -73,7 +73,7 @@ class MovingWindow:
     """A rover on a bed of which only the balls about the rover's wheels are simulated.
 
     Balls within `reach` of a wheel, seen from above, are simulated, and so are those near a box of the rover that hangs
-    low. The balls around them, two diameters of the largest wide, are kinematic: they keep their place and hold
+    low. The balls around them, three diameters of the largest wide, are kinematic: they keep their place and hold
     the others. Those beyond keep their place too and cost nothing. Once a wheel has moved by `stride` the window is set
     anew, so a ball that rests is never closer to a wheel than `reach - stride`. A ball that is left behind faster
     than `freeze_speed` stays in the simulation, with a border of its own, until it is slower. What is frozen loses

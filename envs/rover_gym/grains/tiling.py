@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -65,7 +66,7 @@ def settled_track(
     radius_max: float,
     **options: Any,
 ) -> BallBed:
-    """A long shallow bed out of one settled tile.
+    """A long shallow bed out of one settled tile, without the balls that reach above its layers.
 
     Args:
         length: Least length along x, m; whole tiles are laid.
@@ -87,5 +88,6 @@ def settled_track(
     if not 1.0 <= count <= MOST_BALLS:
         refuse(OptionError, "tile", tile, f"makes a tile of {count:.3g} balls, not 1 to {MOST_BALLS}")
     check_memory("length", along * round(count))
-    settled = settled_balls(round(count), tile, across, radius_min=radius_min, radius_max=radius_max, **options)
-    return tiled(settled, along, 1)
+    bed = settled_balls(round(count), tile, across, radius_min=radius_min, radius_max=radius_max, **options)
+    low = bed.position[:, 1] + bed.radius <= max(layers, 1.0) * 2.0 * mean
+    return tiled(replace(bed, radius=bed.radius[low], mass=bed.mass[low], position=bed.position[low]), along, 1)
