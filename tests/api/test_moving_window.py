@@ -113,7 +113,7 @@ def test_a_snapshot_continues_bit_for_bit_across_moves_of_the_window(bed: BallBe
     sim = window(bed)
     push(sim, 1.0)
     sim.step(15)
-    taken = pickle.loads(pickle.dumps(sim.snapshot()))
+    taken = pickle.loads(pickle.dumps(sim.snapshot()))  # noqa: S301 - our own
     moves = sim.moves
     sim.step(30)
     end, momentum = state(sim), sim.frozen_momentum

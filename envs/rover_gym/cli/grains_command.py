@@ -18,7 +18,8 @@ from rover_gym.cli.console import (
     say_path,
 )
 from rover_gym.cli.scene_options import ModelName, named_model
-from rover_gym.mechanics import RoverModel
+from rover_gym.mechanics import OptionError, RoverModel
+from rover_gym.validation import number, refuse
 
 if TYPE_CHECKING:
     from rover_gym.grains.grain_recording import Recordable
@@ -29,7 +30,7 @@ grains = typer.Typer(
     no_args_is_help=True,
 )
 
-EARTH = 9.81  # m/s^2
+EARTH, MARS = 9.81, 3.71  # m/s^2
 END = 0.05  # m before the walls' reach at which a rover's crossing ends
 
 Balls = Annotated[int, typer.Option(min=1, max=1_000_000, help="Number of balls.")]
@@ -249,23 +250,23 @@ def track(
     *,
     length: Annotated[float, typer.Option(help="Length of the bed along x, m.")] = 6.0,
     depth: Annotated[float, typer.Option(help="Width of the bed across, m.")] = 1.6,
-    layers: Annotated[float, typer.Option(help="Depth of the bed in diameters of a ball.")] = 2.0,
-    radius: Radius = 0.0175,
+    layers: Annotated[
+        float, typer.Option(help="Depth of the bed in diameters of a ball; below 1 the floor shows between them.")
+    ] = 0.6,
+    radius: Radius = 0.02,
     tile: Annotated[float, typer.Option(help="Length of the settled tile, m, which is laid along the bed.")] = 1.0,
     model: ModelName = "rover",
-    wheel_radius: Annotated[
-        float | None, typer.Option(help="Radius of the wheels, m. Default: as in the model.")
-    ] = None,
+    wheel_radius: Annotated[float, typer.Option(help="Radius of the wheels, m.")] = 0.25,
     wheel_width: Annotated[
         float | None, typer.Option(help="Width of the wheels, m. Default: as in the model; thin discs cut in deep.")
     ] = 0.2,
-    torque: Annotated[float, typer.Option(help="Torque of each wheel, N m, positive forward.")] = 60.0,
+    torque: Annotated[float, typer.Option(help="Torque of each wheel, N m, positive forward.")] = 40.0,
     reach: Annotated[float, typer.Option(help="Distance from a wheel within which balls are simulated, m.")] = 0.3,
     stride: Annotated[float, typer.Option(help="How far a wheel moves before the window follows, m.")] = 0.1,
     friction: Friction = 0.5,
     wall_friction: WallFriction = 0.5,
     wheel_friction: Annotated[float, typer.Option(help="Friction coefficient of the rover on balls.")] = 0.9,
-    gravity: Gravity = EARTH,
+    gravity: Gravity = MARS,
     time_step: TimeStep = 0.004,
     tolerance: Tolerance = 1e-3,
     sleep: Sleep = True,
@@ -281,11 +282,13 @@ def track(
     from rover_gym.grains.tiling import settled_track  # noqa: PLC0415 - as above
 
     check_folder("output", output)
-    chosen = named_model(model) or RoverModel()
-    if wheel_radius is not None:
-        chosen = chosen.replace(wheel_radius=wheel_radius)
+    chosen = (named_model(model) or RoverModel()).replace(wheel_radius=wheel_radius)
     if wheel_width is not None:
         chosen = with_wheel_width(chosen, wheel_width)
+    if number("length", length) < 2.0 * chosen.clear_radius:
+        refuse(
+            OptionError, "length", length, f"must be at least {2.0 * chosen.clear_radius:.2f} m, for the rover to turn"
+        )
     options = _options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
     with console().status("settling a tile"):
         bed = settled_track(length, depth, layers, tile=tile, **_radii(radius), seed=seed, **options)

@@ -51,7 +51,7 @@ class WindowSnapshot:
         inside: Increasing numbers of the window's balls.
         kinematic: Which of them do not move.
         footprint: The rover when the window was last set.
-        low: Height below which parts of the rover count, m.
+        low: Height below which parts of the rover may meet a ball that rests, m.
         frozen_momentum: N s.
         moves: How often the window moved.
         both: The rover among the window's balls.
@@ -119,7 +119,7 @@ class MovingWindow:
         self._inside: Numbers = np.arange(len(radius))
         self._kinematic = self._glued
         self._frozen_momentum, self._moves = 0.0, 0
-        self._low = self._top()
+        self._low = self._top(self._inside)
         self._set(self._parts.footprint(rover, self._low))
 
     @property
@@ -301,17 +301,18 @@ class MovingWindow:
         result[self._inside] = own
         return result
 
-    def _top(self) -> float:
-        """Height below which a part of the rover may meet a ball, m."""
-        return float((self._position[:, 1] + self._radius).max()) + self._diameter
+    def _top(self, balls: Numbers) -> float:
+        """Height below which a part of the rover may meet one of these balls, m."""
+        return float((self._position[balls, 1] + self._radius[balls]).max(initial=-np.inf)) + self._diameter
 
     def _follow(self) -> None:
         """Sets the window anew, if the rover or a ball has gone too far for it."""
         footprint = self._parts.footprint(self._rover, self._low)
         if footprint.has_moved(self._footprint, self._stride) or self._has_strayed():
-            self._position, self._velocity, self._spin = self.position, self.velocity, self.spin
-            self._low = self._top()
-            self._set(self._parts.footprint(self._rover, self._low))
+            self._position[self._inside] = self._grains.position
+            self._velocity[self._inside] = self._grains.velocity
+            self._spin[self._inside] = self._grains.spin
+            self._set(footprint)
             self._moves += 1
 
     def _has_strayed(self) -> bool:
@@ -328,30 +329,31 @@ class MovingWindow:
         moved = self._inside[~self._kinematic]
         rim = np.linalg.norm(self._velocity[moved], axis=1)
         rim += self._radius[moved] * np.linalg.norm(self._spin[moved], axis=1)
-        # A distance for each ball of a long bed costs more than one comparison.
-        low, high = footprint.bounds()
+        fast = moved[rim > self._freeze_speed]
+        # Of a long bed, what is far along x is left out at once.
         x = self._position[:, 0]
-        near = np.flatnonzero((x > low - self._reach - border) & (x < high + self._reach + border))
-        distance = footprint.distance(self._position[near][:, MAP])
-        is_free = np.zeros(len(x), dtype=bool)
-        is_free[near] = distance < self._reach
-        is_inside = is_free.copy()
-        is_inside[near] |= distance < self._reach + border
-        for stray in moved[(rim > self._freeze_speed) & ~is_free[moved]]:
-            is_free[stray] = True
-            about = np.flatnonzero(np.abs(x - x[stray]) < border)
-            away = self._position[about][:, MAP] - self._position[stray, MAP]
-            is_inside[about] |= np.hypot(away[:, 0], away[:, 1]) < border
-        is_free &= ~self._glued
+        low, high = footprint.bounds()
+        low = min(low - self._reach, float(x[fast].min(initial=low))) - border
+        high = max(high + self._reach, float(x[fast].max(initial=high))) + border
+        near = np.flatnonzero((x > low) & (x < high))
+        if not len(near):
+            near = np.array([footprint.distance(self._position[:, MAP]).argmin()])
+        places = self._position[near][:, MAP]
+        distance = footprint.distance(places)
+        is_free, is_inside = distance < self._reach, distance < self._reach + border
+        is_stray = np.isin(near, fast) & ~is_free
+        for stray in places[is_stray]:
+            is_inside |= np.hypot(*(places - stray).T) < border
+        is_free |= is_stray
+        is_free &= ~self._glued[near]
         if not is_inside.any():
-            is_inside[footprint.distance(self._position[:, MAP]).argmin()] = True
-        frozen = moved[~is_free[moved]]
-        speed = np.linalg.norm(self._velocity[frozen], axis=1)
-        self._frozen_momentum += float(self._mass[frozen] @ speed)
+            is_inside[distance.argmin()] = True
+        frozen = np.setdiff1d(moved, near[is_free], assume_unique=True)
+        self._frozen_momentum += float(self._mass[frozen] @ np.linalg.norm(self._velocity[frozen], axis=1))
         self._velocity[frozen] = self._spin[frozen] = 0.0
-        inside = np.flatnonzero(is_inside)
+        self._low = max(self._low, self._top(frozen))
         self._footprint = footprint
-        self._exchange(inside, ~is_free[inside])
+        self._exchange(near[is_inside], ~is_free[is_inside])
 
     def _exchange(self, inside: Numbers, kinematic: Flags) -> None:
         """Puts these balls into the simulation."""
