@@ -249,10 +249,10 @@ def rover(
 def track(
     *,
     length: Annotated[float, typer.Option(help="Length of the bed along x, m.")] = 6.0,
-    depth: Annotated[float, typer.Option(help="Width of the bed across, m.")] = 1.6,
+    depth: Annotated[float, typer.Option(help="Width of the bed across, m.")] = 2.0,
     layers: Annotated[
         float, typer.Option(help="Depth of the bed in diameters of a ball; below 1 the floor shows between them.")
-    ] = 0.6,
+    ] = 0.3,
     radius: Radius = 0.02,
     tile: Annotated[float, typer.Option(help="Length of the settled tile, m, which is laid along the bed.")] = 1.0,
     model: ModelName = "rover",

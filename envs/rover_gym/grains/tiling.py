@@ -66,12 +66,12 @@ def settled_track(
     radius_max: float,
     **options: Any,
 ) -> BallBed:
-    """A long shallow bed out of one settled tile, without the balls that reach above its layers.
+    """A long shallow bed out of one settled tile, without the balls that reach above its layers, if there are several.
 
     Args:
         length: Least length along x, m; whole tiles are laid.
         across: Width along z, m.
-        layers: Depth of the bed in mean diameters, about.
+        layers: Depth of the bed in mean diameters, about; below 1, the share of a layer.
         tile: Length of the settled tile, m.
         radius_min: Smallest radius, m, of radii drawn evenly;
         radius_max: and the largest.
@@ -89,5 +89,7 @@ def settled_track(
         refuse(OptionError, "tile", tile, f"makes a tile of {count:.3g} balls, not 1 to {MOST_BALLS}")
     check_memory("length", along * round(count))
     bed = settled_balls(round(count), tile, across, radius_min=radius_min, radius_max=radius_max, **options)
-    low = bed.position[:, 1] + bed.radius <= max(layers, 1.0) * 2.0 * mean
-    return tiled(replace(bed, radius=bed.radius[low], mass=bed.mass[low], position=bed.position[low]), along, 1)
+    if layers > 1.0:
+        low = bed.position[:, 1] + bed.radius <= layers * 2.0 * mean
+        bed = replace(bed, radius=bed.radius[low], mass=bed.mass[low], position=bed.position[low])
+    return tiled(bed, along, 1)

@@ -152,8 +152,8 @@ impl Sleep {
         }
     }
 
-    /// After an exchange: of the `before` (n) numbers so far, with those marked (n) kinematic. Others
-    /// are awake.
+    /// After an exchange: `before` (n) has the number of each grain so far, if it was there;
+    /// those that were not are awake.
     #[must_use]
     pub fn exchanged(
         &self,
