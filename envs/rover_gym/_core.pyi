@@ -1127,6 +1127,12 @@ class StepReport:
     @property
     def energy_lifted(self) -> float:
         """Potential energy gained by pushing bodies out of penetration, summed over the steps, J."""
+    def followed_by(self, later: StepReport) -> StepReport:
+        """The report of these steps and of further ones.
+
+        Args:
+            later: How the further ones went.
+        """
 
 @final
 class Contacts:
@@ -3167,6 +3173,39 @@ class GrainSimulation:
 
         Raises:
             ModelError: The number of truth values differs, or no ball would be left. Nothing has
+                changed.
+        """
+    def exchange(
+        self,
+        radius: npt.ArrayLike,
+        mass: npt.ArrayLike,
+        position: npt.ArrayLike,
+        before: Sequence[int],
+        *,
+        kinematic: npt.ArrayLike | None = None,
+        velocity: npt.ArrayLike | None = None,
+        spin: npt.ArrayLike | None = None,
+    ) -> None:
+        """Puts other balls in the place of those so far; time and options stay.
+
+        Balls that were there keep their sleep and the impulses of their contacts, from which the
+        next step's solver starts. Overlaps are not refused: a run may have made them. Earlier
+        snapshots fit again once the same balls are back.
+
+        Args:
+            radius: Radii of all balls from here on, (n,), m.
+            mass: Their masses, (n,), kg.
+            position: Their centres, (n, 3), m.
+            before: The number of each among the balls so far, (n,); -1 for one that was not there.
+                Balls that stay keep their order.
+            kinematic: Which of them are kinematic, (n,); none by default.
+            velocity: Velocities of their centres, (n, 3), m/s; at rest by default.
+            spin: Their angular velocities, (n, 3), rad/s; at rest by default.
+
+        Raises:
+            ModelError: A radius or mass is not finite and positive, or `before` does not increase.
+                Nothing has changed.
+            StateError: An array has a wrong shape or an entry that is not finite. Nothing has
                 changed.
         """
     def step(self, n: int = 1) -> StepReport:

@@ -31,6 +31,7 @@ def rover(*arguments: str) -> str:
         ("drum", ["--balls", "40", "--radius", "0.01"], "slope"),
         ("sphere", ["--balls", "100", "--radius", "0.012"], "deepest"),
         ("rover", ["--balls", "150", "--radius", "0.05", "--width", "1.5", "--depth", "1"], "load of all wheels"),
+        ("track", ["--length", "3", "--layers", "1", "--radius", "0.04", "--wheel-radius", "0.25"], "balls simulated"),
     ],
 )
 def test_a_run_is_recorded_and_its_result_told(command: str, options: list[str], said: str, tmp_path: Path) -> None:
@@ -41,7 +42,7 @@ def test_a_run_is_recorded_and_its_result_told(command: str, options: list[str],
     assert run.trajectory.attributes["complete"]
     assert run.time[-1] == pytest.approx(0.1, abs=0.02)
     assert run.trajectory["penetration"].max() < 0.01 * run.radius.min()
-    assert (run.model is not None) == (command == "rover")
+    assert (run.model is not None) == (command in {"rover", "track"})
 
 
 @pytest.mark.parametrize(
@@ -53,6 +54,10 @@ def test_a_run_is_recorded_and_its_result_told(command: str, options: list[str],
         ("drum", ["--balls", "100000"], "--balls"),
         ("rover", ["--width", "0.5", "--balls", "30", "--radius", "0.05"], "--width"),
         ("rover", ["--wheel-width", "0"], "--wheel-width"),
+        ("track", ["--length", "2"], "--length"),
+        ("track", ["--reach", "0.05", "--layers", "0.3", "--length", "3"], "--reach"),
+        ("track", ["--stride", "0.2", "--layers", "0.3", "--length", "3"], "--stride"),
+        ("track", ["--layers", "0"], "--layers"),
     ],
 )
 def test_bad_options_end_with_one_line(command: str, options: list[str], field: str, tmp_path: Path) -> None:

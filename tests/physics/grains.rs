@@ -762,3 +762,25 @@ fn a_simulation_of_balls_continues_from_its_snapshot_bit_for_bit_and_lets_balls_
     balls.step(50).expect("finite");
     assert!(balls.penetration() < 0.01 * balls.soil().grains.smallest());
 }
+
+#[test]
+fn balls_exchanged_for_the_same_continue_bit_for_bit() {
+    let Heap {
+        scene, options, q, ..
+    } = bed(60);
+    let sleep = Some(SleepOptions::default());
+    let scene = Arc::new(scene);
+    let mut balls = GrainSimulation::<3>::new(scene, options, sleep, q).expect("balls");
+    balls.step(200).expect("finite");
+    let mut other = balls.clone();
+    let grains = other.soil().grains.clone();
+    let (q, v) = (other.q().clone(), other.v().to_vec());
+    let same: Vec<_> = (0..60).map(Some).collect();
+    let short = other.exchange(grains.clone(), &q, &v, &same[1..]);
+    assert_eq!(short.expect_err("too few").field(), "before");
+    other.exchange(grains, &q, &v, &same).expect("the same");
+    let (one, two) = (balls.step(50), other.step(50));
+    assert_eq!(one, two);
+    assert_eq!((balls.q(), balls.v()), (other.q(), other.v()));
+    assert_eq!(balls.time().to_bits(), other.time().to_bits());
+}

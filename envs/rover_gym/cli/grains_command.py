@@ -1,4 +1,4 @@
-"""`rover grains collapse|silo|drum|sphere|rover`: balls in space, recorded."""
+"""`rover grains collapse|silo|drum|sphere|rover|track`: balls in space, recorded."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -18,17 +18,19 @@ from rover_gym.cli.console import (
     say_path,
 )
 from rover_gym.cli.scene_options import ModelName, named_model
-from rover_gym.mechanics import GrainSimulation, RoverGrainSimulation, RoverModel
+from rover_gym.mechanics import OptionError, RoverModel
+from rover_gym.validation import number, refuse
 
 if TYPE_CHECKING:
+    from rover_gym.grains.grain_recording import Recordable
     from rover_gym.grains.grain_run import GrainRun
 
 grains = typer.Typer(
-    help="Balls in space: a column that collapses, a silo, a drum, a sphere that strikes a bed, a rover on one.",
+    help="Balls in space: a column that collapses, a silo, a drum, a sphere that strikes a bed, a rover on beds.",
     no_args_is_help=True,
 )
 
-EARTH = 9.81  # m/s^2
+EARTH, MARS = 9.81, 3.71  # m/s^2
 END = 0.05  # m before the walls' reach at which a rover's crossing ends
 
 Balls = Annotated[int, typer.Option(min=1, max=1_000_000, help="Number of balls.")]
@@ -239,18 +241,89 @@ def rover(
         film=film,
         until=lambda now: bool(now.rover.q[0] > end),
     )
-    way = float(run.trajectory["q"][-1, 0] - run.trajectory["q"][0, 0])
-    second = run.n_frames // 2
+    _say(run, _drive(run, bed.surface, chosen.mass * gravity))
+
+
+@grains.command()
+@plain_errors
+def track(
+    *,
+    length: Annotated[float, typer.Option(help="Length of the bed along x, m.")] = 6.0,
+    depth: Annotated[float, typer.Option(help="Width of the bed across, m.")] = 2.0,
+    layers: Annotated[
+        float, typer.Option(help="Depth of the bed in diameters of a ball; below 1 the floor shows between them.")
+    ] = 0.3,
+    radius: Radius = 0.02,
+    tile: Annotated[float, typer.Option(help="Length of the settled tile, m, which is laid along the bed.")] = 1.0,
+    model: ModelName = "rover",
+    wheel_radius: Annotated[float, typer.Option(help="Radius of the wheels, m.")] = 0.25,
+    wheel_width: Annotated[
+        float | None, typer.Option(help="Width of the wheels, m. Default: as in the model; thin discs cut in deep.")
+    ] = 0.2,
+    torque: Annotated[float, typer.Option(help="Torque of each wheel, N m, positive forward.")] = 40.0,
+    reach: Annotated[float, typer.Option(help="Distance from a wheel within which balls are simulated, m.")] = 0.3,
+    stride: Annotated[float, typer.Option(help="How far a wheel moves before the window follows, m.")] = 0.1,
+    friction: Friction = 0.5,
+    wall_friction: WallFriction = 0.5,
+    wheel_friction: Annotated[float, typer.Option(help="Friction coefficient of the rover on balls.")] = 0.9,
+    gravity: Gravity = MARS,
+    time_step: TimeStep = 0.004,
+    tolerance: Tolerance = 1e-3,
+    sleep: Sleep = True,
+    seed: Seed = 0,
+    duration: Duration = 10.0,
+    fps: Fps = 25.0,
+    film: Film = False,
+    output: Output = FOLDER,
+) -> None:
+    """Drive a rover along a long bed, of which only the balls about its wheels are simulated. It ends with the bed."""
+    from rover_gym.grains.bed_scenes import rover_on_bed, with_wheel_width  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.grains.moving_window import MovingWindow  # noqa: PLC0415 - as above
+    from rover_gym.grains.tiling import settled_track  # noqa: PLC0415 - as above
+
+    check_folder("output", output)
+    chosen = (named_model(model) or RoverModel()).replace(wheel_radius=wheel_radius)
+    if wheel_width is not None:
+        chosen = with_wheel_width(chosen, wheel_width)
+    if number("length", length) < 2.0 * chosen.clear_radius:
+        refuse(
+            OptionError, "length", length, f"must be at least {2.0 * chosen.clear_radius:.2f} m, for the rover to turn"
+        )
+    options = _options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
+    with console().status("settling a tile"):
+        bed = settled_track(length, depth, layers, tile=tile, **_radii(radius), seed=seed, **options)
+    both = rover_on_bed(bed, chosen, torque, wheel_friction=wheel_friction, **options)
+    window = MovingWindow(both.rover, both.grains, wheel_friction=wheel_friction, reach=reach, stride=stride)
+    simulated: list[int] = []
+
+    def ends(now: MovingWindow) -> bool:
+        simulated.append(len(now.inside))
+        return bool(now.rover.q[0] > bed.width - chosen.clear_radius - END)
+
+    title = f"{model} on {len(bed.radius)} balls"
+    run = _recorded(window, "track", title, duration, fps, seed, output, film=film, until=ends)
     _say(
         run,
-        {
-            "bed": f"{1e3 * bed.surface:.0f} mm deep",
-            "distance": f"{way:.3f} m in {run.time[-1]:g} s",
-            "mean sinkage, second half": f"{1e3 * np.nanmean(run.sinkage[second:]):.1f} mm",
-            "load of all wheels, second half": f"{run.wheel_forces[second:, :, 1].sum(axis=1).mean():.0f} N,"
-            f" weight {chosen.mass * gravity:.0f} N",
+        _drive(run, bed.surface, chosen.mass * gravity)
+        | {
+            "balls simulated": f"{np.mean(simulated):.0f} on average, of {len(bed.radius)}",
+            "window moved": f"{window.moves} times",
+            "momentum frozen": f"{window.frozen_momentum:.3g} N s",
         },
     )
+
+
+def _drive(run: "GrainRun", surface: float, weight: float) -> dict[str, str]:
+    """What a rover did on a bed of this mean height, m."""
+    way = float(run.trajectory["q"][-1, 0] - run.trajectory["q"][0, 0])
+    second = run.n_frames // 2
+    load = run.wheel_forces[second:, :, 1].sum(axis=1).mean()
+    return {
+        "bed": f"{1e3 * surface:.0f} mm deep",
+        "distance": f"{way:.3f} m in {run.time[-1]:g} s",
+        "mean sinkage, second half": f"{1e3 * np.nanmean(run.sinkage[second:]):.1f} mm",
+        "load of all wheels, second half": f"{load:.0f} N, weight {weight:.0f} N",
+    }
 
 
 def _options(
@@ -274,7 +347,7 @@ def _radii(radius: float) -> dict[str, float]:
 
 
 def _recorded(
-    sim: GrainSimulation | RoverGrainSimulation,
+    sim: "Recordable",
     name: str,
     title: str,
     duration: float,

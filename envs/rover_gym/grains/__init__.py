@@ -11,18 +11,22 @@ from rover_gym.grains.bed_scenes import penetration_depths, rover_on_bed, striki
 from rover_gym.grains.grain_recording import GrainSampler, describe_grains, record_grains
 from rover_gym.grains.grain_run import GrainRun, read_grain_run
 from rover_gym.grains.grain_surface import SurfaceMap, surface_map
+from rover_gym.grains.moving_window import BedEnergy, MovingWindow, WindowSnapshot
 from rover_gym.grains.pit import Pit, PitFill
 from rover_gym.grains.sizes import even_radii, lognormal_radii, sieved_radii
-from rover_gym.grains.tiling import tiled
+from rover_gym.grains.tiling import settled_track, tiled
 from rover_gym.grains.vessel_scenes import column, drum, outflow, run_out, silo, slopes
 
 __all__ = [
     "BallBed",
+    "BedEnergy",
     "GrainRun",
     "GrainSampler",
+    "MovingWindow",
     "Pit",
     "PitFill",
     "SurfaceMap",
+    "WindowSnapshot",
     "box_walls",
     "column",
     "describe_grains",
@@ -37,6 +41,7 @@ __all__ = [
     "run_out",
     "settle",
     "settled_balls",
+    "settled_track",
     "sieved_radii",
     "silo",
     "slopes",

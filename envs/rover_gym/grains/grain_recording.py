@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.grains.moving_window import MovingWindow
 from rover_gym.grains.stored_vessel import stored_vessel
 from rover_gym.mechanics import GrainSimulation, RoverGrainSimulation, RoverModel, Simulation
 from rover_gym.record.channels import Channel, state_channels
@@ -22,6 +23,8 @@ from rover_gym.record.recorder import Recorder
 from rover_gym.validation import number
 
 Array = npt.NDArray[np.float64]
+#: Balls in space, alone or under a rover.
+Recordable: TypeAlias = GrainSimulation | RoverGrainSimulation | MovingWindow
 
 KIND = "GrainSimulation"
 #: Share of the smallest radius by which a stored position may be off.
@@ -30,9 +33,11 @@ RESOLUTION = 1.0 / 250.0
 ROWS_PER_FLUSH = 16
 
 
-def _both(sim: GrainSimulation | RoverGrainSimulation) -> tuple[GrainSimulation, Simulation | None]:
-    """The balls, and the rover among them."""
-    return (sim, None) if isinstance(sim, GrainSimulation) else (sim.grains, sim.rover)
+def _both(sim: Recordable) -> tuple[GrainSimulation | MovingWindow, Simulation | None]:
+    """All the balls, and the rover among them."""
+    if isinstance(sim, GrainSimulation):
+        return sim, None
+    return (sim if isinstance(sim, MovingWindow) else sim.grains), sim.rover
 
 
 class StoredPlaces:
@@ -60,10 +65,10 @@ class GrainSampler:
     """Steps balls, alone or under a rover, from row to row and makes the rows for a `Recorder`.
 
     Args:
-        sim: A `GrainSimulation` or a `RoverGrainSimulation`.
+        sim: A `GrainSimulation`, a `RoverGrainSimulation` or a `MovingWindow`.
     """
 
-    def __init__(self, sim: GrainSimulation | RoverGrainSimulation) -> None:
+    def __init__(self, sim: Recordable) -> None:
         self._sim = sim
         self._grains, self._rover = _both(sim)
         self._places = StoredPlaces(self._grains.radius)
@@ -169,7 +174,7 @@ def _rover_channels(model: RoverModel) -> tuple[Channel, ...]:
 
 
 def describe_grains(
-    sim: GrainSimulation | RoverGrainSimulation,
+    sim: Recordable,
     title: str,
     scene: Mapping[str, Any] | None = None,
     *,
@@ -202,7 +207,7 @@ def describe_grains(
 
 
 def record_grains(
-    sim: GrainSimulation | RoverGrainSimulation,
+    sim: Recordable,
     duration: float,
     path: str | Path,
     fps: float = 25.0,
@@ -219,7 +224,7 @@ def record_grains(
     Rows are written 16 at a time: a run that is killed keeps all but its last 15 rows at most.
 
     Args:
-        sim: A `GrainSimulation` or a `RoverGrainSimulation`.
+        sim: A `GrainSimulation`, a `RoverGrainSimulation` or a `MovingWindow`.
         duration: Time to simulate, s.
         path: HDF5 file to write.
         fps: Rows per second of simulated time, rounded to a whole number of steps from row to row.

@@ -9,7 +9,7 @@ use rover_core::integrator::StepOptions;
 use rover_core::nalgebra::Vector3;
 use rover_core::system::grains::{COORDINATES, Cohesion, GrainScene, Grains, SleepOptions, Wall};
 
-use crate::arguments::Given;
+use crate::arguments::{Given, refused};
 use crate::arrays::fresh_rows;
 use crate::bed_arguments::{self, StepArguments, Usual, check_rows, grain_error, rows};
 use crate::errors::{BorderError, Kind, Value};
@@ -177,6 +177,23 @@ pub fn state(
         }
     }
     Ok((q, v))
+}
+
+/// Numbers of balls, (n,); none for -1.
+pub fn numbers(before: &Bound<'_, PyAny>) -> PyResult<Vec<Option<u32>>> {
+    let wrong = |value: &Bound<'_, PyAny>, field: &str| {
+        refused(value, Kind::Model, field, "a whole number from -1")
+    };
+    let entries = before.try_iter().map_err(|_| wrong(before, "before"))?;
+    let read = |(i, entry): (usize, PyResult<Bound<'_, PyAny>>)| {
+        let entry = entry?;
+        match entry.extract::<i64>() {
+            Ok(-1) => Ok(None),
+            Ok(number) if u32::try_from(number).is_ok() => Ok(u32::try_from(number).ok()),
+            _ => Err(wrong(&entry, &format!("before[{i}]")).into()),
+        }
+    };
+    entries.enumerate().map(read).collect()
 }
 
 /// Columns `from` to `from + 2` of `n` rows of `width` entries as a fresh (n, 3) array.

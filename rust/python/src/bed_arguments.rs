@@ -31,6 +31,7 @@ pub fn grain_error(e: &GrainError) -> BorderError {
         GrainError::Length { count, .. } | GrainError::TooMany { count, .. } => {
             Value::Count(*count)
         }
+        GrainError::Before { value, .. } => Value::Count(*value),
         GrainError::Overlap { value, .. }
         | GrainError::InWall { value, .. }
         | GrainError::WheelIn { value, .. }

@@ -306,6 +306,48 @@ impl GrainSimulation {
         Ok(inner.remove(&which).map_err(|e| grain_error(&e))?)
     }
 
+    /// Puts other balls in the place of those so far; time and options stay.
+    ///
+    /// Balls that were there keep their sleep and the impulses of their contacts, from which the
+    /// next step's solver starts. Overlaps are not refused: a run may have made them. Earlier
+    /// snapshots fit again once the same balls are back.
+    ///
+    /// Args:
+    ///     radius: Radii of all balls from here on, (n,), m.
+    ///     mass: Their masses, (n,), kg.
+    ///     position: Their centres, (n, 3), m.
+    ///     before: The number of each among the balls so far, (n,); -1 for one that was not there.
+    ///         Balls that stay keep their order.
+    ///     kinematic: Which of them are kinematic, (n,); none by default.
+    ///     velocity: Velocities of their centres, (n, 3), m/s; at rest by default.
+    ///     spin: Their angular velocities, (n, 3), rad/s; at rest by default.
+    ///
+    /// Raises:
+    ///     ModelError: A radius or mass is not finite and positive, or `before` does not increase.
+    ///         Nothing has changed.
+    ///     StateError: An array has a wrong shape or an entry that is not finite. Nothing has
+    ///         changed.
+    #[allow(clippy::too_many_arguments)] // keyword arguments of a Python method
+    #[pyo3(signature = (radius, mass, position, before, *, kinematic = Given::MISSING, velocity = None, spin = None),
+        text_signature = "($self, radius, mass, position, before, *, kinematic=None, velocity=None, spin=None)")]
+    fn exchange(
+        &self,
+        radius: &Bound<'_, PyAny>,
+        mass: &Bound<'_, PyAny>,
+        position: &Bound<'_, PyAny>,
+        before: &Bound<'_, PyAny>,
+        kinematic: Given<'_>,
+        velocity: Option<&Bound<'_, PyAny>>,
+        spin: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let mut inner = self.open()?;
+        let grains = bed_arguments::grains::<3>(radius, mass, kinematic)?;
+        let (q, v) = balls::state(grains.len(), position, velocity, spin)?;
+        let before = balls::numbers(before)?;
+        let done = inner.exchange(grains, &q, &v, &before);
+        Ok(done.map_err(|e| grain_error(&e))?)
+    }
+
     /// Takes n steps, as `Simulation.step` does.
     ///
     /// Args:

@@ -89,6 +89,16 @@ impl StepReport {
         self.inner.energy_lifted
     }
 
+    /// The report of these steps and of further ones.
+    ///
+    /// Args:
+    ///     later: How the further ones went.
+    fn followed_by(&self, later: &Self) -> Self {
+        let mut inner = self.inner;
+        inner.merge(&later.inner);
+        Self { inner }
+    }
+
     fn __repr__(&self) -> String {
         let r = &self.inner;
         format!(

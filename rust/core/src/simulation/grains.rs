@@ -306,13 +306,80 @@ where
         }
         let renumbering = Renumbering::without(marked);
         let grains = self.soil().grains.without(&renumbering)?;
+        let q = renumbering.keep(&self.state.configuration, COORDINATES);
+        let v = renumbering.keep(&self.state.v, body_velocities(D));
+        self.memory.sleep = self.memory.sleep.without(&renumbering);
+        self.take(grains, q, v, &renumbering);
+        Ok(())
+    }
+
+    /// Puts other grains in the place of those so far; time goes on.
+    ///
+    /// `q`, `v`: coordinates and velocities of all of them, without the machine's, which stay.
+    /// `before`: the number of each among those so far, if it was there. Those keep their sleep and
+    /// the impulses of their contacts; they stand in the same order. Overlaps are not refused: a
+    /// run may have made them.
+    ///
+    /// Earlier snapshots no longer fit.
+    ///
+    /// # Errors
+    /// A length that does not fit, an entry that is not finite, numbers that do not increase.
+    /// Nothing is changed then.
+    pub fn exchange(
+        &mut self,
+        grains: Grains<D>,
+        q: &[f64],
+        v: &[f64],
+        before: &[Option<u32>],
+    ) -> Result<(), GrainError> {
+        let n = grains.len();
+        for (field, expected, count) in [
+            ("position", COORDINATES * n, q.len()),
+            ("velocity", body_velocities(D) * n, v.len()),
+            ("before", n, before.len()),
+        ] {
+            if count != expected {
+                return Err(GrainError::Length {
+                    field,
+                    expected,
+                    count,
+                });
+            }
+        }
+        for (field, values, width) in [
+            ("position", q, COORDINATES),
+            ("velocity", v, body_velocities(D)),
+        ] {
+            for (k, value) in values.iter().enumerate() {
+                finite(&format!("{field}[{}]", k / width), *value)?;
+            }
+        }
+        let soil = self.soil().clone();
+        let renumbering = Renumbering::of(before, soil.grains.len())?;
+        let grains = match soil.grains.cohesion() {
+            Some(cohesion) => grains.with_cohesion(*cohesion),
+            None => grains,
+        };
+        self.memory.sleep = self.memory.sleep.exchanged(
+            &renumbering,
+            before,
+            soil.grains.kinematic(),
+            grains.kinematic(),
+        );
+        let q = [q, soil.machine_coordinates(self.q())].concat();
+        let v = [v, soil.machine_velocities(self.v())].concat();
+        self.take(grains, q, v, &renumbering);
+        Ok(())
+    }
+
+    /// Continues with other grains, whose sleep is set: impulses of contacts follow their bodies.
+    fn take(&mut self, grains: Grains<D>, q: Vec<f64>, v: Vec<f64>, renumbering: &Renumbering) {
         self.scene.soil = Arc::new(GrainScene {
             grains,
             ..(**self.soil()).clone()
         });
-        self.state.configuration = renumbering.keep(&self.state.configuration, COORDINATES);
-        self.state.v = renumbering.keep(&self.state.v, body_velocities(D));
-        self.memory.sleep = self.memory.sleep.without(&renumbering);
+        self.state.configuration = q;
+        self.state.v = v;
         self.warm_start.persistent.clear();
         let impulses = self.warm_start.impulses.iter();
         self.warm_start.impulses = impulses
@@ -321,7 +388,6 @@ where
         let room = 3 * renumbering.left();
         self.scratch = Scratch::new(&self.state.configuration, self.scene.nv(), room, D);
         self.active.clear();
-        Ok(())
     }
 
     /// Sets the torques, N m, positive forward. This wakes no grain; motion does.

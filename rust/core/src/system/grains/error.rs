@@ -92,6 +92,14 @@ pub enum GrainError {
         /// A fifth of the smallest radius, m.
         limit: f64,
     },
+    /// A grain that was not there, or not in this order.
+    #[error("before[{grain}]: must be the number of a ball, above the ones before it, is {value}")]
+    Before {
+        /// Which grain.
+        grain: usize,
+        /// The number.
+        value: usize,
+    },
     /// Where there is no machine, none can drive.
     #[error("machine: the scene has none")]
     NoMachine,
@@ -108,6 +116,7 @@ impl GrainError {
             Self::Length { field, .. } | Self::TooNarrow { field, .. } => (*field).to_owned(),
             Self::Overlap { second, .. } => format!("position[{second}]"),
             Self::InWall { grain, .. } => format!("position[{grain}]"),
+            Self::Before { grain, .. } => format!("before[{grain}]"),
             Self::WheelIn { .. } | Self::NoMachine => "machine".to_owned(),
             Self::Range { .. } => "radius_max".to_owned(),
             Self::Reach { .. } => "cohesion_range".to_owned(),

@@ -1,14 +1,15 @@
-//! Removal of grains from a running simulation: the others keep their state, and each contact keeps
-//! its impulse under its new key.
+//! Removal and exchange of grains in a running simulation: those that stay keep their state, and
+//! each contact of two that stay keeps its impulse under its new key.
 
 use super::contact::{GrainKey, WALL};
+use super::error::GrainError;
 
-/// New numbers of bodies after the removal of grains, in the same order.
+/// New numbers of bodies after the removal or exchange of grains. Those that stay keep their order.
 #[derive(Clone, Debug)]
 pub struct Renumbering {
     /// New number of each grain (n), if it stays.
     grains: Vec<Option<u32>>,
-    /// How many grains stay.
+    /// How many grains there are afterwards.
     left: u32,
 }
 
@@ -28,7 +29,32 @@ impl Renumbering {
         Self { grains, left }
     }
 
-    /// How many grains stay.
+    /// With grains that were, or were not, among the `n` so far: the number of each there.
+    ///
+    /// # Errors
+    /// A number that is not below `n` or not above the ones before it.
+    pub fn of(before: &[Option<u32>], n: usize) -> Result<Self, GrainError> {
+        let mut grains = vec![None; n];
+        let mut least = 0;
+        for (number, old) in (0_u32..).zip(before) {
+            let Some(old) = *old else {
+                continue;
+            };
+            if old < least || old as usize >= n {
+                return Err(GrainError::Before {
+                    grain: number as usize,
+                    value: old as usize,
+                });
+            }
+            least = old + 1;
+            grains[old as usize] = Some(number);
+        }
+        #[allow(clippy::cast_possible_truncation)] // grains are numbered by u32
+        let left = before.len() as u32;
+        Ok(Self { grains, left })
+    }
+
+    /// How many grains there are afterwards.
     #[must_use]
     pub fn left(&self) -> usize {
         self.left as usize
@@ -72,6 +98,25 @@ impl Renumbering {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn those_that_stay_among_others_take_their_contacts_with_them() {
+        let renumbering = Renumbering::of(&[None, Some(1), None, Some(2)], 4).expect("in order");
+        let key = |a, b| GrainKey { a, b };
+        assert_eq!(renumbering.left(), 4);
+        assert_eq!(renumbering.key(key(1, 2)), Some(key(1, 3)));
+        assert_eq!(renumbering.key(key(0, 1)), None);
+        assert_eq!(renumbering.key(key(2, WALL)), Some(key(3, WALL)));
+        assert_eq!(
+            renumbering.key(key(5, 2)),
+            Some(key(5, 3)),
+            "the second wheel"
+        );
+        for wrong in [[Some(2), Some(1)], [Some(1), Some(1)], [None, Some(4)]] {
+            let refused = Renumbering::of(&wrong, 4).expect_err("not in order");
+            assert_eq!(refused.field(), "before[1]");
+        }
+    }
 
     #[test]
     fn those_that_stay_move_up_and_walls_and_wheels_stay_what_they_are() {

@@ -152,6 +152,33 @@ impl Sleep {
         }
     }
 
+    /// After an exchange: `before` (n) has the number of each grain so far, if it was there;
+    /// those that were not are awake.
+    #[must_use]
+    pub fn exchanged(
+        &self,
+        renumbering: &Renumbering,
+        before: &[Option<u32>],
+        was_kinematic: &[bool],
+        kinematic: &[bool],
+    ) -> Self {
+        let mut after = Self::new(kinematic);
+        for (i, old) in before.iter().enumerate() {
+            let Some(old) = old.map(|old| old as usize) else {
+                continue;
+            };
+            if !was_kinematic[old] && !kinematic[i] {
+                after.still[i] = self.still[old];
+                after.asleep[i] = self.asleep[old];
+            }
+        }
+        let dormant = self.dormant.iter();
+        after.dormant = dormant
+            .filter_map(|(key, p)| Some((renumbering.key(*key)?, *p)))
+            .collect();
+        after
+    }
+
     /// Which grains sleep (n).
     #[must_use]
     pub fn asleep(&self) -> &[bool] {
