@@ -3065,15 +3065,18 @@ class GrainSimulation:
             to 25 times that, in units of the root of gravity times the smallest radius; without
             gravity that of 9.81 m/s².
         max_iterations: Largest number of sweeps of the contact solver in a step.
-        stabilisation: "projection" moves overlapping bodies apart, which may add energy by lifting
-            those above; "none" leaves them. By default "none", but "projection" with restitution
-            or in a vessel: a step along the inside of a curve leads into it.
-        penetration_tolerance: Overlap that projection leaves alone, m; 0.5% of the smallest radius
-            by default.
+        stabilisation: "projection" moves overlapping bodies apart, "push_out" lets them part by a
+            fifth of their excessive overlap in each step; both may add energy by lifting those
+            above. "none" leaves overlaps. By default "push_out", but "projection" with
+            restitution or in a vessel: a step along the inside of a curve leads into it.
+        penetration_tolerance: Overlap that stabilisation leaves alone, m; 0.5% of the smallest
+            radius by default.
         sleep: Whether balls at rest far from anything that moves are left out of the step.
         sleep_speed: Speed below which a ball is at rest, m/s; 5e-4 by default.
         sleep_distance: Distance within which nothing may move for a ball to sleep, m; 0.2 by
             default.
+        threads: Number of threads that solve the contact problem. The answer does not depend on
+            it; below some thousands of balls a second one gains little.
 
     Raises:
         ModelError: A radius or mass is not finite and positive.
