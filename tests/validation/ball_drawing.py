@@ -93,7 +93,7 @@ def silo(data: dict[str, Any], path: Path) -> None:
     """Discharge against the hole."""
     figure = Figure(figsize=(5.2, 3.9), dpi=110)
     axes = figure.subplots()
-    hole = np.linspace(1.4, 1.05 * max(run["hole"] for run in data["runs"]), 100)
+    hole = np.linspace(max(1.4, data["fit"]["k"]), 1.05 * max(run["hole"] for run in data["runs"]), 100)
     axes.plot(hole, (0.58 * (hole - 1.4) ** 2.5) ** 0.4, color=PAPER, label="Beverloo: C 0.58, k 1.4")
     fit = data["fit"]
     label = f"C {fit['C']:.2f}, k {fit['k']:.2f}"
@@ -121,7 +121,7 @@ def janssen(data: dict[str, Any], path: Path) -> None:
     errors = [2.0 * row["error"] for row in rows]
     axes.errorbar(*columns, errors, fmt="o", color=OURS, capsize=3, label="means and two standard errors")
     axes.plot(data["smooth"]["filling"], data["smooth"]["borne"], "s", color=OTHER, label="smooth tube")
-    axes.set_ylim(0.0, 1.4 * mass)
+    axes.set_ylim(0.0, 1.25 * data["smooth"]["borne"])
     axes.set_xlabel("filling, in fillings as high as wide")
     axes.set_ylabel("load on the bottom")
     axes.legend(frameon=False, fontsize=8.5)
@@ -131,35 +131,45 @@ def janssen(data: dict[str, Any], path: Path) -> None:
 
 
 def drum(data: dict[str, Any], path: Path) -> None:
-    """Surfaces in a drum, their slope against friction, and against the rate."""
-    figure = Figure(figsize=(12.6, 4.0), dpi=110)
-    left, middle, right = figure.subplots(1, 3, width_ratios=(1.0, 1.1, 1.0))
-    _surfaces(left, data)
-    friction = list(YIELD)
-    middle.plot(friction, list(YIELD.values()), "s", color=PAPER, label="slow shear: Chialvo et al. 2012")
-    middle.axhspan(*GLASS, color=PAPER, alpha=0.12, label="glass beads: Jop et al. 2006")
-    _angles(middle, data, "drum with a rough wall")
+    """Surfaces in a drum, and their slope against friction, against the rate and against the size of the balls."""
+    figure = Figure(figsize=(9.6, 7.4), dpi=110)
+    (surfaces, frictions), (rates, sizes) = figure.subplots(2, 2)
+    _surfaces(surfaces, data)
+    frictions.plot(list(YIELD), list(YIELD.values()), "s", color=PAPER, label="slow shear: Chialvo et al. 2012")
+    frictions.axhspan(*GLASS, color=PAPER, alpha=0.12, label="glass beads: Jop et al. 2006")
+    _angles(frictions, data, "drum with a rough wall")
     smooth = data["smooth"]
-    middle.plot(
-        [r["friction"] for r in smooth], [r["angle"] for r in smooth], "D", color=OTHER, label="drum with a smooth wall"
-    )
-    middle.set_ylabel("slope, degrees")
+    label = "drum with a smooth wall"
+    frictions.plot([r["friction"] for r in smooth], [r["angle"] for r in smooth], "D", color=OTHER, label=label)
     for mu, marker in ((0.5, "o"), (0.0, "^")):
         runs = [run for run in data["rates"] + data["runs"] if run["friction"] == mu]
-        runs.sort(key=lambda run: run["rate"])
-        blocks = np.array([run["blocks"] for run in runs])
-        errors = blocks.std(axis=1, ddof=1) / np.sqrt(blocks.shape[1])
-        places, values = [run["rate"] for run in runs], [run["angle"] for run in runs]
-        right.errorbar(places, values, errors, fmt=marker, color=OURS, capsize=3, label=f"µ {mu:g}")
-        right.axhline(YIELD[mu], color=PAPER, linestyle="-" if mu else "--", linewidth=1.2)
-    right.set_xlim(left=0.0)
-    right.set_xlabel("rate of the drum, rad/s")
-    for axes in (middle, right):
+        _runs(rates, "rate", runs, marker, f"µ {mu:g}")
+        rates.axhline(YIELD[mu], color=PAPER, linestyle="-" if mu else "--", linewidth=1.2)
+    rates.set_xlabel("rate of the drum, rad/s")
+    runs = [run for run in data["sizes"] + data["runs"] if run["friction"] == 0.5]
+    _runs(sizes, "inverse", [run | {"inverse": 1.0 / run["wall"]} for run in runs], "o", "µ 0.5")
+    end, inverse = data["limit"], np.array([0.0, 0.18])
+    label = f"{end['value']:.1f} ± {end['error']:.1f} at 0"
+    sizes.plot(inverse, end["value"] + end["rise"] * inverse, "--", color=OURS, linewidth=1.2, label=label)
+    sizes.axhline(YIELD[0.5], color=PAPER, linewidth=1.2, label="slow shear, µ 0.5")
+    sizes.set_xlabel("diameter of a ball over the drum's radius")
+    for axes in (frictions, rates, sizes):
+        axes.set_ylabel("slope, degrees")
         axes.set_ylim(-1.0, 40.0)
         axes.legend(frameon=False, fontsize=8)
         finish(axes)
+    for axes in (rates, sizes):
+        axes.set_xlim(left=0.0)
     figure.tight_layout()
     figure.savefig(path)
+
+
+def _runs(axes: Axes, name: str, runs: list[dict[str, Any]], marker: str, label: str) -> None:
+    """Slopes of runs, with the standard errors over their quarters."""
+    blocks = np.array([run["blocks"] for run in runs])
+    errors = blocks.std(axis=1, ddof=1) / np.sqrt(blocks.shape[1])
+    places, values = ([run[key] for run in runs] for key in (name, "angle"))
+    axes.errorbar(places, values, errors, fmt=marker, color=OURS, capsize=3, label=label)
 
 
 def repose(data: dict[str, Any], path: Path) -> None:

@@ -21,6 +21,8 @@ FRICTIONS = (0.0, 0.1, 0.2, 0.3, 0.5, 0.8)
 SEEDS = (0, 1)
 COUNT = 760  # half fill the drum
 WALL, LENGTH = 9.0 * DIAMETER, 6.0 * DIAMETER
+#: Radii, in diameters, of drums with friction 0.5 beside those of `WALL`, and their seeds.
+SIZES = ((6.0, 0), (6.0, 1), (12.0, 0), (12.0, 1), (16.0, 0))
 #: rad/s; the Froude number is WALL rate²/g = 2e-4.
 RATE = 0.15
 #: Degrees, of the yield stress ratios of Chialvo et al. 2012, by friction.
@@ -159,6 +161,7 @@ def slope(
         "seed": seed,
         "rate": rate,
         "rough": rough,
+        "wall": wall / DIAMETER,
         "angle": float(np.mean(slopes)),
         "blocks": [float(block.mean()) for block in np.array_split(np.array(slopes), BLOCKS)],
         "spread": float(np.std(slopes)),
@@ -188,13 +191,39 @@ def _turn(watched: Watched, ring: Ring | None, time: float, rate: float, steps: 
 
 
 def measure(ledger: Ledger) -> dict[str, object]:
-    """Drums of several frictions, two of them at other rates, one larger, one with a finer step, and smooth ones."""
+    """Drums of several frictions, two of them at other rates, one in other sizes and with a finer step, smooth ones."""
     runs = [slope(COUNT, mu, seed, ledger) for mu in FRICTIONS for seed in SEEDS]
     rates = [slope(COUNT, mu, 0, ledger, rate=rate) for mu in (0.0, 0.5) for rate in RATES]
-    larger = slope(round(COUNT * 16.0 / 9.0), 0.5, 0, ledger, wall=4.0 / 3.0 * WALL)
+    sizes = [sized(wide, seed, ledger) for wide, seed in SIZES]
     finer = slope(COUNT, 0.5, 0, ledger, time_step=0.5 * TIME_STEP)
     smooth = [slope(COUNT, 0.0, seed, ledger, rough=False) for seed in SEEDS]
-    return {"runs": runs, "means": means(runs), "rates": rates, "larger": larger, "finer": finer, "smooth": smooth}
+    near = sizes + [run for run in runs if run["friction"] == 0.5]
+    return {
+        "runs": runs,
+        "means": means(runs),
+        "rates": rates,
+        "sizes": sizes,
+        "limit": limit(near),
+        "finer": finer,
+        "smooth": smooth,
+    }
+
+
+def sized(wide: float, seed: int, ledger: Ledger) -> dict[str, Any]:
+    """A drum with a radius of so many diameters, half full, friction 0.5."""
+    wall = wide * DIAMETER
+    return slope(round(COUNT * (wall / WALL) ** 2), 0.5, seed, ledger, wall=wall)
+
+
+def limit(runs: list[dict[str, Any]]) -> dict[str, float]:
+    """Slope where balls are ever smaller than the drum: a straight line in diameter over radius.
+
+    Its error is that of runs whose slopes are as uncertain as their quarters say, all alike.
+    """
+    inverse = np.array([1.0 / run["wall"] for run in runs])
+    (rise, value), covariance = np.polyfit(inverse, [run["angle"] for run in runs], 1, cov="unscaled")
+    variance = float(np.mean([np.var(run["blocks"], ddof=1) / BLOCKS for run in runs]))
+    return {"value": float(value), "error": float(np.sqrt(variance * covariance[1, 1])), "rise": float(rise)}
 
 
 def means(runs: list[dict[str, Any]]) -> list[dict[str, float]]:

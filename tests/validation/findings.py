@@ -299,9 +299,12 @@ def ball_drum(data: dict[str, Any]) -> Iterator[Finding]:
         what, f"{low:g} to {high:g}: glass beads", "Jop et al. 2006", rows[0.5]["angle"], low, high, "°", ".1f"
     )
     yield from _rising("balls: drum, slope", data["means"], "angle", "error")
-    for name, run in (("half the time step", data["finer"]), ("a drum 4/3 as wide", data["larger"])):
-        change = run["angle"] - rows[0.5]["angle"]
-        yield Finding(f"balls: drum, slope with {name}", "the same, 2", "", change, -2.0, 2.0, "° more", ".1f")
+    change = data["finer"]["angle"] - rows[0.5]["angle"]
+    yield Finding("balls: drum, slope with half the time step", "the same, 2", "", change, -2.0, 2.0, "° more", ".1f")
+    end, angle = data["limit"], YIELD[0.5]
+    what = f"balls: drum, slope, µ 0.5, balls ever smaller, ± {end['error']:.1f}"
+    expected = f"{angle:.1f} ± 3: slow shear"
+    yield Finding(what, expected, "Chialvo et al. 2012", end["value"], angle - 3.0, angle + 3.0, "°", ".1f")
 
 
 def ball_repose(data: dict[str, Any]) -> Iterator[Finding]:
