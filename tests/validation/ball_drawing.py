@@ -135,7 +135,13 @@ def drum(data: dict[str, Any], path: Path) -> None:
     figure = Figure(figsize=(9.6, 7.4), dpi=110)
     (surfaces, frictions), (rates, sizes) = figure.subplots(2, 2)
     _surfaces(surfaces, data)
-    frictions.plot(list(YIELD), list(YIELD.values()), "s", color=PAPER, label="slow shear: Chialvo et al. 2012")
+    frictions.plot(
+        list(YIELD),
+        list(YIELD.values()),
+        "s",
+        color=PAPER,
+        label="slow shear: Peyneau and Roux 2008, Chialvo et al. 2012",
+    )
     frictions.axhspan(*GLASS, color=PAPER, alpha=0.12, label="glass beads: Jop et al. 2006")
     _angles(frictions, data, "drum with a rough wall")
     smooth = data["smooth"]

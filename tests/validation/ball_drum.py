@@ -25,10 +25,8 @@ WALL, LENGTH = 9.0 * DIAMETER, 6.0 * DIAMETER
 SIZES = ((6.0, 0), (6.0, 1), (12.0, 0), (12.0, 1), (16.0, 0))
 #: rad/s; the Froude number is WALL rate²/g = 2e-4.
 RATE = 0.15
-#: Degrees, of the yield stress ratios of Chialvo et al. 2012, by friction.
-YIELD = {
-    mu: float(np.degrees(np.arctan(ratio))) for mu, ratio in ((0.0, 0.105), (0.1, 0.268), (0.3, 0.357), (0.5, 0.382))
-}
+#: Degrees of slow shear, by friction: Peyneau and Roux 2008 without, yield stress ratios of Chialvo et al. 2012 with.
+YIELD = {0.0: 5.76, **{mu: float(np.degrees(np.arctan(y))) for mu, y in ((0.1, 0.268), (0.3, 0.357), (0.5, 0.382))}}
 #: Degrees between which glass beads flow steadily, Jop et al. 2006.
 GLASS = (20.9, 32.76)
 #: Rates at which two frictions are measured too.
