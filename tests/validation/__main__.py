@@ -1,4 +1,4 @@
-"""Measures all parts, or some: `python -m validation [collapse packing ... ball_silo]`.
+"""Measures all parts, or some: `python -m validation [collapse packing ... plate_on_balls]`.
 
 Writes `docs/validation/*.json` and pictures, and the tables of `docs/validation.md` from all that is there.
 """
@@ -17,8 +17,11 @@ from validation import (
     ball_balance,
     ball_collapse,
     ball_drawing,
+    ball_drum,
     ball_impact,
+    ball_janssen,
     ball_packing,
+    ball_repose,
     ball_silo,
     collapse,
     drawing,
@@ -48,6 +51,9 @@ PARTS: dict[str, ModuleType] = {
     "ball_impact": ball_impact,
     "ball_collapse": ball_collapse,
     "ball_silo": ball_silo,
+    "ball_drum": ball_drum,
+    "ball_repose": ball_repose,
+    "ball_janssen": ball_janssen,
     "wheel_on_balls": wheel_on_balls,
     "plate_on_balls": plate_on_balls,
 }

@@ -5,11 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from validation.ball_collapse import lube
+from validation.ball_drum import GLASS, YIELD
 from validation.drawing import OTHER, OURS, PAPER, finish
+
+VIRIDIS = mpl.colormaps["viridis"]
 
 
 def packing(data: dict[str, Any], path: Path) -> None:
@@ -85,29 +90,130 @@ def collapse(data: dict[str, Any], path: Path) -> None:
 
 
 def silo(data: dict[str, Any], path: Path) -> None:
-    """Discharge against the hole, and load against filling."""
-    figure = Figure(figsize=(9.2, 3.9), dpi=110)
-    left, right = figure.subplots(1, 2)
-    hole = np.linspace(1.4, 1.05 * max(run["hole"] for run in data["runs"]), 100)
-    left.plot(hole, (0.58 * (hole - 1.4) ** 2.5) ** 0.4, color=PAPER, label="Beverloo: C 0.58, k 1.4")
+    """Discharge against the hole."""
+    figure = Figure(figsize=(5.2, 3.9), dpi=110)
+    axes = figure.subplots()
+    hole = np.linspace(max(1.4, data["fit"]["k"]), 1.05 * max(run["hole"] for run in data["runs"]), 100)
+    axes.plot(hole, (0.58 * (hole - 1.4) ** 2.5) ** 0.4, color=PAPER, label="Beverloo: C 0.58, k 1.4")
     fit = data["fit"]
     label = f"C {fit['C']:.2f}, k {fit['k']:.2f}"
-    left.plot(hole, fit["C"] ** 0.4 * (hole - fit["k"]), "--", color=OURS, linewidth=1.2, label=label)
-    left.plot([r["hole"] for r in data["runs"]], [r["scaled"] ** 0.4 for r in data["runs"]], "o", color=OURS)
-    left.set_xlabel("width of the hole, diameters of a ball")
-    left.set_ylabel(r"(W / $\rho_b$ g$^{1/2}$ d$^{5/2}$)$^{2/5}$")
-    loads, mass = data["loads"], data["saturation"]
-    filling = np.linspace(0.0, 1.1 * max(row["filling"] for row in loads), 100)
-    right.plot(filling, filling, color=OTHER, linewidth=1.0, label="whole weight")
-    right.plot(filling, mass * -np.expm1(-filling / mass), color=PAPER, label=f"Janssen, saturating at {mass:.2f}")
-    right.plot([r["filling"] for r in loads], [r["borne"] for r in loads], "o", color=OURS)
-    right.set_xlabel("filling, in fillings as high as wide")
-    right.set_ylabel("load on the bottom")
-    for axes in (left, right):
-        axes.legend(frameon=False, fontsize=8.5)
-        finish(axes)
+    axes.plot(hole, fit["C"] ** 0.4 * (hole - fit["k"]), "--", color=OURS, linewidth=1.2, label=label)
+    axes.plot([r["hole"] for r in data["runs"]], [r["scaled"] ** 0.4 for r in data["runs"]], "o", color=OURS)
+    axes.set_xlabel("width of the hole, diameters of a ball")
+    axes.set_ylabel(r"(W / $\rho_b$ g$^{1/2}$ d$^{5/2}$)$^{2/5}$")
+    axes.legend(frameon=False, fontsize=8.5)
+    finish(axes)
     figure.tight_layout()
     figure.savefig(path)
+
+
+def janssen(data: dict[str, Any], path: Path) -> None:
+    """Load against filling."""
+    figure = Figure(figsize=(5.6, 4.0), dpi=110)
+    axes = figure.subplots()
+    runs, rows, mass = data["runs"], data["means"], data["saturation"]
+    filling = np.linspace(0.0, 1.05 * max(run["filling"] for run in runs), 100)
+    axes.plot(filling, filling, ":", color=OTHER, label="whole weight")
+    label = f"Janssen, m = {mass:.2f} ± {data['saturation_error']:.2f}"
+    axes.plot(filling, mass * -np.expm1(-filling / mass), color=PAPER, label=label)
+    axes.plot([r["filling"] for r in runs], [r["borne"] for r in runs], ".", color=OURS, alpha=0.5)
+    columns = ([row[name] for row in rows] for name in ("filling", "borne"))
+    errors = [2.0 * row["error"] for row in rows]
+    axes.errorbar(*columns, errors, fmt="o", color=OURS, capsize=3, label="means and two standard errors")
+    axes.plot(data["smooth"]["filling"], data["smooth"]["borne"], "s", color=OTHER, label="smooth tube")
+    axes.set_ylim(0.0, 1.25 * data["smooth"]["borne"])
+    axes.set_xlabel("filling, in fillings as high as wide")
+    axes.set_ylabel("load on the bottom")
+    axes.legend(frameon=False, fontsize=8.5)
+    finish(axes)
+    figure.tight_layout()
+    figure.savefig(path)
+
+
+def drum(data: dict[str, Any], path: Path) -> None:
+    """Surfaces in a drum, and their slope against friction, against the rate and against the size of the balls."""
+    figure = Figure(figsize=(9.6, 7.4), dpi=110)
+    (surfaces, frictions), (rates, sizes) = figure.subplots(2, 2)
+    _surfaces(surfaces, data)
+    frictions.plot(
+        list(YIELD),
+        list(YIELD.values()),
+        "s",
+        color=PAPER,
+        label="slow shear: Peyneau and Roux 2008, Chialvo et al. 2012",
+    )
+    frictions.axhspan(*GLASS, color=PAPER, alpha=0.12, label="glass beads: Jop et al. 2006")
+    _angles(frictions, data, "drum with a rough wall")
+    smooth = data["smooth"]
+    label = "drum with a smooth wall"
+    frictions.plot([r["friction"] for r in smooth], [r["angle"] for r in smooth], "D", color=OTHER, label=label)
+    for mu, marker in ((0.5, "o"), (0.0, "^")):
+        runs = [run for run in data["rates"] + data["runs"] if run["friction"] == mu]
+        _runs(rates, "rate", runs, marker, f"µ {mu:g}")
+        rates.axhline(YIELD[mu], color=PAPER, linestyle="-" if mu else "--", linewidth=1.2)
+    rates.set_xlabel("rate of the drum, rad/s")
+    runs = [run for run in data["sizes"] + data["runs"] if run["friction"] == 0.5]
+    _runs(sizes, "inverse", [run | {"inverse": 1.0 / run["wall"]} for run in runs], "o", "µ 0.5")
+    end, inverse = data["limit"], np.array([0.0, 0.18])
+    label = f"{end['value']:.1f} ± {end['error']:.1f} at 0"
+    sizes.plot(inverse, end["value"] + end["rise"] * inverse, "--", color=OURS, linewidth=1.2, label=label)
+    sizes.axhline(YIELD[0.5], color=PAPER, linewidth=1.2, label="slow shear, µ 0.5")
+    sizes.set_xlabel("diameter of a ball over the drum's radius")
+    for axes in (frictions, rates, sizes):
+        axes.set_ylabel("slope, degrees")
+        axes.set_ylim(-1.0, 40.0)
+        axes.legend(frameon=False, fontsize=8)
+        finish(axes)
+    for axes in (rates, sizes):
+        axes.set_xlim(left=0.0)
+    figure.tight_layout()
+    figure.savefig(path)
+
+
+def _runs(axes: Axes, name: str, runs: list[dict[str, Any]], marker: str, label: str) -> None:
+    """Slopes of runs, with the standard errors over their quarters."""
+    blocks = np.array([run["blocks"] for run in runs])
+    errors = blocks.std(axis=1, ddof=1) / np.sqrt(blocks.shape[1])
+    places, values = ([run[key] for run in runs] for key in (name, "angle"))
+    axes.errorbar(places, values, errors, fmt=marker, color=OURS, capsize=3, label=label)
+
+
+def repose(data: dict[str, Any], path: Path) -> None:
+    """Slopes that remain, and their angle against friction."""
+    figure = Figure(figsize=(9.2, 3.8), dpi=110)
+    left, right = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
+    _surfaces(left, data)
+    right.axhspan(*GLASS, color=PAPER, alpha=0.12, label="glass beads: Jop et al. 2006")
+    _angles(right, data, "slope that remains")
+    larger = data["larger"]
+    label = "a bed half as long and high again"
+    right.plot([r["friction"] for r in larger], [r["angle"] for r in larger], "x", color=OTHER, label=label)
+    right.set_ylabel("angle of repose, degrees")
+    right.set_ylim(0.0, 40.0)
+    right.legend(frameon=False, fontsize=8)
+    finish(right)
+    figure.tight_layout()
+    figure.savefig(path)
+
+
+def _surfaces(axes: Axes, data: dict[str, Any]) -> None:
+    """One surface for each friction, to scale."""
+    for mean, shade in zip(data["means"], np.linspace(0.0, 0.85, len(data["means"])), strict=True):
+        run = next(r for r in data["runs"] if r["friction"] == mean["friction"])
+        axes.plot(*run["surface"], color=VIRIDIS(shade), label=f"µ {mean['friction']:g}")
+    axes.set_aspect("equal")
+    axes.set_xlabel("x, diameters")
+    axes.set_ylabel("surface, diameters")
+    axes.legend(frameon=False, fontsize=8, ncols=2)
+    finish(axes)
+
+
+def _angles(axes: Axes, data: dict[str, Any], label: str) -> None:
+    """Angles of all runs, and their means with standard errors."""
+    axes.plot([r["friction"] for r in data["runs"]], [r["angle"] for r in data["runs"]], ".", color=OURS, alpha=0.4)
+    columns = ([row[name] for row in data["means"]] for name in ("friction", "angle", "error"))
+    axes.errorbar(*columns, fmt="o-", color=OURS, markersize=5, capsize=3, linewidth=1.0, label=label)
+    axes.set_xlabel("friction µ")
 
 
 PICTURES = {
@@ -115,4 +221,7 @@ PICTURES = {
     "ball_impact": impact,
     "ball_collapse": collapse,
     "ball_silo": silo,
+    "ball_drum": drum,
+    "ball_repose": repose,
+    "ball_janssen": janssen,
 }

@@ -15,7 +15,7 @@ from validation.balls import DENSITY, DIAMETER, Balls, box, free, loose, settle
 from validation.watch import GRAVITY, Ledger
 
 FRICTION = 0.5
-#: Tangent of the angle of repose of balls with this friction: taken, not measured.
+#: Tangent of the angle of repose, taken; beds of as many balls gave 24.1 degrees (`larger` of ball_repose.json).
 REPOSE = float(np.tan(np.radians(23.5)))
 #: Packing fraction of a poured bed.
 FRACTION = 0.58

@@ -1,7 +1,7 @@
-"""Discharge of a silo through a hole, and the load on the bottom of one.
+"""Discharge of a silo through a hole.
 
-Sources: Beverloo et al. 1961, *The flow of granular solids through orifices*, Chem. Eng. Sci. 15,
-260-269: W = C rho_b sqrt(g) (D - k d)^(5/2), C about 0.58, k about 1.4, rho_b the bulk density; Janssen 1895.
+Source: Beverloo et al. 1961, *The flow of granular solids through orifices*, Chem. Eng. Sci. 15,
+260-269: W = C rho_b sqrt(g) (D - k d)^(5/2), C about 0.58, k about 1.4, rho_b the bulk density.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from validation.balls import DENSITY, DIAMETER, free, loose, settle
 from validation.watch import GRAVITY, Ledger
 
 FRICTION = 0.5
-FRACTION = 0.57  # of a filling, where a unit of mass is needed
 TUBE = 6.0 * DIAMETER  # radius of the silo
 HOLES = (5.0, 6.0, 7.0)  # their diameters, in diameters of a ball; one of 4 clogs
 
@@ -85,41 +84,7 @@ def beverloo(runs: list[dict[str, Any]]) -> dict[str, float]:
     }
 
 
-def borne(count: int, seed: int, ledger: Ledger, *, tube: float = 4.0 * DIAMETER) -> dict[str, float]:
-    """What a bottom that sinks slowly bears of a filling in a rough tube, over the weight of a tube's width of it."""
-    balls = filled(count, tube, seed, ledger)
-    speed, floor = 2.0 * DIAMETER, [[0.0, 0.0, 0.0, 0.0, 1.0, 0.0]]
-    watched = balls.watched(
-        vessel=Silo(tube),
-        stabilisation="projection",
-        walls=floor,
-        wall_velocity=[[0.0, -speed, 0.0]],
-        friction=FRICTION,
-        has_energy=False,
-    )
-    sim = watched.sim
-    loads = []
-    for k in range(30):
-        watched.step(20)
-        contacts = sim.contacts
-        on_floor = (contacts.bodies[:, 1] < 0) & (contacts.normals[:, 1] > 0.5)
-        if k >= 10:
-            loads.append(float(contacts.world_impulses[on_floor, 1].sum()) / sim.time_step / GRAVITY)
-    ledger.merge(watched.ledger)
-    unit = FRACTION * DENSITY * np.pi * tube**2 * 2.0 * tube
-    return {"seed": seed, "filling": float(sim.mass.sum()) / unit, "borne": float(np.mean(loads)) / unit}
-
-
-def saturation(runs: list[dict[str, float]]) -> float:
-    """Janssen's m, in units of a filling as high as wide: borne = m (1 - exp(-filling/m)), least squares."""
-    filling, load = (np.array([run[name] for run in runs]) for name in ("filling", "borne"))
-    masses = np.geomspace(0.1, 10.0, 2000)[:, None]
-    errors = ((masses * -np.expm1(-filling / masses) - load) ** 2).sum(axis=1)
-    return float(masses[errors.argmin(), 0])
-
-
 def measure(ledger: Ledger) -> dict[str, object]:
-    """Holes of several widths, and fillings of several heights."""
+    """Holes of several widths."""
     runs = [discharge(1200, hole, seed, ledger, duration=0.4) for hole in HOLES for seed in (0, 1)]
-    loads = [borne(count, 0, ledger) for count in (150, 300, 600)]
-    return {"runs": runs, "fit": beverloo(runs), "loads": loads, "saturation": saturation(loads)}
+    return {"runs": runs, "fit": beverloo(runs)}

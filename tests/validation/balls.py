@@ -53,10 +53,10 @@ def free(radius: Array, position: Array) -> Balls:
     return Balls(radius, position, np.zeros(len(radius), dtype=bool))
 
 
-def loose(count: int, width: float, seed: int, *, left: float = 0.0) -> Balls:
-    """Balls in loose layers over a square, none of which touch."""
+def loose(count: int, width: float, seed: int, *, left: float = 0.0, depth: float | None = None) -> Balls:
+    """Balls in loose layers over a square, or over a rectangle with a `depth` along z, none of which touch."""
     radius = even_radii(count, RADIUS * (1.0 - SPREAD), RADIUS * (1.0 + SPREAD), seed)
-    position = arrange_balls(radius, width=width, depth=width, left=left, back=left, seed=seed)
+    position = arrange_balls(radius, width=width, depth=depth or width, left=left, back=left, seed=seed)
     return free(radius, position)
 
 
@@ -71,15 +71,20 @@ def glued_disc(reach: float, seed: int) -> Balls:
     return Balls(np.full(len(x), RADIUS), np.stack([x, y, z], axis=1), np.ones(len(x), dtype=bool))
 
 
-def settle(watched: Watched, *, speed: float = 0.01, most: float = 2.0) -> None:
-    """Steps until the free balls' root mean square speed is below `speed` times sqrt(9.81 DIAMETER), or `most` s."""
+def slow(watched: Watched, speed: float = 0.01) -> bool:
+    """Whether the free balls' root mean square speed is below `speed` times sqrt(9.81 DIAMETER)."""
     sim = watched.sim
     mass = float(sim.mass[~sim.kinematic].sum())
+    return bool(np.sqrt(2.0 * sim.energy().kinetic / mass) < speed * np.sqrt(GRAVITY * DIAMETER))
+
+
+def settle(watched: Watched, *, speed: float = 0.01, most: float = 2.0) -> None:
+    """Steps until the balls are `slow`, or `most` seconds."""
     elapsed = 0.0
     while elapsed < most:
-        watched.step(round(0.05 / sim.time_step))
+        watched.step(round(0.05 / watched.sim.time_step))
         elapsed += 0.05
-        if elapsed > 0.15 and np.sqrt(2.0 * sim.energy().kinetic / mass) < speed * np.sqrt(GRAVITY * DIAMETER):
+        if elapsed > 0.15 and slow(watched, speed):
             break
 
 

@@ -8,6 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from validation.ball_drum import GLASS, YIELD
+from validation.ball_janssen import farthest
+
 STARON = "Staron and Hinch 2005"
 BEVERLOO = "Beverloo et al. 1961"
 
@@ -253,16 +256,80 @@ def ball_collapse(data: dict[str, Any]) -> Iterator[Finding]:
 
 
 def ball_silo(data: dict[str, Any]) -> Iterator[Finding]:
-    """Discharge and load of a silo."""
+    """Discharge of a silo."""
     fit = data["fit"]
     what = f"balls: exponent of D - 1.4 d, ± {fit['error']:.2f}"
     yield Finding(what, "2.5 ± 0.25", BEVERLOO, fit["exponent"], 2.25, 2.75)
     yield Finding("balls: Beverloo's C", "0.58 ± 0.1", BEVERLOO, fit["C"], 0.48, 0.68)
     yield Finding("balls: Beverloo's k", "1.4 ± 0.5", BEVERLOO, fit["k"], 0.9, 1.9)
-    mass = data["saturation"]
-    off = [row["borne"] / (mass * -np.expm1(-row["filling"] / mass)) - 1.0 for row in data["loads"]]
-    what = "balls: silo, load farthest from Janssen's law"
-    yield Finding(what, "0 ± 20%", "Janssen 1895", max(off, key=abs), -0.2, 0.2)
+
+
+def ball_janssen(data: dict[str, Any]) -> Iterator[Finding]:
+    """Load on the bottom of a tube of balls."""
+    source = "Janssen 1895"
+    what = "balls: tube, R² of Janssen's law, means of a height"
+    yield Finding(what, "above 0.95", source, data["determination"], 0.95, 1.0, digits=".3f")
+    worst = farthest(data["means"], data["saturation"])
+    yield Finding("balls: tube, mean of a height farthest from the law", "0 ± 10%", "the fit", worst, -0.1, 0.1)
+    what = f"balls: tube, K with the wall's coefficient of friction, ± {data['K_error']:.2f}"
+    yield Finding(what, "0.3 to 0.8", "Nedderman 1992", data["K_of_coulomb"], 0.3, 0.8)
+    what = "balls: tube, K with the friction that the wall mobilises"
+    yield Finding(what, "0.3 to 0.8", "Nedderman 1992", data["K"], 0.3, 0.8)
+    smooth = abs(data["smooth"]["borne"] / data["smooth"]["filling"] - 1.0)
+    what = "balls: smooth tube, error of the borne weight"
+    yield Finding(what, "0", "balance of forces", smooth, 0.0, 0.03, digits=".1e")
+    same = next(row for row in data["means"] if row["count"] == data["slower"]["count"])
+    share = data["slower"]["borne"] / same["borne"]
+    yield Finding("balls: tube, load at half the speed", "the same, 10%", "", share, 0.9, 1.1, "of the other")
+
+
+def ball_drum(data: dict[str, Any]) -> Iterator[Finding]:
+    """Slope in a drum against friction."""
+    level = max((run["angle"] for run in data["smooth"]), key=abs)
+    what, limit = "balls: drum with a smooth wall, steepest slope without friction", YIELD[0.0]
+    yield Finding(what, f"0 ± {limit:.1f}", "Peyneau and Roux 2008", level, -limit, limit, "°", ".1f")
+    rows = {row["friction"]: row for row in data["means"]}
+    for mu, angle in YIELD.items():
+        row, source = rows[mu], "Peyneau and Roux 2008" if mu == 0.0 else "Chialvo et al. 2012"
+        what = f"balls: drum, slope, µ {mu:g}, ± {row['error']:.1f}"
+        yield Finding(what, f"{angle:.1f} ± 3: slow shear", source, row["angle"], angle - 3.0, angle + 3.0, "°", ".1f")
+    low, high = GLASS
+    what = f"balls: drum, slope, µ 0.5, ± {rows[0.5]['error']:.1f}"
+    yield Finding(
+        what, f"{low:g} to {high:g}: glass beads", "Jop et al. 2006", rows[0.5]["angle"], low, high, "°", ".1f"
+    )
+    yield from _rising("balls: drum, slope", data["means"], "angle", "error")
+    change = data["finer"]["angle"] - rows[0.5]["angle"]
+    yield Finding("balls: drum, slope with half the time step", "the same, 2", "", change, -2.0, 2.0, "° more", ".1f")
+    end, angle = data["limit"], YIELD[0.5]
+    what = f"balls: drum, slope, µ 0.5, balls ever smaller, ± {end['error']:.1f}"
+    expected = f"{angle:.1f} ± 3: slow shear"
+    yield Finding(what, expected, "Chialvo et al. 2012", end["value"], angle - 3.0, angle + 3.0, "°", ".1f")
+
+
+def ball_repose(data: dict[str, Any]) -> Iterator[Finding]:
+    """Angle of repose against friction."""
+    rows = {row["friction"]: row for row in data["means"]}
+    what = f"balls: angle of repose, µ 0.5, ± {rows[0.5]['error']:.1f}"
+    low, high = GLASS
+    yield Finding(
+        what, f"{low:g} to {high:g}: glass beads", "Jop et al. 2006", rows[0.5]["angle"], low, high, "°", ".1f"
+    )
+    yield from _rising("balls: angle of repose", data["means"], "angle", "error")
+    yield from _rising("balls: share of a bed that stays", data["means"], "stays", "stays_error")
+
+
+def _rising(what: str, rows: list[dict[str, float]], name: str, error: str) -> Iterator[Finding]:
+    """That a quantity rises with friction, and less and less."""
+    values, errors = (np.array([row[key] for row in rows]) for key in (name, error))
+    friction = [row["friction"] for row in rows]
+    fall = float((-np.diff(values) / np.hypot(errors[1:], errors[:-1])).max())
+    yield Finding(f"{what}, largest fall with µ in standard errors", "below 2: monotone", "", fall, -90.0, 2.0)
+    half = float(np.interp(0.3, friction, values) - values[0])
+    late = float(values[-1] - np.interp(0.3, friction, values))
+    share = late / (half + late)
+    text = f"{what}, share of the rise from µ {friction[0]:g} to 0.8 that lies above 0.3"
+    yield Finding(text, "below a half: saturation", "", share, -np.inf, 0.5)
 
 
 def wheel_on_balls(data: dict[str, Any]) -> Iterator[Finding]:
@@ -321,6 +388,9 @@ PARTS = {
     "ball_impact": ball_impact,
     "ball_collapse": ball_collapse,
     "ball_silo": ball_silo,
+    "ball_drum": ball_drum,
+    "ball_repose": ball_repose,
+    "ball_janssen": ball_janssen,
     "wheel_on_balls": wheel_on_balls,
     "plate_on_balls": plate_on_balls,
 }

@@ -3,7 +3,17 @@
 import numpy as np
 import pytest
 
-from validation import ball_balance, ball_collapse, ball_impact, ball_packing, ball_silo, findings
+from validation import (
+    ball_balance,
+    ball_collapse,
+    ball_drum,
+    ball_impact,
+    ball_janssen,
+    ball_packing,
+    ball_repose,
+    ball_silo,
+    findings,
+)
 from validation.balance import cloud, free_cloud
 from validation.collapse import heap, power, run_out
 from validation.hourglass import beverloo, discharge
@@ -165,3 +175,38 @@ def test_columns_of_balls_run_out_and_a_silo_of_them_flows() -> None:
     flows = ball_silo.discharge(300, 5.0, 0, ledger, duration=0.15, tube=0.03)
     assert flows["rate"] > 0.2
     held(ledger)
+
+
+def test_a_drum_carries_balls_up_only_by_friction_or_a_rough_wall() -> None:
+    ledger = Ledger()
+    options = {"wall": 0.045, "rate": 0.6, "start": 0.42, "turn": 0.3}
+    level = ball_drum.slope(170, 0.0, 0, ledger, **options, rough=False)
+    smooth, rough = (ball_drum.slope(170, mu, 0, ledger, **options) for mu in (0.0, 0.8))
+    # Balls without friction rest on slopes of up to 5.8 degrees.
+    assert level["angle"] == pytest.approx(0.0, abs=5.8)
+    assert 5.0 < smooth["angle"] < rough["angle"] - 4.0 < 40.0
+    assert rough["grip"] > 0.5
+    held(ledger)
+
+
+def test_a_bed_of_balls_without_friction_flows_out_farther() -> None:
+    ledger = Ledger()
+    low, high = (ball_repose.slope(240, mu, 1, ledger, length=12.0, width=5.0) for mu in (0.0, 0.8))
+    # Beds with the same friction that are so low differ by ten degrees.
+    assert 5.0 < low["angle"] < high["angle"] - 8.0 < 37.0
+    assert low["stays"] < high["stays"] - 0.08
+    held(ledger)
+
+
+def test_a_rough_tube_bears_balls_and_a_smooth_one_does_not() -> None:
+    ledger = Ledger()
+    low, high = (ball_janssen.weigh(count, 0, ledger, tube=0.025, travel=1.8) for count in (60, 180))
+    assert low["borne"] > 0.6 * low["filling"]
+    assert high["borne"] < 0.6 * high["filling"]
+    assert 0.5 > high["wall_friction"] > 0.1
+    smooth = ball_janssen.weigh(120, 0, ledger, wall_friction=0.0, tube=0.025, travel=1.8)
+    assert smooth["borne"] == pytest.approx(smooth["filling"], rel=0.03)
+    assert ledger.momentum < 1e-12
+    # Where a filling lands in a tube, projection along the wall leaves overlaps and lifts balls a little.
+    assert ledger.overlap < 0.04
+    assert ledger.regained < 1e-4
