@@ -10,6 +10,7 @@ from rover_gym.cli.console import DEBUG, one_line
 from rover_gym.cli.drive_command import drive
 from rover_gym.cli.grains_command import grains
 from rover_gym.cli.grains_lab_commands import plate, shear, wheel
+from rover_gym.cli.grains_rover_commands import pit, rover, track
 from rover_gym.cli.model_command import model
 from rover_gym.cli.planar_commands import planar
 from rover_gym.cli.plot_command import plot
@@ -34,8 +35,8 @@ app.command()(replay)
 app.command()(scene)
 app.add_typer(model, name="model")
 app.add_typer(planar, name="planar")
-for _test in (plate, shear, wheel):
-    grains.command()(_test)
+for _command in (rover, track, pit, plate, shear, wheel):
+    grains.command()(_command)
 app.add_typer(grains, name="grains")
 app.command()(speed)
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from rover_gym.grains.ball_bed import BallBed
 from rover_gym.grains.grain_run import GrainRun
+from rover_gym.grains.pit import PitFill
 from rover_gym.mechanics import GrainSimulation, OptionError, Plane, RoverGrainSimulation, RoverModel, Simulation
 from rover_gym.validation import number, refuse
 
@@ -95,6 +96,44 @@ def rover_on_bed(
     under = np.hypot(bed.position[:, 0] - x, bed.position[:, 2] - z) < reach
     top = float((bed.position[under, 1] + bed.radius[under]).max(initial=0.0))
     rover.set_state(model.resting_pose(Plane([0.0, 1.0, 0.0], -(top + CLEARANCE)), (x, z), 0.0))
+    rover.set_wheel_torques(np.full(len(model.wheel_radii), torque))
+    return RoverGrainSimulation(rover, grains, wheel_friction=wheel_friction)
+
+
+def rover_before_pit(
+    fill: PitFill,
+    model: RoverModel,
+    torque: float,
+    *,
+    wheel_friction: float = 0.9,
+    **options: Any,
+) -> RoverGrainSimulation:
+    """A rover at the origin, at rest before a pit of balls, with the same torque commanded at each wheel.
+
+    Args:
+        fill: The filled pit.
+        model: The rover. Motors with a torque-speed line keep a speed.
+        torque: At each wheel, N m, positive forward.
+        wheel_friction: Coulomb's coefficient between the rover and balls, and of the rover on the ground.
+        **options: Those of `GrainSimulation`.
+
+    Raises:
+        OptionError: A number is out of its range, or the pit begins under the rover.
+        CommandError: The torque is beyond the limit of a wheel.
+    """
+    torque = number("torque", torque)
+    if fill.pit.begin < model.clear_radius - CLEARANCE:
+        reason = f"must be at least {model.clear_radius:.2f} m, or the pit begins under the rover"
+        refuse(OptionError, "begin", fill.pit.begin, reason)
+    grains = fill.simulation(**options)
+    rover = Simulation(
+        model,
+        fill.pit.terrain,
+        time_step=grains.time_step,
+        gravity=grains.settings["gravity"],
+        friction=wheel_friction,
+    )
+    rover.set_state(model.resting_pose(fill.pit.terrain, (0.0, 0.0), 0.0))
     rover.set_wheel_torques(np.full(len(model.wheel_radii), torque))
     return RoverGrainSimulation(rover, grains, wheel_friction=wheel_friction)
 

@@ -1,0 +1,229 @@
+"""`rover grains rover|track|pit`: a rover on beds of balls and through a pit of them, recorded."""
+
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+
+from rover_gym.cli.console import check_folder, console, plain_errors
+from rover_gym.cli.grains_options import (
+    EARTH,
+    FOLDER,
+    MARS,
+    Balls,
+    Duration,
+    Film,
+    Fps,
+    Friction,
+    Gravity,
+    Output,
+    Radius,
+    Seed,
+    Sleep,
+    TimeStep,
+    Tolerance,
+    WallFriction,
+    grain_options,
+    radii,
+    recorded,
+    say,
+)
+from rover_gym.cli.scene_options import ModelName, named_model
+from rover_gym.mechanics import Motor, OptionError, RoverModel
+from rover_gym.validation import number, refuse
+
+if TYPE_CHECKING:
+    from rover_gym.grains.grain_run import GrainRun
+    from rover_gym.mechanics import RoverGrainSimulation
+
+END = 0.05  # m before the walls' reach at which a rover's crossing ends
+
+Torque = Annotated[float, typer.Option(help="Torque of each wheel, N m, positive forward.")]
+WheelFriction = Annotated[float, typer.Option(help="Friction coefficient of the rover on balls.")]
+WheelWidth = Annotated[
+    float | None, typer.Option(help="Width of the wheels, m. Default: as in the model; thin discs cut in deep.")
+]
+WheelRadius = Annotated[float, typer.Option(help="Radius of the wheels, m.")]
+
+
+@plain_errors
+def rover(
+    *,
+    balls: Balls = 3000,
+    radius: Radius = 0.025,
+    model: ModelName = "skid-steered",
+    wheel_width: WheelWidth = 0.1,
+    width: Annotated[float, typer.Option(help="Length of the bed along x, m.")] = 2.4,
+    depth: Annotated[float, typer.Option(help="Width of the bed across, m.")] = 1.2,
+    torque: Torque = 8.0,
+    friction: Friction = 0.5,
+    wall_friction: WallFriction = 0.5,
+    wheel_friction: WheelFriction = 0.9,
+    gravity: Gravity = EARTH,
+    time_step: TimeStep = 0.002,
+    tolerance: Tolerance = 1e-3,
+    sleep: Sleep = True,
+    seed: Seed = 0,
+    duration: Duration = 4.0,
+    fps: Fps = 25.0,
+    film: Film = False,
+    output: Output = FOLDER,
+) -> None:
+    """Drive a rover over a bed of balls; record forces, sinkage and ruts. It ends where the bed ends."""
+    from rover_gym.grains.ball_bed import settled_balls  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.grains.bed_scenes import rover_on_bed, with_wheel_width  # noqa: PLC0415 - as above
+
+    check_folder("output", output)
+    chosen = named_model(model) or RoverModel()
+    if wheel_width is not None:
+        chosen = with_wheel_width(chosen, wheel_width)
+    options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
+    with console().status("settling the bed"):
+        bed = settled_balls(balls, width, depth, **radii(radius), seed=seed, **options)
+    sim = rover_on_bed(bed, chosen, torque, wheel_friction=wheel_friction, **options)
+    end = width - chosen.clear_radius - END
+    run = recorded(
+        sim,
+        "rover",
+        f"{model} on {balls} balls",
+        duration,
+        fps,
+        seed,
+        output,
+        film=film,
+        until=lambda now: bool(now.rover.q[0] > end),
+    )
+    say(run, _drive(run, bed.surface, chosen.mass * gravity))
+
+
+@plain_errors
+def track(
+    *,
+    length: Annotated[float, typer.Option(help="Length of the bed along x, m.")] = 6.0,
+    depth: Annotated[float, typer.Option(help="Width of the bed across, m.")] = 2.0,
+    layers: Annotated[
+        float, typer.Option(help="Depth of the bed in diameters of a ball; below 1 the floor shows between them.")
+    ] = 0.3,
+    radius: Radius = 0.02,
+    tile: Annotated[float, typer.Option(help="Length of the settled tile, m, which is laid along the bed.")] = 1.0,
+    model: ModelName = "rover",
+    wheel_radius: WheelRadius = 0.25,
+    wheel_width: WheelWidth = 0.2,
+    torque: Torque = 40.0,
+    reach: Annotated[float, typer.Option(help="Distance from a wheel within which balls are simulated, m.")] = 0.3,
+    stride: Annotated[float, typer.Option(help="How far a wheel moves before the window follows, m.")] = 0.1,
+    friction: Friction = 0.5,
+    wall_friction: WallFriction = 0.5,
+    wheel_friction: WheelFriction = 0.9,
+    gravity: Gravity = MARS,
+    time_step: TimeStep = 0.004,
+    tolerance: Tolerance = 1e-3,
+    sleep: Sleep = True,
+    seed: Seed = 0,
+    duration: Duration = 10.0,
+    fps: Fps = 25.0,
+    film: Film = False,
+    output: Output = FOLDER,
+) -> None:
+    """Drive a rover along a long bed, of which only the balls about its wheels are simulated. It ends with the bed."""
+    from rover_gym.grains.bed_scenes import rover_on_bed, with_wheel_width  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.grains.moving_window import MovingWindow  # noqa: PLC0415 - as above
+    from rover_gym.grains.tiling import settled_track  # noqa: PLC0415 - as above
+
+    check_folder("output", output)
+    chosen = (named_model(model) or RoverModel()).replace(wheel_radius=wheel_radius)
+    if wheel_width is not None:
+        chosen = with_wheel_width(chosen, wheel_width)
+    if number("length", length) < 2.0 * chosen.clear_radius:
+        refuse(
+            OptionError, "length", length, f"must be at least {2.0 * chosen.clear_radius:.2f} m, for the rover to turn"
+        )
+    options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
+    with console().status("settling a tile"):
+        bed = settled_track(length, depth, layers, tile=tile, **radii(radius), seed=seed, **options)
+    both = rover_on_bed(bed, chosen, torque, wheel_friction=wheel_friction, **options)
+    window = MovingWindow(both.rover, both.grains, wheel_friction=wheel_friction, reach=reach, stride=stride)
+    simulated: list[int] = []
+
+    def ends(now: MovingWindow) -> bool:
+        simulated.append(len(now.inside))
+        return bool(now.rover.q[0] > bed.width - chosen.clear_radius - END)
+
+    title = f"{model} on {len(bed.radius)} balls"
+    run = recorded(window, "track", title, duration, fps, seed, output, film=film, until=ends)
+    say(
+        run,
+        _drive(run, bed.surface, chosen.mass * gravity)
+        | {
+            "balls simulated": f"{np.mean(simulated):.0f} on average, of {len(bed.radius)}",
+            "window moved": f"{window.moves} times",
+            "momentum frozen": f"{window.frozen_momentum:.3g} N s",
+        },
+    )
+
+
+@plain_errors
+def pit(
+    *,
+    radius: Radius = 0.027,
+    pit_length: Annotated[float, typer.Option(help="Length of the pit's rim along x, m.")] = 1.8,
+    pit_width: Annotated[float, typer.Option(help="Width of the pit's rim across, m.")] = 1.9,
+    pit_depth: Annotated[float, typer.Option(help="Depth of the pit, m.")] = 0.06,
+    bank: Annotated[float, typer.Option(help="Slope of the pit's banks, degrees.")] = 12.0,
+    model: ModelName = "rover",
+    wheel_radius: WheelRadius = 0.25,
+    wheel_width: WheelWidth = 0.2,
+    torque: Annotated[float, typer.Option(help="Stall torque of each wheel's motor, N m.")] = 90.0,
+    speed: Annotated[float, typer.Option(help="Rim speed at which the motors give no torque, m/s.")] = 0.6,
+    friction: Friction = 0.5,
+    wall_friction: WallFriction = 0.5,
+    wheel_friction: WheelFriction = 0.9,
+    gravity: Gravity = MARS,
+    time_step: TimeStep = 0.005,
+    tolerance: Tolerance = 1e-3,
+    sleep: Sleep = True,
+    seed: Seed = 0,
+    threads: Annotated[int, typer.Option(min=1, max=1024, help="Threads that solve the contact problem.")] = 1,
+    duration: Duration = 15.0,
+    fps: Fps = 25.0,
+    film: Film = False,
+    output: Output = FOLDER,
+) -> None:
+    """Drive a rover into a pit of balls, across, and out of it; record forces, sinkage and ruts."""
+    from rover_gym.grains.bed_scenes import rover_before_pit, with_wheel_width  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.grains.pit import Pit  # noqa: PLC0415 - as above
+
+    check_folder("output", output)
+    speed = number("speed", speed, above=0.0)
+    chosen = (named_model(model) or RoverModel()).replace(
+        wheel_radius=wheel_radius, motor=Motor(number("torque", torque, above=0.0), speed / wheel_radius)
+    )
+    if wheel_width is not None:
+        chosen = with_wheel_width(chosen, wheel_width)
+    hole = Pit(begin=chosen.clear_radius, length=pit_length, width=pit_width, depth=pit_depth, bank_deg=bank)
+    options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
+    with console().status("filling the pit"):
+        fill = hole.fill(**radii(radius), seed=seed, **options)
+    sim = rover_before_pit(fill, chosen, torque, wheel_friction=wheel_friction, threads=threads, **options)
+    end = hole.begin + hole.length + chosen.clear_radius
+
+    def is_out(now: "RoverGrainSimulation") -> bool:
+        return bool(now.rover.q[0] > end)
+
+    title = f"{model} through a pit of {len(fill.radius)} balls"
+    run = recorded(sim, "pit", title, duration, fps, seed, output, film=film, until=is_out)
+    out = f"yes, after {run.time[-1]:.2f} s" if is_out(sim) else "no"
+    say(run, {"balls": str(len(fill.radius)), "out of the pit": out} | _drive(run, hole.depth, chosen.mass * gravity))
+
+
+def _drive(run: "GrainRun", surface: float, weight: float) -> dict[str, str]:
+    """What a rover did on a bed of this mean height, m."""
+    way = float(run.trajectory["q"][-1, 0] - run.trajectory["q"][0, 0])
+    second = run.n_frames // 2
+    load = run.wheel_forces[second:, :, 1].sum(axis=1).mean()
+    return {
+        "bed": f"{1e3 * surface:.0f} mm deep",
+        "distance": f"{way:.3f} m in {run.time[-1]:g} s",
+        "mean sinkage, second half": f"{1e3 * np.nanmean(run.sinkage[second:]):.1f} mm",
+        "load of all wheels, second half": f"{load:.0f} N, weight {weight:.0f} N",
+    }
