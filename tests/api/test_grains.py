@@ -153,6 +153,43 @@ def test_a_weaker_gravity_gives_the_same_motion_slower_to_the_bit(bed: BallBed) 
     np.testing.assert_array_equal(ways[0], ways[1])
 
 
+def test_a_ball_a_hundred_thousand_times_heavier_hardly_goes_into_its_bed(bed: BallBed) -> None:
+    big = 0.06
+    place = [0.5 * bed.width, bed.surface + 2.0 * big, 0.5 * bed.depth]
+    sim = GrainSimulation(
+        np.append(bed.radius, big),
+        np.append(bed.mass, 1e5 * bed.mass.mean()),
+        np.vstack((bed.position, place)),
+        walls=bed.walls,
+        time_step=4e-3,
+    )
+    sim.step(60)
+    assert sim.penetration() < 0.03 * bed.radius.min()
+
+
+@pytest.mark.parametrize(("stabilisation", "deepest"), [(None, 5.2e-4), ("none", 9.5e-4)])
+def test_overlaps_beyond_the_tolerance_are_pushed_out(stabilisation: str | None, deepest: float) -> None:
+    ball = one(walls=FLOOR, stabilisation=stabilisation)
+    ball.set_state([[0.0, 0.1 - 9e-4, 0.0]], [[0.0] * 3], [[0.0] * 3])
+    ball.step(20)
+    assert deepest - 1e-4 < ball.penetration() < deepest
+
+
+def test_threads_change_no_bit() -> None:
+    packing = ball_packing(600, radius_min=0.018, radius_max=0.02, mass=0.1, width=1.2, depth=0.2)
+    ends = []
+    for threads in (1, 2, 3):
+        sim = GrainSimulation(*packing, walls=FLOOR, threads=threads)
+        report = sim.step(30)
+        assert report.is_converged
+        assert report.n_contacts > 400, "fewer are not shared among threads"
+        ends.append(sim.position.tobytes() + sim.velocity.tobytes())
+    assert ends[1:] == ends[:1] * 2
+    for bad in (0, 1025, 1.5):
+        with pytest.raises(RoverGymError, match="threads"):
+            GrainSimulation(*packing, threads=bad)
+
+
 def test_packings_repeat_and_do_not_overlap() -> None:
     radius, mass, position = ball_packing(
         100, radius_min=0.01, radius_max=0.02, mass=0.1, width=0.2, depth=0.1, left=-0.1, bottom=0.3, seed=4
