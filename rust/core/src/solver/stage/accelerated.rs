@@ -25,10 +25,12 @@ impl Measured {
     }
 }
 
-/// Sweeps after which a problem counts as hard: every short cut ends then, and leaps begin.
-const HARD: usize = 150;
+/// Sweeps after which a problem counts as hard: every short cut ends then.
+const HARD: usize = 300;
 
-/// Sweeps from one leap to the next, and those over which the drift is measured.
+/// Sweeps before the first leaps, from one leap to the next, and those over which the drift is
+/// measured.
+const EASY: usize = 30;
 const LEAP: usize = 20;
 const DRIFT: usize = 5;
 
@@ -81,8 +83,8 @@ pub(super) fn accelerate<R: Relaxation>(
                 t = 1.0 + kept * (t - 1.0);
             }
             last_change = change;
-            if is_hard {
-                let since = report.iterations - HARD;
+            if report.iterations >= EASY {
+                let since = report.iterations - EASY;
                 if since % LEAP == LEAP - DRIFT {
                     contacts.anchor();
                 } else if since >= LEAP && since % LEAP == 0 && contacts.leap() {

@@ -236,7 +236,8 @@ impl BallRow {
 /// A contact of the machine with a ball or with something fixed, in the contact's frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MachineRow {
-    ball: u32,
+    /// Place of its ball, or of what is fixed.
+    pub ball: u32,
     frame: [[f64; 3]; 3],
     block: [[f64; 3]; 3],
     pub q: [f64; 3],

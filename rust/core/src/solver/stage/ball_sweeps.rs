@@ -17,7 +17,7 @@
 #![allow(clippy::inline_always)] // a visit is one piece of code
 
 use super::accelerated::{Measured, Relaxation, draw_in};
-use super::ball_leap::Anchor;
+use super::ball_leap::{Anchor, Leaping};
 use super::ball_rows::{Ball, BallRow, MachineRow, mass_of, to_frame};
 use crate::law::coulomb::violation;
 use crate::problem::{BodyPairs, Magnitudes, Violations};
@@ -515,12 +515,10 @@ impl Relaxation for BallSolve<'_> {
         let BallSweeps {
             rows,
             machine,
-            balls,
-            own,
             anchor,
             ..
         } = &mut *self.sweeps;
-        anchor.set((rows, machine), balls, own);
+        anchor.set(rows, machine);
     }
 
     fn leap(&mut self) -> bool {
@@ -529,13 +527,30 @@ impl Relaxation for BallSolve<'_> {
             machine,
             balls,
             own,
+            slabs,
+            blocks,
             anchor,
             before,
             own_before,
             ..
         } = &mut *self.sweeps;
-        let leapt = anchor.leap((rows, machine), balls, own);
+        let leapt = anchor.leap(&mut Leaping {
+            pairs: self.pairs,
+            rows,
+            machine,
+            balls,
+            own,
+            slabs,
+            blocks,
+        });
         if leapt {
+            // The next sweep extrapolates nothing.
+            for row in rows {
+                row.before = row.p;
+            }
+            for row in machine {
+                row.before = row.p;
+            }
             before.clone_from(balls);
             own_before.clone_from(own);
         }
