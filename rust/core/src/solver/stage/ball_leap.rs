@@ -15,8 +15,9 @@ use super::ball_rows::{Ball, BallRow, MachineRow};
 use crate::problem::BodyPairs;
 use crate::spatial::space::dot;
 
-/// Largest share.
+/// Largest and smallest share; a shorter leap is not worth the sweeps' extrapolation, which it ends.
 const LONGEST: f64 = 1e3;
+const SHORTEST: f64 = 5.0;
 
 /// Contacts whose normal impulse falls by less than this part of the largest fall do not end a
 /// leap.
@@ -255,8 +256,8 @@ impl Anchor {
         }
         let normals = cluster.iter().map(|&(_, k)| normal(k as usize));
         let falling = normals.filter(|(_, d)| -d > SMALL * largest);
-        falling
-            .map(|(p, d)| p / -d)
-            .fold(wanted.min(LONGEST), f64::min)
+        let opens = falling.map(|(p, d)| p / -d).fold(LONGEST, f64::min);
+        let share = wanted.min(opens);
+        if share < SHORTEST { 0.0 } else { share }
     }
 }
