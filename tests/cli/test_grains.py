@@ -32,6 +32,7 @@ def rover(*arguments: str) -> str:
         ("sphere", ["--balls", "100", "--radius", "0.012"], "deepest"),
         ("rover", ["--balls", "150", "--radius", "0.05", "--width", "1.5", "--depth", "1"], "load of all wheels"),
         ("track", ["--length", "3", "--layers", "1", "--radius", "0.04", "--wheel-radius", "0.25"], "balls simulated"),
+        ("pit", ["--radius", "0.04", "--depth", "0.09", "--length", "1.2", "--threads", "2"], "out of the pit"),
     ],
 )
 def test_a_run_is_recorded_and_its_result_told(command: str, options: list[str], said: str, tmp_path: Path) -> None:
@@ -42,7 +43,7 @@ def test_a_run_is_recorded_and_its_result_told(command: str, options: list[str],
     assert run.trajectory.attributes["complete"]
     assert run.time[-1] == pytest.approx(0.1, abs=0.02)
     assert run.trajectory["penetration"].max() < 0.01 * run.radius.min()
-    assert (run.model is not None) == (command in {"rover", "track"})
+    assert (run.model is not None) == (command in {"rover", "track", "pit"})
 
 
 @pytest.mark.parametrize(
@@ -58,6 +59,10 @@ def test_a_run_is_recorded_and_its_result_told(command: str, options: list[str],
         ("track", ["--reach", "0.05", "--layers", "0.3", "--length", "3"], "--reach"),
         ("track", ["--stride", "0.2", "--layers", "0.3", "--length", "3"], "--stride"),
         ("track", ["--layers", "0"], "--layers"),
+        ("track", ["--speed", "0"], "--speed"),
+        ("pit", ["--torque", "-1"], "--torque"),
+        ("pit", ["--radius", "0.04"], "--radius"),
+        ("pit", ["--length", "0.3"], "--length"),
     ],
 )
 def test_bad_options_end_with_one_line(command: str, options: list[str], field: str, tmp_path: Path) -> None:

@@ -10,7 +10,8 @@ from rover_gym.cli.console import DEBUG, one_line
 from rover_gym.cli.drive_command import drive
 from rover_gym.cli.grains_command import grains
 from rover_gym.cli.grains_lab_commands import plate, shear, wheel
-from rover_gym.cli.grains_rover_commands import pit, rover, track
+from rover_gym.cli.grains_rover_commands import pit, track
+from rover_gym.cli.grains_rover_commands import rover as rover_on_bed
 from rover_gym.cli.model_command import model
 from rover_gym.cli.planar_commands import planar
 from rover_gym.cli.plot_command import plot
@@ -35,7 +36,7 @@ app.command()(replay)
 app.command()(scene)
 app.add_typer(model, name="model")
 app.add_typer(planar, name="planar")
-for _command in (rover, track, pit, plate, shear, wheel):
+for _command in (rover_on_bed, track, pit, plate, shear, wheel):
     grains.command()(_command)
 app.add_typer(grains, name="grains")
 app.command()(speed)

@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 END = 0.05  # m before the walls' reach at which a rover's crossing ends
 
 Torque = Annotated[float, typer.Option(help="Torque of each wheel, N m, positive forward.")]
+StallTorque = Annotated[float, typer.Option(help="Stall torque of each wheel's motor, N m.")]
+MotorSpeed = Annotated[float, typer.Option(help="Rim speed at which the motors give no torque, m/s.")]
 WheelFriction = Annotated[float, typer.Option(help="Friction coefficient of the rover on balls.")]
 WheelWidth = Annotated[
     float | None, typer.Option(help="Width of the wheels, m. Default: as in the model; thin discs cut in deep.")
@@ -109,7 +111,8 @@ def track(
     model: ModelName = "rover",
     wheel_radius: WheelRadius = 0.25,
     wheel_width: WheelWidth = 0.2,
-    torque: Torque = 40.0,
+    torque: StallTorque = 90.0,
+    speed: MotorSpeed = 0.6,
     reach: Annotated[float, typer.Option(help="Distance from a wheel within which balls are simulated, m.")] = 0.3,
     stride: Annotated[float, typer.Option(help="How far a wheel moves before the window follows, m.")] = 0.1,
     friction: Friction = 0.5,
@@ -131,7 +134,7 @@ def track(
     from rover_gym.grains.tiling import settled_track  # noqa: PLC0415 - as above
 
     check_folder("output", output)
-    chosen = (named_model(model) or RoverModel()).replace(wheel_radius=wheel_radius)
+    chosen = _with_motors(named_model(model) or RoverModel(), wheel_radius, torque, speed)
     if wheel_width is not None:
         chosen = with_wheel_width(chosen, wheel_width)
     if number("length", length) < 2.0 * chosen.clear_radius:
@@ -166,15 +169,15 @@ def track(
 def pit(
     *,
     radius: Radius = 0.027,
-    pit_length: Annotated[float, typer.Option(help="Length of the pit's rim along x, m.")] = 1.8,
-    pit_width: Annotated[float, typer.Option(help="Width of the pit's rim across, m.")] = 1.9,
-    pit_depth: Annotated[float, typer.Option(help="Depth of the pit, m.")] = 0.06,
-    bank: Annotated[float, typer.Option(help="Slope of the pit's banks, degrees.")] = 12.0,
+    length: Annotated[float, typer.Option(help="Length of the pit's rim along x, m.")] = 1.8,
+    width: Annotated[float, typer.Option(help="Width of the pit's rim across, m.")] = 1.9,
+    depth: Annotated[float, typer.Option(help="Depth of the pit, m.")] = 0.06,
+    bank_deg: Annotated[float, typer.Option(help="Slope of the pit's banks, degrees.")] = 12.0,
     model: ModelName = "rover",
     wheel_radius: WheelRadius = 0.25,
     wheel_width: WheelWidth = 0.2,
-    torque: Annotated[float, typer.Option(help="Stall torque of each wheel's motor, N m.")] = 90.0,
-    speed: Annotated[float, typer.Option(help="Rim speed at which the motors give no torque, m/s.")] = 0.6,
+    torque: StallTorque = 90.0,
+    speed: MotorSpeed = 0.6,
     friction: Friction = 0.5,
     wall_friction: WallFriction = 0.5,
     wheel_friction: WheelFriction = 0.9,
@@ -194,13 +197,10 @@ def pit(
     from rover_gym.grains.pit import Pit  # noqa: PLC0415 - as above
 
     check_folder("output", output)
-    speed = number("speed", speed, above=0.0)
-    chosen = (named_model(model) or RoverModel()).replace(
-        wheel_radius=wheel_radius, motor=Motor(number("torque", torque, above=0.0), speed / wheel_radius)
-    )
+    chosen = _with_motors(named_model(model) or RoverModel(), wheel_radius, torque, speed)
     if wheel_width is not None:
         chosen = with_wheel_width(chosen, wheel_width)
-    hole = Pit(begin=chosen.clear_radius, length=pit_length, width=pit_width, depth=pit_depth, bank_deg=bank)
+    hole = Pit(begin=chosen.clear_radius, length=length, width=width, depth=depth, bank_deg=bank_deg)
     options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
     with console().status("filling the pit"):
         fill = hole.fill(**radii(radius), seed=seed, **options)
@@ -216,14 +216,23 @@ def pit(
     say(run, {"balls": str(len(fill.radius)), "out of the pit": out} | _drive(run, hole.depth, chosen.mass * gravity))
 
 
+def _with_motors(model: RoverModel, wheel_radius: float, torque: float, speed: float) -> RoverModel:
+    """The same rover on wheels of this radius, m, with motors of this stall torque, N m, and no-load rim speed, m/s."""
+    torque, speed = number("torque", torque, above=0.0), number("speed", speed, above=0.0)
+    radius = number("wheel_radius", wheel_radius, above=0.0)
+    return model.replace(wheel_radius=radius, motor=Motor(torque, speed / radius))
+
+
 def _drive(run: "GrainRun", surface: float, weight: float) -> dict[str, str]:
     """What a rover did on a bed of this mean height, m."""
     way = float(run.trajectory["q"][-1, 0] - run.trajectory["q"][0, 0])
     second = run.n_frames // 2
     load = run.wheel_forces[second:, :, 1].sum(axis=1).mean()
+    sunk = run.sinkage[second:]
+    sunk = sunk[np.isfinite(sunk)]
     return {
         "bed": f"{1e3 * surface:.0f} mm deep",
         "distance": f"{way:.3f} m in {run.time[-1]:g} s",
-        "mean sinkage, second half": f"{1e3 * np.nanmean(run.sinkage[second:]):.1f} mm",
+        "mean sinkage, second half": f"{1e3 * sunk.mean():.1f} mm" if sunk.size else "no wheel on the balls",
         "load of all wheels, second half": f"{load:.0f} N, weight {weight:.0f} N",
     }

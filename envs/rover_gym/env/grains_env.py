@@ -35,7 +35,12 @@ WHEEL_RADIUS, WHEEL_WIDTH = 0.25, 0.2
 #: Speed below which a grain may sleep, m/s: a twentieth of what a free one gains in a control period.
 SLEEP_SPEED = 0.02
 #: Arguments of `RoverEnv` with another default.
-DEFAULTS = {"goal_distance": (4.5, 5.5), "heading_deg": (-5.0, 5.0), "goal_bearing_deg": (-5.0, 5.0)}
+DEFAULTS = {
+    "goal_distance": (4.5, 5.5),
+    "heading_deg": (-5.0, 5.0),
+    "goal_bearing_deg": (-5.0, 5.0),
+    "gravity": (0.0, -3.71, 0.0),
+}
 #: A height far above all grains, m.
 FAR = 1e4
 #: Most beds that are settled.
@@ -68,11 +73,12 @@ class RoverGrainsEnv(RoverEnv):
     ## Ground
 
     Level solid ground with a pit, 2.4 m long, 2.0 m wide and 0.09 m deep, 0.9 m ahead of the start, filled to the
-    brim with some 1770 balls of 30 to 40 mm radius, which roll, slide and are pushed aside. Grains meet one another,
+    brim with some 1170 balls of 30 to 40 mm radius, which roll, slide and are pushed aside. Grains meet one another,
     the ground and the rover with exact contact and Coulomb friction, and forces go both ways within the step.
 
     The built-in rover weighs 960 kg: on its wheels of 0.10 m it would sink into loose grains down to its trunk. Here it
-    has wheels of 0.25 m radius and 0.20 m width unless `model` says otherwise.
+    has wheels of 0.25 m radius and 0.20 m width unless `model` says otherwise. Gravity is that of Mars, 3.71 m/s². On
+    Earth the rover digs itself in before the far bank.
 
     ## Observation
 
