@@ -3111,6 +3111,7 @@ class GrainSimulation:
         sleep: bool = False,
         sleep_speed: float | None = None,
         sleep_distance: float | None = None,
+        threads: int = 1,
     ) -> GrainSimulation: ...
     @property
     def time(self) -> float:

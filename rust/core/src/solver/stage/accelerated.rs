@@ -87,7 +87,7 @@ pub(super) fn accelerate<R: Relaxation>(
                 let since = report.iterations - EASY;
                 if since % LEAP == LEAP - DRIFT {
                     contacts.anchor();
-                } else if since >= LEAP && since % LEAP == 0 && contacts.leap() {
+                } else if since >= LEAP && since.is_multiple_of(LEAP) && contacts.leap() {
                     (t, last_change) = (1.0, f64::INFINITY);
                 }
             }
