@@ -53,3 +53,9 @@ def test_too_many_or_too_large_balls_are_refused_before_they_are_made():
         PIT.fill(0.05, 0.06)
     with pytest.raises(OptionError, match="radius_min"):
         PIT.fill(-0.01, 0.02)
+
+
+def test_a_pit_is_filled_evenly() -> None:
+    fill = Pit(length=1.8, width=1.9, depth=0.06, bank_deg=12.0).fill(0.0243, 0.0297, time_step=4e-3)
+    right = fill.position[:, 2] > 0.0
+    assert fill.mass[right].sum() == pytest.approx(fill.mass[~right].sum(), rel=0.04)

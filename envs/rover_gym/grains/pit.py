@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -129,8 +129,8 @@ class Pit:
             refuse(OptionError, "radius_min", radius_min, reason)
         half = 0.5 * self.length - self.bank, 0.5 * self.width - self.bank
         mass = 4.0 / 3.0 * math.pi * density * mean**3
-        packing = ball_packing(
-            poured,
+        loose = partial(
+            ball_packing,
             radius_min=radius_min,
             radius_max=radius_max,
             mass=mass,
@@ -141,6 +141,11 @@ class Pit:
             bottom=-self.depth,
             seed=seed,
         )
+        packing = loose(poured)
+        # Whole layers: a part of one would fill one side of the pit higher than the other.
+        layer = int((packing[2][:, 1] < 2.0 * radius_max - self.depth).sum())
+        if poured % layer:
+            packing = loose(poured + layer - poured % layer)
         sim = GrainSimulation(*packing, terrain=self.terrain, **options)
         settle(sim)
         place, radius = sim.position, sim.radius
