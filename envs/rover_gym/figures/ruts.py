@@ -38,7 +38,9 @@ def surfaces_of_run(run: GrainRun) -> tuple[SurfaceMap, SurfaceMap]:
 def rut_maps(figure: Sheet, run: GrainRun) -> None:
     """Height before, height after, and the change, with the wheels' ways; means over squares of two balls."""
     before, after = (surface.smoothed(MAP_CELLS) for surface in surfaces_of_run(run))
-    panels = figure.subplots(3, 1, sharex=True, sharey=True)
+    # Beds longer than wide one above the other, others side by side.
+    is_wide = np.ptp(before.z) > np.ptp(before.x)
+    panels = figure.subplots(*((1, 3) if is_wide else (3, 1)), sharex=True, sharey=True)
     known = 1e3 * np.concatenate((before.heights.ravel(), after.heights.ravel()))
     low, high = np.nanquantile(known, (0.01, 0.995))
     change = 1e3 * (after.heights - before.heights)
@@ -54,7 +56,10 @@ def rut_maps(figure: Sheet, run: GrainRun) -> None:
         # z points to the right: seen from above with x to the right, it points down.
         image = axes.imshow(values, extent=edges, cmap=colours, vmin=least, vmax=largest, aspect="equal")
         axes.grid(visible=False)
-        axes.set(ylabel="z (m)")
+        if is_wide:
+            axes.set(xlabel="x (m)")
+        else:
+            axes.set(ylabel="z (m)")
         figure.colorbar(image, ax=axes, label=name, shrink=0.9)
     if run.model is not None:
         style = WheelStyle.of(run.model)
@@ -63,6 +68,7 @@ def rut_maps(figure: Sheet, run: GrainRun) -> None:
             panels[2].plot(way[:, 0], way[:, 2], color=style.colours[wheel], linewidth=0.7, alpha=0.8)
         panels[2].set(xlim=edges[:2], ylim=edges[2:])
     panels[2].set(xlabel="x (m)")
+    panels[0].set(ylabel="z (m)")
 
 
 def rut_sections(figure: Sheet, run: GrainRun) -> None:
