@@ -7,6 +7,7 @@ SOURCE = Path(__file__).parents[2] / "rust" / "core" / "src"
 
 # From the ground up: a chapter may use those before it.
 CHAPTERS = [
+    "pool",
     "quantity",
     "scalar",
     "spatial",

@@ -11,6 +11,7 @@
 //!
 //! Chapters, each using only those above it:
 //!
+//! - `pool`: threads that survive a fork;
 //! - [`quantity`]: admissible numbers of a description; [`scalar`]: one rover or several to a
 //!   register; [`spatial`]: rotations and inertias;
 //! - [`multibody`]: model, state, kinematics, mass matrix, bias, energy, momentum;

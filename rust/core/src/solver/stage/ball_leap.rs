@@ -15,7 +15,8 @@ use super::ball_rows::{Ball, BallRow, MachineRow};
 use crate::problem::BodyPairs;
 use crate::spatial::space::dot;
 
-/// Largest and smallest share; a shorter leap is not worth the sweeps' extrapolation, which it ends.
+/// Largest and smallest share. A shorter leap is not worth the sweeps' extrapolation, which it
+/// ends.
 const LONGEST: f64 = 1e3;
 const SHORTEST: f64 = 5.0;
 
