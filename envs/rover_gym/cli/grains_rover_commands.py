@@ -73,12 +73,10 @@ def rover(
 ) -> None:
     """Drive a rover over a bed of balls; record forces, sinkage and ruts. It ends where the bed ends."""
     from rover_gym.grains.ball_bed import settled_balls  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.grains.bed_scenes import rover_on_bed, with_wheel_width  # noqa: PLC0415 - as above
+    from rover_gym.grains.bed_scenes import rover_on_bed  # noqa: PLC0415 - as above
 
     check_folder("output", output)
-    chosen = named_model(model) or RoverModel()
-    if wheel_width is not None:
-        chosen = with_wheel_width(chosen, wheel_width)
+    chosen = _on_wheels(model, wheel_width)
     options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
     with console().status("settling the bed"):
         bed = settled_balls(balls, width, depth, **radii(radius), seed=seed, **options)
@@ -129,14 +127,12 @@ def track(
     output: Output = FOLDER,
 ) -> None:
     """Drive a rover along a long bed, of which only the balls about its wheels are simulated. It ends with the bed."""
-    from rover_gym.grains.bed_scenes import rover_on_bed, with_wheel_width  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.grains.bed_scenes import rover_on_bed  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.grains.moving_window import MovingWindow  # noqa: PLC0415 - as above
     from rover_gym.grains.tiling import settled_track  # noqa: PLC0415 - as above
 
     check_folder("output", output)
-    chosen = _with_motors(named_model(model) or RoverModel(), wheel_radius, torque, speed)
-    if wheel_width is not None:
-        chosen = with_wheel_width(chosen, wheel_width)
+    chosen = _on_wheels(model, wheel_width, wheel_radius, _motor(torque, speed, wheel_radius))
     if number("length", length) < 2.0 * chosen.clear_radius:
         refuse(
             OptionError, "length", length, f"must be at least {2.0 * chosen.clear_radius:.2f} m, for the rover to turn"
@@ -193,13 +189,11 @@ def pit(
     output: Output = FOLDER,
 ) -> None:
     """Drive a rover into a pit of balls, across, and out of it; record forces, sinkage and ruts."""
-    from rover_gym.grains.bed_scenes import rover_before_pit, with_wheel_width  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.grains.bed_scenes import rover_before_pit  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.grains.pit import Pit  # noqa: PLC0415 - as above
 
     check_folder("output", output)
-    chosen = _with_motors(named_model(model) or RoverModel(), wheel_radius, torque, speed)
-    if wheel_width is not None:
-        chosen = with_wheel_width(chosen, wheel_width)
+    chosen = _on_wheels(model, wheel_width, wheel_radius, _motor(torque, speed, wheel_radius))
     hole = Pit(begin=chosen.clear_radius, length=length, width=width, depth=depth, bank_deg=bank_deg)
     options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
     with console().status("filling the pit"):
@@ -218,11 +212,24 @@ def pit(
     say(run, {"balls": str(len(fill.radius)), "out of the pit": out} | _drive(run, hole.depth, chosen.mass * gravity))
 
 
-def _with_motors(model: RoverModel, wheel_radius: float, torque: float, speed: float) -> RoverModel:
-    """The same rover on wheels of this radius, m, with motors of this stall torque, N m, and no-load rim speed, m/s."""
+def _motor(torque: float, speed: float, wheel_radius: float) -> Motor:
+    """A motor of this stall torque, N m, and no-load rim speed, m/s, for wheels of this radius, m."""
     torque, speed = number("torque", torque, above=0.0), number("speed", speed, above=0.0)
-    radius = number("wheel_radius", wheel_radius, above=0.0)
-    return model.replace(wheel_radius=radius, motor=Motor(torque, speed / radius))
+    return Motor(torque, speed / number("wheel_radius", wheel_radius, above=0.0))
+
+
+def _on_wheels(
+    name: str, wheel_width: float | None, wheel_radius: float | None = None, motor: Motor | None = None
+) -> RoverModel:
+    """The rover of this name, with these wheels (m) and motors where they are given."""
+    from rover_gym.grains.bed_scenes import with_wheel_width  # noqa: PLC0415 - h5py is slow to load
+
+    model = named_model(name) or RoverModel()
+    if wheel_radius is not None:
+        model = model.replace(wheel_radius=wheel_radius)
+    if motor is not None:
+        model = model.replace(motor=motor)
+    return model if wheel_width is None else with_wheel_width(model, wheel_width)
 
 
 def _drive(run: "GrainRun", surface: float, weight: float) -> dict[str, str]:
