@@ -12,6 +12,7 @@ import pytest
 from rover_gym import Plane, RoverModel, Simulation, SphereField
 from rover_gym.extras import MissingExtraError
 from rover_gym.record import Channel, Recorder, RecordingError, RoverSampler, read_trajectory
+from rover_gym.record.steady_file import SteadyFile
 
 TIME = Channel("time", "s", "time since the start")
 POINT = Channel("point", "m", "a point, world", (3,), ("x", "y", "z"))
@@ -68,6 +69,31 @@ def test_a_killed_run_keeps_what_it_had(tmp_path: Path) -> None:
     assert np.array_equal(trajectory["time"], np.arange(50.0))
     assert not trajectory.attributes["complete"]
     assert trajectory.attributes["title"] == "to be killed"
+
+
+def test_an_interrupt_waits_for_the_rows_that_are_being_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In the middle of HDF5's own writing it would crash the process."""
+    write = SteadyFile.write
+    interrupts: list[int] = []
+
+    def interrupted(disk: SteadyFile, data: bytes) -> int:
+        if not interrupts:
+            interrupts.append(1)
+            signal.raise_signal(signal.SIGINT)
+        return write(disk, data)
+
+    recorder = Recorder(tmp_path / "run.h5", [TIME])
+    for i in range(5):
+        recorder.append({"time": i})
+    monkeypatch.setattr(SteadyFile, "write", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        recorder.flush()
+    assert interrupts
+    recorder.close()
+    assert read_trajectory(tmp_path / "run.h5")["time"].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_an_exception_keeps_all_rows_and_leaves_the_file_incomplete(tmp_path: Path) -> None:

@@ -31,6 +31,7 @@ from rover_gym.record.trajectory_format import (
     file_path,
     import_h5py,
 )
+from rover_gym.record.uninterrupted import uninterrupted
 from rover_gym.validation import refuse, whole
 
 if TYPE_CHECKING:
@@ -86,14 +87,15 @@ class Recorder:
         }
         self._process = os.getpid()
         self._disk = _new_file(self.path)
-        self._file: h5py.File = hdf5.File(self._disk, "w", libver=(LIBRARY, LIBRARY))
-        # Close the file before the interpreter exits; later, HDF5 would call Python objects that no longer exist.
-        self._release = weakref.finalize(self, _release, self._file, self._disk)
-        try:
-            self._begin(channels, facts, terrain)
-        except BaseException:
-            self._release()
-            raise
+        with uninterrupted():
+            self._file: h5py.File = hdf5.File(self._disk, "w", libver=(LIBRARY, LIBRARY))
+            # Close the file before the interpreter exits; later, HDF5 would call Python objects that no longer exist.
+            self._release = weakref.finalize(self, _release, self._file, self._disk)
+            try:
+                self._begin(channels, facts, terrain)
+            except BaseException:
+                self._release()
+                raise
 
     def _begin(self, channels: Sequence[Channel], facts: Mapping[str, Any], terrain: Terrain | None) -> None:
         for key, value in facts.items():
@@ -145,13 +147,14 @@ class Recorder:
             RecordingError: The recorder is closed, or the rows cannot be written; the recorder is then closed.
         """
         self._must_be_open()
-        for name, rows in self._pending.items():
-            if rows:
-                data = self._file[self._places[name]]
-                data.resize(data.shape[0] + len(rows), axis=0)
-                data[-len(rows) :] = np.array(rows)
-                rows.clear()
-        self._commit()
+        with uninterrupted():
+            for name, rows in self._pending.items():
+                if rows:
+                    data = self._file[self._places[name]]
+                    data.resize(data.shape[0] + len(rows), axis=0)
+                    data[-len(rows) :] = np.array(rows)
+                    rows.clear()
+            self._commit()
 
     def note(self, **attributes: str | float) -> None:
         """Stores further attributes at the root during the run.
@@ -160,8 +163,9 @@ class Recorder:
             RecordingError: An attribute cannot be stored, or the recorder is closed.
         """
         self._must_be_open()
-        for key, value in storable(attributes).items():
-            write_attribute(self._file, key, value)
+        with uninterrupted():
+            for key, value in storable(attributes).items():
+                write_attribute(self._file, key, value)
 
     def close(self) -> None:
         """Writes the buffered rows and marks the file complete; a second call does nothing.
@@ -169,11 +173,12 @@ class Recorder:
         Raises:
             RecordingError: The last rows cannot be written; the rows written before remain.
         """
-        if self._release.alive:
-            self.flush()
-            self._file.attrs["complete"] = True
-            self._commit()
-            self._release()
+        with uninterrupted():
+            if self._release.alive:
+                self.flush()
+                self._file.attrs["complete"] = True
+                self._commit()
+                self._release()
 
     def __enter__(self) -> Self:
         return self
@@ -230,8 +235,9 @@ def _new_file(path: Path) -> SteadyFile:
 
 def _release(file: h5py.File, disk: SteadyFile) -> None:
     """Closes a file and leaves it on the disk as the last commit wrote it."""
-    file.close()
-    disk.close()
+    with uninterrupted():
+        file.close()
+        disk.close()
 
 
 def _rows_on_disk(path: Path) -> int:
