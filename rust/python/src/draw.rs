@@ -410,6 +410,17 @@ pub fn start_row(start: &Start) -> [f64; 7] {
     ]
 }
 
+/// What a row of `DrawnEpisodes.starts` tells.
+pub fn start_of([slope, uphill, x, z, heading, goal_x, goal_z]: [f64; 7]) -> Start {
+    Start {
+        slope,
+        uphill,
+        position: [x, z],
+        heading,
+        goal: [goal_x, goal_z],
+    }
+}
+
 /// A row of `DrawnEpisodes.domains`.
 pub fn domain_row(domain: &Domain) -> [f64; 4] {
     let (mass, gravity) = (domain.mass_scale, domain.gravity_scale);
@@ -419,6 +430,16 @@ pub fn domain_row(domain: &Domain) -> [f64; 4] {
 /// A row of `DrawnEpisodes.rocks`.
 pub fn rocks_row(rocks: Option<RockDraw>) -> [f64; 3] {
     rocks.map_or([0.0; 3], |r| [r.difficulty, r.abundance, r.max_radius])
+}
+
+/// What a row of `DrawnEpisodes.rocks` tells; None for that of no rocks.
+pub fn rocks_of([difficulty, abundance, max_radius]: [f64; 3], seed: u64) -> Option<RockDraw> {
+    (max_radius > 0.0).then_some(RockDraw {
+        difficulty,
+        abundance,
+        max_radius,
+        seed,
+    })
 }
 
 #[pymethods]

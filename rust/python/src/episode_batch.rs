@@ -5,16 +5,17 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::draw::Pcg64;
 use rover_core::episode::{
-    Autoreset, EpisodeBatch as CoreBatch, EpisodeError, Stepped, Succession,
+    Autoreset, EpisodeBatch as CoreBatch, EpisodeError, Origin as Began, Stepped, Succession,
 };
 
 use crate::arguments::{Given, at_least_one, refused, whole};
 use crate::arrays::fresh_table;
 use crate::batch::{index, mask};
 use crate::draw::{
-    DrawnEpisodes, EpisodeDistribution, Request, domain_row, range, rocks_row, start_row,
+    DrawnEpisodes, EpisodeDistribution, Request, domain_row, range, rocks_of, rocks_row, start_of,
+    start_row,
 };
-use crate::episode::{actions, rules, simulation};
+use crate::episode::{EpisodeRun, actions, rules, simulation};
 use crate::errors::{BorderError, Kind};
 use crate::generators::halves;
 use crate::ground::Ground;
@@ -126,6 +127,24 @@ fn distribution<'a, 'py>(
     let found = given.cast::<EpisodeDistribution>();
     let what = "an EpisodeDistribution";
     found.map_err(|_| refused(given, Kind::Option, "distribution", what).into())
+}
+
+/// Where and on what an episode has begun, as `EpisodeBatch.origin` tells it.
+fn origin(given: &Bound<'_, PyAny>, terrain: &Ground) -> PyResult<Began> {
+    let what = "what `EpisodeBatch.origin` returns";
+    let refuse = || refused(given, Kind::Option, "origin", what);
+    let found: Option<(Vec<f64>, Vec<f64>, u64, Vec<f64>)> = given.extract().ok();
+    let (start, rocks, seed, _) = found.ok_or_else(refuse)?;
+    let start = <[f64; 7]>::try_from(start).map_err(|_| refuse())?;
+    let rocks = <[f64; 3]>::try_from(rocks).map_err(|_| refuse())?;
+    if !start.iter().chain(&rocks).all(|x| x.is_finite()) {
+        return Err(refuse().into());
+    }
+    Ok(Began {
+        start: start_of(start),
+        rocks: rocks_of(rocks, seed),
+        ground: terrain.drawn(),
+    })
 }
 
 #[pymethods]
@@ -381,6 +400,82 @@ impl EpisodeBatch {
             held.set_origin(index, &drawn.words)?;
         }
         Ok(())
+    }
+
+    /// Puts copies of a rover in the middle of its episode in the places of others.
+    ///
+    /// With `simulation`, `episode`, `origin`, `steps` and `generators` of one rover the copies
+    /// continue it bit for bit.
+    ///
+    /// Args:
+    ///     indices: Indices of the rovers that it replaces.
+    ///     simulation: The rover.
+    ///     episode: Its episode, with the rules of the batch.
+    ///     origin: Where and on what it began, as `origin` tells.
+    ///     generator: Generator of the noise, (1, 4) uint64.
+    ///     steps: Control periods since the episode began.
+    ///
+    /// Raises:
+    ///     OptionError: There is no such rover, or an argument does not fit. Nothing has changed.
+    #[allow(clippy::too_many_arguments)] // keyword arguments in Python
+    #[pyo3(signature = (indices, simulation, episode, origin, *, generator, steps = Given::MISSING),
+        text_signature = "($self, indices, simulation, episode, origin, *, generator, steps=0)")]
+    fn resume(
+        &self,
+        indices: &Bound<'_, PyAny>,
+        simulation: &Bound<'_, PyAny>,
+        episode: &Bound<'_, PyAny>,
+        origin: &Bound<'_, PyAny>,
+        generator: &Bound<'_, PyAny>,
+        steps: Given<'_>,
+    ) -> PyResult<()> {
+        let one = self::simulation(simulation, "simulation")?.get();
+        let cast = episode.cast::<EpisodeRun>();
+        let refuse = |_| refused(episode, Kind::Option, "episode", "an EpisodeRun");
+        let episode = cast.map_err(refuse)?.get().copy()?;
+        let origin = self::origin(origin, &one.origin().terrain)?;
+        let given = crate::generators::generators(generator)?;
+        let [random] = <[Pcg64; 1]>::try_from(given)
+            .map_err(|_| refused(generator, Kind::Option, "generator", "one row"))?;
+        let steps = steps.count(0, Kind::Option, "steps")? as u64;
+        let mut held = self.0.open()?;
+        let places = held.indices(indices, None)?;
+        let rover = one.open()?.clone();
+        for index in places {
+            let whole = (episode.clone(), steps);
+            let batch = &mut held.batch;
+            let resumed = batch.resume(index, rover.clone(), whole, origin.clone(), random);
+            resumed.map_err(BorderError::from)?;
+            held.origins[index] = one.origin().clone();
+        }
+        Ok(())
+    }
+
+    /// A copy of the episode of one rover.
+    ///
+    /// Args:
+    ///     index: Index of the rover.
+    ///
+    /// Raises:
+    ///     OptionError: There is no such rover, or its episode has not begun.
+    fn episode(&self, index: &Bound<'_, PyAny>) -> PyResult<EpisodeRun> {
+        let held = self.0.open()?;
+        let index = self::index(index, held.batch.rovers())?;
+        let episode = held.batch.episode(index).map_err(BorderError::from)?;
+        Ok(EpisodeRun::of(episode.clone()))
+    }
+
+    /// Control periods of one rover since its episode began.
+    ///
+    /// Args:
+    ///     index: Index of the rover.
+    ///
+    /// Raises:
+    ///     OptionError: There is no such rover, or its episode has not begun.
+    fn steps(&self, index: &Bound<'_, PyAny>) -> PyResult<u64> {
+        let held = self.0.open()?;
+        let index = self::index(index, held.batch.rovers())?;
+        Ok(held.batch.steps(index).map_err(BorderError::from)?)
     }
 
     /// The generators of rovers, from which their noise is drawn.

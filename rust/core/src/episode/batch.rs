@@ -232,6 +232,40 @@ impl EpisodeBatch {
         Ok(())
     }
 
+    /// Puts a rover in the middle of its episode in the place of another.
+    ///
+    /// `steps`: control periods that it has taken; `random`: where its noise comes from.
+    ///
+    /// # Errors
+    /// `OtherRules`, `NoSuchRover`, `Differs`, or as [`Rules::check_model`]; nothing is changed
+    /// then.
+    pub fn resume(
+        &mut self,
+        index: usize,
+        rover: RoverSimulation,
+        (episode, steps): (Episode, u64),
+        origin: Origin,
+        random: Pcg64,
+    ) -> Result<(), EpisodeError> {
+        if *episode.rules() != self.rules {
+            return Err(EpisodeError::OtherRules);
+        }
+        self.rules.check_model(rover.model())?;
+        self.batch.replace(index, rover, episode.setting().goal)?;
+        let mut seat = Seat::new(episode, origin, random);
+        seat.steps = steps;
+        self.seats[index] = Some(seat);
+        Ok(())
+    }
+
+    /// Control periods of a rover since its episode began.
+    ///
+    /// # Errors
+    /// `NoSuchRover`, `NotBegun`.
+    pub fn steps(&self, index: usize) -> Result<u64, EpisodeError> {
+        Ok(self.seat(index)?.steps)
+    }
+
     /// Gives every rover its action for one control period and writes the observations
     /// (n × size, row-major).
     ///

@@ -1,0 +1,131 @@
+"""Futures of a rover: the same state driven on by many sequences of commands, side by side in the core's batch."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.env.rover_env import RoverEnv
+from rover_gym.mechanics import EpisodeBatch, EpisodeRules, RoverModel, Simulation, Terrain
+from rover_gym.policy.command import CommandController
+from rover_gym.validation import number, whole
+
+Array = npt.NDArray[np.float64]
+
+#: Solver of the futures: their physics is coarser than the environment's.
+SOLVER = {"tolerance": 1e-4, "max_iterations": 20}
+
+
+class Ends(NamedTuple):
+    """How futures ended; an entry for each.
+
+    Attributes:
+        place: (n, 2) x and z of the trunk's origin, m.
+        time: (n,) how long the future lasted, s.
+        reached: (n,) whether it reached the goal.
+        failed: (n,) whether its episode ended otherwise.
+        energy: (n,) work of the wheel motors, driving or braking, J.
+        tilt: (n,) angle between the trunk and the vertical, rad.
+    """
+
+    place: Array
+    time: Array
+    reached: npt.NDArray[np.bool_]
+    failed: npt.NDArray[np.bool_]
+    energy: Array
+    tilt: Array
+
+
+class Futures:
+    """Drives copies of an environment's rover through sequences of commands.
+
+    Args:
+        env: The environment, whose state each call of `drive` reads; it does not change.
+        n: Number of copies.
+        time_step: Largest physics step of the futures, s; the control period is divided into equal ones.
+        threads: Threads that step them; None for one per core.
+        model: The rover of the futures; that of the episode by default. Another mass, for instance, is a mismatch.
+        friction: Friction of wheels and ground in the futures; that of the episode by default.
+
+    Raises:
+        OptionError: An argument is out of its range, or the model has other joints.
+    """
+
+    def __init__(
+        self,
+        env: RoverEnv,
+        n: int,
+        *,
+        time_step: float = 0.025,
+        threads: int | None = None,
+        model: RoverModel | None = None,
+        friction: float | None = None,
+    ) -> None:
+        self._env, self.n = env, whole("n", n, at_least=1, at_most=100_000)
+        task = env.task
+        substeps = max(1, int(np.ceil(env.dt / number("time_step", time_step, above=0.0) - 1e-9)))
+        self._friction = None if friction is None else number("friction", friction, at_least=0.0)
+        self._model = model
+        self._options = dict(task.simulation_options, time_step=env.dt / substeps, solver_options=SOLVER)
+        (rover,), settings = task.rules.__getnewargs_ex__()
+        self._rules = EpisodeRules(rover, **(settings | {"substeps": substeps, "noise": None}))
+        self._batch = EpisodeBatch(self._rules, self._simulation(env.simulation.terrain), self.n, threads=threads)
+        q = task.layout["q"]
+        self._place, self._scale = [q.start, q.start + 2], task.layout.scale[[q.start, q.start + 2]]
+
+    def _simulation(self, terrain: Terrain) -> Simulation:
+        """A rover of the futures on a terrain, at rest in the zero configuration."""
+        env, task = self._env, self._env.task
+        domain = env.domain
+        model = self._model
+        if model is None:
+            model = task.model if domain.mass_scale == 1.0 else task.model.replace(mass_scale=domain.mass_scale)
+        options = dict(self._options, friction=domain.friction if self._friction is None else self._friction)
+        if domain.gravity_scale != 1.0:
+            options["gravity"] = tuple(domain.gravity_scale * g for g in task.gravity)
+        return Simulation(model, terrain, **options)
+
+    def drive(
+        self, controller: CommandController, commands: npt.ArrayLike, hold: int, terrain: Terrain | None = None
+    ) -> Ends:
+        """Drives the copies from the environment's present state.
+
+        Args:
+            controller: Turns commands into actions.
+            commands: (n, knots, 3) within [-1, 1].
+            hold: Control periods that each command is held.
+            terrain: The ground of the futures; the episode's by default.
+
+        Returns:
+            How each future ended: at its end, or where its episode did.
+        """
+        plan = np.asarray(commands, dtype=np.float64)
+        now, snapshot = self._env.simulation, self._env.snapshot()
+        simulation = self._simulation(now.terrain if terrain is None else terrain)
+        simulation.set_state(now.q, now.v)
+        progress = snapshot.progress
+        start = snapshot.scene.start
+        row = [start.slope, start.uphill, *start.position, start.heading, *start.goal]
+        origin = (row, [0.0, 0.0, 0.0], 0, [1.0] * 4)
+        episode = progress.episode(self._rules)
+        self._batch.resume(range(self.n), simulation, episode, origin, generator=np.zeros((1, 4), np.uint64))
+        seen = self._batch.observations()
+        alive = np.ones(self.n, np.bool_)
+        time = np.zeros(self.n)
+        for k in range(plan.shape[1] * hold):
+            action = controller.act(seen, plan[:, k // hold])
+            seen, _, ended, _, _ = self._batch.step(action, alive, has_scan=False)
+            time[alive] += self._env.dt
+            alive &= ~ended
+            if not alive.any():
+                break
+        told: dict[str, Any] = self._batch.infos()
+        reached = np.asarray(told["termination"]) == "goal"
+        return Ends(
+            seen[:, self._place].astype(np.float64) * self._scale,
+            time,
+            reached,
+            ~alive & ~reached,
+            np.asarray(told["energy"]) - progress.energy,
+            np.asarray(told["tilt"]),
+        )

@@ -1,0 +1,195 @@
+"""A policy that plans with the simulator itself: sampling-based model-predictive control of commands.
+
+Every `period` seconds it draws sequences of commands, drives a copy of the rover by each through `horizon` seconds, and
+looks up in a `FieldPlan` what the place at which each future ends still costs. The update of the sequence is either the
+average with weights `exp(-cost / temperature)` (model-predictive path integral control, Williams et al. 2017) or the
+mean of the best tenth (cross-entropy method, Rubinstein 1999). The first command of the cheapest future is driven.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.env.episode_scene import EpisodeScene
+from rover_gym.env.rover_env import RoverEnv
+from rover_gym.mechanics import OptionError, RoverModel, Terrain
+from rover_gym.planning.field_plan import FieldPlan
+from rover_gym.planning.futures import Ends, Futures
+from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimits
+from rover_gym.policy.pd_policy import find_rover_env
+from rover_gym.validation import number, refuse, whole
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PlannerOptions:
+    """What `PlannerPolicy` samples and what a future costs.
+
+    Attributes:
+        samples: Futures of each planning.
+        iterations: Rounds of samples of each planning, each around the best of the round before.
+        horizon: Length of a future, s.
+        knot: How long a command of the sequence is held, s.
+        period: Time from one planning to the next, s.
+        method: "mppi" or "cem".
+        temperature: Of MPPI's weights, in metres of good ground.
+        spread: Standard deviations of the samples of speed, curvature and sideways direction, each within [-1, 1].
+        energy_price: Metres of good ground that a joule is worth.
+        time_price: Metres of good ground that a second is worth.
+        failure_price: Metres of good ground that a failed episode is worth.
+        time_step: Largest physics step of the futures, s.
+    """
+
+    samples: int = 64
+    iterations: int = 1
+    horizon: float = 2.4
+    knot: float = 0.6
+    period: float = 0.3
+    method: Literal["mppi", "cem"] = "cem"
+    temperature: float = 0.1
+    spread: tuple[float, float, float] = (0.4, 0.5, 0.4)
+    energy_price: float = 2e-4
+    time_price: float = 0.1
+    failure_price: float = 20.0
+    time_step: float = 0.025
+
+    def __post_init__(self) -> None:
+        whole("samples", self.samples, at_least=2, at_most=100_000)
+        whole("iterations", self.iterations, at_least=1, at_most=100)
+        for name in ("horizon", "knot", "period", "temperature", "time_step"):
+            number(name, getattr(self, name), at_least=1e-3, at_most=1e3)
+        for name in ("energy_price", "time_price", "failure_price"):
+            number(name, getattr(self, name), at_least=0.0)
+        if self.method not in ("mppi", "cem"):
+            refuse(OptionError, "method", self.method, "must be 'mppi' or 'cem'")
+
+
+class PlannerPolicy:
+    """Drives a `RoverEnv` by planning in copies of it; `predict` is stable-baselines3's.
+
+    It reads the environment's state and ground, which a rover does not know. Args for a mismatch on purpose (`model`,
+    `friction`, `terrain`) change the copies and not the environment.
+
+    Args:
+        env: A `Rover-v0`, wrapped or not; not a vector.
+        options: What is sampled, and what a future costs.
+        limits: The values of a command of 1.
+        seed: Of the samples.
+        threads: Threads that step the futures; None for one per core.
+        model: The rover of the futures, see `Futures`.
+        friction: Of the futures, see `Futures`.
+        terrain: The ground of the futures and of the field's plan; the episode's by default.
+
+    Raises:
+        OptionError: An argument is out of its range.
+        MissingExtraError: SciPy is not installed.
+    """
+
+    def __init__(
+        self,
+        env: Any,
+        options: PlannerOptions | None = None,
+        *,
+        limits: CommandLimits | None = None,
+        seed: int = 0,
+        threads: int | None = None,
+        model: RoverModel | None = None,
+        friction: float | None = None,
+        terrain: Terrain | None = None,
+    ) -> None:
+        self.options = PlannerOptions() if options is None else options
+        self._env: RoverEnv = find_rover_env(env)
+        self._controller = CommandController(self._env, limits, guided=False)
+        self._futures: Futures | None = None
+        self._further = {"threads": threads, "model": model, "friction": friction}
+        self._terrain = terrain
+        self._random = np.random.default_rng(whole("seed", seed, at_least=0))
+        self._hold = max(1, round(self.options.knot / self._env.dt))
+        self._knots = max(1, math.ceil(self.options.horizon / (self._hold * self._env.dt) - 1e-9))
+        self._periods = max(1, round(self.options.period / self._env.dt))
+        self._scene: EpisodeScene | None = None
+        self._field: FieldPlan | None = None
+        self._sequence: Array = np.zeros((self._knots, N_COMMANDS))
+        self._since = 0
+        self._library = _library(self._knots)
+
+    def predict(
+        self,
+        observation: npt.NDArray[np.float32],
+        state: tuple[npt.NDArray[Any], ...] | None = None,
+        episode_start: npt.NDArray[np.bool_] | None = None,  # noqa: ARG002 - the signature is stable-baselines3's
+        deterministic: bool = True,  # noqa: ARG002 - as above
+    ) -> tuple[npt.NDArray[np.float32], tuple[npt.NDArray[Any], ...] | None]:
+        """The action for an observation `(size,)` of the environment, which has not moved since.
+
+        A new episode is noticed by its scene. `state` is returned unchanged.
+        """
+        scene = self._env.snapshot().scene
+        if scene is not self._scene:
+            self._begin(scene)
+        if self._since % self._periods == 0:
+            self._plan()
+        self._since += 1
+        seen = np.asarray(observation, dtype=np.float32)
+        action = self._controller.act(seen.reshape(1, -1), self._sequence[:1])
+        return action[0], state
+
+    def _begin(self, scene: EpisodeScene) -> None:
+        terrain = scene.terrain if self._terrain is None else self._terrain
+        position = self._env.simulation.q[[0, 2]]
+        self._field = FieldPlan.over(terrain, self._env.model, position, scene.start.goal)
+        self._futures = Futures(self._env, self.options.samples, time_step=self.options.time_step, **self._further)
+        self._scene, self._since = scene, 0
+        self._sequence = np.zeros((self._knots, N_COMMANDS))
+        self._sequence[:, 0] = 1.0
+
+    def _plan(self) -> None:
+        """Draws, drives and judges futures; keeps the sequence that the rover follows."""
+        options = self.options
+        futures, field = self._futures, self._field
+        assert futures is not None and field is not None  # noqa: PT018, S101 - `_begin` made them
+        mean = self._shifted()
+        fixed = np.concatenate((mean[None], self._library))[: options.samples]
+        for turn in range(options.iterations):
+            drawn = mean + self._random.normal(size=(options.samples - len(fixed), *mean.shape)) * options.spread
+            plans = np.clip(np.concatenate((fixed, drawn)), -1.0, 1.0)
+            costs = self._costs(futures.drive(self._controller, plans, self._hold, self._terrain), field)
+            order = np.argsort(costs, kind="stable")
+            if options.method == "cem":
+                mean = plans[order[: max(1, options.samples // 10)]].mean(axis=0)
+            else:
+                weights = np.exp(-(costs - costs[order[0]]) / options.temperature)
+                mean = np.tensordot(weights / weights.sum(), plans, axes=1)
+            fixed = np.stack((plans[order[0]], mean))
+        self._sequence = plans[order[0]]
+
+    def _shifted(self) -> Array:
+        """The last sequence, begun later by the time that has passed since."""
+        passed = min(self._since, self._periods) / self._hold
+        at = np.minimum(np.arange(self._knots) + passed, self._knots - 1)
+        return self._sequence[np.rint(at).astype(int)]
+
+    def _costs(self, ends: Ends, field: FieldPlan) -> Array:
+        """(n,) what each future costs, in metres of good ground."""
+        options = self.options
+        rest = np.where(ends.reached, 0.0, field.cost_to_go(ends.place))
+        rest[~np.isfinite(rest)] = options.failure_price
+        return np.asarray(
+            rest
+            + options.time_price * ends.time
+            + options.energy_price * ends.energy
+            + options.failure_price * ends.failed
+        )
+
+
+def _library(knots: int) -> Array:
+    """(n, knots, 3) sequences of one command each, forward and backward, and back followed by forward."""
+    turns = [(k, s) for k in (-1.0, -0.5, 0.0, 0.5, 1.0) for s in (-0.7, 0.0, 0.7)]
+    steady = [[(v, k, s)] * knots for v in (1.0, -1.0) for k, s in turns]
+    half = (knots + 1) // 2
+    around = [[(-1.0, -k, s)] * half + [(1.0, k, s)] * (knots - half) for k in (-1.0, 0.0, 1.0) for s in (-0.7, 0.7)]
+    return np.array(steady + around)
