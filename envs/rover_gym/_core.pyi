@@ -2559,6 +2559,50 @@ class EpisodeBatch:
         Raises:
             OptionError: There is no such rover, or the episodes do not fit. Nothing has changed.
         """
+    def resume(
+        self,
+        indices: Sequence[int],
+        simulation: Simulation,
+        episode: EpisodeRun,
+        origin: tuple[npt.ArrayLike, npt.ArrayLike, int, npt.ArrayLike],
+        *,
+        generator: _Rows,
+        steps: int = 0,
+    ) -> None:
+        """Puts copies of a rover in the middle of its episode in the places of others.
+
+        With `simulation`, `episode`, `origin`, `steps` and `generators` of one rover the copies
+        continue it bit for bit.
+
+        Args:
+            indices: Indices of the rovers that it replaces.
+            simulation: The rover.
+            episode: Its episode, with the rules of the batch.
+            origin: Where and on what it began, as `origin` tells.
+            generator: Generator of the noise, (1, 4) uint64.
+            steps: Control periods since the episode began.
+
+        Raises:
+            OptionError: There is no such rover, or an argument does not fit. Nothing has changed.
+        """
+    def episode(self, index: int) -> EpisodeRun:
+        """A copy of the episode of one rover.
+
+        Args:
+            index: Index of the rover.
+
+        Raises:
+            OptionError: There is no such rover, or its episode has not begun.
+        """
+    def steps(self, index: int) -> int:
+        """Control periods of one rover since its episode began.
+
+        Args:
+            index: Index of the rover.
+
+        Raises:
+            OptionError: There is no such rover, or its episode has not begun.
+        """
     def generators(self, indices: Sequence[int]) -> _Rows:
         """The generators of rovers, from which their noise is drawn.
 

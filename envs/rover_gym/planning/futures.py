@@ -13,7 +13,7 @@ from rover_gym.validation import number, whole
 Array = npt.NDArray[np.float64]
 
 #: Solver of the futures: their physics is coarser than the environment's.
-SOLVER = {"tolerance": 1e-4, "max_iterations": 20}
+SOLVER: dict[str, Any] = {"tolerance": 1e-4, "max_iterations": 20}
 
 
 class Ends(NamedTuple):
@@ -26,6 +26,7 @@ class Ends(NamedTuple):
         failed: (n,) whether its episode ended otherwise.
         energy: (n,) work of the wheel motors, driving or braking, J.
         tilt: (n,) angle between the trunk and the vertical, rad.
+        stuck: (n,) for how much of the time that ends an episode the trunk has been held, 0 to 1.
     """
 
     place: Array
@@ -34,6 +35,7 @@ class Ends(NamedTuple):
     failed: npt.NDArray[np.bool_]
     energy: Array
     tilt: Array
+    stuck: Array
 
 
 class Futures:
@@ -66,11 +68,12 @@ class Futures:
         substeps = max(1, int(np.ceil(env.dt / number("time_step", time_step, above=0.0) - 1e-9)))
         self._friction = None if friction is None else number("friction", friction, at_least=0.0)
         self._model = model
-        self._options = dict(task.simulation_options, time_step=env.dt / substeps, solver_options=SOLVER)
+        self._options = dict(task.simulation_options, time_step=env.dt / substeps, **SOLVER)
         (rover,), settings = task.rules.__getnewargs_ex__()
         self._rules = EpisodeRules(rover, **(settings | {"substeps": substeps, "noise": None}))
         self._batch = EpisodeBatch(self._rules, self._simulation(env.simulation.terrain), self.n, threads=threads)
         q = task.layout["q"]
+        self._stuck = task.layout["stuck"].start
         self._place, self._scale = [q.start, q.start + 2], task.layout.scale[[q.start, q.start + 2]]
 
     def _simulation(self, terrain: Terrain) -> Simulation:
@@ -128,4 +131,5 @@ class Futures:
             ~alive & ~reached,
             np.asarray(told["energy"]) - progress.energy,
             np.asarray(told["tilt"]),
+            seen[:, self._stuck].astype(np.float64),
         )

@@ -8,6 +8,7 @@ mean of the best tenth (cross-entropy method, Rubinstein 1999). The first comman
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -20,7 +21,7 @@ from rover_gym.planning.field_plan import FieldPlan
 from rover_gym.planning.futures import Ends, Futures
 from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimits
 from rover_gym.policy.pd_policy import find_rover_env
-from rover_gym.validation import number, refuse, whole
+from rover_gym.validation import number, refuse, vector, whole
 
 Array = npt.NDArray[np.float64]
 
@@ -64,6 +65,8 @@ class PlannerOptions:
             number(name, getattr(self, name), at_least=1e-3, at_most=1e3)
         for name in ("energy_price", "time_price", "failure_price"):
             number(name, getattr(self, name), at_least=0.0)
+        for value in vector("spread", self.spread, N_COMMANDS):
+            number("spread", value, at_least=0.0)
         if self.method not in ("mppi", "cem"):
             refuse(OptionError, "method", self.method, "must be 'mppi' or 'cem'")
 
@@ -105,7 +108,15 @@ class PlannerPolicy:
         self._env: RoverEnv = find_rover_env(env)
         self._controller = CommandController(self._env, limits, guided=False)
         self._futures: Futures | None = None
-        self._further = {"threads": threads, "model": model, "friction": friction}
+        self._make_futures = partial(
+            Futures,
+            self._env,
+            self.options.samples,
+            time_step=self.options.time_step,
+            threads=threads,
+            model=model,
+            friction=friction,
+        )
         self._terrain = terrain
         self._random = np.random.default_rng(whole("seed", seed, at_least=0))
         self._hold = max(1, round(self.options.knot / self._env.dt))
@@ -142,7 +153,7 @@ class PlannerPolicy:
         terrain = scene.terrain if self._terrain is None else self._terrain
         position = self._env.simulation.q[[0, 2]]
         self._field = FieldPlan.over(terrain, self._env.model, position, scene.start.goal)
-        self._futures = Futures(self._env, self.options.samples, time_step=self.options.time_step, **self._further)
+        self._futures = self._make_futures()
         self._scene, self._since = scene, 0
         self._sequence = np.zeros((self._knots, N_COMMANDS))
         self._sequence[:, 0] = 1.0
@@ -154,7 +165,7 @@ class PlannerPolicy:
         assert futures is not None and field is not None  # noqa: PT018, S101 - `_begin` made them
         mean = self._shifted()
         fixed = np.concatenate((mean[None], self._library))[: options.samples]
-        for turn in range(options.iterations):
+        for _ in range(options.iterations):
             drawn = mean + self._random.normal(size=(options.samples - len(fixed), *mean.shape)) * options.spread
             plans = np.clip(np.concatenate((fixed, drawn)), -1.0, 1.0)
             costs = self._costs(futures.drive(self._controller, plans, self._hold, self._terrain), field)
@@ -171,7 +182,7 @@ class PlannerPolicy:
         """The last sequence, begun later by the time that has passed since."""
         passed = min(self._since, self._periods) / self._hold
         at = np.minimum(np.arange(self._knots) + passed, self._knots - 1)
-        return self._sequence[np.rint(at).astype(int)]
+        return np.asarray(self._sequence[np.rint(at).astype(int)])
 
     def _costs(self, ends: Ends, field: FieldPlan) -> Array:
         """(n,) what each future costs, in metres of good ground."""
@@ -182,7 +193,7 @@ class PlannerPolicy:
             rest
             + options.time_price * ends.time
             + options.energy_price * ends.energy
-            + options.failure_price * ends.failed
+            + options.failure_price * np.where(ends.failed, 1.0, ends.stuck)
         )
 
 
