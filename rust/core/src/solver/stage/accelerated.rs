@@ -30,7 +30,7 @@ const HARD: usize = 300;
 
 /// Sweeps before the first leaps, from one leap to the next, and those over which the drift is
 /// measured.
-const EASY: usize = 60;
+const EASY: usize = 100;
 const LEAP: usize = 20;
 const DRIFT: usize = 5;
 
