@@ -34,6 +34,9 @@ type Step<'py> = (
     Vec<usize>,
 );
 
+/// Start, rocks, seed of the rocks, and domain, as `EpisodeBatch.origin` tells them.
+type OriginRows = (Vec<f64>, Vec<f64>, u64, Vec<f64>);
+
 /// Many rovers with their episodes, each bit for bit as it would be alone.
 ///
 /// One call at a time: a call during another one raises BusyError.
@@ -133,7 +136,7 @@ fn distribution<'a, 'py>(
 fn origin(given: &Bound<'_, PyAny>, terrain: &Ground) -> PyResult<Began> {
     let what = "what `EpisodeBatch.origin` returns";
     let refuse = || refused(given, Kind::Option, "origin", what);
-    let found: Option<(Vec<f64>, Vec<f64>, u64, Vec<f64>)> = given.extract().ok();
+    let found: Option<OriginRows> = given.extract().ok();
     let (start, rocks, seed, _) = found.ok_or_else(refuse)?;
     let start = <[f64; 7]>::try_from(start).map_err(|_| refuse())?;
     let rocks = <[f64; 3]>::try_from(rocks).map_err(|_| refuse())?;
