@@ -34,11 +34,11 @@ class PDGains:
         switch_cost: Path length that a change of direction at `speed` counts as, m.
     """
 
-    speed: float = 1.0
+    speed: float = 1.2
     lateral_acceleration: float = 0.5
     braking: float = 0.4
     final_speed: float = 0.3
-    response: float = 0.5
+    response: float = 0.15
     reverse_cost: float = 1.3
     switch_cost: float = 1.0
 
