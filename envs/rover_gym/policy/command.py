@@ -52,7 +52,7 @@ class CommandLimits:
     speed: float = 1.2
     curvature: float = 0.75
     sideways_deg: float = 35.0
-    response: float = 0.15
+    response: float = 0.1
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():

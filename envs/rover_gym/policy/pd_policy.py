@@ -38,7 +38,7 @@ class PDGains:
     lateral_acceleration: float = 0.5
     braking: float = 0.4
     final_speed: float = 0.3
-    response: float = 0.15
+    response: float = 0.1
     reverse_cost: float = 1.3
     switch_cost: float = 1.0
 

@@ -3,19 +3,21 @@
 Two inertias act on a rim. While the wheel rolls, its torque moves its share of the rover; when it is in the air or
 slips, only the wheel itself, a tenth of that share or less. A gain for the rolling wheel makes the other one swing from
 one torque to its opposite. So the force at the rim, torque over radius, is that of the rolling wheel, kept within what
-moves the wheel alone to its speed:
+moves the wheel alone to its speed. Counted in the direction of the missing rim speed,
 
-    F = clip(F_roll, T + k (e - s), T + k (e + s))
+    F = clip(F_roll, F_low, T + k (e + s))
 
     F_roll = feedforward + (m / n) e / response     the rover's mass over its wheels; response: a time constant
+    F_low  = T + k (e - s)                          at most T e / s where e < s
     k = I / (r^2 dt)                                the wheel's spin inertia at the rim over the control period
-    e                                               wanted less present rim speed
+    e >= 0                                          the missing rim speed, wanted less present
     T                                               traction, zero for a wheel without contact
     s = SLACK min(1, load / mean load)
 
 A wheel under the traction T has the wanted rim speed after one period if s is zero, as it is in the air. On the ground
 it may miss that by s, and in between the softer gain rules. Where a rock stops the rover, the traction follows the
-torque, so that each period pushes harder than the last until the wheels turn or the motors are at their limit.
+torque, so that each period pushes harder than the last until the wheels turn or the motors are at their limit. Close to
+the wanted speed such a push fades with e.
 
 The observed traction is that of the last physics step, in which a wheel may just have struck a rock. It is taken for
 that of the period only as far as the torque of the period before could have balanced it with a rim that changed its
@@ -38,6 +40,9 @@ SLACK = 0.5
 
 #: Largest change of a rim's speed in a control period that explains an observed traction, m/s.
 LEAP = 1.5
+
+#: A slack below this divides as this, m/s.
+TINY = 1e-9
 
 
 class WheelRegulator:
@@ -79,10 +84,12 @@ class WheelRegulator:
         traction = self._force_scale * seen[:, self._traction] * (seen[:, self._contact] > 0.5)
         traction = np.clip(traction, applied - LEAP * k, applied + LEAP * k)
         slack = SLACK * np.clip(seen[:, self._load], 0.0, 1.0)
-        force = np.clip(
-            feedforward + self._roll_gain * missing,
-            traction + k * (missing - slack),
-            traction + k * (missing + slack),
-        )
+
+        direction = np.where(missing < 0.0, -1.0, 1.0)
+        e, T = direction * missing, direction * traction
+        rolling = direction * (feedforward + self._roll_gain * missing)
+        low = T + k * (e - slack)
+        low = np.where(e < slack, np.minimum(low, T * e / np.maximum(slack, TINY)), low)
+        force = direction * np.clip(rolling, low, T + k * (e + slack))
         entries: Array = np.clip(self._entry_per_force * force, -1.0, 1.0)
         return entries
