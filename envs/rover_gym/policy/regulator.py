@@ -19,6 +19,9 @@ it may miss that by s, and in between the softer gain rules. Where a rock stops 
 torque, so that each period pushes harder than the last until the wheels turn or the motors are at their limit. Close to
 the wanted speed such a push fades with e.
 
+The wheels of a rover that skids slip sideways whenever it turns, and share its load by chance. Their force is
+`feedforward + min(k, m / n / response) e`, not cut off.
+
 The observed traction is that of the last physics step, in which a wheel may just have struck a rock. It is taken for
 that of the period only as far as the torque of the period before could have balanced it with a rim that changed its
 speed by LEAP.
@@ -58,8 +61,10 @@ class WheelRegulator:
         n = len(model.wheel_names)
         joints = model.wheel_joint_indices
         spin = model.mass_matrix(np.zeros(model.nq), coordinates="state").diagonal()[joints]
-        self._roll_gain = model.mass / n / max(response, rover.dt)
+        self._skids = not rover.task.steering.joints
         self._spin_gain = spin / model.wheel_radii**2 / rover.dt
+        roll_gain = model.mass / n / max(response, rover.dt)
+        self._roll_gain = np.minimum(roll_gain, self._spin_gain) if self._skids else roll_gain
         self._entry_per_force = model.wheel_radii / model.wheel_torque_limits
         self._rates = layout["velocity"].start + np.asarray(joints, np.intp)
         self._rim_per_entry = model.wheel_radii * drive_signs(model) * layout.scale[self._rates]
@@ -79,6 +84,10 @@ class WheelRegulator:
             feedforward: Forces `(n, n_wheels)` or `(n, 1)` that a rolling wheel needs at its wanted speed, N.
         """
         missing = wanted - self._rim_per_entry * seen[:, self._rates]
+        rolling = feedforward + self._roll_gain * missing
+        if self._skids:
+            skidding: Array = np.clip(self._entry_per_force * rolling, -1.0, 1.0)
+            return skidding
         k = self._spin_gain
         applied = seen[:, self._previous] / self._entry_per_force
         traction = self._force_scale * seen[:, self._traction] * (seen[:, self._contact] > 0.5)
@@ -87,9 +96,8 @@ class WheelRegulator:
 
         direction = np.where(missing < 0.0, -1.0, 1.0)
         e, T = direction * missing, direction * traction
-        rolling = direction * (feedforward + self._roll_gain * missing)
         low = T + k * (e - slack)
         low = np.where(e < slack, np.minimum(low, T * e / np.maximum(slack, TINY)), low)
-        force = direction * np.clip(rolling, low, T + k * (e + slack))
+        force = direction * np.clip(direction * rolling, low, T + k * (e + slack))
         entries: Array = np.clip(self._entry_per_force * force, -1.0, 1.0)
         return entries
