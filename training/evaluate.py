@@ -3,10 +3,11 @@
     python training/evaluate.py runs/train/rocks-seed1 runs/train/rocks-seed2 --difficulty 1 --output runs/evaluation
 
 Prints a table and writes evaluation.json, evaluation.md, evaluation.png and every policy's episodes. A later evaluation
-of the same scene into the same folder reuses those episodes: choose another folder, or delete them, when a policy has
-changed. Intervals are 95%. The seeds differ from those of training, so the policies have not seen the fields.
+into the same folder reuses those episodes if scene, seeds, the policy's files, the package's policies and its compiled
+core are the same. Intervals are 95%. The seeds differ from those of training, so the policies have not seen the fields.
 """
 
+import hashlib
 import json
 import math
 from collections.abc import Callable, Sequence
@@ -20,6 +21,7 @@ from matplotlib.figure import Figure
 from rich.console import Console
 from rich.progress import Progress, TaskID
 
+import rover_gym
 from rover_gym import PDPolicy
 from rover_gym.cli.console import plain_errors, progress_bar, say_path
 from rover_gym.cli.scene_options import BUILT_IN, ModelName
@@ -62,26 +64,29 @@ def evaluate(
     arguments |= {} if model == BUILT_IN else {"model": model}
     arguments |= {} if difficulty is None else {"difficulty": difficulty}
     arguments |= {} if slope is None else {"slope_deg": slope}
+    grounds = [Path(str(value)) for value in arguments.values() if Path(str(value)).is_file()]
     seeds = range(seed, seed + episodes)
     folders = [folder if (folder / "policy.npz").exists() else folder / "policy" for folder in policies]
     first = PolicyCard.read(folders[0] / "policy.json")
 
-    makers: list[tuple[str, Callable[[Any], Policy], dict[str, Any]]] = [("PD baseline", PDPolicy, {})]
+    makers: list[tuple[str, Callable[[Any], Policy], dict[str, Any], list[Path]]] = [("PD baseline", PDPolicy, {}, [])]
     if guide and first.guided:
-        makers.append(("guide alone", lambda env: TrainedPolicy.untrained(env, first), policy_arguments(folders[0])))
+        alone = partial(_untrained, first)
+        makers.append(("guide alone", alone, policy_arguments(folders[0]), [folders[0] / "policy.json"]))
     for given, folder in zip(policies, folders, strict=True):
-        makers.append((given.name, partial(_load, folder), policy_arguments(folder)))
+        files = [folder / "policy.npz", folder / "policy.json"]
+        makers.append((given.name, partial(_load, folder), policy_arguments(folder), files))
 
     output.mkdir(parents=True, exist_ok=True)
     drives: dict[str, list[EvaluatedEpisode]] = {}
     with progress_bar() as bar:
-        for name, make_policy, further in makers:
+        for name, make_policy, further, files in makers:
             task = bar.add_task(name, total=episodes, state="")
             drives[name] = _drive(
                 output / f"episodes-{name.replace(' ', '-')}.json",
                 make_policy,
+                {"environment": arguments | further, "seeds": [seed, episodes], "files": _digest([*grounds, *files])},
                 seeds,
-                arguments | further,
                 threads,
                 partial(_show, bar, task, episodes),
             )
@@ -105,6 +110,10 @@ def evaluate(
         say_path("written", output / path)
 
 
+def _untrained(card: PolicyCard, env: Any) -> Policy:
+    return TrainedPolicy.untrained(env, card)
+
+
 def _load(folder: Path, env: Any) -> Policy:
     return TrainedPolicy.load(env, folder)
 
@@ -116,27 +125,36 @@ def _show(bar: Progress, task: TaskID, episodes: int, done: int) -> None:
 def _drive(
     path: Path,
     make_policy: Callable[[Any], Policy],
+    key: dict[str, Any],
     seeds: Sequence[int],
-    arguments: dict[str, Any],
     threads: int,
     progress: Callable[[int], None],
 ) -> list[EvaluatedEpisode]:
-    """The episodes of one policy, reused from an earlier evaluation if that matches."""
-    scene = json.loads(json.dumps({"environment": arguments, "seeds": [seeds[0], seeds[-1]]}))
-    kept = _kept(path, scene)
+    """The episodes of one policy, reused from an earlier evaluation with the same key."""
+    plain_key = json.loads(json.dumps(key))
+    kept = _kept(path, plain_key)
     if kept is not None:
         return kept
-    drives = drive_all(make_policy, seeds, arguments=arguments, threads=threads, progress=progress)
-    plain = {"scene": scene, "drives": [asdict(drive) for drive in drives]}
+    drives = drive_all(make_policy, seeds, arguments=key["environment"], threads=threads, progress=progress)
+    plain = {"key": plain_key, "drives": [asdict(drive) for drive in drives]}
     path.write_text(json.dumps(plain) + "\n", encoding="utf-8")
     return drives
 
 
-def _kept(path: Path, scene: Any) -> list[EvaluatedEpisode] | None:
+def _digest(files: Sequence[Path]) -> str:
+    """SHA-256 of a policy's files and of what drives it: the package's policies and its compiled core."""
+    package = Path(rover_gym.__file__).parent
+    digest = hashlib.sha256()
+    for path in (*files, *sorted(package.glob("policy/*.py")), *sorted(package.glob("_core.*[!i]"))):
+        digest.update(path.name.encode() + hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
+
+
+def _kept(path: Path, key: Any) -> list[EvaluatedEpisode] | None:
     """The episodes of an earlier evaluation; None if it does not match or its file is damaged."""
     try:
         kept = json.loads(path.read_text(encoding="utf-8"))
-        return [EvaluatedEpisode(**drive) for drive in kept["drives"]] if kept["scene"] == scene else None
+        return [EvaluatedEpisode(**drive) for drive in kept["drives"]] if kept["key"] == key else None
     except (OSError, ValueError, LookupError, TypeError, RecursionError):
         return None
 

@@ -3,7 +3,11 @@
     python training/train_ppo.py --config training/configs/rocks.yaml --seed 1
 
 The run's folder receives the configuration, seed, versions and revision, the raw curve (`curve.monitor.csv`, one line
-per episode), stable-baselines3's log (CSV and TensorBoard), evaluations, checkpoints and the policy.
+per episode), stable-baselines3's log (CSV and TensorBoard), the evaluations (`evaluations.csv`), checkpoints and the
+policy.
+
+`--resume` goes on with the configuration that is given. Hyperparameters, curriculum, evaluation and environment are
+taken over; a change of what the network depends on is refused (`rover_gym.learning.resuming`).
 """
 
 import json
@@ -22,9 +26,10 @@ from stable_baselines3.common.vec_env import VecNormalize
 from rover_gym import OptionError
 from rover_gym.cli.console import plain_errors, say_path
 from rover_gym.learning.build import build_env, normalised
-from rover_gym.learning.callbacks import CheckpointCallback, CurriculumCallback, SameFieldsEvalCallback
+from rover_gym.learning.callbacks import CheckpointCallback, CurriculumCallback, EvaluationCallback
 from rover_gym.learning.export import export
 from rover_gym.learning.provenance import provenance
+from rover_gym.learning.resuming import check_resumable
 from rover_gym.learning.stopwatch import Stopwatch
 from rover_gym.learning.training_config import PPOConfig, read_config
 from rover_gym.validation import refuse
@@ -50,6 +55,8 @@ def train(
     folder = output or Path("runs") / "train" / f"{config.stem}-seed{seed}"
     checkpoints = folder / "checkpoints"
     latest = _latest(checkpoints / "latest.json") if resume else None
+    if latest is not None:
+        check_resumable(read_config(folder / "config.yaml"), settings)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "config.yaml").write_text(settings.to_yaml(), encoding="utf-8")
     origin = provenance()
@@ -61,19 +68,14 @@ def train(
     stream = SEED_STRIDE * seed + 500_000 * (part > 0) + part % 997
     curve = folder / (f"curve-{part}.monitor.csv" if part else "curve.monitor.csv")
     rovers = Stopwatch(build_env(settings, seed=stream, monitor=curve))
-    watched = Stopwatch(
-        build_env(
-            settings,
-            num_envs=min(settings.num_envs, settings.evaluation.episodes),
-            environment=settings.evaluation.environment,
-        )
-    )
     if latest is None:
         envs = normalised(rovers, settings)
-        model = PPO("MlpPolicy", envs, seed=stream, **hyperparameters(settings.ppo))
+        architecture = {"net_arch": list(settings.ppo.net_arch), "log_std_init": settings.ppo.log_std_init}
+        model = PPO("MlpPolicy", envs, seed=stream, policy_kwargs=architecture, **hyperparameters(settings.ppo))
     else:
         envs = VecNormalize.load(str(checkpoints / f"{latest['name']}.pkl"), rovers)
-        model = PPO.load(checkpoints / f"{latest['name']}.zip", env=envs, device="cpu")
+        envs.gamma = settings.ppo.gamma
+        model = PPO.load(checkpoints / f"{latest['name']}.zip", env=envs, **hyperparameters(settings.ppo))
         model.set_random_seed(stream)
     model.set_logger(configure(str(folder / (f"log-{part}" if part else "log")), ["csv", "tensorboard"]))
 
@@ -81,14 +83,7 @@ def train(
     if settings.curriculum is not None:
         curriculum = CurriculumCallback(settings.curriculum, None if latest is None else latest["hardest"])
     checkpoint = CheckpointCallback(settings.checkpoint_every, checkpoints, curriculum)
-    evaluation = SameFieldsEvalCallback(
-        normalised(watched, settings, training=False),
-        seed=settings.evaluation.seed,
-        n_eval_episodes=settings.evaluation.episodes,
-        eval_freq=max(1, settings.evaluation.every // settings.num_envs),
-        log_path=str(folder),
-        verbose=0,
-    )
+    evaluation = EvaluationCallback(settings, folder / "evaluations.csv", append=latest is not None)
     callbacks: list[BaseCallback] = [*([] if curriculum is None else [curriculum]), checkpoint, evaluation]
 
     learn_clock = time.process_time()
@@ -100,7 +95,7 @@ def train(
     )
 
     learn_seconds = time.process_time() - learn_clock
-    environment_seconds = rovers.cpu_seconds + watched.cpu_seconds
+    environment_seconds = rovers.cpu_seconds + evaluation.cpu_seconds
     model.logger.close()
     checkpoint.write()
     source = {
@@ -111,6 +106,7 @@ def train(
         "wall_seconds": round(time.perf_counter() - clock, 1),
         "cpu_seconds": round(time.process_time() - cpu_clock, 1),
         "environment_cpu_seconds": round(environment_seconds, 1),
+        "evaluation_cpu_seconds": round(evaluation.cpu_seconds, 1),
         "learner_cpu_seconds": round(learn_seconds - environment_seconds, 1),
         "environment_share": round(environment_seconds / max(learn_seconds, 1e-9), 3),
         "resumed_from": part,
@@ -119,7 +115,6 @@ def train(
     (folder / "run.json").write_text(json.dumps(source, indent=2) + "\n", encoding="utf-8")
     export(model, envs, settings, folder / "policy", source)
     rovers.close()
-    watched.close()
     say_path("policy", folder / "policy")
 
 
@@ -142,7 +137,7 @@ def _latest(path: Path) -> dict[str, Any]:
 
 
 def hyperparameters(ppo: PPOConfig) -> dict[str, Any]:
-    """Keyword arguments of stable-baselines3's PPO."""
+    """Keyword arguments of stable-baselines3's PPO, without those of its network."""
     first, last = ppo.learning_rate, ppo.final_learning_rate
     return {
         "learning_rate": lambda remaining: last + (first - last) * remaining,
@@ -155,7 +150,6 @@ def hyperparameters(ppo: PPOConfig) -> dict[str, Any]:
         "ent_coef": ppo.ent_coef,
         "vf_coef": ppo.vf_coef,
         "max_grad_norm": ppo.max_grad_norm,
-        "policy_kwargs": {"net_arch": list(ppo.net_arch), "log_std_init": ppo.log_std_init},
         "device": "cpu",
     }
 

@@ -96,7 +96,7 @@ def test_axles_meet_in_the_turning_centre_of_the_wheels_that_do_not_steer() -> N
     left, right = policy.steering_angles(0.5)
     # The back axle is 0.6 m behind the front one, the centre 2 m to its left.
     np.testing.assert_allclose(np.tan([left, right]), [0.6 / 1.7, 0.6 / 2.3], rtol=1e-12)
-    turning = Turning.of(env.model, 100.0, env.dt)
+    turning = Turning.of(env.model, 100.0)
     assert turning.x_c == pytest.approx(-0.3)
     assert policy.steering_angles(policy.max_curvature)[0] == pytest.approx(env.max_steering)
 

@@ -56,7 +56,8 @@ def test_sideways_alone_turns_all_wheels_alike() -> None:
 def test_torques_follow_the_regulator() -> None:
     # At rest on the flat with wheels that stand right: tau = R (m / 6) (v_wanted - 0) / response.
     env = RoverEnv()
-    seen = env.reset(seed=0)[0][None]
+    env.reset(seed=0)
+    seen = env.step(np.zeros(12, np.float32))[0][None]
     limits = CommandLimits(speed=1.0, response=2.0)
     action = CommandController(env, limits, guided=False).act(seen, np.array([[0.3, 0.0, 0.0]]))[0]
     torque = env.model.wheel_radii * env.model.mass / 6.0 * 0.3 / 2.0

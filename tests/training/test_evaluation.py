@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -10,14 +11,19 @@ import pytest
 from rover_gym import OptionError, PDPolicy
 from rover_gym.policy import (
     EvaluatedEpisode,
+    PolicyCard,
+    TrainedPolicy,
     drive_all,
     mean_estimate,
     measure_baseline,
+    policy_arguments,
+    policy_folder,
     ratio_estimate,
     run_episode,
     summarise,
     wilson_interval,
 )
+from rover_gym.vector.batch import RoverBatch
 
 
 def a_drive(seed: int, end: str, time: float = 1.0, distance: float = 1.0, energy: float = 1.0) -> EvaluatedEpisode:
@@ -106,3 +112,33 @@ def test_what_cannot_be_evaluated_is_refused_by_name(call: Callable[[], object],
     with pytest.raises(OptionError) as caught:
         call()
     assert caught.value.field == field
+
+
+@pytest.mark.parametrize(("learned", "num_envs"), [(True, 1), (False, 2)])
+def test_a_held_command_drives_in_a_batch_as_alone(learned: bool, num_envs: int) -> None:
+    """Episodes of a batch begin where commands do, and the scan is taken once a command.
+
+    The guide alone multiplies no matrices, whose products round differently in a batch.
+    """
+    folder = policy_folder("sphere_field")
+    card = PolicyCard.read(folder / "policy.json")
+    arguments = {"terrain": "sphere_field", "difficulty": 1.0, "goal_distance": 3.0, **policy_arguments(folder)}
+    scans: list[bool] = []
+    step = RoverBatch.step
+
+    def make(env: Any) -> TrainedPolicy:
+        return TrainedPolicy.load(env, folder) if learned else TrainedPolicy.untrained(env, card)
+
+    def counted(batch: RoverBatch, *given: Any, has_scan: bool = True) -> Any:
+        scans.append(has_scan)
+        return step(batch, *given, has_scan=has_scan)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(RoverBatch, "step", counted)
+        drives = drive_all(make, range(5), arguments=arguments, num_envs=num_envs)
+    assert scans[:12] == 2 * [False, False, False, False, False, True]
+    env = gym.make("Rover-v0", **arguments)
+    policy = make(env)
+    for drive in drives:
+        episode = run_episode(env, policy, drive.seed)
+        assert (drive.end, drive.time, drive.energy) == (episode.end, episode.time, episode.energy)

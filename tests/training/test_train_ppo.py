@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -19,8 +20,8 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from rover_gym.cli import app
 from rover_gym.learning.build import build_env
-from rover_gym.learning.training_config import read_config
-from rover_gym.policy import Network, TrainedPolicy
+from rover_gym.learning.training_config import environment_arguments, read_config
+from rover_gym.policy import Network, TrainedPolicy, drive_all, summarise, wilson_interval
 from rover_gym.record import read_run
 
 Script = Callable[..., Any]
@@ -80,9 +81,34 @@ def test_returns_are_finite_and_the_curve_has_every_episode(run: Path) -> None:
     # 2048 decisions of 2 periods, episodes of at most 60.
     assert len(rows) >= 2048 * 2 // 60 - 8
     assert np.isfinite([float(row["r"]) for row in rows]).all()
-    evaluations = np.load(run / "evaluations.npz")
-    assert evaluations["timesteps"].tolist() == [1024, 2048]
-    assert np.isfinite(evaluations["results"]).all()
+
+
+def test_evaluations_come_with_their_intervals_and_their_cost(run: Path) -> None:
+    with (run / "evaluations.csv").open(encoding="utf-8") as file:
+        rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
+    assert [row["decisions"] for row in rows] == [1024, 2048]
+    for row in rows:
+        assert row["episodes"] == 4
+        low, high = wilson_interval(round(row["successes"]), 4)
+        assert (row["success"], row["low"], row["high"]) == pytest.approx((row["successes"] / 4, low, high), rel=1e-3)
+        assert row["cpu_seconds"] > 0.0
+    with (run / "log" / "progress.csv").open(encoding="utf-8") as file:
+        logged = [float(row["evaluation/low"]) for row in csv.DictReader(file) if row.get("evaluation/low")]
+    assert logged == pytest.approx([row["low"] for row in rows], rel=1e-3)
+
+
+def test_the_last_evaluation_is_that_of_the_exported_policy(run: Path) -> None:
+    """The evaluation during training drove coarser physics and shorter episodes than that afterwards."""
+    config = read_config(run / "config.yaml")
+    arguments = environment_arguments(config.evaluated_environment)
+    assert not arguments.keys() & {"time_step", "solver_options", "control_frequency"}
+    drives = drive_all(
+        lambda env: TrainedPolicy.load(env, run / "policy"), range(2_000_000, 2_000_004), arguments=arguments
+    )
+    with (run / "evaluations.csv").open(encoding="utf-8") as file:
+        last = list(csv.DictReader(file))[-1]
+    assert int(last["successes"]) == sum(drive.success for drive in drives)
+    assert float(last["energy_per_metre"]) == pytest.approx(summarise("", drives).energy_per_metre.value, rel=1e-3)
 
 
 def test_the_parameters_have_changed(run: Path) -> None:
@@ -126,6 +152,54 @@ def test_a_stopped_training_goes_on(run: Path, train: Script, tmp_path: Path) ->
     report = json.loads((tmp_path / "run" / "run.json").read_text(encoding="utf-8"))
     assert report["resumed_from"] == 1024
     assert (tmp_path / "run" / "curve-1024.monitor.csv").exists()
+
+
+def test_a_training_goes_on_with_the_hyperparameters_that_are_given(run: Path, train: Script, tmp_path: Path) -> None:
+    """It wrote the new configuration and trained with the old one."""
+    folder = tmp_path / "run"
+    shutil.copytree(run, folder)
+    config = yaml.safe_load((folder / "config.yaml").read_text(encoding="utf-8"))
+    changed = {"gamma": 0.9, "n_steps": 32, "batch_size": 64, "n_epochs": 1, "learning_rate": 2e-4, "clip_range": 0.1}
+    config["ppo"] |= changed | {"final_learning_rate": 2e-4}
+    config["num_envs"] = 4
+    path = tmp_path / "changed.yaml"
+    path.write_text(yaml.safe_dump(config), encoding="utf-8")
+    result = train("--config", path, "--output", folder, "--resume", "--steps", 2304, "--no-progress")
+    assert result.exit_code == 0, result.output
+    model = PPO.load(folder / "checkpoints" / "000002304.zip", device="cpu")
+    for name in ("gamma", "n_steps", "batch_size", "n_epochs"):
+        assert getattr(model, name) == changed[name]
+    assert model.clip_range(1.0) == 0.1
+    assert model.policy.optimizer.param_groups[0]["lr"] == 2e-4
+    normalisation = VecNormalize.load(str(folder / "checkpoints" / "000002304.pkl"), build_env(read_config(path)))
+    assert normalisation.gamma == 0.9
+    assert read_config(folder / "config.yaml").ppo.gamma == 0.9
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("ppo.net_arch", [8]),
+        ("ppo.log_std_init", -1.0),
+        ("command.speed", 0.7),
+        ("guided", None),
+        ("environment.height_scan", [4, 4, 0.5]),
+    ],
+)
+def test_a_training_does_not_go_on_with_another_network(
+    field: str, value: Any, run: Path, train: Script, tmp_path: Path
+) -> None:
+    config = yaml.safe_load((run / "config.yaml").read_text(encoding="utf-8"))
+    *outer, name = field.split(".")
+    inner = config[outer[0]] if outer else config
+    inner[name] = not inner[name] if value is None else value
+    path = tmp_path / "changed.yaml"
+    path.write_text(yaml.safe_dump(config), encoding="utf-8")
+    before = {file: file.read_bytes() for file in run.rglob("*") if file.is_file()}
+    result = train("--config", path, "--output", run, "--resume", "--steps", 4096, "--no-progress")
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"error: {field}: was "), result.stderr
+    assert before == {file: file.read_bytes() for file in run.rglob("*") if file.is_file()}
 
 
 @pytest.mark.parametrize(

@@ -41,9 +41,14 @@ def export(
     """Writes the policy that `rover_gym.policy.TrainedPolicy` reads."""
     folder.mkdir(parents=True, exist_ok=True)
     network_of(model, normalisation).save(folder / "policy.npz")
+    card_of(config, source).save(folder / "policy.json")
+
+
+def card_of(config: TrainingConfig, source: Mapping[str, Any]) -> PolicyCard:
+    """The card of a policy that was trained with a configuration."""
     seen = {name: value for name, value in config.environment.items() if name == "height_scan"}
     driven = rover(config.environment)
-    card = PolicyCard(
+    return PolicyCard(
         environment=seen,
         pool=config.pool,
         hold=config.repeat * driven.dt,
@@ -51,4 +56,3 @@ def export(
         guided=config.guided,
         source={**source, "model": driven.model.name},
     )
-    card.save(folder / "policy.json")

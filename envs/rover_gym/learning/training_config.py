@@ -4,7 +4,7 @@ environment    arguments of `RoverEnv`, including randomisation and reward weigh
 command        scale of the policy's commands (`rover_gym.policy.command`)
 curriculum     difficulty of the rocks by success rate; none on the plane
 ppo            hyperparameters of stable-baselines3's PPO
-evaluation     evaluation during training, on a separate environment
+evaluation     evaluation during training, on other fields and finer physics
 """
 
 import dataclasses
@@ -81,25 +81,33 @@ class PPOConfig:
             number(f"ppo.{name}", getattr(self, name), at_least=0.0, at_most=1.0)
 
 
+#: Arguments that may be coarser in training; an evaluation takes the defaults.
+COARSE = ("time_step", "solver_options", "control_frequency")
+
+#: Trainings draw their fields from seeds below this.
+HELD_BACK = 1_000_000
+
+
 @dataclass(frozen=True)
 class EvaluationConfig:
-    """Settings of the evaluation during training.
+    """Settings of the evaluation during training, whose episodes are at most 60 s long.
 
     Attributes:
         every: Decisions of all environments together between two evaluations.
         episodes: Episodes per evaluation; the same ones every time.
-        seed: Seed of their fields; training uses seeds below a million.
-        environment: Arguments that override those of the training.
+        seed: Seed of the first one; the next ones count up. `training/evaluate.py` begins at a million.
+        environment: Arguments that override those of the training; of the latter, the physics (`COARSE`) is left out.
     """
 
     every: int = 50_000
-    episodes: int = 50
+    episodes: int = 200
     seed: int = 2_000_000
     environment: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         number("evaluation.every", self.every, at_least=1)
         number("evaluation.episodes", self.episodes, at_least=1)
+        number("evaluation.seed", self.seed, at_least=HELD_BACK)
 
 
 @dataclass(frozen=True)
@@ -141,8 +149,14 @@ class TrainingConfig:
             number(name, getattr(self, name), at_least=1)
         if self.curriculum is not None and self.environment.get("terrain") not in ("sphere_field", "hills"):
             refuse(OptionError, "curriculum", self.curriculum, "needs environment.terrain 'sphere_field' or 'hills'")
-        for arguments in (self.environment, {**self.environment, **self.evaluation.environment}):
+        for arguments in (self.environment, self.evaluated_environment):
             Features(rover(arguments), self.pool)
+
+    @property
+    def evaluated_environment(self) -> dict[str, Any]:
+        """Arguments of the environment that the evaluation drives in."""
+        kept = {name: value for name, value in self.environment.items() if name not in COARSE}
+        return {**kept, **self.evaluation.environment}
 
     def to_yaml(self) -> str:
         """The configuration as YAML, in the form that `read_config` reads."""

@@ -9,8 +9,8 @@ of a wheel at `(x, z)` from that point, divided by `v`, is
 
 The wheel is steered to `delta = atan2(l, a)`, within the steering limit, and its rim speed is
 `v (a cos(delta) + l sin(delta))`. A wheel that does not steer has delta = 0. With beta = 0 these are `PDPolicy`'s
-formulas. The torques come from the same wheel speed controller, with a feedforward of the force that holds the rover
-on a slope.
+formulas. The torques come from the same wheel regulator (`policy.regulator`), with a feedforward of the force that
+holds the rover on a slope.
 
 A policy's action is the command itself, or an offset from the command of a guide that ignores rocks: full speed along
 the circle that is tangential to the heading and passes through the goal (pure pursuit).
@@ -25,6 +25,7 @@ import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError, atan2, sin_cos
+from rover_gym.policy.regulator import WheelRegulator
 from rover_gym.policy.turning import SCRUB_RATE, WIDENING, YAW, Turning
 from rover_gym.validation import flag, number, refuse
 
@@ -39,20 +40,19 @@ OFFSET = np.array([2.0, 2.0, 1.0])
 
 @dataclass(frozen=True)
 class CommandLimits:
-    """The values of a command of 1, and the time constant of the speed controller.
+    """The values of a command of 1, and the time constant of the wheel regulator.
 
     Attributes:
         speed: Speed, m/s.
         curvature: Curvature of the path, 1/m.
         sideways_deg: Direction of travel off the trunk's x axis, degrees.
-        response: Time constant of the speed controller for the whole rover's mass, s. It is shorter than `PDPolicy`'s,
-            so that a rover stopped by a rock soon pushes with full torque.
+        response: Time constant of the rover's speed, s; see `WheelRegulator`.
     """
 
     speed: float = 1.2
     curvature: float = 0.75
     sideways_deg: float = 35.0
-    response: float = 0.2
+    response: float = 0.1
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -79,7 +79,7 @@ class CommandController:
         self._goal = layout["goal"]
         self._goal_scale = layout.scale[self._goal]
         weight = model.mass * math.hypot(*rover.gravity)
-        turning = Turning.of(model, weight, rover.dt)
+        turning = Turning.of(model, weight)
         self._entries = np.array(turning.steering.entries)
         self._steered_wheels = turning.steering.wheels
         self._steering = np.array([q + i for i in turning.steering.joints], dtype=np.intp)
@@ -87,17 +87,12 @@ class CommandController:
         self._widening = WIDENING if turning.skids else 1.0
         self._yaw_rate = velocity + YAW
         self._yaw_gain, self._scrub = np.array(turning.yaw_gain), np.array(turning.scrub)
-        self._rates = np.array([velocity + i for i in model.wheel_joint_indices])
-        self._rate_scale = layout.scale[self._rates]
         self._x, self._z = np.array(turning.wheels).T
-        self._rim_per_rate = np.array(turning.rim_per_rate)
-        self._lever = model.wheel_radii / model.wheel_torque_limits
         self._max_steering = rover.max_steering
         self._n_wheels = len(turning.wheels)
         self._n_actions = rover.task.n_actions
-        inertia = model.mass / self._n_wheels / self.limits.response
-        self._inertia = np.minimum(inertia, turning.most_gain)
         self._load = weight / self._n_wheels
+        self._regulator = WheelRegulator(rover, self.limits.response)
 
     def act(self, observations: npt.NDArray[Any], commands: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
         """The actions `(n, n_actions)` for observations `(n, size)`, scaled as the environment returns them."""
@@ -121,14 +116,13 @@ class CommandController:
         sine, cosine = sin_cos(angles)
         wanted = speed * (ahead * cosine + left * sine)
 
-        rim = self._rim_per_rate * self._rate_scale * seen[:, self._rates]
         force = self._load * sin_cos(seen[:, self._pitch, None])[0]
         if self._skids:
             yaw_rate = speed * curvature
             missing = yaw_rate - seen[:, self._yaw_rate, None]
             force = force + self._yaw_gain * missing + self._scrub * np.clip(yaw_rate / SCRUB_RATE, -1.0, 1.0)
         actions = np.empty((len(seen), self._n_actions), dtype=np.float32)
-        actions[:, : self._n_wheels] = np.clip(self._lever * (force + self._inertia * (wanted - rim)), -1.0, 1.0)
+        actions[:, : self._n_wheels] = self._regulator.entries(seen, wanted, force)
         if self._steered_wheels:
             actions[:, self._n_wheels :] = np.clip(set_points / self._max_steering, -1.0, 1.0)
         return actions

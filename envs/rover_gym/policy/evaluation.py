@@ -67,7 +67,8 @@ def drive_all(
     An episode depends only on its seed and the policy, apart from the rounding of batched network evaluations.
 
     Args:
-        make_policy: Makes a policy from an environment, which gives layout and constants.
+        make_policy: Makes a policy from an environment, which gives layout and constants. If it has `hold_periods`, the
+            height scan is taken once in so many periods, and episodes begin where commands do.
         seeds: Seeds of the resets.
         arguments: Arguments of `RoverEnv`.
         max_episode_steps: Control periods until truncation; None for 60 s.
@@ -87,6 +88,7 @@ def drive_all(
         return []
     batch = RoverBatch(n, threads=threads, **arguments)
     policy = make_policy(batch.prototype)
+    hold: int = getattr(policy, "hold_periods", 1)
     limit = max_episode_steps or round(MAX_EPISODE_STEPS * 0.05 / batch.task.dt)
 
     running = [waiting.pop() for _ in range(n)]
@@ -99,9 +101,12 @@ def drive_all(
     places = _places(batch, observation)
     done: dict[int, EvaluatedEpisode] = {}
     state = None
-    while active.any():
+    idle: list[int] = []  # rovers that wait for the next command
+    period = 0
+    while active.any() or waiting:
         actions, state = policy.predict(observation, state, steps == 0)
-        observation, _, terminated, _, _ = batch.step(actions, active)
+        period += 1
+        observation, _, terminated, _, _ = batch.step(actions, active, has_scan=period % hold == 0)
         infos = batch.infos()
         now = _places(batch, observation)
         sums[:, 0] += np.linalg.norm(now - places, axis=1)
@@ -110,7 +115,7 @@ def drive_all(
         sums[:, 2] += tilt
         np.maximum(sums[:, 3], tilt, out=sums[:, 3])
         places = now
-        steps += 1
+        steps += active
         for i in np.flatnonzero(active & (terminated | (steps >= limit))).tolist():
             info = batch.info(i)
             way, slip, lean, largest = sums[i].tolist()
@@ -125,14 +130,16 @@ def drive_all(
                 max_tilt=largest,
             )
             progress(len(done))
-            sums[i], steps[i] = 0.0, 0
-            if waiting:
+            active[i] = False
+            idle.append(i)
+        if period % hold == 0:
+            for i in idle[: len(waiting)]:
                 running[i] = waiting.pop()
                 batch.reset(i, running[i])
                 observation[i] = batch.observation[i]
                 places[i] = _places(batch, observation[i : i + 1])[0]
-            else:
-                active[i] = False
+                sums[i], steps[i], active[i] = 0.0, 0, True
+            idle.clear()
     return [done[seed] for seed in seeds]
 
 

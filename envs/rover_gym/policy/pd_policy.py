@@ -1,4 +1,4 @@
-"""The PD baseline, which drives by the observation alone with one turning centre and wheel speed control.
+"""The PD baseline, which drives by the observation alone with one turning centre and regulated wheel speeds.
 
 It drives any rover: one whose wheels steer, all or some, and one that turns by skidding (`policy.turning`).
 """
@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError, StateError, atan2, sin_cos
+from rover_gym.policy.regulator import WheelRegulator
 from rover_gym.policy.turning import SCRUB_RATE, WIDENING, YAW, Turning
 from rover_gym.validation import array, number, refuse
 
@@ -28,16 +29,16 @@ class PDGains:
         lateral_acceleration: Largest lateral acceleration, which limits the speed in turns, m/s2.
         braking: Deceleration on the approach to the goal, m/s2.
         final_speed: Speed at the goal, m/s.
-        response: Time constant of the speed controller for the whole rover's mass, s.
+        response: Time constant of the rover's speed, s; see `WheelRegulator`.
         reverse_cost: Factor on the length of a path driven backward.
         switch_cost: Path length that a change of direction at `speed` counts as, m.
     """
 
-    speed: float = 1.0
+    speed: float = 1.2
     lateral_acceleration: float = 0.5
     braking: float = 0.4
     final_speed: float = 0.3
-    response: float = 0.5
+    response: float = 0.1
     reverse_cost: float = 1.3
     switch_cost: float = 1.0
 
@@ -68,21 +69,18 @@ class PDPolicy:
         self._scale = layout.scale
         self._roll = layout["q"].start + 3
         self._pitch = layout["q"].start + 5
-        self._rates = [layout["velocity"].start + i for i in model.wheel_joint_indices]
         self._forward_speed = layout["velocity"].start
         self._yaw_rate = layout["velocity"].start + YAW
         self._goal = layout["goal"].start
 
         self._weight = model.mass * math.hypot(*rover.gravity)
-        self._turning = Turning.of(model, self._weight, rover.dt)
+        self._turning = Turning.of(model, self._weight)
         self._steering = [layout["q"].start + i for i in self._turning.steering.joints]
         self._steered_wheels = self._turning.steering.wheels
-        self._radii: list[float] = model.wheel_radii.tolist()
-        self._torque_limits: list[float] = model.wheel_torque_limits.tolist()
-        self._n_wheels = len(self._radii)
+        self._n_wheels = len(model.wheel_names)
         self._n_actions = rover.task.n_actions
         self._max_steering = rover.max_steering
-        self._mass = model.mass
+        self._regulator = WheelRegulator(rover, self.gains.response)
         self.max_curvature = self._turning.max_curvature(self._max_steering)
 
     def predict(
@@ -105,13 +103,16 @@ class PDPolicy:
             refuse(StateError, "observation", given.shape, f"must be (..., {self._size})")
         if not np.isfinite(given).all():
             refuse(StateError, "observation", observation, "must be finite")
-        values = given * self._scale
-        if values.ndim == 1:
-            return np.array(self._act(values.tolist()), dtype=np.float32), state
-        actions = np.empty((len(values), self._n_actions), dtype=np.float32)
-        for action, row in zip(actions, values.tolist(), strict=True):
-            action[:] = self._act(row)
-        return actions, state
+        rows = np.atleast_2d(given).astype(np.float64, copy=False)
+        drives = [self._drive(row) for row in (rows * self._scale).tolist()]
+        shape = (len(rows), self._n_wheels)
+        wanted, force = (np.array([drive[k] for drive in drives]).reshape(shape) for k in (0, 1))
+        actions = np.empty((len(rows), self._n_actions), dtype=np.float32)
+        actions[:, : self._n_wheels] = self._regulator.entries(rows, wanted, force)
+        if self._steered_wheels:
+            angles = np.array([drive[2] for drive in drives]).reshape(len(rows), -1)
+            actions[:, self._n_wheels :] = np.clip(angles / self._max_steering, -1.0, 1.0)
+        return (actions[0] if given.ndim == 1 else actions), state
 
     def steering_angles(self, curvature: float) -> list[float]:
         """The angle of each steering joint, rad, at which all axles meet in the turning centre of a curvature, 1/m.
@@ -122,8 +123,8 @@ class PDPolicy:
         angles = [atan2(curvature * x, 1.0 + curvature * z) for x, z in wheels]
         return [sum(angles[i] for i in own) / len(own) for own in self._steered_wheels]
 
-    def _act(self, row: _Row) -> list[float]:
-        """The action for one observation in SI units."""
+    def _drive(self, row: _Row) -> tuple[list[float], list[float], list[float]]:
+        """Rim speeds, m/s, feedforward forces, N, and steering angles, rad, for one observation in SI units."""
         gains = self.gains
         speed_now = row[self._forward_speed]
         ahead, right = row[self._goal], row[self._goal + 1]
@@ -140,26 +141,16 @@ class PDPolicy:
         off = max((abs(angle - row[i]) for angle, i in zip(angles, self._steering, strict=True)), default=0.0)
         speed *= direction * max(0.2, 1.0 - 2.0 * off)
 
-        # Force per wheel that holds the rover on the slope, and the gain of the speed controller.
-        hold = self._weight * sin_cos(row[self._pitch])[0] / self._n_wheels
-        inertia = self._mass / self._n_wheels / gains.response
         turning = self._turning
+        hold = self._weight * sin_cos(row[self._pitch])[0] / self._n_wheels  # holds the rover on the slope
+        if not turning.skids:
+            wanted = [speed * math.hypot(1.0 + curvature * z, curvature * x) for x, z in turning.wheels]
+            return wanted, [hold] * self._n_wheels, angles
         yaw_rate = speed * curvature
-        scrub = min(1.0, max(-1.0, yaw_rate / SCRUB_RATE))
-        action = [0.0] * self._n_actions
-        for i, (x, z) in enumerate(turning.wheels):
-            force = hold
-            if turning.skids:
-                wanted = speed * (1.0 + WIDENING * curvature * z)
-                force += turning.yaw_gain[i] * (yaw_rate - row[self._yaw_rate]) + turning.scrub[i] * scrub
-            else:
-                wanted = speed * math.hypot(1.0 + curvature * z, curvature * x)
-            rim = turning.rim_per_rate[i] * row[self._rates[i]]
-            torque = self._radii[i] * (force + min(inertia, turning.most_gain[i]) * (wanted - rim))
-            action[i] = _clip(torque / self._torque_limits[i])
-        for k, angle in enumerate(angles, self._n_wheels):
-            action[k] = _clip(angle / self._max_steering)
-        return action
+        missing, scrub = yaw_rate - row[self._yaw_rate], min(1.0, max(-1.0, yaw_rate / SCRUB_RATE))
+        wanted = [speed * (1.0 + WIDENING * curvature * z) for _, z in turning.wheels]
+        pushes = zip(turning.yaw_gain, turning.scrub, strict=True)
+        return wanted, [hold + gain * missing + most * scrub for gain, most in pushes], angles
 
     def _way(self, ahead: float, left: float, speed_now: float) -> tuple[float, float]:
         """Direction (1 forward, -1 backward) and curvature of the cheapest path."""
@@ -193,10 +184,6 @@ def _turn_and_straight(ahead: float, left: float, radius: float) -> float:
     if turn > math.tau - 1e-6:  # a goal straight ahead, within round-off
         turn = 0.0
     return radius * turn + straight
-
-
-def _clip(value: float) -> float:
-    return min(1.0, max(-1.0, value))
 
 
 def find_rover_env(env: Any) -> RoverEnv:

@@ -50,6 +50,11 @@ class TrainedPolicy:
         if outputs != N_COMMANDS:
             refuse(PolicyError, "policy", outputs, f"must have {N_COMMANDS} outputs")
 
+    @property
+    def hold_periods(self) -> int:
+        """Control periods that a command is held: the policy looks at the first observation of each."""
+        return self._repeat
+
     @classmethod
     def load(cls, env: Any, folder: str | Path) -> "TrainedPolicy":
         """Loads the policy of a folder.

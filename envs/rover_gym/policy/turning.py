@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rover_gym.env.wheels import Steering, drive_signs, wheel_centres
+from rover_gym.env.wheels import Steering, wheel_centres
 from rover_gym.mechanics import RoverModel, sin_cos
 
 #: Curvature that wheels which skid are asked for, over that of the path.
@@ -50,25 +50,20 @@ class Turning:
         x_c: x of that point in the trunk's frame, m.
         wheels: x and z of each wheel from that point, m.
         steering: Which entry of an action steers which wheel.
-        rim_per_rate: Rim speed of each wheel, positive forward, per joint rate, m.
         yaw_gain: Force of each wheel for the yaw rate that is missing, N s/rad: 0 unless the rover skids, positive on
             the right, negative on the left.
         scrub: Force of each wheel against the sideways friction of a left turn, N, with the same signs.
-        most_gain: Largest force of each wheel per rim speed that is missing, N s/m: a rim that slips alone must not
-            overshoot within a control period. Unlimited unless the rover skids.
     """
 
     x_c: float
     wheels: tuple[tuple[float, float], ...]
     steering: Steering
-    rim_per_rate: tuple[float, ...]
     yaw_gain: tuple[float, ...]
     scrub: tuple[float, ...]
-    most_gain: tuple[float, ...]
 
     @classmethod
-    def of(cls, model: RoverModel, weight: float, dt: float) -> "Turning":
-        """Those of a model with its joints at zero, a weight, N, and a control period, s."""
+    def of(cls, model: RoverModel, weight: float) -> "Turning":
+        """Those of a model with its joints at zero and a weight, N."""
         centres, steering = wheel_centres(model), Steering.of(model)
         fixed = [float(x) for (x, _), entry in zip(centres, steering.entries, strict=True) if entry < 0]
         if fixed and steering.joints:
@@ -76,19 +71,15 @@ class Turning:
         else:
             x_c = 0.5 * float(centres[:, 0].min() + centres[:, 0].max())
         wheels = tuple((float(x - x_c), float(z)) for x, z in centres)
-        rim_per_rate = tuple((model.wheel_radii * drive_signs(model)).tolist())
         width = sum(abs(z) for _, z in wheels)
         gain = scrub = 0.0
-        most_gain = [math.inf] * len(wheels)
         if not steering.joints and width > TINY:
             mass_matrix = model.mass_matrix(np.zeros(model.nq), coordinates="state")
             gain = float(mass_matrix[YAW, YAW]) / YAW_RESPONSE / width
             scrub = SCRUB * weight / len(wheels) * sum(abs(x) for x, _ in wheels) / width
-            inertias = mass_matrix.diagonal()[model.wheel_joint_indices]
-            most_gain = (inertias / model.wheel_radii**2 / dt).tolist()
         sides = [math.copysign(1.0, z) if abs(z) > TINY else 0.0 for _, z in wheels]
         yaw_gain, scrubs = (tuple(side * force for side in sides) for force in (gain, scrub))
-        return cls(x_c, wheels, steering, rim_per_rate, yaw_gain, scrubs, tuple(most_gain))
+        return cls(x_c, wheels, steering, yaw_gain, scrubs)
 
     @property
     def skids(self) -> bool:
