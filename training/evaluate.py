@@ -45,7 +45,7 @@ def evaluate(
         str, typer.Option(help="'plane', 'sphere_field', 'hills', or the file of a map or a mesh.")
     ] = "sphere_field",
     model: ModelName = BUILT_IN,
-    difficulty: Annotated[float | None, typer.Option(help="Of the rocks, from 0 to 1.")] = None,
+    difficulty: Annotated[float | None, typer.Option(help="Of the rocks, from 0 to 2.")] = None,
     slope: Annotated[float | None, typer.Option(help="Of the plane, degrees.")] = None,
     episodes: Annotated[int, typer.Option(min=1, help="Of each policy.")] = 500,
     seed: Annotated[int, typer.Option(min=0, help="Of the first episode; the next ones count up.")] = 1_000_000,

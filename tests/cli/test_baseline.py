@@ -31,7 +31,7 @@ def test_json_says_the_same_twice() -> None:
 
 
 def test_a_difficulty_out_of_range_is_one_line() -> None:
-    result = rover("baseline", "--episodes", "1", "--difficulty", "2")
+    result = rover("baseline", "--episodes", "1", "--difficulty", "2.1")
     assert result.exit_code == 2
     assert result.stderr.startswith("error: ")
     assert len(result.stderr.splitlines()) == 1

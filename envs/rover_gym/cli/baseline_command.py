@@ -20,7 +20,7 @@ CAUSES = {"time": "time limit", "high_centred": "high centred", "roll_over": "ro
 def baseline(
     difficulty: Annotated[
         list[float] | None,
-        typer.Option(help="Difficulty from 0 to 1; repeat for several. Default: five of them."),
+        typer.Option(help="Difficulty from 0 to 2; repeat for several. Default: five of them."),
     ] = None,
     episodes: Annotated[int, typer.Option(min=1, max=MOST_EPISODES, help="Episodes at each difficulty.")] = 200,
     seed: Annotated[

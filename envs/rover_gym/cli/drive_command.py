@@ -54,7 +54,7 @@ def drive(
     height_range: HeightRange = None,
     model: ModelName = BUILT_IN,
     difficulty: Annotated[
-        float | None, typer.Option(help="Difficulty of the rocks, from 0 to 1. Default: 0.5.")
+        float | None, typer.Option(help="Difficulty of the rocks, from 0 to 2. Default: 0.5.")
     ] = None,
     slope: Annotated[
         float | None, typer.Option(help="Slope of the ground, degrees. Default: 0; on rocks, by the difficulty.")

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import gymnasium as gym
 
+from rover_gym.env.rocks import MAX_DIFFICULTY
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.episodes import Episode, Policy, run_episode
 from rover_gym.policy.pd_policy import PDPolicy
@@ -23,7 +24,7 @@ class BaselineRow:
     """The results at one difficulty.
 
     Attributes:
-        difficulty: Difficulty in [0, 1].
+        difficulty: Difficulty in [0, 2].
         episodes: Number of episodes.
         successes: Number of episodes that reached the goal.
         success_rate: Fraction of episodes that reached the goal.
@@ -72,7 +73,7 @@ def measure_baseline(
     """Drives `RoverRocks-v0` or `RoverHills-v0` with a policy, with the same seeds at every difficulty.
 
     Args:
-        difficulties: The difficulties, each in [0, 1].
+        difficulties: The difficulties, each in [0, 2].
         episodes: Episodes per difficulty.
         seed: Seed of the first episode; the seed increases by one per episode.
         policy: "pd", "trained" for the shipped policy, or the folder of a trained policy.
@@ -86,7 +87,7 @@ def measure_baseline(
         BaselineInterrupt: The user interrupted the measurement; the exception holds the results so far.
     """
     episodes, seed = whole("episodes", episodes, at_least=1), whole("seed", seed)
-    difficulties = tuple(number("difficulty", level, at_least=0.0, at_most=1.0) for level in difficulties)
+    difficulties = tuple(number("difficulty", level, at_least=0.0, at_most=MAX_DIFFICULTY) for level in difficulties)
     if terrain not in ENVIRONMENTS:
         refuse(OptionError, "terrain", terrain, f"must be one of {', '.join(ENVIRONMENTS)}")
     folder = find_policy(policy, terrain)
