@@ -2,15 +2,15 @@
 //!
 //! ```text
 //!                  d from 0 to 1      d from 1 to 2
-//! abundance    k   0.2 d              0.2 + 0.15 (d − 1)     fraction of the ground that rocks cover
+//! abundance    k   0.2 d              0.2 + 0.15 (d − 1)     fraction of the ground under rocks
 //! largest rock r   (0.5 + 1.1 d) R    (1.6 + 1.4 (d − 1)²) R radius, with R the wheel radius
 //! slope            0 to 10 d          0 to 10 d              degrees
 //! ```
 //!
 //! Half of a rock is below the ground. The largest rock decides most: with 1.6 R it just reaches the
-//! trunk of the built-in rover. Its square makes success fall evenly: a trained policy that reaches 79%
-//! of its goals at d = 1 reaches 61, 38 and 20% at 1.25, 1.5 and 1.75; with a radius linear in d it
-//! reached 45, 30 and 16%.
+//! trunk of the built-in rover. Its square makes success fall evenly: a trained policy that reaches
+//! 79% of its goals at d = 1 reaches 61, 38 and 20% at 1.25, 1.5 and 1.75; with a radius linear in d
+//! it reached 45, 30 and 16%.
 
 use super::pcg64::Pcg64;
 use super::start::{Range, Start};
