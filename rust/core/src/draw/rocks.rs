@@ -7,10 +7,10 @@
 //! slope            0 to 10 d          0 to 10 d              degrees
 //! ```
 //!
-//! Half of a rock is below the ground. The largest rock decides most: with 1.6 R it just reaches the
+//! Half of a rock is below the ground. The largest rock decides most: one of 1.6 R just reaches the
 //! trunk of the built-in rover. Its square makes success fall evenly: a trained policy that reaches
-//! 79% of its goals at d = 1 reaches 61, 38 and 20% at 1.25, 1.5 and 1.75; with a radius linear in d
-//! it reached 45, 30 and 16%.
+//! 79% of its goals at d = 1 reaches 61, 38 and 20% at 1.25, 1.5 and 1.75. With a radius linear in
+//! d it reached 45, 30 and 16%.
 
 use super::pcg64::Pcg64;
 use super::start::{Range, Start};
