@@ -42,3 +42,9 @@ def test_a_trained_policy_can_be_measured_too() -> None:
     result = rover("baseline", "--episodes", "1", "--difficulty", "0.25", "--policy", "trained")
     assert result.exit_code == 0, result.output
     assert "with a trained policy" in result.output
+
+
+def test_the_planner_by_hand_can_be_measured_too() -> None:
+    result = rover("baseline", "--episodes", "1", "--difficulty", "1.25", "--policy", "scan")
+    assert result.exit_code == 0, result.output
+    assert "the scan planner" in result.output

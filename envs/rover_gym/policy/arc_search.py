@@ -30,6 +30,10 @@ STEPS = 4
 #: Lengths of the rover's reach, and the turn, rad, within which two ends of paths count as one.
 SAME_PLACE, SAME_HEADING = 0.2, 0.25
 
+#: While the rover backs off: the further cost of a change of the command, since wheels that are being steered do not
+#: push, over that of other times; and the cost of the way to the goal.
+RETREAT_SWERVE, RETREAT_TO_GO = 4.0, 0.2
+
 
 @dataclass(frozen=True)
 class PathCosts:
@@ -151,7 +155,8 @@ class ArcSearch:
         cost += costs.switch * (mine[:, 0] * task.command[0] < 0.0) + costs.reverse * (mine[:, 0] < 0.0)
         ends, nearest, way = self._first_poses[:, -1], distance.min(axis=1), mine[:, 0]
         if task.retreat:
-            total = np.where(way == task.retreat, cost + 0.2 * self._to_go(ends, nearest, task), np.inf)
+            cost += RETREAT_SWERVE * costs.swerve * np.abs(mine[:, 1:] - task.command[1:]).sum(axis=1)
+            total = np.where(way == task.retreat, cost + RETREAT_TO_GO * self._to_go(ends, nearest, task), np.inf)
             return int(np.argmin(total))
         root = np.arange(len(mine))
         n = len(self._further)

@@ -39,6 +39,9 @@ PROGRESS = 0.15
 #: Distance of a trap ahead of the rover that is stuck, over the rover's reach.
 TRAP_AHEAD = 0.3
 
+#: Time without movement after which the rover pushes, s.
+PUSH_AFTER = 0.3
+
 #: Fraction of the time to high-centring after which the rover backs off.
 HIGH = 0.05
 
@@ -48,7 +51,8 @@ class ScanGains:
     """The policy's speed and times.
 
     Attributes:
-        speed: Speed, m/s, where the motors reach it. It is also what the rover pushes with where a rock stops it.
+        speed: Speed, m/s, where the motors reach it.
+        push: The same where a rock has stopped the rover: the torque grows with what is missing.
         response: Time constant of the speed controller for the whole rover's mass, s.
         period: Time between decisions, s.
         patience: Time without movement until the rover backs off, s, for a rover that takes a second or less for its
@@ -59,6 +63,7 @@ class ScanGains:
     """
 
     speed: float = 1.2
+    push: float = 2.0
     response: float = 0.2
     period: float = 0.2
     patience: float = 1.0
@@ -117,7 +122,9 @@ class ScanPolicy:
         footprint = Footprint.of(model, scan.spacing)
         self._x_c, self._reach = turning.x_c, _reach(model)
         # Times are meant for a rover that takes at most a second for its own reach.
-        self._pace = max(1.0, self._reach / limits.speed)
+        speed = min(self.gains.speed, SHARE_OF_TOP_SPEED * _top_speed(model))
+        self._pace = max(1.0, self._reach / speed)
+        self._cruise, self._push = speed / limits.speed, self.gains.push / limits.speed
         first, further = _arcs(rover, turning, limits)
         side = math.radians(limits.sideways_deg)
         self._commands = np.column_stack((first.direction, first.curvature / limits.curvature, first.sideways / side))
@@ -189,8 +196,10 @@ class ScanPolicy:
         x, z, heading = (float(row[self._q + k]) for k in (0, 2, 4))
         goal = row[self._goal] * self._scale[self._goal]
         memory.notice((x, z), math.hypot(*goal), self._period, PROGRESS * self._reach, i)
-        is_high = row[self._stuck] > HIGH and memory.still[i] > 0.0
-        if memory.age[i] > 0 and (is_high or memory.still[i] > gains.patience * pace):
+        is_high = row[self._stuck] > HIGH
+        # High-centred, there is time for one attempt in each direction.
+        patience = 0.7 if is_high else gains.patience * pace
+        if memory.age[i] > 0 and (memory.still[i] > patience or (is_high and memory.retreat[i] == 0.0)):
             self._back_off(memory, i, x, z, heading)
         sine, cosine = sin_cos(heading)
         ahead, right, turned = (memory.known_traps(i) - [x, z, heading]).T
@@ -206,9 +215,10 @@ class ScanPolicy:
         heights = row[self._heights] * self._scale[self._heights] - rise
         command: Array = self._commands[self._search.best(self._grid.spread(heights), task)]
         if command[0] < 0.0 and not task.retreat:
-            memory.command[i, 0] = 1.0
+            memory.command[i, 0] = 1.0  # the way not to go
             self._back_off(memory, i, x, z, heading)
-        return command
+        pushes = memory.still[i] > PUSH_AFTER * pace or is_high
+        return command * [self._push if pushes else self._cruise, 1.0, 1.0]
 
     def _back_off(self, memory: ScanMemory, i: int, x: float, z: float, heading: float) -> None:
         """Remembers a trap where the rover was about to go, and that it shall drive the other way for a while."""
@@ -223,12 +233,17 @@ def _reach(model: RoverModel) -> float:
     return float((np.hypot(*wheel_centres(model).T) + model.wheel_radii).max())
 
 
+def _top_speed(model: RoverModel) -> float:
+    """The speed at which the slowest motor has no torque left, m/s; infinite without such a limit."""
+    wheels = zip(model.to_dict()["wheels"], model.wheel_radii.tolist(), strict=True)
+    tops = (wheel["motor"]["no_load_speed"] * radius for wheel, radius in wheels if wheel.get("motor"))
+    return min(tops, default=math.inf)
+
+
 def _limits(rover: RoverEnv, turning: Turning, gains: ScanGains) -> CommandLimits:
     """The commands' limits: what the motors and the steering can follow."""
-    wheels = zip(rover.model.to_dict()["wheels"], rover.model.wheel_radii.tolist(), strict=True)
-    tops = [wheel["motor"]["no_load_speed"] * radius for wheel, radius in wheels if wheel.get("motor")]
     return CommandLimits(
-        speed=min([gains.speed, *(SHARE_OF_TOP_SPEED * top for top in tops)]),
+        speed=max(gains.push, gains.speed),
         curvature=min(turning.max_curvature(rover.max_steering), MAX_CURVATURE),
         sideways_deg=max(1.0, min(MAX_SIDEWAYS_DEG, 0.9 * math.degrees(rover.max_steering))),
         response=gains.response,
