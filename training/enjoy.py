@@ -25,7 +25,7 @@ def enjoy(
         str, typer.Option(help="'plane', 'sphere_field', 'hills', or the file of a map or a mesh.")
     ] = "sphere_field",
     model: ModelName = BUILT_IN,
-    difficulty: Annotated[float | None, typer.Option(help="Of the rocks, from 0 to 1.")] = None,
+    difficulty: Annotated[float | None, typer.Option(help="Of the rocks, from 0 to 2.")] = None,
     episodes: Annotated[int, typer.Option(min=1, help="How many.")] = 1,
     seed: Annotated[int, typer.Option(min=0, help="Of the first episode; the next ones count up.")] = 1_000_000,
     video: Annotated[Path | None, typer.Option(file_okay=False, help="Folder for one mp4 an episode.")] = None,

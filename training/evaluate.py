@@ -1,4 +1,4 @@
-"""Compares trained policies with the PD baseline on the same seeded episodes.
+"""Compares trained policies with the PD baseline and the scan planner on the same seeded episodes.
 
     python training/evaluate.py runs/train/rocks-seed1 runs/train/rocks-seed2 --difficulty 1 --output runs/evaluation
 
@@ -24,13 +24,14 @@ from rich.progress import Progress, TaskID
 import rover_gym
 from rover_gym import PDPolicy
 from rover_gym.cli.console import plain_errors, progress_bar, say_path
-from rover_gym.cli.scene_options import BUILT_IN, ModelName
+from rover_gym.cli.scene_options import BUILT_IN, ModelName, named_model
 from rover_gym.policy import (
     EvaluatedEpisode,
     IntervalEstimate,
     Policy,
     PolicyCard,
     PolicySummary,
+    ScanPolicy,
     TrainedPolicy,
     drive_all,
     policy_arguments,
@@ -47,7 +48,7 @@ def evaluate(
         str, typer.Option(help="'plane', 'sphere_field', 'hills', or the file of a map or a mesh.")
     ] = "sphere_field",
     model: ModelName = BUILT_IN,
-    difficulty: Annotated[float | None, typer.Option(help="Of the rocks, from 0 to 1.")] = None,
+    difficulty: Annotated[float | None, typer.Option(help="Of the rocks, from 0 to 2.")] = None,
     slope: Annotated[float | None, typer.Option(help="Of the plane, degrees.")] = None,
     episodes: Annotated[int, typer.Option(min=1, help="Of each policy.")] = 500,
     seed: Annotated[int, typer.Option(min=0, help="Of the first episode; the next ones count up.")] = 1_000_000,
@@ -57,9 +58,10 @@ def evaluate(
     guide: Annotated[
         bool, typer.Option(help="Also drive the guide alone, that the first policy's actions offset.")
     ] = True,
+    planner: Annotated[bool, typer.Option(help="Also drive the scan planner.")] = True,
     threads: Annotated[int, typer.Option(min=1, help="That step the rovers.")] = 1,
 ) -> None:
-    """Drive every policy and the baseline over the same fields."""
+    """Drive every policy, the baseline and the planner over the same fields."""
     arguments: dict[str, Any] = {"terrain": terrain}
     arguments |= {} if model == BUILT_IN else {"model": model}
     arguments |= {} if difficulty is None else {"difficulty": difficulty}
@@ -70,6 +72,8 @@ def evaluate(
     first = PolicyCard.read(folders[0] / "policy.json")
 
     makers: list[tuple[str, Callable[[Any], Policy], dict[str, Any], list[Path]]] = [("PD baseline", PDPolicy, {}, [])]
+    if planner:
+        makers.append(("scan planner", ScanPolicy, ScanPolicy.arguments(named_model(model)), []))
     if guide and first.guided:
         alone = partial(_untrained, first)
         makers.append(("guide alone", alone, policy_arguments(folders[0]), [folders[0] / "policy.json"]))
@@ -211,7 +215,7 @@ def _plot(rows: Sequence[PolicySummary], path: Path) -> None:
         for place, row in zip(places, rows, strict=True):
             estimate = quantity(row)
             low, high = estimate.interval
-            colour = "tab:grey" if row.policy in {"PD baseline", "guide alone"} else "tab:blue"
+            colour = "tab:grey" if row.policy in {"PD baseline", "scan planner", "guide alone"} else "tab:blue"
             axis.plot([factor * low, factor * high], [place, place], color=colour, linewidth=3, alpha=0.5)
             axis.plot([factor * estimate.value], [place], "o", color=colour)
         axis.set_xlabel(label)

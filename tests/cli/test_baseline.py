@@ -31,7 +31,7 @@ def test_json_says_the_same_twice() -> None:
 
 
 def test_a_difficulty_out_of_range_is_one_line() -> None:
-    result = rover("baseline", "--episodes", "1", "--difficulty", "2")
+    result = rover("baseline", "--episodes", "1", "--difficulty", "2.1")
     assert result.exit_code == 2
     assert result.stderr.startswith("error: ")
     assert len(result.stderr.splitlines()) == 1
@@ -42,3 +42,9 @@ def test_a_trained_policy_can_be_measured_too() -> None:
     result = rover("baseline", "--episodes", "1", "--difficulty", "0.25", "--policy", "trained")
     assert result.exit_code == 0, result.output
     assert "with a trained policy" in result.output
+
+
+def test_the_planner_by_hand_can_be_measured_too() -> None:
+    result = rover("baseline", "--episodes", "1", "--difficulty", "1.25", "--policy", "scan")
+    assert result.exit_code == 0, result.output
+    assert "the scan planner" in result.output

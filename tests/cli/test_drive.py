@@ -75,7 +75,7 @@ def test_a_short_time_limit_ends_the_episode_without_success() -> None:
         (["--terrain", "sea"], "terrain"),
         (["--slope", "-3"], "--slope: "),
         (["--difficulty", "0.5"], "difficulty"),
-        (["--terrain", "sphere_field", "--difficulty", "1.5"], "difficulty"),
+        (["--terrain", "sphere_field", "--difficulty", "2.5"], "difficulty"),
         (["--slope", "nan"], "--slope: must be finite, got nan"),
         (["--friction", "-1"], "--friction"),
         (["--time-step", "0"], "--time-step: must be at least 1e-05"),
@@ -114,3 +114,12 @@ def test_episodes_are_filmed(tmp_path: Path) -> None:
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
     assert frames == 2 * 7  # the start and six steps each
     assert seconds == pytest.approx(14 / 20, abs=0.06)
+
+
+def test_the_planner_by_hand_drives_too(tmp_path: Path) -> None:
+    arguments = ("--policy", "scan", "--terrain", "sphere_field", "--difficulty", "1", "--time-limit", "2")
+    result = rover("drive", *arguments, "--model", "mars-rover", "--output", str(tmp_path))
+    assert result.exit_code == 0, result.output
+    assert "the scan planner" in result.output
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert summary["arguments"]["height_scan"] == [48, 40, 0.18]

@@ -40,8 +40,9 @@ def wall() -> HeightField:
     return HeightField(np.where((places >= 3.0) & (places <= 4.0), 3.0, 0.0) * np.ones((n, 1)), SPACING)
 
 
-def test_hills_are_an_environment_of_their_own() -> None:
-    env = gym.make("RoverHills-v0", difficulty=0.6)
+@pytest.mark.parametrize("difficulty", [0.6, 2.0])
+def test_hills_are_an_environment_of_their_own(difficulty: float) -> None:
+    env = gym.make("RoverHills-v0", difficulty=difficulty)
     check_env(env.unwrapped, skip_render_check=True)
     rover: Any = env.unwrapped
     for seed in range(5):
@@ -50,7 +51,7 @@ def test_hills_are_an_environment_of_their_own() -> None:
         # No wheel is in the ground, and the lowest touches.
         assert -1e-6 < values["wheel_gap"].min() < 1e-3
         assert np.linalg.norm(values["ground_normal"]) == pytest.approx(1.0, abs=1e-6)
-        assert info["difficulty"] == 0.6
+        assert info["difficulty"] == difficulty
         (surface,) = surfaces_of(rover.simulation.terrain)
         assert abs(surface.heights([rover.start.position])[0]) < 1e-6
         assert np.isfinite(surface.heights([rover.start.goal])[0])
@@ -71,6 +72,7 @@ def test_the_slope_of_hills_follows_the_difficulty_or_the_argument() -> None:
 
     assert slopes(difficulty=0.5) == pytest.approx(0.1, rel=0.2)
     assert slopes(difficulty=1.0) == pytest.approx(2.0 * slopes(difficulty=0.5), rel=1e-3)
+    assert slopes(difficulty=2.0) == pytest.approx(4.0 * slopes(difficulty=0.5), rel=1e-3)
     assert slopes(hill_slope_deg=5.0) == pytest.approx(np.tan(np.radians(5.0)), rel=0.2)
 
 

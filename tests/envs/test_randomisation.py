@@ -130,7 +130,7 @@ def test_a_difficulty_that_was_set_shifts_no_other_draw() -> None:
 
 
 @pytest.mark.parametrize(
-    ("difficulty", "field"), [(1.5, "difficulty"), ((0.5, 2.0), "difficulty[1]"), ((0.9, 0.1), "difficulty")]
+    ("difficulty", "field"), [(2.5, "difficulty"), ((0.5, 2.1), "difficulty[1]"), ((0.9, 0.1), "difficulty")]
 )
 def test_bad_difficulties_change_nothing(difficulty: Any, field: str) -> None:
     env = RoverEnv(terrain="sphere_field", difficulty=0.3)

@@ -1,6 +1,5 @@
 """`RoverRocks-v0`: fields by difficulty, start and goal clear, the height scan, the baseline among rocks."""
 
-import ast
 import copy
 import inspect
 import math
@@ -113,14 +112,19 @@ def test_vector_environment_equals_single_ones() -> None:
     vector.close()
 
 
-@pytest.mark.parametrize("difficulty", [0.0, 0.3, 1.0])
-def test_difficulty_is_an_option_of_the_reset(rocks: RoverEnv, difficulty: float) -> None:
+@pytest.mark.parametrize(
+    ("difficulty", "abundance", "largest"),
+    [(0.0, 0.0, 0.5), (0.3, 0.06, 0.83), (1.0, 0.2, 1.6), (1.5, 0.275, 1.95), (2.0, 0.35, 3.0)],
+)
+def test_difficulty_is_an_option_of_the_reset(
+    rocks: RoverEnv, difficulty: float, abundance: float, largest: float
+) -> None:
     rocks.reset(seed=2, options={"difficulty": difficulty})
     drawn = rocks.rocks
     assert drawn is not None
     assert rocks.difficulty == drawn.difficulty == difficulty
-    assert drawn.abundance == pytest.approx(0.2 * difficulty)
-    assert drawn.max_radius == pytest.approx(0.5 + 1.1 * difficulty)
+    assert drawn.abundance == pytest.approx(abundance)
+    assert drawn.max_radius == pytest.approx(largest)
     assert 0.0 <= rocks.start.slope <= math.radians(10.0) * difficulty
     field = field_of(rocks)
     assert (len(field) > 0) == (difficulty > 0.0)
@@ -132,10 +136,10 @@ def test_difficulty_is_an_option_of_the_reset(rocks: RoverEnv, difficulty: float
 
 def test_difficulty_shifts_no_other_draw(rocks: RoverEnv) -> None:
     starts = []
-    for difficulty in (0.0, 1.0):
+    for difficulty in (0.0, 1.0, 2.0):
         rocks.reset(seed=2, options={"difficulty": difficulty})
         starts.append(replace(rocks.start, slope=0.0))
-    assert starts[0] == starts[1]
+    assert starts[0] == starts[1] == starts[2]
 
 
 def test_range_of_difficulties_is_drawn_from() -> None:
@@ -159,22 +163,31 @@ def test_arguments_take_their_quantity_from_the_difficulty() -> None:
         assert env.start.slope == math.radians(3.0)
 
 
+def value_of(formula: str, d: float) -> float:
+    """Evaluates `constant + factor (d - 1)^2` and its like as the card prints them."""
+    total = 0.0
+    for term in formula.split(" + "):
+        factor, _, power = term.partition(" ")
+        base = {"": 1.0, "d": d, "(d - 1)": d - 1.0, "(d - 1)^2": (d - 1.0) ** 2}[power]
+        total += float(factor) * base
+    return total
+
+
 def test_difficulty_table_of_the_card_is_the_map() -> None:
     card = inspect.getdoc(RoverEnv) or ""
     section = card.split("## Rocks\n")[1].split("\n## ")[0]
     lines = [line for line in section.splitlines() if line.startswith("|")][2:]
-    said = {cells[1].strip(): cells[2].strip() for cells in (line.split("|") for line in lines)}
-    abundance, radius = said["rock_abundance"], said["max_rock_radius"]
-    low, slope = (float(word) for word in said["slope_deg"].removeprefix("uniform, ").removesuffix(" d").split(" to "))
-    factor = float(abundance.removesuffix(" d"))
-    constant, rate = (ast.literal_eval(word.removesuffix(" d")) for word in radius.split(" + "))
+    rows = {cells[1].strip(): [cell.strip() for cell in cells[2:4]] for cells in (line.split("|") for line in lines)}
     env = RoverEnv(terrain="sphere_field")
-    for d in (0.0, 0.25, 1.0):
+    for d in (0.0, 0.25, 1.0, 1.25, 2.0):
+        said = {name: halves[d > 1.0] for name, halves in rows.items()}
+        slopes = said["slope_deg"].removeprefix("uniform, ").removesuffix(" d").split(" to ")
+        low, slope = (float(word) for word in slopes)
         env.reset(seed=0, options={"difficulty": d, "position": (0.0, 0.0), "goal": (6.0, 0.0)})
         drawn = env.rocks
         assert drawn is not None
-        assert drawn.abundance == pytest.approx(factor * d)
-        assert drawn.max_radius == pytest.approx(constant + rate * d)
+        assert drawn.abundance == pytest.approx(value_of(said["rock_abundance"], d))
+        assert drawn.max_radius == pytest.approx(value_of(said["max_rock_radius"], d))
         # The first number sets the difficulty, the second is the rocks' seed, the third the slope.
         generator = np.random.Generator(np.random.PCG64(0))
         generator.uniform(0.5, 0.5), generator.integers(2**63)
@@ -188,9 +201,10 @@ def test_difficulty_table_of_the_card_is_the_map() -> None:
     assert (places.max(axis=0) >= (5.0 + margin, margin - 1.0)).all()
 
 
+@pytest.mark.parametrize("difficulty", [1.0, 2.0])
 @pytest.mark.parametrize("seed", range(10))
-def test_start_and_goal_are_clear(rocks: RoverEnv, seed: int) -> None:
-    rocks.reset(seed=seed, options={"difficulty": 1.0})
+def test_start_and_goal_are_clear(rocks: RoverEnv, seed: int, difficulty: float) -> None:
+    rocks.reset(seed=seed, options={"difficulty": difficulty})
     field = field_of(rocks)
     on_the_map = field.centres[:, [0, 2]]
     for place in (rocks.start.position, rocks.goal):
@@ -271,9 +285,9 @@ def test_height_scan_works_on_the_plane() -> None:
     [
         ({"terrain": "sphere-field"}, TerrainError, "terrain"),
         ({"difficulty": -0.1}, OptionError, "difficulty"),
-        ({"difficulty": 1.1}, OptionError, "difficulty"),
+        ({"difficulty": 2.1}, OptionError, "difficulty"),
         ({"difficulty": NAN}, OptionError, "difficulty"),
-        ({"difficulty": (0.0, 2.0)}, OptionError, "difficulty[1]"),
+        ({"difficulty": (0.0, 2.5)}, OptionError, "difficulty[1]"),
         ({"difficulty": "hard"}, OptionError, "difficulty"),
         ({"rock_abundance": -0.1}, OptionError, "rock_abundance"),
         ({"rock_abundance": 0.6}, OptionError, "rock_abundance"),
@@ -299,7 +313,7 @@ def test_bad_arguments(arguments: dict[str, Any], error: type[RoverGymError], fi
 @pytest.mark.parametrize(
     ("options", "field"),
     [
-        ({"difficulty": 1.5}, "options.difficulty"),
+        ({"difficulty": 2.0001}, "options.difficulty"),
         ({"difficulty": -1e-9}, "options.difficulty"),
         ({"difficulty": NAN}, "options.difficulty"),
         ({"difficulty": (0.0, 1.0)}, "options.difficulty"),

@@ -120,7 +120,7 @@ def test_difficulty_by_env_method() -> None:
     assert first == third == 0.1
     assert 0.6 <= second <= 0.7
     assert env.reset_infos[1]["difficulty"] == second
-    for bad in (1.5, (0.9, 0.1), "hard"):
+    for bad in (2.5, (0.9, 0.1), "hard"):
         with pytest.raises(OptionError) as caught:
             env.env_method("set_difficulty", bad)
         assert caught.value.field is not None

@@ -215,7 +215,7 @@ def episodes(random: Random, ledger: Ledger) -> None:
     env = RoverEnv(
         terrain=ground,
         model=model,
-        difficulty=(0.0, 1.0) if ground == "hills" else None,
+        difficulty=(0.0, 2.0) if ground == "hills" else None,
         friction=(0.2, 1.2),
         height_scan=bool(random.uniform() < 0.5),
         steered=bool(random.uniform() < 0.8),

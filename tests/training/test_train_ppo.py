@@ -233,7 +233,8 @@ def test_an_evaluation_names_policies_and_baseline(run: Path, evaluate: Script, 
     result = evaluate(run, "--terrain", terrain, "--episodes", 2, "--output", tmp_path)
     assert result.exit_code == 0, result.output
     report = json.loads((tmp_path / "evaluation.json").read_text(encoding="utf-8"))
-    expected = ["PD baseline", "guide alone", "run"] if terrain == "sphere_field" else ["PD baseline", "run"]
+    guides = ["guide alone"] if terrain == "sphere_field" else []
+    expected = ["PD baseline", "scan planner", *guides, "run"]
     assert [row["policy"] for row in report["rows"]] == expected
     for row in report["rows"]:
         assert sum(row["ends"].values()) == row["episodes"] == 2

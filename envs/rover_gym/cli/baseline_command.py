@@ -1,4 +1,4 @@
-"""`rover baseline`: success of the PD baseline among rocks, by difficulty."""
+"""`rover baseline`: success of the PD baseline or another policy among rocks, by difficulty."""
 
 import json
 import math
@@ -12,6 +12,7 @@ from rich.table import Table
 
 from rover_gym.cli.console import INTERRUPTED, LARGEST_SEED, MOST_EPISODES, console, plain_errors, progress_bar
 from rover_gym.policy.baseline import DIFFICULTIES, ENVIRONMENTS, BaselineInterrupt, BaselineRow, measure_baseline
+from rover_gym.policy.named_policy import NAMES_HELP, policy_title
 
 CAUSES = {"time": "time limit", "high_centred": "high centred", "roll_over": "roll over", "step_failed": "step failed"}
 
@@ -20,7 +21,7 @@ CAUSES = {"time": "time limit", "high_centred": "high centred", "roll_over": "ro
 def baseline(
     difficulty: Annotated[
         list[float] | None,
-        typer.Option(help="Difficulty from 0 to 1; repeat for several. Default: five of them."),
+        typer.Option(help="Difficulty from 0 to 2; repeat for several. Default: five of them."),
     ] = None,
     episodes: Annotated[int, typer.Option(min=1, max=MOST_EPISODES, help="Episodes at each difficulty.")] = 200,
     seed: Annotated[
@@ -28,9 +29,7 @@ def baseline(
     ] = 0,
     policy: Annotated[
         str,
-        typer.Option(
-            help="'pd' for the baseline, 'trained' for the trained policy of the package, or a trained policy's folder."
-        ),
+        typer.Option(help=NAMES_HELP),
     ] = "pd",
     terrain: Annotated[
         str, typer.Option(help="The ground: 'sphere_field' for rocks on a plane, or 'hills'.")
@@ -88,8 +87,7 @@ def baseline(
 
 def _table(rows: Sequence[BaselineRow], seed: int, policy: str, environment: str) -> Table:
     last = seed + rows[0].episodes - 1
-    name = "the PD baseline" if policy == "pd" else "a trained policy"
-    title = f"{environment} with {name}, {rows[0].episodes} episodes a row, seeds {seed} to {last}"
+    title = f"{environment} with {policy_title(policy)}, {rows[0].episodes} episodes a row, seeds {seed} to {last}"
     table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     for heading in ("difficulty", "success", "95% interval", "time to goal", "energy"):
         table.add_column(heading, justify="right")

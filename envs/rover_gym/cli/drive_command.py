@@ -1,4 +1,4 @@
-"""`rover drive`: episodes of `Rover-v0` with the PD baseline or a trained policy."""
+"""`rover drive`: episodes of `Rover-v0` with the PD baseline, the scan planner or a trained policy."""
 
 import json
 import math
@@ -30,9 +30,7 @@ from rover_gym.env.rewards import WEIGHTS
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.episodes import Episode, Policy, run_episode
-from rover_gym.policy.pd_policy import PDPolicy
-from rover_gym.policy.shipped import find_policy, policy_arguments
-from rover_gym.policy.trained_policy import TrainedPolicy
+from rover_gym.policy.named_policy import NAMES_HELP, named_policy, policy_title
 from rover_gym.record.channels import Channel, RoverSampler
 from rover_gym.record.facts import describe
 from rover_gym.record.recorder import Recorder
@@ -54,7 +52,7 @@ def drive(
     height_range: HeightRange = None,
     model: ModelName = BUILT_IN,
     difficulty: Annotated[
-        float | None, typer.Option(help="Difficulty of the rocks, from 0 to 1. Default: 0.5.")
+        float | None, typer.Option(help="Difficulty of the rocks, from 0 to 2. Default: 0.5.")
     ] = None,
     slope: Annotated[
         float | None, typer.Option(help="Slope of the ground, degrees. Default: 0; on rocks, by the difficulty.")
@@ -71,9 +69,7 @@ def drive(
     ] = None,
     policy: Annotated[
         str,
-        typer.Option(
-            help="'pd' for the baseline, 'trained' for the trained policy of the package, or a trained policy's folder."
-        ),
+        typer.Option(help=NAMES_HELP),
     ] = "pd",
     friction: Annotated[float, typer.Option(help="Friction coefficient.")] = 0.7,
     time_step: Annotated[float, typer.Option(help="Time step of the physics, s.")] = 0.005,
@@ -90,7 +86,7 @@ def drive(
         Path | None, typer.Option(dir_okay=False, metavar="FILE.mp4", help="Film the episodes one after the other.")
     ] = None,
 ) -> None:
-    """Drive Rover-v0 to its goal with the PD baseline or a trained policy and print the results of the episodes.
+    """Drive Rover-v0 to its goal with the PD baseline or another policy and print the results of the episodes.
 
     Ctrl-C ends the drive: finished episodes are printed, and what was recorded and filmed is kept.
     """
@@ -113,15 +109,13 @@ def drive(
         arguments["model"] = rover
     if (ground := named_ground(terrain, spacing, height_range)) is not None:
         arguments["terrain"] = ground
-    folder = find_policy(policy, terrain)
-    trained = {} if folder is None else policy_arguments(folder)
-    arguments, as_given = arguments | trained, as_given | trained
+    chosen = named_policy(policy, terrain, rover)
+    arguments, as_given = {**arguments, **chosen.arguments}, {**as_given, **chosen.arguments}
     filming: dict[str, Any] = {}
     if video is not None:
         filming = {"render_mode": "rgb_array", "render_options": {"antialiasing": True}}
     env = gym.make("Rover-v0", max_episode_steps=round(time_limit / CONTROL_PERIOD), **arguments, **filming)
-    driver: Policy = PDPolicy(env) if folder is None else TrainedPolicy.load(env, folder)
-    name = "the PD baseline" if folder is None else "a trained policy"
+    driver, name = chosen.make(env), policy_title(policy)
 
     results: list[Episode] = []
     paths: list[Path] = []

@@ -28,7 +28,7 @@ from rover_gym.env.argument_checks import (
     check_terrain,
     shortest,
 )
-from rover_gym.env.rocks import MAX_ABUNDANCE, ROCK_RADII, check_scan
+from rover_gym.env.rocks import MAX_ABUNDANCE, MAX_DIFFICULTY, ROCK_RADII, check_scan
 from rover_gym.mechanics import RoverModel, Terrain
 from rover_gym.rendering.render_options import check_render_mode, check_render_options
 from rover_gym.validation import Range, flag, mapping
@@ -66,7 +66,8 @@ class RoverArguments(TypedDict, total=False):
         ),
     ]
     difficulty: Annotated[
-        float | Range | None, Argument(None, NumberOrRange(at_least=0.0, at_most=1.0), "of the rocks; None: 0.5")
+        float | Range | None,
+        Argument(None, NumberOrRange(at_least=0.0, at_most=MAX_DIFFICULTY), "of the rocks; None: 0.5"),
     ]
     rock_abundance: Annotated[
         float | None,

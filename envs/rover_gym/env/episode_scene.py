@@ -8,7 +8,7 @@ from typing import Any
 from rover_gym.env.argument_checks import MAX_SLOPE_DEG
 from rover_gym.env.quantities import Array
 from rover_gym.env.randomisation import Domain
-from rover_gym.env.rocks import MAX_GOAL_DISTANCE, Rocks
+from rover_gym.env.rocks import MAX_DIFFICULTY, MAX_GOAL_DISTANCE, Rocks
 from rover_gym.env.start import Start
 from rover_gym.env.task import Task
 from rover_gym.ground import plane_of
@@ -62,7 +62,7 @@ def scene_of(task: Task, start: Array, rocks: Array, rock_seed: int, domain: Arr
 
 def check_difficulty(task: Task, difficulty: object) -> Range:
     """Checks a difficulty or a range of difficulties; the task must have rocks."""
-    checked = span("difficulty", difficulty, at_least=0.0, at_most=1.0)
+    checked = span("difficulty", difficulty, at_least=0.0, at_most=MAX_DIFFICULTY)
     if task.rocks is None:
         refuse(OptionError, "difficulty", difficulty, "needs terrain 'sphere_field' or 'hills'")
     return checked
@@ -74,7 +74,9 @@ def check_reset_options(task: Task, options: Mapping[str, Any] | None) -> ResetO
     known_keys("options", given, RESET_OPTIONS)
     fixed: dict[str, Any] = {}
     if "difficulty" in given:
-        difficulty = fixed["difficulty"] = number("options.difficulty", given["difficulty"], at_least=0.0, at_most=1.0)
+        difficulty = fixed["difficulty"] = number(
+            "options.difficulty", given["difficulty"], at_least=0.0, at_most=MAX_DIFFICULTY
+        )
         if task.rocks is None:
             refuse(OptionError, "options.difficulty", difficulty, "needs terrain 'sphere_field' or 'hills'")
     if "slope_deg" in given:

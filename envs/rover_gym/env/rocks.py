@@ -1,12 +1,13 @@
 """Rock fields by difficulty, and the height scan of the ground around the rover.
 
-One number d in [0, 1], the difficulty, sets how hard an episode is:
+One number d in [0, 2], the difficulty, sets how hard an episode is:
 
-    abundance    k = 0.2 d           fraction of the ground that rocks cover
-    largest rock r = (0.5 + 1.1 d) R radius, with R the wheel radius; half of a rock is below the ground
-    slope          0 to 10 d         degrees
+                     d from 0 to 1    d from 1 to 2
+    abundance    k   0.2 d            0.2 + 0.15 (d - 1)      fraction of the ground that rocks cover
+    largest rock r   (0.5 + 1.1 d) R  (1.6 + 1.4 (d - 1)^2) R radius, with R the wheel radius
+    slope            0 to 10 d        0 to 10 d               degrees
 
-An argument that is given overrides the difficulty.
+Half of a rock is below the ground. An argument that is given overrides the difficulty.
 """
 
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from rover_gym.mechanics import OptionError, sin_cos
 from rover_gym.validation import Range, number, refuse, vector
 
 DEFAULT_DIFFICULTY = 0.5
+MAX_DIFFICULTY = 2.0
 
 #: Largest abundance; the size distribution does not hold beyond it.
 MAX_ABUNDANCE = 0.5
@@ -44,7 +46,7 @@ class Rocks:
     """The rocks of one episode.
 
     Attributes:
-        difficulty: In [0, 1].
+        difficulty: In [0, 2].
         abundance: Fraction of the ground that rocks cover.
         max_radius: Radius of the largest rocks, in wheel radii.
         seed: Seed of the rocks' sizes and positions.

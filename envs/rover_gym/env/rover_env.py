@@ -156,15 +156,15 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     With `terrain="sphere_field"`, as in `RoverRocks-v0`, fixed spheres lie on the plane, half below the
     ground, with the sizes that Golombek and Rapp (1997) found on Mars, the smallest 5 cm wide. They lie at
     random up to 4 m beyond the rectangle that start and goal span. Two circles, around start and goal,
-    stay clear, so that the rover has room to turn. Each reset draws a new field. A single number d, the
-    difficulty, sets how hard it is; `reset(options={"difficulty": 0.3})` sets it for one episode. An argument
+    stay clear, so that the rover has room to turn. Each reset draws a new field. A single number d from 0 to 2,
+    the difficulty, sets how hard it is; `reset(options={"difficulty": 0.3})` sets it for one episode. An argument
     that is not None overrides what the difficulty would set.
 
-    | quantity        | at difficulty d      | meaning                                          |
-    |-----------------|----------------------|--------------------------------------------------|
-    | rock_abundance  | 0.2 d                | fraction of the ground that rocks of all sizes cover |
-    | max_rock_radius | 0.5 + 1.1 d          | radius of the largest rocks, in wheel radii      |
-    | slope_deg       | uniform, 0 to 10 d   | slope of the plane                               |
+    | quantity        | d from 0 to 1      | d from 1 to 2       | meaning                                              |
+    |-----------------|--------------------|---------------------|------------------------------------------------------|
+    | rock_abundance  | 0.2 d              | 0.2 + 0.15 (d - 1)  | fraction of the ground that rocks of all sizes cover |
+    | max_rock_radius | 0.5 + 1.1 d        | 1.6 + 1.4 (d - 1)^2 | radius of the largest rocks, in wheel radii          |
+    | slope_deg       | uniform, 0 to 10 d | uniform, 0 to 10 d  | slope of the plane                                   |
 
     ## Hills and maps
 
@@ -342,7 +342,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         """Sets the rocks' difficulty, or the range it is drawn from, from the next reset on.
 
         Raises:
-            OptionError: The difficulty is not within 0 to 1, or there are no rocks; nothing has changed.
+            OptionError: The difficulty is not within 0 to 2, or there are no rocks; nothing has changed.
         """
         self._difficulty = check_difficulty(self.task, difficulty)
 

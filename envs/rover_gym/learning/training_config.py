@@ -17,6 +17,7 @@ from typing import Any, TypeVar, get_args, get_type_hints
 import yaml
 
 from rover_gym.env.arguments import ARGUMENTS
+from rover_gym.env.rocks import MAX_DIFFICULTY
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.command import CommandLimits
@@ -31,8 +32,8 @@ class CurriculumConfig:
     """Settings of the curriculum, which raises the difficulty as the policy learns.
 
     Attributes:
-        start: Initial hardest difficulty.
-        end: Final hardest difficulty.
+        start: Initial hardest difficulty, from 0 to 2.
+        end: Final hardest difficulty, from 0 to 2.
         step: Increase of the hardest difficulty at a raise.
         width: Difficulties are drawn from [hardest - width, hardest].
         success: Success rate over the last rollouts that triggers a raise.
@@ -47,8 +48,9 @@ class CurriculumConfig:
     episodes: int = 100
 
     def __post_init__(self) -> None:
-        for name in ("start", "end", "width", "success"):
-            number(f"curriculum.{name}", getattr(self, name), at_least=0.0, at_most=1.0)
+        for name in ("start", "end", "width"):
+            number(f"curriculum.{name}", getattr(self, name), at_least=0.0, at_most=MAX_DIFFICULTY)
+        number("curriculum.success", self.success, at_least=0.0, at_most=1.0)
         number("curriculum.step", self.step, above=0.0)
         number("curriculum.episodes", self.episodes, at_least=1)
 

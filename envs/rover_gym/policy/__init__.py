@@ -1,5 +1,6 @@
-"""Policies: the PD baseline, trained policies, their commands and features, and their evaluation."""
+"""Policies: the PD baseline, the scan planner, trained policies, their commands and features, and their evaluation."""
 
+from rover_gym.policy.arc_search import PathCosts
 from rover_gym.policy.baseline import ENDS, BaselineInterrupt, BaselineRow, measure_baseline, wilson_interval
 from rover_gym.policy.command import CommandController, CommandLimits
 from rover_gym.policy.command_vector_env import CommandVectorEnv
@@ -15,10 +16,12 @@ from rover_gym.policy.evaluation import (
     summarise,
 )
 from rover_gym.policy.features import Features
+from rover_gym.policy.named_policy import NamedPolicy, named_policy
 from rover_gym.policy.network import Network
 from rover_gym.policy.pd_policy import PDGains, PDPolicy
 from rover_gym.policy.policy_card import PolicyCard
 from rover_gym.policy.policy_files import PolicyError
+from rover_gym.policy.scan_policy import ScanGains, ScanPolicy
 from rover_gym.policy.shipped import find_policy, policy_arguments, policy_folder
 from rover_gym.policy.trained_policy import TrainedPolicy
 
@@ -34,18 +37,23 @@ __all__ = [
     "EvaluatedEpisode",
     "Features",
     "IntervalEstimate",
+    "NamedPolicy",
     "Network",
     "PDGains",
     "PDPolicy",
+    "PathCosts",
     "Policy",
     "PolicyCard",
     "PolicyError",
     "PolicySummary",
+    "ScanGains",
+    "ScanPolicy",
     "TrainedPolicy",
     "drive_all",
     "find_policy",
     "mean_estimate",
     "measure_baseline",
+    "named_policy",
     "policy_arguments",
     "policy_folder",
     "ratio_estimate",

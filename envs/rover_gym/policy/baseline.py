@@ -1,4 +1,4 @@
-"""Measures the success rate of the PD baseline among rocks, by difficulty."""
+"""Measures the success rate of a policy among rocks, by difficulty."""
 
 import math
 from collections import Counter
@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import gymnasium as gym
 
+from rover_gym.env.rocks import MAX_DIFFICULTY
 from rover_gym.mechanics import OptionError
-from rover_gym.policy.episodes import Episode, Policy, run_episode
-from rover_gym.policy.pd_policy import PDPolicy
-from rover_gym.policy.shipped import find_policy, policy_arguments
-from rover_gym.policy.trained_policy import TrainedPolicy
+from rover_gym.models.lookup import open_model
+from rover_gym.policy.episodes import Episode, run_episode
+from rover_gym.policy.named_policy import named_policy
 from rover_gym.validation import number, refuse, whole
 
 DIFFICULTIES = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -23,7 +23,7 @@ class BaselineRow:
     """The results at one difficulty.
 
     Attributes:
-        difficulty: Difficulty in [0, 1].
+        difficulty: Difficulty in [0, 2].
         episodes: Number of episodes.
         successes: Number of episodes that reached the goal.
         success_rate: Fraction of episodes that reached the goal.
@@ -72,10 +72,10 @@ def measure_baseline(
     """Drives `RoverRocks-v0` or `RoverHills-v0` with a policy, with the same seeds at every difficulty.
 
     Args:
-        difficulties: The difficulties, each in [0, 1].
+        difficulties: The difficulties, each in [0, 2].
         episodes: Episodes per difficulty.
         seed: Seed of the first episode; the seed increases by one per episode.
-        policy: "pd", "trained" for the shipped policy, or the folder of a trained policy.
+        policy: "pd", "scan", "trained" for the shipped policy, or the folder of a trained policy.
         terrain: "sphere_field" or "hills".
         model: The rover: a name of the gallery or a file; None for the built-in one.
         progress: Called after each episode with the difficulty and the number of episodes done.
@@ -86,14 +86,13 @@ def measure_baseline(
         BaselineInterrupt: The user interrupted the measurement; the exception holds the results so far.
     """
     episodes, seed = whole("episodes", episodes, at_least=1), whole("seed", seed)
-    difficulties = tuple(number("difficulty", level, at_least=0.0, at_most=1.0) for level in difficulties)
+    difficulties = tuple(number("difficulty", level, at_least=0.0, at_most=MAX_DIFFICULTY) for level in difficulties)
     if terrain not in ENVIRONMENTS:
         refuse(OptionError, "terrain", terrain, f"must be one of {', '.join(ENVIRONMENTS)}")
-    folder = find_policy(policy, terrain)
-    arguments = {} if folder is None else policy_arguments(folder)
-    arguments |= {} if model is None else {"model": model}
-    env = gym.make(ENVIRONMENTS[terrain], **arguments)
-    driver: Policy = PDPolicy(env) if folder is None else TrainedPolicy.load(env, folder)
+    rover = None if model is None else open_model(model)
+    chosen = named_policy(policy, terrain, rover)
+    env = gym.make(ENVIRONMENTS[terrain], model=rover, **chosen.arguments)
+    driver = chosen.make(env)
     rows: list[BaselineRow] = []
     results: list[Episode] = []
     try:

@@ -9,6 +9,7 @@ hits its flank would miss.
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.env.observation import ObservationLayout
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError, exp, sin_cos
 from rover_gym.validation import refuse, whole
@@ -34,8 +35,7 @@ class Features:
         q, velocity = layout["q"].start, layout["velocity"].start
         wheels = set(rover.model.wheel_joint_indices)
         joints = [i for i in range(6, rover.model.nq) if i not in wheels]
-        self._roll, self._pitch = q + 3, q + 5
-        self._normal = layout["ground_normal"]
+        self._layout = layout
         self._goal = layout["goal"]
         self._distance = layout["goal_distance"].start
         self._goal_scale = float(layout.scale[self._distance])
@@ -55,7 +55,7 @@ class Features:
         seen = observations
         distance = seen[:, self._distance] * self._goal_scale
         goal = seen[:, self._goal] * self._goal_scale / np.maximum(distance, 0.1)[:, None]
-        slope = self._slope(seen)
+        slope = ground_slope(self._layout, seen)
         parts = [
             seen[:, self._taken],
             goal,
@@ -72,19 +72,21 @@ class Features:
         features: npt.NDArray[np.float32] = np.concatenate(parts, axis=1).astype(np.float32)
         return features.clip(-LARGEST_FEATURE, LARGEST_FEATURE)
 
-    def _slope(self, seen: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
-        """`(n, 2)` rise of the ground plane per metre ahead and to the right, in the heading frame."""
-        n = seen[:, self._normal]
-        roll, pitch = seen[:, self._roll], seen[:, self._pitch]
-        # The normal in the heading frame is Rz(pitch) Rx(roll) n.
-        sine, cosine = sin_cos(roll)
-        y = cosine * n[:, 1] - sine * n[:, 2]
-        right = sine * n[:, 1] + cosine * n[:, 2]
-        sine, cosine = sin_cos(pitch)
-        ahead = cosine * n[:, 0] - sine * y
-        up = sine * n[:, 0] + cosine * y
-        rise: npt.NDArray[np.floating] = -np.stack((ahead, right), axis=1) / np.maximum(up, 0.1)[:, None]
-        return rise
+
+def ground_slope(layout: ObservationLayout, seen: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
+    """`(n, 2)` rise of the ground plane per metre ahead and to the right, in the heading frame, from observations."""
+    q = layout["q"].start
+    n = seen[:, layout["ground_normal"]]
+    roll, pitch = seen[:, q + 3], seen[:, q + 5]
+    # The normal in the heading frame is Rz(pitch) Rx(roll) n.
+    sine, cosine = sin_cos(roll)
+    y = cosine * n[:, 1] - sine * n[:, 2]
+    right = sine * n[:, 1] + cosine * n[:, 2]
+    sine, cosine = sin_cos(pitch)
+    ahead = cosine * n[:, 0] - sine * y
+    up = sine * n[:, 0] + cosine * y
+    rise: npt.NDArray[np.floating] = -np.stack((ahead, right), axis=1) / np.maximum(up, 0.1)[:, None]
+    return rise
 
 
 def _cells(offsets: npt.NDArray[np.float64], pool: int) -> npt.NDArray[np.intp]:

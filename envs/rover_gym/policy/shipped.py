@@ -25,16 +25,16 @@ def policy_folder(terrain: str) -> Path:
 
 
 def find_policy(policy: str, terrain: str) -> Path | None:
-    """The folder of a policy: the shipped one for "trained", otherwise the given path; None for "pd", the baseline.
+    """The folder of a policy: the shipped one for "trained", otherwise the given path; None for "pd" and "scan".
 
     Raises:
         PolicyError: There is no such policy.
     """
-    if policy == "pd":
+    if policy in ("pd", "scan"):
         return None
     folder = policy_folder(terrain) if policy == "trained" else Path(policy)
     if not is_there(folder / "policy.json"):
-        refuse(PolicyError, "policy", policy, "must be 'pd', 'trained' or the folder of a trained policy")
+        refuse(PolicyError, "policy", policy, "must be 'pd', 'scan', 'trained' or the folder of a trained policy")
     return folder
 
 

