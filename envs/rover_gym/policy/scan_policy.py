@@ -117,7 +117,7 @@ class ScanPolicy:
         self._heights, self._goal = layout["height_scan"], layout["goal"]
         self._q, self._stuck = layout["q"].start, layout["stuck"].start
 
-        turning = Turning.of(model, model.mass * math.hypot(*rover.gravity), rover.dt)
+        turning = Turning.of(model, model.mass * math.hypot(*rover.gravity))
         limits = _limits(rover, turning, self.gains)
         footprint = Footprint.of(model, scan.spacing)
         self._x_c, self._reach = turning.x_c, _reach(model)
