@@ -45,8 +45,8 @@ class PlannerOptions:
         time_step: Largest physics step of the futures, s.
     """
 
-    samples: int = 64
-    iterations: int = 1
+    samples: int = 40
+    iterations: int = 2
     horizon: float = 2.4
     knot: float = 0.6
     period: float = 0.3

@@ -43,7 +43,7 @@ def named_policy(policy: str, terrain: str, model: RoverModel | None = None) -> 
     """The policy of a name, for a terrain and a rover; None is the built-in one.
 
     Args:
-        policy: "pd", "scan", "planner", "trained" for the one shipped for the terrain, or the folder of a trained policy.
+        policy: "pd", "scan", "planner", "trained" for the one shipped for the terrain, or the folder of another.
         terrain: The argument of the environment.
         model: The rover, to which the planner fits its height scan.
 
