@@ -212,7 +212,7 @@ def test_the_motors_work_is_what_the_environment_counts(recordings: dict[str, Pa
     for kind in ("flat", "rocks"):
         run = read_run(recordings[kind])
         spent = np.abs(np.diff(motor_work(run), axis=0)).sum(axis=1)
-        assert np.cumsum(spent) == pytest.approx(run.trajectory["motor_energy"][1:], rel=1e-3, abs=1e-9)
+        assert np.cumsum(spent) == pytest.approx(run.trajectory["motor_energy"][1:], rel=2e-3, abs=1e-9)
 
 
 def recorded(sim: Simulation, path: Path, steps: int) -> RoverRun:
