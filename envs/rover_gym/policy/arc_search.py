@@ -58,8 +58,8 @@ class PathCosts:
 
     belly: float = 15.0
     margin: float = 0.5
-    climb: float = 0.25
-    step: float = 0.4
+    climb: float = 0.12
+    step: float = 0.2
     lean: float = 3.0
     facing: float = 0.2
     swerve: float = 0.08
@@ -145,7 +145,7 @@ class ArcSearch:
         """The first arc of the cheapest path over heights as `GroundGrid.spread` gives them."""
         costs, mine = self.costs, self._commands
         now = heights[self._places_now[: self._n_wheels]]
-        risk, wheels = self._risk(heights[self._first_places], np.broadcast_to(now, (len(mine), len(now))))
+        risk, wheels = self._risk(heights.take(self._first_places), np.broadcast_to(now, (len(mine), len(now))))
         distance = self._distance(self._first_poses, task)
         # What lies behind the goal costs nothing.
         cost = task.boldness * np.where(np.minimum.accumulate(distance, axis=1) < self._arrival, 0.0, risk).sum(axis=1)
@@ -164,7 +164,7 @@ class ArcSearch:
             kept = self._apart(cost + self._to_go(ends, nearest, task), ends)
             poses = after(ends[kept], self._further_poses)
             before = np.broadcast_to(wheels[kept, None], (len(kept), n, self._n_wheels))
-            risk, wheels = self._risk(heights[self._grid.places(poses)], before)
+            risk, wheels = self._risk(heights.take(self._grid.places(poses)), before)
             distance = np.minimum(np.minimum.accumulate(self._distance(poses, task), axis=2), nearest[kept, None, None])
             risk = task.boldness * np.where(distance < self._arrival, 0.0, risk).sum(axis=2)
             more = costs.later**arc * (risk + costs.memory * self._nearness(poses, task))
@@ -197,7 +197,11 @@ class ArcSearch:
         risk = self._step * costs.lean * (ahead * ahead + right * right)[..., 0]
         if under.shape[-1]:
             x, z = self._underside
-            gap = (self._clearance + level + ahead * x + right * z - under).min(axis=-1) / self._radius
+            gaps = ahead * x
+            gaps += right * z
+            gaps += self._clearance
+            gaps -= under
+            gap = (gaps.min(axis=-1) + level[..., 0]) / self._radius
             low = np.maximum(0.0, costs.margin - gap)
             risk += self._step * costs.belly * low * (1.0 + low)
         passed = np.concatenate((before[..., None, :], wheels), axis=-2)
@@ -209,7 +213,7 @@ class ArcSearch:
     @staticmethod
     def _distance(poses: Array, task: SearchTask) -> Array:
         """Distances of poses from the goal, m."""
-        away: Array = np.hypot(poses[..., 0] - task.goal[0], poses[..., 1] - task.goal[1])
+        away: Array = np.sqrt((poses[..., 0] - task.goal[0]) ** 2 + (poses[..., 1] - task.goal[1]) ** 2)
         return away
 
     def _to_go(self, ends: Array, nearest: Array, task: SearchTask) -> Array:
@@ -217,7 +221,7 @@ class ArcSearch:
         ahead, right = task.goal[0] - ends[:, 0], task.goal[1] - ends[:, 1]
         sine, cosine = sin_cos(ends[:, 2])
         bearing = np.abs(atan2(ahead * sine + right * cosine, ahead * cosine - right * sine))
-        distance = np.hypot(ahead, right)
+        distance = np.sqrt(ahead * ahead + right * right)
         turn = self.costs.facing * np.minimum(bearing, 2.0) * np.minimum(distance, self._reach)
         to_go: Array = np.where(nearest < self._arrival, 0.0, distance + turn)
         return to_go

@@ -61,5 +61,6 @@ class GroundGrid:
         row = np.clip(row, -1, self._shape[0]) + self._margin
         column = np.clip(column, -1, self._shape[1]) + self._margin
         heading = np.rint(poses[..., 2] * (HEADINGS / math.tau)).astype(np.intp) % HEADINGS
-        places: Places = (row * self._width + column)[..., None] + self._offsets[heading]
+        places: Places = self._offsets.take(heading, axis=0)
+        places += (row * self._width + column)[..., None]  # in place: this is where the time goes
         return places

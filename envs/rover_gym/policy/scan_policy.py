@@ -63,12 +63,12 @@ class ScanGains:
     """
 
     speed: float = 1.2
-    push: float = 2.0
+    push: float = 2.5
     response: float = 0.2
     period: float = 0.2
     patience: float = 1.0
     retreat: float = 1.2
-    courage: float = 6.0
+    courage: float = 12.0
     least: float = 0.2
 
     def __post_init__(self) -> None:
