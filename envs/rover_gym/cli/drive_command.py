@@ -25,12 +25,12 @@ from rover_gym.cli.console import (
     progress_bar,
     say_path,
 )
+from rover_gym.cli.drivers import DRIVERS_HELP, driver_title, named_driver
 from rover_gym.cli.scene_options import BUILT_IN, HeightRange, ModelName, Spacing, Start, named_ground, named_model
 from rover_gym.env.rewards import WEIGHTS
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.episodes import Episode, Policy, run_episode
-from rover_gym.policy.named_policy import NAMES_HELP, named_policy, policy_title
 from rover_gym.record.channels import Channel, RoverSampler
 from rover_gym.record.facts import describe
 from rover_gym.record.recorder import Recorder
@@ -69,7 +69,7 @@ def drive(
     ] = None,
     policy: Annotated[
         str,
-        typer.Option(help=NAMES_HELP),
+        typer.Option(help=DRIVERS_HELP),
     ] = "pd",
     friction: Annotated[float, typer.Option(help="Friction coefficient.")] = 0.7,
     time_step: Annotated[float, typer.Option(help="Time step of the physics, s.")] = 0.005,
@@ -109,13 +109,13 @@ def drive(
         arguments["model"] = rover
     if (ground := named_ground(terrain, spacing, height_range)) is not None:
         arguments["terrain"] = ground
-    chosen = named_policy(policy, terrain, rover)
+    chosen = named_driver(policy, terrain, rover)
     arguments, as_given = {**arguments, **chosen.arguments}, {**as_given, **chosen.arguments}
     filming: dict[str, Any] = {}
     if video is not None:
         filming = {"render_mode": "rgb_array", "render_options": {"antialiasing": True}}
     env = gym.make("Rover-v0", max_episode_steps=round(time_limit / CONTROL_PERIOD), **arguments, **filming)
-    driver, name = chosen.make(env), policy_title(policy)
+    driver, name = chosen.make(env), driver_title(policy)
 
     results: list[Episode] = []
     paths: list[Path] = []

@@ -1,4 +1,6 @@
-"""The way over a whole field: what it costs to reach the goal from anywhere, by Dijkstra's algorithm (1959) on a grid.
+"""The way over a whole field: what it costs to reach the goal from anywhere.
+
+The costs are those of Dijkstra's algorithm (Dijkstra 1959) on a grid.
 
 The price of a place tells how badly the rover fits there: how high the ground stands under its trunk, over the mean of
 the ground about it, compared with the trunk's clearance. `PlannerPolicy` looks the end of each future up in it.

@@ -14,11 +14,11 @@ from rover_gym.policy.trained_policy import TrainedPolicy
 
 #: What the command line says about the names.
 NAMES_HELP = (
-    "'pd' for the baseline, 'scan' for the planner by hand, 'planner' for the one that tries out futures in the "
-    "simulator, 'trained' for the trained policy of the package, or a trained policy's folder."
+    "'pd' for the baseline, 'scan' for the planner by hand, 'trained' for the trained policy of the package, or a "
+    "trained policy's folder."
 )
 
-_TITLES = {"pd": "the PD baseline", "scan": "the scan planner", "planner": "the planner with futures"}
+_TITLES = {"pd": "the PD baseline", "scan": "the scan planner"}
 
 
 def policy_title(policy: str) -> str:
@@ -43,7 +43,7 @@ def named_policy(policy: str, terrain: str, model: RoverModel | None = None) -> 
     """The policy of a name, for a terrain and a rover; None is the built-in one.
 
     Args:
-        policy: "pd", "scan", "planner", "trained" for the one shipped for the terrain, or the folder of another.
+        policy: "pd", "scan", "trained" for the policy shipped for the terrain, or the folder of a trained policy.
         terrain: The argument of the environment.
         model: The rover, to which the planner fits its height scan.
 
@@ -54,17 +54,9 @@ def named_policy(policy: str, terrain: str, model: RoverModel | None = None) -> 
     folder = find_policy(policy, terrain)
     if folder is not None:
         return NamedPolicy(policy_arguments(folder), partial(_load, folder))
-    if policy == "planner":
-        return NamedPolicy({}, _plan)
     if policy == "scan":
         return NamedPolicy(ScanPolicy.arguments(model), ScanPolicy)
     return NamedPolicy({}, PDPolicy)
-
-
-def _plan(env: Any) -> Policy:
-    from rover_gym.planning.planner_policy import PlannerPolicy  # noqa: PLC0415 - planning builds on policies
-
-    return PlannerPolicy(env)
 
 
 def _load(folder: Any, env: Any) -> Policy:

@@ -25,17 +25,16 @@ def policy_folder(terrain: str) -> Path:
 
 
 def find_policy(policy: str, terrain: str) -> Path | None:
-    """The folder of a policy: the shipped one for "trained", otherwise the path; None for "pd", "scan", "planner".
+    """The folder of a policy: the shipped one for "trained", otherwise the given path; None for "pd" and "scan".
 
     Raises:
         PolicyError: There is no such policy.
     """
-    if policy in ("pd", "scan", "planner"):
+    if policy in ("pd", "scan"):
         return None
     folder = policy_folder(terrain) if policy == "trained" else Path(policy)
     if not is_there(folder / "policy.json"):
-        names = "'pd', 'scan', 'planner', 'trained'"
-        refuse(PolicyError, "policy", policy, f"must be {names} or the folder of a trained policy")
+        refuse(PolicyError, "policy", policy, "must be 'pd', 'scan', 'trained' or the folder of a trained policy")
     return folder
 
 
