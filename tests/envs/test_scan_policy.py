@@ -197,7 +197,7 @@ def test_it_turns_to_go_round_a_rock_that_it_cannot_pass() -> None:
 def test_it_backs_out_of_a_dead_end() -> None:
     """Rocks on three sides: whoever only drives ahead stays inside."""
     wall = [(2.6, 0.0, 0.45 * k) for k in range(-3, 4)]
-    wall += [(2.6 - 0.45 * k, 0.0, side * 1.35) for k in range(4) for side in (-1, 1)]
+    wall += [(2.6 - 0.45 * k, 0.0, side * 1.35) for k in range(3) for side in (-1, 1)]
     env = RoverEnv(terrain=SphereField(wall, [0.3] * len(wall), Plane()), heading_deg=0.0, **ARGUMENTS)
     end, state = drive(env, ScanPolicy(env), 0, steps=1200, position=(1.0, 0.0), goal=(6.0, 0.0))
     assert end == "goal"

@@ -58,6 +58,7 @@ class ScanGains:
         patience: Time without movement until the rover backs off, s, for a rover that takes a second or less for its
             own reach; longer in proportion for a slower one, as the times below.
         retreat: Time that it backs off, s.
+        insistence: Time without progress after which it backs off for twice as long, s; after twice that, thrice.
         courage: Time without progress that halves the cost of risks, s.
         least: Least factor on the cost of risks.
     """
@@ -68,6 +69,7 @@ class ScanGains:
     period: float = 0.2
     patience: float = 1.0
     retreat: float = 1.2
+    insistence: float = 10.0
     courage: float = 12.0
     least: float = 0.2
 
@@ -225,7 +227,9 @@ class ScanPolicy:
         direction = -1.0 if memory.command[i, 0] < 0.0 else 1.0
         sine, cosine = sin_cos(heading)
         ahead = TRAP_AHEAD * self._reach * direction
-        memory.back_off((x + ahead * cosine, z - ahead * sine, heading), -direction, self.gains.retreat * self._pace, i)
+        longer = 1.0 + memory.fruitless[i] / (self.gains.insistence * self._pace)
+        trap, time = (x + ahead * cosine, z - ahead * sine, heading), self.gains.retreat * self._pace * longer
+        memory.back_off(trap, -direction, time, i)
 
 
 def _reach(model: RoverModel) -> float:
