@@ -11,8 +11,8 @@ import pytest
 from rover_gym import OptionError, PDPolicy, Plane, RoverEnv, RoverModel, SphereField, StateError
 from rover_gym.env.rocks import HeightScan, scan_points
 from rover_gym.policy import PathCosts, ScanGains, ScanPolicy
-from rover_gym.policy.footprint import Footprint
 from rover_gym.policy.ground_grid import GroundGrid
+from rover_gym.policy.rover_outline import RoverOutline
 from rover_gym.policy.scan_memory import TRAPS, ScanMemory
 from rover_gym.policy.sweeps import Arcs, after
 
@@ -116,13 +116,13 @@ def test_predict_leaves_the_given_state_alone_and_forgets_at_a_start(rocks: Rove
 
 
 def test_the_underside_is_the_models() -> None:
-    built_in = Footprint.of(RoverModel(), 0.1)
+    built_in = RoverOutline.of(RoverModel(), 0.1)
     inside = (np.abs(built_in.underside) < 0.45).all(axis=1)
     np.testing.assert_allclose(built_in.clearance[inside], 0.15, atol=1e-9)  # the belly of the report's rover
     # The front axle, 3 cm under its pivot, reaches out before the trunk.
     front = built_in.clearance[np.isclose(built_in.underside[:, 0], 0.6) & (np.abs(built_in.underside[:, 1]) < 0.3)]
     np.testing.assert_allclose(front, 0.15, atol=1e-9)
-    mars = Footprint.of(RoverModel.named("mars-rover"), 0.25)
+    mars = RoverOutline.of(RoverModel.named("mars-rover"), 0.25)
     middle = np.abs(mars.underside).max(axis=1) < 0.3
     np.testing.assert_allclose(mars.clearance[middle], 0.6, atol=1e-9)
     # Its arms are turned boxes that sink to the wheels.
@@ -135,7 +135,7 @@ def test_a_model_without_colliding_shapes_has_no_underside() -> None:
     for solid in description["solids"]:
         solid["collides"] = False
     model = RoverModel.from_dict(description)
-    assert Footprint.of(model, 0.1).underside.shape == (0, 2)
+    assert RoverOutline.of(model, 0.1).underside.shape == (0, 2)
     env = RoverEnv(terrain="sphere_field", model=model, **ARGUMENTS)
     observation, _ = env.reset(seed=0)
     action, _ = ScanPolicy(env).predict(observation)
@@ -197,7 +197,7 @@ def test_it_turns_to_go_round_a_rock_that_it_cannot_pass() -> None:
 def test_it_backs_out_of_a_dead_end() -> None:
     """Rocks on three sides: whoever only drives ahead stays inside."""
     wall = [(2.6, 0.0, 0.45 * k) for k in range(-3, 4)]
-    wall += [(2.6 - 0.45 * k, 0.0, side * 1.35) for k in range(4) for side in (-1, 1)]
+    wall += [(2.6 - 0.45 * k, 0.0, side * 1.35) for k in range(3) for side in (-1, 1)]
     env = RoverEnv(terrain=SphereField(wall, [0.3] * len(wall), Plane()), heading_deg=0.0, **ARGUMENTS)
     end, state = drive(env, ScanPolicy(env), 0, steps=1200, position=(1.0, 0.0), goal=(6.0, 0.0))
     assert end == "goal"

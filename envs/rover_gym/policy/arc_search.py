@@ -17,8 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import OptionError, atan2, exp, sin_cos
-from rover_gym.policy.footprint import Footprint
 from rover_gym.policy.ground_grid import GroundGrid
+from rover_gym.policy.rover_outline import RoverOutline
 from rover_gym.policy.sweeps import Arcs, after
 from rover_gym.validation import number, refuse
 
@@ -107,7 +107,7 @@ class ArcSearch:
         further: Those that it may go on with.
         commands: `(len(first), 3)` the command of each first arc: speed, curvature, sideways.
         grid: Heights under the wheels, then under the underside, by pose.
-        footprint: The rover's points, in this order.
+        outline: The rover's points, in this order.
         reach: The rover's reach, m.
         radius: Its wheels' radius, m.
         arrival: Distance within which the goal is reached, m.
@@ -121,7 +121,7 @@ class ArcSearch:
         commands: Array,
         *,
         grid: GroundGrid,
-        footprint: Footprint,
+        outline: RoverOutline,
         reach: float,
         radius: float,
         arrival: float,
@@ -135,10 +135,10 @@ class ArcSearch:
         self._further_poses = further.poses(costs.length * reach, STEPS)
         self._first_places = grid.places(self._first_poses)
         self._places_now = grid.places(np.zeros(3))
-        x, z = footprint.wheels.T
+        x, z = outline.wheels.T
         self._fit = _plane_fit(x, z).astype(np.float32)
-        self._underside = footprint.underside.T.astype(np.float32)
-        self._clearance = footprint.clearance.astype(np.float32)
+        self._underside = outline.underside.T.astype(np.float32)
+        self._clearance = outline.clearance.astype(np.float32)
         self._n_wheels = len(x)
 
     def best(self, heights: Array, task: SearchTask) -> int:

@@ -14,9 +14,9 @@ from rover_gym.mechanics import OptionError, RoverModel, StateError, exp, sin_co
 from rover_gym.policy.arc_search import ArcSearch, PathCosts, SearchTask
 from rover_gym.policy.command import CommandController, CommandLimits
 from rover_gym.policy.features import ground_slope
-from rover_gym.policy.footprint import Footprint
 from rover_gym.policy.ground_grid import GroundGrid
 from rover_gym.policy.pd_policy import find_rover_env
+from rover_gym.policy.rover_outline import RoverOutline
 from rover_gym.policy.scan_memory import ScanMemory
 from rover_gym.policy.sweeps import Arcs
 from rover_gym.policy.turning import Turning
@@ -45,6 +45,9 @@ PUSH_AFTER = 0.3
 #: Fraction of the time to high-centring after which the rover backs off.
 HIGH = 0.05
 
+#: Time without movement after which a rover that is high-centred tries the other direction, s: once each way.
+HIGH_PATIENCE = 0.7
+
 
 @dataclass(frozen=True)
 class ScanGains:
@@ -58,6 +61,7 @@ class ScanGains:
         patience: Time without movement until the rover backs off, s, for a rover that takes a second or less for its
             own reach; longer in proportion for a slower one, as the times below.
         retreat: Time that it backs off, s.
+        insistence: Time without progress after which it backs off for twice as long, s; after twice that, thrice.
         courage: Time without progress that halves the cost of risks, s.
         least: Least factor on the cost of risks.
     """
@@ -68,6 +72,7 @@ class ScanGains:
     period: float = 0.2
     patience: float = 1.0
     retreat: float = 1.2
+    insistence: float = 10.0
     courage: float = 12.0
     least: float = 0.2
 
@@ -89,7 +94,9 @@ class ScanPolicy:
     - where the trunk begins to carry the rover (the observation's `stuck`),
     - where the cheapest path begins backward.
 
-    It remembers up to 12 such places and avoids them. The longer it makes no progress, the more it risks.
+    It remembers up to 12 such places and avoids them. Where a rock has stopped it, it pushes with most of its torque.
+    The longer it makes no progress, the farther it backs off and the more it risks. docs/baseline.md says how often it
+    reaches its goal.
 
     Example:
         >>> env = gym.make("RoverRocks-v0", difficulty=1.0, **ScanPolicy.arguments())
@@ -119,7 +126,7 @@ class ScanPolicy:
 
         turning = Turning.of(model, model.mass * math.hypot(*rover.gravity))
         limits = _limits(rover, turning, self.gains)
-        footprint = Footprint.of(model, scan.spacing)
+        outline = RoverOutline.of(model, scan.spacing)
         self._x_c, self._reach = turning.x_c, _reach(model)
         # Times are meant for a rover that takes at most a second for its own reach.
         speed = min(self.gains.speed, SHARE_OF_TOP_SPEED * _top_speed(model))
@@ -128,14 +135,14 @@ class ScanPolicy:
         first, further = _arcs(rover, turning, limits)
         side = math.radians(limits.sideways_deg)
         self._commands = np.column_stack((first.direction, first.curvature / limits.curvature, first.sideways / side))
-        points = np.concatenate((footprint.wheels, footprint.underside)) - [turning.x_c, 0.0]
+        points = np.concatenate((outline.wheels, outline.underside)) - [turning.x_c, 0.0]
         self._grid = GroundGrid(scan, points, turning.x_c)
         self._search = ArcSearch(
             first,
             further,
             self._commands,
             grid=self._grid,
-            footprint=footprint,
+            outline=outline,
             reach=self._reach,
             radius=float(model.wheel_radii.max()),
             arrival=0.6 * rover.task.goal_tolerance,
@@ -197,8 +204,7 @@ class ScanPolicy:
         goal = row[self._goal] * self._scale[self._goal]
         memory.notice((x, z), math.hypot(*goal), self._period, PROGRESS * self._reach, i)
         is_high = row[self._stuck] > HIGH
-        # High-centred, there is time for one attempt in each direction.
-        patience = 0.7 if is_high else gains.patience * pace
+        patience = HIGH_PATIENCE if is_high else gains.patience * pace
         if memory.age[i] > 0 and (memory.still[i] > patience or (is_high and memory.retreat[i] == 0.0)):
             self._back_off(memory, i, x, z, heading)
         sine, cosine = sin_cos(heading)
@@ -225,7 +231,9 @@ class ScanPolicy:
         direction = -1.0 if memory.command[i, 0] < 0.0 else 1.0
         sine, cosine = sin_cos(heading)
         ahead = TRAP_AHEAD * self._reach * direction
-        memory.back_off((x + ahead * cosine, z - ahead * sine, heading), -direction, self.gains.retreat * self._pace, i)
+        longer = 1.0 + memory.fruitless[i] / (self.gains.insistence * self._pace)
+        trap, time = (x + ahead * cosine, z - ahead * sine, heading), self.gains.retreat * self._pace * longer
+        memory.back_off(trap, -direction, time, i)
 
 
 def _reach(model: RoverModel) -> float:

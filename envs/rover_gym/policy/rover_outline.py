@@ -15,7 +15,7 @@ Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Footprint:
+class RoverOutline:
     """A rover from above, in the trunk's frame with its joints at zero.
 
     Attributes:
@@ -30,7 +30,7 @@ class Footprint:
     clearance: Array
 
     @classmethod
-    def of(cls, model: RoverModel, cell: float) -> "Footprint":
+    def of(cls, model: RoverModel, cell: float) -> "RoverOutline":
         """That of a model, in square cells of a width, m."""
         zero, wheels, radii = np.zeros(model.nq), wheel_centres(model), model.wheel_radii
         ground = float(np.mean(np.asarray(model.wheel_contact_points(zero, Plane(), coordinates="state"))[:, 1]))
