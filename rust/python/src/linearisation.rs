@@ -130,7 +130,9 @@ impl Linearisation {
         let (nx, nu) = self.inner.b.shape();
         let broken = self.inner.holds.iter().filter(|holds| !**holds).count();
         let modes: Vec<_> = self.modes();
-        format!("Linearisation(nx={nx}, nu={nu}, modes={modes:?}, columns that do not hold={broken})")
+        format!(
+            "Linearisation(nx={nx}, nu={nu}, modes={modes:?}, columns that do not hold={broken})"
+        )
     }
 }
 

@@ -30,6 +30,10 @@ pub enum ContactMode {
     Slip,
 }
 
+/// Velocity, relative to the largest at play, that counts as rounding: a closed contact that slides
+/// no faster sticks, be it at the edge of its cone.
+const ROUNDING: f64 = 1e-9;
+
 /// Singular values below this fraction of the largest count as zero.
 const RANK: f64 = 1e-10;
 
@@ -53,11 +57,14 @@ impl HeldLaw {
     /// Of the solution p, u (d n_c) for friction μ (n_c) and the weights W_NN (n_c).
     pub(crate) fn new(p: Vec<f64>, u: Vec<f64>, mu: Vec<f64>, weight: Vec<f64>) -> Self {
         let d = p.len().checked_div(mu.len()).unwrap_or(1);
+        let pushes = (0..mu.len()).map(|i| weight[i] * norm(&p[d * i..d * (i + 1)]));
+        let rounding = ROUNDING * pushes.fold(norm(&u), f64::max);
         let mode = |i: usize| {
             let (p, u, w) = (&p[d * i..d * (i + 1)], &u[d * i..d * (i + 1)], weight[i]);
-            if w * p[0] <= u[0] {
+            let room = w * (mu[i] * p[0] - norm(&p[1..]));
+            if w * p[0] <= u[0].max(rounding) {
                 ContactMode::Open
-            } else if w * (mu[i] * p[0] - norm(&p[1..])) >= norm(&u[1..]) && mu[i] > 0.0 {
+            } else if room.max(rounding) >= norm(&u[1..]) && mu[i] > 0.0 {
                 ContactMode::Stick
             } else {
                 ContactMode::Slip
@@ -193,7 +200,10 @@ mod tests {
 
     #[test]
     fn modes_and_margins_follow_from_the_nearer_of_the_two_sides() {
-        assert_eq!(held([0.3, 0.0, 0.0], [0.0; 3], 0.5).modes, [ContactMode::Open]);
+        assert_eq!(
+            held([0.3, 0.0, 0.0], [0.0; 3], 0.5).modes,
+            [ContactMode::Open]
+        );
         let stick = held([0.0; 3], [1.0, 0.0, 0.4], 0.5);
         assert_eq!(stick.modes, [ContactMode::Stick]);
         assert!((stick.margins()[0] - 0.1).abs() < 1e-15);

@@ -19,7 +19,7 @@ use nalgebra::{DMatrix, DVectorView};
 use super::ScratchOf;
 use super::contact_modes::{HeldLaw, column};
 use super::mechanical_system::{MechanicalSystem, Start, UnilateralContact};
-use super::moreau_jean::{assemble_contacts, load_explicitly, load_implicitly};
+use super::moreau_jean::{MOST_REVISIONS, assemble_contacts, load_explicitly, load_implicitly};
 use super::options::{Stabilisation, StepOptions};
 use super::warm_start::WarmStart;
 
@@ -47,6 +47,8 @@ pub(crate) struct HeldStep<C> {
     /// The trial of the step itself.
     base: Vec<f64>,
     nv: usize,
+    /// The velocity at the end of the step (nv), by which piecewise forces choose their branches.
+    v_end: Vec<f64>,
     /// `M̂⁻¹ H` (nv, d n_c).
     response: DMatrix<f64>,
     /// `W` (d n_c, d n_c).
@@ -101,6 +103,7 @@ impl<C: Clone + UnilateralContact> HeldStep<C> {
             lambda,
             base: Vec::new(),
             nv,
+            v_end: v_end.to_vec(),
             response: DMatrix::zeros(0, 0),
             W: DMatrix::zeros(0, 0),
         };
@@ -109,11 +112,7 @@ impl<C: Clone + UnilateralContact> HeldStep<C> {
         for is_gyroscopic in [false, true] {
             held.is_gyroscopic = is_gyroscopic;
             let base = held.trial_with(system, start, &p, ws)?;
-            for correction in [
-                Correction::None,
-                Correction::Relative,
-                Correction::Whole,
-            ] {
+            for correction in [Correction::None, Correction::Relative, Correction::Whole] {
                 held.correction = correction;
                 let end = held.finish(system, start, &base[..nv], &base[nv..2 * nv], ws);
                 let pairs = end.1.iter().zip(v_end);
@@ -135,7 +134,10 @@ impl<C: Clone + UnilateralContact> HeldStep<C> {
         }
         let is_same = best <= SAME * fastest
             && held.law.residual() <= SAME
-            && held.projection.as_ref().is_none_or(|p| p.law.residual() <= SAME);
+            && held
+                .projection
+                .as_ref()
+                .is_none_or(|p| p.law.residual() <= SAME);
         is_same.then_some(held)
     }
 
@@ -158,7 +160,12 @@ impl<C: Clone + UnilateralContact> HeldStep<C> {
             counts.push(is_counted);
         }
         let law = |mu: Vec<f64>| {
-            HeldLaw::new(self.lambda.clone(), displacement.clone(), mu, weight.clone())
+            HeldLaw::new(
+                self.lambda.clone(),
+                displacement.clone(),
+                mu,
+                weight.clone(),
+            )
         };
         let rough = law(mu.clone());
         // A displacement that friction locked was found without it.
@@ -204,6 +211,7 @@ impl<C: Clone + UnilateralContact> HeldStep<C> {
         let options = &self.options;
         let (h, theta, d) = (options.time_step, options.theta, S::DIMENSION.components());
         let no_memory = WarmStart::default();
+        self.choose_branches(system, start);
         let (q, v) = (start.configuration, start.v);
         system.set_moved(q, v, (1.0 - theta) * h, &mut ws.middle);
         system.place_middle(&ws.middle);
@@ -284,10 +292,25 @@ impl<C: Clone + UnilateralContact> HeldStep<C> {
         system.set_moved(q, v, (1.0 - theta) * h, &mut ws.middle);
         system.set_moved(&ws.middle, v_end, theta * h, &mut ws.end);
         system.normalise(&mut ws.end);
+        self.choose_branches(system, start);
         let v = self.corrected(system, start, v_end, &ws.end);
         system.advance(&mut ws.end, displacement, 1.0);
         system.normalise(&mut ws.end);
         (ws.end.clone(), v)
+    }
+
+    /// Sets the branches of the piecewise forces as the step has them, for this command.
+    fn choose_branches<S: MechanicalSystem<Contact = C>>(
+        &self,
+        system: &mut S,
+        start: Start<'_, S::Configuration>,
+    ) {
+        system.choose_branches(start);
+        for _ in 0..MOST_REVISIONS {
+            if !system.revise(start, &self.v_end) {
+                break;
+            }
+        }
     }
 
     /// What the audit leaves of a velocity, see [`super::energy_audit`].
@@ -310,8 +333,7 @@ impl<C: Clone + UnilateralContact> HeldStep<C> {
         let Some(after) = system.energy(options, q_end, v_end) else {
             return kept();
         };
-        let excess =
-            (after.kinetic - before.kinetic) + (after.potential - before.potential) - work;
+        let excess = (after.kinetic - before.kinetic) + (after.potential - before.potential) - work;
         let common = after.momentum / after.mass;
         let is_relative = self.correction == Correction::Relative;
         let whole = if is_relative {

@@ -18,9 +18,7 @@ use super::rover_command::RoverCommand;
 use super::scene::{Scene, SceneKey, SceneScratch};
 use crate::contact::Part;
 use crate::integrator::held_step::{HeldStep, law_of_last};
-use crate::integrator::{
-    ContactMode, NoProbe, Start, StepError, UnilateralContact, Variant,
-};
+use crate::integrator::{ContactMode, NoProbe, Start, StepError, UnilateralContact, Variant};
 use crate::multibody::{Configuration, Joint, Model, coordinates};
 use crate::scalar::elementary::sin_cos;
 use crate::system::TreeSystem;
@@ -86,7 +84,7 @@ pub enum LinearisationError {
 
 /// Step of the differences in q (m, rad), in v (m/s, rad/s), in a torque (N m), in a set-point
 /// (rad). The smooth parts are linear in the last two.
-const STEPS: [f64; 4] = [1e-4, 1e-2, 1.0, 1e-2];
+const STEPS: [f64; 4] = [1e-4, 1e-3, 0.1, 1e-5];
 
 /// Tested change of a torque, N m, for a unit of the perturbation.
 const TORQUE: f64 = 1e3;
@@ -122,22 +120,31 @@ impl RoverSimulation {
         let mut bench = Bench::new(self)?;
         let next_state = bench.take(None)?;
         let key = bench.modes();
-        let parts = bench.sim.scratch.contacts().iter().map(|c| c.part).collect();
+        let parts = bench
+            .sim
+            .scratch
+            .contacts()
+            .iter()
+            .map(|c| c.part)
+            .collect();
         let nv = bench.v.len();
-        let (held, reached) = bench.at(None, |system, options, start, ws| {
-            let held = HeldStep::of(system, options, start, &next_state[nv..], ws)?;
-            let (v, displacement) = held.solution();
-            let reached = held.finish(system, start, v.as_slice(), displacement.as_slice(), ws);
-            Some((held, reached))
-        })
-        .ok_or(LinearisationError::NotHeld)?;
+        let (held, reached) = bench
+            .at(None, |system, options, start, ws| {
+                let held = HeldStep::of(system, options, start, &next_state[nv..], ws)?;
+                let (v, displacement) = held.solution();
+                let reached = held.finish(system, start, v.as_slice(), displacement.as_slice(), ws);
+                Some((held, reached))
+            })
+            .ok_or(LinearisationError::NotHeld)?;
         let reached = bench.state(&reached);
         let off = bench.difference(&reached, &next_state, 1.0);
         let size = next_state.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
         if off.amax() > SAME * size {
             return Err(LinearisationError::NotHeld);
         }
-        let all = bench.derive(&held, &reached).ok_or(LinearisationError::NotHeld)?;
+        let all = bench
+            .derive(&held, &reached)
+            .ok_or(LinearisationError::NotHeld)?;
         let (holds, errors) = bench.test(&all, &key, perturbation)?;
         let (nx, nu) = (2 * nv, bench.n_inputs());
         Ok(Linearisation {
@@ -223,14 +230,18 @@ impl Bench {
                 1 => v[column - nv] += amount,
                 2 => {
                     let wheel = &wheels[column - 2 * nv];
-                    let drive = wheel.joint.and_then(|j| command.actuators.drives[j].as_mut());
+                    let drive = wheel
+                        .joint
+                        .and_then(|j| command.actuators.drives[j].as_mut());
                     if let Some(drive) = drive {
                         drive.torque += wheel.drive_sign * amount;
                     }
                 }
                 _ => {
                     let wheel = &wheels[column - 2 * nv - wheels.len()];
-                    let held = wheel.steering.and_then(|j| command.actuators.held[j].as_mut());
+                    let held = wheel
+                        .steering
+                        .and_then(|j| command.actuators.held[j].as_mut());
                     if let Some(held) = held {
                         held.set_point += amount;
                     }
@@ -365,10 +376,7 @@ impl Bench {
 }
 
 /// Derivative at 0, of fourth order in the step.
-fn slope(
-    step: f64,
-    mut f: impl FnMut(f64) -> Option<DVector<f64>>,
-) -> Option<DVector<f64>> {
+fn slope(step: f64, mut f: impl FnMut(f64) -> Option<DVector<f64>>) -> Option<DVector<f64>> {
     let near = f(step)? - f(-step)?;
     let far = f(2.0 * step)? - f(-2.0 * step)?;
     Some((near * 8.0 - far) / (12.0 * step))
