@@ -4,9 +4,8 @@
 //! The step is the one that follows [`RoverSimulation::set_state`], without memory of earlier
 //! impulses. Its contacts and their modes are held
 //! ([`crate::integrator::held_step`]): the derivatives of the explicit, smooth parts are fourth-order
-//! central differences, and the implicit function theorem gives that of the solution. Steps of the
-//! contact problem are differenced nowhere but in the test at the end, which takes two real steps
-//! for each column and reports where modes change.
+//! central differences, and the implicit function theorem gives that of the solution. Only the test
+//! at the end differences whole steps: it takes two for each column and reports where modes change.
 
 use std::sync::Arc;
 
@@ -163,8 +162,9 @@ impl RoverSimulation {
     }
 }
 
-/// Contacts that transmit impulses with their modes, and whether the position was projected.
-type Modes = (Vec<(SceneKey<RoverScene>, ContactMode)>, bool);
+/// Contacts that transmit impulses with their modes, whether the position was projected, and
+/// whether the energy audit slowed the motion.
+type Modes = (Vec<(SceneKey<RoverScene>, ContactMode)>, [bool; 2]);
 
 /// A copy of a simulation that is set to states and commands near a base.
 struct Bench {
@@ -174,6 +174,8 @@ struct Bench {
     command: RoverCommand,
     /// First indices of angles among the coordinates.
     angles: Vec<usize>,
+    /// Whether the energy audit slowed the last step.
+    is_slowed: bool,
 }
 
 impl Bench {
@@ -197,6 +199,7 @@ impl Bench {
             command: of.command().clone(),
             sim: of.clone(),
             angles,
+            is_slowed: false,
         })
     }
 
@@ -278,7 +281,8 @@ impl Bench {
     /// Takes a real step and returns the state after it.
     fn take(&mut self, change: Option<(usize, f64)>) -> Result<Vec<f64>, StepError> {
         self.set(change);
-        self.sim.general_step(&Variant::Linearised, &mut NoProbe)?;
+        let report = self.sim.general_step(&Variant::Linearised, &mut NoProbe)?;
+        self.is_slowed = report.energy_removed > 0.0;
         let state = &self.sim.state;
         let configuration = coordinates::to_public(self.sim.model(), &state.configuration);
         Ok([configuration, state.v.clone()].concat())
@@ -292,7 +296,7 @@ impl Bench {
         let closed = sim.scratch.contacts().iter().zip(&law.modes);
         let closed = closed.filter(|(_, mode)| **mode != ContactMode::Open);
         let modes = closed.map(|(contact, mode)| (contact.key(), *mode));
-        (modes.collect(), is_projected)
+        (modes.collect(), [is_projected, self.is_slowed])
     }
 
     fn state(&self, (configuration, v): &(Configuration, Vec<f64>)) -> Vec<f64> {
