@@ -53,20 +53,22 @@ def sliding() -> Simulation:
 
 def on_rocks(stabilisation: str = "none") -> Simulation:
     rng = np.random.default_rng(3)
+    centres = np.column_stack([rng.uniform(-2, 4, 400), np.zeros(400), rng.uniform(-2, 2, 400)])
     radii = rng.uniform(0.05, 0.25, 400)
-    centres = np.column_stack([rng.uniform(-2, 4, 400), -0.6 * radii, rng.uniform(-2, 2, 400)])
+    centres[:, 1] = -0.6 * radii
     sim = Simulation(terrain=SphereField(centres, radii), stabilisation=stabilisation)
     q = np.zeros(NV)
     q[1] = 0.55
     sim.set_state(q)
     sim.set_wheel_torques(np.full(6, 10.0))
-    sim.step(300)
+    sim.step(150)
     return sim
 
 
 def differences(sim: Simulation, column: int, step: float) -> np.ndarray:
     """Central difference of a real step, from the same state without memory."""
     other = Simulation(sim.model, sim.terrain, **{**sim.settings, "tolerance": 1e-15})
+    other.restore(sim.snapshot())  # joints that are held stay so
     ends = []
     for sign in (1.0, -1.0):
         point = np.concatenate([sim.q, sim.v, sim.wheel_torques, sim.steering])
@@ -79,14 +81,14 @@ def differences(sim: Simulation, column: int, step: float) -> np.ndarray:
 
 
 def difference_error(sim: Simulation, linear: Linearisation) -> np.ndarray:
-    """Relative error of each column that holds, against the better of two steps of the differences."""
+    """Relative error of each column that holds, against the best of three steps of the differences."""
     ab = np.column_stack([linear.a, linear.b])
     errors = np.zeros(ab.shape[1])
     for k in np.flatnonzero(linear.holds):
         if not ab[:, k].any():
             continue  # an axle that is not steered
         scale = 1000.0 if 2 * NV <= k < 2 * NV + 6 else 1.0
-        tried = [np.abs(differences(sim, k, scale * h) - ab[:, k]).max() for h in (3e-7, 3e-6)]
+        tried = [np.abs(differences(sim, k, scale * h) - ab[:, k]).max() for h in (3e-7, 3e-6, 3e-5)]
         errors[k] = min(tried) / np.abs(ab[:, k]).max()
     return errors
 
@@ -116,7 +118,7 @@ def test_a_projection_is_differentiated():
     linear = sim.linearise()
     assert linear.is_projected
     assert linear.holds.sum() >= 40
-    assert np.median(difference_error(sim, linear)[linear.holds]) < 1e-6
+    assert difference_error(sim, linear).max() < 1e-6
 
 
 def test_it_says_where_modes_change():
@@ -129,20 +131,22 @@ def test_it_says_where_modes_change():
     # Over the ground by less than the tested change, a wheel touches on one side only.
     falling = Simulation(stabilisation="none")
     q = np.zeros(NV)
-    q[1] = 0.35 + 0.5 * 0.01 * 0.005 + 1e-7
     v = np.zeros(NV)
-    v[1] = -0.005
+    v[1] = -1.0
+    q[1] = 0.35 + 0.5 * falling.time_step + 1e-7
     falling.set_state(q, v)
-    assert flying().linearise().is_smooth
-    near = falling.linearise(perturbation=1e-4)
+    near = falling.linearise()
+    assert near.modes == []
     assert not near.holds[1]
+    assert falling.linearise(perturbation=1e-8).holds[1]
+    assert flying().linearise().is_smooth
 
 
 def test_margins_say_how_far_the_next_mode_is():
     linear = held_on_a_slope().linearise()
     assert linear.bodies == [f"wheel_{name}" for name in Simulation().model.wheel_names]
     assert (linear.margins > 0.0).all()
-    assert (on_rocks().linearise().margins >= 0.0).all()
+    assert (on_rocks().linearise().margins >= -1e-12).all()
 
 
 def test_the_simulation_is_left_as_it_was():
