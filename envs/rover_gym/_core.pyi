@@ -40,6 +40,7 @@ __all__ = [
     "GrainSnapshot",
     "HeightField",
     "Line",
+    "Linearisation",
     "MirroredRoverSimulation",
     "ModelError",
     "Motor",
@@ -1221,16 +1222,16 @@ class Linearisation:
         """Whether the step moves bodies out of penetration; the derivative contains it then."""
     @property
     def holds(self) -> npt.NDArray[np.bool_]:
-        """Whether nothing changes in jumps within the tested changes of each entry of (x, u),
-        (nx + nu,).
+        """Whether nothing jumps within the tested changes of each entry of (x, u), (nx + nu,).
 
         Two steps, ahead and back, have the same closed contacts in the same modes, are projected and
         corrected by the energy audit as this step is, and agree with the column within 1%.
         """
     @property
     def errors(self) -> _Array:
-        """Largest difference of each column of (a, b) from the central difference of its two tested
-        steps, relative to the column's largest entry, (nx + nu,).
+        """Difference of each column of (a, b) from that of its two tested steps, (nx + nu,).
+
+        It is the largest difference of an entry, relative to the column's largest entry.
         """
     @property
     def is_smooth(self) -> bool:

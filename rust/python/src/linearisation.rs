@@ -103,8 +103,7 @@ impl Linearisation {
         self.inner.is_projected
     }
 
-    /// Whether nothing changes in jumps within the tested changes of each entry of (x, u),
-    /// (nx + nu,).
+    /// Whether nothing jumps within the tested changes of each entry of (x, u), (nx + nu,).
     ///
     /// Two steps, ahead and back, have the same closed contacts in the same modes, are projected and
     /// corrected by the energy audit as this step is, and agree with the column within 1%.
@@ -113,8 +112,9 @@ impl Linearisation {
         PyArray1::from_slice(py, &self.inner.holds)
     }
 
-    /// Largest difference of each column of (a, b) from the central difference of its two tested
-    /// steps, relative to the column's largest entry, (nx + nu,).
+    /// Difference of each column of (a, b) from that of its two tested steps, (nx + nu,).
+    ///
+    /// It is the largest difference of an entry, relative to the column's largest entry.
     #[getter]
     fn errors<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         fresh(py, &self.inner.errors)
