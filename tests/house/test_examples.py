@@ -12,6 +12,7 @@ ROOT = Path(__file__).parents[2]
 PAGES = (
     "README.md",
     "docs/economy.md",
+    "docs/linearise.md",
     "docs/planar.md",
     "docs/recording.md",
     "docs/replay.md",
@@ -21,7 +22,7 @@ PAGES = (
     "docs/your-rover.md",
 )
 #: Packages of extras that a block needs if it holds these words.
-EXTRAS = {"from_urdf": "yourdfpy", "from_mjcf": "mujoco"}
+EXTRAS = {"from_urdf": "yourdfpy", "from_mjcf": "mujoco", "scipy": "scipy"}
 
 
 def blocks() -> list[pytest.param]:

@@ -21,6 +21,7 @@ mod grains;
 mod ground;
 mod height_field;
 mod infos;
+mod linearisation;
 mod materials;
 mod model;
 mod model_files;
@@ -61,6 +62,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<ground::Union>()?;
     module.add_class::<contacts::Contacts>()?;
     module.add_class::<simulation::Simulation>()?;
+    module.add_class::<linearisation::Linearisation>()?;
     module.add_class::<batch::SimulationBatch>()?;
     module.add_class::<draw::EpisodeDistribution>()?;
     module.add_class::<draw::DrawnEpisodes>()?;

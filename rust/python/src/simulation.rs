@@ -18,6 +18,7 @@ use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
 use crate::contacts::Contacts;
 use crate::errors::{BorderError, Kind, Value};
 use crate::ground::Ground;
+use crate::linearisation::Linearisation;
 use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
 use crate::options::{Options, SolverWords, settings};
 use crate::plane::Plane;
@@ -681,6 +682,35 @@ impl Simulation {
     ///     coefficients, (n_c,).
     fn last_problem<'py>(&self, py: Python<'py>) -> PyResult<Problem<'py>> {
         problem(py, &*self.open()?)
+    }
+
+    /// Derivatives of the next step by state and command. The simulation does not change.
+    ///
+    /// The step is the one after `set_state(q, v)`, without memory of earlier impulses. Its
+    /// contacts and their modes are held, and so are the branches of the motors; the limits of the
+    /// commands are left out. Where the modes change within `perturbation`, the step has no such
+    /// derivative, and `Linearisation.holds` says so.
+    ///
+    /// Args:
+    ///     perturbation: Change of each entry of (x, u) in the two steps that test its column, m,
+    ///         rad, m/s or rad/s, and 1000 times as many N m; from 1e-9 to 1e-3, 1e-6 by default.
+    ///
+    /// Returns:
+    ///     A, B, the modes and how far they hold.
+    ///
+    /// Raises:
+    ///     OptionError: `perturbation` is out of its range, or the variant is "newton".
+    ///     StateError: A pitch is 90 degrees, where the coordinates are singular.
+    ///     StepError: A step could not be taken, or was taken in parts or not solved, so that it
+    ///         has no derivative.
+    #[pyo3(signature = (perturbation = Given::MISSING), text_signature = "($self, perturbation=1e-6)")]
+    fn linearise(&self, py: Python<'_>, perturbation: Given<'_>) -> PyResult<Linearisation> {
+        let perturbation = perturbation.number(1e-6, Kind::Option, "perturbation")?;
+        let held = self.open()?;
+        let inner = &*held;
+        let found = py.detach(|| inner.linearise(perturbation));
+        let found = found.map_err(BorderError::from)?;
+        Ok(Linearisation::new(&self.model, found))
     }
 
     /// Measures where the time of a step goes, on a copy of this simulation.

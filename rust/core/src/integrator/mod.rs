@@ -7,14 +7,17 @@
 //!
 //! Both schemes treat impacts and persistent contact by the same law at velocity level and locate
 //! no events. [`position_projection`] removes the penetration that the velocity law leaves.
-//! [`energy_audit`] checks the energy of every step.
+//! [`energy_audit`] checks the energy of every step. `held_step` differentiates a step while the
+//! modes of its contacts ([`contact_modes`]) hold.
 //!
 //! Each scheme is written once, for any [`MechanicalSystem`]: the multibody tree and the planar
 //! systems ([`crate::system`], [`crate::planar`]) step through the same code.
 
 pub mod accuracy;
+pub mod contact_modes;
 pub mod energy_audit;
 pub mod error;
+pub(crate) mod held_step;
 pub mod mechanical_system;
 pub mod moreau_jean;
 pub mod moreau_jean_newton;
@@ -26,6 +29,7 @@ pub mod scratch;
 pub mod warm_start;
 
 pub use accuracy::Accuracy;
+pub use contact_modes::ContactMode;
 pub use energy_audit::MechanicalEnergy;
 pub use error::{OptionsError, StepError};
 pub use mechanical_system::{MechanicalSystem, Start, UnilateralContact};

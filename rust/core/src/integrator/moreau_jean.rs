@@ -276,7 +276,7 @@ pub(super) fn place<S: MechanicalSystem>(system: &S, options: &StepOptions, ws: 
 
 /// The free change `ws.y` (factor coordinates): first from the forces at v, then from those at the
 /// resulting velocity.
-fn load_explicitly<S: MechanicalSystem>(
+pub(super) fn load_explicitly<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
     start: Start<'_, S::Configuration>,
@@ -304,7 +304,7 @@ fn load_explicitly<S: MechanicalSystem>(
 
 /// The free change `ws.y` (factor coordinates) with implicit gyroscopic
 /// terms; the correction r is part of the forecast impulse.
-fn load_implicitly<S: MechanicalSystem>(
+pub(super) fn load_implicitly<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
     start: Start<'_, S::Configuration>,

@@ -4,7 +4,8 @@
 //! - [`state`], [`snapshot`], [`active_contact`]: its state, the data needed to continue, its
 //!   contacts;
 //! - [`rover`]: a rover on a terrain, with its [commands](rover_command), its
-//!   [contacts](rover_contacts), its [ordinary] steps and its [`reading`];
+//!   [contacts](rover_contacts), its [ordinary] steps, its [`reading`] and the [`linearisation`] of
+//!   a step;
 //! - [`planar`]: a planar machine on a ground; [`grains`]: a bed of grains,
 //!   perhaps with a machine on it;
 //! - [`rover_in_grains`]: a rover and a bed of balls, stepped together;
@@ -15,6 +16,7 @@ pub mod batch;
 pub mod error;
 pub mod fleet;
 pub mod grains;
+pub mod linearisation;
 pub mod ordinary;
 pub mod planar;
 pub mod profile;
@@ -36,6 +38,7 @@ pub use error::{BatchError, CommandError, SnapshotError};
 pub use grains::{
     BedCommand, BedMemory, GrainBed, GrainSimulation, SoilSetupError, SoilSimulation, soil_options,
 };
+pub use linearisation::{Linearisation, LinearisationError};
 pub use planar::{
     BallSimulation, MirroredRoverSimulation, PlanarScene, PlanarSimulation, TwoWheelRoverSimulation,
 };
