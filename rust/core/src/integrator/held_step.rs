@@ -11,8 +11,8 @@
 //!
 //! are smooth ([`HeldStep::trial`]). By the implicit function theorem their derivatives at held
 //! p and λ give those of the step ([`HeldStep::respond`]): dp follows from du, then dλ from the
-//! gaps at the end ([`super::contact_modes`]). [`HeldStep::finish`] is the explicit rest of the step,
-//! from (v⁺, d) to the state at its end.
+//! gaps at the end ([`super::contact_modes`]). [`HeldStep::finish`] is the explicit rest of the
+//! step, from (v⁺, d) to the state at its end.
 
 use nalgebra::{DMatrix, DVectorView};
 
