@@ -1224,8 +1224,8 @@ class Linearisation:
     def holds(self) -> npt.NDArray[np.bool_]:
         """Whether nothing jumps within the tested changes of each entry of (x, u), (nx + nu,).
 
-        Two steps, ahead and back, have the same closed contacts in the same modes, are projected and
-        corrected by the energy audit as this step is, and agree with the column within 1%.
+        Two steps, ahead and back, have the same closed contacts in the same modes, are projected
+        and corrected by the energy audit as this step is, and agree with the column within 1%.
         """
     @property
     def errors(self) -> _Array:

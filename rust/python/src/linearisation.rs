@@ -105,8 +105,8 @@ impl Linearisation {
 
     /// Whether nothing jumps within the tested changes of each entry of (x, u), (nx + nu,).
     ///
-    /// Two steps, ahead and back, have the same closed contacts in the same modes, are projected and
-    /// corrected by the energy audit as this step is, and agree with the column within 1%.
+    /// Two steps, ahead and back, have the same closed contacts in the same modes, are projected
+    /// and corrected by the energy audit as this step is, and agree with the column within 1%.
     #[getter]
     fn holds<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
         PyArray1::from_slice(py, &self.inner.holds)

@@ -14,10 +14,10 @@
 //! slip    dp_T + μ t dp_N + (μ p_N / |u_T|) (1 − t tᵀ) du_T = 0
 //! ```
 //!
-//! Redundant contacts make the system singular; the solution of least norm is taken, which leaves
-//! du as it is wherever the system can be solved.
+//! Redundant contacts make the system singular. Any of its solutions gives the same du, so that of
+//! an elimination with complete pivoting is taken, with zeros where there is no pivot.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 /// What a contact does at the end of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +34,7 @@ pub enum ContactMode {
 /// no faster sticks, be it at the edge of its cone.
 const ROUNDING: f64 = 1e-9;
 
-/// Singular values below this fraction of the largest count as zero.
+/// Pivots below this fraction of the largest count as zero.
 const RANK: f64 = 1e-10;
 
 /// A solution with the modes of its contacts.
@@ -128,13 +128,9 @@ impl HeldLaw {
         u[1..].iter().map(|x| scale * x).collect()
     }
 
-    /// The impulses' answer dp (d n_c, m) to changes du⁰ (d n_c, m) at held impulses. None if the
-    /// decomposition fails.
-    pub(crate) fn respond(&self, W: &DMatrix<f64>, du: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    /// The impulses' answer dp (d n_c, m) to changes du⁰ (d n_c, m) at held impulses.
+    pub(crate) fn respond(&self, W: &DMatrix<f64>, du: &DMatrix<f64>) -> DMatrix<f64> {
         let size = self.p.len();
-        if size == 0 {
-            return Some(DMatrix::zeros(0, du.ncols()));
-        }
         // law = of_u du + of_p dp
         let mut of_u = DMatrix::<f64>::zeros(size, size);
         let mut of_p = DMatrix::<f64>::zeros(size, size);
@@ -164,16 +160,61 @@ impl HeldLaw {
                 }
             }
         }
-        let law = &of_u * W + of_p;
-        let decomposed = law.svd(true, true);
-        let least = RANK * decomposed.singular_values.max();
-        decomposed.solve(&(-(of_u * du)), least).ok()
+        let law = product(&of_u, W) + of_p;
+        solve(law, -product(&of_u, du))
     }
 }
 
-/// A vector as a column.
-pub(crate) fn column(x: &[f64]) -> DVector<f64> {
-    DVector::from_column_slice(x)
+/// `A B`, by sums in a fixed order: the same bits on every machine.
+pub(crate) fn product(A: &DMatrix<f64>, B: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(A.nrows(), B.ncols());
+    for (mut column, b) in out.column_iter_mut().zip(B.column_iter()) {
+        for (a, b) in A.column_iter().zip(b.iter()) {
+            for (out, a) in column.iter_mut().zip(a.iter()) {
+                *out += a * b;
+            }
+        }
+    }
+    out
+}
+
+/// A solution of `A X = B` with A square, be it singular; B must then be in its range.
+fn solve(mut A: DMatrix<f64>, mut B: DMatrix<f64>) -> DMatrix<f64> {
+    let n = A.nrows();
+    let mut order: Vec<usize> = (0..n).collect();
+    let (mut rank, mut largest) = (0, 0.0_f64);
+    for k in 0..n {
+        let rest = A.view((k, k), (n - k, n - k));
+        let (i, j) = rest.iamax_full();
+        let pivot = rest[(i, j)].abs();
+        largest = largest.max(pivot);
+        if pivot <= RANK * largest {
+            break;
+        }
+        A.swap_rows(k, k + i);
+        B.swap_rows(k, k + i);
+        A.swap_columns(k, k + j);
+        order.swap(k, k + j);
+        rank = k + 1;
+        for row in k + 1..n {
+            let factor = A[(row, k)] / A[(k, k)];
+            for column in k..n {
+                A[(row, column)] -= factor * A[(k, column)];
+            }
+            for column in 0..B.ncols() {
+                B[(row, column)] -= factor * B[(k, column)];
+            }
+        }
+    }
+    let mut X = DMatrix::zeros(n, B.ncols());
+    for column in 0..B.ncols() {
+        for k in (0..rank).rev() {
+            let known = (k + 1..rank).map(|l| A[(k, l)] * X[(order[l], column)]);
+            let known: f64 = known.sum();
+            X[(order[k], column)] = (B[(k, column)] - known) / A[(k, k)];
+        }
+    }
+    X
 }
 
 #[cfg(test)]
@@ -191,11 +232,18 @@ mod tests {
         assert_eq!(law.modes, [ContactMode::Slip]);
         assert!(law.residual() < 1e-15);
         let du = DMatrix::from_column_slice(3, 2, &[-1.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
-        let dp = law.respond(&DMatrix::identity(3, 3), &du).unwrap();
+        let dp = law.respond(&DMatrix::identity(3, 3), &du);
         // Pressed harder it brakes harder: dp = (1, −μ, 0).
         assert!((dp[(0, 0)] - 1.0).abs() < 1e-14 && (dp[(1, 0)] + 0.5).abs() < 1e-14);
         // Pushed across: dp_b = −k (1 + dp_b), k = μ p_N / |u_T| = ¼.
         assert!((dp[(2, 1)] + 0.2).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_singular_system_is_solved_where_it_can_be() {
+        let A = DMatrix::from_row_slice(3, 3, &[1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 2.0, 1.0]);
+        let B = DMatrix::from_column_slice(3, 1, &[3.0, 3.0, 4.0]);
+        assert!((product(&A, &solve(A.clone(), B.clone())) - B).amax() < 1e-15);
     }
 
     #[test]

@@ -10,14 +10,14 @@
 //! ```
 //!
 //! are smooth ([`HeldStep::trial`]). By the implicit function theorem their derivatives at held
-//! p and λ give those of the step ([`HeldStep::respond`]): dp follows from du, then dλ from the gaps
-//! at the end ([`super::contact_modes`]). [`HeldStep::finish`] is the explicit rest of the step,
-//! from (v⁺, d) to the state at its end.
+//! p and λ give those of the step ([`HeldStep::respond`]): dp follows from du, then dλ from the
+//! gaps at the end ([`super::contact_modes`]). [`HeldStep::finish`] is the explicit rest of the
+//! step, from (v⁺, d) to the state at its end.
 
 use nalgebra::{DMatrix, DVectorView};
 
 use super::ScratchOf;
-use super::contact_modes::{HeldLaw, column};
+use super::contact_modes::{HeldLaw, product};
 use super::mechanical_system::{MechanicalSystem, Start, UnilateralContact};
 use super::moreau_jean::{MOST_REVISIONS, assemble_contacts, load_explicitly, load_implicitly};
 use super::options::{Stabilisation, StepOptions};
@@ -255,16 +255,16 @@ impl<C: Clone + UnilateralContact> HeldStep<C> {
     }
 
     /// Derivatives of the step from those of the trial (as long, m).
-    pub(crate) fn respond(&self, trial: &DMatrix<f64>) -> Option<Response> {
+    pub(crate) fn respond(&self, trial: &DMatrix<f64>) -> Response {
         let (nv, size, m) = (self.nv, self.lambda.len(), trial.ncols());
         let d = size.checked_div(self.law.modes.len()).unwrap_or(1);
         let du = trial.rows(2 * nv, size).into_owned();
-        let dp = self.law.respond(&self.W, &du)?;
-        let v = trial.rows(0, nv) + &self.response * &dp;
+        let dp = self.law.respond(&self.W, &du);
+        let v = trial.rows(0, nv) + product(&self.response, &dp);
         let mut displacement = trial.rows(nv, nv).into_owned();
         if let Some(projection) = &self.projection {
             let share = self.options.theta * self.options.time_step;
-            let answered = &self.W * &dp;
+            let answered = product(&self.W, &dp);
             let mut change = trial.rows(2 * nv + size, size).into_owned();
             let gaps = trial.rows(2 * (nv + size), self.law.modes.len());
             for (i, _) in projection.counts.iter().enumerate().filter(|(_, c)| **c) {
@@ -272,9 +272,9 @@ impl<C: Clone + UnilateralContact> HeldStep<C> {
                     change[(d * i, k)] += gaps[(i, k)] + share * answered[(d * i, k)];
                 }
             }
-            displacement += &self.response * projection.law.respond(&self.W, &change)?;
+            displacement += product(&self.response, &projection.law.respond(&self.W, &change));
         }
-        Some(Response { v, displacement })
+        Response { v, displacement }
     }
 
     /// The state at the end, from the velocity before the audit and the projection's displacement
@@ -377,9 +377,9 @@ fn operators<S: MechanicalSystem>(system: &S, size: usize) -> (DMatrix<f64>, DMa
         y.fill(0.0);
         system.add_impulses(&p, &mut y);
         system.local(&y, &mut u);
-        W.set_column(i, &column(&u));
+        W.column_mut(i).copy_from_slice(&u);
         system.half_solve_back(&mut y);
-        response.set_column(i, &column(&y));
+        response.column_mut(i).copy_from_slice(&y);
         p[i] = 0.0;
     }
     (response, W)

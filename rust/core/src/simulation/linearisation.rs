@@ -2,10 +2,10 @@
 //! coordinates, and u = (wheel torques, steering set-points).
 //!
 //! The step is the one that follows [`RoverSimulation::set_state`], without memory of earlier
-//! impulses. Its contacts and their modes are held
-//! ([`crate::integrator::held_step`]): the derivatives of the explicit, smooth parts are fourth-order
-//! central differences, and the implicit function theorem gives that of the solution. Only the test
-//! at the end differences whole steps: it takes two for each column and reports where modes change.
+//! impulses. Its contacts and their modes are held ([`crate::integrator::held_step`]): the
+//! derivatives of the explicit, smooth parts are fourth-order central differences, and the
+//! implicit function theorem gives that of the solution. Only the test at the end differences
+//! whole steps: it takes two for each column and reports where modes change.
 
 use std::sync::Arc;
 
@@ -337,7 +337,7 @@ impl Bench {
                 of.map(DVector::from_vec)
             })?);
         }
-        let response = held.respond(&DMatrix::from_columns(&trials))?;
+        let response = held.respond(&DMatrix::from_columns(&trials));
         let (v, displacement) = held.solution();
         let mut ends = Vec::with_capacity(columns.len());
         for &(j, step) in &columns {
