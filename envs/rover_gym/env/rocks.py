@@ -2,10 +2,9 @@
 
 One number d in [0, 2], the difficulty, sets how hard an episode is:
 
-                     d from 0 to 1    d from 1 to 2
-    abundance    k   0.2 d            0.2 + 0.15 (d - 1)      fraction of the ground that rocks cover
-    largest rock r   (0.5 + 1.1 d) R  (1.6 + 1.4 (d - 1)^2) R radius, with R the wheel radius
-    slope            0 to 10 d        0 to 10 d               degrees
+- abundance, the fraction of the ground that rocks cover: 0.2 d up to 1, then 0.2 + 0.15 (d - 1);
+- radius of the largest rock, in wheel radii: 0.5 + 1.1 d up to 1, then 1.6 + 1.4 (d - 1)^2;
+- slope, degrees: from 0 to 10 d.
 
 Half of a rock is below the ground. An argument that is given overrides the difficulty.
 """
