@@ -2,7 +2,7 @@
 //! coordinates, and u = (wheel torques, steering set-points).
 //!
 //! The step is the one that follows [`RoverSimulation::set_state`], without memory of earlier
-//! impulses. Its contacts and their modes are held ([`crate::integrator::held_step`]): the
+//! impulses. Its contacts and their modes are held (`integrator::held_step`): the
 //! derivatives of the explicit, smooth parts are fourth-order central differences, and the
 //! implicit function theorem gives that of the solution. Only the test at the end differences
 //! whole steps: it takes two for each column and reports where modes change.
