@@ -43,7 +43,7 @@ def raising(error: BaseException) -> Callable[..., NoReturn]:
 
 @pytest.mark.parametrize("error", [ZeroDivisionError("by zero"), KeyError("q"), MemoryError(), RecursionError("a\nb")])
 def test_an_error_that_nobody_foresaw_is_one_line_too(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(drive_command, "named_policy", raising(error))
+    monkeypatch.setattr(drive_command, "named_driver", raising(error))
     line = one_line(rover("drive"), code=1)
     assert line.startswith(f"error: unforeseen {type(error).__name__}: ")
     assert "ROVER_DEBUG=1" in line
