@@ -7,6 +7,7 @@ the ground about it, compared with the trunk's clearance. `PlannerPolicy` looks 
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +15,7 @@ import numpy.typing as npt
 from rover_gym.extras import require
 from rover_gym.ground import heights_of
 from rover_gym.mechanics import OptionError, RoverModel, Terrain
-from rover_gym.models.statics import check_statics
+from rover_gym.models.statics import Statics, check_statics
 from rover_gym.validation import number, refuse, vector
 
 Array = npt.NDArray[np.float64]
@@ -86,7 +87,7 @@ class FieldPlan:
         heights = heights_of(terrain, places.reshape(-1, 2)).reshape(tuple(shape))
         unknown = ~np.isfinite(heights)
         level = np.where(unknown, np.nanmean(heights) if not unknown.all() else 0.0, heights)
-        stance = check_statics(model)
+        stance = _stance(model)
         half = 0.5 * stance.track
         about = ndimage.uniform_filter(level, max(1, round(2.0 * model.clear_radius / resolution)), mode="nearest")
         reach = np.arange(-int(half / resolution), int(half / resolution) + 1) * resolution
@@ -131,6 +132,12 @@ class FieldPlan:
             cells.append(at)
         rows, columns = np.unravel_index(cells, self.cost.shape)
         return np.asarray(self.corner + self.resolution * np.stack((rows, columns), axis=1))
+
+
+@lru_cache(maxsize=8)
+def _stance(model: RoverModel) -> Statics:
+    """The rover on level ground, for which it must settle once."""
+    return check_statics(model)
 
 
 def _dijkstra(price: Array, resolution: float, goal: tuple[int, ...]) -> tuple[Array, npt.NDArray[np.int64]]:

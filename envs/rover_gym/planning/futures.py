@@ -1,5 +1,6 @@
 """Futures of a rover: the same state driven on by many sequences of commands, side by side in the core's batch."""
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -67,8 +68,9 @@ class Futures:
         task = env.task
         substeps = max(1, int(np.ceil(env.dt / number("time_step", time_step, above=0.0) - 1e-9)))
         self._friction = None if friction is None else number("friction", friction, at_least=0.0)
-        self._model = model
-        self._options = dict(task.simulation_options, time_step=env.dt / substeps, **SOLVER)
+        self._has_own_model = model is not None
+        options = dict(task.simulation_options, time_step=env.dt / substeps, **SOLVER)
+        self._task = replace(task, model=task.model if model is None else model, simulation_options=options)
         (rover,), settings = task.rules.__getnewargs_ex__()
         self._rules = EpisodeRules(rover, **(settings | {"substeps": substeps, "noise": None}))
         self._batch = EpisodeBatch(self._rules, self._simulation(env.simulation.terrain), self.n, threads=threads)
@@ -78,15 +80,12 @@ class Futures:
 
     def _simulation(self, terrain: Terrain) -> Simulation:
         """A rover of the futures on a terrain, at rest in the zero configuration."""
-        env, task = self._env, self._env.task
-        domain = env.domain
-        model = self._model
-        if model is None:
-            model = task.model if domain.mass_scale == 1.0 else task.model.replace(mass_scale=domain.mass_scale)
-        options = dict(self._options, friction=domain.friction if self._friction is None else self._friction)
-        if domain.gravity_scale != 1.0:
-            options["gravity"] = tuple(domain.gravity_scale * g for g in task.gravity)
-        return Simulation(model, terrain, **options)
+        domain = self._env.domain
+        if self._has_own_model:
+            domain = replace(domain, mass_scale=1.0)
+        if self._friction is not None:
+            domain = replace(domain, friction=self._friction)
+        return self._task.simulate(terrain, domain)
 
     def drive(
         self, controller: CommandController, commands: npt.ArrayLike, hold: int, terrain: Terrain | None = None

@@ -14,8 +14,8 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.env.episode_scene import EpisodeScene
 from rover_gym.env.rover_env import RoverEnv
+from rover_gym.env.start import Start
 from rover_gym.mechanics import OptionError, RoverModel, Terrain
 from rover_gym.planning.field_plan import FieldPlan
 from rover_gym.planning.futures import Ends, Futures
@@ -122,7 +122,7 @@ class PlannerPolicy:
         self._hold = max(1, round(self.options.knot / self._env.dt))
         self._knots = max(1, math.ceil(self.options.horizon / (self._hold * self._env.dt) - 1e-9))
         self._periods = max(1, round(self.options.period / self._env.dt))
-        self._scene: EpisodeScene | None = None
+        self._start: Start | None = None
         self._field: FieldPlan | None = None
         self._sequence: Array = np.zeros((self._knots, N_COMMANDS))
         self._since = 0
@@ -137,11 +137,10 @@ class PlannerPolicy:
     ) -> tuple[npt.NDArray[np.float32], tuple[npt.NDArray[Any], ...] | None]:
         """The action for an observation `(size,)` of the environment, which has not moved since.
 
-        A new episode is noticed by its scene. `state` is returned unchanged.
+        A new episode is noticed by its start. `state` is returned unchanged.
         """
-        scene = self._env.snapshot().scene
-        if scene is not self._scene:
-            self._begin(scene)
+        if self._env.start is not self._start:
+            self._begin()
         if self._since % self._periods == 0:
             self._plan()
         self._since += 1
@@ -149,12 +148,12 @@ class PlannerPolicy:
         action = self._controller.act(seen.reshape(1, -1), self._sequence[:1])
         return action[0], state
 
-    def _begin(self, scene: EpisodeScene) -> None:
-        terrain = scene.terrain if self._terrain is None else self._terrain
-        position = self._env.simulation.q[[0, 2]]
-        self._field = FieldPlan.over(terrain, self._env.model, position, scene.start.goal)
+    def _begin(self) -> None:
+        start, simulation = self._env.start, self._env.simulation
+        terrain = simulation.terrain if self._terrain is None else self._terrain
+        self._field = FieldPlan.over(terrain, self._env.model, simulation.q[[0, 2]], start.goal)
         self._futures = self._make_futures()
-        self._scene, self._since = scene, 0
+        self._start, self._since = start, 0
         self._sequence = np.zeros((self._knots, N_COMMANDS))
         self._sequence[:, 0] = 1.0
 

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError, StateError, atan2, sin_cos
+from rover_gym.policy.observed import check_observed
 from rover_gym.policy.regulator import WheelRegulator
 from rover_gym.policy.turning import SCRUB_RATE, WIDENING, YAW, Turning
 from rover_gym.validation import array, number, refuse
@@ -99,10 +100,7 @@ class PDPolicy:
             StateError: The observation has a wrong shape or an entry that is not finite.
         """
         given = array("observation", observation, error=StateError)
-        if given.ndim not in (1, 2) or given.shape[-1] != self._size:
-            refuse(StateError, "observation", given.shape, f"must be (..., {self._size})")
-        if not np.isfinite(given).all():
-            refuse(StateError, "observation", observation, "must be finite")
+        check_observed(given, self._size)
         rows = np.atleast_2d(given).astype(np.float64, copy=False)
         drives = [self._drive(row) for row in (rows * self._scale).tolist()]
         shape = (len(rows), self._n_wheels)

@@ -15,6 +15,7 @@ from rover_gym.policy.arc_search import ArcSearch, PathCosts, SearchTask
 from rover_gym.policy.command import CommandController, CommandLimits
 from rover_gym.policy.features import ground_slope
 from rover_gym.policy.ground_grid import GroundGrid
+from rover_gym.policy.observed import check_observed
 from rover_gym.policy.pd_policy import find_rover_env
 from rover_gym.policy.rover_outline import RoverOutline
 from rover_gym.policy.scan_memory import ScanMemory
@@ -179,11 +180,7 @@ class ScanPolicy:
             StateError: The observation has a wrong shape or an entry that is not finite.
         """
         given = array("observation", observation, error=StateError)
-        size = self._layout.size
-        if given.ndim not in (1, 2) or given.shape[-1] != size:
-            refuse(StateError, "observation", given.shape, f"must be (..., {size})")
-        if not np.isfinite(given).all():
-            refuse(StateError, "observation", observation, "must be finite")
+        check_observed(given, self._layout.size)
         rows = np.atleast_2d(given)
         memory = ScanMemory.of(state, len(rows))
         if episode_start is not None:

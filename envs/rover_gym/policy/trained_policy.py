@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.mechanics import StateError
 from rover_gym.policy.command import N_COMMANDS, CommandController
 from rover_gym.policy.features import Features
 from rover_gym.policy.network import Network
+from rover_gym.policy.observed import check_observed
 from rover_gym.policy.pd_policy import find_rover_env
 from rover_gym.policy.policy_card import PolicyCard
 from rover_gym.policy.policy_files import PolicyError, is_there
@@ -97,10 +97,7 @@ class TrainedPolicy:
             StateError: The observation has a wrong shape or an entry that is not finite.
         """
         given = np.asarray(observation)
-        if given.ndim not in (1, 2) or given.shape[-1] != self._size:
-            refuse(StateError, "observation", given.shape, f"must be (..., {self._size})")
-        if not np.isfinite(given).all():
-            refuse(StateError, "observation", observation, "must be finite")
+        check_observed(given, self._size)
         rows = np.atleast_2d(given)
         if state is None:
             commands, age = np.zeros((len(rows), N_COMMANDS), np.float32), np.zeros(len(rows), np.int64)
