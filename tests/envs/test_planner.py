@@ -4,7 +4,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from rover_gym import HeightField, OptionError, Plane, RoverModel, SphereField
+from rover_gym import HeightField, OptionError, Plane, RoverModel, SphereField, StateError
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.planning import FieldPlan, Futures, PlannerOptions, PlannerPolicy
 from rover_gym.policy import CommandController
@@ -96,6 +96,15 @@ def test_planning_leaves_the_environment_as_it_is() -> None:
     assert env.action_space.contains(action)
     assert after.simulation == before.simulation
     assert after.random_state == before.random_state
+
+
+def test_an_observation_that_is_none_is_refused_before_planning() -> None:
+    env = planar()
+    policy = PlannerPolicy(env, PlannerOptions(samples=40), threads=1)
+    seen = env.snapshot().progress.observation
+    for bad in (seen[:-1], np.stack((seen, seen)), np.where(np.arange(len(seen)) == 3, np.nan, seen)):
+        with pytest.raises(StateError, match="observation"):
+            policy.predict(bad)
 
 
 @pytest.mark.parametrize("method", ["cem", "mppi"])

@@ -16,12 +16,13 @@ import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.start import Start
-from rover_gym.mechanics import OptionError, RoverModel, Terrain
+from rover_gym.mechanics import OptionError, RoverModel, StateError, Terrain
 from rover_gym.planning.field_plan import FieldPlan
 from rover_gym.planning.futures import Ends, Futures
 from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimits
+from rover_gym.policy.observed import check_observed
 from rover_gym.policy.pd_policy import find_rover_env
-from rover_gym.validation import number, refuse, vector, whole
+from rover_gym.validation import array, number, refuse, vector, whole
 
 Array = npt.NDArray[np.float64]
 
@@ -138,14 +139,20 @@ class PlannerPolicy:
         """The action for an observation `(size,)` of the environment, which has not moved since.
 
         A new episode is noticed by its start. `state` is returned unchanged.
+
+        Raises:
+            StateError: The observation is not `(size,)`, or has an entry that is not finite; nothing was planned.
         """
+        seen = array("observation", observation, error=StateError)
+        if seen.ndim != 1:
+            refuse(StateError, "observation", seen.shape, "must be one of one environment")
+        check_observed(seen, self._env.task.layout.size)
         if self._env.start is not self._start:
             self._begin()
         if self._since % self._periods == 0:
             self._plan()
         self._since += 1
-        seen = np.asarray(observation, dtype=np.float32)
-        action = self._controller.act(seen.reshape(1, -1), self._sequence[:1])
+        action = self._controller.act(seen[None].astype(np.float32), self._sequence[:1])
         return action[0], state
 
     def _begin(self) -> None:
