@@ -210,7 +210,7 @@ SCAN = HeightScan(33, 25, 0.12)
 X_C, REACH, RADIUS, ARRIVAL = 0.05, 0.9, 0.15, 0.3
 
 
-def rover_arcs() -> tuple[Arcs, Arcs, np.ndarray]:
+def rover_arcs() -> tuple[Arcs, Arcs, Array]:
     first = Arcs.grid([-1.0, 0.0, 1.0], [-0.4, 0.0, 0.4], 1.0).joined(Arcs.grid([-1.0, 0.0, 1.0], [0.0], -1.0))
     further = Arcs.grid([-1.0, 0.0, 1.0], [-0.4, 0.4], 1.0).joined(Arcs.grid([0.0], [0.0], -1.0))
     return first, further, np.column_stack((first.direction, first.curvature, first.sideways))
@@ -227,10 +227,10 @@ def searches(costs: PathCosts) -> tuple[ArcSearch, OracleGrid, OracleSearch]:
     return ArcSearch(first, further, commands, scan=SCAN, x_c=X_C, **shared), grid, oracle
 
 
-def rocky(rng: np.random.Generator) -> np.ndarray:
+def rocky(rng: np.random.Generator) -> Array:
     """Heights of a scan with some rocks on a slope."""
     x, z = SCAN.offsets.T
-    heights = 0.1 * rng.normal() * x + 0.1 * rng.normal() * z
+    heights: Array = 0.1 * rng.normal() * x + 0.1 * rng.normal() * z
     for _ in range(15):
         away = np.hypot(x - rng.uniform(-2.0, 2.0), z - rng.uniform(-1.5, 1.5))
         radius = rng.uniform(0.1, 0.5)

@@ -19,13 +19,13 @@ use crate::errors::Kind;
 ///
 /// Args:
 ///     scan: Rows, columns and spacing, m, of the height scan.
-///     outline: The rover in the trunk's frame: `wheels` (n_wheels, 2) and `underside` (n, 2), x and
-///         z, m; `clearance` (n,) of the underside, m; `plane_fit` (3, n_wheels), level and slopes
-///         of the ground plane by the heights under the wheels; `x_c`, m, of the point that follows
-///         the path; `radius` of the wheels, m.
+///     outline: The rover in the trunk's frame: `wheels` (n_wheels, 2) and `underside` (n, 2), x
+///         and z, m; `clearance` (n,) of the underside, m; `plane_fit` (3, n_wheels), level and
+///         slopes of the ground plane by the heights under the wheels; `x_c`, m, of the point that
+///         follows the path; `radius` of the wheels, m.
 ///     costs: The fields of `PathCosts`.
-///     first: The arcs that a path may begin with: `poses` (n, 4, 3), `direction` (n,), 1 or -1, and
-///         `commands` (n, 3), speed, curvature and sideways.
+///     first: The arcs that a path may begin with: `poses` (n, 4, 3), `direction` (n,), 1 or -1,
+///         and `commands` (n, 3), speed, curvature and sideways.
 ///     further: Those that it may go on with: `poses` and `direction`.
 ///     reach: The rover's reach, m.
 ///     arrival: Distance within which the goal is reached, m.
