@@ -1216,6 +1216,7 @@ class PathSearch:
         boldness: float,
         traps: npt.ArrayLike,
         retreat: float,
+        extra: npt.ArrayLike | None = None,
     ) -> int:
         """The first arc of the cheapest path.
 
@@ -1227,9 +1228,25 @@ class PathSearch:
             traps: `(n, 3)` poses where the rover got stuck.
             retreat: Direction of the first arc, 1 or -1, while the rover backs off; 0 for a free
                 choice.
+            extra: `(n,)` a further cost of each first arc, m; none by default.
 
         Returns:
             The index of the arc among the first arcs.
+
+        Raises:
+            OptionError: An argument has a wrong shape or an entry that is not finite.
+        """
+    def under(self, heights: npt.ArrayLike, poses: npt.ArrayLike) -> npt.NDArray[np.float32]:
+        """What lies under the rover in poses.
+
+        Args:
+            heights: `(rows * columns,)` heights of the scan, m.
+            poses: `(..., 3)` poses.
+
+        Returns:
+            (n, n_wheels + 3) for each pose the heights under the wheels over the mean of the present
+            ones and the least gap under the rover, both over the wheels' radius; then the slopes
+            ahead and to the right of the plane through the ground under the wheels.
 
         Raises:
             OptionError: An argument has a wrong shape or an entry that is not finite.

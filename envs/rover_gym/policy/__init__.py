@@ -16,6 +16,7 @@ from rover_gym.policy.evaluation import (
     summarise,
 )
 from rover_gym.policy.features import Features
+from rover_gym.policy.foresight_policy import FORECAST_FILE, ForesightCosts, ForesightPolicy
 from rover_gym.policy.named_policy import NamedPolicy, named_policy
 from rover_gym.policy.network import Network
 from rover_gym.policy.pd_policy import PDGains, PDPolicy
@@ -27,6 +28,7 @@ from rover_gym.policy.trained_policy import TrainedPolicy
 
 __all__ = [
     "ENDS",
+    "FORECAST_FILE",
     "BaselineInterrupt",
     "BaselineRow",
     "CommandController",
@@ -36,6 +38,8 @@ __all__ = [
     "Episode",
     "EvaluatedEpisode",
     "Features",
+    "ForesightCosts",
+    "ForesightPolicy",
     "IntervalEstimate",
     "NamedPolicy",
     "Network",

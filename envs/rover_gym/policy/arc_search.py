@@ -83,6 +83,7 @@ class SearchTask:
         boldness: Factor on the costs of belly, climb and lean.
         traps: `(n, 3)` places ahead and to the right, m, and headings, rad, where the rover got stuck.
         retreat: Direction of the first arc, 1 or -1, while the rover backs off; 0 for a free choice.
+        extra: `(n,)` a further cost of each first arc, m; None for none.
     """
 
     goal: tuple[float, float]
@@ -90,6 +91,7 @@ class SearchTask:
     boldness: float
     traps: Array
     retreat: float
+    extra: Array | None = None
 
 
 class ArcSearch:
@@ -142,7 +144,11 @@ class ArcSearch:
 
     def best(self, heights: Array, task: SearchTask) -> int:
         """The first arc of the cheapest path over heights `(rows * columns,)` of the scan, m."""
-        return self._search.best(heights, task.goal, task.command, task.boldness, task.traps, task.retreat)
+        return self._search.best(heights, task.goal, task.command, task.boldness, task.traps, task.retreat, task.extra)
+
+    def under(self, heights: Array, poses: Array) -> npt.NDArray[np.float32]:
+        """`(n, n_wheels + 3)` what lies under the rover in poses `(..., 3)`; see `PathSearch.under`."""
+        return self._search.under(heights, poses)
 
 
 def _plane_fit(x: Array, z: Array) -> Array:

@@ -1,6 +1,6 @@
 //! `PathSearch`: the cheapest of many paths over a height scan.
 
-use numpy::{PyReadonlyArray1, PyReadonlyArrayDyn};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 use pyo3::types::PyMapping;
 use rover_core::paths::search::STEPS;
@@ -93,21 +93,26 @@ fn table<const M: usize>(
     rows(&value, &field)
 }
 
-fn arcs(given: &Bound<'_, PyMapping>, outer: &str) -> PyResult<Arcs> {
-    let poses = table::<3>(given, outer, "poses")?;
-    let direction = numbers(given, outer, "direction")?;
-    if poses.len() != STEPS * direction.len() || direction.is_empty() {
-        let what = format!("for arcs of {STEPS} poses each, at least one");
-        return Err(refused(given.as_any(), Kind::Option, outer, &what).into());
-    }
+/// Poses of any leading shape.
+fn poses(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<Pose>> {
     let pose = |[ahead, right, heading]: [f64; 3]| Pose {
         ahead,
         right,
         heading,
     };
-    let (chunks, _) = poses.as_chunks::<STEPS>();
+    Ok(rows(value, field)?.into_iter().map(pose).collect())
+}
+
+fn arcs(given: &Bound<'_, PyMapping>, outer: &str) -> PyResult<Arcs> {
+    let (value, field) = item(given, outer, "poses")?;
+    let poses = poses(&value, &field)?;
+    let direction = numbers(given, outer, "direction")?;
+    if poses.len() != STEPS * direction.len() || direction.is_empty() {
+        let what = format!("for arcs of {STEPS} poses each, at least one");
+        return Err(refused(given.as_any(), Kind::Option, outer, &what).into());
+    }
     Ok(Arcs {
-        poses: chunks.iter().map(|arc| arc.map(pose)).collect(),
+        poses: poses.as_chunks::<STEPS>().0.to_vec(),
         direction,
     })
 }
@@ -248,12 +253,15 @@ impl PathSearch {
     ///     traps: `(n, 3)` poses where the rover got stuck.
     ///     retreat: Direction of the first arc, 1 or -1, while the rover backs off; 0 for a free
     ///         choice.
+    ///     extra: `(n,)` a further cost of each first arc, m; none by default.
     ///
     /// Returns:
     ///     The index of the arc among the first arcs.
     ///
     /// Raises:
     ///     OptionError: An argument has a wrong shape or an entry that is not finite.
+    #[pyo3(signature = (heights, goal, command, boldness, traps, retreat, extra = None))]
+    #[expect(clippy::too_many_arguments)]
     fn best(
         &mut self,
         heights: &Bound<'_, PyAny>,
@@ -262,31 +270,76 @@ impl PathSearch {
         boldness: f64,
         traps: &Bound<'_, PyAny>,
         retreat: f64,
+        extra: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<usize> {
         let task = SearchTask {
             goal: two(goal, Kind::Option, "goal")?,
             command: triple(command, Kind::Option, "command")?,
             boldness,
-            traps: {
-                let traps = rows::<3>(traps, "traps")?.into_iter();
-                let pose = |[ahead, right, heading]: [f64; 3]| Pose {
-                    ahead,
-                    right,
-                    heading,
-                };
-                traps.map(pose).collect()
-            },
+            traps: poses(traps, "traps")?,
             retreat: (retreat != 0.0).then_some(retreat),
+            extra: match extra {
+                Some(given) => self.extra(given)?,
+                None => Vec::new(),
+            },
         };
-        let given: Vec<f64> = match heights.extract::<PyReadonlyArray1<'_, f64>>() {
+        let heights = self.heights(heights)?;
+        Ok(self.inner.best(&heights, &task))
+    }
+
+    /// What lies under the rover in poses.
+    ///
+    /// Args:
+    ///     heights: `(rows * columns,)` heights of the scan, m.
+    ///     poses: `(..., 3)` poses.
+    ///
+    /// Returns:
+    ///     (n, n_wheels + 3) for each pose the heights under the wheels over the mean of the present
+    ///     ones and the least gap under the rover, both over the wheels' radius; then the slopes
+    ///     ahead and to the right of the plane through the ground under the wheels.
+    ///
+    /// Raises:
+    ///     OptionError: An argument has a wrong shape or an entry that is not finite.
+    fn under<'py>(
+        &mut self,
+        py: Python<'py>,
+        heights: &Bound<'_, PyAny>,
+        poses: &Bound<'_, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let heights = self.heights(heights)?;
+        let poses = self::poses(poses, "poses")?;
+        let found = self.inner.under(&heights, &poses);
+        PyArray1::from_vec(py, found).reshape([poses.len(), self.inner.n_wheels() + 3])
+    }
+}
+
+impl PathSearch {
+    /// A finite height a point of the scan.
+    fn heights(&self, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+        let found: Vec<f64> = match given.extract::<PyReadonlyArray1<'_, f64>>() {
             Ok(ready) => ready.as_array().to_vec(),
-            Err(_) => vector(heights, Kind::Option, "heights")?,
+            Err(_) => vector(given, Kind::Option, "heights")?,
         };
         let n = self.inner.n_heights();
-        if given.len() != n || !given.iter().all(|height| height.is_finite()) {
-            let what = format!("{n} finite heights");
-            return Err(refused(heights, Kind::Option, "heights", &what).into());
+        if found.len() == n && found.iter().all(|height| height.is_finite()) {
+            return Ok(found);
         }
-        Ok(self.inner.best(&given, &task))
+        Err(refused(
+            given,
+            Kind::Option,
+            "heights",
+            &format!("{n} finite heights"),
+        )
+        .into())
+    }
+
+    /// A finite cost an arc.
+    fn extra(&self, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+        let n = self.inner.n_first();
+        let found = vector(given, Kind::Option, "extra")?;
+        if found.len() == n && found.iter().all(|cost| cost.is_finite()) {
+            return Ok(found);
+        }
+        Err(refused(given, Kind::Option, "extra", &format!("{n} finite costs")).into())
     }
 }

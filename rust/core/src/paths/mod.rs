@@ -14,5 +14,5 @@ pub mod search;
 pub use cost::PathCosts;
 pub use grid::{GroundGrid, ScanShape};
 pub use pose::Pose;
-pub use risk::{Outline, PathRisk};
+pub use risk::{Outline, PathRisk, Stand};
 pub use search::{Arcs, PathSearch, Search, SearchTask, Trap};

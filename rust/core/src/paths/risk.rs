@@ -29,6 +29,17 @@ impl Outline {
     }
 }
 
+/// How a rover would stand in a pose.
+#[derive(Clone, Copy, Debug)]
+pub struct Stand {
+    /// Slope ahead of the plane through the ground under the wheels, rise over run.
+    pub ahead: f32,
+    /// Slope to the right.
+    pub right: f32,
+    /// Least gap under the rover, over the wheels' radius; infinite if nothing collides.
+    pub gap: f32,
+}
+
 /// Costs of poses by the heights under the rover's points.
 #[derive(Clone, Debug)]
 pub struct PathRisk {
@@ -77,32 +88,48 @@ impl PathRisk {
         &self.grid
     }
 
+    /// Radius of the wheels, m.
+    #[must_use]
+    pub fn radius(&self) -> f32 {
+        self.radius
+    }
+
     /// Wheels of the rover.
     #[must_use]
     pub fn n_wheels(&self) -> usize {
         self.n_wheels
     }
 
-    /// Cost of a pose, and writes the heights under the rover's points to `seen`; `before` are
-    /// those under its wheels at the pose before.
-    pub fn of(&self, heights: &[f32], pose: Pose, before: &[f32], seen: &mut [f32]) -> f32 {
+    /// The heights under the rover's points in a pose, and how the rover would stand there.
+    pub fn stand(&self, heights: &[f32], pose: Pose, seen: &mut [f32]) -> Stand {
         self.grid.under(heights, pose, seen);
         let (wheels, under) = seen.split_at(self.n_wheels);
         let [level, ahead, right] = [0, 1, 2].map(|i| {
             let products = wheels.iter().zip(&self.fit[i]);
             products.fold(0.0_f32, |sum, (height, weight)| sum + height * weight)
         });
-        let mut risk = self.lean * (ahead * ahead + right * right);
-        if !under.is_empty() {
-            let gap = (self.smallest_gap(under, ahead, right) + level) / self.radius;
-            let low = (self.margin - gap).max(0.0);
-            risk += self.belly * low * (1.0 + low);
-        }
-        let rises = wheels.iter().zip(before).map(|(height, before)| {
-            let rise = (height - before).max(0.0) / self.radius;
-            let steep = (rise - 0.5).max(0.0);
-            self.climb * rise + self.step * steep * steep
-        });
+        let gap = if under.is_empty() {
+            f32::INFINITY
+        } else {
+            (self.smallest_gap(under, ahead, right) + level) / self.radius
+        };
+        Stand { ahead, right, gap }
+    }
+
+    /// Cost of a pose, and writes the heights under the rover's points to `seen`; `before` are
+    /// those under its wheels at the pose before.
+    pub fn of(&self, heights: &[f32], pose: Pose, before: &[f32], seen: &mut [f32]) -> f32 {
+        let Stand { ahead, right, gap } = self.stand(heights, pose, seen);
+        let low = (self.margin - gap).max(0.0);
+        let risk = self.lean * (ahead * ahead + right * right) + self.belly * low * (1.0 + low);
+        let rises = seen[..self.n_wheels]
+            .iter()
+            .zip(before)
+            .map(|(height, before)| {
+                let rise = (height - before).max(0.0) / self.radius;
+                let steep = (rise - 0.5).max(0.0);
+                self.climb * rise + self.step * steep * steep
+            });
         risk + rises.fold(0.0, |sum, cost| sum + cost)
     }
 

@@ -73,6 +73,8 @@ pub struct SearchTask {
     pub traps: Vec<Trap>,
     /// Direction of the first arc while the rover backs off; `None` for a free choice.
     pub retreat: Option<f64>,
+    /// A further cost of each first arc, m; empty for none.
+    pub extra: Vec<f64>,
 }
 
 /// A path that is being extended.
@@ -122,10 +124,49 @@ impl PathSearch {
         }
     }
 
+    /// Arcs that a path may begin with.
+    #[must_use]
+    pub fn n_first(&self) -> usize {
+        self.inner.commands.len()
+    }
+
+    /// Wheels of the rover.
+    #[must_use]
+    pub fn n_wheels(&self) -> usize {
+        self.risk.n_wheels()
+    }
+
     /// Points of the scan.
     #[must_use]
     pub fn n_heights(&self) -> usize {
         self.risk.grid().n_heights()
+    }
+
+    /// What lies under the rover in poses, over heights in the order of the scan: for each pose the
+    /// heights under the wheels over the mean of the present ones, the least gap under the rover,
+    /// both over the wheels' radius, and the slopes ahead and to the right.
+    ///
+    /// # Panics
+    ///
+    /// The heights are not as many as the scan has points.
+    pub fn under(&mut self, heights: &[f64], poses: &[Pose]) -> Vec<f32> {
+        let Self {
+            risk,
+            heights: grid,
+            seen,
+            ..
+        } = self;
+        risk.grid().spread(heights, grid);
+        let (n, radius) = (risk.n_wheels(), risk.radius());
+        risk.grid().under(grid, Pose::default(), seen);
+        let level = seen[..n].iter().sum::<f32>() / n as f32;
+        let mut found = Vec::with_capacity(poses.len() * (n + 3));
+        for pose in poses {
+            let stand = risk.stand(grid, *pose, seen);
+            found.extend(seen[..n].iter().map(|height| (height - level) / radius));
+            found.extend([stand.gap, stand.ahead, stand.right]);
+        }
+        found
     }
 
     /// The first arc of the cheapest path over heights in the order of the scan.
@@ -193,6 +234,7 @@ impl PathSearch {
             let cost = task.boldness * f64::from(sum)
                 + costs.memory * nearness(poses, task, inner.reach)
                 + swerve * change
+                + task.extra.get(root).copied().unwrap_or(0.0)
                 + if turns_back { costs.switch } else { 0.0 }
                 + if direction < 0.0 { costs.reverse } else { 0.0 };
             paths.push(Path {
