@@ -8,6 +8,7 @@ variance that the network explains in states it has not seen.
 """
 
 import json
+import math
 import time
 from pathlib import Path
 from typing import Annotated
@@ -68,6 +69,11 @@ def train(
     }
     (folder / "run.json").write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
     say_path("forecast", folder)
+
+
+def _rounded(share: float) -> float | None:
+    """A share for JSON, which has no NaN."""
+    return round(share, 3) if math.isfinite(share) else None
 
 
 if __name__ == "__main__":
