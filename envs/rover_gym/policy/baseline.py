@@ -75,7 +75,7 @@ def measure_baseline(
         difficulties: The difficulties, each in [0, 2].
         episodes: Episodes per difficulty.
         seed: Seed of the first episode; the seed increases by one per episode.
-        policy: "pd", "scan", "trained" for the shipped policy, or the folder of a trained policy.
+        policy: A name or folder, as `named_policy` takes it.
         terrain: "sphere_field" or "hills".
         model: The rover: a name of the gallery or a file; None for the built-in one.
         progress: Called after each episode with the difficulty and the number of episodes done.

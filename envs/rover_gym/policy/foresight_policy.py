@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import OptionError
-from rover_gym.policy.arc_forecast import ArcFeatures, ArcForecast
+from rover_gym.policy.arc_forecast import ArcFeatures, ArcForecast, Outcomes
 from rover_gym.policy.arc_search import PathCosts
 from rover_gym.policy.network import Network
 from rover_gym.policy.pd_policy import find_rover_env
@@ -92,6 +92,10 @@ class ForesightPolicy(ScanPolicy):
         features = ArcFeatures(find_rover_env(env), self)
         self._length, self._forecast = features.length, ArcForecast(features, Network.read(path))
         self._caution = self.foresight.caution
+
+    def foresee(self, row: Array) -> Outcomes:
+        """What becomes of the rover on each arc, for an observation `(size,)`, scaled as the environment returns it."""
+        return self._forecast(row, *self.ground(row))
 
     def _outlook(self, row: Array, slope: list[float], heights: Array) -> tuple[Array | None, npt.NDArray[np.bool_]]:
         costs, outcomes = self.foresight, self._forecast(row, slope, heights)
