@@ -30,8 +30,8 @@ OUTPUTS = ("way", "stuck", "failed")
 @plain_errors
 def train(
     seed: Annotated[int, typer.Option(min=1, max=400, help="Seed of fields, strays and network.")] = 1,
-    states: Annotated[int, typer.Option(min=10, help="States from which arcs are tried.")] = 6000,
-    epochs: Annotated[int, typer.Option(min=1, help="Passes of the fit.")] = 12,
+    states: Annotated[int, typer.Option(min=10, help="States from which arcs are tried.")] = 15_000,
+    epochs: Annotated[int, typer.Option(min=1, help="Passes of the fit.")] = 15,
     difficulty: Annotated[tuple[float, float], typer.Option(help="Range of the fields' difficulty.")] = (
         1.0,
         2.0,

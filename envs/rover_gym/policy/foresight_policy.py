@@ -39,9 +39,9 @@ class ForesightCosts:
     """
 
     lost: float = 2.0
-    stuck: float = 10.0
+    stuck: float = 15.0
     failed: float = 3.0
-    push: float = 0.6
+    push: float = 1.5
     caution: float = 0.5
 
     def __post_init__(self) -> None:
