@@ -34,14 +34,14 @@ class ForesightCosts:
         lost: Of a metre that is not made.
         stuck: Of a trunk that has been held for as long as ends an episode.
         failed: Of an episode that has ended.
-        push: Of driving fast.
+        push: Of driving fast; less the longer the rover makes no progress, as the costs of risks.
         caution: Factor on the costs of belly, climb and lean that `PathCosts` gives.
     """
 
     lost: float = 2.0
-    stuck: float = 15.0
+    stuck: float = 10.0
     failed: float = 3.0
-    push: float = 1.5
+    push: float = 1.0
     caution: float = 0.5
 
     def __post_init__(self) -> None:
@@ -97,9 +97,11 @@ class ForesightPolicy(ScanPolicy):
         """What becomes of the rover on each arc, for an observation `(size,)`, scaled as the environment returns it."""
         return self._forecast(row, *self.ground(row))
 
-    def _outlook(self, row: Array, slope: list[float], heights: Array) -> tuple[Array | None, npt.NDArray[np.bool_]]:
+    def _outlook(
+        self, row: Array, slope: list[float], heights: Array, boldness: float
+    ) -> tuple[Array | None, npt.NDArray[np.bool_]]:
         costs, outcomes = self.foresight, self._forecast(row, slope, heights)
         lost = self._length * np.maximum(0.0, OPEN_WAY - outcomes.way)
         by_speed = costs.lost * lost + costs.stuck * outcomes.stuck + costs.failed * outcomes.failed
-        slow, fast = by_speed[0], by_speed[1] + costs.push
+        slow, fast = by_speed[0], by_speed[1] + boldness * costs.push
         return np.minimum(slow, fast), fast < slow

@@ -218,11 +218,12 @@ class ScanPolicy:
         sine, cosine = sin_cos(heading)
         ahead, right, turned = (memory.known_traps(i) - [x, z, heading]).T
         heights = self._over_plane(row, slope)
-        extra, fast = self._outlook(row, slope, heights)
+        boldness = self._boldness(memory.fruitless[i])
+        extra, fast = self._outlook(row, slope, heights, boldness)
         task = SearchTask(
             goal=(float(goal[0]) - self._x_c, float(goal[1])),
             command=memory.command[i].copy(),
-            boldness=self._caution * self._boldness(memory.fruitless[i]),
+            boldness=self._caution * boldness,
             traps=np.column_stack((ahead * cosine - right * sine, ahead * sine + right * cosine, turned)),
             retreat=float(memory.away[i]) if memory.retreat[i] > 0.0 else 0.0,
             extra=extra,
@@ -256,6 +257,7 @@ class ScanPolicy:
         row: Array,  # noqa: ARG002 - for policies that know more
         slope: list[float],  # noqa: ARG002
         heights: Array,  # noqa: ARG002
+        boldness: float,  # noqa: ARG002
     ) -> tuple[Array | None, npt.NDArray[np.bool_]]:
         """`(n_arcs,)` further costs of the first arcs, m, and whether they are driven fast."""
         return None, self._slow
