@@ -149,7 +149,26 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     `reset(options=...)` fixes what it names: `difficulty`, `slope_deg`, `uphill_deg`, `position` (x, z),
     `heading_deg`, `goal` (x, z), or the whole state as `q` (21,) with `v` (21,), as
-    `Simulation.set_state` takes them. Unknown names are refused with `OptionError`.
+    `Simulation.set_state` takes them; the `goals` of a course, one (x, z) a waypoint; and `field_seed`, a whole number from
+    0, by which the rocks are drawn and the piece of hills is cut: with equal starts and goals, equal fields. Unknown names
+    are refused with `OptionError`.
+
+    ## Courses
+
+    With `waypoints` above 1, as in `RoverWaypoints-v0`, that many goals are reached one after the other. Each lies at a distance
+    from `goal_distance` from the one before it, in the direction of the leg before turned by `waypoint_turn_deg`. `goal` and
+    `goal_distance` in the observation, the reward's `progress` and `info["distance_to_goal"]` are those of the present goal;
+    the next takes its place in the step that reaches it. The episode ends with `"goal"` at the last. Two fields follow
+    `stuck` in the observation: `next_goal` (m, scale 10), the goal after the present one, ahead and to the right, or the
+    present one again where it is the last; and `waypoints_remaining`, goals still to reach (scale: their number). Among rocks each
+    goal has its clearing, and on hills a way leads to each from the one before. `info` has `waypoints_reached`,
+    `waypoints_remaining` and `distance_remaining`, the way to the last goal, straight from goal to goal, m.
+
+    ## Battery
+
+    With `battery`, as in `RoverBattery-v0`, the rover starts with that many joules. The wheel motors draw their work, braking
+    counted, as in `info["energy"]`; with none left the episode ends in failure with `"battery_empty"`. `charge` in the
+    observation, after `stuck`, is the fraction that is left, `info["charge"]` the joules.
 
     ## Rocks
 
@@ -178,11 +197,11 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     ## End
 
     `terminated`, with `info["termination"]`:
-    `"goal"`, the trunk's origin is within `goal_tolerance` of the goal, horizontally;
+    `"goal"`, the trunk's origin is within `goal_tolerance` of the goal, the last of a course, horizontally;
     `"roll_over"`, the trunk leans more than `max_tilt_deg` from the vertical;
     `"high_centred"`, for `stuck_time` seconds the trunk has carried more than a tenth of the weight
     while the rover moved slower than 0.05 m/s; `"step_failed"`, the physics could not take a step:
-    the observation is then the last finite one, and `info["solver"]` says what happened.
+    the observation is then the last finite one, and `info["solver"]` says what happened; `"battery_empty"`, see Battery.
     `truncated`: after 1200 steps (60 s), by Gymnasium's time limit. Change it with
     `gymnasium.make(..., max_episode_steps=...)`. The environment itself never truncates.
 
@@ -256,8 +275,9 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     @property
     def goal(self) -> tuple[float, float]:
-        """The episode's goal (x, z), m."""
-        return self._running().start.goal
+        """The episode's present goal (x, z), m."""
+        self._running()
+        return self._episode.goal
 
     @property
     def start(self) -> Start:
@@ -359,7 +379,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         scene = self._running()
         if self._renderer is None:
             self._renderer = self.make_renderer(scene)
-        self._renderer.set_scene(scene.terrain, goal=scene.start.goal, goal_tolerance=self.goal_tolerance)
+        self._renderer.set_scene(scene.terrain, goal=self.goal, goal_tolerance=self.goal_tolerance)
         return self._renderer.render(self._simulation)
 
     def make_renderer(self, scene: EpisodeScene) -> "FrameRenderer":

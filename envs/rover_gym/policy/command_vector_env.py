@@ -15,6 +15,7 @@ from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimit
 from rover_gym.policy.drive_by_command import MAX_REPEAT
 from rover_gym.policy.features import LARGEST_FEATURE, Features
 from rover_gym.validation import array, known_keys, refuse, whole
+from rover_gym.vector.batch_snapshot import BatchSnapshot
 from rover_gym.vector.vector_env import RoverVectorEnv
 
 Array = npt.NDArray[np.float32]
@@ -70,6 +71,20 @@ class CommandVectorEnv(VectorWrapper):
         self._seen, infos = self._rovers.reset(seed=seed, options=options)
         self._over &= ~(options or {}).get("reset_mask", np.True_)
         return self._features(self._seen), infos
+
+    def snapshot(self) -> BatchSnapshot:
+        """Returns the state of the rovers, as `RoverVectorEnv.snapshot`."""
+        return self._rovers.snapshot()
+
+    def restore(self, snapshot: BatchSnapshot) -> None:
+        """Restores a snapshot, as `RoverVectorEnv.restore`.
+
+        Raises:
+            StateError: As `RoverVectorEnv.restore`; nothing has changed.
+        """
+        self._rovers.restore(snapshot)
+        self._seen = self._rovers.batch.observation
+        self._over = np.isin(np.arange(self.num_envs), self._rovers.batch.over)
 
     def step(self, actions: npt.ArrayLike) -> tuple[Array, npt.NDArray[np.float64], Mask, Mask, dict[str, Any]]:
         """Holds commands `(num_envs, 3)`, clipped to [-1, 1], for `repeat` steps or until a rover's episode ends.
