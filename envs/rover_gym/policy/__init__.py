@@ -3,6 +3,7 @@
 from rover_gym.policy.arc_search import PathCosts
 from rover_gym.policy.baseline import ENDS, BaselineInterrupt, BaselineRow, measure_baseline, wilson_interval
 from rover_gym.policy.command import CommandController, CommandLimits
+from rover_gym.policy.command_env import RoverCommandEnv, RoverCommandVectorEnv
 from rover_gym.policy.command_vector_env import CommandVectorEnv
 from rover_gym.policy.drive_by_command import DriveByCommand
 from rover_gym.policy.episodes import Episode, Policy, run_episode
@@ -46,6 +47,8 @@ __all__ = [
     "PolicyCard",
     "PolicyError",
     "PolicySummary",
+    "RoverCommandEnv",
+    "RoverCommandVectorEnv",
     "ScanGains",
     "ScanPolicy",
     "TrainedPolicy",

@@ -19,6 +19,11 @@ Array = npt.NDArray[np.float32]
 MAX_REPEAT = 10_000
 
 
+def check_repeat(repeat: object) -> int:
+    """Checks for how many steps a command is held."""
+    return whole("repeat", repeat, at_least=1, at_most=MAX_REPEAT)
+
+
 class DriveByCommand(gym.Wrapper[Array, Array, Array, Array]):
     """Holds each command for several steps of the rover and sums the rewards.
 
@@ -39,7 +44,7 @@ class DriveByCommand(gym.Wrapper[Array, Array, Array, Array]):
     def __init__(
         self, env: gym.Env[Array, Array], repeat: int = 4, guided: bool = False, pool: int = 1, **limits: float
     ) -> None:
-        repeat = whole("repeat", repeat, at_least=1, at_most=MAX_REPEAT)
+        repeat = check_repeat(repeat)
         known_keys("limits", limits, [field.name for field in fields(CommandLimits)])
         rover = find_rover_env(env)
         super().__init__(env)

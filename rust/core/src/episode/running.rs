@@ -161,7 +161,8 @@ impl Episode {
 
     /// An episode that goes on from its progress and its last observation.
     ///
-    /// `last`: what else is known of its last period. `owed`: the normal numbers of an observation that lacks its heights, empty without noise.
+    /// `last`: what else is known of its last period. `owed`: the normal numbers of an observation
+    /// that lacks its heights, empty without noise.
     ///
     /// # Errors
     /// `Length`, `OutOfRange`: they do not fit the rules, or are not finite.
