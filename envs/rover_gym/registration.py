@@ -44,6 +44,7 @@ ENVIRONMENTS: Mapping[str, Registration] = {
     "RoverCommand-v0": Registration(
         "rover_gym.policy:RoverCommandEnv", "rover_gym.policy:RoverCommandVectorEnv", MAX_COMMANDS
     ),
+    "RoverGoal-v0": Registration("rover_gym.policy:RoverGoalEnv", max_episode_steps=MAX_COMMANDS),
     "RoverGrains-v0": Registration("rover_gym.env:RoverGrainsEnv"),
 }
 

@@ -1,5 +1,6 @@
 """Courses of several goals: drawn, observed, rewarded and ended as the card says, on every ground and in a batch."""
 
+import itertools
 import math
 from typing import Any
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from rover_gym import OptionError, PDPolicy, RoverEnv
+from rover_gym.planning import PlannerOptions, PlannerPolicy
 from rover_gym.vector import RoverVectorEnv
 
 GROUNDS = [{}, {"terrain": "sphere_field", "difficulty": 0.3}, {"terrain": "hills", "difficulty": 0.3}]
@@ -24,7 +26,7 @@ def test_the_baseline_reaches_one_goal_after_the_other(ground: dict[str, Any]) -
     goals, layout = env.start.goals, env.observation_layout
     policy = PDPolicy(env)
     assert (info["waypoints_reached"], info["waypoints_remaining"]) == (0, 3)
-    legs = [math.dist(a, b) for a, b in zip(goals, goals[1:], strict=False)]
+    legs = [math.dist(a, b) for a, b in itertools.pairwise(goals)]
     assert info["distance_remaining"] == pytest.approx(info["distance_to_goal"] + sum(legs))
     total, terminated, reached = 0.0, False, 0
     while not terminated:
@@ -55,7 +57,7 @@ def test_the_baseline_reaches_one_goal_after_the_other(ground: dict[str, Any]) -
 
 def target(env: RoverEnv) -> slice:
     """The goal ahead and to the right in a reading."""
-    place = env.simulation.reading_layout["target"]
+    place = env.simulation.reading_layout()["target"]
     return slice(place.start, place.start + 2)
 
 
@@ -65,11 +67,9 @@ def test_goals_lie_as_far_apart_and_turn_as_asked() -> None:
         env.reset(seed=seed)
         start = env.start
         places = [start.position, *start.goals]
-        directions = [math.atan2(a[1] - b[1], b[0] - a[0]) for a, b in zip(places, places[1:], strict=False)]
-        assert all(3.0 <= math.dist(a, b) <= 4.0 for a, b in zip(places, places[1:], strict=False))
-        turns = [
-            math.degrees(math.remainder(b - a, math.tau)) for a, b in zip(directions, directions[1:], strict=False)
-        ]
+        directions = [math.atan2(a[1] - b[1], b[0] - a[0]) for a, b in itertools.pairwise(places)]
+        assert all(3.0 <= math.dist(a, b) <= 4.0 for a, b in itertools.pairwise(places))
+        turns = [math.degrees(math.remainder(b - a, math.tau)) for a, b in itertools.pairwise(directions)]
         assert all(20.0 - 1e-9 <= turn <= 40.0 + 1e-9 for turn in turns)
         assert math.degrees(math.remainder(directions[0] - start.heading, math.tau)) == pytest.approx(10.0)
 
@@ -162,3 +162,13 @@ def test_a_vector_reaches_goals_as_single_rovers_do() -> None:
         assert alone.unwrapped.goal == envs.get_attr("goal")[1]  # type: ignore[attr-defined]
         reached = np.maximum(reached, infos["waypoints_reached"])
     assert (reached >= 1).all()
+
+
+def test_the_planner_turns_to_the_next_goal() -> None:
+    env = course(waypoints=2, goal_distance=1.2, waypoint_turn_deg=40.0)
+    observation, info = env.reset(seed=1)
+    policy = PlannerPolicy(env, PlannerOptions(samples=40, iterations=1))
+    while not info["termination"]:
+        observation, *_, info = env.step(policy.predict(observation)[0])
+        assert info["time"] < 15.0
+    assert info["termination"] == "goal"

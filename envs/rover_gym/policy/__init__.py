@@ -17,6 +17,8 @@ from rover_gym.policy.evaluation import (
     summarise,
 )
 from rover_gym.policy.features import Features
+from rover_gym.policy.goal_env import RoverGoalEnv
+from rover_gym.policy.goal_observation import GoalObservation
 from rover_gym.policy.named_policy import NamedPolicy, named_policy
 from rover_gym.policy.network import Network
 from rover_gym.policy.pd_policy import PDGains, PDPolicy
@@ -37,6 +39,7 @@ __all__ = [
     "Episode",
     "EvaluatedEpisode",
     "Features",
+    "GoalObservation",
     "IntervalEstimate",
     "NamedPolicy",
     "Network",
@@ -49,6 +52,7 @@ __all__ = [
     "PolicySummary",
     "RoverCommandEnv",
     "RoverCommandVectorEnv",
+    "RoverGoalEnv",
     "ScanGains",
     "ScanPolicy",
     "TrainedPolicy",
