@@ -32,6 +32,7 @@ from rover_gym.env.argument_checks import (
     check_waypoints,
     shortest,
 )
+from rover_gym.env.reward_terms import RewardTerm, RewardTerms, check_reward_terms
 from rover_gym.env.rocks import MAX_ABUNDANCE, MAX_DIFFICULTY, ROCK_RADII, check_scan
 from rover_gym.mechanics import RoverModel, Terrain
 from rover_gym.rendering.render_options import check_render_mode, check_render_options
@@ -224,6 +225,14 @@ class RoverArguments(TypedDict, total=False):
     reward_weights: Annotated[
         Mapping[str, float] | None,
         Argument(None, Special("a mapping", check_reward_weights), "weights to replace, by term"),
+    ]
+    reward_terms: Annotated[
+        RewardTerm | RewardTerms | None,
+        Argument(
+            None,
+            Special("a function, or a mapping of functions", check_reward_terms),
+            "further terms of the reward, by name; see Reward",
+        ),
     ]
     render_mode: Annotated[
         str | None,

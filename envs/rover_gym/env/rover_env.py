@@ -17,6 +17,7 @@ from rover_gym.env.generators import check_seed, row_of, seeded, set_row
 from rover_gym.env.observation import ObservationLayout
 from rover_gym.env.progress import Progress
 from rover_gym.env.randomisation import Domain
+from rover_gym.env.reward_terms import earn, total
 from rover_gym.env.rocks import Rocks
 from rover_gym.env.start import Start
 from rover_gym.env.task import Task, make_task
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 
 
 NOT_RUNNING = "RoverEnv: call reset() first"
+#: Termination of an episode whose physics could not take a step.
+STEP_FAILED = "step_failed"
 
 
 @with_argument_table
@@ -120,7 +123,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     ## Reward
 
     The reward is the sum of the terms below, which `info["reward_terms"]` lists; `dt` is the control period.
-    `reward_weights` replaces weights by name.
+    `reward_weights` replaces weights by name; `reward_terms` adds terms of your own.
 
     | term            | formula                                                        | weight w |
     |-----------------|----------------------------------------------------------------|----------|
@@ -137,6 +140,13 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     If the physics could not take a step, only `failure` counts. The quantities of one step are bounded, whatever the
     physics did: 30 m of progress either way, 4e5 J of work, 60 s of `dt`, a slip ratio of 2. With these weights the
     reward of a step therefore never exceeds 90 in magnitude.
+
+    A term of your own is a function `term(before, action, after, info)` of a control period, given as
+    `reward_terms={"name": term}` or, with the function's own name, `reward_terms=term`. `before` and `after` are the
+    observations before and after it, split into fields in SI units, and what is returned is added as it is. In a vector each
+    array has a leading axis of rovers, and one number a rover is returned: `after["q"][..., 1] - before["q"][..., 1]`
+    pays for climbing in both. A function that raises or returns no finite number is refused with `OptionError`, which
+    names it; the period has then been taken.
 
     ## Start
 
@@ -322,7 +332,9 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         self._scene = scene_of(
             self.task, drawn.starts[0], drawn.rocks[0], drawn.rock_seeds[0], drawn.domains[0], drawn.terrain(0)
         )
-        return self._episode.observation, self._episode.info()
+        info = self._episode.info()
+        info["reward_terms"] |= dict.fromkeys(self.task.reward_terms, 0.0)
+        return self._episode.observation, info
 
     def step(
         self, action: npt.NDArray[np.float32]
@@ -332,10 +344,12 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         Raises:
             CommandError: The action has a wrong shape or an entry that is not finite or outside
                 [-1, 1]; nothing has changed.
+            OptionError: A function of `reward_terms` fails; the period has been taken.
             ResetNeeded: The environment has not been reset.
         """
         if self._scene is None:
             raise ResetNeeded(NOT_RUNNING)
+        before = self._episode.observation if self.task.reward_terms else None
         if self.task.is_noisy:
             normals, after = standard_normals(row_of(self.np_random)[None], self.task.layout.size)
             result = self._episode.step(self._moving(), action, normals[0], has_scan=self.has_scan)
@@ -343,7 +357,22 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         else:
             result = self._episode.step(self._moving(), action, has_scan=self.has_scan)
         observation, reward, terminated, info = result
+        if before is not None:
+            reward += self._earn(before, action, observation, info)
         return observation, reward, terminated, False, info
+
+    def _earn(
+        self,
+        before: npt.NDArray[np.float32],
+        action: npt.NDArray[np.float32],
+        after: npt.NDArray[np.float32],
+        info: dict[str, Any],
+    ) -> float:
+        """The user's terms of a control period, which are added to its info; returns their sum."""
+        task, counts = self.task, info["termination"] != STEP_FAILED
+        own = earn(task.reward_terms, task.layout, before, action, after, info, counts)
+        info["reward_terms"] |= {name: float(term) for name, term in own.items()}
+        return float(total(own.values()))
 
     def _moving(self) -> Simulation | RoverGrainSimulation:
         """What a control period moves."""

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from rover_gym.env import rewards
 from rover_gym.env.observation import ObservationLayout, build_layout
 from rover_gym.env.randomisation import Domain, DomainDistribution
+from rover_gym.env.reward_terms import RewardTerms
 from rover_gym.env.rocks import MAX_GOAL_DISTANCE, RockDistribution, rock_distribution
 from rover_gym.env.start import StartDistribution, slope_of
 from rover_gym.env.wheels import Steering
@@ -59,6 +60,7 @@ class Task:
         simulation_options: Keyword arguments of `Simulation`.
         max_steering: Set-point of a steering action of 1, rad; 0 where nothing steers.
         layout: Layout of the observation.
+        reward_terms: Terms of the reward that the user gives, by name.
         rules: What the core needs to run an episode.
         episodes: What the core draws episodes from.
     """
@@ -80,6 +82,7 @@ class Task:
     simulation_options: Mapping[str, Any]
     max_steering: float
     layout: ObservationLayout
+    reward_terms: RewardTerms
     rules: EpisodeRules
     episodes: EpisodeDistribution
 
@@ -209,6 +212,7 @@ def make_task(given: Mapping[str, Any]) -> Task:
         simulation_options=options,
         max_steering=max_steering,
         layout=layout,
+        reward_terms=given["reward_terms"] or {},
         rules=rules,
         episodes=episodes,
     )

@@ -36,6 +36,7 @@ from rover_gym.env.task import Task, check_actions
 from rover_gym.mechanics import DrawnEpisodes, EpisodeBatch, OptionError, Plane, RoverModel, Simulation
 from rover_gym.validation import Range, refuse, whole
 from rover_gym.vector.batch_snapshot import BatchSnapshot, check_batch_snapshot
+from rover_gym.vector.batch_terms import BatchTerms
 
 if TYPE_CHECKING:
     from rover_gym.rendering import FrameRenderer
@@ -82,6 +83,7 @@ class RoverBatch:
         self.episodes = EpisodeBatch(
             self.task.rules, simulation, self.n, max_steps=self.max_episode_steps, threads=threads
         )
+        self._terms = BatchTerms(self.task, self.episodes)
         self.rovers = tuple(BatchRover(self, i) for i in range(self.n))
         #: Generators of the rovers before their first episodes; afterwards the core has them.
         self._generators: Rows = np.zeros((self.n, 4), np.uint64)
@@ -143,6 +145,7 @@ class RoverBatch:
         chosen, episodes = drawn.chosen, drawn.episodes
         self.episodes.begin(chosen, episodes)
         self._begun[chosen] = True
+        self._terms.clear(chosen)
         for i, seed in zip(chosen, drawn.seeds, strict=True):
             self._seeds[i] = seed
         for i in drawn.seeded & self._lent.keys():
@@ -167,11 +170,17 @@ class RoverBatch:
         Raises:
             CommandError: The actions have a wrong shape or an entry that is not finite or outside [-1, 1]; nothing
                 has changed.
+            OptionError: A function of `reward_terms` fails; the period has been taken.
             ResetNeeded: A rover has not been reset.
         """
         self._check_begun(actions)
+        before = self._terms.before()
         with self._lending(self._lent if self.task.is_noisy else ()):
-            return self.episodes.step(actions, active, has_scan=has_scan)
+            stepped = self.episodes.step(actions, active, has_scan=has_scan)
+        if before is not None:
+            moved = np.ones(self.n, np.bool_) if active is None else np.asarray(active)
+            self._terms.earn(before, actions, stepped, moved, self.episodes.infos())
+        return stepped
 
     def step_on(
         self, actions: object, *, same_step: bool, has_scan: bool = True
@@ -192,18 +201,24 @@ class RoverBatch:
 
         Raises:
             CommandError: As of `step`.
+            OptionError: As of `step`.
             ResetNeeded: A rover has not been reset.
             TerrainError: As `RoverEnv.reset`, for a rover whose episode was over; nothing has changed.
         """
         self._check_begun(actions)
+        before = self._terms.before()
+        moved = np.isin(np.arange(self.n), self.over, invert=True) if before is not None else None
         with self._lending(self._lent):
-            return self.episodes.step_on(
+            stepped = self.episodes.step_on(
                 actions,
                 self.task.episodes,
                 same_step=same_step,
                 attempts=beginning.PLACING_ATTEMPTS,
                 has_scan=has_scan,
             )
+        if before is not None and moved is not None:
+            self._terms.earn(before, actions, stepped, moved, self.episodes.infos(), self.episodes.finals())
+        return stepped
 
     @property
     def over(self) -> list[int]:
@@ -212,15 +227,15 @@ class RoverBatch:
 
     def finals(self) -> dict[int, tuple[Observations, dict[str, Any]]]:
         """Last observations `(size,) float32` and infos of the episodes that the last `step_on` has ended, by rover."""
-        return self.episodes.finals()
+        return self._terms.add_to_finals(self.episodes.finals())
 
     def info(self, i: int) -> dict[str, Any]:
         """The info of rover i's last period or reset, as `RoverEnv` returns it."""
-        return self.episodes.info(i)
+        return self._terms.add_to_info(i, self.episodes.info(i))
 
     def infos(self) -> dict[str, Any]:
         """The infos of all n rovers, as one array per key with Gymnasium's masks."""
-        return self.episodes.infos()
+        return self._terms.add_to_infos(self.episodes.infos())
 
     def snapshot(self) -> BatchSnapshot:
         """Returns the state of all rovers, of their episodes and random generators, for `restore`.
@@ -243,7 +258,7 @@ class RoverBatch:
         )
         messages = tuple(str(message) for message in self.infos()["solver"]["message"])
         steps = tuple(self.episodes.steps(i) for i in range(self.n))
-        return BatchSnapshot(rovers, steps, tuple(self._seeds), messages)
+        return BatchSnapshot(rovers, steps, tuple(self._seeds), messages, self._terms.state())
 
     def restore(self, snapshot: BatchSnapshot) -> None:
         """Restores a snapshot of a batch of as many rovers with the same arguments, which then continues bit for bit.
@@ -254,7 +269,9 @@ class RoverBatch:
             StateError: The value is no snapshot, is damaged, or comes from a batch of other size or arguments; nothing
                 has changed.
         """
-        for i, rover in enumerate(check_batch_snapshot(self.task, self.n, snapshot)):
+        checked = check_batch_snapshot(self.task, self.n, snapshot)
+        self._terms.set_state(snapshot.terms)
+        for i, rover in enumerate(checked):
             self.episodes.resume(
                 [i],
                 rover.simulation,
