@@ -41,10 +41,16 @@ ENVIRONMENTS: Mapping[str, Registration] = {
         2 * MAX_EPISODE_STEPS,
         {"waypoints": 5, "goal_distance": (4.0, 8.0)},
     ),
+    "RoverBattery-v0": Registration(
+        "rover_gym.env:RoverEnv",
+        "rover_gym.vector:RoverVectorEnv",
+        arguments={"terrain": "sphere_field", "goal_distance": (10.0, 14.0), "battery": 7000.0},
+    ),
     "RoverCommand-v0": Registration(
         "rover_gym.policy:RoverCommandEnv", "rover_gym.policy:RoverCommandVectorEnv", MAX_COMMANDS
     ),
     "RoverGoal-v0": Registration("rover_gym.policy:RoverGoalEnv", max_episode_steps=MAX_COMMANDS),
+    "RoverTrap-v0": Registration("rover_gym.policy:RoverTrapEnv", max_episode_steps=MAX_EPISODE_STEPS // 2),
     "RoverGrains-v0": Registration("rover_gym.env:RoverGrainsEnv"),
 }
 

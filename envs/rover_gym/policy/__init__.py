@@ -27,6 +27,7 @@ from rover_gym.policy.policy_files import PolicyError
 from rover_gym.policy.scan_policy import ScanGains, ScanPolicy
 from rover_gym.policy.shipped import find_policy, policy_arguments, policy_folder
 from rover_gym.policy.trained_policy import TrainedPolicy
+from rover_gym.policy.trap_env import RoverTrapEnv
 
 __all__ = [
     "ENDS",
@@ -53,6 +54,7 @@ __all__ = [
     "RoverCommandEnv",
     "RoverCommandVectorEnv",
     "RoverGoalEnv",
+    "RoverTrapEnv",
     "ScanGains",
     "ScanPolicy",
     "TrainedPolicy",
