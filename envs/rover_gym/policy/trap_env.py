@@ -40,10 +40,11 @@ class RoverTrapEnv(RoverEnv):
 
     ## Start
 
-    A scene is drawn as in `RoverRocks-v0`, and the PD baseline drives towards its goal. Where the trunk has carried more than
-    a tenth of the weight for 2 s while the rover stood, the drive has ended in a trap: the episode starts in this pose, at
-    rest, with the time zero. Drives that end otherwise are followed by another scene; after 100 of them `reset` raises
-    `TerrainError`. A reset costs as much as some seconds of driving a scene. The goal stays where it was, beyond the trap.
+    A scene is drawn as in `RoverRocks-v0`, and the PD baseline drives towards its goal. Where the trunk has carried
+    more than a tenth of the weight for 2 s while the rover stood, the drive has ended in a trap: the episode starts in
+    this pose, at rest, with the time zero. Drives that end otherwise are followed by another scene; after 100 of them
+    `reset` raises `TerrainError`. A reset costs as much as some seconds of driving. The goal stays where it was, beyond
+    the trap.
 
     The options of `reset` fix the scene that is driven in. With `q` nobody drives: the episode starts in that state.
 
@@ -58,8 +59,8 @@ class RoverTrapEnv(RoverEnv):
 
     ## End
 
-    `terminated`, with `info["termination"]`: `"free"`, the trunk's origin is `free_distance` away from where the episode
-    started, in any direction: a success; and as in `Rover-v0`. `stuck_time` is 60 s by default, so that a rover
+    `terminated`, with `info["termination"]`: `"free"`, the trunk's origin is `free_distance` away from where the
+    episode started, in any direction: a success; and as in `Rover-v0`. `stuck_time` is 60 s by default, so that a rover
     that is still held goes on trying. `truncated`: after 600 steps (30 s).
 
     ## Info
@@ -68,8 +69,8 @@ class RoverTrapEnv(RoverEnv):
 
     ## Arguments
 
-    Those of `Rover-v0`, with other defaults of `terrain` ("sphere_field"), `difficulty` ((1.0, 1.5)) and `stuck_time` (60), one
-    goal, and in addition:
+    Those of `Rover-v0`, with other defaults of `terrain` ("sphere_field"), `difficulty` ((1.0, 1.5)) and `stuck_time`
+    (60), one goal, and in addition:
 
     | name          | default | unit | meaning                                      |
     |---------------|---------|------|----------------------------------------------|
@@ -94,15 +95,9 @@ class RoverTrapEnv(RoverEnv):
         # The terms of this task take the place of those two, and the baseline drives without noise.
         silent = {"reward_weights": {**weights, "progress": 0.0, "success": 0.0}}
         self.task = RoverEnv(**(given | silent)).task
-        quiet = {
-            "stuck_time": HELD,
-            "observation_noise": 0.0,
-            "battery": None,
-            "reward_terms": None,
-            "height_scan": False,
-        }
-        self._driven = RoverEnv(**(given | quiet | {"render_mode": None})).task
-        self._driver = PDPolicy(RoverEnv(**(given | quiet | {"render_mode": None})))
+        quiet = {"stuck_time": HELD, "observation_noise": 0.0, "height_scan": False}
+        driven = RoverEnv(**(given | quiet | dict.fromkeys(("battery", "reward_terms", "render_mode"))))
+        self._driven, self._driver = driven.task, PDPolicy(driven)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
