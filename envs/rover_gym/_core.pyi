@@ -1175,6 +1175,68 @@ class Contacts:
     def __len__(self) -> int: ...
 
 @final
+class PathSearch:
+    """Finds the cheapest of many paths of a rover over a height scan, by beam search.
+
+    `rover_gym.policy.ScanPolicy` drives by it, and `rover_gym.policy.PathCosts` says what a path
+    costs. Poses are way ahead, way to the right, m, and turn to the left, rad.
+
+    Args:
+        scan: Rows, columns and spacing, m, of the height scan.
+        outline: The rover in the trunk's frame: `wheels` (n_wheels, 2) and `underside` (n, 2), x
+            and z, m; `clearance` (n,) of the underside, m; `plane_fit` (3, n_wheels), level and
+            slopes of the ground plane by the heights under the wheels; `x_c`, m, of the point that
+            follows the path; `radius` of the wheels, m.
+        costs: The fields of `PathCosts`.
+        first: The arcs that a path may begin with: `poses` (n, 4, 3), `direction` (n,), 1 or -1,
+            and `commands` (n, 3), speed, curvature and sideways.
+        further: Those that it may go on with: `poses` and `direction`.
+        reach: The rover's reach, m.
+        arrival: Distance within which the goal is reached, m.
+
+    Raises:
+        OptionError: An argument is missing, no number, or of a wrong shape.
+    """
+
+    def __new__(
+        cls,
+        *,
+        scan: tuple[int, int, float],
+        outline: Mapping[str, Any],
+        costs: Mapping[str, float],
+        first: Mapping[str, Any],
+        further: Mapping[str, Any],
+        reach: float,
+        arrival: float,
+    ) -> PathSearch: ...
+    def best(
+        self,
+        heights: npt.ArrayLike,
+        goal: npt.ArrayLike,
+        command: npt.ArrayLike,
+        boldness: float,
+        traps: npt.ArrayLike,
+        retreat: float,
+    ) -> int:
+        """The first arc of the cheapest path.
+
+        Args:
+            heights: `(rows * columns,)` heights of the scan, m.
+            goal: The goal ahead and to the right of the point that follows the path, m.
+            command: `(3,)` the present command; its first entry is 0 at a start.
+            boldness: Factor on the costs of belly, climb and lean.
+            traps: `(n, 3)` poses where the rover got stuck.
+            retreat: Direction of the first arc, 1 or -1, while the rover backs off; 0 for a free
+                choice.
+
+        Returns:
+            The index of the arc among the first arcs.
+
+        Raises:
+            OptionError: An argument has a wrong shape or an entry that is not finite.
+        """
+
+@final
 class Linearisation:
     """Derivatives of a time step by state and command, as `Simulation.linearise` returns them.
 

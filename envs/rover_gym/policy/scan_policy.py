@@ -14,7 +14,6 @@ from rover_gym.mechanics import OptionError, RoverModel, StateError, exp, sin_co
 from rover_gym.policy.arc_search import ArcSearch, PathCosts, SearchTask
 from rover_gym.policy.command import CommandController, CommandLimits
 from rover_gym.policy.features import ground_slope
-from rover_gym.policy.ground_grid import GroundGrid
 from rover_gym.policy.observed import check_observed
 from rover_gym.policy.pd_policy import find_rover_env
 from rover_gym.policy.rover_outline import RoverOutline
@@ -136,14 +135,13 @@ class ScanPolicy:
         first, further = _arcs(rover, turning, limits)
         side = math.radians(limits.sideways_deg)
         self._commands = np.column_stack((first.direction, first.curvature / limits.curvature, first.sideways / side))
-        points = np.concatenate((outline.wheels, outline.underside)) - [turning.x_c, 0.0]
-        self._grid = GroundGrid(scan, points, turning.x_c)
         self._search = ArcSearch(
             first,
             further,
             self._commands,
-            grid=self._grid,
+            scan=scan,
             outline=outline,
+            x_c=turning.x_c,
             reach=self._reach,
             radius=float(model.wheel_radii.max()),
             arrival=0.6 * rover.task.goal_tolerance,
@@ -216,7 +214,7 @@ class ScanPolicy:
         # Over the ground plane a slope costs nothing.
         rise = slope[0] * self._offsets[:, 0] + slope[1] * self._offsets[:, 1]
         heights = row[self._heights] * self._scale[self._heights] - rise
-        command: Array = self._commands[self._search.best(self._grid.spread(heights), task)]
+        command: Array = self._commands[self._search.best(heights, task)]
         if command[0] < 0.0 and not task.retreat:
             memory.command[i, 0] = 1.0  # the way not to go
             self._back_off(memory, i, x, z, heading)
