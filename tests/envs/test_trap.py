@@ -61,6 +61,17 @@ def test_who_backs_out_comes_free(env: RoverTrapEnv) -> None:
     assert ends.count("free") >= 2
 
 
+def test_a_goal_beside_the_trap_is_a_success_too(env: RoverTrapEnv) -> None:
+    env.reset(seed=0)
+    x, z = env.start.position
+    env.reset(options={"q": env.simulation.q, "goal": (x + 0.3, z)})
+    _, reward, terminated, _, info = env.step(np.zeros(12, np.float32))
+    assert terminated
+    assert (info["termination"], info["success"]) == ("goal", True)
+    assert info["reward_terms"]["success"] == 10.0
+    assert reward == pytest.approx(sum(info["reward_terms"].values()))
+
+
 def test_the_same_seed_is_the_same_trap() -> None:
     arguments: dict[str, Any] = {"observation_noise": 0.01, "friction": (0.5, 0.8), "battery": 3000.0}
     one, other = RoverTrapEnv(**arguments), RoverTrapEnv(**arguments)

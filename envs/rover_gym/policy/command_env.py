@@ -95,9 +95,9 @@ class RoverCommandEnv(DriveByCommand):
 
 
 class RoverCommandVectorEnv(CommandVectorEnv):
-    """A vector of `RoverCommandEnv`s that the compiled core steps on several threads.
+    """A vector of `RoverCommandEnv` environments that the compiled core steps on several threads.
 
-    Observations, rewards and ends equal, bit for bit, those of a `SyncVectorEnv` of `RoverCommandEnv`s with a
+    Observations, rewards and ends equal, bit for bit, those of a `SyncVectorEnv` of them with a
     `TimeLimit` and the same arguments and seeds.
 
     Args:

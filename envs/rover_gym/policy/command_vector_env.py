@@ -24,7 +24,7 @@ Array = npt.NDArray[np.float32]
 class CommandVectorEnv(VectorWrapper):
     """Holds each rover's command for several steps and sums the rewards, as `DriveByCommand` does for one rover.
 
-    Observations, rewards and ends equal, bit for bit, those of a `SyncVectorEnv` of `DriveByCommand`s; the rovers are
+    Observations, rewards and ends equal, bit for bit, those of a `SyncVectorEnv` of such environments; the rovers are
     stepped together. A rover whose episode ends while its command is held stands still until the others' commands are
     over. Its next episode starts with the next command or, with autoreset in the same step, then and there.
 

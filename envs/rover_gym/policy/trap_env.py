@@ -53,7 +53,7 @@ class RoverTrapEnv(RoverEnv):
     | term     | formula                                                        | weight w |
     |----------|----------------------------------------------------------------|----------|
     | progress | w (d_after - d_before), d the horizontal distance from the trap | 1       |
-    | success  | w on the step that comes free                                  | 10       |
+    | success  | w on the step that comes free, or reaches the goal             | 10       |
 
     The other terms are those of `Rover-v0`.
 
@@ -149,7 +149,7 @@ class RoverTrapEnv(RoverEnv):
         is_free = now >= self.free_distance and info["termination"] in ("", "goal")
         terms = info["reward_terms"]
         terms["progress"] = self._weights["progress"] * (now - before)
-        terms["success"] = self._weights["success"] * is_free
+        terms["success"] = self._weights["success"] * (is_free or info["success"])
         if is_free:
             info["termination"], info["success"], info["is_success"] = FREE, True, True
         info["distance_from_trap"] = now

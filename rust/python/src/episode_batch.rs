@@ -430,7 +430,7 @@ impl EpisodeBatch {
         origin: &Bound<'_, PyAny>,
         generator: &Bound<'_, PyAny>,
         steps: Given<'_>,
-        message: Option<String>,
+        message: Option<&str>,
     ) -> PyResult<()> {
         let one = self::simulation(simulation, "simulation")?.get();
         let cast = episode.cast::<EpisodeRun>();
@@ -453,7 +453,7 @@ impl EpisodeBatch {
                 whole,
                 origin.clone(),
                 random,
-                message.clone(),
+                message.map(str::to_owned),
             );
             resumed.map_err(BorderError::from)?;
             held.origins[index] = one.origin().clone();
