@@ -143,5 +143,5 @@ def _summarise(difficulty: float, results: Sequence[Episode]) -> BaselineRow:
         interval=wilson_interval(len(times), len(results)),
         time_to_goal=sum(times) / len(times) if times else math.nan,
         energy_per_metre=sum(episode.energy for episode in results) / way if way > 0.0 else math.nan,
-        ends={end: counts[end] for end in ENDS},
+        ends=dict.fromkeys(ENDS, 0) | counts,
     )
