@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -20,14 +21,15 @@ Torque = Callable[[float], float]
 
 #: Standard deviations of the noise: m and rad, m/s and rad/s.
 NOISE = {"q": 1e-3, "v": 1e-2}
-BELIEVED: dict[str, Any] = {"model": RoverModel(), "settings": {"friction": 0.7}}
+MODEL = RoverModel.named("skid-steered")
+BELIEVED: dict[str, Any] = {"model": MODEL, "settings": {"friction": 0.7}}
 
 
 def a_run(
     path: Path, torque: Torque, seconds: float = 1.0, *, friction: float = 0.5, mass_scale: float = 1.2
 ) -> RoverRun:
-    """A rover that stands at first, driven over flat ground; a row each 0.05 s."""
-    sim = Simulation(RoverModel().replace(mass_scale=mass_scale), friction=friction)
+    """A rover that stands at first, driven over flat ground; a row each 0.02 s."""
+    sim = Simulation(MODEL.replace(mass_scale=mass_scale), friction=friction)
     sim.set_state(sim.model.resting_pose(sim.terrain, (0.0, 0.0), 0.0))
     sim.step(200)
     sim.set_state(sim.q)
@@ -35,8 +37,8 @@ def a_run(
     with Recorder(path, sampler.channels, describe(sim, "a drive"), terrain=sim.terrain) as recorder:
         recorder.append(sampler.row(sim))
         while sim.time < seconds - 1e-9:
-            sim.set_wheel_torques(np.full(6, torque(sim.time)))
-            sim.step(10)
+            sim.set_wheel_torques(np.full(4, torque(sim.time)))
+            sim.step(4)
             recorder.append(sampler.row(sim))
     return read_run(path)
 
@@ -53,52 +55,59 @@ def with_noise(run: RoverRun, seed: int) -> RoverRun:
 @pytest.fixture(scope="module")
 def slipping(tmp_path_factory: pytest.TempPathFactory) -> RoverRun:
     """Wheels that spin and hold again."""
-    return a_run(tmp_path_factory.mktemp("run") / "slipping.h5", lambda t: 120.0 if 0.3 <= t < 0.5 else 30.0)
+    return a_run(tmp_path_factory.mktemp("run") / "slipping.h5", lambda t: 20.0 if t % 0.5 > 0.3 else 2.0, 1.5)
 
 
 @pytest.fixture(scope="module")
 def rolling(tmp_path_factory: pytest.TempPathFactory) -> RoverRun:
     """Wheels that hold."""
-    return a_run(tmp_path_factory.mktemp("run") / "rolling.h5", lambda t: 10.0 + 20.0 * t)
+    return a_run(tmp_path_factory.mktemp("run") / "rolling.h5", lambda t: 0.3 + t)
+
+
+#: Fits by seed, each made once.
+Fits = Callable[[int], Identification]
 
 
 @pytest.fixture(scope="module")
-def found(slipping: RoverRun) -> list[Identification]:
-    """Mass and friction from several noisy recordings, with models that are wrong in both."""
-    return [
-        identify(with_noise(slipping, seed), ["mass_scale", "friction"], window=0.3, **BELIEVED) for seed in range(6)
+def fits(slipping: RoverRun) -> Fits:
+    """Mass and friction from noisy recordings, with a model and a ground that are wrong in both."""
+
+    @cache
+    def fit(seed: int) -> Identification:
+        return identify(with_noise(slipping, seed), ["mass_scale", "friction"], window=0.3, **BELIEVED)
+
+    return fit
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_parameters_are_recovered_within_their_uncertainty(fits: Fits, seed: int) -> None:
+    for estimate, truth in zip(fits(seed).estimates, (1.2, 0.5), strict=True):
+        assert estimate.is_identified
+        assert estimate.standard_error < 0.03 * truth
+        assert abs(estimate.value - truth) < 3.5 * estimate.standard_error
+
+
+def test_most_95_percent_intervals_hold_the_truth(fits: Fits) -> None:
+    intervals = [
+        (one.interval, truth) for seed in range(4) for one, truth in zip(fits(seed).estimates, (1.2, 0.5), strict=True)
     ]
+    # Of eight intervals of 95% fewer than six hold it in 6 of 1000 cases.
+    assert sum(low < truth < high for (low, high), truth in intervals) >= 6
 
 
-def test_parameters_are_recovered_within_their_uncertainty(found: list[Identification]) -> None:
-    truth = np.array([1.2, 0.5])
-    off = np.array(
-        [
-            [(one.value - true) / one.standard_error for one, true in zip(fit.estimates, truth, strict=True)]
-            for fit in found
-        ]
-    )
-    # Of twelve normal variables: the largest beyond 3.5 in 6 of 1000 cases, the root mean square outside [0.5, 1.6] in 4.
-    assert np.abs(off).max() < 3.5
-    assert 0.5 < np.sqrt((off**2).mean()) < 1.6
-    errors = np.array([[one.standard_error for one in fit.estimates] for fit in found])
-    assert (errors < 0.01 * truth).all()
-    assert all(estimate.is_identified for fit in found for estimate in fit.estimates)
+def test_the_noise_is_estimated(fits: Fits) -> None:
+    fit = fits(0)
+    assert len(fit.columns) == len(fit.deviations) == 20
+    np.testing.assert_allclose(fit.deviations[:10], NOISE["q"], rtol=0.2)
+    np.testing.assert_allclose(fit.deviations[10:], NOISE["v"], rtol=0.2)
+    assert 0.8 < fit.mean_square < 1.25
 
 
-def test_the_noise_is_estimated(found: list[Identification]) -> None:
-    for fit in found:
-        assert len(fit.columns) == len(fit.deviations) == 42
-        assert np.sqrt((fit.deviations[:21] ** 2).mean()) == pytest.approx(NOISE["q"], rel=0.3)
-        assert np.sqrt((fit.deviations[21:] ** 2).mean()) == pytest.approx(NOISE["v"], rel=0.3)
-        assert 0.7 < fit.mean_square < 1.6
-
-
-def test_residuals_and_covariance_belong_together(found: list[Identification]) -> None:
-    fit = found[0]
+def test_residuals_and_covariance_belong_together(fits: Fits) -> None:
+    fit = fits(0)
     assert [len(time) for time in fit.times] == [len(rows) for rows in fit.residuals]
     rows = np.concatenate(fit.residuals)
-    assert np.sqrt((rows[:, 21:] ** 2).mean()) < 1.5 * NOISE["v"]
+    assert np.sqrt((rows[:, 10:] ** 2).mean()) < 1.5 * NOISE["v"]
     np.testing.assert_allclose(np.sqrt(np.diag(fit.covariance)), [one.standard_error for one in fit.estimates])
     assert np.abs(fit.correlation[0, 1]) < 1.0
     low, high = fit["friction"].interval
@@ -140,9 +149,9 @@ def test_a_parameter_of_ones_own(slipping: RoverRun) -> None:
     def apply(setup: Any, value: float) -> Any:
         return replace(setup, model=setup.model.replace(masses={"trunk": value}))
 
-    trunk = Parameter("trunk", "kg", start=900.0, low=100.0, high=2000.0, scale=300.0, apply=apply)
+    trunk = Parameter("trunk", "kg", start=50.0, low=10.0, high=100.0, scale=20.0, apply=apply)
     fit = identify(with_noise(slipping, 3), [trunk], window=0.3, max_windows=2)
-    assert abs(fit["trunk"].value - 720.0) < 4.0 * fit["trunk"].standard_error
+    assert abs(fit["trunk"].value - 1.2 * 33.455) < 4.0 * fit["trunk"].standard_error
     assert fit["trunk"].unit == "kg"
 
 
@@ -178,7 +187,7 @@ def with_rows(run: RoverRun, name: str, rows: npt.ArrayLike) -> RoverRun:
         ({"settings": {"frction": 0.5}}, "settings.frction"),
         ({"settings": {"friction": -0.5}}, "friction"),
         ({"model": 3}, "model"),
-        ({"model": RoverModel.named("skid-steered")}, "model"),
+        ({"model": RoverModel()}, "model"),
     ],
 )
 def test_wrong_arguments_are_named(rolling: RoverRun, arguments: dict[str, Any], field: str) -> None:
@@ -193,7 +202,7 @@ def test_what_a_recording_lacks_is_named(rolling: RoverRun) -> None:
     cases = {
         "recording": without(rolling, "steering_set_points"),
         "recording.v": with_rows(rolling, "v", v),
-        "recording.time[1]": with_rows(rolling, "time", rolling.time * 1.01),
+        "recording.time[4]": with_rows(rolling, "time", [*rolling.time[:4], *(rolling.time[4:] + 0.001)]),
     }
     for field, run in cases.items():
         with pytest.raises(OptionError) as caught:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.identification.fitting import is_told
 from rover_gym.identification.parameters import Parameter
 from rover_gym.mechanics import OptionError
 from rover_gym.validation import refuse
@@ -15,12 +16,6 @@ Array = npt.NDArray[np.float64]
 
 #: Quantile of the normal distribution for 95%.
 Z95 = 1.959963984540054
-#: A combination of parameters is open if its standard deviation is larger than half of its scale. Less would not do:
-#: noise lets wheels that hold seem to slip for a step, which makes a friction that does not matter look measured.
-LEAST_SENSITIVITY = 2.0
-#: It is also open if its sensitivity is smaller than this part of the largest one: differences of
-#: a simulation with contacts tell no more.
-SMALLEST_SENSITIVITY = 1e-4
 #: A parameter takes part in a combination if it makes up more than this part of it.
 SMALLEST_PART = 0.05
 
@@ -140,10 +135,7 @@ class OpenCombination:
 
 
 def open_combinations(jacobian: Array, scales: Array, variance: float) -> tuple[Array, list[OpenCombination]]:
-    """The sensitivities of a fit, and the combinations of parameters that it leaves open.
-
-    A combination is open if its standard deviation is larger than half of its scale, or its sensitivity too small a
-    part of the largest one.
+    """The sensitivities of a fit, and the combinations of parameters that the run does not tell.
 
     Args:
         jacobian: (m, p) derivative of the weighted residuals by the parameters.
@@ -152,9 +144,8 @@ def open_combinations(jacobian: Array, scales: Array, variance: float) -> tuple[
     """
     sensitivities, directions = np.linalg.svd(jacobian * scales / math.sqrt(variance), full_matrices=False)[1:]
     found = []
-    for sensitivity, direction in zip(sensitivities, directions, strict=True):
-        if sensitivity < max(LEAST_SENSITIVITY, SMALLEST_SENSITIVITY * sensitivities[0]):
-            parts = direction**2
-            order = np.argsort(-parts)
-            found.append(OpenCombination(tuple(int(i) for i in order if parts[i] > SMALLEST_PART)))
+    for direction in directions[~is_told(sensitivities)]:
+        parts = direction**2
+        order = np.argsort(-parts)
+        found.append(OpenCombination(tuple(int(i) for i in order if parts[i] > SMALLEST_PART)))
     return sensitivities, found

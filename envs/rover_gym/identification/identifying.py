@@ -1,6 +1,7 @@
 """Fits parameters of rover and ground to a recorded run."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.identification.estimates import Estimate, Identification, open_combinations
-from rover_gym.identification.fitting import EXACT, SMALLEST_CHANGE, Solution, WindowFit
+from rover_gym.identification.fitting import SMALLEST_CHANGE, Solution, WindowFit
 from rover_gym.identification.parameters import Parameter, Setup, chosen_parameters
+from rover_gym.identification.profiles import look_around, variance_of
 from rover_gym.identification.windows import Window, cut
 from rover_gym.mechanics import OptionError, RoverModel
 from rover_gym.record.channels import state_channels
@@ -42,7 +44,7 @@ def identify(
     the recorded commands from a state of its own, which is estimated together with the parameters, since it is measured
     with noise. The commands of a row are those under which the rover came to it from the row before, as `rover drive`
     records them. The sum of squares of simulated minus measured coordinates and velocities, over their standard
-    deviations, is minimised by the method of Levenberg and Marquardt; derivatives are central differences of
+    deviations, is minimised by the method of Gauss and Newton; derivatives are central differences of
     simulations. The covariance is that of linear least squares at the minimum.
 
     Args:
@@ -57,7 +59,7 @@ def identify(
         window: Length of a window, s.
         max_windows: Largest number of windows; of more, as many are taken at equal distances.
         noise: Standard deviations of the measured coordinates, "q", m and rad, and velocities, "v", m/s and rad/s. By
-            default each column's is estimated from its residuals.
+            default those of place, attitude, joints and their rates are estimated from the residuals.
         max_iterations: Largest number of iterations.
         progress: Called with the number of an iteration and the mean square of the weighted residuals.
 
@@ -81,30 +83,48 @@ def identify(
     fit = WindowFit(setup, chosen, windows)
     solution = fit.solve(_values(chosen), deviations, iterations=max_iterations, progress=progress)
     if noise is None:
-        estimated = _estimated_noise(solution)
+        estimated = _estimated_noise(solution, nq)
         solution = fit.solve(solution.values, estimated, iterations=max_iterations, progress=progress)
-    variance = _variance(solution, len(chosen))
     scales = np.array([parameter.scale for parameter in chosen])
-    sensitivities, found = open_combinations(solution.jacobian, scales, variance)
+    sensitivities, found = open_combinations(solution.jacobian, scales, variance_of(solution, len(chosen)))
     reasons: dict[int, str] = {}
-    held: list[int] = []
+    held: dict[int, float] = {}
     for combination in found:
         reasons |= {one: combination.reason(chosen, one) for one in combination.members}
-        held.append(next(one for one in combination.members if one not in held))
-    if held:
-        # What is open stays where it began; the others are as they are best then.
-        fit = fit.hold(held)
-        free = [i for i in range(len(chosen)) if i not in held]
-        values = _values(chosen)
-        if free:
-            solution = fit.solve(
-                solution.values[free], solution.deviations, iterations=max_iterations, progress=progress
-            )
-            values[free] = solution.values
-        variance = _variance(solution, len(free))
-    else:
-        free, values = list(range(len(chosen))), solution.values
-    return _identification(chosen, windows, solution, values, free, reasons, sensitivities, variance, setup)
+        held |= next({one: chosen[one].start} for one in combination.members if one not in held)
+    # What the run does not tell stays where the search began; the others are as they are best then.
+    free, told, best = _free(fit, solution, chosen, held, max_iterations)
+    factors: dict[int, float] = {}
+    if free:
+        around = look_around(told, best, [chosen[i] for i in free], max_iterations)
+        best = around.solution
+        factors = dict(zip(free, around.factors.tolist(), strict=True))
+        if around.flat:
+            reasons |= {free[i]: reason for i, reason in around.flat.items()}
+            held |= {free[i]: chosen[free[i]].start for i in around.flat}
+            fit.go_on_from(told)
+            solution = replace(solution, values=_inserted(solution.values, free, best.values))
+            free, told, best = _free(fit, solution, chosen, held, max_iterations)
+    widened = np.array([factors[i] for i in free])
+    return _identification(chosen, windows, best, free, widened, reasons, sensitivities, setup)
+
+
+def _free(
+    fit: WindowFit, solution: Solution, parameters: Sequence[Parameter], held: Mapping[int, float], iterations: int
+) -> tuple[list[int], WindowFit, Solution]:
+    """The indices of what is not held, its fit, and its minimum."""
+    free = [i for i in range(len(parameters)) if i not in held]
+    if not held:
+        return free, fit, solution
+    told = fit.hold(held)
+    return free, told, told.solve(solution.values[free], solution.deviations, iterations=iterations)
+
+
+def _inserted(values: Array, places: Sequence[int], entries: Array) -> Array:
+    """The values with others in some places."""
+    inserted: Array = values.copy()
+    inserted[list(places)] = entries
+    return inserted
 
 
 def _setup(run: RoverRun, model: RoverModel | None, settings: Mapping[str, Any] | None) -> Setup:
@@ -140,35 +160,35 @@ def _values(parameters: Sequence[Parameter]) -> Array:
     return np.array([parameter.start for parameter in parameters])
 
 
-def _estimated_noise(solution: Solution) -> Array:
-    """(nq + nv,) deviation of each column by the median of its residuals, which windows that do not fit hardly move."""
-    rows = solution.residuals.reshape(-1, solution.deviations.size)
-    taken = solution.residuals.size / max(solution.freedom, 1.0)
-    found: Array = FROM_MEDIAN * np.median(np.abs(rows), axis=0) * np.sqrt(taken)
-    return np.maximum(found, SMALLEST_CHANGE)
+def _estimated_noise(solution: Solution, nq: int) -> Array:
+    """(nq + nv,) deviations by the median of the residuals, which windows that do not fit hardly move.
 
-
-def _variance(solution: Solution, n: int) -> float:
-    """Variance of a weighted residual, at least that at which a fit ends as exact."""
-    return max(float(solution.weighted @ solution.weighted) / max(solution.freedom - n, 1.0), EXACT)
+    Columns of one kind share theirs: place, attitude and joints, and the rates of each.
+    """
+    rows = np.abs(solution.residuals.reshape(-1, solution.deviations.size))
+    taken = np.sqrt(solution.residuals.size / max(solution.freedom, 1.0))
+    kinds = np.split(rows, [3, 6, nq, nq + 3, nq + 6], axis=1)
+    found = [np.full(kind.shape[1], FROM_MEDIAN * taken * np.median(kind)) for kind in kinds if kind.size]
+    return np.maximum(np.concatenate(found), SMALLEST_CHANGE)
 
 
 def _identification(
     parameters: Sequence[Parameter],
     windows: Sequence[Window],
     solution: Solution,
-    values: Array,
     free: Sequence[int],
+    factors: Array,
     reasons: Mapping[int, str],
     sensitivities: Array,
-    variance: float,
     setup: Setup,
 ) -> Identification:
     n = len(parameters)
+    variance = variance_of(solution, len(free))
+    values = _inserted(_values(parameters), free, solution.values)
     covariance = np.full((n, n), np.nan)
     if free:
         jacobian = solution.jacobian
-        covariance[np.ix_(free, free)] = variance * np.linalg.inv(jacobian.T @ jacobian)
+        covariance[np.ix_(free, free)] = variance * np.linalg.inv(jacobian.T @ jacobian) * np.outer(factors, factors)
     covariance[list(reasons), :] = covariance[:, list(reasons)] = np.nan
     estimates = []
     for i, parameter in enumerate(parameters):
