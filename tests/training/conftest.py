@@ -42,3 +42,10 @@ def evaluate() -> Script:
 def enjoy() -> Script:
     """`enjoy.py`."""
     return script("enjoy", "enjoy")
+
+
+@pytest.fixture(scope="session")
+def tune() -> Script:
+    """`tune.py`."""
+    pytest.importorskip("optuna", reason="the extra train is not installed")
+    return script("tune", "tune")
