@@ -38,8 +38,8 @@ COARSE: dict[str, Any] = {"time_step": 0.02, "solver_options": {"tolerance": 1e-
 
 #: The environment, its arguments and the decisions of all rovers together, by task.
 TASKS: dict[str, tuple[str, dict[str, Any], int]] = {
-    "plane": ("Rover-v0", {}, 600_000),
-    "rocks": ("RoverRocks-v0", {"difficulty": 0.5, "height_scan": True}, 1_250_000),
+    "plane": ("Rover-v0", {}, 500_000),
+    "rocks": ("RoverRocks-v0", {"difficulty": 0.5, "height_scan": True}, 1_000_000),
 }
 
 
@@ -105,7 +105,8 @@ class Agent(nn.Module):
     def log_probability(self, seen: torch.Tensor, acted: torch.Tensor) -> torch.Tensor:
         """Logarithm of the density `(n,)` of actions, up to a constant."""
         away = (acted - self.actor(seen)) / self.log_std.exp()
-        return -(0.5 * away.square() + self.log_std).sum(-1)
+        density: torch.Tensor = -(0.5 * away.square() + self.log_std).sum(-1)
+        return density
 
     def value(self, seen: torch.Tensor) -> torch.Tensor:
         """The values `(n,)`."""
@@ -220,7 +221,7 @@ def train(
                 policy_loss = -torch.min(gains * ratio, gains * clipped).mean()
                 loss = policy_loss + given.vf_coef * (agent.value(one_seen) - aims).square().mean()
                 optimizer.zero_grad()
-                loss.backward()
+                loss.backward()  # type: ignore[no-untyped-call] # PyTorch gives it no types
                 nn.utils.clip_grad_norm_(agent.parameters(), given.max_grad_norm)
                 optimizer.step()
         if recent:
