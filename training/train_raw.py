@@ -34,7 +34,6 @@ SEED_STRIDE = 1000
 
 # First seed of the fields on which the learning curve is measured; the final evaluation begins at `HELD_BACK`.
 CURVE_SEED = 2_000_000
-CURVE_EPISODES = 50
 
 
 @plain_errors
@@ -107,12 +106,12 @@ def train(
     summary = drive(policy, settings, HELD_BACK, episodes)
     (folder / "evaluation.json").write_text(json.dumps(asdict(summary), indent=2) + "\n", encoding="utf-8")
     typer.echo(told(model.num_timesteps, summary))
-    rovers.close()
+    envs.close()
     say_path("policy", folder)
 
 
 class Evaluation(BaseCallback):
-    """Drives the policy without exploration, at the environment's own physics, on the same 50 fields every time.
+    """Drives the policy without exploration, at the environment's own physics, on the same fields every time.
 
     Attributes:
         cpu_seconds: CPU time so far, s.
@@ -139,7 +138,7 @@ class Evaluation(BaseCallback):
     def evaluate(self) -> None:
         """Adds a line to `evaluations.csv` and prints it."""
         start = time.process_time()
-        summary = drive(self._policy, self._settings, CURVE_SEED, CURVE_EPISODES)
+        summary = drive(self._policy, self._settings, CURVE_SEED, self._settings.evaluation_episodes)
         self.cpu_seconds += time.process_time() - start
         figures = (summary.success.value, *summary.success.interval, summary.energy_per_metre.value)
         written = (f"{value:.4g}" for value in (*figures, time.perf_counter() - self._start))

@@ -52,6 +52,7 @@ class RawConfig:
         normalise_observations: Whether observations are normalised by their running mean and deviation.
         normalise_rewards: Whether rewards are divided by the running deviation of the return.
         clip_observations: Largest magnitude of a normalised entry.
+        evaluation_episodes: Fields of each evaluation during training; the same ones every time.
         final_learning_rate: What the learning rate falls to, linearly; None to keep it.
     """
 
@@ -66,6 +67,7 @@ class RawConfig:
     normalise_observations: bool = True
     normalise_rewards: bool = True
     clip_observations: float = 10.0
+    evaluation_episodes: int = 50
     final_learning_rate: float | None = None
 
     def __post_init__(self) -> None:
@@ -73,7 +75,7 @@ class RawConfig:
             refuse(OptionError, "algorithm", self.algorithm, f"must be one of {', '.join(ALGORITHMS)}")
         known = inspect.signature(ALGORITHMS[self.algorithm].__init__).parameters
         known_keys("hyperparameters", self.hyperparameters, [name for name in known if name not in SET_BY_TRAINER])
-        for name in ("num_envs", "threads", "max_episode_steps"):
+        for name in ("num_envs", "threads", "max_episode_steps", "evaluation_episodes"):
             whole(name, getattr(self, name), at_least=1)
         for name in ("normalise_observations", "normalise_rewards"):
             if not isinstance(getattr(self, name), bool):
