@@ -1245,9 +1245,9 @@ class PathSearch:
             poses: `(..., 3)` poses.
 
         Returns:
-            (n, n_wheels + 3) for each pose the heights under the wheels over the mean of the present
-            ones and the least gap under the rover, both over the wheels' radius; then the slopes
-            ahead and to the right of the plane through the ground under the wheels.
+            (n, n_wheels + 3) for each pose the heights under the wheels over the mean of the
+            present ones and the least gap under the rover, both over the wheels' radius; then the
+            slopes ahead and to the right of the plane through the ground under the wheels.
 
         Raises:
             OptionError: An argument has a wrong shape or an entry that is not finite.

@@ -26,7 +26,7 @@ BATCH, RATE, DECAY, LEAST_DEVIATION = 1024, 2e-3, 1e-4, 1e-3
 def fit_forecast(
     tried: ArcOutcomes, *, seed: int = 0, epochs: int = 12, hidden: Sequence[int] = (128, 128)
 ) -> tuple[Network, npt.NDArray[np.float64]]:
-    """Fits a network by Adam with decay of weights (Loshchilov & Hutter 2019), its rate rising and falling once.
+    """Fits a network by Adam with decay of weights (Loshchilov and Hutter 2019), its rate rising and falling once.
 
     Args:
         tried: The arcs, of ten states at least.
