@@ -27,7 +27,7 @@ def driven(env: Any, steps: int, seed: int = 0) -> list[Any]:
 @pytest.mark.parametrize("reward_type", ["sparse", "dense"])
 @pytest.mark.parametrize("raw", [False, True])
 def test_it_keeps_the_contract_of_a_goal_env(reward_type: Any, raw: bool) -> None:
-    arguments: dict[str, Any] = {"goal_distance": (0.6, 1.2), "height_scan": (4, 4, 0.3)}
+    arguments: dict[str, Any] = {"goal_distance": (0.55, 0.7), "height_scan": (4, 4, 0.3)}
     env: Any = (
         GoalObservation(gym.make("Rover-v0", **arguments), reward_type)
         if raw

@@ -8,7 +8,7 @@ use rover_core::paths::{
     Arcs, Outline, PathCosts, PathSearch as Core, Pose, ScanShape, Search, SearchTask,
 };
 
-use crate::arguments::{count, number, refused};
+use crate::arguments::{at_least_one, count, number, refused};
 use crate::arrays::{array, triple, two, vector};
 use crate::errors::Kind;
 
@@ -148,19 +148,8 @@ fn outline(given: &Bound<'_, PyMapping>) -> PyResult<Outline> {
 fn costs(given: &Bound<'_, PyMapping>) -> PyResult<PathCosts> {
     let cost = |name: &str| entry(given, "costs", name);
     let whole = |name: &str| -> PyResult<usize> {
-        let value = cost(name)?;
-        if value >= 1.0 && value <= 1e3 && value.fract() == 0.0 {
-            return Ok(value as usize);
-        }
-        let field = format!("costs.{name}");
-        let (found, _) = item(given, "costs", name)?;
-        Err(refused(
-            &found,
-            Kind::Option,
-            &field,
-            "a whole number from 1 to 1000",
-        )
-        .into())
+        let (value, field) = item(given, "costs", name)?;
+        at_least_one(&value, Kind::Option, &field)
     };
     Ok(PathCosts {
         belly: cost("belly")?,

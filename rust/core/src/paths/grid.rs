@@ -1,4 +1,10 @@
 //! A height scan as a finer grid with a margin, and the points of a rover on it by pose.
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    reason = "rows and columns of a grid of some thousand cells"
+)]
 
 use std::f64::consts::TAU;
 

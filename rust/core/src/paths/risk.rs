@@ -1,4 +1,8 @@
 //! What the ground under a path costs.
+#![expect(
+    clippy::cast_possible_truncation,
+    reason = "heights and costs are compared in single precision"
+)]
 
 use super::{GroundGrid, PathCosts, Pose};
 

@@ -1,4 +1,12 @@
 //! The cheapest of many paths (beam search).
+#![expect(
+    clippy::cast_possible_truncation,
+    reason = "numbers of cells within some hundred metres"
+)]
+#![expect(
+    clippy::inline_always,
+    reason = "what is not inlined is not compiled for the machine's instructions"
+)]
 
 use super::{GroundGrid, Outline, PathCosts, PathRisk, Pose, ScanShape};
 use crate::scalar::elementary::{atan2, exp, sin_cos};
@@ -187,7 +195,7 @@ impl PathSearch {
         self.begin(task);
         if let Some(direction) = task.retreat {
             let [paths, _] = &self.paths;
-            let ways = paths.iter().filter(|path| path.direction == direction);
+            let ways = paths.iter().filter(|path| path.direction * direction > 0.0);
             let total = |path: &Path| path.cost + RETREAT_TO_GO * self.to_go(path, task);
             return cheapest(ways.map(|path| (path.root, total(path))));
         }
