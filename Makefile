@@ -74,7 +74,7 @@ bench: $(STAMPS)/core ## time a step and tell where the time goes, MuJoCo's besi
 	else echo "valgrind is not installed: no instruction counts"; fi
 
 train: $(STAMPS)/train $(STAMPS)/demo $(STAMPS)/core ## train a policy for the rocks (about half an hour of one core) and compare it with the baseline, under runs/
-	$(BIN)/python training/train_ppo.py --config training/configs/rocks.yaml --seed 1
+	$(BIN)/python training/train_ppo.py --config rocks --seed 1
 	$(BIN)/python training/evaluate.py runs/train/rocks-seed1 --difficulty 1
 
 train-rllib: ## train Rover-v0 on a local Ray with 1 and with 2 workers; Ray wants a virtual environment of its own

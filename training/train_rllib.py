@@ -22,7 +22,7 @@ from ray.tune.registry import register_env
 from rover_gym.policy import CommandVectorEnv, DriveByCommand
 from rover_gym.vector import RoverVectorEnv
 
-# Control periods per decision: 0.3 s, as in configs/plane.yaml.
+# Control periods per decision: 0.3 s, as in the configuration `plane`.
 REPEAT = 6
 
 

@@ -10,6 +10,7 @@ The package consists of the subpackages below. Each one may import those above i
     models         models from and to URDF and MJCF files
     rendering      images of a rover: frames and video
     record         trajectories in HDF5
+    identification  parameters of a recorded run, with their uncertainty
     soil           granular soil of disks, in the plane
     grains         granular ground of balls, in space
     env            `Rover-v0`: its card, arguments and control period

@@ -45,6 +45,13 @@ def enjoy() -> Script:
 
 
 @pytest.fixture(scope="session")
+def tune() -> Script:
+    """`tune.py`."""
+    pytest.importorskip("optuna", reason="the extra train is not installed")
+    return script("tune", "tune")
+
+
+@pytest.fixture(scope="session")
 def train_raw() -> Script:
     """`train_raw.py`."""
     pytest.importorskip("stable_baselines3", reason="the extra train is not installed")

@@ -10,15 +10,15 @@ from rover_gym import OptionError, RoverGymError
 pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
 
 from rover_gym.learning.build import build_env
+from rover_gym.learning.configurations import SHIPPED_CONFIGURATIONS, find_configuration
 from rover_gym.learning.training_config import parse_config, read_config
 
-CONFIGS = Path(__file__).parents[2] / "training" / "configs"
 SMALLEST: dict[str, Any] = {"environment": {"terrain": "plane"}, "total_steps": 100}
 
 
-@pytest.mark.parametrize("name", ["plane", "rocks"])
+@pytest.mark.parametrize("name", SHIPPED_CONFIGURATIONS)
 def test_a_kept_configuration_survives_writing_and_reading(name: str, tmp_path: Path) -> None:
-    config = read_config(CONFIGS / f"{name}.yaml")
+    config = read_config(find_configuration(name))
     copy = tmp_path / "copy.yaml"
     copy.write_text(config.to_yaml(), encoding="utf-8")
     assert read_config(copy).to_yaml() == config.to_yaml()

@@ -16,7 +16,7 @@ TRAINING = Path(rover_gym.__file__).parents[2] / "training"
 
 @pytest.mark.parametrize("name", [name for name, known in ENVIRONMENTS.items() if known.vector_entry_point])
 def test_make_vec_makes_the_vector_of_the_core(name: str) -> None:
-    envs = gym.make_vec(name, 64)
+    envs = gym.make_vec(name, 64).unwrapped
     assert type(envs) is RoverVectorEnv
     assert envs.batch.episodes.threads == len(os.sched_getaffinity(0))
     assert envs.prototype.simulation.never_ordinary is None
@@ -26,10 +26,11 @@ def test_make_vec_makes_the_vector_of_the_core(name: str) -> None:
 def test_train_ppo_trains_on_the_vector_of_the_core(name: str) -> None:
     pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
     from rover_gym.learning.build import build_env  # noqa: PLC0415 - needs the extra
+    from rover_gym.learning.configurations import find_configuration  # noqa: PLC0415
     from rover_gym.learning.training_config import read_config  # noqa: PLC0415
     from rover_gym.vector.sb3 import RoverVecEnv  # noqa: PLC0415
 
-    config = read_config(TRAINING / "configs" / f"{name}.yaml")
+    config = read_config(find_configuration(name))
     rovers = build_env(config).unwrapped
     assert type(rovers) is RoverVecEnv
     assert rovers.num_envs == config.num_envs

@@ -209,7 +209,7 @@ def test_a_damaged_checkpoint_is_one_line(text: str, train: Script, tmp_path: Pa
     folder = tmp_path / "run" / "checkpoints"
     folder.mkdir(parents=True)
     (folder / "latest.json").write_text(text, encoding="utf-8")
-    config = Path(__file__).parents[2] / "training" / "configs" / "plane.yaml"
+    config = "plane"
     result = train("--config", config, "--output", tmp_path / "run", "--resume")
     assert result.exit_code == 2
     assert result.stderr.startswith("error: --resume: names no checkpoint")

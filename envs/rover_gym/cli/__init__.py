@@ -8,6 +8,7 @@ import typer
 from rover_gym.cli.baseline_command import baseline
 from rover_gym.cli.console import DEBUG, one_line
 from rover_gym.cli.drive_command import drive
+from rover_gym.cli.evaluate_command import evaluate
 from rover_gym.cli.grains_command import grains
 from rover_gym.cli.grains_lab_commands import plate, shear, wheel
 from rover_gym.cli.grains_rover_commands import pit, track
@@ -19,6 +20,7 @@ from rover_gym.cli.replay_command import replay
 from rover_gym.cli.report_command import report
 from rover_gym.cli.scene_command import scene
 from rover_gym.cli.speed_command import speed
+from rover_gym.cli.train_command import ManySeeds, train
 from rover_gym.mechanics import __version__
 
 app = typer.Typer(
@@ -30,6 +32,8 @@ app = typer.Typer(
 )
 app.command()(drive)
 app.command()(baseline)
+app.command(cls=ManySeeds)(train)
+app.command()(evaluate)
 app.command()(report)
 app.command()(plot)
 app.command()(replay)

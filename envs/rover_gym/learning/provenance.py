@@ -22,9 +22,12 @@ def provenance() -> dict[str, Any]:
 
 
 def revision() -> str | None:
-    """The git revision of the sources, with "-dirty" after uncommitted changes; None outside a repository."""
-    git = ["git", "-C", str(Path(__file__).parent)]
+    """The git revision of the sources, with "-dirty" after uncommitted changes; None if no repository holds them."""
+    here = Path(__file__)
+    git = ["git", "-C", str(here.parent)]
     try:
+        # An installed package may lie in the folder of another repository, which does not track it.
+        subprocess.run([*git, "ls-files", "--error-unmatch", here.name], check=True, capture_output=True)  # noqa: S603
         head = subprocess.run([*git, "rev-parse", "HEAD"], check=True, capture_output=True, text=True)  # noqa: S603
         changed = subprocess.run([*git, "status", "--porcelain"], check=True, capture_output=True, text=True)  # noqa: S603
     except (OSError, subprocess.CalledProcessError):

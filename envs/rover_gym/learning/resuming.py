@@ -1,7 +1,10 @@
-"""What may change in the configuration of a training that goes on from a checkpoint."""
+"""How a training goes on from a checkpoint, and what may change in its configuration."""
 
+import json
+import re
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 from rover_gym.learning.training_config import TrainingConfig
@@ -18,6 +21,44 @@ FIXED = (
     "ppo.net_arch",
     "ppo.log_std_init",
 )
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """What `latest.json` says of a run's last checkpoint.
+
+    Attributes:
+        name: Name of its files, the number of decisions.
+        hardest: Hardest difficulty of the curriculum; None without one.
+    """
+
+    name: str
+    hardest: float | None
+
+    @property
+    def decisions(self) -> int:
+        """Decisions of all environments so far."""
+        return int(self.name)
+
+
+def latest_checkpoint(folder: Path) -> Checkpoint:
+    """The last checkpoint in a folder of checkpoints.
+
+    Raises:
+        OptionError: `latest.json` is damaged.
+        OSError: There is none.
+    """
+    path = folder / "latest.json"
+    text = path.read_bytes()
+    try:
+        latest: dict[str, Any] = json.loads(text)
+        hardest = None if latest["hardest"] is None else float(latest["hardest"])
+        is_named = re.fullmatch("[0-9]{9,15}", latest["name"]) is not None
+    except (ValueError, LookupError, TypeError, RecursionError):
+        is_named = False
+    if not is_named:
+        refuse(OptionError, "resume", str(path), "names no checkpoint")
+    return Checkpoint(latest["name"], hardest)
 
 
 def check_resumable(before: TrainingConfig, now: TrainingConfig) -> None:

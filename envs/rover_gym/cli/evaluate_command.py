@@ -1,0 +1,135 @@
+"""`rover evaluate`: trained policies beside the PD baseline and the scan planner, on the same seeded episodes."""
+
+import json
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import Progress, TaskID
+
+from rover_gym.cli.console import LARGEST_SEED, MOST_EPISODES, check_folder, plain_errors, progress_bar, say_path
+from rover_gym.cli.scene_options import BUILT_IN, ModelName, named_model
+from rover_gym.extras import MissingExtraError, require
+from rover_gym.figures.policy_figure import draw_policies
+from rover_gym.mechanics import OptionError
+from rover_gym.policy.comparison import (
+    BASELINE,
+    Contender,
+    comparison_report,
+    comparison_table,
+    drive_or_reuse,
+    guide_contender,
+    planner_contender,
+    trained_contender,
+)
+from rover_gym.policy.evaluation import EvaluatedEpisode, summarise
+from rover_gym.policy.films import film_episode
+from rover_gym.policy.pd_policy import PDPolicy
+from rover_gym.validation import refuse
+
+
+@plain_errors
+def evaluate(
+    policies: Annotated[
+        list[str], typer.Argument(help="Folders of runs or of policies, or 'trained' for the package's.")
+    ],
+    terrain: Annotated[
+        str, typer.Option(help="'plane', 'sphere_field', 'hills', or the file of a map or a mesh.")
+    ] = "sphere_field",
+    model: ModelName = BUILT_IN,
+    difficulty: Annotated[float | None, typer.Option(help="Of the rocks, from 0 to 2.")] = None,
+    slope: Annotated[float | None, typer.Option(help="Of the plane, degrees.")] = None,
+    episodes: Annotated[int, typer.Option(min=1, max=MOST_EPISODES, help="Of each policy.")] = 500,
+    seed: Annotated[
+        int, typer.Option(min=0, max=LARGEST_SEED, help="Of the first episode; the next ones count up.")
+    ] = 1_000_000,
+    output: Annotated[Path, typer.Option(file_okay=False, help="Folder of table, data and plot.")] = Path(
+        "runs/evaluation"
+    ),
+    guide: Annotated[
+        bool, typer.Option(help="Also drive the guide alone, that the first policy's actions offset.")
+    ] = True,
+    planner: Annotated[bool, typer.Option(help="Also drive the scan planner.")] = True,
+    films: Annotated[int, typer.Option(min=0, help="Number of fields that are also filmed (extra render).")] = 0,
+    threads: Annotated[int, typer.Option(min=1, help="That step the rovers.")] = 1,
+) -> None:
+    """Drive every policy, the baseline and the planner over the same fields, and print success and energy.
+
+    Writes evaluation.json, evaluation.md, with matplotlib evaluation.png, and every policy's episodes. A later
+    evaluation into the same folder reuses those episodes if scene, seeds, the policy's files, the package's policies
+    and its compiled core are the same. Intervals are 95%. The seeds differ from those of training, so the policies
+    have not seen the fields.
+    """
+    arguments: dict[str, Any] = {"terrain": terrain}
+    arguments |= {} if model == BUILT_IN else {"model": model}
+    arguments |= {} if difficulty is None else {"difficulty": difficulty}
+    arguments |= {} if slope is None else {"slope_deg": slope}
+    if films:
+        for package in ("imageio_ffmpeg", "vtkmodules"):
+            require(package, "render")
+    trained = [trained_contender(policy, terrain) for policy in policies]
+    contenders = _contenders(trained, model, guide=guide, planner=planner)
+    check_folder("output", output)
+    output.mkdir(parents=True, exist_ok=True)
+
+    seeds = range(seed, seed + episodes)
+    grounds = [Path(str(value)) for value in arguments.values() if Path(str(value)).is_file()]
+    drives: dict[str, list[EvaluatedEpisode]] = {}
+    with progress_bar() as bar:
+        for contender in contenders:
+            task = bar.add_task(contender.name, total=episodes, state="")
+            drives[contender.name] = drive_or_reuse(
+                contender,
+                output / f"episodes-{contender.name.replace(' ', '-')}.json",
+                seeds,
+                arguments=arguments,
+                files=grounds,
+                threads=threads,
+                progress=partial(_show, bar, task, episodes),
+            )
+    rows = [summarise(name, found) for name, found in drives.items()]
+    if len(trained) > 1:
+        together = [drive for contender in trained for drive in drives[contender.name]]
+        rows.append(summarise(f"all {len(trained)} together", together))
+
+    table = comparison_table(rows)
+    Console(highlight=False, soft_wrap=True).print(table, markup=False)
+    (output / "evaluation.md").write_text(table + "\n", encoding="utf-8")
+    report = comparison_report(rows, arguments, seeds)
+    (output / "evaluation.json").write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+    written = [output / "evaluation.md", output / "evaluation.json"]
+    try:
+        draw_policies(rows, output / "evaluation.png")
+        written.append(output / "evaluation.png")
+    except MissingExtraError as error:
+        typer.echo(f"no picture: {error}", err=True)
+    for contender in contenders:
+        for now in seeds[:films]:
+            written.append(output / "films" / f"{contender.name.replace(' ', '-')}-seed{now}.mp4")
+            film_episode(written[-1], contender.make, {**arguments, **contender.arguments}, now)
+    for path in written:
+        say_path("written", path)
+
+
+def _contenders(trained: list[Contender], model: str, *, guide: bool, planner: bool) -> list[Contender]:
+    """All who drive, in the order of the table.
+
+    Raises:
+        OptionError: Two policies have the same name.
+    """
+    contenders = [Contender(BASELINE, PDPolicy)]
+    if planner:
+        contenders.append(planner_contender(named_model(model)))
+    alone = guide_contender(trained[0]) if guide else None
+    contenders += [*([] if alone is None else [alone]), *trained]
+    names = [contender.name for contender in contenders]
+    for i, name in enumerate(names):
+        if name in names[:i]:
+            refuse(OptionError, "policies", name, "must be folders of different names, which the rows are called by")
+    return contenders
+
+
+def _show(bar: Progress, task: TaskID, episodes: int, done: int) -> None:
+    bar.update(task, completed=done, state=f"{done} of {episodes}")

@@ -1,0 +1,112 @@
+"""`rover train`: policies by reinforcement learning, one seed or several."""
+
+import re
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperCommand
+
+from rover_gym.cli.console import check_folder, plain_errors, say_path
+from rover_gym.extras import require
+
+LARGEST = 498  # the largest seed: the fields of all seeds stay below the evaluations'
+
+
+SEEDS = ("--seeds", "--seed")
+
+
+class ManySeeds(TyperCommand):
+    """A command whose `--seeds` takes several numbers: `--seeds 1 2 3`."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Repeats the option before each number that follows it."""
+        given: list[str] = []
+        is_seed = False
+        for argument in args:
+            if is_seed and re.fullmatch(r"\d+", argument):
+                if given[-1] not in SEEDS:
+                    given.append(SEEDS[0])
+            else:
+                is_seed = argument in SEEDS
+            given.append(argument)
+        return super().parse_args(ctx, given)
+
+
+@plain_errors
+def train(
+    config: Annotated[str, typer.Argument(help="A configuration of the package, 'plane' or 'rocks', or a YAML file.")],
+    seeds: Annotated[
+        list[int] | None,
+        typer.Option(
+            *SEEDS,
+            min=0,
+            max=LARGEST,
+            help="Seeds of network, exploration and fields, trained one after the other. Default: 1.",
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            file_okay=False,
+            help="Folder of the run, with several seeds of their runs. Default: runs/train/NAME-seedN, runs/train.",
+        ),
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on from the latest checkpoint; of several seeds, where there is one.")
+    ] = False,
+    steps: Annotated[
+        int | None, typer.Option(min=1, help="Decisions in total, instead of the configuration's.")
+    ] = None,
+    films: Annotated[
+        int, typer.Option(min=0, help="Number of fields of each evaluation that are also filmed (extra render).")
+    ] = 0,
+    progress: Annotated[bool, typer.Option(help="Show a progress bar.")] = True,
+    show: Annotated[bool, typer.Option("--show", help="Print the configuration as YAML and end.")] = False,
+) -> None:
+    """Train a policy for Rover-v0 with stable-baselines3's PPO and print its figures.
+
+    Needs the extra `train`. Checkpoints, TensorBoard's log (`tensorboard --logdir runs/train`), evaluations, the policy
+    at the end (`policy`) and the one that did best in the evaluations (`best`) are in the run's folder. Several seeds
+    end with a table: mean over the seeds with its 95% interval.
+    """
+    for package in ("yaml", "stable_baselines3", "tensorboard"):
+        require(package, "train")
+    if films:
+        for package in ("imageio_ffmpeg", "vtkmodules"):
+            require(package, "render")
+    from rover_gym.learning.configurations import find_configuration  # noqa: PLC0415 - as below
+    from rover_gym.learning.ppo import Reporting, train_ppo  # noqa: PLC0415 - needs the extra, and slow to load
+    from rover_gym.learning.several_seeds import read_seed, write_seeds  # noqa: PLC0415
+    from rover_gym.learning.training_config import read_config  # noqa: PLC0415
+
+    path = find_configuration(config)
+    settings = read_config(path)
+    if show:
+        typer.echo(path.read_text(encoding="utf-8"), nl=False)
+        return
+    check_folder("output", output)
+    chosen = list(dict.fromkeys(seeds or [1]))
+    is_alone = len(chosen) == 1
+    parent = output if output is not None and not is_alone else Path("runs") / "train"
+    folders = [output if output is not None and is_alone else parent / f"{path.stem}-seed{seed}" for seed in chosen]
+    reporting = Reporting(say=typer.echo, progress=progress, films=films)
+    for seed, folder in zip(chosen, folders, strict=True):
+        if not is_alone:
+            typer.echo(f"seed {seed}:")
+        policy = train_ppo(
+            settings,
+            folder,
+            name=path.name,
+            seed=seed,
+            resume=resume and (is_alone or (folder / "checkpoints" / "latest.json").exists()),
+            total_steps=steps,
+            reporting=reporting,
+        )
+        say_path("policy", policy)
+        say_path("best policy in the evaluations", folder / "best")
+    if not is_alone:
+        stem = parent / f"{path.stem}-seeds"
+        typer.echo(write_seeds([read_seed(folder) for folder in folders], stem))
+        for ending in ("md", "json"):
+            say_path("written", stem.with_name(f"{stem.name}.{ending}"))

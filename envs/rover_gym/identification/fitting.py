@@ -1,0 +1,325 @@
+"""The least squares of an identification: parameters of all windows together, a starting state of each by itself."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.identification.parameters import Parameter, Setup
+from rover_gym.identification.windows import Shooter, Window
+from rover_gym.mechanics import OptionError, Simulation
+from rover_gym.validation import refuse
+
+Array = npt.NDArray[np.float64]
+
+#: Smallest change of a state for a difference, m, rad, m/s or rad/s: the memory that a step has of the last impulses,
+#: which a start does not have, moves a rover by as much.
+SMALLEST_CHANGE = 1e-5
+#: Change of a parameter for a difference, as a part of its scale.
+PARAMETER_CHANGE = 2e-3
+#: Dampings of a move of a window's starting state that are tried, in units of the weight of its own measurement.
+DAMPINGS = (0.0, 1.0, 10.0, 100.0, 1e3, 1e4)
+#: Mean square of a window's weighted residuals above which its starting state is searched for among those of the
+#: differences, and the number of such moves: wheels that hold instead of slipping leave no derivative to follow.
+MISFIT, MOST_MOVES = 2.5, 6
+#: Places from which the starting state of a window that does not fit is searched anew, and iterations from each.
+DRAWS, DRAW_ITERATIONS = 5, 8
+#: An iteration that lowers the sum of squares by less than this, in units of the variance of a residual, is the last
+#: one: a standard error changes it by one.
+SMALLEST_GAIN = 0.02
+#: A combination of parameters is told by a run if its standard deviation, the inverse of its sensitivity, is less than
+#: half of its scale. Less would not do: noise lets wheels that hold seem to slip for a step, which makes a friction
+#: that does not matter look measured.
+LEAST_SENSITIVITY = 2.0
+#: Nor is it told if its sensitivity is a smaller part than this of the largest one: differences of a simulation with
+#: contacts are not exact enough.
+SMALLEST_SENSITIVITY = 1e-4
+#: Mean square of a window's weighted residuals from which on it counts for less: a wheel that spins in one window and
+#: holds in its simulation says little until the parameters are nearly right, and would outweigh all other windows.
+TOLERATED = 9.0
+#: Largest change of a parameter in an iteration, as a part of its scale: what the run hardly tells stays near its
+#: start.
+LONGEST_STEP = 0.5
+#: Mean square of the weighted residuals at which a fit is exact.
+EXACT = 1e-6
+#: Attempts with shorter and shorter steps before a fit ends.
+MOST_ATTEMPTS = 4
+
+
+@dataclass
+class _Linear:
+    """Weighted residuals of a window and their derivatives.
+
+    Attributes:
+        residuals: (m,)
+        by_state: (m, nq + nv) derivative by the starting state.
+        by_parameters: (m, p) derivative by the parameters.
+        basis: (m, nq + nv) orthonormal basis of the columns of `by_state`.
+    """
+
+    residuals: Array
+    by_state: Array
+    by_parameters: Array
+    basis: Array
+
+    @property
+    def weight(self) -> float:
+        """Weight of the window, by its loss: about 1 if it fits, and the inverse of its mean square if it does not."""
+        return (1.0 + 1.0 / TOLERATED) / (1.0 + _loss_argument(self.residuals))
+
+    def free_of_state(self, columns: Array) -> Array:
+        """What a starting state cannot explain of columns (m, ...)."""
+        free: Array = columns - self.basis @ (self.basis.T @ columns)
+        return free
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Where a fit ended.
+
+    Attributes:
+        values: (p,) the parameters.
+        residuals: (m,) residuals of all windows in measured units, simulated minus measured.
+        weighted: (m,) the same over the deviations, without what the starting states explain to first order, times the
+            root of the window's weight.
+        jacobian: (m, p) derivative of `weighted` by the parameters.
+        deviations: (nq + nv,) standard deviations of the measurements.
+        freedom: Number of residuals that the starting states leave free.
+        loss: Loss of the weighted residuals: their sum of squares, if all windows fit.
+        iterations: Number of iterations.
+    """
+
+    values: Array
+    residuals: Array
+    weighted: Array
+    jacobian: Array
+    deviations: Array
+    freedom: float
+    loss: float
+    iterations: int
+
+
+class WindowFit:
+    """Fits parameters to windows by the method of Gauss and Newton with shortened steps.
+
+    A window starts from a state that is measured with noise, so the state is estimated as well, from all rows of the
+    window. It is eliminated from the normal equations (variable projection), which leaves those of the parameters.
+
+    Args:
+        setup: What the run is simulated with, where the parameters do not change it.
+        parameters: The parameters.
+        windows: The windows.
+    """
+
+    def __init__(self, setup: Setup, parameters: Sequence[Parameter], windows: Sequence[Window]) -> None:
+        self._setup = setup
+        self._parameters = parameters
+        self._windows = windows
+        self._scales = np.array([parameter.scale for parameter in parameters])
+        self._lows = np.array([parameter.low for parameter in parameters])
+        self._highs = np.array([parameter.high for parameter in parameters])
+        self._shooter = Shooter(setup.model.nq, np.array(setup.model.wheel_joint_indices))
+        self._states = [window.measured[0].copy() for window in windows]
+
+    def hold(self, held: Mapping[int, float]) -> "WindowFit":
+        """The same fit with some parameters held at given values, by their indices, from the last starting states."""
+        setup = self._setup
+        for i, value in held.items():
+            setup = self._parameters[i].apply(setup, value)
+        free = [parameter for i, parameter in enumerate(self._parameters) if i not in held]
+        fit = WindowFit(setup, free, self._windows)
+        fit.go_on_from(self)
+        return fit
+
+    def go_on_from(self, other: "WindowFit") -> None:
+        """Takes over the starting states of another fit of the same windows."""
+        self._states = list(other._states)
+
+    def restart(self, solution: Solution) -> bool:
+        """Fits the starting states of windows that do not fit from other places: as measured, and drawn around it.
+
+        Returns:
+            Whether a window fits better now. The draws are the same each time.
+        """
+        setup = self._setup
+        for parameter, value in zip(self._parameters, solution.values.tolist(), strict=True):
+            setup = parameter.apply(setup, value)
+        random = np.random.default_rng(0)
+        is_better = False
+        for k, window in enumerate(self._windows):
+            alone = WindowFit(setup, [], [window])
+            alone._states = [self._states[k]]
+            loss = alone.solve(np.zeros(0), solution.deviations, iterations=0).loss
+            if loss <= MISFIT * window.measured.size:
+                continue
+            for draw in range(DRAWS):
+                noise = random.normal(0.0, solution.deviations) if draw else 0.0
+                alone._states = [window.measured[0] + noise]
+                found = alone.solve(np.zeros(0), solution.deviations, iterations=DRAW_ITERATIONS).loss
+                if found < loss - 1.0:
+                    loss, self._states[k], is_better = found, alone._states[0], True
+        return is_better
+
+    def rover(self, values: Array) -> tuple[Simulation, float]:
+        """A simulation with given values of the parameters, and the factor on its torques."""
+        setup = self._setup
+        for parameter, value in zip(self._parameters, values.tolist(), strict=True):
+            setup = parameter.apply(setup, value)
+        return setup.simulation(), setup.gain
+
+    def solve(
+        self,
+        values: Array,
+        deviations: Array,
+        *,
+        iterations: int,
+        progress: Callable[[int, float], None] = lambda _iteration, _cost: None,
+    ) -> Solution:
+        """Fits from given values and the last starting states.
+
+        Args:
+            values: (p,) where the parameters begin.
+            deviations: (nq + nv,) standard deviations of the measurements, by which residuals are divided.
+            iterations: Largest number of iterations.
+            progress: Called with each iteration and the mean square of the weighted residuals.
+        """
+        part, done, attempts = 1.0, 0, 0
+        values = np.clip(values, self._lows, self._highs)
+        linear = self._linearise(values, deviations)
+        n = sum(part.residuals.size for part in linear)
+        cost = _cost(linear)
+        while done < iterations and attempts < MOST_ATTEMPTS and cost > EXACT * n:
+            progress(done, cost / n)
+            moved, states, found = self._better(values, deviations, linear, part)
+            if not found < cost:
+                part, attempts = 0.25 * part, attempts + 1
+                continue
+            is_last = cost - found < SMALLEST_GAIN * found / n
+            values, self._states, part, attempts = moved, states, min(4.0 * part, 1.0), 0
+            linear = self._linearise(values, deviations)
+            cost = _cost(linear)
+            done += 1
+            if is_last:
+                break
+        progress(done, cost / n)
+        width = deviations.size
+        freedom = sum(part.weight * (part.residuals.size - float((part.basis**2).sum())) for part in linear)
+        residuals = np.concatenate([part.residuals for part in linear])
+        return Solution(
+            values,
+            (residuals.reshape(-1, width) * deviations).ravel(),
+            _reduced(linear, [part.residuals for part in linear]),
+            _reduced(linear, [part.by_parameters for part in linear]),
+            deviations,
+            freedom,
+            cost,
+            done,
+        )
+
+    def _linearise(self, values: Array, deviations: Array) -> list[_Linear]:
+        """Residuals and derivatives of all windows, by central differences."""
+        ends, distances = [], []
+        for i, change in enumerate(PARAMETER_CHANGE * self._scales):
+            pair = []
+            for sign in (1.0, -1.0):
+                moved = values.copy()
+                moved[i] = np.clip(moved[i] + sign * change, self._lows[i], self._highs[i])
+                pair.append(moved)
+            ends += pair
+            distances.append(pair[0][i] - pair[1][i])
+        changed = [self.rover(end) for end in ends]
+        base = self.rover(values)
+        changes = np.maximum(deviations, SMALLEST_CHANGE)
+        n = changes.size
+        rovers = [base[0]] * (2 * n + 1) + [rover for rover, _ in changed]
+        gains = np.array([base[1]] * (2 * n + 1) + [gain for _, gain in changed])
+        result: list[_Linear] = []
+        moved_states: list[Array] = []
+        for window, state in zip(self._windows, self._states, strict=True):
+            states = np.tile(state, (len(rovers), 1))
+            states[1 : n + 1] += np.diag(changes)
+            states[n + 1 : 2 * n + 1] -= np.diag(changes)
+            rows = self._weighted(window, rovers, gains, states, deviations)
+            for _ in range(MOST_MOVES):
+                squares = np.nan_to_num((rows[: 2 * n + 1] ** 2).sum(axis=1), nan=np.inf)
+                best = int(np.argmin(squares))
+                if best == 0 or squares[0] < MISFIT * rows.shape[1]:
+                    break
+                states += states[best] - states[0]
+                rows = self._weighted(window, rovers, gains, states, deviations)
+            moved_states.append(states[0])
+            if not np.isfinite(rows[0]).all():
+                refuse(OptionError, "recording", float(window.time[0]), "has a window that cannot be simulated, from s")
+            by_state = (rows[1 : n + 1] - rows[n + 1 : 2 * n + 1]).T / (2.0 * changes)
+            by_parameters = (rows[2 * n + 1 :: 2] - rows[2 * n + 2 :: 2]).T / np.array(distances)
+            by_state, by_parameters = np.nan_to_num(by_state), np.nan_to_num(by_parameters)
+            result.append(_Linear(rows[0], by_state, by_parameters, np.linalg.qr(by_state)[0]))
+        self._states = moved_states
+        return result
+
+    def _better(
+        self, values: Array, deviations: Array, linear: Sequence[_Linear], part: float
+    ) -> tuple[Array, list[Array], float]:
+        """A part of a step of Gauss and Newton: parameters, starting states and the loss there.
+
+        Combinations of the parameters that the run does not tell stay as they are.
+        """
+        jacobian = _reduced(linear, [one.by_parameters for one in linear]) * self._scales
+        residuals = _reduced(linear, [one.residuals for one in linear])
+        left, sensitivities, right = np.linalg.svd(jacobian, full_matrices=False)
+        told = is_told(sensitivities)
+        step = -right[told].T @ ((left.T @ residuals)[told] / sensitivities[told])
+        step *= part / max(1.0, float(np.abs(step).max(initial=0.0)) / LONGEST_STEP)
+        moved = np.clip(values + self._scales * step, self._lows, self._highs)
+        rover, gain = self.rover(moved)
+        tries = len(DAMPINGS) + 1  # the last is where it is
+        rovers, gains = [rover] * tries, np.full(tries, gain)
+        changes = np.maximum(deviations, SMALLEST_CHANGE)
+        states, total = [], 0.0
+        for one, window, state in zip(linear, self._windows, self._states, strict=True):
+            expected = one.residuals + one.by_parameters @ (moved - values)
+            _, widths, axes = np.linalg.svd(one.by_state * changes, full_matrices=False)
+            along = axes @ (changes * (one.by_state.T @ expected))
+            tried = np.tile(state, (tries, 1))
+            for k, damping in enumerate(DAMPINGS):
+                tried[k] -= changes * (axes.T @ (along / (widths**2 + damping + 1e-12 * widths[0] ** 2)))
+            rows = self._weighted(window, rovers, gains, tried, deviations)
+            costs = np.nan_to_num((rows**2).sum(axis=1), nan=np.inf)
+            best = int(np.argmin(costs))
+            states.append(tried[best])
+            total += _loss(rows[best])
+        return moved, states, total
+
+    def _weighted(
+        self, window: Window, rovers: Sequence[Simulation], gains: Array, states: Array, deviations: Array
+    ) -> Array:
+        """(n, m) weighted residuals of a window, simulated minus measured, from each state."""
+        rows = self._shooter.shoot(window, rovers, gains, states)
+        return ((rows - window.measured) / deviations).reshape(len(rovers), -1)
+
+
+def is_told(sensitivities: Array) -> npt.NDArray[np.bool_]:
+    """(p,) which combinations of parameters a run tells, by their falling sensitivities."""
+    least = max(LEAST_SENSITIVITY, SMALLEST_SENSITIVITY * float(sensitivities.max(initial=0.0)))
+    told: npt.NDArray[np.bool_] = sensitivities >= least
+    return told
+
+
+def _loss_argument(residuals: Array) -> float:
+    return float(residuals @ residuals) / residuals.size / TOLERATED
+
+
+def _loss(residuals: Array) -> float:
+    """Cauchy's loss of a window: its sum of squares if it fits, the logarithm of it if it does not."""
+    return residuals.size * TOLERATED * float(np.log1p(_loss_argument(residuals)))
+
+
+def _cost(linear: Sequence[_Linear]) -> float:
+    return sum(_loss(part.residuals) for part in linear)
+
+
+def _reduced(linear: Sequence[_Linear], columns: Sequence[Array]) -> Array:
+    """What starting states cannot explain of columns of all windows, times the roots of the windows' weights."""
+    parts = [np.sqrt(part.weight) * part.free_of_state(one) for part, one in zip(linear, columns, strict=True)]
+    return np.concatenate(parts)

@@ -1,0 +1,216 @@
+"""Fits parameters of rover and ground to a recorded run."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.identification.estimates import Estimate, Identification, open_combinations
+from rover_gym.identification.fitting import SMALLEST_CHANGE, Solution, WindowFit
+from rover_gym.identification.parameters import Parameter, Setup, chosen_parameters
+from rover_gym.identification.profiles import look_around, variance_of
+from rover_gym.identification.windows import Window, cut
+from rover_gym.mechanics import OptionError, RoverModel
+from rover_gym.record.channels import state_channels
+from rover_gym.record.rover_run import RoverRun, read_run
+from rover_gym.validation import number, refuse, whole
+
+Array = npt.NDArray[np.float64]
+
+#: Standard deviations of measured coordinates (m, rad) and velocities (m/s, rad/s) with which a fit begins.
+FIRST_DEVIATIONS = {"q": 1e-3, "v": 1e-2}
+#: Median of the absolute value of a normal variable over its standard deviation, inverted.
+FROM_MEDIAN = 1.4826
+
+
+def identify(
+    recording: RoverRun | str | Path,
+    parameters: Sequence[str | Parameter],
+    *,
+    model: RoverModel | None = None,
+    settings: Mapping[str, Any] | None = None,
+    window: float = 0.5,
+    max_windows: int = 20,
+    noise: Mapping[str, float] | None = None,
+    max_iterations: int = 30,
+    progress: Callable[[int, float], None] = lambda _iteration, _mean_square: None,
+) -> Identification:
+    """Fits parameters of a simulation to a recorded run, with their uncertainty.
+
+    The run is cut into short windows, so that the simulation need not follow it for longer. Each is simulated under
+    the recorded commands from a state of its own, which is estimated together with the parameters, since it is measured
+    with noise. The commands of a row are those under which the rover came to it from the row before, as `rover drive`
+    records them. The sum of squares of simulated minus measured coordinates and velocities, over their standard
+    deviations, is minimised by the method of Gauss and Newton; derivatives are central differences of
+    simulations. The covariance is that of linear least squares at the minimum.
+
+    Args:
+        recording: The run, or its file. Its model, ground and settings are what does not change.
+        parameters: Names, or `Parameter`s of one's own. Names are "friction" (of all contacts without materials),
+            "restitution", "gravity_scale", "mass_scale" (of all masses and inertias), "payload" (added to the first
+            solid, kg), "actuator_gain" (on the wheel torques), "steering_stiffness", "steering_damping", "stall_torque"
+            and "no_load_speed".
+        model: The rover as it is believed to be; the recorded one by default.
+        settings: Keyword arguments of `Simulation` that replace the recorded ones, such as `{"friction": 0.7}`. The
+            search begins at the values of model and settings, and at factors of 1.
+        window: Length of a window, s.
+        max_windows: Largest number of windows; of more, as many are taken at equal distances.
+        noise: Standard deviations of the measured coordinates, "q", m and rad, and velocities, "v", m/s and rad/s. By
+            default those of place, attitude, joints and their rates are estimated from the residuals.
+        max_iterations: Largest number of iterations.
+        progress: Called with the number of an iteration and the mean square of the weighted residuals.
+
+    Raises:
+        OptionError: An argument is out of range or a parameter unknown, or the run lacks a channel, is too short or
+            cannot be simulated.
+        RecordingError: The file holds no run of a rover.
+        RoverGymError: Model or settings do not fit the run.
+    """
+    run = recording if isinstance(recording, RoverRun) else read_run(recording)
+    max_windows = whole("max_windows", max_windows, at_least=1)
+    max_iterations = whole("max_iterations", max_iterations, at_least=1)
+    setup = _setup(run, model, settings)
+    chosen = chosen_parameters(parameters, setup)
+    nq, nv = setup.model.nq, setup.model.nv
+    deviations = np.repeat([FIRST_DEVIATIONS["q"], FIRST_DEVIATIONS["v"]], [nq, nv])
+    if noise is not None:
+        deviations = _given_noise(noise, nq, nv)
+    windows = _some(cut(run, window, setup.simulation().time_step), max_windows)
+
+    fit = WindowFit(setup, chosen, windows)
+    solution = fit.solve(_values(chosen), deviations, iterations=max_iterations, progress=progress)
+    if noise is None:
+        estimated = _estimated_noise(solution, nq)
+        solution = fit.solve(solution.values, estimated, iterations=max_iterations, progress=progress)
+    scales = np.array([parameter.scale for parameter in chosen])
+    sensitivities, found = open_combinations(solution.jacobian, scales, variance_of(solution, len(chosen)))
+    reasons: dict[int, str] = {}
+    held: dict[int, float] = {}
+    for combination in found:
+        reasons |= {one: combination.reason(chosen, one) for one in combination.members}
+        held |= next({one: chosen[one].start} for one in combination.members if one not in held)
+    # What the run does not tell stays where the search began; the others are as they are best then.
+    free, told, best = _free(fit, solution, chosen, held, max_iterations)
+    factors: dict[int, float] = {}
+    if free:
+        around = look_around(told, best, [chosen[i] for i in free], max_iterations)
+        best = around.solution
+        factors = dict(zip(free, around.factors.tolist(), strict=True))
+        if around.flat:
+            reasons |= {free[i]: reason for i, reason in around.flat.items()}
+            held |= {free[i]: chosen[free[i]].start for i in around.flat}
+            fit.go_on_from(told)
+            solution = replace(solution, values=_inserted(solution.values, free, best.values))
+            free, told, best = _free(fit, solution, chosen, held, max_iterations)
+    widened = np.array([factors[i] for i in free])
+    return _identification(chosen, windows, best, free, widened, reasons, sensitivities, setup)
+
+
+def _free(
+    fit: WindowFit, solution: Solution, parameters: Sequence[Parameter], held: Mapping[int, float], iterations: int
+) -> tuple[list[int], WindowFit, Solution]:
+    """The indices of what is not held, its fit, and its minimum."""
+    free = [i for i in range(len(parameters)) if i not in held]
+    if not held:
+        return free, fit, solution
+    told = fit.hold(held)
+    return free, told, told.solve(solution.values[free], solution.deviations, iterations=iterations)
+
+
+def _inserted(values: Array, places: Sequence[int], entries: Array) -> Array:
+    """The values with others in some places."""
+    inserted: Array = values.copy()
+    inserted[list(places)] = entries
+    return inserted
+
+
+def _setup(run: RoverRun, model: RoverModel | None, settings: Mapping[str, Any] | None) -> Setup:
+    recorded = run.trajectory.attributes.get("solver")
+    if not isinstance(recorded, dict):
+        refuse(OptionError, "recording", "solver", "is no attribute of this run, but needed")
+    if model is not None and not isinstance(model, RoverModel):
+        refuse(OptionError, "model", model, "must be a RoverModel")
+    if model is not None and model.dof_names != run.model.dof_names:
+        refuse(OptionError, "model", model.name, f"must have the joints of the recorded {run.model.name!r}")
+    known = {**recorded, **(settings or {})}
+    for name in settings or {}:
+        if name not in recorded:
+            refuse(OptionError, f"settings.{name}", name, f"unknown; known are {', '.join(recorded)}")
+    return Setup(run.model if model is None else model, run.terrain, known)
+
+
+def _given_noise(noise: object, nq: int, nv: int) -> Array:
+    if not isinstance(noise, Mapping) or set(noise) != {"q", "v"}:
+        refuse(OptionError, "noise", noise, "must be a mapping with the entries 'q' and 'v'")
+    given = [number(f"noise.{name}", noise[name], above=0.0) for name in ("q", "v")]
+    return np.repeat(given, [nq, nv])
+
+
+def _some(windows: list[Window], most: int) -> list[Window]:
+    """As many windows as wanted, at equal distances."""
+    if len(windows) <= most:
+        return windows
+    return [windows[i] for i in np.linspace(0, len(windows) - 1, most).round().astype(int).tolist()]
+
+
+def _values(parameters: Sequence[Parameter]) -> Array:
+    return np.array([parameter.start for parameter in parameters])
+
+
+def _estimated_noise(solution: Solution, nq: int) -> Array:
+    """(nq + nv,) deviations by the median of the residuals, which windows that do not fit hardly move.
+
+    Columns of one kind share theirs: place, attitude and joints, and the rates of each.
+    """
+    rows = np.abs(solution.residuals.reshape(-1, solution.deviations.size))
+    taken = np.sqrt(solution.residuals.size / max(solution.freedom, 1.0))
+    kinds = np.split(rows, [3, 6, nq, nq + 3, nq + 6], axis=1)
+    found = [np.full(kind.shape[1], FROM_MEDIAN * taken * np.median(kind)) for kind in kinds if kind.size]
+    return np.maximum(np.concatenate(found), SMALLEST_CHANGE)
+
+
+def _identification(
+    parameters: Sequence[Parameter],
+    windows: Sequence[Window],
+    solution: Solution,
+    free: Sequence[int],
+    factors: Array,
+    reasons: Mapping[int, str],
+    sensitivities: Array,
+    setup: Setup,
+) -> Identification:
+    n = len(parameters)
+    variance = variance_of(solution, len(free))
+    values = _inserted(_values(parameters), free, solution.values)
+    covariance = np.full((n, n), np.nan)
+    if free:
+        jacobian = solution.jacobian
+        covariance[np.ix_(free, free)] = variance * np.linalg.inv(jacobian.T @ jacobian) * np.outer(factors, factors)
+    covariance[list(reasons), :] = covariance[:, list(reasons)] = np.nan
+    estimates = []
+    for i, parameter in enumerate(parameters):
+        error, reason = float(np.sqrt(covariance[i, i])), reasons.get(i, "")
+        if not reason and not parameter.low < values[i] < parameter.high:
+            reason = "it ended at its bound"
+        estimates.append(
+            Estimate(parameter.name, parameter.unit, float(values[i]), np.inf if reason else error, reason)
+        )
+    width = solution.deviations.size
+    ends = np.cumsum([window.measured.shape[0] for window in windows])[:-1]
+    coordinates, rates = state_channels(setup.model)
+    return Identification(
+        estimates=tuple(estimates),
+        covariance=covariance,
+        sensitivities=sensitivities,
+        condition=float(sensitivities[0] / sensitivities[-1]) if sensitivities[-1] > 0.0 else np.inf,
+        columns=(*coordinates.columns, *rates.columns[:6], *(f"rate of {name}" for name in rates.columns[6:])),
+        deviations=solution.deviations,
+        times=tuple(window.time for window in windows),
+        residuals=tuple(np.split(solution.residuals.reshape(-1, width), ends)),
+        mean_square=variance,
+        degrees_of_freedom=solution.freedom - len(free),
+        iterations=solution.iterations,
+    )

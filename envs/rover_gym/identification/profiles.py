@@ -1,0 +1,90 @@
+"""Looks around a minimum: with one parameter held elsewhere, how well do the others fit?
+
+The derivative at the minimum does not tell all. Where no wheel slips, all larger frictions fit alike, although the
+smallest slip that noise makes has a derivative. And the sum of squares of a machine with contacts has kinks, at which
+its derivative understates the uncertainty, and more than one minimum.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.identification.fitting import EXACT, Solution, WindowFit
+from rover_gym.identification.parameters import Parameter
+
+Array = npt.NDArray[np.float64]
+
+#: Iterations that the other parameters and the starting states have to make up for a change of one parameter.
+ITERATIONS = 3
+#: Distances in standard errors, besides that of the parameter's scale, and the rise of the sum of squares over the
+#: variance by which a parameter's scale must be seen: half of what the largest standard error allows for.
+DISTANCE, LEAST_RISE = 2.0, 2.0
+#: A place that is better than the minimum by this, in units of the variance, is where the search goes on.
+BETTER = 0.5
+#: Number of times that it goes on.
+MOST_RESTARTS = 4
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """A minimum and what is around it.
+
+    Attributes:
+        solution: The minimum, the best that was found.
+        variance: Variance of a weighted residual.
+        factors: (p,) how many times larger the standard errors are than the derivative says; at least 1.
+        flat: By the index of each parameter that the run does not tell, why.
+    """
+
+    solution: Solution
+    variance: float
+    factors: Array
+    flat: dict[int, str]
+
+
+def variance_of(solution: Solution, n: int) -> float:
+    """Variance of a weighted residual with `n` parameters, at least that at which a fit ends as exact."""
+    return max(float(solution.weighted @ solution.weighted) / max(solution.freedom - n, 1.0), EXACT)
+
+
+def look_around(fit: WindowFit, solution: Solution, parameters: Sequence[Parameter], iterations: int) -> Surroundings:
+    """Holds each parameter at other values and fits the rest; goes on from where that is better.
+
+    Args:
+        fit: The fit, whose starting states are those of the solution.
+        solution: Its minimum.
+        parameters: Its parameters.
+        iterations: Largest number of iterations of a search that goes on.
+    """
+    for _ in range(MOST_RESTARTS):
+        if fit.restart(solution):
+            solution = fit.solve(solution.values, solution.deviations, iterations=iterations)
+        variance = variance_of(solution, len(parameters))
+        factors, flat = np.ones(len(parameters)), {}
+        covariance = variance * np.linalg.inv(solution.jacobian.T @ solution.jacobian)
+        better: tuple[float, WindowFit, Array] | None = None
+        for i, parameter in enumerate(parameters):
+            here, error = float(solution.values[i]), float(np.sqrt(covariance[i, i]))
+            for distance in (DISTANCE * error, -DISTANCE * error, parameter.scale, -parameter.scale):
+                there = float(np.clip(here + distance, parameter.low, parameter.high))
+                if abs(there - here) < 0.5 * abs(distance):
+                    continue
+                moved_fit = fit.hold({i: there})
+                others = np.delete(solution.values + covariance[i] / covariance[i, i] * (there - here), i)
+                moved = moved_fit.solve(others, solution.deviations, iterations=ITERATIONS)
+                rise = (moved.loss - solution.loss) / variance
+                if rise < -BETTER and (better is None or moved.loss < better[0]):
+                    better = (moved.loss, moved_fit, np.insert(moved.values, i, there))
+                if abs(distance) == parameter.scale and rise < LEAST_RISE:
+                    side = "larger" if distance > 0.0 else "smaller"
+                    flat[i] = f"{side} values, such as {there:.3g}, fit as well"
+                elif abs(distance) < parameter.scale:
+                    seen = abs(there - here) / np.sqrt(max(rise, 0.25))
+                    factors[i] = max(factors[i], seen / error)
+        if better is None:
+            break
+        fit.go_on_from(better[1])
+        solution = fit.solve(better[2], solution.deviations, iterations=iterations)
+    return Surroundings(solution, variance_of(solution, len(parameters)), factors, flat)

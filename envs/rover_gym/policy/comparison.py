@@ -1,0 +1,183 @@
+"""Compares policies on the same seeded episodes: who drives, episodes that are kept, and the table."""
+
+import hashlib
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from rover_gym.mechanics import RoverModel
+from rover_gym.policy.episodes import Policy
+from rover_gym.policy.evaluation import EvaluatedEpisode, IntervalEstimate, PolicySummary, drive_all
+from rover_gym.policy.policy_card import PolicyCard
+from rover_gym.policy.policy_files import PolicyError
+from rover_gym.policy.scan_policy import ScanPolicy
+from rover_gym.policy.shipped import find_policy, policy_arguments
+from rover_gym.policy.trained_policy import TrainedPolicy
+from rover_gym.validation import refuse
+
+COLUMNS = ("policy", "success", "95% interval", "time to goal, s", "energy, J/m", "slip", "tilt, °", "other ends")
+
+#: Policies without a training, by their rows' names.
+BASELINE, PLANNER, GUIDE = "PD baseline", "scan planner", "guide alone"
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A policy of a comparison.
+
+    Attributes:
+        name: Name of its row.
+        make: Makes it from an environment.
+        arguments: Arguments of `RoverEnv` that it needs.
+        files: Files that it is read from.
+    """
+
+    name: str
+    make: Callable[[Any], Policy]
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    files: tuple[Path, ...] = ()
+
+
+def trained_contender(policy: str, terrain: str) -> Contender:
+    """A trained policy: the folder of one, the folder of a run, or "trained" for the one shipped for a terrain.
+
+    Raises:
+        PolicyError: There is none.
+        OSError: Its files may not be read.
+    """
+    inner = Path(policy) / "policy"
+    folder = find_policy(str(inner) if (inner / "policy.npz").exists() else policy, terrain)
+    if folder is None:
+        refuse(PolicyError, "policies", policy, "must be the folder of a trained policy or 'trained'")
+    name = policy if policy == "trained" else Path(policy).name
+    files = (folder / "policy.npz", folder / "policy.json")
+    return Contender(name, partial(_load, folder), policy_arguments(folder), files)
+
+
+def planner_contender(model: RoverModel | None) -> Contender:
+    """The scan planner, with the height scan that it needs for a rover."""
+    return Contender(PLANNER, ScanPolicy, ScanPolicy.arguments(model))
+
+
+def guide_contender(trained: Contender) -> Contender | None:
+    """The guide whose commands a trained policy offsets, alone; None if it has no guide."""
+    card = PolicyCard.read(trained.files[1])
+    return Contender(GUIDE, partial(_untrained, card), trained.arguments, trained.files[1:]) if card.guided else None
+
+
+def _load(folder: Path, env: Any) -> Policy:
+    return TrainedPolicy.load(env, folder)
+
+
+def _untrained(card: PolicyCard, env: Any) -> Policy:
+    return TrainedPolicy.untrained(env, card)
+
+
+def drive_or_reuse(
+    contender: Contender,
+    path: Path,
+    seeds: range,
+    *,
+    arguments: Mapping[str, Any],
+    files: Sequence[Path] = (),
+    threads: int = 1,
+    progress: Callable[[int], None] = lambda _done: None,
+) -> list[EvaluatedEpisode]:
+    """Drives one episode a seed, or takes those in a file that an earlier call wrote, if nothing differs.
+
+    Args:
+        contender: Who drives.
+        path: The JSON file of the episodes. They are reused if arguments, seeds, the content of all files, the
+            package's policies and its compiled core are the same.
+        seeds: Seeds of the resets.
+        arguments: Arguments of `RoverEnv`.
+        files: Files that the arguments name: maps, models.
+        threads: Threads that step the rovers.
+        progress: Called with the number of episodes done.
+
+    Raises:
+        OptionError: An argument is out of range.
+        OSError: The file cannot be written.
+    """
+    environment = {**arguments, **contender.arguments}
+    key = {
+        "environment": environment,
+        "seeds": [seeds.start, len(seeds)],
+        "files": _digest([*files, *contender.files]),
+    }
+    plain_key = json.loads(json.dumps(key))
+    kept = _kept(path, plain_key)
+    if kept is not None:
+        return kept
+    drives = drive_all(contender.make, seeds, arguments=environment, threads=threads, progress=progress)
+    plain = {"key": plain_key, "drives": [asdict(drive) for drive in drives]}
+    path.write_text(json.dumps(plain) + "\n", encoding="utf-8")
+    return drives
+
+
+def _digest(files: Sequence[Path]) -> str:
+    """SHA-256 of a policy's files and of what drives it: the package's policies and its compiled core."""
+    package = Path(__file__).parents[1]
+    digest = hashlib.sha256()
+    for path in (*files, *sorted(package.glob("policy/*.py")), *sorted(package.glob("_core.*[!i]"))):
+        digest.update(path.name.encode() + hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
+
+
+def _kept(path: Path, key: Any) -> list[EvaluatedEpisode] | None:
+    """The episodes of an earlier evaluation; None if it does not match or its file is damaged."""
+    try:
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        return [EvaluatedEpisode(**drive) for drive in kept["drives"]] if kept["key"] == key else None
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
+        return None
+
+
+def comparison_table(rows: Sequence[PolicySummary]) -> str:
+    """The figures of policies as a table in Markdown."""
+    lines = ["| " + " | ".join(COLUMNS) + " |", "|" + "---|" * len(COLUMNS)]
+    for row in rows:
+        low, high = row.success.interval
+        others = ", ".join(f"{end.replace('_', ' ')} {n}" for end, n in row.ends.items() if n and end != "goal")
+        cells = (
+            row.policy,
+            f"{row.successes} of {row.episodes}, {row.success.value:.1%}",
+            f"{100.0 * low:.1f} to {high:.1%}",
+            _cell(row.time, ".1f"),
+            _cell(row.energy_per_metre, ".0f"),
+            _cell(row.slip, ".3f"),
+            _cell(row.tilt, ".2f"),
+            others,
+        )
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def _cell(estimate: IntervalEstimate, form: str) -> str:
+    if math.isnan(estimate.value):
+        return "-"
+    half = 0.5 * (estimate.interval[1] - estimate.interval[0])
+    return f"{estimate.value:{form}} ± {half:{form}}"
+
+
+def comparison_report(rows: Sequence[PolicySummary], arguments: Mapping[str, Any], seeds: range) -> dict[str, Any]:
+    """The figures of policies for JSON, which lacks NaN."""
+    return {
+        "environment": dict(arguments),
+        "episodes": len(seeds),
+        "seed": seeds.start,
+        "rows": [_without_nan(asdict(row)) for row in rows],
+    }
+
+
+def _without_nan(value: Any) -> Any:
+    """Replaces NaN by None."""
+    if isinstance(value, dict):
+        return {key: _without_nan(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_without_nan(entry) for entry in value]
+    return None if isinstance(value, float) and math.isnan(value) else value

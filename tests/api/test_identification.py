@@ -1,0 +1,232 @@
+"""`identify`: parameters of recorded runs, their uncertainty, and what a run does not tell."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from rover_gym import OptionError, RoverGymError, RoverModel, Simulation
+from rover_gym.identification import Identification, Parameter, identify
+
+pytest.importorskip("h5py", reason="the extra demo is not installed")
+
+from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_run
+
+Torque = Callable[[float], float]
+
+#: Standard deviations of the noise: m and rad, m/s and rad/s.
+NOISE = {"q": 1e-3, "v": 1e-2}
+MODEL = RoverModel.named("skid-steered")
+BELIEVED: dict[str, Any] = {"model": MODEL, "settings": {"friction": 0.7}}
+
+
+def a_run(
+    path: Path, torque: Torque, seconds: float = 1.0, *, friction: float = 0.5, mass_scale: float = 1.2
+) -> RoverRun:
+    """A rover that stands at first, driven over flat ground; a row each 0.02 s."""
+    sim = Simulation(MODEL.replace(mass_scale=mass_scale), friction=friction)
+    sim.set_state(sim.model.resting_pose(sim.terrain, (0.0, 0.0), 0.0))
+    sim.step(200)
+    sim.set_state(sim.q)
+    sampler = RoverSampler(sim.model)
+    with Recorder(path, sampler.channels, describe(sim, "a drive"), terrain=sim.terrain) as recorder:
+        recorder.append(sampler.row(sim))
+        while sim.time < seconds - 1e-9:
+            sim.set_wheel_torques(np.full(4, torque(sim.time)))
+            sim.step(4)
+            recorder.append(sampler.row(sim))
+    return read_run(path)
+
+
+def with_noise(run: RoverRun, seed: int) -> RoverRun:
+    """The run as it is measured."""
+    random = np.random.default_rng(seed)
+    data = dict(run.trajectory.data)
+    for name, deviation in NOISE.items():
+        data[name] = data[name] + random.normal(0.0, deviation, data[name].shape)
+    return replace(run, trajectory=replace(run.trajectory, data=data))
+
+
+@pytest.fixture(scope="module")
+def slipping(tmp_path_factory: pytest.TempPathFactory) -> RoverRun:
+    """Wheels that spin and hold again."""
+    return a_run(tmp_path_factory.mktemp("run") / "slipping.h5", lambda t: 20.0 if t % 0.5 > 0.3 else 2.0, 1.5)
+
+
+@pytest.fixture(scope="module")
+def rolling(tmp_path_factory: pytest.TempPathFactory) -> RoverRun:
+    """Wheels that hold."""
+    return a_run(tmp_path_factory.mktemp("run") / "rolling.h5", lambda t: 0.3 + t)
+
+
+#: Fits by seed, each made once.
+Fits = Callable[[int], Identification]
+
+
+@pytest.fixture(scope="module")
+def fits(slipping: RoverRun) -> Fits:
+    """Mass and friction from noisy recordings, with a model and a ground that are wrong in both."""
+
+    @cache
+    def fit(seed: int) -> Identification:
+        return identify(with_noise(slipping, seed), ["mass_scale", "friction"], window=0.3, **BELIEVED)
+
+    return fit
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_parameters_are_recovered_within_their_uncertainty(fits: Fits, seed: int) -> None:
+    for estimate, truth in zip(fits(seed).estimates, (1.2, 0.5), strict=True):
+        assert estimate.is_identified
+        assert estimate.standard_error < 0.03 * truth
+        assert abs(estimate.value - truth) < 3.5 * estimate.standard_error
+
+
+def test_most_95_percent_intervals_hold_the_truth(fits: Fits) -> None:
+    intervals = [
+        (one.interval, truth) for seed in range(4) for one, truth in zip(fits(seed).estimates, (1.2, 0.5), strict=True)
+    ]
+    # Of eight intervals of 95% fewer than six hold it in 6 of 1000 cases.
+    assert sum(low < truth < high for (low, high), truth in intervals) >= 6
+
+
+def test_the_noise_is_estimated(fits: Fits) -> None:
+    fit = fits(0)
+    assert len(fit.columns) == len(fit.deviations) == 20
+    np.testing.assert_allclose(fit.deviations[:10], NOISE["q"], rtol=0.2)
+    np.testing.assert_allclose(fit.deviations[10:], NOISE["v"], rtol=0.2)
+    assert 0.8 < fit.mean_square < 1.25
+
+
+def test_residuals_and_covariance_belong_together(fits: Fits) -> None:
+    fit = fits(0)
+    assert [len(time) for time in fit.times] == [len(rows) for rows in fit.residuals]
+    rows = np.concatenate(fit.residuals)
+    assert np.sqrt((rows[:, 10:] ** 2).mean()) < 1.5 * NOISE["v"]
+    np.testing.assert_allclose(np.sqrt(np.diag(fit.covariance)), [one.standard_error for one in fit.estimates])
+    assert np.abs(fit.correlation[0, 1]) < 1.0
+    low, high = fit["friction"].interval
+    assert high - low == pytest.approx(2 * 1.96 * fit["friction"].standard_error, rel=1e-3)
+    assert fit.condition == pytest.approx(fit.sensitivities[0] / fit.sensitivities[1])
+    with pytest.raises(OptionError, match="name: must be one of mass_scale, friction"):
+        fit["frction"]
+
+
+@pytest.mark.parametrize("seed", [None, 1])
+def test_a_run_without_slip_does_not_tell_the_friction(rolling: RoverRun, seed: int | None) -> None:
+    run = rolling if seed is None else with_noise(rolling, seed)
+    fit = identify(run, ["mass_scale", "friction"], window=0.3, **BELIEVED)
+    friction = fit["friction"]
+    assert not friction.is_identified
+    assert friction.reason == "the run does not depend on it by more than the noise"
+    assert (friction.value, friction.standard_error) == (0.7, np.inf)
+    assert np.isnan(fit.covariance[1]).all()
+    assert fit["mass_scale"].is_identified
+    assert abs(fit["mass_scale"].value - 1.2) < max(4.0 * fit["mass_scale"].standard_error, 1e-3)
+    assert "| friction | 0.7, not identified |" in fit.table()
+
+
+def test_a_run_that_tells_only_a_quotient_says_so(rolling: RoverRun) -> None:
+    """While wheels hold, a heavier rover with stronger motors moves in the same way."""
+    fit = identify(with_noise(rolling, 2), ["mass_scale", "actuator_gain"], window=0.3, **BELIEVED)
+    for name, other in (("mass_scale", "actuator_gain"), ("actuator_gain", "mass_scale")):
+        assert fit[name].reason == f"the run tells only a combination of it and {other}"
+    assert fit["mass_scale"].value / fit["actuator_gain"].value == pytest.approx(1.2, rel=0.01)
+
+
+def test_without_noise_the_parameters_are_exact(slipping: RoverRun) -> None:
+    fit = identify(slipping, ["mass_scale", "friction"], window=0.3, **BELIEVED)
+    assert fit["mass_scale"].value == pytest.approx(1.2, abs=1e-5)
+    assert fit["friction"].value == pytest.approx(0.5, abs=1e-5)
+
+
+def test_a_parameter_of_ones_own(slipping: RoverRun) -> None:
+    def apply(setup: Any, value: float) -> Any:
+        return replace(setup, model=setup.model.replace(masses={"trunk": value}))
+
+    trunk = Parameter("trunk", "kg", start=50.0, low=10.0, high=100.0, scale=20.0, apply=apply)
+    fit = identify(with_noise(slipping, 3), [trunk], window=0.3, max_windows=2)
+    assert abs(fit["trunk"].value - 1.2 * 33.455) < 4.0 * fit["trunk"].standard_error
+    assert fit["trunk"].unit == "kg"
+
+
+def test_the_stated_noise_is_taken(slipping: RoverRun) -> None:
+    fit = identify(with_noise(slipping, 4), ["friction"], window=0.3, noise=NOISE, max_windows=2)
+    assert set(fit.deviations) == set(NOISE.values())
+
+
+def without(run: RoverRun, name: str) -> RoverRun:
+    data = {key: value for key, value in run.trajectory.data.items() if key != name}
+    return replace(run, trajectory=replace(run.trajectory, data=data))
+
+
+def with_rows(run: RoverRun, name: str, rows: npt.ArrayLike) -> RoverRun:
+    data = {**run.trajectory.data, name: np.asarray(rows)}
+    return replace(run, trajectory=replace(run.trajectory, data=data))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "field"),
+    [
+        ({"parameters": []}, "parameters"),
+        ({"parameters": "friction"}, "parameters"),
+        ({"parameters": ["frction"]}, "parameters"),
+        ({"parameters": ["friction", "friction"]}, "parameters"),
+        ({"window": 0.0}, "window"),
+        ({"window": 0.05}, "window"),
+        ({"window": 99.0}, "window"),
+        ({"max_windows": 0}, "max_windows"),
+        ({"max_iterations": 0.5}, "max_iterations"),
+        ({"noise": {"q": 1e-3}}, "noise"),
+        ({"noise": {"q": 1e-3, "v": 0.0}}, "noise.v"),
+        ({"settings": {"frction": 0.5}}, "settings.frction"),
+        ({"settings": {"friction": -0.5}}, "friction"),
+        ({"model": 3}, "model"),
+        ({"model": RoverModel()}, "model"),
+    ],
+)
+def test_wrong_arguments_are_named(rolling: RoverRun, arguments: dict[str, Any], field: str) -> None:
+    with pytest.raises(RoverGymError) as caught:
+        identify(rolling, **{"parameters": ["friction"], **arguments})
+    assert caught.value.field == field
+
+
+def test_what_a_recording_lacks_is_named(rolling: RoverRun) -> None:
+    v = rolling.trajectory["v"].copy()
+    v[3, 2] = np.nan
+    cases = {
+        "recording": without(rolling, "steering_set_points"),
+        "recording.v": with_rows(rolling, "v", v),
+        "recording.time[4]": with_rows(rolling, "time", [*rolling.time[:4], *(rolling.time[4:] + 0.001)]),
+    }
+    for field, run in cases.items():
+        with pytest.raises(OptionError) as caught:
+            identify(run, ["friction"])
+        assert caught.value.field == field
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"start": 5.0}, "mine.start"),
+        ({"low": 2.0}, "mine.low"),
+        ({"scale": 0.0}, "mine.scale"),
+        ({"high": np.inf}, "mine.high"),
+    ],
+)
+def test_a_parameter_that_cannot_be_is_refused(change: dict[str, float], field: str) -> None:
+    given = {"start": 0.5, "low": 0.0, "high": 1.0, "scale": 0.1, **change}
+    with pytest.raises(OptionError) as caught:
+        Parameter("mine", "1", apply=lambda setup, _value: setup, **given)
+    assert caught.value.field == field
+
+
+def test_a_rover_without_motors_has_none_to_identify(rolling: RoverRun) -> None:
+    model = rolling.model.replace(motor=None)
+    with pytest.raises(OptionError, match="stall_torque"):
+        identify(rolling, ["stall_torque"], model=model)
