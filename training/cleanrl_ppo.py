@@ -30,7 +30,7 @@ from rover_gym.validation import refuse
 
 Array = npt.NDArray[np.float32]
 
-#: What an action is held for: without it, PPO does not learn. An evaluation has it too.
+#: An action lasts 0.2 s, in evaluations too.
 DECISIONS: dict[str, Any] = {"control_frequency": 5.0}
 
 #: Coarser physics than in evaluations, which run at the defaults.
