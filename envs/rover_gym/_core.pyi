@@ -46,6 +46,7 @@ __all__ = [
     "ModelError",
     "Motor",
     "OptionError",
+    "PathSearch",
     "PlanarContacts",
     "PlanarSimulation",
     "PlanarSnapshot",
