@@ -21,14 +21,14 @@ Torque = Callable[[float], float]
 
 #: Standard deviations of the noise: m and rad, m/s and rad/s.
 NOISE = {"q": 1e-3, "v": 1e-2}
-MODEL = RoverModel.named("skid-steered")
+MODEL = RoverModel()
 BELIEVED: dict[str, Any] = {"model": MODEL, "settings": {"friction": 0.7}}
 
 
 def a_run(
     path: Path, torque: Torque, seconds: float = 1.0, *, friction: float = 0.5, mass_scale: float = 1.2
 ) -> RoverRun:
-    """A rover that stands at first, driven over flat ground; a row each 0.02 s."""
+    """A rover that stands at first, driven over flat ground; a row each 0.05 s."""
     sim = Simulation(MODEL.replace(mass_scale=mass_scale), friction=friction)
     sim.set_state(sim.model.resting_pose(sim.terrain, (0.0, 0.0), 0.0))
     sim.step(200)
@@ -37,8 +37,8 @@ def a_run(
     with Recorder(path, sampler.channels, describe(sim, "a drive"), terrain=sim.terrain) as recorder:
         recorder.append(sampler.row(sim))
         while sim.time < seconds - 1e-9:
-            sim.set_wheel_torques(np.full(4, torque(sim.time)))
-            sim.step(4)
+            sim.set_wheel_torques(np.full(6, torque(sim.time)))
+            sim.step(10)
             recorder.append(sampler.row(sim))
     return read_run(path)
 
@@ -55,13 +55,13 @@ def with_noise(run: RoverRun, seed: int) -> RoverRun:
 @pytest.fixture(scope="module")
 def slipping(tmp_path_factory: pytest.TempPathFactory) -> RoverRun:
     """Wheels that spin and hold again."""
-    return a_run(tmp_path_factory.mktemp("run") / "slipping.h5", lambda t: 20.0 if t % 0.5 > 0.3 else 2.0, 1.5)
+    return a_run(tmp_path_factory.mktemp("run") / "slipping.h5", lambda t: 120.0 if t % 0.5 > 0.3 else 20.0, 2.0)
 
 
 @pytest.fixture(scope="module")
 def rolling(tmp_path_factory: pytest.TempPathFactory) -> RoverRun:
     """Wheels that hold."""
-    return a_run(tmp_path_factory.mktemp("run") / "rolling.h5", lambda t: 0.3 + t)
+    return a_run(tmp_path_factory.mktemp("run") / "rolling.h5", lambda t: 10.0 + 20.0 * t)
 
 
 #: Fits by seed, each made once.
@@ -74,40 +74,41 @@ def fits(slipping: RoverRun) -> Fits:
 
     @cache
     def fit(seed: int) -> Identification:
-        return identify(with_noise(slipping, seed), ["mass_scale", "friction"], window=0.3, **BELIEVED)
+        return identify(with_noise(slipping, seed), ["mass_scale", "friction"], window=0.4, **BELIEVED)
 
     return fit
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(3))
 def test_parameters_are_recovered_within_their_uncertainty(fits: Fits, seed: int) -> None:
     for estimate, truth in zip(fits(seed).estimates, (1.2, 0.5), strict=True):
         assert estimate.is_identified
-        assert estimate.standard_error < 0.03 * truth
+        assert estimate.standard_error < 0.01 * truth
         assert abs(estimate.value - truth) < 3.5 * estimate.standard_error
 
 
 def test_most_95_percent_intervals_hold_the_truth(fits: Fits) -> None:
     intervals = [
-        (one.interval, truth) for seed in range(4) for one, truth in zip(fits(seed).estimates, (1.2, 0.5), strict=True)
+        (one.interval, truth) for seed in range(3) for one, truth in zip(fits(seed).estimates, (1.2, 0.5), strict=True)
     ]
-    # Of eight intervals of 95% fewer than six hold it in 6 of 1000 cases.
-    assert sum(low < truth < high for (low, high), truth in intervals) >= 6
+    # Of six intervals of 95% fewer than four hold it in 2 of 1000 cases.
+    assert sum(low < truth < high for (low, high), truth in intervals) >= 4
 
 
 def test_the_noise_is_estimated(fits: Fits) -> None:
     fit = fits(0)
-    assert len(fit.columns) == len(fit.deviations) == 20
-    np.testing.assert_allclose(fit.deviations[:10], NOISE["q"], rtol=0.2)
-    np.testing.assert_allclose(fit.deviations[10:], NOISE["v"], rtol=0.2)
+    assert len(fit.columns) == len(fit.deviations) == 42
+    np.testing.assert_allclose(fit.deviations[:21], NOISE["q"], rtol=0.2)
+    np.testing.assert_allclose(fit.deviations[21:], NOISE["v"], rtol=0.2)
     assert 0.8 < fit.mean_square < 1.25
 
 
 def test_residuals_and_covariance_belong_together(fits: Fits) -> None:
     fit = fits(0)
+    assert fit.window_mean_squares.shape == (len(fit.times),)
     assert [len(time) for time in fit.times] == [len(rows) for rows in fit.residuals]
     rows = np.concatenate(fit.residuals)
-    assert np.sqrt((rows[:, 10:] ** 2).mean()) < 1.5 * NOISE["v"]
+    assert np.sqrt((rows[:, 21:] ** 2).mean()) < 1.5 * NOISE["v"]
     np.testing.assert_allclose(np.sqrt(np.diag(fit.covariance)), [one.standard_error for one in fit.estimates])
     assert np.abs(fit.correlation[0, 1]) < 1.0
     low, high = fit["friction"].interval
@@ -120,7 +121,7 @@ def test_residuals_and_covariance_belong_together(fits: Fits) -> None:
 @pytest.mark.parametrize("seed", [None, 1])
 def test_a_run_without_slip_does_not_tell_the_friction(rolling: RoverRun, seed: int | None) -> None:
     run = rolling if seed is None else with_noise(rolling, seed)
-    fit = identify(run, ["mass_scale", "friction"], window=0.3, **BELIEVED)
+    fit = identify(run, ["mass_scale", "friction"], window=0.4, **BELIEVED)
     friction = fit["friction"]
     assert not friction.is_identified
     assert friction.reason == "the run does not depend on it by more than the noise"
@@ -133,14 +134,14 @@ def test_a_run_without_slip_does_not_tell_the_friction(rolling: RoverRun, seed: 
 
 def test_a_run_that_tells_only_a_quotient_says_so(rolling: RoverRun) -> None:
     """While wheels hold, a heavier rover with stronger motors moves in the same way."""
-    fit = identify(with_noise(rolling, 2), ["mass_scale", "actuator_gain"], window=0.3, **BELIEVED)
+    fit = identify(with_noise(rolling, 2), ["mass_scale", "actuator_gain"], window=0.4, **BELIEVED)
     for name, other in (("mass_scale", "actuator_gain"), ("actuator_gain", "mass_scale")):
         assert fit[name].reason == f"the run tells only a combination of it and {other}"
     assert fit["mass_scale"].value / fit["actuator_gain"].value == pytest.approx(1.2, rel=0.01)
 
 
 def test_without_noise_the_parameters_are_exact(slipping: RoverRun) -> None:
-    fit = identify(slipping, ["mass_scale", "friction"], window=0.3, **BELIEVED)
+    fit = identify(slipping, ["mass_scale", "friction"], window=0.4, **BELIEVED)
     assert fit["mass_scale"].value == pytest.approx(1.2, abs=1e-5)
     assert fit["friction"].value == pytest.approx(0.5, abs=1e-5)
 
@@ -149,14 +150,14 @@ def test_a_parameter_of_ones_own(slipping: RoverRun) -> None:
     def apply(setup: Any, value: float) -> Any:
         return replace(setup, model=setup.model.replace(masses={"trunk": value}))
 
-    trunk = Parameter("trunk", "kg", start=50.0, low=10.0, high=100.0, scale=20.0, apply=apply)
-    fit = identify(with_noise(slipping, 3), [trunk], window=0.3, max_windows=2)
-    assert abs(fit["trunk"].value - 1.2 * 33.455) < 4.0 * fit["trunk"].standard_error
+    trunk = Parameter("trunk", "kg", start=600.0, low=100.0, high=2000.0, scale=300.0, apply=apply)
+    fit = identify(with_noise(slipping, 3), [trunk], window=0.4, max_windows=2)
+    assert abs(fit["trunk"].value - 720.0) < 4.0 * fit["trunk"].standard_error
     assert fit["trunk"].unit == "kg"
 
 
 def test_the_stated_noise_is_taken(slipping: RoverRun) -> None:
-    fit = identify(with_noise(slipping, 4), ["friction"], window=0.3, noise=NOISE, max_windows=2)
+    fit = identify(with_noise(slipping, 4), ["friction"], window=0.4, noise=NOISE, max_windows=2)
     assert set(fit.deviations) == set(NOISE.values())
 
 
@@ -187,7 +188,7 @@ def with_rows(run: RoverRun, name: str, rows: npt.ArrayLike) -> RoverRun:
         ({"settings": {"frction": 0.5}}, "settings.frction"),
         ({"settings": {"friction": -0.5}}, "friction"),
         ({"model": 3}, "model"),
-        ({"model": RoverModel()}, "model"),
+        ({"model": RoverModel.named("skid-steered")}, "model"),
     ],
 )
 def test_wrong_arguments_are_named(rolling: RoverRun, arguments: dict[str, Any], field: str) -> None:

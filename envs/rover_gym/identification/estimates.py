@@ -64,6 +64,8 @@ class Identification:
         deviations: (nq + nv,) standard deviation of the measurements of each column, given or estimated.
         times: Of each window, (rows,) the times of its rows, s.
         residuals: Of each window, (rows, nq + nv) simulated minus measured, m, rad, m/s and rad/s.
+        window_mean_squares: (n_windows,) mean square of each window's residuals over their deviations. One that is far
+            above 1 does not fit; it counts for less, by its inverse.
         mean_square: Mean square of the weighted residuals over their degrees of freedom. About 1 if the model fits to
             within the noise; the covariance contains it as a factor.
         degrees_of_freedom: Number of residuals less that of estimated quantities.
@@ -78,6 +80,7 @@ class Identification:
     deviations: Array
     times: tuple[Array, ...]
     residuals: tuple[Array, ...]
+    window_mean_squares: Array
     mean_square: float
     degrees_of_freedom: float
     iterations: int

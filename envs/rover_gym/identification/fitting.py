@@ -234,28 +234,32 @@ class WindowFit:
         n = changes.size
         rovers = [base[0]] * (2 * n + 1) + [rover for rover, _ in changed]
         gains = np.array([base[1]] * (2 * n + 1) + [gain for _, gain in changed])
-        result: list[_Linear] = []
-        moved_states: list[Array] = []
+        shot: list[tuple[Array, Array]] = []
         for window, state in zip(self._windows, self._states, strict=True):
             states = np.tile(state, (len(rovers), 1))
             states[1 : n + 1] += np.diag(changes)
             states[n + 1 : 2 * n + 1] -= np.diag(changes)
-            rows = self._weighted(window, rovers, gains, states, deviations)
+            shot.append((states, self._weighted(window, rovers, gains, states, deviations)))
+        misfits = [i for i, (_, rows) in enumerate(shot) if _is_misfit(rows[0])]
+        # If most windows do not fit, it is for the parameters.
+        for i in misfits if 2 * len(misfits) <= len(shot) or len(shot) == 1 else ():
+            states, rows = shot[i]
             for _ in range(MOST_MOVES):
                 squares = np.nan_to_num((rows[: 2 * n + 1] ** 2).sum(axis=1), nan=np.inf)
                 best = int(np.argmin(squares))
-                if best == 0 or squares[0] < MISFIT * rows.shape[1]:
+                if best == 0 or not _is_misfit(rows[0]):
                     break
-                states += states[best] - states[0]
-                rows = self._weighted(window, rovers, gains, states, deviations)
-            moved_states.append(states[0])
+                states = states + (states[best] - states[0])
+                rows = self._weighted(self._windows[i], rovers, gains, states, deviations)
+            shot[i] = (states, rows)
+        self._states = [states[0] for states, _ in shot]
+        result = []
+        for window, (_, rows) in zip(self._windows, shot, strict=True):
             if not np.isfinite(rows[0]).all():
                 refuse(OptionError, "recording", float(window.time[0]), "has a window that cannot be simulated, from s")
-            by_state = (rows[1 : n + 1] - rows[n + 1 : 2 * n + 1]).T / (2.0 * changes)
-            by_parameters = (rows[2 * n + 1 :: 2] - rows[2 * n + 2 :: 2]).T / np.array(distances)
-            by_state, by_parameters = np.nan_to_num(by_state), np.nan_to_num(by_parameters)
+            by_state = np.nan_to_num((rows[1 : n + 1] - rows[n + 1 : 2 * n + 1]).T / (2.0 * changes))
+            by_parameters = np.nan_to_num((rows[2 * n + 1 :: 2] - rows[2 * n + 2 :: 2]).T / np.array(distances))
             result.append(_Linear(rows[0], by_state, by_parameters, np.linalg.qr(by_state)[0]))
-        self._states = moved_states
         return result
 
     def _better(
@@ -304,6 +308,10 @@ def is_told(sensitivities: Array) -> npt.NDArray[np.bool_]:
     least = max(LEAST_SENSITIVITY, SMALLEST_SENSITIVITY * float(sensitivities.max(initial=0.0)))
     told: npt.NDArray[np.bool_] = sensitivities >= least
     return told
+
+
+def _is_misfit(residuals: Array) -> bool:
+    return not float(residuals @ residuals) < MISFIT * residuals.size
 
 
 def _loss_argument(residuals: Array) -> float:

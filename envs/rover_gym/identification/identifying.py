@@ -45,7 +45,8 @@ def identify(
     with noise. The commands of a row are those under which the rover came to it from the row before, as `rover drive`
     records them. The sum of squares of simulated minus measured coordinates and velocities, over their standard
     deviations, is minimised by the method of Gauss and Newton; derivatives are central differences of
-    simulations. The covariance is that of linear least squares at the minimum.
+    simulations. A window that does not fit counts for less. The covariance is that of linear least squares at the
+    minimum; where the sum of squares rises more slowly than that says, standard errors are larger.
 
     Args:
         recording: The run, or its file. Its model, ground and settings are what does not change.
@@ -167,9 +168,10 @@ def _estimated_noise(solution: Solution, nq: int) -> Array:
     """
     rows = np.abs(solution.residuals.reshape(-1, solution.deviations.size))
     taken = np.sqrt(solution.residuals.size / max(solution.freedom, 1.0))
-    kinds = np.split(rows, [3, 6, nq, nq + 3, nq + 6], axis=1)
+    kinds: list[Array] = np.split(rows, [3, 6, nq, nq + 3, nq + 6], axis=1)
     found = [np.full(kind.shape[1], FROM_MEDIAN * taken * np.median(kind)) for kind in kinds if kind.size]
-    return np.maximum(np.concatenate(found), SMALLEST_CHANGE)
+    deviations: Array = np.maximum(np.concatenate(found), SMALLEST_CHANGE)
+    return deviations
 
 
 def _identification(
@@ -200,6 +202,7 @@ def _identification(
         )
     width = solution.deviations.size
     ends = np.cumsum([window.measured.shape[0] for window in windows])[:-1]
+    residuals = tuple(np.split(solution.residuals.reshape(-1, width), ends))
     coordinates, rates = state_channels(setup.model)
     return Identification(
         estimates=tuple(estimates),
@@ -209,7 +212,8 @@ def _identification(
         columns=(*coordinates.columns, *rates.columns[:6], *(f"rate of {name}" for name in rates.columns[6:])),
         deviations=solution.deviations,
         times=tuple(window.time for window in windows),
-        residuals=tuple(np.split(solution.residuals.reshape(-1, width), ends)),
+        residuals=residuals,
+        window_mean_squares=np.array([np.mean((rows / solution.deviations) ** 2) for rows in residuals]),
         mean_square=variance,
         degrees_of_freedom=solution.freedom - len(free),
         iterations=solution.iterations,

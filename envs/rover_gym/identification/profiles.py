@@ -24,7 +24,7 @@ DISTANCE, LEAST_RISE = 2.0, 2.0
 #: A place that is better than the minimum by this, in units of the variance, is where the search goes on.
 BETTER = 0.5
 #: Number of times that it goes on.
-MOST_RESTARTS = 4
+MOST_RESTARTS = 2
 
 
 @dataclass(frozen=True)
@@ -67,9 +67,11 @@ def look_around(fit: WindowFit, solution: Solution, parameters: Sequence[Paramet
         better: tuple[float, WindowFit, Array] | None = None
         for i, parameter in enumerate(parameters):
             here, error = float(solution.values[i]), float(np.sqrt(covariance[i, i]))
-            for distance in (DISTANCE * error, -DISTANCE * error, parameter.scale, -parameter.scale):
+            far = (parameter.scale, -parameter.scale)
+            flat_so_far = [False, False]
+            for k, distance in enumerate((DISTANCE * error, -DISTANCE * error, *far)):
                 there = float(np.clip(here + distance, parameter.low, parameter.high))
-                if abs(there - here) < 0.5 * abs(distance):
+                if abs(there - here) < 0.5 * abs(distance) or (k >= 2 and not flat_so_far[k - 2]):
                     continue
                 moved_fit = fit.hold({i: there})
                 others = np.delete(solution.values + covariance[i] / covariance[i, i] * (there - here), i)
@@ -77,10 +79,11 @@ def look_around(fit: WindowFit, solution: Solution, parameters: Sequence[Paramet
                 rise = (moved.loss - solution.loss) / variance
                 if rise < -BETTER and (better is None or moved.loss < better[0]):
                     better = (moved.loss, moved_fit, np.insert(moved.values, i, there))
-                if abs(distance) == parameter.scale and rise < LEAST_RISE:
+                if k >= 2 and rise < LEAST_RISE:
                     side = "larger" if distance > 0.0 else "smaller"
                     flat[i] = f"{side} values, such as {there:.3g}, fit as well"
-                elif abs(distance) < parameter.scale:
+                elif k < 2:
+                    flat_so_far[k] = rise < LEAST_RISE
                     seen = abs(there - here) / np.sqrt(max(rise, 0.25))
                     factors[i] = max(factors[i], seen / error)
         if better is None:
