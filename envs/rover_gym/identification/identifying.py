@@ -50,10 +50,10 @@ def identify(
 
     Args:
         recording: The run, or its file. Its model, ground and settings are what does not change.
-        parameters: Each a name, or a `Parameter` of one's own. Names are "friction" (of all contacts without materials),
-            "restitution", "gravity_scale", "mass_scale" (of all masses and inertias), "payload" (added to the first
-            solid, kg), "actuator_gain" (on the wheel torques), "steering_stiffness", "steering_damping", "stall_torque"
-            and "no_load_speed".
+        parameters: Each a name, or a `Parameter` of one's own. Names are "friction" (of all contacts without
+            materials), "restitution", "gravity_scale", "mass_scale" (of all masses and inertias), "payload" (added to
+            the first solid, kg), "actuator_gain" (on the wheel torques), "steering_stiffness", "steering_damping",
+            "stall_torque" and "no_load_speed".
         model: The rover as it is believed to be; the recorded one by default.
         settings: Keyword arguments of `Simulation` that replace the recorded ones, such as `{"friction": 0.7}`. The
             search begins at the values of model and settings, and at factors of 1.
