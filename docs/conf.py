@@ -1,7 +1,7 @@
 """Sphinx configuration.
 
-Two pages are made from the code itself: the environment's card and the command line's help. The compiled module is
-documented from its stub, which has the types beside the module's own docstrings.
+Some pages are made from the code itself: the cards of the environments and the help of the command line. The compiled
+module is documented from its stub, which has the types beside the module's own docstrings.
 """
 
 import __future__
@@ -19,6 +19,7 @@ from typer.testing import CliRunner
 import rover_gym
 from rover_gym import RoverEnv, __version__, mechanics
 from rover_gym.cli import app as rover
+from rover_gym.policy import RoverCommandEnv, RoverGoalEnv, RoverTrapEnv
 
 HERE = Path(__file__).parent
 GENERATED = HERE / "_generated"
@@ -61,7 +62,12 @@ def _use_stub() -> None:
 
 
 #: Environments whose docstring is a card in Markdown, by name; each has a page of its own.
-CARDS = {"Rover-v0": RoverEnv}
+CARDS = {
+    "Rover-v0": RoverEnv,
+    "RoverCommand-v0": RoverCommandEnv,
+    "RoverGoal-v0": RoverGoalEnv,
+    "RoverTrap-v0": RoverTrapEnv,
+}
 
 
 def _card(name: str) -> str:

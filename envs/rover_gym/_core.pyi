@@ -19,6 +19,7 @@ _Terrain: TypeAlias = "Plane | SphereField | HeightField | TriangleMesh | Union"
 _Terrains: TypeAlias = Sequence[_Terrain]
 _Coordinates: TypeAlias = Literal["report", "state"]
 _Range: TypeAlias = tuple[float, float]
+_Outcome: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike, str]
 _MaterialRow: TypeAlias = tuple[str, str, float, float]
 _Materials: TypeAlias = Mapping[tuple[str, str], tuple[float, float]] | Sequence[_MaterialRow]
 
@@ -45,6 +46,7 @@ __all__ = [
     "ModelError",
     "Motor",
     "OptionError",
+    "PathSearch",
     "PlanarContacts",
     "PlanarSimulation",
     "PlanarSnapshot",
@@ -1174,6 +1176,85 @@ class Contacts:
     def __len__(self) -> int: ...
 
 @final
+class PathSearch:
+    """Finds the cheapest of many paths of a rover over a height scan, by beam search.
+
+    `rover_gym.policy.ScanPolicy` drives by it, and `rover_gym.policy.PathCosts` says what a path
+    costs. Poses are way ahead, way to the right, m, and turn to the left, rad.
+
+    Args:
+        scan: Rows, columns and spacing, m, of the height scan.
+        outline: The rover in the trunk's frame: `wheels` (n_wheels, 2) and `underside` (n, 2), x
+            and z, m; `clearance` (n,) of the underside, m; `plane_fit` (3, n_wheels), level and
+            slopes of the ground plane by the heights under the wheels; `x_c`, m, of the point that
+            follows the path; `radius` of the wheels, m.
+        costs: The fields of `PathCosts`.
+        first: The arcs that a path may begin with: `poses` (n, 4, 3), `direction` (n,), 1 or -1,
+            and `commands` (n, 3), speed, curvature and sideways.
+        further: Those that it may go on with: `poses` and `direction`.
+        reach: The rover's reach, m.
+        arrival: Distance within which the goal is reached, m.
+
+    Raises:
+        OptionError: An argument is missing, no number, or of a wrong shape.
+    """
+
+    def __new__(
+        cls,
+        *,
+        scan: tuple[int, int, float],
+        outline: Mapping[str, Any],
+        costs: Mapping[str, float],
+        first: Mapping[str, Any],
+        further: Mapping[str, Any],
+        reach: float,
+        arrival: float,
+    ) -> PathSearch: ...
+    def best(
+        self,
+        heights: npt.ArrayLike,
+        goal: npt.ArrayLike,
+        command: npt.ArrayLike,
+        boldness: float,
+        traps: npt.ArrayLike,
+        retreat: float,
+        extra: npt.ArrayLike | None = None,
+    ) -> int:
+        """The first arc of the cheapest path.
+
+        Args:
+            heights: `(rows * columns,)` heights of the scan, m.
+            goal: The goal ahead and to the right of the point that follows the path, m.
+            command: `(3,)` the present command; its first entry is 0 at a start.
+            boldness: Factor on the costs of belly, climb and lean.
+            traps: `(n, 3)` poses where the rover got stuck.
+            retreat: Direction of the first arc, 1 or -1, while the rover backs off; 0 for a free
+                choice.
+            extra: `(n,)` a further cost of each first arc, m; none by default.
+
+        Returns:
+            The index of the arc among the first arcs.
+
+        Raises:
+            OptionError: An argument has a wrong shape or an entry that is not finite.
+        """
+    def under(self, heights: npt.ArrayLike, poses: npt.ArrayLike) -> npt.NDArray[np.float32]:
+        """What lies under the rover in poses.
+
+        Args:
+            heights: `(rows * columns,)` heights of the scan, m.
+            poses: `(..., 3)` poses.
+
+        Returns:
+            (n, n_wheels + 3) for each pose the heights under the wheels over the mean of the
+            present ones and the least gap under the rover, both over the wheels' radius; then the
+            slopes ahead and to the right of the plane through the ground under the wheels.
+
+        Raises:
+            OptionError: An argument has a wrong shape or an entry that is not finite.
+        """
+
+@final
 class Linearisation:
     """Derivatives of a time step by state and command, as `Simulation.linearise` returns them.
 
@@ -2184,6 +2265,12 @@ class EpisodeRules:
         noise: Standard deviation of each entry's noise, (size,); no noise by default.
         scan: Points of the height scan ahead and to the right of the trunk's origin in the heading
             frame, (n, 2), m; none by default.
+        goals: Number of goals that are reached one after the other. The observation of several has
+            three entries more before the heights: the goal after the present one, ahead and to the
+            right, m, and the number of goals still to reach.
+        battery: Work of the motors, driving or braking, after which the battery is empty and the
+            episode ends, J; none by default. The observation of a rover with a battery has one
+            entry more, after the time to high-centring: the fraction of its charge.
 
     Raises:
         ModelError: `model` is not a RoverModel.
@@ -2209,6 +2296,8 @@ class EpisodeRules:
         scale: npt.ArrayLike,
         noise: npt.ArrayLike | None = None,
         scan: npt.ArrayLike | None = None,
+        goals: int = 1,
+        battery: float | None = None,
     ) -> EpisodeRules: ...
     def __getnewargs_ex__(self) -> tuple[tuple[RoverModel], dict[str, Any]]: ...
 
@@ -2228,6 +2317,12 @@ class EpisodeRun:
         energy_positive: Its driving part, J.
         stuck_time: How long the rover has been high-centred, s.
         observation: The last observation, (size,).
+        further: Goals after the first, (n, 2), x and z, m; none by default.
+        reached: How many goals have been reached.
+        outcome: What else is known of the last control period, as `state` returns it; by default
+            the episode runs, and its info tells its progress only.
+        owed: Standard normal numbers of an observation that lacks its heights, (size,), or (0,)
+            without noise; None where it lacks none.
 
     Raises:
         OptionError: An argument has a wrong shape or a number that is not finite.
@@ -2247,6 +2342,10 @@ class EpisodeRun:
         energy_positive: float,
         stuck_time: float,
         observation: npt.ArrayLike,
+        further: npt.ArrayLike | None = None,
+        reached: int = 0,
+        outcome: _Outcome | None = None,
+        owed: npt.ArrayLike | None = None,
     ) -> EpisodeRun: ...
     @staticmethod
     def begin(
@@ -2258,6 +2357,7 @@ class EpisodeRun:
         trunk_load_limit: float,
         difficulty: float,
         normals: npt.ArrayLike | None = None,
+        further: npt.ArrayLike | None = None,
     ) -> EpisodeRun | None:
         """The beginning of an episode.
 
@@ -2270,6 +2370,7 @@ class EpisodeRun:
             difficulty: Difficulty of the rocks.
             normals: A standard normal number for each entry of the observation, (size,), where the
                 rules have noise.
+            further: As of the class.
 
         Returns:
             The episode; None if its observation is not finite in float32.
@@ -2343,6 +2444,9 @@ class EpisodeRun:
     @property
     def observation(self) -> _Observation:
         """The last observation, (size,) float32."""
+    @property
+    def goal(self) -> _Range:
+        """The present goal (x, z), m; the last one where all are reached."""
     def info(self) -> dict[str, Any]:
         """The info of the last period, or of the beginning."""
     def state(self) -> dict[str, Any]:
@@ -2360,8 +2464,10 @@ class EpisodeDistribution:
     Args:
         rules: What all episodes share; rocks leave the goal clear within its tolerance.
         simulation: The rover, before its masses are scaled, and the options of its steps.
-        start: Ranges (low, high) of `slope`, `uphill`, `heading`, `goal_distance` and
-            `goal_bearing`, by name, rad and m.
+        start: Ranges (low, high) of `slope`, `uphill`, `heading`, `goal_distance`, `goal_bearing`
+            and `turn`, by name, rad and m. A goal after the first lies at a distance from
+            `goal_distance` from the one before it, in the direction of the last leg turned by
+            `turn`.
         domain: Ranges of `mass_scale`, `friction`, `actuator_gain` and `gravity_scale`, by name.
         trunk_load_limit: Force on the trunk beyond which the rover is high-centred, before masses
             and gravity are scaled, N.
@@ -2409,8 +2515,9 @@ class EpisodeDistribution:
             difficulties: For each generator a range (low, high) that replaces that of the rocks'
                 difficulty, or None; by default none.
             fixed: Values that replace draws, which are made all the same, by name: `slope`,
-                `uphill`, `position` (x, z), `heading`, `goal` (x, z), `difficulty`, `q`, `v`; one
-                mapping for all or a list of one for each generator; none by default.
+                `uphill`, `position` (x, z), `heading`, `goal` (x, z), `further` (n, 2) of the goals
+                after it, `difficulty`, `field_seed`, `q`, `v`; one mapping for all or a list of one
+                for each generator; none by default.
 
         Returns:
             The episodes.
@@ -2436,9 +2543,9 @@ class DrawnEpisodes:
         """First observations, (m, size) float32."""
     @property
     def starts(self) -> _Array:
-        """Starts, (m, 7), rad and m.
+        """Starts, (m, 5 + 2 n) with n goals, rad and m.
 
-        Slope, direction of steepest ascent, x and z of the start, heading, x and z of the goal.
+        Slope, direction of steepest ascent, x and z of the start, heading, x and z of each goal.
         """
     @property
     def domains(self) -> _Array:
@@ -2654,6 +2761,7 @@ class EpisodeBatch:
         *,
         generator: _Rows,
         steps: int = 0,
+        message: str | None = None,
     ) -> None:
         """Puts copies of a rover in the middle of its episode in the places of others.
 
@@ -2667,6 +2775,7 @@ class EpisodeBatch:
             origin: Where and on what it began, as `origin` tells.
             generator: Generator of the noise, (1, 4) uint64.
             steps: Control periods since the episode began.
+            message: Message of the physics step that failed, if that has ended the episode.
 
         Raises:
             OptionError: There is no such rover, or an argument does not fit. Nothing has changed.

@@ -7,6 +7,7 @@ from typing import Any
 import gymnasium as gym
 
 from rover_gym.env.task import MAX_EPISODE_STEPS
+from rover_gym.policy.command_env import MAX_COMMANDS
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,22 @@ ENVIRONMENTS: Mapping[str, Registration] = {
     "RoverHills-v0": Registration(
         "rover_gym.env:RoverEnv", "rover_gym.vector:RoverVectorEnv", arguments={"terrain": "hills"}
     ),
+    "RoverWaypoints-v0": Registration(
+        "rover_gym.env:RoverEnv",
+        "rover_gym.vector:RoverVectorEnv",
+        2 * MAX_EPISODE_STEPS,
+        {"waypoints": 5, "goal_distance": (4.0, 8.0)},
+    ),
+    "RoverBattery-v0": Registration(
+        "rover_gym.env:RoverEnv",
+        "rover_gym.vector:RoverVectorEnv",
+        arguments={"terrain": "sphere_field", "goal_distance": (10.0, 14.0), "battery": 7000.0},
+    ),
+    "RoverCommand-v0": Registration(
+        "rover_gym.policy:RoverCommandEnv", "rover_gym.policy:RoverCommandVectorEnv", MAX_COMMANDS
+    ),
+    "RoverGoal-v0": Registration("rover_gym.policy:RoverGoalEnv", max_episode_steps=MAX_COMMANDS),
+    "RoverTrap-v0": Registration("rover_gym.policy:RoverTrapEnv", max_episode_steps=MAX_EPISODE_STEPS // 2),
     "RoverGrains-v0": Registration("rover_gym.env:RoverGrainsEnv"),
 }
 

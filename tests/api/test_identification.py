@@ -98,8 +98,8 @@ def test_most_95_percent_intervals_hold_the_truth(fits: Fits) -> None:
 def test_the_noise_is_estimated(fits: Fits) -> None:
     fit = fits(0)
     assert len(fit.columns) == len(fit.deviations) == 42
-    np.testing.assert_allclose(fit.deviations[:21], NOISE["q"], rtol=0.35)
-    np.testing.assert_allclose(fit.deviations[21:], NOISE["v"], rtol=0.35)
+    np.testing.assert_allclose(fit.deviations[:21], NOISE["q"], rtol=0.3)
+    np.testing.assert_allclose(fit.deviations[21:], NOISE["v"], rtol=0.3)
     assert 0.8 < fit.mean_square < 1.25
 
 

@@ -263,7 +263,7 @@ def test_a_bad_request_for_episodes_is_refused_by_name(arguments: dict[str, Any]
 def test_a_bad_distribution_is_refused_by_name() -> None:
     rules = RoverEnv().task.rules
     good: dict[str, Any] = {
-        "start": dict.fromkeys(("slope", "uphill", "heading", "goal_distance", "goal_bearing"), (0.0, 1.0)),
+        "start": dict.fromkeys(("slope", "uphill", "heading", "goal_distance", "goal_bearing", "turn"), (0.0, 1.0)),
         "domain": dict.fromkeys(("mass_scale", "friction", "actuator_gain", "gravity_scale"), (1.0, 1.0)),
         "trunk_load_limit": 50.0,
     }

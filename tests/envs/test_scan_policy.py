@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 
 from rover_gym import OptionError, PDPolicy, Plane, RoverEnv, RoverModel, SphereField, StateError
-from rover_gym.env.rocks import HeightScan, scan_points
 from rover_gym.policy import PathCosts, ScanGains, ScanPolicy
-from rover_gym.policy.ground_grid import GroundGrid
 from rover_gym.policy.rover_outline import RoverOutline
 from rover_gym.policy.scan_memory import TRAPS, ScanMemory
-from rover_gym.policy.sweeps import Arcs, after
+from rover_gym.policy.sweeps import Arcs
 
 ARGUMENTS = ScanPolicy.arguments()
 
@@ -152,12 +150,6 @@ def test_poses_of_an_arc_are_the_integral_of_its_directions() -> None:
         np.testing.assert_allclose(pose, [ahead, -left, kappa * direction * 1.3], atol=1e-9)
 
 
-def test_an_arc_after_another_goes_on_from_its_end() -> None:
-    whole = Arcs.grid([0.5], [0.0], 1.0).poses(2.0, 2)[0]
-    half = Arcs.grid([0.5], [0.0], 1.0).poses(1.0, 1)
-    np.testing.assert_allclose(after(half[:, -1], half)[0, 0, 0], whole[1], atol=1e-12)
-
-
 def test_only_arcs_that_the_wheels_can_follow_are_kept() -> None:
     wheels = np.array([[0.6, -0.5], [0.6, 0.5], [-0.6, -0.5], [-0.6, 0.5]])
     arcs = Arcs.grid(np.linspace(-1.0, 1.0, 9), np.radians([-30.0, 0.0, 30.0]), 1.0)
@@ -165,24 +157,6 @@ def test_only_arcs_that_the_wheels_can_follow_are_kept() -> None:
     assert 0 < len(kept) < len(arcs)
     assert np.abs(kept.steering(wheels)).max() <= math.radians(41.0)
     assert len(arcs.within(math.radians(40.0), wheels[:0])) == len(arcs)
-
-
-def test_the_grid_gives_the_heights_of_the_ground_under_the_rover() -> None:
-    scan = HeightScan(41, 31, 0.1)
-    ground = SphereField([[0.4, -0.2, 0.3], [-0.6, -0.3, -0.5]], [0.6, 0.7], Plane())
-    points = np.array([[0.5, -0.4], [0.5, 0.4], [-0.6, 0.0]])
-    grid = GroundGrid(scan, points, 0.1)
-    heights = grid.spread(ground.heights(scan_points(scan.offsets, (0.0, 0.0), 0.0)))
-    rng = np.random.default_rng(0)
-    poses = rng.uniform((-0.5, -0.3, -3.0), (0.5, 0.3, 3.0), (200, 3))
-    seen = heights[grid.places(poses)]
-    for pose, row in zip(poses, seen, strict=True):
-        place = (0.1 + pose[0], pose[1])
-        expected = ground.heights(scan_points(points, place, pose[2]))
-        # The nearest cell is at most 5 cm away, where these rocks rise by half of that at most.
-        assert np.abs(row - expected).max() < 0.12
-    # Far outside the ground is as it mostly is.
-    assert heights[grid.places(np.array([50.0, -50.0, 1.0]))].tolist() == [0.0, 0.0, 0.0]
 
 
 def test_it_turns_to_go_round_a_rock_that_it_cannot_pass() -> None:

@@ -142,6 +142,74 @@ def test_options_are_every_rovers() -> None:
     assert env.get_attr("goal") == ((3.0, 1.0),) * 3
 
 
+def test_options_are_each_rovers() -> None:
+    """A curriculum sets scenes by the rover: difficulties, fields, goals."""
+    env, alone = native("RoverRocks-v0", 3), gym.make("RoverRocks-v0")
+    own = [{"difficulty": 0.1}, None, {"goal": (4.0, 2.0), "field_seed": 7}]
+    seen, infos = env.reset(seed=0, options={"heading_deg": 0.0, "difficulty": 0.3, "rovers": own})
+    assert infos["difficulty"].tolist() == [0.1, 0.3, 0.3]
+    assert env.get_attr("goal")[2] == (4.0, 2.0)
+    assert env.get_attr("rocks")[2].seed == 7
+    for i, one in enumerate(own):
+        options = {"heading_deg": 0.0, "difficulty": 0.3, **(one or {})}
+        assert alone.reset(seed=i, options=options)[0].tobytes() == seen[i].tobytes()
+    mask = np.array([True, False, True])
+    again, _ = env.reset(seed=0, options={"heading_deg": 0.0, "difficulty": 0.3, "rovers": own, "reset_mask": mask})
+    assert again.tobytes() == seen.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("name", "level"), [("RoverRocks-v0", {"slope_deg": 0.0, "uphill_deg": 0.0}), ("RoverHills-v0", {})]
+)
+def test_a_field_is_drawn_by_its_seed_alone(name: str, level: dict[str, float]) -> None:
+    env: Any = gym.make(name).unwrapped
+    points = np.random.default_rng(0).uniform(-2.0, 9.0, (200, 2))
+    heights = []
+    for seed, field in ((1, 5), (2, 5), (2, 6)):
+        env.reset(seed=seed, options={"field_seed": field, "goal": (7.0, 0.0), "difficulty": 0.9, **level})
+        heights.append(env.simulation.terrain.heights(points))
+    np.testing.assert_array_equal(heights[0], heights[1])
+    assert (heights[1] != heights[2]).any()
+
+
+@pytest.mark.parametrize(
+    ("rovers", "field"),
+    [
+        ([{}], "options.rovers"),
+        ({"goal": (1.0, 2.0)}, "options.rovers"),
+        ([None, 3.0], "options.rovers[1]"),
+        ([None, {"difficulty": 3.0}], "options.rovers[1].difficulty"),
+        ([{"gaol": (1.0, 2.0)}, None], "options.rovers[0].gaol"),
+        ([None, {"field_seed": -1}], "options.rovers[1].field_seed"),
+        ([None, {"goals": [(1.0, 2.0), (3.0, 4.0)]}], "options.rovers[1].goals"),
+    ],
+)
+def test_bad_options_of_a_rover_are_refused_for_all(rovers: Any, field: str) -> None:
+    env = native("RoverRocks-v0", 2)
+    before, _ = env.reset(seed=0)
+    with pytest.raises(OptionError) as caught:
+        env.reset(seed=1, options={"rovers": rovers})
+    assert caught.value.field == field
+    assert env.batch.observation.tobytes() == before.tobytes()
+    assert env.np_random_seed == (0, 1)
+
+
+def test_difficulties_are_set_by_the_rover() -> None:
+    env = native("RoverRocks-v0", 3, autoreset_mode="SameStep")
+    env.set_difficulties([0.1, (0.4, 0.5), None])
+    env.reset(seed=0)
+    first = env.get_attr("difficulty")
+    assert (first[0], first[2]) == (0.1, 0.5)
+    assert 0.4 <= first[1] <= 0.5
+    for bad, field in (([0.1, 0.2], "difficulties"), (0.3, "difficulties"), ([0.1, 0.2, 3.0], "difficulties[2]")):
+        with pytest.raises(OptionError) as caught:
+            env.set_difficulties(bad)
+        assert caught.value.field == field
+    for action in actions(3, steps=LIMIT):
+        env.step(action)
+    assert env.get_attr("difficulty")[0] == 0.1
+
+
 def test_difficulty_is_set_from_the_next_reset_on() -> None:
     env = native("RoverRocks-v0", 3, autoreset_mode="SameStep")
     env.reset(seed=0)

@@ -25,6 +25,7 @@ CHAPTERS = [
     "simulation",
     "draw",
     "episode",
+    "paths",
 ]
 
 # A path from the crate's root, and what it may name: `crate::law::coulomb`, `crate::{cone, law::coulomb}`.

@@ -19,11 +19,12 @@ PAGES = (
     "docs/replay.md",
     "docs/seeing.md",
     "docs/soil.md",
+    "docs/tasks.md",
     "docs/vector.md",
     "docs/your-rover.md",
 )
 #: Packages of extras that a block needs if it holds these words.
-EXTRAS = {"from_urdf": "yourdfpy", "from_mjcf": "mujoco", "scipy": "scipy"}
+EXTRAS = {"from_urdf": "yourdfpy", "from_mjcf": "mujoco", "scipy": "scipy", "stable_baselines3": "stable_baselines3"}
 
 
 def blocks() -> list[pytest.param]:

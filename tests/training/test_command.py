@@ -236,7 +236,7 @@ def test_a_vector_of_commanded_rovers_is_that_of_single_ones(arguments: dict[str
 def test_a_vector_of_commanded_rovers_refuses_what_it_cannot_do() -> None:
     for env, field in (
         (gym.make_vec("Rover-v0", 2, "sync"), "env"),
-        (gym.make_vec("Rover-v0", 2, autoreset_mode="SameStep"), "env.autoreset_mode"),
+        (gym.make_vec("Rover-v0", 2, autoreset_mode="Disabled"), "env.autoreset_mode"),
     ):
         made: Any = env
         with pytest.raises(OptionError) as caught:

@@ -9,17 +9,28 @@ from pathlib import Path
 
 import pytest
 
-CONFIG = Path(__file__).parents[2] / "training" / "configs" / "rl_zoo.yml"
+CONFIGS = Path(__file__).parents[2] / "training" / "configs"
 
 
-@pytest.mark.parametrize("name", ["Rover-v0", "RoverRocks-v0"])
-def test_rl_zoo_trains(name: str, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "rl_zoo3.train", "--algo", "ppo", "--env", name, "--gym-packages", "rover_gym"]
-    command += ["--conf-file", str(CONFIG), "-n", "512", "--log-folder", str(tmp_path), "--device", "cpu"]
-    command += ["--hyperparams", "n_envs:2", "n_steps:128", "--eval-freq", "-1", "--num-threads", "1"]
+@pytest.mark.parametrize(
+    ("config", "algorithm", "name"),
+    [
+        ("rl_zoo", "ppo", "Rover-v0"),
+        ("rl_zoo", "ppo", "RoverRocks-v0"),
+        ("rl_zoo_raw_ppo", "ppo", "Rover-v0"),
+        ("rl_zoo_raw_sac", "sac", "RoverRocks-v0"),
+    ],
+)
+def test_rl_zoo_trains(config: str, algorithm: str, name: str, tmp_path: Path) -> None:
+    small = {"ppo": ["n_steps:128", "batch_size:128"], "sac": ["learning_starts:100"]}
+    command = [sys.executable, "-m", "rl_zoo3.train", "--algo", algorithm, "--env", name, "--gym-packages", "rover_gym"]
+    command += ["--conf-file", str(CONFIGS / f"{config}.yml"), "-n", "512", "--log-folder", str(tmp_path)]
+    command += ["--device", "cpu", "--hyperparams", "n_envs:2", *small[algorithm]]
+    command += ["--eval-freq", "-1", "--num-threads", "1"]
     result = subprocess.run(command, check=False, cwd=tmp_path, capture_output=True, text=True, timeout=280)
     assert result.returncode == 0, result.stderr[-2000:]
-    run = tmp_path / "ppo" / f"{name}_1"
+    run = tmp_path / algorithm / f"{name}_1"
     assert (run / f"{name}.zip").exists()
     assert (run / name / "vecnormalize.pkl").exists()
-    assert "total_timesteps      | 512" in result.stdout
+    if algorithm == "ppo":
+        assert "total_timesteps      | 512" in result.stdout

@@ -5,6 +5,7 @@ from rover_gym.env.env_snapshot import EnvSnapshot
 from rover_gym.env.grains_env import BedDraw, GrainsEnvSnapshot, RoverGrainsEnv
 from rover_gym.env.observation import ObservationField, ObservationLayout
 from rover_gym.env.randomisation import Domain
+from rover_gym.env.reward_terms import RewardTerm
 from rover_gym.env.rocks import HeightScan, Rocks
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.start import Start, resting_pose, tilted_plane
@@ -21,6 +22,7 @@ __all__ = [
     "HeightScan",
     "ObservationField",
     "ObservationLayout",
+    "RewardTerm",
     "Rocks",
     "RoverArguments",
     "RoverEnv",

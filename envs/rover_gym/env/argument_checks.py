@@ -15,7 +15,7 @@ from rover_gym.env import rewards
 from rover_gym.maps.terrain_files import is_terrain_file, open_terrain
 from rover_gym.mechanics import ModelError, OptionError, RoverModel, Terrain, TerrainError, Union
 from rover_gym.models.lookup import open_model
-from rover_gym.validation import Range, known_keys, mapping, number, refuse, span, vector
+from rover_gym.validation import Range, known_keys, mapping, number, refuse, span, vector, whole
 
 TERRAINS = ("plane", "sphere_field", "hills")
 SOLVER_OPTIONS = (
@@ -41,6 +41,9 @@ SCALES = (1e-3, 1e3)
 MAX_WEIGHT = 1e6
 MIN_TIME_STEP = 1e-6  # s
 MIN_STEERING_DEG = 0.01
+MIN_BATTERY, MAX_BATTERY = 1.0, 1e12  # J
+#: Most goals of a course.
+MAX_WAYPOINTS = 100
 
 
 def shortest(value: float) -> str:
@@ -111,6 +114,11 @@ def check_terrain(field: str, value: object) -> str | Terrain:
         )
     terrain: Terrain = value
     return terrain
+
+
+def check_waypoints(field: str, value: object) -> int:
+    """Checks the number of goals of a course."""
+    return whole(field, value, at_least=1, at_most=MAX_WAYPOINTS)
 
 
 def check_gravity(field: str, value: object) -> tuple[float, ...]:

@@ -11,10 +11,13 @@ from os import PathLike
 from typing import Annotated, Any, TypedDict, TypeVar, get_args, get_type_hints
 
 from rover_gym.env.argument_checks import (
+    MAX_BATTERY,
     MAX_DISTANCE,
     MAX_FRICTION,
     MAX_HILL_SLOPE_DEG,
     MAX_SLOPE_DEG,
+    MAX_WAYPOINTS,
+    MIN_BATTERY,
     MIN_STEERING_DEG,
     MIN_TIME_STEP,
     SCALES,
@@ -26,8 +29,10 @@ from rover_gym.env.argument_checks import (
     check_reward_weights,
     check_solver_options,
     check_terrain,
+    check_waypoints,
     shortest,
 )
+from rover_gym.env.reward_terms import RewardTerm, RewardTerms, check_reward_terms
 from rover_gym.env.rocks import MAX_ABUNDANCE, MAX_DIFFICULTY, ROCK_RADII, check_scan
 from rover_gym.mechanics import RoverModel, Terrain
 from rover_gym.rendering.render_options import check_render_mode, check_render_options
@@ -131,6 +136,27 @@ class RoverArguments(TypedDict, total=False):
             0.5, Number(above=0.0, at_most=MAX_DISTANCE), "the goal is reached within it; among rocks at most 100", "m"
         ),
     ]
+    waypoints: Annotated[
+        int,
+        Argument(
+            1,
+            Special(f"1 to {MAX_WAYPOINTS}", check_waypoints),
+            "goals, reached one after the other, each `goal_distance` from the one before it",
+        ),
+    ]
+    waypoint_turn_deg: Annotated[
+        float | Range,
+        Argument((-60.0, 60.0), NumberOrRange(), "turn from one leg of the course to the next", "deg"),
+    ]
+    battery: Annotated[
+        float | None,
+        Argument(
+            None,
+            Number(at_least=MIN_BATTERY, at_most=MAX_BATTERY),
+            "work of the wheel motors, braking counted, that ends the episode; None: no limit",
+            "J",
+        ),
+    ]
     steered: Annotated[
         bool,
         Argument(True, Special("True or False", flag), "False: steering welded straight ahead, actions are torques"),
@@ -199,6 +225,14 @@ class RoverArguments(TypedDict, total=False):
     reward_weights: Annotated[
         Mapping[str, float] | None,
         Argument(None, Special("a mapping", check_reward_weights), "weights to replace, by term"),
+    ]
+    reward_terms: Annotated[
+        RewardTerm | RewardTerms | None,
+        Argument(
+            None,
+            Special("a function, or a mapping of functions", check_reward_terms),
+            "further terms of the reward, by name; see Reward",
+        ),
     ]
     render_mode: Annotated[
         str | None,

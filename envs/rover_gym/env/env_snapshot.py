@@ -18,7 +18,8 @@ from rover_gym.validation import Range, refuse
 class EnvSnapshot:
     """The state from which a `RoverEnv` continues bit for bit; picklable.
 
-    It does not include the step count of a `TimeLimit` wrapper.
+    It includes the outcome of the last control period, so that an episode that has ended stays ended, but not the step
+    count of a `TimeLimit` wrapper.
     """
 
     simulation: Snapshot

@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from rover_gym.env.argument_checks import MAX_SLOPE_DEG
 from rover_gym.env.quantities import Array
 from rover_gym.env.randomisation import Domain
@@ -13,9 +15,23 @@ from rover_gym.env.start import Start
 from rover_gym.env.task import Task
 from rover_gym.ground import plane_of
 from rover_gym.mechanics import OptionError, Plane, StateError, Terrain
-from rover_gym.validation import Range, known_keys, mapping, number, refuse, span, vector
+from rover_gym.validation import Range, known_keys, mapping, number, refuse, span, vector, whole
 
-RESET_OPTIONS = ("difficulty", "slope_deg", "uphill_deg", "position", "heading_deg", "goal", "q", "v")
+RESET_OPTIONS = (
+    "difficulty",
+    "field_seed",
+    "slope_deg",
+    "uphill_deg",
+    "position",
+    "heading_deg",
+    "goal",
+    "goals",
+    "q",
+    "v",
+)
+
+#: Seeds of fields are below this.
+FIELD_SEEDS = 1 << 63
 
 #: Largest magnitude of a map coordinate x or z, m.
 MAX_PLACE = 1e6
@@ -50,62 +66,99 @@ class ResetOptions:
 
 def scene_of(task: Task, start: Array, rocks: Array, rock_seed: int, domain: Array, terrain: Terrain) -> EpisodeScene:
     """The scene of one episode from rows of `DrawnEpisodes`: `starts`, `rocks`, `rock_seeds`, `domains`."""
-    slope, uphill, x, z, heading, goal_x, goal_z = start.tolist()
+    slope, uphill, x, z, heading, *places = start.tolist()
+    goal, *further = zip(places[::2], places[1::2], strict=True)
     difficulty, abundance, max_radius = rocks.tolist()
     return EpisodeScene(
-        start=Start(slope, uphill, (x, z), heading, (goal_x, goal_z)),
+        start=Start(slope, uphill, (x, z), heading, goal, tuple(further)),
         terrain=terrain,
         rocks=None if task.rocks is None else Rocks(difficulty, abundance, max_radius, int(rock_seed)),
         domain=Domain(*domain.tolist()),
     )
 
 
-def check_difficulty(task: Task, difficulty: object) -> Range:
+def origin_of(scene: EpisodeScene) -> tuple[list[float], list[float], int, list[float]]:
+    """The rows of `DrawnEpisodes` that `scene_of` makes a scene from: start, rocks, seed of the rocks, domain."""
+    start, rocks = scene.start, scene.rocks
+    places = [x for goal in start.goals for x in goal]
+    row = [start.slope, start.uphill, *start.position, start.heading, *places]
+    domain = list(scene.domain.as_info().values())
+    if rocks is None:
+        return row, [0.0, 0.0, 0.0], 0, domain
+    return row, [rocks.difficulty, rocks.abundance, rocks.max_radius], rocks.seed, domain
+
+
+def check_difficulty(task: Task, difficulty: object, field: str = "difficulty") -> Range:
     """Checks a difficulty or a range of difficulties; the task must have rocks."""
-    checked = span("difficulty", difficulty, at_least=0.0, at_most=MAX_DIFFICULTY)
+    checked = span(field, difficulty, at_least=0.0, at_most=MAX_DIFFICULTY)
     if task.rocks is None:
-        refuse(OptionError, "difficulty", difficulty, "needs terrain 'sphere_field' or 'hills'")
+        refuse(OptionError, field, difficulty, "needs terrain 'sphere_field' or 'hills'")
     return checked
 
 
-def check_reset_options(task: Task, options: Mapping[str, Any] | None) -> ResetOptions:
-    """Checks the options of `reset(options=...)` and refuses the first bad one."""
-    given = mapping("options", options)
-    known_keys("options", given, RESET_OPTIONS)
+def check_reset_options(task: Task, options: Mapping[str, Any] | None, field: str = "options") -> ResetOptions:
+    """Checks the options of `reset(options=...)`; `field` is their name in errors."""
+    given = mapping(field, options)
+    known_keys(field, given, RESET_OPTIONS)
     fixed: dict[str, Any] = {}
     if "difficulty" in given:
         difficulty = fixed["difficulty"] = number(
-            "options.difficulty", given["difficulty"], at_least=0.0, at_most=MAX_DIFFICULTY
+            f"{field}.difficulty", given["difficulty"], at_least=0.0, at_most=MAX_DIFFICULTY
         )
         if task.rocks is None:
-            refuse(OptionError, "options.difficulty", difficulty, "needs terrain 'sphere_field' or 'hills'")
+            refuse(OptionError, f"{field}.difficulty", difficulty, "needs terrain 'sphere_field' or 'hills'")
+    if "field_seed" in given:
+        seed = fixed["field_seed"] = whole(f"{field}.field_seed", given["field_seed"], at_most=FIELD_SEEDS - 1)
+        if task.rocks is None:
+            refuse(OptionError, f"{field}.field_seed", seed, "needs terrain 'sphere_field' or 'hills'")
     if "slope_deg" in given:
         fixed["slope"] = math.radians(
-            number("options.slope_deg", given["slope_deg"], at_least=0.0, at_most=MAX_SLOPE_DEG)
+            number(f"{field}.slope_deg", given["slope_deg"], at_least=0.0, at_most=MAX_SLOPE_DEG)
         )
     if "uphill_deg" in given:
-        fixed["uphill"] = math.radians(number("options.uphill_deg", given["uphill_deg"]))
+        fixed["uphill"] = math.radians(number(f"{field}.uphill_deg", given["uphill_deg"]))
     if "heading_deg" in given:
-        fixed["heading"] = math.radians(number("options.heading_deg", given["heading_deg"]))
+        fixed["heading"] = math.radians(number(f"{field}.heading_deg", given["heading_deg"]))
     for name in ("position", "goal"):
         if name in given:
-            fixed[name] = vector(f"options.{name}", given[name], 2)
-            for i, value in enumerate(fixed[name]):
-                number(f"options.{name}[{i}]", value, at_least=-MAX_PLACE, at_most=MAX_PLACE)
+            fixed[name] = _place(f"{field}.{name}", given[name])
+    if "goals" in given:
+        if "goal" in given:
+            refuse(OptionError, f"{field}.goal", given["goal"], "must not come with goals, which hold it")
+        fixed["goal"], *fixed["further"] = _course(task, f"{field}.goals", given["goals"])
 
     if "v" in given and "q" not in given:
-        refuse(OptionError, "options.v", given["v"], "must come with q")
+        refuse(OptionError, f"{field}.v", given["v"], "must come with q")
     if "q" in given:
         for name in ("position", "heading_deg"):
             if name in given:
-                refuse(OptionError, f"options.{name}", given[name], "must not come with q, which holds it")
-        q = fixed["q"] = vector("options.q", given["q"], task.model.nq, error=StateError)
+                refuse(OptionError, f"{field}.{name}", given[name], "must not come with q, which holds it")
+        q = fixed["q"] = vector(f"{field}.q", given["q"], task.model.nq, error=StateError)
         fixed["position"], fixed["heading"] = (q[0], q[2]), q[4]
         if "v" in given:
-            fixed["v"] = vector("options.v", given["v"], task.model.nv, error=StateError)
+            fixed["v"] = vector(f"{field}.v", given["v"], task.model.nv, error=StateError)
     if task.rocks is not None and "goal" in fixed:
-        distance = math.dist(fixed["goal"], fixed.get("position", (0.0, 0.0)))
-        if not distance <= MAX_GOAL_DISTANCE:
-            reason = f"must be within {MAX_GOAL_DISTANCE:g} m of the start"
-            refuse(OptionError, "options.goal", given["goal"], reason)
+        name = "goals" if "goals" in given else "goal"
+        for place in (fixed["goal"], *fixed.get("further", ())):
+            if not math.dist(place, fixed.get("position", (0.0, 0.0))) <= MAX_GOAL_DISTANCE:
+                reason = f"must be within {MAX_GOAL_DISTANCE:g} m of the start"
+                refuse(OptionError, f"{field}.{name}", given[name], reason)
     return ResetOptions(fixed)
+
+
+def _place(field: str, value: object) -> tuple[float, ...]:
+    """Checks a place (x, z) on the map, m."""
+    place = vector(field, value, 2)
+    for i, x in enumerate(place):
+        number(f"{field}[{i}]", x, at_least=-MAX_PLACE, at_most=MAX_PLACE)
+    return place
+
+
+def _course(task: Task, field: str, value: object) -> list[tuple[float, ...]]:
+    """Checks the goals of a course, as many as the task has."""
+    n = 1 + task.n_further
+    if isinstance(value, np.ndarray):
+        value = list(value)
+    if not isinstance(value, (list, tuple)) or len(value) != n:
+        refuse(OptionError, field, value, f"must be a list of {n} places (x, z), as many as waypoints")
+    return [_place(f"{field}[{i}]", place) for i, place in enumerate(value)]

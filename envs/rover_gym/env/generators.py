@@ -73,8 +73,13 @@ def set_row(generator: np.random.Generator, row: Rows) -> None:
     generator.bit_generator.state = known
 
 
+def fresh_generator() -> np.random.Generator:
+    """A new generator over `PCG64`, whose state is yet to be set."""
+    return np.random.Generator(np.random.PCG64(0))
+
+
 def generator_at(row: Rows) -> np.random.Generator:
     """A new generator at a row."""
-    generator = np.random.Generator(np.random.PCG64(0))
+    generator = fresh_generator()
     set_row(generator, row)
     return generator

@@ -109,8 +109,19 @@ class ObservationLayout(Mapping[str, slice]):
         return {field.name: values[..., field.slice].copy() for field in self.fields}
 
 
-def build_layout(model: RoverModel, gravity_magnitude: float, n_scan: int, n_actions: int) -> ObservationLayout:
-    """Builds the layout of `Rover-v0` for a model, a gravity magnitude (m/s2) and a height scan of `n_scan` points."""
+def build_layout(
+    model: RoverModel,
+    gravity_magnitude: float,
+    n_scan: int,
+    n_actions: int,
+    *,
+    n_goals: int = 1,
+    has_battery: bool = False,
+) -> ObservationLayout:
+    """Builds the layout of `Rover-v0` for a model, a gravity magnitude (m/s2) and a height scan of `n_scan` points.
+
+    A battery and a course of several goals add fields before the scan.
+    """
     nq, nv, n = model.nq, model.nv, len(model.wheel_names)
     wheel_load = model.mass * gravity_magnitude / n
 
@@ -133,6 +144,12 @@ def build_layout(model: RoverModel, gravity_magnitude: float, n_scan: int, n_act
         ("previous_action", "", [1.0] * n_actions, (-1.0, 1.0), "the action before this observation"),
         ("stuck", "", [1.0], (0.0, 1.0), "fraction of the time to high-centring"),
     ]
+    if has_battery:
+        rows.append(("charge", "", [1.0], (0.0, 1.0), "fraction of the battery's charge"))
+    if n_goals > 1:
+        meaning = "the goal after the present one, ahead and to the right of the trunk, horizontal"
+        rows.append(("next_goal", "m", [GOAL_SCALE] * 2, any_number, meaning))
+        rows.append(("waypoints_remaining", "", [float(n_goals)], (0.0, 1.0), "goals still to reach"))
     if n_scan:
         meaning = "heights of ground and rocks over the trunk's origin, from the front, each row from the left"
         rows.append(("height_scan", "m", [1.0] * n_scan, any_number, meaning))

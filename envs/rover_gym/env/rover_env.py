@@ -17,6 +17,7 @@ from rover_gym.env.generators import check_seed, row_of, seeded, set_row
 from rover_gym.env.observation import ObservationLayout
 from rover_gym.env.progress import Progress
 from rover_gym.env.randomisation import Domain
+from rover_gym.env.reward_terms import earn, total
 from rover_gym.env.rocks import Rocks
 from rover_gym.env.start import Start
 from rover_gym.env.task import Task, make_task
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 
 
 NOT_RUNNING = "RoverEnv: call reset() first"
+#: Termination of an episode whose physics could not take a step.
+STEP_FAILED = "step_failed"
 
 
 @with_argument_table
@@ -120,7 +123,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     ## Reward
 
     The reward is the sum of the terms below, which `info["reward_terms"]` lists; `dt` is the control period.
-    `reward_weights` replaces weights by name.
+    `reward_weights` replaces weights by name; `reward_terms` adds terms of your own.
 
     | term            | formula                                                        | weight w |
     |-----------------|----------------------------------------------------------------|----------|
@@ -138,6 +141,13 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     physics did: 30 m of progress either way, 4e5 J of work, 60 s of `dt`, a slip ratio of 2. With these weights the
     reward of a step therefore never exceeds 90 in magnitude.
 
+    A term of your own is a function `term(before, action, after, info)` of a control period, given as
+    `reward_terms={"name": term}` or, with the function's own name, `reward_terms=term`. `before` and `after` are the
+    observations before and after it, split into fields in SI units, and what is returned is added as it is. In a vector each
+    array has a leading axis of rovers, and one number a rover is returned: `after["q"][..., 1] - before["q"][..., 1]`
+    pays for climbing in both. A function that raises or returns no finite number is refused with `OptionError`, which
+    names it; the period has then been taken.
+
     ## Start
 
     The ground is a plane through the origin with slope and direction of steepest ascent drawn
@@ -149,7 +159,26 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     `reset(options=...)` fixes what it names: `difficulty`, `slope_deg`, `uphill_deg`, `position` (x, z),
     `heading_deg`, `goal` (x, z), or the whole state as `q` (21,) with `v` (21,), as
-    `Simulation.set_state` takes them. Unknown names are refused with `OptionError`.
+    `Simulation.set_state` takes them; the `goals` of a course, one (x, z) a waypoint; and `field_seed`, a whole number from
+    0, by which the rocks are drawn and the piece of hills is cut: with equal starts and goals, equal fields. Unknown names
+    are refused with `OptionError`.
+
+    ## Courses
+
+    With `waypoints` above 1, as in `RoverWaypoints-v0`, that many goals are reached one after the other. Each lies at a distance
+    from `goal_distance` from the one before it, in the direction of the leg before turned by `waypoint_turn_deg`. `goal` and
+    `goal_distance` in the observation, the reward's `progress` and `info["distance_to_goal"]` are those of the present goal;
+    the next takes its place in the step that reaches it. The episode ends with `"goal"` at the last. Two fields follow
+    `stuck` in the observation: `next_goal` (m, scale 10), the goal after the present one, ahead and to the right, or the
+    present one again where it is the last; and `waypoints_remaining`, goals still to reach (scale: their number). Among rocks each
+    goal has its clearing, and on hills a way leads to each from the one before. `info` has `waypoints_reached`,
+    `waypoints_remaining` and `distance_remaining`, the way to the last goal, straight from goal to goal, m.
+
+    ## Battery
+
+    With `battery`, as in `RoverBattery-v0`, the rover starts with that many joules. The wheel motors draw their work, braking
+    counted, as in `info["energy"]`; with none left the episode ends in failure with `"battery_empty"`. `charge` in the
+    observation, after `stuck`, is the fraction that is left, `info["charge"]` the joules.
 
     ## Rocks
 
@@ -178,11 +207,11 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     ## End
 
     `terminated`, with `info["termination"]`:
-    `"goal"`, the trunk's origin is within `goal_tolerance` of the goal, horizontally;
+    `"goal"`, the trunk's origin is within `goal_tolerance` of the goal, the last of a course, horizontally;
     `"roll_over"`, the trunk leans more than `max_tilt_deg` from the vertical;
     `"high_centred"`, for `stuck_time` seconds the trunk has carried more than a tenth of the weight
     while the rover moved slower than 0.05 m/s; `"step_failed"`, the physics could not take a step:
-    the observation is then the last finite one, and `info["solver"]` says what happened.
+    the observation is then the last finite one, and `info["solver"]` says what happened; `"battery_empty"`, see Battery.
     `truncated`: after 1200 steps (60 s), by Gymnasium's time limit. Change it with
     `gymnasium.make(..., max_episode_steps=...)`. The environment itself never truncates.
 
@@ -256,8 +285,9 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     @property
     def goal(self) -> tuple[float, float]:
-        """The episode's goal (x, z), m."""
-        return self._running().start.goal
+        """The episode's present goal (x, z), m."""
+        self._running()
+        return self._episode.goal
 
     @property
     def start(self) -> Start:
@@ -302,7 +332,9 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         self._scene = scene_of(
             self.task, drawn.starts[0], drawn.rocks[0], drawn.rock_seeds[0], drawn.domains[0], drawn.terrain(0)
         )
-        return self._episode.observation, self._episode.info()
+        info = self._episode.info()
+        info["reward_terms"] |= dict.fromkeys(self.task.reward_terms, 0.0)
+        return self._episode.observation, info
 
     def step(
         self, action: npt.NDArray[np.float32]
@@ -312,10 +344,12 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         Raises:
             CommandError: The action has a wrong shape or an entry that is not finite or outside
                 [-1, 1]; nothing has changed.
+            OptionError: A function of `reward_terms` fails; the period has been taken.
             ResetNeeded: The environment has not been reset.
         """
         if self._scene is None:
             raise ResetNeeded(NOT_RUNNING)
+        before = self._episode.observation if self.task.reward_terms else None
         if self.task.is_noisy:
             normals, after = standard_normals(row_of(self.np_random)[None], self.task.layout.size)
             result = self._episode.step(self._moving(), action, normals[0], has_scan=self.has_scan)
@@ -323,7 +357,22 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         else:
             result = self._episode.step(self._moving(), action, has_scan=self.has_scan)
         observation, reward, terminated, info = result
+        if before is not None:
+            reward += self._earn(before, action, observation, info)
         return observation, reward, terminated, False, info
+
+    def _earn(
+        self,
+        before: npt.NDArray[np.float32],
+        action: npt.NDArray[np.float32],
+        after: npt.NDArray[np.float32],
+        info: dict[str, Any],
+    ) -> float:
+        """The user's terms of a control period, which are added to its info; returns their sum."""
+        task, counts = self.task, info["termination"] != STEP_FAILED
+        own = earn(task.reward_terms, task.layout, before, action, after, info, counts)
+        info["reward_terms"] |= {name: float(term) for name, term in own.items()}
+        return float(total(own.values()))
 
     def _moving(self) -> Simulation | RoverGrainSimulation:
         """What a control period moves."""
@@ -359,7 +408,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         scene = self._running()
         if self._renderer is None:
             self._renderer = self.make_renderer(scene)
-        self._renderer.set_scene(scene.terrain, goal=scene.start.goal, goal_tolerance=self.goal_tolerance)
+        self._renderer.set_scene(scene.terrain, goal=self.goal, goal_tolerance=self.goal_tolerance)
         return self._renderer.render(self._simulation)
 
     def make_renderer(self, scene: EpisodeScene) -> "FrameRenderer":

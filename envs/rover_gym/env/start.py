@@ -20,24 +20,37 @@ Point: TypeAlias = tuple[float, float]
 
 @dataclass(frozen=True)
 class StartDistribution:
-    """Ranges that starts are drawn from uniformly; angles in rad, distances in m."""
+    """Ranges that starts are drawn from uniformly; angles in rad, distances in m.
+
+    `turn` is the angle from one leg of a course to the next.
+    """
 
     slope: Range
     uphill: Range
     heading: Range
     goal_distance: Range
     goal_bearing: Range
+    turn: Range
 
 
 @dataclass(frozen=True)
 class Start:
-    """One start: slope and direction of steepest ascent (rad), pose and goal on the map (m, rad)."""
+    """One start: slope and direction of steepest ascent (rad), pose and goals on the map (m, rad).
+
+    `goal` is the first goal, `further` those that follow it.
+    """
 
     slope: float
     uphill: float
     position: Point
     heading: float
     goal: Point
+    further: tuple[Point, ...] = ()
+
+    @property
+    def goals(self) -> tuple[Point, ...]:
+        """All goals in order."""
+        return (self.goal, *self.further)
 
 
 def tilted_plane(slope: float, uphill: float) -> Plane:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from rover_gym.env import rewards
 from rover_gym.env.observation import ObservationLayout, build_layout
 from rover_gym.env.randomisation import Domain, DomainDistribution
+from rover_gym.env.reward_terms import RewardTerms
 from rover_gym.env.rocks import MAX_GOAL_DISTANCE, RockDistribution, rock_distribution
 from rover_gym.env.start import StartDistribution, slope_of
 from rover_gym.env.wheels import Steering
@@ -52,12 +53,14 @@ class Task:
         start: Distribution of the starts.
         domain: Distribution of the randomised properties.
         goal_tolerance: Distance within which the goal is reached, m.
+        n_further: Goals of the course after the first.
         gravity: Gravity before it is scaled, m/s2.
         substeps: Physics steps per control period.
         dt: Control period, s.
         simulation_options: Keyword arguments of `Simulation`.
         max_steering: Set-point of a steering action of 1, rad; 0 where nothing steers.
         layout: Layout of the observation.
+        reward_terms: Terms of the reward that the user gives, by name.
         rules: What the core needs to run an episode.
         episodes: What the core draws episodes from.
     """
@@ -72,12 +75,14 @@ class Task:
     start: StartDistribution
     domain: DomainDistribution
     goal_tolerance: float
+    n_further: int
     gravity: tuple[float, ...]
     substeps: int
     dt: float
     simulation_options: Mapping[str, Any]
     max_steering: float
     layout: ObservationLayout
+    reward_terms: RewardTerms
     rules: EpisodeRules
     episodes: EpisodeDistribution
 
@@ -110,6 +115,9 @@ def make_task(given: Mapping[str, Any]) -> Task:
         nearest, farthest = given["goal_distance"]
         distance = nearest if nearest == farthest else (nearest, farthest)
         span("goal_distance", distance, at_most=MAX_GOAL_DISTANCE)
+        if given["waypoints"] * farthest > MAX_GOAL_DISTANCE:
+            reason = f"must give a course of at most {MAX_GOAL_DISTANCE:g} m with goal_distance up to {farthest:g} m"
+            refuse(OptionError, "waypoints", given["waypoints"], reason)
         number("goal_tolerance", given["goal_tolerance"], at_most=MAX_GOAL_DISTANCE)
     else:
         for name in ("difficulty", "rock_abundance", "max_rock_radius"):
@@ -122,6 +130,7 @@ def make_task(given: Mapping[str, Any]) -> Task:
         heading=_radians(given["heading_deg"]),
         goal_distance=given["goal_distance"],
         goal_bearing=_radians(given["goal_bearing_deg"]),
+        turn=_radians(given["waypoint_turn_deg"]),
     )
     if terrain not in ("plane", "sphere_field"):
         if slope_deg is not None:
@@ -149,8 +158,12 @@ def make_task(given: Mapping[str, Any]) -> Task:
     }
     simulation = Simulation(rover, Plane(), **options)  # the core validates the simulation options
     points = None if scan is None else scan.offsets
+    goals, battery = given["waypoints"], given["battery"]
     n_actions = len(rover.wheel_names) + len(steering.joints)
-    layout = build_layout(rover, math.hypot(*gravity), 0 if points is None else len(points), n_actions)
+    n_scan = 0 if points is None else len(points)
+    layout = build_layout(
+        rover, math.hypot(*gravity), n_scan, n_actions, n_goals=goals, has_battery=battery is not None
+    )
     max_steering = _steering_limit(rover, steering, given["max_steering_deg"])
     weights = dict(rewards.WEIGHTS) if given["reward_weights"] is None else given["reward_weights"]
     rules = EpisodeRules(
@@ -166,6 +179,8 @@ def make_task(given: Mapping[str, Any]) -> Task:
         scale=layout.scale,
         noise=domain.observation_noise * layout.unbounded if domain.observation_noise > 0.0 else None,
         scan=points,
+        goals=goals,
+        battery=battery,
     )
     slope_by_difficulty = slope_deg is None and terrain == "sphere_field"
     episodes = EpisodeDistribution(
@@ -190,12 +205,14 @@ def make_task(given: Mapping[str, Any]) -> Task:
         start=start,
         domain=domain,
         goal_tolerance=given["goal_tolerance"],
+        n_further=goals - 1,
         gravity=gravity,
         substeps=substeps,
         dt=substeps * step,
         simulation_options=options,
         max_steering=max_steering,
         layout=layout,
+        reward_terms=given["reward_terms"] or {},
         rules=rules,
         episodes=episodes,
     )

@@ -8,9 +8,11 @@ from gymnasium import spaces
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
+from rover_gym.mechanics import StateError
 from rover_gym.policy.command import N_COMMANDS, CommandController
 from rover_gym.policy.features import LARGEST_FEATURE, Features
-from rover_gym.vector.sb3 import RoverVecEnv
+from rover_gym.validation import refuse
+from rover_gym.vector.sb3 import RoverVecEnv, VecEnvSnapshot
 
 
 class CommandVecEnv(VecEnvWrapper):
@@ -46,6 +48,17 @@ class CommandVecEnv(VecEnvWrapper):
         """Resets all environments and returns their features."""
         self._seen = np.asarray(self.venv.reset())
         return self.features(self._seen)
+
+    def restore(self, snapshot: VecEnvSnapshot) -> None:
+        """Restores a snapshot of the wrapped `RoverVecEnv`.
+
+        Raises:
+            StateError: As `RoverVecEnv.restore`, or another vector of environments is wrapped; nothing has changed.
+        """
+        if self._rovers is None:
+            refuse(StateError, "snapshot", snapshot, "needs a RoverVecEnv inside")
+        self._rovers.restore(snapshot)
+        self._seen = self._rovers.batch.observation
 
     def step_async(self, actions: npt.NDArray[Any]) -> None:
         """Stores the commands for `step_wait`."""

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.env.start import Start
+from rover_gym.env.start import Point, Start
 from rover_gym.mechanics import OptionError, RoverModel, StateError, Terrain
 from rover_gym.planning.field_plan import FieldPlan
 from rover_gym.planning.futures import Ends, Futures
@@ -124,6 +124,7 @@ class PlannerPolicy:
         self._knots = max(1, math.ceil(self.options.horizon / (self._hold * self._env.dt) - 1e-9))
         self._periods = max(1, round(self.options.period / self._env.dt))
         self._start: Start | None = None
+        self._goal: Point | None = None
         self._field: FieldPlan | None = None
         self._sequence: Array = np.zeros((self._knots, N_COMMANDS))
         self._since = 0
@@ -149,6 +150,8 @@ class PlannerPolicy:
         check_observed(seen, self._env.task.layout.size)
         if self._env.start is not self._start:
             self._begin()
+        elif self._env.goal != self._goal:
+            self._aim()
         if self._since % self._periods == 0:
             self._plan()
         self._since += 1
@@ -156,13 +159,18 @@ class PlannerPolicy:
         return action[0], state
 
     def _begin(self) -> None:
-        start, simulation = self._env.start, self._env.simulation
-        terrain = simulation.terrain if self._terrain is None else self._terrain
-        self._field = FieldPlan.over(terrain, self._env.model, simulation.q[[0, 2]], start.goal)
+        self._aim()
         self._futures = self._make_futures()
-        self._start, self._since = start, 0
+        self._start, self._since = self._env.start, 0
         self._sequence = np.zeros((self._knots, N_COMMANDS))
         self._sequence[:, 0] = 1.0
+
+    def _aim(self) -> None:
+        """Plans over the field to the present goal, the next of a course where the last one is reached."""
+        simulation = self._env.simulation
+        terrain = simulation.terrain if self._terrain is None else self._terrain
+        self._goal = self._env.goal
+        self._field = FieldPlan.over(terrain, self._env.model, simulation.q[[0, 2]], self._goal)
 
     def _plan(self) -> None:
         """Draws, drives and judges futures; keeps the sequence that the rover follows."""

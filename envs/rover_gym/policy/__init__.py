@@ -3,6 +3,7 @@
 from rover_gym.policy.arc_search import PathCosts
 from rover_gym.policy.baseline import ENDS, BaselineInterrupt, BaselineRow, measure_baseline, wilson_interval
 from rover_gym.policy.command import CommandController, CommandLimits
+from rover_gym.policy.command_env import RoverCommandEnv, RoverCommandVectorEnv
 from rover_gym.policy.command_vector_env import CommandVectorEnv
 from rover_gym.policy.drive_by_command import DriveByCommand
 from rover_gym.policy.episodes import Episode, Policy, run_episode
@@ -16,6 +17,9 @@ from rover_gym.policy.evaluation import (
     summarise,
 )
 from rover_gym.policy.features import Features
+from rover_gym.policy.foresight_policy import FORECAST_FILE, ForesightCosts, ForesightPolicy
+from rover_gym.policy.goal_env import RoverGoalEnv
+from rover_gym.policy.goal_observation import GoalObservation
 from rover_gym.policy.named_policy import NamedPolicy, named_policy
 from rover_gym.policy.network import Network
 from rover_gym.policy.pd_policy import PDGains, PDPolicy
@@ -24,9 +28,11 @@ from rover_gym.policy.policy_files import PolicyError
 from rover_gym.policy.scan_policy import ScanGains, ScanPolicy
 from rover_gym.policy.shipped import find_policy, policy_arguments, policy_folder
 from rover_gym.policy.trained_policy import TrainedPolicy
+from rover_gym.policy.trap_env import RoverTrapEnv
 
 __all__ = [
     "ENDS",
+    "FORECAST_FILE",
     "BaselineInterrupt",
     "BaselineRow",
     "CommandController",
@@ -36,6 +42,9 @@ __all__ = [
     "Episode",
     "EvaluatedEpisode",
     "Features",
+    "ForesightCosts",
+    "ForesightPolicy",
+    "GoalObservation",
     "IntervalEstimate",
     "NamedPolicy",
     "Network",
@@ -46,6 +55,10 @@ __all__ = [
     "PolicyCard",
     "PolicyError",
     "PolicySummary",
+    "RoverCommandEnv",
+    "RoverCommandVectorEnv",
+    "RoverGoalEnv",
+    "RoverTrapEnv",
     "ScanGains",
     "ScanPolicy",
     "TrainedPolicy",

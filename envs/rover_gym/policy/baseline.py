@@ -75,7 +75,7 @@ def measure_baseline(
         difficulties: The difficulties, each in [0, 2].
         episodes: Episodes per difficulty.
         seed: Seed of the first episode; the seed increases by one per episode.
-        policy: "pd", "scan", "trained" for the shipped policy, or the folder of a trained policy.
+        policy: A name or folder, as `named_policy` takes it.
         terrain: "sphere_field" or "hills".
         model: The rover: a name of the gallery or a file; None for the built-in one.
         progress: Called after each episode with the difficulty and the number of episodes done.
@@ -143,5 +143,5 @@ def _summarise(difficulty: float, results: Sequence[Episode]) -> BaselineRow:
         interval=wilson_interval(len(times), len(results)),
         time_to_goal=sum(times) / len(times) if times else math.nan,
         energy_per_metre=sum(episode.energy for episode in results) / way if way > 0.0 else math.nan,
-        ends={end: counts[end] for end in ENDS},
+        ends=dict.fromkeys(ENDS, 0) | counts,
     )

@@ -10,11 +10,12 @@ from gymnasium.vector import AutoresetMode, VectorWrapper
 from gymnasium.vector.utils import batch_space
 
 from rover_gym.env.quantities import Mask
-from rover_gym.mechanics import CommandError, OptionError
+from rover_gym.mechanics import CommandError, OptionError, TerrainError
 from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimits
-from rover_gym.policy.drive_by_command import MAX_REPEAT
+from rover_gym.policy.drive_by_command import check_repeat
 from rover_gym.policy.features import LARGEST_FEATURE, Features
-from rover_gym.validation import array, known_keys, refuse, whole
+from rover_gym.validation import array, known_keys, refuse
+from rover_gym.vector.batch_snapshot import BatchSnapshot
 from rover_gym.vector.vector_env import RoverVectorEnv
 
 Array = npt.NDArray[np.float32]
@@ -23,15 +24,15 @@ Array = npt.NDArray[np.float32]
 class CommandVectorEnv(VectorWrapper):
     """Holds each rover's command for several steps and sums the rewards, as `DriveByCommand` does for one rover.
 
-    Observations, rewards and ends equal, bit for bit, those of a `SyncVectorEnv` of `DriveByCommand`s; the rovers are
-    stepped together. A rover whose episode ends while its command is held stands still until the next command, which
-    starts its next episode.
+    Observations, rewards and ends equal, bit for bit, those of a `SyncVectorEnv` of such environments; the rovers are
+    stepped together. A rover whose episode ends while its command is held stands still until the others' commands are
+    over. Its next episode starts with the next command or, with autoreset in the same step, then and there.
 
     Example:
         >>> envs = CommandVectorEnv(gym.make_vec("Rover-v0", 64), repeat=6)
 
     Args:
-        env: A `RoverVectorEnv` with autoreset in the next step; wrappers go around this one.
+        env: A `RoverVectorEnv` with autoreset in the next or in the same step; wrappers go around this one.
         repeat: Steps that a command is held.
         guided: Whether actions are offsets from the guide's command.
         pool: Height-scan points per pooling cell, lengthwise and crosswise.
@@ -46,9 +47,9 @@ class CommandVectorEnv(VectorWrapper):
     ) -> None:
         if not isinstance(env, RoverVectorEnv):
             refuse(OptionError, "env", env, "must be a RoverVectorEnv, as gymnasium.make_vec makes it")
-        if env.autoreset_mode != AutoresetMode.NEXT_STEP:
-            refuse(OptionError, "env.autoreset_mode", env.autoreset_mode.value, "must be NextStep")
-        self._repeat = whole("repeat", repeat, at_least=1, at_most=MAX_REPEAT)
+        if env.autoreset_mode == AutoresetMode.DISABLED:
+            refuse(OptionError, "env.autoreset_mode", env.autoreset_mode.value, "must be NextStep or SameStep")
+        self.repeat = check_repeat(repeat)
         known_keys("limits", limits, [field.name for field in fields(CommandLimits)])
         super().__init__(env)
         self._rovers = env
@@ -71,6 +72,20 @@ class CommandVectorEnv(VectorWrapper):
         self._over &= ~(options or {}).get("reset_mask", np.True_)
         return self._features(self._seen), infos
 
+    def snapshot(self) -> BatchSnapshot:
+        """Returns the state of the rovers, as `RoverVectorEnv.snapshot`."""
+        return self._rovers.snapshot()
+
+    def restore(self, snapshot: BatchSnapshot) -> None:
+        """Restores a snapshot, as `RoverVectorEnv.restore`.
+
+        Raises:
+            StateError: As `RoverVectorEnv.restore`; nothing has changed.
+        """
+        self._rovers.restore(snapshot)
+        self._seen = self._rovers.batch.observation
+        self._over = np.isin(np.arange(self.num_envs), self._rovers.batch.over)
+
     def step(self, actions: npt.ArrayLike) -> tuple[Array, npt.NDArray[np.float64], Mask, Mask, dict[str, Any]]:
         """Holds commands `(num_envs, 3)`, clipped to [-1, 1], for `repeat` steps or until a rover's episode ends.
 
@@ -90,7 +105,7 @@ class CommandVectorEnv(VectorWrapper):
         self._over = np.zeros(self.num_envs, np.bool_)
         rewards = np.zeros(self.num_envs)
         terminated, truncated = self._over.copy(), self._over.copy()
-        for left in reversed(range(self._repeat)):
+        for left in reversed(range(self.repeat)):
             if not active.any():
                 break
             moves = self._controller.act(self._seen, commands)
@@ -100,4 +115,25 @@ class CommandVectorEnv(VectorWrapper):
             truncated |= timed_out & active
             active &= ~(terminated | truncated)
         self._over = terminated | truncated
-        return self._features(self._seen), rewards, terminated, truncated, self._rovers.batch.infos()
+        finals = self._begin_next() if self._rovers.autoreset_mode == AutoresetMode.SAME_STEP else {}
+        infos = self._rovers.batch.infos()
+        for i, final in finals.items():
+            infos = self._rovers._add_info(infos, final, i)
+        return self._features(self._seen), rewards, terminated, truncated, infos
+
+    def _begin_next(self) -> dict[int, dict[str, Any]]:
+        """Starts the next episodes of the rovers whose episode is over; returns what the last ones ended with.
+
+        If one cannot begin, none does, and the next command refuses it.
+        """
+        over = [int(i) for i in np.flatnonzero(self._over)]
+        if not over:
+            return {}
+        last = self._features(self._seen)
+        finals = {i: {"final_obs": last[i], "final_info": self._rovers.batch.info(i)} for i in over}
+        try:
+            self._seen, _ = self._rovers.reset(options={"reset_mask": self._over})
+        except TerrainError:
+            return finals
+        self._over = np.zeros(self.num_envs, np.bool_)
+        return finals

@@ -19,6 +19,11 @@ Array = npt.NDArray[np.float32]
 MAX_REPEAT = 10_000
 
 
+def check_repeat(repeat: object) -> int:
+    """Checks for how many steps a command is held."""
+    return whole("repeat", repeat, at_least=1, at_most=MAX_REPEAT)
+
+
 class DriveByCommand(gym.Wrapper[Array, Array, Array, Array]):
     """Holds each command for several steps of the rover and sums the rewards.
 
@@ -39,24 +44,24 @@ class DriveByCommand(gym.Wrapper[Array, Array, Array, Array]):
     def __init__(
         self, env: gym.Env[Array, Array], repeat: int = 4, guided: bool = False, pool: int = 1, **limits: float
     ) -> None:
-        repeat = whole("repeat", repeat, at_least=1, at_most=MAX_REPEAT)
+        repeat = check_repeat(repeat)
         known_keys("limits", limits, [field.name for field in fields(CommandLimits)])
         rover = find_rover_env(env)
         super().__init__(env)
-        self._features = Features(rover, pool)
+        self.features = Features(rover, pool)
         self._controller = CommandController(rover, CommandLimits(**limits), guided=guided)
         self._repeat = repeat
         self._rover = rover
         self._heights = rover.observation_layout.get("height_scan")
         self._seen = np.zeros((1, rover.observation_layout.size), np.float32)
-        self.observation_space = gym.spaces.Box(-LARGEST_FEATURE, LARGEST_FEATURE, (self._features.size,), np.float32)
+        self.observation_space = gym.spaces.Box(-LARGEST_FEATURE, LARGEST_FEATURE, (self.features.size,), np.float32)
         self.action_space = gym.spaces.Box(-1.0, 1.0, (N_COMMANDS,), np.float32)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
         """Starts an episode."""
         observation, info = self.env.reset(seed=seed, options=options)
         self._seen = observation[None]
-        return self._features(self._seen)[0], info
+        return self.features(self._seen)[0], info
 
     def step(self, action: Array) -> tuple[Array, SupportsFloat, bool, bool, dict[str, Any]]:
         """Holds a command, clipped to [-1, 1], for `repeat` steps or until the episode ends.
@@ -82,4 +87,4 @@ class DriveByCommand(gym.Wrapper[Array, Array, Array, Array]):
                 if self._heights is not None:
                     observation[self._heights] = self._rover.complete_observation()[self._heights]
                 break
-        return self._features(self._seen)[0], total, terminated, truncated, info
+        return self.features(self._seen)[0], total, terminated, truncated, info

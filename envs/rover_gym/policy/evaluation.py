@@ -197,7 +197,7 @@ def summarise(policy: str, drives: Sequence[EvaluatedEpisode]) -> PolicySummary:
         energy_per_metre=ratio_estimate([drive.energy for drive in drives], [drive.distance for drive in drives]),
         slip=mean_estimate([drive.slip for drive in drives]),
         tilt=mean_estimate([math.degrees(drive.tilt) for drive in drives]),
-        ends={end: counts[end] for end in ENDS},
+        ends=dict.fromkeys(ENDS, 0) | counts,
     )
 
 

@@ -50,6 +50,12 @@ class Features:
         self._cells = _cells(self._offsets, pool)
         self.size = len(self._taken) + 7 + (0 if self._scan is None else 1 + len(self._cells))
 
+    @property
+    def goal_entries(self) -> npt.NDArray[np.intp]:
+        """Entries of the features that say where the goal is."""
+        n = len(self._taken)
+        return np.array([n, n + 1, n + 2, n + 3, n + 6])  # those at n + 4 and n + 5 are the ground's slope
+
     def __call__(self, observations: npt.NDArray[np.floating]) -> npt.NDArray[np.float32]:
         """Computes the features of observations, scaled as the environment returns them."""
         seen = observations

@@ -1,24 +1,27 @@
-"""The policies that have a name: the PD baseline, the scan planner and the trained policies."""
+"""The policies that have a name: the PD baseline, the scan planner, the one with foresight and the trained policies."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from rover_gym.mechanics import RoverModel
 from rover_gym.policy.episodes import Policy
+from rover_gym.policy.foresight_policy import FORECAST_FILE, ForesightPolicy
 from rover_gym.policy.pd_policy import PDPolicy
+from rover_gym.policy.policy_files import is_there
 from rover_gym.policy.scan_policy import ScanPolicy
 from rover_gym.policy.shipped import find_policy, policy_arguments
 from rover_gym.policy.trained_policy import TrainedPolicy
 
 #: What the command line says about the names.
 NAMES_HELP = (
-    "'pd' for the baseline, 'scan' for the planner by hand, 'trained' for the trained policy of the package, or a "
-    "trained policy's folder."
+    "'pd' for the baseline, 'scan' for the planner by hand, 'foresight' for that planner with a learned forecast, "
+    "'trained' for the trained policy of the package, or the folder of a trained policy or forecast."
 )
 
-_TITLES = {"pd": "the PD baseline", "scan": "the scan planner"}
+_TITLES = {"pd": "the PD baseline", "scan": "the scan planner", "foresight": "the planner with foresight"}
 
 
 def policy_title(policy: str) -> str:
@@ -43,7 +46,8 @@ def named_policy(policy: str, terrain: str, model: RoverModel | None = None) -> 
     """The policy of a name, for a terrain and a rover; None is the built-in one.
 
     Args:
-        policy: "pd", "scan", "trained" for the policy shipped for the terrain, or the folder of a trained policy.
+        policy: "pd", "scan", "foresight", "trained" for the policy shipped for the terrain, or the folder of a trained
+            policy or forecast.
         terrain: The argument of the environment.
         model: The rover, to which the planner fits its height scan.
 
@@ -51,6 +55,10 @@ def named_policy(policy: str, terrain: str, model: RoverModel | None = None) -> 
         PolicyError: There is no such policy.
         OSError: A file may not be read.
     """
+    if policy == "foresight":
+        return NamedPolicy(ForesightPolicy.arguments(model), ForesightPolicy)
+    if is_there(Path(policy) / FORECAST_FILE):
+        return NamedPolicy(ForesightPolicy.arguments(model), partial(ForesightPolicy, forecast=policy))
     folder = find_policy(policy, terrain)
     if folder is not None:
         return NamedPolicy(policy_arguments(folder), partial(_load, folder))

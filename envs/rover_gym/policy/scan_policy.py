@@ -14,7 +14,6 @@ from rover_gym.mechanics import OptionError, RoverModel, StateError, exp, sin_co
 from rover_gym.policy.arc_search import ArcSearch, PathCosts, SearchTask
 from rover_gym.policy.command import CommandController, CommandLimits
 from rover_gym.policy.features import ground_slope
-from rover_gym.policy.ground_grid import GroundGrid
 from rover_gym.policy.observed import check_observed
 from rover_gym.policy.pd_policy import find_rover_env
 from rover_gym.policy.rover_outline import RoverOutline
@@ -109,6 +108,15 @@ class ScanPolicy:
         gains: Speed and times.
         costs: What a path costs.
 
+    Attributes:
+        gains: Speed and times.
+        arcs: The arcs that a path may begin with.
+        commands: `(n_arcs, 3)` their commands, at a speed of 1.
+        cruise: The first entry of a command at cruising speed, `cruise_speed` in m/s.
+        push: The same where the policy pushes.
+        search: Finds the cheapest path.
+        controller: Turns commands into actions.
+
     Raises:
         OptionError: The environment has no height scan, or the rover's wheels stand in a line.
     """
@@ -132,24 +140,27 @@ class ScanPolicy:
         # Times are meant for a rover that takes at most a second for its own reach.
         speed = min(self.gains.speed, SHARE_OF_TOP_SPEED * _top_speed(model))
         self._pace = max(1.0, self._reach / speed)
-        self._cruise, self._push = speed / limits.speed, self.gains.push / limits.speed
+        self.cruise_speed = speed
+        self.cruise, self.push = speed / limits.speed, self.gains.push / limits.speed
         first, further = _arcs(rover, turning, limits)
         side = math.radians(limits.sideways_deg)
-        self._commands = np.column_stack((first.direction, first.curvature / limits.curvature, first.sideways / side))
-        points = np.concatenate((outline.wheels, outline.underside)) - [turning.x_c, 0.0]
-        self._grid = GroundGrid(scan, points, turning.x_c)
-        self._search = ArcSearch(
+        self.commands = np.column_stack((first.direction, first.curvature / limits.curvature, first.sideways / side))
+        self.arcs = first
+        self.search = ArcSearch(
             first,
             further,
-            self._commands,
-            grid=self._grid,
+            self.commands,
+            scan=scan,
             outline=outline,
+            x_c=turning.x_c,
             reach=self._reach,
             radius=float(model.wheel_radii.max()),
             arrival=0.6 * rover.task.goal_tolerance,
             costs=PathCosts() if costs is None else costs,
         )
-        self._controller = CommandController(rover, limits, guided=False)
+        self._slow = np.zeros(len(first), np.bool_)
+        self._caution = 1.0
+        self.controller = CommandController(rover, limits, guided=False)
         self._repeat = max(1, round(self.gains.period / rover.dt))
         self._period = self._repeat * rover.dt
 
@@ -190,7 +201,7 @@ class ScanPolicy:
             slopes = ground_slope(self._layout, rows[due])
             for i, slope in zip(due.tolist(), slopes.tolist(), strict=True):
                 memory.command[i] = self._decide(rows[i], slope, memory, i)
-        actions = self._controller.act(rows, memory.command)
+        actions = self.controller.act(rows, memory.command)
         memory.age += 1
         return (actions[0] if given.ndim == 1 else actions), memory.state
 
@@ -206,22 +217,50 @@ class ScanPolicy:
             self._back_off(memory, i, x, z, heading)
         sine, cosine = sin_cos(heading)
         ahead, right, turned = (memory.known_traps(i) - [x, z, heading]).T
+        heights = self._over_plane(row, slope)
+        boldness = self._boldness(memory.fruitless[i])
+        extra, fast = self._outlook(row, slope, heights, boldness)
         task = SearchTask(
             goal=(float(goal[0]) - self._x_c, float(goal[1])),
             command=memory.command[i].copy(),
-            boldness=max(gains.least, float(exp(-math.log(2.0) * memory.fruitless[i] / (gains.courage * pace)))),
+            boldness=self._caution * boldness,
             traps=np.column_stack((ahead * cosine - right * sine, ahead * sine + right * cosine, turned)),
             retreat=float(memory.away[i]) if memory.retreat[i] > 0.0 else 0.0,
+            extra=extra,
         )
-        # Over the ground plane a slope costs nothing.
-        rise = slope[0] * self._offsets[:, 0] + slope[1] * self._offsets[:, 1]
-        heights = row[self._heights] * self._scale[self._heights] - rise
-        command: Array = self._commands[self._search.best(self._grid.spread(heights), task)]
+        arc = self.search.best(heights, task)
+        command: Array = self.commands[arc]
         if command[0] < 0.0 and not task.retreat:
             memory.command[i, 0] = 1.0  # the way not to go
             self._back_off(memory, i, x, z, heading)
-        pushes = memory.still[i] > PUSH_AFTER * pace or is_high
-        return command * [self._push if pushes else self._cruise, 1.0, 1.0]
+        pushes = memory.still[i] > PUSH_AFTER * pace or is_high or fast[arc]
+        return command * [self.push if pushes else self.cruise, 1.0, 1.0]
+
+    def ground(self, row: Array) -> tuple[list[float], Array]:
+        """Slope of the ground plane ahead and to the right, and the scan's heights over it, m, for an observation."""
+        slope: list[float] = ground_slope(self._layout, row[None])[0].tolist()
+        return slope, self._over_plane(row, slope)
+
+    def _over_plane(self, row: Array, slope: list[float]) -> Array:
+        """The scan's heights over the ground plane, m: over it a slope costs nothing."""
+        rise = slope[0] * self._offsets[:, 0] + slope[1] * self._offsets[:, 1]
+        heights: Array = row[self._heights] * self._scale[self._heights] - rise
+        return heights
+
+    def _boldness(self, fruitless: float) -> float:
+        """Factor on the cost of risks after a time without progress, s."""
+        halvings = fruitless / (self.gains.courage * self._pace)
+        return max(self.gains.least, float(exp(-math.log(2.0) * halvings)))
+
+    def _outlook(
+        self,
+        row: Array,  # noqa: ARG002 - for policies that know more
+        slope: list[float],  # noqa: ARG002
+        heights: Array,  # noqa: ARG002
+        boldness: float,  # noqa: ARG002
+    ) -> tuple[Array | None, npt.NDArray[np.bool_]]:
+        """`(n_arcs,)` further costs of the first arcs, m, and whether they are driven fast."""
+        return None, self._slow
 
     def _back_off(self, memory: ScanMemory, i: int, x: float, z: float, heading: float) -> None:
         """Remembers a trap where the rover was about to go, and that it shall drive the other way for a while."""

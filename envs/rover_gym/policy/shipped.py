@@ -34,7 +34,12 @@ def find_policy(policy: str, terrain: str) -> Path | None:
         return None
     folder = policy_folder(terrain) if policy == "trained" else Path(policy)
     if not is_there(folder / "policy.json"):
-        refuse(PolicyError, "policy", policy, "must be 'pd', 'scan', 'trained' or the folder of a trained policy")
+        refuse(
+            PolicyError,
+            "policy",
+            policy,
+            "must be 'pd', 'scan', 'foresight', 'trained' or the folder of a trained policy or forecast",
+        )
     return folder
 
 

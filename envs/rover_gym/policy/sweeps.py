@@ -74,17 +74,3 @@ class Arcs:
         chord = way * np.where(turned, sin_cos(half)[0] / np.where(turned, half, 1.0), 1.0)
         sine, cosine = sin_cos(half + self.sideways[:, None])
         return np.stack((chord * cosine, -chord * sine, theta), axis=-1)
-
-
-def after(first: Array, second: Array) -> Array:
-    """`(n, m, steps, 3)` poses `second` `(m, steps, 3)`, each as seen from poses `first` `(n, 3)`."""
-    ahead, right, theta = (first[:, i, None, None] for i in range(3))
-    sine, cosine = sin_cos(theta)
-    return np.stack(
-        (
-            ahead + cosine * second[..., 0] + sine * second[..., 1],
-            right - sine * second[..., 0] + cosine * second[..., 1],
-            theta + second[..., 2],
-        ),
-        axis=-1,
-    )

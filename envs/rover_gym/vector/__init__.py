@@ -5,12 +5,14 @@ library.
 """
 
 from rover_gym.vector.batch import BatchRover, RoverBatch
+from rover_gym.vector.batch_snapshot import BatchSnapshot
 from rover_gym.vector.exploring import ExploringSpeed, measure_exploring
 from rover_gym.vector.throughput import VectorSpeed, measure_speed
 from rover_gym.vector.vector_env import RoverVectorEnv
 
 __all__ = [
     "BatchRover",
+    "BatchSnapshot",
     "ExploringSpeed",
     "RoverBatch",
     "RoverVectorEnv",

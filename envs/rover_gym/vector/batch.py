@@ -15,17 +15,28 @@ from gymnasium.error import ResetNeeded
 
 from rover_gym.env import beginning
 from rover_gym.env.arguments import RoverArguments, takes_arguments
-from rover_gym.env.episode_scene import EpisodeScene, ResetOptions, check_difficulty, check_reset_options, scene_of
+from rover_gym.env.env_snapshot import EnvSnapshot
+from rover_gym.env.episode_scene import (
+    EpisodeScene,
+    ResetOptions,
+    check_difficulty,
+    check_reset_options,
+    origin_of,
+    scene_of,
+)
 from rover_gym.env.generators import Rows, check_seed, fresh_seed, generator_at, row_of, seeded_rows, set_row
 from rover_gym.env.observation import ObservationLayout
+from rover_gym.env.progress import Progress
 from rover_gym.env.quantities import Array, Mask, Observations
 from rover_gym.env.randomisation import Domain
 from rover_gym.env.rocks import Rocks
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.start import Start
 from rover_gym.env.task import Task, check_actions
-from rover_gym.mechanics import DrawnEpisodes, EpisodeBatch, Plane, RoverModel, Simulation
-from rover_gym.validation import Range, whole
+from rover_gym.mechanics import DrawnEpisodes, EpisodeBatch, OptionError, Plane, RoverModel, Simulation
+from rover_gym.validation import Range, refuse, whole
+from rover_gym.vector.batch_snapshot import BatchSnapshot, check_batch_snapshot
+from rover_gym.vector.batch_terms import BatchTerms
 
 if TYPE_CHECKING:
     from rover_gym.rendering import FrameRenderer
@@ -72,6 +83,7 @@ class RoverBatch:
         self.episodes = EpisodeBatch(
             self.task.rules, simulation, self.n, max_steps=self.max_episode_steps, threads=threads
         )
+        self._terms = BatchTerms(self.task, self.episodes)
         self.rovers = tuple(BatchRover(self, i) for i in range(self.n))
         #: Generators of the rovers before their first episodes; afterwards the core has them.
         self._generators: Rows = np.zeros((self.n, 4), np.uint64)
@@ -86,9 +98,9 @@ class RoverBatch:
         """`(n, size) float32` copy of the last observations."""
         return self.episodes.observations()
 
-    def check_options(self, options: Mapping[str, Any] | None) -> ResetOptions:
-        """Checks reset options and refuses the first bad one."""
-        return check_reset_options(self.task, options)
+    def check_options(self, options: Mapping[str, Any] | None, field: str = "options") -> ResetOptions:
+        """Checks reset options; `field` is their name in errors."""
+        return check_reset_options(self.task, options, field)
 
     def reset(self, i: int, seed: int | None = None, options: ResetOptions | None = None) -> dict[str, Any]:
         """Starts an episode of rover i and returns its info; the other rovers continue.
@@ -133,6 +145,7 @@ class RoverBatch:
         chosen, episodes = drawn.chosen, drawn.episodes
         self.episodes.begin(chosen, episodes)
         self._begun[chosen] = True
+        self._terms.clear(chosen)
         for i, seed in zip(chosen, drawn.seeds, strict=True):
             self._seeds[i] = seed
         for i in drawn.seeded & self._lent.keys():
@@ -157,11 +170,17 @@ class RoverBatch:
         Raises:
             CommandError: The actions have a wrong shape or an entry that is not finite or outside [-1, 1]; nothing
                 has changed.
+            OptionError: A function of `reward_terms` fails; the period has been taken.
             ResetNeeded: A rover has not been reset.
         """
         self._check_begun(actions)
+        before = self._terms.before()
         with self._lending(self._lent if self.task.is_noisy else ()):
-            return self.episodes.step(actions, active, has_scan=has_scan)
+            stepped = self.episodes.step(actions, active, has_scan=has_scan)
+        if before is not None:
+            moved = np.ones(self.n, np.bool_) if active is None else np.asarray(active)
+            self._terms.earn(before, actions, stepped, moved, self.episodes.infos())
+        return stepped
 
     def step_on(
         self, actions: object, *, same_step: bool, has_scan: bool = True
@@ -182,18 +201,24 @@ class RoverBatch:
 
         Raises:
             CommandError: As of `step`.
+            OptionError: As of `step`.
             ResetNeeded: A rover has not been reset.
             TerrainError: As `RoverEnv.reset`, for a rover whose episode was over; nothing has changed.
         """
         self._check_begun(actions)
+        before = self._terms.before()
+        moved = np.isin(np.arange(self.n), self.over, invert=True) if before is not None else None
         with self._lending(self._lent):
-            return self.episodes.step_on(
+            stepped = self.episodes.step_on(
                 actions,
                 self.task.episodes,
                 same_step=same_step,
                 attempts=beginning.PLACING_ATTEMPTS,
                 has_scan=has_scan,
             )
+        if before is not None and moved is not None:
+            self._terms.earn(before, actions, stepped, moved, self.episodes.infos(), self.episodes.finals())
+        return stepped
 
     @property
     def over(self) -> list[int]:
@@ -202,15 +227,83 @@ class RoverBatch:
 
     def finals(self) -> dict[int, tuple[Observations, dict[str, Any]]]:
         """Last observations `(size,) float32` and infos of the episodes that the last `step_on` has ended, by rover."""
-        return self.episodes.finals()
+        return self._terms.add_to_finals(self.episodes.finals())
 
     def info(self, i: int) -> dict[str, Any]:
         """The info of rover i's last period or reset, as `RoverEnv` returns it."""
-        return self.episodes.info(i)
+        return self._terms.add_to_info(i, self.episodes.info(i))
 
     def infos(self) -> dict[str, Any]:
         """The infos of all n rovers, as one array per key with Gymnasium's masks."""
-        return self.episodes.infos()
+        return self._terms.add_to_infos(self.episodes.infos())
+
+    def snapshot(self) -> BatchSnapshot:
+        """Returns the state of all rovers, of their episodes and random generators, for `restore`.
+
+        Raises:
+            ResetNeeded: A rover has not been reset.
+        """
+        if not self._begun.all():
+            raise ResetNeeded("a batch of rovers: call reset() first")
+        rows = self._rows(range(self.n))
+        rovers = tuple(
+            EnvSnapshot(
+                simulation=self.episodes.simulation(i).snapshot(),
+                scene=self.scene(i),
+                progress=Progress.of(self.episodes.episode(i)),
+                difficulty=self.episodes.difficulty(i),
+                random_state=generator_at(rows[i]).bit_generator.state,
+            )
+            for i in range(self.n)
+        )
+        messages = tuple(str(message) for message in self.infos()["solver"]["message"])
+        steps = tuple(self.episodes.steps(i) for i in range(self.n))
+        return BatchSnapshot(rovers, steps, tuple(self._seeds), messages, self._terms.state())
+
+    def restore(self, snapshot: BatchSnapshot) -> None:
+        """Restores a snapshot of a batch of as many rovers with the same arguments, which then continues bit for bit.
+
+        The numbers of threads and the time limits may differ.
+
+        Raises:
+            StateError: The value is no snapshot, is damaged, or comes from a batch of other size or arguments; nothing
+                has changed.
+        """
+        checked = check_batch_snapshot(self.task, self.n, snapshot)
+        self._terms.set_state(snapshot.terms)
+        for i, rover in enumerate(checked):
+            self.episodes.resume(
+                [i],
+                rover.simulation,
+                rover.episode,
+                origin_of(snapshot.rovers[i].scene),
+                generator=rover.generator,
+                steps=rover.steps,
+                message=rover.message or None,
+            )
+            self.episodes.set_difficulty(i, rover.difficulty)
+            self._seeds[i] = rover.seed
+        self._begun[:] = True
+        self._hand_back(self._lent)
+
+    def set_difficulties(self, difficulties: Sequence[float | Range | None]) -> None:
+        """Sets each rover's difficulty of the rocks, or the range it is drawn from, from its next reset on.
+
+        Args:
+            difficulties: One a rover; None for the argument `difficulty`.
+
+        Raises:
+            OptionError: There are not as many as rovers, one is not within 0 to 2, or there are no rocks; nothing has
+                changed.
+        """
+        if not isinstance(difficulties, (list, tuple, np.ndarray)) or len(difficulties) != self.n:
+            refuse(OptionError, "difficulties", difficulties, f"must be a list of {self.n}, one a rover")
+        ranges = [
+            None if one is None else check_difficulty(self.task, one, f"difficulties[{i}]")
+            for i, one in enumerate(difficulties)
+        ]
+        for i, one in enumerate(ranges):
+            self.episodes.set_difficulty(i, one)
 
     def generator(self, i: int) -> np.random.Generator:
         """Rover i's random generator; before the first reset it is seeded at random, as in `gymnasium.Env`.
@@ -234,7 +327,9 @@ class RoverBatch:
         """
         if not self._begun[i]:
             raise ResetNeeded("a batch of rovers: call reset() first")
-        return scene_of(self.task, *self.episodes.origin(i), self.episodes.terrain(i))
+        ground = self.task.ground  # one object for all, so that snapshots hold it once
+        terrain = self.episodes.terrain(i) if ground is None else ground
+        return scene_of(self.task, *self.episodes.origin(i), terrain)
 
     def _check_begun(self, actions: object) -> None:
         """Refuses a step before all rovers have been reset; once they have been, all have an episode for good."""
@@ -313,7 +408,7 @@ class BatchRover:
         scene, prototype = self._scene, self._batch.prototype
         if self._renderer is None:
             self._renderer = prototype.make_renderer(scene)
-        self._renderer.set_scene(scene.terrain, goal=scene.start.goal, goal_tolerance=prototype.goal_tolerance)
+        self._renderer.set_scene(scene.terrain, goal=self.goal, goal_tolerance=prototype.goal_tolerance)
         return self._renderer.render(self.simulation)
 
     def close(self) -> None:
@@ -334,8 +429,8 @@ class BatchRover:
 
     @property
     def goal(self) -> tuple[float, float]:
-        """The episode's goal (x, z), m."""
-        return self._scene.start.goal
+        """The episode's present goal (x, z), m."""
+        return self._batch.episodes.episode(self._i).goal
 
     @property
     def rocks(self) -> Rocks | None:

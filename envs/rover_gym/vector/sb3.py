@@ -8,6 +8,7 @@ model = stable_baselines3.PPO("MlpPolicy", VecMonitor(venv))
 
 import copy
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Unpack
 
 import numpy as np
@@ -19,15 +20,33 @@ from rover_gym.env.observation import LARGEST
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
 from rover_gym.extras import MissingExtraError
-from rover_gym.mechanics import OptionError
-from rover_gym.validation import refuse
+from rover_gym.mechanics import OptionError, StateError
+from rover_gym.validation import Range, refuse
 from rover_gym.vector.batch import BatchRover, Drawn, RoverBatch
+from rover_gym.vector.batch_snapshot import BatchSnapshot
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
     from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 except ImportError as error:
     raise MissingExtraError("stable-baselines3", "train") from error
+
+
+@dataclass(frozen=True)
+class VecEnvSnapshot:
+    """The state from which a `RoverVecEnv` continues bit for bit; picklable.
+
+    Attributes:
+        batch: The rovers.
+        reset_infos: Infos of the resets of the running episodes.
+        seeds: Seeds that were set for the next reset.
+        options: Options that were set for the next reset.
+    """
+
+    batch: BatchSnapshot
+    reset_infos: list[dict[str, Any]]
+    seeds: list[int | None]
+    options: list[dict[str, Any]]
 
 
 class RoverVecEnv(VecEnv):
@@ -105,6 +124,10 @@ class RoverVecEnv(VecEnv):
             self.batch.check_options(one)
         self._options = [copy.deepcopy(dict(one or {})) for one in given]
 
+    def set_difficulties(self, difficulties: Sequence[float | Range | None]) -> None:
+        """Sets each rover's difficulty of the rocks, as `RoverVectorEnv.set_difficulties`."""
+        self.batch.set_difficulties(difficulties)
+
     def step_async(self, actions: npt.NDArray[np.float32]) -> None:
         """Stores the actions `(n_envs, n_actions)` for `step_wait`."""
         self._actions = actions
@@ -146,6 +169,27 @@ class RoverVecEnv(VecEnv):
     def _tell_resets(self, begun: Sequence[int]) -> None:
         for i in begun:
             self.reset_infos[i] = self.batch.info(i)
+
+    def snapshot(self) -> VecEnvSnapshot:
+        """Returns the state of all rovers, of their episodes and random generators, for `restore`; picklable.
+
+        Raises:
+            ResetNeeded: The rovers have not been reset.
+        """
+        kept = copy.deepcopy((self.reset_infos, self._seeds, self._options))
+        return VecEnvSnapshot(self.batch.snapshot(), *kept)
+
+    def restore(self, snapshot: VecEnvSnapshot) -> None:
+        """Restores a snapshot of a vector of as many rovers with the same arguments, which continues bit for bit.
+
+        Raises:
+            StateError: The value is no snapshot, is damaged, or comes from other arguments; nothing has changed.
+        """
+        if not isinstance(snapshot, VecEnvSnapshot):
+            refuse(StateError, "snapshot", snapshot, "must come from RoverVecEnv.snapshot()")
+        self.batch.restore(snapshot.batch)
+        kept = copy.deepcopy((snapshot.reset_infos, snapshot.seeds, snapshot.options))
+        self.reset_infos, self._seeds, self._options = kept
 
     def close(self) -> None:
         """Frees the renderers, if there are any."""

@@ -10,12 +10,14 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
+from rover_gym.env.episode_scene import ResetOptions
 from rover_gym.env.generators import spread_seeds
 from rover_gym.env.quantities import Array, Mask, Observations
 from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
 from rover_gym.mechanics import OptionError
-from rover_gym.validation import mapping, refuse
+from rover_gym.validation import Range, mapping, refuse
 from rover_gym.vector.batch import RoverBatch
+from rover_gym.vector.batch_snapshot import BatchSnapshot
 
 _Info = dict[str, Any]
 
@@ -77,7 +79,8 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
 
         Args:
             seed: Seed of the first rover, which increases by one per rover; or one seed per rover.
-            options: Options of `RoverEnv.reset`, for every rover, and `reset_mask`, `(num_envs,)` bool: the rovers to
+            options: Options of `RoverEnv.reset`, for every rover; `rovers`, a list of further options for each rover, a
+                mapping or None, which go before those for all; and `reset_mask`, `(num_envs,)` bool: the rovers to
                 reset, by default all; the others continue.
 
         A refused reset changes nothing for any rover.
@@ -90,7 +93,7 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         seeds = spread_seeds(seed, self.num_envs)
         given = dict(mapping("options", options))
         chosen = self._check_mask(given.pop("reset_mask")) if "reset_mask" in given else list(range(self.num_envs))
-        fixed = self.batch.check_options(given)
+        fixed = self._check_options(given, chosen)
         self.batch.begin(self.batch.draw(chosen, [seeds[i] for i in chosen], fixed))
         if len(chosen) == self.num_envs:
             return self.batch.observation, self.batch.infos()
@@ -127,6 +130,36 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
                 infos = self._add_info(infos, {"final_obs": last, "final_info": info}, i)
         return observation, reward, terminated, truncated, infos
 
+    def set_difficulties(self, difficulties: Sequence[float | Range | None]) -> None:
+        """Sets each rover's difficulty of the rocks, or the range it is drawn from, from its next reset on.
+
+        Args:
+            difficulties: One a rover; None for the argument `difficulty`.
+
+        Raises:
+            OptionError: There are not as many as rovers, one is not within 0 to 2, or there are no rocks; nothing has
+                changed.
+        """
+        self.batch.set_difficulties(difficulties)
+
+    def snapshot(self) -> BatchSnapshot:
+        """Returns the state of all rovers, of their episodes and random generators, for `restore`; picklable.
+
+        Raises:
+            ResetNeeded: A rover has not been reset.
+        """
+        return self.batch.snapshot()
+
+    def restore(self, snapshot: BatchSnapshot) -> None:
+        """Restores a snapshot of a vector of as many rovers with the same arguments, which continues bit for bit.
+
+        Episodes that had ended in the snapshot are followed by the next ones as `autoreset_mode` says.
+
+        Raises:
+            StateError: The value is no snapshot, is damaged, or comes from other arguments; nothing has changed.
+        """
+        self.batch.restore(snapshot)
+
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
         """One frame per rover with `render_mode="rgb_array"`; None without a render mode."""
         frames = tuple(frame for rover in self.batch.rovers if (frame := rover.render()) is not None)
@@ -145,6 +178,21 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
     def get_attr(self, name: str) -> tuple[Any, ...]:
         """Reads an attribute of every rover, by its name in `RoverEnv`."""
         return tuple(getattr(rover, name) for rover in self.batch.rovers)
+
+    def _check_options(self, given: _Info, chosen: Sequence[int]) -> ResetOptions | list[ResetOptions]:
+        """The options of all chosen rovers, or of each."""
+        if "rovers" not in given:
+            return self.batch.check_options(given)
+        own = given.pop("rovers")
+        if not isinstance(own, (list, tuple)) or len(own) != self.num_envs:
+            refuse(OptionError, "options.rovers", own, f"must be a list of {self.num_envs} mappings, one a rover")
+        fixed = []
+        for i, one in enumerate(own):
+            field = f"options.rovers[{i}]"
+            checked = self.batch.check_options({**given, **mapping(field, one)}, field)
+            if i in chosen:
+                fixed.append(checked)
+        return fixed
 
     def _check_mask(self, mask: object) -> list[int]:
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):

@@ -25,7 +25,8 @@
 //! - [`lanes`]: the ordinary step of one rover or several to a register;
 //! - [`simulation`]: many steps of any scene;
 //! - [`draw`]: random numbers, for scenes that are drawn;
-//! - [`episode`]: the episodes of a driving task: actions, observations, rewards, ends.
+//! - [`episode`]: the episodes of a driving task: actions, observations, rewards, ends;
+//! - [`paths`]: what a rover would touch on a path over known heights, and the cheapest of many.
 #![forbid(unsafe_code)]
 // Same bits on every machine: sines and their like come from `scalar::elementary`.
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
@@ -41,6 +42,7 @@ pub mod integrator;
 pub mod lanes;
 pub mod law;
 pub mod multibody;
+pub mod paths;
 pub mod planar;
 mod pool;
 pub mod problem;

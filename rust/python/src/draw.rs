@@ -10,7 +10,7 @@ use rover_core::draw::{
 use rover_core::episode::{Beginning, EpisodeBatch, EpisodeDistribution as CoreDistribution};
 use rover_core::simulation::RoverSimulation;
 
-use crate::arguments::{Given, count, number, refused};
+use crate::arguments::{Given, count, number, refused, whole};
 use crate::arrays::{fresh_table, two, vector};
 use crate::episode::{self, EpisodeRun};
 use crate::errors::{BorderError, Kind};
@@ -18,6 +18,7 @@ use crate::generators::{generators, halves};
 use crate::ground::Ground;
 use crate::options::SolverWords;
 use crate::plane::Plane;
+use crate::reading::points;
 use crate::shared::Watch;
 use crate::simulation::{Origin, Simulation};
 
@@ -33,8 +34,10 @@ type NewArguments<'py> = ((Bound<'py, PyAny>, Bound<'py, PyAny>), Bound<'py, PyD
 /// Args:
 ///     rules: What all episodes share; rocks leave the goal clear within its tolerance.
 ///     simulation: The rover, before its masses are scaled, and the options of its steps.
-///     start: Ranges (low, high) of `slope`, `uphill`, `heading`, `goal_distance` and
-///         `goal_bearing`, by name, rad and m.
+///     start: Ranges (low, high) of `slope`, `uphill`, `heading`, `goal_distance`, `goal_bearing`
+///         and `turn`, by name, rad and m. A goal after the first lies at a distance from
+///         `goal_distance` from the one before it, in the direction of the last leg turned by
+///         `turn`.
 ///     domain: Ranges of `mass_scale`, `friction`, `actuator_gain` and `gravity_scale`, by name.
 ///     trunk_load_limit: Force on the trunk beyond which the rover is high-centred, before masses
 ///         and gravity are scaled, N.
@@ -140,8 +143,14 @@ fn fixed(given: &Bound<'_, PyAny>) -> PyResult<Fixed> {
             position: named.point("position")?,
             heading: named.number("heading")?,
             goal: named.point("goal")?,
+            further: (named.some("further")?).map_or(Ok(Vec::new()), |given| {
+                points(&given, &named.path("further"))
+            })?,
         },
         difficulty: named.number("difficulty")?,
+        field_seed: (named.some("field_seed")?)
+            .map(|given| whole(&given, Kind::Option, &named.path("field_seed")))
+            .transpose()?,
         state: read("q", "q")?.map(|q| (q, v)),
     })
 }
@@ -289,6 +298,8 @@ impl EpisodeDistribution {
                 heading: start.range("heading")?,
                 goal_distance: start.range("goal_distance")?,
                 goal_bearing: start.range("goal_bearing")?,
+                further: rules.settings().goals - 1,
+                turn: start.range("turn")?,
             },
             domain: DomainDistribution {
                 mass_scale: domain.range("mass_scale")?,
@@ -320,8 +331,9 @@ impl EpisodeDistribution {
     ///     difficulties: For each generator a range (low, high) that replaces that of the rocks'
     ///         difficulty, or None; by default none.
     ///     fixed: Values that replace draws, which are made all the same, by name: `slope`,
-    ///         `uphill`, `position` (x, z), `heading`, `goal` (x, z), `difficulty`, `q`, `v`; one
-    ///         mapping for all or a list of one for each generator; none by default.
+    ///         `uphill`, `position` (x, z), `heading`, `goal` (x, z), `further` (n, 2) of the goals
+    ///         after it, `difficulty`, `field_seed`, `q`, `v`; one mapping for all or a list of one
+    ///         for each generator; none by default.
     ///
     /// Returns:
     ///     The episodes.
@@ -397,28 +409,26 @@ impl DrawnEpisodes {
 }
 
 /// A row of `DrawnEpisodes.starts`.
-pub fn start_row(start: &Start) -> [f64; 7] {
-    let ([x, z], [goal_x, goal_z]) = (start.position, start.goal);
-    [
-        start.slope,
-        start.uphill,
-        x,
-        z,
-        start.heading,
-        goal_x,
-        goal_z,
-    ]
+pub fn start_row(start: &Start) -> Vec<f64> {
+    let [x, z] = start.position;
+    let pose = [start.slope, start.uphill, x, z, start.heading];
+    pose.into_iter().chain(start.goals().flatten()).collect()
 }
 
-/// What a row of `DrawnEpisodes.starts` tells.
-pub fn start_of([slope, uphill, x, z, heading, goal_x, goal_z]: [f64; 7]) -> Start {
-    Start {
+/// What a row of `DrawnEpisodes.starts` tells; None if it has another length.
+pub fn start_of(row: &[f64]) -> Option<Start> {
+    let (&[slope, uphill, x, z, heading, goal_x, goal_z], rest) = row.split_first_chunk()?;
+    let (further, []) = rest.as_chunks() else {
+        return None;
+    };
+    Some(Start {
         slope,
         uphill,
         position: [x, z],
         heading,
         goal: [goal_x, goal_z],
-    }
+        further: further.to_vec(),
+    })
 }
 
 /// A row of `DrawnEpisodes.domains`.
@@ -458,13 +468,18 @@ impl DrawnEpisodes {
         PyArray1::from_iter(py, entries.copied()).reshape([self.drawn.len(), size])
     }
 
-    /// Starts, (m, 7), rad and m.
+    /// Starts, (m, 5 + 2 n) with n goals, rad and m.
     ///
-    /// Slope, direction of steepest ascent, x and z of the start, heading, x and z of the goal.
+    /// Slope, direction of steepest ascent, x and z of the start, heading, x and z of each goal.
     #[getter]
     fn starts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let row = |one: &Beginning| start_row(&one.scene.start);
-        fresh_table(py, self.drawn.iter().map(row))
+        let rows: Vec<_> = self
+            .drawn
+            .iter()
+            .map(|one| start_row(&one.scene.start))
+            .collect();
+        let width = rows.first().map_or(0, Vec::len);
+        PyArray1::from_iter(py, rows.into_iter().flatten()).reshape([self.drawn.len(), width])
     }
 
     /// Properties of rover and world, (m, 4).

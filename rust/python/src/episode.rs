@@ -7,15 +7,18 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyRange};
 use rover_core::draw::Domain;
 use rover_core::episode::running::{Period, check_normals};
-use rover_core::episode::{Episode as CoreEpisode, Progress, Rules, Setting, action};
+use rover_core::episode::{
+    Ending, Episode as CoreEpisode, Last, N_QUANTITIES, N_TERMS, Progress, Quantities, Rules,
+    Setting, action,
+};
 use rover_core::simulation::{ReadingScratch, RoverSimulation};
 
-use crate::arguments::{number, refused};
-use crate::arrays::{array, fresh, vector};
+use crate::arguments::{Given, number, refused};
+use crate::arrays::{array, fresh, fresh_rows, vector};
 use crate::episode_rules::EpisodeRules;
 use crate::errors::{BorderError, Kind, Value};
 use crate::infos::info;
-use crate::reading::place;
+use crate::reading::{place, points};
 use crate::rover_grains::RoverGrainSimulation;
 use crate::shared::{Shared, Watch};
 use crate::simulation::Simulation;
@@ -37,6 +40,12 @@ type Step<'py> = (Bound<'py, PyArray1<f32>>, f64, bool, Bound<'py, PyDict>);
 ///     energy_positive: Its driving part, J.
 ///     stuck_time: How long the rover has been high-centred, s.
 ///     observation: The last observation, (size,).
+///     further: Goals after the first, (n, 2), x and z, m; none by default.
+///     reached: How many goals have been reached.
+///     outcome: What else is known of the last control period, as `state` returns it; by default
+///         the episode runs, and its info tells its progress only.
+///     owed: Standard normal numbers of an observation that lacks its heights, (size,), or (0,)
+///         without noise; None where it lacks none.
 ///
 /// Raises:
 ///     OptionError: An argument has a wrong shape or a number that is not finite.
@@ -96,6 +105,7 @@ pub fn rules(value: &Bound<'_, PyAny>) -> PyResult<Arc<Rules>> {
 
 fn setting(
     goal: &Bound<'_, PyAny>,
+    further: Option<&Bound<'_, PyAny>>,
     domain: &Bound<'_, PyAny>,
     trunk_load_limit: &Bound<'_, PyAny>,
     difficulty: &Bound<'_, PyAny>,
@@ -107,6 +117,7 @@ fn setting(
     };
     Ok(Setting {
         goal: place(Some(goal))?,
+        further: further.map_or(Ok(Vec::new()), |given| points(given, "further"))?,
         domain: Domain {
             mass_scale,
             friction,
@@ -115,6 +126,25 @@ fn setting(
         },
         trunk_load_limit: number(trunk_load_limit, Kind::Option, "trunk_load_limit")?,
         difficulty: number(difficulty, Kind::Option, "difficulty")?,
+    })
+}
+
+/// What else an episode knows of its last control period.
+fn last(given: &Bound<'_, PyAny>) -> PyResult<Last> {
+    let what = "what `EpisodeRun.state` returns";
+    let refuse = || refused(given, Kind::Option, "outcome", what);
+    let found: Option<(Vec<f64>, Vec<f64>, String)> = given.extract().ok();
+    let (now, terms, name) = found.ok_or_else(refuse)?;
+    let now = <[f64; N_QUANTITIES]>::try_from(now).map_err(|_| refuse())?;
+    let terms = <[f64; N_TERMS]>::try_from(terms).map_err(|_| refuse())?;
+    let ending = Ending::ALL.into_iter().find(|own| own.name() == name);
+    if now.iter().chain(&terms).any(|x| x.is_nan()) {
+        return Err(refuse().into());
+    }
+    Ok(Last {
+        now: Quantities::from_row(now),
+        terms,
+        ending: ending.ok_or_else(refuse)?,
     })
 }
 
@@ -167,7 +197,7 @@ impl Inner {
         let mut numbers = std::mem::take(&mut self.scratch.numbers);
         numbers.resize(rules.places().size + scan.len(), 0.0);
         let (reading, heights) = numbers.split_at_mut(rules.places().size);
-        rover.read_state(self.episode.setting().goal, &mut self.scratch, reading);
+        rover.read_state(self.episode.goal(), &mut self.scratch, reading);
         if has_scan {
             rover.read_heights(scan, heights);
         }
@@ -205,7 +235,9 @@ impl EpisodeRun {
     #[new]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
     #[pyo3(signature = (rules, *, goal, domain, trunk_load_limit, difficulty, distance,
-        previous_action, energy, energy_positive, stuck_time, observation))]
+        previous_action, energy, energy_positive, stuck_time, observation, further = None,
+        reached = Given::MISSING, outcome = None, owed = None),
+        text_signature = "(rules, *, goal, domain, trunk_load_limit, difficulty, distance, previous_action, energy, energy_positive, stuck_time, observation, further=None, reached=0, outcome=None, owed=None)")]
     fn new(
         rules: &Bound<'_, PyAny>,
         goal: &Bound<'_, PyAny>,
@@ -218,6 +250,10 @@ impl EpisodeRun {
         energy_positive: &Bound<'_, PyAny>,
         stuck_time: &Bound<'_, PyAny>,
         observation: &Bound<'_, PyAny>,
+        further: Option<&Bound<'_, PyAny>>,
+        reached: Given<'_>,
+        outcome: Option<&Bound<'_, PyAny>>,
+        owed: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let option = |given, field| number(given, Kind::Option, field);
         let progress = Progress {
@@ -226,14 +262,19 @@ impl EpisodeRun {
             energy: option(energy, "energy")?,
             energy_positive: option(energy_positive, "energy_positive")?,
             stuck_time: option(stuck_time, "stuck_time")?,
+            reached: reached.count(0, Kind::Option, "reached")?,
         };
         #[allow(clippy::cast_possible_truncation)] // float32 is what an observation holds
         let observation = vector(observation, Kind::Option, "observation")?
             .into_iter()
             .map(|x| x as f32)
             .collect();
-        let setting = setting(goal, domain, trunk_load_limit, difficulty)?;
-        let episode = CoreEpisode::resume(self::rules(rules)?, setting, progress, observation);
+        let setting = setting(goal, further, domain, trunk_load_limit, difficulty)?;
+        let last = outcome.map(last).transpose()?;
+        let owed = owed.map(|given| vector(given, Kind::Option, "owed"));
+        let rules = self::rules(rules)?;
+        let owed = owed.transpose()?;
+        let episode = CoreEpisode::resume(rules, setting, progress, observation, last, owed);
         Ok(Self::of(episode.map_err(BorderError::from)?))
     }
 
@@ -248,6 +289,7 @@ impl EpisodeRun {
     ///     difficulty: Difficulty of the rocks.
     ///     normals: A standard normal number for each entry of the observation, (size,), where the
     ///         rules have noise.
+    ///     further: As of the class.
     ///
     /// Returns:
     ///     The episode; None if its observation is not finite in float32.
@@ -256,8 +298,9 @@ impl EpisodeRun {
     ///     OptionError: An argument has a wrong shape or a number that is not finite, or the
     ///         rover's model does not fit the rules.
     #[staticmethod]
+    #[allow(clippy::too_many_arguments)] // keyword arguments in Python
     #[pyo3(signature = (rules, simulation, *, goal, domain, trunk_load_limit, difficulty,
-        normals = None))]
+        normals = None, further = None))]
     fn begin(
         rules: &Bound<'_, PyAny>,
         simulation: &Bound<'_, PyAny>,
@@ -266,9 +309,10 @@ impl EpisodeRun {
         trunk_load_limit: &Bound<'_, PyAny>,
         difficulty: &Bound<'_, PyAny>,
         normals: Option<&Bound<'_, PyAny>>,
+        further: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Option<Self>> {
         let rules = self::rules(rules)?;
-        let setting = setting(goal, domain, trunk_load_limit, difficulty)?;
+        let setting = setting(goal, further, domain, trunk_load_limit, difficulty)?;
         let normals = self::normals(normals)?;
         let rover = self::simulation(simulation, "simulation")?.get().open()?;
         let begun = CoreEpisode::begin(rules, setting, &rover, normals.as_deref());
@@ -411,6 +455,12 @@ impl EpisodeRun {
         ))
     }
 
+    /// The present goal (x, z), m; the last one where all are reached.
+    #[getter]
+    fn goal(&self) -> PyResult<(f64, f64)> {
+        Ok(self.0.open()?.episode.goal().into())
+    }
+
     /// The info of the last period, or of the beginning.
     fn info<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         info(py, &(&self.0.open()?.episode, None))
@@ -439,6 +489,14 @@ impl EpisodeRun {
         state.set_item("stuck_time", progress.stuck_time)?;
         let observation = PyArray1::from_slice(py, held.episode.observation());
         state.set_item("observation", observation)?;
+        state.set_item("further", fresh_rows(py, &setting.further)?)?;
+        state.set_item("reached", progress.reached)?;
+        let outcome = held.episode.outcome();
+        let (now, terms) = (outcome.now.row(), outcome.terms);
+        let told = (fresh(py, &now), fresh(py, &terms), outcome.ending.name());
+        state.set_item("outcome", told)?;
+        let owed = held.episode.owed();
+        state.set_item("owed", owed.map(|owed| fresh(py, owed)))?;
         Ok(state)
     }
 

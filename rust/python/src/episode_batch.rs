@@ -61,8 +61,7 @@ struct Inner {
 impl Inner {
     /// What the infos tell of a rover.
     fn told(&self, index: usize) -> Result<Told<'_>, EpisodeError> {
-        let message = self.batch.errors()[index].as_ref().map(ToString::to_string);
-        Ok((self.batch.episode(index)?, message))
+        Ok((self.batch.episode(index)?, self.batch.message(index)))
     }
 
     /// One step, by a function of the batch, the actions and the room for the observations; and the
@@ -138,13 +137,12 @@ fn origin(given: &Bound<'_, PyAny>, terrain: &Ground) -> PyResult<Began> {
     let refuse = || refused(given, Kind::Option, "origin", what);
     let found: Option<OriginRows> = given.extract().ok();
     let (start, rocks, seed, _) = found.ok_or_else(refuse)?;
-    let start = <[f64; 7]>::try_from(start).map_err(|_| refuse())?;
     let rocks = <[f64; 3]>::try_from(rocks).map_err(|_| refuse())?;
     if !start.iter().chain(&rocks).all(|x| x.is_finite()) {
         return Err(refuse().into());
     }
     Ok(Began {
-        start: start_of(start),
+        start: start_of(&start).ok_or_else(refuse)?,
         rocks: rocks_of(rocks, seed),
         ground: terrain.drawn(),
     })
@@ -417,12 +415,13 @@ impl EpisodeBatch {
     ///     origin: Where and on what it began, as `origin` tells.
     ///     generator: Generator of the noise, (1, 4) uint64.
     ///     steps: Control periods since the episode began.
+    ///     message: Message of the physics step that failed, if that has ended the episode.
     ///
     /// Raises:
     ///     OptionError: There is no such rover, or an argument does not fit. Nothing has changed.
     #[allow(clippy::too_many_arguments)] // keyword arguments in Python
-    #[pyo3(signature = (indices, simulation, episode, origin, *, generator, steps = Given::MISSING),
-        text_signature = "($self, indices, simulation, episode, origin, *, generator, steps=0)")]
+    #[pyo3(signature = (indices, simulation, episode, origin, *, generator, steps = Given::MISSING, message = None),
+        text_signature = "($self, indices, simulation, episode, origin, *, generator, steps=0, message=None)")]
     fn resume(
         &self,
         indices: &Bound<'_, PyAny>,
@@ -431,6 +430,7 @@ impl EpisodeBatch {
         origin: &Bound<'_, PyAny>,
         generator: &Bound<'_, PyAny>,
         steps: Given<'_>,
+        message: Option<&str>,
     ) -> PyResult<()> {
         let one = self::simulation(simulation, "simulation")?.get();
         let cast = episode.cast::<EpisodeRun>();
@@ -447,7 +447,14 @@ impl EpisodeBatch {
         for index in places {
             let whole = (episode.clone(), steps);
             let batch = &mut held.batch;
-            let resumed = batch.resume(index, rover.clone(), whole, origin.clone(), random);
+            let resumed = batch.resume(
+                index,
+                rover.clone(),
+                whole,
+                origin.clone(),
+                random,
+                message.map(str::to_owned),
+            );
             resumed.map_err(BorderError::from)?;
             held.origins[index] = one.origin().clone();
         }

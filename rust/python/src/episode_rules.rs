@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyTuple};
 use rover_core::episode::{Rules, Settings, TERMS, Weights};
 
-use crate::arguments::{count, number, refused};
+use crate::arguments::{Given, count, number, refused};
 use crate::arrays::{fresh, fresh_rows, vector};
 use crate::errors::{BorderError, Kind};
 use crate::model::RoverModel;
@@ -29,6 +29,12 @@ use crate::reading::scan_points;
 ///     noise: Standard deviation of each entry's noise, (size,); no noise by default.
 ///     scan: Points of the height scan ahead and to the right of the trunk's origin in the heading
 ///         frame, (n, 2), m; none by default.
+///     goals: Number of goals that are reached one after the other. The observation of several has
+///         three entries more before the heights: the goal after the present one, ahead and to the
+///         right, m, and the number of goals still to reach.
+///     battery: Work of the motors, driving or braking, after which the battery is empty and the
+///         episode ends, J; none by default. The observation of a rover with a battery has one
+///         entry more, after the time to high-centring: the fraction of its charge.
 ///
 /// Raises:
 ///     ModelError: `model` is not a RoverModel.
@@ -66,7 +72,8 @@ impl EpisodeRules {
     #[new]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
     #[pyo3(signature = (model, *, substeps, dt, torque_limits, max_steering, goal_tolerance,
-        cos_max_tilt, stuck_time, weights, scale, noise = None, scan = None))]
+        cos_max_tilt, stuck_time, weights, scale, noise = None, scan = None, goals = Given::MISSING, battery = None),
+        text_signature = "(model, *, substeps, dt, torque_limits, max_steering, goal_tolerance, cos_max_tilt, stuck_time, weights, scale, noise=None, scan=None, goals=1, battery=None)")]
     fn new(
         model: &Bound<'_, PyAny>,
         substeps: &Bound<'_, PyAny>,
@@ -80,6 +87,8 @@ impl EpisodeRules {
         scale: &Bound<'_, PyAny>,
         noise: Option<&Bound<'_, PyAny>>,
         scan: Option<&Bound<'_, PyAny>>,
+        goals: Given<'_>,
+        battery: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let model = model
             .extract::<RoverModel>()
@@ -98,6 +107,8 @@ impl EpisodeRules {
             scale: list(scale, "scale")?,
             noise: noise.map_or(Ok(Vec::new()), |given| list(given, "noise"))?,
             scan: scan_points(scan)?,
+            goals: goals.count(1, Kind::Option, "goals")?,
+            battery: battery.map(|given| option(given, "battery")).transpose()?,
         };
         let inner = Rules::new(model.inner, settings).map_err(BorderError::from)?;
         Ok(Self::of(Arc::new(inner)))
@@ -126,6 +137,8 @@ impl EpisodeRules {
             named.set_item("noise", fresh(py, &settings.noise))?;
         }
         named.set_item("scan", fresh_rows(py, &settings.scan)?)?;
+        named.set_item("goals", settings.goals)?;
+        named.set_item("battery", settings.battery)?;
         let model = RoverModel::from(self.inner.model().clone());
         Ok(((model,), named))
     }

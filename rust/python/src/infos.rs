@@ -41,6 +41,19 @@ impl Solver {
     }
 }
 
+/// Charge of the battery, J.
+fn charge(episode: &Episode) -> f64 {
+    let battery = episode.rules().settings().battery.unwrap_or(0.0);
+    (battery - episode.progress().energy).max(0.0)
+}
+
+/// Goals that have been reached, and those that remain.
+#[allow(clippy::cast_possible_wrap)] // small numbers
+fn waypoints(episode: &Episode) -> [i64; 2] {
+    let (reached, goals) = (episode.progress().reached, episode.rules().settings().goals);
+    [reached as i64, goals as i64 - reached as i64]
+}
+
 /// The info of one rover.
 pub fn info<'py>(py: Python<'py>, told: &Told<'_>) -> PyResult<Bound<'py, PyDict>> {
     let (episode, message) = told;
@@ -78,6 +91,16 @@ pub fn info<'py>(py: Python<'py>, told: &Told<'_>) -> PyResult<Bound<'py, PyDict
     info.set_item(intern!(py, "domain"), domain)?;
     info.set_item(intern!(py, "reward_terms"), terms)?;
     info.set_item(intern!(py, "solver"), solver)?;
+    let settings = episode.rules().settings();
+    if settings.battery.is_some() {
+        info.set_item(intern!(py, "charge"), charge(episode))?;
+    }
+    if settings.has_course() {
+        let [reached, remaining] = waypoints(episode);
+        info.set_item(intern!(py, "waypoints_reached"), reached)?;
+        info.set_item(intern!(py, "waypoints_remaining"), remaining)?;
+        info.set_item(intern!(py, "distance_remaining"), episode.way())?;
+    }
     Ok(info)
 }
 
@@ -199,5 +222,14 @@ pub fn infos<'py>(py: Python<'py>, told: &[Told<'_>]) -> PyResult<Bound<'py, PyD
         &terms,
     )?;
     all.nest(intern!(py, "solver"), intern!(py, "_solver"), &solver)?;
+    let settings = told.first().map(|one| one.0.rules().settings());
+    if settings.is_some_and(|settings| settings.battery.is_some()) {
+        add!(all, "charge", |t| charge(t.0));
+    }
+    if settings.is_some_and(rover_core::episode::Settings::has_course) {
+        add!(all, "waypoints_reached", |t| waypoints(t.0)[0]);
+        add!(all, "waypoints_remaining", |t| waypoints(t.0)[1]);
+        add!(all, "distance_remaining", |t| t.0.way());
+    }
     Ok(all.out)
 }

@@ -27,6 +27,7 @@ mod model;
 mod model_files;
 mod motor;
 mod options;
+mod path_search;
 mod planar;
 mod planar_ground;
 mod planar_machines;
@@ -69,6 +70,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<episode_rules::EpisodeRules>()?;
     module.add_class::<episode::EpisodeRun>()?;
     module.add_class::<episode_batch::EpisodeBatch>()?;
+    module.add_class::<path_search::PathSearch>()?;
     module.add_class::<report::StepReport>()?;
     module.add_class::<report::Energy>()?;
     module.add_class::<snapshot::Snapshot>()?;

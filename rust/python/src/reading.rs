@@ -22,13 +22,18 @@ pub fn scan_points(given: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<[f64; 2]>> 
     let Some(given) = given else {
         return Ok(Vec::new());
     };
-    let points = array(given, Kind::Option, "scan")?;
+    points(given, "scan")
+}
+
+/// Finite points (n, 2).
+pub fn points(given: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<[f64; 2]>> {
+    let points = array(given, Kind::Option, field)?;
     let view = points.as_array();
     let is_finite = view.iter().all(|x| x.is_finite());
     if view.ndim() != 2 || view.shape()[1] != 2 || !is_finite {
         let shape = view.shape();
-        let message = format!("scan: needs finite numbers of shape (n, 2), has {shape:?}");
-        return Err(BorderError::option("scan", message, Value::Count(view.ndim())).into());
+        let message = format!("{field}: needs finite numbers of shape (n, 2), has {shape:?}");
+        return Err(BorderError::option(field, message, Value::Count(view.ndim())).into());
     }
     let flat: Vec<f64> = view.iter().copied().collect();
     Ok(flat.chunks_exact(2).map(|p| [p[0], p[1]]).collect())

@@ -32,6 +32,8 @@ fn settings() -> Settings {
         scale: (0..SIZE).map(|i| 1.0 + 0.01 * i as f64).collect(),
         noise: vec![0.01; SIZE],
         scan: SCAN.to_vec(),
+        goals: 1,
+        battery: None,
     }
 }
 
@@ -63,6 +65,8 @@ fn distribution(model: &Arc<Model>, i: usize) -> EpisodeDistribution {
                 heading: [-3.0, 3.0],
                 goal_distance: [3.0, 5.0],
                 goal_bearing: [-1.0, 1.0],
+                further: 0,
+                turn: [0.0, 0.0],
             },
             domain: DomainDistribution {
                 mass_scale: [1.0, 1.0],
@@ -120,7 +124,7 @@ fn alone(model: &Arc<Model>, i: usize, periods: usize) -> (Vec<u32>, u64) {
             .command(&mut rover, &action, &mut [0.0; 12])
             .unwrap();
         rover.step(5).unwrap();
-        rover.read_state(episode.setting().goal, &mut scratch, &mut reading);
+        rover.read_state(episode.goal(), &mut scratch, &mut reading);
         rover.read_heights(&SCAN, &mut heights);
         noise::draw(&mut generator, &mut normals);
         let period = Period {

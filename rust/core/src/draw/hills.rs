@@ -12,7 +12,7 @@
 use std::sync::OnceLock;
 
 use super::pcg64::Pcg64;
-use super::start::Start;
+use super::start::{Range, Start};
 use crate::geometry::terrain::rocks::Random;
 use crate::geometry::{HeightField, TerrainError};
 use crate::scalar::elementary::sin_cos;
@@ -29,7 +29,7 @@ const WAVELENGTHS: [f64; 6] = [32.0, 16.0, 8.0, 4.0, 2.0, 1.0];
 /// Root mean square of the slope at difficulty 1, rise over run.
 const HARDEST_SLOPE: f64 = 0.2;
 
-/// The map reaches this far beyond the rectangle that start and goal span, m.
+/// The map reaches this far beyond the rectangle that start and goals span, m.
 pub const MARGIN: f64 = 25.0;
 
 /// What hills are drawn from.
@@ -49,9 +49,11 @@ pub struct HillDraw {
 }
 
 impl HillDistribution {
-    /// Draws the hills of an episode.
-    pub fn draw(&self, random: &mut Pcg64, difficulty: f64) -> HillDraw {
+    /// Draws the hills of an episode. `seed` replaces the draw of the place, which is made all the
+    /// same.
+    pub fn draw(&self, random: &mut Pcg64, difficulty: f64, seed: Option<u64>) -> HillDraw {
         let (n, drawn) = (N as u64, random.below(1 << 63));
+        let drawn = seed.unwrap_or(drawn);
         HillDraw {
             rms_slope: self.rms_slope.unwrap_or(HARDEST_SLOPE * difficulty),
             offset: [drawn % n, drawn / n % n],
@@ -60,7 +62,7 @@ impl HillDistribution {
 }
 
 impl HillDraw {
-    /// The ground around start and goal; at the start it has the height zero.
+    /// The ground around start and goals; at the start it has the height zero.
     ///
     /// # Errors
     /// As [`HeightField::new`].
@@ -72,13 +74,12 @@ impl HillDraw {
     // Indices of a grid, small numbers.
     pub fn lay_out(&self, start: &Start) -> Result<HeightField, TerrainError> {
         let map = map();
-        let ends = |k: usize| {
-            let (a, b) = (start.position[k], start.goal[k]);
-            let first = ((a.min(b) - MARGIN) / SPACING).floor();
-            let last = ((a.max(b) + MARGIN) / SPACING).ceil();
+        let ends = |[low, high]: Range| {
+            let first = ((low - MARGIN) / SPACING).floor();
+            let last = ((high + MARGIN) / SPACING).ceil();
             (first, (last - first) as usize + 1)
         };
-        let [(x, columns), (z, rows)] = [ends(0), ends(1)];
+        let [(x, columns), (z, rows)] = start.bounds().map(ends);
         let begin = |first: f64, offset: u64| (first as i64 + offset as i64).rem_euclid(N as i64);
         let (i, j) = (begin(x, self.offset[0]), begin(z, self.offset[1]));
         let at = |row: usize, column: usize| {
@@ -175,6 +176,7 @@ mod tests {
             position,
             heading: 0.0,
             goal,
+            further: Vec::new(),
         }
     }
 
@@ -188,7 +190,7 @@ mod tests {
         let mut random = Pcg64::seeded(&[1]);
         let mut squares = [0.0, 0.0];
         for _ in 0..20 {
-            let hills = HillDistribution::default().draw(&mut random, 0.5);
+            let hills = HillDistribution::default().draw(&mut random, 0.5, None);
             let field = hills.lay_out(&start([3.0, -7.0], [12.0, 5.0])).unwrap();
             assert!(field.height(3.0, -7.0).unwrap().abs() < 1e-6);
             let [rows, columns] = field.shape();

@@ -25,7 +25,7 @@ const ABUNDANCE: [f64; 2] = [0.2, 0.35];
 const LARGEST_ROCK: [f64; 3] = [0.5, 1.6, 3.0];
 /// Steepest slope at difficulty 1, degrees.
 const SLOPE_DEG: f64 = 10.0;
-/// Rocks lie up to this far beyond the rectangle that start and goal span, m.
+/// Rocks lie up to this far beyond the rectangle that start and goals span, m.
 const MARGIN: f64 = 4.0;
 /// Free room that a clearing leaves around the rover, m.
 const CLEARANCE: f64 = 0.1;
@@ -55,16 +55,22 @@ pub struct RockDraw {
 }
 
 impl RockDistribution {
-    /// Draws the rocks of an episode. `range` replaces the range of the difficulty, `fixed` its
-    /// draw, which is made all the same.
-    pub fn draw(&self, random: &mut Pcg64, range: Option<Range>, fixed: Option<f64>) -> RockDraw {
+    /// Draws the rocks of an episode. `range` replaces the range of the difficulty, `fixed` the
+    /// difficulty and the seed; all draws are made all the same.
+    pub fn draw(
+        &self,
+        random: &mut Pcg64,
+        range: Option<Range>,
+        fixed: (Option<f64>, Option<u64>),
+    ) -> RockDraw {
         let drawn = random.uniform(range.unwrap_or(self.difficulty));
-        let d = fixed.unwrap_or(drawn);
+        let seed = random.below(1 << 63);
+        let d = fixed.0.unwrap_or(drawn);
         RockDraw {
             difficulty: d,
             abundance: self.abundance.unwrap_or_else(|| abundance(d)),
             max_radius: self.max_radius.unwrap_or_else(|| largest_rock(d)),
-            seed: random.below(1 << 63),
+            seed: fixed.1.unwrap_or(seed),
         }
     }
 }
@@ -79,8 +85,8 @@ impl RockDraw {
         ]
     }
 
-    /// The rocks around start and goal, with a clearing at each. `radius`: of the clearing at the
-    /// start, see [`clear_radius`]; the other one has at least `goal_tolerance` (m).
+    /// The rocks around start and goals, with a clearing at each. `radius`: of the clearing at the
+    /// start, see [`clear_radius`]; the others have at least `goal_tolerance` (m).
     ///
     /// # Errors
     /// As [`SphereField::rocks`].
@@ -118,9 +124,9 @@ impl RockDraw {
     }
 
     fn rocks(&self, model: &Model, start: &Start, radius: f64, goal_tolerance: f64) -> Rocks {
-        let ([x, z], [goal_x, goal_z]) = (start.position, start.goal);
-        let along = [x.min(goal_x) - MARGIN, x.max(goal_x) + MARGIN];
-        let across = [z.min(goal_z) - MARGIN, z.max(goal_z) + MARGIN];
+        let [along, across] = start
+            .bounds()
+            .map(|[low, high]| [low - MARGIN, high + MARGIN]);
         let wheels = model.wheels().iter().map(|wheel| wheel.radius);
         let clearing = |[x, z]: [f64; 2], radius| Clearing { x, z, radius };
         Rocks {
@@ -129,10 +135,13 @@ impl RockDraw {
             middle: [0.5 * (along[0] + along[1]), 0.5 * (across[0] + across[1])],
             seed: self.seed,
             max_diameter: 2.0 * self.max_radius * wheels.fold(0.0, f64::max),
-            clearings: vec![
-                clearing(start.position, radius),
-                clearing(start.goal, radius.max(goal_tolerance)),
-            ],
+            clearings: std::iter::once(clearing(start.position, radius))
+                .chain(
+                    start
+                        .goals()
+                        .map(|goal| clearing(goal, radius.max(goal_tolerance))),
+                )
+                .collect(),
             ..Rocks::default()
         }
     }

@@ -48,6 +48,8 @@ pub struct Fixed {
     pub start: FixedStart,
     /// Difficulty of the rocks.
     pub difficulty: Option<f64>,
+    /// Seed of the rocks' sizes and places, and the piece of the hills, below 2⁶³.
+    pub field_seed: Option<u64>,
     /// Public coordinates and velocity (nv each), the latter at rest by default.
     pub state: Option<(Vec<f64>, Option<Vec<f64>>)>,
 }
@@ -109,14 +111,15 @@ impl SceneDistribution {
         fixed: &Fixed,
     ) -> Result<Result<DrawnScene, Unsuitable>, DrawError> {
         let rocks = self.rocks.as_ref();
-        let rocks = rocks.map(|rocks| rocks.draw(random, difficulty, fixed.difficulty));
+        let given = (fixed.difficulty, fixed.field_seed);
+        let rocks = rocks.map(|rocks| rocks.draw(random, difficulty, given));
         let mut start = self.start.clone();
         if let (Some(rocks), true) = (rocks, self.slope_by_difficulty) {
             start.slope = rocks.slope();
         }
         let start = start.draw(random, &fixed.start);
         let domain = self.domain.draw(random);
-        let ground = self.lay_out(random, &start, rocks)?;
+        let ground = self.lay_out(random, &start, rocks, fixed.field_seed)?;
         let terrain = ground.terrain();
         let scene = match domain.scaled(&self.rover.model)? {
             Some(scaled) => RoverScene::new(Arc::new(scaled), terrain),
@@ -140,13 +143,16 @@ impl SceneDistribution {
             }
         };
         if plane.is_none() {
-            let (from, to) = (start.position, start.goal);
-            let [x, z] = to;
-            if terrain.height(x, z).is_none() {
-                return Ok(Err(Unsuitable::NoGoal { x, z }));
-            }
-            if !way::leads(|x, z| ground.height(x, z), from, to) {
-                return Ok(Err(Unsuitable::NoWay { from, to }));
+            let mut from = start.position;
+            for to in start.goals() {
+                let [x, z] = to;
+                if terrain.height(x, z).is_none() {
+                    return Ok(Err(Unsuitable::NoGoal { x, z }));
+                }
+                if !way::leads(|x, z| ground.height(x, z), from, to) {
+                    return Ok(Err(Unsuitable::NoWay { from, to }));
+                }
+                from = to;
             }
         }
         let configuration = coordinates::from_public(model, &q)?;
@@ -172,6 +178,7 @@ impl SceneDistribution {
         random: &mut Pcg64,
         start: &Start,
         rocks: Option<RockDraw>,
+        field_seed: Option<u64>,
     ) -> Result<DrawnGround, DrawError> {
         let model = &self.rover.model;
         let (radius, tolerance) = (clear_radius(model), self.goal_tolerance);
@@ -187,7 +194,7 @@ impl SceneDistribution {
             }
             GroundDistribution::Hills(hills) => {
                 let difficulty = rocks.map_or(0.0, |rocks| rocks.difficulty);
-                let map = hills.draw(random, difficulty).lay_out(start)?;
+                let map = hills.draw(random, difficulty, field_seed).lay_out(start)?;
                 let field = match rocks {
                     Some(rocks) => rocks.lay_on(model, start, &map, radius, tolerance)?,
                     None => None,

@@ -29,6 +29,10 @@ pub struct StartDistribution {
     pub goal_distance: Range,
     /// Direction of the goal relative to the heading.
     pub goal_bearing: Range,
+    /// Goals after the first; each lies at a distance from `goal_distance` from the one before it.
+    pub further: usize,
+    /// Direction of each further goal relative to the leg before it.
+    pub turn: Range,
 }
 
 /// Values that replace draws.
@@ -44,10 +48,12 @@ pub struct FixedStart {
     pub heading: Option<f64>,
     /// x and z, m.
     pub goal: Option<[f64; 2]>,
+    /// The first of the further goals, x and z, m.
+    pub further: Vec<[f64; 2]>,
 }
 
 /// A start.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Start {
     /// Slope of the ground, rad.
     pub slope: f64,
@@ -59,6 +65,28 @@ pub struct Start {
     pub heading: f64,
     /// x and z, m.
     pub goal: [f64; 2],
+    /// Goals that follow it, in order, x and z, m.
+    pub further: Vec<[f64; 2]>,
+}
+
+impl Start {
+    /// All goals in order, x and z, m.
+    pub fn goals(&self) -> impl Iterator<Item = [f64; 2]> {
+        std::iter::once(self.goal).chain(self.further.iter().copied())
+    }
+
+    /// Bounds of start and goals along x and z, low and high, m.
+    #[must_use]
+    pub fn bounds(&self) -> [Range; 2] {
+        [0, 1].map(|k| {
+            let place = self.position[k];
+            let low = self.goals().fold(place, |low, goal| low.min(goal[k]));
+            [
+                low,
+                self.goals().fold(place, |high, goal| high.max(goal[k])),
+            ]
+        })
+    }
 }
 
 impl StartDistribution {
@@ -80,13 +108,33 @@ impl StartDistribution {
             position[0] + distance * cosine,
             position[1] - distance * sine,
         ];
+        let goal = fixed.goal.unwrap_or(goal);
         Start {
             slope: fixed.slope.unwrap_or(slope),
             uphill: fixed.uphill.unwrap_or(uphill),
             position,
             heading,
-            goal: fixed.goal.unwrap_or(goal),
+            goal,
+            further: self.draw_further(random, [position, goal], &fixed.further),
         }
+    }
+
+    /// The goals after the first leg.
+    fn draw_further(
+        &self,
+        random: &mut Pcg64,
+        [mut from, mut to]: [[f64; 2]; 2],
+        fixed: &[[f64; 2]],
+    ) -> Vec<[f64; 2]> {
+        let next = |k: usize| {
+            let [distance, turn] = [self.goal_distance, self.turn].map(|r| random.uniform(r));
+            let direction = atan2(from[1] - to[1], to[0] - from[0]);
+            let (sine, cosine) = sin_cos(direction + turn);
+            let drawn = [to[0] + distance * cosine, to[1] - distance * sine];
+            (from, to) = (to, fixed.get(k).copied().unwrap_or(drawn));
+            to
+        };
+        (0..self.further).map(next).collect()
     }
 }
 

@@ -90,6 +90,16 @@ impl EpisodeBatch {
         self.batch.errors()
     }
 
+    /// Message of the physics step that failed in the last period of a rover, if one did.
+    #[must_use]
+    pub fn message(&self, index: usize) -> Option<String> {
+        let error = self.batch.errors()[index].as_ref();
+        let seat = self.seats[index].as_ref();
+        error
+            .map(ToString::to_string)
+            .or_else(|| seat?.message.clone())
+    }
+
     /// The episode of a rover.
     ///
     /// # Errors
@@ -234,7 +244,8 @@ impl EpisodeBatch {
 
     /// Puts a rover in the middle of its episode in the place of another.
     ///
-    /// `steps`: control periods that it has taken; `random`: where its noise comes from.
+    /// `steps`: control periods that it has taken; `random`: where its noise comes from; `message`:
+    /// of the physics step that failed, if that has ended the episode.
     ///
     /// # Errors
     /// `OtherRules`, `NoSuchRover`, `Differs`, or as [`Rules::check_model`]; nothing is changed
@@ -246,14 +257,15 @@ impl EpisodeBatch {
         (episode, steps): (Episode, u64),
         origin: Origin,
         random: Pcg64,
+        message: Option<String>,
     ) -> Result<(), EpisodeError> {
         if *episode.rules() != self.rules {
             return Err(EpisodeError::OtherRules);
         }
         self.rules.check_model(rover.model())?;
-        self.batch.replace(index, rover, episode.setting().goal)?;
+        self.batch.replace(index, rover, episode.goal())?;
         let mut seat = Seat::new(episode, origin, random);
-        seat.steps = steps;
+        (seat.steps, seat.message) = (steps, message);
         self.seats[index] = Some(seat);
         Ok(())
     }

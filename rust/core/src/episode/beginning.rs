@@ -58,6 +58,7 @@ impl EpisodeDistribution {
         let domain = scene.domain;
         let setting = Setting {
             goal: scene.start.goal,
+            further: scene.start.further.clone(),
             domain,
             trunk_load_limit: self.trunk_load_limit * domain.mass_scale * domain.gravity_scale,
             difficulty: scene.rocks.map_or(0.0, |rocks| rocks.difficulty),

@@ -15,6 +15,8 @@ pub(super) struct Seat {
     pub(super) steps: u64,
     /// Where its noise comes from.
     pub(super) generator: Pcg64,
+    /// Message of the physics step that failed before the episode was resumed.
+    pub(super) message: Option<String>,
     /// Room for the commands of an action.
     commands: Vec<f64>,
 }
@@ -38,6 +40,7 @@ impl Seat {
             origin,
             steps: 0,
             generator,
+            message: None,
         }
     }
 
@@ -99,7 +102,7 @@ impl Turn<Place<'_>> for ControlPeriod<'_> {
         numbers.resize(rules.places().size + scan.len() + rules.noise().len(), 0.0);
         let (reading, rest) = numbers.split_at_mut(rules.places().size);
         let (heights, normals) = rest.split_at_mut(scan.len());
-        rover.read_state(seat.episode.setting().goal, scratch, reading);
+        rover.read_state(seat.episode.goal(), scratch, reading);
         if self.has_scan {
             rover.read_heights(scan, heights);
         }

@@ -14,7 +14,7 @@ pub enum Ending {
     /// It has not.
     #[default]
     None,
-    /// The trunk's origin is within the tolerance of the goal.
+    /// The trunk's origin is within the tolerance of the last goal.
     Goal,
     /// The trunk leans too far.
     RollOver,
@@ -22,16 +22,19 @@ pub enum Ending {
     HighCentred,
     /// The physics could not take a step, or gave numbers that float32 cannot hold.
     StepFailed,
+    /// The motors have used up the battery.
+    BatteryEmpty,
 }
 
 impl Ending {
     /// All, by their code.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::None,
         Self::Goal,
         Self::RollOver,
         Self::HighCentred,
         Self::StepFailed,
+        Self::BatteryEmpty,
     ];
 
     /// Its name; empty while the episode runs.
@@ -43,6 +46,7 @@ impl Ending {
             Self::RollOver => "roll_over",
             Self::HighCentred => "high_centred",
             Self::StepFailed => "step_failed",
+            Self::BatteryEmpty => "battery_empty",
         }
     }
 
@@ -59,17 +63,19 @@ impl Ending {
     }
 
     /// The ending after a control period: a failed step takes precedence, then the goal, then
-    /// rolling over.
+    /// rolling over, high-centring and the battery.
     #[must_use]
     pub fn of(rules: &Rules, now: &Quantities, progress: &Progress, has_failed: bool) -> Self {
         if has_failed {
             Self::StepFailed
-        } else if now.distance <= rules.settings().goal_tolerance {
+        } else if progress.reached >= rules.settings().goals {
             Self::Goal
         } else if now.cos_tilt < rules.settings().cos_max_tilt {
             Self::RollOver
         } else if progress.stuck_time >= rules.settings().stuck_time {
             Self::HighCentred
+        } else if (rules.settings().battery).is_some_and(|battery| progress.energy >= battery) {
+            Self::BatteryEmpty
         } else {
             Self::None
         }

@@ -9,12 +9,19 @@
 //! | a reading from `pose` to `target` ([`crate::simulation::ReadingLayout`]) | nq + nv + 5 n + 6 |
 //! | the previous action | n, and one for each steering joint |
 //! | fraction of the time to high-centring | 1 |
+//! | fraction of the battery's charge, with a battery | 1 |
+//! | the goal after the present one, ahead and to the right, and goals still to reach, with several | 3 |
 //! | heights of the scan | points |
 //!
 //! with n wheels. Entries are never clipped.
 
 use super::progress::Progress;
 use super::rules::Rules;
+use super::running::Setting;
+use crate::simulation::seen_from;
+
+/// Most entries between the previous action and the heights.
+const MOST_MARKS: usize = 5;
 
 /// Writes the entries before the heights and says whether all of them are finite.
 ///
@@ -26,15 +33,29 @@ use super::rules::Rules;
 pub fn write_state(
     rules: &Rules,
     reading: &[f64],
-    progress: &Progress,
+    (setting, progress): (&Setting, &Progress),
     normals: Option<&[f64]>,
     out: &mut [f32],
 ) -> bool {
-    let stuck = (progress.stuck_time / rules.settings().stuck_time).min(1.0);
+    let settings = rules.settings();
+    let mut marks = [0.0; MOST_MARKS];
+    marks[0] = (progress.stuck_time / settings.stuck_time).min(1.0);
+    let mut n = 1;
+    if let Some(battery) = settings.battery {
+        marks[n] = (1.0 - progress.energy / battery).max(0.0);
+        n += 1;
+    }
+    if settings.has_course() {
+        let [x, z, heading] = [reading[0], reading[2], reading[4]];
+        let [ahead, right, _] = seen_from([x, z], heading, setting.goal_at(progress.reached + 1));
+        let remaining = settings.goals.saturating_sub(progress.reached) as f64;
+        marks[n..][..3].copy_from_slice(&[ahead, right, remaining]);
+        n += 3;
+    }
     let (shared, actions) = (rules.n_shared(), rules.n_actions());
     write(rules, 0, &reading[..shared], normals, out)
         & write(rules, shared, &progress.previous_action, normals, out)
-        & write(rules, shared + actions, &[stuck], normals, out)
+        & write(rules, shared + actions, &marks[..n], normals, out)
 }
 
 /// Writes the entries of the heights and says whether all of them are finite; slices as for

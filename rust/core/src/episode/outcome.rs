@@ -5,6 +5,9 @@ use super::reward::N_TERMS;
 use super::rules::Places;
 use crate::scalar::elementary::acos;
 
+/// Number of the quantities.
+pub const N_QUANTITIES: usize = 12;
+
 /// Quantities of a reading that rewards, ends and reports are made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Quantities {
@@ -38,9 +41,15 @@ impl Quantities {
     /// From a reading without heights.
     #[must_use]
     pub fn of(places: &Places, reading: &[f64]) -> Self {
-        let Ok(s) = <[f64; 12]>::try_from(&reading[places.scalars.clone()]) else {
-            unreachable!("invariant: the scalars of a reading are twelve")
+        let Ok(s) = <[f64; N_QUANTITIES]>::try_from(&reading[places.scalars.clone()]) else {
+            unreachable!("invariant: the scalars of a reading are as many as the quantities")
         };
+        Self::from_row(s)
+    }
+
+    /// From a list in the order of the fields.
+    #[must_use]
+    pub fn from_row(s: [f64; N_QUANTITIES]) -> Self {
         Self {
             distance: s[0],
             cos_tilt: s[1],
@@ -55,6 +64,25 @@ impl Quantities {
             residual: s[10],
             n_contacts: s[11],
         }
+    }
+
+    /// As a list, in the order of the fields.
+    #[must_use]
+    pub fn row(&self) -> [f64; N_QUANTITIES] {
+        [
+            self.distance,
+            self.cos_tilt,
+            self.speed,
+            self.trunk_force,
+            self.slip_ratio,
+            self.work,
+            self.positive_work,
+            self.time,
+            self.not_converged,
+            self.iterations,
+            self.residual,
+            self.n_contacts,
+        ]
     }
 
     /// Tilt of the trunk from the vertical, rad.

@@ -6,7 +6,7 @@ use super::outcome::Quantities;
 /// What an episode remembers from period to period.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Progress {
-    /// Horizontal distance to the goal, m.
+    /// Horizontal distance to the present goal, m.
     pub distance: f64,
     /// The last action (n_actions); zeros at the beginning.
     pub previous_action: Vec<f64>,
@@ -16,6 +16,8 @@ pub struct Progress {
     pub energy_positive: f64,
     /// How long the rover has been high-centred, s.
     pub stuck_time: f64,
+    /// How many goals have been reached.
+    pub reached: usize,
 }
 
 impl Progress {
@@ -28,6 +30,7 @@ impl Progress {
             energy: 0.0,
             energy_positive: 0.0,
             stuck_time: 0.0,
+            reached: 0,
         }
     }
 

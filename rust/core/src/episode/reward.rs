@@ -57,8 +57,8 @@ pub type Weights = [f64; N_TERMS];
 pub struct Earned<'a> {
     /// The quantities at its end.
     pub now: &'a Quantities,
-    /// Distance to the goal before it, m.
-    pub distance_before: f64,
+    /// How much nearer it brought the goal, m.
+    pub approach: f64,
     /// Sums of the squared changes of the actions: of the torques, of the steering.
     pub changes: [f64; 2],
     /// Entries of an action that are summed, in the same order.
@@ -89,7 +89,7 @@ pub fn terms(weights: &Weights, earned: &Earned<'_>) -> [f64; N_TERMS] {
         |weight: f64, k: usize| weight * earned.changes[k] / earned.entries[k].max(1) as f64;
     let one_if = |is_so: bool| f64::from(u8::from(is_so));
     let mut terms = [
-        progress * within(earned.distance_before - now.distance, MOST_PROGRESS),
+        progress * within(earned.approach, MOST_PROGRESS),
         time * dt,
         energy * within(now.work, MOST_WORK),
         slip * within(now.slip_ratio, MOST_RATIO) * dt,
@@ -131,7 +131,7 @@ mod tests {
     fn reward(now: &Quantities, dt: f64, ending: Ending) -> [f64; N_TERMS] {
         let earned = Earned {
             now,
-            distance_before: 1e30,
+            approach: 1e30,
             changes: squared_changes(&[1.0; 12], &[-1.0; 12], 6),
             entries: [6, 6],
             dt,

@@ -33,6 +33,26 @@ pub struct Settings {
     pub noise: Vec<f64>,
     /// Points of the height scan, as of [`crate::simulation::Look`].
     pub scan: Vec<[f64; 2]>,
+    /// Goals that an episode reaches one after the other, at least one.
+    pub goals: usize,
+    /// Work of the motors, driving or braking, after which the battery is empty, J; None without
+    /// one.
+    pub battery: Option<f64>,
+}
+
+impl Settings {
+    /// Entries of an observation after the previous action and before the heights: see
+    /// [`super::observation`].
+    #[must_use]
+    pub fn n_marks(&self) -> usize {
+        1 + usize::from(self.battery.is_some()) + if self.has_course() { 3 } else { 0 }
+    }
+
+    /// Whether there is more than one goal.
+    #[must_use]
+    pub fn has_course(&self) -> bool {
+        self.goals > 1
+    }
 }
 
 /// Places of what an episode needs in a reading without heights.
@@ -137,7 +157,7 @@ impl Rules {
             Steering::none(&model)
         };
         let n_actions = n_wheels + steering.n_entries;
-        let size = shared + n_actions + 1 + settings.scan.len();
+        let size = shared + n_actions + settings.n_marks() + settings.scan.len();
         let noise = settings.noise.len();
         check_lengths([
             ("torque_limits", settings.torque_limits.len(), n_wheels),
@@ -150,6 +170,13 @@ impl Rules {
         let any = |field, value: f64| (field, value, true, "a finite number");
         let numbers = [
             positive("dt", settings.dt),
+            positive("battery", settings.battery.unwrap_or(1.0)),
+            (
+                "goals",
+                settings.goals as f64,
+                settings.goals == 1 || settings.has_course() && model.trees()[0].is_free,
+                "at least 1, and 1 for a machine on a fixed base",
+            ),
             not_negative("max_steering", settings.max_steering),
             not_negative("goal_tolerance", settings.goal_tolerance),
             any("cos_max_tilt", settings.cos_max_tilt),

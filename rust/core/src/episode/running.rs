@@ -8,16 +8,19 @@ use super::error::{EpisodeError, check_lengths};
 use super::observation::{write_heights, write_state};
 use super::outcome::{Outcome, Quantities};
 use super::progress::Progress;
-use super::reward::{Earned, squared_changes, terms};
+use super::reward::{Earned, N_TERMS, squared_changes, terms};
 use super::rules::Rules;
 use crate::draw::Domain;
-use crate::simulation::{CommandError, ReadingScratch, RoverSimulation};
+use crate::scalar::elementary::hypot;
+use crate::simulation::{CommandError, ReadingScratch, RoverSimulation, seen_from};
 
-/// What was drawn for an episode. Only goal, gain and load limit act; the rest is reported.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// What was drawn for an episode. Only goals, gain and load limit act; the rest is reported.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
-    /// The goal (x, z), m.
+    /// The goal (x, z), m; the first of several.
     pub goal: [f64; 2],
+    /// Goals that follow it, in order, (x, z), m.
+    pub further: Vec<[f64; 2]>,
     /// Properties of rover and world.
     pub domain: Domain,
     /// Force on the trunk beyond which the rover is high-centred, N.
@@ -27,7 +30,27 @@ pub struct Setting {
 }
 
 impl Setting {
-    fn check(&self) -> Result<(), EpisodeError> {
+    /// The goal of a number, from zero; the last one from there on.
+    #[must_use]
+    pub fn goal_at(&self, number: usize) -> [f64; 2] {
+        match number.min(self.further.len()) {
+            0 => self.goal,
+            k => self.further[k - 1],
+        }
+    }
+
+    /// Way from the goal of a number to the last, leg by leg, m.
+    #[must_use]
+    pub fn way_from(&self, number: usize) -> f64 {
+        let legs = (number..self.further.len()).map(|k| {
+            let ([a, b], [c, d]) = (self.goal_at(k), self.goal_at(k + 1));
+            hypot(c - a, d - b)
+        });
+        legs.fold(0.0, |sum, leg| sum + leg)
+    }
+
+    fn check(&self, rules: &Rules) -> Result<(), EpisodeError> {
+        check_lengths([("goals", 1 + self.further.len(), rules.settings().goals)])?;
         let Domain {
             mass_scale,
             friction,
@@ -44,7 +67,9 @@ impl Setting {
             ("trunk_load_limit", self.trunk_load_limit),
             ("difficulty", self.difficulty),
         ];
-        match numbers.into_iter().find(|(_, value)| !value.is_finite()) {
+        let further = self.further.iter().flatten().map(|&x| ("further", x));
+        let mut all = numbers.into_iter().chain(further);
+        match all.find(|(_, value)| !value.is_finite()) {
             None => Ok(()),
             Some((field, value)) => Err(EpisodeError::OutOfRange {
                 field,
@@ -66,6 +91,17 @@ pub struct Period<'a> {
     pub normals: Option<&'a [f64]>,
     /// Whether a physics step could not be taken.
     pub has_failed: bool,
+}
+
+/// What the outcome of the last period adds to the progress of an episode.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Last {
+    /// Quantities at its end.
+    pub now: Quantities,
+    /// Terms of the reward, in the order of [`super::TERMS`].
+    pub terms: [f64; N_TERMS],
+    /// Whether and how the episode has ended.
+    pub ending: Ending,
 }
 
 /// An episode outside its simulation.
@@ -95,7 +131,7 @@ impl Episode {
         rover: &RoverSimulation,
         normals: Option<&[f64]>,
     ) -> Result<Option<Self>, EpisodeError> {
-        setting.check()?;
+        setting.check(&rules)?;
         rules.check_model(rover.model())?;
         check_normals(&rules, normals)?;
         let mut scratch = ReadingScratch::default();
@@ -106,7 +142,8 @@ impl Episode {
         let now = Quantities::of(rules.places(), &reading);
         let progress = Progress::begin(now.distance, rules.n_actions());
         let mut observation = vec![0.0; rules.size()];
-        let is_finite = write_state(&rules, &reading, &progress, normals, &mut observation)
+        let known = (&setting, &progress);
+        let is_finite = write_state(&rules, &reading, known, normals, &mut observation)
             & write_heights(&rules, &heights, normals, &mut observation);
         Ok(is_finite.then(|| Self {
             rules,
@@ -124,6 +161,9 @@ impl Episode {
 
     /// An episode that goes on from its progress and its last observation.
     ///
+    /// `last`: what else is known of its last period. `owed`: the normal numbers of an observation
+    /// that lacks its heights, empty without noise.
+    ///
     /// # Errors
     /// `Length`, `OutOfRange`: they do not fit the rules, or are not finite.
     pub fn resume(
@@ -131,8 +171,11 @@ impl Episode {
         setting: Setting,
         progress: Progress,
         observation: Vec<f32>,
+        last: Option<Last>,
+        owed: Option<Vec<f64>>,
     ) -> Result<Self, EpisodeError> {
-        setting.check()?;
+        setting.check(&rules)?;
+        check_normals(&rules, owed.as_deref().or(Some(rules.noise())))?;
         let (previous, size) = (progress.previous_action.len(), observation.len());
         check_lengths([
             ("previous_action", previous, rules.n_actions()),
@@ -155,23 +198,28 @@ impl Episode {
                 });
             }
         }
-        let now = Quantities {
-            distance: progress.distance,
-            ..Quantities::default()
-        };
+        let Last { now, terms, ending } = last.unwrap_or_else(|| Last {
+            now: Quantities {
+                distance: progress.distance,
+                ..Quantities::default()
+            },
+            ..Last::default()
+        });
         Ok(Self {
             outcome: Outcome {
                 now,
                 energy: progress.energy,
                 energy_positive: progress.energy_positive,
-                ..Outcome::default()
+                terms,
+                reward: terms.iter().fold(0.0, |sum, term| sum + term),
+                ending,
             },
             rules,
             setting,
             progress,
             observation,
-            owed: Vec::new(),
-            lacks_heights: false,
+            lacks_heights: owed.is_some(),
+            owed: owed.unwrap_or_default(),
         })
     }
 
@@ -185,6 +233,24 @@ impl Episode {
     #[must_use]
     pub fn setting(&self) -> &Setting {
         &self.setting
+    }
+
+    /// The present goal (x, z), m; the last one where all are reached.
+    #[must_use]
+    pub fn goal(&self) -> [f64; 2] {
+        self.setting.goal_at(self.progress.reached)
+    }
+
+    /// Way to the last goal, straight from goal to goal, m.
+    #[must_use]
+    pub fn way(&self) -> f64 {
+        self.progress.distance + self.setting.way_from(self.progress.reached)
+    }
+
+    /// The normal numbers of the last observation, if it lacks its heights; empty without noise.
+    #[must_use]
+    pub fn owed(&self) -> Option<&[f64]> {
+        self.lacks_heights.then_some(&self.owed[..])
     }
 
     /// Its progress.
@@ -247,7 +313,7 @@ impl Episode {
         if !is_readable {
             now.distance = self.progress.distance;
         }
-        let distance_before = self.progress.distance;
+        let approach = self.progress.distance - now.distance;
         let changes = squared_changes(
             period.action,
             &self.progress.previous_action,
@@ -256,8 +322,13 @@ impl Episode {
         let dt = rules.settings().dt;
         (self.progress).advance(period.action, &now, dt, self.setting.trunk_load_limit);
 
+        if is_readable && !period.has_failed {
+            now.distance = reach(rules, &self.setting, &mut self.progress, reading);
+        }
+
         let normals = period.normals;
-        let mut is_sound = write_state(rules, reading, &self.progress, normals, observation);
+        let known = (&self.setting, &self.progress);
+        let mut is_sound = write_state(rules, reading, known, normals, observation);
         let n_state = rules.n_state();
         if period.heights.is_some() {
             is_sound &= write_heights(rules, heights, normals, observation);
@@ -279,7 +350,7 @@ impl Episode {
         let ending = Ending::of(rules, &now, &self.progress, has_failed);
         let earned = Earned {
             now: &now,
-            distance_before,
+            approach,
             changes,
             entries: [rules.n_wheels(), rules.n_steering()],
             dt,
@@ -318,6 +389,22 @@ impl Episode {
             self.observation = observation;
         }
     }
+}
+
+/// Counts the goals that a rover has reached, aims the reading at the next, and returns its
+/// distance, m.
+fn reach(rules: &Rules, setting: &Setting, progress: &mut Progress, reading: &mut [f64]) -> f64 {
+    let settings = rules.settings();
+    while progress.reached < settings.goals && progress.distance <= settings.goal_tolerance {
+        progress.reached += 1;
+        if progress.reached < settings.goals {
+            let [x, z, heading] = [reading[0], reading[2], reading[4]];
+            let seen = seen_from([x, z], heading, setting.goal_at(progress.reached));
+            reading[rules.n_shared() - seen.len()..rules.n_shared()].copy_from_slice(&seen);
+            progress.distance = seen[2];
+        }
+    }
+    progress.distance
 }
 
 /// Checks the number of the normal numbers, which must be there if and only if there is noise.

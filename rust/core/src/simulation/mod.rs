@@ -42,7 +42,7 @@ pub use linearisation::{Linearisation, LinearisationError};
 pub use planar::{
     BallSimulation, MirroredRoverSimulation, PlanarScene, PlanarSimulation, TwoWheelRoverSimulation,
 };
-pub use reading::{Look, ReadingLayout, ReadingScratch};
+pub use reading::{Look, ReadingLayout, ReadingScratch, seen_from};
 pub use rover::{LastCall, Placement, RoverScene, RoverSimulation};
 pub use rover_command::RoverCommand;
 pub use rover_in_grains::{RoverInGrains, TogetherError};

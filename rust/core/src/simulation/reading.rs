@@ -153,6 +153,18 @@ pub struct ReadingScratch {
     pub numbers: Vec<f64>,
 }
 
+/// A target (x, z) from a place (x, z) with a heading (rad): ahead, to the right, and how far, m.
+#[must_use]
+pub fn seen_from([x, z]: [f64; 2], heading: f64, target: [f64; 2]) -> [f64; 3] {
+    let (sine, cosine) = sin_cos(heading);
+    let (dx, dz) = (target[0] - x, target[1] - z);
+    [
+        dx * cosine - dz * sine,
+        dx * sine + dz * cosine,
+        hypot(dx, dz),
+    ]
+}
+
 impl RoverSimulation {
     /// Writes a reading in the order of [`ReadingLayout`].
     ///
@@ -219,13 +231,7 @@ impl RoverSimulation {
         row.put(normal.iter().copied());
 
         let heading = if is_free { pose[4] } else { 0.0 };
-        let (sine, cosine) = sin_cos(heading);
-        let (dx, dz) = (target[0] - x, target[1] - z);
-        row.put([
-            dx * cosine - dz * sine,
-            dx * sine + dz * cosine,
-            hypot(dx, dz),
-        ]);
+        row.put(seen_from([x, z], heading, target));
         let gravity = &self.options().gravity;
         let up = gravity.try_normalize(0.0).map_or(Vector3::y(), |g| -g);
         row.put([

@@ -1,0 +1,174 @@
+"""`Dict` observations with achieved and desired goals, for hindsight replay (Andrychowicz et al. 2017)."""
+
+from typing import Any, Literal, SupportsFloat
+
+import gymnasium as gym
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.env.observation import LARGEST, ObservationLayout
+from rover_gym.env.quantities import Array, Mask
+from rover_gym.mechanics import OptionError, StateError, sin_cos
+from rover_gym.policy.drive_by_command import DriveByCommand
+from rover_gym.policy.pd_policy import find_rover_env
+from rover_gym.validation import array, refuse
+
+GoalDict = dict[str, npt.NDArray[Any]]
+
+REWARD_TYPES = ("sparse", "dense")
+
+#: Terminations that are no failure.
+_SOUND = ("", "goal")
+
+
+class GoalObservation(gym.Wrapper[GoalDict, Any, Any, Any]):
+    """Observations as Gymnasium-Robotics' `GoalEnv` has them, and rewards that follow from achieved and desired goal.
+
+    An observation is a dictionary:
+
+    - `observation`: `(size,) float32`, what the wrapped environment observes without what it says of the goal, and the
+      cosine and sine of the heading, which turn a place on the map into a direction;
+    - `achieved_goal`: `(2,) float64`, x and z of the trunk's origin on the map, m, without noise;
+    - `desired_goal`: `(2,) float64`, x and z of the goal, m.
+
+    The reward of a step is `compute_reward(achieved_goal, desired_goal, info)`, and nothing else:
+
+    - `"sparse"`: 1 within `goal_tolerance` of the goal, else 0;
+    - `"dense"`: `exp(-d)` with the distance d to the goal, m.
+
+    Neither is ever negative, so that an episode is not worth ending in failure. Both hold for relabelled goals too.
+    `info["reward_terms"]` is still the wrapped environment's.
+
+    Args:
+        env: A `Rover-v0` with one goal an episode, with or without a `DriveByCommand` around it.
+        reward_type: "sparse" or "dense".
+
+    Raises:
+        OptionError: `env` has a course of several goals or other wrappers of observations, or `reward_type` is unknown.
+    """
+
+    def __init__(self, env: gym.Env[Any, Any], reward_type: Literal["sparse", "dense"] = "sparse") -> None:
+        if reward_type not in REWARD_TYPES:
+            refuse(OptionError, "reward_type", reward_type, f"must be one of {', '.join(REWARD_TYPES)}")
+        rover = find_rover_env(env)
+        if rover.task.n_further:
+            refuse(
+                OptionError, "env.waypoints", 1 + rover.task.n_further, "must be 1: a goal that is relabelled is one"
+            )
+        super().__init__(env)
+        self.reward_type = reward_type
+        self.goal_tolerance = rover.goal_tolerance
+        self._rover = rover
+        self._kept = _kept(env, rover.observation_layout)
+        self._achieved: Array = np.zeros(2)
+        inner = env.observation_space
+        if not isinstance(inner, gym.spaces.Box):
+            refuse(OptionError, "env.observation_space", inner, "must be a Box")
+        goals = gym.spaces.Box(-LARGEST, LARGEST, (2,), np.float64)
+        self.observation_space = gym.spaces.Dict(  # type: ignore[assignment] # of the dictionaries
+            observation=gym.spaces.Box(
+                np.append(inner.low[self._kept], [-1.0, -1.0]).astype(np.float32),
+                np.append(inner.high[self._kept], [1.0, 1.0]).astype(np.float32),
+                dtype=np.float32,
+            ),
+            achieved_goal=goals,
+            desired_goal=goals,
+        )
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[GoalDict, dict[str, Any]]:
+        """Starts an episode."""
+        observation: Any
+        observation, info = self.env.reset(seed=seed, options=options)
+        return self._observed(observation), info
+
+    def step(self, action: npt.NDArray[np.float32]) -> tuple[GoalDict, SupportsFloat, bool, bool, dict[str, Any]]:
+        """Applies an action to the wrapped environment.
+
+        Raises:
+            CommandError: As the wrapped environment.
+            ResetNeeded: The environment has not been reset.
+        """
+        observation: Any
+        observation, _, terminated, truncated, info = self.env.step(action)
+        seen = self._observed(observation)
+        reward = float(self.compute_reward(seen["achieved_goal"], seen["desired_goal"], info))
+        return seen, reward, terminated, truncated, info
+
+    def compute_reward(
+        self,
+        achieved_goal: npt.ArrayLike,
+        desired_goal: npt.ArrayLike,
+        info: Any,  # noqa: ARG002 - GoalEnv's signature
+    ) -> Array:
+        """The rewards `(...)` of achieved and desired goals `(..., 2)`, m; `info` is not read.
+
+        Raises:
+            StateError: A goal has a wrong shape.
+        """
+        away = _distances(achieved_goal, desired_goal)
+        reward: Array = np.exp(-away) if self.reward_type == "dense" else (away <= self.goal_tolerance).astype(float)
+        return reward
+
+    def compute_terminated(self, achieved_goal: npt.ArrayLike, desired_goal: npt.ArrayLike, info: Any) -> Mask:
+        """Whether an episode ends `(...)` with achieved and desired goals `(..., 2)`: at the goal, or in failure.
+
+        `info` is that of the step, or a sequence of them.
+
+        Raises:
+            StateError: A goal has a wrong shape.
+        """
+        infos = [info] if isinstance(info, dict) else info
+        failed = np.array([one.get("termination", "") not in _SOUND for one in infos])
+        arrived = _distances(achieved_goal, desired_goal) <= self.goal_tolerance
+        return np.asarray(arrived | (failed[0] if isinstance(info, dict) else failed))
+
+    def compute_truncated(
+        self,
+        achieved_goal: npt.ArrayLike,
+        desired_goal: npt.ArrayLike,
+        info: Any,  # noqa: ARG002 - GoalEnv's signature
+    ) -> Mask:
+        """False `(...)`: a time limit is a wrapper's."""
+        return np.zeros_like(_distances(achieved_goal, desired_goal), np.bool_)
+
+    def _observed(self, observation: npt.NDArray[np.float32]) -> GoalDict:
+        q = self._rover.simulation.q
+        if np.isfinite(q).all():
+            self._achieved = q[[0, 2]]
+        layout = self._rover.observation_layout
+        seen = self._rover.complete_observation()
+        sine, cosine = sin_cos(float(seen[layout["q"].start + 4]))
+        return {
+            "observation": np.append(observation[self._kept], np.array([cosine, sine], np.float32)),
+            "achieved_goal": self._achieved.copy(),
+            "desired_goal": np.array(self._rover.goal),
+        }
+
+
+def _kept(env: gym.Env[Any, Any], layout: ObservationLayout) -> npt.NDArray[np.intp]:
+    """Entries of the observation that say nothing of the goal."""
+    size, goal = layout.size, [*range(*layout["goal"].indices(layout.size)), layout["goal_distance"].start]
+    layer: Any = env
+    while isinstance(layer, gym.Wrapper):
+        if isinstance(layer, DriveByCommand):
+            size, goal = layer.features.size, layer.features.goal_entries.tolist()
+        layer = layer.env
+    if env.observation_space.shape != (size,):
+        reason = "must be that of Rover-v0 or of a DriveByCommand"
+        refuse(OptionError, "env.observation_space", env.observation_space.shape, reason)
+    return np.setdiff1d(np.arange(size), goal)
+
+
+def _distances(achieved: npt.ArrayLike, desired: npt.ArrayLike) -> Array:
+    """Distances `(...)` of goals `(..., 2)`, m."""
+    places = []
+    for field, goal in (("achieved_goal", achieved), ("desired_goal", desired)):
+        place = array(field, goal, error=StateError)
+        if place.ndim == 0 or place.shape[-1] != 2:
+            refuse(StateError, field, place.shape, "must have x and z on its last axis")
+        places.append(place)
+    away = places[0] - places[1]
+    distance: Array = np.hypot(away[..., 0], away[..., 1])
+    return distance

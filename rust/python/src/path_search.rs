@@ -1,0 +1,334 @@
+//! `PathSearch`: the cheapest of many paths over a height scan.
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn};
+use pyo3::prelude::*;
+use pyo3::types::PyMapping;
+use rover_core::paths::search::STEPS;
+use rover_core::paths::{
+    Arcs, Outline, PathCosts, PathSearch as Core, Pose, ScanShape, Search, SearchTask,
+};
+
+use crate::arguments::{at_least_one, count, number, refused};
+use crate::arrays::{array, triple, two, vector};
+use crate::errors::Kind;
+
+/// Finds the cheapest of many paths of a rover over a height scan, by beam search.
+///
+/// `rover_gym.policy.ScanPolicy` drives by it, and `rover_gym.policy.PathCosts` says what a path
+/// costs. Poses are way ahead, way to the right, m, and turn to the left, rad.
+///
+/// Args:
+///     scan: Rows, columns and spacing, m, of the height scan.
+///     outline: The rover in the trunk's frame: `wheels` (n_wheels, 2) and `underside` (n, 2), x
+///         and z, m; `clearance` (n,) of the underside, m; `plane_fit` (3, n_wheels), level and
+///         slopes of the ground plane by the heights under the wheels; `x_c`, m, of the point that
+///         follows the path; `radius` of the wheels, m.
+///     costs: The fields of `PathCosts`.
+///     first: The arcs that a path may begin with: `poses` (n, 4, 3), `direction` (n,), 1 or -1,
+///         and `commands` (n, 3), speed, curvature and sideways.
+///     further: Those that it may go on with: `poses` and `direction`.
+///     reach: The rover's reach, m.
+///     arrival: Distance within which the goal is reached, m.
+///
+/// Raises:
+///     OptionError: An argument is missing, no number, or of a wrong shape.
+#[pyclass(module = "rover_gym.mechanics")]
+pub struct PathSearch {
+    inner: Core,
+}
+
+fn item<'py>(
+    given: &Bound<'py, PyMapping>,
+    outer: &str,
+    name: &str,
+) -> PyResult<(Bound<'py, PyAny>, String)> {
+    let field = format!("{outer}.{name}");
+    let missing = |_| refused(given.as_any(), Kind::Option, &field, "given");
+    Ok((given.get_item(name).map_err(missing)?, field))
+}
+
+fn entry(given: &Bound<'_, PyMapping>, outer: &str, name: &str) -> PyResult<f64> {
+    let (value, field) = item(given, outer, name)?;
+    finite(&value, &field)
+}
+
+fn finite(value: &Bound<'_, PyAny>, field: &str) -> PyResult<f64> {
+    let found = number(value, Kind::Option, field)?;
+    if found.is_finite() {
+        return Ok(found);
+    }
+    Err(refused(value, Kind::Option, field, "finite").into())
+}
+
+fn numbers(given: &Bound<'_, PyMapping>, outer: &str, name: &str) -> PyResult<Vec<f64>> {
+    let (value, field) = item(given, outer, name)?;
+    vector(&value, Kind::Option, &field)
+}
+
+/// Rows of M finite numbers, of any leading shape.
+fn rows<const M: usize>(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<[f64; M]>> {
+    let found: PyReadonlyArrayDyn<'_, f64> = array(value, Kind::Option, field)?;
+    let view = found.as_array();
+    let wrong = || {
+        refused(
+            value,
+            Kind::Option,
+            field,
+            &format!("finite, in rows of {M}"),
+        )
+    };
+    if view.shape().last() != Some(&M) || !view.iter().all(|entry| entry.is_finite()) {
+        return Err(wrong().into());
+    }
+    let flat: Vec<f64> = view.iter().copied().collect();
+    Ok(flat.as_chunks::<M>().0.to_vec())
+}
+
+fn table<const M: usize>(
+    given: &Bound<'_, PyMapping>,
+    outer: &str,
+    name: &str,
+) -> PyResult<Vec<[f64; M]>> {
+    let (value, field) = item(given, outer, name)?;
+    rows(&value, &field)
+}
+
+/// Poses of any leading shape.
+fn poses(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<Pose>> {
+    let pose = |[ahead, right, heading]: [f64; 3]| Pose {
+        ahead,
+        right,
+        heading,
+    };
+    Ok(rows(value, field)?.into_iter().map(pose).collect())
+}
+
+fn arcs(given: &Bound<'_, PyMapping>, outer: &str) -> PyResult<Arcs> {
+    let (value, field) = item(given, outer, "poses")?;
+    let poses = poses(&value, &field)?;
+    let direction = numbers(given, outer, "direction")?;
+    if poses.len() != STEPS * direction.len() || direction.is_empty() {
+        let what = format!("for arcs of {STEPS} poses each, at least one");
+        return Err(refused(given.as_any(), Kind::Option, outer, &what).into());
+    }
+    Ok(Arcs {
+        poses: poses.as_chunks::<STEPS>().0.to_vec(),
+        direction,
+    })
+}
+
+fn outline(given: &Bound<'_, PyMapping>) -> PyResult<Outline> {
+    let read = Outline {
+        wheels: table(given, "outline", "wheels")?,
+        underside: table(given, "outline", "underside")?,
+        clearance: numbers(given, "outline", "clearance")?,
+        plane_fit: {
+            let (value, field) = item(given, "outline", "plane_fit")?;
+            let found = array(&value, Kind::Option, &field)?;
+            let view = found.as_array();
+            let wrong = || refused(&value, Kind::Option, &field, "3 rows, an entry a wheel");
+            let flat: Vec<f64> = view.iter().copied().collect();
+            if view.ndim() != 2 || view.shape()[0] != 3 {
+                return Err(wrong().into());
+            }
+            let n = view.shape()[1];
+            [0, 1, 2].map(|i| flat[i * n..(i + 1) * n].to_vec())
+        },
+        x_c: entry(given, "outline", "x_c")?,
+        radius: entry(given, "outline", "radius")?,
+    };
+    let fits = read.plane_fit[0].len() == read.wheels.len();
+    if !fits || read.clearance.len() != read.underside.len() || read.radius <= 0.0 {
+        let what = "of equal lengths, with a positive radius";
+        return Err(refused(given.as_any(), Kind::Option, "outline", what).into());
+    }
+    Ok(read)
+}
+
+fn costs(given: &Bound<'_, PyMapping>) -> PyResult<PathCosts> {
+    let cost = |name: &str| entry(given, "costs", name);
+    let whole = |name: &str| -> PyResult<usize> {
+        let (value, field) = item(given, "costs", name)?;
+        at_least_one(&value, Kind::Option, &field)
+    };
+    Ok(PathCosts {
+        belly: cost("belly")?,
+        margin: cost("margin")?,
+        climb: cost("climb")?,
+        step: cost("step")?,
+        lean: cost("lean")?,
+        facing: cost("facing")?,
+        swerve: cost("swerve")?,
+        switch: cost("switch")?,
+        reverse: cost("reverse")?,
+        memory: cost("memory")?,
+        later: cost("later")?,
+        depth: whole("depth")?,
+        width: whole("width")?,
+        length: cost("length")?,
+    })
+}
+
+fn scan_shape(value: &Bound<'_, PyAny>) -> PyResult<ScanShape> {
+    let wrong = || {
+        refused(
+            value,
+            Kind::Option,
+            "scan",
+            "two rows and columns or more, and m",
+        )
+    };
+    let (rows, columns, spacing): (Bound<'_, PyAny>, Bound<'_, PyAny>, Bound<'_, PyAny>) =
+        value.extract().map_err(|_| wrong())?;
+    let read = ScanShape {
+        rows: count(&rows, Kind::Option, "scan")?,
+        columns: count(&columns, Kind::Option, "scan")?,
+        spacing: finite(&spacing, "scan")?,
+    };
+    let fits = |n: usize| (2..=10_000).contains(&n);
+    if fits(read.rows) && fits(read.columns) && read.spacing > 0.0 {
+        return Ok(read);
+    }
+    Err(wrong().into())
+}
+
+fn positive(value: &Bound<'_, PyAny>, field: &str) -> PyResult<f64> {
+    let found = finite(value, field)?;
+    if found > 0.0 {
+        return Ok(found);
+    }
+    Err(refused(value, Kind::Option, field, "positive").into())
+}
+
+#[pymethods]
+impl PathSearch {
+    #[new]
+    #[pyo3(signature = (*, scan, outline, costs, first, further, reach, arrival))]
+    fn new(
+        scan: &Bound<'_, PyAny>,
+        outline: &Bound<'_, PyMapping>,
+        costs: &Bound<'_, PyMapping>,
+        first: &Bound<'_, PyMapping>,
+        further: &Bound<'_, PyMapping>,
+        reach: &Bound<'_, PyAny>,
+        arrival: &Bound<'_, PyAny>,
+    ) -> PyResult<Self> {
+        let read = Search {
+            scan: scan_shape(scan)?,
+            outline: self::outline(outline)?,
+            costs: self::costs(costs)?,
+            commands: table(first, "first", "commands")?,
+            first: arcs(first, "first")?,
+            further: arcs(further, "further")?,
+            reach: positive(reach, "reach")?,
+            arrival: finite(arrival, "arrival")?,
+        };
+        if read.commands.len() != read.first.direction.len() {
+            let what = "a command an arc";
+            return Err(refused(first.as_any(), Kind::Option, "first.commands", what).into());
+        }
+        Ok(Self {
+            inner: Core::new(read),
+        })
+    }
+
+    /// The first arc of the cheapest path.
+    ///
+    /// Args:
+    ///     heights: `(rows * columns,)` heights of the scan, m.
+    ///     goal: The goal ahead and to the right of the point that follows the path, m.
+    ///     command: `(3,)` the present command; its first entry is 0 at a start.
+    ///     boldness: Factor on the costs of belly, climb and lean.
+    ///     traps: `(n, 3)` poses where the rover got stuck.
+    ///     retreat: Direction of the first arc, 1 or -1, while the rover backs off; 0 for a free
+    ///         choice.
+    ///     extra: `(n,)` a further cost of each first arc, m; none by default.
+    ///
+    /// Returns:
+    ///     The index of the arc among the first arcs.
+    ///
+    /// Raises:
+    ///     OptionError: An argument has a wrong shape or an entry that is not finite.
+    #[pyo3(signature = (heights, goal, command, boldness, traps, retreat, extra = None))]
+    #[expect(clippy::too_many_arguments)]
+    fn best(
+        &mut self,
+        heights: &Bound<'_, PyAny>,
+        goal: &Bound<'_, PyAny>,
+        command: &Bound<'_, PyAny>,
+        boldness: f64,
+        traps: &Bound<'_, PyAny>,
+        retreat: f64,
+        extra: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<usize> {
+        let task = SearchTask {
+            goal: two(goal, Kind::Option, "goal")?,
+            command: triple(command, Kind::Option, "command")?,
+            boldness,
+            traps: poses(traps, "traps")?,
+            retreat: (retreat != 0.0).then_some(retreat),
+            extra: match extra {
+                Some(given) => self.extra(given)?,
+                None => Vec::new(),
+            },
+        };
+        let heights = self.heights(heights)?;
+        Ok(self.inner.best(&heights, &task))
+    }
+
+    /// What lies under the rover in poses.
+    ///
+    /// Args:
+    ///     heights: `(rows * columns,)` heights of the scan, m.
+    ///     poses: `(..., 3)` poses.
+    ///
+    /// Returns:
+    ///     (n, n_wheels + 3) for each pose the heights under the wheels over the mean of the
+    ///     present ones and the least gap under the rover, both over the wheels' radius; then the
+    ///     slopes ahead and to the right of the plane through the ground under the wheels.
+    ///
+    /// Raises:
+    ///     OptionError: An argument has a wrong shape or an entry that is not finite.
+    fn under<'py>(
+        &mut self,
+        py: Python<'py>,
+        heights: &Bound<'_, PyAny>,
+        poses: &Bound<'_, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let heights = self.heights(heights)?;
+        let poses = self::poses(poses, "poses")?;
+        let found = self.inner.under(&heights, &poses);
+        PyArray1::from_vec(py, found).reshape([poses.len(), self.inner.n_wheels() + 3])
+    }
+}
+
+impl PathSearch {
+    /// A finite height a point of the scan.
+    fn heights(&self, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+        let found: Vec<f64> = match given.extract::<PyReadonlyArray1<'_, f64>>() {
+            Ok(ready) => ready.as_array().to_vec(),
+            Err(_) => vector(given, Kind::Option, "heights")?,
+        };
+        let n = self.inner.n_heights();
+        if found.len() == n && found.iter().all(|height| height.is_finite()) {
+            return Ok(found);
+        }
+        Err(refused(
+            given,
+            Kind::Option,
+            "heights",
+            &format!("{n} finite heights"),
+        )
+        .into())
+    }
+
+    /// A finite cost an arc.
+    fn extra(&self, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+        let n = self.inner.n_first();
+        let found = vector(given, Kind::Option, "extra")?;
+        if found.len() == n && found.iter().all(|cost| cost.is_finite()) {
+            return Ok(found);
+        }
+        Err(refused(given, Kind::Option, "extra", &format!("{n} finite costs")).into())
+    }
+}

@@ -1,0 +1,65 @@
+"""The arcs that are tried for a forecast, and the fit to what became of them."""
+
+import numpy as np
+import pytest
+
+from rover_gym import OptionError, RoverEnv
+from rover_gym.learning.arc_outcomes import ArcOutcomes, try_arcs
+from rover_gym.learning.fit_forecast import fit_forecast
+from rover_gym.policy import ScanPolicy
+from rover_gym.policy.arc_forecast import ArcFeatures
+
+ARGUMENTS = {"terrain": "sphere_field", "difficulty": 1.0, **ScanPolicy.arguments()}
+
+
+def test_arcs_are_tried_from_states_of_a_drive() -> None:
+    counted: list[int] = []
+    tried = try_arcs(ARGUMENTS, 5, 6, copies=40, progress=counted.append)
+    env = RoverEnv(**ARGUMENTS)
+    size = ArcFeatures(env, ScanPolicy(env)).size + 1
+    assert tried.features.shape == (6 * 40, size)
+    assert tried.outcomes.shape == (6 * 40, 3)
+    assert counted == [1, 2, 3, 4, 5, 6]
+    assert np.bincount(tried.state).tolist() == [40] * 6
+    assert np.isfinite(tried.features).all()
+    assert np.abs(tried.outcomes).max() <= 1.0
+    # The rover gets on along the chord of most arcs, and farther where it drives fast.
+    fast = tried.features[:, -1] == 1.0
+    assert 0.1 < np.median(tried.outcomes[~fast, 0]) < np.median(tried.outcomes[fast, 0])
+    again = try_arcs(ARGUMENTS, 5, 6, copies=40)
+    np.testing.assert_array_equal(again.features, tried.features)
+    np.testing.assert_array_equal(again.outcomes, tried.outcomes)
+
+
+def made_up(rng: np.random.Generator, states: int) -> ArcOutcomes:
+    """Outcomes that follow from the features by a law that is not linear."""
+    features = rng.normal(size=(20 * states, 7)).astype(np.float32)
+    way = np.tanh(features[:, 0] * features[:, 1])
+    stuck = 1.0 / (1.0 + np.exp(-3.0 * features[:, 2]))
+    outcomes = np.stack((way, stuck, np.zeros(len(way))), axis=1).astype(np.float32)
+    return ArcOutcomes(features, outcomes, np.repeat(np.arange(states), 20))
+
+
+def test_the_fit_explains_states_that_it_has_not_seen() -> None:
+    tried = made_up(np.random.default_rng(0), 2000)
+    network, explained = fit_forecast(tried, seed=1, epochs=20, hidden=(32, 32))
+    assert explained[0] > 0.9
+    assert explained[1] > 0.95
+    assert np.isnan(explained[2])
+    unseen = made_up(np.random.default_rng(1), 50)
+    errors = network(unseen.features) - unseen.outcomes
+    assert np.abs(errors[:, :2]).mean() < 0.1
+    again, _ = fit_forecast(tried, seed=1, epochs=20, hidden=(32, 32))
+    np.testing.assert_array_equal(again.weights[0], network.weights[0])
+
+
+def test_too_few_states_and_bad_numbers_are_refused() -> None:
+    with pytest.raises(OptionError) as caught:
+        fit_forecast(made_up(np.random.default_rng(0), 5))
+    assert caught.value.field == "tried"
+    with pytest.raises(OptionError) as caught:
+        try_arcs(ARGUMENTS, 0, 5)
+    assert caught.value.field == "seed"
+    with pytest.raises(OptionError) as caught:
+        try_arcs(ARGUMENTS, 1, 0)
+    assert caught.value.field == "states"
