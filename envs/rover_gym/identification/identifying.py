@@ -50,7 +50,7 @@ def identify(
 
     Args:
         recording: The run, or its file. Its model, ground and settings are what does not change.
-        parameters: Names, or `Parameter`s of one's own. Names are "friction" (of all contacts without materials),
+        parameters: Each a name, or a `Parameter` of one's own. Names are "friction" (of all contacts without materials),
             "restitution", "gravity_scale", "mass_scale" (of all masses and inertias), "payload" (added to the first
             solid, kg), "actuator_gain" (on the wheel torques), "steering_stiffness", "steering_damping", "stall_torque"
             and "no_load_speed".
