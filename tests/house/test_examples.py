@@ -12,6 +12,7 @@ ROOT = Path(__file__).parents[2]
 PAGES = (
     "README.md",
     "docs/economy.md",
+    "docs/identification.md",
     "docs/linearise.md",
     "docs/planar.md",
     "docs/recording.md",

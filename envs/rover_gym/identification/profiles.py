@@ -58,6 +58,8 @@ def look_around(fit: WindowFit, solution: Solution, parameters: Sequence[Paramet
         parameters: Its parameters.
         iterations: Largest number of iterations of a search that goes on.
     """
+    if variance_of(solution, len(parameters)) <= EXACT:  # no noise: nothing to compare a rise with
+        return Surroundings(solution, EXACT, np.ones(len(parameters)), {})
     for _ in range(MOST_RESTARTS):
         if fit.restart(solution):
             solution = fit.solve(solution.values, solution.deviations, iterations=iterations)
