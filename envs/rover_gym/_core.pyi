@@ -49,6 +49,7 @@ __all__ = [
     "PlanarContacts",
     "PlanarSimulation",
     "PlanarSnapshot",
+    "PathSearch",
     "Plane",
     "Polyline",
     "ProblemError",
