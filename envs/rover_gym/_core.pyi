@@ -50,6 +50,7 @@ __all__ = [
     "PlanarContacts",
     "PlanarSimulation",
     "PlanarSnapshot",
+    "PathSearch",
     "Plane",
     "Polyline",
     "ProblemError",
