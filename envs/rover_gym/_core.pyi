@@ -50,7 +50,6 @@ __all__ = [
     "PlanarContacts",
     "PlanarSimulation",
     "PlanarSnapshot",
-    "PathSearch",
     "Plane",
     "Polyline",
     "ProblemError",
