@@ -80,7 +80,8 @@ def _command_line() -> str:
     parts = ["# The command line\n"]
     runner = CliRunner(env={"TERMINAL_WIDTH": "100", "COLUMNS": "100", "NO_COLOR": "1"})
     models = [["model", name] for name in ("import", "show", "check")]
-    for command in ([], ["drive"], ["baseline"], ["report"], ["plot"], ["replay"], ["scene"], *models):
+    names = ("drive", "train", "evaluate", "baseline", "report", "plot", "replay", "scene")
+    for command in ([], *([name] for name in names), *models):
         text = runner.invoke(rover, [*command, "--help"], prog_name="rover").output
         parts.append(f"```text\n$ {' '.join(['rover', *command, '--help'])}\n{text.rstrip()}\n```\n")
     return "\n".join(parts)
