@@ -157,7 +157,7 @@ def _place(field: str, value: object) -> tuple[float, ...]:
 def _course(task: Task, field: str, value: object) -> list[tuple[float, ...]]:
     """Checks the goals of a course, as many as the task has."""
     n = 1 + task.n_further
-    if isinstance(value, np.ndarray):
+    if isinstance(value, np.ndarray) and value.ndim:
         value = list(value)
     if not isinstance(value, (list, tuple)) or len(value) != n:
         refuse(OptionError, field, value, f"must be a list of {n} places (x, z), as many as waypoints")
