@@ -31,9 +31,7 @@ def baseline(
         str,
         typer.Option(help=NAMES_HELP),
     ] = "pd",
-    terrain: Annotated[
-        str, typer.Option(help="The ground: 'sphere_field' for rocks on a plane, or 'hills'.")
-    ] = "sphere_field",
+    terrain: Annotated[str, typer.Option(help="The ground: 'rocks' on a plane, or 'hills'.")] = "rocks",
     model: Annotated[
         str | None, typer.Option(help="The rover: a name of the gallery, or a model's file. Default: the built-in one.")
     ] = None,

@@ -46,7 +46,7 @@ def drive(
     *,
     terrain: Annotated[
         str,
-        typer.Option(help="The ground: 'plane', 'sphere_field' for rocks, 'hills', or the file of a map or a mesh."),
+        typer.Option(help="The ground: 'plane', 'rocks', 'hills', or the file of a map or a mesh."),
     ] = "plane",
     spacing: Spacing = None,
     height_range: HeightRange = None,

@@ -35,9 +35,7 @@ def evaluate(
     policies: Annotated[
         list[str], typer.Argument(help="Folders of runs or of policies, or 'trained' for the package's.")
     ],
-    terrain: Annotated[
-        str, typer.Option(help="'plane', 'sphere_field', 'hills', or the file of a map or a mesh.")
-    ] = "sphere_field",
+    terrain: Annotated[str, typer.Option(help="'plane', 'rocks', 'hills', or the file of a map or a mesh.")] = "rocks",
     model: ModelName = BUILT_IN,
     difficulty: Annotated[float | None, typer.Option(help="Of the rocks, from 0 to 2.")] = None,
     slope: Annotated[float | None, typer.Option(help="Of the plane, degrees.")] = None,

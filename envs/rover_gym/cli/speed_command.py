@@ -22,7 +22,7 @@ class SpeedTerrain(StrEnum):
     """What the rovers drive on."""
 
     plane = "plane"
-    sphere_field = "sphere_field"
+    rocks = "rocks"
 
 
 @plain_errors
@@ -52,7 +52,7 @@ def speed(
             exploring = measure_exploring(
                 num_envs, threads, ground=ground.value, torque=torque, rounds=exploring_rounds, progress=advance
             )
-            arguments: dict[str, Any] = {"terrain": ground.value, "height_scan": ground is SpeedTerrain.sphere_field}
+            arguments: dict[str, Any] = {"terrain": ground.value, "height_scan": ground is SpeedTerrain.rocks}
             told[ground.value] = (
                 exploring,
                 measure_speed(num_envs, threads, rounds=rounds, progress=advance, **arguments),

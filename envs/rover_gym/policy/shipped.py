@@ -4,12 +4,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from rover_gym.env.argument_checks import terrain_name
 from rover_gym.policy.policy_card import PolicyCard
 from rover_gym.policy.policy_files import PolicyError, is_there
 from rover_gym.validation import refuse
 
 #: Folder names of the shipped policies, by terrain.
-SHIPPED: Mapping[str, str] = {"plane": "plane", "sphere_field": "rocks"}
+SHIPPED: Mapping[str, str] = {"plane": "plane", "rocks": "rocks"}
 FOLDER = Path(__file__).parents[1] / "data" / "policies"
 
 
@@ -19,6 +20,7 @@ def policy_folder(terrain: str) -> Path:
     Raises:
         PolicyError: No policy is shipped for this terrain.
     """
+    terrain = terrain_name(terrain)
     if terrain not in SHIPPED:
         refuse(PolicyError, "policy", terrain, f"none was trained; there are some for {', '.join(SHIPPED)}")
     return FOLDER / SHIPPED[terrain]
