@@ -74,7 +74,7 @@ def test_a_short_time_limit_ends_the_episode_without_success() -> None:
     [
         (["--terrain", "sea"], "terrain"),
         (["--slope", "-3"], "--slope: "),
-        (["--difficulty", "0.5"], "difficulty"),
+        (["--terrain", "plane", "--difficulty", "0.5"], "difficulty"),
         (["--terrain", "rocks", "--difficulty", "2.5"], "difficulty"),
         (["--slope", "nan"], "--slope: must be finite, got nan"),
         (["--friction", "-1"], "--friction"),

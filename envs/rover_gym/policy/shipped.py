@@ -29,18 +29,22 @@ def policy_folder(terrain: str) -> Path:
 def find_policy(policy: str, terrain: str) -> Path | None:
     """The folder of a policy: the shipped one for "trained", otherwise the given path; None for "pd" and "scan".
 
+    Of the folder of a run of `rover train` it is the policy at its end.
+
     Raises:
         PolicyError: There is no such policy.
     """
     if policy in ("pd", "scan"):
         return None
     folder = policy_folder(terrain) if policy == "trained" else Path(policy)
+    if is_there(folder / "policy" / "policy.json"):
+        folder = folder / "policy"
     if not is_there(folder / "policy.json"):
         refuse(
             PolicyError,
             "policy",
             policy,
-            "must be 'pd', 'scan', 'foresight', 'trained' or the folder of a trained policy or forecast",
+            "must be 'pd', 'scan', 'foresight', 'trained' or the folder of a run, a trained policy or a forecast",
         )
     return folder
 
