@@ -30,7 +30,7 @@ class Registration:
 ENVIRONMENTS: Mapping[str, Registration] = {
     "Rover-v0": Registration("rover_gym.env:RoverEnv", "rover_gym.vector:RoverVectorEnv"),
     "RoverRocks-v0": Registration(
-        "rover_gym.env:RoverEnv", "rover_gym.vector:RoverVectorEnv", arguments={"terrain": "sphere_field"}
+        "rover_gym.env:RoverEnv", "rover_gym.vector:RoverVectorEnv", arguments={"terrain": "rocks"}
     ),
     "RoverHills-v0": Registration(
         "rover_gym.env:RoverEnv", "rover_gym.vector:RoverVectorEnv", arguments={"terrain": "hills"}
@@ -44,7 +44,7 @@ ENVIRONMENTS: Mapping[str, Registration] = {
     "RoverBattery-v0": Registration(
         "rover_gym.env:RoverEnv",
         "rover_gym.vector:RoverVectorEnv",
-        arguments={"terrain": "sphere_field", "goal_distance": (10.0, 14.0), "battery": 7000.0},
+        arguments={"terrain": "rocks", "goal_distance": (10.0, 14.0), "battery": 7000.0},
     ),
     "RoverCommand-v0": Registration(
         "rover_gym.policy:RoverCommandEnv", "rover_gym.policy:RoverCommandVectorEnv", MAX_COMMANDS

@@ -54,11 +54,11 @@ def test_the_same_seed_drives_the_same_way(tmp_path: Path) -> None:
 
 
 def test_rocks_are_driven_over_and_recorded(tmp_path: Path) -> None:
-    arguments = ("--terrain", "sphere_field", "--difficulty", "0.5", "--time-limit", "2", "--output", str(tmp_path))
+    arguments = ("--terrain", "rocks", "--difficulty", "0.5", "--time-limit", "2", "--output", str(tmp_path))
     result = rover("drive", *arguments)
     assert result.exit_code == 0, result.output
     scene = read_trajectory(tmp_path / "episode-0.h5").attributes["scene"]
-    assert scene["terrain"] == "sphere_field"
+    assert scene["terrain"] == "rocks"
     assert scene["rocks"]["difficulty"] == 0.5
 
 
@@ -74,8 +74,8 @@ def test_a_short_time_limit_ends_the_episode_without_success() -> None:
     [
         (["--terrain", "sea"], "terrain"),
         (["--slope", "-3"], "--slope: "),
-        (["--difficulty", "0.5"], "difficulty"),
-        (["--terrain", "sphere_field", "--difficulty", "2.5"], "difficulty"),
+        (["--terrain", "plane", "--difficulty", "0.5"], "difficulty"),
+        (["--terrain", "rocks", "--difficulty", "2.5"], "difficulty"),
         (["--slope", "nan"], "--slope: must be finite, got nan"),
         (["--friction", "-1"], "--friction"),
         (["--time-step", "0"], "--time-step: must be at least 1e-05"),
@@ -107,7 +107,7 @@ def test_version_and_help() -> None:
 
 def test_episodes_are_filmed(tmp_path: Path) -> None:
     path = tmp_path / "films" / "rocks.mp4"
-    arguments = ("--terrain", "sphere_field", "--time-limit", "0.3", "--episodes", "2", "--video", str(path))
+    arguments = ("--terrain", "rocks", "--time-limit", "0.3", "--episodes", "2", "--video", str(path))
     result = rover("drive", *arguments)
     assert result.exit_code == 0, result.output
     assert str(path) in result.output.replace("\n", "")
@@ -117,7 +117,7 @@ def test_episodes_are_filmed(tmp_path: Path) -> None:
 
 
 def test_the_planner_by_hand_drives_too(tmp_path: Path) -> None:
-    arguments = ("--policy", "scan", "--terrain", "sphere_field", "--difficulty", "1", "--time-limit", "2")
+    arguments = ("--policy", "scan", "--terrain", "rocks", "--difficulty", "1", "--time-limit", "2")
     result = rover("drive", *arguments, "--model", "mars-rover", "--output", str(tmp_path))
     assert result.exit_code == 0, result.output
     assert "the scan planner" in result.output

@@ -336,7 +336,7 @@ def test_a_far_away_pose_lies_on_the_median() -> None:
 
 
 def test_the_policy_and_its_arguments_know_the_search() -> None:
-    env = RoverEnv(terrain="sphere_field", **ScanPolicy.arguments())
+    env = RoverEnv(terrain="rocks", **ScanPolicy.arguments())
     observation, _ = env.reset(seed=1)
     action, _ = ScanPolicy(env).predict(observation)
     assert np.isfinite(action).all()

@@ -9,6 +9,7 @@ from rover_gym.cli.baseline_command import baseline
 from rover_gym.cli.console import DEBUG, one_line
 from rover_gym.cli.drive_command import drive
 from rover_gym.cli.evaluate_command import evaluate
+from rover_gym.cli.first_steps import say_first_steps
 from rover_gym.cli.grains_command import grains
 from rover_gym.cli.grains_lab_commands import plate, shear, wheel
 from rover_gym.cli.grains_rover_commands import pit, track
@@ -25,7 +26,6 @@ from rover_gym.mechanics import __version__
 
 app = typer.Typer(
     help="Drive a six-wheel Mars rover in a nonsmooth simulator.",
-    no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     epilog=f"Errors are one line; with {DEBUG}=1 in the environment they tell where they came from.",
@@ -52,13 +52,16 @@ def _print_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
+@app.callback(invoke_without_command=True)
 def rover(
+    context: typer.Context,
     _version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
     """Drive a six-wheel Mars rover in a nonsmooth simulator."""
+    if context.invoked_subcommand is None:
+        say_first_steps()
 
 
 def main() -> None:

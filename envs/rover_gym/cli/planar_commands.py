@@ -6,9 +6,10 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from rich.table import Table
 
-from rover_gym.cli.console import check_folder, console, keeping, plain_errors, progress_bar, say_path
+from rover_gym.cli.console import check_folder, plain_errors, progress_bar
+from rover_gym.cli.results import AsJson, Results, row
+from rover_gym.cli.scene_options import warn_of_slope
 from rover_gym.cli.soil_command import soil
 from rover_gym.mechanics import (
     BallSimulation,
@@ -77,6 +78,7 @@ def ball(
     time_step: TimeStep = 0.002,
     duration: Duration = 10.0,
     output: Output = Path("runs/planar"),
+    as_json: AsJson = False,
 ) -> None:
     """Drop a ball on a line, a sine, a step or a table of points; record and draw its path."""
     check_folder("output", output)
@@ -90,7 +92,7 @@ def ball(
     )
     sim.set_state([0.0, sim.ground.height(0.0) + radius + drop, 0.0], [speed, 0.0, 0.0])
     _lift(sim, drop)
-    _run(sim, "a ball", duration, output / "ball.h5")
+    _run(sim, "a ball", duration, output / "ball.h5", as_json=as_json)
 
 
 @planar.command()
@@ -110,6 +112,7 @@ def rover(
     time_step: TimeStep = 0.002,
     duration: Duration = 10.0,
     output: Output = Path("runs/planar"),
+    as_json: AsJson = False,
 ) -> None:
     """Drive the two-wheel rover over a line, a sine, a step or a table of points; record and draw its path."""
     check_folder("output", output)
@@ -125,7 +128,9 @@ def rover(
     sim.set_state([0.0, sim.ground.height(0.0) + 0.2, angle, 0.0, 0.0], [speed, 0.0, 0.0, -speed / 0.2, -speed / 0.2])
     _lift(sim, 0.0)
     sim.set_torques([torque, torque])
-    _run(sim, "the two-wheel rover", duration, output / "rover.h5")
+    if ground is PlanarGroundKind.line:
+        warn_of_slope(slope, friction)
+    _run(sim, "the two-wheel rover", duration, output / "rover.h5", as_json=as_json)
 
 
 planar.command()(soil)
@@ -171,26 +176,30 @@ def _words(ground: PlanarGround) -> str:
     return "a step" if isinstance(ground, Polyline) else "a table of points"
 
 
-def _run(sim: PlanarSimulation, who: str, duration: float, path: Path) -> None:
+def _run(sim: PlanarSimulation, who: str, duration: float, path: Path, *, as_json: bool) -> None:
     title = f"{who} on {_words(sim.ground)}"
-    with keeping("trajectory", path), progress_bar() as bar:
-        task = bar.add_task(who, total=duration, state="")
-        rows = record_planar(
-            sim,
-            path,
-            describe_planar(sim, title),
-            duration=duration,
-            progress=lambda time: bar.update(task, completed=time, state=f"{time:.1f} s"),
+    with Results(as_json=as_json) as results:
+        with results.keeping("trajectory", path), progress_bar() as bar:
+            task = bar.add_task(who, total=duration, state="")
+            rows = record_planar(
+                sim,
+                path,
+                describe_planar(sim, title),
+                duration=duration,
+                progress=lambda time: bar.update(task, completed=time, state=f"{time:.1f} s"),
+            )
+        x, y = sim.q[:2]
+        speed, gap = float(np.hypot(*sim.v[:2])), float(read_trajectory(path)["gaps"].min())
+        results.table(
+            title,
+            [
+                row("at the end", f"x = {x:.3f} m, y = {y:.3f} m after {sim.time:g} s", x=x, y=y, time=sim.time),
+                row("speed at the end", f"{speed:.3f} m/s", speed=speed),
+                row("smallest gap", f"{1e3 * gap:.4f} mm", smallest_gap=gap),
+                row("steps not converged", str(rows), unconverged_rows=rows),
+            ],
         )
-    trajectory = read_trajectory(path)
-    table = Table(title=title, show_header=False, title_justify="left")
-    x, y = sim.q[:2]
-    table.add_row("at the end", f"x = {x:.3f} m, y = {y:.3f} m after {sim.time:g} s")
-    table.add_row("speed at the end", f"{np.hypot(*sim.v[:2]):.3f} m/s")
-    table.add_row("smallest gap", f"{1e3 * trajectory['gaps'].min():.4f} mm")
-    table.add_row("steps not converged", str(rows))
-    console().print(table)
-    say_path("trajectory", path)
-    from rover_gym.figures.planar_run import draw_planar_run  # noqa: PLC0415 - matplotlib is slow to load
+        results.path("trajectory", path)
+        from rover_gym.figures.planar_run import draw_planar_run  # noqa: PLC0415 - matplotlib is slow to load
 
-    say_path("figure", draw_planar_run(sim, path, path.with_suffix(".png")))
+        results.path("figure", draw_planar_run(sim, path, path.with_suffix(".png")))

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from rover_gym.cli.completion import complete_recording
 from rover_gym.cli.console import check_folder, plain_errors, say_path
 from rover_gym.grains.grain_run import grain_run_of, is_grains
 from rover_gym.record.rover_run import run_of
@@ -18,6 +19,7 @@ def plot(
         Path,
         typer.Argument(
             metavar="RUN",
+            autocompletion=complete_recording,
             help="What `rover drive --output`, `rover report`, `rover planar soil` or `rover grains` saved.",
         ),
     ],

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from rover_gym.cli.completion import complete_recording
 from rover_gym.cli.console import check_file, plain_errors, progress_bar, say_path
 from rover_gym.extras import require
 from rover_gym.grains.grain_run import grain_run_of, is_grains
@@ -22,7 +23,8 @@ def replay(
     run: Annotated[
         Path,
         typer.Argument(
-            help="What `rover drive --output`, `rover report`, `rover planar soil` or `rover grains` saved."
+            help="What `rover drive --output`, `rover report`, `rover planar soil` or `rover grains` saved.",
+            autocompletion=complete_recording,
         ),
     ],
     html: Annotated[Path | None, typer.Option(dir_okay=False, help="Page for the browser; needs no network.")] = None,
@@ -40,7 +42,7 @@ def replay(
     """Replay a saved run: as a page with a timeline and curves, and as animated 3D files for other programs."""
     wanted = {"html": html, "vrml": vrml, "gltf": gltf, "film": film}
     if not any(wanted.values()):
-        refuse(OptionError, "output", None, "say what to write: --html, --vrml, --gltf or --film, with a file's name")
+        raise OptionError("say what to write: --html, --vrml, --gltf or --film, with a file's name")
     trajectory = read_trajectory(run)
     for package, path in (("viser", None if is_grains(trajectory) else html), ("pygltflib", gltf)):
         if path is not None:

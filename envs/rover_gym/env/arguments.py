@@ -66,7 +66,7 @@ class RoverArguments(TypedDict, total=False):
         str | PathLike[str] | Terrain | Sequence[Terrain],
         Argument(
             "plane",
-            Special('"plane", "sphere_field", "hills", a terrain, its file or a list of terrains', check_terrain),
+            Special('"plane", "rocks", "hills", a terrain, its file or a list of terrains', check_terrain),
             "the ground",
         ),
     ]

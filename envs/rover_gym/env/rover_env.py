@@ -182,7 +182,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     ## Rocks
 
-    With `terrain="sphere_field"`, as in `RoverRocks-v0`, fixed spheres lie on the plane, half below the
+    With `terrain="rocks"`, as in `RoverRocks-v0`, fixed spheres lie on the plane, half below the
     ground, with the sizes that Golombek and Rapp (1997) found on Mars, the smallest 5 cm wide. They lie at
     random up to 4 m beyond the rectangle that start and goal span. Two circles, around start and goal,
     stay clear, so that the rover has room to turn. Each reset draws a new field. A single number d from 0 to 2,
