@@ -248,6 +248,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     - v0: plane ground and rocks. Numbers may change until the first release.
     """
 
+    #: Render modes, and the frames of a second of film: the control frequency.
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 20}  # noqa: RUF012 - as Gymnasium declares it
 
     @takes_arguments
