@@ -4,6 +4,7 @@ from rover_gym.live.live_commands import Change, Drive, Pause, Record, Restart, 
 from rover_gym.live.live_loop import LiveLoop
 from rover_gym.live.live_rover import LiveRover
 from rover_gym.live.live_scene import LiveChoices, LiveScene
+from rover_gym.live.live_server import LiveServer
 from rover_gym.live.live_state import LiveState
 
 __all__ = [
@@ -13,6 +14,7 @@ __all__ = [
     "LiveLoop",
     "LiveRover",
     "LiveScene",
+    "LiveServer",
     "LiveState",
     "Pause",
     "Record",

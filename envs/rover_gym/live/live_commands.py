@@ -142,9 +142,9 @@ def command_of(entries: dict[str, Any]) -> Command:
     if kind is None:
         refuse(OptionError, "do", name, f"must be one of {', '.join(COMMANDS)}")
     known = {field.name for field in fields(kind)}
-    for entry in values:
+    for entry, value in values.items():
         if entry not in known:
-            refuse(OptionError, f"{name}.{shown(entry)}", values[entry], "is unknown")
+            refuse(OptionError, f"{name}.{shown(entry)}", value, "is unknown")
     for field in fields(kind):
         if field.default is MISSING and field.name not in values:
             refuse(OptionError, f"{name}.{field.name}", None, "is missing")

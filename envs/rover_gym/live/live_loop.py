@@ -124,6 +124,10 @@ class LiveLoop:
         else:
             self._finish()
 
+    def wait(self, timeout: float) -> bool:
+        """Waits until the loop has ended, or for a time, s; returns whether it has."""
+        return self._stopping.wait(timeout)
+
     def advance(self) -> None:
         """Carries out the commands that wait and, unless the time stands still, takes one control period."""
         self._obey()

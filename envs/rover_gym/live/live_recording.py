@@ -72,9 +72,7 @@ class LiveRecording:
         """
         info, scene = rover.info, rover.scene
         solver = info["solver"]
-        row = self._sampler.row(
-            rover.env.simulation, residual=solver["residual"], iterations=solver["iterations"]
-        )
+        row = self._sampler.row(rover.env.simulation, residual=solver["residual"], iterations=solver["iterations"])
         more = {
             "distance_to_goal": info["distance_to_goal"],
             "slip_ratio": info["slip_ratio"],

@@ -162,7 +162,9 @@ class LiveRover:
         Raises:
             OptionError: A number is not within -1 to 1.
         """
-        command = [number(name, value, at_least=-1.0, at_most=1.0) for name, value in (("forward", forward), ("turn", turn))]
+        command = [
+            number(name, value, at_least=-1.0, at_most=1.0) for name, value in (("forward", forward), ("turn", turn))
+        ]
         if self.ended:
             return
         wheel, state = self._wheel, self._wheel.state
@@ -206,7 +208,8 @@ class LiveRover:
         """
         if name not in LiveScene.__dataclass_fields__:
             refuse(OptionError, "name", name, f"must be one of {', '.join(LiveScene.__dataclass_fields__)}")
-        scene = replace(self.scene, **{name: value}).checked(self.choices)
+        wanted: dict[str, Any] = {name: value}
+        scene = replace(self.scene, **wanted).checked(self.choices)
         if name in PROPERTIES:
             self._replace(friction=scene.friction, gravity=scene.gravity)
             self.scene = scene
