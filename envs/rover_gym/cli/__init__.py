@@ -14,6 +14,7 @@ from rover_gym.cli.grains_command import grains
 from rover_gym.cli.grains_lab_commands import plate, shear, wheel
 from rover_gym.cli.grains_rover_commands import pit, track
 from rover_gym.cli.grains_rover_commands import rover as rover_on_bed
+from rover_gym.cli.live_command import live
 from rover_gym.cli.model_command import model
 from rover_gym.cli.planar_commands import planar
 from rover_gym.cli.plot_command import plot
@@ -37,6 +38,7 @@ app.command()(evaluate)
 app.command()(report)
 app.command()(plot)
 app.command()(replay)
+app.command()(live)
 app.command()(scene)
 app.add_typer(model, name="model")
 app.add_typer(planar, name="planar")
