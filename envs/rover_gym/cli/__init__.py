@@ -9,6 +9,7 @@ from rover_gym.cli.baseline_command import baseline
 from rover_gym.cli.console import DEBUG, one_line
 from rover_gym.cli.drive_command import drive
 from rover_gym.cli.evaluate_command import evaluate
+from rover_gym.cli.export_command import export
 from rover_gym.cli.first_steps import say_first_steps
 from rover_gym.cli.grains_command import grains
 from rover_gym.cli.grains_lab_commands import plate, shear, wheel
@@ -45,6 +46,7 @@ app.add_typer(planar, name="planar")
 for _command in (rover_on_bed, track, pit, plate, shear, wheel):
     grains.command()(_command)
 app.add_typer(grains, name="grains")
+app.add_typer(export, name="export")
 app.command()(speed)
 
 
