@@ -728,6 +728,26 @@ class Plane:
         Raises:
             TerrainError: The plane is vertical, or an argument is not a number.
         """
+    def cast_rays(
+        self, origins: npt.ArrayLike, directions: npt.ArrayLike, max_range: float | None = None
+    ) -> tuple[_Array, _Array]:
+        """Where rays meet the ground first.
+
+        A surface is met from either side. What depth cameras and laser scanners measure.
+
+        Args:
+            origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
+            directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
+            max_range: Distance to which they are followed, m; without end by default.
+
+        Returns:
+            Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
+            world frame, (n, 3), nan where nothing is met.
+
+        Raises:
+            OptionError: An array has a wrong shape or an entry that is not finite, a direction is
+                zero, an origin is beyond 1e6 m, or `max_range` is not positive.
+        """
     def __reduce__(self) -> Any: ...
 
 @final
@@ -834,6 +854,26 @@ class SphereField:
 
         Raises:
             TerrainError: `points` has a wrong shape.
+        """
+    def cast_rays(
+        self, origins: npt.ArrayLike, directions: npt.ArrayLike, max_range: float | None = None
+    ) -> tuple[_Array, _Array]:
+        """Where rays meet the ground first.
+
+        A surface is met from either side. What depth cameras and laser scanners measure.
+
+        Args:
+            origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
+            directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
+            max_range: Distance to which they are followed, m; without end by default.
+
+        Returns:
+            Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
+            world frame, (n, 3), nan where nothing is met.
+
+        Raises:
+            OptionError: An array has a wrong shape or an entry that is not finite, a direction is
+                zero, an origin is beyond 1e6 m, or `max_range` is not positive.
         """
     def __len__(self) -> int: ...
     def __reduce__(self) -> Any: ...
@@ -980,6 +1020,26 @@ class HeightField:
         Raises:
             TerrainError: `points` has a wrong shape.
         """
+    def cast_rays(
+        self, origins: npt.ArrayLike, directions: npt.ArrayLike, max_range: float | None = None
+    ) -> tuple[_Array, _Array]:
+        """Where rays meet the ground first.
+
+        A surface is met from either side. What depth cameras and laser scanners measure.
+
+        Args:
+            origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
+            directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
+            max_range: Distance to which they are followed, m; without end by default.
+
+        Returns:
+            Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
+            world frame, (n, 3), nan where nothing is met.
+
+        Raises:
+            OptionError: An array has a wrong shape or an entry that is not finite, a direction is
+                zero, an origin is beyond 1e6 m, or `max_range` is not positive.
+        """
     def __reduce__(self) -> tuple[Any, ...]: ...
 
 @final
@@ -1052,6 +1112,26 @@ class TriangleMesh:
         Raises:
             TerrainError: `points` has a wrong shape.
         """
+    def cast_rays(
+        self, origins: npt.ArrayLike, directions: npt.ArrayLike, max_range: float | None = None
+    ) -> tuple[_Array, _Array]:
+        """Where rays meet the ground first.
+
+        A surface is met from either side. What depth cameras and laser scanners measure.
+
+        Args:
+            origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
+            directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
+            max_range: Distance to which they are followed, m; without end by default.
+
+        Returns:
+            Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
+            world frame, (n, 3), nan where nothing is met.
+
+        Raises:
+            OptionError: An array has a wrong shape or an entry that is not finite, a direction is
+                zero, an origin is beyond 1e6 m, or `max_range` is not positive.
+        """
     def __len__(self) -> int: ...
     def __reduce__(self) -> tuple[Any, ...]: ...
 
@@ -1084,6 +1164,26 @@ class Union:
 
         Raises:
             TerrainError: `points` has a wrong shape.
+        """
+    def cast_rays(
+        self, origins: npt.ArrayLike, directions: npt.ArrayLike, max_range: float | None = None
+    ) -> tuple[_Array, _Array]:
+        """Where rays meet the ground first.
+
+        A surface is met from either side. What depth cameras and laser scanners measure.
+
+        Args:
+            origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
+            directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
+            max_range: Distance to which they are followed, m; without end by default.
+
+        Returns:
+            Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
+            world frame, (n, 3), nan where nothing is met.
+
+        Raises:
+            OptionError: An array has a wrong shape or an entry that is not finite, a direction is
+                zero, an origin is beyond 1e6 m, or `max_range` is not positive.
         """
     def __len__(self) -> int: ...
     def __reduce__(self) -> tuple[Any, ...]: ...
@@ -1670,6 +1770,33 @@ class Simulation:
 
         Raises:
             OptionError: `n_scan` is not a count.
+        """
+    def cast_rays(
+        self,
+        origins: npt.ArrayLike,
+        directions: npt.ArrayLike,
+        max_range: float | None = None,
+        *,
+        parts: bool = False,
+        without: str | Sequence[str] = (),
+    ) -> tuple[_Array, _Array]:
+        """Where rays meet the ground first, or the rover itself.
+
+        Of the rover its wheels, boxes and balls are seen, as they collide.
+
+        Args:
+            origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
+            directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
+            max_range: Distance to which they are followed, m; without end by default.
+            parts: Whether the rover's own parts are met.
+            without: Names of solids whose parts are not met, such as the one that carries a sensor.
+
+        Returns:
+            Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
+            world frame, (n, 3), nan where nothing is met.
+
+        Raises:
+            OptionError: As of `Plane.cast_rays`, or `without` names no solid of the model.
         """
     def energy(self) -> Energy:
         """Kinetic and potential energy now."""

@@ -18,6 +18,7 @@ PAGES = (
     "docs/recording.md",
     "docs/replay.md",
     "docs/seeing.md",
+    "docs/sensors.md",
     "docs/soil.md",
     "docs/tasks.md",
     "docs/vector.md",
