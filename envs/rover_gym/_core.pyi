@@ -1324,6 +1324,7 @@ class PathSearch:
         traps: npt.ArrayLike,
         retreat: float,
         extra: npt.ArrayLike | None = None,
+        ways: npt.ArrayLike | None = None,
     ) -> int:
         """The first arc of the cheapest path.
 
@@ -1336,12 +1337,44 @@ class PathSearch:
             retreat: Direction of the first arc, 1 or -1, while the rover backs off; 0 for a free
                 choice.
             extra: `(n,)` a further cost of each first arc, m; none by default.
+            ways: `(rows * columns,)` way to the goal from each point of the scan, m; straight by
+                default.
 
         Returns:
             The index of the arc among the first arcs.
 
         Raises:
             OptionError: An argument has a wrong shape or an entry that is not finite.
+        """
+    def ways(
+        self,
+        heights: npt.ArrayLike,
+        spacing: float,
+        goal: npt.ArrayLike,
+        boldness: float,
+        extra: npt.ArrayLike | None = None,
+    ) -> npt.NDArray[np.float64]:
+        """The way to a goal from every cell of a map (Dijkstra 1959).
+
+        The rover goes from a cell to one of its eight neighbours, headed for it. That costs the
+        distance and what the ground costs on a path: belly, climb and lean. A wheel over ground
+        that is not known stands as high as the others do; where all do, the distance is all.
+
+        Args:
+            heights: (rows, columns) heights, m, nan where they are not known; from 3 to 2000 of
+                each. Rows lie across, the first farthest ahead; columns lead to the right.
+            spacing: Distance of rows and columns, m.
+            goal: Row and column of the goal. One beyond the map is reached by the straight way from
+                its border.
+            boldness: Factor on the costs of belly, climb and lean.
+            extra: (rows, columns) further price of a metre in each cell, at least 0; none by
+                default.
+
+        Returns:
+            (rows, columns) ways, in metres of level ground.
+
+        Raises:
+            OptionError: An argument has a wrong shape or an entry out of its range.
         """
     def under(self, heights: npt.ArrayLike, poses: npt.ArrayLike) -> npt.NDArray[np.float32]:
         """What lies under the rover in poses.

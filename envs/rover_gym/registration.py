@@ -49,7 +49,7 @@ ENVIRONMENTS: Mapping[str, Registration] = {
     "RoverCommand-v0": Registration(
         "rover_gym.policy:RoverCommandEnv", "rover_gym.policy:RoverCommandVectorEnv", MAX_COMMANDS
     ),
-    "RoverGoal-v0": Registration("rover_gym.policy:RoverGoalEnv", max_episode_steps=MAX_COMMANDS),
+    "RoverGoal-v0": Registration("rover_gym.policy:RoverGoalEnv", "rover_gym.policy:RoverGoalVectorEnv", MAX_COMMANDS),
     "RoverTrap-v0": Registration("rover_gym.policy:RoverTrapEnv", max_episode_steps=MAX_EPISODE_STEPS // 2),
     "RoverGrains-v0": Registration("rover_gym.sensors:make_grains_rover"),
 }
