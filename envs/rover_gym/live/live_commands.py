@@ -21,7 +21,7 @@ LONGEST_REWIND = 3600.0
 
 @dataclass(frozen=True)
 class Drive:
-    """Drive by hand until the next such command, for half a second at most: speed and curvature, each -1 to 1."""
+    """Drive by hand until the next such command, for a second at most: speed and curvature, each -1 to 1."""
 
     forward: float = 0.0
     turn: float = 0.0
