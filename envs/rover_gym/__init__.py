@@ -20,8 +20,10 @@ The package consists of the subpackages below. Each one may import those above i
     planar         the planar systems: a ball, a two-wheel rover
     reproduction   the experiments of the 2010 report
     replay         saved runs for the browser, VRML and glTF
+    live           a rover that is driven in the browser
     figures        figures of saved runs
     learning       training with stable-baselines3
+    exports        runs, policies and simulations for other programs
     cli            the command `rover`
     registration   the environments' names for Gymnasium
 """

@@ -6,7 +6,7 @@ listed FL, FR, ML, BL, MR, BR. Every array returned is new.
 
 from collections.abc import Collection, Mapping, Sequence
 from os import PathLike
-from typing import Any, Literal, TypeAlias, final, overload
+from typing import Any, Literal, Protocol, TypeAlias, final, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,11 @@ _Range: TypeAlias = tuple[float, float]
 _Outcome: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike, str]
 _MaterialRow: TypeAlias = tuple[str, str, float, float]
 _Materials: TypeAlias = Mapping[tuple[str, str], tuple[float, float]] | Sequence[_MaterialRow]
+
+class _SparseArray(Protocol):
+    @property
+    def shape(self) -> tuple[int, ...]: ...
+    def tobsr(self, blocksize: tuple[int, int] | None = ..., copy: bool = ...) -> Any: ...
 
 __all__ = [
     "BallSimulation",
@@ -3784,6 +3789,14 @@ class FrictionContactSolution:
     @property
     def report(self) -> SolverReport:
         """How the solver ended."""
+    @property
+    def history(self) -> list[tuple[str, int, float]]:
+        """The residuals measured on the way, with the argument `history`.
+
+        Each is a tuple of the stage, the iterations so far and the relative residual. "nsgs" and
+        "admm" measure every few iterations, the others at every step. Of "relaxed" it is the
+        residual of the relaxed law.
+        """
 
 def accuracy_options(accuracy: Literal["fast", "balanced", "reference"] | float) -> dict[str, Any]:
     """The options of `Simulation` that an accuracy stands for.
@@ -3858,7 +3871,7 @@ def exp(x: float) -> float:
 @overload
 def exp(x: npt.NDArray[Any]) -> _Array: ...
 def solve_friction_contact(
-    W: npt.ArrayLike | tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike],
+    W: npt.ArrayLike | _SparseArray | tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike],
     q: npt.ArrayLike,
     mu: npt.ArrayLike,
     tolerance: float = 1e-8,
@@ -3868,16 +3881,17 @@ def solve_friction_contact(
     max_iterations: int = 1000,
     initial: npt.ArrayLike | None = None,
     budget: int = 300000000,
+    history: bool = False,
 ) -> FrictionContactSolution:
     """Solves the friction-contact problem K* contains W p + q + mu |u_T| n, orthogonal to p in K.
 
     Args:
         W: Delassus operator, (n_c d, n_c d), 1/kg, used as it is: it may be singular or
-            unsymmetric. For many contacts its block rows `(indptr, indices, data)` of shapes
-            (n_c + 1,), (n_blocks,), (n_blocks, d, d), each row ascending and with its diagonal
-            block.
+            unsymmetric. For many contacts one of SciPy's sparse arrays, or block rows
+            `(indptr, indices, data)` of shapes (n_c + 1,), (n_blocks,), (n_blocks, d, d), each row
+            ascending and with its diagonal block.
         q: Free velocity, (n_c d,), m/s, contact by contact: normal, tangents.
-        mu: Friction coefficients, (n_c,).
+        mu: Friction coefficients, (n_c,), or one for all contacts.
         tolerance: Largest relative residual of a converged answer; its velocities are right to
             max(tolerance, 1e-9) m/s as well.
         dimension: Components d of a contact, 2 or 3.
@@ -3889,6 +3903,7 @@ def solve_friction_contact(
         budget: Largest amount of work, counted and not timed: a unit is one multiplication and
             addition in a product with W. The default takes about 0.3 s. What exceeds it is left
             undone, and the report says so.
+        history: Whether the solution keeps the residuals measured on the way.
 
     Returns:
         Impulses, velocities and the solver's report. Not converging is no error: see

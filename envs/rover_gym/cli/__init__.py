@@ -9,11 +9,13 @@ from rover_gym.cli.baseline_command import baseline
 from rover_gym.cli.console import DEBUG, one_line
 from rover_gym.cli.drive_command import drive
 from rover_gym.cli.evaluate_command import evaluate
+from rover_gym.cli.export_command import export
 from rover_gym.cli.first_steps import say_first_steps
 from rover_gym.cli.grains_command import grains
 from rover_gym.cli.grains_lab_commands import plate, shear, wheel
 from rover_gym.cli.grains_rover_commands import pit, track
 from rover_gym.cli.grains_rover_commands import rover as rover_on_bed
+from rover_gym.cli.live_command import live
 from rover_gym.cli.model_command import model
 from rover_gym.cli.planar_commands import planar
 from rover_gym.cli.plot_command import plot
@@ -37,12 +39,14 @@ app.command()(evaluate)
 app.command()(report)
 app.command()(plot)
 app.command()(replay)
+app.command()(live)
 app.command()(scene)
 app.add_typer(model, name="model")
 app.add_typer(planar, name="planar")
 for _command in (rover_on_bed, track, pit, plate, shear, wheel):
     grains.command()(_command)
 app.add_typer(grains, name="grains")
+app.add_typer(export, name="export")
 app.command()(speed)
 
 

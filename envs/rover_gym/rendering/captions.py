@@ -26,7 +26,7 @@ def captioned(frame: Frame, lines: Sequence[str]) -> Frame:
     size = max(SMALLEST, round(SIZE * frame.shape[0]))
     for i, line in enumerate(lines):
         place = (0.5 * size, (0.4 + 1.25 * i) * size)
-        draw.text(place, line, font=_font(size), fill=(255, 255, 255), stroke_width=max(1, size // 10), stroke_fill=0)
+        draw.text(place, line, font=_font(size), fill=(255, 255, 255), stroke_width=max(1, size // 16), stroke_fill=0)
     return np.asarray(image, dtype=np.uint8)
 
 

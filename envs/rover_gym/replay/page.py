@@ -10,25 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.record.outcomes import outcome_words
-from rover_gym.rendering.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR, sphere_mesh
-from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, rgb, rounded, shortened, with_panel
+from rover_gym.replay.player import add_surroundings, hidden_server, rounded, shortened, with_panel
 from rover_gym.replay.rotation import continuous, quaternions
-from rover_gym.replay.scenery import (
-    coloured_meshes,
-    first_view,
-    goal_meshes,
-    ground_tiles,
-    identifiers,
-    parts_by_solid,
-    spheres,
-    surfaces,
-    trunk_path,
-)
+from rover_gym.replay.scenery import first_view, trunk_path
+from rover_gym.replay.world_nodes import add_ground, add_rover
 
 if TYPE_CHECKING:
     from rover_gym.record.rover_run import RoverRun
 
-#: One colour per wheel: Okabe and Ito's palette, safe for colour-blind readers.
 WHEEL_NAMES = {
     "FL": "front left",
     "FR": "front right",
@@ -38,9 +27,8 @@ WHEEL_NAMES = {
     "BR": "back right",
 }
 SMOOTHING = 0.2  # s, window of the loads' mean: an impact lasts a step and says nothing of the weight carried
+#: One colour per wheel: Okabe and Ito's palette, safe for colour-blind readers.
 WHEEL_COLOURS = ("#0072B2", "#56B4E9", "#009E73", "#D55E00", "#CC79A7", "#E69F00")
-LARGE = 0.12  # m, radius above which a sphere gets more triangles
-MANY = 1000  # number of spheres above which each gets fewer again
 LONGEST_FACT = 100
 FOLLOW_TIME = 1.0  # s, smoothing window of the path that the eye follows
 
@@ -85,40 +73,8 @@ def _build(run: RoverRun, scene: Any) -> tuple[Any, list[Any]]:
     """Builds the scene and returns the moving frames: the whole world's, and those of the solids."""
     add_surroundings(scene)
     world = scene.add_frame("/world", show_axes=False)
-    solids = []
-    named = parts_by_solid(run)
-    nodes = identifiers(named)
-    for name, parts in named.items():
-        # In a separate folder: a solid may have the same name as the ground.
-        solids.append(scene.add_frame(f"/world/solids/{nodes[name]}", show_axes=False))
-        add_meshes(scene, f"/world/solids/{nodes[name]}", coloured_meshes(parts))
-    tiles = ground_tiles(run)
-    if tiles is not None:
-        vertices, light, dark = tiles
-        squares = ((GROUND_COLOUR, vertices, light), (GROUND_COLOUR_2, vertices, dark))
-        add_meshes(scene, "/world/ground", squares, cast_shadow=False)
-    for k, (vertices, faces) in enumerate(surfaces(run)):
-        painted = [(colour, vertices, triangles) for colour, triangles in faces if len(triangles)]
-        add_meshes(scene, f"/world/surface_{k}", painted, cast_shadow=False)
-    add_meshes(scene, "/world/goal", goal_meshes(run))
-    centres, radii = spheres(run)
-    for name, rings, chosen in (
-        ("pebbles", 5, radii < LARGE),
-        ("rocks", 10 if len(radii) < MANY else 7, radii >= LARGE),
-    ):
-        if chosen.any():
-            vertices, triangles = sphere_mesh(rings)
-            scene.add_batched_meshes_simple(
-                f"/world/{name}",
-                vertices,
-                triangles,
-                batched_wxyzs=np.tile((1.0, 0.0, 0.0, 0.0), (int(chosen.sum()), 1)),
-                batched_positions=centres[chosen],
-                batched_scales=radii[chosen],
-                batched_colors=rgb(ROCK_COLOUR),
-                lod="off",
-                cast_shadow=False,  # thousands of triangles, several times a frame
-            )
+    solids = add_rover(scene, run)
+    add_ground(scene, run)
     return world, solids
 
 

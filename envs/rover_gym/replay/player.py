@@ -94,8 +94,13 @@ def with_panel(page: str, title: str, curves: Mapping[str, Any]) -> str:
         f'<script type="application/json" id="curves">{data}</script>'
         f"<script>{script}</script>"
     )
+    return with_parts(page, title, panel)
+
+
+def with_parts(page: str, title: str, parts: str) -> str:
+    """Viser's page with a title and with HTML of ours beside the scene."""
     head, found, rest = page.partition("<title>Viser</title>")
     body, end, tail = rest.rpartition("</body>")
     if not found or not end:
         raise RuntimeError("viser's page has changed: it lacks the title or the end of the body where ours begins")
-    return f"{head}<title>{html.escape(title)}</title>{body}{panel}{end}{tail}"
+    return f"{head}<title>{html.escape(title)}</title>{body}{parts}{end}{tail}"

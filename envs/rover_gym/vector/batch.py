@@ -78,6 +78,7 @@ class RoverBatch:
         if threads is not None:
             threads = whole("threads", threads, at_least=1, at_most=MAX_THREADS)
         self.prototype = RoverEnv(**arguments)
+        #: What the episodes have in common.
         self.task: Task = self.prototype.task
         simulation = Simulation(self.task.model, Plane(), **self.task.simulation_options)
         self.episodes = EpisodeBatch(
@@ -390,6 +391,7 @@ class Drawn(NamedTuple):
 class BatchRover:
     """A view of one rover of a batch, with the names of `RoverEnv`: read-only except for the difficulty."""
 
+    #: None: Gymnasium has registered the vector environment, not its rovers.
     spec = None
 
     def __init__(self, batch: RoverBatch, i: int) -> None:

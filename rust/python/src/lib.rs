@@ -17,6 +17,7 @@ mod errors;
 mod files;
 mod friction_contact;
 mod generators;
+mod given_problem;
 mod grains;
 mod ground;
 mod height_field;

@@ -1,0 +1,357 @@
+"""Writes a rover's run as MCAP, row by row, as `Recorder` writes HDF5: the log that robotics viewers open."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.exports import mcap_messages as messages
+from rover_gym.exports.mcap_file import McapFile
+from rover_gym.mechanics import RoverModel, Terrain
+from rover_gym.record.channels import RoverSampler
+from rover_gym.record.facts import storable, versions
+from rover_gym.record.rover_run import RoverRun
+from rover_gym.record.trajectory import Trajectory
+from rover_gym.record.trajectory_format import RecordingError
+from rover_gym.rendering.appearance import ROCK_COLOUR
+from rover_gym.replay import scenery
+from rover_gym.validation import array, number, refuse, vector
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+    from types import TracebackType
+
+Array = npt.NDArray[np.float64]
+
+#: Half of the piece of ground that is shown about the first row of a run whose way is not known, m.
+REACH = 15.0
+#: Rows' channels that become columns of `/wheels`: the channel, and the names of its columns.
+WHEEL_CHANNELS = {
+    "wheel_gaps": ("gap",),
+    "wheel_forces": ("normal_force", "rolling_force", "lateral_force"),
+    "wheel_torques": ("torque",),
+    "motor_torques": ("motor_torque",),
+    "steering_set_points": ("steering_set_point",),
+}
+EARTH = (0.0, -9.81, 0.0)  # m/s², of runs whose attributes name none
+LATEST = 1.8e10  # s after 1970: what nanoseconds of 64 bits hold
+
+
+class McapWriter:
+    """Appends rows to an MCAP file; a context manager.
+
+    The file is complete after every commit, so that a process that is killed leaves a file that every reader opens: at
+    most the last 64 KiB of messages are lost, and none before `flush`. A full disk ends the log with an error, and the
+    file stays as it was committed. Topics:
+
+    | topic | schema | content |
+    |---|---|---|
+    | `/tf` | `foxglove.FrameTransforms` | `map` (z up) to `world` (y up), `world` to every solid |
+    | `/joint_states` | `foxglove.JointStates` | every joint; the effort of driven wheels |
+    | `/imu` | `sensor_msgs/msg/Imu` | see `imu` |
+    | `/scene` | `foxglove.SceneUpdate` | the rover's shapes, ground, rocks and goal; once |
+    | `/wheels` | JSON | by wheel: gap, forces, torques, set-point |
+    | `/signals` | JSON | every other channel of the rows |
+    | `/points`, `/camera` | `foxglove.PointCloud`, `foxglove.CompressedImage` | see `points` and `image` |
+
+    Args:
+        path: The file to create, with its folder. An existing file is replaced unless it is being written.
+        model: The rover.
+        terrain: The ground.
+        goal: Goal on the map (x, z), m.
+        attributes: Metadata of the run, as `describe` returns them.
+        way: (n, 2) places (x, z), m, about which a map or a plane is shown; about the first row by default.
+        epoch: Time of time 0, s after 1970; 0 puts the run there.
+
+    Raises:
+        RecordingError: An argument is out of range, or the file is in use.
+        OSError: The file cannot be created.
+        MissingExtraError: The extra `logs` is not installed.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        model: RoverModel,
+        terrain: Terrain,
+        *,
+        goal: tuple[float, float] | None = None,
+        attributes: Mapping[str, Any] | None = None,
+        way: npt.ArrayLike | None = None,
+        epoch: float = 0.0,
+    ) -> None:
+        self._epoch = number("epoch", epoch, at_least=0.0, at_most=LATEST / 2, error=RecordingError)
+        self._goal = None if goal is None else _pair("goal", goal)
+        self._way = None if way is None else array("way", way, error=RecordingError)
+        if self._way is not None and (
+            self._way.ndim != 2 or self._way.shape[1] != 2 or not np.isfinite(self._way).all()
+        ):
+            refuse(RecordingError, "way", self._way.shape, "must be finite and have the shape (n, 2)")
+        solver = (attributes or {}).get("solver")
+        gravity = solver.get("gravity", EARTH) if isinstance(solver, dict) else EARTH
+        self._gravity = np.array(vector("solver.gravity", gravity, 3, error=RecordingError))
+        facts = storable({**versions(), **(attributes or {})})
+        self._model, self._terrain = model, terrain
+        self._shapes = {channel.name: channel.shape for channel in RoverSampler(model).channels}
+        self._frames = scenery.identifiers(model.solid_names, taken=(messages.MAP, messages.WORLD))
+        self._signs = _drive_signs(model)
+        self._last: tuple[float, Array] | None = None  # time and velocity of the last row, for the IMU
+        self._topics: dict[str, int] = {}
+        self._file = McapFile(path)
+        self._file.describe("rover_gym", {name: _text(value) for name, value in facts.items()})
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self._file.path
+
+    def append(self, row: Mapping[str, npt.ArrayLike]) -> None:
+        """Writes one row, as `RoverSampler.row` returns it; further channels go to `/signals`.
+
+        The IMU is an ideal one at the trunk's origin: its acceleration is the mean since the last row.
+
+        Args:
+            row: Channels by name, with at least `time`, `q` and `v`.
+
+        Raises:
+            RecordingError: A channel is missing, not numeric, of a wrong shape or not finite; nothing is written. Or
+                the file is closed or cannot be written; it is then closed.
+        """
+        values = self._checked(row)
+        time, q, v = float(values.pop("time")), values.pop("q"), values.pop("v")
+        stamp = self._stamp(time)
+        if "scene" not in self._topics:
+            self._topics["scene"] = 0
+            self._file.write("/scene", stamp, self._scene(stamp, q))
+        poses = self._model.poses(q, "state")
+        frames = [(messages.MAP, messages.WORLD, np.zeros(3), messages.MAP_FROM_WORLD)]
+        frames += [(messages.WORLD, self._frames[name], *poses[name]) for name in self._model.solid_names]
+        self._file.write("/tf", stamp, messages.transforms(stamp, frames))
+        efforts = {
+            joint - 6: float(sign * torque)
+            for (joint, sign), torque in zip(self._signs, values.get("motor_torques", np.empty(0)), strict=False)
+        }
+        names = self._model.dof_names[6:]
+        self._file.write("/joint_states", stamp, messages.joint_states(stamp, names, q[6:], v[6:], efforts))
+        self._own_imu(time, poses[self._model.solid_names[0]][1], v)
+        wheels = {name: values.pop(name) for name in WHEEL_CHANNELS if name in values}
+        if wheels:
+            self._json("/wheels", stamp, self._by_wheel(wheels))
+        values.pop("wheel_centres", None)  # they are in /tf
+        if values:
+            self._json("/signals", stamp, {name: _plain(value) for name, value in values.items()})
+
+    def imu(
+        self,
+        time: float,
+        rotation: npt.ArrayLike,
+        angular_velocity: npt.ArrayLike,
+        acceleration: npt.ArrayLike,
+        *,
+        frame: str | None = None,
+        topic: str = "/imu/sensor",
+    ) -> None:
+        """Writes the reading of an IMU.
+
+        Args:
+            time: s.
+            rotation: Of the sensor's frame to the world, (3, 3).
+            angular_velocity: In the sensor's frame, rad/s, (3,).
+            acceleration: Acceleration less gravity in the sensor's frame, m/s², (3,); at rest it points up.
+            frame: The sensor's frame; the trunk's by default.
+            topic: The topic.
+
+        Raises:
+            RecordingError: An argument is out of range, or the file is closed or cannot be written.
+        """
+        stamp, turn = self._stamp(time), _finite("rotation", rotation, (3, 3))
+        rates = _finite("angular_velocity", angular_velocity, (3,))
+        felt = _finite("acceleration", acceleration, (3,))
+        if topic not in self._topics:
+            schema = self._topics.get("imu")
+            if schema is None:
+                schema = self._file.schema(messages.IMU_NAME, "ros2msg", messages.IMU_SCHEMA.encode())
+                self._topics["imu"] = schema
+            self._file.add_channel(topic, messages.IMU_NAME, "cdr", schema)
+            self._topics[topic] = schema
+        seen_from = self._frames[self._model.solid_names[0]] if frame is None else frame
+        data = messages.imu(stamp, seen_from, messages.MAP_FROM_WORLD @ turn, rates, felt)
+        self._file.write_bytes(topic, stamp, data)
+
+    def points(
+        self, time: float, points: npt.ArrayLike, *, frame: str = messages.WORLD, topic: str = "/points"
+    ) -> None:
+        """Writes a point cloud, such as a scan or balls.
+
+        Args:
+            time: s.
+            points: (n, 3), m; rows that are not finite, where a ray met nothing, are left out.
+            frame: The frame of the points: `world` or a solid's.
+            topic: The topic.
+
+        Raises:
+            RecordingError: An argument is out of range, or the file is closed or cannot be written.
+        """
+        given = array("points", points, error=RecordingError)
+        if given.ndim != 2 or given.shape[1] != 3:
+            refuse(RecordingError, "points", given.shape, "must have the shape (n, 3)")
+        stamp = self._stamp(time)
+        self._file.write(topic, stamp, messages.point_cloud(stamp, frame, given[np.isfinite(given).all(axis=1)]))
+
+    def image(
+        self, time: float, pixels: npt.NDArray[np.uint8], *, frame: str = "camera", topic: str = "/camera"
+    ) -> None:
+        """Writes a rendered image.
+
+        Args:
+            time: s.
+            pixels: (height, width, 3) uint8, top row first.
+            frame: The camera's frame.
+            topic: The topic.
+
+        Raises:
+            RecordingError: An argument is out of range, or the file is closed or cannot be written.
+        """
+        given = np.asarray(pixels)
+        if given.dtype != np.uint8 or given.ndim != 3 or given.shape[2] != 3 or 0 in given.shape:
+            refuse(RecordingError, "pixels", (given.shape, str(given.dtype)), "must be (height, width, 3) of uint8")
+        stamp = self._stamp(time)
+        self._file.write(topic, stamp, messages.image(stamp, frame, given))
+
+    def flush(self) -> None:
+        """Writes all messages to the disk.
+
+        Raises:
+            RecordingError: The file is closed or cannot be written; it is then closed.
+        """
+        self._file.flush()
+
+    def close(self) -> None:
+        """Writes what is left and the index; a second call does nothing.
+
+        Raises:
+            RecordingError: The disk is full; what was committed stays readable.
+        """
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _checked(self, row: Mapping[str, npt.ArrayLike]) -> dict[str, Array]:
+        """Copies of a row's values, checked."""
+        values = {name: array(name, value, error=RecordingError) for name, value in row.items()}
+        for name in ("time", "q", "v"):
+            if name not in values:
+                refuse(RecordingError, "row", sorted(values), f"must hold {name}")
+        for name, value in values.items():
+            shape = self._shapes.get(name, value.shape)
+            if value.shape != shape:
+                refuse(RecordingError, name, value.shape, f"must have the shape {shape}")
+        for name in ("time", "q", "v"):
+            if not np.isfinite(values[name]).all():
+                refuse(RecordingError, name, values[name], "must be finite")
+        return values
+
+    def _stamp(self, time: object) -> int:
+        seconds = self._epoch + number("time", time, error=RecordingError)
+        if not 0.0 <= seconds <= LATEST:
+            refuse(RecordingError, "time", time, f"must be from {-self._epoch:g} to {LATEST - self._epoch:g} s")
+        return round(seconds * 1e9)
+
+    def _own_imu(self, time: float, rotation: Array, v: Array) -> None:
+        """What an ideal IMU at the trunk's origin says."""
+        before, self._last = self._last, (time, v[:3].copy())
+        if before is None or not time > before[0]:
+            return
+        felt = (v[:3] - before[1]) / (time - before[0]) - self._gravity
+        self.imu(time, rotation, rotation.T @ v[3:6], rotation.T @ felt, topic="/imu")
+
+    def _by_wheel(self, values: Mapping[str, Array]) -> dict[str, dict[str, float | None]]:
+        found: dict[str, dict[str, float | None]] = {name: {} for name in self._model.wheel_names}
+        for channel, rows in values.items():
+            for name, row in zip(self._model.wheel_names, rows.reshape(len(rows), -1), strict=True):
+                found[name] |= zip(WHEEL_CHANNELS[channel], map(_plain, row), strict=True)
+        return found
+
+    def _json(self, topic: str, stamp: int, content: Mapping[str, Any]) -> None:
+        if topic not in self._topics:
+            name = f"rover_gym.{topic[1:].title()}"
+            shape = {"type": "object", "properties": {key: _schema_of(value) for key, value in content.items()}}
+            self._topics[topic] = self._file.schema(name, "jsonschema", json.dumps(shape).encode())
+            self._file.add_channel(topic, name, "json", self._topics[topic])
+        self._file.write_bytes(topic, stamp, json.dumps(content, allow_nan=False).encode())
+
+    def _scene(self, stamp: int, q: Array) -> Any:
+        """The rover's shapes in its solids' frames, and the ground about the way in the world."""
+        way = self._way
+        if way is None:
+            way = q[[0, 2]] + REACH * np.array([[-1.0, -1.0], [1.0, 1.0]])
+        rows = np.tile(q, (len(way), 1))
+        rows[:, [0, 2]] = way
+        run = RoverRun(Trajectory({"q": rows}, {}, {}), self._model, self._terrain, self._goal, "")
+        found = messages.scene(stamp)
+        for name, parts in scenery.parts_by_solid(run).items():
+            if parts:
+                messages.add_meshes(found, stamp, f"rover/{name}", self._frames[name], scenery.coloured_meshes(parts))
+        tiles = scenery.ground_tiles(run)
+        if tiles is not None:
+            vertices, light, dark = tiles
+            colours = ((scenery.GROUND_COLOUR, vertices, light), (scenery.GROUND_COLOUR_2, vertices, dark))
+            messages.add_meshes(found, stamp, "ground", messages.WORLD, colours)
+        for i, (vertices, faces) in enumerate(scenery.surfaces(run)):
+            coloured = [(colour, vertices, triangles) for colour, triangles in faces]
+            messages.add_meshes(found, stamp, f"surface/{i}", messages.WORLD, coloured)
+        centres, radii = scenery.spheres(run)
+        if len(radii):
+            messages.add_spheres(found, stamp, "rocks", centres, radii, ROCK_COLOUR)
+        if self._goal is not None:
+            goal = scenery.coloured_meshes(scenery.goal_parts(run))
+            messages.add_meshes(found, stamp, "goal", messages.WORLD, goal)
+        return found
+
+
+def _drive_signs(model: RoverModel) -> list[tuple[int, float]]:
+    """Of each wheel: the index of its joint in `dof_names`, and the sign of a torque that drives forward."""
+    wheels = model.to_dict()["wheels"]
+    joints = {name: i for i, name in enumerate(model.dof_names)}
+    return [(joints.get(wheel["solid"], 0), wheel.get("drive_sign", 1.0)) for wheel in wheels]
+
+
+def _pair(field: str, value: object) -> tuple[float, float]:
+    x, z = vector(field, value, 2, error=RecordingError)
+    return x, z
+
+
+def _finite(field: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> Array:
+    given = array(field, value, error=RecordingError)
+    if given.shape != shape or not np.isfinite(given).all():
+        refuse(RecordingError, field, value, f"must be finite and have the shape {shape}")
+    return given
+
+
+def _plain(value: Any) -> Any:
+    """A number, or nested lists of them, for JSON; None for what is not finite."""
+    if np.ndim(value):
+        return [_plain(entry) for entry in value]
+    return float(value) if np.isfinite(value) else None
+
+
+def _schema_of(value: Any) -> dict[str, Any]:
+    if isinstance(value, dict):
+        return {"type": "object", "properties": {key: _schema_of(entry) for key, entry in value.items()}}
+    if isinstance(value, list):
+        return {"type": "array", "items": {"type": ["number", "null"]}}
+    return {"type": ["number", "null"]}
+
+
+def _text(value: Any) -> str:
+    return value if isinstance(value, str) else json.dumps(np.asarray(value).tolist())
