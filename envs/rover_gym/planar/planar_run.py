@@ -151,7 +151,8 @@ def planar_run_of(trajectory: Trajectory, path: str | Path) -> PlanarRun:
 
 def _ground(plain: dict[str, Any]) -> PlanarGround:
     arguments = {name: value for name, value in plain.items() if name != "kind"}
-    return GROUNDS[plain["kind"]](**arguments)
+    ground: PlanarGround = GROUNDS[plain["kind"]](**arguments)
+    return ground
 
 
 def _radii(machine: dict[str, Any], discs: int) -> Array:
