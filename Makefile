@@ -74,7 +74,7 @@ docs: $(STAMPS)/test $(STAMPS)/train $(STAMPS)/core ## build the documentation, 
 
 bench: $(STAMPS)/core ## time a step and tell where the time goes, MuJoCo's beside it where it is installed (informs, does not gate)
 	$(COMPARE).exploring_bench
-	cargo bench --locked $(addprefix --bench ,step accuracy spheres solver soil)
+	cargo bench --locked $(addprefix --bench ,step accuracy spheres rays solver soil)
 	@if command -v valgrind > /dev/null; then cargo build --release --locked --quiet --example drive_steps; \
 	  count() { valgrind --tool=callgrind --callgrind-out-file=/dev/null target/release/examples/drive_steps $$1 2>&1 \
 	    | awk '/Collected/ { print $$NF }'; }; \

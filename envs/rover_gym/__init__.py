@@ -15,6 +15,7 @@ The package consists of the subpackages below. Each one may import those above i
     grains         granular ground of balls, in space
     env            `Rover-v0`: its card, arguments and control period
     vector         batches of rovers, for Gymnasium and for stable-baselines3
+    sensors        encoders, inertial unit, cameras and scanners as observations
     policy         the baseline, trained policies and their evaluation
     planning       the cheapest model that a scene permits
     planar         the planar systems: a ball, a two-wheel rover

@@ -135,6 +135,22 @@ for name in ("robot.urdf", "robot.xml"):
     rover("model", "import", name, "--output", "read.toml")
     rover("drive", "--model", "read.toml", "--time-limit", "0.2")
 """,
+    "data": """
+import minari
+import h5py
+""",
+    "onnx": """
+import onnx
+""",
+    "logs": """
+rover(*RECORDED)
+rover("export", "mcap", "run/episode-0.h5")
+(log,) = Path(".").rglob("*.mcap")
+from mcap.reader import make_reader
+
+with log.open("rb") as stream:
+    assert make_reader(stream).get_summary().statistics.message_count > 10
+""",
     "train": """
 rover("train", "plane", "--steps", "2000", "--no-progress", "--output", "run")
 rover("drive", "--policy", "run", "--time-limit", "0.2")

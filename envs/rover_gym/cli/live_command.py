@@ -38,6 +38,9 @@ def live(
         str, typer.Option(help="Address to listen at. The default refuses other machines; 0.0.0.0 lets them in.")
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="Port to listen at; 0 takes any that is free.")] = 8765,
+    fps: Annotated[
+        float, typer.Option(help="Pictures a second, 1 to 60; fewer for a browser without a graphics card.")
+    ] = 40.0,
     show: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
 ) -> None:
     """Drive a rover in real time behind a page in the browser, by keyboard, gamepad, sliders or a policy.
@@ -68,7 +71,7 @@ def live(
         seed=seed,
     )
     loop = LiveLoop(LiveRover(scene, choices), output)
-    server = LiveServer(loop, choices, host=host, port=port)
+    server = LiveServer(loop, choices, host=host, port=port, fps=fps)
     typer.echo(f"rover live: {server.address} (Ctrl-C ends it)")
     loop.start()
     try:

@@ -21,7 +21,7 @@ LONGEST_REWIND = 3600.0
 
 @dataclass(frozen=True)
 class Drive:
-    """Drive by hand until the next such command, for half a second at most.
+    """Drive by hand until the next such command, for a second at most.
 
     Attributes:
         forward: Speed, -1 to 1 of the largest.

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 #: Most commands that wait: a page sends some ten a second.
 MOST_WAITING = 1000
 #: A command by hand ends after this time, so that a rover whose page has vanished comes to rest, s.
-HOLD = 0.5
+HOLD = 1.0
 #: A loop that is behind by more gives the time up instead of hurrying after it, s.
 MOST_DEBT = 0.25
 #: Time over which the real-time factor is measured, s.

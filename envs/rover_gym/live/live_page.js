@@ -4,7 +4,7 @@
 (() => {
   const part = (name) => document.getElementById(name);
   const KEPT = 20; // s of curves
-  const PERIOD = 100; // ms between two commands by hand; the drive forgets one after 500
+  const PERIOD = 100; // ms between two commands by hand; the drive forgets one after 1000
   const DEAD = 0.12; // of a gamepad's stick, which never rests at zero
   const STEERS = { w: [1, 0], s: [-1, 0], a: [0, 1], d: [0, -1],
     arrowup: [1, 0], arrowdown: [-1, 0], arrowleft: [0, 1], arrowright: [0, -1] };

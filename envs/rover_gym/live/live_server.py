@@ -20,7 +20,7 @@ from rover_gym.live.live_view import LiveView
 from rover_gym.mechanics import CommandError, RoverGymError
 from rover_gym.replay.page import WHEEL_COLOURS
 from rover_gym.replay.player import with_parts
-from rover_gym.validation import refuse
+from rover_gym.validation import number, refuse
 
 if TYPE_CHECKING:
     from rover_gym.live.live_loop import LiveLoop
@@ -45,23 +45,27 @@ class LiveServer:
         choices: What may be chosen.
         host: Name or address to listen at; "127.0.0.1" refuses other machines.
         port: Port; 0 for any free one.
+        fps: Pictures of the scene a second, 1 to 60; fewer for a browser that draws slowly.
 
     Attributes:
         address: Where the page is, as a browser takes it.
         view: What the pages see.
 
     Raises:
-        OptionError: There is no such host, or the port is in use.
+        OptionError: There is no such host, the port is in use, or `fps` is out of its range.
         MissingExtraError: viser is not installed.
     """
 
-    def __init__(self, loop: LiveLoop, choices: LiveChoices, *, host: str = "127.0.0.1", port: int = 8765) -> None:
+    def __init__(
+        self, loop: LiveLoop, choices: LiveChoices, *, host: str = "127.0.0.1", port: int = 8765, fps: float = 40.0
+    ) -> None:
+        pictures = number("fps", fps, at_least=1.0, at_most=60.0)
         self._loop, self._choices = loop, choices
         self._pages: list[Any] = []
         self._at_wheel: Any = None
         self._served: GuardedServer = start_guarded(host, port, _page(), self._serve)
         self.address = self._served.address
-        self.view = LiveView(self._served.viser, loop)
+        self.view = LiveView(self._served.viser, loop, pictures)
         self.view.start()
 
     @property

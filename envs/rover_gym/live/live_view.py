@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from rover_gym.live.live_loop import LiveLoop
     from rover_gym.live.live_state import LiveState
 
-FRAMES = 40.0  # a second, at most
 REACH = 25.0  # m of ground around start and goal
 NEAR_EDGE = 8.0  # m from the edge of that ground, where it is laid anew
 #: The eye comes after the rover with this time constant, s.
@@ -41,13 +40,14 @@ class LiveView:
     Args:
         server: The viser server.
         loop: The drive.
+        fps: Pictures a second, at most.
 
     Attributes:
         frames: How many pictures have been sent.
     """
 
-    def __init__(self, server: Any, loop: LiveLoop) -> None:
-        self._server, self._loop = server, loop
+    def __init__(self, server: Any, loop: LiveLoop, fps: float) -> None:
+        self._server, self._loop, self._fps = server, loop, fps
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="live view", daemon=True)
         self._world_shown = -1
@@ -79,7 +79,7 @@ class LiveView:
                 before, now, since = now, state, at
             share = min(1.0, (at - since) / now.period)
             self.show(now, before if before.world == now.world else None, share)
-            due = max(due + 1.0 / FRAMES, at)
+            due = max(due + 1.0 / self._fps, at)
             self._stopping.wait(max(0.0, due - time.perf_counter()))
 
     def show(self, state: LiveState, before: LiveState | None, share: float) -> None:
@@ -106,7 +106,7 @@ class LiveView:
         centre = places[0]
         gap = centre - self._centre
         if np.abs(gap).max() > STILL:
-            share = 1.0 if np.abs(gap).max() > 3.0 else 1.0 - np.exp(-1.0 / (FRAMES * FOLLOW_TIME))
+            share = 1.0 if np.abs(gap).max() > 3.0 else 1.0 - np.exp(-1.0 / (self._fps * FOLLOW_TIME))
             self._centre = self._centre + share * gap
             self._frame.position = shortened(-self._centre)
         if self._shown is None:
