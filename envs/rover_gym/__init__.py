@@ -22,9 +22,9 @@ The package consists of the subpackages below. Each one may import those above i
     replay         saved runs for the browser, VRML and glTF
     figures        figures of saved runs
     learning       training with stable-baselines3
+    registration   the environments' names for Gymnasium
     exports        runs, policies and simulations for other programs
     cli            the command `rover`
-    registration   the environments' names for Gymnasium
 """
 
 from rover_gym.env.rover_env import RoverEnv
