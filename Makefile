@@ -14,7 +14,7 @@ UV     := $(BIN)/uv pip install --quiet --python $(BIN)/python
 export PYO3_PYTHON := $(abspath $(BIN)/python)# one interpreter for every cargo call, so that nothing is built twice
 export VIRTUAL_ENV := $(abspath $(VENV))# where maturin installs
 
-.PHONY: help demo test check lint types deny format stub test-rust test-python docs bench chart stability torture validate orders bits profiles train train-rllib pins clean
+.PHONY: help demo test check lint types deny format stub test-rust test-python wheel extras docs bench chart stability torture validate orders bits profiles train train-rllib pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -58,6 +58,14 @@ test-rust: ## the Rust tests only
 test-python: $(STAMPS)/test $(STAMPS)/train $(STAMPS)/core $(STAMPS)/debian-demo $(STAMPS)/debian-test ## the Python tests only
 	$(BIN)/pytest --numprocesses auto
 
+wheel: $(STAMPS)/demo ## build the wheel, one for every Python from 3.11 on, and the archive of the sources, into dist/
+	rm -rf dist
+	CARGO_TARGET_DIR=$(abspath target) $(BIN)/python -m maturin build --release --sdist --quiet --out dist
+	@ls dist/*
+
+extras: $(STAMPS)/test wheel ## install the wheel, without Rust, in an empty environment for every Python and for each extra, and try what it promises
+	ROVER_GYM_WHEEL=$$(ls $(abspath dist)/*.whl) $(BIN)/pytest --numprocesses 0 --capture no tests/installing
+
 docs: $(STAMPS)/test $(STAMPS)/train $(STAMPS)/core ## build the documentation, Rust and Python, warnings denied
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked --quiet
 	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going docs docs/_build/html
@@ -66,7 +74,7 @@ docs: $(STAMPS)/test $(STAMPS)/train $(STAMPS)/core ## build the documentation, 
 
 bench: $(STAMPS)/core ## time a step and tell where the time goes, MuJoCo's beside it where it is installed (informs, does not gate)
 	$(COMPARE).exploring_bench
-	cargo bench --locked $(addprefix --bench ,step accuracy spheres solver soil)
+	cargo bench --locked $(addprefix --bench ,step accuracy spheres rays solver soil)
 	@if command -v valgrind > /dev/null; then cargo build --release --locked --quiet --example drive_steps; \
 	  count() { valgrind --tool=callgrind --callgrind-out-file=/dev/null target/release/examples/drive_steps $$1 2>&1 \
 	    | awk '/Collected/ { print $$NF }'; }; \
@@ -118,7 +126,7 @@ pins: $(STAMPS)/venv ## resolve requirements/*.txt anew from pyproject.toml
 	$(call pin,peers) --extra peers --constraint requirements/test.txt
 
 clean: ## remove everything that make made, but for runs/
-	rm -rf $(VENV) $(VENV)-rllib target docs/_build envs/rover_gym/_core*.so .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) $(VENV)-rllib target dist docs/_build envs/rover_gym/_core*.so .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
 # One list for every Python from 3.11 on, versions only.
 pin = $(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --no-annotate \

@@ -235,7 +235,7 @@ def train(
         csv.writer(file).writerows([("decisions", "success", "return", "length", "wall_seconds"), *rows])
     scale = {"mean": agent.scale.mean, "variance": agent.scale.variance}
     torch.save({"agent": agent.state_dict(), "scale": scale}, folder / "agent.pt")
-    ground = {} if task == "plane" else {"terrain": "sphere_field"}
+    ground = {} if task == "plane" else {"terrain": "rocks"}
     drives = drive_all(
         lambda _env: agent, range(1_000_000, 1_000_000 + episodes), arguments={**DECISIONS, **ground, **arguments}
     )

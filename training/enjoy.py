@@ -21,9 +21,7 @@ from rover_gym.policy import TrainedPolicy, policy_arguments, run_episode
 @plain_errors
 def enjoy(
     policy: Annotated[Path, typer.Argument(exists=True, help="Folder of a run or of a policy.")],
-    terrain: Annotated[
-        str, typer.Option(help="'plane', 'sphere_field', 'hills', or the file of a map or a mesh.")
-    ] = "sphere_field",
+    terrain: Annotated[str, typer.Option(help="'plane', 'rocks', 'hills', or the file of a map or a mesh.")] = "rocks",
     model: ModelName = BUILT_IN,
     difficulty: Annotated[float | None, typer.Option(help="Of the rocks, from 0 to 2.")] = None,
     episodes: Annotated[int, typer.Option(min=1, help="How many.")] = 1,

@@ -1,6 +1,6 @@
 """Copies a trained policy, its run and its evaluation into the package, for `rover drive --policy trained`.
 
-python training/ship.py runs/train/rocks-seed1 --evaluation runs/evaluation-rocks --terrain sphere_field
+python training/ship.py runs/train/rocks-seed1 --evaluation runs/evaluation-rocks --terrain rocks
 """
 
 import csv
@@ -19,7 +19,7 @@ from rover_gym.policy import policy_folder
 def ship(
     run: Annotated[Path, typer.Argument(exists=True, file_okay=False, help="Folder of a run.")],
     evaluation: Annotated[Path, typer.Option(exists=True, file_okay=False, help="Folder of its evaluation.")],
-    terrain: Annotated[str, typer.Option(help="'plane' or 'sphere_field'.")] = "sphere_field",
+    terrain: Annotated[str, typer.Option(help="'plane' or 'rocks'.")] = "rocks",
 ) -> None:
     """Copy a policy into the package."""
     folder = policy_folder(terrain)

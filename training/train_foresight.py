@@ -36,7 +36,7 @@ def train(
         1.0,
         2.0,
     ),
-    terrain: Annotated[str, typer.Option(help="sphere_field or hills.")] = "sphere_field",
+    terrain: Annotated[str, typer.Option(help="rocks or hills.")] = "rocks",
     model: ModelName = BUILT_IN,
     output: Annotated[
         Path | None, typer.Option(file_okay=False, help="The run's folder; runs/train/foresight-seedN if not given.")

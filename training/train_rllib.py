@@ -60,7 +60,7 @@ def train(
     register_env("Rover", make_rovers)
     environment: dict[str, Any] = {"command": {"repeat": REPEAT}, "max_episode_steps": 600}
     if rocks:
-        environment |= {"terrain": "sphere_field", "height_scan": (32, 16, 0.1)}
+        environment |= {"terrain": "rocks", "height_scan": (32, 16, 0.1)}
         environment["command"] |= {"guided": True, "pool": 2}
 
     rows = []

@@ -12,7 +12,7 @@ from rover_gym.record import read_run
 
 HERE = Path(__file__).parent
 WIDTH = 900  # pixels
-DRIVE = ("drive", "--terrain", "sphere_field", "--difficulty", "0.75", "--seed", "3", "--output")
+DRIVE = ("drive", "--terrain", "rocks", "--difficulty", "0.75", "--seed", "3", "--output")
 
 
 def main() -> None:

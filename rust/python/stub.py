@@ -26,9 +26,9 @@ def nodes(stub: str) -> Iterator[tuple[str, Documented]]:
 
 
 def docstring(module: ModuleType, name: str) -> str | None:
-    """The module's docstring of what has this dotted name; None for special methods, which Python documents."""
+    """The module's docstring of what has this dotted name; None for special methods and for the stub's own names."""
     owner, _, member = name.rpartition(".")
-    if member.startswith("__"):
+    if member.startswith("_") or owner.startswith("_"):
         return None
     doc = getattr(getattr(module, owner) if owner else module, member).__doc__
     return inspect.cleandoc(doc) if doc else None

@@ -13,7 +13,7 @@ import pytest
 from rover_gym import OptionError, RoverGymError, RoverModel, Simulation
 from rover_gym.identification import Identification, Parameter, identify
 
-pytest.importorskip("h5py", reason="the extra demo is not installed")
+pytest.importorskip("h5py", reason="the extra record is not installed")
 
 from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_run
 

@@ -144,7 +144,7 @@ def test_a_plan_says_what_a_batch_leaves_out() -> None:
     assert decided(Scene(), "in a batch")[0] == "RoverVectorEnv with its defaults"
     assert decided(Scene(steered=False), "in a batch")[0] == "RoverVectorEnv with steered False"
     rocks = SphereField(np.array([(3.0, 0.0, 0.0)]), np.array([0.1]), Plane())
-    assert "sphere_field" in decided(Scene(rocks), "in a batch")[0]
+    assert "rocks" in decided(Scene(rocks), "in a batch")[0]
     assert decided(Scene(rocks, reach=0.5), "in a batch")[0] == "RoverVectorEnv with its defaults"
 
 

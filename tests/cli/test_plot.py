@@ -61,7 +61,7 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("runs")
     common = ("--time-limit", "2", "--seed", "1", "--output")
     assert rover("drive", *common, str(folder / "flat")).exit_code == 0
-    rocks = ("--terrain", "sphere_field", "--difficulty", "1")
+    rocks = ("--terrain", "rocks", "--difficulty", "1")
     assert rover("drive", *rocks, *common, str(folder / "rocks")).exit_code == 0
     inclined_plane.run(folder / "section_6_1.h5", duration=3.5)
     sphere_rug.run(folder / "rug.h5", duration=4.0)

@@ -65,7 +65,7 @@ def test_the_wheels_recorded_gaps_are_those_over_the_ground_that_is_read(tmp_pat
             assert run.model.wheel_gaps(q, run.terrain, "state") == pytest.approx(gaps, abs=1e-12)
 
 
-@pytest.mark.parametrize("terrain", ["plane", "sphere_field"])
+@pytest.mark.parametrize("terrain", ["plane", "rocks"])
 def test_an_episode_is_read_back_with_its_goal(terrain: str, tmp_path: Path) -> None:
     arguments = ["drive", "--terrain", terrain, "--goal", "5", "1", "--time-limit", "1", "--output", str(tmp_path)]
     assert CliRunner().invoke(app, arguments).exit_code == 0

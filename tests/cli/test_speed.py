@@ -10,7 +10,7 @@ from rover_gym.cli import app
 from rover_gym.vector.exploring import MUJOCO
 
 
-@pytest.mark.parametrize("terrain", ["plane", "sphere_field"])
+@pytest.mark.parametrize("terrain", ["plane", "rocks"])
 def test_json_adds_up(terrain: str) -> None:
     options = ["--num-envs", "3", "--threads", "2", "--rounds", "2", "--terrain", terrain, "--json"]
     result = CliRunner().invoke(app, ["speed", *options])
@@ -43,7 +43,7 @@ def test_the_text_names_what_it_tells() -> None:
         "rover-steps/s",
         "simulated s/s",
         "plane",
-        "sphere_field",
+        "rocks",
         "inside the physics",
         "over SyncVectorEnv",
     ):

@@ -122,13 +122,13 @@ def trajectories() -> dict[str, Callable[[], Trajectory]]:
     found["batch of eight among rocks"] = batch
     for name, arguments in {
         "plane": {},
-        "rocks": {"terrain": "sphere_field", "height_scan": True},
+        "rocks": {"terrain": "rocks", "height_scan": True},
         "slope, randomised": {"slope_deg": 8.0, "friction": (0.4, 0.9), "mass_scale": (0.8, 1.2)},
     }.items():
         found[f"environment, {name}"] = partial(environment, **arguments)
         found[f"vector environment, {name}"] = partial(vector, **arguments)
     found["PD baseline, plane"] = baseline
-    found["PD baseline, rocks"] = partial(baseline, terrain="sphere_field")
+    found["PD baseline, rocks"] = partial(baseline, terrain="rocks")
     found["ball on a line"] = lambda: planar(BallSimulation(Line(slope=-0.2)))
     found["two-wheel rover"] = lambda: planar(TwoWheelRoverSimulation(Line()), np.array([20.0, 20.0]))
     found["soil"] = soil

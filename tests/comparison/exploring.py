@@ -2,7 +2,7 @@
 
 Torques and set-points of the steering are redrawn every 50 ms. A drive is recorded as numbers in [-1, 1], which a
 torque (N m) and the steering's limit scale, so that one record serves all torques. Its rocks are those of `Rover-v0`
-with `terrain="sphere_field"` at difficulty 0.5, slope included; the rover starts at rest halfway to the goal, since
+with `terrain="rocks"` at difficulty 0.5, slope included; the rover starts at rest halfway to the goal, since
 the clearing at the environment's start has no rocks. Rust plays the same file (`tests/physics/exploring_scenes.rs`).
 
 `python -m comparison.exploring` records `exploring.json` anew.
@@ -97,7 +97,7 @@ def scene(drive: Drive, ground: str, torque: float, periods: int = PERIODS) -> R
 
 def _record(seed: int) -> dict[str, Any]:
     rng = np.random.default_rng(seed)
-    env: Any = gym.make("Rover-v0", terrain="sphere_field", difficulty=DIFFICULTY).unwrapped
+    env: Any = gym.make("Rover-v0", terrain="rocks", difficulty=DIFFICULTY).unwrapped
     env.reset(seed=seed)
     terrain, start = env.simulation.terrain, env.start
     normal = [float(x) for x in terrain.ground.normal]

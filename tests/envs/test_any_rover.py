@@ -60,7 +60,7 @@ def test_the_reward_takes_means_over_wheels_and_over_joints_that_steer() -> None
 @pytest.mark.parametrize("name", NAMES)
 def test_rovers_of_a_batch_move_as_alone(name: str) -> None:
     n_actions, model = MACHINES[name]
-    arguments: dict[str, Any] = {"model": model, "max_episode_steps": 9, "terrain": "sphere_field", "difficulty": 0.5}
+    arguments: dict[str, Any] = {"model": model, "max_episode_steps": 9, "terrain": "rocks", "difficulty": 0.5}
     ours = gym.make_vec("Rover-v0", 3, threads=2, **arguments)
     assert type(ours) is RoverVectorEnv
     alone = gym.make_vec("Rover-v0", 3, "sync", **arguments)

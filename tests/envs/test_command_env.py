@@ -27,7 +27,7 @@ def test_the_card_is_the_signature() -> None:
 
 
 def test_it_is_the_wrapper_around_the_rover() -> None:
-    arguments: dict[str, Any] = {"terrain": "sphere_field", "difficulty": 0.3, "height_scan": (8, 4, 0.2)}
+    arguments: dict[str, Any] = {"terrain": "rocks", "difficulty": 0.3, "height_scan": (8, 4, 0.2)}
     ours = gym.make("RoverCommand-v0", repeat=3, guided=True, pool=2, speed=0.8, **arguments)
     theirs = DriveByCommand(gym.make("Rover-v0", **arguments), repeat=3, guided=True, pool=2, speed=0.8)
     assert ours.observation_space == theirs.observation_space

@@ -25,7 +25,7 @@ from rover_gym.vector import RoverVectorEnv
 
 #: Everything that can be drawn is drawn.
 ALL_DRAWN: dict[str, Any] = {
-    "terrain": "sphere_field",
+    "terrain": "rocks",
     "difficulty": (0.0, 0.6),
     "friction": (0.5, 0.9),
     "mass_scale": (0.8, 1.2),
@@ -132,7 +132,7 @@ def test_scenes_do_not_hang_on_the_number_of_threads(mode: str) -> None:
 
 
 def test_episodes_can_be_drawn_without_an_environment() -> None:
-    task = RoverEnv(terrain="sphere_field").task
+    task = RoverEnv(terrain="rocks").task
     rows = seeded_rows([1, 2, 3])
     alone = task.episodes.draw(rows, fixed={"difficulty": 0.2, "position": (1.0, 2.0)})
     batch = EpisodeBatch(task.rules, Simulation(), 4, threads=2)
@@ -166,7 +166,7 @@ def test_episodes_can_be_drawn_without_an_environment() -> None:
 
 @pytest.mark.parametrize("same_step", [False, True])
 def test_a_step_that_begins_episodes_is_a_step_a_draw_and_a_beginning(same_step: bool) -> None:
-    task = RoverEnv(terrain="sphere_field", observation_noise=0.01).task
+    task = RoverEnv(terrain="rocks", observation_noise=0.01).task
     one, two = (EpisodeBatch(task.rules, Simulation(), 3, max_steps=2, threads=threads) for threads in (2, 1))
     for batch in (one, two):
         batch.begin(range(3), task.episodes.draw(seed_generators(range(3))))
@@ -291,7 +291,7 @@ RESETS = """
 import hashlib, numpy as np
 from rover_gym import RoverEnv
 seen = hashlib.sha256()
-rocks = {"terrain": "sphere_field", "height_scan": True, "observation_noise": 0.1}
+rocks = {"terrain": "rocks", "height_scan": True, "observation_noise": 0.1}
 for arguments in ({"slope_deg": (0.0, 20.0)}, rocks, {"terrain": "hills"}):
     env = RoverEnv(**arguments)
     for seed in range(40):

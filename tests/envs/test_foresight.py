@@ -109,10 +109,10 @@ def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
 
 def test_a_name_and_a_folder_lead_to_it(tmp_path: Path) -> None:
     env, _ = in_front_of_a_rock(0.1)
-    named = named_policy("foresight", "sphere_field")
+    named = named_policy("foresight", "rocks")
     assert isinstance(named.make(env), ForesightPolicy)
     size = ArcFeatures(env, ScanPolicy(env)).size + 1
     constant(size, [0.0, 0.0, 0.0]).save(tmp_path / FORECAST_FILE)
-    own = named_policy(str(tmp_path), "sphere_field")
+    own = named_policy(str(tmp_path), "rocks")
     assert own.arguments == ARGUMENTS
     assert isinstance(own.make(env), ForesightPolicy)

@@ -18,7 +18,7 @@ SCENES: list[dict[str, Any]] = [
     {},
     {"goal_distance": (0.6, 1.0), "stuck_time": 0.3, "max_tilt_deg": 8.0, "slope_deg": (0.0, 15.0)},
     {
-        "terrain": "sphere_field",
+        "terrain": "rocks",
         "height_scan": (5, 3, 0.4),
         "observation_noise": 0.02,
         "actuator_gain": (0.5, 1.5),
@@ -162,7 +162,7 @@ def test_rovers_that_do_not_move_keep_their_last_period() -> None:
     assert (states == rovers.generators(range(3))).all(axis=1).tolist() == [False, True, False]
 
 
-SCAN: dict[str, Any] = {"terrain": "sphere_field", "height_scan": (5, 3, 0.4), "difficulty": 1.0}
+SCAN: dict[str, Any] = {"terrain": "rocks", "height_scan": (5, 3, 0.4), "difficulty": 1.0}
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.05])

@@ -90,7 +90,7 @@ def drive(env: RoverEnv) -> None:
 ARGUMENTS = list(inspect.signature(RoverEnv).parameters)
 
 
-@pytest.mark.parametrize("terrain", ["plane", "sphere_field"])
+@pytest.mark.parametrize("terrain", ["plane", "rocks"])
 @pytest.mark.parametrize("name", ARGUMENTS)
 def test_arguments_of_the_environment(name: str, terrain: str) -> None:
     assert throw(lambda value: drive(RoverEnv(**{"terrain": terrain, name: value}))) > 50
@@ -201,7 +201,7 @@ def vector() -> Watched:
     return Watched(RoverVectorEnv(2, threads=1), RoverVectorEnv(2, threads=1), vector_state)
 
 
-@pytest.mark.parametrize("terrain", ["plane", "sphere_field"])
+@pytest.mark.parametrize("terrain", ["plane", "rocks"])
 @pytest.mark.parametrize("name", RESET_OPTIONS)
 def test_reset_options(name: str, terrain: str) -> None:
     watched = single(terrain=terrain)
@@ -231,7 +231,7 @@ def test_masks_of_a_vector_reset() -> None:
 
 
 def test_difficulties_and_snapshots() -> None:
-    watched = single(terrain="sphere_field")
+    watched = single(terrain="rocks")
     assert watched.throw(watched.env.restore) > 70
 
     def use(value: Any) -> None:

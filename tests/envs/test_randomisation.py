@@ -42,7 +42,7 @@ def test_each_reset_draws_from_the_ranges() -> None:
 
 
 def test_randomisation_leaves_start_and_goal_as_they_were() -> None:
-    plain, random = RoverEnv(terrain="sphere_field"), RoverEnv(terrain="sphere_field", **RANGES)
+    plain, random = RoverEnv(terrain="rocks"), RoverEnv(terrain="rocks", **RANGES)
     for env in (plain, random):
         env.reset(seed=3)
     assert (plain.start, plain.rocks) == (random.start, random.rocks)
@@ -105,7 +105,7 @@ def test_noise_is_gaussian_and_only_on_what_is_measured() -> None:
 
 
 def test_difficulty_holds_from_the_next_reset_on() -> None:
-    env = RoverEnv(terrain="sphere_field", difficulty=0.2)
+    env = RoverEnv(terrain="rocks", difficulty=0.2)
     env.reset(seed=0)
     env.set_difficulty((0.7, 0.9))
     assert env.difficulty == 0.2
@@ -119,7 +119,7 @@ def test_difficulty_holds_from_the_next_reset_on() -> None:
 
 
 def test_a_difficulty_that_was_set_shifts_no_other_draw() -> None:
-    plain, harder = RoverEnv(terrain="sphere_field", slope_deg=0.0), RoverEnv(terrain="sphere_field", slope_deg=0.0)
+    plain, harder = RoverEnv(terrain="rocks", slope_deg=0.0), RoverEnv(terrain="rocks", slope_deg=0.0)
     harder.set_difficulty(0.9)
     for env in (plain, harder):
         env.reset(seed=5)
@@ -133,7 +133,7 @@ def test_a_difficulty_that_was_set_shifts_no_other_draw() -> None:
     ("difficulty", "field"), [(2.5, "difficulty"), ((0.5, 2.1), "difficulty[1]"), ((0.9, 0.1), "difficulty")]
 )
 def test_bad_difficulties_change_nothing(difficulty: Any, field: str) -> None:
-    env = RoverEnv(terrain="sphere_field", difficulty=0.3)
+    env = RoverEnv(terrain="rocks", difficulty=0.3)
     with pytest.raises(OptionError) as caught:
         env.set_difficulty(difficulty)
     assert caught.value.field == field
@@ -147,12 +147,12 @@ def test_the_plane_has_no_difficulty() -> None:
 
 
 def test_snapshots_keep_domain_and_difficulty() -> None:
-    env = RoverEnv(terrain="sphere_field", observation_noise=0.01, **RANGES)
+    env = RoverEnv(terrain="rocks", observation_noise=0.01, **RANGES)
     env.reset(seed=1)
     env.set_difficulty(0.8)
     env.step(push(0.3))
     snapshot = pickle.loads(pickle.dumps(env.snapshot()))  # noqa: S301 - our own bytes
-    other = RoverEnv(terrain="sphere_field", observation_noise=0.01, **RANGES)
+    other = RoverEnv(terrain="rocks", observation_noise=0.01, **RANGES)
     other.reset(seed=9)
     other.restore(snapshot)
     assert other.domain == env.domain

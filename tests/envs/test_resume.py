@@ -9,7 +9,7 @@ from rover_gym.vector.batch import RoverBatch
 
 
 def begun(**arguments: object) -> RoverBatch:
-    batch = RoverBatch(2, threads=1, terrain="sphere_field", difficulty=0.8, **arguments)  # type: ignore[arg-type]
+    batch = RoverBatch(2, threads=1, terrain="rocks", difficulty=0.8, **arguments)  # type: ignore[arg-type]
     batch.begin(batch.draw([0, 1], [7, 8]))
     return batch
 

@@ -29,7 +29,7 @@ def ends(before: Any, action: Any, after: Any, info: Any) -> Any:  # noqa: ARG00
 TERMS = {"climb": climb, "thrift": thrift, "ends": ends}
 ARGUMENTS: dict[str, Any] = {
     "reward_terms": TERMS,
-    "terrain": "sphere_field",
+    "terrain": "rocks",
     "goal_distance": (0.55, 0.7),
     "goal_bearing_deg": 0.0,
 }

@@ -63,7 +63,7 @@ def test_checkers_have_nothing_to_say(arguments: dict[str, Any]) -> None:
 
 
 def test_both_names_make_the_same_episodes() -> None:
-    names = ({"id": "RoverRocks-v0"}, {"id": "Rover-v0", "terrain": "sphere_field"})
+    names = ({"id": "RoverRocks-v0"}, {"id": "Rover-v0", "terrain": "rocks"})
     a, b = (gym.make(**arguments) for arguments in names)
     assert_equal_bits([a.reset(seed=4), *rollout(a, 20)], [b.reset(seed=4), *rollout(b, 20)])
 
@@ -88,7 +88,7 @@ def test_fields_differ_by_seed_and_from_episode_to_episode(rocks: RoverEnv) -> N
 
 
 def test_snapshot_and_copies_continue_bit_for_bit() -> None:
-    env = RoverEnv(terrain="sphere_field", difficulty=1.0)
+    env = RoverEnv(terrain="rocks", difficulty=1.0)
     env.reset(seed=3)
     rollout(env, 11, seed=5)
     snapshot = env.snapshot()
@@ -96,7 +96,7 @@ def test_snapshot_and_copies_continue_bit_for_bit() -> None:
     first = rollout(env, 20)
     env.restore(snapshot)
     assert_equal_bits(first, rollout(env, 20))
-    fresh = RoverEnv(terrain="sphere_field", difficulty=1.0)
+    fresh = RoverEnv(terrain="rocks", difficulty=1.0)
     fresh.reset(seed=99)
     fresh.restore(pickle.loads(pickle.dumps(snapshot)))  # noqa: S301 - our own bytes
     for other in (*others, fresh):
@@ -143,7 +143,7 @@ def test_difficulty_shifts_no_other_draw(rocks: RoverEnv) -> None:
 
 
 def test_range_of_difficulties_is_drawn_from() -> None:
-    env = RoverEnv(terrain="sphere_field", difficulty=(0.2, 0.4))
+    env = RoverEnv(terrain="rocks", difficulty=(0.2, 0.4))
     drawn = []
     for seed in range(20):
         env.reset(seed=seed)
@@ -155,7 +155,7 @@ def test_range_of_difficulties_is_drawn_from() -> None:
 
 
 def test_arguments_take_their_quantity_from_the_difficulty() -> None:
-    env = RoverEnv(terrain="sphere_field", rock_abundance=0.05, max_rock_radius=0.7, slope_deg=3.0)
+    env = RoverEnv(terrain="rocks", rock_abundance=0.05, max_rock_radius=0.7, slope_deg=3.0)
     for difficulty in (0.0, 1.0):
         env.reset(seed=1, options={"difficulty": difficulty})
         assert env.rocks is not None
@@ -178,7 +178,7 @@ def test_difficulty_table_of_the_card_is_the_map() -> None:
     section = card.split("## Rocks\n")[1].split("\n## ")[0]
     lines = [line for line in section.splitlines() if line.startswith("|")][2:]
     rows = {cells[1].strip(): [cell.strip() for cell in cells[2:4]] for cells in (line.split("|") for line in lines)}
-    env = RoverEnv(terrain="sphere_field")
+    env = RoverEnv(terrain="rocks")
     for d in (0.0, 0.25, 1.0, 1.25, 2.0):
         said = {name: halves[d > 1.0] for name, halves in rows.items()}
         slopes = said["slope_deg"].removeprefix("uniform, ").removesuffix(" d").split(" to ")
@@ -232,7 +232,7 @@ def test_ground_normal_is_the_planes(rocks: RoverEnv) -> None:
 
 @pytest.mark.parametrize("scan", [True, (3, 5, 0.4)])
 def test_height_scan_is_the_terrain_in_the_heading_frame(scan: Any) -> None:
-    env = RoverEnv(terrain="sphere_field", difficulty=1.0, height_scan=scan)
+    env = RoverEnv(terrain="rocks", difficulty=1.0, height_scan=scan)
     env.reset(seed=5)
     for _ in range(60):
         observation, *_ = env.step(np.array([0.3] * 6 + [0.5] * 6, np.float32))
@@ -253,7 +253,7 @@ def test_height_scan_is_the_terrain_in_the_heading_frame(scan: Any) -> None:
 
 
 def test_height_scan_comes_after_the_base_observation() -> None:
-    plain, seeing = RoverEnv(terrain="sphere_field"), RoverEnv(terrain="sphere_field", height_scan=True)
+    plain, seeing = RoverEnv(terrain="rocks"), RoverEnv(terrain="rocks", height_scan=True)
     base, _ = plain.reset(seed=3)
     whole, _ = seeing.reset(seed=3)
     assert whole.shape == seeing.observation_space.shape == (91 + 117,)
@@ -424,7 +424,7 @@ def test_a_field_without_ground_is_no_ground() -> None:
 
 
 def test_ten_minutes_of_driving_over_rocks() -> None:
-    env = RoverEnv(terrain="sphere_field", difficulty=(0.0, 1.0))
+    env = RoverEnv(terrain="rocks", difficulty=(0.0, 1.0))
     policy = PDPolicy(env)
     driven, seed, periods, unsolved = 0.0, 0, 0, 0
     while driven < 600.0:
@@ -443,3 +443,10 @@ def test_ten_minutes_of_driving_over_rocks() -> None:
         driven += info["time"]
         seed += 1
     assert unsolved <= periods // 1000
+
+
+def test_the_class_of_their_field_is_another_name_of_the_terrain() -> None:
+    """Files of trainings hold it."""
+    two = [RoverEnv(terrain=name) for name in ("rocks", "sphere_field")]
+    first, second = (env.reset(seed=1)[0] for env in two)
+    assert np.array_equal(first, second)

@@ -19,7 +19,7 @@ from rover_gym.vector.sb3 import RoverVecEnv
 LIMIT = 12
 SCENES: list[dict[str, Any]] = [
     {"goal_distance": (0.6, 1.0)},
-    {"terrain": "sphere_field", "height_scan": (5, 3, 0.4), "difficulty": (0.0, 1.0), "observation_noise": 0.02},
+    {"terrain": "rocks", "height_scan": (5, 3, 0.4), "difficulty": (0.0, 1.0), "observation_noise": 0.02},
 ]
 
 
@@ -94,7 +94,7 @@ def test_rewards_and_observations_are_the_callers() -> None:
 
 
 def test_seeds_and_options_are_used_once() -> None:
-    env = RoverVecEnv(2, terrain="sphere_field")
+    env = RoverVecEnv(2, terrain="rocks")
     env.seed(3)
     env.set_options({"difficulty": 0.9})
     first = env.reset()
@@ -109,7 +109,7 @@ def test_seeds_and_options_are_used_once() -> None:
 
 
 def test_difficulty_by_env_method() -> None:
-    env = RoverVecEnv(3, terrain="sphere_field", max_episode_steps=2)
+    env = RoverVecEnv(3, terrain="rocks", max_episode_steps=2)
     env.seed(0)
     env.reset()
     env.env_method("set_difficulty", 0.1, indices=[0, 2])
@@ -196,7 +196,7 @@ def test_ppo_learns_from_it_without_complaint() -> None:
     assert all("is_success" in episode for episode in model.ep_info_buffer)
 
 
-SCANNED: dict[str, Any] = {"terrain": "sphere_field", "height_scan": (6, 4, 0.3), "difficulty": 1.0}
+SCANNED: dict[str, Any] = {"terrain": "rocks", "height_scan": (6, 4, 0.3), "difficulty": 1.0}
 
 
 class Opaque(VecEnvWrapper):

@@ -20,7 +20,7 @@ ARGUMENTS = ScanPolicy.arguments()
 @pytest.fixture(scope="module")
 def rocks() -> RoverEnv:
     """A rover among rocks of difficulty 1, with the scan that the policy asks for."""
-    return RoverEnv(terrain="sphere_field", difficulty=1.0, **ARGUMENTS)
+    return RoverEnv(terrain="rocks", difficulty=1.0, **ARGUMENTS)
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +87,7 @@ def test_the_signature_is_stable_baselines3s(policy: ScanPolicy) -> None:
 
 
 def test_a_batch_drives_as_each_rover_alone(policy: ScanPolicy) -> None:
-    envs = [RoverEnv(terrain="sphere_field", difficulty=1.0, **ARGUMENTS) for _ in range(3)]
+    envs = [RoverEnv(terrain="rocks", difficulty=1.0, **ARGUMENTS) for _ in range(3)]
     seen = np.stack([env.reset(seed=seed)[0] for seed, env in enumerate(envs)])
     states: list[Any] = [None] * 3
     state: Any = None
@@ -134,7 +134,7 @@ def test_a_model_without_colliding_shapes_has_no_underside() -> None:
         solid["collides"] = False
     model = RoverModel.from_dict(description)
     assert RoverOutline.of(model, 0.1).underside.shape == (0, 2)
-    env = RoverEnv(terrain="sphere_field", model=model, **ARGUMENTS)
+    env = RoverEnv(terrain="rocks", model=model, **ARGUMENTS)
     observation, _ = env.reset(seed=0)
     action, _ = ScanPolicy(env).predict(observation)
     assert np.isfinite(action).all()
@@ -212,12 +212,10 @@ def test_it_reaches_goals_that_the_baseline_does_not(rocks: RoverEnv, policy: Sc
 @pytest.mark.parametrize("name", RoverModel.names())
 def test_it_drives_every_rover_of_the_gallery(name: str) -> None:
     model = RoverModel.named(name)
-    env = RoverEnv(
-        terrain="sphere_field", difficulty=0.3, model=model, goal_distance=3.0, **ScanPolicy.arguments(model)
-    )
+    env = RoverEnv(terrain="rocks", difficulty=0.3, model=model, goal_distance=3.0, **ScanPolicy.arguments(model))
     assert drive(env, ScanPolicy(env), 1)[0] == "goal"
 
 
 def test_a_smaller_scan_will_do() -> None:
-    env = RoverEnv(terrain="sphere_field", difficulty=0.75, height_scan=True)
+    env = RoverEnv(terrain="rocks", difficulty=0.75, height_scan=True)
     assert drive(env, ScanPolicy(env), 2)[0] == "goal"

@@ -11,7 +11,7 @@ import pytest
 from rover_gym import CommandError, OptionError, RoverEnv, RoverModel
 from rover_gym.vector import RoverVectorEnv
 
-ROCKS: dict[str, Any] = {"terrain": "sphere_field", "height_scan": (5, 3, 0.4), "difficulty": 0.8}
+ROCKS: dict[str, Any] = {"terrain": "rocks", "height_scan": (5, 3, 0.4), "difficulty": 0.8}
 
 
 def torques(n: int, steps: int, seed: int = 0) -> Any:

@@ -73,7 +73,7 @@ def test_vector_is_sync_vector_bit_for_bit(name: str, arguments: dict[str, Any],
 @pytest.mark.parametrize("threads", [1, 2, 5])
 @pytest.mark.parametrize("n", [1, 4, 9])
 def test_neither_threads_nor_neighbours_show(n: int, threads: int) -> None:
-    arguments: dict[str, Any] = {"terrain": "sphere_field", "difficulty": 0.5}
+    arguments: dict[str, Any] = {"terrain": "rocks", "difficulty": 0.5}
     batch = native("Rover-v0", n, threads=threads, **arguments)
     batch.reset(seed=0)
     alone = gym.wrappers.TimeLimit(RoverEnv(**arguments), LIMIT)
@@ -301,7 +301,7 @@ def test_a_rover_that_fails_fails_alone(threads: int) -> None:
 def test_a_rover_can_be_looked_at() -> None:
     env = native("RoverRocks-v0", 2)
     env.reset(seed=3)
-    alone = RoverEnv(terrain="sphere_field")
+    alone = RoverEnv(terrain="rocks")
     alone.reset(seed=4)
     action = actions(2)[0]
     env.step(action)

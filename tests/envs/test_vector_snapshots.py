@@ -16,7 +16,7 @@ from rover_gym.vector import RoverVectorEnv
 
 LIMIT = 12
 HARD: dict[str, Any] = {
-    "terrain": "sphere_field",
+    "terrain": "rocks",
     "difficulty": (0.2, 1.0),
     "height_scan": (5, 3, 0.4),
     "observation_noise": 0.01,

@@ -12,7 +12,7 @@ from rover_gym import OptionError, PDPolicy, RoverEnv
 from rover_gym.planning import PlannerOptions, PlannerPolicy
 from rover_gym.vector import RoverVectorEnv
 
-GROUNDS = [{}, {"terrain": "sphere_field", "difficulty": 0.3}, {"terrain": "hills", "difficulty": 0.3}]
+GROUNDS = [{}, {"terrain": "rocks", "difficulty": 0.3}, {"terrain": "hills", "difficulty": 0.3}]
 
 
 def course(**arguments: Any) -> RoverEnv:
@@ -83,7 +83,7 @@ def test_one_waypoint_is_the_environment_without() -> None:
 
 
 def test_rocks_leave_each_goal_clear() -> None:
-    env = course(waypoints=4, goal_distance=(4.0, 5.0), terrain="sphere_field", difficulty=1.5, goal_tolerance=2.0)
+    env = course(waypoints=4, goal_distance=(4.0, 5.0), terrain="rocks", difficulty=1.5, goal_tolerance=2.0)
     env.reset(seed=0)
     field: Any = env.simulation.terrain
     for goal in env.start.goals:
@@ -136,7 +136,7 @@ def test_goals_within_the_tolerance_are_all_reached_at_once() -> None:
         ({"waypoints": 2.0}, "waypoints"),
         ({"waypoints": 1000}, "waypoints"),
         ({"waypoint_turn_deg": (3.0, 2.0)}, "waypoint_turn_deg"),
-        ({"waypoints": 20, "goal_distance": 6.0, "terrain": "sphere_field"}, "waypoints"),
+        ({"waypoints": 20, "goal_distance": 6.0, "terrain": "rocks"}, "waypoints"),
     ],
 )
 def test_bad_courses_are_refused(arguments: dict[str, Any], field: str) -> None:

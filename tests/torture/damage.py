@@ -376,7 +376,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "RoverEnv": (
         RoverEnv,
         {
-            "terrain": "sphere_field",
+            "terrain": "rocks",
             "difficulty": 0.5,
             "rock_abundance": 0.1,
             "max_rock_radius": 1.0,

@@ -82,7 +82,7 @@ def settings(random: Random, ledger: Ledger) -> None:
     step = float(random.choice([0.001, 0.0025, 0.005, 0.01, 0.025, 0.05]))
     stony = bool(random.uniform() < 0.5)
     env = RoverEnv(
-        terrain="sphere_field" if stony else "plane",
+        terrain="rocks" if stony else "plane",
         difficulty=random.uniform(0.0, 2.0) if stony else None,
         slope_deg=(0.0, 30.0 if stony else 60.0),
         friction=(0.0, 2.0),
@@ -111,7 +111,7 @@ def settings(random: Random, ledger: Ledger) -> None:
 
 def vector(random: Random, ledger: Ledger) -> None:
     """Sixteen rovers among rocks at once, episodes following each other."""
-    env = RoverVectorEnv(16, terrain="sphere_field", difficulty=(0.0, 2.0), threads=1)
+    env = RoverVectorEnv(16, terrain="rocks", difficulty=(0.0, 2.0), threads=1)
     env.reset(seed=int(random.integers(2**31)))
     act = [full_throttle, constant, bang_bang, uniform][random.integers(4)](random, 16)
     for _ in range(100):
@@ -148,7 +148,7 @@ def fine(random: Random, ledger: Ledger) -> None:
 
 # A period of ten steps: the time is theirs together.
 PERIOD = Bounds(slowest=1.0)
-ROCKS = {"terrain": "sphere_field", "difficulty": (0.0, 2.0)}
+ROCKS = {"terrain": "rocks", "difficulty": (0.0, 2.0)}
 
 REGIMES = [
     Regime("Rover-v0, full throttle, a minute", episodes(full_throttle, 1200), 8, PERIOD),

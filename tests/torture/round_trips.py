@@ -97,7 +97,7 @@ def simulations(random: Random, ledger: Ledger) -> None:
 
 def environments(random: Random, ledger: Ledger) -> None:
     """An environment goes on from its snapshot as it did."""
-    env = RoverEnv(terrain="sphere_field", observation_noise=0.1, friction=(0.3, 0.9))
+    env = RoverEnv(terrain="rocks", observation_noise=0.1, friction=(0.3, 0.9))
     env.reset(seed=int(random.integers(1000)))
     actions = random.uniform(-1.0, 1.0, (20, 12)).astype(np.float32)
     for action in actions[:10]:

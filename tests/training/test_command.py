@@ -191,7 +191,7 @@ def test_the_wrapper_sums_the_rewards_of_the_steps_it_holds() -> None:
     assert total == pytest.approx(expected, rel=1e-12)
 
 
-SCANNED: dict[str, Any] = {"terrain": "sphere_field", "height_scan": (6, 4, 0.3), "difficulty": 1.0}
+SCANNED: dict[str, Any] = {"terrain": "rocks", "height_scan": (6, 4, 0.3), "difficulty": 1.0}
 
 
 @pytest.mark.parametrize("limit", [9, 10])

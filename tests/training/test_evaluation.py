@@ -75,7 +75,7 @@ def test_a_summary_counts_ends_and_takes_times_of_successes_only() -> None:
 
 def test_many_episodes_at_a_time_are_the_single_ones() -> None:
     seeds = range(40, 45)
-    arguments = {"terrain": "sphere_field", "difficulty": 0.6, "goal_distance": 3.0}
+    arguments = {"terrain": "rocks", "difficulty": 0.6, "goal_distance": 3.0}
     drives = drive_all(PDPolicy, seeds, arguments=arguments, num_envs=3)
     assert [drive.seed for drive in drives] == list(seeds)
     env = gym.make("Rover-v0", **arguments)
@@ -120,9 +120,9 @@ def test_a_held_command_drives_in_a_batch_as_alone(learned: bool, num_envs: int)
 
     The guide alone multiplies no matrices, whose products round differently in a batch.
     """
-    folder = policy_folder("sphere_field")
+    folder = policy_folder("rocks")
     card = PolicyCard.read(folder / "policy.json")
-    arguments = {"terrain": "sphere_field", "difficulty": 1.0, "goal_distance": 3.0, **policy_arguments(folder)}
+    arguments = {"terrain": "rocks", "difficulty": 1.0, "goal_distance": 3.0, **policy_arguments(folder)}
     scans: list[bool] = []
     step = RoverBatch.step
 

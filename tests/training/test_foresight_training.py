@@ -9,7 +9,7 @@ from rover_gym.learning.fit_forecast import fit_forecast
 from rover_gym.policy import ScanPolicy
 from rover_gym.policy.arc_forecast import ArcFeatures
 
-ARGUMENTS = {"terrain": "sphere_field", "difficulty": 1.0, **ScanPolicy.arguments()}
+ARGUMENTS = {"terrain": "rocks", "difficulty": 1.0, **ScanPolicy.arguments()}
 
 
 def test_arcs_are_tried_from_states_of_a_drive() -> None:

@@ -38,7 +38,7 @@ def a_config(folder: Path, algorithm: str) -> Path:
         "near": {
             "total_steps": 256,
             "evaluate_every": 128,
-            "environment": {"terrain": "sphere_field", "difficulty": 0.2, "goal_distance": 2.0},
+            "environment": {"terrain": "rocks", "difficulty": 0.2, "goal_distance": 2.0},
         }
     }
     path = folder / f"{algorithm}.yaml"
@@ -151,7 +151,7 @@ def test_every_trainer_has_the_same_hyperparameters() -> None:
             assert entry["n_envs"] == config.num_envs
             kwargs = dict(entry["env_kwargs"])
             assert kwargs.pop("max_episode_steps") == config.max_episode_steps
-            registered = {} if task == "plane" else {"terrain": "sphere_field"}
+            registered = {} if task == "plane" else {"terrain": "rocks"}
             assert {**registered, **kwargs} == config.environment_of(task)
             for key, value in config.hyperparameters.items():
                 assert entry[key] == (f"lin_{value:.0e}".replace("e-0", "e-") if _falls(config, key) else value), key

@@ -16,7 +16,7 @@ ROVERS, SEED, LIMIT, REPEAT = 3, 70, 100, 3
 GROUNDS: dict[str, dict[str, Any]] = {
     "plane": {"terrain": "plane", "goal_distance": [2.0, 4.0], "control_frequency": 10},
     "rocks": {
-        "terrain": "sphere_field",
+        "terrain": "rocks",
         "goal_distance": [2.0, 4.0],
         "difficulty": 1.0,
         "height_scan": [8, 6, 0.2],

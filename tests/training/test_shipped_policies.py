@@ -20,7 +20,7 @@ def binomial_cdf(k: int, n: int, p: float) -> float:
     return math.fsum(math.comb(n, i) * p**i * (1.0 - p) ** (n - i) for i in range(k + 1))
 
 
-@pytest.mark.parametrize("terrain", ["plane", "sphere_field"])
+@pytest.mark.parametrize("terrain", ["plane", "rocks"])
 def test_twenty_episodes_succeed_as_often_as_stated(terrain: str) -> None:
     folder = policy_folder(terrain)
     report = json.loads((folder / "evaluation.json").read_text(encoding="utf-8"))
@@ -38,7 +38,7 @@ def test_the_evaluations_say_what_the_manual_says() -> None:
         assert row["episodes"] >= 500
         assert row["success"]["value"] >= 0.98, row["policy"]
 
-    rocks = json.loads((policy_folder("sphere_field") / "evaluation.json").read_text(encoding="utf-8"))
+    rocks = json.loads((policy_folder("rocks") / "evaluation.json").read_text(encoding="utf-8"))
     rows = {row["policy"]: row for row in rocks["rows"]}
     baseline, planner = rows.pop("PD baseline"), rows.pop("scan planner")
     assert baseline["success"]["value"] >= 0.7
@@ -50,7 +50,7 @@ def test_the_evaluations_say_what_the_manual_says() -> None:
         assert row["success"]["value"] > baseline["success"]["value"]
 
 
-@pytest.mark.parametrize("terrain", ["plane", "sphere_field"])
+@pytest.mark.parametrize("terrain", ["plane", "rocks"])
 def test_a_policy_comes_with_what_it_was_made_of_and_is_small(terrain: str) -> None:
     folder = policy_folder(terrain)
     names = {path.name for path in folder.iterdir()}
@@ -59,7 +59,7 @@ def test_a_policy_comes_with_what_it_was_made_of_and_is_small(terrain: str) -> N
 
 
 def test_drive_runs_the_trained_policy(tmp_path: Path) -> None:
-    arguments = ["drive", "--policy", "trained", "--terrain", "sphere_field", "--difficulty", "0.3", "--seed", "1"]
+    arguments = ["drive", "--policy", "trained", "--terrain", "rocks", "--difficulty", "0.3", "--seed", "1"]
     result = CliRunner().invoke(app, [*arguments, "--output", str(tmp_path)])
     assert result.exit_code == 0, result.output
     assert "trained policy" in result.output
@@ -82,7 +82,7 @@ def test_no_policy_was_trained_for_other_ground() -> None:
 
 
 def test_the_baseline_is_evaluated_on_the_same_fields() -> None:
-    arguments = {"terrain": "sphere_field", "difficulty": 1.0}
+    arguments = {"terrain": "rocks", "difficulty": 1.0}
     first, second = (
         drive_all(PDPolicy, range(3), arguments=arguments, max_episode_steps=1, num_envs=n) for n in (1, 3)
     )

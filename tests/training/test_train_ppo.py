@@ -28,7 +28,7 @@ Script = Callable[..., Any]
 
 ENVIRONMENTS: Mapping[str, dict[str, Any]] = {
     "plane": {"terrain": "plane", "goal_distance": 2.0, "friction": [0.5, 0.8]},
-    "rocks": {"terrain": "sphere_field", "goal_distance": 3.0, "height_scan": [12, 8, 0.2]},
+    "rocks": {"terrain": "rocks", "goal_distance": 3.0, "height_scan": [12, 8, 0.2]},
 }
 
 
@@ -229,11 +229,11 @@ def test_the_curriculum_rises_with_success(run: Path) -> None:
 
 
 def test_an_evaluation_names_policies_and_baseline(run: Path, evaluate: Script, tmp_path: Path) -> None:
-    terrain = "sphere_field" if "rocks" in run.parent.name else "plane"
+    terrain = "rocks" if "rocks" in run.parent.name else "plane"
     result = evaluate(run, "--terrain", terrain, "--episodes", 2, "--output", tmp_path)
     assert result.exit_code == 0, result.output
     report = json.loads((tmp_path / "evaluation.json").read_text(encoding="utf-8"))
-    guides = ["guide alone"] if terrain == "sphere_field" else []
+    guides = ["guide alone"] if terrain == "rocks" else []
     expected = ["PD baseline", "scan planner", *guides, "run"]
     assert [row["policy"] for row in report["rows"]] == expected
     for row in report["rows"]:
@@ -243,7 +243,7 @@ def test_an_evaluation_names_policies_and_baseline(run: Path, evaluate: Script, 
 
 
 def test_enjoy_drives(run: Path, enjoy: Script) -> None:
-    terrain = "sphere_field" if "rocks" in run.parent.name else "plane"
+    terrain = "rocks" if "rocks" in run.parent.name else "plane"
     result = enjoy(run, "--terrain", terrain, "--seed", 5)
     assert result.exit_code == 0, result.output
     assert "seed 5: " in result.output

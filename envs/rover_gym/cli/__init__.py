@@ -11,10 +11,12 @@ from rover_gym.cli.dataset_command import dataset
 from rover_gym.cli.drive_command import drive
 from rover_gym.cli.evaluate_command import evaluate
 from rover_gym.cli.export_command import export
+from rover_gym.cli.first_steps import say_first_steps
 from rover_gym.cli.grains_command import grains
 from rover_gym.cli.grains_lab_commands import plate, shear, wheel
 from rover_gym.cli.grains_rover_commands import pit, track
 from rover_gym.cli.grains_rover_commands import rover as rover_on_bed
+from rover_gym.cli.live_command import live
 from rover_gym.cli.model_command import model
 from rover_gym.cli.planar_commands import planar
 from rover_gym.cli.plot_command import plot
@@ -27,7 +29,6 @@ from rover_gym.mechanics import __version__
 
 app = typer.Typer(
     help="Drive a six-wheel Mars rover in a nonsmooth simulator.",
-    no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     epilog=f"Errors are one line; with {DEBUG}=1 in the environment they tell where they came from.",
@@ -39,6 +40,7 @@ app.command()(evaluate)
 app.command()(report)
 app.command()(plot)
 app.command()(replay)
+app.command()(live)
 app.command()(scene)
 app.add_typer(model, name="model")
 app.add_typer(planar, name="planar")
@@ -56,13 +58,16 @@ def _print_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
+@app.callback(invoke_without_command=True)
 def rover(
+    context: typer.Context,
     _version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
     """Drive a six-wheel Mars rover in a nonsmooth simulator."""
+    if context.invoked_subcommand is None:
+        say_first_steps()
 
 
 def main() -> None:

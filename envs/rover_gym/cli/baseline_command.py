@@ -1,16 +1,17 @@
 """`rover baseline`: success of the PD baseline or another policy among rocks, by difficulty."""
 
-import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import Annotated
 
 import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from rover_gym.cli.console import INTERRUPTED, LARGEST_SEED, MOST_EPISODES, console, plain_errors, progress_bar
+from rover_gym.cli.completion import complete_model, complete_policy
+from rover_gym.cli.console import INTERRUPTED, LARGEST_SEED, MOST_EPISODES, plain_errors, progress_bar
+from rover_gym.cli.results import AsJson, Results
+from rover_gym.env.argument_checks import terrain_name
 from rover_gym.policy.baseline import DIFFICULTIES, ENVIRONMENTS, BaselineInterrupt, BaselineRow, measure_baseline
 from rover_gym.policy.named_policy import NAMES_HELP, policy_title
 
@@ -29,21 +30,27 @@ def baseline(
     ] = 0,
     policy: Annotated[
         str,
-        typer.Option(help=NAMES_HELP),
+        typer.Option(help=NAMES_HELP, autocompletion=complete_policy),
     ] = "pd",
     terrain: Annotated[
-        str, typer.Option(help="The ground: 'sphere_field' for rocks on a plane, or 'hills'.")
-    ] = "sphere_field",
+        str,
+        typer.Option(help="The ground: 'rocks' on a plane, or 'hills'.", autocompletion=lambda: list(ENVIRONMENTS)),
+    ] = "rocks",
     model: Annotated[
-        str | None, typer.Option(help="The rover: a name of the gallery, or a model's file. Default: the built-in one.")
+        str | None,
+        typer.Option(
+            help="The rover: a name of the gallery, or a model's file. Default: the built-in one.",
+            autocompletion=complete_model,
+        ),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Drive RoverRocks-v0 or RoverHills-v0 with a policy and print how often it reached the goal.
 
     The interval is Wilson's, 95%. Time is the mean of the episodes that reached the goal; energy the work through
     the wheel motors over the way driven. Ctrl-C ends the measurement: what is finished is printed.
     """
+    terrain = terrain_name(terrain)
     difficulties = tuple(difficulty) if difficulty else DIFFICULTIES
     with progress_bar() as bar:
         task = bar.add_task("baseline", total=episodes * len(difficulties), state="")
@@ -62,27 +69,14 @@ def baseline(
             )
         except BaselineInterrupt as interrupt:
             interrupted, rows = True, interrupt.rows
-    if as_json:
-        # JSON knows no NaN: where no episode reached the goal, its time is null.
-        plain = [
-            {
-                name: None if isinstance(value, float) and math.isnan(value) else value
-                for name, value in asdict(row).items()
-            }
-            for row in rows
-        ]
-        typer.echo(
-            json.dumps(
-                {"environment": ENVIRONMENTS[terrain], "model": model, "policy": policy, "seed": seed, "rows": plain},
-                indent=2,
-            )
-        )
-    elif rows:
-        console().print(_table(rows, seed, policy, ENVIRONMENTS[terrain]))
-    if interrupted:
-        done = sum(row.episodes for row in rows)
-        typer.echo(f"interrupted: {done} of {episodes * len(difficulties)} episodes are done", err=True)
-        raise typer.Exit(INTERRUPTED)
+    with Results(as_json=as_json) as results:
+        results.add(environment=ENVIRONMENTS[terrain], model=model, policy=policy, seed=seed, rows=rows)
+        if rows:
+            results.show(_table(rows, seed, policy, ENVIRONMENTS[terrain]))
+        if interrupted:
+            done = sum(row.episodes for row in rows)
+            typer.echo(f"interrupted: {done} of {episodes * len(difficulties)} episodes are done", err=True)
+            raise typer.Exit(INTERRUPTED)
 
 
 def _table(rows: Sequence[BaselineRow], seed: int, policy: str, environment: str) -> Table:

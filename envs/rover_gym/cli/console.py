@@ -14,6 +14,7 @@ from typing import NoReturn, ParamSpec, TypeVar
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from typer.models import ArgumentInfo
 
 from rover_gym.extras import MissingExtraError
 from rover_gym.mechanics import OptionError, RoverGymError
@@ -29,7 +30,10 @@ SET_BY = {
     "heading_deg": ("heading", "--heading"),
     "format": ("file_format", "--format"),
     "torques": ("torque", "--torque"),
+    "width": ("size", "--size"),
+    "height": ("size", "--size"),
     "wheels": ("wheel", "--wheel"),
+    "slips": ("slip", "--slip"),
     "position": ("start", "--start"),
     "count": ("balls", "--balls"),
     "radius_min": ("radius", "--radius"),
@@ -37,6 +41,15 @@ SET_BY = {
     "options.position": ("start", "--start"),
     "options.goal": ("goal", "--goal"),
 }
+#: The same of what a command takes by its place: the name in errors, and the command's parameters.
+PLACED = (
+    ("path", "run"),
+    ("path", "recording"),
+    ("path", "file"),
+    ("model", "name"),
+    ("policy", "policies"),
+    ("configuration", "config"),
+)
 #: If set to any value, the commands show the traceback of an error.
 DEBUG = "ROVER_DEBUG"
 
@@ -68,18 +81,6 @@ def progress_bar() -> Progress:
 def say_path(what: str, path: Path) -> None:
     """Prints the path of a written file on a separate line that is never wrapped."""
     typer.echo(_printable(f"{what}: {path}"))
-
-
-@contextmanager
-def keeping(what: str, *paths: Path) -> Iterator[None]:
-    """If the user interrupts the block, prints which files hold the results so far."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        for path in paths:
-            if path.exists():
-                say_path(f"{what}, incomplete", path)
-        raise
 
 
 def check_file(option: str, path: Path | None) -> None:
@@ -138,8 +139,11 @@ def plain_errors(command: Callable[P, R]) -> Callable[P, R]:
     that are not finite are refused here, for all options. An error that names an argument names its option instead.
     """
     parameters = inspect.signature(command).parameters
-    options = {name: f"--{name.replace('_', '-')}" for name in parameters}
+    options = {name: _as_typed(name, parameter) for name, parameter in parameters.items()}
     options |= {name: option for name, (parameter, option) in SET_BY.items() if parameter in parameters}
+    for name, parameter in PLACED:
+        if parameter in parameters:
+            options.setdefault(name, options[parameter])
 
     @functools.wraps(command)
     def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -149,6 +153,14 @@ def plain_errors(command: Callable[P, R]) -> Callable[P, R]:
             return command(*args, **kwargs)
 
     return guarded
+
+
+def _as_typed(name: str, parameter: inspect.Parameter) -> str:
+    """An option as the user types it, and what is given by its place as the help names it."""
+    for mark in getattr(parameter.annotation, "__metadata__", ()):
+        if isinstance(mark, ArgumentInfo):
+            return mark.metavar or name.upper()
+    return f"--{name.replace('_', '-')}"
 
 
 @contextmanager
@@ -176,6 +188,8 @@ def one_line(options: Mapping[str, str]) -> Iterator[None]:
 
 def _with_option(error: Exception, options: Mapping[str, str]) -> str:
     """The error's message, with the option's name in place of the argument's."""
+    if isinstance(error, OSError) and error.filename is not None and error.strerror:
+        return f"{error.filename}: {error.strerror}"
     text, field = str(error), getattr(error, "field", None)
     if isinstance(field, str) and text.startswith(f"{field}:"):
         name = field.partition("[")[0]

@@ -1,4 +1,4 @@
-"""`rover drive`: episodes of `Rover-v0` with the PD baseline, the scan planner or a trained policy."""
+"""`rover drive`: episodes of `Rover-v0` and its like with the PD baseline, the scan planner or a trained policy."""
 
 import json
 import math
@@ -14,27 +14,41 @@ import typer
 from rich.progress import Progress
 from rich.table import Table
 
+from rover_gym.cli.completion import complete_policy
 from rover_gym.cli.console import (
     INTERRUPTED,
     LARGEST_SEED,
     MOST_EPISODES,
     check_file,
     check_folder,
-    console,
     plain_errors,
     progress_bar,
-    say_path,
 )
 from rover_gym.cli.drivers import DRIVERS_HELP, driver_title, named_driver
-from rover_gym.cli.scene_options import BUILT_IN, HeightRange, ModelName, Spacing, Start, named_ground, named_model
+from rover_gym.cli.film_options import FilmAntialiasing, FilmCamera, FilmForces, FilmSize, film_options
+from rover_gym.cli.results import AsJson, Results
+from rover_gym.cli.scene_options import (
+    BUILT_IN,
+    HeightRange,
+    ModelName,
+    Spacing,
+    Start,
+    TerrainName,
+    chosen_terrain,
+    environment_of,
+    environment_title,
+    named_ground,
+    named_model,
+    warn_of_slope,
+)
 from rover_gym.env.rewards import WEIGHTS
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.episodes import Episode, Policy, run_episode
+from rover_gym.policy.films import EpisodeFilm
 from rover_gym.record.channels import Channel, RoverSampler
 from rover_gym.record.facts import describe
 from rover_gym.record.recorder import Recorder
-from rover_gym.rendering.video import VideoWriter
 from rover_gym.validation import number, refuse
 
 CONTROL_PERIOD = 0.05  # s, of Rover-v0
@@ -44,15 +58,13 @@ SHORTEST_STEP = 1e-5  # s: a shorter one makes no episode end
 @plain_errors
 def drive(
     *,
-    terrain: Annotated[
-        str,
-        typer.Option(help="The ground: 'plane', 'sphere_field' for rocks, 'hills', or the file of a map or a mesh."),
-    ] = "plane",
+    terrain: TerrainName = None,
     spacing: Spacing = None,
     height_range: HeightRange = None,
     model: ModelName = BUILT_IN,
     difficulty: Annotated[
-        float | None, typer.Option(help="Difficulty of the rocks, from 0 to 2. Default: 0.5.")
+        float | None,
+        typer.Option(help="Difficulty of the rocks, from 0 to 2. Default: 0.5. It implies rocks."),
     ] = None,
     slope: Annotated[
         float | None, typer.Option(help="Slope of the ground, degrees. Default: 0; on rocks, by the difficulty.")
@@ -69,7 +81,7 @@ def drive(
     ] = None,
     policy: Annotated[
         str,
-        typer.Option(help=DRIVERS_HELP),
+        typer.Option(help=DRIVERS_HELP, autocompletion=complete_policy),
     ] = "pd",
     friction: Annotated[float, typer.Option(help="Friction coefficient.")] = 0.7,
     time_step: Annotated[float, typer.Option(help="Time step of the physics, s.")] = 0.005,
@@ -85,12 +97,20 @@ def drive(
     video: Annotated[
         Path | None, typer.Option(dir_okay=False, metavar="FILE.mp4", help="Film the episodes one after the other.")
     ] = None,
+    size: FilmSize = "640x480",
+    camera: FilmCamera = "follow",
+    forces: FilmForces = False,
+    antialiasing: FilmAntialiasing = True,
+    as_json: AsJson = False,
 ) -> None:
-    """Drive Rover-v0 to its goal with the PD baseline or another policy and print the results of the episodes.
+    """Drive a rover to its goal with the PD baseline or another policy and print the results of the episodes.
+
+    The environment is Rover-v0, among rocks RoverRocks-v0, on hills RoverHills-v0.
 
     Ctrl-C ends the drive: finished episodes are printed, and what was recorded and filmed is kept.
     """
     _check_time_step(time_step)
+    terrain = chosen_terrain(terrain, difficulty)
     check_folder("output", output)
     check_file("video", video)
     arguments: dict[str, Any] = {
@@ -113,41 +133,48 @@ def drive(
     arguments, as_given = {**arguments, **chosen.arguments}, {**as_given, **chosen.arguments}
     filming: dict[str, Any] = {}
     if video is not None:
-        filming = {"render_mode": "rgb_array", "render_options": {"antialiasing": True}}
-    env = gym.make("Rover-v0", max_episode_steps=round(time_limit / CONTROL_PERIOD), **arguments, **filming)
-    driver, name = chosen.make(env), driver_title(policy)
+        options_of_film = film_options(size, camera, forces=forces, antialiasing=antialiasing)
+        filming = {"render_mode": "rgb_array", "render_options": options_of_film}
+    env = gym.make(
+        environment_of(terrain), max_episode_steps=round(time_limit / CONTROL_PERIOD), **arguments, **filming
+    )
+    warn_of_slope(slope, friction)
+    driver, title = chosen.make(env), f"{environment_title(terrain)} with {driver_title(policy)}"
 
     results: list[Episode] = []
     paths: list[Path] = []
     interrupted = False
     with progress_bar() as bar, ExitStack() as stack:
         stack.callback(env.close)
-        film = None if video is None else stack.enter_context(VideoWriter(video, env.metadata["render_fps"]))
+        film = None if video is None else stack.enter_context(EpisodeFilm(video, env.metadata["render_fps"], title))
         try:
             for now in range(seed, seed + episodes):
                 path = None if output is None else output / f"episode-{now}.h5"
                 paths += [path] if path else []
-                results.append(_drive_one(env, driver, name, now, as_given, options, path, bar, film))
+                results.append(_drive_one(env, driver, title, now, as_given, options, path, bar, film))
         except KeyboardInterrupt:
             interrupted = True
 
-    if results:
-        console().print(_table(results, name))
-    if output is not None:
-        summary = {
-            "policy": policy,
-            "arguments": as_given | options,
-            "episodes": [asdict(episode) for episode in results],
-        }
-        paths.append(output / "summary.json")
-        paths[-1].write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-    paths += [] if video is None else [video]
-    for path in paths:
-        if path.exists():
-            say_path("written", path)
-    if interrupted:
-        typer.echo(f"interrupted: {len(results)} of {episodes} episodes are done", err=True)
-        raise typer.Exit(INTERRUPTED)
+    summary = {
+        "environment": environment_of(terrain),
+        "policy": policy,
+        "arguments": as_given | options,
+        "episodes": [asdict(episode) for episode in results],
+    }
+    with Results(as_json=as_json) as said:
+        said.add(**summary)
+        if results:
+            said.show(_table(results, title))
+        if output is not None:
+            paths.append(output / "summary.json")
+            paths[-1].write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        paths += [] if video is None else [video]
+        for path in paths:
+            if path.exists():
+                said.path("written", path)
+        if interrupted:
+            typer.echo(f"interrupted: {len(results)} of {episodes} episodes are done", err=True)
+            raise typer.Exit(INTERRUPTED)
 
 
 def _check_time_step(time_step: float) -> None:
@@ -162,13 +189,13 @@ def _check_time_step(time_step: float) -> None:
 def _drive_one(
     env: gym.Env[Any, Any],
     policy: Policy,
-    name: str,
+    title: str,
     seed: int,
     arguments: Mapping[str, Any],
     options: Mapping[str, Any],
     path: Path | None,
     bar: Progress,
-    film: VideoWriter | None,
+    film: EpisodeFilm | None,
 ) -> Episode:
     """Drives one episode, recorded if there is a path, filmed if there is a film."""
     task = bar.add_task(f"seed {seed}", total=None, state="")
@@ -180,13 +207,17 @@ def _drive_one(
             bar.update(task, state=f"{info['time']:.1f} s, {info['distance_to_goal']:.1f} m to go")
             if path is not None:
                 if tape is None:  # after the reset, when the start is known
-                    tape = _Tape(path, rover, name, seed, arguments)
+                    tape = _Tape(path, rover, title, seed, arguments)
                     stack.enter_context(tape.recorder)
                 tape.append(rover, info)
-            if film is not None and (frame := rover.render()) is not None:
-                film.append(frame)
+            if film is not None:
+                film.show(rover, seed, info["time"])
 
         episode = run_episode(env, policy, seed, options=options, on_step=on_step)
+        if film is not None:
+            film.end(episode)
+        if tape is not None:
+            tape.recorder.note(outcome=episode.end)
     bar.remove_task(task)
     return episode
 
@@ -194,7 +225,7 @@ def _drive_one(
 class _Tape:
     """Records an episode: the simulation and the environment's signals."""
 
-    def __init__(self, path: Path, rover: RoverEnv, policy: str, seed: int, arguments: Mapping[str, Any]) -> None:
+    def __init__(self, path: Path, rover: RoverEnv, title: str, seed: int, arguments: Mapping[str, Any]) -> None:
         self._sampler = RoverSampler(rover.model)
         channels = (
             *self._sampler.channels,
@@ -204,8 +235,8 @@ class _Tape:
             Channel("reward_terms", "1", "terms of the step's reward", (len(WEIGHTS),), tuple(WEIGHTS)),
         )
         scene = {**arguments, **asdict(rover.start), **_rocks(rover), "control_period": rover.dt}
-        title = f"an episode of Rover-v0 with {policy}"
-        attributes = describe(rover.simulation, title, scene, seed=seed)
+        scene["goal_tolerance"] = rover.goal_tolerance
+        attributes = describe(rover.simulation, f"an episode of {title}", scene, seed=seed)
         self.recorder = Recorder(path, channels, attributes, terrain=rover.simulation.terrain)
 
     def append(self, rover: RoverEnv, info: Mapping[str, Any]) -> None:
@@ -227,8 +258,8 @@ def _rocks(rover: RoverEnv) -> dict[str, Any]:
     return {} if rover.rocks is None else {"rocks": asdict(rover.rocks)}
 
 
-def _table(results: Sequence[Episode], name: str) -> Table:
-    table = Table(title=f"Rover-v0 with {name}", title_justify="left")
+def _table(results: Sequence[Episode], title: str) -> Table:
+    table = Table(title=title, title_justify="left")
     for heading in ("seed", "success", "distance", "time", "energy", "slip", "real-time factor"):
         table.add_column(heading, justify="right")
     for episode in results:

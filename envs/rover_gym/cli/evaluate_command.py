@@ -9,8 +9,11 @@ import typer
 from rich.console import Console
 from rich.progress import Progress, TaskID
 
-from rover_gym.cli.console import LARGEST_SEED, MOST_EPISODES, check_folder, plain_errors, progress_bar, say_path
-from rover_gym.cli.scene_options import BUILT_IN, ModelName, named_model
+from rover_gym.cli.completion import complete_policy, complete_terrain
+from rover_gym.cli.console import LARGEST_SEED, MOST_EPISODES, check_folder, plain_errors, progress_bar
+from rover_gym.cli.results import AsJson, Results
+from rover_gym.cli.scene_options import BUILT_IN, ModelName, named_model, warn_of_slope
+from rover_gym.env.argument_checks import MAX_SLOPE_DEG, terrain_name
 from rover_gym.extras import MissingExtraError, require
 from rover_gym.figures.policy_figure import draw_policies
 from rover_gym.mechanics import OptionError
@@ -27,17 +30,23 @@ from rover_gym.policy.comparison import (
 from rover_gym.policy.evaluation import EvaluatedEpisode, summarise
 from rover_gym.policy.films import film_episode
 from rover_gym.policy.pd_policy import PDPolicy
-from rover_gym.validation import refuse
+from rover_gym.validation import number, refuse
 
 
 @plain_errors
 def evaluate(
     policies: Annotated[
-        list[str], typer.Argument(help="Folders of runs or of policies, or 'trained' for the package's.")
+        list[str],
+        typer.Argument(
+            help="Folders of runs or of policies, or 'trained' for the package's.", autocompletion=complete_policy
+        ),
     ],
     terrain: Annotated[
-        str, typer.Option(help="'plane', 'sphere_field', 'hills', or the file of a map or a mesh.")
-    ] = "sphere_field",
+        str,
+        typer.Option(
+            help="'plane', 'rocks', 'hills', or the file of a map or a mesh.", autocompletion=complete_terrain
+        ),
+    ] = "rocks",
     model: ModelName = BUILT_IN,
     difficulty: Annotated[float | None, typer.Option(help="Of the rocks, from 0 to 2.")] = None,
     slope: Annotated[float | None, typer.Option(help="Of the plane, degrees.")] = None,
@@ -54,6 +63,7 @@ def evaluate(
     planner: Annotated[bool, typer.Option(help="Also drive the scan planner.")] = True,
     films: Annotated[int, typer.Option(min=0, help="Number of fields that are also filmed (extra render).")] = 0,
     threads: Annotated[int, typer.Option(min=1, help="That step the rovers.")] = 1,
+    as_json: AsJson = False,
 ) -> None:
     """Drive every policy, the baseline and the planner over the same fields, and print success and energy.
 
@@ -62,6 +72,9 @@ def evaluate(
     and its compiled core are the same. Intervals are 95%. The seeds differ from those of training, so the policies
     have not seen the fields.
     """
+    terrain = terrain_name(terrain)
+    if slope is not None:
+        warn_of_slope(number("slope", slope, at_least=0.0, at_most=MAX_SLOPE_DEG))
     arguments: dict[str, Any] = {"terrain": terrain}
     arguments |= {} if model == BUILT_IN else {"model": model}
     arguments |= {} if difficulty is None else {"difficulty": difficulty}
@@ -95,7 +108,8 @@ def evaluate(
         rows.append(summarise(f"all {len(trained)} together", together))
 
     table = comparison_table(rows)
-    Console(highlight=False, soft_wrap=True).print(table, markup=False)
+    if not as_json:
+        Console(highlight=False, soft_wrap=True).print(table, markup=False)
     (output / "evaluation.md").write_text(table + "\n", encoding="utf-8")
     report = comparison_report(rows, arguments, seeds)
     (output / "evaluation.json").write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
@@ -109,8 +123,10 @@ def evaluate(
         for now in seeds[:films]:
             written.append(output / "films" / f"{contender.name.replace(' ', '-')}-seed{now}.mp4")
             film_episode(written[-1], contender.make, {**arguments, **contender.arguments}, now)
-    for path in written:
-        say_path("written", path)
+    with Results(as_json=as_json) as results:
+        results.add(**report)
+        for path in written:
+            results.path("written", path)
 
 
 def _contenders(trained: list[Contender], model: str, *, guide: bool, planner: bool) -> list[Contender]:

@@ -5,7 +5,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from rover_gym.cli.console import check_folder, console, plain_errors
+from rover_gym.cli.console import check_folder, plain_errors
 from rover_gym.cli.grains_options import (
     EARTH,
     FOLDER,
@@ -27,6 +27,7 @@ from rover_gym.cli.grains_options import (
     recorded,
     say,
 )
+from rover_gym.cli.results import AsJson, Results, row, status
 
 grains = typer.Typer(
     help="Balls in space: a column that collapses, a silo, a drum, a sphere that strikes a bed, a rover on beds.",
@@ -52,18 +53,24 @@ def collapse(
     fps: Fps = 50.0,
     film: Film = False,
     output: Output = FOLDER,
+    as_json: AsJson = False,
 ) -> None:
     """Let a round column of balls collapse on a floor; record it and say how far it spreads."""
     from rover_gym.grains.vessel_scenes import column, run_out  # noqa: PLC0415 - h5py is slow to load
 
     check_folder("output", output)
     options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
-    with console().status("filling the tube"):
+    with status("filling the tube"):
         sim = column(balls, tube, radius, seed=seed, **options)
     title = f"a column of {balls} balls collapses"
-    run = recorded(sim, "collapse", title, duration, fps, seed, output, film=film, scene={"tube": tube})
-    aspect, spread = run_out(run, tube)
-    say(run, {"height of the column": f"{aspect:.2f} radii", "its edge went": f"{spread:.2f} radii"})
+    with Results(as_json=as_json) as results:
+        run = recorded(results, sim, "collapse", title, duration, fps, seed, output, film=film, scene={"tube": tube})
+        aspect, spread = run_out(run, tube)
+        rows = [
+            row("height of the column", f"{aspect:.2f} radii", height_in_radii=aspect),
+            row("its edge went", f"{spread:.2f} radii", run_out_in_radii=spread),
+        ]
+        say(results, run, rows)
 
 
 @grains.command()
@@ -85,6 +92,7 @@ def silo(
     fps: Fps = 50.0,
     film: Film = False,
     output: Output = FOLDER,
+    as_json: AsJson = False,
 ) -> None:
     """Empty a silo of balls through a round hole; record it and say how fast they leave."""
     from rover_gym.grains.vessel_scenes import outflow  # noqa: PLC0415 - h5py is slow to load
@@ -92,15 +100,20 @@ def silo(
 
     check_folder("output", output)
     options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
-    with console().status("filling the silo"):
+    with status("filling the silo"):
         sim = scene(balls, tube, hole, radius, seed=seed, **options)
     title = f"a silo of {balls} balls empties"
-    run = recorded(sim, "silo", title, duration, fps, seed, output, film=film)
-    out = outflow(run)
-    steady = (out > 0.2 * out[-1]) & (out < 0.8 * out[-1])
-    rate = float(np.polyfit(run.time[steady], out[steady], 1)[0]) if steady.sum() > 1 else float("nan")
-    share = out[-1] / float(run.mass.sum())
-    say(run, {"left the silo": f"{100.0 * share:.1f}%", "flow, from 20 to 80% of that": f"{rate:.4g} kg/s"})
+    with Results(as_json=as_json) as results:
+        run = recorded(results, sim, "silo", title, duration, fps, seed, output, film=film)
+        out = outflow(run)
+        steady = (out > 0.2 * out[-1]) & (out < 0.8 * out[-1])
+        rate = float(np.polyfit(run.time[steady], out[steady], 1)[0]) if steady.sum() > 1 else float("nan")
+        share = out[-1] / float(run.mass.sum())
+        rows = [
+            row("left the silo", f"{100.0 * share:.1f}%", share_out=share),
+            row("flow, from 20 to 80% of that", f"{rate:.4g} kg/s", flow=rate),
+        ]
+        say(results, run, rows)
 
 
 @grains.command()
@@ -123,6 +136,7 @@ def drum(
     fps: Fps = 25.0,
     film: Film = False,
     output: Output = FOLDER,
+    as_json: AsJson = False,
 ) -> None:
     """Turn a drum with balls; record it and say how steep they lie."""
     from rover_gym.grains.vessel_scenes import drum as scene  # noqa: PLC0415 - h5py is slow to load
@@ -130,12 +144,15 @@ def drum(
 
     check_folder("output", output)
     options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
-    with console().status("filling the drum"):
+    with status("filling the drum"):
         sim = scene(balls, wall, length, rate, radius, seed=seed, **options)
     title = f"a drum with {balls} balls turns at {rate:g} rad/s"
-    run = recorded(sim, "drum", title, duration, fps, seed, output, film=film)
-    angles = np.degrees(slopes(run)[run.n_frames // 2 :])
-    say(run, {"slope, second half of the run": f"{np.nanmean(angles):.1f} ± {np.nanstd(angles):.1f} degrees"})
+    with Results(as_json=as_json) as results:
+        run = recorded(results, sim, "drum", title, duration, fps, seed, output, film=film)
+        angles = np.degrees(slopes(run)[run.n_frames // 2 :])
+        mean, spread = float(np.nanmean(angles)), float(np.nanstd(angles))
+        text = f"{mean:.1f} ± {spread:.1f} degrees"
+        say(results, run, [row("slope, second half of the run", text, slope_deg=mean, slope_deviation_deg=spread)])
 
 
 @grains.command()
@@ -159,6 +176,7 @@ def sphere(
     fps: Fps = 100.0,
     film: Film = False,
     output: Output = FOLDER,
+    as_json: AsJson = False,
 ) -> None:
     """Let a sphere strike a bed of balls; record it and say how deep it goes."""
     from rover_gym.grains.ball_bed import settled_balls  # noqa: PLC0415 - h5py is slow to load
@@ -166,10 +184,15 @@ def sphere(
 
     check_folder("output", output)
     options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
-    with console().status("settling the bed"):
+    with status("settling the bed"):
         bed = settled_balls(balls, width, width, **radii(radius), seed=seed, **options)
     sim = striking_sphere(bed, sphere_radius, density, drop, **options)
     title = f"a sphere of {2e3 * sphere_radius:g} mm strikes {balls} balls"
-    run = recorded(sim, "sphere", title, duration, fps, seed, output, film=film)
-    depths = 1e3 * penetration_depths(run)
-    say(run, {"bed": f"{1e3 * bed.surface:.1f} mm deep", "deepest": f"{depths.max():.1f} mm"})
+    with Results(as_json=as_json) as results:
+        run = recorded(results, sim, "sphere", title, duration, fps, seed, output, film=film)
+        deepest = float(penetration_depths(run).max())
+        rows = [
+            row("bed", f"{1e3 * bed.surface:.1f} mm deep", bed_depth=bed.surface),
+            row("deepest", f"{1e3 * deepest:.1f} mm", deepest=deepest),
+        ]
+        say(results, run, rows)

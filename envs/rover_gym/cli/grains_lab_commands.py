@@ -5,12 +5,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.table import Table
 
-from rover_gym.cli.console import LARGEST_SEED, check_folder, console, plain_errors, progress_bar, say_path
+from rover_gym.cli.console import LARGEST_SEED, check_folder, plain_errors, progress_bar
+from rover_gym.cli.results import AsJson, Results, Row, row, status
+from rover_gym.validation import number
 
 if TYPE_CHECKING:
     from rover_gym.grains.ball_bed import BallBed
+    from rover_gym.grains.lab.fits import ShearLaw
 
 EARTH = 9.81  # m/s^2
 
@@ -50,24 +52,29 @@ def plate(
     tolerance: Tolerance = 3e-3,
     seed: Seed = 0,
     output: Output = FOLDER,
+    as_json: AsJson = False,
 ) -> None:
     """Push a round plate into a bed of balls; write pressure against depth and fit k zⁿ."""
     from rover_gym.grains.lab import fit_pressure, plate_test, write_table  # noqa: PLC0415 - h5py is slow to load
 
     check_folder("output", output)
     options = _options(friction, gravity, time_step, tolerance)
+    number("ball_radius", ball_radius, above=0.0)
+    number("sinkage", sinkage, above=0.0)
     bed = _bed(balls, ball_radius, width, depth, seed, friction, gravity)
-    with console().status("pushing the plate"):
+    with status("pushing the plate"):
         points = plate_test(
             bed, radius, depth=sinkage, speed=speed, samples=samples, plate_friction=tool_friction, **options
         )
     output.mkdir(parents=True, exist_ok=True)
-    say_path("table", write_table(points, output / "plate.csv"))
-    law = fit_pressure(points)
-    _say(
-        "pressure k zⁿ from the first contact",
-        {"k": f"{law.k:.3g} ± {law.k_error:.2g} N/m^(n+2)", "n": f"{law.n:.2f} ± {law.n_error:.2f}"},
-    )
+    with Results(as_json=as_json) as results:
+        results.path("table", write_table(points, output / "plate.csv"))
+        law = fit_pressure(points)
+        rows = [
+            row("k", f"{law.k:.3g} ± {law.k_error:.2g} N/m^(n+2)", k=law.k, k_error=law.k_error),
+            row("n", f"{law.n:.2f} ± {law.n_error:.2f}", n=law.n, n_error=law.n_error),
+        ]
+        results.table("pressure k zⁿ from the first contact", rows)
 
 
 @plain_errors
@@ -92,38 +99,48 @@ def shear(
     tolerance: Tolerance = 3e-3,
     seed: Seed = 0,
     output: Output = FOLDER,
+    as_json: AsJson = False,
 ) -> None:
     """Turn a loaded disc with vanes on a bed of balls; write shear stress against displacement and fit its laws."""
     from rover_gym.grains.lab import fit_shear, fit_strength, shear_test, write_table  # noqa: PLC0415 - h5py is slow
 
     check_folder("output", output)
     options = _options(friction, gravity, time_step, tolerance)
+    number("ball_radius", ball_radius, above=0.0)
     bed = _bed(balls, ball_radius, width, depth, seed, friction, gravity)
-    laws, rows = [], {}
-    for stress in normal_stress:
-        with console().status(f"shearing under {stress:g} Pa"):
-            points = shear_test(
-                bed,
-                stress,
-                radius=radius,
-                displacement=displacement,
-                speed=speed,
-                samples=samples,
-                disc_friction=tool_friction,
-                **options,
-            )
-        output.mkdir(parents=True, exist_ok=True)
-        say_path("table", write_table(points, output / f"shear-{stress:g}Pa.csv"))
-        law = fit_shear(points)
-        laws.append(law)
-        scale = f"K {1e3 * law.scale:.2g} ± {1e3 * law.scale_error:.1g} mm"
-        rows[f"{law.normal_stress:.0f} Pa"] = f"limit {law.limit:.0f} ± {law.limit_error:.0f} Pa, {scale}"
-    if len({law.normal_stress for law in laws}) > 1:
-        strength = fit_strength(laws)
-        angle, error = math.degrees(strength.friction_angle), math.degrees(strength.friction_angle_error)
-        rows["friction angle"] = f"{angle:.1f}" + (f" ± {error:.1f}" if math.isfinite(error) else "") + " degrees"
-        rows["cohesion"] = f"{strength.cohesion:.0f} Pa"
-    _say("shear stress, limit (1 - exp(-j / K))", rows)
+    with Results(as_json=as_json) as results:
+        laws: list[ShearLaw] = []
+        for stress in normal_stress:
+            with status(f"shearing under {stress:g} Pa"):
+                points = shear_test(
+                    bed,
+                    stress,
+                    radius=radius,
+                    displacement=displacement,
+                    speed=speed,
+                    samples=samples,
+                    disc_friction=tool_friction,
+                    **options,
+                )
+            output.mkdir(parents=True, exist_ok=True)
+            results.path("table", write_table(points, output / f"shear-{stress:g}Pa.csv"))
+            laws.append(fit_shear(points))
+        rows = [_law(law) for law in laws]
+        if len({law.normal_stress for law in laws}) > 1:
+            strength = fit_strength(laws)
+            angle, error = math.degrees(strength.friction_angle), math.degrees(strength.friction_angle_error)
+            text = f"{angle:.1f}" + (f" ± {error:.1f}" if math.isfinite(error) else "") + " degrees"
+            rows += [
+                row("friction angle", text, friction_angle_deg=angle, friction_angle_error_deg=error),
+                row("cohesion", f"{strength.cohesion:.0f} Pa", cohesion=strength.cohesion),
+            ]
+        results.add(laws=laws)
+        results.table("shear stress, limit (1 - exp(-j / K))", rows)
+
+
+def _law(law: "ShearLaw") -> Row:
+    scale = f"K {1e3 * law.scale:.2g} ± {1e3 * law.scale_error:.1g} mm"
+    return row(f"{law.normal_stress:.0f} Pa", f"limit {law.limit:.0f} ± {law.limit_error:.0f} Pa, {scale}")
 
 
 @plain_errors
@@ -153,12 +170,15 @@ def wheel(
     tolerance: Tolerance = 3e-3,
     seed: Seed = 0,
     output: Output = FOLDER,
+    as_json: AsJson = False,
 ) -> None:
     """Drive a wheel over a bed of balls; write pull, lateral force, torque and sinkage against slip."""
     from rover_gym.grains.lab import fit_pull, wheel_test, write_table  # noqa: PLC0415 - h5py is slow to load
 
     check_folder("output", output)
     options = _options(friction, gravity, time_step, tolerance)
+    number("ball_radius", ball_radius, above=0.0)
+    number("slip_angle", slip_angle, at_least=-90.0, at_most=90.0)
     bed = _bed(balls, ball_radius, width, depth, seed, friction, gravity)
     with progress_bar() as bar:
         task = bar.add_task("wheel", total=len(slip), state="")
@@ -177,18 +197,24 @@ def wheel(
             **options,
         )
     output.mkdir(parents=True, exist_ok=True)
-    say_path("table", write_table(points, output / "wheel.csv"))
-    rows = {
-        f"slip {p.slip:g}": f"pull {p.pull:.2f} ± {p.pull_error:.2f} N,"
-        f" lateral {p.lateral:.2f} ± {p.lateral_error:.2f} N,"
-        f" torque {p.torque:.3f} N m, sinkage {1e3 * p.sinkage:.1f} mm"
-        for p in points
-    }
-    slips = {p.slip for p in points}
-    if len(slips) >= 4 and sum(s >= 0.5 for s in slips) >= 2:
-        fit = fit_pull(points)
-        rows["A, s₀, K"] = ", ".join(f"{e.value:.3f}" for e in (fit.limit, fit.free_slip, fit.scale))
-    _say(f"wheel on {balls} balls", rows)
+    with Results(as_json=as_json) as results:
+        results.path("table", write_table(points, output / "wheel.csv"))
+        results.add(points=points)
+        rows = [
+            row(
+                f"slip {p.slip:g}",
+                f"pull {p.pull:.2f} ± {p.pull_error:.2f} N,"
+                f" lateral {p.lateral:.2f} ± {p.lateral_error:.2f} N,"
+                f" torque {p.torque:.3f} N m, sinkage {1e3 * p.sinkage:.1f} mm",
+            )
+            for p in points
+        ]
+        slips = {p.slip for p in points}
+        if len(slips) >= 4 and sum(s >= 0.5 for s in slips) >= 2:
+            fit = fit_pull(points)
+            numbers = ", ".join(f"{e.value:.3f}" for e in (fit.limit, fit.free_slip, fit.scale))
+            rows.append(row("A, s₀, K", numbers, fit=fit))
+        results.table(f"wheel on {balls} balls", rows)
 
 
 def _options(friction: float, gravity: float, time_step: float, tolerance: float) -> dict[str, Any]:
@@ -201,7 +227,7 @@ def _bed(
 ) -> "BallBed":
     from rover_gym.grains.ball_bed import settled_balls  # noqa: PLC0415 - h5py is slow to load
 
-    with console().status("settling the bed"):
+    with status("settling the bed"):
         return settled_balls(
             balls,
             width,
@@ -212,10 +238,3 @@ def _bed(
             friction=friction,
             gravity=(0.0, -gravity, 0.0),
         )
-
-
-def _say(title: str, rows: dict[str, str]) -> None:
-    table = Table(title=title, show_header=False, title_justify="left")
-    for name, value in rows.items():
-        table.add_row(name, value)
-    console().print(table)

@@ -1,13 +1,13 @@
 """What the commands that record balls in space share: their options, the recording, and what they say."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.table import Table
 
-from rover_gym.cli.console import LARGEST_SEED, console, keeping, progress_bar, say_path
+from rover_gym.cli.console import LARGEST_SEED, progress_bar
+from rover_gym.cli.results import Results, Row, row, status
 
 if TYPE_CHECKING:
     from rover_gym.grains.grain_recording import Recordable
@@ -54,6 +54,7 @@ def radii(radius: float) -> dict[str, float]:
 
 
 def recorded(
+    results: Results,
     sim: "Recordable",
     name: str,
     title: str,
@@ -71,7 +72,7 @@ def recorded(
     from rover_gym.grains.grain_run import read_grain_run  # noqa: PLC0415 - as above
 
     path = output / f"{name}.h5"
-    with keeping("trajectory", path), progress_bar() as bar:
+    with results.keeping("trajectory", path), progress_bar() as bar:
         task = bar.add_task(name, total=duration, state="")
         record_grains(
             sim,
@@ -85,22 +86,27 @@ def recorded(
             progress=lambda time: bar.update(task, completed=time, state=f"{time:.2f} s"),
         )
     run = read_grain_run(path)
-    say_path("trajectory", path)
+    results.path("trajectory", path)
     if film:
         from rover_gym.figures.grain_frames import film_grains  # noqa: PLC0415 - VTK is slow to load
 
-        with console().status("drawing the film"):
-            say_path("film", film_grains(run, path.with_suffix(".mp4")))
+        with status("drawing the film"):
+            results.path("film", film_grains(run, path.with_suffix(".mp4")))
     return run
 
 
-def say(run: "GrainRun", results: dict[str, str]) -> None:
-    """Prints results, and how well the run was solved."""
+def say(results: Results, run: "GrainRun", rows: Sequence[Row]) -> None:
+    """Says results, and how well the run was solved."""
     data = run.trajectory
-    table = Table(title=run.title, show_header=False, title_justify="left")
-    for name, value in results.items():
-        table.add_row(name, value)
-    share = 100.0 * float(data["penetration"].max()) / float(run.radius.min())
-    table.add_row("deepest overlap", f"{share:.3f}% of the smallest radius")
-    table.add_row("rows not converged", f"{data.attributes['unconverged_rows']} of {run.n_frames - 1}")
-    console().print(table)
+    share = float(data["penetration"].max()) / float(run.radius.min())
+    unconverged = int(data.attributes["unconverged_rows"])
+    solved = [
+        row("deepest overlap", f"{100.0 * share:.3f}% of the smallest radius", deepest_overlap_in_radii=share),
+        row(
+            "rows not converged",
+            f"{unconverged} of {run.n_frames - 1}",
+            unconverged_rows=unconverged,
+            rows=run.n_frames - 1,
+        ),
+    ]
+    results.table(run.title, [*rows, *solved])

@@ -1,11 +1,12 @@
 """`rover grains rover|track|pit`: a rover on beds of balls and through a pit of them, recorded."""
 
+import math
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
 
-from rover_gym.cli.console import check_folder, console, plain_errors
+from rover_gym.cli.console import check_folder, plain_errors
 from rover_gym.cli.grains_options import (
     EARTH,
     FOLDER,
@@ -28,6 +29,7 @@ from rover_gym.cli.grains_options import (
     recorded,
     say,
 )
+from rover_gym.cli.results import AsJson, Results, Row, row, status
 from rover_gym.cli.scene_options import ModelName, named_model
 from rover_gym.mechanics import Motor, OptionError, RoverModel
 from rover_gym.validation import number, refuse
@@ -70,6 +72,7 @@ def rover(
     fps: Fps = 25.0,
     film: Film = False,
     output: Output = FOLDER,
+    as_json: AsJson = False,
 ) -> None:
     """Drive a rover over a bed of balls; record forces, sinkage and ruts. It ends where the bed ends."""
     from rover_gym.grains.ball_bed import settled_balls  # noqa: PLC0415 - h5py is slow to load
@@ -78,22 +81,18 @@ def rover(
     check_folder("output", output)
     chosen = _on_wheels(model, wheel_width)
     options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
-    with console().status("settling the bed"):
+    with status("settling the bed"):
         bed = settled_balls(balls, width, depth, **radii(radius), seed=seed, **options)
     sim = rover_on_bed(bed, chosen, torque, wheel_friction=wheel_friction, **options)
     end = width - chosen.clear_radius - END
-    run = recorded(
-        sim,
-        "rover",
-        f"{model} on {balls} balls",
-        duration,
-        fps,
-        seed,
-        output,
-        film=film,
-        until=lambda now: bool(now.rover.q[0] > end),
-    )
-    say(run, _drive(run, bed.surface, chosen.mass * gravity))
+
+    def is_across(now: "RoverGrainSimulation") -> bool:
+        return bool(now.rover.q[0] > end)
+
+    title = f"{model} on {balls} balls"
+    with Results(as_json=as_json) as results:
+        run = recorded(results, sim, "rover", title, duration, fps, seed, output, film=film, until=is_across)
+        say(results, run, _drive(run, bed.surface, chosen.mass * gravity))
 
 
 @plain_errors
@@ -125,6 +124,7 @@ def track(
     fps: Fps = 25.0,
     film: Film = False,
     output: Output = FOLDER,
+    as_json: AsJson = False,
 ) -> None:
     """Drive a rover along a long bed, of which only the balls about its wheels are simulated. It ends with the bed."""
     from rover_gym.grains.bed_scenes import rover_on_bed  # noqa: PLC0415 - h5py is slow to load
@@ -138,7 +138,7 @@ def track(
             OptionError, "length", length, f"must be at least {2.0 * chosen.clear_radius:.2f} m, for the rover to turn"
         )
     options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
-    with console().status("settling a tile"):
+    with status("settling a tile"):
         bed = settled_track(length, depth, layers, tile=tile, **radii(radius), seed=seed, **options)
     both = rover_on_bed(bed, chosen, torque, wheel_friction=wheel_friction, **options)
     window = MovingWindow(both.rover, both.grains, wheel_friction=wheel_friction, reach=reach, stride=stride)
@@ -149,16 +149,15 @@ def track(
         return bool(now.rover.q[0] > bed.width - chosen.clear_radius - END)
 
     title = f"{model} on {len(bed.radius)} balls"
-    run = recorded(window, "track", title, duration, fps, seed, output, film=film, until=ends)
-    say(
-        run,
-        _drive(run, bed.surface, chosen.mass * gravity)
-        | {
-            "balls simulated": f"{np.mean(simulated):.0f} on average, of {len(bed.radius)}",
-            "window moved": f"{window.moves} times",
-            "momentum frozen": f"{window.frozen_momentum:.3g} N s",
-        },
-    )
+    with Results(as_json=as_json) as results:
+        run = recorded(results, window, "track", title, duration, fps, seed, output, film=film, until=ends)
+        mean, total, frozen = float(np.mean(simulated)), len(bed.radius), window.frozen_momentum
+        about_the_window = [
+            row("balls simulated", f"{mean:.0f} on average, of {total}", mean_balls_simulated=mean, balls=total),
+            row("window moved", f"{window.moves} times", window_moves=window.moves),
+            row("momentum frozen", f"{frozen:.3g} N s", frozen_momentum=frozen),
+        ]
+        say(results, run, [*_drive(run, bed.surface, chosen.mass * gravity), *about_the_window])
 
 
 @plain_errors
@@ -187,6 +186,7 @@ def pit(
     fps: Fps = 25.0,
     film: Film = False,
     output: Output = FOLDER,
+    as_json: AsJson = False,
 ) -> None:
     """Drive a rover into a pit of balls, across, and out of it; record forces, sinkage and ruts."""
     from rover_gym.grains.bed_scenes import rover_before_pit  # noqa: PLC0415 - h5py is slow to load
@@ -196,7 +196,7 @@ def pit(
     chosen = _on_wheels(model, wheel_width, wheel_radius, _motor(torque, speed, wheel_radius))
     hole = Pit(begin=chosen.clear_radius, length=length, width=width, depth=depth, bank_deg=bank_deg)
     options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
-    with console().status("filling the pit"):
+    with status("filling the pit"):
         fill = hole.fill(**radii(radius), seed=seed, **options)
     # Far from the rover balls tremble by what the tolerance allows; one that falls is faster after a step.
     options["sleep_speed"] = 0.5 * gravity * time_step
@@ -207,9 +207,14 @@ def pit(
         return bool(now.rover.q[0] > end)
 
     title = f"{model} through a pit of {len(fill.radius)} balls"
-    run = recorded(sim, "pit", title, duration, fps, seed, output, film=film, until=is_out)
-    out = f"yes, after {run.time[-1]:.2f} s" if is_out(sim) else "no"
-    say(run, {"balls": str(len(fill.radius)), "out of the pit": out} | _drive(run, hole.depth, chosen.mass * gravity))
+    with Results(as_json=as_json) as results:
+        run = recorded(results, sim, "pit", title, duration, fps, seed, output, film=film, until=is_out)
+        out, count = is_out(sim), len(fill.radius)
+        rows = [
+            row("balls", str(count), balls=count),
+            row("out of the pit", f"yes, after {run.time[-1]:.2f} s" if out else "no", out_of_the_pit=out),
+        ]
+        say(results, run, [*rows, *_drive(run, hole.depth, chosen.mass * gravity)])
 
 
 def _motor(torque: float, speed: float, wheel_radius: float) -> Motor:
@@ -232,16 +237,19 @@ def _on_wheels(
     return model if wheel_width is None else with_wheel_width(model, wheel_width)
 
 
-def _drive(run: "GrainRun", surface: float, weight: float) -> dict[str, str]:
+def _drive(run: "GrainRun", surface: float, weight: float) -> list[Row]:
     """What a rover did on a bed of this mean height, m."""
-    way = float(run.trajectory["q"][-1, 0] - run.trajectory["q"][0, 0])
+    way, time = float(run.trajectory["q"][-1, 0] - run.trajectory["q"][0, 0]), float(run.time[-1])
     second = run.n_frames // 2
-    load = run.wheel_forces[second:, :, 1].sum(axis=1).mean()
+    load = float(run.wheel_forces[second:, :, 1].sum(axis=1).mean())
     sunk = run.sinkage[second:]
     sunk = sunk[np.isfinite(sunk)]
-    return {
-        "bed": f"{1e3 * surface:.0f} mm deep",
-        "distance": f"{way:.3f} m in {run.time[-1]:g} s",
-        "mean sinkage, second half": f"{1e3 * sunk.mean():.1f} mm" if sunk.size else "no wheel on the balls",
-        "load of all wheels, second half": f"{load:.0f} N, weight {weight:.0f} N",
-    }
+    mean = float(sunk.mean()) if sunk.size else math.nan
+    sinkage = f"{1e3 * mean:.1f} mm" if sunk.size else "no wheel on the balls"
+    weights = f"{load:.0f} N, weight {weight:.0f} N"
+    return [
+        row("bed", f"{1e3 * surface:.0f} mm deep", bed_depth=surface),
+        row("distance", f"{way:.3f} m in {time:g} s", distance=way, time=time),
+        row("mean sinkage, second half", sinkage, mean_sinkage=mean),
+        row("load of all wheels, second half", weights, mean_load=load, weight=weight),
+    ]

@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -9,17 +10,24 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from rover_gym.cli.console import check_file, console, plain_errors, say_path
-from rover_gym.extras import require
+from rover_gym.cli.completion import complete_model
+from rover_gym.cli.console import check_file, plain_errors
+from rover_gym.cli.results import AsJson, Results
+from rover_gym.extras import MissingExtraError, require
 from rover_gym.figures.model_drawing import write_model_picture
 from rover_gym.figures.saving import check_format
 from rover_gym.mechanics import ModelError, OptionError, RoverModel
-from rover_gym.models import ImportReport, check_statics, open_model, read_robot, solid_rows
+from rover_gym.models import ImportReport, Statics, check_statics, open_model, read_robot, solid_rows
 from rover_gym.validation import refuse
 
 model = typer.Typer(help="Models: read URDF and MJCF, show and check any model.", no_args_is_help=True)
 
-Named = Annotated[str, typer.Argument(metavar="FILE_OR_NAME", help="A name of the gallery, or a model's file.")]
+Named = Annotated[
+    str,
+    typer.Argument(
+        metavar="FILE_OR_NAME", help="A name of the gallery, or a model's file.", autocompletion=complete_model
+    ),
+]
 Picture = Annotated[Path | None, typer.Option(dir_okay=False, help="Picture to write: .png, .svg or .pdf.")]
 
 #: What errors recommend as arguments, and the same as options of `rover model import`.
@@ -55,9 +63,11 @@ def import_model(
     ignore: Annotated[
         list[str] | None, typer.Option(help="What to leave out although it changes the motion, such as friction.")
     ] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Read a URDF or MJCF, tell what was understood, and write a model file and a picture."""
-    require("matplotlib", "demo")
+    if picture is not None:
+        require("matplotlib", "demo")
     picture = picture or output.with_suffix(".png")
     check_format(picture.suffix.removeprefix("."))
     for option, path in (("output", output), ("picture", picture)):
@@ -70,28 +80,34 @@ def import_model(
     if fixed_base:
         options["free_base"] = False
     read, report = _read(file, options)
-    _print_solids(read)
-    for title, entries in (("assumed", report.assumed), ("not simulated", report.left_out)):
-        for entry in entries:
-            console().print(f"{title}: {entry}", markup=False)
-    output.parent.mkdir(parents=True, exist_ok=True)
-    read.to_file(output)
-    say_path("model", output)
-    say_path("picture", write_model_picture(read, picture))
+    with Results(as_json=as_json) as results:
+        _say_solids(results, read)
+        results.add(assumed=report.assumed, not_simulated=report.left_out)
+        for title, entries in (("assumed", report.assumed), ("not simulated", report.left_out)):
+            for entry in entries:
+                results.show(f"{title}: {entry}")
+        output.parent.mkdir(parents=True, exist_ok=True)
+        read.to_file(output)
+        results.path("model", output)
+        try:
+            results.path("picture", write_model_picture(read, picture))
+        except MissingExtraError as error:
+            typer.echo(f"no picture: {error}", err=True)
 
 
 @model.command()
 @plain_errors
-def show(*, name: Named, picture: Picture = None) -> None:
+def show(*, name: Named, picture: Picture = None, as_json: AsJson = False) -> None:
     """Show a model's solids, joints and wheels, and draw it where a picture is named."""
     if picture is not None:
         require("matplotlib", "demo")
         check_format(picture.suffix.removeprefix("."))
         check_file("picture", picture)
     found = open_model(name)
-    _print_solids(found)
-    if picture is not None:
-        say_path("picture", write_model_picture(found, picture))
+    with Results(as_json=as_json) as results:
+        _say_solids(results, found)
+        if picture is not None:
+            results.path("picture", write_model_picture(found, picture))
 
 
 @model.command()
@@ -100,21 +116,30 @@ def check(
     *,
     name: Named,
     friction: Annotated[float, typer.Option(help="Friction coefficient of wheel and ground.")] = 0.7,
+    as_json: AsJson = False,
 ) -> None:
     """Set a rover on level ground: wheel loads, steering geometry, clearance, and the step that it can climb."""
     found = open_model(name)
     statics = check_statics(found, friction=friction)
-    console().print(f"{found.name} on level ground, 9.81 m/s²", markup=False)
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
     for heading in ("wheel", "load", "share"):
         table.add_column(heading, justify="left" if heading == "wheel" else "right")
     for wheel, load in zip(found.wheel_names, statics.loads, strict=True):
         table.add_row(wheel, f"{load:.5g} N", f"{load / max(float(statics.loads.sum()), 1e-300):.1%}")
-    console().print(table)
+    with Results(as_json=as_json) as results:
+        results.add(name=found.name, wheels=found.wheel_names, **asdict(statics))
+        results.show(f"{found.name} on level ground, 9.81 m/s²")
+        results.show(table)
+        for line in _statics(statics):
+            results.show(line)
+
+
+def _statics(statics: Statics) -> list[str]:
+    """What a rover is on level ground, in words."""
     roll, pitch = (math.degrees(angle) for angle in statics.attitude)
     is_bare = math.isinf(statics.clearance)
     turning = "" if math.isinf(statics.turning_radius) else f", radius from {statics.turning_radius:.3g} m"
-    lines = [
+    return [
         f"at rest: roll {roll:.2f}°, pitch {pitch:.2f}°, largest velocity {statics.rest_speed:.1e}",
         f"wheelbase {statics.wheelbase:.4g} m, track {statics.track:.4g} m",
         f"clearance: {'no limit, since only wheels touch' if is_bare else f'{statics.clearance:.3g} m'}",
@@ -123,8 +148,6 @@ def check(
         f"{statics.step_height:.3g} m"
         + (" (the wheels' radius: equilibrium holds on a wall)" if statics.climbs_wall else ""),
     ]
-    for line in lines:
-        console().print(line, markup=False)
 
 
 def _read(file: Path, options: dict[str, object]) -> tuple[RoverModel, ImportReport]:
@@ -140,15 +163,18 @@ def _read(file: Path, options: dict[str, object]) -> tuple[RoverModel, ImportRep
         raise told from None
 
 
-def _print_solids(found: RoverModel) -> None:
-    title = f"{found.name}: {found.mass:.5g} kg, {found.nv} degrees of freedom, {len(found.wheel_names)} wheels"
-    console().print(title, markup=False)
+def _say_solids(results: Results, found: RoverModel) -> None:
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
-    for heading in ("solid", "joint", "on", "mass", "role"):
+    headings = ("solid", "joint", "on", "mass", "role")
+    for heading in headings:
         table.add_column(heading, justify="right" if heading == "mass" else "left")
-    for name, joint, parent, mass, role in solid_rows(found):
+    rows = solid_rows(found)
+    for name, joint, parent, mass, role in rows:
         table.add_row(name, joint, parent, f"{mass:.4g} kg", role)
-    console().print(table)
+    solids = [dict(zip(headings, entry, strict=True)) for entry in rows]
+    results.add(name=found.name, mass=found.mass, dofs=found.nv, wheels=len(found.wheel_names), solids=solids)
+    results.show(f"{found.name}: {found.mass:.5g} kg, {found.nv} degrees of freedom, {len(found.wheel_names)} wheels")
+    results.show(table)
 
 
 def _radii(given: list[str] | None) -> list[str] | dict[str, float] | None:

@@ -1,14 +1,16 @@
 """`rover planar ball|rover|soil`: the planar systems of the report's chapter 3."""
 
+import math
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import typer
-from rich.table import Table
 
-from rover_gym.cli.console import check_folder, console, keeping, plain_errors, progress_bar, say_path
+from rover_gym.cli.console import check_folder, plain_errors, progress_bar
+from rover_gym.cli.results import AsJson, Results, row
+from rover_gym.cli.scene_options import warn_of_slope
 from rover_gym.cli.soil_command import soil
 from rover_gym.mechanics import (
     BallSimulation,
@@ -21,7 +23,7 @@ from rover_gym.mechanics import (
     TwoWheelRoverSimulation,
 )
 from rover_gym.planar.planar_recording import PlanarGround, describe_planar, record_planar
-from rover_gym.record.trajectory import read_trajectory
+from rover_gym.planar.planar_run import read_planar_run
 from rover_gym.validation import number, refuse
 
 planar = typer.Typer(
@@ -31,6 +33,7 @@ planar = typer.Typer(
 
 STEEPEST = 89.0  # degrees: an upright line is no ground
 LARGEST_TABLE = 1 << 26  # bytes
+LONGEST, FARTHEST = 10.0, 6.0  # s and m, where neither a duration nor a distance is given
 
 
 class PlanarGroundKind(StrEnum):
@@ -53,7 +56,14 @@ TableFile = Annotated[
 Friction = Annotated[float, typer.Option(help="Friction coefficient.")]
 Restitution = Annotated[float, typer.Option(help="Coefficient of restitution.")]
 TimeStep = Annotated[float, typer.Option(help="Time step, s.")]
-Duration = Annotated[float, typer.Option(min=0.01, max=1000.0, help="Time to simulate, s.")]
+Duration = Annotated[
+    float | None,
+    typer.Option(min=0.01, max=1000.0, help="Time to simulate, s. Default: until the distance is gone, at most 10 s."),
+]
+Distance = Annotated[
+    float | None,
+    typer.Option(min=0.01, max=1e6, help="Way along x at which the run ends, m. Default: 6 m; with a duration, none."),
+]
 Speed = Annotated[float, typer.Option(min=-1e4, max=1e4, help="Forward speed at the start, m/s.")]
 Output = Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)]
 
@@ -75,8 +85,10 @@ def ball(
     friction: Friction = 0.7,
     restitution: Restitution = 0.5,
     time_step: TimeStep = 0.002,
-    duration: Duration = 10.0,
+    duration: Duration = None,
+    distance: Distance = None,
     output: Output = Path("runs/planar"),
+    as_json: AsJson = False,
 ) -> None:
     """Drop a ball on a line, a sine, a step or a table of points; record and draw its path."""
     check_folder("output", output)
@@ -90,7 +102,7 @@ def ball(
     )
     sim.set_state([0.0, sim.ground.height(0.0) + radius + drop, 0.0], [speed, 0.0, 0.0])
     _lift(sim, drop)
-    _run(sim, "a ball", duration, output / "ball.h5")
+    _run(sim, "a ball", duration, distance, output / "ball.h5", as_json=as_json)
 
 
 @planar.command()
@@ -108,8 +120,10 @@ def rover(
     friction: Friction = 0.9,
     restitution: Restitution = 0.0,
     time_step: TimeStep = 0.002,
-    duration: Duration = 10.0,
+    duration: Duration = None,
+    distance: Distance = None,
     output: Output = Path("runs/planar"),
+    as_json: AsJson = False,
 ) -> None:
     """Drive the two-wheel rover over a line, a sine, a step or a table of points; record and draw its path."""
     check_folder("output", output)
@@ -125,7 +139,9 @@ def rover(
     sim.set_state([0.0, sim.ground.height(0.0) + 0.2, angle, 0.0, 0.0], [speed, 0.0, 0.0, -speed / 0.2, -speed / 0.2])
     _lift(sim, 0.0)
     sim.set_torques([torque, torque])
-    _run(sim, "the two-wheel rover", duration, output / "rover.h5")
+    if ground is PlanarGroundKind.line:
+        warn_of_slope(slope, friction)
+    _run(sim, "the two-wheel rover", duration, distance, output / "rover.h5", as_json=as_json)
 
 
 planar.command()(soil)
@@ -171,26 +187,37 @@ def _words(ground: PlanarGround) -> str:
     return "a step" if isinstance(ground, Polyline) else "a table of points"
 
 
-def _run(sim: PlanarSimulation, who: str, duration: float, path: Path) -> None:
+def _run(
+    sim: PlanarSimulation, who: str, duration: float | None, distance: float | None, path: Path, *, as_json: bool
+) -> None:
+    longest = LONGEST if duration is None else duration
+    farthest = distance or (FARTHEST if duration is None else math.inf)
+    start = float(sim.q[0])
     title = f"{who} on {_words(sim.ground)}"
-    with keeping("trajectory", path), progress_bar() as bar:
-        task = bar.add_task(who, total=duration, state="")
-        rows = record_planar(
-            sim,
-            path,
-            describe_planar(sim, title),
-            duration=duration,
-            progress=lambda time: bar.update(task, completed=time, state=f"{time:.1f} s"),
+    with Results(as_json=as_json) as results:
+        with results.keeping("trajectory", path), progress_bar() as bar:
+            task = bar.add_task(who, total=longest, state="")
+            rows = record_planar(
+                sim,
+                path,
+                describe_planar(sim, title),
+                duration=longest,
+                until=lambda now: bool(abs(now.q[0] - start) >= farthest),
+                progress=lambda time: bar.update(task, completed=time, state=f"{time:.1f} s"),
+            )
+        x, y = sim.q[:2]
+        run = read_planar_run(path)
+        speed, gap = float(np.hypot(*sim.v[:2])), float(run.trajectory["gaps"].min())
+        results.table(
+            title,
+            [
+                row("at the end", f"x = {x:.3f} m, y = {y:.3f} m after {sim.time:g} s", x=x, y=y, time=sim.time),
+                row("speed at the end", f"{speed:.3f} m/s", speed=speed),
+                row("smallest gap", f"{1e3 * gap:.4f} mm", smallest_gap=gap),
+                row("steps not converged", str(rows), unconverged_rows=rows),
+            ],
         )
-    trajectory = read_trajectory(path)
-    table = Table(title=title, show_header=False, title_justify="left")
-    x, y = sim.q[:2]
-    table.add_row("at the end", f"x = {x:.3f} m, y = {y:.3f} m after {sim.time:g} s")
-    table.add_row("speed at the end", f"{np.hypot(*sim.v[:2]):.3f} m/s")
-    table.add_row("smallest gap", f"{1e3 * trajectory['gaps'].min():.4f} mm")
-    table.add_row("steps not converged", str(rows))
-    console().print(table)
-    say_path("trajectory", path)
-    from rover_gym.figures.planar_run import draw_planar_run  # noqa: PLC0415 - matplotlib is slow to load
+        results.path("trajectory", path)
+        from rover_gym.figures.planar_run import draw_planar_run  # noqa: PLC0415 - matplotlib is slow to load
 
-    say_path("figure", draw_planar_run(sim, path, path.with_suffix(".png")))
+        results.path("figure", draw_planar_run(run, path.with_suffix(".png")))

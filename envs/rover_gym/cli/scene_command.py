@@ -1,6 +1,5 @@
 """`rover scene`: what is built for a scene, why, and what that costs and saves."""
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -12,8 +11,19 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from rover_gym.cli.console import LARGEST_SEED, console, plain_errors, progress_bar
-from rover_gym.cli.scene_options import BUILT_IN, HeightRange, ModelName, Spacing, Start, named_ground, named_model
+from rover_gym.cli.completion import complete_terrain
+from rover_gym.cli.console import LARGEST_SEED, plain_errors, progress_bar
+from rover_gym.cli.results import AsJson, Results
+from rover_gym.cli.scene_options import (
+    BUILT_IN,
+    HeightRange,
+    ModelName,
+    Spacing,
+    Start,
+    named_ground,
+    named_model,
+    warn_of_slope,
+)
 from rover_gym.env.start import tilted_plane
 from rover_gym.mechanics import OptionError, Plane, RoverModel, SphereField, Terrain
 from rover_gym.planning.economy import Economy, measure_economies
@@ -35,7 +45,11 @@ GROUNDS = ("plane", "rocks", "rug")
 def scene(
     *,
     terrain: Annotated[
-        str, typer.Option(help="The ground: 'plane', 'rocks', 'rug', or the file of a map or a mesh.")
+        str,
+        typer.Option(
+            help="The ground: 'plane', 'rocks', 'rug' of the report's section 6.2, or the file of a map or a mesh.",
+            autocompletion=complete_terrain,
+        ),
     ] = "plane",
     spacing: Spacing = None,
     height_range: HeightRange = None,
@@ -60,7 +74,7 @@ def scene(
     ] = False,
     torque: Annotated[float, typer.Option(help="Torque of every wheel in the measured drive, N m.")] = 15.0,
     duration: Annotated[float, typer.Option(min=0.1, max=600.0, help="Duration of the measured drive, s.")] = 10.0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Print what is built for a scene: model, ground, scheme, solver and step, each with its reason.
 
@@ -74,6 +88,7 @@ def scene(
         refuse(OptionError, "slope", slope, "is the ground's own")
     if ground is None:
         ground = _ground(terrain, rover, slope, seed)
+        warn_of_slope(slope)
     described = Scene(
         ground,
         rover,
@@ -93,22 +108,19 @@ def scene(
             economies = measure_economies(
                 made, torque=torque, duration=duration, progress=lambda done: bar.update(task, completed=done)
             )
-    if as_json:
-        rows = [{**asdict(e), "ratio": e.ratio} for e in economies]
-        report = {"model": made.kind, "dofs": _dofs(made), "error": made.error, "parts": made.explain()}
-        typer.echo(json.dumps({**report, "measured": rows} if measure else report, indent=2))
-        return
-    out = console()
     dofs = _dofs(made)
-    out.print(
-        f"{made.kind} model of {dofs} degrees of freedom, within {made.error:.0e} m of the full one in 10 s"
-        if made.kind != "full"
-        else f"full model of {dofs} degrees of freedom"
-    )
-    if explain:
-        out.print(_explained(made))
-    if measure:
-        out.print(_measured(economies, made, duration))
+    with Results(as_json=as_json) as results:
+        results.add(model=made.kind, dofs=dofs, error=made.error, parts=made.explain())
+        results.show(
+            f"{made.kind} model of {dofs} degrees of freedom, within {made.error:.0e} m of the full one in 10 s"
+            if made.kind != "full"
+            else f"full model of {dofs} degrees of freedom"
+        )
+        if explain:
+            results.show(_explained(made))
+        if measure:
+            results.add(measured=[{**asdict(e), "ratio": e.ratio} for e in economies])
+            results.show(_measured(economies, made, duration))
 
 
 def _dofs(made: ScenePlan) -> int:

@@ -1,16 +1,33 @@
-"""Options that name the rover and its map, for all commands that take them."""
+"""Options that name the rover and its ground, for all commands that take them."""
 
+import math
 from typing import Annotated, Any
 
 import typer
 
+from rover_gym.cli.completion import complete_model, complete_terrain
+from rover_gym.env.argument_checks import TERRAINS, terrain_name
+from rover_gym.env.arguments import ARGUMENTS
 from rover_gym.maps.map_files import ENDINGS
 from rover_gym.maps.terrain_files import is_terrain_file, open_terrain
 from rover_gym.mechanics import HeightField, OptionError, RoverModel, TriangleMesh
 from rover_gym.models import open_model
 from rover_gym.validation import refuse
 
-ModelName = Annotated[str, typer.Option(help="The rover: a name of the gallery, or a model's file (TOML, URDF, MJCF).")]
+ModelName = Annotated[
+    str,
+    typer.Option(
+        help="The rover: a name of the gallery, or a model's file (TOML, URDF, MJCF).", autocompletion=complete_model
+    ),
+]
+TerrainName = Annotated[
+    str | None,
+    typer.Option(
+        help="The ground: 'plane', 'rocks', 'hills', or the file of a map or a mesh. "
+        "Default: the plane; with a difficulty, rocks.",
+        autocompletion=complete_terrain,
+    ),
+]
 Spacing = Annotated[
     float | None, typer.Option(help="Distance of a map's columns and rows, m, where its file does not give it.")
 ]
@@ -20,6 +37,40 @@ HeightRange = Annotated[
 Start = Annotated[tuple[float, float] | None, typer.Option(metavar="X Z", help="Start on the map, m. Default: 0 0.")]
 
 BUILT_IN = "rover"
+
+#: Friction coefficient of wheel and ground where no option sets it.
+FRICTION: float = ARGUMENTS["friction"].default
+
+#: Environments by the names of their grounds.
+ENVIRONMENTS = dict(zip(TERRAINS, ("Rover-v0", "RoverRocks-v0", "RoverHills-v0"), strict=True))
+
+
+def chosen_terrain(terrain: str | None, difficulty: float | None) -> str:
+    """The ground of an option `--terrain`; where none is given, rocks with a difficulty and the plane without."""
+    if terrain is None:
+        return "plane" if difficulty is None else "rocks"
+    return terrain_name(terrain)
+
+
+def environment_of(terrain: str) -> str:
+    """The environment that has this ground; of a file `Rover-v0`."""
+    return ENVIRONMENTS.get(terrain, "Rover-v0")
+
+
+def environment_title(terrain: str) -> str:
+    """The environment that has this ground, as a heading says it."""
+    return environment_of(terrain) if terrain in ENVIRONMENTS else f"{environment_of(terrain)} on {terrain}"
+
+
+def warn_of_slope(slope_deg: float | None, friction: float = FRICTION) -> None:
+    """Says on standard error that a slope, degrees, is beyond the friction angle, where rovers slide."""
+    angle = math.degrees(math.atan(friction))
+    if slope_deg is not None and abs(slope_deg) > angle:
+        typer.echo(
+            f"warning: --slope {slope_deg:g} is steeper than the friction angle of {angle:.1f} degrees "
+            f"(friction {friction:g}): a rover slides down",
+            err=True,
+        )
 
 
 def named_model(name: str) -> RoverModel | None:

@@ -15,12 +15,10 @@ from rover_gym.cli.console import (
     INTERRUPTED,
     LARGEST_SEED,
     check_folder,
-    console,
-    keeping,
     plain_errors,
     progress_bar,
-    say_path,
 )
+from rover_gym.cli.results import AsJson, Results, row, status
 from rover_gym.mechanics import OptionError
 from rover_gym.validation import refuse
 
@@ -89,6 +87,7 @@ def soil(
     ] = 480,
     pull_layers: Annotated[int, typer.Option(min=1, max=100, help="Sweep: layers of those disks.")] = 6,
     output: Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)] = Path("runs/planar"),
+    as_json: AsJson = False,
 ) -> None:
     """Drive the two-wheel rover over granular soil of disks; record, draw and film it."""
     check_folder("output", output)
@@ -98,15 +97,17 @@ def soil(
         "friction": friction,
         "time_step": (2e-3 if sweep else 1e-3) * slowness if time_step is None else time_step,
     }
-    if sweep:
-        beds = range(seed, seed + seeds)
-        _sweep(disks or 444, layers, pull_disks, pull_layers, beds, wheel_friction, options, output)
-    else:
-        seconds = 4.0 * slowness if duration is None else duration
-        _cross(disks or 222, layers, torque, seconds, seed, wheel_friction, options, output, video=video)
+    with Results(as_json=as_json) as results:
+        if sweep:
+            beds = range(seed, seed + seeds)
+            _sweep(results, disks or 444, layers, pull_disks, pull_layers, beds, wheel_friction, options, output)
+        else:
+            seconds = 4.0 * slowness if duration is None else duration
+            _cross(results, disks or 222, layers, torque, seconds, seed, wheel_friction, options, output, video=video)
 
 
 def _cross(
+    results: Results,
     disks: int,
     layers: int,
     torque: float,
@@ -131,7 +132,7 @@ def _cross(
     title = f"the two-wheel rover on a soil of {disks} disks"
     path = output / "soil.h5"
     rate = FRAMES * float(np.sqrt(-options["gravity"][1] / EARTH))
-    with keeping("trajectory", path), progress_bar() as bar:
+    with results.keeping("trajectory", path), progress_bar() as bar:
         task = bar.add_task("soil", total=duration, state="")
         rows = record_soil(
             sim,
@@ -145,25 +146,29 @@ def _cross(
         )
     run = read_soil_run(path)
     machine = run.trajectory["machine"]
-    distance, rims = (
-        machine[-1, 0] - machine[0, 0],
-        -float((run.wheels[0, :, 2] * (machine[-1] - machine[0])[3:]).mean()),
-    )
-    table = Table(title=title, show_header=False, title_justify="left")
-    table.add_row("distance", f"{distance:.3f} m in {sim.time:g} s")
-    table.add_row("slip", f"{1.0 - distance / rims:.3f}" if rims > 0.01 else "the wheels stand")
-    table.add_row("mean sinkage", f"{1e3 * run.sinkage.mean():.1f} mm")
-    table.add_row("contacts at the end", str(len(sim.contacts)))
+    distance = float(machine[-1, 0] - machine[0, 0])
+    rims = -float((run.wheels[0, :, 2] * (machine[-1] - machine[0])[3:]).mean())
+    slip = 1.0 - distance / rims if rims > 0.01 else math.nan
+    sinkage, contacts = float(run.sinkage.mean()), len(sim.contacts)
     share = float(run.trajectory["penetration"].max()) / float(sim.radius.min())
-    table.add_row("deepest overlap", f"{100.0 * share:.3f}% of the smallest radius")
-    table.add_row("rows not converged", f"{rows} of {run.n_frames - 1}")
-    console().print(table)
-    say_path("trajectory", path)
-    say_path("figure", draw_soil(run, output / "soil.png", row=run.n_frames // 2))
+    unconverged = f"{rows} of {run.n_frames - 1}"
+    results.table(
+        title,
+        [
+            row("distance", f"{distance:.3f} m in {sim.time:g} s", distance=distance, time=sim.time),
+            row("slip", "the wheels stand" if math.isnan(slip) else f"{slip:.3f}", slip=slip),
+            row("mean sinkage", f"{1e3 * sinkage:.1f} mm", mean_sinkage=sinkage),
+            row("contacts at the end", str(contacts), contacts=contacts),
+            row("deepest overlap", f"{100.0 * share:.3f}% of the smallest radius", deepest_overlap_in_radii=share),
+            row("rows not converged", unconverged, unconverged_rows=rows, rows=run.n_frames - 1),
+        ],
+    )
+    results.path("trajectory", path)
+    results.path("figure", draw_soil(run, output / "soil.png", row=run.n_frames // 2))
     if video:
-        with console().status("drawing the video"):
+        with status("drawing the video"):
             film = film_soil(run.resample(rate), output / "soil.mp4", frames_per_second=round(FRAMES))
-        say_path("video", film)
+        results.path("video", film)
 
 
 def _check_width(option: str, disks: int, layers: int, needed: float, radius_max: float = 0.0165) -> None:
@@ -178,6 +183,7 @@ def _check_width(option: str, disks: int, layers: int, needed: float, radius_max
 
 
 def _sweep(
+    results: Results,
     disks: int,
     layers: int,
     pull_disks: int,
@@ -227,7 +233,7 @@ def _sweep(
     if interrupted and not pulls:
         raise KeyboardInterrupt
     fits = {load: fit_traction(rows) for load, rows in pulls.items()}
-    _say_fits(fits)
+    results.show(_fits(fits))
     output.mkdir(parents=True, exist_ok=True)
     numbers = {
         "drives": [[asdict(drive) for drive in row] for row in drives],
@@ -237,15 +243,16 @@ def _sweep(
     path = output / "soil-curves.json"
     # JSON knows no nan: the slip of wheels that stood is null, and so is the standard error of one bed.
     path.write_text(json.dumps(numbers, indent=1).replace("NaN", "null") + "\n", encoding="utf-8")
-    say_path("numbers", path)
+    results.add(**numbers)
+    results.path("numbers", path)
     if interrupted:
         typer.echo("interrupted: the pulls are done, the drives are not", err=True)
         raise typer.Exit(INTERRUPTED)
-    say_path("curves", draw_curves(drives, pulls, fits, output / "soil-curves.png"))
+    results.path("curves", draw_curves(drives, pulls, fits, output / "soil-curves.png"))
 
 
-def _say_fits(fits: dict[float, "Traction"]) -> None:
-    """Prints the parameters of the pull curve for each load."""
+def _fits(fits: dict[float, "Traction"]) -> Table:
+    """The parameters of the pull curve for each load."""
     first = next(iter(fits.values())).first
     table = Table(title="pull / load = A (1 - exp(-(s - s₀) / K)) of the slip s", title_justify="left")
     for column in ("load", "A", "s₀", "K", f"slope from s = {first:g} on"):
@@ -253,4 +260,4 @@ def _say_fits(fits: dict[float, "Traction"]) -> None:
     for load, fit in fits.items():
         numbers = (fit.limit, fit.free_slip, fit.scale, fit.last_slope)
         table.add_row(f"{load:g} kg", *map(str, numbers))
-    console().print(table)
+    return table

@@ -1,7 +1,6 @@
 """`rover speed`: how fast a batch of rovers is here, beside MuJoCo, and where the time of its environment goes."""
 
 import datetime
-import json
 import os
 from dataclasses import asdict
 from enum import StrEnum
@@ -11,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from rover_gym.cli.console import plain_errors, progress_bar
+from rover_gym.cli.results import AsJson, Results
 from rover_gym.vector.exploring import ExploringSpeed, measure_exploring, processor
 from rover_gym.vector.throughput import VectorSpeed, measure_speed
 
@@ -22,7 +22,7 @@ class SpeedTerrain(StrEnum):
     """What the rovers drive on."""
 
     plane = "plane"
-    sphere_field = "sphere_field"
+    rocks = "rocks"
 
 
 @plain_errors
@@ -36,7 +36,7 @@ def speed(
     ] = None,
     torque: Annotated[float, typer.Option(min=0.0, max=1e3, help="Largest torque of exploring rovers, N m.")] = 60.0,
     rounds: Annotated[int, typer.Option(min=1, max=1_000_000, help="Steps of each environment that are timed.")] = 200,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Step a batch of exploring rovers, and MuJoCo's rollout of the same where it is installed, and print how fast."""
     grounds = list(SpeedTerrain) if terrain is None else [terrain]
@@ -52,7 +52,7 @@ def speed(
             exploring = measure_exploring(
                 num_envs, threads, ground=ground.value, torque=torque, rounds=exploring_rounds, progress=advance
             )
-            arguments: dict[str, Any] = {"terrain": ground.value, "height_scan": ground is SpeedTerrain.sphere_field}
+            arguments: dict[str, Any] = {"terrain": ground.value, "height_scan": ground is SpeedTerrain.rocks}
             told[ground.value] = (
                 exploring,
                 measure_speed(num_envs, threads, rounds=rounds, progress=advance, **arguments),
@@ -66,8 +66,9 @@ def speed(
         "date": datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
         "packages": versions,
     }
+    with Results(as_json=as_json) as results:
+        results.add(machine=machine, grounds={name: _fields(*two) for name, two in told.items()})
     if as_json:
-        typer.echo(json.dumps({"machine": machine, "grounds": {name: _fields(*two) for name, two in told.items()}}))
         return
     packages = ", ".join(f"{name} {version}" for name, version in versions.items())
     typer.echo(f"{machine['processor']}, {machine['cores']} cores, {machine['instruction_set']}; {machine['date']}")

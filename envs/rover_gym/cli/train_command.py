@@ -1,13 +1,15 @@
 """`rover train`: policies by reinforcement learning, one seed or several."""
 
 import re
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand
 
-from rover_gym.cli.console import check_folder, plain_errors, say_path
+from rover_gym.cli.console import check_folder, plain_errors
+from rover_gym.cli.results import AsJson, Results
 from rover_gym.extras import require
 
 LARGEST = 498  # the largest seed: the fields of all seeds stay below the evaluations'
@@ -63,6 +65,7 @@ def train(
     ] = 0,
     progress: Annotated[bool, typer.Option(help="Show a progress bar.")] = True,
     show: Annotated[bool, typer.Option("--show", help="Print the configuration as YAML and end.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Train a policy for Rover-v0 with stable-baselines3's PPO and print its figures.
 
@@ -90,23 +93,27 @@ def train(
     is_alone = len(chosen) == 1
     parent = output if output is not None and not is_alone else Path("runs") / "train"
     folders = [output if output is not None and is_alone else parent / f"{path.stem}-seed{seed}" for seed in chosen]
-    reporting = Reporting(say=typer.echo, progress=progress, films=films)
-    for seed, folder in zip(chosen, folders, strict=True):
+    say = partial(typer.echo, err=as_json)
+    reporting = Reporting(say=say, progress=progress, films=films)
+    with Results(as_json=as_json) as results:
+        for seed, folder in zip(chosen, folders, strict=True):
+            if not is_alone:
+                say(f"seed {seed}:")
+            policy = train_ppo(
+                settings,
+                folder,
+                name=path.name,
+                seed=seed,
+                resume=resume and (is_alone or (folder / "checkpoints" / "latest.json").exists()),
+                total_steps=steps,
+                reporting=reporting,
+            )
+            results.path("policy", policy)
+            results.path("best policy in the evaluations", folder / "best")
+        done = [read_seed(folder) for folder in folders] if as_json or not is_alone else []
+        results.add(seeds=done)
         if not is_alone:
-            typer.echo(f"seed {seed}:")
-        policy = train_ppo(
-            settings,
-            folder,
-            name=path.name,
-            seed=seed,
-            resume=resume and (is_alone or (folder / "checkpoints" / "latest.json").exists()),
-            total_steps=steps,
-            reporting=reporting,
-        )
-        say_path("policy", policy)
-        say_path("best policy in the evaluations", folder / "best")
-    if not is_alone:
-        stem = parent / f"{path.stem}-seeds"
-        typer.echo(write_seeds([read_seed(folder) for folder in folders], stem))
-        for ending in ("md", "json"):
-            say_path("written", stem.with_name(f"{stem.name}.{ending}"))
+            stem = parent / f"{path.stem}-seeds"
+            say(write_seeds(done, stem))
+            for ending in ("md", "json"):
+                results.path("written", stem.with_name(f"{stem.name}.{ending}"))

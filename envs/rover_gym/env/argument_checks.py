@@ -17,7 +17,9 @@ from rover_gym.mechanics import ModelError, OptionError, RoverModel, Terrain, Te
 from rover_gym.models.lookup import open_model
 from rover_gym.validation import Range, known_keys, mapping, number, refuse, span, vector, whole
 
-TERRAINS = ("plane", "sphere_field", "hills")
+TERRAINS = ("plane", "rocks", "hills")
+#: Another name of a terrain, which files of trainings hold.
+SYNONYMS = {"sphere_field": "rocks"}
 SOLVER_OPTIONS = (
     "variant",
     "theta",
@@ -97,8 +99,15 @@ class Special:
         return self.words
 
 
+def terrain_name(name: str) -> str:
+    """The name of a terrain, for a synonym the one that `TERRAINS` holds; any other text stays."""
+    return SYNONYMS.get(name, name)
+
+
 def check_terrain(field: str, value: object) -> str | Terrain:
     """Checks the name of a terrain, or a terrain; a file is opened, and a list of terrains is their union."""
+    if isinstance(value, str):
+        value = terrain_name(value)
     if isinstance(value, str) and value in TERRAINS:
         return value
     if isinstance(value, (list, tuple)):

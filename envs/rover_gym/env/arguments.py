@@ -66,7 +66,7 @@ class RoverArguments(TypedDict, total=False):
         str | PathLike[str] | Terrain | Sequence[Terrain],
         Argument(
             "plane",
-            Special('"plane", "sphere_field", "hills", a terrain, its file or a list of terrains', check_terrain),
+            Special('"plane", "rocks", "hills", a terrain, its file or a list of terrains', check_terrain),
             "the ground",
         ),
     ]
@@ -140,7 +140,7 @@ class RoverArguments(TypedDict, total=False):
         int,
         Argument(
             1,
-            Special(f"1 to {MAX_WAYPOINTS}", check_waypoints),
+            Special("1 to " + str(MAX_WAYPOINTS), check_waypoints),
             "goals, reached one after the other, each `goal_distance` from the one before it",
         ),
     ]

@@ -20,6 +20,13 @@ class EnvSnapshot:
 
     It includes the outcome of the last control period, so that an episode that has ended stays ended, but not the step
     count of a `TimeLimit` wrapper.
+
+    Attributes:
+        simulation: The rover in the core.
+        scene: What the episode was drawn as: ground, start, goals.
+        progress: How far the episode has come.
+        difficulty: The range that difficulties are drawn from; None without rocks.
+        random_state: State of the environment's random generators.
     """
 
     simulation: Snapshot

@@ -49,7 +49,13 @@ MOST_BEDS = 1000
 
 @dataclass(frozen=True)
 class BedDraw:
-    """The bed of an episode: its number, and whether it is mirrored along x and along z."""
+    """The bed of an episode.
+
+    Attributes:
+        number: Which of the settled beds it is.
+        along_x: Whether it is mirrored along x.
+        along_z: Whether it is mirrored along z.
+    """
 
     number: int
     along_x: bool
@@ -58,7 +64,13 @@ class BedDraw:
 
 @dataclass(frozen=True)
 class GrainsEnvSnapshot:
-    """The state from which a `RoverGrainsEnv` continues bit for bit; picklable."""
+    """The state from which a `RoverGrainsEnv` continues bit for bit; picklable.
+
+    Attributes:
+        rover: Rover and episode.
+        bed: The bed that was drawn.
+        grains: Rover and balls in the core.
+    """
 
     rover: EnvSnapshot
     bed: BedDraw

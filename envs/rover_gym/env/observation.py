@@ -26,7 +26,18 @@ LARGEST = float(np.finfo(np.float32).max)
 
 @dataclass(frozen=True)
 class ObservationField:
-    """One named slice of the observation; `low` and `high` bound the scaled entries."""
+    """One named slice of the observation.
+
+    Attributes:
+        name: Name of the field.
+        start: Index of its first entry.
+        size: Number of entries.
+        unit: Unit before scaling.
+        scale: By what each entry is divided.
+        low: Lower bound of the scaled entries.
+        high: Upper bound of the scaled entries.
+        meaning: Meaning, in a few words.
+    """
 
     name: str
     start: int

@@ -33,7 +33,13 @@ SPACINGS = (1e-3, 10.0)
 
 @dataclass(frozen=True)
 class RockDistribution:
-    """What rocks are drawn from: a range of difficulties, and the values that override the difficulty."""
+    """What rocks are drawn from.
+
+    Attributes:
+        difficulty: Range of difficulties.
+        abundance: Fraction of the ground that rocks cover; None: by the difficulty.
+        max_radius: Radius of the largest rocks, in wheel radii; None: by the difficulty.
+    """
 
     difficulty: Range = (DEFAULT_DIFFICULTY, DEFAULT_DIFFICULTY)
     abundance: float | None = None

@@ -2,6 +2,7 @@
 
 import copy
 from dataclasses import asdict
+from functools import partial
 from typing import TYPE_CHECKING, Any, Unpack
 
 import gymnasium as gym
@@ -15,6 +16,7 @@ from rover_gym.env.env_snapshot import EnvSnapshot, check_random_state, check_sn
 from rover_gym.env.episode_scene import EpisodeScene, check_difficulty, check_reset_options, scene_of
 from rover_gym.env.generators import check_seed, row_of, seeded, set_row
 from rover_gym.env.observation import ObservationLayout
+from rover_gym.env.play_keys import keys_to_action, pushed
 from rover_gym.env.progress import Progress
 from rover_gym.env.randomisation import Domain
 from rover_gym.env.reward_terms import earn, total
@@ -120,6 +122,11 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     row farthest ahead, from left to right; the last are the row farthest behind. True stands for 13 rows of 9
     points, 0.25 m apart: 117 entries, 1.5 m ahead and behind, 1 m to either side.
 
+    ## Sensors
+
+    `gymnasium.make(..., sensors=[...])` adds readings of encoders, motors, an inertial unit, cameras and scanners: the observation
+    is then a `Dict` with this one as `state` (`docs/sensors.md`).
+
     ## Reward
 
     The reward is the sum of the terms below, which `info["reward_terms"]` lists; `dt` is the control period.
@@ -182,7 +189,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     ## Rocks
 
-    With `terrain="sphere_field"`, as in `RoverRocks-v0`, fixed spheres lie on the plane, half below the
+    With `terrain="rocks"`, as in `RoverRocks-v0`, fixed spheres lie on the plane, half below the
     ground, with the sizes that Golombek and Rapp (1997) found on Mars, the smallest 5 cm wide. They lie at
     random up to 4 m beyond the rectangle that start and goal span. Two circles, around start and goal,
     stay clear, so that the rover has room to turn. Each reset draws a new field. A single number d from 0 to 2,
@@ -241,13 +248,15 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     default; `gymnasium.make(..., render_mode="human")` shows the same in a window. Both need `rover-gym[render]`; the
     first needs no display. The cameras "follow", "side" and "top" move with the rover; a pair of points (eye, target) is
     a fixed camera. `show_forces` draws the contact forces of the last physics step as arrows.
-    `metadata["render_fps"]` is the control frequency, so that a video runs in real time.
+    `metadata["render_fps"]` is the control frequency, so that a video runs in real time. `gymnasium.utils.play.play`
+    drives the environment by the keys w, a, s and d.
 
     ## Version history
 
     - v0: plane ground and rocks. Numbers may change until the first release.
     """
 
+    #: Render modes, and the frames of a second of film: the control frequency.
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 20}  # noqa: RUF012 - as Gymnasium declares it
 
     @takes_arguments
@@ -386,6 +395,13 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         """
         self._running()
         return self._episode.complete(self._simulation)
+
+    def get_keys_to_action(self) -> dict[str, npt.NDArray[np.float32]]:
+        """Actions by keys held together, for `gymnasium.utils.play`: w and s push, a and d steer; "" is no key.
+
+        Without a key the motors are off, and the rover rolls on.
+        """
+        return keys_to_action(partial(pushed, self.task))
 
     def set_difficulty(self, difficulty: float | Range) -> None:
         """Sets the rocks' difficulty, or the range it is drawn from, from the next reset on.

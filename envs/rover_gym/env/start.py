@@ -35,9 +35,15 @@ class StartDistribution:
 
 @dataclass(frozen=True)
 class Start:
-    """One start: slope and direction of steepest ascent (rad), pose and goals on the map (m, rad).
+    """One start on the map.
 
-    `goal` is the first goal, `further` those that follow it.
+    Attributes:
+        slope: Slope of the ground's plane, rad.
+        uphill: Direction of its steepest ascent, rad to the left of x.
+        position: Place (x, z) of the trunk's origin, m.
+        heading: Heading, rad to the left of x.
+        goal: Place (x, z) of the first goal, m.
+        further: The goals that follow it.
     """
 
     slope: float

@@ -110,7 +110,7 @@ def make_task(given: Mapping[str, Any]) -> Task:
     terrain, model, scan = given["terrain"], given["model"], given["height_scan"]
     ground = None if isinstance(terrain, str) else terrain
     rocks: RockDistribution | None = None
-    if terrain in ("sphere_field", "hills"):
+    if terrain in ("rocks", "hills"):
         rocks = rock_distribution(given["difficulty"], given["rock_abundance"], given["max_rock_radius"])
         nearest, farthest = given["goal_distance"]
         distance = nearest if nearest == farthest else (nearest, farthest)
@@ -122,7 +122,7 @@ def make_task(given: Mapping[str, Any]) -> Task:
     else:
         for name in ("difficulty", "rock_abundance", "max_rock_radius"):
             if given[name] is not None:
-                refuse(OptionError, name, given[name], "needs terrain 'sphere_field' or 'hills'")
+                refuse(OptionError, name, _as_given(given[name]), "needs terrain 'rocks' or 'hills'")
     slope_deg, hills = given["slope_deg"], _hills(terrain, given["hill_slope_deg"])
     start = StartDistribution(
         slope=_radians((0.0, 0.0) if slope_deg is None else slope_deg),
@@ -132,9 +132,9 @@ def make_task(given: Mapping[str, Any]) -> Task:
         goal_bearing=_radians(given["goal_bearing_deg"]),
         turn=_radians(given["waypoint_turn_deg"]),
     )
-    if terrain not in ("plane", "sphere_field"):
+    if terrain not in ("plane", "rocks"):
         if slope_deg is not None:
-            refuse(OptionError, "slope_deg", slope_deg, "is the ground's own")
+            refuse(OptionError, "slope_deg", _as_given(slope_deg), "is the ground's own")
         slope, uphill = slope_of(ground)
         start = replace(start, slope=(slope, slope), uphill=(uphill, uphill))
     domain = DomainDistribution(
@@ -182,7 +182,7 @@ def make_task(given: Mapping[str, Any]) -> Task:
         goals=goals,
         battery=battery,
     )
-    slope_by_difficulty = slope_deg is None and terrain == "sphere_field"
+    slope_by_difficulty = slope_deg is None and terrain == "rocks"
     episodes = EpisodeDistribution(
         rules,
         simulation,
@@ -228,6 +228,11 @@ def _hills(terrain: object, slope_deg: float | None) -> float | None:
         return math.nan
     sine, cosine = sin_cos(math.radians(slope_deg))
     return float(sine / cosine)
+
+
+def _as_given(value: Any) -> Any:
+    """A checked number or range as an error shows it: a range of one number is that number."""
+    return value[0] if isinstance(value, tuple) and value[0] == value[1] else value
 
 
 def _substeps(frequency: float, step: float) -> int:

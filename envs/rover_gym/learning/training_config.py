@@ -16,6 +16,7 @@ from typing import Any, TypeVar, get_args, get_type_hints
 
 import yaml
 
+from rover_gym.env.argument_checks import terrain_name
 from rover_gym.env.arguments import ARGUMENTS
 from rover_gym.env.rocks import MAX_DIFFICULTY
 from rover_gym.env.rover_env import RoverEnv
@@ -149,8 +150,8 @@ class TrainingConfig:
     def __post_init__(self) -> None:
         for name in ("total_steps", "num_envs", "threads", "max_episode_steps", "repeat", "pool", "checkpoint_every"):
             number(name, getattr(self, name), at_least=1)
-        if self.curriculum is not None and self.environment.get("terrain") not in ("sphere_field", "hills"):
-            refuse(OptionError, "curriculum", self.curriculum, "needs environment.terrain 'sphere_field' or 'hills'")
+        if self.curriculum is not None and terrain_name(str(self.environment.get("terrain"))) not in ("rocks", "hills"):
+            refuse(OptionError, "curriculum", self.curriculum, "needs environment.terrain 'rocks' or 'hills'")
         for arguments in (self.environment, self.evaluated_environment):
             Features(rover(arguments), self.pool)
 

@@ -283,7 +283,7 @@ def _batch(terrain: Terrain, *, welded: bool) -> Decision:
     if isinstance(terrain, Plane):
         why += f"; no rock is met, and a field of them would take {BATCH_UNMET:g} of the time"
     elif isinstance(terrain, SphereField):
-        arguments.append("terrain 'sphere_field'")
+        arguments.append("terrain 'rocks'")
         why += "; rocks may be met"
     else:
         arguments.append("this terrain")

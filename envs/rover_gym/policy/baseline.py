@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import gymnasium as gym
 
+from rover_gym.env.argument_checks import terrain_name
 from rover_gym.env.rocks import MAX_DIFFICULTY
 from rover_gym.mechanics import OptionError
 from rover_gym.models.lookup import open_model
@@ -56,7 +57,7 @@ class BaselineInterrupt(KeyboardInterrupt):
 
 
 #: Environments with a difficulty, by their ground.
-ENVIRONMENTS = {"sphere_field": "RoverRocks-v0", "hills": "RoverHills-v0"}
+ENVIRONMENTS = {"rocks": "RoverRocks-v0", "hills": "RoverHills-v0"}
 
 
 def measure_baseline(
@@ -65,7 +66,7 @@ def measure_baseline(
     episodes: int = 200,
     seed: int = 0,
     policy: str = "pd",
-    terrain: str = "sphere_field",
+    terrain: str = "rocks",
     model: str | None = None,
     progress: Callable[[float, int], None] = lambda _difficulty, _done: None,
 ) -> list[BaselineRow]:
@@ -76,7 +77,7 @@ def measure_baseline(
         episodes: Episodes per difficulty.
         seed: Seed of the first episode; the seed increases by one per episode.
         policy: A name or folder, as `named_policy` takes it.
-        terrain: "sphere_field" or "hills".
+        terrain: "rocks" or "hills".
         model: The rover: a name of the gallery or a file; None for the built-in one.
         progress: Called after each episode with the difficulty and the number of episodes done.
 
@@ -87,6 +88,7 @@ def measure_baseline(
     """
     episodes, seed = whole("episodes", episodes, at_least=1), whole("seed", seed)
     difficulties = tuple(number("difficulty", level, at_least=0.0, at_most=MAX_DIFFICULTY) for level in difficulties)
+    terrain = terrain_name(terrain)
     if terrain not in ENVIRONMENTS:
         refuse(OptionError, "terrain", terrain, f"must be one of {', '.join(ENVIRONMENTS)}")
     rover = None if model is None else open_model(model)

@@ -73,6 +73,7 @@ class RoverCommandEnv(DriveByCommand):
     - v0: numbers may change until the first release.
     """
 
+    #: As of the rover's environment.
     metadata = RoverEnv.metadata
 
     @takes_arguments

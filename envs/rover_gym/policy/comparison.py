@@ -49,8 +49,7 @@ def trained_contender(policy: str, terrain: str) -> Contender:
         PolicyError: There is none.
         OSError: Its files may not be read.
     """
-    inner = Path(policy) / "policy"
-    folder = find_policy(str(inner) if (inner / "policy.npz").exists() else policy, terrain)
+    folder = find_policy(policy, terrain)
     if folder is None:
         refuse(PolicyError, "policies", policy, "must be the folder of a trained policy or 'trained'")
     name = policy if policy == "trained" else Path(policy).name

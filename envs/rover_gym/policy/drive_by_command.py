@@ -7,6 +7,7 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.env.play_keys import keys_to_action
 from rover_gym.mechanics import CommandError
 from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimits
 from rover_gym.policy.features import LARGEST_FEATURE, Features
@@ -88,3 +89,7 @@ class DriveByCommand(gym.Wrapper[Array, Array, Array, Array]):
                     observation[self._heights] = self._rover.complete_observation()[self._heights]
                 break
         return self.features(self._seen)[0], total, terminated, truncated, info
+
+    def get_keys_to_action(self) -> dict[str, Array]:
+        """Commands by keys held together, for `gymnasium.utils.play`: w and s drive, a and d turn; "" is no key."""
+        return keys_to_action(lambda forward, left: np.array([forward, left, 0.0], np.float32))

@@ -145,7 +145,12 @@ def drive_all(
 
 @dataclass(frozen=True)
 class IntervalEstimate:
-    """An estimate over episodes and its 95% interval."""
+    """An estimate over episodes.
+
+    Attributes:
+        value: The estimate.
+        interval: Its 95% interval.
+    """
 
     value: float
     interval: Interval

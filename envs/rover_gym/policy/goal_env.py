@@ -40,6 +40,7 @@ class RoverGoalEnv(GoalObservation):
     - v0: numbers may change until the first release.
     """
 
+    #: As of the rover's environment.
     metadata = RoverEnv.metadata
 
     def __init__(self, *, reward_type: Literal["sparse", "dense"] = "sparse", **arguments: Any) -> None:

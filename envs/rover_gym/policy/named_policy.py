@@ -18,7 +18,7 @@ from rover_gym.policy.trained_policy import TrainedPolicy
 #: What the command line says about the names.
 NAMES_HELP = (
     "'pd' for the baseline, 'scan' for the planner by hand, 'foresight' for that planner with a learned forecast, "
-    "'trained' for the trained policy of the package, or the folder of a trained policy or forecast."
+    "'trained' for the trained policy of the package, or the folder of a run, a trained policy or a forecast."
 )
 
 _TITLES = {"pd": "the PD baseline", "scan": "the scan planner", "foresight": "the planner with foresight"}
@@ -46,8 +46,8 @@ def named_policy(policy: str, terrain: str, model: RoverModel | None = None) -> 
     """The policy of a name, for a terrain and a rover; None is the built-in one.
 
     Args:
-        policy: "pd", "scan", "foresight", "trained" for the policy shipped for the terrain, or the folder of a trained
-            policy or forecast.
+        policy: "pd", "scan", "foresight", "trained" for the policy shipped for the terrain, or the folder of a run, a
+            trained policy or a forecast.
         terrain: The argument of the environment.
         model: The rover, to which the planner fits its height scan.
 

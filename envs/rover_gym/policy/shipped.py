@@ -4,12 +4,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from rover_gym.env.argument_checks import terrain_name
 from rover_gym.policy.policy_card import PolicyCard
 from rover_gym.policy.policy_files import PolicyError, is_there
 from rover_gym.validation import refuse
 
 #: Folder names of the shipped policies, by terrain.
-SHIPPED: Mapping[str, str] = {"plane": "plane", "sphere_field": "rocks"}
+SHIPPED: Mapping[str, str] = {"plane": "plane", "rocks": "rocks"}
 FOLDER = Path(__file__).parents[1] / "data" / "policies"
 
 
@@ -19,6 +20,7 @@ def policy_folder(terrain: str) -> Path:
     Raises:
         PolicyError: No policy is shipped for this terrain.
     """
+    terrain = terrain_name(terrain)
     if terrain not in SHIPPED:
         refuse(PolicyError, "policy", terrain, f"none was trained; there are some for {', '.join(SHIPPED)}")
     return FOLDER / SHIPPED[terrain]
@@ -27,18 +29,22 @@ def policy_folder(terrain: str) -> Path:
 def find_policy(policy: str, terrain: str) -> Path | None:
     """The folder of a policy: the shipped one for "trained", otherwise the given path; None for "pd" and "scan".
 
+    Of the folder of a run of `rover train` it is the policy at its end.
+
     Raises:
         PolicyError: There is no such policy.
     """
     if policy in ("pd", "scan"):
         return None
     folder = policy_folder(terrain) if policy == "trained" else Path(policy)
+    if is_there(folder / "policy" / "policy.json"):
+        folder = folder / "policy"
     if not is_there(folder / "policy.json"):
         refuse(
             PolicyError,
             "policy",
             policy,
-            "must be 'pd', 'scan', 'foresight', 'trained' or the folder of a trained policy or forecast",
+            "must be 'pd', 'scan', 'foresight', 'trained' or the folder of a run, a trained policy or a forecast",
         )
     return folder
 

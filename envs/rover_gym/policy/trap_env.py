@@ -21,7 +21,7 @@ from rover_gym.policy.pd_policy import PDPolicy
 from rover_gym.validation import number, refuse
 
 #: Arguments of `RoverEnv` with another default.
-DEFAULTS: dict[str, Any] = {"terrain": "sphere_field", "difficulty": (1.0, 1.5), "stuck_time": 60.0}
+DEFAULTS: dict[str, Any] = {"terrain": "rocks", "difficulty": (1.0, 1.5), "stuck_time": 60.0}
 
 #: A drive ends in a trap when the trunk has been held for so long, s.
 HELD = 2.0
@@ -69,7 +69,7 @@ class RoverTrapEnv(RoverEnv):
 
     ## Arguments
 
-    Those of `Rover-v0`, with other defaults of `terrain` ("sphere_field"), `difficulty` ((1.0, 1.5)) and `stuck_time`
+    Those of `Rover-v0`, with other defaults of `terrain` ("rocks"), `difficulty` ((1.0, 1.5)) and `stuck_time`
     (60), one goal, and in addition:
 
     | name          | default | unit | meaning                                      |

@@ -35,7 +35,7 @@ def import_h5py() -> Any:
     Raises:
         MissingExtraError: h5py is not installed.
     """
-    return require("h5py", "demo")
+    return require("h5py", "record")
 
 
 def refuse_field(path: str | Path, field: str, value: object, reason: str) -> NoReturn:

@@ -9,28 +9,27 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.rendering.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR, sphere_mesh
-from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, rgb, rounded, shortened, with_panel
+from rover_gym.record.outcomes import outcome_words
+from rover_gym.replay.player import add_surroundings, hidden_server, rounded, shortened, with_panel
 from rover_gym.replay.rotation import continuous, quaternions
-from rover_gym.replay.scenery import (
-    coloured_meshes,
-    first_view,
-    goal_parts,
-    ground_tiles,
-    identifiers,
-    parts_by_solid,
-    spheres,
-    surfaces,
-    trunk_path,
-)
+from rover_gym.replay.scenery import first_view, trunk_path
+from rover_gym.replay.world_nodes import add_ground, add_rover
 
 if TYPE_CHECKING:
     from rover_gym.record.rover_run import RoverRun
 
+WHEEL_NAMES = {
+    "FL": "front left",
+    "FR": "front right",
+    "ML": "middle left",
+    "MR": "middle right",
+    "BL": "back left",
+    "BR": "back right",
+}
+SMOOTHING = 0.2  # s, window of the loads' mean: an impact lasts a step and says nothing of the weight carried
 #: One colour per wheel: Okabe and Ito's palette, safe for colour-blind readers.
 WHEEL_COLOURS = ("#0072B2", "#56B4E9", "#009E73", "#D55E00", "#CC79A7", "#E69F00")
-LARGE = 0.12  # m, radius above which a sphere gets more triangles
-MANY = 1000  # number of spheres above which each gets fewer again
+LONGEST_FACT = 100
 FOLLOW_TIME = 1.0  # s, smoothing window of the path that the eye follows
 
 Array = npt.NDArray[np.float64]
@@ -74,40 +73,8 @@ def _build(run: RoverRun, scene: Any) -> tuple[Any, list[Any]]:
     """Builds the scene and returns the moving frames: the whole world's, and those of the solids."""
     add_surroundings(scene)
     world = scene.add_frame("/world", show_axes=False)
-    solids = []
-    named = parts_by_solid(run)
-    nodes = identifiers(named)
-    for name, parts in named.items():
-        # In a separate folder: a solid may have the same name as the ground.
-        solids.append(scene.add_frame(f"/world/solids/{nodes[name]}", show_axes=False))
-        add_meshes(scene, f"/world/solids/{nodes[name]}", coloured_meshes(parts))
-    tiles = ground_tiles(run)
-    if tiles is not None:
-        vertices, light, dark = tiles
-        squares = ((GROUND_COLOUR, vertices, light), (GROUND_COLOUR_2, vertices, dark))
-        add_meshes(scene, "/world/ground", squares, cast_shadow=False)
-    for k, (vertices, faces) in enumerate(surfaces(run)):
-        painted = [(colour, vertices, triangles) for colour, triangles in faces if len(triangles)]
-        add_meshes(scene, f"/world/surface_{k}", painted, cast_shadow=False)
-    add_meshes(scene, "/world/goal", coloured_meshes(goal_parts(run)))
-    centres, radii = spheres(run)
-    for name, rings, chosen in (
-        ("pebbles", 5, radii < LARGE),
-        ("rocks", 10 if len(radii) < MANY else 7, radii >= LARGE),
-    ):
-        if chosen.any():
-            vertices, triangles = sphere_mesh(rings)
-            scene.add_batched_meshes_simple(
-                f"/world/{name}",
-                vertices,
-                triangles,
-                batched_wxyzs=np.tile((1.0, 0.0, 0.0, 0.0), (int(chosen.sum()), 1)),
-                batched_positions=centres[chosen],
-                batched_scales=radii[chosen],
-                batched_colors=rgb(ROCK_COLOUR),
-                lod="off",
-                cast_shadow=False,  # thousands of triangles, several times a frame
-            )
+    solids = add_rover(scene, run)
+    add_ground(scene, run)
     return world, solids
 
 
@@ -119,18 +86,50 @@ def _followed(run: RoverRun) -> Array:
     return result
 
 
+def moving_mean(time: Array, values: Array) -> Array:
+    """Values `(n, m)` averaged over the samples within half of `SMOOTHING` s, without those that are not finite."""
+    first = np.searchsorted(time, time - 0.5 * SMOOTHING, side="left")
+    last = np.searchsorted(time, time + 0.5 * SMOOTHING, side="right")
+    known = np.isfinite(values)
+    sums = np.vstack((np.zeros(values.shape[1]), np.cumsum(np.where(known, values, 0.0), axis=0)))
+    counts = np.vstack((np.zeros(values.shape[1]), np.cumsum(known, axis=0)))
+    with np.errstate(invalid="ignore"):
+        result: Array = (sums[last] - sums[first]) / (counts[last] - counts[first])
+    return result
+
+
+def facts(run: RoverRun) -> list[str]:
+    """What the run was, for the panel: its ground, seed, difficulty and outcome, as far as the file says them."""
+    attributes = run.trajectory.attributes
+    scene = attributes.get("scene", {})
+    terrain, seed, outcome = scene.get("terrain"), attributes.get("seed"), attributes.get("outcome")
+    rocks = scene.get("rocks")
+    difficulty = rocks.get("difficulty") if isinstance(rocks, dict) else None
+    slope = scene.get("slope")
+    told = [
+        f"scene: {terrain}" if isinstance(terrain, str) else None,
+        f"slope: {np.degrees(slope):.1f} degrees" if isinstance(slope, float) and slope else None,
+        f"seed: {seed}" if isinstance(seed, (int, np.integer)) else None,
+        f"difficulty: {difficulty:.2g}" if isinstance(difficulty, float) else None,
+        f"outcome: {outcome_words(str(outcome))}" if outcome is not None else None,
+    ]
+    return [fact[:LONGEST_FACT] for fact in told if fact is not None]
+
+
 def _curves(run: RoverRun) -> dict[str, Any]:
     """Contents of the panel: its title, the time, and for each chart one curve per wheel."""
     data, wheels = run.trajectory, run.model.wheel_names
     charts = [
-        ("wheel load", "N", data["wheel_forces"][:, :, 0], 1),
+        (f"wheel load, mean over {SMOOTHING:g} s", "N", moving_mean(run.time, data["wheel_forces"][:, :, 0]), 0),
         ("wheel gap", "mm", 1e3 * data["wheel_gaps"], 2),
     ]
     return {
         "title": run.title,
+        "facts": facts(run),
         "time": [round(float(time - run.time[0]), 4) for time in run.time],
         "wheels": [
-            {"name": name, "colour": colour} for name, colour in zip(wheels, cycle(WHEEL_COLOURS), strict=False)
+            {"name": WHEEL_NAMES.get(name, name), "colour": colour}
+            for name, colour in zip(wheels, cycle(WHEEL_COLOURS), strict=False)
         ],
         "charts": [
             {

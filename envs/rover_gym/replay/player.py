@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
+AMBIENT = 0.8  # intensity of the light from all sides: solar panels and tyres stay no black holes
+
 
 @contextmanager
 def hidden_server() -> Iterator[Any]:
@@ -48,6 +50,7 @@ def add_surroundings(scene: Any) -> None:
     scene.set_up_direction("+y")
     scene.configure_environment_map(None)  # a third of the time of a frame without it, where there is no GPU
     scene.add_light_hemisphere("/sky", sky_color=rgb(SKY_COLOUR), ground_color=rgb(GROUND_COLOUR), intensity=1.2)
+    scene.add_light_ambient("/daylight", intensity=AMBIENT)
     shades = np.linspace(rgb(SKY_COLOUR_2), rgb(SKY_COLOUR), 64).astype(np.uint8)
     scene.set_background_image(np.repeat(shades[:, None], 2, axis=1), format="png")
 
@@ -91,8 +94,13 @@ def with_panel(page: str, title: str, curves: Mapping[str, Any]) -> str:
         f'<script type="application/json" id="curves">{data}</script>'
         f"<script>{script}</script>"
     )
+    return with_parts(page, title, panel)
+
+
+def with_parts(page: str, title: str, parts: str) -> str:
+    """Viser's page with a title and with HTML of ours beside the scene."""
     head, found, rest = page.partition("<title>Viser</title>")
     body, end, tail = rest.rpartition("</body>")
     if not found or not end:
         raise RuntimeError("viser's page has changed: it lacks the title or the end of the body where ours begins")
-    return f"{head}<title>{html.escape(title)}</title>{body}{panel}{end}{tail}"
+    return f"{head}<title>{html.escape(title)}</title>{body}{parts}{end}{tail}"

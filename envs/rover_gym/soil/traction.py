@@ -29,7 +29,12 @@ SCALES = np.geomspace(0.01, 10.0, 601)
 
 @dataclass(frozen=True)
 class BedEstimate:
-    """An estimate with its standard error over the beds, nan for a single bed."""
+    """An estimate over beds.
+
+    Attributes:
+        value: The mean over the beds.
+        error: Its standard error; nan for a single bed.
+    """
 
     value: float
     error: float

@@ -78,6 +78,7 @@ class RoverBatch:
         if threads is not None:
             threads = whole("threads", threads, at_least=1, at_most=MAX_THREADS)
         self.prototype = RoverEnv(**arguments)
+        #: What the episodes have in common.
         self.task: Task = self.prototype.task
         simulation = Simulation(self.task.model, Plane(), **self.task.simulation_options)
         self.episodes = EpisodeBatch(
@@ -314,6 +315,10 @@ class RoverBatch:
             self._lent[i] = generator_at(self._rows([i])[0])
         return self._lent[i]
 
+    def generator_rows(self, chosen: Sequence[int]) -> Rows:
+        """The states of some rovers' random generators, `(m, 4)`; none is moved."""
+        return self._rows(chosen)
+
     def seed_of(self, i: int) -> int:
         """The seed of rover i's random generator."""
         self._seed_at_random([i])
@@ -390,6 +395,7 @@ class Drawn(NamedTuple):
 class BatchRover:
     """A view of one rover of a batch, with the names of `RoverEnv`: read-only except for the difficulty."""
 
+    #: None: Gymnasium has registered the vector environment, not its rovers.
     spec = None
 
     def __init__(self, batch: RoverBatch, i: int) -> None:

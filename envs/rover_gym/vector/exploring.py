@@ -21,7 +21,7 @@ from rover_gym.mechanics import Simulation, SimulationBatch
 from rover_gym.vector.mujoco_rover import rover_xml
 
 Array = npt.NDArray[np.float64]
-Ground = Literal["plane", "sphere_field"]
+Ground = Literal["plane", "rocks"]
 
 TIME_STEP = 0.005  # s
 #: Steps from one command to the next, commands of a round, and rounds that are not measured.
@@ -41,7 +41,7 @@ class ExploringSpeed:
     """How fast rovers explore on one ground.
 
     Attributes:
-        ground: "plane" or "sphere_field".
+        ground: "plane" or "rocks".
         num_envs: Number of rovers.
         threads: Threads that step them.
         instruction_set: Of the processor, as far as the core uses it.

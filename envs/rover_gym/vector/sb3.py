@@ -2,7 +2,7 @@
 
 from rover_gym.vector.sb3 import RoverVecEnv
 
-venv = RoverVecEnv(64, terrain="sphere_field", height_scan=True)
+venv = RoverVecEnv(64, terrain="rocks", height_scan=True)
 model = stable_baselines3.PPO("MlpPolicy", VecMonitor(venv))
 """
 
@@ -58,7 +58,7 @@ class RoverVecEnv(VecEnv):
     infos are complete only where an episode ends; otherwise they hold only `TimeLimit.truncated`.
 
     Example:
-        >>> venv = RoverVecEnv(64, terrain="sphere_field", height_scan=True)
+        >>> venv = RoverVecEnv(64, terrain="rocks", height_scan=True)
         >>> model = stable_baselines3.PPO("MlpPolicy", VecMonitor(venv))
 
     Args:

@@ -1,16 +1,16 @@
 //! `solve_friction_contact`: a problem from anywhere.
 
-use numpy::{PyArray2, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
-use rover_core::problem::{BlockSparseDelassus, Dimension, FrictionContactProblem};
+use rover_core::problem::{Dimension, FrictionContactProblem};
 use rover_core::solver::{
-    ContactLaw, Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, solve,
+    ContactLaw, Iterate, Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, solve,
 };
 
 use crate::arguments::Given;
-use crate::arrays::{array, fresh, vector};
+use crate::arrays::fresh;
 use crate::errors::{BorderError, Kind, Value};
+use crate::given_problem::{Delassus, coefficients, flat, with_hint};
 
 /// How the contact solver ended.
 #[pyclass(module = "rover_gym.mechanics", frozen)]
@@ -116,6 +116,7 @@ pub struct FrictionContactSolution {
     u: Vec<f64>,
     dimension: usize,
     report: SolverReport,
+    history: Vec<Iterate>,
 }
 
 #[pymethods]
@@ -136,6 +137,19 @@ impl FrictionContactSolution {
     #[getter]
     fn report(&self) -> SolverReport {
         self.report.clone()
+    }
+
+    /// The residuals measured on the way, with the argument `history`.
+    ///
+    /// Each is a tuple of the stage, the iterations so far and the relative residual. "nsgs" and
+    /// "admm" measure every few iterations, the others at every step. Of "relaxed" it is the
+    /// residual of the relaxed law.
+    #[getter]
+    fn history(&self) -> Vec<(&'static str, usize, f64)> {
+        let iterates = self.history.iter();
+        iterates
+            .map(|iterate| (iterate.stage.name(), iterate.iterations, iterate.residual))
+            .collect()
     }
 }
 
@@ -191,72 +205,15 @@ pub fn solver_options(
     })
 }
 
-/// `W` as it was given.
-enum Delassus {
-    Dense(Vec<f64>),
-    BlockSparse(BlockSparseDelassus),
-}
-
-impl Delassus {
-    /// A square array, or block rows `(indptr, indices, data)`.
-    fn read(W: &Bound<'_, PyAny>, dimension: Dimension) -> PyResult<Self> {
-        if let Ok(rows) = W.cast::<PyTuple>()
-            && rows.len() == 3
-            && array(&rows.get_item(2)?, Kind::Problem, "W")?.shape().len() == 3
-        {
-            let index = |at: usize| -> PyResult<Vec<usize>> {
-                let numbers = flat(&rows.get_item(at)?, "W")?;
-                numbers.into_iter().map(as_index).collect()
-            };
-            let (starts, columns) = (index(0)?, index(1)?);
-            let blocks = flat(&rows.get_item(2)?, "W")?;
-            let sparse = BlockSparseDelassus::from_rows(dimension, starts, columns, blocks);
-            return Ok(Self::BlockSparse(sparse.map_err(BorderError::from)?));
-        }
-        let dense = array(W, Kind::Problem, "W")?;
-        let shape = dense.shape().to_vec();
-        if shape.len() != 2 || shape[0] != shape[1] {
-            let message = format!("W: must be square, has shape {shape:?}");
-            let value = Value::Numbers(shape.iter().map(|&s| s as f64).collect());
-            return Err(problem_error("W", message, value).into());
-        }
-        Ok(Self::Dense(dense.as_array().iter().copied().collect()))
-    }
-}
-
-/// Any array-like as a list, whatever its shape.
-fn flat(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<f64>> {
-    let numbers = array(value, Kind::Problem, field)?;
-    Ok(numbers.as_array().iter().copied().collect())
-}
-
-fn as_index(number: f64) -> PyResult<usize> {
-    if number >= 0.0 && number.fract() == 0.0 && number < 1e15 {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked above
-        return Ok(number as usize);
-    }
-    let message = format!("W: indices must be whole numbers >= 0, one is {number}");
-    Err(problem_error("W", message, Value::Number(number)).into())
-}
-
-fn problem_error(field: &str, message: String, value: Value) -> BorderError {
-    BorderError {
-        kind: Kind::Problem,
-        message,
-        field: Some(field.to_owned()),
-        value,
-    }
-}
-
 /// Solves the friction-contact problem K* contains W p + q + mu |u_T| n, orthogonal to p in K.
 ///
 /// Args:
 ///     W: Delassus operator, (n_c d, n_c d), 1/kg, used as it is: it may be singular or
-///         unsymmetric. For many contacts its block rows `(indptr, indices, data)` of shapes
-///         (n_c + 1,), (n_blocks,), (n_blocks, d, d), each row ascending and with its diagonal
-///         block.
+///         unsymmetric. For many contacts one of SciPy's sparse arrays, or block rows
+///         `(indptr, indices, data)` of shapes (n_c + 1,), (n_blocks,), (n_blocks, d, d), each row
+///         ascending and with its diagonal block.
 ///     q: Free velocity, (n_c d,), m/s, contact by contact: normal, tangents.
-///     mu: Friction coefficients, (n_c,).
+///     mu: Friction coefficients, (n_c,), or one for all contacts.
 ///     tolerance: Largest relative residual of a converged answer; its velocities are right to
 ///         max(tolerance, 1e-9) m/s as well.
 ///     dimension: Components d of a contact, 2 or 3.
@@ -268,6 +225,7 @@ fn problem_error(field: &str, message: String, value: Value) -> BorderError {
 ///     budget: Largest amount of work, counted and not timed: a unit is one multiplication and
 ///         addition in a product with W. The default takes about 0.3 s. What exceeds it is left
 ///         undone, and the report says so.
+///     history: Whether the solution keeps the residuals measured on the way.
 ///
 /// Returns:
 ///     Impulses, velocities and the solver's report. Not converging is no error: see
@@ -283,8 +241,8 @@ fn problem_error(field: &str, message: String, value: Value) -> BorderError {
 #[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
 #[pyo3(signature = (
     W, q, mu, tolerance = Given::MISSING, *, dimension = Given::MISSING, solver = Given::MISSING, max_iterations = Given::MISSING,
-    initial = None, budget = Given::MISSING
-), text_signature = "(W, q, mu, tolerance=1e-08, *, dimension=3, solver='auto', max_iterations=1000, initial=None, budget=300000000)")]
+    initial = None, budget = Given::MISSING, history = Given::MISSING
+), text_signature = "(W, q, mu, tolerance=1e-08, *, dimension=3, solver='auto', max_iterations=1000, initial=None, budget=300000000, history=False)")]
 pub fn solve_friction_contact(
     py: Python<'_>,
     W: &Bound<'_, PyAny>,
@@ -296,6 +254,7 @@ pub fn solve_friction_contact(
     max_iterations: Given<'_>,
     initial: Option<&Bound<'_, PyAny>>,
     budget: Given<'_>,
+    history: Given<'_>,
 ) -> PyResult<FrictionContactSolution> {
     let option = Kind::Option;
     let tolerance = tolerance.number(1e-8, option, "tolerance")?;
@@ -313,16 +272,17 @@ pub fn solve_friction_contact(
     };
     let options = SolverOptions {
         budget,
+        keeps_history: history.flag(false, option, "history")?,
         ..solver_options(&solver, tolerance, max_iterations, &Method::ALL)?
     };
     let W = Delassus::read(W, kind)?;
     let q = flat(q, "q")?;
-    let mu = vector(mu, Kind::Problem, "mu")?;
+    let mu = coefficients(mu, q.len(), dimension)?;
     let problem = match &W {
         Delassus::Dense(W) => FrictionContactProblem::new(kind, W, &q, &mu),
         Delassus::BlockSparse(W) => FrictionContactProblem::new_sparse(kind, W, &q, &mu),
     }
-    .map_err(BorderError::from)?;
+    .map_err(with_hint)?;
     let mut p = vec![0.0; q.len()];
     if let Some(initial) = initial {
         let start = flat(initial, "initial")?;
@@ -340,19 +300,13 @@ pub fn solve_friction_contact(
         p = start;
     }
     let mut u = vec![0.0; q.len()];
-    let inner = py.detach(|| {
-        solve(
-            &problem,
-            &options,
-            &mut p,
-            &mut u,
-            &mut SolverWorkspace::default(),
-        )
-    });
+    let mut workspace = SolverWorkspace::default();
+    let inner = py.detach(|| solve(&problem, &options, &mut p, &mut u, &mut workspace));
     Ok(FrictionContactSolution {
         p,
         u,
         dimension,
         report: SolverReport { inner },
+        history: workspace.history().to_vec(),
     })
 }

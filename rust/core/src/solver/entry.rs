@@ -96,6 +96,7 @@ fn solve_in<const D: usize>(
     if p.iter().any(|x| !x.is_finite()) {
         p.fill(0.0);
     }
+    workspace.scratch.history.begin(options.keeps_history);
     let q = problem.free_velocity();
     if q.iter().all(|q| *q == 0.0) {
         return at_rest(problem, options.method, p, u);

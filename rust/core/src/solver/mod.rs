@@ -3,7 +3,8 @@
 //!
 //! The chapter is built in layers, and no module uses one of a higher layer. From the bottom up:
 //!
-//! - `options`, `report`, `work`: the caller's options, the report, and the count of work;
+//! - `options`, `report`, `history`, `work`: the caller's options, the report, the residuals on the
+//!   way, and the count of work;
 //! - `local`: one contact with all others fixed: its exact [solution](solve_one_contact) and its
 //!   mode;
 //! - `linear`: the linear system of a Newton step and its factors, dense or block-sparse;
@@ -24,6 +25,7 @@
 #![doc = include_str!("escalation.md")]
 
 mod entry;
+mod history;
 mod linear;
 mod local;
 mod options;
@@ -36,6 +38,7 @@ mod work;
 mod workspace;
 
 pub use entry::{solve, solve_many_bodies};
+pub use history::Iterate;
 pub use local::one_contact::{OneContactSolution, solve_one_contact};
 pub use options::{ContactLaw, Method, SolverOptions};
 pub use report::{Rung, Rungs, SolveReport, SolveStatus, Stage};

@@ -104,6 +104,9 @@ pub struct SolverOptions {
     pub budget: u64,
     /// Most contacts for which `Auto` starts with Newton, without Gauss–Seidel first; default 32.
     pub direct_contacts: usize,
+    /// Whether the workspace keeps the residuals [measured](super::SolverWorkspace::history) on the
+    /// way; default false.
+    pub keeps_history: bool,
     /// Threads for sweeps over thousands of balls, the only solver that uses any; default 1. The
     /// answer does not depend on them.
     pub threads: usize,
@@ -136,6 +139,7 @@ impl Default for SolverOptions {
             regularisation: 1e-6,
             budget: Self::DEFAULT_BUDGET,
             direct_contacts: 32,
+            keeps_history: false,
             threads: 1,
         }
     }

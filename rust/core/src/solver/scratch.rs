@@ -1,5 +1,6 @@
 //! Memory that the stages of a solve share, kept between solves so that none of them allocates.
 
+use super::history::History;
 use super::linear::reduced_system::ReducedSystem;
 use super::report::{Rung, Rungs, SolveStatus, Stage};
 use super::work::{Work, sweep};
@@ -28,6 +29,8 @@ pub(super) struct Scratch {
     pub work: Work,
     /// Stages tried.
     pub rungs: Rungs,
+    /// Residuals measured.
+    pub history: History,
 }
 
 impl Scratch {
@@ -70,6 +73,7 @@ impl Scratch {
             }
             status => status,
         };
+        self.history.end_stage(stage);
         self.rungs.push(Rung {
             stage,
             status,

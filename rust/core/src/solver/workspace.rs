@@ -1,5 +1,6 @@
 //! Scratch memory of a solve, kept between solves so that none of them allocates.
 
+use super::history::Iterate;
 use super::scratch::Scratch;
 use super::stage::body_sweeps::BodySweeps;
 use super::strategy::islands::Islands;
@@ -32,6 +33,16 @@ impl SolverWorkspace {
     #[must_use]
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// The residuals that the last solve measured, if its options asked for them
+    /// ([`keeps_history`](crate::solver::SolverOptions::keeps_history)).
+    ///
+    /// Gauss–Seidel and ADMM measure every few iterations, the others at every step. Islands give
+    /// one entry, when all are solved; sweeps over pairs of bodies give none.
+    #[must_use]
+    pub fn history(&self) -> &[Iterate] {
+        self.scratch.history.as_slice()
     }
 
     /// Scratch for problems of up to `n_contacts` contacts of `components`

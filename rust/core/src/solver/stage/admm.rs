@@ -135,6 +135,7 @@ pub(in crate::solver) fn alternate<const D: usize, M: Fn(&[f64], &[f64]) -> Resi
         if step % LOOK == 0 || step == options.max_sweeps {
             data.W.multiply_add(p, data.q, u);
             let residual = (law.measure)(p, u);
+            scratch.history.note(*iterations, residual);
             if !residual.is_finite() && !best.is_finite() {
                 return (SolveStatus::NonFinite, residual);
             }

@@ -32,6 +32,7 @@ pub(in crate::solver) fn sweeps<const D: usize>(
     loop {
         data.W.multiply_add(p, data.q, u);
         let residual = data.measure::<D>(p, u);
+        scratch.history.note(*iterations, residual);
         if residual.relative < best.relative {
             best = residual;
             scratch.best.copy_from_slice(p);

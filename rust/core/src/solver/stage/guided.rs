@@ -143,6 +143,7 @@ pub(in crate::solver) fn solve<const D: usize>(
         p.copy_from_slice(&scratch.system.trial);
         data.W.multiply_add(p, data.q, u);
         let residual = data.measure::<D>(p, u);
+        scratch.history.note(*iterations, residual);
         let progress = residual.relative / last;
         let is_solved = options.accepts(residual)
             || (progress > LEAST_GAIN

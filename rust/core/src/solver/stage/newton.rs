@@ -161,6 +161,7 @@ pub(in crate::solver) fn full_steps<const D: usize>(
     let mut best = Residual::UNSOLVED;
     loop {
         let residual = data.measure::<D>(p, u);
+        scratch.history.note(*iterations, residual);
         if residual.relative < best.relative {
             best = residual;
             scratch.best.copy_from_slice(p);

@@ -226,6 +226,7 @@ pub(in crate::solver) fn pivots<const D: usize>(
     data.W.multiply_add(p, data.q, u);
     let recalled = modes::recall::<D>(data.mu, p, u, &mut scratch.system.contacts);
     let mut residual = data.measure::<D>(p, u);
+    scratch.history.note(*iterations, residual);
     if options.accepts(residual) {
         return (SolveStatus::Converged, residual);
     }
@@ -268,6 +269,7 @@ pub(in crate::solver) fn pivots<const D: usize>(
         p.copy_from_slice(&scratch.system.trial);
         data.W.multiply_add(p, data.q, u);
         residual = data.measure::<D>(p, u);
+        scratch.history.note(*iterations, residual);
         if options.accepts(residual) {
             return (SolveStatus::Converged, residual);
         }

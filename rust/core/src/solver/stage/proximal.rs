@@ -279,6 +279,7 @@ pub(in crate::solver) fn solve<const D: usize>(
 ) -> (SolveStatus, Residual) {
     data.W.multiply_add(p, data.q, u);
     let mut best = data.measure::<D>(p, u);
+    scratch.history.note(*iterations, best);
     if options.accepts(best) {
         return (SolveStatus::Converged, best);
     }
@@ -326,6 +327,7 @@ pub(in crate::solver) fn solve<const D: usize>(
         // Count a round even if its start was its answer, so that the search ends.
         *iterations = (*iterations).max(before + 1);
         let residual = data.measure::<D>(p, u);
+        scratch.history.note(*iterations, residual);
         if options.accepts(residual)
             || (residual.relative < LOOSE && data.is_within_rounding::<D>(p, u))
         {

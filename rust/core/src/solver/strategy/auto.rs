@@ -153,6 +153,7 @@ pub(in crate::solver) fn escalate<const D: usize>(
             islands::solve::<D>(data, options, p, u, work, islands, iterations)
         {
             let (stage, found) = (Stage::Islands, (status, residual));
+            scratch.history.note(*iterations, residual);
             let entered = ladder.enter_as(method, stage, found, p, scratch, *iterations);
             if let Some(outcome) = entered {
                 return outcome;

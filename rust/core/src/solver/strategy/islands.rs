@@ -128,6 +128,7 @@ pub(in crate::solver) fn solve<const D: usize>(
         }
         let own = SolverOptions {
             budget: work.budget.saturating_sub(work.spent),
+            keeps_history: false,
             ..*options
         };
         let report = solve_island::<D>(data, W, &own, island, p, islands, solve);

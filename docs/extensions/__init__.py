@@ -1,0 +1,1 @@
+"""What the manual makes from the code itself while it is built."""

@@ -1,0 +1,74 @@
+"""The page of the command line: every command with its arguments and options as tables, from the command itself."""
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import typer
+
+from rover_gym.cli import app as rover
+
+INTRODUCTION = """# The command line
+
+`rover --help` and `rover COMMAND --help` say in the terminal what stands here.
+"""
+
+
+def commands(command: Any, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """A command, then those below it in the order of its help."""
+    yield path, command
+    for name, below in getattr(command, "commands", {}).items():
+        if not below.hidden:
+            yield from commands(below, (*path, name))
+
+
+def cell(text: str) -> str:
+    """A text in a cell of a table."""
+    return re.sub(r"\s+", " ", text).replace("|", r"\|").strip()
+
+
+def row(parameter: Any, context: Any) -> tuple[str, str, str]:
+    """How a parameter is written, its default, and what it means."""
+    written, text = parameter.get_help_record(context)
+    meaning, _, facts = text.rstrip("]").partition("  [")
+    default = ""
+    for fact in filter(None, facts.split("; ")):
+        if fact.startswith("default: "):
+            default = f"`{fact.removeprefix('default: ')}`"
+        else:
+            meaning += f" ({fact.replace('<=', ' ≤ ').strip()})"
+    return f"`{cell(written)}`", cell(default), cell(meaning)
+
+
+def table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    """A table in Markdown."""
+    lines = [head, tuple("---" for _ in head), *rows]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def section(path: tuple[str, ...], command: Any) -> str:
+    """A command: usage, what it does, its arguments and options, or the commands below it."""
+    context = typer.Context(command, info_name=" ".join(path))
+    usage = " ".join([*path, *command.collect_usage_pieces(context)])
+    parts = [f"{'#' * min(len(path), 3)}# `{' '.join(path)}`", f"```console\n{usage}\n```", command.help or ""]
+    below = [one for one in getattr(command, "commands", {}).values() if not one.hidden]
+    if below:
+        parts.append(table(("command", "what it does"), [(f"`{one.name}`", cell(summary(one))) for one in below]))
+    for title, kind in (("argument", "argument"), ("option", "option")):
+        listed = [one for one in command.params if one.param_type_name == kind and not getattr(one, "hidden", False)]
+        if listed:
+            parts.append(table((title, "default", "meaning"), [row(one, context) for one in listed]))
+    if command.epilog:
+        parts.append(command.epilog)
+    return "\n\n".join(part for part in parts if part)
+
+
+def summary(command: Any) -> str:
+    """The first paragraph of a command's help."""
+    return (command.help or "").split("\n\n")[0]
+
+
+def page() -> str:
+    """The whole page, in Markdown."""
+    listed = commands(typer.main.get_command(rover), ("rover",))
+    return "\n\n".join([INTRODUCTION, *(section(path, command) for path, command in listed)]) + "\n"

@@ -1,0 +1,111 @@
+"""The recording of a live drive, in files that `rover replay` and `rover plot` read.
+
+A file holds one ground and one rover, and its time runs forward. Where a rock is thrown, another drive begins or the
+drive goes back, the recording goes on in the next file.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+from rover_gym.record.channels import Channel, RoverSampler
+from rover_gym.record.facts import describe
+from rover_gym.record.recorder import Recorder
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from rover_gym.live.live_rover import LiveRover
+
+#: Rows that a kill may lose: two and a half seconds.
+ROWS_PER_FLUSH = 50
+MOST_FILES = 100_000
+
+
+class LiveRecording:
+    """Records a rover into files `live-1.h5`, `live-2.h5`, ... of a folder; existing files stay.
+
+    Args:
+        folder: The folder; it is created.
+        rover: The rover, recorded from its present state on.
+
+    Attributes:
+        path: The file that is being written.
+        rows: Rows of this file.
+
+    Raises:
+        RecordingError: The file cannot be recorded to.
+        OSError: The file cannot be created.
+        MissingExtraError: h5py is not installed.
+    """
+
+    def __init__(self, folder: Path, rover: LiveRover) -> None:
+        self._folder = folder
+        self._begin(rover)
+
+    def _begin(self, rover: LiveRover) -> None:
+        self.path = _free_path(self._folder)
+        self._sampler = RoverSampler(rover.env.model)
+        channels = (
+            *self._sampler.channels,
+            Channel("distance_to_goal", "m", "horizontal distance from the trunk's origin to the goal"),
+            Channel("slip_ratio", "1", "mean over the wheels in contact of rim slip over the faster of rim and ground"),
+            Channel("motor_energy", "J", "work through the wheel motors since the start, driving or braking"),
+            Channel("friction", "1", "friction coefficient"),
+            Channel("gravity", "m/s2", "magnitude of gravity"),
+        )
+        simulation, scene = rover.env.simulation, rover.scene
+        facts = {**asdict(scene), "goal": rover.env.goal, "control_period": rover.dt}
+        attributes = describe(simulation, "a live drive", facts, seed=scene.seed)
+        self._recorder = Recorder(
+            self.path, channels, attributes, terrain=simulation.terrain, rows_per_flush=ROWS_PER_FLUSH
+        )
+        self.rows = 0
+        self.append(rover)
+
+    def append(self, rover: LiveRover) -> None:
+        """Adds the present state.
+
+        Raises:
+            RecordingError: The rows cannot be written; the recording has ended, and what was written stays.
+        """
+        info, scene = rover.info, rover.scene
+        solver = info["solver"]
+        row = self._sampler.row(rover.env.simulation, residual=solver["residual"], iterations=solver["iterations"])
+        more = {
+            "distance_to_goal": info["distance_to_goal"],
+            "slip_ratio": info["slip_ratio"],
+            "motor_energy": info["energy"],
+            "friction": scene.friction,
+            "gravity": scene.gravity,
+        }
+        self._recorder.append({**row, **more})
+        self.rows += 1
+
+    def next_file(self, rover: LiveRover) -> None:
+        """Ends the file and goes on in the next one.
+
+        Raises:
+            RecordingError: The last rows cannot be written, or the next file cannot.
+            OSError: The next file cannot be created.
+        """
+        self.close()
+        self._begin(rover)
+
+    def close(self) -> None:
+        """Writes what is left and ends the file; a second call does nothing.
+
+        Raises:
+            RecordingError: The last rows cannot be written; the rows written before stay.
+        """
+        self._recorder.close()
+
+
+def _free_path(folder: Path) -> Path:
+    """The first of the folder's names that is free."""
+    for number in range(1, MOST_FILES):
+        path = folder / f"live-{number}.h5"
+        if not path.exists():
+            return path
+    raise FileExistsError(f"{folder}: holds {MOST_FILES - 1} recordings; name another folder")

@@ -1,0 +1,140 @@
+"""The manual: every public name is printed with its docstring, and its pages fit a desk and a phone."""
+
+import importlib
+import inspect
+import pkgutil
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+from browser.manual_pages import DOCS, build, printed
+from browser.test_replay_page import start_browser
+from selenium import webdriver
+
+import rover_gym
+from rover_gym import _core, mechanics
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]
+
+WIDTHS = {"desk": 1280, "phone": 390}  # CSS pixels
+
+# What sticks out to the right of the window, but for what can be scrolled by itself.
+STICKING_OUT = """
+const scrolls = (node) => node && node !== document.body &&
+  (["auto", "scroll", "hidden"].includes(getComputedStyle(node).overflowX) || scrolls(node.parentElement));
+return [...document.querySelectorAll("article *")]
+  .filter((node) => node.getBoundingClientRect().right > innerWidth + 1 && !scrolls(node.parentElement))
+  .map((node) => node.tagName + "." + node.className + ": " + node.textContent.slice(0, 60)).slice(0, 3);
+"""
+
+
+@pytest.fixture(scope="module")
+def manual() -> Path:
+    pytest.importorskip("furo", reason="the extra docs is not installed")
+    return build()
+
+
+@pytest.fixture(scope="module")
+def texts(manual: Path) -> dict[str, str]:
+    return printed(manual)
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[webdriver.Chrome]:
+    browser = start_browser(tmp_path_factory.mktemp("profile"))
+    try:
+        yield browser
+    finally:
+        browser.quit()
+
+
+def rooms() -> list[ModuleType]:
+    """The modules that offer public names."""
+    names = [f"rover_gym.{info.name}" for info in pkgutil.iter_modules(rover_gym.__path__) if info.ispkg]
+    found = [importlib.import_module(name) for name in names]
+    return [mechanics, *(room for room in found if hasattr(room, "__all__"))]
+
+
+def public_names() -> Iterator[tuple[str, Any]]:
+    """Full names, as the manual has them, of what the rooms offer, each with the thing itself, members included."""
+    for room in rooms():
+        for name in room.__all__:
+            thing = getattr(room, name)
+            is_compiled = getattr(_core, name, None) is thing
+            if name.startswith("_") or (is_compiled and room is not mechanics):
+                continue
+            full = f"{room.__name__}.{name}"
+            yield full, thing
+            if isinstance(thing, type) and full != "rover_gym.env.RoverArguments":  # its card has its table
+                inherited = {member for base in thing.__mro__[1:] for member in vars(base)}
+                for member in {**vars(thing), **vars(thing).get("__annotations__", {})}:
+                    if not member.startswith("_") and member not in inherited:
+                        yield f"{full}.{member}", inspect.getattr_static(thing, member, None)
+
+
+def letters(text: str) -> str:
+    """A text without signs, spaces and markup, for comparison."""
+    return re.sub(r"[\W_]+", "", re.sub(r":\w+:`", "", text))
+
+
+def first_sentence(thing: Any) -> str:
+    """The first line of a docstring, where the thing has one of its own."""
+    thing = thing.__func__ if isinstance(thing, staticmethod | classmethod) else thing
+    documented = isinstance(thing, type) or inspect.isroutine(thing) or inspect.isdatadescriptor(thing)
+    line = (inspect.getdoc(thing) or "").split("\n")[0] if documented else ""
+    return "" if line.startswith("Alias for field number") else line  # a named tuple's own word
+
+
+def test_every_public_name_is_printed_with_its_docstring(texts: dict[str, str]) -> None:
+    expected = dict(public_names())
+    assert len(expected) > 900
+    missing = [name for name in expected if name not in texts]
+    silent = [name for name in expected if name in texts and not texts[name]]
+    garbled = [
+        name for name, thing in expected.items() if letters(first_sentence(thing)) not in letters(texts.get(name, ""))
+    ]
+    assert (missing, silent, sorted(set(garbled) - set(missing) - set(silent))) == ([], [], [])
+
+
+def test_every_argument_of_a_constructor_is_printed(texts: dict[str, str]) -> None:
+    missing = []
+    for name, thing in public_names():
+        if isinstance(thing, type) and name.startswith("rover_gym.mechanics."):
+            try:
+                arguments = inspect.signature(thing).parameters
+            except ValueError:
+                continue  # it has no constructor
+            missing += [f"{name}({one})" for one in arguments if not re.search(rf"\b{one}\b", texts[name])]
+    assert not missing
+
+
+def test_no_docstring_is_taken_for_a_type(texts: dict[str, str]) -> None:
+    assert not [name for name, text in texts.items() if re.search(r"^Type\b", text, flags=re.MULTILINE)]
+
+
+@pytest.mark.parametrize("device", WIDTHS)
+def test_no_page_is_wider_than_the_window(manual: Path, browser: webdriver.Chrome, device: str) -> None:
+    pages = sorted(page for page in manual.rglob("*.html") if not page.parts[-2].startswith("_static"))
+    assert len(pages) > 60
+    size = {"width": WIDTHS[device], "height": 844, "deviceScaleFactor": 1, "mobile": False}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    wide = {}
+    for page in pages:
+        browser.get(page.as_uri())
+        assert browser.execute_script("return innerWidth") == WIDTHS[device]
+        if found := browser.execute_script(STICKING_OUT):
+            wide[str(page.relative_to(manual))] = found
+    assert wide == {}
+
+
+def test_the_start_page_has_four_ways_in(manual: Path, browser: webdriver.Chrome) -> None:
+    browser.get((manual / "index.html").as_uri())
+    links = browser.execute_script(
+        "return [...document.querySelectorAll('.way')].map((way) => [way.querySelector('strong a').href,"
+        " way.querySelector('img').naturalWidth]);"
+    )
+    assert len(links) == len(list((DOCS / "tutorials").glob("*.md"))) == 4
+    assert all(width > 0 and Path(link.removeprefix("file://")).is_file() for link, width in links)

@@ -1,0 +1,1 @@
+"""The wheel in empty environments: what it promises alone, and with each extra."""

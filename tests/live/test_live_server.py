@@ -1,0 +1,238 @@
+"""The page's server without a browser: who may connect, who is at the wheel, and what bad messages and ports do."""
+
+import http.client
+import json
+import socket
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+
+from rover_gym.live import LiveChoices, LiveLoop, LiveRover, LiveScene, LiveServer
+from rover_gym.mechanics import OptionError
+
+viser = pytest.importorskip("viser")
+client = pytest.importorskip("websockets.sync.client")
+from websockets.exceptions import ConnectionClosed, InvalidStatus  # noqa: E402 - comes with viser
+
+PROTOCOL = f"viser-v{viser.__version__}"
+
+
+@dataclass
+class Served:
+    """A drive that is served."""
+
+    loop: LiveLoop
+    server: LiveServer
+
+    @property
+    def port(self) -> int:
+        """Where it listens."""
+        return urlsplit(self.server.address).port or 0
+
+    def page(self, path: str = "/live", **options: Any) -> Any:
+        """A connection as a page of ours makes it."""
+        options.setdefault("origin", f"http://127.0.0.1:{self.port}")
+        return client.connect(f"ws://127.0.0.1:{self.port}{path}", **options)
+
+    def get(self, path: str = "/", host: str | None = None) -> http.client.HTTPResponse:
+        """The answer to a request for a page."""
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=10.0)
+        connection.request("GET", path, headers={} if host is None else {"Host": host})
+        return connection.getresponse()
+
+
+@pytest.fixture
+def served(tmp_path: Path) -> Iterator[Served]:
+    choices = LiveChoices()
+    loop = LiveLoop(LiveRover(LiveScene(), choices), tmp_path)
+    server = LiveServer(loop, choices, port=0)
+    loop.start()
+    yield Served(loop, server)
+    loop.stop()
+    server.stop()
+
+
+def say(page: Any, **message: Any) -> None:
+    page.send(json.dumps(message))
+
+
+def heard(page: Any, key: str, condition: Callable[[Any], bool] = lambda _: True) -> Any:
+    """The next message of a kind that satisfies a condition."""
+    end = time.monotonic() + 20.0
+    while time.monotonic() < end:
+        message = json.loads(page.recv(timeout=20.0))
+        if key in message and condition(message[key]):
+            return message[key]
+    raise AssertionError(f"no {key} came")
+
+
+def test_a_page_hears_states_and_drives(served: Served) -> None:
+    with served.page() as page:
+        choices = heard(page, "choices")
+        assert choices["ground"] == ["plane", "rocks", "hills"]
+        assert heard(page, "state")["wheel"] == "here"
+        for _ in range(12):
+            say(page, do="drive", forward=1.0, turn=0.0)
+            time.sleep(0.1)
+        assert served.loop.state.speed > 0.5
+        say(page, do="change", name="friction", value=0.25)
+        assert heard(page, "state", lambda state: state["scene"]["friction"] == 0.25)
+        say(page, do="change", name="ground", value="moon")
+        assert "must be one of" in heard(page, "state", lambda state: "ground" in state["notice"])["notice"]
+
+
+def test_a_browser_that_vanishes_stops_the_rover_and_frees_the_wheel(served: Served) -> None:
+    page = served.page()
+    for _ in range(8):
+        say(page, do="drive", forward=1.0)
+        time.sleep(0.1)
+    assert served.loop.state.speed > 0.3
+    page.socket.shutdown(socket.SHUT_RDWR)  # without a word
+    page.socket.close()
+    time.sleep(2.0)
+    assert served.loop.state.speed < 0.1
+    assert served.server.n_pages == 0
+    at = served.loop.state.time
+    with served.page() as other:
+        assert heard(other, "state")["wheel"] == "here"
+    time.sleep(0.2)
+    assert served.loop.state.time > at
+
+
+def test_of_two_pages_one_is_at_the_wheel(served: Served) -> None:
+    with served.page() as first, served.page() as second:
+        assert heard(first, "state", lambda state: state["pages"] == 2)["wheel"] == "here"
+        assert heard(second, "state")["wheel"] == "elsewhere"
+        say(second, do="change", name="friction", value=0.1)
+        assert "for the page at the wheel" in heard(second, "error")
+        assert served.loop.state.scene.friction == 0.7
+        say(second, do="take")
+        assert heard(second, "state", lambda state: state["wheel"] == "here")
+        assert heard(first, "state", lambda state: state["wheel"] == "elsewhere")
+        say(second, do="change", name="friction", value=0.1)
+        assert heard(first, "state", lambda state: state["scene"]["friction"] == 0.1)
+        say(first, do="pause")
+        assert "for the page at the wheel" in heard(first, "error")
+        second.close()
+        assert heard(first, "state", lambda state: state["wheel"] == "free")
+        say(first, do="pause")
+        assert heard(first, "state", lambda state: state["paused"])["wheel"] == "here"
+
+
+@pytest.mark.parametrize(
+    "message", ["", "{", "null", '{"do": "fly"}', b"\xff\x00", '{"do": "drive", "forward": 1e400}']
+)
+def test_malformed_messages_are_answered_and_the_drive_goes_on(served: Served, message: str | bytes) -> None:
+    with served.page() as page:
+        page.send(message)
+        assert heard(page, "error")
+        at = served.loop.state.time
+        assert heard(page, "state", lambda state: state["time"] > at)
+
+
+def test_malformed_messages_to_visers_own_connection_end_it_alone(served: Served) -> None:
+    with served.page("/", subprotocols=[PROTOCOL]) as scene:
+        scene.send("no message of viser's")
+        with pytest.raises(ConnectionClosed):
+            all(scene.recv(timeout=20.0) for _ in range(10_000))
+    with served.page() as page:
+        at = served.loop.state.time
+        assert heard(page, "state", lambda state: state["time"] > at)
+
+
+@pytest.mark.parametrize("path", ["/live", "/"])
+@pytest.mark.parametrize("origin", ["http://example.org", "null", "https://127.0.0.1", "http://127.0.0.1:1"])
+def test_other_pages_are_refused(served: Served, path: str, origin: str) -> None:
+    with pytest.raises(InvalidStatus, match="403"):
+        served.page(path, origin=origin, subprotocols=[PROTOCOL])
+
+
+@pytest.mark.parametrize("host", ["example.org", "example.org:80", "[", "127.0.0.1.example.org"])
+def test_a_name_of_a_site_that_leads_here_is_refused(served: Served, host: str) -> None:
+    """A site may have its own name lead to this address, so that the browser takes our page for one of its own."""
+    assert served.get("/", host).status == 421
+
+
+def test_the_page_is_all_that_is_served_and_may_load_nothing(served: Served) -> None:
+    page = served.get("/")
+    assert page.status == 200
+    policy = page.headers["Content-Security-Policy"]
+    assert "default-src 'none'" in policy
+    assert "'unsafe-eval'" not in policy
+    assert "http" not in policy
+    assert b"rover live" in page.read()
+    for path in ("/../pyproject.toml", "/%2e%2e/viser/__init__.py", "/assets", "/live.js"):
+        assert served.get(path).status == 404
+    assert served.get("/?x=1", "localhost").status == 200
+
+
+def test_a_client_of_another_version_is_refused(served: Served) -> None:
+    with pytest.raises(InvalidStatus, match="400"):
+        served.page("/", subprotocols=["viser-v0.0.1"])
+
+
+def test_a_port_in_use_is_named(served: Served, tmp_path: Path) -> None:
+    choices = LiveChoices()
+    loop = LiveLoop(LiveRover(LiveScene(), choices), tmp_path)
+    with pytest.raises(OptionError, match=f"port: is in use by another program.*{served.port}"):
+        LiveServer(loop, choices, port=served.port)
+    assert served.get("/").status == 200
+    loop.stop()
+
+
+@pytest.mark.parametrize(
+    ("host", "port", "field"), [("no.such.host.invalid", 0, "host"), ("127.0.0.1", 99_999, "port")]
+)
+def test_a_place_that_is_none_is_named(tmp_path: Path, host: str, port: int, field: str) -> None:
+    choices = LiveChoices()
+    loop = LiveLoop(LiveRover(LiveScene(), choices), tmp_path)
+    with pytest.raises(OptionError) as caught:
+        LiveServer(loop, choices, host=host, port=port)
+    assert caught.value.field == field
+    loop.stop()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux has more than one address of its own")
+def test_other_machines_are_refused_unless_asked_in(served: Served, tmp_path: Path) -> None:
+    """127.0.0.2 stands for an address that other machines reach: the server listens at its own address only."""
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(("127.0.0.2", served.port), timeout=5.0)
+    loop = LiveLoop(LiveRover(), tmp_path)
+    server = LiveServer(loop, LiveChoices(), host="0.0.0.0", port=0)  # noqa: S104 - as `--host 0.0.0.0`
+    port = urlsplit(server.address).port or 0
+    with client.connect(f"ws://127.0.0.2:{port}/live", origin=f"http://127.0.0.2:{port}") as page:
+        assert heard(page, "choices")
+    loop.stop()
+    server.stop()
+
+
+def test_the_scene_is_shared_with_no_service(served: Served) -> None:
+    messages = pytest.importorskip("viser._messages")
+    handlers = served.server._served.viser._websock_server._incoming_handlers
+    assert messages.ShareUrlRequest not in handlers
+    assert messages.ShareUrlDisconnect not in handlers
+
+
+def test_only_what_moves_is_sent(served: Served) -> None:
+    """A rover that stands sends next to nothing: the rocks and the ground were sent once."""
+    time.sleep(1.0)
+    with served.page("/", subprotocols=[PROTOCOL], max_size=None) as scene:
+        end, sizes = time.monotonic() + 1.0, []
+        while time.monotonic() < end:
+            try:
+                scene.recv(timeout=0.5)
+            except TimeoutError:
+                break
+        end = time.monotonic() + 1.0
+        while time.monotonic() < end:
+            try:
+                sizes.append(len(scene.recv(timeout=0.2)))
+            except TimeoutError:
+                continue
+    assert sum(sizes) < 10_000

@@ -1,0 +1,1 @@
+"""The tutorials of the manual, run as a reader runs them."""
