@@ -9,7 +9,7 @@ from rover_gym.mechanics import OptionError
 from rover_gym.validation import number, refuse
 
 if TYPE_CHECKING:
-    from rover_gym.live.live_rover import LiveRover, LiveMoment
+    from rover_gym.live.live_rover import LiveMoment, LiveRover
 
 #: Simulated time between two moments, s, and how many are kept: one minute.
 EVERY, KEPT = 0.25, 240
