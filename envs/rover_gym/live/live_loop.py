@@ -238,7 +238,7 @@ class LiveLoop:
         elif self._recording is None:
             self._recording = LiveRecording(self._folder, self._rover)
             self._note_file()
-            self._say(f"recording {self._recording.path}")
+            self._say(f"recording {self._recording.path.name}")
 
     def _note_file(self) -> None:
         if self._recording is not None:
@@ -250,7 +250,7 @@ class LiveLoop:
             self._guard(lambda recording: recording.close())
             if self._recording is not None:
                 self._recording = None
-                self._say(f"recorded {path}: {rows} rows")
+                self._say(f"recorded {path.name}: {rows} rows")
 
     def _guard(self, work: Callable[[LiveRecording], None]) -> None:
         """Works on the recording, if there is one; where that fails, the recording ends and the drive goes on."""
