@@ -15,6 +15,7 @@ PAGES = (
     "docs/identification.md",
     "docs/linearise.md",
     "docs/live.md",
+    "docs/logs.md",
     "docs/planar.md",
     "docs/recording.md",
     "docs/replay.md",
@@ -27,7 +28,13 @@ PAGES = (
     "docs/your-rover.md",
 )
 #: Packages of extras that a block needs if it holds these words.
-EXTRAS = {"from_urdf": "yourdfpy", "from_mjcf": "mujoco", "scipy": "scipy", "stable_baselines3": "stable_baselines3"}
+EXTRAS = {
+    "McapWriter": "mcap",
+    "from_urdf": "yourdfpy",
+    "from_mjcf": "mujoco",
+    "scipy": "scipy",
+    "stable_baselines3": "stable_baselines3",
+}
 
 
 def blocks() -> list[pytest.param]:

@@ -136,15 +136,19 @@ for name in ("robot.urdf", "robot.xml"):
     rover("drive", "--model", "read.toml", "--time-limit", "0.2")
 """,
     "data": """
-import minari
-import h5py
+rover("dataset", "rover/random-v0", "--policy", "random", "--episodes", "1", "--folder", "sets")
+assert list(Path("sets/rover/random-v0").rglob("*.hdf5"))
 """,
     "onnx": """
+rover("export", "onnx", "trained", "-o", "plane.onnx")
+rover("export", "onnx", "foresight", "-o", "forecast.onnx")
 import onnx
+
+onnx.checker.check_model("plane.onnx", full_check=True)
 """,
     "logs": """
 rover(*RECORDED)
-rover("export", "mcap", "run/episode-0.h5")
+rover("export", "mcap", "run/episode-0.h5", "-o", "run.mcap")
 (log,) = Path(".").rglob("*.mcap")
 from mcap.reader import make_reader
 

@@ -1,5 +1,6 @@
 """`rover dataset`: episodes of a policy as a Minari data set."""
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -50,7 +51,7 @@ def dataset(
         refuse(OptionError, "environment", environment, f"must be one of {', '.join(ENVIRONMENTS)}")
     given = {"terrain": terrain, "difficulty": difficulty, "model": None if model == BUILT_IN else model}
     arguments: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
-    make = partial(RandomPolicy, seed=seed)
+    make: Callable[[gym.Env[Any, Any]], Policy] = partial(RandomPolicy, seed=seed)
     if policy != RANDOM:
         ground = arguments.get("terrain", ENVIRONMENTS[environment].arguments.get("terrain", "plane"))
         chosen = named_driver(policy, ground, named_model(model))
