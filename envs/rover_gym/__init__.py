@@ -24,9 +24,9 @@ The package consists of the subpackages below. Each one may import those above i
     live           a rover that is driven in the browser
     figures        figures of saved runs
     learning       training with stable-baselines3
+    registration   the environments' names for Gymnasium
     exports        runs, policies and simulations for other programs
     cli            the command `rover`
-    registration   the environments' names for Gymnasium
 """
 
 from rover_gym.env.rover_env import RoverEnv
