@@ -17,13 +17,18 @@ from rover_gym.figures.style import STYLE
 from rover_gym.sensors import DepthCamera, LaserScanner, Mount
 
 PICTURE = Path(__file__).parent / "sensors.png"
-DIFFICULTY, SEED = 1.0, 5
+SEED = 4
 CAMERA = DepthCamera(
-    mount=Mount(position=(0.6, 0.7, 0.0), pitch_deg=-22.0), width=160, height=120, view_deg=70.0, max_range=8.0
+    mount=Mount(position=(0.75, 0.2, 0.0), pitch_deg=-14.0), width=320, height=240, view_deg=60.0, max_range=6.0
 )
 SCANNER = LaserScanner(
-    mount=Mount(position=(0.0, 1.0, 0.0)), rays=720, elevations_deg=tuple(range(-40, 0, 4)), max_range=8.0
+    mount=Mount(position=(0.0, 1.2, 0.0)),
+    rays=1440,
+    elevations_deg=tuple(np.linspace(-60.0, -12.0, 48)),
+    max_range=8.0,
 )
+#: Of the rendered scene: a place behind the depth camera, and one that it looks at, m.
+EYE, TARGET = (-3.5, 2.6, 1.6), (1.2, 0.2, 0.0)
 
 
 def main() -> None:
@@ -31,19 +36,22 @@ def main() -> None:
     env = gym.make(
         "RoverRocks-v0",
         sensors=[CAMERA, SCANNER],
-        difficulty=DIFFICULTY,
+        difficulty=2.0,
+        rock_abundance=0.3,
         slope_deg=0.0,
+        heading_deg=0.0,
+        goal_bearing_deg=0.0,
         render_mode="rgb_array",
-        render_options={"width": 640, "height": 640},
+        render_options={"width": 800, "height": 800, "camera": (EYE, TARGET)},
     )
     observation, _ = env.reset(seed=SEED)
     with mpl.rc_context(STYLE):
-        figure, (left, middle, right) = plt.subplots(1, 3, figsize=(12.0, 4.0), width_ratios=(1.0, 1.45, 1.15))
+        figure, (left, middle, right) = plt.subplots(1, 3, figsize=(12.0, 4.0), width_ratios=(1.05, 1.5, 1.3))
         left.imshow(env.render())
         left.set_title("the scene")
         left.axis("off")
         image = middle.imshow(observation["depth"], cmap="viridis_r", vmin=0.0, vmax=CAMERA.max_range)
-        middle.set_title("depth camera, 160 x 120")
+        middle.set_title("depth camera, 320 x 240")
         middle.axis("off")
         figure.colorbar(image, ax=middle, label="depth, m", shrink=0.8)
         draw_scan(right, observation["scan"], env.unwrapped)
@@ -61,10 +69,12 @@ def draw_scan(axes: plt.Axes, scan: np.ndarray, env: rover_gym.RoverEnv) -> None
     met = (scan > 0.0) & (scan < SCANNER.max_range)
     places = SCANNER.directions * scan[..., None] + np.asarray(SCANNER.mount.position)
     height = places[..., 1] + env.simulation.q[1]
-    drawn = axes.scatter(places[met][:, 2], places[met][:, 0], c=height[met], s=1.5, cmap="viridis", vmin=0.0, vmax=0.5)
+    drawn = axes.scatter(
+        places[met][:, 2], places[met][:, 0], c=height[met], s=0.4, lw=0.0, cmap="viridis", vmin=0.0, vmax=0.4
+    )
     axes.figure.colorbar(drawn, ax=axes, label="height, m", shrink=0.8)
-    axes.set(title="laser scanner, 10 rings", xlabel="to the right, m", ylabel="ahead, m", aspect="equal")
-    axes.set(xlim=(-5, 5), ylim=(-5, 5))
+    axes.set(title="laser scanner, 48 rings", xlabel="to the right, m", ylabel="ahead, m", aspect="equal")
+    axes.set(xlim=(-5.0, 5.0), ylim=(-4.0, 6.0))
 
 
 if __name__ == "__main__":

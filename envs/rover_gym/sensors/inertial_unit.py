@@ -110,7 +110,8 @@ class InertialUnit(Sensor):
         """Velocity of the unit's place, its attitude, and its angular velocity, world frame."""
         place, rotation = moment.frame(self.mount)
         angular_velocity = moment.v[3:6]
-        return moment.v[:3] + np.cross(angular_velocity, place - moment.q[:3]), rotation, angular_velocity
+        velocity = moment.v[:3] + np.cross(angular_velocity, place - moment.q[:3])
+        return velocity, rotation, angular_velocity
 
     @staticmethod
     def _noise(generator: np.random.Generator, accelerometer: float, gyroscope: float) -> Array:
@@ -123,7 +124,8 @@ def rotation_vector(rotation: Array) -> Array:
     skew = 0.5 * (skew - np.array([rotation[1, 2], rotation[2, 0], rotation[0, 1]]))
     sine = float(np.linalg.norm(skew))
     angle = math.atan2(sine, 0.5 * (float(np.trace(rotation)) - 1.0))
-    return skew * (angle / sine if sine > 0.0 else 1.0)
+    vector: Array = skew * (angle / sine if sine > 0.0 else 1.0)
+    return vector
 
 
 def rotation_matrix(vector: Array) -> Array:

@@ -58,7 +58,7 @@ class LaserScanner(Sensor):
         whole("rays", self.rays, at_least=1, at_most=MAX_RAYS)
         number("begin_deg", self.begin_deg)
         number("end_deg", self.end_deg, above=self.begin_deg, at_most=self.begin_deg + 360.0)
-        rings = self.elevations_deg
+        rings: object = self.elevations_deg
         if not isinstance(rings, (tuple, list, np.ndarray)) or not 1 <= len(rings) <= MAX_RINGS:
             refuse(OptionError, "elevations_deg", rings, f"must be 1 to {MAX_RINGS} angles")
         elevations = vector("elevations_deg", rings, len(rings))

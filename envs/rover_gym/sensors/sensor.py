@@ -47,8 +47,9 @@ class Sensor(ABC):
     latency: float | Range = 0.0
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str) or not self.name.isidentifier():
-            refuse(OptionError, "name", self.name, "must be a name of letters, digits and underscores")
+        name: object = self.name
+        if not isinstance(name, str) or not name.isidentifier():
+            refuse(OptionError, "name", name, "must be a name of letters, digits and underscores")
         if self.rate is not None:
             number("rate", self.rate, above=0.0)
         self._keep("latency", span("latency", self.latency, at_least=0.0, at_most=MAX_LATENCY))

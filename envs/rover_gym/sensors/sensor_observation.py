@@ -46,11 +46,12 @@ class SensorObservation(gym.Wrapper, RecordConstructorArgs):
     """
 
     def __init__(self, env: gym.Env[Any, Any], sensors: Sequence[Sensor]) -> None:
-        if not isinstance(env, gym.Env) or not isinstance(env.unwrapped, RoverEnv):
-            refuse(OptionError, "env", env, "must be a RoverEnv")
+        given: object = env
+        if not isinstance(given, gym.Env) or not isinstance(given.unwrapped, RoverEnv):
+            refuse(OptionError, "env", given, "must be a RoverEnv")
         RecordConstructorArgs.__init__(self, sensors=sensors)
         gym.Wrapper.__init__(self, env)
-        self._rover: RoverEnv = env.unwrapped
+        self._rover: RoverEnv = given.unwrapped
         self.suite = SensorSuite(sensors, self._rover.model, self._rover.dt)
         self.observation_space = gym.spaces.Dict({STATE: env.observation_space, **self.suite.spaces})
         self._state: SuiteState | None = None

@@ -103,9 +103,10 @@ class SensorVectorObservation(VectorWrapper):
         """
         if not isinstance(snapshot, SensedBatchSnapshot):
             refuse(StateError, "snapshot", snapshot, "must come from SensorVectorObservation.snapshot()")
-        if not isinstance(snapshot.sensors, tuple) or len(snapshot.sensors) != self.num_envs:
-            refuse(StateError, "snapshot.sensors", snapshot.sensors, f"must be of {self.num_envs} rovers")
-        states = [self.suite.check_state(state) for state in snapshot.sensors]
+        kept: object = snapshot.sensors
+        if not isinstance(kept, tuple) or len(kept) != self.num_envs:
+            refuse(StateError, "snapshot.sensors", kept, f"must be of {self.num_envs} rovers")
+        states = [self.suite.check_state(state) for state in kept]
         self._rovers.restore(snapshot.rovers)
         self._states[:] = states
 

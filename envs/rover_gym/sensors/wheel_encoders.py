@@ -39,8 +39,9 @@ class WheelEncoders(Sensor):
         return -most, most
 
     def draw(self, model: RoverModel, generator: np.random.Generator) -> Values:
-        """Draws the gains."""
-        return {"gain": uniform(generator, self.gain, len(model.wheel_names))}
+        """Draws the gains, which turn the joints' angles into ones that are positive forward."""
+        forward = np.sign(np.diagonal(model.actuation_matrix()[model.wheel_joint_indices]))
+        return {"gain": forward * uniform(generator, self.gain, len(model.wheel_names))}
 
     def begin(self, moment: Moment) -> Values:
         """The angles at the start, which count as 0."""

@@ -31,12 +31,14 @@ fn height(x: f64, z: f64) -> f64 {
     waves.iter().map(of_wave).sum()
 }
 
-/// A map of `side` x `side` m.
-fn map(side: f64, cell: f64) -> HeightField {
-    let n = (side / cell).round() as usize + 1;
-    let at = |k: usize| k as f64 * cell - 0.5 * side;
+/// A map of n x n heights about the origin.
+fn map(n: u32, cell: f64) -> HeightField {
+    let half = 0.5 * f64::from(n - 1) * cell;
+    let at = |k: u32| f64::from(k) * cell - half;
+    #[allow(clippy::cast_possible_truncation)] // as maps are kept
     let heights = (0..n * n).map(|k| height(at(k % n), at(k / n)) as f32);
-    HeightField::new(heights.collect(), [n, n], [cell; 2], [-0.5 * side; 2]).unwrap()
+    let shape = [n as usize; 2];
+    HeightField::new(heights.collect(), shape, [cell; 2], [-half; 2]).unwrap()
 }
 
 /// The same as a mesh.
@@ -118,7 +120,7 @@ fn scanner(eye: Vector3<f64>) -> Vec<Ray> {
 }
 
 fn main() {
-    let field = map(50.0, 0.1);
+    let field = map(501, 0.1);
     let grounds: [(&str, Arc<dyn Terrain>); 7] = [
         ("plane", Arc::new(Plane::ground())),
         (
@@ -132,7 +134,7 @@ fn main() {
         ("height field, 501 x 501, 0.1 m", Arc::new(field.clone())),
         (
             "height field, 2001 x 2001, 0.025 m",
-            Arc::new(map(50.0, 0.025)),
+            Arc::new(map(2001, 0.025)),
         ),
         ("mesh, 500 000 triangles", Arc::new(mesh(&field))),
         (

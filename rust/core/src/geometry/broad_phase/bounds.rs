@@ -31,8 +31,8 @@ impl Bounds {
         }
     }
 
-    /// Distances (m) at which a ray from `origin` enters and leaves, within 0 and `reach`; `inverse`
-    /// has the inverses of its direction's components.
+    /// Distances (m) at which a ray from `origin` enters and leaves, within 0 and `reach`.
+    /// `inverse`: of the components of its direction.
     #[inline]
     #[must_use]
     pub fn crossing(

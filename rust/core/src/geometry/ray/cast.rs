@@ -70,7 +70,7 @@ mod tests {
 
     /// A closed mesh: a ball of triangles, every corner moved in or out.
     fn stone(radii: &[f64]) -> TriangleMesh {
-        let (around, down) = (12, 7);
+        let (around, down) = (12_u32, 7_u32);
         let mut corners = vec![[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]];
         for j in 1..down {
             for i in 0..around {
@@ -115,8 +115,12 @@ mod tests {
             for ray in [exit, past, Ray { direction: -past.direction, ..past }] {
                 let sheared = Sheared::new(&ray);
                 let all = mesh.triangles().iter().filter_map(|t| sheared.distance(&corners(t), 9.0));
-                let found = mesh.first_hit(&ray, 9.0);
-                prop_assert_eq!(found.map(|hit| hit.distance), all.reduce(f64::min));
+                let found = mesh.first_hit(&ray, 9.0).map(|hit| hit.distance);
+                // Of triangles that meet in one place any may answer, each with its own rounding.
+                match (found, all.reduce(f64::min)) {
+                    (Some(found), Some(nearest)) => prop_assert!((found - nearest).abs() < 1e-12),
+                    (found, nearest) => prop_assert_eq!(found, nearest),
+                }
             }
         }
 

@@ -309,7 +309,7 @@ mod tests {
                     prop_assert!((hit.normal.norm() - 1.0).abs() < 1e-12 && hit.normal.y > 0.0);
                 }
                 (None, None) => {}
-                // One of the two may miss where the ray only grazes a face or a border, or begins on one.
+                // One of the two may miss where the ray grazes a face or begins on it.
                 (found, expected) => {
                     let first = found.map_or(f64::INFINITY, |hit| hit.distance);
                     let first = first.min(expected.unwrap_or(f64::INFINITY));
