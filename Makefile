@@ -74,7 +74,7 @@ docs: $(STAMPS)/test $(STAMPS)/train $(STAMPS)/core ## build the documentation, 
 
 bench: $(STAMPS)/core ## time a step and tell where the time goes, MuJoCo's beside it where it is installed (informs, does not gate)
 	$(COMPARE).exploring_bench
-	cargo bench --locked $(addprefix --bench ,step accuracy spheres solver soil)
+	cargo bench --locked $(addprefix --bench ,step accuracy spheres rays solver soil)
 	@if command -v valgrind > /dev/null; then cargo build --release --locked --quiet --example drive_steps; \
 	  count() { valgrind --tool=callgrind --callgrind-out-file=/dev/null target/release/examples/drive_steps $$1 2>&1 \
 	    | awk '/Collected/ { print $$NF }'; }; \
@@ -126,7 +126,7 @@ pins: $(STAMPS)/venv ## resolve requirements/*.txt anew from pyproject.toml
 	$(call pin,peers) --extra peers --constraint requirements/test.txt
 
 clean: ## remove everything that make made, but for runs/
-	rm -rf $(VENV) $(VENV)-rllib target dist docs/_build envs/rover_gym/_core*.so .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) $(VENV)-rllib target dist docs/_build envs/rover_gym/_core*.so envs/rover_gym/_fmu .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
 # One list for every Python from 3.11 on, versions only.
 pin = $(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --no-annotate \
@@ -164,7 +164,11 @@ $(STAMPS)/peers: requirements/peers.txt $(STAMPS)/demo
 	$(UV) --requirement $< || for one in $$(grep -o '^[a-z-]*==[^ ;]*' $<); do $(UV) $$one || true; done
 	@touch $@
 
-# The compiled core, in release mode, and the package itself, editable.
+# The compiled core, in release mode, the package itself, editable, and the library of co-simulation units.
 $(STAMPS)/core: pyproject.toml Cargo.toml Cargo.lock $(shell find rust -type f) | $(STAMPS)/demo
 	$(BIN)/python -m maturin develop --release --uv --quiet
+	cargo build --release --locked --quiet -p rover-fmu
+	@mkdir -p envs/rover_gym/_fmu
+	@for made in target/release/{lib,}rover_fmu.{so,dylib,dll}; do [ ! -f $$made ] || cp $$made envs/rover_gym/_fmu/rover_fmu.$${made##*.}; done
+	@! command -v strip > /dev/null || strip -S envs/rover_gym/_fmu/rover_fmu.*
 	@touch $@

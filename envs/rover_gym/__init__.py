@@ -15,6 +15,7 @@ The package consists of the subpackages below. Each one may import those above i
     grains         granular ground of balls, in space
     env            `Rover-v0`: its card, arguments and control period
     vector         batches of rovers, for Gymnasium and for stable-baselines3
+    sensors        encoders, inertial unit, cameras and scanners as observations
     policy         the baseline, trained policies and their evaluation
     planning       the cheapest model that a scene permits
     planar         the planar systems: a ball, a two-wheel rover
@@ -23,9 +24,9 @@ The package consists of the subpackages below. Each one may import those above i
     live           a rover that is driven in the browser
     figures        figures of saved runs
     learning       training with stable-baselines3
+    registration   the environments' names for Gymnasium
     exports        runs, policies and simulations for other programs
     cli            the command `rover`
-    registration   the environments' names for Gymnasium
 """
 
 from rover_gym.env.rover_env import RoverEnv

@@ -728,6 +728,26 @@ class Plane:
         Raises:
             TerrainError: The plane is vertical, or an argument is not a number.
         """
+    def cast_rays(
+        self, origins: npt.ArrayLike, directions: npt.ArrayLike, max_range: float | None = None
+    ) -> tuple[_Array, _Array]:
+        """Where rays meet the ground first.
+
+        A surface is met from either side. What depth cameras and laser scanners measure.
+
+        Args:
+            origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
+            directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
+            max_range: Distance to which they are followed, m; without end by default.
+
+        Returns:
+            Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
+            world frame, (n, 3), nan where nothing is met.
+
+        Raises:
+            OptionError: An array has a wrong shape or an entry that is not finite, a direction is
+                zero, an origin is beyond 1e6 m, or `max_range` is not positive.
+        """
     def __reduce__(self) -> Any: ...
 
 @final
@@ -834,6 +854,26 @@ class SphereField:
 
         Raises:
             TerrainError: `points` has a wrong shape.
+        """
+    def cast_rays(
+        self, origins: npt.ArrayLike, directions: npt.ArrayLike, max_range: float | None = None
+    ) -> tuple[_Array, _Array]:
+        """Where rays meet the ground first.
+
+        A surface is met from either side. What depth cameras and laser scanners measure.
+
+        Args:
+            origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
+            directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
+            max_range: Distance to which they are followed, m; without end by default.
+
+        Returns:
+            Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
+            world frame, (n, 3), nan where nothing is met.
+
+        Raises:
+            OptionError: An array has a wrong shape or an entry that is not finite, a direction is
+                zero, an origin is beyond 1e6 m, or `max_range` is not positive.
         """
     def __len__(self) -> int: ...
     def __reduce__(self) -> Any: ...
@@ -980,6 +1020,26 @@ class HeightField:
         Raises:
             TerrainError: `points` has a wrong shape.
         """
+    def cast_rays(
+        self, origins: npt.ArrayLike, directions: npt.ArrayLike, max_range: float | None = None
+    ) -> tuple[_Array, _Array]:
+        """Where rays meet the ground first.
+
+        A surface is met from either side. What depth cameras and laser scanners measure.
+
+        Args:
+            origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
+            directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
+            max_range: Distance to which they are followed, m; without end by default.
+
+        Returns:
+            Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
+            world frame, (n, 3), nan where nothing is met.
+
+        Raises:
+            OptionError: An array has a wrong shape or an entry that is not finite, a direction is
+                zero, an origin is beyond 1e6 m, or `max_range` is not positive.
+        """
     def __reduce__(self) -> tuple[Any, ...]: ...
 
 @final
@@ -1052,6 +1112,26 @@ class TriangleMesh:
         Raises:
             TerrainError: `points` has a wrong shape.
         """
+    def cast_rays(
+        self, origins: npt.ArrayLike, directions: npt.ArrayLike, max_range: float | None = None
+    ) -> tuple[_Array, _Array]:
+        """Where rays meet the ground first.
+
+        A surface is met from either side. What depth cameras and laser scanners measure.
+
+        Args:
+            origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
+            directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
+            max_range: Distance to which they are followed, m; without end by default.
+
+        Returns:
+            Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
+            world frame, (n, 3), nan where nothing is met.
+
+        Raises:
+            OptionError: An array has a wrong shape or an entry that is not finite, a direction is
+                zero, an origin is beyond 1e6 m, or `max_range` is not positive.
+        """
     def __len__(self) -> int: ...
     def __reduce__(self) -> tuple[Any, ...]: ...
 
@@ -1084,6 +1164,26 @@ class Union:
 
         Raises:
             TerrainError: `points` has a wrong shape.
+        """
+    def cast_rays(
+        self, origins: npt.ArrayLike, directions: npt.ArrayLike, max_range: float | None = None
+    ) -> tuple[_Array, _Array]:
+        """Where rays meet the ground first.
+
+        A surface is met from either side. What depth cameras and laser scanners measure.
+
+        Args:
+            origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
+            directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
+            max_range: Distance to which they are followed, m; without end by default.
+
+        Returns:
+            Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
+            world frame, (n, 3), nan where nothing is met.
+
+        Raises:
+            OptionError: An array has a wrong shape or an entry that is not finite, a direction is
+                zero, an origin is beyond 1e6 m, or `max_range` is not positive.
         """
     def __len__(self) -> int: ...
     def __reduce__(self) -> tuple[Any, ...]: ...
@@ -1224,6 +1324,7 @@ class PathSearch:
         traps: npt.ArrayLike,
         retreat: float,
         extra: npt.ArrayLike | None = None,
+        ways: npt.ArrayLike | None = None,
     ) -> int:
         """The first arc of the cheapest path.
 
@@ -1236,12 +1337,44 @@ class PathSearch:
             retreat: Direction of the first arc, 1 or -1, while the rover backs off; 0 for a free
                 choice.
             extra: `(n,)` a further cost of each first arc, m; none by default.
+            ways: `(rows * columns,)` way to the goal from each point of the scan, m; straight by
+                default.
 
         Returns:
             The index of the arc among the first arcs.
 
         Raises:
             OptionError: An argument has a wrong shape or an entry that is not finite.
+        """
+    def ways(
+        self,
+        heights: npt.ArrayLike,
+        spacing: float,
+        goal: npt.ArrayLike,
+        boldness: float,
+        extra: npt.ArrayLike | None = None,
+    ) -> npt.NDArray[np.float64]:
+        """The way to a goal from every cell of a map (Dijkstra 1959).
+
+        The rover goes from a cell to one of its eight neighbours, headed for it. That costs the
+        distance and what the ground costs on a path: belly, climb and lean. A wheel over ground
+        that is not known stands as high as the others do; where all do, the distance is all.
+
+        Args:
+            heights: (rows, columns) heights, m, nan where they are not known; from 3 to 2000 of
+                each. Rows lie across, the first farthest ahead; columns lead to the right.
+            spacing: Distance of rows and columns, m.
+            goal: Row and column of the goal. One beyond the map is reached by the straight way from
+                its border.
+            boldness: Factor on the costs of belly, climb and lean.
+            extra: (rows, columns) further price of a metre in each cell, at least 0; none by
+                default.
+
+        Returns:
+            (rows, columns) ways, in metres of level ground.
+
+        Raises:
+            OptionError: An argument has a wrong shape or an entry out of its range.
         """
     def under(self, heights: npt.ArrayLike, poses: npt.ArrayLike) -> npt.NDArray[np.float32]:
         """What lies under the rover in poses.
@@ -1670,6 +1803,33 @@ class Simulation:
 
         Raises:
             OptionError: `n_scan` is not a count.
+        """
+    def cast_rays(
+        self,
+        origins: npt.ArrayLike,
+        directions: npt.ArrayLike,
+        max_range: float | None = None,
+        *,
+        parts: bool = False,
+        without: str | Sequence[str] = (),
+    ) -> tuple[_Array, _Array]:
+        """Where rays meet the ground first, or the rover itself.
+
+        Of the rover its wheels, boxes and balls are seen, as they collide.
+
+        Args:
+            origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
+            directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
+            max_range: Distance to which they are followed, m; without end by default.
+            parts: Whether the rover's own parts are met.
+            without: Names of solids whose parts are not met, such as the one that carries a sensor.
+
+        Returns:
+            Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
+            world frame, (n, 3), nan where nothing is met.
+
+        Raises:
+            OptionError: As of `Plane.cast_rays`, or `without` names no solid of the model.
         """
     def energy(self) -> Energy:
         """Kinetic and potential energy now."""

@@ -15,8 +15,8 @@ class Registration:
     """The registration of one environment with Gymnasium.
 
     Attributes:
-        entry_point: The environment's class, as "module:class".
-        vector_entry_point: The vector environment's class; with None, Gymnasium builds a vector of single environments.
+        entry_point: The environment's class, or the function that makes it, as "module:name".
+        vector_entry_point: The same of the vector environment; with None, Gymnasium builds a vector of single ones.
         max_episode_steps: Steps until truncation.
         arguments: Keyword arguments that differ from the class's defaults.
     """
@@ -28,30 +28,30 @@ class Registration:
 
 
 ENVIRONMENTS: Mapping[str, Registration] = {
-    "Rover-v0": Registration("rover_gym.env:RoverEnv", "rover_gym.vector:RoverVectorEnv"),
+    "Rover-v0": Registration("rover_gym.sensors:make_rover", "rover_gym.sensors:make_rover_vector"),
     "RoverRocks-v0": Registration(
-        "rover_gym.env:RoverEnv", "rover_gym.vector:RoverVectorEnv", arguments={"terrain": "rocks"}
+        "rover_gym.sensors:make_rover", "rover_gym.sensors:make_rover_vector", arguments={"terrain": "rocks"}
     ),
     "RoverHills-v0": Registration(
-        "rover_gym.env:RoverEnv", "rover_gym.vector:RoverVectorEnv", arguments={"terrain": "hills"}
+        "rover_gym.sensors:make_rover", "rover_gym.sensors:make_rover_vector", arguments={"terrain": "hills"}
     ),
     "RoverWaypoints-v0": Registration(
-        "rover_gym.env:RoverEnv",
-        "rover_gym.vector:RoverVectorEnv",
+        "rover_gym.sensors:make_rover",
+        "rover_gym.sensors:make_rover_vector",
         2 * MAX_EPISODE_STEPS,
         {"waypoints": 5, "goal_distance": (4.0, 8.0)},
     ),
     "RoverBattery-v0": Registration(
-        "rover_gym.env:RoverEnv",
-        "rover_gym.vector:RoverVectorEnv",
+        "rover_gym.sensors:make_rover",
+        "rover_gym.sensors:make_rover_vector",
         arguments={"terrain": "rocks", "goal_distance": (10.0, 14.0), "battery": 7000.0},
     ),
     "RoverCommand-v0": Registration(
         "rover_gym.policy:RoverCommandEnv", "rover_gym.policy:RoverCommandVectorEnv", MAX_COMMANDS
     ),
-    "RoverGoal-v0": Registration("rover_gym.policy:RoverGoalEnv", max_episode_steps=MAX_COMMANDS),
+    "RoverGoal-v0": Registration("rover_gym.policy:RoverGoalEnv", "rover_gym.policy:RoverGoalVectorEnv", MAX_COMMANDS),
     "RoverTrap-v0": Registration("rover_gym.policy:RoverTrapEnv", max_episode_steps=MAX_EPISODE_STEPS // 2),
-    "RoverGrains-v0": Registration("rover_gym.env:RoverGrainsEnv"),
+    "RoverGrains-v0": Registration("rover_gym.sensors:make_grains_rover"),
 }
 
 

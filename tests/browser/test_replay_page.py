@@ -21,6 +21,7 @@ from rover_gym import HeightField, Plane, RoverModel, Simulation, SphereField, T
 from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_run
 from rover_gym.rendering.appearance import GROUND_COLOUR, TRUNK_COLOUR
 from rover_gym.replay import write_page, write_soil_page
+from rover_gym.replay.page import SMOOTHING, WHEEL_NAMES, moving_mean
 from rover_gym.soil import SoilRun, read_soil_run, record_soil, rover_on_soil, settled_bed
 
 ROCKS = SphereField([[1.6, 0.0, 0.6], [1.2, 0.05, -1.3], [-0.9, 0.0, 1.3]], [0.25, 0.2, 0.15], Plane())
@@ -261,7 +262,7 @@ def readings(browser: webdriver.Chrome) -> list[list[str]]:
 def test_the_curves_stand_beside_the_scene_and_follow_the_timeline(shown: Shown) -> None:
     browser, run = shown.browser, shown.run
     assert [node.text for node in browser.find_elements(By.CSS_SELECTOR, "#panel h2")] == [
-        "wheel load (N)",
+        f"wheel load, mean over {SMOOTHING:g} s (N)",
         "wheel gap (mm)",
     ]
     assert len(browser.find_elements(By.CSS_SELECTOR, "#panel .curve")) == 12
@@ -269,18 +270,22 @@ def test_the_curves_stand_beside_the_scene_and_follow_the_timeline(shown: Shown)
     panel = browser.find_element(By.ID, "panel")
     assert panel.rect["x"] >= canvas.rect["x"] + canvas.rect["width"] - 1.0
 
+    loads = moving_mean(run.time, run.trajectory["wheel_forces"][:, :, 0])
     positions = []
     for row in (5, 15):
         go_to(browser, float(run.time[row] - run.time[0]) + 0.01)
         await_that(lambda row=row: f"{run.time[row] + 0.01:.2f} s of" in panel.text, "the panel's clock")
         positions.append(cursors(browser))
         names = run.model.wheel_names
-        loads = run.trajectory["wheel_forces"][row, :, 0]
-        expected = [word for name, load in zip(names, loads, strict=True) for word in (name, f"{load:.1f}")]
+        expected = []
+        for name, load in zip(names, np.round(loads[row]), strict=True):
+            expected += [*WHEEL_NAMES[name].split(), f"{load:.1f}" if load < 100.0 else f"{load:.0f}"]
         assert readings(browser)[0] == expected
     assert len(positions[0]) == 2
     # One impact must not flatten the other curves: the axis ends below it and notes that.
-    assert browser.find_element(By.CSS_SELECTOR, "#panel .peak").text == "cut off, peak 100000 N"
+    assert (
+        browser.find_element(By.CSS_SELECTOR, "#panel .peak").text == f"cut off, peak {float(f'{loads.max():.3g}'):g} N"
+    )
     curves = browser.find_elements(By.CSS_SELECTOR, "#panel .curve")[:6]
     heights = [float(y) for curve in curves for y in re.findall(r"[\d.]+ ([\d.]+)", curve.get_attribute("d") or "")]
     assert min(heights) == pytest.approx(6.0, abs=0.1)  # the top

@@ -9,7 +9,8 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from rover_gym.cli import app
-from rover_gym.record import read_trajectory
+from rover_gym.policy.films import ENDING
+from rover_gym.record import read_run, read_trajectory
 
 
 def rover(*arguments: str) -> Result:
@@ -112,8 +113,8 @@ def test_episodes_are_filmed(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     assert str(path) in result.output.replace("\n", "")
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
-    assert frames == 2 * 7  # the start and six steps each
-    assert seconds == pytest.approx(14 / 20, abs=0.06)
+    assert frames == 2 * (7 + ENDING)  # the start, six steps and the outcome each
+    assert seconds == pytest.approx(frames / 20, abs=0.06)
 
 
 def test_the_planner_by_hand_drives_too(tmp_path: Path) -> None:
@@ -123,3 +124,45 @@ def test_the_planner_by_hand_drives_too(tmp_path: Path) -> None:
     assert "the scan planner" in result.output
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert summary["arguments"]["height_scan"] == [48, 40, 0.18]
+
+
+def test_a_film_has_the_size_and_the_camera_that_are_asked_for(tmp_path: Path) -> None:
+    frames = {}
+    for name, options in {"plain": (), "other": ("--camera", "top", "--forces", "--no-antialiasing")}.items():
+        path = tmp_path / f"{name}.mp4"
+        arguments = ("drive", "--time-limit", "0.2", "--video", str(path), "--size", "320x180", *options)
+        assert rover(*arguments).exit_code == 0
+        frames[name] = last_frame(path)
+        assert frames[name].shape == (180, 320, 3)
+    difference = np.abs(frames["plain"].astype(int) - frames["other"])
+    assert difference.mean() > 10.0
+    caption = frames["plain"][:40, :200].astype(int)
+    assert (caption.min(axis=2) > 230).sum() > 100  # white letters: the seed, the outcome and the time
+
+
+def last_frame(path: Path) -> np.ndarray:
+    reader = imageio_ffmpeg.read_frames(str(path))
+    width, height = next(reader)["size"]
+    *_, last = reader
+    return np.frombuffer(last, np.uint8).reshape(height, width, 3)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--size", "big"), "--size: must be WIDTHxHEIGHT"),
+        (("--size", "3x3"), "--size: must be a whole number from 16"),
+        (("--camera", "moon"), "--camera: must be one of follow, side, top"),
+    ],
+)
+def test_a_film_that_cannot_be_is_refused(options: tuple[str, ...], message: str, tmp_path: Path) -> None:
+    result = rover("drive", "--video", str(tmp_path / "film.mp4"), *options)
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"error: {message}")
+
+
+def test_the_recording_says_outcome_and_goal(tmp_path: Path) -> None:
+    assert rover("drive", "--time-limit", "0.2", "--output", str(tmp_path)).exit_code == 0
+    run = read_run(tmp_path / "episode-0.h5")
+    assert run.trajectory.attributes["outcome"] == "time"
+    assert run.goal_tolerance == 0.5

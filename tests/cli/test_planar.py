@@ -13,9 +13,10 @@ from typer.testing import CliRunner
 
 from rover_gym.cli import app
 from rover_gym.figures.chapter_3 import draw_chapter_3
+from rover_gym.figures.planar_drawing import PLANAR_DRAWINGS, path_over_ground
 from rover_gym.figures.soil_run_figures import SOIL_DRAWINGS
-from rover_gym.planar import describe_planar, record_planar
-from rover_gym.record import read_trajectory
+from rover_gym.planar import BallSimulation, Sine, describe_planar, read_planar_run, record_planar
+from rover_gym.record import RecordingError, read_trajectory
 from rover_gym.reproduction.chapter_3_balls import ball_on_incline, published
 from rover_gym.soil import read_soil_run
 
@@ -218,3 +219,51 @@ def test_chapter_3_is_redrawn(tmp_path: Path) -> None:
     paths = draw_chapter_3(tmp_path)
     assert [path.name[:10] for path in paths] == ["figure-3.2", "figure-3.3", "figure-3.4", "figure-3.5"]
     assert all(is_png(path) for path in paths)
+
+
+def test_a_default_run_ends_where_its_subject_ends(tmp_path: Path) -> None:
+    """A step of 5 cm was drawn on an axis of 70 m."""
+    result = CliRunner().invoke(app, ["planar", "rover", "--ground", "step", "--output", str(tmp_path)])
+    assert result.exit_code == 0, result.output
+    run = read_planar_run(tmp_path / "rover.h5")
+    assert 6.0 <= run.discs[-1, :, 0].mean() < 6.1
+    figure = Figure()
+    axes = figure.subplots()
+    path_over_ground(axes, run)
+    assert np.ptp(axes.get_xlim()) < 9.0
+
+
+@pytest.mark.parametrize("command", ["ball", "rover"])
+def test_a_planar_run_is_plotted_and_replayed(command: str, tmp_path: Path) -> None:
+    runner = CliRunner()
+    assert runner.invoke(app, ["planar", command, "--duration", "0.5", "--output", str(tmp_path)]).exit_code == 0
+    recording = tmp_path / f"{command}.h5"
+    plots = runner.invoke(app, ["plot", str(recording), "--overview", "--output", str(tmp_path / "plots")])
+    assert plots.exit_code == 0, plots.output
+    drawn = {path.stem for path in (tmp_path / "plots").iterdir()}
+    assert drawn == {*PLANAR_DRAWINGS, "overview"}
+    page = tmp_path / "page.html"
+    assert runner.invoke(app, ["replay", str(recording), "--html", str(page)]).exit_code == 0
+    curves = page.read_text(encoding="utf-8").partition('id="curves">')[2].partition("</script>")[0]
+    charts = json.loads(curves)["charts"]
+    assert [chart["unit"] for chart in charts] == ["N", "mm", "mm/s"]
+    refused = runner.invoke(app, ["replay", str(recording), "--gltf", str(tmp_path / "run.glb")])
+    assert refused.exit_code == 2
+    assert "is replayed as a page, with --html" in refused.output
+
+
+def test_a_planar_run_read_back_is_the_simulations(tmp_path: Path) -> None:
+    sim = BallSimulation(Sine(0.1, 2.0), radius=0.3)
+    sim.set_state([0.0, 0.5, 0.0], [1.0, 0.0, 0.0])
+    record_planar(sim, tmp_path / "ball.h5", describe_planar(sim, "a ball"), duration=0.5)
+    run = read_planar_run(tmp_path / "ball.h5")
+    assert run.radius == pytest.approx([sim.parameters["radius"]])
+    assert run.discs[-1, 0] == pytest.approx(sim.q)
+    assert run.ground.height(0.7) == sim.ground.height(0.7)
+    with pytest.raises(RecordingError, match="holds no planar machine"):
+        read_planar_run(write_episode(tmp_path))
+
+
+def write_episode(folder: Path) -> Path:
+    assert CliRunner().invoke(app, ["drive", "--time-limit", "0.1", "--output", str(folder)]).exit_code == 0
+    return folder / "episode-0.h5"

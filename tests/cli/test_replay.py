@@ -21,6 +21,7 @@ from rover_gym.figures import draw_run
 from rover_gym.record import RecordingError, RoverRun, Trajectory, read_run
 from rover_gym.rendering.appearance import rover_parts, sphere_mesh
 from rover_gym.replay import write_gltf, write_page, write_vrml
+from rover_gym.replay.page import WHEEL_NAMES, facts, moving_mean
 from rover_gym.replay.rotation import axis_angles, continuous, quaternions
 from rover_gym.replay.scenery import ground_tiles, identifiers
 
@@ -379,7 +380,7 @@ def test_the_page_holds_the_curves_of_the_run(tmp_path: Path) -> None:
     data = curves(page)
     assert data["title"] == run.title
     assert data["time"] == pytest.approx(run.time - run.time[0])
-    assert [wheel["name"] for wheel in data["wheels"]] == run.model.wheel_names
+    assert [wheel["name"] for wheel in data["wheels"]] == [WHEEL_NAMES[name] for name in run.model.wheel_names]
     loads, gaps = data["charts"]
     assert (loads["unit"], gaps["unit"]) == ("N", "mm")
     assert loads["values"] == [[1.0] * run.n_frames] * 6
@@ -553,3 +554,30 @@ def test_a_missing_package_is_named_with_its_extra(
     assert result.exit_code == 2
     assert result.stderr == f"error: {package} is not installed: pip install 'rover-gym[replay]'\n"
     assert list(tmp_path.iterdir()) == []
+
+
+# --- What the panel says of a run
+
+
+def test_the_panel_says_scene_seed_difficulty_and_outcome(tmp_path: Path) -> None:
+    from typer.testing import CliRunner  # noqa: PLC0415 - for this test alone
+
+    from rover_gym.cli import app  # noqa: PLC0415 - as above
+    from rover_gym.record import read_run  # noqa: PLC0415 - as above
+
+    drive = ["drive", "--difficulty", "0.5", "--slope", "3", "--seed", "4", "--time-limit", "0.2"]
+    assert CliRunner().invoke(app, [*drive, "--output", str(tmp_path)]).exit_code == 0
+    told = ["scene: rocks", "slope: 3.0 degrees", "seed: 4", "difficulty: 0.5", "outcome: ran out of time"]
+    assert facts(read_run(tmp_path / "episode-4.h5")) == told
+    assert facts(turning_run()) == []
+
+
+def test_loads_are_smoothed_and_what_is_unknown_is_left_out() -> None:
+    time = np.arange(0.0, 1.0, 0.05)
+    values = np.ones((len(time), 2))
+    values[10, 0], values[5, 1] = 11.0, np.nan
+    smooth = moving_mean(time, values)
+    assert smooth[10, 0] == pytest.approx(3.0)  # five samples within 0.2 s
+    assert smooth[3, 0] == pytest.approx(1.0)
+    assert np.allclose(smooth[:, 1], 1.0)
+    assert np.isnan(moving_mean(time, np.full((len(time), 1), np.nan))).all()

@@ -1,6 +1,7 @@
 """The path search of the core against the same search written in NumPy."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -282,6 +283,62 @@ def test_the_core_finds_what_numpy_finds(costs: PathCosts) -> None:
         assert totals[found] <= totals.min() + 1e-4
         chosen.add(found)
     assert len(chosen) > 5
+
+
+def test_straight_ways_lead_where_no_ways_do() -> None:
+    search, grid, oracle = searches(PathCosts())
+    rng = np.random.default_rng(8)
+    points = SCAN.offsets - [X_C, 0.0]
+    for _ in range(20):
+        heights = rocky(rng)
+        goal = (rng.uniform(3.0, 6.0), rng.uniform(-4.0, 4.0))
+        ways = np.hypot(*(points - goal).T)
+        task = SearchTask(goal, rng.uniform(-1.0, 1.0, 3), 1.0, np.zeros((0, 3)), 0.0, ways=ways)
+        totals = oracle.totals(grid.spread(heights), task)
+        # Between the points of the scan the distance is not quite linear, nor beyond its border.
+        assert totals[search.best(heights, task)] <= totals.min() + 0.1
+
+
+def test_ways_lead_round_a_wall() -> None:
+    """The goal is straight ahead; the ways say that it is reached to the left only."""
+    search, _, _ = searches(PathCosts())
+    ways = 5.0 + SCAN.offsets[:, 1]
+    task = SearchTask((4.0, 0.0), np.zeros(3), 1.0, np.zeros((0, 3)), 0.0)
+    _, _, commands = rover_arcs()
+    ahead = commands[search.best(np.zeros(825), task)]
+    left = commands[search.best(np.zeros(825), replace(task, ways=ways))]
+    assert ahead.tolist() == [1.0, 0.0, 0.0]
+    assert left[0] == left[1] == 1.0
+
+
+def test_the_way_over_a_map_is_the_distance_where_nothing_is_in_it() -> None:
+    search, _, _ = searches(PathCosts())
+    level = np.zeros((40, 50))
+    known = np.full((40, 50), 0.3)
+    known[:, 20:] = np.nan
+    ways = search.ways(known, 0.1, (30, 10), 1.0, level)
+    assert ways[30, 10] == 0.0
+    assert ways[30, 45] == pytest.approx(3.5)
+    assert ways[10, 30] == pytest.approx(0.1 * 20 * math.sqrt(2.0))
+    wall = np.zeros((40, 50))
+    wall[5:25, 24:26] = 0.5
+    assert search.ways(wall, 0.1, (15, 10), 1.0, level)[15, 40] > 3.0 + 0.5
+    assert search.ways(wall, 0.1, (15, 10), 0.0, level)[15, 40] == pytest.approx(3.0)
+    price = np.zeros((40, 50))
+    price[:, 30:] = 2.0
+    assert search.ways(known, 0.1, (30, 10), 1.0, price)[30, 45] == pytest.approx(2.0 + 3.0 * 1.5, abs=0.3)
+    bad: list[tuple[str, tuple[Any, ...]]] = [
+        ("heights", (np.zeros((2, 50)), 0.1, (0, 0), 1.0, level)),
+        ("heights", (np.full((40, 50), np.inf), 0.1, (0, 0), 1.0, level)),
+        ("spacing", (known, 0.0, (0, 0), 1.0, level)),
+        ("goal", (known, 0.1, (0, np.nan), 1.0, level)),
+        ("boldness", (known, 0.1, (0, 0), -1.0, level)),
+        ("extra", (known, 0.1, (0, 0), 1.0, np.zeros((3, 3)))),
+        ("extra", (known, 0.1, (0, 0), 1.0, -price)),
+    ]
+    for field, given in bad:
+        with pytest.raises(OptionError, match=field):
+            search.ways(*given)
 
 
 def test_what_is_wrong_is_named() -> None:

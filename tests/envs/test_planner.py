@@ -7,7 +7,8 @@ import pytest
 from rover_gym import HeightField, OptionError, Plane, RoverModel, SphereField, StateError
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.planning import FieldPlan, Futures, PlannerOptions, PlannerPolicy
-from rover_gym.policy import CommandController
+from rover_gym.planning.scanned_ground import ScannedGround
+from rover_gym.policy import CommandController, ScanPolicy
 
 ROVER = RoverModel()
 
@@ -132,8 +133,63 @@ def test_the_planner_backs_out_of_a_dead_end(method: str) -> None:
         ({"energy_price": -1.0}, "energy_price"),
         ({"method": "newton"}, "method"),
         ({"spread": (0.4, 0.5)}, "spread"),
+        ({"actions": "torques"}, "actions"),
+        ({"raw_spread": (0.1, -0.1)}, "raw_spread"),
     ],
 )
 def test_bad_options_are_refused_by_name(options: dict[str, object], field: str) -> None:
     with pytest.raises(OptionError, match=field):
         PlannerOptions(**options)  # type: ignore[arg-type]
+
+
+def test_raw_actions_drive_to_the_goal() -> None:
+    env = planar()
+    policy = PlannerPolicy(env, PlannerOptions(samples=40, actions="raw", horizon=1.2), threads=1)
+    seen = env.snapshot().progress.observation
+    for _ in range(20):
+        action, _ = policy.predict(seen)
+        assert env.action_space.contains(action)
+        seen, _, over, _, info = env.step(action)
+        assert not over
+    # One second from rest, of 6 m.
+    assert info["distance_to_goal"] < 5.9
+
+
+def scanning(terrain: SphereField) -> RoverEnv:
+    env = gym.make("Rover-v0", terrain=terrain, heading_deg=0.0, **ScanPolicy.arguments()).unwrapped
+    assert isinstance(env, RoverEnv)
+    return env
+
+
+def test_a_planner_that_sees_by_scan_knows_what_was_scanned() -> None:
+    field = SphereField([[1.5, 0.0, 0.3], [30.0, 0.0, 0.0]], [0.3, 2.0], Plane())
+    env = scanning(field)
+    seen, _ = env.reset(seed=0, options={"position": (0.0, 0.0), "goal": (5.0, 0.0)})
+    ground = ScannedGround(env)
+    ground.see(seen)
+    points = np.stack(np.meshgrid(np.linspace(-2.0, 2.0, 21), np.linspace(-2.0, 2.0, 21)), axis=-1).reshape(-1, 2)
+    off = np.abs(np.asarray(ground.terrain.heights(points)) - np.asarray(field.heights(points)))
+    assert np.median(off) < 1e-3
+    # A cell of the scan is wider than a rock's edge is steep.
+    assert np.quantile(off, 0.95) < 0.05
+    # The rock beyond the scan is not known, and the ground there is as high as what was seen.
+    assert abs(float(ground.terrain.heights([[5.0, 0.0]])[0])) < 0.02
+
+
+def test_a_planner_that_sees_by_scan_leaves_the_environment_as_it_is() -> None:
+    env = scanning(SphereField([[1.5, 0.0, 0.3]], [0.3], Plane()))
+    env.reset(seed=0, options={"position": (0.0, 0.0), "goal": (5.0, 0.0)})
+    policy = PlannerPolicy(env, PlannerOptions(samples=40, horizon=0.6, knot=0.3), threads=1, sees="scan")
+    before = env.snapshot()
+    action, _ = policy.predict(before.progress.observation)
+    assert env.action_space.contains(action)
+    assert env.snapshot().simulation == before.simulation
+
+
+def test_what_a_planner_cannot_see_by_is_refused() -> None:
+    with pytest.raises(OptionError, match="height_scan"):
+        PlannerPolicy(planar(), sees="scan")
+    with pytest.raises(OptionError, match="sees"):
+        PlannerPolicy(planar(), sees="stars")  # type: ignore[arg-type]
+    with pytest.raises(OptionError, match="terrain"):
+        PlannerPolicy(scanning(rock(3.0, 0.0, 0.4)), sees="scan", terrain=Plane())

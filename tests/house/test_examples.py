@@ -15,17 +15,26 @@ PAGES = (
     "docs/identification.md",
     "docs/linearise.md",
     "docs/live.md",
+    "docs/logs.md",
     "docs/planar.md",
     "docs/recording.md",
     "docs/replay.md",
+    "docs/snippets.md",
     "docs/seeing.md",
+    "docs/sensors.md",
     "docs/soil.md",
     "docs/tasks.md",
     "docs/vector.md",
     "docs/your-rover.md",
 )
 #: Packages of extras that a block needs if it holds these words.
-EXTRAS = {"from_urdf": "yourdfpy", "from_mjcf": "mujoco", "scipy": "scipy", "stable_baselines3": "stable_baselines3"}
+EXTRAS = {
+    "McapWriter": "mcap",
+    "from_urdf": "yourdfpy",
+    "from_mjcf": "mujoco",
+    "scipy": "scipy",
+    "stable_baselines3": "stable_baselines3",
+}
 
 
 def blocks() -> list[pytest.param]:
@@ -47,7 +56,8 @@ def test_example_runs(code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def test_the_commands_of_the_readme_are_known() -> None:
-    commands = re.findall(r"^rover (\w+)", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
+    text = "".join((ROOT / page).read_text(encoding="utf-8") for page in ("README.md", "docs/commands.md"))
+    commands = re.findall(r"^rover (\w+)", text, flags=re.MULTILINE)
     assert commands
     for command in commands:
         assert CliRunner().invoke(app, [command, "--help"]).exit_code == 0

@@ -7,6 +7,7 @@ import typer
 
 from rover_gym.cli.baseline_command import baseline
 from rover_gym.cli.console import DEBUG, one_line
+from rover_gym.cli.dataset_command import dataset
 from rover_gym.cli.drive_command import drive
 from rover_gym.cli.evaluate_command import evaluate
 from rover_gym.cli.export_command import export
@@ -47,6 +48,7 @@ for _command in (rover_on_bed, track, pit, plate, shear, wheel):
     grains.command()(_command)
 app.add_typer(grains, name="grains")
 app.add_typer(export, name="export")
+app.command()(dataset)
 app.command()(speed)
 
 

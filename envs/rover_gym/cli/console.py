@@ -30,6 +30,8 @@ SET_BY = {
     "heading_deg": ("heading", "--heading"),
     "format": ("file_format", "--format"),
     "torques": ("torque", "--torque"),
+    "width": ("size", "--size"),
+    "height": ("size", "--size"),
     "wheels": ("wheel", "--wheel"),
     "slips": ("slip", "--slip"),
     "position": ("start", "--start"),

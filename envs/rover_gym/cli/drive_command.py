@@ -25,6 +25,7 @@ from rover_gym.cli.console import (
     progress_bar,
 )
 from rover_gym.cli.drivers import DRIVERS_HELP, driver_title, named_driver
+from rover_gym.cli.film_options import FilmAntialiasing, FilmCamera, FilmForces, FilmSize, film_options
 from rover_gym.cli.results import AsJson, Results
 from rover_gym.cli.scene_options import (
     BUILT_IN,
@@ -44,10 +45,10 @@ from rover_gym.env.rewards import WEIGHTS
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.episodes import Episode, Policy, run_episode
+from rover_gym.policy.films import EpisodeFilm
 from rover_gym.record.channels import Channel, RoverSampler
 from rover_gym.record.facts import describe
 from rover_gym.record.recorder import Recorder
-from rover_gym.rendering.video import VideoWriter
 from rover_gym.validation import number, refuse
 
 CONTROL_PERIOD = 0.05  # s, of Rover-v0
@@ -96,6 +97,10 @@ def drive(
     video: Annotated[
         Path | None, typer.Option(dir_okay=False, metavar="FILE.mp4", help="Film the episodes one after the other.")
     ] = None,
+    size: FilmSize = "640x480",
+    camera: FilmCamera = "follow",
+    forces: FilmForces = False,
+    antialiasing: FilmAntialiasing = True,
     as_json: AsJson = False,
 ) -> None:
     """Drive a rover to its goal with the PD baseline or another policy and print the results of the episodes.
@@ -128,7 +133,8 @@ def drive(
     arguments, as_given = {**arguments, **chosen.arguments}, {**as_given, **chosen.arguments}
     filming: dict[str, Any] = {}
     if video is not None:
-        filming = {"render_mode": "rgb_array", "render_options": {"antialiasing": True}}
+        options_of_film = film_options(size, camera, forces=forces, antialiasing=antialiasing)
+        filming = {"render_mode": "rgb_array", "render_options": options_of_film}
     env = gym.make(
         environment_of(terrain), max_episode_steps=round(time_limit / CONTROL_PERIOD), **arguments, **filming
     )
@@ -140,7 +146,7 @@ def drive(
     interrupted = False
     with progress_bar() as bar, ExitStack() as stack:
         stack.callback(env.close)
-        film = None if video is None else stack.enter_context(VideoWriter(video, env.metadata["render_fps"]))
+        film = None if video is None else stack.enter_context(EpisodeFilm(video, env.metadata["render_fps"], title))
         try:
             for now in range(seed, seed + episodes):
                 path = None if output is None else output / f"episode-{now}.h5"
@@ -189,7 +195,7 @@ def _drive_one(
     options: Mapping[str, Any],
     path: Path | None,
     bar: Progress,
-    film: VideoWriter | None,
+    film: EpisodeFilm | None,
 ) -> Episode:
     """Drives one episode, recorded if there is a path, filmed if there is a film."""
     task = bar.add_task(f"seed {seed}", total=None, state="")
@@ -204,10 +210,14 @@ def _drive_one(
                     tape = _Tape(path, rover, title, seed, arguments)
                     stack.enter_context(tape.recorder)
                 tape.append(rover, info)
-            if film is not None and (frame := rover.render()) is not None:
-                film.append(frame)
+            if film is not None:
+                film.show(rover, seed, info["time"])
 
         episode = run_episode(env, policy, seed, options=options, on_step=on_step)
+        if film is not None:
+            film.end(episode)
+        if tape is not None:
+            tape.recorder.note(outcome=episode.end)
     bar.remove_task(task)
     return episode
 
@@ -225,6 +235,7 @@ class _Tape:
             Channel("reward_terms", "1", "terms of the step's reward", (len(WEIGHTS),), tuple(WEIGHTS)),
         )
         scene = {**arguments, **asdict(rover.start), **_rocks(rover), "control_period": rover.dt}
+        scene["goal_tolerance"] = rover.goal_tolerance
         attributes = describe(rover.simulation, f"an episode of {title}", scene, seed=seed)
         self.recorder = Recorder(path, channels, attributes, terrain=rover.simulation.terrain)
 

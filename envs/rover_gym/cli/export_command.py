@@ -1,12 +1,16 @@
 """`rover export`: runs and policies in the formats of other programs."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
+import gymnasium as gym
 import typer
 
-from rover_gym.cli.console import check_file, plain_errors, progress_bar, say_path
+from rover_gym.cli.console import LARGEST_SEED, check_file, plain_errors, progress_bar, say_path
+from rover_gym.cli.scene_options import BUILT_IN, HeightRange, ModelName, Spacing, Start, named_ground, named_model
+from rover_gym.exports.fmu import fmu_library, write_fmu
 from rover_gym.exports.mcap_run import FPS, write_mcap
+from rover_gym.exports.onnx_policy import write_onnx
 from rover_gym.extras import require
 from rover_gym.mechanics import OptionError
 from rover_gym.record.rover_run import read_run
@@ -37,3 +41,59 @@ def mcap(
         task = bar.add_task("rows", total=saved.n_frames, state="")
         write_mcap(saved, path, images=images, fps=fps, progress=lambda n: bar.update(task, completed=n))
     say_path("MCAP", path)
+
+
+@export.command()
+@plain_errors
+def onnx(
+    *,
+    policy: Annotated[
+        str,
+        typer.Argument(
+            help="'trained' or 'foresight' for the package's, or the folder of a policy, a forecast or a raw run."
+        ),
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", dir_okay=False, help="File to write.")],
+    terrain: Annotated[str, typer.Option(help="Of 'trained': 'plane', or 'sphere_field' for rocks.")] = "plane",
+) -> None:
+    """Write a policy's network as ONNX, with the normalisation of its inputs."""
+    require("onnx", "onnx")
+    check_file("output", output)
+    say_path("ONNX", write_onnx(policy, output, terrain))
+
+
+@export.command()
+@plain_errors
+def fmu(
+    *,
+    output: Annotated[Path, typer.Option("--output", "-o", dir_okay=False, help="File to write, usually .fmu.")],
+    terrain: Annotated[
+        str, typer.Option(help="'plane', 'sphere_field' for rocks, 'hills', or the file of a map or a mesh.")
+    ] = "plane",
+    spacing: Spacing = None,
+    height_range: HeightRange = None,
+    model: ModelName = BUILT_IN,
+    difficulty: Annotated[float | None, typer.Option(help="Difficulty of the rocks, from 0 to 2.")] = None,
+    slope: Annotated[float | None, typer.Option(help="Slope of the ground, degrees.")] = None,
+    heading: Annotated[float | None, typer.Option(help="Start heading, degrees to the left of x.")] = None,
+    start: Start = None,
+    friction: Annotated[float, typer.Option(help="Friction coefficient.")] = 0.7,
+    time_step: Annotated[float, typer.Option(help="Time step of the physics, s.")] = 0.005,
+    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of ground and start.")] = 0,
+) -> None:
+    """Write a rover at the start of an episode as an FMI 3.0 co-simulation unit."""
+    fmu_library()
+    check_file("output", output)
+    arguments: dict[str, Any] = {"terrain": terrain, "friction": friction, "time_step": time_step}
+    arguments |= {} if difficulty is None else {"difficulty": difficulty}
+    arguments |= {} if slope is None else {"slope_deg": slope}
+    arguments |= {} if heading is None else {"heading_deg": heading}
+    if (rover := named_model(model)) is not None:
+        arguments["model"] = rover
+    if (ground := named_ground(terrain, spacing, height_range)) is not None:
+        arguments["terrain"] = ground
+    env = gym.make("Rover-v0", **arguments)
+    env.reset(seed=seed, options=None if start is None else {"position": start})
+    simulation = env.unwrapped.simulation  # type: ignore[attr-defined]
+    say_path("FMU", write_fmu(simulation, output, name=simulation.model.name))
+    env.close()

@@ -1,5 +1,6 @@
 """`rover planar ball|rover|soil`: the planar systems of the report's chapter 3."""
 
+import math
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -22,7 +23,7 @@ from rover_gym.mechanics import (
     TwoWheelRoverSimulation,
 )
 from rover_gym.planar.planar_recording import PlanarGround, describe_planar, record_planar
-from rover_gym.record.trajectory import read_trajectory
+from rover_gym.planar.planar_run import read_planar_run
 from rover_gym.validation import number, refuse
 
 planar = typer.Typer(
@@ -32,6 +33,7 @@ planar = typer.Typer(
 
 STEEPEST = 89.0  # degrees: an upright line is no ground
 LARGEST_TABLE = 1 << 26  # bytes
+LONGEST, FARTHEST = 10.0, 6.0  # s and m, where neither a duration nor a distance is given
 
 
 class PlanarGroundKind(StrEnum):
@@ -54,7 +56,14 @@ TableFile = Annotated[
 Friction = Annotated[float, typer.Option(help="Friction coefficient.")]
 Restitution = Annotated[float, typer.Option(help="Coefficient of restitution.")]
 TimeStep = Annotated[float, typer.Option(help="Time step, s.")]
-Duration = Annotated[float, typer.Option(min=0.01, max=1000.0, help="Time to simulate, s.")]
+Duration = Annotated[
+    float | None,
+    typer.Option(min=0.01, max=1000.0, help="Time to simulate, s. Default: until the distance is gone, at most 10 s."),
+]
+Distance = Annotated[
+    float | None,
+    typer.Option(min=0.01, max=1e6, help="Way along x at which the run ends, m. Default: 6 m; with a duration, none."),
+]
 Speed = Annotated[float, typer.Option(min=-1e4, max=1e4, help="Forward speed at the start, m/s.")]
 Output = Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)]
 
@@ -76,7 +85,8 @@ def ball(
     friction: Friction = 0.7,
     restitution: Restitution = 0.5,
     time_step: TimeStep = 0.002,
-    duration: Duration = 10.0,
+    duration: Duration = None,
+    distance: Distance = None,
     output: Output = Path("runs/planar"),
     as_json: AsJson = False,
 ) -> None:
@@ -92,7 +102,7 @@ def ball(
     )
     sim.set_state([0.0, sim.ground.height(0.0) + radius + drop, 0.0], [speed, 0.0, 0.0])
     _lift(sim, drop)
-    _run(sim, "a ball", duration, output / "ball.h5", as_json=as_json)
+    _run(sim, "a ball", duration, distance, output / "ball.h5", as_json=as_json)
 
 
 @planar.command()
@@ -110,7 +120,8 @@ def rover(
     friction: Friction = 0.9,
     restitution: Restitution = 0.0,
     time_step: TimeStep = 0.002,
-    duration: Duration = 10.0,
+    duration: Duration = None,
+    distance: Distance = None,
     output: Output = Path("runs/planar"),
     as_json: AsJson = False,
 ) -> None:
@@ -130,7 +141,7 @@ def rover(
     sim.set_torques([torque, torque])
     if ground is PlanarGroundKind.line:
         warn_of_slope(slope, friction)
-    _run(sim, "the two-wheel rover", duration, output / "rover.h5", as_json=as_json)
+    _run(sim, "the two-wheel rover", duration, distance, output / "rover.h5", as_json=as_json)
 
 
 planar.command()(soil)
@@ -176,20 +187,27 @@ def _words(ground: PlanarGround) -> str:
     return "a step" if isinstance(ground, Polyline) else "a table of points"
 
 
-def _run(sim: PlanarSimulation, who: str, duration: float, path: Path, *, as_json: bool) -> None:
+def _run(
+    sim: PlanarSimulation, who: str, duration: float | None, distance: float | None, path: Path, *, as_json: bool
+) -> None:
+    longest = LONGEST if duration is None else duration
+    farthest = distance or (FARTHEST if duration is None else math.inf)
+    start = float(sim.q[0])
     title = f"{who} on {_words(sim.ground)}"
     with Results(as_json=as_json) as results:
         with results.keeping("trajectory", path), progress_bar() as bar:
-            task = bar.add_task(who, total=duration, state="")
+            task = bar.add_task(who, total=longest, state="")
             rows = record_planar(
                 sim,
                 path,
                 describe_planar(sim, title),
-                duration=duration,
+                duration=longest,
+                until=lambda now: bool(abs(now.q[0] - start) >= farthest),
                 progress=lambda time: bar.update(task, completed=time, state=f"{time:.1f} s"),
             )
         x, y = sim.q[:2]
-        speed, gap = float(np.hypot(*sim.v[:2])), float(read_trajectory(path)["gaps"].min())
+        run = read_planar_run(path)
+        speed, gap = float(np.hypot(*sim.v[:2])), float(run.trajectory["gaps"].min())
         results.table(
             title,
             [
@@ -200,6 +218,6 @@ def _run(sim: PlanarSimulation, who: str, duration: float, path: Path, *, as_jso
             ],
         )
         results.path("trajectory", path)
-        from rover_gym.figures.planar_run import draw_planar_run  # noqa: PLC0415 - matplotlib is slow to load
+        from rover_gym.figures.planar_drawing import draw_planar_run  # noqa: PLC0415 - matplotlib is slow to load
 
-        results.path("figure", draw_planar_run(sim, path, path.with_suffix(".png")))
+        results.path("figure", draw_planar_run(run, path.with_suffix(".png")))

@@ -10,9 +10,10 @@ from rover_gym.cli.console import check_file, plain_errors, progress_bar, say_pa
 from rover_gym.extras import require
 from rover_gym.grains.grain_run import grain_run_of, is_grains
 from rover_gym.mechanics import OptionError
+from rover_gym.planar.planar_run import is_planar, planar_run_of
 from rover_gym.record.rover_run import run_of
 from rover_gym.record.trajectory import Trajectory, read_trajectory
-from rover_gym.replay import write_gltf, write_grain_page, write_page, write_soil_page, write_vrml
+from rover_gym.replay import write_gltf, write_grain_page, write_page, write_planar_page, write_soil_page, write_vrml
 from rover_gym.soil.soil_run import is_soil, soil_run_of
 from rover_gym.validation import refuse
 
@@ -23,7 +24,7 @@ def replay(
     run: Annotated[
         Path,
         typer.Argument(
-            help="What `rover drive --output`, `rover report`, `rover planar soil` or `rover grains` saved.",
+            help="What `rover drive --output`, `rover report`, `rover planar` or `rover grains` saved.",
             autocompletion=complete_recording,
         ),
     ],
@@ -55,6 +56,12 @@ def replay(
         _refuse_others({"vrml": vrml, "gltf": gltf, "film": film}, "a run on a soil is replayed as a page, with --html")
         if html is not None:
             say_path("page", write_soil_page(soil_run_of(trajectory, run).resample(fps), html, follow=follow))
+        return
+    if is_planar(trajectory):
+        others = {"vrml": vrml, "gltf": gltf, "film": film}
+        _refuse_others(others, "a ball or a two-wheel rover is replayed as a page, with --html")
+        if html is not None:
+            say_path("page", write_planar_page(planar_run_of(trajectory, run).resample(fps), html, follow=follow))
         return
     if is_grains(trajectory):
         reason = "a run of balls is replayed as a page or a film, with --html or --film"

@@ -122,6 +122,11 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     row farthest ahead, from left to right; the last are the row farthest behind. True stands for 13 rows of 9
     points, 0.25 m apart: 117 entries, 1.5 m ahead and behind, 1 m to either side.
 
+    ## Sensors
+
+    `gymnasium.make(..., sensors=[...])` adds readings of encoders, motors, an inertial unit, cameras and scanners: the observation
+    is then a `Dict` with this one as `state` (`docs/sensors.md`).
+
     ## Reward
 
     The reward is the sum of the terms below, which `info["reward_terms"]` lists; `dt` is the control period.

@@ -16,7 +16,7 @@ from rover_gym.record.facts import storable, versions
 from rover_gym.record.rover_run import RoverRun
 from rover_gym.record.trajectory import Trajectory
 from rover_gym.record.trajectory_format import RecordingError
-from rover_gym.rendering.appearance import ROCK_COLOUR
+from rover_gym.rendering.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR
 from rover_gym.replay import scenery
 from rover_gym.validation import array, number, refuse, vector
 
@@ -305,7 +305,7 @@ class McapWriter:
         tiles = scenery.ground_tiles(run)
         if tiles is not None:
             vertices, light, dark = tiles
-            colours = ((scenery.GROUND_COLOUR, vertices, light), (scenery.GROUND_COLOUR_2, vertices, dark))
+            colours = ((GROUND_COLOUR, vertices, light), (GROUND_COLOUR_2, vertices, dark))
             messages.add_meshes(found, stamp, "ground", messages.WORLD, colours)
         for i, (vertices, faces) in enumerate(scenery.surfaces(run)):
             coloured = [(colour, vertices, triangles) for colour, triangles in faces]

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.figures.planar_run import FRICTION, GROUND, OURS, speed_of
+from rover_gym.figures.planar_drawing import GROUND
 from rover_gym.figures.saving import save_figures
 from rover_gym.planar.planar_recording import describe_planar, record_planar
 from rover_gym.record.trajectory import Trajectory, read_trajectory
+from rover_gym.rendering.appearance import PLANAR_WHEEL_COLOURS
 from rover_gym.reproduction.chapter_3_balls import ball_on_incline, ball_on_sine, published
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 STEP = 0.0005  # s, of the report's runs
 RIM, PUBLISHED = "#009E73", "0.55"
+OURS, FRICTION = PLANAR_WHEEL_COLOURS[1], PLANAR_WHEEL_COLOURS[0]
 
 
 def draw_chapter_3(folder: str | Path) -> list[Path]:
@@ -82,7 +84,7 @@ def _incline_path(figure: Figure, centre: Trajectory, rim: Trajectory) -> None:
 def _incline_curves(figure: Figure, centre: Trajectory) -> None:
     speed, impulses = figure.subplots(1, 2)
     name = "fig_3_3_ball_incline_velocity_forces"
-    _against(speed, name, "Ball Velocity", centre["time"], speed_of(centre), OURS, "speed, ours")
+    _against(speed, name, "Ball Velocity", centre["time"], _speed_of(centre), OURS, "speed, ours")
     normal, tangential = centre["impulses"][:, 0].T
     _against(impulses, name, "reaction", centre["time"], normal, OURS, "reaction, ours")
     _against(impulses, name, "friction", centre["time"], tangential, FRICTION, "friction, ours")
@@ -109,7 +111,7 @@ def _sine_path(figure: Figure, centre: Trajectory, rim: Trajectory) -> None:
 def _sine_curves(figure: Figure, centre: Trajectory) -> None:
     speed, impulses = figure.subplots(1, 2)
     name = "fig_3_5_ball_sine_velocity_forces"
-    _against(speed, name, "Velocity", centre["time"], speed_of(centre), OURS, "speed, ours", STEP)
+    _against(speed, name, "Velocity", centre["time"], _speed_of(centre), OURS, "speed, ours", STEP)
     normal, tangential = centre["impulses"][:, 0].T
     _against(impulses, name, "Reaction", centre["time"], normal, OURS, "reaction, ours", STEP)
     _against(impulses, name, "Friction", centre["time"], tangential, FRICTION, "friction, ours", STEP)
@@ -139,3 +141,8 @@ def _against(
     is_first = not axes.lines
     axes.plot(scale * t, value, color=PUBLISHED, linewidth=3.0, alpha=0.7, label="the report's" if is_first else "")
     axes.plot(time, ours, color=colour, label=label)
+
+
+def _speed_of(trajectory: Trajectory) -> npt.NDArray[np.float64]:
+    """Speed of the ball's centre, (n,), m/s."""
+    return np.linalg.norm(trajectory["v"][:, :2], axis=1)  # type: ignore[no-any-return]

@@ -16,6 +16,7 @@ from rover_gym.figures.derived_signals import Array, smooth
 from rover_gym.figures.saving import check_format, save_figures
 from rover_gym.figures.signals import WINDOW
 from rover_gym.figures.style import DARK, QUANTITY_COLOURS, panel_legend, plain
+from rover_gym.rendering.appearance import PLANAR_WHEEL_COLOURS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,9 +27,6 @@ if TYPE_CHECKING:
     from rover_gym.soil.soil_run import SoilRun
 
 __all__ = ["SOIL_DRAWINGS", "draw_soil_run"]
-
-#: Wheel colours, back to front (Okabe and Ito's palette).
-COLOURS = ("#D55E00", "#0072B2")
 
 
 def draw_soil_run(
@@ -131,7 +129,7 @@ def _wheels(run: SoilRun) -> list[tuple[str, str]]:
     """Name and colour of each wheel."""
     n = run.wheels.shape[1]
     names = ("back wheel", "front wheel") if n == 2 else tuple(f"wheel {i + 1}" for i in range(n))
-    return [(name, COLOURS[i % len(COLOURS)]) for i, name in enumerate(names)]
+    return [(name, PLANAR_WHEEL_COLOURS[i % len(PLANAR_WHEEL_COLOURS)]) for i, name in enumerate(names)]
 
 
 def _raw_and_smooth(axes: Axes, run: SoilRun, values: Array, colour: str, name: str) -> None:

@@ -66,9 +66,9 @@ def title(figure: Sheet, what: str, run: RoverRun) -> None:
     figure.suptitle(f"{what}\n{plain(run.title)}{broken_off}")
 
 
-def panel_legend(axes: Axes) -> None:
+def panel_legend(axes: Axes, columns: int = 4) -> None:
     """The legend of one panel, in a row above it, where it covers no curve."""
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, frameon=False, borderaxespad=0.1)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, frameon=False, borderaxespad=0.1)
 
 
 def circle(axes: Axes, x: float, y: float, radius: float, color: str) -> None:

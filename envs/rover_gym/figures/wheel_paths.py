@@ -63,6 +63,12 @@ def path_from_above(figure: Sheet, run: RoverRun) -> None:
         style: dict[str, Any] = {"marker": "*", "color": "#DDCC00", "markeredgecolor": "black", "markersize": 15}
         axes.plot(run.goal[1], run.goal[0], zorder=5, label="_goal", **style)
         others["goal"] = {**style, "markersize": 10, "linestyle": "none"}
+        if run.goal_tolerance is not None:
+            edge: dict[str, Any] = {"color": "#117733", "linewidth": 1.2, "linestyle": "--"}
+            turn = np.linspace(0.0, 2.0 * np.pi, 100)
+            x, z = np.array(run.goal)[:, None] + run.goal_tolerance * np.array([np.cos(turn), np.sin(turn)])
+            axes.plot(z, x, zorder=4, label="_reached", **edge)
+            others["reached within"] = edge
     _draw_headings(axes, trajectory["q"])
     others["heading"] = {"marker": "$\u2192$", "color": "black", "linestyle": "none", "markersize": 9}
     axes.set(xlabel="to the right, z (m)", ylabel="forward, x (m)")
@@ -160,7 +166,8 @@ def _show_extent(axes: Axes, run: RoverRun) -> None:
     """Limits the view to path and goal plus a margin, at equal scales, with just enough ground to fill the axes."""
     places = [run.trajectory["wheel_centres"][..., [2, 0]].reshape(-1, 2)]
     if run.goal is not None:
-        places.append(np.array([[run.goal[1], run.goal[0]]]))
+        radius = run.goal_tolerance or 0.0
+        places.append(np.array([run.goal[::-1]]) + radius * np.array([[-1.0, -1.0], [1.0, 1.0]]))
     seen = np.concatenate(places)
     low, high = seen.min(axis=0), seen.max(axis=0)
     extent = (high - low).max() * 2.0 * MARGIN + (high - low)

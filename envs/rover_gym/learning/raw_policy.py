@@ -31,6 +31,16 @@ class RawPolicy:
         self._model = model
         self._normalisation = normalisation
 
+    @property
+    def model(self) -> BaseAlgorithm:
+        """The model."""
+        return self._model
+
+    @property
+    def normalisation(self) -> VecNormalize:
+        """The statistics that it was trained with."""
+        return self._normalisation
+
     @classmethod
     def load(cls, folder: str | Path) -> "RawPolicy":
         """Loads the policy of a run of `training/train_raw.py`. The files are pickles: load only what you trust.

@@ -23,6 +23,7 @@ from rover_gym.mechanics import (
     TwoWheelRoverSimulation,
 )
 from rover_gym.planar.planar_recording import PlanarGround, PlanarSampler, describe_planar, record_planar
+from rover_gym.planar.planar_run import PlanarRun, is_planar, planar_run_of, read_planar_run
 
 __all__ = [
     "BallSimulation",
@@ -30,6 +31,7 @@ __all__ = [
     "MirroredRoverSimulation",
     "PlanarContacts",
     "PlanarGround",
+    "PlanarRun",
     "PlanarSampler",
     "PlanarSimulation",
     "PlanarSnapshot",
@@ -38,5 +40,8 @@ __all__ = [
     "Spline",
     "TwoWheelRoverSimulation",
     "describe_planar",
+    "is_planar",
+    "planar_run_of",
+    "read_planar_run",
     "record_planar",
 ]

@@ -120,6 +120,7 @@ def record_planar(
     *,
     duration: float,
     steps_per_row: int = 1,
+    until: Callable[[PlanarSimulation], bool] = lambda _: False,
     progress: Callable[[float], None] = lambda _: None,
 ) -> int:
     """Runs a simulation from its current state and records it.
@@ -130,6 +131,7 @@ def record_planar(
         attributes: Attributes of the run, from `describe_planar`.
         duration: Time to simulate, s.
         steps_per_row: Steps from one row to the next.
+        until: Asked after each row whether the run ends before its time.
         progress: Called periodically with the simulated time.
 
     Returns:
@@ -152,5 +154,7 @@ def record_planar(
             unconverged += not report.is_converged
             if row % 100 == 0:
                 progress(sim.time)
+            if until(sim):
+                break
         recorder.note(unconverged_rows=unconverged)
     return unconverged

@@ -1,20 +1,26 @@
 """Futures of a rover: the same state driven on by many sequences of commands, side by side in the core's batch."""
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import EpisodeBatch, EpisodeRules, RoverModel, Simulation, Terrain
-from rover_gym.policy.command import CommandController
 from rover_gym.validation import number, whole
 
 Array = npt.NDArray[np.float64]
 
 #: Solver of the futures: their physics is coarser than the environment's.
 SOLVER: dict[str, Any] = {"tolerance": 1e-4, "max_iterations": 20}
+
+
+class Controller(Protocol):
+    """Turns what is drawn into actions, as `CommandController` does."""
+
+    def act(self, observations: npt.NDArray[Any], commands: npt.NDArray[Any], /) -> npt.NDArray[np.float32]:
+        """The actions `(n, n_actions)` for observations `(n, size)`."""
 
 
 class Ends(NamedTuple):
@@ -87,14 +93,12 @@ class Futures:
             domain = replace(domain, friction=self._friction)
         return self._task.simulate(terrain, domain)
 
-    def drive(
-        self, controller: CommandController, commands: npt.ArrayLike, hold: int, terrain: Terrain | None = None
-    ) -> Ends:
+    def drive(self, controller: Controller, commands: npt.ArrayLike, hold: int, terrain: Terrain | None = None) -> Ends:
         """Drives the copies from the environment's present state.
 
         Args:
-            controller: Turns commands into actions.
-            commands: (n, knots, 3) within [-1, 1].
+            controller: Turns commands into actions: `CommandController`, for instance.
+            commands: (n, knots, size of a command) within [-1, 1].
             hold: Control periods that each command is held.
             terrain: The ground of the futures; the episode's by default.
 

@@ -19,9 +19,12 @@ from rover_gym.env.start import Point, Start
 from rover_gym.mechanics import OptionError, RoverModel, StateError, Terrain
 from rover_gym.planning.field_plan import FieldPlan
 from rover_gym.planning.futures import Ends, Futures
+from rover_gym.planning.raw_actions import RawActions
+from rover_gym.planning.scanned_ground import ScannedGround
 from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimits
 from rover_gym.policy.observed import check_observed
 from rover_gym.policy.pd_policy import find_rover_env
+from rover_gym.policy.scan_grid import scan_grid
 from rover_gym.validation import array, number, refuse, vector, whole
 
 Array = npt.NDArray[np.float64]
@@ -37,9 +40,12 @@ class PlannerOptions:
         horizon: Length of a future, s.
         knot: How long a command of the sequence is held, s.
         period: Time from one planning to the next, s.
+        actions: What is sampled: "commands", or "raw" actions, wheel torques and steering set-points.
         method: "mppi" or "cem".
         temperature: Of MPPI's weights, in metres of good ground.
         spread: Standard deviations of the samples of speed, curvature and sideways direction, each within [-1, 1].
+        raw_spread: Those of wheel torques, over that at which a wheel pulls with its share of the weight, and of
+            steering set-points, over the steering limit.
         energy_price: Metres of good ground that a joule is worth.
         time_price: Metres of good ground that a second is worth.
         failure_price: Metres of good ground that a failed episode is worth.
@@ -51,9 +57,11 @@ class PlannerOptions:
     horizon: float = 2.4
     knot: float = 0.6
     period: float = 0.3
+    actions: Literal["commands", "raw"] = "commands"
     method: Literal["mppi", "cem"] = "cem"
     temperature: float = 0.1
     spread: tuple[float, float, float] = (0.4, 0.5, 0.4)
+    raw_spread: tuple[float, float] = (0.2, 0.3)
     energy_price: float = 2e-4
     time_price: float = 0.1
     failure_price: float = 20.0
@@ -68,6 +76,10 @@ class PlannerOptions:
             number(name, getattr(self, name), at_least=0.0)
         for value in vector("spread", self.spread, N_COMMANDS):
             number("spread", value, at_least=0.0)
+        for value in vector("raw_spread", self.raw_spread, 2):
+            number("raw_spread", value, at_least=0.0)
+        if self.actions not in ("commands", "raw"):
+            refuse(OptionError, "actions", self.actions, "must be 'commands' or 'raw'")
         if self.method not in ("mppi", "cem"):
             refuse(OptionError, "method", self.method, "must be 'mppi' or 'cem'")
 
@@ -87,9 +99,11 @@ class PlannerPolicy:
         model: The rover of the futures, see `Futures`.
         friction: Of the futures, see `Futures`.
         terrain: The ground of the futures and of the field's plan; the episode's by default.
+        sees: "field" for all of the ground, or "scan" for what the height scans have shown so far; what they have not
+            is taken to be as high as the nearest place that they have.
 
     Raises:
-        OptionError: An argument is out of its range.
+        OptionError: An argument is out of its range, or the environment has no height scan to see by.
         MissingExtraError: SciPy is not installed.
     """
 
@@ -104,10 +118,20 @@ class PlannerPolicy:
         model: RoverModel | None = None,
         friction: float | None = None,
         terrain: Terrain | None = None,
+        sees: Literal["field", "scan"] = "field",
     ) -> None:
+        if sees not in ("field", "scan"):
+            refuse(OptionError, "sees", sees, "must be 'field' or 'scan'")
+        if sees == "scan" and terrain is not None:
+            refuse(OptionError, "terrain", terrain, "must not be given to a planner that sees by scan")
         self.options = PlannerOptions() if options is None else options
         self._env: RoverEnv = find_rover_env(env)
-        self._controller = CommandController(self._env, limits, guided=False)
+        commands = CommandController(self._env, limits, guided=False)
+        self._controller: CommandController | RawActions = commands
+        self._spread = np.array(self.options.spread)
+        if self.options.actions == "raw":
+            self._controller = raw = RawActions(self._env, commands, self.options.raw_spread)
+            self._spread = raw.spread
         self._futures: Futures | None = None
         self._make_futures = partial(
             Futures,
@@ -119,6 +143,10 @@ class PlannerPolicy:
             friction=friction,
         )
         self._terrain = terrain
+        self._seen: ScannedGround | None = None
+        if sees == "scan":
+            scan_grid(self._env)
+        self._sees_scan = sees == "scan"
         self._random = np.random.default_rng(whole("seed", seed, at_least=0))
         self._hold = max(1, round(self.options.knot / self._env.dt))
         self._knots = max(1, math.ceil(self.options.horizon / (self._hold * self._env.dt) - 1e-9))
@@ -126,9 +154,11 @@ class PlannerPolicy:
         self._start: Start | None = None
         self._goal: Point | None = None
         self._field: FieldPlan | None = None
-        self._sequence: Array = np.zeros((self._knots, N_COMMANDS))
+        self._sequence: Array = np.zeros((self._knots, len(self._spread)))
         self._since = 0
         self._library = _library(self._knots)
+        if isinstance(self._controller, RawActions):
+            self._library = np.repeat(self._controller.library[:, None], self._knots, axis=1)
 
     def predict(
         self,
@@ -148,9 +178,12 @@ class PlannerPolicy:
         if seen.ndim != 1:
             refuse(StateError, "observation", seen.shape, "must be one of one environment")
         check_observed(seen, self._env.task.layout.size)
-        if self._env.start is not self._start:
+        begins, due = self._env.start is not self._start, self._since % self._periods == 0
+        if self._sees_scan and (begins or due):
+            self._look(seen, begins)
+        if begins:
             self._begin()
-        elif self._env.goal != self._goal:
+        elif self._env.goal != self._goal or (self._sees_scan and due):
             self._aim()
         if self._since % self._periods == 0:
             self._plan()
@@ -158,12 +191,20 @@ class PlannerPolicy:
         action = self._controller.act(seen[None].astype(np.float32), self._sequence[:1])
         return action[0], state
 
+    def _look(self, seen: Array, begins: bool) -> None:
+        """Remembers what an observation shows of the ground."""
+        if self._seen is None or begins:
+            self._seen = ScannedGround(self._env)
+        self._seen.see(seen)
+        self._terrain = self._seen.terrain
+
     def _begin(self) -> None:
         self._aim()
         self._futures = self._make_futures()
         self._start, self._since = self._env.start, 0
-        self._sequence = np.zeros((self._knots, N_COMMANDS))
-        self._sequence[:, 0] = 1.0
+        self._sequence = np.zeros_like(self._sequence)
+        if not isinstance(self._controller, RawActions):
+            self._sequence[:, 0] = 1.0
 
     def _aim(self) -> None:
         """Plans over the field to the present goal, the next of a course where the last one is reached."""
@@ -180,7 +221,7 @@ class PlannerPolicy:
         mean = self._shifted()
         fixed = np.concatenate((mean[None], self._library))[: options.samples]
         for _ in range(options.iterations):
-            drawn = mean + self._random.normal(size=(options.samples - len(fixed), *mean.shape)) * options.spread
+            drawn = mean + self._random.normal(size=(options.samples - len(fixed), *mean.shape)) * self._spread
             plans = np.clip(np.concatenate((fixed, drawn)), -1.0, 1.0)
             costs = self._costs(futures.drive(self._controller, plans, self._hold, self._terrain), field)
             order = np.argsort(costs, kind="stable")

@@ -20,6 +20,8 @@ from rover_gym.policy.features import Features
 from rover_gym.policy.foresight_policy import FORECAST_FILE, ForesightCosts, ForesightPolicy
 from rover_gym.policy.goal_env import RoverGoalEnv
 from rover_gym.policy.goal_observation import GoalObservation
+from rover_gym.policy.goal_vector_env import RoverGoalVectorEnv
+from rover_gym.policy.ground_map import MapOptions
 from rover_gym.policy.named_policy import NamedPolicy, named_policy
 from rover_gym.policy.network import Network
 from rover_gym.policy.pd_policy import PDGains, PDPolicy
@@ -46,6 +48,7 @@ __all__ = [
     "ForesightPolicy",
     "GoalObservation",
     "IntervalEstimate",
+    "MapOptions",
     "NamedPolicy",
     "Network",
     "PDGains",
@@ -58,6 +61,7 @@ __all__ = [
     "RoverCommandEnv",
     "RoverCommandVectorEnv",
     "RoverGoalEnv",
+    "RoverGoalVectorEnv",
     "RoverTrapEnv",
     "ScanGains",
     "ScanPolicy",

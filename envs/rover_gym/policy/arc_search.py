@@ -84,6 +84,7 @@ class SearchTask:
         traps: `(n, 3)` places ahead and to the right, m, and headings, rad, where the rover got stuck.
         retreat: Direction of the first arc, 1 or -1, while the rover backs off; 0 for a free choice.
         extra: `(n,)` a further cost of each first arc, m; None for none.
+        ways: `(rows * columns,)` way to the goal from each point of the scan, m; None for the straight way.
     """
 
     goal: tuple[float, float]
@@ -92,6 +93,7 @@ class SearchTask:
     traps: Array
     retreat: float
     extra: Array | None = None
+    ways: Array | None = None
 
 
 class ArcSearch:
@@ -144,7 +146,12 @@ class ArcSearch:
 
     def best(self, heights: Array, task: SearchTask) -> int:
         """The first arc of the cheapest path over heights `(rows * columns,)` of the scan, m."""
-        return self._search.best(heights, task.goal, task.command, task.boldness, task.traps, task.retreat, task.extra)
+        t = task
+        return self._search.best(heights, t.goal, t.command, t.boldness, t.traps, t.retreat, t.extra, t.ways)
+
+    def ways(self, heights: Array, spacing: float, goal: tuple[float, float], boldness: float, extra: Array) -> Array:
+        """`(rows, columns)` the way to a goal from each cell of a map, m; see `PathSearch.ways`."""
+        return self._search.ways(heights, spacing, goal, boldness, extra)
 
     def under(self, heights: Array, poses: Array) -> npt.NDArray[np.float32]:
         """`(n, n_wheels + 3)` what lies under the rover in poses `(..., 3)`; see `PathSearch.under`."""

@@ -66,11 +66,11 @@ class CommandVectorEnv(VectorWrapper):
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Array, dict[str, Any]]:
+    ) -> tuple[Any, dict[str, Any]]:
         """Starts episodes, as `RoverVectorEnv.reset`."""
         self._seen, infos = self._rovers.reset(seed=seed, options=options)
         self._over &= ~(options or {}).get("reset_mask", np.True_)
-        return self._features(self._seen), infos
+        return self._observed(), infos
 
     def snapshot(self) -> BatchSnapshot:
         """Returns the state of the rovers, as `RoverVectorEnv.snapshot`."""
@@ -86,7 +86,7 @@ class CommandVectorEnv(VectorWrapper):
         self._seen = self._rovers.batch.observation
         self._over = np.isin(np.arange(self.num_envs), self._rovers.batch.over)
 
-    def step(self, actions: npt.ArrayLike) -> tuple[Array, npt.NDArray[np.float64], Mask, Mask, dict[str, Any]]:
+    def step(self, actions: npt.ArrayLike) -> tuple[Any, npt.NDArray[np.float64], Mask, Mask, dict[str, Any]]:
         """Holds commands `(num_envs, 3)`, clipped to [-1, 1], for `repeat` steps or until a rover's episode ends.
 
         Raises:
@@ -101,7 +101,8 @@ class CommandVectorEnv(VectorWrapper):
             refuse(CommandError, "action", actions, "must be finite")
         if self._over.any():
             self._seen, _ = self._rovers.reset(options={"reset_mask": self._over})
-        active = ~self._over
+        moved = ~self._over
+        active = moved.copy()
         self._over = np.zeros(self.num_envs, np.bool_)
         rewards = np.zeros(self.num_envs)
         terminated, truncated = self._over.copy(), self._over.copy()
@@ -115,13 +116,32 @@ class CommandVectorEnv(VectorWrapper):
             truncated |= timed_out & active
             active &= ~(terminated | truncated)
         self._over = terminated | truncated
-        finals = self._begin_next() if self._rovers.autoreset_mode == AutoresetMode.SAME_STEP else {}
+        last = self._observed()
+        rewards = self._earned(rewards, last, moved)
+        finals = self._begin_next(last) if self._rovers.autoreset_mode == AutoresetMode.SAME_STEP else {}
         infos = self._rovers.batch.infos()
         for i, final in finals.items():
             infos = self._rovers._add_info(infos, final, i)
-        return self._features(self._seen), rewards, terminated, truncated, infos
+        return (self._observed() if finals else last), rewards, terminated, truncated, infos
 
-    def _begin_next(self) -> dict[int, dict[str, Any]]:
+    def _observed(self) -> Any:
+        """The observations of all rovers, from the last of the core's."""
+        return self._features(self._seen)
+
+    def _of_rover(self, observations: Any, i: int) -> Any:
+        """Rover i's part of them."""
+        return observations[i]
+
+    def _earned(
+        self,
+        rewards: npt.NDArray[np.float64],
+        observations: Any,  # noqa: ARG002 - for rewards that follow from them
+        moved: Mask,  # noqa: ARG002
+    ) -> npt.NDArray[np.float64]:
+        """`(num_envs,)` rewards, from the sums of the core's, for the rovers that have moved."""
+        return rewards
+
+    def _begin_next(self, last: Any) -> dict[int, dict[str, Any]]:
         """Starts the next episodes of the rovers whose episode is over; returns what the last ones ended with.
 
         If one cannot begin, none does, and the next command refuses it.
@@ -129,8 +149,7 @@ class CommandVectorEnv(VectorWrapper):
         over = [int(i) for i in np.flatnonzero(self._over)]
         if not over:
             return {}
-        last = self._features(self._seen)
-        finals = {i: {"final_obs": last[i], "final_info": self._rovers.batch.info(i)} for i in over}
+        finals = {i: {"final_obs": self._of_rover(last, i), "final_info": self._rovers.batch.info(i)} for i in over}
         try:
             self._seen, _ = self._rovers.reset(options={"reset_mask": self._over})
         except TerrainError:

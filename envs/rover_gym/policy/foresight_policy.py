@@ -10,6 +10,7 @@ import numpy.typing as npt
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.arc_forecast import ArcFeatures, ArcForecast, Outcomes
 from rover_gym.policy.arc_search import PathCosts
+from rover_gym.policy.ground_map import MapOptions
 from rover_gym.policy.network import Network
 from rover_gym.policy.pd_policy import find_rover_env
 from rover_gym.policy.policy_files import PolicyError, is_there
@@ -67,6 +68,7 @@ class ForesightPolicy(ScanPolicy):
         gains: Speed and times.
         costs: What a path costs.
         foresight: What foreseen outcomes cost.
+        map: A map of what the scans have shown; see `ScanPolicy`.
 
     Raises:
         OptionError: The environment has no height scan, or the rover's wheels stand in a line.
@@ -81,10 +83,11 @@ class ForesightPolicy(ScanPolicy):
         gains: ScanGains | None = None,
         costs: PathCosts | None = None,
         foresight: ForesightCosts | None = None,
+        map: MapOptions | None = None,  # noqa: A002 - what it is
     ) -> None:
         if foresight is not None and not isinstance(foresight, ForesightCosts):
             refuse(OptionError, "foresight", foresight, "must be ForesightCosts")
-        super().__init__(env, gains, costs)
+        super().__init__(env, gains, costs, map=map)
         self.foresight = ForesightCosts() if foresight is None else foresight
         path = (FOLDER / "foresight" if forecast is None else Path(forecast)) / FORECAST_FILE
         if not is_there(path):

@@ -43,6 +43,9 @@ class GoalObservation(gym.Wrapper[GoalDict, Any, Any, Any]):
         env: A `Rover-v0` with one goal an episode, with or without a `DriveByCommand` around it.
         reward_type: "sparse" or "dense".
 
+    Attributes:
+        kept: Entries of the wrapped environment's observation that say nothing of the goal.
+
     Raises:
         OptionError: `env` has a course of several goals or other wrappers of observations, or `reward_type` is unknown.
     """
@@ -59,7 +62,7 @@ class GoalObservation(gym.Wrapper[GoalDict, Any, Any, Any]):
         self.reward_type = reward_type
         self.goal_tolerance = rover.goal_tolerance
         self._rover = rover
-        self._kept = _kept(env, rover.observation_layout)
+        self.kept = _kept(env, rover.observation_layout)
         self._achieved: Array = np.zeros(2)
         inner = env.observation_space
         if not isinstance(inner, gym.spaces.Box):
@@ -67,8 +70,8 @@ class GoalObservation(gym.Wrapper[GoalDict, Any, Any, Any]):
         goals = gym.spaces.Box(-LARGEST, LARGEST, (2,), np.float64)
         self.observation_space = gym.spaces.Dict(  # type: ignore[assignment] # of the dictionaries
             observation=gym.spaces.Box(
-                np.append(inner.low[self._kept], [-1.0, -1.0]).astype(np.float32),
-                np.append(inner.high[self._kept], [1.0, 1.0]).astype(np.float32),
+                np.append(inner.low[self.kept], [-1.0, -1.0]).astype(np.float32),
+                np.append(inner.high[self.kept], [1.0, 1.0]).astype(np.float32),
                 dtype=np.float32,
             ),
             achieved_goal=goals,
@@ -141,7 +144,7 @@ class GoalObservation(gym.Wrapper[GoalDict, Any, Any, Any]):
         seen = self._rover.complete_observation()
         sine, cosine = sin_cos(float(seen[layout["q"].start + 4]))
         return {
-            "observation": np.append(observation[self._kept], np.array([cosine, sine], np.float32)),
+            "observation": np.append(observation[self.kept], np.array([cosine, sine], np.float32)),
             "achieved_goal": self._achieved.copy(),
             "desired_goal": np.array(self._rover.goal),
         }

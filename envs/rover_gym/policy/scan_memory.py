@@ -33,6 +33,10 @@ class ScanMemory:
         away: `(n,)` direction in which, 1 or -1.
         traps: `(n, TRAPS, 3)` x and z, m, and heading, rad, of places where it got stuck.
         n_traps: `(n,)` how many there have been.
+        ground: `(n, cells, cells)` heights of the ground that was seen, m; see `GroundMap`. No cells without a map.
+        corner: `(n, 2)` where its first cell lies, in cells.
+        ways: `(n, cells, cells)` the way to the goal from each cell, m, when it was last computed.
+        ways_corner: `(n, 2)` where the first cell lay then.
     """
 
     command: Array
@@ -45,10 +49,16 @@ class ScanMemory:
     away: Array
     traps: Array
     n_traps: Counts
+    ground: npt.NDArray[np.float32]
+    corner: Counts
+    ways: npt.NDArray[np.float32]
+    ways_corner: Counts
 
     @classmethod
-    def of(cls, state: tuple[npt.NDArray[Any], ...] | None, n: int) -> "ScanMemory":
+    def of(cls, state: tuple[npt.NDArray[Any], ...] | None, n: int, cells: int = 0) -> "ScanMemory":
         """A copy of the memory in a state that `predict` returned; that of n rovers at a start without one.
+
+        Maps have so many `cells` along each side.
 
         Raises:
             StateError: The state is of another policy or of another number of rovers.
@@ -64,6 +74,10 @@ class ScanMemory:
             away=np.zeros(n),
             traps=np.zeros((n, TRAPS, 3)),
             n_traps=np.zeros(n, np.int64),
+            ground=np.zeros((n, cells, cells), np.float32),
+            corner=np.zeros((n, 2), np.int64),
+            ways=np.zeros((n, cells, cells), np.float32),
+            ways_corner=np.zeros((n, 2), np.int64),
         )
         if state is None:
             return fresh

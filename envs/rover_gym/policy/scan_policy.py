@@ -7,16 +7,17 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.env.rocks import HeightScan
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.wheels import wheel_centres
 from rover_gym.mechanics import OptionError, RoverModel, StateError, exp, sin_cos
 from rover_gym.policy.arc_search import ArcSearch, PathCosts, SearchTask
 from rover_gym.policy.command import CommandController, CommandLimits
 from rover_gym.policy.features import ground_slope
+from rover_gym.policy.ground_map import GroundMap, MapOptions
 from rover_gym.policy.observed import check_observed
 from rover_gym.policy.pd_policy import find_rover_env
 from rover_gym.policy.rover_outline import RoverOutline
+from rover_gym.policy.scan_grid import scan_grid
 from rover_gym.policy.scan_memory import ScanMemory
 from rover_gym.policy.sweeps import Arcs
 from rover_gym.policy.turning import Turning
@@ -107,6 +108,7 @@ class ScanPolicy:
             and rover constants.
         gains: Speed and times.
         costs: What a path costs.
+        map: A map of what the scans have shown, which tells the way to the goal; None for the straight way.
 
     Attributes:
         gains: Speed and times.
@@ -121,12 +123,19 @@ class ScanPolicy:
         OptionError: The environment has no height scan, or the rover's wheels stand in a line.
     """
 
-    def __init__(self, env: Any, gains: ScanGains | None = None, costs: PathCosts | None = None) -> None:
+    def __init__(
+        self,
+        env: Any,
+        gains: ScanGains | None = None,
+        costs: PathCosts | None = None,
+        *,
+        map: MapOptions | None = None,  # noqa: A002 - what it is
+    ) -> None:
         rover = find_rover_env(env)
-        for name, given, kind in (("gains", gains, ScanGains), ("costs", costs, PathCosts)):
+        for name, given, kind in (("gains", gains, ScanGains), ("costs", costs, PathCosts), ("map", map, MapOptions)):
             if given is not None and not isinstance(given, kind):
                 refuse(OptionError, name, given, f"must be {kind.__name__}")
-        scan = _scan_of(rover)
+        scan = scan_grid(rover)
         self.gains = ScanGains() if gains is None else gains
         layout, model = rover.observation_layout, rover.model
         self._layout, self._scale, self._offsets = layout, layout.scale, scan.offsets
@@ -158,6 +167,8 @@ class ScanPolicy:
             arrival=0.6 * rover.task.goal_tolerance,
             costs=PathCosts() if costs is None else costs,
         )
+        self._map = None if map is None else GroundMap(scan, map, TRAP_AHEAD * self._reach)
+        self._cells = 0 if map is None else map.cells
         self._slow = np.zeros(len(first), np.bool_)
         self._caution = 1.0
         self.controller = CommandController(rover, limits, guided=False)
@@ -193,7 +204,7 @@ class ScanPolicy:
         given = array("observation", observation, error=StateError)
         check_observed(given, self._layout.size)
         rows = np.atleast_2d(given)
-        memory = ScanMemory.of(state, len(rows))
+        memory = ScanMemory.of(state, len(rows), self._cells)
         if episode_start is not None:
             memory.forget(np.broadcast_to(episode_start, (len(rows),)))
         due = np.flatnonzero(memory.age % self._repeat == 0)
@@ -227,6 +238,7 @@ class ScanPolicy:
             traps=np.column_stack((ahead * cosine - right * sine, ahead * sine + right * cosine, turned)),
             retreat=float(memory.away[i]) if memory.retreat[i] > 0.0 else 0.0,
             extra=extra,
+            ways=self._ways(row, slope, memory, i),
         )
         arc = self.search.best(heights, task)
         command: Array = self.commands[arc]
@@ -235,6 +247,32 @@ class ScanPolicy:
             self._back_off(memory, i, x, z, heading)
         pushes = memory.still[i] > PUSH_AFTER * pace or is_high or fast[arc]
         return command * [self.push if pushes else self.cruise, 1.0, 1.0]
+
+    def _ways(self, row: Array, slope: list[float], memory: ScanMemory, i: int) -> Array | None:
+        """The way to the goal from each point of the scan over the remembered map, m, which then holds the scan."""
+        if self._map is None:
+            return None
+        x, y, z, heading = (float(row[self._q + k]) for k in (0, 1, 2, 4))
+        cells, corner = memory.ground[i], memory.corner[i]
+        if memory.age[i] == 0:
+            self._map.begin(cells, corner, (x, z))
+        heights = row[self._heights] * self._scale[self._heights] + y
+        self._map.remember(cells, corner, heights, (x, z), heading)
+        if memory.age[i] // self._repeat % self._map.options.every == 0:
+            ahead, right = (row[self._goal] * self._scale[self._goal]).tolist()
+            sine, cosine = sin_cos(heading)
+            memory.ways[i] = self._map.ways(
+                self.search,
+                cells,
+                corner,
+                heading=heading,
+                goal=(x + ahead * cosine + right * sine, z - ahead * sine + right * cosine),
+                slope=slope,
+                boldness=self._caution * self._boldness(memory.fruitless[i]),
+                traps=memory.known_traps(i),
+            )
+            memory.ways_corner[i] = corner
+        return self._map.at_scan(memory.ways[i], memory.ways_corner[i], (x, z), heading)
 
     def ground(self, row: Array) -> tuple[list[float], Array]:
         """Slope of the ground plane ahead and to the right, and the scan's heights over it, m, for an observation."""
@@ -307,15 +345,3 @@ def _arcs(rover: RoverEnv, turning: Turning, limits: CommandLimits) -> tuple[Arc
     further = Arcs.grid(spread(7, bend), spread(3, side), 1.0).joined(Arcs.grid(spread(3, bend), [0.0], -1.0))
     wheels = np.array(turning.wheels)[steered]
     return first.within(rover.max_steering, wheels), further.within(rover.max_steering, wheels)
-
-
-def _scan_of(rover: RoverEnv) -> HeightScan:
-    """The grid of the environment's height scan."""
-    offsets = rover.task.scan
-    if offsets is None:
-        refuse(OptionError, "height_scan", False, "must be given, as by ScanPolicy.arguments(), to plan over")
-    columns = int(np.count_nonzero(offsets[:, 0] == offsets[0, 0]))
-    rows = len(offsets) // columns
-    if rows < 2 or columns < 2:
-        refuse(OptionError, "height_scan", (rows, columns), "must have two rows and columns at least")
-    return HeightScan(rows, columns, float(offsets[0, 0] - offsets[columns, 0]))

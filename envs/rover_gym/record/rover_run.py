@@ -39,6 +39,7 @@ class RoverRun:
         terrain: The ground.
         goal: Goal on the map, (x, z), m; None if the run had none.
         title: Title of the run.
+        goal_tolerance: Distance from the goal at which it counts as reached, m; None if the file does not say it.
     """
 
     trajectory: Trajectory
@@ -46,6 +47,7 @@ class RoverRun:
     terrain: Terrain
     goal: tuple[float, float] | None
     title: str
+    goal_tolerance: float | None = None
 
     @property
     def n_frames(self) -> int:
@@ -145,6 +147,7 @@ def run_of(trajectory: Trajectory, path: str | Path) -> RoverRun:
         terrain=trajectory.terrain,
         goal=_goal(scene.get("goal"), path),
         title=title_of(trajectory),
+        goal_tolerance=_tolerance(scene.get("goal_tolerance"), path),
     )
 
 
@@ -203,6 +206,12 @@ def _check_solver(solver: object, path: str | Path) -> None:
             number(f"{path}: solver.{name}", solver[name], above=0.0, at_most=LARGEST, error=RecordingError)
     if "gravity" in solver:
         vector(f"{path}: solver.gravity", solver["gravity"], 3, error=RecordingError)
+
+
+def _tolerance(tolerance: object, path: str | Path) -> float | None:
+    if tolerance is None:
+        return None
+    return number(f"{path}: scene.goal_tolerance", tolerance, above=0.0, at_most=LARGEST, error=RecordingError)
 
 
 def _goal(goal: object, path: str | Path) -> tuple[float, float] | None:

@@ -37,6 +37,8 @@ NOSE_COLOUR: Colour = (0.96, 0.72, 0.12)
 AXLE_COLOUR: Colour = (0.28, 0.45, 0.66)  # a beam that turns about x
 BOGIE_COLOUR: Colour = (0.22, 0.56, 0.55)  # a beam that turns about another axis
 COLUMN_COLOUR: Colour = (0.55, 0.57, 0.60)
+#: Curves of one, two or three wheels in the plane, back to front (Okabe and Ito's palette).
+PLANAR_WHEEL_COLOURS = ("#D55E00", "#0072B2", "#009E73")
 TYRE_COLOUR: Colour = (0.16, 0.16, 0.18)
 TREAD_COLOUR: Colour = (0.40, 0.40, 0.43)
 HUB_COLOUR: Colour = (0.74, 0.75, 0.77)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.record.outcomes import outcome_words
 from rover_gym.replay.player import add_surroundings, hidden_server, rounded, shortened, with_panel
 from rover_gym.replay.rotation import continuous, quaternions
 from rover_gym.replay.scenery import first_view, trunk_path
@@ -17,8 +18,18 @@ from rover_gym.replay.world_nodes import add_ground, add_rover
 if TYPE_CHECKING:
     from rover_gym.record.rover_run import RoverRun
 
+WHEEL_NAMES = {
+    "FL": "front left",
+    "FR": "front right",
+    "ML": "middle left",
+    "MR": "middle right",
+    "BL": "back left",
+    "BR": "back right",
+}
+SMOOTHING = 0.2  # s, window of the loads' mean: an impact lasts a step and says nothing of the weight carried
 #: One colour per wheel: Okabe and Ito's palette, safe for colour-blind readers.
 WHEEL_COLOURS = ("#0072B2", "#56B4E9", "#009E73", "#D55E00", "#CC79A7", "#E69F00")
+LONGEST_FACT = 100
 FOLLOW_TIME = 1.0  # s, smoothing window of the path that the eye follows
 
 Array = npt.NDArray[np.float64]
@@ -75,18 +86,50 @@ def _followed(run: RoverRun) -> Array:
     return result
 
 
+def moving_mean(time: Array, values: Array) -> Array:
+    """Values `(n, m)` averaged over the samples within half of `SMOOTHING` s, without those that are not finite."""
+    first = np.searchsorted(time, time - 0.5 * SMOOTHING, side="left")
+    last = np.searchsorted(time, time + 0.5 * SMOOTHING, side="right")
+    known = np.isfinite(values)
+    sums = np.vstack((np.zeros(values.shape[1]), np.cumsum(np.where(known, values, 0.0), axis=0)))
+    counts = np.vstack((np.zeros(values.shape[1]), np.cumsum(known, axis=0)))
+    with np.errstate(invalid="ignore"):
+        result: Array = (sums[last] - sums[first]) / (counts[last] - counts[first])
+    return result
+
+
+def facts(run: RoverRun) -> list[str]:
+    """What the run was, for the panel: its ground, seed, difficulty and outcome, as far as the file says them."""
+    attributes = run.trajectory.attributes
+    scene = attributes.get("scene", {})
+    terrain, seed, outcome = scene.get("terrain"), attributes.get("seed"), attributes.get("outcome")
+    rocks = scene.get("rocks")
+    difficulty = rocks.get("difficulty") if isinstance(rocks, dict) else None
+    slope = scene.get("slope")
+    told = [
+        f"scene: {terrain}" if isinstance(terrain, str) else None,
+        f"slope: {np.degrees(slope):.1f} degrees" if isinstance(slope, float) and slope else None,
+        f"seed: {seed}" if isinstance(seed, (int, np.integer)) else None,
+        f"difficulty: {difficulty:.2g}" if isinstance(difficulty, float) else None,
+        f"outcome: {outcome_words(str(outcome))}" if outcome is not None else None,
+    ]
+    return [fact[:LONGEST_FACT] for fact in told if fact is not None]
+
+
 def _curves(run: RoverRun) -> dict[str, Any]:
     """Contents of the panel: its title, the time, and for each chart one curve per wheel."""
     data, wheels = run.trajectory, run.model.wheel_names
     charts = [
-        ("wheel load", "N", data["wheel_forces"][:, :, 0], 1),
+        (f"wheel load, mean over {SMOOTHING:g} s", "N", moving_mean(run.time, data["wheel_forces"][:, :, 0]), 0),
         ("wheel gap", "mm", 1e3 * data["wheel_gaps"], 2),
     ]
     return {
         "title": run.title,
+        "facts": facts(run),
         "time": [round(float(time - run.time[0]), 4) for time in run.time],
         "wheels": [
-            {"name": name, "colour": colour} for name, colour in zip(wheels, cycle(WHEEL_COLOURS), strict=False)
+            {"name": WHEEL_NAMES.get(name, name), "colour": colour}
+            for name, colour in zip(wheels, cycle(WHEEL_COLOURS), strict=False)
         ],
         "charts": [
             {

@@ -80,7 +80,7 @@
       cursor.setAttribute("x2", x(time));
       readings.forEach((node, wheel) => {
         const value = chart.values[wheel][row];
-        node.textContent = value === null ? "-" : value.toFixed(1);
+        node.textContent = value === null ? "-" : value.toFixed(Math.abs(value) < 100 ? 1 : 0);
       });
     };
   };
@@ -93,6 +93,7 @@
   };
 
   add(panel, "h1", {}, data.title);
+  for (const fact of data.facts ?? []) add(panel, "p", { class: "fact" }, fact);
   add(panel, "p", {}, "Drag to orbit, right button to pan, scroll to zoom, space to pause; click a curve to go there.");
   const clock = add(panel, "p");
   const updates = data.charts.map(draw);

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
+AMBIENT = 0.8  # intensity of the light from all sides: solar panels and tyres stay no black holes
+
 
 @contextmanager
 def hidden_server() -> Iterator[Any]:
@@ -48,6 +50,7 @@ def add_surroundings(scene: Any) -> None:
     scene.set_up_direction("+y")
     scene.configure_environment_map(None)  # a third of the time of a frame without it, where there is no GPU
     scene.add_light_hemisphere("/sky", sky_color=rgb(SKY_COLOUR), ground_color=rgb(GROUND_COLOUR), intensity=1.2)
+    scene.add_light_ambient("/daylight", intensity=AMBIENT)
     shades = np.linspace(rgb(SKY_COLOUR_2), rgb(SKY_COLOUR), 64).astype(np.uint8)
     scene.set_background_image(np.repeat(shades[:, None], 2, axis=1), format="png")
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from rover_gym.ground import heights_of, plane_of, spheres_of, surfaces_of, triangles_of
 from rover_gym.mechanics import HeightField, Plane, TriangleMesh
 from rover_gym.rendering.appearance import (
+    COLUMN_COLOUR,
     GOAL_COLOUR,
     GROUND_COLOUR,
     GROUND_COLOUR_2,
@@ -34,6 +35,8 @@ MOST_HEIGHTS = 40_000  # shown of a height field
 MARGIN = 5.0  # m of ground around the path
 LONGEST_NAME = 60
 GOAL_POLE = 0.8  # m, height
+FLAG_POLE = 1.5  # m, height of the page's
+RING, RING_LIFT = 64, 0.015  # points of the goal's ring, and its height over the ground, m
 NEARNESS = 3.7  # of the eye, in radii of the circle that the rover stands in
 
 Array = npt.NDArray[np.float64]
@@ -160,6 +163,35 @@ def goal_parts(run: RoverRun) -> tuple[Part, ...]:
     pole = Part("", "cylinder", (0.02, GOAL_POLE), (x, y + GOAL_POLE / 2, z), upright, GOAL_COLOUR)
     knob = Part("", "cylinder", (0.09, 0.18), (x, y + GOAL_POLE, z), upright, GOAL_COLOUR)
     return pole, knob
+
+
+def goal_meshes(run: RoverRun) -> list[tuple[Colour, Array, Triangles]]:
+    """A pole with a pennant at the goal, and on the ground the ring within which it counts as reached."""
+    if run.goal is None:
+        return []
+    x, z = run.goal
+    y = float(np.nan_to_num(heights_of(run.terrain, [run.goal])[0]))
+    foot = np.array([x, y, z])
+    pole = Part("", "cylinder", (0.022, FLAG_POLE), (x, y + FLAG_POLE / 2, z), np.eye(3), COLUMN_COLOUR)
+    vertices, triangles = part_mesh(pole)
+    pennant = foot + np.array([[0.0, 1.48, 0.0], [0.0, 1.02, 0.0], [0.38, 1.25, 0.38]])
+    cloth = np.vstack((pennant, pennant)), np.array([[0, 1, 2], [3, 5, 4]], dtype=np.int32)
+    meshes = [(COLUMN_COLOUR, vertices + np.array(pole.position), triangles), (GOAL_COLOUR, *cloth)]
+    if run.goal_tolerance is not None:
+        meshes.append((GOAL_COLOUR, *_ring(run, run.goal, run.goal_tolerance)))
+    return meshes
+
+
+def _ring(run: RoverRun, centre: tuple[float, float], radius: float) -> tuple[Array, Triangles]:
+    """A flat ring on the ground, as wide as a tenth of its radius."""
+    turn = np.linspace(0.0, 2.0 * np.pi, RING, endpoint=False)
+    around = np.column_stack((np.cos(turn), np.sin(turn)))
+    places = np.array(centre) + np.vstack((radius * around, 0.9 * radius * around))
+    heights = np.nan_to_num(heights_of(run.terrain, places.tolist())) + RING_LIFT
+    k, after = np.arange(RING), (np.arange(RING) + 1) % RING
+    quads = np.vstack((np.column_stack((k, k + RING, after)), np.column_stack((after, k + RING, after + RING))))
+    both_sides = np.vstack((quads, quads[:, ::-1])).astype(np.int32)
+    return np.column_stack((places[:, 0], heights, places[:, 1])), both_sides
 
 
 def coloured_meshes(parts: tuple[Part, ...]) -> Iterator[tuple[Colour, Array, Triangles]]:

@@ -11,9 +11,9 @@ import numpy.typing as npt
 from rover_gym.extras import require
 from rover_gym.rendering.appearance import (
     AXLE_COLOUR,
-    FORCE_COLOUR,
     GROUND_COLOUR,
     HUB_COLOUR,
+    PLANAR_WHEEL_COLOURS,
     ROCK_COLOUR,
     TYRE_COLOUR,
     Colour,
@@ -25,16 +25,17 @@ from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server,
 if TYPE_CHECKING:
     from rover_gym.soil.soil_run import SoilRun
 
-#: Curve colours of the back and front wheel.
-WHEEL_COLOURS = ("#0072B2", "#D55E00")
 SAND_COLOURS: tuple[Colour, Colour] = (
-    (0.86, 0.74, 0.54),
-    (0.66, 0.51, 0.33),
+    (0.97, 0.90, 0.76),
+    (0.86, 0.75, 0.56),
 )  # of a disk's halves: they show its rotation
+BACKGROUND = 244  # of 255: nearly white, on which pale disks and forces stand out
+CHAIN_COLOUR: Colour = (0.80, 0.0, 0.10)
 DEPTH = 1.0  # out-of-plane thickness of disks, in mean diameters
 BATCH = 100  # disks per batch: a batch in which nothing moves needs no update
 CHAINS = 300  # strongest contacts drawn
-SEEN = 2.6  # m of soil in view
+SEEN = 1.8  # m of soil in view at most
+SKIRT = 1.04  # width of the picture, in widths of the bed
 ASPECT = 1.2  # width over height of the picture
 FIELD_OF_VIEW = 0.35  # rad, vertical: narrow and far away, for little perspective
 FOLLOW_TIME = 1.0  # s, smoothing window of the path that the eye follows
@@ -57,12 +58,13 @@ def write_soil_page(run: SoilRun, path: str | Path, *, follow: bool = True) -> P
     with hidden_server() as server:
         scene = server.scene
         add_surroundings(scene)
+        scene.set_background_image(np.full((2, 2, 3), BACKGROUND, dtype=np.uint8), format="png")
         scene.add_light_directional("/front", intensity=1.5, position=(1.0, 2.0, 6.0))  # the disks face this way
         world = scene.add_frame("/world", show_axes=False)
         moving: list[_Disks | _Wheels | _Chains] = [_Disks(run, scene), _Wheels(run, scene), _Chains(run, scene)]
         _add_walls(run, scene)
         eye = _eye(run, follow=follow)
-        distance = 0.5 * SEEN / (ASPECT * np.tan(0.5 * FIELD_OF_VIEW))
+        distance = 0.5 * _seen(run) / (ASPECT * np.tan(0.5 * FIELD_OF_VIEW))
         server.initial_camera.position = (0.0, eye[0, 1] + 0.1 * distance, distance)
         server.initial_camera.look_at = (0.0, eye[0, 1], 0.0)
         server.initial_camera.fov = FIELD_OF_VIEW
@@ -80,7 +82,7 @@ def write_soil_page(run: SoilRun, path: str | Path, *, follow: bool = True) -> P
     return path
 
 
-def _about_z(angles: Array) -> Array:
+def about_z(angles: Array) -> Array:
     """(n, 4) unit quaternions w, x, y, z of rotations about z."""
     turns = np.zeros((len(angles), 4))
     turns[:, 0], turns[:, 3] = np.cos(0.5 * angles), np.sin(0.5 * angles)
@@ -106,7 +108,7 @@ class _Disks:
             scene.add_batched_meshes_trimesh(
                 f"/world/disks/{i}",
                 mesh,
-                batched_wxyzs=_about_z(np.zeros(len(batch))),
+                batched_wxyzs=about_z(np.zeros(len(batch))),
                 batched_positions=np.zeros((len(batch), 3)),
                 batched_scales=np.stack((run.radius[batch], run.radius[batch], np.full(len(batch), depth)), axis=1),
                 lod="off",
@@ -123,7 +125,7 @@ class _Disks:
             if not np.array_equal(places, self._shown[i]):
                 self._shown[i] = places
                 handle.batched_positions = np.column_stack((places[:, :2], np.zeros(len(batch))))
-                handle.batched_wxyzs = shortened(_about_z(places[:, 2]), 9)
+                handle.batched_wxyzs = shortened(about_z(places[:, 2]), 9)
 
 
 class _Wheels:
@@ -135,24 +137,24 @@ class _Wheels:
         for k, radius in enumerate(run.wheels[0, :, 2]):
             name = f"/world/wheel_{k}"
             self._handles.append(scene.add_frame(name, show_axes=False))
-            add_meshes(scene, name, _wheel_meshes(float(radius), self._depth), cast_shadow=False)
+            add_meshes(scene, name, wheel_meshes(float(radius), self._depth), cast_shadow=False)
         self._body = None
         if len(self._handles) == 2:
             self._body = scene.add_frame("/world/body", show_axes=False)
             length = float(np.hypot(*np.diff(run.wheels[0, :, :2], axis=0)[0]))
             beam = Part("", "box", (length, 0.05, 0.02), (0.0, 0.0, 0.8 * self._depth), np.eye(3), AXLE_COLOUR)
-            add_meshes(scene, "/world/body", [_surface(beam)], cast_shadow=False)
+            add_meshes(scene, "/world/body", [surface_mesh(beam)], cast_shadow=False)
 
     def show(self, frame: int) -> None:
         """Moves wheels and body."""
         wheels, angles = self._run.wheels[frame], self._run.wheel_angles[frame]
-        for handle, (x, y, _), turn in zip(self._handles, wheels, _about_z(angles), strict=True):
+        for handle, (x, y, _), turn in zip(self._handles, wheels, about_z(angles), strict=True):
             handle.position = shortened(np.array([x, y, 0.0]))
             handle.wxyz = shortened(turn)
         if self._body is not None:
             (x, y), (dx, dy) = wheels[:, :2].mean(axis=0), np.diff(wheels[:, :2], axis=0)[0]
             self._body.position = shortened(np.array([x, y, 0.0]))
-            self._body.wxyz = shortened(_about_z(np.array([np.arctan2(dy, dx)]))[0])
+            self._body.wxyz = shortened(about_z(np.array([np.arctan2(dy, dx)]))[0])
 
 
 class _Chains:
@@ -164,15 +166,15 @@ class _Chains:
         loads = np.linalg.norm(run.wheel_forces[1:], axis=-1)
         self._full = max(1e-9, float(np.median(loads, axis=0).max()) if loads.size else 0.0)
         self._width = float(run.radius.mean())
-        vertices, triangles = part_mesh(Part("", "box", (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), np.eye(3), FORCE_COLOUR))
+        vertices, triangles = part_mesh(Part("", "box", (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), np.eye(3), CHAIN_COLOUR))
         self._handle = scene.add_batched_meshes_simple(
             "/world/chains",
             vertices,
             triangles,
-            batched_wxyzs=_about_z(np.zeros(self._n)),
+            batched_wxyzs=about_z(np.zeros(self._n)),
             batched_positions=np.zeros((self._n, 3)),
             batched_scales=np.full((self._n, 3), 1e-6),
-            batched_colors=rgb(FORCE_COLOUR),
+            batched_colors=rgb(CHAIN_COLOUR),
             lod="off",
             cast_shadow=False,
             receive_shadow=False,
@@ -186,7 +188,7 @@ class _Chains:
         widths = np.minimum(1.0, np.sqrt(chains[:, 4] / self._full)) * self._width
         height = np.full(self._n, 0.5 * _depth(self._run))
         self._handle.batched_positions = shortened(np.column_stack((0.5 * (start + end), height)), 13)
-        self._handle.batched_wxyzs = shortened(_about_z(np.arctan2(along[:, 1], along[:, 0])), 9)
+        self._handle.batched_wxyzs = shortened(about_z(np.arctan2(along[:, 1], along[:, 0])), 9)
         length = np.hypot(along[:, 0], along[:, 1])
         sizes = np.column_stack((length, widths, 0.2 * widths))
         self._handle.batched_scales = np.maximum(shortened(sizes, 13), 1e-6)
@@ -214,12 +216,13 @@ def _disk_mesh(sides: int) -> Any:
     )
 
 
-def _surface(part: Part) -> tuple[Colour, Array, npt.NDArray[np.int32]]:
+def surface_mesh(part: Part) -> tuple[Colour, Array, npt.NDArray[np.int32]]:
+    """Colour, vertices (n, 3), m, and triangles of a part in its solid's frame."""
     vertices, triangles = part_mesh(part, 48)
     return part.colour, vertices @ part.rotation.T + np.array(part.position), triangles
 
 
-def _wheel_meshes(radius: float, depth: float) -> list[tuple[Colour, Array, npt.NDArray[np.int32]]]:
+def wheel_meshes(radius: float, depth: float) -> list[tuple[Colour, Array, npt.NDArray[np.int32]]]:
     """A tyre with three bars across it, about z."""
     to_z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
     parts = [
@@ -229,7 +232,7 @@ def _wheel_meshes(radius: float, depth: float) -> list[tuple[Colour, Array, npt.
     for angle in np.pi / 3.0 * np.arange(3):
         turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
         parts.append(Part("", "box", (1.8 * radius, 0.05 * radius, 0.02), (0.0, 0.0, 0.55 * depth), turn, TYRE_COLOUR))
-    return [_surface(part) for part in parts]
+    return [surface_mesh(part) for part in parts]
 
 
 def _add_walls(run: SoilRun, scene: Any) -> None:
@@ -248,7 +251,13 @@ def _add_walls(run: SoilRun, scene: Any) -> None:
         turn = np.array([[n[1], n[0], 0.0], [-n[0], n[1], 0.0], [0.0, 0.0, 1.0]])
         colour = ROCK_COLOUR if upright else GROUND_COLOUR
         slab = Part("", "box", (reach, thick, depth), (float(foot[0]), float(foot[1]), 0.0), turn, colour)
-        add_meshes(scene, f"/world/wall_{i}", [_surface(slab)], cast_shadow=False)
+        add_meshes(scene, f"/world/wall_{i}", [surface_mesh(slab)], cast_shadow=False)
+
+
+def _seen(run: SoilRun) -> float:
+    """Width of the picture, m: the bed, or the rover's surroundings on a longer one."""
+    x = run.positions[0, :, 0]
+    return min(SEEN, SKIRT * float(x.max() - x.min() + 2.0 * run.radius.max()))
 
 
 def _eye(run: SoilRun, *, follow: bool) -> Array:
@@ -257,16 +266,17 @@ def _eye(run: SoilRun, *, follow: bool) -> Array:
     left, right = float(x.min()), float(x.max())
     height = float(run.wheels[0, :, 1].mean()) if run.wheels.size else 0.0
     middle = np.full(run.n_frames, 0.5 * (left + right))
-    if follow and run.wheels.size and right - left > SEEN:
+    seen = _seen(run)
+    if follow and run.wheels.size and right - left > seen:
         spans = np.abs(run.time[:, None] - run.time) <= FOLLOW_TIME / 2
         middle = spans @ run.wheels[..., 0].mean(axis=1) / spans.sum(axis=1)
-        middle = np.clip(middle, left + 0.5 * SEEN, right - 0.5 * SEEN)
+        middle = np.clip(middle, left + 0.5 * seen, right - 0.5 * seen)
     return np.column_stack((middle, np.full(run.n_frames, height)))
 
 
 def _curves(run: SoilRun) -> dict[str, Any]:
     """Contents of the panel."""
-    names = ("wheel",) if run.wheels.shape[1] == 1 else ("back", "front")
+    names = ("wheel",) if run.wheels.shape[1] == 1 else ("back wheel", "front wheel")
     charts = [
         ("load of the wheel", "N", run.wheel_forces[..., 1], 1),
         ("sinkage", "mm", 1e3 * run.sinkage, 2),
@@ -276,7 +286,8 @@ def _curves(run: SoilRun) -> dict[str, Any]:
         "title": run.title,
         "time": [round(float(time - run.time[0]), 4) for time in run.time],
         "wheels": [
-            {"name": name, "colour": colour} for name, colour in zip(names, WHEEL_COLOURS[: len(names)], strict=True)
+            {"name": name, "colour": colour}
+            for name, colour in zip(names, PLANAR_WHEEL_COLOURS[: len(names)], strict=True)
         ],
         "charts": [
             {

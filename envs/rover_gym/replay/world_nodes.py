@@ -10,7 +10,7 @@ from rover_gym.rendering.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_
 from rover_gym.replay.player import add_meshes, rgb
 from rover_gym.replay.scenery import (
     coloured_meshes,
-    goal_parts,
+    goal_meshes,
     ground_tiles,
     identifiers,
     parts_by_solid,
@@ -47,7 +47,7 @@ def add_ground(scene: Any, run: RoverRun, under: str = "/world") -> None:
     for k, (vertices, faces) in enumerate(surfaces(run)):
         painted = [(colour, vertices, triangles) for colour, triangles in faces if len(triangles)]
         add_meshes(scene, f"{under}/surface_{k}", painted, cast_shadow=False)
-    add_meshes(scene, f"{under}/goal", coloured_meshes(goal_parts(run)))
+    add_meshes(scene, f"{under}/goal", goal_meshes(run))
     centres, radii = spheres(run)
     for name, rings, chosen in (
         ("pebbles", 5, radii < LARGE),

@@ -315,6 +315,10 @@ class RoverBatch:
             self._lent[i] = generator_at(self._rows([i])[0])
         return self._lent[i]
 
+    def generator_rows(self, chosen: Sequence[int]) -> Rows:
+        """The states of some rovers' random generators, `(m, 4)`; none is moved."""
+        return self._rows(chosen)
+
     def seed_of(self, i: int) -> int:
         """The seed of rover i's random generator."""
         self._seed_at_random([i])

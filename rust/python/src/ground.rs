@@ -8,11 +8,12 @@ use pyo3::types::{PyList, PyTuple};
 use rover_core::draw::DrawnGround;
 use rover_core::geometry::{Terrain, Union as CoreUnion};
 
-use crate::arguments::{refused, shown};
+use crate::arguments::{Given, refused, shown};
 use crate::arrays::fresh;
 use crate::errors::{BorderError, Kind, Value};
 use crate::height_field::HeightField;
 use crate::plane::Plane;
+use crate::rays::{Met, cast_rays};
 use crate::sphere_field::{SphereField, rows};
 use crate::triangle_mesh::TriangleMesh;
 
@@ -183,6 +184,34 @@ impl Union {
         points: &Bound<'_, PyAny>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         heights(&*self.inner, py, points)
+    }
+
+    /// Where rays meet the ground first.
+    ///
+    /// A surface is met from either side. What depth cameras and laser scanners measure.
+    ///
+    /// Args:
+    ///     origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
+    ///     directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
+    ///     max_range: Distance to which they are followed, m; without end by default.
+    ///
+    /// Returns:
+    ///     Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
+    ///     world frame, (n, 3), nan where nothing is met.
+    ///
+    /// Raises:
+    ///     OptionError: An array has a wrong shape or an entry that is not finite, a direction is
+    ///         zero, an origin is beyond 1e6 m, or `max_range` is not positive.
+    #[pyo3(signature = (origins, directions, max_range = Given::MISSING),
+        text_signature = "($self, origins, directions, max_range=None)")]
+    fn cast_rays<'py>(
+        &self,
+        py: Python<'py>,
+        origins: &Bound<'_, PyAny>,
+        directions: &Bound<'_, PyAny>,
+        max_range: Given<'_>,
+    ) -> PyResult<Met<'py>> {
+        cast_rays(&*self.inner, py, origins, directions, max_range)
     }
 
     fn __len__(&self) -> usize {

@@ -12,6 +12,7 @@ use crate::arrays::{one_or_two, two};
 use crate::errors::{BorderError, Kind, Value};
 use crate::ground::heights;
 use crate::materials;
+use crate::rays::{Met, cast_rays};
 
 /// A map of heights as ground: two triangles a cell, solid below. Immutable.
 ///
@@ -281,6 +282,34 @@ impl HeightField {
         points: &Bound<'_, PyAny>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         heights(&*self.inner, py, points)
+    }
+
+    /// Where rays meet the ground first.
+    ///
+    /// A surface is met from either side. What depth cameras and laser scanners measure.
+    ///
+    /// Args:
+    ///     origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
+    ///     directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
+    ///     max_range: Distance to which they are followed, m; without end by default.
+    ///
+    /// Returns:
+    ///     Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
+    ///     world frame, (n, 3), nan where nothing is met.
+    ///
+    /// Raises:
+    ///     OptionError: An array has a wrong shape or an entry that is not finite, a direction is
+    ///         zero, an origin is beyond 1e6 m, or `max_range` is not positive.
+    #[pyo3(signature = (origins, directions, max_range = Given::MISSING),
+        text_signature = "($self, origins, directions, max_range=None)")]
+    fn cast_rays<'py>(
+        &self,
+        py: Python<'py>,
+        origins: &Bound<'_, PyAny>,
+        directions: &Bound<'_, PyAny>,
+        max_range: Given<'_>,
+    ) -> PyResult<Met<'py>> {
+        cast_rays(&*self.inner, py, origins, directions, max_range)
     }
 
     fn __repr__(&self) -> String {

@@ -34,6 +34,7 @@ mod planar_ground;
 mod planar_machines;
 mod planar_soil;
 mod plane;
+mod rays;
 mod reading;
 mod report;
 mod rover_grains;

@@ -5,7 +5,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyMapping;
 use rover_core::paths::search::STEPS;
 use rover_core::paths::{
-    Arcs, Outline, PathCosts, PathSearch as Core, Pose, ScanShape, Search, SearchTask,
+    Arcs, MapTask, Outline, PathCosts, PathSearch as Core, Pose, ScanShape, Search, SearchTask,
+    WayMap,
 };
 
 use crate::arguments::{at_least_one, count, number, refused};
@@ -35,6 +36,7 @@ use crate::errors::Kind;
 #[pyclass(module = "rover_gym.mechanics")]
 pub struct PathSearch {
     inner: Core,
+    map: Option<WayMap>,
 }
 
 fn item<'py>(
@@ -229,6 +231,7 @@ impl PathSearch {
         }
         Ok(Self {
             inner: Core::new(read),
+            map: None,
         })
     }
 
@@ -243,13 +246,17 @@ impl PathSearch {
     ///     retreat: Direction of the first arc, 1 or -1, while the rover backs off; 0 for a free
     ///         choice.
     ///     extra: `(n,)` a further cost of each first arc, m; none by default.
+    ///     ways: `(rows * columns,)` way to the goal from each point of the scan, m; straight by
+    ///         default.
     ///
     /// Returns:
     ///     The index of the arc among the first arcs.
     ///
     /// Raises:
     ///     OptionError: An argument has a wrong shape or an entry that is not finite.
-    #[pyo3(signature = (heights, goal, command, boldness, traps, retreat, extra = None))]
+    #[pyo3(signature = (
+        heights, goal, command, boldness, traps, retreat, extra = None, ways = None
+    ))]
     #[expect(clippy::too_many_arguments)]
     fn best(
         &mut self,
@@ -260,6 +267,7 @@ impl PathSearch {
         traps: &Bound<'_, PyAny>,
         retreat: f64,
         extra: Option<&Bound<'_, PyAny>>,
+        ways: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<usize> {
         let task = SearchTask {
             goal: two(goal, Kind::Option, "goal")?,
@@ -271,9 +279,93 @@ impl PathSearch {
                 Some(given) => self.extra(given)?,
                 None => Vec::new(),
             },
+            ways: match ways {
+                Some(given) => self.at_points(given, "ways")?,
+                None => Vec::new(),
+            },
         };
-        let heights = self.heights(heights)?;
+        let heights = self.at_points(heights, "heights")?;
         Ok(self.inner.best(&heights, &task))
+    }
+
+    /// The way to a goal from every cell of a map (Dijkstra 1959).
+    ///
+    /// The rover goes from a cell to one of its eight neighbours, headed for it. That costs the
+    /// distance and what the ground costs on a path: belly, climb and lean. A wheel over ground
+    /// that is not known stands as high as the others do; where all do, the distance is all.
+    ///
+    /// Args:
+    ///     heights: (rows, columns) heights, m, nan where they are not known; from 3 to 2000 of
+    ///         each. Rows lie across, the first farthest ahead; columns lead to the right.
+    ///     spacing: Distance of rows and columns, m.
+    ///     goal: Row and column of the goal. One beyond the map is reached by the straight way from
+    ///         its border.
+    ///     boldness: Factor on the costs of belly, climb and lean.
+    ///     extra: (rows, columns) further price of a metre in each cell, at least 0; none by
+    ///         default.
+    ///
+    /// Returns:
+    ///     (rows, columns) ways, in metres of level ground.
+    ///
+    /// Raises:
+    ///     OptionError: An argument has a wrong shape or an entry out of its range.
+    #[pyo3(signature = (heights, spacing, goal, boldness, extra = None))]
+    fn ways<'py>(
+        &mut self,
+        py: Python<'py>,
+        heights: &Bound<'_, PyAny>,
+        spacing: &Bound<'_, PyAny>,
+        goal: &Bound<'_, PyAny>,
+        boldness: &Bound<'_, PyAny>,
+        extra: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let refuse = |value, field, what| PyErr::from(refused(value, Kind::Option, field, what));
+        let read = array(heights, Kind::Option, "heights")?;
+        let shape = match *read.as_array().shape() {
+            [rows, columns] if [rows, columns].iter().all(|n| (3..=2000).contains(n)) => {
+                [rows, columns]
+            }
+            _ => return Err(refuse(heights, "heights", "3 to 2000 rows and columns")),
+        };
+        let seen: Vec<f64> = read.as_array().iter().copied().collect();
+        if seen.iter().any(|height| height.is_infinite()) {
+            return Err(refuse(heights, "heights", "finite, or nan"));
+        }
+        let price = match extra {
+            None => vec![0.0; seen.len()],
+            Some(given) => {
+                let read = array(given, Kind::Option, "extra")?;
+                let price: Vec<f64> = read.as_array().iter().copied().collect();
+                if read.as_array().shape() != shape
+                    || !price.iter().all(|more| more.is_finite() && *more >= 0.0)
+                {
+                    let what = "a finite price of at least 0 for each height";
+                    return Err(refuse(given, "extra", what));
+                }
+                price
+            }
+        };
+        let spacing = positive(spacing, "spacing")?;
+        let aim = two(goal, Kind::Option, "goal")?;
+        if !aim.iter().all(|at| at.is_finite()) {
+            return Err(refuse(goal, "goal", "finite"));
+        }
+        let bold = finite(boldness, "boldness")?;
+        if bold < 0.0 {
+            return Err(refuse(boldness, "boldness", "at least 0"));
+        }
+        if self.map.as_ref().map(WayMap::shape) != Some((shape, spacing)) {
+            self.map = None;
+        }
+        let inner = &self.inner;
+        let map = self.map.get_or_insert_with(|| inner.map(shape, spacing));
+        let found = map.ways(&MapTask {
+            heights: &seen,
+            extra: &price,
+            goal: aim,
+            boldness: bold,
+        });
+        PyArray1::from_vec(py, found).reshape(shape)
     }
 
     /// What lies under the rover in poses.
@@ -295,7 +387,7 @@ impl PathSearch {
         heights: &Bound<'_, PyAny>,
         poses: &Bound<'_, PyAny>,
     ) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let heights = self.heights(heights)?;
+        let heights = self.at_points(heights, "heights")?;
         let poses = self::poses(poses, "poses")?;
         let found = self.inner.under(&heights, &poses);
         PyArray1::from_vec(py, found).reshape([poses.len(), self.inner.n_wheels() + 3])
@@ -303,23 +395,17 @@ impl PathSearch {
 }
 
 impl PathSearch {
-    /// A finite height a point of the scan.
-    fn heights(&self, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    /// A finite number for each point of the scan.
+    fn at_points(&self, given: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<f64>> {
         let found: Vec<f64> = match given.extract::<PyReadonlyArray1<'_, f64>>() {
             Ok(ready) => ready.as_array().to_vec(),
-            Err(_) => vector(given, Kind::Option, "heights")?,
+            Err(_) => vector(given, Kind::Option, field)?,
         };
         let n = self.inner.n_heights();
-        if found.len() == n && found.iter().all(|height| height.is_finite()) {
+        if found.len() == n && found.iter().all(|value| value.is_finite()) {
             return Ok(found);
         }
-        Err(refused(
-            given,
-            Kind::Option,
-            "heights",
-            &format!("{n} finite heights"),
-        )
-        .into())
+        Err(refused(given, Kind::Option, field, &format!("{n} finite {field}")).into())
     }
 
     /// A finite cost an arc.

@@ -8,6 +8,7 @@ use rover_core::geometry::Plane as CorePlane;
 use crate::arguments::{Given, number};
 use crate::arrays::{fresh, triple};
 use crate::errors::{BorderError, Kind, Value};
+use crate::rays::{Met, cast_rays};
 
 type Normal = (f64, f64, f64);
 
@@ -101,6 +102,34 @@ impl Plane {
             .into());
         }
         Ok(-(n.x * x + n.z * z + self.inner.offset()) / n.y)
+    }
+
+    /// Where rays meet the ground first.
+    ///
+    /// A surface is met from either side. What depth cameras and laser scanners measure.
+    ///
+    /// Args:
+    ///     origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
+    ///     directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
+    ///     max_range: Distance to which they are followed, m; without end by default.
+    ///
+    /// Returns:
+    ///     Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
+    ///     world frame, (n, 3), nan where nothing is met.
+    ///
+    /// Raises:
+    ///     OptionError: An array has a wrong shape or an entry that is not finite, a direction is
+    ///         zero, an origin is beyond 1e6 m, or `max_range` is not positive.
+    #[pyo3(signature = (origins, directions, max_range = Given::MISSING),
+        text_signature = "($self, origins, directions, max_range=None)")]
+    fn cast_rays<'py>(
+        &self,
+        py: Python<'py>,
+        origins: &Bound<'_, PyAny>,
+        directions: &Bound<'_, PyAny>,
+        max_range: Given<'_>,
+    ) -> PyResult<Met<'py>> {
+        cast_rays(&self.inner, py, origins, directions, max_range)
     }
 
     fn __repr__(&self) -> String {

@@ -3,6 +3,7 @@
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
+use rover_core::contact::Part;
 use rover_core::integrator::{Accuracy, StepOptions};
 use rover_core::multibody::{Model, coordinates};
 use rover_core::nalgebra::DMatrix;
@@ -22,6 +23,7 @@ use crate::linearisation::Linearisation;
 use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
 use crate::options::{Options, SolverWords, settings};
 use crate::plane::Plane;
+use crate::rays::{Met, met, rays};
 use crate::reading::{place, scan_points, slices};
 use crate::report::{Energy, StepReport};
 use crate::shared::{Shared, Watch};
@@ -620,6 +622,60 @@ impl Simulation {
     ) -> PyResult<Bound<'py, PyDict>> {
         let n_scan = n_scan.count(0, Kind::Option, "n_scan")?;
         slices(py, &ReadingLayout::new(&self.model, n_scan))
+    }
+
+    /// Where rays meet the ground first, or the rover itself.
+    ///
+    /// Of the rover its wheels, boxes and balls are seen, as they collide.
+    ///
+    /// Args:
+    ///     origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
+    ///     directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
+    ///     max_range: Distance to which they are followed, m; without end by default.
+    ///     parts: Whether the rover's own parts are met.
+    ///     without: Names of solids whose parts are not met, such as the one that carries a sensor.
+    ///
+    /// Returns:
+    ///     Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
+    ///     world frame, (n, 3), nan where nothing is met.
+    ///
+    /// Raises:
+    ///     OptionError: As of `Plane.cast_rays`, or `without` names no solid of the model.
+    #[pyo3(signature = (origins, directions, max_range = Given::MISSING, *, parts = Given::MISSING, without = None),
+        text_signature = "($self, origins, directions, max_range=None, *, parts=False, without=())")]
+    fn cast_rays<'py>(
+        &self,
+        py: Python<'py>,
+        origins: &Bound<'_, PyAny>,
+        directions: &Bound<'_, PyAny>,
+        max_range: Given<'_>,
+        parts: Given<'_>,
+        without: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Met<'py>> {
+        let (rays, range) = rays(origins, directions, max_range)?;
+        let sees_parts = parts.flag(false, Kind::Option, "parts")?;
+        let without = without.map_or_else(
+            || Ok(Vec::new()),
+            |given| texts(given, Kind::Option, "without"),
+        )?;
+        for name in &without {
+            if !self.model.frames().iter().any(|frame| frame.name == *name) {
+                let message = format!("without: the model has no solid {name:?}");
+                return Err(
+                    BorderError::option("without", message, Value::Text(name.clone())).into(),
+                );
+            }
+        }
+        let is_seen = |part: &Part| !without.iter().any(|name| name == part.name(&self.model));
+        let seen: Vec<Part> = if sees_parts {
+            Part::all(&self.model).filter(is_seen).collect()
+        } else {
+            Vec::new()
+        };
+        let held = self.open()?;
+        let inner = &*held;
+        let hits = py.detach(|| inner.cast(&rays, range, &seen));
+        met(py, &hits)
     }
 
     /// Kinetic and potential energy now.

@@ -15,6 +15,7 @@ use crate::files::{self, in_file, read_text};
 use crate::ground::{Ground, heights};
 use crate::materials;
 use crate::plane::Plane;
+use crate::rays::{Met, cast_rays};
 
 /// Longest file of spheres, bytes.
 const MAX_FILE: usize = 1 << 28;
@@ -319,6 +320,34 @@ impl SphereField {
         points: &Bound<'_, PyAny>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         heights(&*self.inner, py, points)
+    }
+
+    /// Where rays meet the ground first.
+    ///
+    /// A surface is met from either side. What depth cameras and laser scanners measure.
+    ///
+    /// Args:
+    ///     origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
+    ///     directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
+    ///     max_range: Distance to which they are followed, m; without end by default.
+    ///
+    /// Returns:
+    ///     Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
+    ///     world frame, (n, 3), nan where nothing is met.
+    ///
+    /// Raises:
+    ///     OptionError: An array has a wrong shape or an entry that is not finite, a direction is
+    ///         zero, an origin is beyond 1e6 m, or `max_range` is not positive.
+    #[pyo3(signature = (origins, directions, max_range = Given::MISSING),
+        text_signature = "($self, origins, directions, max_range=None)")]
+    fn cast_rays<'py>(
+        &self,
+        py: Python<'py>,
+        origins: &Bound<'_, PyAny>,
+        directions: &Bound<'_, PyAny>,
+        max_range: Given<'_>,
+    ) -> PyResult<Met<'py>> {
+        cast_rays(&*self.inner, py, origins, directions, max_range)
     }
 
     fn __len__(&self) -> usize {

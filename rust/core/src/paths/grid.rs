@@ -62,14 +62,6 @@ impl GroundGrid {
         let margin = (reach / cell).ceil() as usize + 2;
         let (rows, columns) = (FINER * (scan.rows - 1) + 1, FINER * (scan.columns - 1) + 1);
         let width = columns + 2 * margin;
-        let offsets = (0..HEADINGS).flat_map(|k| {
-            let (sine, cosine) = sin_cos(f64::from(k) * TAU / f64::from(HEADINGS));
-            points.iter().map(move |[x, z]| {
-                let (ahead, right) = (cosine * x + sine * z, cosine * z - sine * x);
-                let row = (-ahead / cell).round_ties_even() as i32;
-                row * width as i32 + (right / cell).round_ties_even() as i32
-            })
-        });
         Self {
             scan,
             cell,
@@ -81,9 +73,25 @@ impl GroundGrid {
                 0.5 * (rows - 1) as f64 - x_c / cell,
                 0.5 * (columns - 1) as f64,
             ],
-            offsets: offsets.collect(),
+            offsets: offsets(points, cell, width),
             n_points: points.len(),
         }
+    }
+
+    /// The grid of a map of at least 3 rows and columns of cells, `cell` m apart, for points at x
+    /// and z from the point that follows the path. Its first cell lies where poses begin.
+    #[must_use]
+    pub fn by_cells([rows, columns]: [usize; 2], cell: f64, points: &[[f64; 2]]) -> Self {
+        let scan = ScanShape {
+            rows: rows.div_ceil(FINER),
+            columns: columns.div_ceil(FINER),
+            spacing: cell * FINER as f64,
+        };
+        let mut grid = Self::new(scan, points, 0.0);
+        grid.width = grid.width - grid.columns + columns;
+        (grid.rows, grid.columns, grid.origin) = (rows, columns, [0.0; 2]);
+        grid.offsets = offsets(points, cell, grid.width);
+        grid
     }
 
     /// Points of the scan.
@@ -131,7 +139,19 @@ impl GroundGrid {
         }
     }
 
-    /// The heights of a grid under the points of the rover in a pose.
+    /// Fills `grid` with a height for each cell; the margin is not known.
+    pub fn lay(&self, heights: &[f64], grid: &mut Vec<f32>) {
+        grid.clear();
+        grid.resize((self.rows + 2 * self.margin) * self.width, f32::NAN);
+        for (row, values) in heights.chunks_exact(self.columns).enumerate() {
+            let start = (row + self.margin) * self.width + self.margin;
+            for (out, height) in grid[start..start + self.columns].iter_mut().zip(values) {
+                *out = *height as f32;
+            }
+        }
+    }
+
+    /// The heights of a grid under the points of the rover in a pose, or under the first of them.
     pub fn under(&self, grid: &[f32], pose: Pose, heights: &mut [f32]) {
         let middle = self.place(pose);
         let turn = (pose.heading * (f64::from(HEADINGS) / TAU)).round_ties_even() as i64;
@@ -142,6 +162,35 @@ impl GroundGrid {
         }
     }
 
+    /// The way to the goal from the place of a pose, and its direction, ahead and to the right, by
+    /// linear interpolation of the ways from the scan's points, m; beyond the scan, by the straight
+    /// way to its border.
+    #[must_use]
+    pub fn way(&self, ways: &[f64], pose: Pose) -> (f64, f64, f64) {
+        let along = |at: f64, n: usize| {
+            let within = at.clamp(0.0, (n - 1) as f64);
+            let first = (within as usize).min(n - 2);
+            (first, within - first as f64, at - within)
+        };
+        let finer = FINER as f64;
+        let (row, u, before) = along(
+            (self.origin[0] - pose.ahead / self.cell) / finer,
+            self.scan.rows,
+        );
+        let (column, w, beside) = along(
+            (self.origin[1] + pose.right / self.cell) / finer,
+            self.scan.columns,
+        );
+        let at = |i: usize, j: usize| ways[(row + i) * self.scan.columns + column + j];
+        let (left, right) = (
+            at(0, 0) + u * (at(1, 0) - at(0, 0)),
+            at(0, 1) + u * (at(1, 1) - at(0, 1)),
+        );
+        let back = at(1, 0) - at(0, 0) + w * (at(1, 1) - at(1, 0) - at(0, 1) + at(0, 0));
+        let beyond = (before * before + beside * beside).sqrt() * self.scan.spacing;
+        (left + w * (right - left) + beyond, back, left - right)
+    }
+
     /// Where the point that follows the path lies in the grid; just outside the scan if beyond it.
     fn place(&self, pose: Pose) -> i32 {
         let within = |at: f64, n: usize| at.round_ties_even().clamp(-1.0, n as f64) as i32;
@@ -150,6 +199,19 @@ impl GroundGrid {
         let margin = self.margin as i32;
         (row + margin) * self.width as i32 + column + margin
     }
+}
+
+/// Where points lie from another in a grid of a width, by heading.
+fn offsets(points: &[[f64; 2]], cell: f64, width: usize) -> Vec<i32> {
+    let by_heading = (0..HEADINGS).flat_map(|k| {
+        let (sine, cosine) = sin_cos(f64::from(k) * TAU / f64::from(HEADINGS));
+        points.iter().map(move |[x, z]| {
+            let (ahead, right) = (cosine * x + sine * z, cosine * z - sine * x);
+            let row = (-ahead / cell).round_ties_even() as i32;
+            row * width as i32 + (right / cell).round_ties_even() as i32
+        })
+    });
+    by_heading.collect()
 }
 
 /// The median of numbers, of which there is at least one.

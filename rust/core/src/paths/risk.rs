@@ -107,6 +107,13 @@ impl PathRisk {
     /// The heights under the rover's points in a pose, and how the rover would stand there.
     pub fn stand(&self, heights: &[f32], pose: Pose, seen: &mut [f32]) -> Stand {
         self.grid.under(heights, pose, seen);
+        self.stand_on(seen)
+    }
+
+    /// How the rover would stand with these heights under its points. Those under the underside may
+    /// be unknown (nan).
+    #[must_use]
+    pub fn stand_on(&self, seen: &[f32]) -> Stand {
         let (wheels, under) = seen.split_at(self.n_wheels);
         let [level, ahead, right] = [0, 1, 2].map(|i| {
             let products = wheels.iter().zip(&self.fit[i]);
@@ -123,18 +130,27 @@ impl PathRisk {
     /// Cost of a pose, and writes the heights under the rover's points to `seen`; `before` are
     /// those under its wheels at the pose before.
     pub fn of(&self, heights: &[f32], pose: Pose, before: &[f32], seen: &mut [f32]) -> f32 {
-        let Stand { ahead, right, gap } = self.stand(heights, pose, seen);
+        let stand = self.stand(heights, pose, seen);
+        self.of_stand(&stand) + self.of_rise(&seen[..self.n_wheels], before)
+    }
+
+    /// Cost of standing so, without the climb.
+    #[must_use]
+    pub fn of_stand(&self, stand: &Stand) -> f32 {
+        let Stand { ahead, right, gap } = *stand;
         let low = (self.margin - gap).max(0.0);
-        let risk = self.lean * (ahead * ahead + right * right) + self.belly * low * (1.0 + low);
-        let rises = seen[..self.n_wheels]
-            .iter()
-            .zip(before)
-            .map(|(height, before)| {
-                let rise = (height - before).max(0.0) / self.radius;
-                let steep = (rise - 0.5).max(0.0);
-                self.climb * rise + self.step * steep * steep
-            });
-        risk + rises.fold(0.0, |sum, cost| sum + cost)
+        self.lean * (ahead * ahead + right * right) + self.belly * low * (1.0 + low)
+    }
+
+    /// Cost of the climb of the wheels to these heights from those before.
+    #[must_use]
+    pub fn of_rise(&self, wheels: &[f32], before: &[f32]) -> f32 {
+        let rises = wheels.iter().zip(before).map(|(height, before)| {
+            let rise = (height - before).max(0.0) / self.radius;
+            let steep = (rise - 0.5).max(0.0);
+            self.climb * rise + self.step * steep * steep
+        });
+        rises.fold(0.0, |sum, cost| sum + cost)
     }
 
     /// The smallest gap between the underside, carried by a plane of given slopes through 0, and

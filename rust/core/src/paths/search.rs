@@ -8,7 +8,7 @@
     reason = "what is not inlined is not compiled for the machine's instructions"
 )]
 
-use super::{GroundGrid, Outline, PathCosts, PathRisk, Pose, ScanShape};
+use super::{GroundGrid, Outline, PathCosts, PathRisk, Pose, ScanShape, WayMap};
 use crate::scalar::elementary::{atan2, exp, sin_cos};
 use crate::scalar::instructions::Single;
 
@@ -83,6 +83,8 @@ pub struct SearchTask {
     pub retreat: Option<f64>,
     /// A further cost of each first arc, m; empty for none.
     pub extra: Vec<f64>,
+    /// Way to the goal from each point of the scan, m; empty for the straight way.
+    pub ways: Vec<f64>,
 }
 
 /// A path that is being extended.
@@ -148,6 +150,12 @@ impl PathSearch {
     #[must_use]
     pub fn n_heights(&self) -> usize {
         self.risk.grid().n_heights()
+    }
+
+    /// A map over which the rover's ways cost what its paths do.
+    #[must_use]
+    pub fn map(&self, shape: [usize; 2], spacing: f64) -> WayMap {
+        WayMap::new(shape, spacing, &self.inner.outline, &self.inner.costs)
     }
 
     /// What lies under the rover in poses, over heights in the order of the scan: for each pose the
@@ -350,10 +358,14 @@ impl PathSearch {
         if path.nearest < inner.arrival {
             return 0.0;
         }
-        let (ahead, right) = (task.goal[0] - path.end.ahead, task.goal[1] - path.end.right);
+        let (distance, ahead, right) = if task.ways.is_empty() {
+            let (ahead, right) = (task.goal[0] - path.end.ahead, task.goal[1] - path.end.right);
+            ((ahead * ahead + right * right).sqrt(), ahead, right)
+        } else {
+            self.risk.grid().way(&task.ways, path.end)
+        };
         let (sine, cosine) = sin_cos(path.end.heading);
         let bearing = atan2(ahead * sine + right * cosine, ahead * cosine - right * sine).abs();
-        let distance = (ahead * ahead + right * right).sqrt();
         let facing = inner.costs.facing * bearing.min(MAX_BEARING);
         distance + facing * distance.min(inner.reach)
     }

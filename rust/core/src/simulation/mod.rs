@@ -4,7 +4,7 @@
 //! - [`state`], [`snapshot`], [`active_contact`]: its state, the data needed to continue, its
 //!   contacts;
 //! - [`rover`]: a rover on a terrain, with its [commands](rover_command), its
-//!   [contacts](rover_contacts), its [ordinary] steps, its [`reading`] and the [`linearisation`] of
+//!   [contacts](rover_contacts), its [ordinary] steps, its [`reading`], what [rays](rover_rays) meet, and the [`linearisation`] of
 //!   a step;
 //! - [`planar`]: a planar machine on a ground; [`grains`]: a bed of grains,
 //!   perhaps with a machine on it;
@@ -26,6 +26,7 @@ pub mod rover_command;
 pub mod rover_contacts;
 pub mod rover_in_grains;
 mod rover_quick;
+pub mod rover_rays;
 pub mod scene;
 pub mod snapshot;
 pub mod state;

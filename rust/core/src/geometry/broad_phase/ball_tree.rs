@@ -10,6 +10,8 @@
 
 use nalgebra::Vector3;
 
+use super::bounds::Bounds;
+use crate::geometry::ray::{self, Hit, Ray};
 use crate::geometry::shape::Sphere;
 use crate::scalar::elementary::hypot;
 
@@ -50,6 +52,8 @@ pub struct BallTree {
     balls: Vec<Ball>,
     /// Where each ball of the input is among them.
     places: Vec<u32>,
+    /// Around all.
+    bounds: Option<Bounds>,
 }
 
 impl BallTree {
@@ -76,10 +80,16 @@ impl BallTree {
         for (place, ball) in balls.iter().enumerate() {
             places[ball.index as usize] = narrow(place);
         }
+        let around = |ball: &Sphere| Bounds {
+            low: ball.centre.add_scalar(-ball.radius),
+            high: ball.centre.add_scalar(ball.radius),
+        };
+        let bounds = spheres.iter().map(around).reduce(|a, b| a.with(&b));
         Self {
             nodes,
             balls,
             places,
+            bounds,
         }
     }
 
@@ -141,6 +151,75 @@ impl BallTree {
     pub fn visit_pillar(&self, centre: &Vector3<f64>, radius: f64, mut visit: impl FnMut(&Sphere)) {
         let reach = [radius, f64::INFINITY, radius];
         self.search(centre, &reach, |ball| visit(&ball.sphere));
+    }
+
+    /// The ball that a ray meets first within `reach` (m).
+    #[must_use]
+    pub fn first_hit(&self, ray: &Ray, reach: f64) -> Option<Hit> {
+        let inverse = ray.inverse();
+        let whole = self.bounds?.crossing(&ray.origin, &inverse, reach)?;
+        let mut nearest: Option<(f64, &Sphere)> = None;
+        let mut waiting = [(0_u32, [0.0_f64; 2]); DEPTH];
+        let mut n_waiting = 0;
+        let (mut at, mut within) = (0_usize, whole);
+        loop {
+            let node = &self.nodes[at];
+            if node.kind < IS_LEAF {
+                let axis = node.kind as usize;
+                let (x, inverse) = (ray.origin[axis], inverse[axis]);
+                let [enter, leave] = within;
+                // Where the ray leaves the one half and where it enters the other.
+                let (lower, upper) = (at, node.at as usize);
+                let lower_end = (node.lower_end - x) * inverse;
+                let upper_begin = (node.upper_begin - x) * inverse;
+                let (near, far, until, from) = if inverse >= 0.0 {
+                    (lower + 1, upper, lower_end, upper_begin)
+                } else {
+                    (upper, lower + 1, upper_begin, lower_end)
+                };
+                let near_range = [enter, leave.min(until)];
+                let far_range = [enter.max(from), leave];
+                let crosses = |range: [f64; 2]| range[0] <= range[1];
+                match (crosses(near_range), crosses(far_range)) {
+                    (true, true) => {
+                        waiting[n_waiting] = (narrow(far), far_range);
+                        n_waiting += 1;
+                        (at, within) = (near, near_range);
+                        continue;
+                    }
+                    (true, false) => {
+                        (at, within) = (near, near_range);
+                        continue;
+                    }
+                    (false, true) => {
+                        (at, within) = (far, far_range);
+                        continue;
+                    }
+                    (false, false) => {}
+                }
+            } else {
+                let count = (node.kind - IS_LEAF) as usize;
+                for ball in &self.balls[node.at as usize..][..count] {
+                    let reach = nearest.map_or(reach, |(distance, _)| distance);
+                    if let Some(distance) = ray::sphere::distance(ray, &ball.sphere, reach) {
+                        nearest = Some((distance, &ball.sphere));
+                    }
+                }
+            }
+            loop {
+                if n_waiting == 0 {
+                    return nearest
+                        .map(|(distance, ball)| ray::sphere::hit_at(ray, ball, distance));
+                }
+                n_waiting -= 1;
+                let (next, [enter, leave]) = waiting[n_waiting];
+                let leave = nearest.map_or(leave, |(distance, _)| leave.min(distance));
+                if enter <= leave {
+                    (at, within) = (next as usize, [enter, leave]);
+                    break;
+                }
+            }
+        }
     }
 
     /// Visits the balls of all leaves that come closer than `reach` to `centre` along each axis.
@@ -263,6 +342,21 @@ mod tests {
                 .filter(|&i| spheres[i].distance(&centre) <= reach)
                 .collect();
             prop_assert_eq!(found, expected);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_ray_meets_the_ball_that_looking_at_all_finds(
+            spheres in prop::collection::vec(sphere(), 0..200),
+            origin in prop::array::uniform3(prop_oneof![4 => -12.0..12.0, 1 => Just(1.0)]),
+            direction in prop::array::uniform3(prop_oneof![4 => -1.0..1.0, 1 => Just(0.0)]),
+            reach in prop_oneof![1 => 0.0..20.0, 1 => Just(f64::INFINITY)],
+        ) {
+            let Some(ray) = Ray::new(origin.into(), direction.into()) else { return Ok(()) };
+            let found = BallTree::new(&spheres).first_hit(&ray, reach).map(|hit| hit.distance);
+            let all = spheres.iter().filter_map(|ball| ray::sphere::distance(&ray, ball, reach));
+            prop_assert_eq!(found, all.reduce(f64::min));
         }
     }
 

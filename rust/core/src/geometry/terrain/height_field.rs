@@ -21,6 +21,7 @@ use super::sphere_field::MAX_SIZE;
 use super::surface::{Edge, Face, Hinge, MAX_SPOKES, Vertex};
 use super::tiles::{Tile, Tiles};
 use super::{Coverage, GROUND, Primitive, Terrain};
+use crate::geometry::ray::{self, Hit, Ray};
 use crate::geometry::shape::Sphere;
 
 /// Pieces that belong to one corner.
@@ -50,7 +51,7 @@ pub struct HeightField {
 
 /// One of the two faces of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Half {
+pub(in crate::geometry) enum Half {
     /// u ≥ v.
     Low,
     /// u < v.
@@ -173,6 +174,33 @@ impl HeightField {
     #[must_use]
     pub fn origin(&self) -> [f64; 2] {
         self.origin
+    }
+
+    /// Bounds of its tiles.
+    #[inline]
+    pub(in crate::geometry) fn tiles(&self) -> &Tiles {
+        &self.tiles
+    }
+
+    /// Heights of a cell's corners (m): of (column, row), the next column, the next row, and both.
+    #[inline]
+    pub(in crate::geometry) fn cell_heights(&self, [i, j]: [usize; 2]) -> [f32; 4] {
+        let at = j * self.columns + i;
+        let (near, far) = (
+            &self.heights[at..at + 2],
+            &self.heights[at + self.columns..][..2],
+        );
+        [near[0], near[1], far[0], far[1]]
+    }
+
+    /// Unit normal of a face of a cell; None where there is none.
+    #[inline]
+    pub(in crate::geometry) fn face_normal(
+        &self,
+        cell: [usize; 2],
+        half: Half,
+    ) -> Option<Vector3<f64>> {
+        self.normal(cell.map(narrow), half)
     }
 
     /// Memory, bytes.
@@ -645,6 +673,10 @@ impl Terrain for HeightField {
             },
         );
         hole.map_or(Coverage::Known, Coverage::Unknown)
+    }
+
+    fn first_hit(&self, ray: &Ray, reach: f64) -> Option<Hit> {
+        ray::height_field::hit(ray, self, reach)
     }
 
     fn height(&self, x: f64, z: f64) -> Option<f64> {

@@ -4,7 +4,7 @@
 //! open one pushes outwards too, and what lies below it is inside.
 
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::Vector3;
 
@@ -13,7 +13,9 @@ use super::plane::Plane;
 use super::sphere_field::check_entry;
 use super::surface::{Edge, Face, Hinge, MAX_SPOKES, Vertex, Wall};
 use super::{Coverage, GROUND, Primitive, Terrain};
-use crate::geometry::broad_phase::BallTree;
+use crate::geometry::broad_phase::{BallTree, Bounds, BoxTree};
+use crate::geometry::ray::triangle::Sheared;
+use crate::geometry::ray::{Hit, Ray};
 use crate::geometry::shape::Sphere;
 use crate::scalar::elementary::sin_cos;
 
@@ -41,6 +43,8 @@ pub struct TriangleMesh {
     spokes: Vec<u32>,
     /// Bounding balls of the triangles.
     tree: BallTree,
+    /// Their bounding boxes, from the first ray on.
+    boxes: OnceLock<BoxTree>,
     /// Where it is not the default.
     material: Option<Arc<str>>,
 }
@@ -114,6 +118,7 @@ impl TriangleMesh {
             begins,
             spokes,
             tree: BallTree::new(&balls),
+            boxes: OnceLock::new(),
         })
     }
 
@@ -133,6 +138,17 @@ impl TriangleMesh {
     #[must_use]
     pub fn is_closed(&self) -> bool {
         self.neighbours.iter().flatten().all(|&t| t != NONE)
+    }
+
+    fn bounding_boxes(&self) -> BoxTree {
+        let bounds = |triangle: &[u32; 3]| {
+            let corners = triangle.map(|v| self.vertices[v as usize]);
+            let of_corner = |x: &Vector3<f64>| Bounds { low: *x, high: *x };
+            let corners = corners.iter().map(of_corner);
+            corners.fold(Bounds::NOTHING, |all, one| all.with(&one))
+        };
+        let boxes: Vec<Bounds> = self.triangles.iter().map(bounds).collect();
+        BoxTree::new(&boxes)
     }
 
     fn ends(&self, t: usize, k: usize) -> [Vector3<f64>; 2] {
@@ -397,6 +413,24 @@ impl Terrain for TriangleMesh {
             furthest = furthest.max(n.dot(&ball.centre) + ball.radius);
         });
         furthest
+    }
+
+    fn first_hit(&self, ray: &Ray, reach: f64) -> Option<Hit> {
+        let sheared = Sheared::new(ray);
+        let mut nearest = None;
+        let boxes = self.boxes.get_or_init(|| self.bounding_boxes());
+        boxes.visit_along(ray, reach, |t, reach| {
+            let corners = self.triangles[t as usize].map(|v| self.vertices[v as usize]);
+            let Some(distance) = sheared.distance(&corners, reach) else {
+                return reach;
+            };
+            nearest = Some((distance, t));
+            distance
+        });
+        nearest.map(|(distance, t)| Hit {
+            distance,
+            normal: self.normals[t as usize],
+        })
     }
 
     fn height(&self, x: f64, z: f64) -> Option<f64> {

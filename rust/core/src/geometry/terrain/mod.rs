@@ -24,6 +24,7 @@ pub use sphere_field::SphereField;
 pub use surface::{Edge, Face, Vertex};
 pub use union::Union;
 
+use super::ray::{Hit, Ray};
 use super::shape::Sphere;
 
 /// A convex piece of ground whose distance to every shape has a closed form.
@@ -139,6 +140,9 @@ pub trait Terrain: Send + Sync {
     fn furthest(&self, _n: &Vector3<f64>, _centre: &Vector3<f64>, _radius: f64) -> f64 {
         f64::INFINITY
     }
+
+    /// What a ray meets first within `reach` (m), from either side of a surface.
+    fn first_hit(&self, ray: &Ray, reach: f64) -> Option<Hit>;
 
     /// Height y (m) of the visible surface at (x, z); `None` where there is none.
     fn height(&self, x: f64, z: f64) -> Option<f64>;

@@ -5,6 +5,7 @@ use nalgebra::{Unit, Vector3};
 use super::error::TerrainError;
 use super::sphere_field::MAX_SIZE;
 use super::{Primitive, Terrain};
+use crate::geometry::ray::{self, Hit, Ray};
 
 /// Largest deviation of the squared length of a normalised vector from 1: three roundings of its
 /// entries, and those of the square.
@@ -130,6 +131,10 @@ impl Terrain for Plane {
 
     fn n_primitives(&self) -> u32 {
         1
+    }
+
+    fn first_hit(&self, ray: &Ray, reach: f64) -> Option<Hit> {
+        ray::plane::hit(ray, self, reach)
     }
 
     fn height(&self, x: f64, z: f64) -> Option<f64> {

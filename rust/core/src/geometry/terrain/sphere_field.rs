@@ -9,6 +9,7 @@ use super::plane::Plane;
 use super::rocks::Rocks;
 use super::{Coverage, GROUND, Primitive, ROCK, Terrain};
 use crate::geometry::broad_phase::BallTree;
+use crate::geometry::ray::{self, Hit, Ray};
 use crate::geometry::shape::Sphere;
 use crate::scalar::elementary::{hypot, sin_cos};
 
@@ -238,6 +239,13 @@ impl Terrain for SphereField {
         } else {
             Coverage::Silent
         }
+    }
+
+    fn first_hit(&self, ray: &Ray, reach: f64) -> Option<Hit> {
+        let ground = self.ground.as_ref();
+        let ground = ground.and_then(|plane| ray::plane::hit(ray, plane, reach));
+        let reach = ground.map_or(reach, |hit| hit.distance);
+        self.tree.first_hit(ray, reach).or(ground)
     }
 
     /// The highest of ground and spheres.

@@ -40,7 +40,7 @@ pub(super) struct Tile {
 
 /// Bounds of all tiles.
 #[derive(Clone, Debug)]
-pub(super) struct Tiles {
+pub(in crate::geometry) struct Tiles {
     levels: Vec<Level>,
 }
 
@@ -80,6 +80,35 @@ impl Tiles {
     pub(super) fn has_hole(&self) -> bool {
         let top = self.levels.last();
         top.is_some_and(|level| level.bounds.iter().any(|bound| bound.has_hole))
+    }
+
+    /// Highest point, m; −∞ without data.
+    pub(in crate::geometry) fn highest(&self) -> f32 {
+        let top = self.levels.last().map(|level| level.bounds[0].highest);
+        top.unwrap_or(f32::NEG_INFINITY)
+    }
+
+    /// Cells along the side of a tile of the first level.
+    pub(in crate::geometry) fn finest(&self) -> usize {
+        FIRST
+    }
+
+    /// First cell and size of the widest tile about a cell that is wanted; `wants` gets these and
+    /// the tile's highest point, m. `cells`: columns and rows of cells of the map.
+    #[inline]
+    pub(in crate::geometry) fn widest(
+        &self,
+        cell: [usize; 2],
+        cells: [usize; 2],
+        wants: impl Fn([usize; 2], [usize; 2], f32) -> bool,
+    ) -> Option<([usize; 2], [usize; 2])> {
+        self.levels.iter().rev().find_map(|level| {
+            let [column, row] = cell.map(|k| k / level.side);
+            let first = [column * level.side, row * level.side];
+            let size = [0, 1].map(|k| level.side.min(cells[k] - first[k]));
+            let highest = level.bounds[row * level.columns + column].highest;
+            wants(first, size, highest).then_some((first, size))
+        })
     }
 
     /// Bytes.

@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 use super::error::TerrainError;
 use super::plane::Plane;
 use super::{Coverage, Primitive, Terrain};
+use crate::geometry::ray::{Hit, Ray};
 use crate::geometry::shape::Sphere;
 
 /// Everything that any of several terrains has. Immutable.
@@ -160,6 +161,13 @@ impl Terrain for Union {
         let surfaces = self.parts.iter().filter(|part| part.has_surface());
         let distances = surfaces.map(|part| part.furthest(n, centre, radius));
         distances.fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    fn first_hit(&self, ray: &Ray, reach: f64) -> Option<Hit> {
+        self.parts.iter().fold(None, |nearest: Option<Hit>, part| {
+            let reach = nearest.map_or(reach, |hit| hit.distance);
+            part.first_hit(ray, reach).or(nearest)
+        })
     }
 
     fn height(&self, x: f64, z: f64) -> Option<f64> {

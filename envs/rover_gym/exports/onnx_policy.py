@@ -1,0 +1,128 @@
+"""Policies as ONNX files."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rover_gym.exports.onnx_graph import Perceptron, onnx_model
+from rover_gym.extras import MissingExtraError, require
+from rover_gym.policy.arc_forecast import OUTPUTS
+from rover_gym.policy.features import LARGEST_FEATURE
+from rover_gym.policy.foresight_policy import FORECAST_FILE
+from rover_gym.policy.network import Network
+from rover_gym.policy.policy_card import PolicyCard
+from rover_gym.policy.policy_files import PolicyError, is_there
+from rover_gym.policy.shipped import FOLDER, find_policy
+from rover_gym.validation import refuse
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+#: The file that tells a run of `training/train_raw.py`.
+RAW_FILE = "model.zip"
+
+
+def write_onnx(policy: str | Path, path: str | Path, terrain: str = "plane") -> Path:
+    """Writes a policy's network as ONNX, with the normalisation of its inputs.
+
+    | policy | input | output |
+    |---|---|---|
+    | "trained", or the folder of a trained policy | `features` | `command`: three entries in [-1, 1] |
+    | "foresight", or the folder of a forecast | `features` | `outcomes`: way, stuck, failed |
+    | the folder of a run of `training/train_raw.py` | `observation` | `action` |
+
+    Args:
+        policy: The policy.
+        path: The file to write, with its folder.
+        terrain: Of which "trained" is meant.
+
+    Raises:
+        PolicyError: There is no such policy, it has no network, or its files are damaged.
+        OSError: A file may not be read or written.
+        MissingExtraError: An extra is not installed.
+    """
+    require("onnx", "onnx")
+    model = onnx_policy(policy, terrain)
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(model.SerializeToString())
+    return path
+
+
+def onnx_policy(policy: str | Path, terrain: str = "plane") -> Any:
+    """The `onnx.ModelProto` of a policy, as `write_onnx` writes it.
+
+    Raises:
+        PolicyError: There is no such policy, it has no network, or its files are damaged.
+        OSError: A file may not be read.
+        MissingExtraError: An extra is not installed.
+    """
+    folder = FOLDER / "foresight" if policy == "foresight" else Path(policy)
+    if is_there(folder / FORECAST_FILE):
+        facts: Mapping[str, Any] = {
+            "kind": "forecast",
+            "features": "rover_gym.policy.arc_forecast.ArcFeatures, and whether the arc is driven fast",
+            "outcomes": "way along the arc over the way at cruising speed; share of the time that ends an episode for"
+            " which the trunk has been held; likelihood that the episode has failed",
+        }
+        return onnx_model(
+            forecast_network(Network.read(folder / FORECAST_FILE)), "forecast", "features", "outcomes", facts
+        )
+    if is_there(folder / RAW_FILE):
+        return _raw(folder)
+    found = find_policy(str(policy), terrain)
+    if found is None:
+        refuse(PolicyError, "policy", str(policy), "has no network to export")
+    card = PolicyCard.read(found / "policy.json")
+    facts = {
+        "kind": "trained",
+        "features": f"rover_gym.policy.features.Features with pool={card.pool}",
+        "command": "rover_gym.policy.command.CommandController"
+        + (": offsets from the guide's command" if card.guided else ""),
+        "card": asdict(card),
+    }
+    return onnx_model(command_network(Network.read(found / "policy.npz")), "policy", "features", "command", facts)
+
+
+def command_network(network: Network) -> Perceptron:
+    """A policy's network: outputs clipped to [-1, 1]."""
+    return Perceptron(
+        network.weights, network.biases, "Tanh", network.mean, network.deviation, LARGEST_FEATURE, squash="Clip"
+    )
+
+
+def forecast_network(network: Network) -> Perceptron:
+    """A forecast's network: outputs in the units of `Outcomes`, stuck and failed from 0 to 1."""
+    return Perceptron(
+        network.weights,
+        network.biases,
+        "Tanh",
+        network.mean,
+        network.deviation,
+        LARGEST_FEATURE,
+        squash="Clip",
+        scale=OUTPUTS,
+        low=np.array([-OUTPUTS[0], 0.0, 0.0], np.float32),
+        high=OUTPUTS,
+    )
+
+
+def _raw(folder: Path) -> Any:
+    """A policy of stable-baselines3: from the observation to the action, whole."""
+    try:
+        from rover_gym.exports.onnx_raw import raw_network  # noqa: PLC0415 - torch is slow to load, and optional
+        from rover_gym.learning.raw_policy import RawPolicy  # noqa: PLC0415
+    except ModuleNotFoundError as error:
+        raise MissingExtraError(error.name or "torch", "train") from error
+    policy = RawPolicy.load(folder)
+    facts = {
+        "kind": "raw",
+        "observation": "that of RoverEnv, made with `environment`",
+        "action": "that of RoverEnv",
+        "environment": policy.environment,
+    }
+    return onnx_model(raw_network(policy), "policy", "observation", "action", facts)

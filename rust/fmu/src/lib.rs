@@ -1,0 +1,13 @@
+//! The library of an FMI 3.0 co-simulation unit of a rover.
+//!
+//! `rover export fmu` packs it with a scene. Arrows point one way: `scene_file` reads the scene,
+//! `unit` steps it, `border` holds the C functions and all unsafe code. The rover itself is
+//! `rover-core`'s: the unit has no mechanics.
+#![deny(unsafe_code)]
+
+mod border;
+mod reading;
+mod refusal;
+mod saved;
+mod scene_file;
+mod unit;

@@ -1,0 +1,47 @@
+//! The state of a unit, which a master keeps, restores, and writes as bytes.
+
+use rover_core::simulation::{RoverScene, Snapshot};
+use serde::{Deserialize, Serialize};
+
+use crate::refusal::Refusal;
+use crate::unit::{Inputs, LastStep, Mode, Parameters};
+
+/// Everything that changes in a unit.
+#[derive(Clone, Serialize, Deserialize)]
+pub struct Saved {
+    /// Of the unit that it belongs to.
+    pub token: String,
+    pub mode: Mode,
+    pub parameters: Parameters,
+    pub inputs: Inputs,
+    /// Time of the master, s.
+    pub time: f64,
+    /// Where the run ends, s.
+    pub stop: Option<f64>,
+    pub last: LastStep,
+    pub rover: Snapshot<RoverScene>,
+}
+
+impl Saved {
+    /// As bytes, from which [`Self::from_bytes`] reads the same.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, Refusal> {
+        postcard::to_stdvec(self).map_err(|e| damaged(&e))
+    }
+
+    /// Reads exactly these bytes.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, Refusal> {
+        let (saved, rest) = postcard::take_from_bytes(bytes).map_err(|e| damaged(&e))?;
+        if rest.is_empty() {
+            return Ok(saved);
+        }
+        Err(Refusal::State {
+            message: format!("{} bytes follow its end", rest.len()),
+        })
+    }
+}
+
+fn damaged(e: &postcard::Error) -> Refusal {
+    Refusal::State {
+        message: format!("is damaged ({e})"),
+    }
+}

@@ -1,0 +1,93 @@
+//! Rays as arrays, and what they meet as arrays.
+
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use rover_core::geometry::ray::{self, Hit, Ray, check_rays};
+use rover_core::geometry::{RayError, Terrain};
+
+use crate::arguments::{Given, shown};
+use crate::arrays::{array, fresh, fresh_rows};
+use crate::errors::{BorderError, Kind, Value};
+
+/// Distances (n,) and normals (n, 3).
+pub type Met<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
+
+impl From<RayError> for BorderError {
+    fn from(e: RayError) -> Self {
+        let (index, value) = match &e {
+            RayError::MismatchedLengths { directions, .. } => (None, Value::Count(*directions)),
+            RayError::NotFinite { index, value, .. } | RayError::TooFar { index, value, .. } => {
+                (Some(index), Value::Number(*value))
+            }
+            RayError::NoDirection { index } => (Some(index), Value::Numbers(vec![0.0; 3])),
+            RayError::BadRange { value } => (None, Value::Number(*value)),
+        };
+        let field = index.map_or_else(
+            || e.field().to_owned(),
+            |index| format!("{}[{index}]", e.field()),
+        );
+        Self {
+            kind: Kind::Option,
+            message: e.to_string(),
+            field: Some(field),
+            value,
+        }
+    }
+}
+
+/// (n, 3) numbers, or (3,) for all rays.
+fn triples(value: &Bound<'_, PyAny>, field: &str) -> PyResult<(Vec<[f64; 3]>, bool)> {
+    let given = array(value, Kind::Option, field)?;
+    let view = given.as_array();
+    let is_one = view.shape() == [3];
+    if !is_one && (view.ndim() != 2 || view.shape()[1] != 3) {
+        let shape = view.shape();
+        let message = format!("{field}: needs shape (n, 3) or (3,), has {shape:?}");
+        return Err(BorderError::option(field, message, Value::Text(shown(value))).into());
+    }
+    let flat: Vec<f64> = view.iter().copied().collect();
+    let rows = flat.chunks_exact(3).map(|x| [x[0], x[1], x[2]]).collect();
+    Ok((rows, is_one))
+}
+
+/// Checked rays, and their range, m.
+pub fn rays(
+    origins: &Bound<'_, PyAny>,
+    directions: &Bound<'_, PyAny>,
+    max_range: Given<'_>,
+) -> PyResult<(Vec<Ray>, f64)> {
+    let (mut origins, has_one_origin) = triples(origins, "origins")?;
+    let (mut directions, has_one_direction) = triples(directions, "directions")?;
+    if has_one_origin && !has_one_direction {
+        origins = vec![origins[0]; directions.len()];
+    } else if has_one_direction && !has_one_origin {
+        directions = vec![directions[0]; origins.len()];
+    }
+    let range = max_range
+        .maybe(Kind::Option, "max_range")?
+        .unwrap_or(f64::INFINITY);
+    let rays = check_rays(&origins, &directions, range).map_err(BorderError::from)?;
+    Ok((rays, range))
+}
+
+/// Hits as arrays: infinite distances and nan where nothing is met.
+pub fn met<'py>(py: Python<'py>, hits: &[Option<Hit>]) -> PyResult<Met<'py>> {
+    let distance = |hit: &Option<Hit>| hit.map_or(f64::INFINITY, |hit| hit.distance);
+    let normal = |hit: &Option<Hit>| hit.map_or([f64::NAN; 3], |hit| hit.normal.into());
+    let distances: Vec<f64> = hits.iter().map(distance).collect();
+    let normals: Vec<[f64; 3]> = hits.iter().map(normal).collect();
+    Ok((fresh(py, &distances), fresh_rows(py, &normals)?))
+}
+
+/// Casts rays against a terrain.
+pub fn cast_rays<'py>(
+    terrain: &dyn Terrain,
+    py: Python<'py>,
+    origins: &Bound<'_, PyAny>,
+    directions: &Bound<'_, PyAny>,
+    max_range: Given<'_>,
+) -> PyResult<Met<'py>> {
+    let (rays, range) = rays(origins, directions, max_range)?;
+    let hits = py.detach(|| ray::cast(terrain, &rays, range));
+    met(py, &hits)
+}

@@ -1,0 +1,92 @@
+"""ONNX files give the originals' outputs to 1e-5, in the runtime that robots use."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from rover_gym.cli import app
+from rover_gym.policy import Network, PolicyError, TrainedPolicy, policy_arguments, policy_folder
+from rover_gym.policy.arc_forecast import OUTPUTS
+from rover_gym.policy.shipped import FOLDER
+
+pytest.importorskip("onnx")
+pytest.importorskip("onnxruntime")
+
+import onnx
+import onnxruntime as runtime
+
+from rover_gym import RoverEnv
+from rover_gym.exports import onnx_policy
+
+
+def run(model: Any, rows: np.ndarray) -> np.ndarray:
+    options = runtime.SessionOptions()
+    options.intra_op_num_threads = 1
+    session = runtime.InferenceSession(model.SerializeToString(), options, providers=["CPUExecutionProvider"])
+    (result,) = session.run(None, {session.get_inputs()[0].name: rows.astype(np.float32)})
+    return np.asarray(result)
+
+
+def facts(model: Any) -> dict[str, str]:
+    return {entry.key: entry.value for entry in model.metadata_props}
+
+
+def features(network: Network, n: int = 500) -> np.ndarray:
+    """Inputs around the network's mean, some of them far outside of what it has seen."""
+    draw = np.random.default_rng(5).standard_normal((n, len(network.mean)))
+    draw[::10] *= 100.0
+    return (network.mean + draw * network.deviation).astype(np.float32)
+
+
+@pytest.mark.parametrize("terrain", ["plane", "sphere_field"])
+def test_a_shipped_policy_gives_the_same_commands(terrain: str) -> None:
+    model, network = onnx_policy("trained", terrain), Network.read(policy_folder(terrain) / "policy.npz")
+    rows = features(network)
+    assert np.abs(run(model, rows) - network(rows)).max() < 1e-5
+    assert np.ptp(network(rows), axis=0).min() > 0.1  # the commands differ
+    assert run(model, rows[:1]).shape == (1, 3)
+    card = json.loads(facts(model)["card"])
+    assert card["hold"] > 0.0
+    assert f"pool={card['pool']}" in facts(model)["features"]
+
+
+def test_it_decides_in_an_episode_as_the_policy_does() -> None:
+    """The features of real observations, from the policy's own code."""
+    env = RoverEnv(terrain="sphere_field", **policy_arguments(policy_folder("sphere_field")))
+    policy = TrainedPolicy.load(env, policy_folder("sphere_field"))
+    model, observation, state, rows = onnx_policy("trained", "sphere_field"), env.reset(seed=1)[0], None, []
+    commands = []
+    for _ in range(10):
+        action, state = policy.predict(observation, state)
+        rows.append(policy._features(observation[None])[0])
+        commands.append(policy._network(policy._features(observation[None]))[0])
+        observation, *_ = env.step(action)
+    assert np.abs(run(model, np.array(rows)) - commands).max() < 1e-5
+
+
+def test_the_forecast_gives_the_same_outcomes() -> None:
+    network = Network.read(FOLDER / "foresight" / "forecast.npz")
+    rows = features(network)
+    expected = network(rows) * OUTPUTS
+    expected[:, 1:] = expected[:, 1:].clip(0.0, 1.0)
+    assert np.abs(run(onnx_policy("foresight"), rows) - expected).max() < 1e-5
+
+
+@pytest.mark.parametrize("policy", ["pd", "scan", "no/such/folder"])
+def test_what_has_no_network_is_refused(policy: str, tmp_path: Path) -> None:
+    with pytest.raises(PolicyError):
+        onnx_policy(policy)
+    result = CliRunner().invoke(app, ["export", "onnx", policy, "-o", str(tmp_path / "a.onnx")])
+    assert result.exit_code == 2
+    assert len(result.stderr.splitlines()) == 1
+    assert not (tmp_path / "a.onnx").exists()
+
+
+def test_the_command_writes_a_file_that_the_checker_accepts(tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["export", "onnx", "foresight", "-o", str(tmp_path / "deep" / "a.onnx")])
+    assert result.exit_code == 0, result.output
+    onnx.checker.check_model(str(tmp_path / "deep" / "a.onnx"), full_check=True)
