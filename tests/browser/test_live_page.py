@@ -162,7 +162,7 @@ def test_a_policy_drives_and_a_rock_falls_in_its_way(live: Live) -> None:
 
 
 def test_text_of_the_drive_is_shown_as_text(live: Live) -> None:
-    live.loop._say("<img src=x onerror='document.title=1'><b id=bold>")
+    live.loop.tell("<img src=x onerror='document.title=1'><b id=bold>")
     await_that(lambda: "<b id=bold>" in text(live.browser, "notice"), "the notice")
     assert live.browser.find_elements(By.ID, "bold") == []
     assert live.browser.title == "rover live"

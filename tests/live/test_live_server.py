@@ -237,3 +237,17 @@ def test_only_what_moves_is_sent(served: Served) -> None:
             except TimeoutError:
                 continue
     assert sum(sizes) < 10_000
+
+
+def test_a_scene_that_cannot_be_shown_is_told_and_the_drive_goes_on(
+    served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("of the test")
+
+    monkeypatch.setattr(served.server.view, "show", broken)
+    with served.page() as page:
+        notice = heard(page, "state", lambda state: state["notice"] != "")["notice"]
+        assert notice == "the scene is shown no further: ZeroDivisionError: of the test"
+        at = served.loop.state.time
+        assert heard(page, "state", lambda state: state["time"] > at)

@@ -112,6 +112,11 @@ class LiveLoop:
             refuse(CommandError, "command", command, f"comes too soon: {MOST_WAITING} commands wait")
         self._wake.set()
 
+    def tell(self, notice: str) -> None:
+        """Sets the message for the user; for any thread."""
+        self._notice = notice
+        self._notices += 1
+
     def start(self) -> None:
         """Starts the thread."""
         self._thread = threading.Thread(target=self._run, name="live drive", daemon=True)
@@ -142,12 +147,12 @@ class LiveLoop:
         self._rover.step(hand.forward, hand.turn)
         if self._rover.goals_reached > goals:
             self._world += 1
-            self._say("the goal is reached: back to where it came from")
+            self.tell("the goal is reached: back to where it came from")
         self._past.keep(self._rover)
         self._guard(lambda recording: recording.append(self._rover))
         if self._rover.ended:
             self._is_paused = True
-            self._say(f"{ENDINGS.get(self._rover.ended, self._rover.ended)}: rewind or restart")
+            self.tell(f"{ENDINGS.get(self._rover.ended, self._rover.ended)}: rewind or restart")
         self.state = self._current()
 
     def _run(self) -> None:
@@ -170,7 +175,7 @@ class LiveLoop:
                     due = self._clock()
         except Exception as error:  # the user must learn of it, and the recording must be closed
             self.failure = error
-            self._say(f"the drive has stopped: {type(error).__name__}: {error}")
+            self.tell(f"the drive has stopped: {type(error).__name__}: {error}")
         finally:
             self._stopping.set()
             self._finish()
@@ -188,7 +193,7 @@ class LiveLoop:
             try:
                 self._carry_out(command)
             except EXPECTED as error:
-                self._say(str(error))
+                self.tell(str(error))
 
     def _carry_out(self, command: Command) -> None:
         match command:
@@ -238,7 +243,7 @@ class LiveLoop:
         elif self._recording is None:
             self._recording = LiveRecording(self._folder, self._rover)
             self._note_file()
-            self._say(f"recording {self._recording.path.name}")
+            self.tell(f"recording {self._recording.path.name}")
 
     def _note_file(self) -> None:
         if self._recording is not None:
@@ -250,7 +255,7 @@ class LiveLoop:
             self._guard(lambda recording: recording.close())
             if self._recording is not None:
                 self._recording = None
-                self._say(f"recorded {path.name}: {rows} rows")
+                self.tell(f"recorded {path.name}: {rows} rows")
 
     def _guard(self, work: Callable[[LiveRecording], None]) -> None:
         """Works on the recording, if there is one; where that fails, the recording ends and the drive goes on."""
@@ -259,11 +264,7 @@ class LiveLoop:
                 work(self._recording)
             except EXPECTED as error:
                 self._recording = None
-                self._say(str(error))
-
-    def _say(self, notice: str) -> None:
-        self._notice = notice
-        self._notices += 1
+                self.tell(str(error))
 
     def _measure(self) -> None:
         """Keeps pairs of wall and simulated time, of the last seconds."""

@@ -146,6 +146,7 @@
     part("record").classList.toggle("on", now.recording !== "");
     part("back").disabled = now.reach <= 0 || now.wheel === "elsewhere";
     wheel(now);
+    part("difficulty").disabled = now.wheel === "elsewhere" || now.scene.ground === "plane";
     for (const name of [...CHOICES, ...SLIDERS, "seed"]) {
       const node = part(name);
       if (document.activeElement !== node && performance.now() - (held[name] ?? -1e9) > 600) node.value = now.scene[name];

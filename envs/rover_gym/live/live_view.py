@@ -70,6 +70,12 @@ class LiveView:
         self._thread.join()
 
     def _run(self) -> None:
+        try:
+            self._follow()
+        except Exception as error:  # the drive goes on without its picture, and the user must learn of it
+            self._loop.tell(f"the scene is shown no further: {type(error).__name__}: {error}")
+
+    def _follow(self) -> None:
         before = now = self._loop.state
         since = due = time.perf_counter()
         while not self._stopping.is_set():
