@@ -11,7 +11,7 @@ from sphinx.application import Sphinx
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
-from extensions import cards, command_line, public_names  # noqa: E402 - they are found beside this file
+from extensions import cards, command_line, public_names, rooms  # noqa: E402 - they are found beside this file
 from extensions.compiled import use_stub  # noqa: E402
 
 from rover_gym import __version__  # noqa: E402
@@ -28,7 +28,7 @@ extensions = [
     "extensions.contents",
     "extensions.docstrings",
 ]
-exclude_patterns = ["_build", "_generated/names.md", "extensions"]
+exclude_patterns = ["_build", "_generated/names.md", "_generated/other-rooms.md", "extensions"]
 html_theme = "furo"
 html_title = f"rover-gym {release}"
 html_static_path = ["_static"]
@@ -49,7 +49,12 @@ autodoc_default_options = {"members": True, "undoc-members": True}
 def _write_generated(_app: Sphinx) -> None:
     folder = HERE / "_generated"
     folder.mkdir(exist_ok=True)
-    pages = {**cards.pages(), "command-line.md": command_line.page(), "names.md": public_names.table()}
+    pages = {
+        **cards.pages(),
+        "command-line.md": command_line.page(),
+        "names.md": public_names.table(),
+        "other-rooms.md": rooms.sections(),
+    }
     for name, text in pages.items():
         path = folder / name
         if not path.exists() or path.read_text(encoding="utf-8") != text:  # what is unchanged is not read again

@@ -27,22 +27,22 @@ def cell(text: str) -> str:
     return re.sub(r"\s+", " ", text).replace("|", r"\|").strip()
 
 
-def row(parameter: Any, context: Any) -> tuple[str, str, str]:
-    """How a parameter is written, its default, and what it means."""
+def row(parameter: Any, context: Any) -> tuple[str, str]:
+    """How a parameter is written, and what it means, with its default and range."""
     written, text = parameter.get_help_record(context)
+    names, _, value = cell(written).partition(" <")
     meaning, _, facts = text.rstrip("]").partition("  [")
-    default = ""
-    for fact in filter(None, facts.split("; ")):
+    for fact in sorted(filter(None, facts.split("; ")), key=lambda fact: fact.startswith("default")):
         if fact.startswith("default: "):
-            default = f"`{fact.removeprefix('default: ')}`"
+            meaning += f" Default: `{fact.removeprefix('default: ')}`."
         else:
-            meaning += f" ({fact.replace('<=', ' ≤ ').strip()})"
-    return f"`{cell(written)}`", cell(default), cell(meaning)
+            meaning = f"{meaning.rstrip('.')} ({fact.replace('<=', ' ≤ ').strip()})."
+    return f"`{names}`" + (f" {value.rstrip('>')}" if value else ""), cell(meaning)
 
 
-def table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+def table(head: tuple[str, str], rows: list[tuple[str, str]]) -> str:
     """A table in Markdown."""
-    lines = [head, tuple("---" for _ in head), *rows]
+    lines = [head, ("---", "---"), *rows]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
@@ -57,7 +57,7 @@ def section(path: tuple[str, ...], command: Any) -> str:
     for title, kind in (("argument", "argument"), ("option", "option")):
         listed = [one for one in command.params if one.param_type_name == kind and not getattr(one, "hidden", False)]
         if listed:
-            parts.append(table((title, "default", "meaning"), [row(one, context) for one in listed]))
+            parts.append(table((title, "meaning"), [row(one, context) for one in listed]))
     if command.epilog:
         parts.append(command.epilog)
     return "\n\n".join(part for part in parts if part)

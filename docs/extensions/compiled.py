@@ -3,6 +3,7 @@
 import __future__
 
 import operator
+import re
 import sys
 from collections.abc import Callable
 from functools import reduce
@@ -15,7 +16,23 @@ from sphinx.pycode import ModuleAnalyzer
 import rover_gym
 from rover_gym import mechanics
 
-ALIASES = (("npt.ArrayLike", "ArrayLike"), ("npt.NDArray[np.float64]", "np.ndarray"))  # unfolded, they fill half a page
+NAMES_IN_PRINT = (
+    ("npt.ArrayLike", "ArrayLike"),
+    (r"npt.NDArray\[np.\w+\]", "np.ndarray"),
+)  # unfolded, they fill half a page
+
+
+def in_print(text: str) -> str:
+    """A stub whose signatures say what they take: public names, and what private aliases stand for."""
+    for pattern, name in NAMES_IN_PRINT:
+        text = re.sub(pattern, name, text)
+    aliases = dict(re.findall(r"^(_\w+): TypeAlias = (.*)$", text, flags=re.MULTILINE))
+    text = re.sub(r"^_\w+: TypeAlias = .*\n", "", text, flags=re.MULTILINE)
+    aliases["_Terrain"] = "Terrain"
+    for _ in aliases:  # one may stand in another
+        for alias, meaning in aliases.items():
+            text = re.sub(rf"\b{alias}\b", meaning, text)
+    return re.sub(r"\b_([A-Z]\w*)\b", r"\1", text)  # a protocol that only the stub has
 
 
 def use_stub() -> None:
@@ -23,9 +40,7 @@ def use_stub() -> None:
     name = mechanics.__name__
     stub = ModuleType(name, mechanics.__doc__)
     source = Path(mechanics.__file__).with_name("_core.pyi")
-    text = source.read_text(encoding="utf-8")
-    for alias, name_in_print in ALIASES:
-        text = text.replace(alias, name_in_print)
+    text = in_print(source.read_text(encoding="utf-8"))
     stub.ArrayLike = type("ArrayLike", (), {"__module__": "numpy.typing"})
     stub.first_docstring = first_docstring
     run = text.replace("@overload", "@first_docstring")

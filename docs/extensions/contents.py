@@ -13,7 +13,7 @@ CAPTION = "Guides: live and among other tools"
 def unlisted(text: str, pages: set[str]) -> list[str]:
     """Pages of the top folder that no list of contents in a text names, sorted."""
     lists = re.findall(r"```\{toctree\}\n(.*?)```", text, flags=re.DOTALL)
-    listed = {line.strip() for block in lists for line in block.splitlines()}
+    listed = {re.sub(r".*<(.*)>$", r"\1", line.strip()) for block in lists for line in block.splitlines()}
     return sorted(page for page in pages - listed - {START} if "/" not in page)
 
 
@@ -22,7 +22,7 @@ def list_rest(app: Sphinx, name: str, source: list[str]) -> None:
     if name != START:
         return
     rest = unlisted(source[0], set(app.env.found_docs))
-    listing = "\n".join([f'```{{toctree}}\n:caption: "{CAPTION}"\n:maxdepth: 1\n', *rest, "```\n"]) if rest else ""
+    listing = "\n".join([f'```{{toctree}}\n:caption: "{CAPTION}"\n:hidden:\n', *rest, "```\n"]) if rest else ""
     source[0] = source[0].replace(MARK, listing)
 
 

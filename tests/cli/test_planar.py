@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from rover_gym.cli import app
 from rover_gym.figures.chapter_3 import draw_chapter_3
-from rover_gym.figures.planar_run import PLANAR_DRAWINGS, path_over_ground
+from rover_gym.figures.planar_drawing import PLANAR_DRAWINGS, path_over_ground
 from rover_gym.figures.soil_run_figures import SOIL_DRAWINGS
 from rover_gym.planar import BallSimulation, Sine, describe_planar, read_planar_run, record_planar
 from rover_gym.record import RecordingError, read_trajectory

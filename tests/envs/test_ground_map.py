@@ -70,7 +70,7 @@ def test_a_rover_remembers_the_ground_of_its_own_episode() -> None:
     twice = (np.concatenate((part, part)) for part in state)
     actions, state = policy.predict(both, tuple(twice), np.array([False, True]))
     assert actions.shape == (2, 12)
-    cells, corner = state[-2], state[-1]
+    cells, corner = state[-4], state[-3]
     x, z = ((corner[1, k] + np.arange(100)) * ScanPolicy.arguments()["height_scan"][2] for k in (0, 1))
     points = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
     truth = np.asarray(env.unwrapped.simulation.terrain.heights(points)).reshape(100, 100)  # type: ignore[union-attr]
@@ -83,7 +83,7 @@ def test_a_map_that_is_none_is_refused() -> None:
     env = gym.make("RoverRocks-v0", **ScanPolicy.arguments())
     with pytest.raises(OptionError, match="map"):
         ScanPolicy(env, map=160)  # type: ignore[arg-type]
-    for name, value in (("cells", 7), ("risk", -1.0), ("unknown", np.nan), ("trap", np.inf)):
+    for name, value in (("cells", 7), ("risk", -1.0), ("unknown", np.nan), ("trap", np.inf), ("every", 0)):
         with pytest.raises(OptionError, match=f"map.{name}"):
             MapOptions(**{name: value})  # type: ignore[arg-type]
     observation, _ = env.reset(seed=1)

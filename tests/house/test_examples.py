@@ -14,6 +14,7 @@ PAGES = (
     "docs/economy.md",
     "docs/identification.md",
     "docs/linearise.md",
+    "docs/live.md",
     "docs/logs.md",
     "docs/planar.md",
     "docs/recording.md",

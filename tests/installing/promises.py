@@ -108,18 +108,19 @@ heights = np.cumsum(rng.normal(0.0, 0.01, (60, 60)), axis=1).astype(np.float32)
 np.save("map.npy", heights)
 Image.fromarray(np.uint16(1000 * (heights - heights.min()))).save("map.png")
 about = {"driver": "GTiff", "width": 60, "height": 60, "count": 1, "dtype": "float32", "crs": "EPSG:32633"}
-with rasterio.open("map.tif", "w", transform=from_origin(0.0, 0.0, 0.5, 0.5), **about) as file:
+with rasterio.open("map.tif", "w", transform=from_origin(0.0, 30.0, 0.5, 0.5), **about) as file:
     file.write(heights, 1)
-rover("drive", "--terrain", "map.tif", "--time-limit", "0.2")
-rover("drive", "--terrain", "map.npy", "--spacing", "0.5", "--time-limit", "0.2")
-rover("drive", "--terrain", "map.png", "--spacing", "0.5", "--height-range", "0", "1", "--time-limit", "0.2")
+BRIEFLY = ("--goal", "4", "0", "--time-limit", "0.2")
+rover("drive", "--terrain", "map.tif", *BRIEFLY)
+rover("drive", "--terrain", "map.npy", "--spacing", "0.5", *BRIEFLY)
+rover("drive", "--terrain", "map.png", "--spacing", "0.5", "--height-range", "0", "1", *BRIEFLY)
 
 from rover_gym import TriangleMesh
 
 for ending in ("obj", "ply", "stl", "off", "glb"):
-    trimesh.creation.box((30.0, 30.0, 1.0)).export(f"ground.{ending}")
+    trimesh.creation.box((30.0, 1.0, 30.0)).export(f"ground.{ending}")
     TriangleMesh.from_file(f"ground.{ending}")
-rover("drive", "--terrain", "ground.stl", "--time-limit", "0.2")
+rover("drive", "--terrain", "ground.stl", *BRIEFLY)
 """,
     "planning": """
 rover("drive", "--difficulty", "1", "--policy", "planner", "--time-limit", "0.5")

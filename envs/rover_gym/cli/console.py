@@ -35,6 +35,8 @@ SET_BY = {
     "wheels": ("wheel", "--wheel"),
     "slips": ("slip", "--slip"),
     "position": ("start", "--start"),
+    "ground": ("terrain", "--terrain"),
+    "driver": ("policy", "--policy"),
     "count": ("balls", "--balls"),
     "radius_min": ("radius", "--radius"),
     "radius_max": ("radius", "--radius"),

@@ -6,12 +6,23 @@ from typing import Annotated
 
 import typer
 
-from rover_gym.cli.console import LARGEST_SEED, check_folder, plain_errors
+from rover_gym.cli.completion import complete_policy
+from rover_gym.cli.console import check_folder, plain_errors
 from rover_gym.cli.drivers import DRIVERS_HELP, named_driver
-from rover_gym.cli.scene_options import BUILT_IN, HeightRange, ModelName, Spacing, named_ground, named_model
+from rover_gym.cli.scene_options import (
+    BUILT_IN,
+    FRICTION,
+    HeightRange,
+    ModelName,
+    Spacing,
+    TerrainName,
+    chosen_terrain,
+    named_ground,
+    named_model,
+)
 from rover_gym.extras import require
 from rover_gym.live import LiveChoices, LiveLoop, LiveRover, LiveScene, LiveServer
-from rover_gym.live.live_scene import BY_HAND, DRAWN_GROUNDS
+from rover_gym.live.live_scene import BY_HAND, LARGEST_SEED
 from rover_gym.mechanics import Terrain
 
 #: How often the command looks whether the drive still runs, s.
@@ -21,19 +32,24 @@ LOOK = 0.2
 @plain_errors
 def live(
     *,
-    terrain: Annotated[
-        str, typer.Option(help="The ground: 'plane', 'rocks', 'hills', or the file of a map or a mesh.")
-    ] = "plane",
+    terrain: TerrainName = None,
     spacing: Spacing = None,
     height_range: HeightRange = None,
     model: ModelName = BUILT_IN,
-    difficulty: Annotated[float, typer.Option(help="Difficulty of rocks and hills, from 0 to 2.")] = 0.5,
+    difficulty: Annotated[
+        float | None,
+        typer.Option(help="Difficulty of rocks and hills, from 0 to 2. Default: 0.5. It implies rocks."),
+    ] = None,
     goal_distance: Annotated[float, typer.Option(help="Distance of the goal from the start, m.")] = 8.0,
-    policy: Annotated[str, typer.Option(help=f"'hand' for you, or {DRIVERS_HELP}")] = BY_HAND,
-    friction: Annotated[float, typer.Option(help="Friction coefficient.")] = 0.7,
+    policy: Annotated[
+        str, typer.Option(help=f"'hand' for you, or {DRIVERS_HELP}", autocompletion=complete_policy)
+    ] = BY_HAND,
+    friction: Annotated[float, typer.Option(help="Friction coefficient.")] = FRICTION,
     gravity: Annotated[float, typer.Option(help="Gravity, m/s².")] = 9.81,
     seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of ground, start and goal.")] = 0,
-    output: Annotated[Path, typer.Option(file_okay=False, help="Folder of the recordings.")] = Path(),
+    output: Annotated[
+        Path, typer.Option(file_okay=False, help="Folder of the recordings that the page asks for.")
+    ] = Path(),
     host: Annotated[
         str, typer.Option(help="Address to listen at. The default refuses other machines; 0.0.0.0 lets them in.")
     ] = "127.0.0.1",
@@ -49,22 +65,23 @@ def live(
     """
     require("viser", "replay")
     check_folder("output", output)
-    grounds: dict[str, str | Terrain] = dict(DRAWN_GROUNDS)
-    known = {"sphere_field": "rocks"}.get(terrain, terrain)
-    drivers, models = (*LiveChoices().drivers, "planner"), dict(LiveChoices().models)
-    if known not in grounds:
-        ground = named_ground(terrain, spacing, height_range)
-        known = Path(terrain).name if ground is not None else terrain
-        grounds |= {} if ground is None else {known: ground}
+    choices, scene = LiveChoices(), LiveScene()
+    named = chosen_terrain(terrain, difficulty)
+    grounds: dict[str, str | Terrain] = dict(choices.grounds)
+    if (ground := named_ground(named, spacing, height_range)) is not None:
+        named = Path(named).name
+        grounds[named] = ground
+    models, rover = dict(choices.models), model
     if model not in models:
-        models[Path(model).name] = named_model(model)
-    drivers += () if policy in drivers else (policy,)
-    choices = LiveChoices(grounds, models, drivers, named_driver)
+        rover = Path(model).name
+        models[rover] = named_model(model)
+    drivers = dict.fromkeys((*choices.drivers, "planner", policy))
+    choices = LiveChoices(grounds, models, tuple(drivers), named_driver)
     scene = LiveScene(
-        ground=known,
-        model=model if model in models else Path(model).name,
+        ground=named,
+        model=rover,
         driver=policy,
-        difficulty=difficulty,
+        difficulty=scene.difficulty if difficulty is None else difficulty,
         goal_distance=goal_distance,
         friction=friction,
         gravity=gravity,
@@ -72,17 +89,19 @@ def live(
     )
     loop = LiveLoop(LiveRover(scene, choices), output)
     server = LiveServer(loop, choices, host=host, port=port, fps=fps)
-    typer.echo(f"rover live: {server.address} (Ctrl-C ends it)")
+    typer.echo(f"live: {server.address} (Ctrl-C ends the drive)")
     loop.start()
     try:
         if show:
             webbrowser.open(server.address)
         while not loop.wait(LOOK):
             pass
+    except KeyboardInterrupt:
+        pass  # the end that is meant
     finally:
         loop.stop()
         server.stop()
-        if loop.state.notice.startswith("recorded"):
-            typer.echo(loop.state.notice)
+    if loop.recorded:
+        typer.echo(f"recorded: {', '.join(map(str, loop.recorded))}")
     if loop.failure is not None:
         raise loop.failure

@@ -218,6 +218,6 @@ def _run(
             ],
         )
         results.path("trajectory", path)
-        from rover_gym.figures.planar_run import draw_planar_run  # noqa: PLC0415 - matplotlib is slow to load
+        from rover_gym.figures.planar_drawing import draw_planar_run  # noqa: PLC0415 - matplotlib is slow to load
 
         results.path("figure", draw_planar_run(run, path.with_suffix(".png")))

@@ -52,7 +52,7 @@ def plot(
         paths = draw_grain_run(grain_run, folder, file_format=file_format, with_overview=overview)
     elif is_planar(trajectory):
         planar_run = planar_run_of(trajectory, recording)
-        from rover_gym.figures.planar_run import draw_planar_figures  # noqa: PLC0415 - as below
+        from rover_gym.figures.planar_drawing import draw_planar_figures  # noqa: PLC0415 - as below
 
         paths = draw_planar_figures(planar_run, folder, file_format=file_format, with_overview=overview)
     else:

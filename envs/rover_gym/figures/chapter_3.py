@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.figures.planar_run import GROUND
+from rover_gym.figures.planar_drawing import GROUND
 from rover_gym.figures.saving import save_figures
 from rover_gym.planar.planar_recording import describe_planar, record_planar
 from rover_gym.record.trajectory import Trajectory, read_trajectory

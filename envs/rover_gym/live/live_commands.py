@@ -21,7 +21,12 @@ LONGEST_REWIND = 3600.0
 
 @dataclass(frozen=True)
 class Drive:
-    """Drive by hand until the next such command, for a second at most: speed and curvature, each -1 to 1."""
+    """Drive by hand until the next such command, for a second at most.
+
+    Attributes:
+        forward: Speed, -1 to 1 of the largest.
+        turn: Curvature, -1 to 1 of the largest.
+    """
 
     forward: float = 0.0
     turn: float = 0.0
@@ -33,7 +38,11 @@ class Drive:
 
 @dataclass(frozen=True)
 class Pause:
-    """Stop the time, or let it go on."""
+    """Stop the time, or let it go on.
+
+    Attributes:
+        on: Whether it stops.
+    """
 
     on: bool = True
 
@@ -48,7 +57,11 @@ class SingleStep:
 
 @dataclass(frozen=True)
 class Rewind:
-    """Go back by a time, s."""
+    """Go back by a time.
+
+    Attributes:
+        seconds: How far, s.
+    """
 
     seconds: float = 5.0
 
@@ -58,7 +71,12 @@ class Rewind:
 
 @dataclass(frozen=True)
 class Change:
-    """Change a choice of `LiveScene`: its name, and its value."""
+    """Change a choice of `LiveScene`.
+
+    Attributes:
+        name: Name of the choice.
+        value: Its value.
+    """
 
     name: str
     value: str | float
@@ -75,7 +93,11 @@ class Change:
 
 @dataclass(frozen=True)
 class ThrowRock:
-    """Put a rock of a radius, m, in the rover's way."""
+    """Put a rock in the rover's way.
+
+    Attributes:
+        radius: Its radius, m.
+    """
 
     radius: float = 0.15
 
@@ -85,7 +107,11 @@ class ThrowRock:
 
 @dataclass(frozen=True)
 class Record:
-    """Begin a recording, or end it."""
+    """Begin a recording, or end it.
+
+    Attributes:
+        on: Whether it begins.
+    """
 
     on: bool = True
 

@@ -76,6 +76,7 @@ class LiveLoop:
     Attributes:
         state: The last state.
         failure: What stopped the loop unasked; None where nothing did.
+        recorded: Files that have been recorded to, in order.
     """
 
     def __init__(
@@ -93,6 +94,7 @@ class LiveLoop:
         self._pace: deque[tuple[float, float]] = deque()
         self._thread: threading.Thread | None = None
         self.failure: Exception | None = None
+        self.recorded: list[Path] = []
         self._past.keep(rover)
         self.state = self._current()
 
@@ -228,13 +230,19 @@ class LiveLoop:
         self._world += 1
         self._pace.clear()
         self._guard(lambda recording: recording.next_file(self._rover))
+        self._note_file()
 
     def _record(self, *, on: bool) -> None:
         if not on:
             self._end_recording()
         elif self._recording is None:
             self._recording = LiveRecording(self._folder, self._rover)
-            self._say(f"recording {self._recording.path}")
+            self._note_file()
+            self._say(f"recording {self._recording.path.name}")
+
+    def _note_file(self) -> None:
+        if self._recording is not None:
+            self.recorded.append(self._recording.path)
 
     def _end_recording(self) -> None:
         if self._recording is not None:
@@ -242,7 +250,7 @@ class LiveLoop:
             self._guard(lambda recording: recording.close())
             if self._recording is not None:
                 self._recording = None
-                self._say(f"recorded {path}: {rows} rows")
+                self._say(f"recorded {path.name}: {rows} rows")
 
     def _guard(self, work: Callable[[LiveRecording], None]) -> None:
         """Works on the recording, if there is one; where that fails, the recording ends and the drive goes on."""

@@ -190,8 +190,10 @@
     chart.legend = part("charts").appendChild(document.createElement("div"));
     chart.legend.className = "legend";
   }
-  const round = (value) => 10 ** Math.floor(Math.log10(value)) * [1, 2, 5, 10].find(
-    (factor) => factor * 10 ** Math.floor(Math.log10(value)) >= value * (1 - 1e-9));
+  const round = (value) => {
+    const power = 10 ** Math.floor(Math.log10(value));
+    return power * [1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10].find((factor) => factor * power >= value * (1 - 1e-9));
+  };
   const draw = (chart) => {
     const { canvas } = chart;
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];

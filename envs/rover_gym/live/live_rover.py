@@ -59,7 +59,7 @@ class _Wheel:
 
 
 @dataclass(frozen=True)
-class Moment:
+class LiveMoment:
     """A state of a `LiveRover`, from which it continues bit for bit.
 
     Attributes:
@@ -244,9 +244,9 @@ class LiveRover:
         self._replace(rocks=rocks)
         self._rocks = rocks
 
-    def moment(self) -> Moment:
+    def moment(self) -> LiveMoment:
         """The present state, for `go_back`."""
-        return Moment(
+        return LiveMoment(
             time=self.time,
             scene=self.scene,
             rocks=self._rocks,
@@ -257,7 +257,7 @@ class LiveRover:
             info=self.info,
         )
 
-    def go_back(self, moment: Moment) -> None:
+    def go_back(self, moment: LiveMoment) -> None:
         """Goes back to a moment of this drive: the world, the rover, its friction, its rocks and its driver."""
         moment.wheel.env.restore(moment.snapshot)
         self._take(moment.wheel)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
+from rover_gym.env.argument_checks import TERRAINS
 from rover_gym.env.rocks import MAX_DIFFICULTY
 from rover_gym.mechanics import OptionError, RoverModel, Terrain
 from rover_gym.policy.named_policy import NamedPolicy, named_policy
@@ -13,8 +14,6 @@ from rover_gym.validation import number, refuse, whole
 
 #: A driver that is no policy: the keyboard, the gamepad or the sliders.
 BY_HAND = "hand"
-#: Grounds that the environment draws itself, by the name that is chosen.
-DRAWN_GROUNDS: Mapping[str, str] = {"plane": "plane", "rocks": "sphere_field", "hills": "hills"}
 #: Friction coefficients and gravity, m/s², that a live drive takes.
 MAX_FRICTION = 5.0
 GRAVITY = (0.1, 30.0)
@@ -37,7 +36,7 @@ class LiveChoices:
         find_policy: Makes a driver of a name.
     """
 
-    grounds: Mapping[str, str | Terrain] = field(default_factory=lambda: dict(DRAWN_GROUNDS))
+    grounds: Mapping[str, str | Terrain] = field(default_factory=lambda: {name: name for name in TERRAINS})
     models: Mapping[str, RoverModel | None] = field(
         default_factory=lambda: {
             name: None if name == "rover" else RoverModel.named(name) for name in RoverModel.names()
@@ -106,7 +105,7 @@ class LiveScene:
     def arguments(self, choices: LiveChoices) -> dict[str, Any]:
         """The arguments of `RoverEnv`, but for those that the driver needs."""
         ground = choices.grounds[self.ground]
-        rocky = {"difficulty": self.difficulty} if ground in ("sphere_field", "hills") else {}
+        rocky = {"difficulty": self.difficulty} if ground in ("rocks", "hills") else {}
         return {
             "terrain": ground,
             "model": choices.models[self.model],

@@ -9,7 +9,7 @@ from rover_gym.mechanics import OptionError
 from rover_gym.validation import number, refuse
 
 if TYPE_CHECKING:
-    from rover_gym.live.live_rover import LiveRover, Moment
+    from rover_gym.live.live_rover import LiveMoment, LiveRover
 
 #: Simulated time between two moments, s, and how many are kept: one minute.
 EVERY, KEPT = 0.25, 240
@@ -19,7 +19,7 @@ class Past:
     """The last minute of a drive, in steps of a quarter of a second; older moments are forgotten."""
 
     def __init__(self) -> None:
-        self._moments: deque[Moment] = deque(maxlen=KEPT)
+        self._moments: deque[LiveMoment] = deque(maxlen=KEPT)
 
     def keep(self, rover: LiveRover) -> None:
         """Keeps the present moment, if the last one is long enough ago."""

@@ -48,4 +48,5 @@ class RawActions:
 
     def act(self, _observations: npt.NDArray[Any], actions: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
         """The actions `(n, n_actions)`."""
-        return np.clip(actions, -1.0, 1.0).astype(np.float32)
+        clipped: npt.NDArray[np.float32] = np.clip(actions, -1.0, 1.0).astype(np.float32)
+        return clipped

@@ -1,5 +1,7 @@
 """The ground as far as a rover has seen it, for a planner that does not know the rest."""
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -43,7 +45,7 @@ class ScannedGround:
         self._corner = np.zeros(2, np.int64)
         self._map.begin(self._cells, self._corner, (float(place[0]), float(place[1])))
 
-    def see(self, observation: npt.NDArray[np.float32]) -> None:
+    def see(self, observation: npt.NDArray[np.floating[Any]]) -> None:
         """Writes the scan of an observation `(size,)` into the map."""
         seen = observation.astype(np.float64)
         x, y, z, heading = (float(seen[self._q + k]) for k in (0, 1, 2, 4))

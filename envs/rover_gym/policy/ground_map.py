@@ -37,15 +37,18 @@ class MapOptions:
         risk: Factor on the costs of belly, climb and lean, which a path may still avoid.
         unknown: Further price of a metre over ground that is not known.
         trap: Further price of a metre at a place where the rover got stuck.
+        every: Decisions between two computations of the ways.
     """
 
     cells: int = 160
     risk: float = 0.4
     unknown: float = 0.0
     trap: float = 1.0
+    every: int = 3
 
     def __post_init__(self) -> None:
         whole("map.cells", self.cells, at_least=8, at_most=MOST_CELLS)
+        whole("map.every", self.every, at_least=1, at_most=1000)
         for name in ("risk", "unknown", "trap"):
             number(f"map.{name}", getattr(self, name), at_least=0.0, at_most=1e3)
 
@@ -89,14 +92,13 @@ class GroundMap:
         cells: Cells,
         corner: Corner,
         *,
-        place: Point,
         heading: float,
         goal: Point,
         slope: Sequence[float],
         boldness: float,
         traps: Array,
     ) -> Array:
-        """`(rows * columns,)` the way to the goal from each point of the scan, m.
+        """`(cells, cells)` the way to the goal from each cell, m.
 
         The slope of the ground plane, ahead and to the right, costs nothing.
         """
@@ -117,9 +119,14 @@ class GroundMap:
             (n - 1.0 - aim[0], aim[1]),
             options.risk * boldness,
             np.ascontiguousarray(price[::-1]),
-        )[::-1]
+        )
+        return ways[::-1]
+
+    def at_scan(self, ways: npt.NDArray[np.floating], corner: Corner, place: Point, heading: float) -> Array:
+        """`(rows * columns,)` the ways from the points of a scan taken at a place and a heading, m."""
         at = scan_points(self._offsets, place, heading) / self.cell - corner
-        return _interpolated(ways, at[:, 0].clip(0.0, n - 1.0), at[:, 1].clip(0.0, n - 1.0))
+        top = len(ways) - 1.0
+        return _interpolated(ways, at[:, 0].clip(0.0, top), at[:, 1].clip(0.0, top))
 
     def _follow(self, cells: Cells, corner: Corner, place: Point) -> None:
         """Moves the map where the rover has left its middle."""

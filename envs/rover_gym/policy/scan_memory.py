@@ -35,6 +35,8 @@ class ScanMemory:
         n_traps: `(n,)` how many there have been.
         ground: `(n, cells, cells)` heights of the ground that was seen, m; see `GroundMap`. No cells without a map.
         corner: `(n, 2)` where its first cell lies, in cells.
+        ways: `(n, cells, cells)` the way to the goal from each cell, m, when it was last computed.
+        ways_corner: `(n, 2)` where the first cell lay then.
     """
 
     command: Array
@@ -49,6 +51,8 @@ class ScanMemory:
     n_traps: Counts
     ground: npt.NDArray[np.float32]
     corner: Counts
+    ways: npt.NDArray[np.float32]
+    ways_corner: Counts
 
     @classmethod
     def of(cls, state: tuple[npt.NDArray[Any], ...] | None, n: int, cells: int = 0) -> "ScanMemory":
@@ -72,6 +76,8 @@ class ScanMemory:
             n_traps=np.zeros(n, np.int64),
             ground=np.zeros((n, cells, cells), np.float32),
             corner=np.zeros((n, 2), np.int64),
+            ways=np.zeros((n, cells, cells), np.float32),
+            ways_corner=np.zeros((n, 2), np.int64),
         )
         if state is None:
             return fresh

@@ -258,19 +258,21 @@ class ScanPolicy:
             self._map.begin(cells, corner, (x, z))
         heights = row[self._heights] * self._scale[self._heights] + y
         self._map.remember(cells, corner, heights, (x, z), heading)
-        ahead, right = (row[self._goal] * self._scale[self._goal]).tolist()
-        sine, cosine = sin_cos(heading)
-        return self._map.ways(
-            self.search,
-            cells,
-            corner,
-            place=(x, z),
-            heading=heading,
-            goal=(x + ahead * cosine + right * sine, z - ahead * sine + right * cosine),
-            slope=slope,
-            boldness=self._caution * self._boldness(memory.fruitless[i]),
-            traps=memory.known_traps(i),
-        )
+        if memory.age[i] // self._repeat % self._map.options.every == 0:
+            ahead, right = (row[self._goal] * self._scale[self._goal]).tolist()
+            sine, cosine = sin_cos(heading)
+            memory.ways[i] = self._map.ways(
+                self.search,
+                cells,
+                corner,
+                heading=heading,
+                goal=(x + ahead * cosine + right * sine, z - ahead * sine + right * cosine),
+                slope=slope,
+                boldness=self._caution * self._boldness(memory.fruitless[i]),
+                traps=memory.known_traps(i),
+            )
+            memory.ways_corner[i] = corner
+        return self._map.at_scan(memory.ways[i], memory.ways_corner[i], (x, z), heading)
 
     def ground(self, row: Array) -> tuple[list[float], Array]:
         """Slope of the ground plane ahead and to the right, and the scan's heights over it, m, for an observation."""

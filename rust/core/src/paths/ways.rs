@@ -1,8 +1,8 @@
 //! The way to a goal from every cell of a map of heights (Dijkstra 1959).
 //!
 //! A rover goes from a cell to one of its eight neighbours, headed for it. That costs the distance
-//! and, by [`PathRisk`], what the ground under the rover costs. Where none of it is known, the distance is
-//! all.
+//! and, by [`PathRisk`], what the ground under the rover costs. Where none of it is known, the
+//! distance is all.
 #![expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -145,8 +145,8 @@ impl WayMap {
         border.map(|(row, column)| left(row, column)).collect()
     }
 
-    /// What the ground costs from a cell to the next. A wheel over ground that is not known stands as
-    /// high as the others do.
+    /// What the ground costs from a cell to the next. A wheel over ground that is not known stands
+    /// as high as the others do.
     fn risk_of(
         &self,
         from: [i32; 2],

@@ -1,0 +1,81 @@
+"""`rover live`: it says where its page is, ends by Ctrl-C with its recordings kept, and refuses by one line."""
+
+import json
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+from urllib.request import urlopen
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from rover_gym.cli import app
+from rover_gym.record import read_run
+
+client = pytest.importorskip("websockets.sync.client")
+pytest.importorskip("viser")
+
+RUN = "from rover_gym.cli import main; main()"
+
+
+def rover(*arguments: str) -> Result:
+    return CliRunner(env={"COLUMNS": "160", "NO_COLOR": "1"}).invoke(app, ["live", *arguments])
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is another thing there")
+def test_it_serves_its_page_and_keeps_the_recording_when_it_is_ended(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", RUN, "live", "--port", "0", "--output", str(tmp_path), "--policy", "pd"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        found = re.fullmatch(r"live: (http://127\.0\.0\.1:\d+) \(Ctrl-C ends the drive\)\n", line)
+        assert found, line
+        with urlopen(found[1], timeout=20.0) as page:  # noqa: S310 - our own
+            assert b"rover live" in page.read()
+        with client.connect(f"{found[1].replace('http', 'ws')}/live") as page:
+            page.send(json.dumps({"do": "record"}))
+            end = time.monotonic() + 30.0
+            while json.loads(page.recv(timeout=20.0)).get("state", {}).get("rows", 0) < 10:
+                assert time.monotonic() < end
+        process.send_signal(signal.SIGINT)
+        output, errors = process.communicate(timeout=30.0)
+    assert process.returncode == 0, errors
+    assert output.splitlines() == [f"recorded: {tmp_path / 'live-1.h5'}"]
+    assert errors == ""
+    run = read_run(tmp_path / "live-1.h5")
+    assert run.n_frames >= 10
+    assert run.trajectory.attributes["complete"]
+    assert run.trajectory.attributes["scene"]["driver"] == "pd"
+
+
+def test_a_port_in_use_is_one_line() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as busy:
+        result = rover("--port", str(busy.getsockname()[1]))
+    assert result.exit_code == 2
+    assert result.stderr.startswith("error: --port: is in use by another program")
+    assert len(result.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--terrain", "moon"), "--terrain: must be one of plane, rocks, hills"),
+        (("--terrain", "moon.tif"), "moon.tif"),
+        (("--policy", "nobody"), "policy"),
+        (("--friction", "-1"), "--friction: must be at least 0"),
+        (("--gravity", "nan"), "--gravity: must be finite"),
+        (("--model", "tank"), "model: must be a name"),
+        (("--host", "no.such.host.invalid"), "--host: must be a name or an address of this machine"),
+        (("--fps", "500"), "--fps: must be at most 60"),
+        (("--output", "/dev/null"), "--output: cannot be written"),
+    ],
+)
+def test_bad_input_is_one_line(arguments: tuple[str, ...], message: str) -> None:
+    result = rover("--port", "0", *arguments)
+    assert result.exit_code == 2, result.output
+    assert message in result.stderr
+    assert len(result.stderr.splitlines()) == 1

@@ -1,0 +1,87 @@
+"""What the manual is made from is complete: chapters and pages are in the contents, every command has its rows."""
+
+import importlib
+import re
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+import typer
+
+import rover_gym
+from rover_gym.cli import app
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+@pytest.fixture
+def extension(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], ModuleType]]:
+    """Imports a module of the manual's own extensions."""
+    monkeypatch.syspath_prepend(str(DOCS))
+    yield lambda name: importlib.import_module(f"extensions.{name}")
+    for name in [name for name in sys.modules if name.partition(".")[0] == "extensions"]:
+        del sys.modules[name]
+
+
+def test_every_chapter_is_in_the_contents() -> None:
+    contents = (DOCS / "api.md").read_text(encoding="utf-8")
+    assert not [page.stem for page in (DOCS / "api").glob("*.md") if f"\napi/{page.stem}\n" not in contents]
+
+
+def test_a_room_without_a_chapter_is_documented(
+    extension: Callable[[str], ModuleType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rooms = extension("rooms")
+    assert "rover_gym.policy" not in rooms.without_chapter()
+    monkeypatch.setattr(rooms, "CHAPTERS", tmp_path)
+    assert ".. automodule:: rover_gym.policy\n" in rooms.sections()
+
+
+def test_a_page_that_no_list_names_is_listed(extension: Callable[[str], ModuleType]) -> None:
+    contents = extension("contents")
+    text = (DOCS / "index.md").read_text(encoding="utf-8")
+    assert contents.MARK in text
+    pages = {"index", "readme", "gallery", "something-new", "tutorials/train-a-policy"}
+    assert contents.unlisted(text, pages) == ["something-new"]
+
+
+def test_signatures_name_nothing_private(extension: Callable[[str], ModuleType]) -> None:
+    """The stub's aliases are unfolded."""
+    stub = Path(rover_gym.__file__).with_name("_core.pyi").read_text(encoding="utf-8")
+    assert re.search(r"\b_[A-Z]", stub)
+    assert not re.search(r"\b_[A-Z]", extension("compiled").in_print(stub))
+
+
+def test_a_class_hands_its_fields_their_descriptions(extension: Callable[[str], ModuleType]) -> None:
+    lines = [
+        "A thing.",
+        "",
+        "Attributes:",
+        "    size: How large,",
+        "        in m.",
+        "    name: Its name.",
+        "",
+        "Raises:",
+        "    X: y",
+    ]
+    rest, fields = extension("docstrings").split_attributes(lines)
+    assert rest == ["A thing.", "", "Raises:", "    X: y"]
+    assert fields["size"] == ["How large,", "in m."]
+    assert fields["name"] == ["Its name.", ""]
+
+
+def test_every_command_and_option_has_its_row(extension: Callable[[str], ModuleType]) -> None:
+    command_line = extension("command_line")
+    page = command_line.page()
+    commands = list(command_line.commands(typer.main.get_command(app), ("rover",)))
+    assert len(commands) > 20
+    for path, command in commands:
+        _, found, rest = page.partition(f"# `{' '.join(path)}`\n")
+        assert found
+        section = rest.partition("\n## ")[0].partition("\n### ")[0] if len(path) > 1 else rest
+        rows = [line for line in section.splitlines() if line.startswith("| `")]
+        shown = [one for one in command.params if not getattr(one, "hidden", False)]
+        names = [one.opts[0] if one.opts[0].startswith("-") else one.metavar or one.opts[0] for one in shown]
+        assert [name for name in names if not any(name in row for row in rows)] == []
