@@ -3,7 +3,7 @@
 import re
 import zipfile
 from collections.abc import Callable, Iterator
-from ctypes import CDLL
+from ctypes import CDLL, c_double, c_size_t, c_uint32
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 
+ERROR = 3  # fmi3Error
 BUMPS = np.random.default_rng(4).uniform(0.0, 0.05, (40, 40)).astype(np.float32)
 BUMPS[0, 0] = np.nan
 GROUNDS: dict[str, Terrain] = {
@@ -410,3 +411,29 @@ def test_the_command_writes_an_episodes_start(tmp_path: Path) -> None:
     assert validate_fmu(str(tmp_path / "a.fmu")) == []
     description = read_model_description(str(tmp_path / "a.fmu"))
     assert {one.name: one.start for one in description.modelVariables}["friction"] == "0.6"
+
+
+def test_null_pointers_are_refused(master: Callable[[Simulation], Master], capfd: pytest.CaptureFixture[str]) -> None:
+    """Straight into the library, as an importer in C would."""
+    sim = simulation_on(Plane())
+    unit = master(sim)
+    unit.start()
+    library, instance, references = unit.fmu.dll, unit.fmu.component, (c_uint32 * 1)(0)
+    capfd.readouterr()
+    assert library.fmi3DoStep(None, c_double(0.0), c_double(0.05), False, None, None, None, None) == ERROR
+    assert library.fmi3Terminate(None) == ERROR
+    library.fmi3FreeInstance(None)
+    assert library.fmi3GetFloat64(instance, None, c_size_t(1), None, c_size_t(1)) == ERROR
+    assert library.fmi3GetFloat64(instance, references, c_size_t(1), None, c_size_t(1)) == ERROR
+    assert library.fmi3GetFloat64(instance, None, c_size_t(0), None, c_size_t(0)) == 0
+    assert library.fmi3GetFloat64(instance, references, c_size_t(1), (c_double * 2)(), c_size_t(2)) == ERROR
+    assert library.fmi3SetFMUState(instance, None) == ERROR
+    assert library.fmi3GetFMUState(instance, None) == ERROR
+    assert library.fmi3DeserializeFMUState(instance, None, c_size_t(8), None) == ERROR
+    said = capfd.readouterr().out
+    for argument in ("valueReferences", "values", "FMUState", "serializedState"):
+        assert f"{argument}: must not be null" in said
+    assert "nValues: must be 1, is 2" in said
+    unit.step()
+    sim.step(10)
+    assert_same(unit, sim)
