@@ -90,3 +90,22 @@ def test_a_map_that_is_none_is_refused() -> None:
     _, state = ScanPolicy(env).predict(observation)
     with pytest.raises(StateError, match="state"):
         ScanPolicy(env, map=MapOptions()).predict(observation, state)
+
+
+def test_a_rover_with_a_map_comes_out_of_a_deep_dead_end() -> None:
+    """A bay of rocks, 5 m wide and 4 m deep, stands open to the rover; the goal lies behind it.
+
+    Without a map the policy is still in it after a minute.
+    """
+    end = [[5.0, 0.0, z] for z in np.arange(-2.5, 2.6, 0.6)]
+    sides = [[x, 0.0, side * 2.8] for x in np.arange(1.0, 5.1, 0.6) for side in (-1.0, 1.0)]
+    centres = end + sides
+    terrain = SphereField(centres, [0.5] * len(centres), Plane())
+    env = gym.make("Rover-v0", terrain=terrain, heading_deg=0.0, **ScanPolicy.arguments())
+    observation, _ = env.reset(seed=0, options={"position": (0.0, 0.0), "goal": (9.0, 0.0)})
+    policy, state, over = ScanPolicy(env, map=MapOptions()), None, False
+    while not over:
+        action, state = policy.predict(observation, state)
+        observation, _, terminated, truncated, info = env.step(action)
+        over = terminated or truncated
+    assert info["termination"] == "goal"

@@ -40,7 +40,7 @@ class MapOptions:
         every: Decisions between two computations of the ways.
     """
 
-    cells: int = 160
+    cells: int = 128
     risk: float = 0.4
     unknown: float = 0.0
     trap: float = 1.0

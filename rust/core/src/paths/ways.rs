@@ -5,6 +5,7 @@
 //! distance is all.
 #![expect(
     clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
     clippy::cast_sign_loss,
     reason = "rows and columns of a grid of some thousand cells"
 )]
