@@ -52,16 +52,23 @@ def simulation_on(terrain: Terrain, **options: Any) -> Simulation:
     return sim
 
 
+#: What a file says of itself, and where it is unpacked.
+Unit = tuple[Any, str]
+
+
+def unpacked(path: Path, folder: Path) -> Unit:
+    return read_model_description(str(path)), extract(str(path), str(folder))
+
+
 class Master:
     """A unit in FMPy, with its variables by name and its messages."""
 
-    def __init__(self, path: Path, folder: Path) -> None:
-        description = read_model_description(str(path))
+    def __init__(self, unit: Unit) -> None:
+        description, folder = unit
         self.references = {variable.name: variable.valueReference for variable in description.modelVariables}
-        self.messages: list[str] = []
         self.fmu = FMU3Slave(
             guid=description.guid,
-            unzipDirectory=extract(str(path), str(folder)),
+            unzipDirectory=folder,
             modelIdentifier=description.coSimulation.modelIdentifier,
             instanceName="one",
         )
@@ -101,12 +108,26 @@ def master(tmp_path: Path) -> Iterator[Callable[[Simulation], Master]]:
 
     def make(simulation: Simulation) -> Master:
         path = write_fmu(simulation, tmp_path / "a.fmu")
-        made.append(Master(path, tmp_path / f"unit-{len(made)}"))
+        made.append(Master(unpacked(path, tmp_path / f"unit-{len(made)}")))
         return made[-1]
 
     yield make
     for one in made:
         one.fmu.freeInstance()
+
+
+@pytest.fixture(scope="module")
+def plane_unit(tmp_path_factory: pytest.TempPathFactory) -> Unit:
+    folder = tmp_path_factory.mktemp("plane")
+    return unpacked(write_fmu(simulation_on(Plane()), folder / "a.fmu"), folder / "unit")
+
+
+@pytest.fixture
+def on_plane(plane_unit: Unit) -> Iterator[tuple[Master, Simulation]]:
+    """A unit on a plane, and the simulation that it was made from."""
+    unit = Master(plane_unit)
+    yield unit, simulation_on(Plane())
+    unit.fmu.freeInstance()
 
 
 def assert_same(master: Master, sim: Simulation) -> None:
@@ -276,11 +297,10 @@ MISUSES: list[tuple[Callable[[Master], Any], str]] = [
 def test_a_refused_call_says_why_and_changes_nothing(
     misuse: Callable[[Master], Any],
     message: str,
-    master: Callable[[Simulation], Master],
+    on_plane: tuple[Master, Simulation],
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    sim = simulation_on(Plane())
-    unit = master(sim)
+    unit, sim = on_plane
     unit.start()
     unit.step()
     capfd.readouterr()
@@ -314,11 +334,10 @@ def test_a_refused_call_says_why_and_changes_nothing(
 def test_before_the_start_too(
     misuse: Callable[[Master], Any],
     message: str,
-    master: Callable[[Simulation], Master],
+    on_plane: tuple[Master, Simulation],
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    sim = simulation_on(Plane())
-    unit = master(sim)
+    unit, sim = on_plane
     with pytest.raises(FMICallException):
         misuse(unit)
     assert message in capfd.readouterr().out
@@ -384,7 +403,7 @@ def test_a_damaged_scene_is_not_instantiated(
         for name, data in files.items():
             archive.writestr(name, data)
     with pytest.raises(Exception, match="Failed to instantiate"):
-        Master(path, tmp_path / "unit")
+        Master(unpacked(path, tmp_path / "unit"))
     assert message in capfd.readouterr().out
 
 
@@ -413,10 +432,9 @@ def test_the_command_writes_an_episodes_start(tmp_path: Path) -> None:
     assert {one.name: one.start for one in description.modelVariables}["friction"] == "0.6"
 
 
-def test_null_pointers_are_refused(master: Callable[[Simulation], Master], capfd: pytest.CaptureFixture[str]) -> None:
+def test_null_pointers_are_refused(on_plane: tuple[Master, Simulation], capfd: pytest.CaptureFixture[str]) -> None:
     """Straight into the library, as an importer in C would."""
-    sim = simulation_on(Plane())
-    unit = master(sim)
+    unit, sim = on_plane
     unit.start()
     library, instance, references = unit.fmu.dll, unit.fmu.component, (c_uint32 * 1)(0)
     capfd.readouterr()
