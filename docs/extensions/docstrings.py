@@ -17,11 +17,11 @@ from extensions.compiled import is_compiled
 BEFORE_NAPOLEON, AFTER_NAPOLEON = 400, 600
 
 
-def split_attributes(lines: list[str]) -> tuple[list[str], dict[str, list[str]]]:
-    """A class's docstring without its section `Attributes:`, and the lines about each name of that section."""
-    if "Attributes:" not in lines:
+def split_attributes(lines: list[str], heading: str = "Attributes:") -> tuple[list[str], dict[str, list[str]]]:
+    """A class's docstring without one of its sections, and the lines about each name of that section."""
+    if heading not in lines:
         return lines, {}
-    begin = lines.index("Attributes:")
+    begin = lines.index(heading)
     end = next((i for i in range(begin + 1, len(lines)) if lines[i] and not lines[i].startswith(" ")), len(lines))
     fields: dict[str, list[str]] = {}
     name = ""
@@ -40,11 +40,15 @@ def describe_fields(_app: Sphinx, _what: str, _name: str, obj: Any, options: Any
         return  # only some members are printed, or none
     rest, fields = split_attributes(lines)
     own = {*vars(obj), *vars(obj).get("__annotations__", {})}
-    if fields and set(fields) <= own:
+    is_moved = set(fields) <= own
+    _, arguments = split_attributes(lines, "Args:")  # those of a data class are its fields
+    told = {**{name: text for name, text in arguments.items() if name in own}, **(fields if is_moved else {})}
+    if told:
         analyzer = ModuleAnalyzer.for_module(obj.__module__)
         analyzer.analyze()
-        for field, text in fields.items():
-            analyzer.attr_docs[obj.__qualname__, field] = [*text, ""]
+        for field, text in told.items():
+            analyzer.attr_docs.setdefault((obj.__qualname__, field), [*text, ""])
+    if is_moved:
         lines[:] = rest
 
 

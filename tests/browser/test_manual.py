@@ -69,7 +69,8 @@ def public_names() -> Iterator[tuple[str, Any]]:
             full = f"{room.__name__}.{name}"
             yield full, thing
             if isinstance(thing, type) and full != "rover_gym.env.RoverArguments":  # its card has its table
-                inherited = {member for base in thing.__mro__[1:] for member in vars(base)}
+                bases = thing.__mro__[1:]
+                inherited = {one for base in bases for one in {**vars(base), **vars(base).get("__annotations__", {})}}
                 for member in {**vars(thing), **vars(thing).get("__annotations__", {})}:
                     if not member.startswith("_") and member not in inherited:
                         yield f"{full}.{member}", inspect.getattr_static(thing, member, None)
