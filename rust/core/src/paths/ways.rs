@@ -239,7 +239,7 @@ mod tests {
     fn on_level_or_unknown_ground_the_way_is_the_distance_over_the_neighbours() {
         for height in [0.3, f64::NAN] {
             let found = ways(&[height; 21 * 31], [10.0, 2.0]);
-            assert_eq!(found[10 * 31 + 2], 0.0);
+            assert!(found[10 * 31 + 2].abs() < 1e-12);
             assert!((found[10 * 31 + 22] - 2.0).abs() < 1e-6);
             let slanting = 0.1 * (4.0 + 6.0 * 2.0_f64.sqrt());
             assert!(

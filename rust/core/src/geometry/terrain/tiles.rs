@@ -90,7 +90,7 @@ impl Tiles {
 
     /// Cells along the side of a tile of the first level.
     pub(in crate::geometry) fn finest(&self) -> usize {
-        FIRST
+        self.levels.first().map_or(FIRST, |level| level.side)
     }
 
     /// First cell and size of the widest tile about a cell that is wanted; `wants` gets these and
