@@ -88,8 +88,9 @@ def _followed(run: RoverRun) -> Array:
 
 def moving_mean(time: Array, values: Array) -> Array:
     """Values `(n, m)` averaged over the samples within half of `SMOOTHING` s, without those that are not finite."""
-    first = np.searchsorted(time, time - 0.5 * SMOOTHING, side="left")
-    last = np.searchsorted(time, time + 0.5 * SMOOTHING, side="right")
+    half = 0.5 * SMOOTHING + 1e-6  # samples at the edge count, whatever their rounding
+    first = np.searchsorted(time, time - half, side="left")
+    last = np.searchsorted(time, time + half, side="right")
     known = np.isfinite(values)
     sums = np.vstack((np.zeros(values.shape[1]), np.cumsum(np.where(known, values, 0.0), axis=0)))
     counts = np.vstack((np.zeros(values.shape[1]), np.cumsum(known, axis=0)))
