@@ -1,7 +1,9 @@
 //! A search for the boxes that a ray crosses: a hierarchy of bounding boxes.
 //!
 //! Each node splits its boxes in halves at the median middle along the longest extent of the
-//! middles. A ray enters the nearer half first, and no half that lies beyond what it has met.
+//! middles. A ray enters the nearer half first, and no half that lies beyond what it has met. The
+//! two halves of a node stand side by side, with bounds in single precision, rounded outwards: both
+//! fit one line of the cache.
 
 use nalgebra::Vector3;
 
@@ -15,10 +17,14 @@ const LEAF: usize = 4;
 const DEPTH: usize = 34;
 
 /// Two halves, or the boxes themselves.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(32))]
 struct Node {
-    bounds: Bounds,
-    /// Inner node: the second half; the first comes right after its parent. Leaf: first item.
+    /// m.
+    low: [f32; 3],
+    /// m.
+    high: [f32; 3],
+    /// Inner node: the first half; the second comes right after it. Leaf: first item.
     at: u32,
     /// Number of items of a leaf; 0 for an inner node.
     count: u32,
@@ -32,6 +38,40 @@ pub struct BoxTree {
     items: Vec<u32>,
 }
 
+impl Node {
+    fn around(bounds: &Bounds) -> Self {
+        Self {
+            low: bounds.low.map(below).into(),
+            high: bounds.high.map(above).into(),
+            ..Self::default()
+        }
+    }
+
+    #[inline]
+    fn bounds(&self) -> Bounds {
+        Bounds {
+            low: Vector3::from(self.low.map(f64::from)),
+            high: Vector3::from(self.high.map(f64::from)),
+        }
+    }
+}
+
+/// A number of single precision that is not above another.
+#[allow(clippy::cast_possible_truncation)] // rounded down
+fn below(x: f64) -> f32 {
+    let near = x as f32;
+    if f64::from(near) > x {
+        near.next_down()
+    } else {
+        near
+    }
+}
+
+/// One that is not below.
+fn above(x: f64) -> f32 {
+    -below(-x)
+}
+
 impl BoxTree {
     /// Builds the tree; `n log n`.
     ///
@@ -42,7 +82,9 @@ impl BoxTree {
         let mut items: Vec<u32> = (0..narrow(boxes.len())).collect();
         let mut nodes = Vec::with_capacity(boxes.len());
         if !boxes.is_empty() {
-            grow(&mut nodes, boxes, &mut items, 0);
+            // The root, and a gap after it.
+            nodes.extend([Node::default(); 2]);
+            grow(&mut nodes, 0, boxes, &mut items, 0);
         }
         nodes.shrink_to_fit();
         Self { nodes, items }
@@ -54,7 +96,8 @@ impl BoxTree {
     pub fn visit_along(&self, ray: &Ray, mut reach: f64, mut visit: impl FnMut(u32, f64) -> f64) {
         let inverse = ray.inverse();
         let enters = |at: usize, reach: f64| {
-            let crossing = self.nodes[at].bounds.crossing(&ray.origin, &inverse, reach);
+            let bounds = self.nodes[at].bounds();
+            let crossing = bounds.crossing(&ray.origin, &inverse, reach);
             crossing.map(|[enter, _]| enter)
         };
         if self.nodes.is_empty() || enters(0, reach).is_none() {
@@ -66,14 +109,14 @@ impl BoxTree {
         loop {
             let node = &self.nodes[at];
             if node.count == 0 {
-                let (first, second) = (at + 1, node.at as usize);
+                let (first, second) = (node.at as usize, node.at as usize + 1);
                 match (enters(first, reach), enters(second, reach)) {
                     (Some(a), Some(b)) => {
                         let is_first_nearer = a <= b;
                         waiting[n_waiting] = if is_first_nearer {
-                            (node.at, b)
+                            (node.at + 1, b)
                         } else {
-                            (narrow(first), a)
+                            (node.at, a)
                         };
                         n_waiting += 1;
                         at = if is_first_nearer { first } else { second };
@@ -113,17 +156,17 @@ fn narrow(x: usize) -> u32 {
     u32::try_from(x).unwrap_or_else(|_| panic!("invariant: {x} boxes or nodes fit 32 bits"))
 }
 
-/// Appends the tree of `items`, which begin at `first` among all.
-fn grow(nodes: &mut Vec<Node>, boxes: &[Bounds], items: &mut [u32], first: usize) {
-    let me = nodes.len();
+/// Makes node `me` the tree of `items`, which begin at `first` among all.
+fn grow(nodes: &mut Vec<Node>, me: usize, boxes: &[Bounds], items: &mut [u32], first: usize) {
     let own = items.iter().map(|&i| &boxes[i as usize]);
     let bounds = own.fold(Bounds::NOTHING, |all, one| all.with(one));
+    let node = Node::around(&bounds);
     if items.len() <= LEAF {
-        nodes.push(Node {
-            bounds,
+        nodes[me] = Node {
             at: narrow(first),
             count: narrow(items.len()),
-        });
+            ..node
+        };
         return;
     }
     let twice_middle = |i: u32| -> Vector3<f64> { boxes[i as usize].low + boxes[i as usize].high };
@@ -137,15 +180,15 @@ fn grow(nodes: &mut Vec<Node>, boxes: &[Bounds], items: &mut [u32], first: usize
         let (x, y) = (twice_middle(a)[axis], twice_middle(b)[axis]);
         x.total_cmp(&y).then(a.cmp(&b))
     });
-    nodes.push(Node {
-        bounds,
-        at: 0,
-        count: 0,
-    });
+    let halves = nodes.len();
+    nodes[me] = Node {
+        at: narrow(halves),
+        ..node
+    };
+    nodes.extend([Node::default(); 2]);
     let (lower, upper) = items.split_at_mut(half);
-    grow(nodes, boxes, lower, first);
-    nodes[me].at = narrow(nodes.len());
-    grow(nodes, boxes, upper, first + half);
+    grow(nodes, halves, boxes, lower, first);
+    grow(nodes, halves + 1, boxes, upper, first + half);
 }
 
 #[cfg(test)]

@@ -24,6 +24,8 @@ struct Walk<'a> {
     from: [f64; 2],
     /// Columns and rows a metre.
     rate: [f64; 2],
+    /// Metres a column and a row.
+    pace: [f64; 2],
     /// Cells along x and z.
     cells: [usize; 2],
     reach: f64,
@@ -34,11 +36,13 @@ struct Walk<'a> {
 pub fn hit(ray: &Ray, field: &HeightField, reach: f64) -> Option<Hit> {
     let ([dx, dz], [x, z]) = (field.spacing(), field.origin());
     let [rows, columns] = field.shape();
+    let rate = [ray.direction.x / dx, ray.direction.z / dz];
     let walk = Walk {
         field,
         ray,
         from: [(ray.origin.x - x) / dx, (ray.origin.z - z) / dz],
-        rate: [ray.direction.x / dx, ray.direction.z / dz],
+        rate,
+        pace: rate.map(f64::recip),
         cells: [columns - 1, rows - 1],
         reach: reach.min(FARTHEST),
     };
@@ -138,9 +142,9 @@ impl Walk<'_> {
     fn leaves(&self, first: [usize; 2], size: [usize; 2]) -> (f64, usize) {
         let side = |k: usize| {
             if self.rate[k] > 0.0 {
-                ((first[k] + size[k]) as f64 - self.from[k]) / self.rate[k]
+                ((first[k] + size[k]) as f64 - self.from[k]) * self.pace[k]
             } else if self.rate[k] < 0.0 {
-                (first[k] as f64 - self.from[k]) / self.rate[k]
+                (first[k] as f64 - self.from[k]) * self.pace[k]
             } else {
                 f64::INFINITY
             }
