@@ -11,12 +11,6 @@
 //! Null pointers are refused. A panic ends at this border, as `fmi3Fatal`, and nothing but
 //! `fmi3FreeInstance` is answered afterwards.
 #![expect(unsafe_code, reason = "C functions take pointers")]
-#![expect(
-    clippy::missing_safety_doc,
-    clippy::too_many_arguments,
-    clippy::fn_params_excessive_bools,
-    reason = "the standard's names, contracts and signatures"
-)]
 
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};

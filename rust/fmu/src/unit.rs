@@ -22,6 +22,7 @@ const MOST_STEPS: f64 = 1e9;
 
 /// States of a unit, as the standard names them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[expect(clippy::enum_variant_names, reason = "the standard's names")]
 pub enum Mode {
     Instantiated,
     InitializationMode,
@@ -184,7 +185,8 @@ impl Unit {
             let name = name.to_owned();
             Err(Refusal::OutOfRange { name, range, value })
         };
-        if !((at - self.time).abs() <= slack.max(1e-12 * at.abs())) {
+        let is_next = (at - self.time).abs() <= slack.max(1e-12 * at.abs()); // not if it is NaN
+        if !is_next {
             let range = format!("where the last step ended, {}", self.time);
             return refuse("currentCommunicationPoint", range, at);
         }
