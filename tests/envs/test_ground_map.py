@@ -1,5 +1,7 @@
 """The map that a rover remembers from its height scans, and the way over it."""
 
+from typing import Any
+
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
@@ -103,7 +105,9 @@ def test_a_rover_with_a_map_comes_out_of_a_deep_dead_end() -> None:
     terrain = SphereField(centres, [0.5] * len(centres), Plane())
     env = gym.make("Rover-v0", terrain=terrain, heading_deg=0.0, **ScanPolicy.arguments())
     observation, _ = env.reset(seed=0, options={"position": (0.0, 0.0), "goal": (9.0, 0.0)})
-    policy, state, over = ScanPolicy(env, map=MapOptions()), None, False
+    policy = ScanPolicy(env, map=MapOptions())
+    state: Any = None
+    over = False
     while not over:
         action, state = policy.predict(observation, state)
         observation, _, terminated, truncated, info = env.step(action)
