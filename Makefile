@@ -58,9 +58,10 @@ test-rust: ## the Rust tests only
 test-python: $(STAMPS)/test $(STAMPS)/train $(STAMPS)/core $(STAMPS)/debian-demo $(STAMPS)/debian-test ## the Python tests only
 	$(BIN)/pytest --numprocesses auto
 
-wheel: $(STAMPS)/demo ## build the wheel, one for every Python from 3.11 on, and the archive of the sources, into dist/
+wheel: $(STAMPS)/demo $(STAMPS)/fmu ## build the wheel, one for every Python from 3.11 on, and the archive of the sources, into dist/
 	rm -rf dist
-	CARGO_TARGET_DIR=$(abspath target) $(BIN)/python -m maturin build --release --sdist --quiet --out dist
+	$(BIN)/python -m maturin sdist --quiet --out dist
+	CARGO_TARGET_DIR=$(abspath target) $(BIN)/python -m maturin build --release --quiet --out dist
 	@ls dist/*
 
 extras: $(STAMPS)/test wheel ## install the wheel, without Rust, in an empty environment for every Python and for each extra, and try what it promises
@@ -164,9 +165,13 @@ $(STAMPS)/peers: requirements/peers.txt $(STAMPS)/demo
 	$(UV) --requirement $< || for one in $$(grep -o '^[a-z-]*==[^ ;]*' $<); do $(UV) $$one || true; done
 	@touch $@
 
-# The compiled core, in release mode, the package itself, editable, and the library of co-simulation units.
-$(STAMPS)/core: pyproject.toml Cargo.toml Cargo.lock $(shell find rust -type f) | $(STAMPS)/demo
+# The compiled core, in release mode, and the package itself, editable.
+$(STAMPS)/core: pyproject.toml Cargo.toml Cargo.lock $(shell find rust -type f) | $(STAMPS)/demo $(STAMPS)/fmu
 	$(BIN)/python -m maturin develop --release --uv --quiet
+	@touch $@
+
+# The library of co-simulation units, where the package and its wheel look for it.
+$(STAMPS)/fmu: Cargo.toml Cargo.lock $(shell find rust/core rust/fmu -type f) | $(STAMPS)/venv
 	cargo build --release --locked --quiet -p rover-fmu
 	@mkdir -p envs/rover_gym/_fmu
 	@for made in target/release/{lib,}rover_fmu.{so,dylib,dll}; do [ ! -f $$made ] || cp $$made envs/rover_gym/_fmu/rover_fmu.$${made##*.}; done

@@ -44,6 +44,8 @@ import gymnasium as gym
 env = gym.make("rover_gym:RoverRocks-v0", height_scan=True)
 env.reset(seed=0)
 assert env.step(env.action_space.sample())[0].dtype == np.float32
+rover("export", "fmu", "--output", "rover.fmu")
+assert Path("rover.fmu").stat().st_size > 100_000
 envs = gym.make_vec("RoverRocks-v0", num_envs=3)
 envs.reset(seed=0)
 assert envs.step(envs.action_space.sample())[1].shape == (3,)

@@ -30,7 +30,7 @@ def dataset(
     environment: Annotated[str, typer.Option(help=f"One of {', '.join(ENVIRONMENTS)}.")] = "Rover-v0",
     policy: Annotated[str, typer.Option(help=f"'random' for any environment, or {DRIVERS_HELP}")] = "pd",
     terrain: Annotated[
-        str | None, typer.Option(help="'plane', 'sphere_field', 'hills', or a file. Default: the environment's.")
+        str | None, typer.Option(help="'plane', 'rocks', 'hills', or a file. Default: the environment's.")
     ] = None,
     model: ModelName = BUILT_IN,
     difficulty: Annotated[float | None, typer.Option(help="Difficulty of the rocks, from 0 to 2.")] = None,

@@ -7,7 +7,19 @@ import gymnasium as gym
 import typer
 
 from rover_gym.cli.console import LARGEST_SEED, check_file, plain_errors, progress_bar, say_path
-from rover_gym.cli.scene_options import BUILT_IN, HeightRange, ModelName, Spacing, Start, named_ground, named_model
+from rover_gym.cli.scene_options import (
+    BUILT_IN,
+    FRICTION,
+    HeightRange,
+    ModelName,
+    Spacing,
+    Start,
+    TerrainName,
+    chosen_terrain,
+    named_ground,
+    named_model,
+    warn_of_slope,
+)
 from rover_gym.exports.fmu import fmu_library, write_fmu
 from rover_gym.exports.mcap_run import FPS, write_mcap
 from rover_gym.exports.onnx_policy import write_onnx
@@ -54,7 +66,7 @@ def onnx(
         ),
     ],
     output: Annotated[Path, typer.Option("--output", "-o", dir_okay=False, help="File to write.")],
-    terrain: Annotated[str, typer.Option(help="Of 'trained': 'plane', or 'sphere_field' for rocks.")] = "plane",
+    terrain: Annotated[str, typer.Option(help="Of 'trained': 'plane' or 'rocks'.")] = "plane",
 ) -> None:
     """Write a policy's network as ONNX, with the normalisation of its inputs."""
     require("onnx", "onnx")
@@ -67,23 +79,25 @@ def onnx(
 def fmu(
     *,
     output: Annotated[Path, typer.Option("--output", "-o", dir_okay=False, help="File to write, usually .fmu.")],
-    terrain: Annotated[
-        str, typer.Option(help="'plane', 'sphere_field' for rocks, 'hills', or the file of a map or a mesh.")
-    ] = "plane",
+    terrain: TerrainName = None,
     spacing: Spacing = None,
     height_range: HeightRange = None,
     model: ModelName = BUILT_IN,
-    difficulty: Annotated[float | None, typer.Option(help="Difficulty of the rocks, from 0 to 2.")] = None,
+    difficulty: Annotated[
+        float | None, typer.Option(help="Difficulty of rocks and hills, from 0 to 2. It implies rocks.")
+    ] = None,
     slope: Annotated[float | None, typer.Option(help="Slope of the ground, degrees.")] = None,
     heading: Annotated[float | None, typer.Option(help="Start heading, degrees to the left of x.")] = None,
     start: Start = None,
-    friction: Annotated[float, typer.Option(help="Friction coefficient.")] = 0.7,
+    friction: Annotated[float, typer.Option(help="Friction coefficient.")] = FRICTION,
     time_step: Annotated[float, typer.Option(help="Time step of the physics, s.")] = 0.005,
     seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of ground and start.")] = 0,
 ) -> None:
     """Write a rover at the start of an episode as an FMI 3.0 co-simulation unit."""
     fmu_library()
     check_file("output", output)
+    terrain = chosen_terrain(terrain, difficulty)
+    warn_of_slope(slope, friction)
     arguments: dict[str, Any] = {"terrain": terrain, "friction": friction, "time_step": time_step}
     arguments |= {} if difficulty is None else {"difficulty": difficulty}
     arguments |= {} if slope is None else {"slope_deg": slope}
