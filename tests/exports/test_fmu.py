@@ -26,6 +26,7 @@ from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
+from scipy.spatial.transform import Rotation
 
 ERROR = 3  # fmi3Error
 BUMPS = np.random.default_rng(4).uniform(0.0, 0.05, (40, 40)).astype(np.float32)
@@ -163,6 +164,33 @@ def test_a_unit_steps_as_the_simulation_does(ground: str, master: Callable[[Simu
         assert unit.get("solver_iterations") == report.iterations
         assert unit.get("contacts") == report.n_contacts
     assert unit.get("time") == unit.time
+
+
+def test_the_inertial_unit_tells_means_over_the_communication_step(master: Callable[[Simulation], Master]) -> None:
+    gravity = np.array([0.1, -3.7, 0.0])
+    sim = simulation_on(GROUNDS["rocks"], gravity=gravity)
+    unit = master(sim)
+    unit.start()
+
+    def motion() -> tuple[Any, Any]:
+        return np.array(sim.v[:6]), Rotation.from_quat(unit.get("attitude"), scalar_first=True)
+
+    v, attitude = motion()
+    expected = np.concatenate([attitude.inv().apply(-gravity), attitude.inv().apply(v[3:])])
+    np.testing.assert_allclose(unit.get("imu"), expected, atol=1e-12)
+    sim.set_wheel_torques(np.full(6, 60.0))
+    unit.set_all("wheel_torque", sim.model.wheel_names, np.full(6, 60.0))
+    forces = []
+    for _ in range(30):
+        unit.step()
+        sim.step(10)
+        (before, from_attitude), (v, attitude) = (v, attitude), motion()
+        turn = (from_attitude.inv() * attitude).as_rotvec()
+        halfway = from_attitude * Rotation.from_rotvec(0.5 * turn)
+        force = halfway.inv().apply((v[:3] - before[:3]) / 0.05 - gravity)
+        np.testing.assert_allclose(unit.get("imu"), np.concatenate([force, turn / 0.05]), atol=1e-9)
+        forces.append(force)
+    assert np.ptp(forces, axis=0).min() > 0.1  # it was shaken along every axis
 
 
 def test_the_common_importer_runs_it_whole(tmp_path: Path) -> None:

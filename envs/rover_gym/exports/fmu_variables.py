@@ -93,6 +93,10 @@ def _outputs(simulation: Simulation) -> Iterator[Row]:
     for i, name in enumerate(model.wheel_names):
         what = "mean torque that the drive gave in the last time step, positive forward"
         yield f"motor_torque.{name}", "output", "motor_torque", i, "N.m", what, None
+    for i, name in enumerate(("specific_force", "angular_velocity")):
+        what = "mean over the last communication step, at the trunk's origin, in its frame"
+        for k, axis in enumerate("xyz"):
+            yield f"imu.{name}.{axis}", "output", "inertial", 3 * i + k, ("m/s2", "rad/s")[i], what, None
     for name, unit, what in (
         ("trunk_force", "N", "mean normal force of the last time step on all that is no wheel"),
         ("kinetic_energy", "J", "of the whole rover"),

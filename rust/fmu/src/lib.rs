@@ -6,6 +6,7 @@
 #![deny(unsafe_code)]
 
 mod border;
+mod inertial;
 mod reading;
 mod refusal;
 mod saved;

@@ -5,6 +5,7 @@ use std::cell::OnceCell;
 use rover_core::multibody::{Energy, coordinates};
 use rover_core::simulation::RoverSimulation;
 
+use crate::inertial::unaccelerated;
 use crate::scene_file::Channel;
 use crate::unit::LastStep;
 
@@ -12,6 +13,7 @@ use crate::unit::LastStep;
 pub struct Reading<'a> {
     rover: &'a RoverSimulation,
     last: &'a LastStep,
+    gravity: [f64; 3],
     q: OnceCell<Vec<f64>>,
     gaps: OnceCell<Vec<f64>>,
     forces: OnceCell<Vec<[f64; 3]>>,
@@ -19,10 +21,11 @@ pub struct Reading<'a> {
 }
 
 impl<'a> Reading<'a> {
-    pub fn new(rover: &'a RoverSimulation, last: &'a LastStep) -> Self {
+    pub fn new(rover: &'a RoverSimulation, last: &'a LastStep, gravity: [f64; 3]) -> Self {
         Self {
             rover,
             last,
+            gravity,
             q: OnceCell::new(),
             gaps: OnceCell::new(),
             forces: OnceCell::new(),
@@ -46,6 +49,11 @@ impl<'a> Reading<'a> {
             Channel::WheelForce => *self.forces().get(index / 3)?.get(index % 3)?,
             Channel::MotorTorque => *rover.motor_torques().get(index)?,
             Channel::TrunkForce => rover.body_force(),
+            Channel::Inertial => {
+                let readings = self.last.inertial;
+                let readings = readings.unwrap_or_else(|| unaccelerated(rover, self.gravity));
+                *readings.get(index)?
+            }
             Channel::KineticEnergy => energy().kinetic,
             Channel::PotentialEnergy => energy().potential,
             Channel::Contacts => self.last.contacts,

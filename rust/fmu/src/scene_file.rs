@@ -36,6 +36,7 @@ pub enum Channel {
     WheelForce,
     MotorTorque,
     TrunkForce,
+    Inertial,
     KineticEnergy,
     PotentialEnergy,
     Contacts,

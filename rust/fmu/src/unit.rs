@@ -8,6 +8,7 @@ use rover_core::nalgebra::Vector3;
 use rover_core::simulation::RoverSimulation;
 use serde::{Deserialize, Serialize};
 
+use crate::inertial::Motion;
 use crate::reading::Reading;
 use crate::refusal::Refusal;
 use crate::saved::Saved;
@@ -78,6 +79,8 @@ pub struct LastStep {
     pub residual: f64,
     pub iterations: f64,
     pub contacts: f64,
+    /// Readings of the [inertial unit](crate::inertial).
+    pub inertial: Option<[f64; 6]>,
 }
 
 impl From<StepReport> for LastStep {
@@ -86,6 +89,7 @@ impl From<StepReport> for LastStep {
             residual: report.residual,
             iterations: report.iterations as f64,
             contacts: report.n_contacts as f64,
+            inertial: None,
         }
     }
 }
@@ -206,8 +210,16 @@ impl Unit {
             clippy::cast_sign_loss,
             reason = "checked"
         )]
-        let report = self.rover.step(n as usize)?;
-        self.last = report.into();
+        let report = {
+            let before = Motion::of(&self.rover);
+            let report = self.rover.step(n as usize)?;
+            let inertial = before.readings(&self.rover, self.parameters.gravity, n * h);
+            self.last = LastStep {
+                inertial: Some(inertial),
+                ..report.into()
+            };
+            report
+        };
         self.time = at + by;
         Ok(report.status == StepStatus::Converged)
     }
@@ -224,7 +236,8 @@ impl Unit {
             &[Mode::InitializationMode, Mode::StepMode, Mode::Terminated],
         )?;
         count(references.len(), values.len())?;
-        let reading = Reading::new(&self.rover, &self.last);
+        let gravity = self.parameters.gravity;
+        let reading = Reading::new(&self.rover, &self.last, gravity);
         for (&reference, value) in references.iter().zip(values) {
             let variable = self.variable(reference)?;
             let found = match variable.channel {
