@@ -11,7 +11,7 @@
 //! A surface is met from either side, so a ray that starts in the ground meets the surface where
 //! it leaves. Neighbouring triangles leave no gap between them.
 //!
-//! [`cast`] answers for many rays at once.
+//! [`mod@cast`] answers for many rays at once.
 
 pub mod cast;
 pub mod disc;
