@@ -185,5 +185,5 @@ def test_the_ground_comes_back_and_describes_itself(terrain: Plane | SphereField
 
 def test_without_h5py_the_error_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "h5py", None)
-    with pytest.raises(MissingExtraError, match=r"pip install 'rover-gym\[demo\]'"):
+    with pytest.raises(MissingExtraError, match=r"pip install 'rover-gym\[record\]'"):
         Recorder(tmp_path / "run.h5", [TIME])
