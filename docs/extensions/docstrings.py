@@ -4,6 +4,7 @@ A field that its class describes under `Attributes:` is printed where the field 
 or a constant is prose from its first word: what stands before a colon is no type.
 """
 
+import inspect
 import re
 from collections.abc import Collection
 from typing import Any
@@ -34,6 +35,12 @@ def split_attributes(lines: list[str], heading: str = "Attributes:") -> tuple[li
     return lines[:begin] + lines[end:], fields
 
 
+def speaks_for_itself(member: Any) -> bool:
+    """Whether a property or a routine has a docstring of its own."""
+    text = member.__doc__ if inspect.isdatadescriptor(member) or inspect.isroutine(member) else None
+    return bool(text) and not text.startswith("Alias for field number")  # a named tuple's own word
+
+
 def describe_fields(_app: Sphinx, _what: str, _name: str, obj: Any, options: Any, lines: list[str]) -> None:
     """Moves what a class says of its fields to the fields, where Sphinx looks for comments, if each gets an entry."""
     if not isinstance(obj, type) or isinstance(getattr(options, "members", None), Collection | None):
@@ -43,6 +50,7 @@ def describe_fields(_app: Sphinx, _what: str, _name: str, obj: Any, options: Any
     is_moved = set(fields) <= own
     _, arguments = split_attributes(lines, "Args:")  # those of a data class are its fields
     told = {**{name: text for name, text in arguments.items() if name in own}, **(fields if is_moved else {})}
+    told = {name: text for name, text in told.items() if not speaks_for_itself(own[name])}
     if told:
         analyzer = ModuleAnalyzer.for_module(obj.__module__)
         analyzer.analyze()

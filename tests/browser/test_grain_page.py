@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from balls import MovingBalls, RoverOnMovingBalls
-from browser.test_replay_page import await_that, coarse, go_to, messages, opened, picture, readings, slider
+from browser.test_replay_page import await_that, coarse, go_to, messages, opened, picture, readings, shown_load, slider
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 
@@ -145,7 +145,8 @@ def test_the_curves_follow_the_timeline(shown: BallsShown) -> None:
     ]
     go_to(browser, float(run.time[7]) + 0.01)
     loads = run.wheel_forces[7, :, 1]
-    expected = [word for name, load in zip(run.model.wheel_names, loads, strict=True) for word in (name, f"{load:.1f}")]
+    pairs = zip(run.model.wheel_names, loads, strict=True)
+    expected = [word for name, load in pairs for word in (name, shown_load(load))]
     await_that(lambda: readings(browser)[0] == expected, "the loads at that time")
     chart = browser.find_element(By.CSS_SELECTOR, "#panel svg")
     browser.execute_script(

@@ -2,6 +2,7 @@
 
 import io
 import json
+import math
 import re
 import shutil
 import time
@@ -254,6 +255,12 @@ def cursors(browser: webdriver.Chrome) -> list[float]:
     return [float(cursor.get_attribute("x1") or "nan") for cursor in found]
 
 
+def shown_load(load: float) -> str:
+    """A load, N, as the panel prints it: the page has one decimal, and JavaScript rounds halves up."""
+    load = round(float(load), 1)
+    return f"{load:.1f}" if abs(load) < 100.0 else str(math.floor(load + 0.5))
+
+
 def readings(browser: webdriver.Chrome) -> list[list[str]]:
     found = browser.find_elements(By.CSS_SELECTOR, "#panel .legend")
     return [legend.text.split() for legend in found]
@@ -279,7 +286,7 @@ def test_the_curves_stand_beside_the_scene_and_follow_the_timeline(shown: Shown)
         names = run.model.wheel_names
         expected = []
         for name, load in zip(names, np.round(loads[row]), strict=True):
-            expected += [*WHEEL_NAMES[name].split(), f"{load:.1f}" if load < 100.0 else f"{load:.0f}"]
+            expected += [*WHEEL_NAMES[name].split(), shown_load(load)]
         assert readings(browser)[0] == expected
     assert len(positions[0]) == 2
     # One impact must not flatten the other curves: the axis ends below it and notes that.
@@ -289,7 +296,7 @@ def test_the_curves_stand_beside_the_scene_and_follow_the_timeline(shown: Shown)
     curves = browser.find_elements(By.CSS_SELECTOR, "#panel .curve")[:6]
     heights = [float(y) for curve in curves for y in re.findall(r"[\d.]+ ([\d.]+)", curve.get_attribute("d") or "")]
     assert min(heights) == pytest.approx(6.0, abs=0.1)  # the top
-    assert np.mean(np.array(heights) < 130.0) > 0.5  # the rest fills the chart
+    assert np.median(heights) < 145.0  # the rest stands clear of the axis, which lies at 160
     assert positions[1][0] - positions[0][0] == pytest.approx(0.5 * (330 - 42 - 6), abs=2.0)  # half of the axis
 
 
@@ -353,7 +360,7 @@ def test_a_soils_timeline_moves_disks_chains_and_wheels_and_comes_back(soil_show
     first = picture(browser)
     go_to(browser, 0.5)
     later = picture(browser)
-    end = f"{run.wheel_forces[-1, 0, 1]:.1f}"
+    end = shown_load(run.wheel_forces[-1, 0, 1])
     await_that(lambda: end in readings(browser)[0], "the load at the end")
     go_to(browser, 0.0)
     back = picture(browser)

@@ -23,7 +23,7 @@ from rover_gym.learning.several_seeds import seed_estimate, student_quantile
 from rover_gym.learning.training_config import parse_config, read_config
 from rover_gym.learning.training_evaluation import TrainingEvaluation, read_evaluations
 from rover_gym.policy import PolicyCard, TrainedPolicy, drive_all
-from rover_gym.policy.films import film_episode
+from rover_gym.policy.films import ENDING, film_episode
 
 TINY: dict[str, Any] = {
     "environment": {"terrain": "plane", "goal_distance": 1.2, "control_frequency": 10, "time_step": 0.02},
@@ -170,7 +170,7 @@ def test_without_the_extra_the_error_names_it(monkeypatch: pytest.MonkeyPatch, t
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("moon",), "error: configuration: must be a YAML file or one of plane, rocks"),
+        (("moon",), "error: CONFIG: must be a YAML file or one of plane, rocks"),
         (("plane", "--seeds", "499"), "498"),
     ],
 )
@@ -210,7 +210,7 @@ def test_an_episode_is_filmed_to_its_end(tmp_path: Path) -> None:
     episode = film_episode(path, PDPolicy, {"goal_distance": 1.2, "control_frequency": 5.0}, 2_000_000)
     assert episode.success
     frames, _seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
-    assert frames == round(episode.time * 5.0) + 1
+    assert frames == round(episode.time * 5.0) + 1 + ENDING
 
 
 @pytest.mark.parametrize(
