@@ -50,7 +50,7 @@ def describe_fields(_app: Sphinx, _what: str, _name: str, obj: Any, options: Any
     is_moved = set(fields) <= own
     _, arguments = split_attributes(lines, "Args:")  # those of a data class are its fields
     told = {**{name: text for name, text in arguments.items() if name in own}, **(fields if is_moved else {})}
-    told = {name: text for name, text in told.items() if not speaks_for_itself(own[name])}
+    told = {name: text for name, text in told.items() if not speaks_for_itself(vars(obj).get(name))}
     if told:
         analyzer = ModuleAnalyzer.for_module(obj.__module__)
         analyzer.analyze()
