@@ -60,7 +60,7 @@ test-python: $(STAMPS)/test $(STAMPS)/train $(STAMPS)/core $(STAMPS)/debian-demo
 
 wheel: $(STAMPS)/demo $(STAMPS)/fmu ## build the wheel, one for every Python from 3.11 on, and the archive of the sources, into dist/
 	rm -rf dist
-	$(BIN)/python -m maturin sdist --quiet --out dist
+	$(BIN)/python -m maturin sdist --out dist
 	CARGO_TARGET_DIR=$(abspath target) $(BIN)/python -m maturin build --release --quiet --out dist
 	@ls dist/*
 
