@@ -60,9 +60,7 @@ def train(
         "states": states,
         "arcs": len(tried.features),
         "environment": arguments,
-        "explained": {
-            name: round(x, 3) if x == x else None for name, x in zip(OUTPUTS, explained.tolist(), strict=True)
-        },
+        "explained": {name: _rounded(share) for name, share in zip(OUTPUTS, explained.tolist(), strict=True)},
         "trying_cpu_seconds": round(tried_seconds, 1),
         "fitting_cpu_seconds": round(time.process_time() - clock - tried_seconds, 1),
         **provenance(),

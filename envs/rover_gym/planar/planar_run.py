@@ -97,9 +97,7 @@ class PlanarRun:
         Raises:
             OptionError: `fps` is not a positive number.
         """
-        rows = film_rows(self.time, fps)
-        data = {name: values[rows] for name, values in self.trajectory.data.items()}
-        return replace(self, trajectory=replace(self.trajectory, data=data))
+        return replace(self, trajectory=self.trajectory.at(film_rows(self.time, fps)))
 
 
 def is_planar(trajectory: Trajectory) -> bool:

@@ -89,9 +89,7 @@ class RoverRun:
         Raises:
             OptionError: `fps` is not a positive number.
         """
-        rows = film_rows(self.time, fps)
-        data = {name: values[rows] for name, values in self.trajectory.data.items()}
-        return replace(self, trajectory=replace(self.trajectory, data=data))
+        return replace(self, trajectory=self.trajectory.at(film_rows(self.time, fps)))
 
 
 def film_rows(time: npt.NDArray[np.float64], fps: float) -> npt.NDArray[np.int64]:

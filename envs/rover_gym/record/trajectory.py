@@ -6,7 +6,7 @@ import json
 import math
 import stat
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -70,6 +70,10 @@ class Trajectory:
         if name not in self.data:
             refuse(RecordingError, name, sorted(self.data), "the run holds no such data set; it holds")
         return self.data[name]
+
+    def at(self, rows: npt.NDArray[np.int64]) -> Trajectory:
+        """Some samples of the run, by their indices `(n,)`."""
+        return replace(self, data={name: values[rows] for name, values in self.data.items()})
 
 
 def read_trajectory(path: str | Path) -> Trajectory:

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.replay.followed import smoothed
 from rover_gym.replay.scenery import first_view
 
 if TYPE_CHECKING:
     from rover_gym.grains.grain_run import GrainRun
 
 FIELD_OF_VIEW = 0.6  # rad, vertical, of a run without a rover
-FOLLOW_TIME = 1.0  # s, smoothing window of the path that the eye follows
 
 Array = npt.NDArray[np.float64]
 
@@ -46,8 +46,6 @@ def eye_path(run: GrainRun, *, follow: bool = True) -> Array:
     """(n, 3) what carries the eye along, relative to its start, m: the trunk's smoothed path."""
     if run.rover is None or not follow:
         return np.zeros((run.n_frames, 3))
-    path = run.trajectory["q"][:, :3]
-    spans = np.abs(run.time[:, None] - run.time) <= FOLLOW_TIME / 2
-    smooth = spans @ path / spans.sum(axis=1, keepdims=True)
+    smooth = smoothed(run.time, run.trajectory["q"][:, :3])
     result: Array = smooth - smooth[0]
     return result

@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.record.outcomes import outcome_words
-from rover_gym.replay.player import add_surroundings, hidden_server, rounded, shortened, with_panel
+from rover_gym.replay.followed import smoothed
+from rover_gym.replay.player import add_surroundings, hidden_server, panel_contents, shortened, with_panel
 from rover_gym.replay.rotation import continuous, quaternions
 from rover_gym.replay.scenery import first_view, trunk_path
 from rover_gym.replay.world_nodes import add_ground, add_rover
@@ -30,7 +31,6 @@ SMOOTHING = 0.2  # s, window of the loads' mean: an impact lasts a step and says
 #: One colour per wheel: Okabe and Ito's palette, safe for colour-blind readers.
 WHEEL_COLOURS = ("#0072B2", "#56B4E9", "#009E73", "#D55E00", "#CC79A7", "#E69F00")
 LONGEST_FACT = 100
-FOLLOW_TIME = 1.0  # s, smoothing window of the path that the eye follows
 
 Array = npt.NDArray[np.float64]
 
@@ -49,7 +49,9 @@ def write_page(run: RoverRun, path: str | Path, *, follow: bool = True) -> Path:
     """
     with hidden_server() as server:
         world, solids = _build(run, server.scene)
-        view, centre = first_view(run), _followed(run) if follow else np.zeros((run.n_frames, 3))
+        view, centre = first_view(run), np.zeros((run.n_frames, 3))
+        if follow:
+            centre = smoothed(run.time, trunk_path(run))
         server.initial_camera.position = view.eye - centre[0]
         server.initial_camera.look_at = view.target - centre[0]
         server.initial_camera.fov = view.field_of_view
@@ -76,14 +78,6 @@ def _build(run: RoverRun, scene: Any) -> tuple[Any, list[Any]]:
     solids = add_rover(scene, run)
     add_ground(scene, run)
     return world, solids
-
-
-def _followed(run: RoverRun) -> Array:
-    """(n, 3) smoothed path of the trunk, so that the eye does not shake with the rover."""
-    path = trunk_path(run)
-    spans = np.abs(run.time[:, None] - run.time) <= FOLLOW_TIME / 2
-    result: Array = spans @ path / spans.sum(axis=1, keepdims=True)
-    return result
 
 
 def moving_mean(time: Array, values: Array) -> Array:
@@ -124,20 +118,8 @@ def _curves(run: RoverRun) -> dict[str, Any]:
         (f"wheel load, mean over {SMOOTHING:g} s", "N", moving_mean(run.time, data["wheel_forces"][:, :, 0]), 0),
         ("wheel gap", "mm", 1e3 * data["wheel_gaps"], 2),
     ]
+    names = [WHEEL_NAMES.get(name, name) for name in wheels]
     return {
-        "title": run.title,
         "facts": facts(run),
-        "time": [round(float(time - run.time[0]), 4) for time in run.time],
-        "wheels": [
-            {"name": WHEEL_NAMES.get(name, name), "colour": colour}
-            for name, colour in zip(wheels, cycle(WHEEL_COLOURS), strict=False)
-        ],
-        "charts": [
-            {
-                "title": title,
-                "unit": unit,
-                "values": [rounded(column, digits) for column in values.T],
-            }
-            for title, unit, values, digits in charts
-        ],
+        **panel_contents(run.title, run.time, zip(names, cycle(WHEEL_COLOURS), strict=False), charts),
     }

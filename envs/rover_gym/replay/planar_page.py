@@ -17,8 +17,9 @@ from rover_gym.rendering.appearance import (
     Colour,
     Part,
 )
+from rover_gym.replay.followed import smoothed
 from rover_gym.replay.page import SMOOTHING, moving_mean
-from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, rounded, shortened, with_panel
+from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, panel_contents, shortened, with_panel
 from rover_gym.replay.soil_page import about_z, surface_mesh, wheel_meshes
 
 if TYPE_CHECKING:
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
 SEEN = 9.0  # width of the picture, in diameters of the largest disc
 ASPECT = 1.5  # width over height of the picture
 FIELD_OF_VIEW = 0.35  # rad, vertical
-FOLLOW_TIME = 1.0  # s, smoothing window of the path that the eye follows
 LAND = 1.5  # picture widths of ground beyond the way
 TILE = 0.5  # m, length of the ground's squares
 THICK = 0.4  # of a disc along its axle, in its radii
@@ -141,9 +141,7 @@ def _eye(run: PlanarRun, *, follow: bool) -> Array:
     middle = run.discs[..., :2].mean(axis=1)
     if not follow:
         return np.tile(0.5 * (middle.min(axis=0) + middle.max(axis=0)), (run.n_frames, 1))
-    spans = np.abs(run.time[:, None] - run.time) <= FOLLOW_TIME / 2
-    result: Array = spans @ middle / spans.sum(axis=1, keepdims=True)
-    return result
+    return smoothed(run.time, middle)
 
 
 def _curves(run: PlanarRun) -> dict[str, Any]:
@@ -154,12 +152,4 @@ def _curves(run: PlanarRun) -> dict[str, Any]:
         ("gap", "mm", 1e3 * run.trajectory["gaps"], 2),
         ("rim faster than machine", "mm/s", 1e3 * run.slip_speeds, 1),
     ]
-    return {
-        "title": run.title,
-        "time": [round(float(time - run.time[0]), 4) for time in run.time],
-        "wheels": [{"name": name, "colour": colour} for name, colour in zip(run.names, colours, strict=True)],
-        "charts": [
-            {"title": title, "unit": unit, "values": [rounded(column, digits) for column in values.T]}
-            for title, unit, values, digits in charts
-        ],
-    }
+    return panel_contents(run.title, run.time, zip(run.names, colours, strict=True), charts)

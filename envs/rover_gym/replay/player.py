@@ -83,6 +83,28 @@ def rounded(values: Array, digits: int) -> list[float | None]:
     return [round(float(value), digits) if np.isfinite(value) else None for value in values]
 
 
+def panel_contents(
+    title: str, time: Array, wheels: Iterable[tuple[str, str]], charts: Iterable[tuple[str, str, Array, int]]
+) -> dict[str, Any]:
+    """Contents of the panel: a title, the times, and charts with one curve for each wheel.
+
+    Args:
+        title: Of the run.
+        time: (n,) s.
+        wheels: Name and colour of each wheel.
+        charts: Title, unit, values (n, n_wheels) and digits after the point of each.
+    """
+    return {
+        "title": title,
+        "time": [round(float(one - time[0]), 4) for one in time],
+        "wheels": [{"name": name, "colour": colour} for name, colour in wheels],
+        "charts": [
+            {"title": heading, "unit": unit, "values": [rounded(column, digits) for column in values.T]}
+            for heading, unit, values, digits in charts
+        ],
+    }
+
+
 def with_panel(page: str, title: str, curves: Mapping[str, Any]) -> str:
     """Viser's page with our panel beside the scene."""
     files = resources.files("rover_gym.replay")

@@ -20,7 +20,16 @@ from rover_gym.rendering.appearance import (
     Part,
     part_mesh,
 )
-from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, rgb, rounded, shortened, with_panel
+from rover_gym.replay.followed import smoothed
+from rover_gym.replay.player import (
+    add_meshes,
+    add_surroundings,
+    hidden_server,
+    panel_contents,
+    rgb,
+    shortened,
+    with_panel,
+)
 
 if TYPE_CHECKING:
     from rover_gym.soil.soil_run import SoilRun
@@ -38,7 +47,6 @@ SEEN = 1.8  # m of soil in view at most
 SKIRT = 1.04  # width of the picture, in widths of the bed
 ASPECT = 1.2  # width over height of the picture
 FIELD_OF_VIEW = 0.35  # rad, vertical: narrow and far away, for little perspective
-FOLLOW_TIME = 1.0  # s, smoothing window of the path that the eye follows
 
 Array = npt.NDArray[np.float64]
 
@@ -268,8 +276,7 @@ def _eye(run: SoilRun, *, follow: bool) -> Array:
     middle = np.full(run.n_frames, 0.5 * (left + right))
     seen = _seen(run)
     if follow and run.wheels.size and right - left > seen:
-        spans = np.abs(run.time[:, None] - run.time) <= FOLLOW_TIME / 2
-        middle = spans @ run.wheels[..., 0].mean(axis=1) / spans.sum(axis=1)
+        middle = smoothed(run.time, run.wheels[..., 0].mean(axis=1)[:, None])[:, 0]
         middle = np.clip(middle, left + 0.5 * seen, right - 0.5 * seen)
     return np.column_stack((middle, np.full(run.n_frames, height)))
 
@@ -282,19 +289,5 @@ def _curves(run: SoilRun) -> dict[str, Any]:
         ("sinkage", "mm", 1e3 * run.sinkage, 2),
         ("rim faster than rover", "mm/s", 1e3 * run.slip_speeds, 1),
     ]
-    return {
-        "title": run.title,
-        "time": [round(float(time - run.time[0]), 4) for time in run.time],
-        "wheels": [
-            {"name": name, "colour": colour}
-            for name, colour in zip(names, PLANAR_WHEEL_COLOURS[: len(names)], strict=True)
-        ],
-        "charts": [
-            {
-                "title": title,
-                "unit": unit,
-                "values": [rounded(column, digits) for column in values.T],
-            }
-            for title, unit, values, digits in charts
-        ],
-    }
+    wheels = zip(names, PLANAR_WHEEL_COLOURS[: len(names)], strict=True)
+    return panel_contents(run.title, run.time, wheels, charts)

@@ -104,9 +104,7 @@ class SoilRun:
         Raises:
             OptionError: `fps` is not a positive number.
         """
-        rows = film_rows(self.time, fps)
-        data = {name: values[rows] for name, values in self.trajectory.data.items()}
-        return replace(self, trajectory=replace(self.trajectory, data=data))
+        return replace(self, trajectory=self.trajectory.at(film_rows(self.time, fps)))
 
 
 def is_soil(trajectory: Trajectory) -> bool:

@@ -20,7 +20,7 @@ use std::ptr;
 use crate::refusal::Refusal;
 use crate::saved::Saved;
 use crate::scene_file::SceneFile;
-use crate::unit::Unit;
+use crate::unit::{Unit, count};
 
 /// `fmi3Status`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -370,10 +370,7 @@ pub unsafe extern "C" fn fmi3GetString(
         answer(instance, |it| {
             let references = slice("valueReferences", references, n_references)?;
             let values = slice_mut("values", values, n_values)?;
-            if references.len() != values.len() {
-                let (expected, actual) = (references.len(), values.len());
-                return Err(Refusal::Count { expected, actual });
-            }
+            count(references.len(), values.len())?;
             it.texts.clear();
             for (&reference, value) in references.iter().zip(values) {
                 let text = it.unit.text(reference)?.replace('\0', " ");
@@ -398,15 +395,24 @@ pub unsafe extern "C" fn fmi3SetString(
         answer(instance, |it| {
             let references = slice("valueReferences", references, n_references)?;
             let values = slice("values", values, n_values)?;
-            if references.len() != values.len() {
-                let (expected, actual) = (references.len(), values.len());
-                return Err(Refusal::Count { expected, actual });
-            }
+            count(references.len(), values.len())?;
             for (&reference, &value) in references.iter().zip(values) {
                 it.unit.set_text(reference, text("values", value)?)?;
             }
             Ok(Status::Ok)
         })
+    }
+}
+
+/// Writes a state over the one that a place holds, or into a new one where it holds none.
+///
+/// # Safety
+/// The place holds null or a state.
+unsafe fn hand_over(place: &mut *mut Saved, saved: Saved) {
+    // SAFETY: the caller's.
+    match unsafe { place.as_mut() } {
+        Some(earlier) => *earlier = saved,
+        None => *place = Box::into_raw(Box::new(saved)),
     }
 }
 
@@ -418,12 +424,7 @@ pub unsafe extern "C" fn fmi3GetFMUState(
     // SAFETY: the importer's instance and place, which holds null or a state.
     unsafe {
         answer(instance, |it| {
-            let place = place("FMUState", state)?;
-            let saved = it.unit.saved();
-            match place.as_mut() {
-                Some(earlier) => *earlier = saved,
-                None => *place = Box::into_raw(Box::new(saved)),
-            }
+            hand_over(place("FMUState", state)?, it.unit.saved());
             Ok(Status::Ok)
         })
     }
@@ -484,10 +485,7 @@ pub unsafe extern "C" fn fmi3SerializeFMUState(
     unsafe {
         answer(instance, |_| {
             let bytes = place("FMUState", state)?.to_bytes()?;
-            let (expected, actual) = (bytes.len(), size);
-            if expected != actual {
-                return Err(Refusal::Count { expected, actual });
-            }
+            count(bytes.len(), size)?;
             slice_mut("serializedState", serialized, size)?.copy_from_slice(&bytes);
             Ok(Status::Ok)
         })
@@ -506,11 +504,7 @@ pub unsafe extern "C" fn fmi3DeserializeFMUState(
         answer(instance, |it| {
             let saved = Saved::from_bytes(slice("serializedState", serialized, size)?)?;
             it.unit.check(&saved)?;
-            let place = place("FMUState", state)?;
-            match place.as_mut() {
-                Some(earlier) => *earlier = saved,
-                None => *place = Box::into_raw(Box::new(saved)),
-            }
+            hand_over(place("FMUState", state)?, saved);
             Ok(Status::Ok)
         })
     }

@@ -459,7 +459,7 @@ fn finite(name: &str, value: f64) -> Result<(), Refusal> {
     })
 }
 
-fn count(expected: usize, actual: usize) -> Result<(), Refusal> {
+pub fn count(expected: usize, actual: usize) -> Result<(), Refusal> {
     if expected == actual {
         return Ok(());
     }
