@@ -18,6 +18,7 @@ from selenium.webdriver.common.by import By
 from rover_gym.grains import GrainRun, read_grain_run, record_grains
 from rover_gym.rendering.appearance import SAND_COLOUR
 from rover_gym.replay import write_grain_page
+from rover_gym.replay.smoothing import LOAD_TIME, moving_mean
 
 # Time of the script for a new sample, on any thread: rebuilt from its differences, and given to the graphics card.
 SAMPLE_TIMES = """
@@ -137,14 +138,14 @@ def test_the_curves_follow_the_timeline(shown: BallsShown) -> None:
     browser, run = shown.browser, shown.run
     assert run.model is not None
     assert [node.text for node in browser.find_elements(By.CSS_SELECTOR, "#panel h2")] == [
-        "wheel load (N)",
+        f"wheel load, mean over {LOAD_TIME:g} s (N)",
         "sinkage (mm)",
         "energy (J)",
         "contacts (1)",
         "deepest overlap (% of a radius)",
     ]
     go_to(browser, float(run.time[7]) + 0.01)
-    loads = run.wheel_forces[7, :, 1]
+    loads = moving_mean(run.time, run.wheel_forces[..., 1], LOAD_TIME)[7]
     pairs = zip(run.model.wheel_names, loads, strict=True)
     expected = [word for name, load in pairs for word in (name, shown_load(load))]
     await_that(lambda: readings(browser)[0] == expected, "the loads at that time")

@@ -22,7 +22,8 @@ from rover_gym import HeightField, Plane, RoverModel, Simulation, SphereField, T
 from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_run
 from rover_gym.rendering.appearance import GROUND_COLOUR, TRUNK_COLOUR
 from rover_gym.replay import write_page, write_soil_page
-from rover_gym.replay.page import SMOOTHING, WHEEL_NAMES, moving_mean
+from rover_gym.replay.page import WHEEL_NAMES
+from rover_gym.replay.smoothing import LOAD_TIME, moving_mean
 from rover_gym.soil import SoilRun, read_soil_run, record_soil, rover_on_soil, settled_bed
 
 ROCKS = SphereField([[1.6, 0.0, 0.6], [1.2, 0.05, -1.3], [-0.9, 0.0, 1.3]], [0.25, 0.2, 0.15], Plane())
@@ -269,7 +270,7 @@ def readings(browser: webdriver.Chrome) -> list[list[str]]:
 def test_the_curves_stand_beside_the_scene_and_follow_the_timeline(shown: Shown) -> None:
     browser, run = shown.browser, shown.run
     assert [node.text for node in browser.find_elements(By.CSS_SELECTOR, "#panel h2")] == [
-        f"wheel load, mean over {SMOOTHING:g} s (N)",
+        f"wheel load, mean over {LOAD_TIME:g} s (N)",
         "wheel gap (mm)",
     ]
     assert len(browser.find_elements(By.CSS_SELECTOR, "#panel .curve")) == 12
@@ -277,7 +278,7 @@ def test_the_curves_stand_beside_the_scene_and_follow_the_timeline(shown: Shown)
     panel = browser.find_element(By.ID, "panel")
     assert panel.rect["x"] >= canvas.rect["x"] + canvas.rect["width"] - 1.0
 
-    loads = moving_mean(run.time, run.trajectory["wheel_forces"][:, :, 0])
+    loads = moving_mean(run.time, run.trajectory["wheel_forces"][:, :, 0], LOAD_TIME)
     positions = []
     for row in (5, 15):
         go_to(browser, float(run.time[row] - run.time[0]) + 0.01)
@@ -296,7 +297,7 @@ def test_the_curves_stand_beside_the_scene_and_follow_the_timeline(shown: Shown)
     curves = browser.find_elements(By.CSS_SELECTOR, "#panel .curve")[:6]
     heights = [float(y) for curve in curves for y in re.findall(r"[\d.]+ ([\d.]+)", curve.get_attribute("d") or "")]
     assert min(heights) == pytest.approx(6.0, abs=0.1)  # the top
-    assert np.median(heights) < 145.0  # the rest stands clear of the axis, which lies at 160
+    assert np.mean(np.array(heights) < 130.0) > 0.5  # the rest stands clear of the axis, which lies at 160
     assert positions[1][0] - positions[0][0] == pytest.approx(0.5 * (330 - 42 - 6), abs=2.0)  # half of the axis
 
 
@@ -342,7 +343,7 @@ def test_a_soils_page_loads_alone_and_shows_rover_and_disks(soil_shown: SoilShow
     browser = soil_shown.browser
     assert browser.title == "the rover on 150 disks"
     assert [node.text for node in browser.find_elements(By.CSS_SELECTOR, "#panel h2")] == [
-        "load of the wheel (N)",
+        f"wheel load, mean over {LOAD_TIME:g} s (N)",
         "sinkage (mm)",
         "rim faster than rover (mm/s)",
     ]
@@ -360,7 +361,7 @@ def test_a_soils_timeline_moves_disks_chains_and_wheels_and_comes_back(soil_show
     first = picture(browser)
     go_to(browser, 0.5)
     later = picture(browser)
-    end = shown_load(run.wheel_forces[-1, 0, 1])
+    end = shown_load(moving_mean(run.time, run.wheel_forces[..., 1], LOAD_TIME)[-1, 0])
     await_that(lambda: end in readings(browser)[0], "the load at the end")
     go_to(browser, 0.0)
     back = picture(browser)

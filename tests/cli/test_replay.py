@@ -21,9 +21,10 @@ from rover_gym.figures import draw_run
 from rover_gym.record import RecordingError, RoverRun, Trajectory, read_run
 from rover_gym.rendering.appearance import rover_parts, sphere_mesh
 from rover_gym.replay import write_gltf, write_page, write_vrml
-from rover_gym.replay.page import WHEEL_NAMES, facts, moving_mean
+from rover_gym.replay.page import WHEEL_NAMES, facts
 from rover_gym.replay.rotation import axis_angles, continuous, quaternions
 from rover_gym.replay.scenery import ground_tiles, identifiers
+from rover_gym.replay.smoothing import moving_mean
 
 SLOPE = Plane((-0.1, 1.0, 0.05), 0.2)
 FIELD = SphereField([[1.0, 0.1, -0.5], [2.0, 0.0, 0.7]], [0.2, 0.3], SLOPE)
@@ -380,7 +381,8 @@ def test_the_page_holds_the_curves_of_the_run(tmp_path: Path) -> None:
     data = curves(page)
     assert data["title"] == run.title
     assert data["time"] == pytest.approx(run.time - run.time[0])
-    assert [wheel["name"] for wheel in data["wheels"]] == [WHEEL_NAMES[name] for name in run.model.wheel_names]
+    names = [WHEEL_NAMES[name] for name in run.model.wheel_names]
+    assert all([curve["name"] for curve in chart["series"]] == names for chart in data["charts"])
     loads, gaps = data["charts"]
     assert (loads["unit"], gaps["unit"]) == ("N", "mm")
     assert loads["values"] == [[1.0] * run.n_frames] * 6
@@ -576,8 +578,8 @@ def test_loads_are_smoothed_and_what_is_unknown_is_left_out() -> None:
     time = np.arange(0.0, 1.0, 0.05)
     values = np.ones((len(time), 2))
     values[10, 0], values[5, 1] = 11.0, np.nan
-    smooth = moving_mean(time, values)
+    smooth = moving_mean(time, values, 0.2)
     assert smooth[10, 0] == pytest.approx(3.0)  # five samples within 0.2 s
     assert smooth[3, 0] == pytest.approx(1.0)
     assert np.allclose(smooth[:, 1], 1.0)
-    assert np.isnan(moving_mean(time, np.full((len(time), 1), np.nan))).all()
+    assert np.isnan(moving_mean(time, np.full((len(time), 1), np.nan), 0.2)).all()

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.replay.followed import smoothed
 from rover_gym.replay.scenery import first_view
+from rover_gym.replay.smoothing import FOLLOW_TIME, moving_mean
 
 if TYPE_CHECKING:
     from rover_gym.grains.grain_run import GrainRun
@@ -46,6 +46,6 @@ def eye_path(run: GrainRun, *, follow: bool = True) -> Array:
     """(n, 3) what carries the eye along, relative to its start, m: the trunk's smoothed path."""
     if run.rover is None or not follow:
         return np.zeros((run.n_frames, 3))
-    smooth = smoothed(run.time, run.trajectory["q"][:, :3])
+    smooth = moving_mean(run.time, run.trajectory["q"][:, :3], FOLLOW_TIME)
     result: Array = smooth - smooth[0]
     return result

@@ -10,10 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.record.outcomes import outcome_words
-from rover_gym.replay.followed import smoothed
-from rover_gym.replay.player import add_surroundings, hidden_server, panel_contents, shortened, with_panel
+from rover_gym.replay.panel import Chart, load_chart, panel_contents, with_panel
+from rover_gym.replay.player import add_surroundings, hidden_server, shortened
 from rover_gym.replay.rotation import continuous, quaternions
 from rover_gym.replay.scenery import first_view, trunk_path
+from rover_gym.replay.smoothing import FOLLOW_TIME, moving_mean
 from rover_gym.replay.world_nodes import add_ground, add_rover
 
 if TYPE_CHECKING:
@@ -27,7 +28,6 @@ WHEEL_NAMES = {
     "BL": "back left",
     "BR": "back right",
 }
-SMOOTHING = 0.2  # s, window of the loads' mean: an impact lasts a step and says nothing of the weight carried
 #: One colour per wheel: Okabe and Ito's palette, safe for colour-blind readers.
 WHEEL_COLOURS = ("#0072B2", "#56B4E9", "#009E73", "#D55E00", "#CC79A7", "#E69F00")
 LONGEST_FACT = 100
@@ -51,7 +51,7 @@ def write_page(run: RoverRun, path: str | Path, *, follow: bool = True) -> Path:
         world, solids = _build(run, server.scene)
         view, centre = first_view(run), np.zeros((run.n_frames, 3))
         if follow:
-            centre = smoothed(run.time, trunk_path(run))
+            centre = moving_mean(run.time, trunk_path(run), FOLLOW_TIME)
         server.initial_camera.position = view.eye - centre[0]
         server.initial_camera.look_at = view.target - centre[0]
         server.initial_camera.fov = view.field_of_view
@@ -67,7 +67,7 @@ def write_page(run: RoverRun, path: str | Path, *, follow: bool = True) -> Path:
         page = recording.as_html()
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(with_panel(page, run.title, _curves(run)), encoding="utf-8")
+    path.write_text(with_panel(page, _curves(run)), encoding="utf-8")
     return path
 
 
@@ -78,19 +78,6 @@ def _build(run: RoverRun, scene: Any) -> tuple[Any, list[Any]]:
     solids = add_rover(scene, run)
     add_ground(scene, run)
     return world, solids
-
-
-def moving_mean(time: Array, values: Array) -> Array:
-    """Values `(n, m)` averaged over the samples within half of `SMOOTHING` s, without those that are not finite."""
-    half = 0.5 * SMOOTHING + 1e-6  # samples at the edge count, whatever their rounding
-    first = np.searchsorted(time, time - half, side="left")
-    last = np.searchsorted(time, time + half, side="right")
-    known = np.isfinite(values)
-    sums = np.vstack((np.zeros(values.shape[1]), np.cumsum(np.where(known, values, 0.0), axis=0)))
-    counts = np.vstack((np.zeros(values.shape[1]), np.cumsum(known, axis=0)))
-    with np.errstate(invalid="ignore"):
-        result: Array = (sums[last] - sums[first]) / (counts[last] - counts[first])
-    return result
 
 
 def facts(run: RoverRun) -> list[str]:
@@ -112,14 +99,14 @@ def facts(run: RoverRun) -> list[str]:
 
 
 def _curves(run: RoverRun) -> dict[str, Any]:
-    """Contents of the panel: its title, the time, and for each chart one curve per wheel."""
-    data, wheels = run.trajectory, run.model.wheel_names
-    charts = [
-        (f"wheel load, mean over {SMOOTHING:g} s", "N", moving_mean(run.time, data["wheel_forces"][:, :, 0]), 0),
-        ("wheel gap", "mm", 1e3 * data["wheel_gaps"], 2),
+    """Contents of the panel."""
+    data = run.trajectory
+    wheels = [
+        (WHEEL_NAMES.get(name, name), colour)
+        for name, colour in zip(run.model.wheel_names, cycle(WHEEL_COLOURS), strict=False)
     ]
-    names = [WHEEL_NAMES.get(name, name) for name in wheels]
-    return {
-        "facts": facts(run),
-        **panel_contents(run.title, run.time, zip(names, cycle(WHEEL_COLOURS), strict=False), charts),
-    }
+    charts = [
+        load_chart("wheel load", run.time, data["wheel_forces"][:, :, 0], 0, wheels),
+        Chart("wheel gap", "mm", 1e3 * data["wheel_gaps"], 2, wheels),
+    ]
+    return panel_contents(run.title, run.time, charts, facts(run))

@@ -27,7 +27,7 @@
   const x = (time) => box.left + (time / end) * (box.width - box.left - box.right);
 
   const draw = (chart) => {
-    const series = chart.series ?? data.wheels;
+    const { series } = chart;
     const known = chart.values.flat().filter((value) => value !== null);
     let low = known.reduce((a, b) => Math.min(a, b), 0);
     let high = known.reduce((a, b) => Math.max(a, b), 0);
@@ -35,7 +35,8 @@
     // One impact must not flatten all the rest: the axis then covers the bulk, and the peak is told in words.
     const peak = high;
     const sorted = Float64Array.from(known).sort();
-    const bulk = sorted[Math.floor(0.95 * (sorted.length - 1))] ?? 0;
+    const share = Math.max(0.5, Math.min(0.95, 1 - (1.5 * chart.window) / end)); // of the values that no impact touches
+    const bulk = sorted[Math.floor(share * (sorted.length - 1))] ?? 0;
     if (bulk > 0 && high > 4 * bulk) high = 1.5 * bulk;
     const y = (value) => box.top + ((high - Math.min(value, high)) / (high - low)) * (box.height - box.top - box.bottom);
 
@@ -93,7 +94,7 @@
   };
 
   add(panel, "h1", {}, data.title);
-  for (const fact of data.facts ?? []) add(panel, "p", { class: "fact" }, fact);
+  for (const fact of data.facts) add(panel, "p", { class: "fact" }, fact);
   add(panel, "p", {}, "Drag to orbit, right button to pan, scroll to zoom, space to pause; click a curve to go there.");
   const clock = add(panel, "p");
   const updates = data.charts.map(draw);

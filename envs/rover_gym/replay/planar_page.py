@@ -17,9 +17,9 @@ from rover_gym.rendering.appearance import (
     Colour,
     Part,
 )
-from rover_gym.replay.followed import smoothed
-from rover_gym.replay.page import SMOOTHING, moving_mean
-from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, panel_contents, shortened, with_panel
+from rover_gym.replay.panel import Chart, load_chart, panel_contents, with_panel
+from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, shortened
+from rover_gym.replay.smoothing import FOLLOW_TIME, moving_mean
 from rover_gym.replay.soil_page import about_z, surface_mesh, wheel_meshes
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def write_planar_page(run: PlanarRun, path: str | Path, *, follow: bool = True) 
         page = recording.as_html()
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(with_panel(page, run.title, _curves(run)), encoding="utf-8")
+    path.write_text(with_panel(page, _curves(run)), encoding="utf-8")
     return path
 
 
@@ -141,15 +141,15 @@ def _eye(run: PlanarRun, *, follow: bool) -> Array:
     middle = run.discs[..., :2].mean(axis=1)
     if not follow:
         return np.tile(0.5 * (middle.min(axis=0) + middle.max(axis=0)), (run.n_frames, 1))
-    return smoothed(run.time, middle)
+    return moving_mean(run.time, middle, FOLLOW_TIME)
 
 
 def _curves(run: PlanarRun) -> dict[str, Any]:
     """Contents of the panel."""
-    colours = PLANAR_WHEEL_COLOURS[: len(run.names)]
+    discs = list(zip(run.names, PLANAR_WHEEL_COLOURS[: len(run.names)], strict=True))
     charts = [
-        (f"load, mean over {SMOOTHING:g} s", "N", moving_mean(run.time, run.loads), 1),
-        ("gap", "mm", 1e3 * run.trajectory["gaps"], 2),
-        ("rim faster than machine", "mm/s", 1e3 * run.slip_speeds, 1),
+        load_chart("load", run.time, run.loads, 1, discs),
+        Chart("gap", "mm", 1e3 * run.trajectory["gaps"], 2, discs),
+        Chart("rim faster than machine", "mm/s", 1e3 * run.slip_speeds, 1, discs),
     ]
-    return panel_contents(run.title, run.time, zip(run.names, colours, strict=True), charts)
+    return panel_contents(run.title, run.time, charts)

@@ -1,17 +1,14 @@
-"""Shared parts of the browser pages: viser's scene and player, and our curves beside them.
+"""Shared parts of the browser pages: viser's scene and player.
 
 Scene and player come from viser [https://viser.studio]: its recording of scene updates, embedded in the client that
-its package includes. Our script `panel.js` draws the curves and follows the player's clock.
+its package includes.
 """
 
 from __future__ import annotations
 
 import html
 import io
-import json
-from collections.abc import Mapping
 from contextlib import contextmanager, redirect_stdout
-from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -76,47 +73,6 @@ def shortened(values: Array, bits: int = 18) -> Array:
     """Values rounded to 2^-bits (4 micrometres or microradians): the trailing zero bits compress well."""
     result: Array = np.round(values * 2.0**bits) / 2.0**bits
     return result
-
-
-def rounded(values: Array, digits: int) -> list[float | None]:
-    """Values for JSON, which has neither nan nor infinity: unknown values leave gaps in the curve."""
-    return [round(float(value), digits) if np.isfinite(value) else None for value in values]
-
-
-def panel_contents(
-    title: str, time: Array, wheels: Iterable[tuple[str, str]], charts: Iterable[tuple[str, str, Array, int]]
-) -> dict[str, Any]:
-    """Contents of the panel: a title, the times, and charts with one curve for each wheel.
-
-    Args:
-        title: Of the run.
-        time: (n,) s.
-        wheels: Name and colour of each wheel.
-        charts: Title, unit, values (n, n_wheels) and digits after the point of each.
-    """
-    return {
-        "title": title,
-        "time": [round(float(one - time[0]), 4) for one in time],
-        "wheels": [{"name": name, "colour": colour} for name, colour in wheels],
-        "charts": [
-            {"title": heading, "unit": unit, "values": [rounded(column, digits) for column in values.T]}
-            for heading, unit, values, digits in charts
-        ],
-    }
-
-
-def with_panel(page: str, title: str, curves: Mapping[str, Any]) -> str:
-    """Viser's page with our panel beside the scene."""
-    files = resources.files("rover_gym.replay")
-    style, script = (files.joinpath(name).read_text(encoding="utf-8") for name in ("panel.css", "panel.js"))
-    data = json.dumps(curves, separators=(",", ":")).replace("<", "\\u003c")  # no closing tag may end the script early
-    panel = (
-        f"<style>{style}</style>"
-        '<aside id="panel"></aside>'
-        f'<script type="application/json" id="curves">{data}</script>'
-        f"<script>{script}</script>"
-    )
-    return with_parts(page, title, panel)
 
 
 def with_parts(page: str, title: str, parts: str) -> str:

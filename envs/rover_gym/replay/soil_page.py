@@ -20,16 +20,9 @@ from rover_gym.rendering.appearance import (
     Part,
     part_mesh,
 )
-from rover_gym.replay.followed import smoothed
-from rover_gym.replay.player import (
-    add_meshes,
-    add_surroundings,
-    hidden_server,
-    panel_contents,
-    rgb,
-    shortened,
-    with_panel,
-)
+from rover_gym.replay.panel import Chart, load_chart, panel_contents, with_panel
+from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, rgb, shortened
+from rover_gym.replay.smoothing import FOLLOW_TIME, moving_mean
 
 if TYPE_CHECKING:
     from rover_gym.soil.soil_run import SoilRun
@@ -86,7 +79,7 @@ def write_soil_page(run: SoilRun, path: str | Path, *, follow: bool = True) -> P
         page = recording.as_html()
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(with_panel(page, run.title, _curves(run)), encoding="utf-8")
+    path.write_text(with_panel(page, _curves(run)), encoding="utf-8")
     return path
 
 
@@ -276,7 +269,7 @@ def _eye(run: SoilRun, *, follow: bool) -> Array:
     middle = np.full(run.n_frames, 0.5 * (left + right))
     seen = _seen(run)
     if follow and run.wheels.size and right - left > seen:
-        middle = smoothed(run.time, run.wheels[..., 0].mean(axis=1)[:, None])[:, 0]
+        middle = moving_mean(run.time, run.wheels[..., 0].mean(axis=1)[:, None], FOLLOW_TIME)[:, 0]
         middle = np.clip(middle, left + 0.5 * seen, right - 0.5 * seen)
     return np.column_stack((middle, np.full(run.n_frames, height)))
 
@@ -284,10 +277,10 @@ def _eye(run: SoilRun, *, follow: bool) -> Array:
 def _curves(run: SoilRun) -> dict[str, Any]:
     """Contents of the panel."""
     names = ("wheel",) if run.wheels.shape[1] == 1 else ("back wheel", "front wheel")
+    wheels = list(zip(names, PLANAR_WHEEL_COLOURS[: len(names)], strict=True))
     charts = [
-        ("load of the wheel", "N", run.wheel_forces[..., 1], 1),
-        ("sinkage", "mm", 1e3 * run.sinkage, 2),
-        ("rim faster than rover", "mm/s", 1e3 * run.slip_speeds, 1),
+        load_chart("wheel load", run.time, run.wheel_forces[..., 1], 1, wheels),
+        Chart("sinkage", "mm", 1e3 * run.sinkage, 2, wheels),
+        Chart("rim faster than rover", "mm/s", 1e3 * run.slip_speeds, 1, wheels),
     ]
-    wheels = zip(names, PLANAR_WHEEL_COLOURS[: len(names)], strict=True)
-    return panel_contents(run.title, run.time, wheels, charts)
+    return panel_contents(run.title, run.time, charts)
