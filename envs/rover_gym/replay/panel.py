@@ -63,9 +63,7 @@ def with_panel(page: str, contents: Mapping[str, Any]) -> str:
     files = resources.files("rover_gym.replay")
     style, script = (files.joinpath(name).read_text(encoding="utf-8") for name in ("panel.css", "panel.js"))
     # No closing tag may end the script early.
-    data = json.dumps(contents, separators=(",", ":")).replace(
-        "<", "\\u003c"
-    )  # no closing tag may end the script early
+    data = json.dumps(contents, separators=(",", ":")).replace("<", "\\u003c")
     panel = (
         f"<style>{style}</style>"
         '<aside id="panel"></aside>'
