@@ -1,12 +1,16 @@
 """The loop of a live drive without a browser: time, commands, recordings, and what goes wrong."""
 
 import errno
+import json
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
+from mcap.reader import make_reader
 
+from rover_gym.exports import McapWriter
 from rover_gym.live import (
     Change,
     Drive,
@@ -23,7 +27,7 @@ from rover_gym.live import (
 from rover_gym.live.live_commands import command_of, read_message
 from rover_gym.live.live_loop import HOLD, MOST_WAITING
 from rover_gym.mechanics import CommandError, OptionError
-from rover_gym.record import read_run
+from rover_gym.record import RecordingError, read_run
 from rover_gym.record.steady_file import SteadyFile
 from rover_gym.replay import write_vrml
 
@@ -48,9 +52,9 @@ def stepped(loop: LiveLoop, clock: Clock, periods: int, *, holding: Drive | None
     return loop
 
 
-def paused(folder: Path, scene: LiveScene | None = None) -> tuple[LiveLoop, Clock]:
+def paused(folder: Path, scene: LiveScene | None = None, *, mcap: bool = False) -> tuple[LiveLoop, Clock]:
     clock = Clock()
-    return LiveLoop(LiveRover(scene), folder, clock=clock), clock
+    return LiveLoop(LiveRover(scene), folder, mcap=mcap, clock=clock), clock
 
 
 def test_a_command_by_hand_moves_the_rover_and_runs_out(tmp_path: Path) -> None:
@@ -162,6 +166,50 @@ def test_a_recording_goes_on_in_another_file_where_time_or_ground_change(tmp_pat
     assert all(run.trajectory.attributes["complete"] for run in runs)
     assert runs[1].time[0] == runs[0].time[-1]
     assert not (tmp_path / "live-7.h5").exists()
+
+
+def rows_logged(path: Path) -> dict[str, list[Any]]:
+    """The JSON topics of a log, by name."""
+    rows: dict[str, list[Any]] = {"/signals": [], "/wheels": []}
+    with path.open("rb") as stream:
+        for _, channel, message in make_reader(stream).iter_messages(topics=list(rows)):
+            rows[channel.topic].append(json.loads(message.data))
+    return rows
+
+
+def test_a_log_for_viewers_gets_the_rows_of_the_recording(tmp_path: Path) -> None:
+    (tmp_path / "live-1.mcap").write_text("of another day")
+    loop, clock = paused(tmp_path, LiveScene(ground="rocks"), mcap=True)
+    loop.send(Record())
+    stepped(loop, clock, 20, holding=Drive(1.0))
+    loop.send(Restart())
+    stepped(loop, clock, 5)
+    loop.stop()
+    assert (tmp_path / "live-1.mcap").read_text() == "of another day"
+    assert [path.name for path in loop.recorded] == ["live-2.h5", "live-2.mcap", "live-3.h5", "live-3.mcap"]
+    for number in (2, 3):
+        run = read_run(tmp_path / f"live-{number}.h5")
+        rows = rows_logged(tmp_path / f"live-{number}.mcap")
+        told = [row["distance_to_goal"] for row in rows["/signals"]]
+        assert told == pytest.approx(run.trajectory["distance_to_goal"].tolist())
+        assert len(rows["/wheels"]) == run.n_frames
+
+
+def test_a_log_that_fails_ends_its_recording_which_is_complete(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    loop, clock = paused(tmp_path, mcap=True)
+    loop.send(Record())
+    stepped(loop, clock, 10)
+
+    def full(_log: McapWriter, _row: object) -> None:
+        raise RecordingError("No space left on device")
+
+    monkeypatch.setattr(McapWriter, "append", full)
+    stepped(loop, clock, 10, holding=Drive(1.0))
+    assert loop.state.recording == ""
+    assert "No space left on device" in loop.state.notice
+    assert loop.state.time == pytest.approx(20 * 0.05)
+    assert read_run(tmp_path / "live-1.h5").trajectory.attributes["complete"]
+    assert len(rows_logged(tmp_path / "live-1.mcap")["/signals"]) == 11  # what was logged before
 
 
 def test_a_full_disk_ends_the_recording_and_not_the_drive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -50,6 +50,9 @@ def live(
     output: Annotated[
         Path, typer.Option(file_okay=False, help="Folder of the recordings that the page asks for.")
     ] = Path(),
+    mcap: Annotated[
+        bool, typer.Option("--mcap", help="Write each recording as an MCAP log, too (extra logs).")
+    ] = False,
     host: Annotated[
         str, typer.Option(help="Address to listen at. The default refuses other machines; 0.0.0.0 lets them in.")
     ] = "127.0.0.1",
@@ -64,6 +67,8 @@ def live(
     Ctrl-C ends the drive; what was recorded is kept.
     """
     require("viser", "replay")
+    if mcap:
+        require("mcap", "logs")
     check_folder("output", output)
     choices, scene = LiveChoices(), LiveScene()
     named = chosen_terrain(terrain, difficulty)
@@ -87,7 +92,7 @@ def live(
         gravity=gravity,
         seed=seed,
     )
-    loop = LiveLoop(LiveRover(scene, choices), output)
+    loop = LiveLoop(LiveRover(scene, choices), output, mcap=mcap)
     server = LiveServer(loop, choices, host=host, port=port, fps=fps)
     typer.echo(f"live: {server.address} (Ctrl-C ends the drive)")
     loop.start()

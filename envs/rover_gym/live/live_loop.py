@@ -71,6 +71,7 @@ class LiveLoop:
     Args:
         rover: The rover. It belongs to the loop from here on.
         recordings: Folder of the recordings.
+        mcap: Whether each recording is also written as an MCAP log.
         clock: The time that the drive keeps, s.
 
     Attributes:
@@ -80,9 +81,14 @@ class LiveLoop:
     """
 
     def __init__(
-        self, rover: LiveRover, recordings: str | Path = ".", *, clock: Callable[[], float] = time.perf_counter
+        self,
+        rover: LiveRover,
+        recordings: str | Path = ".",
+        *,
+        mcap: bool = False,
+        clock: Callable[[], float] = time.perf_counter,
     ) -> None:
-        self._rover, self._folder, self._clock = rover, Path(recordings), clock
+        self._rover, self._folder, self._mcap, self._clock = rover, Path(recordings), mcap, clock
         self._commands: queue.Queue[Command] = queue.Queue(MOST_WAITING)
         self._wake, self._stopping = threading.Event(), threading.Event()
         self._past = Past()
@@ -241,13 +247,13 @@ class LiveLoop:
         if not on:
             self._end_recording()
         elif self._recording is None:
-            self._recording = LiveRecording(self._folder, self._rover)
+            self._recording = LiveRecording(self._folder, self._rover, mcap=self._mcap)
             self._note_file()
             self.tell(f"recording {self._recording.path.name}")
 
     def _note_file(self) -> None:
         if self._recording is not None:
-            self.recorded.append(self._recording.path)
+            self.recorded += self._recording.paths
 
     def _end_recording(self) -> None:
         if self._recording is not None:

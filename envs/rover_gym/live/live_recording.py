@@ -1,4 +1,4 @@
-"""The recording of a live drive, in files that `rover replay` and `rover plot` read.
+"""The recording of a live drive, in files that `rover replay` and `rover plot` read, and as logs for robotics viewers.
 
 A file holds one ground and one rover, and its time runs forward. Where a rock is thrown, another drive begins or the
 drive goes back, the recording goes on in the next file.
@@ -6,9 +6,11 @@ drive goes back, the recording goes on in the next file.
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
+from rover_gym.exports import McapWriter
 from rover_gym.record.channels import Channel, RoverSampler
 from rover_gym.record.facts import describe
 from rover_gym.record.recorder import Recorder
@@ -29,6 +31,7 @@ class LiveRecording:
     Args:
         folder: The folder; it is created.
         rover: The rover, recorded from its present state on.
+        mcap: Whether `live-1.mcap`, ... get the same rows.
 
     Attributes:
         path: The file that is being written.
@@ -37,11 +40,11 @@ class LiveRecording:
     Raises:
         RecordingError: The file cannot be recorded to.
         OSError: The file cannot be created.
-        MissingExtraError: h5py is not installed.
+        MissingExtraError: h5py is not installed, or what writes MCAP.
     """
 
-    def __init__(self, folder: Path, rover: LiveRover) -> None:
-        self._folder = folder
+    def __init__(self, folder: Path, rover: LiveRover, *, mcap: bool = False) -> None:
+        self._folder, self._mcap = folder, mcap
         self._begin(rover)
 
     def _begin(self, rover: LiveRover) -> None:
@@ -58,11 +61,22 @@ class LiveRecording:
         simulation, scene = rover.env.simulation, rover.scene
         facts = {**asdict(scene), "goal": rover.env.goal, "control_period": rover.dt}
         attributes = describe(simulation, "a live drive", facts, seed=scene.seed)
-        self._recorder = Recorder(
-            self.path, channels, attributes, terrain=simulation.terrain, rows_per_flush=ROWS_PER_FLUSH
-        )
+        terrain = simulation.terrain
+        with ExitStack() as opened:
+            recorder = Recorder(self.path, channels, attributes, terrain=terrain, rows_per_flush=ROWS_PER_FLUSH)
+            self._files: list[Recorder | McapWriter] = [opened.enter_context(recorder)]
+            if self._mcap:
+                log = self.path.with_suffix(".mcap")
+                goal = rover.env.goal
+                self._files += [McapWriter(log, rover.env.model, terrain, goal=goal, attributes=attributes)]
+            opened.pop_all()
         self.rows = 0
         self.append(rover)
+
+    @property
+    def paths(self) -> list[Path]:
+        """All files that are being written."""
+        return [file.path for file in self._files]
 
     def append(self, rover: LiveRover) -> None:
         """Adds the present state.
@@ -80,7 +94,11 @@ class LiveRecording:
             "friction": scene.friction,
             "gravity": scene.gravity,
         }
-        self._recorder.append({**row, **more})
+        with ExitStack() as failing:  # one file that fails ends the other
+            failing.callback(self.close)
+            for file in self._files:
+                file.append({**row, **more})
+            failing.pop_all()
         self.rows += 1
 
     def next_file(self, rover: LiveRover) -> None:
@@ -99,13 +117,15 @@ class LiveRecording:
         Raises:
             RecordingError: The last rows cannot be written; the rows written before stay.
         """
-        self._recorder.close()
+        with ExitStack() as closing:
+            for file in self._files:
+                closing.callback(file.close)
 
 
 def _free_path(folder: Path) -> Path:
-    """The first of the folder's names that is free."""
+    """The first of the folder's names that is free, for both formats."""
     for number in range(1, MOST_FILES):
         path = folder / f"live-{number}.h5"
-        if not path.exists():
+        if not path.exists() and not path.with_suffix(".mcap").exists():
             return path
     raise FileExistsError(f"{folder}: holds {MOST_FILES - 1} recordings; name another folder")

@@ -26,10 +26,13 @@ FORECAST_FILE = "forecast.npz"
 #: Share of the way at cruising speed that a rover makes on open ground, where it first has to steer.
 OPEN_WAY = 0.85
 
+#: Way at cruising speed within the horizon for which the costs are meant, m; other rovers' costs are in proportion.
+USUAL_WAY = 1.2
+
 
 @dataclass(frozen=True)
 class ForesightCosts:
-    """What foreseen outcomes cost, in metres of way.
+    """What foreseen outcomes cost, in metres of way of a rover that drives 1.2 m/s; less in proportion for a slower one.
 
     Attributes:
         lost: Of a metre that is not made.
@@ -104,7 +107,7 @@ class ForesightPolicy(ScanPolicy):
         self, row: Array, slope: list[float], heights: Array, boldness: float
     ) -> tuple[Array | None, npt.NDArray[np.bool_]]:
         costs, outcomes = self.foresight, self._forecast(row, slope, heights)
-        lost = self._length * np.maximum(0.0, OPEN_WAY - outcomes.way)
+        lost = USUAL_WAY * np.maximum(0.0, OPEN_WAY - outcomes.way)
         by_speed = costs.lost * lost + costs.stuck * outcomes.stuck + costs.failed * outcomes.failed
         slow, fast = by_speed[0], by_speed[1] + boldness * costs.push
-        return np.minimum(slow, fast), fast < slow
+        return self._length / USUAL_WAY * np.minimum(slow, fast), fast < slow

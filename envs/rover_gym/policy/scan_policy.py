@@ -32,7 +32,7 @@ SCAN = (48, 40, 0.1)
 MAX_SIDEWAYS_DEG, MAX_CURVATURE = 30.0, 3.0
 
 #: Largest speed over that at which the slowest motor has no torque left.
-SHARE_OF_TOP_SPEED = 0.7
+SHARE_OF_TOP_SPEED = 0.9
 
 #: Way that counts as movement, and distance to the goal that counts as progress, over the rover's reach.
 PROGRESS = 0.15
