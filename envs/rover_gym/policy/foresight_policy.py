@@ -32,7 +32,7 @@ USUAL_WAY = 1.2
 
 @dataclass(frozen=True)
 class ForesightCosts:
-    """What foreseen outcomes cost, in metres of way of a rover that drives 1.2 m/s; less in proportion for a slower one.
+    """What foreseen outcomes cost, in metres of way at 1.2 m/s; less in proportion for a slower rover.
 
     Attributes:
         lost: Of a metre that is not made.
