@@ -9,9 +9,10 @@ import pytest
 from typer.testing import CliRunner
 
 from rover_gym.cli import app
+from rover_gym.models import open_model
 from rover_gym.policy import Network, PolicyError, TrainedPolicy, policy_arguments, policy_folder
 from rover_gym.policy.arc_forecast import OUTPUTS
-from rover_gym.policy.shipped import FOLDER
+from rover_gym.policy.shipped import forecast_folder
 
 pytest.importorskip("onnx")
 pytest.importorskip("onnxruntime")
@@ -68,12 +69,14 @@ def test_it_decides_in_an_episode_as_the_policy_does() -> None:
     assert np.abs(run(model, np.array(rows)) - commands).max() < 1e-5
 
 
-def test_the_forecast_gives_the_same_outcomes() -> None:
-    network = Network.read(FOLDER / "foresight" / "forecast.npz")
+@pytest.mark.parametrize("rover", [None, "open-rover"])
+def test_the_forecast_gives_the_same_outcomes(rover: str | None) -> None:
+    model = None if rover is None else open_model(rover)
+    network = Network.read(forecast_folder(model) / "forecast.npz")
     rows = features(network)
     expected = network(rows) * OUTPUTS
     expected[:, 1:] = expected[:, 1:].clip(0.0, 1.0)
-    assert np.abs(run(onnx_policy("foresight"), rows) - expected).max() < 1e-5
+    assert np.abs(run(onnx_policy("foresight", model=model), rows) - expected).max() < 1e-5
 
 
 @pytest.mark.parametrize("policy", ["pd", "scan", "no/such/folder"])
@@ -87,6 +90,9 @@ def test_what_has_no_network_is_refused(policy: str, tmp_path: Path) -> None:
 
 
 def test_the_command_writes_a_file_that_the_checker_accepts(tmp_path: Path) -> None:
-    result = CliRunner().invoke(app, ["export", "onnx", "foresight", "-o", str(tmp_path / "deep" / "a.onnx")])
-    assert result.exit_code == 0, result.output
-    onnx.checker.check_model(str(tmp_path / "deep" / "a.onnx"), full_check=True)
+    for rover in ("rover", "open-rover"):
+        path = tmp_path / rover / "a.onnx"
+        result = CliRunner().invoke(app, ["export", "onnx", "foresight", "--model", rover, "-o", str(path)])
+        assert result.exit_code == 0, result.output
+        onnx.checker.check_model(str(path), full_check=True)
+    assert (tmp_path / "rover" / "a.onnx").read_bytes() != (tmp_path / "open-rover" / "a.onnx").read_bytes()

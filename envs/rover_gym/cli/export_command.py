@@ -67,11 +67,12 @@ def onnx(
     ],
     output: Annotated[Path, typer.Option("--output", "-o", dir_okay=False, help="File to write.")],
     terrain: Annotated[str, typer.Option(help="Of 'trained': 'plane' or 'rocks'.")] = "plane",
+    model: Annotated[str, typer.Option(help="Of 'foresight': the rover, a name of the gallery or a file.")] = BUILT_IN,
 ) -> None:
     """Write a policy's network as ONNX, with the normalisation of its inputs."""
     require("onnx", "onnx")
     check_file("output", output)
-    say_path("ONNX", write_onnx(policy, output, terrain))
+    say_path("ONNX", write_onnx(policy, output, terrain, named_model(model)))
 
 
 @export.command()

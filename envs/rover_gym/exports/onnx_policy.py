@@ -16,17 +16,19 @@ from rover_gym.policy.foresight_policy import FORECAST_FILE
 from rover_gym.policy.network import Network
 from rover_gym.policy.policy_card import PolicyCard
 from rover_gym.policy.policy_files import PolicyError, is_there
-from rover_gym.policy.shipped import FOLDER, find_policy
+from rover_gym.policy.shipped import find_policy, forecast_folder
 from rover_gym.validation import refuse
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from rover_gym.mechanics import RoverModel
+
 #: The file that tells a run of `training/train_raw.py`.
 RAW_FILE = "model.zip"
 
 
-def write_onnx(policy: str | Path, path: str | Path, terrain: str = "plane") -> Path:
+def write_onnx(policy: str | Path, path: str | Path, terrain: str = "plane", model: RoverModel | None = None) -> Path:
     """Writes a policy's network as ONNX, with the normalisation of its inputs.
 
     | policy | input | output |
@@ -39,6 +41,7 @@ def write_onnx(policy: str | Path, path: str | Path, terrain: str = "plane") -> 
         policy: The policy.
         path: The file to write, with its folder.
         terrain: Of which "trained" is meant.
+        model: The rover of which "foresight" is meant; the built-in one by default.
 
     Raises:
         PolicyError: There is no such policy, it has no network, or its files are damaged.
@@ -46,14 +49,14 @@ def write_onnx(policy: str | Path, path: str | Path, terrain: str = "plane") -> 
         MissingExtraError: An extra is not installed.
     """
     require("onnx", "onnx")
-    model = onnx_policy(policy, terrain)
+    graph = onnx_policy(policy, terrain, model)
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(model.SerializeToString())
+    path.write_bytes(graph.SerializeToString())
     return path
 
 
-def onnx_policy(policy: str | Path, terrain: str = "plane") -> Any:
+def onnx_policy(policy: str | Path, terrain: str = "plane", model: RoverModel | None = None) -> Any:
     """The `onnx.ModelProto` of a policy, as `write_onnx` writes it.
 
     Raises:
@@ -61,7 +64,7 @@ def onnx_policy(policy: str | Path, terrain: str = "plane") -> Any:
         OSError: A file may not be read.
         MissingExtraError: An extra is not installed.
     """
-    folder = FOLDER / "foresight" if policy == "foresight" else Path(policy)
+    folder = forecast_folder(model) if policy == "foresight" else Path(policy)
     if is_there(folder / FORECAST_FILE):
         facts: Mapping[str, Any] = {
             "kind": "forecast",

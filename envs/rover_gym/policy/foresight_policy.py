@@ -15,7 +15,7 @@ from rover_gym.policy.network import Network
 from rover_gym.policy.pd_policy import find_rover_env
 from rover_gym.policy.policy_files import PolicyError, is_there
 from rover_gym.policy.scan_policy import ScanGains, ScanPolicy
-from rover_gym.policy.shipped import FOLDER
+from rover_gym.policy.shipped import forecast_folder
 from rover_gym.validation import number, refuse
 
 Array = npt.NDArray[np.float64]
@@ -67,7 +67,8 @@ class ForesightPolicy(ScanPolicy):
     Args:
         env: A rover environment with a height scan, wrapped or not, or a vector of them. It is read once, for layout
             and rover constants.
-        forecast: Folder of a trained forecast; None for the one of the package, for the built-in rover.
+        forecast: Folder of a trained forecast; None for the package's, of which there is one for the built-in rover and
+            one for `open-rover`.
         gains: Speed and times.
         costs: What a path costs.
         foresight: What foreseen outcomes cost.
@@ -92,10 +93,11 @@ class ForesightPolicy(ScanPolicy):
             refuse(OptionError, "foresight", foresight, "must be ForesightCosts")
         super().__init__(env, gains, costs, map=map)
         self.foresight = ForesightCosts() if foresight is None else foresight
-        path = (FOLDER / "foresight" if forecast is None else Path(forecast)) / FORECAST_FILE
+        rover = find_rover_env(env)
+        path = (forecast_folder(rover.model) if forecast is None else Path(forecast)) / FORECAST_FILE
         if not is_there(path):
             refuse(PolicyError, "forecast", str(path), "is not there")
-        features = ArcFeatures(find_rover_env(env), self)
+        features = ArcFeatures(rover, self)
         self._length, self._forecast = features.length, ArcForecast(features, Network.read(path))
         self._caution = self.foresight.caution
 

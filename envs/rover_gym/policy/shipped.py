@@ -1,16 +1,22 @@
-"""Finds policies: those shipped with the package, by terrain, and others, by folder."""
+"""Finds policies and forecasts: those shipped with the package, by terrain or rover, and others, by folder."""
 
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from rover_gym.env.argument_checks import terrain_name
+from rover_gym.mechanics import RoverModel
 from rover_gym.policy.policy_card import PolicyCard
 from rover_gym.policy.policy_files import PolicyError, is_there
 from rover_gym.validation import refuse
 
 #: Folder names of the shipped policies, by terrain.
 SHIPPED: Mapping[str, str] = {"plane": "plane", "rocks": "rocks"}
+
+#: Folder names of the shipped forecasts, by the name of the rover's model; the built-in rover's serves its variants.
+FORECASTS: Mapping[str, str] = {"open-rover": "foresight-open-rover"}
+BUILT_IN_FORECAST = "foresight"
+
 FOLDER = Path(__file__).parents[1] / "data" / "policies"
 
 
@@ -24,6 +30,11 @@ def policy_folder(terrain: str) -> Path:
     if terrain not in SHIPPED:
         refuse(PolicyError, "policy", terrain, f"none was trained; there are some for {', '.join(SHIPPED)}")
     return FOLDER / SHIPPED[terrain]
+
+
+def forecast_folder(model: RoverModel | None = None) -> Path:
+    """The folder of the forecast shipped for a rover; None is the built-in one."""
+    return FOLDER / (BUILT_IN_FORECAST if model is None else FORECASTS.get(model.name, BUILT_IN_FORECAST))
 
 
 def find_policy(policy: str, terrain: str) -> Path | None:
