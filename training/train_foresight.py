@@ -1,6 +1,6 @@
 """Trains the forecast of `ForesightPolicy`: what becomes of the rover on the arcs that it may drive next.
 
-    python training/train_foresight.py --seed 1      # runs/train/foresight-seed1, 20 minutes of one core
+    python training/train_foresight.py --seed 1      # runs/train/foresight-seed1, 12 minutes of one core
 
 Copies of the rover try arcs from states that `ScanPolicy` meets; a network is fitted to what became of them. The
 folder receives the network (`forecast.npz`) and `run.json`: seed, versions, revision, times, and the shares of the

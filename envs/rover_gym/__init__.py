@@ -21,11 +21,11 @@ The package consists of the subpackages below. Each one may import those above i
     planar         the planar systems: a ball, a two-wheel rover
     reproduction   the experiments of the 2010 report
     replay         saved runs for the browser, VRML and glTF
-    live           a rover that is driven in the browser
     figures        figures of saved runs
     learning       training with stable-baselines3
     registration   the environments' names for Gymnasium
     exports        runs, policies and simulations for other programs
+    live           a rover that is driven in the browser
     cli            the command `rover`
 """
 

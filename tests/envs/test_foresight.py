@@ -12,6 +12,7 @@ from rover_gym.policy import FORECAST_FILE, ForesightCosts, ForesightPolicy, Net
 from rover_gym.policy.arc_forecast import OUTPUTS, ArcFeatures, ArcForecast, with_speed
 from rover_gym.policy.evaluation import drive_all
 from rover_gym.policy.named_policy import named_policy
+from rover_gym.policy.shipped import FOLDER
 
 ARGUMENTS = ScanPolicy.arguments()
 
@@ -66,6 +67,27 @@ def test_the_small_rover_has_a_forecast_of_its_own() -> None:
     arguments = {"terrain": "rocks", "difficulty": 2.0, "model": model, **ForesightPolicy.arguments(model)}
     drives = drive_all(ForesightPolicy, range(1_000_000, 1_000_008), arguments=arguments, num_envs=8)
     assert sum(drive.success for drive in drives) >= 6
+
+
+@pytest.mark.parametrize(
+    ("terrain", "rover", "folder"),
+    [
+        ("rocks", "rover", "foresight"),
+        ("plane", "rover", "foresight"),
+        ("hills", "rover", "foresight-hills"),
+        ("hills", "open-rover", "foresight-open-rover"),
+    ],
+)
+def test_rover_and_ground_choose_the_forecast(terrain: str, rover: str, folder: str) -> None:
+    """By itself the policy foresees what it does with that forecast by name, and not what it does with another."""
+    model = open_model(rover)
+    env = RoverEnv(terrain=terrain, model=model, **ForesightPolicy.arguments(model))
+    row = env.reset(seed=2)[0].astype(np.float64)
+    way = ForesightPolicy(env).foresee(row).way
+    for other in ("foresight", "foresight-hills", "foresight-open-rover"):
+        if (other == "foresight-open-rover") == (rover == "open-rover"):
+            same = (way == ForesightPolicy(env, FOLDER / other).foresee(row).way).all()
+            assert same == (other == folder)
 
 
 def test_what_is_foreseen_costs_in_proportion_to_the_way(tmp_path: Path) -> None:

@@ -69,14 +69,14 @@ def test_it_decides_in_an_episode_as_the_policy_does() -> None:
     assert np.abs(run(model, np.array(rows)) - commands).max() < 1e-5
 
 
-@pytest.mark.parametrize("rover", [None, "open-rover"])
-def test_the_forecast_gives_the_same_outcomes(rover: str | None) -> None:
+@pytest.mark.parametrize(("rover", "terrain"), [(None, "plane"), (None, "hills"), ("open-rover", "plane")])
+def test_the_forecast_gives_the_same_outcomes(rover: str | None, terrain: str) -> None:
     model = None if rover is None else open_model(rover)
-    network = Network.read(forecast_folder(model) / "forecast.npz")
+    network = Network.read(forecast_folder(model, hills=terrain == "hills") / "forecast.npz")
     rows = features(network)
     expected = network(rows) * OUTPUTS
     expected[:, 1:] = expected[:, 1:].clip(0.0, 1.0)
-    assert np.abs(run(onnx_policy("foresight", model=model), rows) - expected).max() < 1e-5
+    assert np.abs(run(onnx_policy("foresight", terrain, model), rows) - expected).max() < 1e-5
 
 
 @pytest.mark.parametrize("policy", ["pd", "scan", "no/such/folder"])

@@ -66,7 +66,7 @@ def onnx(
         ),
     ],
     output: Annotated[Path, typer.Option("--output", "-o", dir_okay=False, help="File to write.")],
-    terrain: Annotated[str, typer.Option(help="Of 'trained': 'plane' or 'rocks'.")] = "plane",
+    terrain: Annotated[str, typer.Option(help="Of 'trained': 'plane' or 'rocks'; of 'foresight': 'hills'.")] = "plane",
     model: Annotated[str, typer.Option(help="Of 'foresight': the rover, a name of the gallery or a file.")] = BUILT_IN,
 ) -> None:
     """Write a policy's network as ONNX, with the normalisation of its inputs."""

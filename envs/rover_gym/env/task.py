@@ -48,6 +48,7 @@ class Task:
         n_actions: Entries of an action: a torque for each wheel, then a set-point for each joint that steers.
         ground: The given terrain, which is the ground of every episode; None without one.
         rocks: Distribution of the rock fields; None without rocks.
+        on_hills: Whether the ground is hills.
         slope_by_difficulty: Whether the rocks' difficulty sets the slope of the ground.
         scan: `(n, 2)` points of the height scan in the heading frame, m; None without one.
         start: Distribution of the starts.
@@ -70,6 +71,7 @@ class Task:
     n_actions: int
     ground: Terrain | None
     rocks: RockDistribution | None
+    on_hills: bool
     slope_by_difficulty: bool
     scan: npt.NDArray[np.float64] | None
     start: StartDistribution
@@ -200,6 +202,7 @@ def make_task(given: Mapping[str, Any]) -> Task:
         n_actions=n_actions,
         ground=ground,
         rocks=rocks,
+        on_hills=hills is not None,
         slope_by_difficulty=slope_by_difficulty,
         scan=points,
         start=start,

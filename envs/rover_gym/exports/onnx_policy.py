@@ -40,7 +40,7 @@ def write_onnx(policy: str | Path, path: str | Path, terrain: str = "plane", mod
     Args:
         policy: The policy.
         path: The file to write, with its folder.
-        terrain: Of which "trained" is meant.
+        terrain: Of which "trained" or "foresight" is meant.
         model: The rover of which "foresight" is meant; the built-in one by default.
 
     Raises:
@@ -64,7 +64,7 @@ def onnx_policy(policy: str | Path, terrain: str = "plane", model: RoverModel | 
         OSError: A file may not be read.
         MissingExtraError: An extra is not installed.
     """
-    folder = forecast_folder(model) if policy == "foresight" else Path(policy)
+    folder = forecast_folder(model, hills=terrain == "hills") if policy == "foresight" else Path(policy)
     if is_there(folder / FORECAST_FILE):
         facts: Mapping[str, Any] = {
             "kind": "forecast",

@@ -67,8 +67,8 @@ class ForesightPolicy(ScanPolicy):
     Args:
         env: A rover environment with a height scan, wrapped or not, or a vector of them. It is read once, for layout
             and rover constants.
-        forecast: Folder of a trained forecast; None for the package's, of which there is one for the built-in rover and
-            one for `open-rover`.
+        forecast: Folder of a trained forecast; None for the package's: one for the built-in rover on hills, one for it
+            on other ground, one for `open-rover`.
         gains: Speed and times.
         costs: What a path costs.
         foresight: What foreseen outcomes cost.
@@ -94,7 +94,8 @@ class ForesightPolicy(ScanPolicy):
         super().__init__(env, gains, costs, map=map)
         self.foresight = ForesightCosts() if foresight is None else foresight
         rover = find_rover_env(env)
-        path = (forecast_folder(rover.model) if forecast is None else Path(forecast)) / FORECAST_FILE
+        folder = forecast_folder(rover.model, hills=rover.task.on_hills) if forecast is None else Path(forecast)
+        path = folder / FORECAST_FILE
         if not is_there(path):
             refuse(PolicyError, "forecast", str(path), "is not there")
         features = ArcFeatures(rover, self)

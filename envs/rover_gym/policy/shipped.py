@@ -13,9 +13,10 @@ from rover_gym.validation import refuse
 #: Folder names of the shipped policies, by terrain.
 SHIPPED: Mapping[str, str] = {"plane": "plane", "rocks": "rocks"}
 
-#: Folder names of the shipped forecasts, by the name of the rover's model; the built-in rover's serves its variants.
+#: Folder names of the shipped forecasts: by the name of the rover's model, of the built-in one on hills, and of it
+#: on all other ground.
 FORECASTS: Mapping[str, str] = {"open-rover": "foresight-open-rover"}
-BUILT_IN_FORECAST = "foresight"
+HILLS_FORECAST, ROCKS_FORECAST = "foresight-hills", "foresight"
 
 FOLDER = Path(__file__).parents[1] / "data" / "policies"
 
@@ -32,9 +33,10 @@ def policy_folder(terrain: str) -> Path:
     return FOLDER / SHIPPED[terrain]
 
 
-def forecast_folder(model: RoverModel | None = None) -> Path:
-    """The folder of the forecast shipped for a rover; None is the built-in one."""
-    return FOLDER / (BUILT_IN_FORECAST if model is None else FORECASTS.get(model.name, BUILT_IN_FORECAST))
+def forecast_folder(model: RoverModel | None = None, *, hills: bool = False) -> Path:
+    """The folder of the forecast shipped for a rover, None for the built-in one, among rocks or on hills."""
+    of_terrain = HILLS_FORECAST if hills else ROCKS_FORECAST
+    return FOLDER / (of_terrain if model is None else FORECASTS.get(model.name, of_terrain))
 
 
 def find_policy(policy: str, terrain: str) -> Path | None:

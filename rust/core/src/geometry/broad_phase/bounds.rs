@@ -41,12 +41,15 @@ impl Bounds {
         inverse: &Vector3<f64>,
         reach: f64,
     ) -> Option<[f64; 2]> {
+        // Comparisons, not `f64::max`: nothing here is nan, and each is one instruction.
         let (mut enter, mut leave) = (0.0_f64, reach);
         for k in 0..3 {
             let first = (self.low[k] - origin[k]) * inverse[k];
             let second = (self.high[k] - origin[k]) * inverse[k];
-            enter = enter.max(first.min(second));
-            leave = leave.min(first.max(second) * LEAVES);
+            let (near, far) = if first < second { (first, second) } else { (second, first) };
+            let far = far * LEAVES;
+            enter = if near > enter { near } else { enter };
+            leave = if far < leave { far } else { leave };
         }
         (enter <= leave).then_some([enter, leave])
     }

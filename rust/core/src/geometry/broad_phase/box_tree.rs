@@ -11,7 +11,7 @@ use super::bounds::Bounds;
 use crate::geometry::ray::Ray;
 
 /// Most boxes in a leaf.
-const LEAF: usize = 4;
+const LEAF: usize = 1;
 
 /// Deeper than any tree of 2^32 boxes.
 const DEPTH: usize = 34;
