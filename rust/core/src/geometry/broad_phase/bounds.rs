@@ -46,7 +46,11 @@ impl Bounds {
         for k in 0..3 {
             let first = (self.low[k] - origin[k]) * inverse[k];
             let second = (self.high[k] - origin[k]) * inverse[k];
-            let (near, far) = if first < second { (first, second) } else { (second, first) };
+            let (near, far) = if first < second {
+                (first, second)
+            } else {
+                (second, first)
+            };
             let far = far * LEAVES;
             enter = if near > enter { near } else { enter };
             leave = if far < leave { far } else { leave };
