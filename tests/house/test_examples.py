@@ -12,6 +12,7 @@ ROOT = Path(__file__).parents[2]
 PAGES = (
     "README.md",
     "docs/economy.md",
+    "docs/foresight.md",
     "docs/identification.md",
     "docs/linearise.md",
     "docs/live.md",
