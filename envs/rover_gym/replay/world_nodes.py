@@ -50,8 +50,8 @@ def add_ground(scene: Any, run: RoverRun, under: str = "/world") -> None:
     add_meshes(scene, f"{under}/goal", goal_meshes(run))
     centres, radii = spheres(run)
     for name, rings, chosen in (
-        ("pebbles", 5, radii < LARGE),
-        ("rocks", 10 if len(radii) < MANY else 7, radii >= LARGE),
+        ("pebbles", 5 if len(radii) < MANY else 3, radii < LARGE),
+        ("rocks", 10 if len(radii) < MANY else 5, radii >= LARGE),
     ):
         if chosen.any():
             vertices, triangles = sphere_mesh(rings)
