@@ -68,7 +68,7 @@ class LiveRecording:
             if self._mcap:
                 log = self.path.with_suffix(".mcap")
                 goal = rover.env.goal
-                self._files += [McapWriter(log, rover.env.model, terrain, goal=goal, attributes=attributes)]
+                self._files.append(McapWriter(log, rover.env.model, terrain, goal=goal, attributes=attributes))
             opened.pop_all()
         self.rows = 0
         self.append(rover)
@@ -94,10 +94,11 @@ class LiveRecording:
             "friction": scene.friction,
             "gravity": scene.gravity,
         }
+        row |= more
         with ExitStack() as failing:  # one file that fails ends the other
             failing.callback(self.close)
             for file in self._files:
-                file.append({**row, **more})
+                file.append(row)
             failing.pop_all()
         self.rows += 1
 
