@@ -6,15 +6,32 @@
     clippy::cast_sign_loss
 )] // one long comparison; numbers drawn by a sine
 
-use rover_core::scalar::Lane;
+use fearless_simd::{f64x4, f64x8};
+use rover_core::scalar::{Instructions, Lane, Single};
 
-#[path = "lanes/contacts.rs"]
 mod contacts;
-#[path = "lanes/tree.rs"]
+mod fleet;
+mod solver;
+mod surfaces;
 mod tree;
 
-#[path = "lanes/fleet.rs"]
-mod fleet;
+/// What is compared for every number of lanes.
+trait OverLanes {
+    fn run<T: Lane>(&mut self, token: T::Token);
+}
+
+/// Runs `work` over one lane, and over the registers of each instruction set of this machine.
+fn on_every_register(work: &mut impl OverLanes) {
+    for instructions in Instructions::all_of_this_machine() {
+        match instructions {
+            Instructions::Baseline => work.run::<f64>(Single::Baseline),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx2(token) => work.run::<f64x4<_>>(token),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx512(token) => work.run::<f64x8<_>>(token),
+        }
+    }
+}
 
 /// Repeatable numbers in [−1, 1).
 struct Random(u64);
@@ -39,5 +56,3 @@ fn spread<T: Lane, R>(token: T::Token, rovers: &[R], of: impl Fn(&R) -> Vec<f64>
     }
     out
 }
-#[path = "lanes/surfaces.rs"]
-mod surfaces;

@@ -1,15 +1,10 @@
 //! Friction and restitution by pair of materials.
 #![allow(clippy::unwrap_used)]
 
-#[path = "spheres/sphere_scenes.rs"]
-#[allow(dead_code)] // the tests of spheres use the rest
-mod sphere_scenes;
-#[path = "surfaces/surface_scenes.rs"]
-#[allow(dead_code)] // the tests of surfaces use the rest
-mod surface_scenes;
-
 use std::sync::Arc;
 
+use crate::spheres::sphere_scenes::{field, lone_wheel};
+use crate::surfaces::surface_scenes::map;
 use rover_core::geometry::{Plane, Terrain, Union};
 use rover_core::integrator::StepOptions;
 use rover_core::lanes::admission::NeverOrdinary;
@@ -17,8 +12,6 @@ use rover_core::law::materials::{MaterialPair, Materials};
 use rover_core::multibody::{Configuration, Model, ModelDescription};
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
 use rover_core::simulation::RoverSimulation;
-use sphere_scenes::{field, lone_wheel};
-use surface_scenes::map;
 
 fn pairs(listed: &[(&str, &str, f64, f64)]) -> Materials {
     let pair = |&(a, b, friction_coefficient, restitution): &(&str, &str, f64, f64)| MaterialPair {

@@ -2,11 +2,7 @@
 //! may not say.
 #![allow(clippy::unwrap_used)]
 
-#[path = "shapes/descriptions.rs"]
 mod descriptions;
-#[path = "shapes/inertia.rs"]
 mod inertia;
-#[path = "shapes/machines.rs"]
 mod machines;
-#[path = "shapes/resting.rs"]
 mod resting;

@@ -1,7 +1,6 @@
 //! Whole behaviour of the friction-contact solvers on small mechanisms with known answers.
 
-mod solver_scenes;
-
+use crate::solver_scenes::{Problem, ROVER_NV, Scene, falling, pile, rover, table};
 use proptest::prelude::*;
 use rover_core::problem::{
     BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem, PairContact, RoundPair,
@@ -11,7 +10,6 @@ use rover_core::solver::{
     ManyBodies, Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, Stage, solve,
     solve_many_bodies,
 };
-use solver_scenes::{Problem, ROVER_NV, Scene, falling, pile, rover, table};
 
 const METHODS: [Method; 5] = [
     Method::Auto,

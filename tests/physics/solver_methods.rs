@@ -1,13 +1,11 @@
 //! Every method: manufactured answers, unsymmetric operators, the relaxed law, many contacts.
 
-mod solver_scenes;
-
+use crate::solver_scenes::{Problem, falling, pile};
 use proptest::prelude::*;
 use rover_core::problem::{BlockSparseDelassus, Dimension, FrictionContactProblem, PairContact};
 use rover_core::solver::{
     ContactLaw, Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, solve,
 };
-use solver_scenes::{Problem, falling, pile};
 
 fn solve_with(
     method: Method,
@@ -361,5 +359,36 @@ fn many_contacts_take_few_iterations() {
         assert!(report.is_converged(), "{report:?}");
         assert!(report.iterations <= bound, "{n_columns}: {report:?}");
         assert!(u.iter().all(|x| x.abs() < 1e-9));
+    }
+}
+
+#[test]
+fn no_method_allocates_in_a_sized_workspace() {
+    // The larger problem sizes the workspace, the smaller one alternates with it.
+    let large = pile(&[1.0, 1e2, 1.0], 0.9).problem(&falling(3, 0.01));
+    let small = pile(&[1.0], 0.5).problem(&[0.3, -0.01, 0.0, 0.0, 0.1, 0.0]);
+    let mut workspace = SolverWorkspace::with_capacity(large.mu.len(), 3);
+    for method in [
+        Method::Auto,
+        Method::GaussSeidel,
+        Method::Newton,
+        Method::ProximalPoint,
+        Method::Admm,
+        Method::Relaxed,
+    ] {
+        let options = SolverOptions {
+            method,
+            max_sweeps: 100,
+            ..SolverOptions::default()
+        };
+        for problem in [&large, &small, &large] {
+            let n = problem.q.len();
+            let (mut p, mut u) = (vec![0.0; n], vec![0.0; n]);
+            let view = problem.view();
+            let counted = allocation_counter::measure(|| {
+                solve(&view, &options, &mut p, &mut u, &mut workspace);
+            });
+            assert_eq!(counted.count_total, 0, "{method:?} allocates");
+        }
     }
 }

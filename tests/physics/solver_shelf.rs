@@ -1,14 +1,12 @@
 //! The shelf's hard problems, `tests/shelf`: piles, stacks, mass ratios,
 //! jams, the rover's wheels; always tested.
 
-mod solver_npz;
-
 use std::collections::BTreeMap;
 
+use crate::solver_npz::{Recorded, shelf};
 use rover_core::problem::FrictionContactProblem;
 use rover_core::solver::{SolveReport, SolverOptions, SolverWorkspace, solve};
 use serde::Deserialize;
-use solver_npz::{Recorded, shelf};
 
 /// `tests/shelf/bounds.json`: the relative residual that every problem is
 /// solved to, and larger ones for those that are not.

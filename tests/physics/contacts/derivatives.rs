@@ -6,7 +6,7 @@ use rover_core::contact::{Contact, generalized_impulse, relocate};
 use rover_core::geometry::Plane;
 use rover_core::multibody::{Configuration, Kinematics, Model};
 
-use crate::contact_scenes::{folding, near, tips};
+use super::contact_scenes::{folding, near, tips};
 
 /// The configuration of the machine, and its self-contacts with a gap of at most 20 cm.
 fn contacts(model: &Model, joints: [f64; 3], turn: [f64; 3]) -> (Configuration, Vec<Contact>) {

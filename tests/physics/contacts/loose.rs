@@ -9,7 +9,7 @@ use rover_core::multibody::{Configuration, JointKind, Kinematics, Model, ModelDe
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
 use rover_core::simulation::RoverSimulation;
 
-use crate::contact_scenes::{near, overlap};
+use super::contact_scenes::{near, overlap};
 
 const BALL: &str = "shape = { kind = \"sphere\", radius = 0.1 }";
 const BLOCK: &str = "shape = { kind = \"box\", size = [0.4, 0.2, 0.3] }";

@@ -3,7 +3,7 @@
 use rover_core::contact::Part;
 use rover_core::integrator::Variant;
 
-use crate::contact_scenes::{at_rest, folding, overlap, tips};
+use super::contact_scenes::{at_rest, folding, overlap, tips};
 
 #[test]
 fn a_folded_arm_rests_on_the_chassis() {

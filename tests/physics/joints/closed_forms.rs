@@ -4,7 +4,7 @@ use nalgebra::{Rotation3, Vector3};
 use rover_core::integrator::Variant;
 use rover_core::multibody::{Configuration, Hold, JointKind, Kinematics, Spring};
 
-use crate::machines::{energy, model, options, simulation, solid};
+use super::machines::{energy, model, options, simulation, solid};
 
 /// Period of a pendulum of length l that swings by ±a:
 /// `4 √(l/g) K(sin(a/2))`, K by the arithmetic–geometric mean.

@@ -6,7 +6,7 @@ use rover_core::multibody::{
     Spring,
 };
 
-use crate::machines::{energy, machine, model, options, simulation, solid};
+use super::machines::{energy, machine, model, options, simulation, solid};
 
 fn follows(joint: &str, ratio: f64, offset: f64) -> CouplingDescription {
     CouplingDescription {

@@ -7,7 +7,7 @@ use rover_core::multibody::coriolis::{CoriolisScratch, coriolis_matrix};
 use rover_core::multibody::momentum::{EnergyScratch, energy, energy_and_momentum, momentum};
 use rover_core::multibody::{Configuration, FactoredMassMatrix, Kinematics, MassMatrix, Model};
 
-use crate::machines::{GRAVITY, ROOTS, menagerie, somewhere};
+use super::machines::{GRAVITY, ROOTS, menagerie, somewhere};
 
 const H: f64 = 1e-5;
 

@@ -2,7 +2,7 @@
 
 use rover_core::multibody::{JointKind, Model, ModelDescription, Spring};
 
-use crate::machines::{ROOTS, machine, menagerie, solid};
+use super::machines::{ROOTS, machine, menagerie, solid};
 
 #[test]
 fn a_description_of_every_joint_survives_both_formats() {

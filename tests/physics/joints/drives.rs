@@ -5,7 +5,7 @@ use rover_core::multibody::{
     DriveDescription, JointKind, Model, ModelDescription, Motor, SolidDescription, WheelDescription,
 };
 
-use crate::machines::{machine, model, options, simulation, solid};
+use super::machines::{machine, model, options, simulation, solid};
 
 /// About y, so that gravity exerts no torque.
 const INERTIA: f64 = 0.25 * 0.1 * 0.1;

@@ -12,7 +12,7 @@ use rover_core::multibody::{
 };
 use rover_core::simulation::RoverSimulation;
 
-use crate::machines::{energy, machine, model, options, simulation, solid};
+use super::machines::{energy, machine, model, options, simulation, solid};
 
 const VARIANTS: [Variant; 2] = [Variant::Linearised, Variant::Newton];
 const G: f64 = 9.81;

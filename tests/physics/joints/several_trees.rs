@@ -5,7 +5,7 @@ use rover_core::multibody::{
     Configuration, JointKind, Model, ModelDescription, ModelError, SolidDescription, coordinates,
 };
 
-use crate::machines::{machine, menagerie, model, options, simulation, solid, somewhere};
+use super::machines::{machine, menagerie, model, options, simulation, solid, somewhere};
 
 /// The solids of a description under other names.
 fn renamed(description: &ModelDescription, prefix: &str) -> Vec<SolidDescription> {

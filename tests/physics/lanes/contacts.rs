@@ -21,9 +21,9 @@ use rover_core::lanes::poses::Poses;
 use rover_core::lanes::problem::{ContactProblem, block};
 use rover_core::lanes::rows::{Answer, Rows};
 use rover_core::multibody::{self, Configuration, Kinematics, Model};
-use rover_core::scalar::{Instructions, Lane, LaneMask, Single, Vec3};
+use rover_core::scalar::{Lane, LaneMask, Single, Vec3};
 
-use crate::{Random, spread};
+use super::{OverLanes, Random, on_every_register, spread};
 
 const G: f64 = 9.81;
 const THETA: f64 = 0.5;
@@ -402,9 +402,9 @@ fn grounds() -> Vec<Arc<dyn Terrain>> {
         rocks(2, 0.2),
         Arc::new(SphereField::rug()),
         Arc::new(SphereField::new(&[], &[], Some(Plane::ground())).unwrap()),
-        crate::surfaces::flat(0.3),
-        crate::surfaces::hills(0.25, 5),
-        crate::surfaces::hills_with_rocks(6),
+        super::surfaces::flat(0.3),
+        super::surfaces::hills(0.25, 5),
+        super::surfaces::hills_with_rocks(6),
     ]
 }
 
@@ -522,18 +522,17 @@ fn lanes_agree<T: Lane>(token: T::Token) {
     }
 }
 
+struct LanesAgree;
+
+impl OverLanes for LanesAgree {
+    fn run<T: Lane>(&mut self, token: T::Token) {
+        lanes_agree::<T>(token);
+    }
+}
+
 #[test]
 fn every_lane_has_the_bits_of_a_rover_alone() {
-    match Instructions::of_this_machine() {
-        #[cfg(target_arch = "x86_64")]
-        Instructions::Avx512(token) => {
-            lanes_agree::<fearless_simd::f64x4<_>>(token);
-            lanes_agree::<fearless_simd::f64x8<_>>(token);
-        }
-        #[cfg(target_arch = "x86_64")]
-        Instructions::Avx2(token) => lanes_agree::<fearless_simd::f64x4<_>>(token),
-        Instructions::Baseline => {}
-    }
+    on_every_register(&mut LanesAgree);
 }
 
 /// The trunk moves by four times its distance from the rock in half a step, along it.
@@ -579,9 +578,9 @@ fn what_a_search_keeps_does_not_show() {
     for terrain in [
         rocks(3, 0.2),
         Arc::new(SphereField::rug()) as Arc<dyn Terrain>,
-        crate::surfaces::flat(0.1),
-        crate::surfaces::hills(0.2, 3),
-        crate::surfaces::hills_with_rocks(4),
+        super::surfaces::flat(0.1),
+        super::surfaces::hills(0.2, 3),
+        super::surfaces::hills_with_rocks(4),
     ] {
         let mut rover = rover(&model, &terrain, &mut random, 0.01, 0.05);
         let mut block = Block::<f64>::new(Single::best(), &model, std::slice::from_ref(&rover));

@@ -10,7 +10,7 @@ use rover_core::scalar::Instructions;
 use rover_core::simulation::RoverSimulation;
 use rover_core::simulation::fleet::{Fleet, Rider};
 
-use crate::Random;
+use super::Random;
 
 fn rocks(numbers: &mut Random) -> Arc<dyn Terrain> {
     let mut centres = Vec::new();
@@ -30,10 +30,10 @@ fn rocks(numbers: &mut Random) -> Arc<dyn Terrain> {
 /// A rover on its ground: a plane, rocks, a flat map, hills, or hills with rocks.
 fn rover(i: usize, model: &Arc<Model>, numbers: &mut Random) -> RoverSimulation {
     let terrain: Arc<dyn Terrain> = match i % 7 {
-        6 => crate::surfaces::hills(0.02, i as u64),
-        1 => crate::surfaces::flat(0.25),
-        3 => crate::surfaces::hills(0.15, i as u64),
-        4 => crate::surfaces::hills_with_rocks(i as u64),
+        6 => super::surfaces::hills(0.02, i as u64),
+        1 => super::surfaces::flat(0.25),
+        3 => super::surfaces::hills(0.15, i as u64),
+        4 => super::surfaces::hills_with_rocks(i as u64),
         2 | 5 => rocks(numbers),
         _ => Arc::new(Plane::ground()),
     };

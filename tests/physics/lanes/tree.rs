@@ -15,7 +15,7 @@ use rover_core::multibody::description::{JointKind, Limits, SolidDescription};
 use rover_core::multibody::{Configuration, Kinematics, Model, ModelDescription};
 use rover_core::scalar::{Lane, LaneMask, Single, Vec3};
 
-use crate::spread;
+use super::{OverLanes, on_every_register, spread};
 
 /// Time over which the configurations of a test move.
 const H: f64 = 0.3;
@@ -183,6 +183,18 @@ fn tolerance(name: &str) -> f64 {
     }
 }
 
+/// Rovers in lanes, beside the same rovers alone.
+struct SameBits<'a> {
+    rovers: &'a [Rover],
+    alone: &'a [Found],
+}
+
+impl OverLanes for SameBits<'_> {
+    fn run<T: Lane>(&mut self, token: T::Token) {
+        same_bits::<T>(token, self.rovers, self.alone);
+    }
+}
+
 fn same_bits<T: Lane>(token: T::Token, rovers: &[Rover], alone: &[Found]) {
     // Also with the rovers in other lanes.
     for shift in [0, 3] {
@@ -225,24 +237,12 @@ fn check(rovers: &[Rover]) {
             let error = (&x - &y).amax() / y.amax().max(1.0);
             assert!(error < tolerance(name), "{name}: {error:e}");
         }
-        let baseline = found_at_baseline(rover);
-        for ((name, x), (_, y)) in found.parts.iter().zip(&baseline.parts) {
-            assert!(
-                x.iter().zip(y).all(|(x, y)| x.to_bits() == y.to_bits()),
-                "{name}"
-            );
-        }
         alone.push(found);
     }
-    let level = fearless_simd::Level::new();
-    fearless_simd::dispatch!(level, token => {
-        same_bits::<fearless_simd::f64x4<_>>(token, rovers, &alone);
-        same_bits::<fearless_simd::f64x8<_>>(token, rovers, &alone);
+    on_every_register(&mut SameBits {
+        rovers,
+        alone: &alone,
     });
-}
-
-fn found_at_baseline(rover: &Rover) -> Found {
-    found::<f64>(Single::Baseline, std::slice::from_ref(rover)).remove(0)
 }
 
 /// A number between −1 and 1 that depends on the seed and k.

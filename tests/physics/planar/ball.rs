@@ -6,7 +6,7 @@ use rover_core::integrator::{StepOptions, Variant};
 use rover_core::planar::{Ball, Line, Polyline, Sine, Spline};
 use rover_core::simulation::BallSimulation;
 
-use crate::scenes::{G, VARIANTS, ball_on, count, level, options, speed};
+use super::scenes::{G, VARIANTS, ball_on, count, level, options, speed};
 
 fn disc() -> Ball {
     // A homogeneous disc: J = m r²/2.

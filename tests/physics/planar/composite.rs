@@ -17,7 +17,7 @@ use rover_core::system::{
     Apart, Composite, CompositeParts, Coupling, PlanarContact, PlanarScratch, PlanarSystem,
 };
 
-use crate::scenes::{G, VARIANTS, level, options};
+use super::scenes::{G, VARIANTS, level, options};
 
 type Pair<const N: usize, const P: usize> = (SVector<f64, N>, SVector<f64, P>);
 type Both<'s, 'a> = (&'s PlanarSystem<'a, 3, Ball>, &'s PlanarSystem<'a, 3, Ball>);

@@ -12,7 +12,7 @@ use rover_core::multibody::{
 use rover_core::planar::{ContactRule, Line, MirroredRover, PlanarError, PlanarMachine, Sine};
 use rover_core::simulation::{MirroredRoverSimulation, RoverSimulation};
 
-use crate::scenes::{G, VARIANTS, options};
+use super::scenes::{G, VARIANTS, options};
 
 fn planar() -> MirroredRover<7> {
     MirroredRover::new(&Model::rover()).unwrap()

@@ -7,7 +7,7 @@ use rover_core::integrator::{StepOptions, Variant};
 use rover_core::planar::{Ball, ContactRule, Ground, Line, Sine};
 use rover_core::simulation::BallSimulation;
 
-use crate::scenes::{count, options, unprojected};
+use super::scenes::{count, options, unprojected};
 
 /// Rows of a reference: t, x, y, θ, vx, vy, ω.
 fn rows(name: &str) -> Vec<Vec<f64>> {

@@ -11,7 +11,7 @@ use rover_core::planar::{
 use rover_core::simulation::TwoWheelRoverSimulation;
 use rover_core::system::contact_rows;
 
-use crate::scenes::{G, VARIANTS, count, level, options, speed};
+use super::scenes::{G, VARIANTS, count, level, options, speed};
 
 type Q = SVector<f64, 5>;
 

@@ -7,7 +7,7 @@
 
 use rover_core::integrator::Variant;
 
-use crate::scenes::{VARIANTS, check_drive};
+use super::scenes::{VARIANTS, check_drive};
 
 /// Distance (m) and heading error (rad) from where the three engines end.
 fn errors(variant: Variant, h: f64) -> (f64, f64) {

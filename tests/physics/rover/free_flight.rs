@@ -6,7 +6,7 @@ use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::{Model, coordinates};
 use rover_core::simulation::RoverSimulation;
 
-use crate::scenes::{VARIANTS, count, order, simulation};
+use super::scenes::{VARIANTS, count, order, simulation};
 
 /// The rover tumbling high above the ground with all joints turning.
 fn tumbling(variant: Variant, time_step: f64, gravity: Vector3<f64>) -> RoverSimulation {

@@ -4,7 +4,7 @@
 use rover_core::integrator::{Stabilisation, Variant};
 use rover_core::simulation::RoverSimulation;
 
-use crate::scenes::{VARIANTS, count, golden, numbers, report_scene};
+use super::scenes::{VARIANTS, count, golden, numbers, report_scene};
 
 /// Distance (m) of the trunk from the reference's at the end of 10 s, and
 /// the deepest gap on the way.

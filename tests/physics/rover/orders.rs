@@ -4,7 +4,7 @@ use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::Model;
 
-use crate::scenes::{VARIANTS, count, order, simulation};
+use super::scenes::{VARIANTS, count, order, simulation};
 
 /// L1 error of the height over half a second of a drop, one to three
 /// bounces included (e = 0.5, no friction).

@@ -5,7 +5,7 @@ use rover_core::integrator::StepOptions;
 use rover_core::problem::{Dimension, FrictionContactProblem};
 use rover_core::solver::{SolverOptions, SolverWorkspace, solve};
 
-use crate::scenes::{VARIANTS, at_rest, on_slope};
+use super::scenes::{VARIANTS, at_rest, on_slope};
 
 /// Closed form, N: front (trunk 40/102 + group)/2, side (trunk 62/204 +
 /// group)/2, group = axle or bogie + 2 steering + 2 wheels.

@@ -9,7 +9,7 @@ use rover_core::multibody::{
     Kinematics, MassMatrix, Model, ModelDescription, bias, coordinates, momentum,
 };
 
-use crate::scenes::{golden, numbers, set_contact_radius};
+use super::scenes::{golden, numbers, set_contact_radius};
 
 fn assert_close(what: &str, actual: &[f64], expected: &[f64]) {
     let scale = expected.iter().fold(0.0_f64, |m, x| m.max(x.abs()));

@@ -8,7 +8,7 @@ use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::{Model, ModelDescription, coordinates};
 use rover_core::simulation::RoverSimulation;
 
-use crate::scenes::{VARIANTS, at_rest, count, simulation};
+use super::scenes::{VARIANTS, at_rest, count, simulation};
 
 fn dropped(
     model: Model,

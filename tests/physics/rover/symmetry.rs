@@ -7,7 +7,7 @@ use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Configuration, Model};
 use rover_core::simulation::RoverSimulation;
 
-use crate::scenes::simulation;
+use super::scenes::simulation;
 
 fn driving(heading: f64, steering: f64) -> RoverSimulation {
     let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), heading);

@@ -5,7 +5,7 @@ use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::{Model, ModelDescription, ModelError, TagDescription};
 
-use crate::scenes::simulation;
+use super::scenes::simulation;
 
 const CART: &str = r#"
 name = "cart"

@@ -5,7 +5,7 @@ use rover_core::geometry::Plane;
 use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Kinematics, MassMatrix, Model, coordinates, momentum};
 
-use crate::scenes::simulation;
+use super::scenes::simulation;
 
 fn dense(model: &Model, q: &[f64]) -> DMatrix<f64> {
     let kinematics = Kinematics::of(model, &coordinates::from_public(model, q).unwrap());

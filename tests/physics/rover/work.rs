@@ -7,7 +7,7 @@ use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Configuration, Model, ModelDescription};
 use rover_core::simulation::{RoverSimulation, SnapshotError};
 
-use crate::scenes::{VARIANTS, at_rest, on_slope};
+use super::scenes::{VARIANTS, at_rest, on_slope};
 
 fn driving(options: StepOptions) -> RoverSimulation {
     let mut simulation = at_rest(options);

@@ -9,7 +9,7 @@ use rover_core::multibody::{Configuration, Model};
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
 use rover_core::simulation::RoverSimulation;
 
-use crate::machines::body;
+use super::machines::body;
 
 const GRAVITY: f64 = 9.81;
 

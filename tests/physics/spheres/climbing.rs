@@ -13,7 +13,7 @@ use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Model, ModelDescription};
 use rover_core::simulation::RoverSimulation;
 
-use crate::scenes::simulation;
+use crate::rover::scenes::simulation;
 
 const R: f64 = 0.1;
 const EDGE: f64 = 1e-4;

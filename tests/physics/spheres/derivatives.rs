@@ -7,7 +7,7 @@ use rover_core::contact::{Contact, ContactFrame, ContactKey, Part, relocate};
 use rover_core::geometry::SphereField;
 use rover_core::multibody::{Configuration, Kinematics, Model};
 
-use crate::sphere_scenes::field;
+use super::sphere_scenes::field;
 
 /// Contact of a part with the only sphere of a field.
 fn contact_at(

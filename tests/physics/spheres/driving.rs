@@ -5,7 +5,7 @@ use rover_core::geometry::SphereField;
 use rover_core::integrator::StepOptions;
 use rover_core::multibody::Model;
 
-use crate::sphere_scenes::{deepest, placed, rocks};
+use super::sphere_scenes::{deepest, placed, rocks};
 
 #[allow(clippy::print_stderr)] // figures that are reported beside what is asserted
 fn report(line: &str) {

@@ -8,7 +8,7 @@ use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Configuration, Model};
 use rover_core::simulation::RoverSimulation;
 
-use crate::sphere_scenes::{Random, rocks};
+use super::sphere_scenes::{Random, rocks};
 
 /// Worst of so many drops.
 struct Worst {

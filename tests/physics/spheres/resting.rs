@@ -9,8 +9,8 @@ use rover_core::contact::{Contact, Opposite};
 use rover_core::integrator::StepOptions;
 use rover_core::simulation::RoverSimulation;
 
-use crate::scenes::VARIANTS;
-use crate::sphere_scenes::{WHEEL_MASS, WHEEL_RADIUS, field, lone_wheel, placed};
+use super::sphere_scenes::{WHEEL_MASS, WHEEL_RADIUS, field, lone_wheel, placed};
+use crate::rover::scenes::VARIANTS;
 
 const R: f64 = WHEEL_RADIUS;
 const G: f64 = 9.81;

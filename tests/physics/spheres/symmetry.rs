@@ -8,7 +8,7 @@ use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Configuration, Model};
 use rover_core::simulation::RoverSimulation;
 
-use crate::sphere_scenes::Random;
+use super::sphere_scenes::Random;
 
 /// Spheres for a drive along x, drawn with the rover's own track: every
 /// sphere in reach of a wheel sooner or later.

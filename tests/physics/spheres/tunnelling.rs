@@ -5,8 +5,8 @@ use rover_core::contact::Part;
 use rover_core::integrator::StepOptions;
 use rover_core::multibody::Model;
 
-use crate::scenes::VARIANTS;
-use crate::sphere_scenes::{Random, WHEEL_RADIUS, deepest, field, lone_wheel, placed};
+use super::sphere_scenes::{Random, WHEEL_RADIUS, deepest, field, lone_wheel, placed};
+use crate::rover::scenes::VARIANTS;
 
 const R: f64 = WHEEL_RADIUS;
 

@@ -209,7 +209,7 @@ proptest! {
 #[test]
 fn the_far_side_of_a_ridge_does_not_push() {
     // A ridge along z; the wheel stands beside it and touches nothing.
-    let field = crate::surface_scenes::map(40, 0.1, |x, _| if x.abs() < 0.05 { 1.0 } else { 0.0 });
+    let field = super::surface_scenes::map(40, 0.1, |x, _| if x.abs() < 0.05 { 1.0 } else { 0.0 });
     for side in [-1.0, 1.0] {
         let disc = Disc {
             centre: Vector3::new(side * 0.5, 0.3, 0.02),

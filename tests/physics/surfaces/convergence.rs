@@ -4,8 +4,8 @@ use rover_core::contact::detection::disc_gap;
 use rover_core::geometry::Disc;
 use rover_core::nalgebra::Vector3;
 
-use crate::scenes::order;
-use crate::surface_scenes::map;
+use super::surface_scenes::map;
+use crate::rover::scenes::order;
 
 #[test]
 fn gaps_over_a_sine_converge_with_the_square_of_the_spacing() {

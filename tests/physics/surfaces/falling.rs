@@ -6,9 +6,9 @@ use rover_core::geometry::{HeightField, Terrain};
 use rover_core::integrator::{StepError, StepOptions};
 use rover_core::nalgebra::Vector3;
 
-use crate::scenes::VARIANTS;
-use crate::sphere_scenes::{Random, WHEEL_RADIUS, deepest, lone_wheel, placed};
-use crate::surface_scenes::{map, rover_on};
+use super::surface_scenes::{map, rover_on};
+use crate::rover::scenes::VARIANTS;
+use crate::spheres::sphere_scenes::{Random, WHEEL_RADIUS, deepest, lone_wheel, placed};
 
 /// Bumps of random height.
 fn bumpy(seed: u64, spacing: f64, height: f64) -> HeightField {

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use rover_core::geometry::{Plane, Terrain, Union};
 use rover_core::simulation::RoverSimulation;
 
-use crate::scenes::on_slope;
-use crate::sphere_scenes::{WHEEL_MASS, WHEEL_RADIUS, lone_wheel, placed};
-use crate::surface_scenes::{map, rover_on};
+use super::surface_scenes::{map, rover_on};
+use crate::rover::scenes::on_slope;
+use crate::spheres::sphere_scenes::{WHEEL_MASS, WHEEL_RADIUS, lone_wheel, placed};
 use rover_core::integrator::StepOptions;
 use rover_core::nalgebra::Vector3;
 

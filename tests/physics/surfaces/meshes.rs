@@ -7,8 +7,8 @@ use rover_core::geometry::{Disc, HeightField, Plane, Terrain, TriangleMesh, Unio
 use rover_core::integrator::StepOptions;
 use rover_core::nalgebra::Vector3;
 
-use crate::sphere_scenes::{deepest, lone_wheel, placed};
-use crate::surface_scenes::map;
+use super::surface_scenes::map;
+use crate::spheres::sphere_scenes::{deepest, lone_wheel, placed};
 
 /// An octahedron's faces, cut n times and blown up to a ball.
 fn ball(radius: f64, cuts: usize, centre: Vector3<f64>) -> TriangleMesh {

@@ -3,7 +3,7 @@
 use rover_core::lanes::machine::{Machine, NotOrdinary};
 use rover_core::multibody::{Model, ModelDescription};
 
-use crate::wheel_scenes::wide_rover;
+use super::wheel_scenes::wide_rover;
 
 #[test]
 fn width_and_rounding_are_checked_by_name() {

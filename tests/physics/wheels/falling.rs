@@ -4,10 +4,10 @@ use rover_core::geometry::Terrain;
 use rover_core::integrator::StepOptions;
 use rover_core::nalgebra::Vector3;
 
-use crate::scenes::VARIANTS;
-use crate::sphere_scenes::{Random, WHEEL_RADIUS, deepest, field, placed};
-use crate::surface_scenes::map;
-use crate::wheel_scenes::lone;
+use super::wheel_scenes::lone;
+use crate::rover::scenes::VARIANTS;
+use crate::spheres::sphere_scenes::{Random, WHEEL_RADIUS, deepest, field, placed};
+use crate::surfaces::surface_scenes::map;
 
 const R: f64 = WHEEL_RADIUS;
 

@@ -9,9 +9,9 @@ use rover_core::geometry::{HeightField, Plane, Roller, Sphere, SphereField, Supp
 use rover_core::multibody::{Configuration, Kinematics};
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
 
-use crate::sphere_scenes::field;
-use crate::surface_scenes::map;
-use crate::wheel_scenes::{lone, roller, shape, surface};
+use super::wheel_scenes::{lone, roller, shape, surface};
+use crate::spheres::sphere_scenes::field;
+use crate::surfaces::surface_scenes::map;
 
 /// Radius, width and share of the rounding of a wheel.
 fn sizes() -> impl Strategy<Value = [f64; 3]> {

@@ -9,10 +9,10 @@ use rover_core::multibody::{Model, coordinates};
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
 use rover_core::simulation::RoverSimulation;
 
-use crate::scenes::VARIANTS;
-use crate::sphere_scenes::{WHEEL_MASS, WHEEL_RADIUS, placed};
-use crate::surface_scenes::map;
-use crate::wheel_scenes::{lone, wide_rover};
+use super::wheel_scenes::{lone, wide_rover};
+use crate::rover::scenes::VARIANTS;
+use crate::spheres::sphere_scenes::{WHEEL_MASS, WHEEL_RADIUS, placed};
+use crate::surfaces::surface_scenes::map;
 
 fn rover(model: Model, terrain: Arc<dyn Terrain>, q: &[f64]) -> RoverSimulation {
     let mut simulation =

@@ -4,7 +4,7 @@ use rover_core::geometry::{Disc, PlacedShape, Roller};
 use rover_core::multibody::{Model, ModelDescription};
 use rover_core::nalgebra::{Rotation3, Vector3};
 
-use crate::sphere_scenes::lone_wheel;
+use crate::spheres::sphere_scenes::lone_wheel;
 
 /// A model whose wheels all have this width and rounding, m.
 pub fn widened(mut description: ModelDescription, width: f64, rounding: f64) -> Model {

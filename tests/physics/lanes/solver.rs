@@ -1,9 +1,7 @@
 //! The solver over lanes: its answers obey the law, and no lane's bits depend on its neighbours.
-#![allow(clippy::float_cmp)] // equal bits are the claim
 
 use std::sync::Arc;
 
-use fearless_simd::{Level, f64x4, f64x8};
 use proptest::prelude::*;
 use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, UnilateralContact};
@@ -14,6 +12,8 @@ use rover_core::problem::{Dimension, FrictionContactProblem, evaluate};
 use rover_core::scalar::{Lane, Single};
 use rover_core::simulation::RoverSimulation;
 use rover_core::solver::SolverOptions;
+
+use super::{OverLanes, on_every_register};
 
 /// `W` as a whole, row-major.
 fn operator(problem: &ContactProblem) -> Vec<f64> {
@@ -115,16 +115,32 @@ fn assert_same(found: &ContactProblem, alone: &ContactProblem) {
     assert_eq!(bits(found), bits(alone));
 }
 
+/// The answers to a list of problems, one list for each number of lanes.
+struct Solved<'a> {
+    problems: &'a [ContactProblem],
+    found: Vec<Vec<ContactProblem>>,
+}
+
+impl OverLanes for Solved<'_> {
+    fn run<T: Lane>(&mut self, token: T::Token) {
+        let mut found = self.problems.to_vec();
+        solve_all::<T>(token, &mut found, &SolverOptions::default());
+        self.found.push(found);
+    }
+}
+
+fn solve_over_lanes(problems: &[ContactProblem]) -> Vec<Vec<ContactProblem>> {
+    let mut solved = Solved {
+        problems,
+        found: Vec::new(),
+    };
+    on_every_register(&mut solved);
+    solved.found
+}
+
 /// Solves the list with every width and compares each answer with that of the problem alone.
 fn assert_alike(problems: &[ContactProblem], alone: &[ContactProblem]) {
-    let options = SolverOptions::default();
-    let mut found = vec![problems.to_vec(); 3];
-    solve_all::<f64>(Single::Baseline, &mut found[0], &options);
-    fearless_simd::dispatch!(Level::new(), token => {
-        solve_all::<f64x4<_>>(token, &mut found[1], &options);
-        solve_all::<f64x8<_>>(token, &mut found[2], &options);
-    });
-    for found in found {
+    for found in solve_over_lanes(problems) {
         for (found, alone) in found.iter().zip(alone) {
             assert_same(found, alone);
         }
@@ -190,10 +206,7 @@ fn an_exploring_rover_is_solved_in_few_steps() {
     for (torque, mean, unsolved) in [(0.0, 3.0, 0), (60.0, 4.4, 0), (150.0, 5.2, 0)] {
         let problems = drive(torque, 600);
         assert!(problems.len() > 500);
-        let mut found = problems.clone();
-        fearless_simd::dispatch!(Level::new(), token => {
-            solve_all::<f64x8<_>>(token, &mut found, &SolverOptions::default());
-        });
+        let found = solve_alone(&problems);
         for (found, start) in found.iter().zip(&problems) {
             assert_sound(found, start);
         }
@@ -202,7 +215,7 @@ fn an_exploring_rover_is_solved_in_few_steps() {
         let left = found.iter().filter(|p| !p.is_solved).count();
         assert!(steps < mean, "{torque} N m: {steps} steps");
         assert!(left <= unsolved, "{torque} N m: {left} unsolved");
-        assert_alike(&problems, &solve_alone(&problems));
+        assert_alike(&problems, &found);
     }
 }
 
@@ -250,12 +263,7 @@ fn what_is_not_finite_is_unsolved_and_harms_no_neighbour() {
         problems[3].q[4] = bad;
         problems[9].W[block(2, 1)][5] = bad;
         problems[10].mu[0] = bad;
-        let mut found = problems.clone();
-        solve_all::<f64>(Single::best(), &mut found, &SolverOptions::default());
-        fearless_simd::dispatch!(Level::new(), token => {
-            solve_all::<f64x8<_>>(token, &mut problems, &SolverOptions::default());
-        });
-        for problems in [found, problems] {
+        for problems in solve_over_lanes(&problems) {
             for (k, (found, alone)) in problems.iter().zip(&alone).enumerate() {
                 if [3, 9, 10].contains(&k) {
                     assert!(!found.is_solved);
@@ -293,8 +301,16 @@ fn without_free_velocity_or_contacts_the_answer_is_zero() {
     }
 }
 
-/// Lets each group of problems through a queue as often as there are `rounds`; a group goes on with
+/// Lets each group of problems through a queue as often as there are rounds; a group goes on with
 /// its next problems while others are still at work.
+struct ThroughAQueue<'a>(&'a [Vec<ContactProblem>]);
+
+impl OverLanes for ThroughAQueue<'_> {
+    fn run<T: Lane>(&mut self, token: T::Token) {
+        assert_queue_gives_the_same::<T>(token, self.0);
+    }
+}
+
 fn assert_queue_gives_the_same<T: Lane>(token: T::Token, rounds: &[Vec<ContactProblem>]) {
     let options = SolverOptions::default();
     let n_groups = rounds[0].len() / T::LANES;
@@ -336,11 +352,7 @@ fn groups_that_never_wait_for_each_other_get_the_same_answers() {
         })
         .collect();
     assert!(rounds.iter().all(|round| round.len() == 32));
-    assert_queue_gives_the_same::<f64>(Single::best(), &rounds);
-    fearless_simd::dispatch!(Level::new(), token => {
-        assert_queue_gives_the_same::<f64x4<_>>(token, &rounds);
-        assert_queue_gives_the_same::<f64x8<_>>(token, &rounds);
-    });
+    on_every_register(&mut ThroughAQueue(&rounds));
 }
 
 /// `W = G Gᵀ` of `rank` columns, `q` in its range.
