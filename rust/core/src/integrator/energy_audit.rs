@@ -21,26 +21,11 @@
 //! The correction is of the order of the excess, so the scheme keeps its order. Position projection
 //! follows the audit, and its energy is counted separately.
 
-use nalgebra::Vector3;
-
-use super::ScratchOf;
-use super::mechanical_system::{MechanicalSystem, Start};
-use super::moreau_jean::place;
+use super::mechanical_system::{MechanicalEnergy, MechanicalSystem, Start};
 use super::options::StepOptions;
 use super::report::StepReport;
-
-/// Energy of a state, and its overall momentum.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct MechanicalEnergy {
-    /// J.
-    pub kinetic: f64,
-    /// J.
-    pub potential: f64,
-    /// Linear momentum, kg m/s.
-    pub momentum: Vector3<f64>,
-    /// kg.
-    pub mass: f64,
-}
+use super::scratch::{Scratch, ScratchOf};
+use super::step_contacts::place;
 
 /// Largest gain in a step that is tolerated, as a fraction of the kinetic energy.
 pub const GAIN: f64 = 5e-10;
@@ -65,34 +50,6 @@ const LEAST_WAY: f64 = 1e-3;
 
 /// Most times that a velocity is shortened together with its displacement.
 const MOST_SHORTENINGS: usize = 8;
-
-/// A state whose energy is known: the end of a step is the start of the next.
-#[derive(Clone, Debug)]
-pub(super) struct Audited<Q> {
-    configuration: Q,
-    v: Vec<f64>,
-    energy: Option<MechanicalEnergy>,
-}
-
-impl<Q> Audited<Q> {
-    pub(super) fn new(configuration: Q, nv: usize) -> Self {
-        Self {
-            configuration,
-            v: vec![f64::NAN; nv],
-            energy: None,
-        }
-    }
-}
-
-impl<Q: Clone> Audited<Q> {
-    /// Stores the energy of a state.
-    fn is(&mut self, configuration: &Q, v: &[f64], energy: MechanicalEnergy) {
-        self.configuration.clone_from(configuration);
-        self.v.clear();
-        self.v.extend_from_slice(v);
-        self.energy = Some(energy);
-    }
-}
 
 /// Energy at the start of a step, remembered from the end of the last one if the state is the same.
 pub(super) fn energy_before<S: MechanicalSystem>(
@@ -320,7 +277,7 @@ fn balance<S: MechanicalSystem>(
 }
 
 /// `v⁺ ← share v⁺`, in the local velocities too.
-fn shorten<Q, C>(ws: &mut super::Scratch<Q, C>, share: f64) {
+fn shorten<Q, C>(ws: &mut Scratch<Q, C>, share: f64) {
     for x in ws.v.iter_mut().chain(&mut ws.u) {
         *x *= share;
     }

@@ -21,16 +21,15 @@
 
 use super::energy_audit::{Audit, GAIN, Verdict, energy_before};
 use super::error::StepError;
-use super::mechanical_system::{MechanicalSystem, Start, UnilateralContact};
-use super::moreau_jean::{
-    MOST_REVISIONS, MoreauJean, activation, add_correction, assemble_contacts, finish,
-    solve_contacts,
-};
+use super::mechanical_system::{KeyOf, MechanicalSystem, Start, UnilateralContact};
+use super::moreau_jean::{MOST_REVISIONS, MoreauJean, finish};
 use super::options::StepOptions;
 use super::probe::{Phase, Probe};
 use super::report::{StepReport, StepStatus};
+use super::scheme::{Integrator, StateMut};
+use super::scratch::ScratchOf;
+use super::step_contacts::{activation, add_correction, assemble_contacts, solve_contacts};
 use super::warm_start::WarmStart;
-use super::{Integrator, KeyOf, ScratchOf, StateMut};
 
 /// Relative change below which an iteration that no longer contracts has reached rounding.
 const ROUNDING: f64 = 1e-8;
