@@ -7,21 +7,26 @@ from pathlib import Path
 RUST = Path(__file__).parents[2] / "rust"
 CRATES = ["core", "python", "comparison", "fmu"]
 
-#: Modules of the package that Rust code imports, and why Python cannot call the core instead.
-PYTHON_IMPORTS = {}
-
-#: Where a compiled class appears to live. To name it is not to import it.
-PUBLIC_FACE = "rover_gym.mechanics"
+#: Modules of the package that files of the border import, against the arrows, each with the reason.
+PYTHON_IMPORTS = {
+    (
+        "height_field.rs",
+        "rover_gym.maps",
+    ): "HeightField.from_file and .fractal; Python reads maps and makes the heights",
+    ("triangle_mesh.rs", "rover_gym.maps"): "TriangleMesh.from_file; Python reads the formats of meshes",
+    ("model_files.rs", "rover_gym.models"): "RoverModel.from_urdf and its like; Python reads and writes these formats",
+}
 
 COMMENTS_AND_STRINGS = re.compile(
     r"""//[^\n]* | /\*.*?\*/ | b?r(?P<fence>\#*)".*?"(?P=fence) | "(?:\\.|[^"\\])*" | '(?:\\[^'\n]+|[^'\\\n])'""",
     re.DOTALL | re.VERBOSE,
 )
-TESTS = re.compile(r"#\[cfg\(test\)\]\s*(?:pub(?:\([^)]*\))?\s+)?mod \w+ \{.*?\n\}", re.DOTALL)
+TESTS = re.compile(r"^( *)#\[cfg\(test\)\]\s*(?:use [^;]+;|mod \w+ \{.*?\n\1\})", re.DOTALL | re.MULTILINE)
 USES = re.compile(r"(\bpub(?:\([^)]*\))?\s+)?\buse\s+([^;]+);")
 DECLARATIONS = re.compile(r"#!?\[[^\]]*\]|(?:\bpub(?:\([^)]*\))?\s+)?\bmod \w+;")
 PATHS = re.compile(r"(?<![\w:])(?<!\(in )(\w+(?:::\w+)+)")
 WORDS = re.compile(r"\w+")
+PUBLIC_FACE = re.compile(r'(?:\bmodule = |"__module__", )"rover_gym\.mechanics"')
 PACKAGE_NAMES = re.compile(r'"(rover_gym(?:\.\w+)*)"')
 
 Module = tuple[str, ...]
@@ -99,6 +104,7 @@ class Crate:
         return {self.owner(target) for target in targets} - {module}
 
     def arrows(self) -> dict[Module, set[Module]]:
+        """The files that define something, each with those of them that it uses."""
         nodes = {module for module in self.code if not self.is_face(module)}
         return {module: self.used(module) & nodes for module in nodes}
 
@@ -138,10 +144,47 @@ def test_no_files_use_one_another_in_a_circle() -> None:
     assert not {crate: groups for crate, groups in found.items() if groups}
 
 
+def test_the_reading_finds_all_forms_of_a_path() -> None:
+    crate = Crate(
+        {
+            (): "pub mod a; mod b;",
+            ("a",): "mod lower; mod middle; pub use lower::{Noun, VERB as Deed}; //! use super::b::B;",
+            ("a", "lower"): "pub struct Noun; fn f(x: &'static str) { g('\"') }",
+            ("a", "middle"): "use super::{Noun, lower::{self, other}}; pub struct Middle;",
+            ("b",): """
+            use crate::a;
+            /* use crate::a::middle::Middle; */ // crate::a::middle::Middle
+            fn f() { a::Deed::new("crate::a::middle::Middle"); std::mem::take() }
+            #[cfg(test)]
+            use crate::a::middle::Middle;
+            #[cfg(test)]
+            mod tests {
+                use crate::a::middle::Middle;
+            }
+            """,
+        }
+    )
+    assert crate.is_face(())
+    assert crate.is_face(("a",))
+    assert crate.arrows() == {("a", "lower"): set(), ("a", "middle"): {("a", "lower")}, ("b",): {("a", "lower")}}
+
+
+def test_a_folder_with_definitions_is_a_file_too() -> None:
+    child = "use super::Whole; pub struct Part;"
+    for own, found in [(";", []), ("(Part);", [["folder", "folder/part"]])]:
+        folder = f"mod part; pub use part::Part; pub struct Whole{own}"
+        assert circles(Crate({("folder",): folder, ("folder", "part"): child}).arrows()) == found
+
+
+def test_a_circle_of_any_length_is_found() -> None:
+    arrows = {"a": "b", "b": "c", "c": "ad", "d": ""}
+    assert circles({(name,): {(other,) for other in used} for name, used in arrows.items()}) == [["a", "b", "c"]]
+
+
 def python_imports(text: str) -> set[str]:
-    """Modules of the package that a Rust file names in a string of their own."""
+    """Modules of the package that a Rust file names in strings, but for the one where its own classes appear."""
     code = re.sub(r"//[^\n]*", "", text)
-    return set(PACKAGE_NAMES.findall(re.sub(r'(?:module = |"__module__", )"rover_gym\.mechanics"', "", code)))
+    return set(PACKAGE_NAMES.findall(PUBLIC_FACE.sub("", code)))
 
 
 def test_the_border_imports_python_only_where_it_must() -> None:
@@ -149,3 +192,13 @@ def test_the_border_imports_python_only_where_it_must() -> None:
     for page in (RUST / "python" / "src").rglob("*.rs"):
         found |= {(page.name, module) for module in python_imports(page.read_text(encoding="utf-8"))}
     assert found == PYTHON_IMPORTS.keys()
+
+
+def test_the_reading_finds_all_imports_of_python() -> None:
+    text = """
+    #[pyclass(module = "rover_gym.mechanics")]
+    body.set_item("__module__", "rover_gym.mechanics")?; // "rover_gym.cli"
+    const ROOM: &str = "rover_gym.models";
+    PyModule::import(py, "rover_gym")?; py.import("rover_gym.maps")?; py.import("numpy")?;
+    """
+    assert python_imports(text) == {"rover_gym", "rover_gym.models", "rover_gym.maps"}
