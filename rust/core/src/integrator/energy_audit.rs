@@ -105,27 +105,15 @@ impl Audit {
             return Verdict::Sound;
         };
         ws.audited.energy = None;
-        let mut balance = balance(system, options, start, ws, &before);
-        if self.is_last {
-            for _ in 0..MOST_SHORTENINGS {
-                let Balance { after, excess, .. } = balance;
-                if excess.is_nan() || excess <= SHORT * after.kinetic {
-                    break;
-                }
-                // The velocity is far off, and so is the displacement that it caused. Shorten both
-                // together.
-                let share = (before.kinetic / after.kinetic).min(SHORT).sqrt();
-                shorten(ws, share);
-                place(system, options, ws);
-                system.normalise(&mut ws.end);
-                balance = self::balance(system, options, start, ws, &before);
-            }
-        }
         let Balance {
             after,
             excess,
             work,
-        } = balance;
+        } = if self.is_last {
+            shortened_balance(system, options, start, ws, &before)
+        } else {
+            balance(system, options, start, ws, &before)
+        };
         if !excess.is_finite() {
             return if self.is_last {
                 Verdict::Sound // not finite: refused when the step ends
@@ -163,17 +151,8 @@ impl Audit {
         if (coarse > COARSE * size || is_left) && !self.is_last {
             return Verdict::Coarse;
         }
-        let whole = after.momentum.norm_squared() / (2.0 * after.mass);
-        let relative_kinetic = after.kinetic - whole;
         let d = S::DIMENSION.components();
-        if is_free && excess < relative_kinetic {
-            let share = (1.0 - excess / relative_kinetic).min(1.0 + RAISE).sqrt();
-            let translation = after.momentum / after.mass;
-            for (k, v) in ws.v.iter_mut().enumerate() {
-                let common = if k < d { translation[k] } else { 0.0 };
-                *v = common + share * (*v - common);
-            }
-        } else if excess > 0.0 {
+        if !(is_free && scale_relative_motion(&mut ws.v, d, &after, excess)) && excess > 0.0 {
             let share = (1.0 - excess / after.kinetic).max(0.0).sqrt();
             shorten(ws, share);
             if is_left {
@@ -274,6 +253,49 @@ fn balance<S: MechanicalSystem>(
         excess: (after.kinetic - before.kinetic) + (after.potential - before.potential) - work,
         work,
     }
+}
+
+/// The same, after the velocity and its displacement are shortened while the excess is a large part
+/// of the kinetic energy.
+fn shortened_balance<S: MechanicalSystem>(
+    system: &mut S,
+    options: &StepOptions,
+    start: Start<'_, S::Configuration>,
+    ws: &mut ScratchOf<S>,
+    before: &MechanicalEnergy,
+) -> Balance {
+    let mut found = balance(system, options, start, ws, before);
+    for _ in 0..MOST_SHORTENINGS {
+        let Balance { after, excess, .. } = found;
+        if excess.is_nan() || excess <= SHORT * after.kinetic {
+            break;
+        }
+        // The velocity is far off, and so is the displacement that it caused. Shorten both
+        // together.
+        let share = (before.kinetic / after.kinetic).min(SHORT).sqrt();
+        shorten(ws, share);
+        place(system, options, ws);
+        system.normalise(&mut ws.end);
+        found = balance(system, options, start, ws, before);
+    }
+    found
+}
+
+/// Scales the motion relative to the mass centre, whose translation has d components, to remove an
+/// excess; false where the excess is larger than the energy of that motion.
+fn scale_relative_motion(v: &mut [f64], d: usize, after: &MechanicalEnergy, excess: f64) -> bool {
+    let whole = after.momentum.norm_squared() / (2.0 * after.mass);
+    let relative_kinetic = after.kinetic - whole;
+    let has_enough = excess < relative_kinetic;
+    if has_enough {
+        let share = (1.0 - excess / relative_kinetic).min(1.0 + RAISE).sqrt();
+        let translation = after.momentum / after.mass;
+        for (k, v) in v.iter_mut().enumerate() {
+            let common = if k < d { translation[k] } else { 0.0 };
+            *v = common + share * (*v - common);
+        }
+    }
+    has_enough
 }
 
 /// `v⁺ ← share v⁺`, in the local velocities too.

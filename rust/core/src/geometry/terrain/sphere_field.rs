@@ -227,6 +227,7 @@ impl Terrain for SphereField {
 
 #[cfg(test)]
 mod tests {
+    use super::super::limits::MAX_SPHERES;
     use super::*;
 
     #[test]
