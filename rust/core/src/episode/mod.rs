@@ -3,12 +3,12 @@
 //!
 //! An agent chooses an action once a control period, which lasts several physics steps. The rover
 //! is given the action's commands ([`action`]), takes its steps and is read
-//! ([`crate::simulation::reading`]). Its [`quantities`] and the [`setting`] drawn for the episode
-//! give the observation ([`observation`], with [`noise`]), the [`progress`] of the episode, the terms of the [`reward`] and whether the episode
-//! ends ([`ending`]); together they are the period's [`outcome`].
+//! ([`crate::simulation::reading`]). From the reading follow the observation ([`observation`], with
+//! [`noise`]), its [`quantities`], the [`progress`] of the episode, the terms of the [`reward`] and
+//! whether and why the episode ends ([`ending`]); together they are the period's [`outcome`].
 //!
 //! - [`rules`]: what all episodes of a task share; [`beginning`]: how one begins, in a scene that
-//!   is drawn ([`crate::draw`]);
+//!   is drawn ([`crate::draw`]); [`setting`]: what was drawn for it;
 //! - [`running`]: one episode and its control period;
 //! - [`batch`]: many rovers side by side, each with its episode; [`autoreset`]: a step in which the
 //!   next episodes begin, too.

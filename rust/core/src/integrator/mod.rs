@@ -10,9 +10,10 @@
 //! [`energy_audit`] checks the energy of every step. `held_step` differentiates a step while the
 //! modes of its contacts ([`contact_modes`]) hold.
 //!
-//! An [`Integrator`] is a scheme; `variant` chooses one by the options, and `step_contacts` holds
-//! the treatment of contacts that the schemes share. Each scheme is written once, for any [`MechanicalSystem`]: the multibody tree and the planar
-//! systems ([`crate::system`], [`crate::planar`]) step through the same code.
+//! Each scheme is an [`Integrator`], written once, for any [`MechanicalSystem`]: the multibody tree
+//! and the planar systems ([`crate::system`], [`crate::planar`]) step through the same code. The
+//! schemes share the treatment of contacts (`step_contacts`), and `variant` chooses one of them by
+//! the options.
 
 pub mod accuracy;
 pub mod contact_modes;

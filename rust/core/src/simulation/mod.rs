@@ -3,9 +3,9 @@
 //! - [`scene`]: what can be simulated, and the data needed to continue; [`stepping`]: the one
 //!   simulation of all scenes;
 //! - [`state`], [`active_contact`]: its state, its contacts;
-//! - [`rover`]: a rover on a terrain, with its [commands](rover_command) and their [setters](rover_controls), its
-//!   [contacts](rover_contacts), its [ordinary] steps, its [`reading`], what [rays](rover_rays) meet, and the [`linearisation`] of
-//!   a step;
+//! - [`rover`]: a rover on a terrain, with its [command](rover_command), its
+//!   [controls](rover_controls), its [contacts](rover_contacts), its [ordinary] steps, its
+//!   [`reading`], what [rays](rover_rays) meet, and the [`linearisation`] of a step;
 //! - [`planar`]: a planar machine on a ground; [`grains`]: a bed of grains,
 //!   perhaps with a machine on it;
 //! - [`rover_in_grains`]: a rover and a bed of balls, stepped together;

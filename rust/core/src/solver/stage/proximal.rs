@@ -97,8 +97,8 @@ impl Course {
         begins
     }
 
-    /// The next problem: a sprint with the `target` for `α`, or a proximal step. `last`: residual of
-    /// the last step; `asked`: the one required with the smallest `α`.
+    /// The next problem: a sprint with the `target` for `α`, or a proximal step. `last`: residual
+    /// of the last step; `asked`: the one required with the smallest `α`.
     fn task(&self, sprints: bool, target: f64, last: f64, asked: f64) -> Task {
         if sprints {
             return Task {
@@ -122,7 +122,7 @@ impl Course {
         }
     }
 
-    /// Reduces `α` along Tikhonov's path after a success; false if it has left the path or ends it.
+    /// Reduces `α` along Tikhonov's path after a success; false if the path has ended.
     fn follow_path(&mut self, target: f64) -> bool {
         let follows = self.follows_path && self.alpha > target;
         if follows {

@@ -8,8 +8,8 @@
 //!   without overlap, from a seed;
 //! - [`cohesion`]: an attraction of contacts;
 //! - [`grid`]: the search for neighbours; [`contact`]: a contact and its key;
-//! - [`system`]: grains as a mechanical system for [`crate::integrator`]; `search` and `detection`: its
-//!   contacts; `measures`: energy, momentum, overlap;
+//! - [`system`]: grains as a mechanical system for [`crate::integrator`]; `search` and `detection`:
+//!   its contacts; `measures`: energy, momentum, overlap;
 //! - [`sleep`]: leaves out grains that rest far from anything that moves; [`removal`]: takes grains
 //!   out and renumbers the others.
 //!
