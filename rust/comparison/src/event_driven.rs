@@ -105,7 +105,23 @@ impl<K> Reserve<K> {
             Self::Gap(x) | Self::Normal(x, _) | Self::Friction(x, _, _) | Self::Slip(x) => *x,
         }
     }
+
+    /// How the contact that ended the motion goes on, where that is decided.
+    fn decision(self) -> Option<Decision<K>> {
+        match self {
+            Self::Gap(_) | Self::Slip(_) => None,
+            Self::Normal(_, key) => Some(Decision::Opens(key)),
+            Self::Friction(_, key, sign) => Some(Decision::Slides(key, sign)),
+        }
+    }
 }
+
+/// Configuration and velocity after a part of the step, and what is about to end the motion there.
+type Reached<S> = (
+    <S as MechanicalSystem>::Configuration,
+    Vec<f64>,
+    Reserve<KeyOf<S>>,
+);
 
 /// One step's view: system, options and the solver's scratch.
 struct Run<'a, S: MechanicalSystem> {
@@ -117,6 +133,42 @@ struct Run<'a, S: MechanicalSystem> {
 }
 
 impl<S: MechanicalSystem> Run<'_, S> {
+    /// Bisects for the event that ends the motion from (q, v) before `end`, a time from there, s,
+    /// and what is reached then.
+    fn locate(
+        &mut self,
+        motion: &mut Motion<S::Contact>,
+        (q, v): (&S::Configuration, &[f64]),
+        end: (f64, Reached<S>),
+        reach: f64,
+    ) -> Result<(f64, Reached<S>), StepError> {
+        let h = self.options.time_step;
+        // Bracket: nothing has ended at `low`, something has at `high`.
+        let (mut high, mut found) = end;
+        let mut low = 0.0;
+        let mut trial = 0.5 * high;
+        let mut is_bracketed = false;
+        for _ in 0..100 {
+            let (q_trial, v_trial) = self.advance(motion, q, v, trial)?;
+            let there = self.reserve(motion, &q_trial, &v_trial, reach)?;
+            if there.value() < 0.0 {
+                high = trial;
+                found = (q_trial, v_trial, there);
+            } else {
+                low = trial;
+                is_bracketed = true;
+            }
+            if high - low <= 1e-15 * h.max(self.time) {
+                break;
+            }
+            trial = 0.5 * (low + high);
+            if !is_bracketed && high < 1e-12 * h {
+                break;
+            }
+        }
+        Ok((high, found))
+    }
+
     /// Decides at (q, v) which contacts stay closed and in which mode; `decision` overrides cases
     /// that rounding would decide.
     fn begin(
@@ -446,49 +498,18 @@ impl<S: MechanicalSystem> Integrator<S> for EventDriven {
                 (q, v) = (q_end, v_end);
                 break;
             }
-            // Bracket: nothing has ended at `low`, something has at `high`.
-            let (mut low, mut high) = (0.0, left);
-            let mut found = (q_end, v_end, at_end);
-            let mut trial = 0.5 * left;
-            let mut is_bracketed = false;
-            for _ in 0..100 {
-                let (q_trial, v_trial) = run.advance(&mut motion, &q, &v, trial)?;
-                let there = run.reserve(&mut motion, &q_trial, &v_trial, reach)?;
-                if there.value() < 0.0 {
-                    high = trial;
-                    found = (q_trial, v_trial, there);
-                } else {
-                    low = trial;
-                    is_bracketed = true;
-                }
-                if high - low <= 1e-15 * h.max(time) {
-                    break;
-                }
-                trial = 0.5 * (low + high);
-                if !is_bracketed && high < 1e-12 * h {
-                    break;
-                }
-            }
-            left -= high;
-            let decision = match found.2 {
-                Reserve::Gap(_) | Reserve::Slip(_) => None,
-                Reserve::Normal(_, key) => Some(Decision::Opens(key)),
-                Reserve::Friction(_, key, sign) => Some(Decision::Slides(key, sign)),
-            };
-            (q, v) = (found.0, found.1);
+            let end = (left, (q_end, v_end, at_end));
+            let (until, event) = run.locate(&mut motion, (&q, &v), end, reach)?;
+            left -= until;
+            let ended;
+            (q, v, ended) = event;
             events += 1;
-            match found.2 {
+            match ended {
                 Reserve::Gap(_) => {
                     impacts += 1;
                     run.strike(&q, &mut v)?;
                 }
-                Reserve::Slip(_) => {
-                    // Rounding's rest of the slip is taken out, so that the contact may stick.
-                    for mode in &mut motion.modes {
-                        *mode = Mode::Stick;
-                    }
-                    stop_slip(&mut run, &mut motion, &mut q, &mut v)?;
-                }
+                Reserve::Slip(_) => stop_slip(&mut run, &mut motion, &mut q, &mut v)?,
                 Reserve::Normal(..) | Reserve::Friction(..) => {}
             }
             if impacts > self.max_impacts || events > MOST_EVENTS {
@@ -497,7 +518,7 @@ impl<S: MechanicalSystem> Integrator<S> for EventDriven {
                     events,
                 });
             }
-            motion = run.begin(&q, &v, decision)?;
+            motion = run.begin(&q, &v, ended.decision())?;
             n_contacts = n_contacts.max(motion.contacts.len());
         }
         let status = run.status;
@@ -518,7 +539,8 @@ impl<S: MechanicalSystem> Integrator<S> for EventDriven {
     }
 }
 
-/// Takes a slip below the event's accuracy out of v; a contact that still slides is left alone.
+/// Takes a slip below the event's accuracy out of v, so that the contact may stick; a contact that
+/// still slides is left alone.
 fn stop_slip<S: MechanicalSystem>(
     run: &mut Run<'_, S>,
     motion: &mut Motion<S::Contact>,

@@ -25,7 +25,7 @@ use rover_core::integrator::{
     StepReport, StepStatus, WarmStart,
 };
 use rover_core::law::newton_impact::rebound;
-use rover_core::solver::SolverWorkspace;
+use rover_core::solver::{SolveReport, SolverWorkspace};
 
 use crate::acceleration::{find, response, smooth_acceleration, solve_law};
 
@@ -67,8 +67,126 @@ impl GeneralisedAlpha {
     }
 }
 
+/// α_m, α_f, β and γ of the method.
+struct Coefficients {
+    alpha_m: f64,
+    alpha_f: f64,
+    beta: f64,
+    gamma: f64,
+}
+
+impl Coefficients {
+    /// Of a spectral radius at infinite frequency.
+    fn of(rho: f64) -> Self {
+        let (alpha_m, alpha_f) = ((2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0));
+        let gamma = 0.5 + alpha_f - alpha_m;
+        Self {
+            alpha_m,
+            alpha_f,
+            beta: 0.25 * (gamma + 0.5) * (gamma + 0.5),
+            gamma,
+        }
+    }
+}
+
+/// The end of the step as far as it is iterated.
+struct Iterate<S: MechanicalSystem> {
+    contacts: Vec<S::Contact>,
+    /// ã⁺ and a⁺.
+    rate: Vec<f64>,
+    a: Vec<f64>,
+    q: S::Configuration,
+    v: Vec<f64>,
+    /// Displacement of the step, divided by h.
+    v_mean: Vec<f64>,
+    w: Vec<f64>,
+    p: Vec<f64>,
+    u: Vec<f64>,
+    u_before: Vec<f64>,
+}
+
+impl<S: MechanicalSystem> Iterate<S> {
+    /// From where the last step ended, near some contacts.
+    fn new(memory: &Memory, q: &S::Configuration, contacts: Vec<S::Contact>) -> Self {
+        let nv = memory.rate.len();
+        Self {
+            contacts,
+            rate: memory.rate.clone(),
+            a: memory.a.clone(),
+            q: q.clone(),
+            v: vec![0.0; nv],
+            v_mean: vec![0.0; nv],
+            w: vec![0.0; nv],
+            p: Vec::new(),
+            u: Vec::new(),
+            u_before: Vec::new(),
+        }
+    }
+
+    /// The mean velocity with the impulses of this iterate, from the velocity `v` before the step.
+    fn set_mean(&mut self, by: &Coefficients, memory: &Memory, v: &[f64], h: f64) {
+        for i in 0..v.len() {
+            self.v_mean[i] =
+                v[i] + h * ((0.5 - by.beta) * memory.a[i] + by.beta * self.a[i]) + 0.5 * self.w[i];
+        }
+    }
+
+    /// The smooth motion from the velocity `v` before the step.
+    fn move_smoothly(&mut self, by: &Coefficients, memory: &Memory, v: &[f64], h: f64) {
+        for i in 0..v.len() {
+            self.a[i] = ((1.0 - by.alpha_f) * self.rate[i] + by.alpha_f * memory.rate[i]
+                - by.alpha_m * memory.a[i])
+                / (1.0 - by.alpha_m);
+            self.v[i] = v[i] + h * ((1.0 - by.gamma) * memory.a[i] + by.gamma * self.a[i]);
+        }
+        self.set_mean(by, memory, v, h);
+    }
+
+    /// Adds what impacts change, where the velocity before the step is `v`.
+    fn strike(
+        &mut self,
+        system: &mut S,
+        options: &StepOptions,
+        v: &[f64],
+        time: f64,
+        solver: &mut SolverWorkspace,
+    ) -> Result<SolveReport, StepError> {
+        let d = S::DIMENSION.components();
+        system.place_middle(&self.q);
+        system.place_end(&self.q);
+        system.relocate(&mut self.contacts);
+        system.update_mass_matrix(options);
+        if !system.factorise(options) {
+            return Err(StepError::SingularMassMatrix { time });
+        }
+        self.u_before.resize(d * self.contacts.len(), 0.0);
+        system.assemble(&self.contacts, v, &mut self.u_before);
+        let mut q_free = vec![0.0; self.u_before.len()];
+        system.add_local_of_velocity(&self.contacts, &self.v, &mut q_free);
+        for (q, u) in q_free
+            .chunks_exact_mut(d)
+            .zip(self.u_before.chunks_exact(d))
+        {
+            q[0] += rebound(options.restitution, u[0]);
+        }
+        let solved = solve_law(
+            system,
+            options,
+            &self.contacts,
+            &q_free,
+            &mut self.p,
+            &mut self.u,
+            solver,
+        );
+        response(system, &self.p, &mut self.w);
+        for (v, w) in self.v.iter_mut().zip(&self.w) {
+            *v += w;
+        }
+        Ok(solved)
+    }
+}
+
 impl<S: MechanicalSystem> Integrator<S> for GeneralisedAlpha {
-    #[allow(clippy::too_many_lines)] // the page's equations, line by line in their order
     fn step(
         &self,
         system: &mut S,
@@ -79,12 +197,7 @@ impl<S: MechanicalSystem> Integrator<S> for GeneralisedAlpha {
         _probe: &mut dyn Probe,
     ) -> Result<StepReport, StepError> {
         let h = options.time_step;
-        let (alpha_m, alpha_f) = (
-            (2.0 * self.rho - 1.0) / (self.rho + 1.0),
-            self.rho / (self.rho + 1.0),
-        );
-        let gamma = 0.5 + alpha_f - alpha_m;
-        let beta = 0.25 * (gamma + 0.5) * (gamma + 0.5);
+        let by = Coefficients::of(self.rho);
         let d = S::DIMENSION.components();
         let time = *state.time;
         let g = options.gravity.norm();
@@ -99,79 +212,39 @@ impl<S: MechanicalSystem> Integrator<S> for GeneralisedAlpha {
                 smooth_acceleration(system, options, &mut contacts, at, &mut memory.solver)?;
             memory.a.clone_from(&memory.rate);
         }
-        let nv = v.len();
-        let mut rate = memory.rate.clone();
-        let mut a = memory.a.clone();
-        let (mut v_end, mut v_mean) = (vec![0.0; nv], vec![0.0; nv]);
-        let mut q_end = q.clone();
-        let mut w = vec![0.0; nv];
-        let (mut p, mut u, mut u_before) = (Vec::new(), Vec::new(), Vec::new());
+        let mut end = Iterate::<S>::new(memory, q, contacts);
         let mut report = StepReport {
             steps: 1,
             status: StepStatus::NotConverged,
             ..StepReport::default()
         };
         for iteration in 0..MOST {
-            for i in 0..nv {
-                a[i] = ((1.0 - alpha_f) * rate[i] + alpha_f * memory.rate[i]
-                    - alpha_m * memory.a[i])
-                    / (1.0 - alpha_m);
-                v_end[i] = v[i] + h * ((1.0 - gamma) * memory.a[i] + gamma * a[i]);
-                v_mean[i] = v[i] + h * ((0.5 - beta) * memory.a[i] + beta * a[i]) + 0.5 * w[i];
-            }
-            system.set_moved(q, &v_mean, h, &mut q_end);
+            end.move_smoothly(&by, memory, v, h);
+            system.set_moved(q, &end.v_mean, h, &mut end.q);
             if iteration == 0 {
-                find(system, &q_end, &v_end, hover, slow, &mut contacts);
-                p.resize(d * contacts.len(), 0.0);
-                warm_start.recall(&contacts, d, &mut p);
-                report.n_contacts = contacts.len();
+                find(system, &end.q, &end.v, hover, slow, &mut end.contacts);
+                end.p.resize(d * end.contacts.len(), 0.0);
+                warm_start.recall(&end.contacts, d, &mut end.p);
+                report.n_contacts = end.contacts.len();
             }
             let mut is_solved = true;
-            if !contacts.is_empty() {
-                system.place_middle(&q_end);
-                system.place_end(&q_end);
-                system.relocate(&mut contacts);
-                system.update_mass_matrix(options);
-                if !system.factorise(options) {
-                    return Err(StepError::SingularMassMatrix { time });
-                }
-                u_before.resize(d * contacts.len(), 0.0);
-                system.assemble(&contacts, v, &mut u_before);
-                let mut q_free = vec![0.0; u_before.len()];
-                system.add_local_of_velocity(&contacts, &v_end, &mut q_free);
-                for (q, u) in q_free.chunks_exact_mut(d).zip(u_before.chunks_exact(d)) {
-                    q[0] += rebound(options.restitution, u[0]);
-                }
-                let solved = solve_law(
-                    system,
-                    options,
-                    &contacts,
-                    &q_free,
-                    &mut p,
-                    &mut u,
-                    &mut memory.solver,
-                );
+            if !end.contacts.is_empty() {
+                let solved = end.strike(system, options, v, time, &mut memory.solver)?;
                 report.iterations += solved.iterations;
                 report.residual = solved.residual;
                 is_solved = solved.is_converged();
-                response(system, &p, &mut w);
-                for i in 0..nv {
-                    v_end[i] += w[i];
-                }
-                // The mean velocity with the impulses of this iterate.
-                for i in 0..nv {
-                    v_mean[i] = v[i] + h * ((0.5 - beta) * memory.a[i] + beta * a[i]) + 0.5 * w[i];
-                }
-                system.set_moved(q, &v_mean, h, &mut q_end);
+                end.set_mean(&by, memory, v, h);
+                system.set_moved(q, &end.v_mean, h, &mut end.q);
             }
-            let at = (&q_end, &v_end[..], time);
-            let next = smooth_acceleration(system, options, &mut contacts, at, &mut memory.solver)?;
+            let at = (&end.q, &end.v[..], time);
+            let solver = &mut memory.solver;
+            let next = smooth_acceleration(system, options, &mut end.contacts, at, solver)?;
             let change = next
                 .iter()
-                .zip(&rate)
+                .zip(&end.rate)
                 .fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
-            let size = v_end.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
-            rate = next;
+            let size = end.v.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
+            end.rate = next;
             report.newton_iterations = iteration + 1;
             if h * change <= SETTLED * size {
                 if is_solved {
@@ -180,18 +253,18 @@ impl<S: MechanicalSystem> Integrator<S> for GeneralisedAlpha {
                 break;
             }
         }
-        if !system.is_finite(&q_end) || v_end.iter().any(|x| !x.is_finite()) {
+        if !system.is_finite(&end.q) || end.v.iter().any(|x| !x.is_finite()) {
             return Err(StepError::NonFinite { time });
         }
-        system.normalise(&mut q_end);
-        *state.configuration = q_end;
-        state.v.copy_from_slice(&v_end);
+        system.normalise(&mut end.q);
+        *state.configuration = end.q;
+        state.v.copy_from_slice(&end.v);
         *state.time += h;
-        warm_start.remember(&contacts, d, &p);
+        warm_start.remember(&end.contacts, d, &end.p);
         memory.time = *state.time;
-        memory.v = v_end;
-        memory.rate = rate;
-        memory.a = a;
+        memory.v = end.v;
+        memory.rate = end.rate;
+        memory.a = end.a;
         Ok(report)
     }
 }

@@ -9,7 +9,7 @@
 //! - [`generalised_alpha`], [`schatzman_paoli`], [`event_driven`],
 //!   [`penalty`]: one scheme each; [`scheme`]: the list;
 //! - [`scenes`]: motions with closed forms or a converged reference;
-//!   [`measure`]: orders, drift, energy, cost.
+//!   [`measure`]: orders, drift, energy, cost; [`error`]: what can go wrong.
 //! - [`free_spheres`] in space with a block-sparse W, found by the core's grid of cells, and a
 //!   [`slab`] among them; [`sphere_simulation`]; [`sphere_scenes`]: heaps, bounces and rolling;
 //!   [`projected_to_convergence`]: no penetration at the end of any step.
@@ -18,6 +18,7 @@
 #![forbid(unsafe_code)]
 
 mod acceleration;
+pub mod error;
 pub mod event_driven;
 pub mod free_spheres;
 pub mod generalised_alpha;
@@ -31,6 +32,7 @@ pub mod slab;
 pub mod sphere_scenes;
 pub mod sphere_simulation;
 
+pub use error::MeasureError;
 pub use event_driven::EventDriven;
 pub use generalised_alpha::GeneralisedAlpha;
 pub use penalty::Penalty;

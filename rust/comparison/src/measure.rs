@@ -4,39 +4,18 @@ use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
 
-use rover_core::integrator::{OptionsError, StepError};
-use rover_core::multibody::StateError;
-use rover_core::planar::{Ball, ContactRule, Line, PlanarError, PlanarMachine};
-use rover_core::simulation::{BallSimulation, CommandError, PlanarSimulation};
+use rover_core::integrator::StepError;
+use rover_core::planar::{Ball, ContactRule, Line, PlanarMachine};
+use rover_core::simulation::{BallSimulation, PlanarSimulation};
 
 use serde::Serialize;
-use thiserror::Error;
 
+use crate::error::MeasureError;
 use crate::scenes::{
     G, MASS, WHEEL_LOAD, ball_above, ball_on_sine, bouncing_at, driving, flight, flight_at,
     options, rolling, sliding,
 };
 use crate::{EventDriven, Kind, SCHEMES, Scheme, Stepper};
-
-/// A measurement that could not be made.
-#[derive(Debug, Error, Clone, PartialEq)]
-pub enum MeasureError {
-    /// See [`PlanarError`].
-    #[error(transparent)]
-    Planar(#[from] PlanarError),
-    /// See [`OptionsError`].
-    #[error(transparent)]
-    Options(#[from] OptionsError),
-    /// See [`StateError`].
-    #[error(transparent)]
-    State(#[from] StateError),
-    /// See [`CommandError`].
-    #[error(transparent)]
-    Command(#[from] CommandError),
-    /// See [`StepError`].
-    #[error(transparent)]
-    Step(#[from] StepError),
-}
 
 /// Steps of one scene from the coarsest, each half of the one before, and the error at each.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -54,6 +54,18 @@ struct Memory {
     solver: SolverWorkspace,
 }
 
+impl Memory {
+    /// Zeros for n contacts of d components.
+    fn fit(&mut self, n: usize, d: usize) {
+        for local in [&mut self.u, &mut self.gaps, &mut self.p] {
+            local.clear();
+            local.resize(d * n, 0.0);
+        }
+        self.mu.clear();
+        self.mu.resize(n, 0.0);
+    }
+}
+
 impl<S: MechanicalSystem> Integrator<S> for ProjectedToConvergence {
     fn step(
         &self,
@@ -106,13 +118,7 @@ impl<S: MechanicalSystem> Integrator<S> for ProjectedToConvergence {
                 f64::INFINITY,
                 &mut contacts,
             );
-            let n = contacts.len();
-            for local in [&mut memory.u, &mut memory.gaps, &mut memory.p] {
-                local.clear();
-                local.resize(d * n, 0.0);
-            }
-            memory.mu.clear();
-            memory.mu.resize(n, 0.0);
+            memory.fit(contacts.len(), d);
             system.assemble(&contacts, &memory.v_zero, &mut memory.u);
             for (row, contact) in memory.gaps.chunks_exact_mut(d).zip(&contacts) {
                 row[0] = contact.gap();

@@ -10,7 +10,7 @@ use rover_core::planar::{
 use rover_core::simulation::{BallSimulation, TwoWheelRoverSimulation};
 
 use crate::Scheme;
-use crate::measure::MeasureError;
+use crate::error::MeasureError;
 
 /// m/s².
 pub const G: f64 = 9.81;

@@ -24,7 +24,7 @@ use rover_core::integrator::{
     Integrator, KeyOf, MechanicalSystem, Probe, ScratchOf, Start, StateMut, StepError, StepOptions,
     StepReport, StepStatus, UnilateralContact, WarmStart,
 };
-use rover_core::solver::SolverWorkspace;
+use rover_core::solver::{SolveReport, SolverWorkspace};
 
 use crate::acceleration::{find, free_acceleration, response, smooth_acceleration, solve_law};
 
@@ -51,8 +51,122 @@ struct Memory {
     solver: SolverWorkspace,
 }
 
+/// The contacts of a step, and their impulses as far as they are iterated.
+struct Touching<S: MechanicalSystem> {
+    contacts: Vec<S::Contact>,
+    /// Where their gaps are measured.
+    q_star: S::Configuration,
+    p: Vec<f64>,
+    u: Vec<f64>,
+    u_guess: Vec<f64>,
+    /// Change of the velocity by the impulses.
+    change: Vec<f64>,
+}
+
+impl<S: MechanicalSystem> Touching<S> {
+    fn new(contacts: Vec<S::Contact>, q: &S::Configuration) -> Self {
+        let n = S::DIMENSION.components() * contacts.len();
+        Self {
+            contacts,
+            q_star: q.clone(),
+            p: vec![0.0; n],
+            u: Vec::new(),
+            u_guess: vec![0.0; n],
+            change: Vec::new(),
+        }
+    }
+
+    /// Solves the law with the gaps linearised at `q_star`, about the velocity `guess`, for the
+    /// velocity `free` without impulses.
+    fn solve(
+        &mut self,
+        system: &mut S,
+        options: &StepOptions,
+        guess: &[f64],
+        free: &[f64],
+        solver: &mut SolverWorkspace,
+    ) -> SolveReport {
+        let (h, e) = (options.time_step, options.restitution);
+        let d = S::DIMENSION.components();
+        system.place_end(&self.q_star);
+        system.relocate(&mut self.contacts);
+        system.assemble(&self.contacts, guess, &mut self.u_guess);
+        let mut q_free = vec![0.0; self.p.len()];
+        system.add_local_of_velocity(&self.contacts, free, &mut q_free);
+        let rows = q_free.chunks_exact_mut(d).zip(self.u_guess.chunks_exact(d));
+        for (contact, (q, u)) in self.contacts.iter().zip(rows) {
+            q[0] += (1.0 + e) * contact.gap() / h - u[0];
+        }
+        let solved = solve_law(
+            system,
+            options,
+            &self.contacts,
+            &q_free,
+            &mut self.p,
+            &mut self.u,
+            solver,
+        );
+        response(system, &self.p, &mut self.change);
+        solved
+    }
+}
+
+/// Iterates on v_{k+½} and the impulses in `touching`. `start.v` is v_{k−½}.
+fn iterate<S: MechanicalSystem>(
+    system: &mut S,
+    options: &StepOptions,
+    start: Start<'_, S::Configuration>,
+    touching: &mut Touching<S>,
+    solver: &mut SolverWorkspace,
+    report: &mut StepReport,
+) -> Vec<f64> {
+    let (h, e) = (options.time_step, options.restitution);
+    let (q, before) = (start.configuration, start.v);
+    let nv = before.len();
+    let mut v_end = before.to_vec();
+    let (mut v_mean, mut v_star) = (vec![0.0; nv], vec![0.0; nv]);
+    let mut free = vec![0.0; nv];
+    for iteration in 0..MOST {
+        for i in 0..nv {
+            v_mean[i] = 0.5 * (before[i] + v_end[i]);
+            v_star[i] = (v_end[i] - e * before[i]) / (1.0 + e);
+        }
+        system.load(options, start, &v_mean, &mut free);
+        system.half_solve(&mut free);
+        system.half_solve_back(&mut free);
+        for i in 0..nv {
+            free[i] += before[i];
+        }
+        let mut next = free.clone();
+        let mut is_solved = true;
+        if !touching.contacts.is_empty() {
+            system.set_moved(q, &v_star, h, &mut touching.q_star);
+            let solved = touching.solve(system, options, &v_end, &free, solver);
+            report.iterations += solved.iterations;
+            report.residual = solved.residual;
+            is_solved = solved.is_converged();
+            for i in 0..nv {
+                next[i] += touching.change[i];
+            }
+        }
+        let moved = next
+            .iter()
+            .zip(&v_end)
+            .fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+        let size = next.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
+        v_end = next;
+        report.newton_iterations = iteration + 1;
+        if moved <= SETTLED * size {
+            if is_solved {
+                report.status = StepStatus::Converged;
+            }
+            break;
+        }
+    }
+    v_end
+}
+
 impl<S: MechanicalSystem> Integrator<S> for SchatzmanPaoli {
-    #[allow(clippy::too_many_lines)] // the page's equations, line by line in their order
     fn step(
         &self,
         system: &mut S,
@@ -62,13 +176,12 @@ impl<S: MechanicalSystem> Integrator<S> for SchatzmanPaoli {
         _scratch: &mut ScratchOf<S>,
         _probe: &mut dyn Probe,
     ) -> Result<StepReport, StepError> {
-        let (h, e) = (options.time_step, options.restitution);
+        let h = options.time_step;
         let d = S::DIMENSION.components();
         let time = *state.time;
         let g = options.gravity.norm();
         let memory = &mut *self.memory.borrow_mut();
         let (q, v) = (&*state.configuration, &*state.v);
-        let nv = v.len();
         let mut contacts = Vec::new();
         if memory.time.to_bits() != time.to_bits() || memory.v != *v {
             let (hover, slow) = ((0.5 * g * h * h).max(1e-9), (2.0 * g * h).max(1e-9));
@@ -92,72 +205,14 @@ impl<S: MechanicalSystem> Integrator<S> for SchatzmanPaoli {
             n_contacts: contacts.len(),
             ..StepReport::default()
         };
-        let n = d * contacts.len();
-        let mut v_end = before.clone();
-        let (mut v_mean, mut v_star) = (vec![0.0; nv], vec![0.0; nv]);
-        let (mut free, mut change) = (vec![0.0; nv], Vec::new());
-        let (mut p, mut u, mut u_guess) = (vec![0.0; n], Vec::new(), vec![0.0; n]);
-        warm_start.recall(&contacts, d, &mut p);
-        let mut q_star = q.clone();
-        for iteration in 0..MOST {
-            for i in 0..nv {
-                v_mean[i] = 0.5 * (before[i] + v_end[i]);
-                v_star[i] = (v_end[i] - e * before[i]) / (1.0 + e);
-            }
-            let start = Start {
-                configuration: q,
-                v: before,
-            };
-            system.load(options, start, &v_mean, &mut free);
-            system.half_solve(&mut free);
-            system.half_solve_back(&mut free);
-            for i in 0..nv {
-                free[i] += before[i];
-            }
-            let mut next = free.clone();
-            let mut is_solved = true;
-            if n > 0 {
-                system.set_moved(q, &v_star, h, &mut q_star);
-                system.place_end(&q_star);
-                system.relocate(&mut contacts);
-                system.assemble(&contacts, &v_end, &mut u_guess);
-                let mut q_free = vec![0.0; n];
-                system.add_local_of_velocity(&contacts, &free, &mut q_free);
-                let rows = q_free.chunks_exact_mut(d).zip(u_guess.chunks_exact(d));
-                for (contact, (q, u)) in contacts.iter().zip(rows) {
-                    q[0] += (1.0 + e) * contact.gap() / h - u[0];
-                }
-                let solved = solve_law(
-                    system,
-                    options,
-                    &contacts,
-                    &q_free,
-                    &mut p,
-                    &mut u,
-                    &mut memory.solver,
-                );
-                report.iterations += solved.iterations;
-                report.residual = solved.residual;
-                is_solved = solved.is_converged();
-                response(system, &p, &mut change);
-                for i in 0..nv {
-                    next[i] += change[i];
-                }
-            }
-            let moved = next
-                .iter()
-                .zip(&v_end)
-                .fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
-            let size = next.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
-            v_end = next;
-            report.newton_iterations = iteration + 1;
-            if moved <= SETTLED * size {
-                if is_solved {
-                    report.status = StepStatus::Converged;
-                }
-                break;
-            }
-        }
+        let mut touching = Touching::<S>::new(contacts, q);
+        warm_start.recall(&touching.contacts, d, &mut touching.p);
+        let start = Start {
+            configuration: q,
+            v: before,
+        };
+        let solver = &mut memory.solver;
+        let v_end = iterate(system, options, start, &mut touching, solver, &mut report);
         let mut q_end = q.clone();
         system.set_moved(q, &v_end, h, &mut q_end);
         if !system.is_finite(&q_end) || v_end.iter().any(|x| !x.is_finite()) {
@@ -165,17 +220,17 @@ impl<S: MechanicalSystem> Integrator<S> for SchatzmanPaoli {
         }
         system.normalise(&mut q_end);
         let mut shown = v_end.clone();
-        if p.iter().all(|p| *p == 0.0) {
+        if touching.p.iter().all(|p| *p == 0.0) {
             let mut a = Vec::new();
             free_acceleration(system, options, &q_end, &v_end, time, &mut a)?;
-            for i in 0..nv {
+            for i in 0..shown.len() {
                 shown[i] += 0.5 * h * a[i];
             }
         }
         *state.configuration = q_end;
         state.v.copy_from_slice(&shown);
         *state.time += h;
-        warm_start.remember(&contacts, d, &p);
+        warm_start.remember(&touching.contacts, d, &touching.p);
         memory.time = *state.time;
         memory.v = shown;
         memory.v_half = v_end;

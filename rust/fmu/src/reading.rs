@@ -7,7 +7,7 @@ use rover_core::simulation::RoverSimulation;
 
 use crate::inertial::unaccelerated;
 use crate::scene_file::Channel;
-use crate::unit::LastStep;
+use crate::state::LastStep;
 
 /// The outputs of one call.
 pub struct Reading<'a> {

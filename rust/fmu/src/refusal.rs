@@ -5,7 +5,7 @@ use rover_core::multibody::ModelError;
 use rover_core::simulation::{CommandError, SnapshotError};
 use thiserror::Error;
 
-use crate::unit::Mode;
+use crate::state::Mode;
 
 /// Why a call is refused. Nothing has changed.
 #[derive(Debug, Error)]

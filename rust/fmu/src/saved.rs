@@ -4,7 +4,7 @@ use rover_core::simulation::{RoverScene, Snapshot};
 use serde::{Deserialize, Serialize};
 
 use crate::refusal::Refusal;
-use crate::unit::{Inputs, LastStep, Mode, Parameters};
+use crate::state::{Inputs, LastStep, Mode, Parameters};
 
 /// Everything that changes in a unit.
 #[derive(Clone, Serialize, Deserialize)]

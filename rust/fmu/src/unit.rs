@@ -2,17 +2,16 @@
 
 use std::sync::Arc;
 
-use rover_core::integrator::{StepOptions, StepReport, StepStatus};
+use rover_core::integrator::StepStatus;
 use rover_core::multibody::{Model, ModelDescription};
-use rover_core::nalgebra::Vector3;
 use rover_core::simulation::RoverSimulation;
-use serde::{Deserialize, Serialize};
 
 use crate::inertial::Motion;
 use crate::reading::Reading;
 use crate::refusal::Refusal;
 use crate::saved::Saved;
 use crate::scene_file::{Channel, SceneFile, Variable};
+use crate::state::{Inputs, LastStep, Mode, Parameters};
 
 /// Share of a time step by which a communication step may miss a whole number of them: masters add
 /// up their times.
@@ -20,79 +19,6 @@ const STEP_ROUNDING: f64 = 1e-6;
 
 /// Most time steps of a communication step.
 const MOST_STEPS: f64 = 1e9;
-
-/// States of a unit, as the standard names them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[expect(clippy::enum_variant_names, reason = "the standard's names")]
-pub enum Mode {
-    Instantiated,
-    InitializationMode,
-    StepMode,
-    Terminated,
-}
-
-/// What is fixed once the unit is initialised.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Parameters {
-    pub friction: f64,
-    pub restitution: f64,
-    pub gravity: [f64; 3],
-    pub time_step: f64,
-    /// TOML or JSON; the exported model if empty.
-    pub model: String,
-}
-
-impl Parameters {
-    fn of(options: &StepOptions) -> Self {
-        Self {
-            friction: options.friction_coefficient,
-            restitution: options.restitution,
-            gravity: options.gravity.into(),
-            time_step: options.time_step,
-            model: String::new(),
-        }
-    }
-
-    fn options(&self, exported: &StepOptions) -> StepOptions {
-        StepOptions {
-            friction_coefficient: self.friction,
-            restitution: self.restitution,
-            gravity: Vector3::from(self.gravity),
-            time_step: self.time_step,
-            ..exported.clone()
-        }
-    }
-}
-
-/// Inputs as they were set; `None` while the exported command holds.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Inputs {
-    /// N m, one a wheel.
-    pub torques: Option<Vec<f64>>,
-    /// rad, one a wheel.
-    pub steering: Option<Vec<f64>>,
-}
-
-/// What the last communication step told.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub struct LastStep {
-    pub residual: f64,
-    pub iterations: f64,
-    pub contacts: f64,
-    /// Readings of the [inertial unit](crate::inertial).
-    pub inertial: Option<[f64; 6]>,
-}
-
-impl From<StepReport> for LastStep {
-    fn from(report: StepReport) -> Self {
-        Self {
-            residual: report.residual,
-            iterations: report.iterations as f64,
-            contacts: report.n_contacts as f64,
-            inertial: None,
-        }
-    }
-}
 
 /// A unit.
 pub struct Unit {

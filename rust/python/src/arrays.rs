@@ -139,3 +139,26 @@ pub fn fresh_table<T: numpy::Element, const M: usize>(
     let m = rows.len();
     PyArray1::from_iter(py, rows.flatten()).reshape([m, M])
 }
+
+/// (n, N) numbers of a terrain.
+pub fn rows<const N: usize>(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<[f64; N]>> {
+    let given = array(value, Kind::Terrain, field)?;
+    let view = given.as_array();
+    let is_empty = view.is_empty();
+    if !is_empty && (view.ndim() != 2 || view.shape()[1] != N) {
+        let message = format!("{field}: needs shape (n, {N}), has {:?}", view.shape());
+        let (name, value) = (Some(field.to_owned()), Value::Count(view.ndim()));
+        return Err(BorderError {
+            kind: Kind::Terrain,
+            message,
+            field: name,
+            value,
+        }
+        .into());
+    }
+    let flat: Vec<f64> = view.iter().copied().collect();
+    Ok(flat
+        .chunks_exact(N)
+        .map(|row| std::array::from_fn(|k| row[k]))
+        .collect())
+}

@@ -1,4 +1,5 @@
-//! What a simulation stands on: a terrain of any kind, or a list of several.
+//! What a simulation stands on: a terrain of any kind, or a list of several; and the terrains that
+//! are made of others.
 
 use std::sync::Arc;
 
@@ -6,15 +7,14 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};
 use rover_core::draw::DrawnGround;
-use rover_core::geometry::{Terrain, Union as CoreUnion};
+use rover_core::geometry::{SphereField as CoreField, Terrain, Union as CoreUnion};
 
 use crate::arguments::{Given, refused, shown};
-use crate::arrays::fresh;
 use crate::errors::{BorderError, Kind, Value};
 use crate::height_field::HeightField;
+use crate::heights::heights;
 use crate::plane::Plane;
 use crate::rays::{Met, cast_rays};
-use crate::sphere_field::{SphereField, rows};
 use crate::triangle_mesh::TriangleMesh;
 
 /// Any terrain.
@@ -110,18 +110,22 @@ impl Ground {
     }
 }
 
-/// Heights of a terrain's visible surface at places (m, 2); nan where there is none.
-pub fn heights<'py>(
-    terrain: &dyn Terrain,
-    py: Python<'py>,
-    points: &Bound<'_, PyAny>,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let points = rows::<2>(points, "points")?;
-    let heights: Vec<f64> = points
-        .iter()
-        .map(|&[x, z]| terrain.height(x, z).unwrap_or(f64::NAN))
-        .collect();
-    Ok(fresh(py, &heights))
+/// Fixed spheres, with or without a plane under them. Immutable.
+///
+/// Args:
+///     centres: Centres of the spheres, (n, 3), m.
+///     radii: Their radii, (n,), m.
+///     ground: The plane under them; none by default. Its material is "ground".
+///     material: Name of the spheres' material, for the laws of a `Simulation` by pair of
+///         materials.
+///
+/// Raises:
+///     TerrainError: An array has a wrong shape, an entry is not finite or out of its range, or
+///         there are no spheres or too many of them.
+#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
+#[derive(Clone)]
+pub struct SphereField {
+    pub inner: Arc<CoreField>,
 }
 
 /// Several terrains as one ground: a map with rocks on it, say. Immutable.

@@ -10,7 +10,7 @@ use rover_core::geometry::{HeightField as CoreField, Terrain};
 use crate::arguments::{Given, refused};
 use crate::arrays::{one_or_two, two};
 use crate::errors::{BorderError, Kind, Value};
-use crate::ground::heights;
+use crate::heights::heights;
 use crate::materials;
 use crate::rays::{Met, cast_rays};
 

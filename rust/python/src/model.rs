@@ -51,6 +51,32 @@ impl From<Arc<Model>> for RoverModel {
     }
 }
 
+impl RoverModel {
+    /// The model that a reader of other programs' files returns, with the report of its import.
+    fn imported<'py>(
+        reader: &str,
+        path: &Bound<'py, PyAny>,
+        options: model_files::Options<'py>,
+    ) -> PyResult<Self> {
+        let found = model_files::read(reader, path, options)?;
+        let (model, report): (Self, Py<PyAny>) = found.extract()?;
+        Ok(Self {
+            inner: model.inner,
+            report: Some(Arc::new(report)),
+        })
+    }
+
+    fn write<'py>(
+        &self,
+        writer: &str,
+        path: &Bound<'py, PyAny>,
+        options: model_files::Options<'py>,
+    ) -> PyResult<()> {
+        let model = self.clone().into_pyobject(path.py())?.into_any();
+        model_files::write(writer, model, path, options)
+    }
+}
+
 /// How a user's `q` and velocities are to be read.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Coordinates {
@@ -376,7 +402,7 @@ impl RoverModel {
             ("wheel_width", wheel_width),
             ("ignore", ignore),
         ];
-        model_files::read("read_urdf", path, options)
+        Self::imported("read_urdf", path, options)
     }
 
     /// Reads an MJCF file, which MuJoCo compiles.
@@ -442,7 +468,7 @@ impl RoverModel {
             ("wheel_width", wheel_width),
             ("ignore", ignore),
         ];
-        model_files::read("read_mjcf", path, options)
+        Self::imported("read_mjcf", path, options)
     }
 
     /// What the import of this model understood, assumed and left out.
@@ -469,7 +495,7 @@ impl RoverModel {
     ///     OSError: The file cannot be written.
     #[pyo3(signature = (path, *, ignore = Given::MISSING), text_signature = "($self, path, *, ignore=())")]
     fn to_urdf<'py>(&self, path: &Bound<'py, PyAny>, ignore: Given<'py>) -> PyResult<()> {
-        model_files::write("write_urdf", self.clone(), path, vec![("ignore", ignore)])
+        self.write("write_urdf", path, vec![("ignore", ignore)])
     }
 
     /// Writes an MJCF file, for MuJoCo: x forward, y left, z up.
@@ -484,7 +510,7 @@ impl RoverModel {
     /// Raises:
     ///     OSError: The file cannot be written.
     fn to_mjcf(&self, path: &Bound<'_, PyAny>) -> PyResult<()> {
-        model_files::write("write_mjcf", self.clone(), path, Vec::new())
+        self.write("write_mjcf", path, Vec::new())
     }
 
     /// Returns a model that differs in what is given.

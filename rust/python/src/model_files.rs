@@ -1,12 +1,9 @@
 //! Files of other programs: what reads and writes them is Python, in `rover_gym.models`.
 
-use std::sync::Arc;
-
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 
 use crate::arguments::Given;
-use crate::model::RoverModel;
 
 const ROOM: &str = "rover_gym.models";
 
@@ -23,26 +20,21 @@ fn keywords<'py>(py: Python<'py>, options: Options<'py>) -> PyResult<Bound<'py, 
     Ok(given)
 }
 
-/// The model and the report that a reader of the room returns.
+/// What a reader of the room returns: a model and the report of its import.
 pub fn read<'py>(
     reader: &str,
     path: &Bound<'py, PyAny>,
     options: Options<'py>,
-) -> PyResult<RoverModel> {
+) -> PyResult<Bound<'py, PyAny>> {
     let py = path.py();
     let room = py.import(ROOM)?;
-    let found = room.call_method(reader, (path,), Some(&keywords(py, options)?))?;
-    let (model, report): (RoverModel, Py<PyAny>) = found.extract()?;
-    Ok(RoverModel {
-        inner: model.inner,
-        report: Some(Arc::new(report)),
-    })
+    room.call_method(reader, (path,), Some(&keywords(py, options)?))
 }
 
 /// Calls a writer of the room.
 pub fn write<'py>(
     writer: &str,
-    model: RoverModel,
+    model: Bound<'py, PyAny>,
     path: &Bound<'py, PyAny>,
     options: Options<'py>,
 ) -> PyResult<()> {

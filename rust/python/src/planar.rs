@@ -18,7 +18,6 @@ use crate::contacts::PlanarContacts;
 use crate::errors::{BorderError, Kind, Value};
 use crate::options::{Options, SolverWords, choice, name_of, settings};
 use crate::planar_ground::parse;
-use crate::planar_machines;
 use crate::report::{Energy, StepReport};
 use crate::shared::Shared;
 use crate::snapshot::{OfPlanar, PlanarSnapshot, belonging};
@@ -329,19 +328,4 @@ impl PlanarSimulation {
         made.cast::<Self>()?.get().restore(snapshot)?;
         Ok(made)
     }
-}
-
-/// Adds the planar classes to the module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<crate::planar_ground::Line>()?;
-    module.add_class::<crate::planar_ground::Sine>()?;
-    module.add_class::<crate::planar_ground::Spline>()?;
-    module.add_class::<crate::planar_ground::Polyline>()?;
-    module.add_class::<PlanarSnapshot>()?;
-    module.add_class::<PlanarContacts>()?;
-    module.add_class::<PlanarSimulation>()?;
-    module.add_class::<planar_machines::BallSimulation>()?;
-    module.add_class::<planar_machines::TwoWheelRoverSimulation>()?;
-    module.add_class::<planar_machines::MirroredRoverSimulation>()?;
-    Ok(())
 }

@@ -1,4 +1,4 @@
-//! `SphereField`.
+//! Methods of `SphereField`.
 
 use std::sync::Arc;
 
@@ -9,57 +9,17 @@ use rover_core::geometry::{
 };
 
 use crate::arguments::{Given, number, refused, whole};
-use crate::arrays::{array, fresh_rows, one_or_two, vector};
+use crate::arrays::{fresh_rows, one_or_two, rows, vector};
 use crate::errors::{BorderError, Kind, Value};
 use crate::files::{self, in_file, read_text};
-use crate::ground::{Ground, heights};
+use crate::ground::{Ground, SphereField};
+use crate::heights::heights;
 use crate::materials;
 use crate::plane::Plane;
 use crate::rays::{Met, cast_rays};
 
 /// Longest file of spheres, bytes.
 const MAX_FILE: usize = 1 << 28;
-
-/// Fixed spheres, with or without a plane under them. Immutable.
-///
-/// Args:
-///     centres: Centres of the spheres, (n, 3), m.
-///     radii: Their radii, (n,), m.
-///     ground: The plane under them; none by default. Its material is "ground".
-///     material: Name of the spheres' material, for the laws of a `Simulation` by pair of
-///         materials.
-///
-/// Raises:
-///     TerrainError: An array has a wrong shape, an entry is not finite or out of its range, or
-///         there are no spheres or too many of them.
-#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
-#[derive(Clone)]
-pub struct SphereField {
-    pub inner: Arc<CoreField>,
-}
-
-/// (n, width) numbers.
-pub fn rows<const N: usize>(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<[f64; N]>> {
-    let given = array(value, Kind::Terrain, field)?;
-    let view = given.as_array();
-    let is_empty = view.is_empty();
-    if !is_empty && (view.ndim() != 2 || view.shape()[1] != N) {
-        let message = format!("{field}: needs shape (n, {N}), has {:?}", view.shape());
-        let (name, value) = (Some(field.to_owned()), Value::Count(view.ndim()));
-        return Err(BorderError {
-            kind: Kind::Terrain,
-            message,
-            field: name,
-            value,
-        }
-        .into());
-    }
-    let flat: Vec<f64> = view.iter().copied().collect();
-    Ok(flat
-        .chunks_exact(N)
-        .map(|row| std::array::from_fn(|k| row[k]))
-        .collect())
-}
 
 fn build(
     py: Python<'_>,

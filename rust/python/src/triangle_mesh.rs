@@ -8,12 +8,11 @@ use pyo3::types::PyDict;
 use rover_core::geometry::{Terrain, TriangleMesh as CoreMesh};
 
 use crate::arguments::{Given, refused};
-use crate::arrays::{array, fresh_rows};
+use crate::arrays::{array, fresh_rows, rows};
 use crate::errors::{BorderError, Kind};
-use crate::ground::heights;
+use crate::heights::heights;
 use crate::materials;
 use crate::rays::{Met, cast_rays};
-use crate::sphere_field::rows;
 
 /// A mesh of triangles as ground: rocks, or anything else that stands still. Immutable.
 ///

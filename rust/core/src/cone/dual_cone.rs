@@ -33,6 +33,15 @@ impl DualCone {
     }
 }
 
+impl SecondOrderCone {
+    /// The dual cone `K_μ* = { u : u_N ≥ μ |u_T| }`.
+    #[inline]
+    #[must_use]
+    pub const fn dual(self) -> DualCone {
+        DualCone::new(self.friction_coefficient)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

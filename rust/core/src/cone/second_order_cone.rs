@@ -1,6 +1,6 @@
 //! The Coulomb cone `K_μ = { p : |p_T| ≤ μ p_N }`, a second-order cone of half-angle `atan μ`.
 
-use super::{DualCone, tangential_norm};
+use super::tangential_norm;
 
 /// Coulomb's friction cone `K_μ = { p : |p_T| ≤ μ p_N }`.
 ///
@@ -19,13 +19,6 @@ impl SecondOrderCone {
         Self {
             friction_coefficient,
         }
-    }
-
-    /// The dual cone `K_μ* = { u : u_N ≥ μ |u_T| }`.
-    #[inline]
-    #[must_use]
-    pub const fn dual(self) -> DualCone {
-        DualCone::new(self.friction_coefficient)
     }
 
     /// Euclidean projection `Π_K(z)`.

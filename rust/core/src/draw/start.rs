@@ -223,14 +223,53 @@ pub fn resting_on(
     position: [f64; 2],
     heading: f64,
 ) -> Result<Vec<f64>, PlacementError> {
-    let [x, z] = position;
-    let height = |x: f64, z: f64| {
-        terrain
-            .height(x, z)
-            .ok_or(PlacementError::NoGround { x, z })
-    };
-    let y = height(x, z)?;
-    // The slope between the ends of a cross as wide as the rover stands.
+    let plane = plane_under(model, terrain, position)?;
+    let q = resting_pose(model, &plane, position, heading)?;
+    let mut best = lowered(model, terrain, q)?;
+    let moved: Vec<usize> = [1, 3, 5].into_iter().chain(free_joints(model)).collect();
+    let mut q = best.clone();
+    let spread = |gaps: &DVector<f64>| gaps.norm();
+    let mut least = spread(&wheel_gaps(model, terrain, &best)?);
+    for _ in 0..ITERATIONS {
+        let now = wheel_gaps(model, terrain, &q)?;
+        let mut slopes = DMatrix::zeros(now.len(), moved.len());
+        for (mut column, &k) in slopes.column_iter_mut().zip(&moved) {
+            let mut beside = q.clone();
+            beside[k] += DIFFERENCE;
+            column.copy_from(&((wheel_gaps(model, terrain, &beside)? - &now) / DIFFERENCE));
+        }
+        let Some(step) = smallest_step(&slopes, &now) else {
+            break;
+        };
+        let shorten = (LONGEST / step.amax().max(LONGEST)).min(1.0);
+        for (&k, change) in moved.iter().zip(step.iter()) {
+            q[k] -= shorten * change;
+        }
+        if !is_within_stops(model, &q) {
+            break;
+        }
+        let lifted = lowered(model, terrain, q.clone())?;
+        let own = spread(&wheel_gaps(model, terrain, &lifted)?);
+        if own < least {
+            (best, least) = (lifted, own);
+        }
+        if least < TOUCHING {
+            break;
+        }
+    }
+    Ok(best)
+}
+
+/// The plane through the ground at a position, with the slope between the ends of a cross as wide
+/// as the rover stands.
+fn plane_under(
+    model: &Model,
+    terrain: &dyn Terrain,
+    [x, z]: [f64; 2],
+) -> Result<Plane, PlacementError> {
+    let y = terrain
+        .height(x, z)
+        .ok_or(PlacementError::NoGround { x, z })?;
     let zero = Kinematics::of(
         model,
         &coordinates::from_public(model, &vec![0.0; model.nv()])?,
@@ -250,65 +289,42 @@ pub fn resting_on(
             .map_or(0.0, |(a, b)| (a - b) / (2.0 * half))
     };
     let normal = Vector3::new(-slope(half, 0.0), 1.0, -slope(0.0, half)).normalize();
-    let plane = Plane::through(&Vector3::new(x, y, z), normal);
-    let q = resting_pose(model, &plane, position, heading)?;
+    Ok(Plane::through(&Vector3::new(x, y, z), normal))
+}
 
-    let gaps = |q: &[f64]| -> Result<DVector<f64>, PlacementError> {
-        let configuration = coordinates::from_public(model, q)?;
-        let kinematics = Kinematics::of(model, &configuration);
-        for wheel in model.wheels() {
-            let centre = configuration.position + kinematics.point(wheel.body, &wheel.centre);
-            if let Coverage::Unknown([x, z]) = terrain.coverage(&centre, wheel.bound()) {
-                return Err(PlacementError::NoGround { x, z });
-            }
-        }
-        let contacts = wheel_contacts(model, &kinematics, terrain);
-        let gaps = contacts.iter().map(|contact| contact.gap);
-        Ok(DVector::from_iterator(contacts.len(), gaps))
-    };
-    let lift = |mut q: Vec<f64>| -> Result<Vec<f64>, PlacementError> {
-        for _ in 0..LIFTS {
-            let lowest = gaps(&q)?.min();
-            if lowest.abs() <= TOUCHING || !lowest.is_finite() {
-                break;
-            }
-            q[1] -= lowest;
-        }
-        Ok(q)
-    };
-    let mut best = lift(q)?;
-    let moved: Vec<usize> = [1, 3, 5].into_iter().chain(free_joints(model)).collect();
-    let mut q = best.clone();
-    let spread = |gaps: &DVector<f64>| gaps.norm();
-    let mut least = spread(&gaps(&best)?);
-    for _ in 0..ITERATIONS {
-        let now = gaps(&q)?;
-        let mut slopes = DMatrix::zeros(now.len(), moved.len());
-        for (mut column, &k) in slopes.column_iter_mut().zip(&moved) {
-            let mut beside = q.clone();
-            beside[k] += DIFFERENCE;
-            column.copy_from(&((gaps(&beside)? - &now) / DIFFERENCE));
-        }
-        let Some(step) = smallest_step(&slopes, &now) else {
-            break;
-        };
-        let shorten = (LONGEST / step.amax().max(LONGEST)).min(1.0);
-        for (&k, change) in moved.iter().zip(step.iter()) {
-            q[k] -= shorten * change;
-        }
-        if !is_within_stops(model, &q) {
-            break;
-        }
-        let lifted = lift(q.clone())?;
-        let own = spread(&gaps(&lifted)?);
-        if own < least {
-            (best, least) = (lifted, own);
-        }
-        if least < TOUCHING {
-            break;
+/// Gaps of all wheels to the ground, m.
+fn wheel_gaps(
+    model: &Model,
+    terrain: &dyn Terrain,
+    q: &[f64],
+) -> Result<DVector<f64>, PlacementError> {
+    let configuration = coordinates::from_public(model, q)?;
+    let kinematics = Kinematics::of(model, &configuration);
+    for wheel in model.wheels() {
+        let centre = configuration.position + kinematics.point(wheel.body, &wheel.centre);
+        if let Coverage::Unknown([x, z]) = terrain.coverage(&centre, wheel.bound()) {
+            return Err(PlacementError::NoGround { x, z });
         }
     }
-    Ok(best)
+    let contacts = wheel_contacts(model, &kinematics, terrain);
+    let gaps = contacts.iter().map(|contact| contact.gap);
+    Ok(DVector::from_iterator(contacts.len(), gaps))
+}
+
+/// The coordinates at the height at which the lowest wheel touches the ground.
+fn lowered(
+    model: &Model,
+    terrain: &dyn Terrain,
+    mut q: Vec<f64>,
+) -> Result<Vec<f64>, PlacementError> {
+    for _ in 0..LIFTS {
+        let lowest = wheel_gaps(model, terrain, &q)?.min();
+        if lowest.abs() <= TOUCHING || !lowest.is_finite() {
+            break;
+        }
+        q[1] -= lowest;
+    }
+    Ok(q)
 }
 
 /// Most iterations, and most that bring the lowest wheel to the ground.

@@ -1,11 +1,9 @@
 //! A step in which episodes that are over are followed by the next.
 
-use super::batch::{EpisodeBatch, Stepped};
+use super::batch::{EpisodeBatch, Final, Stepped};
 use super::beginning::{Beginning, EpisodeDistribution};
 use super::error::EpisodeError;
-use super::running::Episode;
 use crate::draw::{Fixed, Order};
-use crate::integrator::StepError;
 
 /// When the next episode of a rover begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,17 +24,6 @@ pub struct Succession<'a> {
     pub attempts: usize,
     /// When they begin.
     pub autoreset: Autoreset,
-}
-
-/// An episode that the last step has ended.
-#[derive(Clone, Debug)]
-pub struct Final {
-    /// Index of the rover.
-    pub index: usize,
-    /// The episode at its end.
-    pub episode: Episode,
-    /// The physics step that its rover could not take.
-    pub error: Option<StepError>,
 }
 
 impl EpisodeBatch {

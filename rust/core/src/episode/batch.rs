@@ -6,7 +6,6 @@
 use std::sync::Arc;
 
 use super::action;
-use super::autoreset::Final;
 use super::beginning::{Beginning, EpisodeDistribution};
 use super::control_period::{ControlPeriod, Origin, Place, Seat};
 use super::error::{EpisodeError, check_lengths};
@@ -24,6 +23,17 @@ pub struct EpisodeBatch {
     max_steps: Option<u64>,
     difficulties: Vec<Option<Range>>,
     pub(super) finals: Vec<Final>,
+}
+
+/// An episode that the last step has ended.
+#[derive(Clone, Debug)]
+pub struct Final {
+    /// Index of the rover.
+    pub index: usize,
+    /// The episode at its end.
+    pub episode: Episode,
+    /// The physics step that its rover could not take.
+    pub error: Option<StepError>,
 }
 
 /// How the rovers' control periods went: an entry for each rover, and lists of indices.

@@ -7,7 +7,8 @@ use rayon::ThreadPool;
 use super::error::EpisodeError;
 use super::noise;
 use super::rules::Rules;
-use super::running::{Episode, Setting};
+use super::running::Episode;
+use super::setting::Setting;
 use crate::draw::{Drawn, DrawnScene, Order, Pcg64, SceneDistribution, draw_many};
 
 /// What the episodes of a task are drawn from.

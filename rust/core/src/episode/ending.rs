@@ -1,13 +1,5 @@
 //! Whether and why an episode ends.
 
-use super::outcome::Quantities;
-use super::progress::Progress;
-use super::rules::Rules;
-
-/// A rover is high-centred while its trunk carries too much of the weight and it is no faster than
-/// this, m/s.
-pub const STUCK_SPEED: f64 = 0.05;
-
 /// Why an episode has ended, in the order of the codes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Ending {
@@ -60,24 +52,5 @@ impl Ending {
     #[must_use]
     pub fn is_failure(self) -> bool {
         !matches!(self, Self::None | Self::Goal)
-    }
-
-    /// The ending after a control period: a failed step takes precedence, then the goal, then
-    /// rolling over, high-centring and the battery.
-    #[must_use]
-    pub fn of(rules: &Rules, now: &Quantities, progress: &Progress, has_failed: bool) -> Self {
-        if has_failed {
-            Self::StepFailed
-        } else if progress.reached >= rules.settings().goals {
-            Self::Goal
-        } else if now.cos_tilt < rules.settings().cos_max_tilt {
-            Self::RollOver
-        } else if progress.stuck_time >= rules.settings().stuck_time {
-            Self::HighCentred
-        } else if (rules.settings().battery).is_some_and(|battery| progress.energy >= battery) {
-            Self::BatteryEmpty
-        } else {
-            Self::None
-        }
     }
 }

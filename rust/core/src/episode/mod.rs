@@ -4,11 +4,11 @@
 //! An agent chooses an action once a control period, which lasts several physics steps. The rover
 //! is given the action's commands ([`action`]), takes its steps and is read
 //! ([`crate::simulation::reading`]). From the reading follow the observation ([`observation`], with
-//! [`noise`]), the [`progress`] of the episode, the terms of the [`reward`] and whether the episode
-//! ends ([`ending`]); together they are the period's [`outcome`].
+//! [`noise`]), its [`quantities`], the [`progress`] of the episode, the terms of the [`reward`] and
+//! whether and why the episode ends ([`ending`]); together they are the period's [`outcome`].
 //!
 //! - [`rules`]: what all episodes of a task share; [`beginning`]: how one begins, in a scene that
-//!   is drawn ([`crate::draw`]);
+//!   is drawn ([`crate::draw`]); [`setting`]: what was drawn for it;
 //! - [`running`]: one episode and its control period;
 //! - [`batch`]: many rovers side by side, each with its episode; [`autoreset`]: a step in which the
 //!   next episodes begin, too.
@@ -24,18 +24,22 @@ pub mod noise;
 pub mod observation;
 pub mod outcome;
 pub mod progress;
+pub mod quantities;
 pub mod reward;
 pub mod rules;
 pub mod running;
+pub mod setting;
 
-pub use autoreset::{Autoreset, Final, Succession};
-pub use batch::{EpisodeBatch, Stepped};
+pub use autoreset::{Autoreset, Succession};
+pub use batch::{EpisodeBatch, Final, Stepped};
 pub use beginning::{Beginning, EpisodeDistribution};
 pub use control_period::Origin;
 pub use ending::Ending;
 pub use error::EpisodeError;
-pub use outcome::{N_QUANTITIES, Outcome, Quantities};
+pub use outcome::Outcome;
 pub use progress::Progress;
+pub use quantities::{N_QUANTITIES, Quantities};
 pub use reward::{N_TERMS, TERMS, Weights};
 pub use rules::{Rules, Settings};
-pub use running::{Episode, Last, Setting};
+pub use running::{Episode, Last};
+pub use setting::Setting;

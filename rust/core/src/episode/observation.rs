@@ -17,7 +17,7 @@
 
 use super::progress::Progress;
 use super::rules::Rules;
-use super::running::Setting;
+use super::setting::Setting;
 use crate::simulation::seen_from;
 
 /// Most entries between the previous action and the heights.

@@ -1,7 +1,10 @@
 //! The state of an episode outside the simulation.
 
-use super::ending::STUCK_SPEED;
-use super::outcome::Quantities;
+use super::quantities::Quantities;
+
+/// A rover is high-centred while its trunk carries too much of the weight and it is no faster than
+/// this, m/s.
+pub const STUCK_SPEED: f64 = 0.05;
 
 /// What an episode remembers from period to period.
 #[derive(Clone, Debug, PartialEq)]

@@ -16,7 +16,7 @@
 //! [`MOST_TIME`] and [`MOST_RATIO`]. Normal driving stays within these bounds even over 10 s.
 
 use super::ending::Ending;
-use super::outcome::Quantities;
+use super::quantities::Quantities;
 
 /// Names of the terms, in the order of their sum.
 pub const TERMS: [&str; N_TERMS] = [

@@ -3,7 +3,10 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::ending::Ending;
 use super::error::{EpisodeError, check_lengths};
+use super::progress::Progress;
+use super::quantities::Quantities;
 use super::reward::Weights;
 use crate::multibody::Model;
 use crate::simulation::ReadingLayout;
@@ -290,6 +293,26 @@ impl Rules {
     #[must_use]
     pub fn n_shared(&self) -> usize {
         self.places.shared
+    }
+
+    /// The ending after a control period: a failed step takes precedence, then the goal, then
+    /// rolling over, high-centring and the battery.
+    #[must_use]
+    pub fn ending(&self, now: &Quantities, progress: &Progress, has_failed: bool) -> Ending {
+        let settings = &self.settings;
+        if has_failed {
+            Ending::StepFailed
+        } else if progress.reached >= settings.goals {
+            Ending::Goal
+        } else if now.cos_tilt < settings.cos_max_tilt {
+            Ending::RollOver
+        } else if progress.stuck_time >= settings.stuck_time {
+            Ending::HighCentred
+        } else if (settings.battery).is_some_and(|battery| progress.energy >= battery) {
+            Ending::BatteryEmpty
+        } else {
+            Ending::None
+        }
     }
 
     /// Places in a reading.

@@ -1,4 +1,4 @@
-//! One episode: its setting, its progress and its last outcome.
+//! One episode: its progress and its last outcome.
 
 use std::sync::Arc;
 
@@ -6,79 +6,13 @@ use super::action;
 use super::ending::Ending;
 use super::error::{EpisodeError, check_lengths};
 use super::observation::{write_heights, write_state};
-use super::outcome::{Outcome, Quantities};
+use super::outcome::Outcome;
 use super::progress::Progress;
+use super::quantities::Quantities;
 use super::reward::{Earned, N_TERMS, squared_changes, terms};
 use super::rules::Rules;
-use crate::draw::Domain;
-use crate::scalar::elementary::hypot;
+use super::setting::Setting;
 use crate::simulation::{CommandError, ReadingScratch, RoverSimulation, seen_from};
-
-/// What was drawn for an episode. Only goals, gain and load limit act; the rest is reported.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Setting {
-    /// The goal (x, z), m; the first of several.
-    pub goal: [f64; 2],
-    /// Goals that follow it, in order, (x, z), m.
-    pub further: Vec<[f64; 2]>,
-    /// Properties of rover and world.
-    pub domain: Domain,
-    /// Force on the trunk beyond which the rover is high-centred, N.
-    pub trunk_load_limit: f64,
-    /// Difficulty of the rocks; 0 where there are none.
-    pub difficulty: f64,
-}
-
-impl Setting {
-    /// The goal of a number, from zero; the last one from there on.
-    #[must_use]
-    pub fn goal_at(&self, number: usize) -> [f64; 2] {
-        match number.min(self.further.len()) {
-            0 => self.goal,
-            k => self.further[k - 1],
-        }
-    }
-
-    /// Way from the goal of a number to the last, leg by leg, m.
-    #[must_use]
-    pub fn way_from(&self, number: usize) -> f64 {
-        let legs = (number..self.further.len()).map(|k| {
-            let ([a, b], [c, d]) = (self.goal_at(k), self.goal_at(k + 1));
-            hypot(c - a, d - b)
-        });
-        legs.fold(0.0, |sum, leg| sum + leg)
-    }
-
-    fn check(&self, rules: &Rules) -> Result<(), EpisodeError> {
-        check_lengths([("goals", 1 + self.further.len(), rules.settings().goals)])?;
-        let Domain {
-            mass_scale,
-            friction,
-            actuator_gain,
-            gravity_scale,
-        } = self.domain;
-        let numbers = [
-            ("goal", self.goal[0]),
-            ("goal", self.goal[1]),
-            ("domain.mass_scale", mass_scale),
-            ("domain.friction", friction),
-            ("domain.actuator_gain", actuator_gain),
-            ("domain.gravity_scale", gravity_scale),
-            ("trunk_load_limit", self.trunk_load_limit),
-            ("difficulty", self.difficulty),
-        ];
-        let further = self.further.iter().flatten().map(|&x| ("further", x));
-        let mut all = numbers.into_iter().chain(further);
-        match all.find(|(_, value)| !value.is_finite()) {
-            None => Ok(()),
-            Some((field, value)) => Err(EpisodeError::OutOfRange {
-                field,
-                range: "a finite number",
-                value,
-            }),
-        }
-    }
-}
 
 /// A control period seen from its end.
 #[derive(Clone, Copy, Debug)]
@@ -139,7 +73,7 @@ impl Episode {
         let mut heights = vec![0.0; rules.settings().scan.len()];
         rover.read_state(setting.goal, &mut scratch, &mut reading);
         rover.read_heights(&rules.settings().scan, &mut heights);
-        let now = Quantities::of(rules.places(), &reading);
+        let now = Quantities::of(&reading[rules.places().scalars.clone()]);
         let progress = Progress::begin(now.distance, rules.n_actions());
         let mut observation = vec![0.0; rules.size()];
         let known = (&setting, &progress);
@@ -309,7 +243,7 @@ impl Episode {
                 *x = 0.0;
             }
         }
-        let mut now = Quantities::of(rules.places(), reading);
+        let mut now = Quantities::of(&reading[rules.places().scalars.clone()]);
         if !is_readable {
             now.distance = self.progress.distance;
         }
@@ -347,7 +281,7 @@ impl Episode {
             }
         }
 
-        let ending = Ending::of(rules, &now, &self.progress, has_failed);
+        let ending = rules.ending(&now, &self.progress, has_failed);
         let earned = Earned {
             now: &now,
             approach,

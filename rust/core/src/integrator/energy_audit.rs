@@ -21,26 +21,11 @@
 //! The correction is of the order of the excess, so the scheme keeps its order. Position projection
 //! follows the audit, and its energy is counted separately.
 
-use nalgebra::Vector3;
-
-use super::ScratchOf;
-use super::mechanical_system::{MechanicalSystem, Start};
-use super::moreau_jean::place;
+use super::mechanical_system::{MechanicalEnergy, MechanicalSystem, Start};
 use super::options::StepOptions;
 use super::report::StepReport;
-
-/// Energy of a state, and its overall momentum.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct MechanicalEnergy {
-    /// J.
-    pub kinetic: f64,
-    /// J.
-    pub potential: f64,
-    /// Linear momentum, kg m/s.
-    pub momentum: Vector3<f64>,
-    /// kg.
-    pub mass: f64,
-}
+use super::scratch::{Scratch, ScratchOf};
+use super::step_contacts::place;
 
 /// Largest gain in a step that is tolerated, as a fraction of the kinetic energy.
 pub const GAIN: f64 = 5e-10;
@@ -65,34 +50,6 @@ const LEAST_WAY: f64 = 1e-3;
 
 /// Most times that a velocity is shortened together with its displacement.
 const MOST_SHORTENINGS: usize = 8;
-
-/// A state whose energy is known: the end of a step is the start of the next.
-#[derive(Clone, Debug)]
-pub(super) struct Audited<Q> {
-    configuration: Q,
-    v: Vec<f64>,
-    energy: Option<MechanicalEnergy>,
-}
-
-impl<Q> Audited<Q> {
-    pub(super) fn new(configuration: Q, nv: usize) -> Self {
-        Self {
-            configuration,
-            v: vec![f64::NAN; nv],
-            energy: None,
-        }
-    }
-}
-
-impl<Q: Clone> Audited<Q> {
-    /// Stores the energy of a state.
-    fn is(&mut self, configuration: &Q, v: &[f64], energy: MechanicalEnergy) {
-        self.configuration.clone_from(configuration);
-        self.v.clear();
-        self.v.extend_from_slice(v);
-        self.energy = Some(energy);
-    }
-}
 
 /// Energy at the start of a step, remembered from the end of the last one if the state is the same.
 pub(super) fn energy_before<S: MechanicalSystem>(
@@ -148,27 +105,15 @@ impl Audit {
             return Verdict::Sound;
         };
         ws.audited.energy = None;
-        let mut balance = balance(system, options, start, ws, &before);
-        if self.is_last {
-            for _ in 0..MOST_SHORTENINGS {
-                let Balance { after, excess, .. } = balance;
-                if excess.is_nan() || excess <= SHORT * after.kinetic {
-                    break;
-                }
-                // The velocity is far off, and so is the displacement that it caused. Shorten both
-                // together.
-                let share = (before.kinetic / after.kinetic).min(SHORT).sqrt();
-                shorten(ws, share);
-                place(system, options, ws);
-                system.normalise(&mut ws.end);
-                balance = self::balance(system, options, start, ws, &before);
-            }
-        }
         let Balance {
             after,
             excess,
             work,
-        } = balance;
+        } = if self.is_last {
+            shortened_balance(system, options, start, ws, &before)
+        } else {
+            balance(system, options, start, ws, &before)
+        };
         if !excess.is_finite() {
             return if self.is_last {
                 Verdict::Sound // not finite: refused when the step ends
@@ -206,17 +151,8 @@ impl Audit {
         if (coarse > COARSE * size || is_left) && !self.is_last {
             return Verdict::Coarse;
         }
-        let whole = after.momentum.norm_squared() / (2.0 * after.mass);
-        let relative_kinetic = after.kinetic - whole;
         let d = S::DIMENSION.components();
-        if is_free && excess < relative_kinetic {
-            let share = (1.0 - excess / relative_kinetic).min(1.0 + RAISE).sqrt();
-            let translation = after.momentum / after.mass;
-            for (k, v) in ws.v.iter_mut().enumerate() {
-                let common = if k < d { translation[k] } else { 0.0 };
-                *v = common + share * (*v - common);
-            }
-        } else if excess > 0.0 {
+        if !(is_free && scale_relative_motion(&mut ws.v, d, &after, excess)) && excess > 0.0 {
             let share = (1.0 - excess / after.kinetic).max(0.0).sqrt();
             shorten(ws, share);
             if is_left {
@@ -319,8 +255,51 @@ fn balance<S: MechanicalSystem>(
     }
 }
 
+/// The same, after the velocity and its displacement are shortened while the excess is a large part
+/// of the kinetic energy.
+fn shortened_balance<S: MechanicalSystem>(
+    system: &mut S,
+    options: &StepOptions,
+    start: Start<'_, S::Configuration>,
+    ws: &mut ScratchOf<S>,
+    before: &MechanicalEnergy,
+) -> Balance {
+    let mut found = balance(system, options, start, ws, before);
+    for _ in 0..MOST_SHORTENINGS {
+        let Balance { after, excess, .. } = found;
+        if excess.is_nan() || excess <= SHORT * after.kinetic {
+            break;
+        }
+        // The velocity is far off, and so is the displacement that it caused. Shorten both
+        // together.
+        let share = (before.kinetic / after.kinetic).min(SHORT).sqrt();
+        shorten(ws, share);
+        place(system, options, ws);
+        system.normalise(&mut ws.end);
+        found = balance(system, options, start, ws, before);
+    }
+    found
+}
+
+/// Scales the motion relative to the mass centre, whose translation has d components, to remove an
+/// excess; false where the excess is larger than the energy of that motion.
+fn scale_relative_motion(v: &mut [f64], d: usize, after: &MechanicalEnergy, excess: f64) -> bool {
+    let whole = after.momentum.norm_squared() / (2.0 * after.mass);
+    let relative_kinetic = after.kinetic - whole;
+    let has_enough = excess < relative_kinetic;
+    if has_enough {
+        let share = (1.0 - excess / relative_kinetic).min(1.0 + RAISE).sqrt();
+        let translation = after.momentum / after.mass;
+        for (k, v) in v.iter_mut().enumerate() {
+            let common = if k < d { translation[k] } else { 0.0 };
+            *v = common + share * (*v - common);
+        }
+    }
+    has_enough
+}
+
 /// `v⁺ ← share v⁺`, in the local velocities too.
-fn shorten<Q, C>(ws: &mut super::Scratch<Q, C>, share: f64) {
+fn shorten<Q, C>(ws: &mut Scratch<Q, C>, share: f64) {
     for x in ws.v.iter_mut().chain(&mut ws.u) {
         *x *= share;
     }

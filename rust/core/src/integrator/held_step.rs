@@ -16,11 +16,12 @@
 
 use nalgebra::{DMatrix, DVectorView};
 
-use super::ScratchOf;
 use super::contact_modes::{HeldLaw, product};
 use super::mechanical_system::{MechanicalSystem, Start, UnilateralContact};
-use super::moreau_jean::{MOST_REVISIONS, assemble_contacts, load_explicitly, load_implicitly};
+use super::moreau_jean::{MOST_REVISIONS, load_explicitly, load_implicitly};
 use super::options::{Stabilisation, StepOptions};
+use super::scratch::ScratchOf;
+use super::step_contacts::assemble_contacts;
 use super::warm_start::WarmStart;
 
 /// What the energy audit did to the velocity.

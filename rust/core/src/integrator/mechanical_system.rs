@@ -20,7 +20,8 @@
 //! `Z p`, so W needs no product with M̂⁻¹. Any factor serves (Cholesky's, the tree's `Lᵀ D L`, the
 //! square root of a diagonal).
 
-use super::energy_audit::MechanicalEnergy;
+use nalgebra::Vector3;
+
 use super::options::StepOptions;
 use crate::contact::Activation;
 use crate::law::newton_impact::rebound;
@@ -39,6 +40,9 @@ pub trait UnilateralContact {
     fn gap(&self) -> f64;
 }
 
+/// Key of a system's contacts.
+pub type KeyOf<S> = <<S as MechanicalSystem>::Contact as UnilateralContact>::Key;
+
 /// Start of a step.
 #[derive(Debug)]
 pub struct Start<'a, Q> {
@@ -55,6 +59,19 @@ impl<Q> Clone for Start<'_, Q> {
 }
 
 impl<Q> Copy for Start<'_, Q> {}
+
+/// Energy of a state, and its overall momentum.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MechanicalEnergy {
+    /// J.
+    pub kinetic: f64,
+    /// J.
+    pub potential: f64,
+    /// Linear momentum, kg m/s.
+    pub momentum: Vector3<f64>,
+    /// kg.
+    pub mass: f64,
+}
 
 /// A system with unilateral contacts, see the page above.
 ///

@@ -30,16 +30,17 @@
 
 use super::energy_audit::{Audit, GAIN, Verdict, count_lift, energy_before};
 use super::error::StepError;
-use super::mechanical_system::{MechanicalSystem, Start, UnilateralContact};
+use super::mechanical_system::{KeyOf, MechanicalSystem, Start};
 use super::options::StepOptions;
 use super::position_projection;
 use super::probe::{Phase, Probe};
-use super::report::{StepReport, StepStatus};
-use super::scratch::Scratch;
+use super::report::StepReport;
+use super::scheme::{Integrator, StateMut};
+use super::scratch::{Scratch, ScratchOf};
+use super::step_contacts::{
+    activation, add_correction, assemble_contacts, is_persistent, place, solve_contacts,
+};
 use super::warm_start::WarmStart;
-use super::{Integrator, KeyOf, ScratchOf, StateMut};
-use crate::contact::Activation;
-use crate::solver::SolveReport;
 
 /// The linearised variant.
 #[derive(Clone, Copy, Debug, Default)]
@@ -261,19 +262,6 @@ fn attempt<S: MechanicalSystem>(
     Some(report)
 }
 
-/// `q⁺ = q_m ⊕ θ h v⁺` for the velocity `ws.v`, and the gaps there.
-pub(super) fn place<S: MechanicalSystem>(system: &S, options: &StepOptions, ws: &mut ScratchOf<S>) {
-    let share = options.theta * options.time_step;
-    system.set_moved(&ws.middle, &ws.v, share, &mut ws.end);
-    ws.gap_end.clear();
-    let d = S::DIMENSION.components();
-    let local = ws.u.chunks_exact(d).zip(ws.u_before.chunks_exact(d));
-    let moved = |(contact, (u, before)): (&S::Contact, (&[f64], &[f64]))| {
-        contact.gap() + share * (u[0] - before[0])
-    };
-    ws.gap_end.extend(ws.contacts.iter().zip(local).map(moved));
-}
-
 /// The free change `ws.y` (factor coordinates): first from the forces at v, then from those at the
 /// resulting velocity.
 pub(super) fn load_explicitly<S: MechanicalSystem>(
@@ -330,205 +318,6 @@ pub(super) fn load_implicitly<S: MechanicalSystem>(
         }
     }
     add_correction(system, options, warm_start, ws);
-}
-
-/// The contact forecast, measured from `q_m`, with the margin within which a resting contact stays
-/// closed.
-///
-/// `measured`: seconds after the start of the step at which the gaps are measured.
-pub(super) fn activation(options: &StepOptions, measured: f64) -> Activation {
-    let h = options.time_step;
-    // In one step gravity moves a resting body by g h²/2 and accelerates it by g h.
-    let g = options.gravity.norm();
-    Activation {
-        lead: options.forecast * h - measured,
-        hover: (0.5 * g * h * h).max(1e-9),
-        slow: (2.0 * g * h).max(1e-9),
-        margin: 0.0,
-    }
-}
-
-/// Contact Jacobian, operator, velocity before the step and the solver's starting point, at the end
-/// pose.
-///
-/// Newton's law refers to `v_before`, the velocity before the step.
-pub(super) fn assemble_contacts<S: MechanicalSystem>(
-    system: &mut S,
-    options: &StepOptions,
-    v_before: &[f64],
-    warm_start: &WarmStart<KeyOf<S>>,
-    ws: &mut ScratchOf<S>,
-) {
-    let d = S::DIMENSION.components();
-    let n = ws.contacts.len();
-    for local in [&mut ws.u_before, &mut ws.q_free, &mut ws.p, &mut ws.u] {
-        local.resize(d * n, 0.0);
-    }
-    set_friction(system, options, &ws.contacts, &mut ws.mu);
-    system.assemble(&ws.contacts, v_before, &mut ws.u_before);
-    if options.warm_start {
-        warm_start.recall(&ws.contacts, d, &mut ws.p);
-    } else {
-        ws.p.fill(0.0);
-    }
-}
-
-/// μ of every contact.
-pub(super) fn set_friction<S: MechanicalSystem>(
-    system: &S,
-    options: &StepOptions,
-    contacts: &[S::Contact],
-    mu: &mut Vec<f64>,
-) {
-    mu.clear();
-    mu.extend(
-        contacts
-            .iter()
-            .map(|contact| system.friction_coefficient(options, contact)),
-    );
-}
-
-/// Whether the last step had the same contacts and none of them was new or in impact, so that its
-/// impulses equal those of this step up to O(h).
-fn is_persistent<C: UnilateralContact>(
-    options: &StepOptions,
-    warm_start: &WarmStart<C::Key>,
-    contacts: &[C],
-) -> bool {
-    options.warm_start && !warm_start.persistent.is_empty() && warm_start.is_of(contacts)
-}
-
-/// Adds the deferred correction r to `ws.y` if the last step had the same contacts and all of them
-/// persisted.
-///
-/// `ws.p` must still hold the last step's impulses.
-pub(super) fn add_correction<S: MechanicalSystem>(
-    system: &S,
-    options: &StepOptions,
-    warm_start: &WarmStart<KeyOf<S>>,
-    ws: &mut ScratchOf<S>,
-) {
-    if !is_persistent(options, warm_start, &ws.contacts) {
-        return;
-    }
-    let share = 1.0 - options.theta;
-    system.generalized_impulse(&ws.contacts, &ws.p, &mut ws.correction);
-    for (r, before) in ws.correction.iter_mut().zip(&warm_start.persistent) {
-        *r = share * (before - *r);
-    }
-    system.half_solve(&mut ws.correction);
-    for (y, r) in ws.y.iter_mut().zip(&ws.correction) {
-        *y += r;
-    }
-}
-
-/// Solves the assembled contacts for the free change `ws.y` (factor coordinates) from `ws.v`, and
-/// adds the total change `ws.dv` to `ws.v`.
-///
-/// Newton's law of restitution with friction may have no solution: a wheel held by friction between
-/// two slopes cannot leave both. If the solver finds none, the impact is taken as inelastic. That
-/// problem always has a solution, since rest is admissible on ground at rest.
-///
-/// Starts from `ws.p`. `is_from_start`: `ws.v` is still the velocity before
-/// the step, whose local velocity is known.
-pub(super) fn solve_contacts<S: MechanicalSystem>(
-    system: &S,
-    options: &StepOptions,
-    ws: &mut ScratchOf<S>,
-    is_from_start: bool,
-    probe: &mut dyn Probe,
-) -> StepReport {
-    let d = S::DIMENSION.components();
-    let n = ws.contacts.len();
-    let mut report = StepReport {
-        n_contacts: n,
-        ..StepReport::default()
-    };
-    if n > 0 {
-        system.local(&ws.y, &mut ws.q_free);
-        if is_from_start {
-            for (q, u) in ws.q_free.iter_mut().zip(&ws.u_before) {
-                *q += u;
-            }
-        } else {
-            system.add_local_of_velocity(&ws.contacts, &ws.v, &mut ws.q_free);
-        }
-        add_shifts(system, options, ws, 1.0);
-        let mut solved = solve_problem(system, options, ws);
-        let inelastic;
-        let mut law = options;
-        let is_elastic = options.restitution > 0.0 || options.materials.is_elastic();
-        if !solved.is_converged() && is_elastic && system.solves_to_the_end() {
-            inelastic = StepOptions {
-                restitution: 0.0,
-                materials: options.materials.inelastic(),
-                ..options.clone()
-            };
-            add_shifts(system, law, ws, -1.0);
-            law = &inelastic;
-            add_shifts(system, law, ws, 1.0);
-            ws.p.fill(0.0);
-            solved = solve_problem(system, options, ws);
-            report.retaken = 1;
-        }
-        // u contains the shift: remove it.
-        for ((u, contact), before) in
-            (ws.u.chunks_exact_mut(d).zip(&ws.contacts)).zip(ws.u_before.chunks_exact(d))
-        {
-            u[0] -= system.normal_shift(law, contact, before[0]);
-        }
-        note(&mut report, &solved);
-        system.add_impulses(&ws.p, &mut ws.y);
-        probe.end(Phase::Solve);
-    }
-    ws.half_solve_back(|y| system.half_solve_back(y));
-    for (v, dv) in ws.v.iter_mut().zip(&ws.dv) {
-        *v += dv;
-    }
-    report
-}
-
-/// Adds `sign` times the impact law's shift to the normal free velocities `ws.q_free`.
-fn add_shifts<S: MechanicalSystem>(
-    system: &S,
-    options: &StepOptions,
-    ws: &mut ScratchOf<S>,
-    sign: f64,
-) {
-    let d = S::DIMENSION.components();
-    let contacts = ws.contacts.iter().zip(ws.u_before.chunks_exact(d));
-    for (q, (contact, before)) in ws.q_free.chunks_exact_mut(d).zip(contacts) {
-        q[0] += sign * system.normal_shift(options, contact, before[0]);
-    }
-}
-
-/// Solves the assembled problem from `ws.p` and charges the step's budget.
-fn solve_problem<S: MechanicalSystem>(
-    system: &S,
-    options: &StepOptions,
-    ws: &mut ScratchOf<S>,
-) -> SolveReport {
-    let solved = system.solve(
-        &ws.q_free,
-        &ws.mu,
-        &ws.solver_options(&options.solver),
-        &mut ws.p,
-        &mut ws.u,
-        &mut ws.solver,
-    );
-    ws.work_left = ws.work_left.saturating_sub(solved.work);
-    solved
-}
-
-/// Enters a solver's report into a step's.
-pub(super) fn note(report: &mut StepReport, solved: &SolveReport) {
-    report.iterations += solved.iterations;
-    report.factorisations += solved.factorisations();
-    report.pivots += solved.pivots();
-    report.residual = report.residual.max(solved.residual);
-    if !solved.is_converged() {
-        report.status = StepStatus::NotConverged;
-    }
 }
 
 /// Projects the position, checks that everything is finite, and only then changes state and warm

@@ -21,16 +21,15 @@
 
 use super::energy_audit::{Audit, GAIN, Verdict, energy_before};
 use super::error::StepError;
-use super::mechanical_system::{MechanicalSystem, Start, UnilateralContact};
-use super::moreau_jean::{
-    MOST_REVISIONS, MoreauJean, activation, add_correction, assemble_contacts, finish,
-    solve_contacts,
-};
+use super::mechanical_system::{KeyOf, MechanicalSystem, Start, UnilateralContact};
+use super::moreau_jean::{MOST_REVISIONS, MoreauJean, finish};
 use super::options::StepOptions;
 use super::probe::{Phase, Probe};
 use super::report::{StepReport, StepStatus};
+use super::scheme::{Integrator, StateMut};
+use super::scratch::ScratchOf;
+use super::step_contacts::{activation, add_correction, assemble_contacts, solve_contacts};
 use super::warm_start::WarmStart;
-use super::{Integrator, KeyOf, ScratchOf, StateMut};
 
 /// Relative change below which an iteration that no longer contracts has reached rounding.
 const ROUNDING: f64 = 1e-8;
@@ -56,7 +55,6 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
         scratch: &mut ScratchOf<S>,
         probe: &mut dyn Probe,
     ) -> Result<StepReport, StepError> {
-        let (h, theta) = (options.time_step, options.theta);
         let ws = scratch;
         ws.fit(system.nv());
         ws.grant_work(&options.solver, system.solves_to_the_end());
@@ -68,84 +66,24 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
         system.choose_branches(start);
         system.begin_balance(start);
         ws.v.copy_from_slice(start.v);
-        let mut report = StepReport {
-            steps: 1,
-            status: StepStatus::NotConverged,
-            ..StepReport::default()
-        };
-        let mut is_settled = false;
-        let mut revisions = 0;
-        let mut unsolved = 0;
-        let mut last_change = f64::INFINITY;
-        for iteration in 0..options.newton_max_iterations {
-            let Some(solved) = iterate(system, options, start, warm_start, ws, iteration, probe)
-            else {
-                break;
+        let (mut report, is_settled) = settle(system, options, start, warm_start, ws, probe);
+        let verdict = if is_settled {
+            move_to_the_end(system, options, start, ws);
+            let audit = Audit {
+                before,
+                is_last: false,
+                gain: GAIN,
+                drift: drift(system, options, start),
             };
-            report.iterations += solved.iterations;
-            report.residual = solved.residual;
-            report.n_contacts = solved.n_contacts;
-            report.newton_iterations = iteration + 1;
-            // A maximum ignores NaN, so check for it.
-            if !ws.v.iter().all(|x| x.is_finite()) {
-                break;
-            }
-            // Iterating on an iterate that violates the law is useless; smaller steps have
-            // different problems.
-            unsolved = if solved.is_converged() {
-                0
-            } else {
-                unsolved + 1
-            };
-            if unsolved == MOST_UNSOLVED {
-                break;
-            }
-            let change = ws.dv.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-            let size = ws.v.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
-            // Converged, or as far as rounding allows: the change is small and no longer shrinks.
-            let is_small = change <= options.newton_tolerance * size;
-            let is_rounding = change <= ROUNDING * size && change >= 0.5 * last_change;
-            last_change = change;
-            if is_small || is_rounding {
-                if revisions < MOST_REVISIONS && system.revise(start, &ws.v) {
-                    revisions += 1;
-                    last_change = f64::INFINITY;
-                    continue;
-                }
-                is_settled = true;
-                report.status = solved.status;
-                break;
-            }
-        }
-        if !is_settled {
-            // An iterate that has not converged satisfies no law: take the linearised step and
-            // report it.
-            let taken = MoreauJean.step(system, options, state, warm_start, ws, probe)?;
-            return Ok(StepReport {
-                newton_iterations: report.newton_iterations,
-                retaken: taken.retaken + 1,
-                ..taken
-            });
-        }
-        for ((mean, end), begin) in ws.v_mean.iter_mut().zip(&ws.v).zip(start.v) {
-            *mean = theta * end + (1.0 - theta) * begin;
-        }
-        system.set_moved(start.configuration, &ws.v_mean, h, &mut ws.end);
-        let turn = options.time_step * system.turning(start.v);
-        let drift = if system.conserves_momenta() && turn <= MOST_TURN {
-            turn * turn * turn
+            let is_solved = report.is_converged();
+            let verdict = audit.judge(system, options, start, ws, &mut report);
+            if is_solved { verdict } else { Verdict::Coarse }
         } else {
-            0.0
+            // An iterate that has not converged satisfies no law.
+            Verdict::Coarse
         };
-        let audit = Audit {
-            before,
-            is_last: false,
-            gain: GAIN,
-            drift,
-        };
-        let is_solved = report.is_converged();
-        let verdict = audit.judge(system, options, start, ws, &mut report);
-        if verdict == Verdict::Coarse || !is_solved {
+        if verdict == Verdict::Coarse {
+            // Take the linearised step and report it.
             let taken = MoreauJean.step(system, options, state, warm_start, ws, probe)?;
             return Ok(StepReport {
                 newton_iterations: report.newton_iterations,
@@ -158,6 +96,94 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
         ws.gap_end
             .extend(ws.contacts.iter().map(UnilateralContact::gap));
         finish(system, options, state, warm_start, ws, report, probe)
+    }
+}
+
+/// Newton's iteration on the forces at the end of the step: its report, and whether it settled.
+fn settle<S: MechanicalSystem>(
+    system: &mut S,
+    options: &StepOptions,
+    start: Start<'_, S::Configuration>,
+    warm_start: &WarmStart<KeyOf<S>>,
+    ws: &mut ScratchOf<S>,
+    probe: &mut dyn Probe,
+) -> (StepReport, bool) {
+    let mut report = StepReport {
+        steps: 1,
+        status: StepStatus::NotConverged,
+        ..StepReport::default()
+    };
+    let mut is_settled = false;
+    let mut revisions = 0;
+    let mut unsolved = 0;
+    let mut last_change = f64::INFINITY;
+    for iteration in 0..options.newton_max_iterations {
+        let Some(solved) = iterate(system, options, start, warm_start, ws, iteration, probe) else {
+            break;
+        };
+        report.iterations += solved.iterations;
+        report.residual = solved.residual;
+        report.n_contacts = solved.n_contacts;
+        report.newton_iterations = iteration + 1;
+        // A maximum ignores NaN, so check for it.
+        if !ws.v.iter().all(|x| x.is_finite()) {
+            break;
+        }
+        // Iterating on an iterate that violates the law is useless; smaller steps have
+        // different problems.
+        unsolved = if solved.is_converged() {
+            0
+        } else {
+            unsolved + 1
+        };
+        if unsolved == MOST_UNSOLVED {
+            break;
+        }
+        let change = ws.dv.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let size = ws.v.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
+        // Converged, or as far as rounding allows: the change is small and no longer shrinks.
+        let is_small = change <= options.newton_tolerance * size;
+        let is_rounding = change <= ROUNDING * size && change >= 0.5 * last_change;
+        last_change = change;
+        if is_small || is_rounding {
+            if revisions < MOST_REVISIONS && system.revise(start, &ws.v) {
+                revisions += 1;
+                last_change = f64::INFINITY;
+                continue;
+            }
+            is_settled = true;
+            report.status = solved.status;
+            break;
+        }
+    }
+    (report, is_settled)
+}
+
+/// `ws.end` for the velocity `ws.v`.
+fn move_to_the_end<S: MechanicalSystem>(
+    system: &S,
+    options: &StepOptions,
+    start: Start<'_, S::Configuration>,
+    ws: &mut ScratchOf<S>,
+) {
+    let (h, theta) = (options.time_step, options.theta);
+    for ((mean, end), begin) in ws.v_mean.iter_mut().zip(&ws.v).zip(start.v) {
+        *mean = theta * end + (1.0 - theta) * begin;
+    }
+    system.set_moved(start.configuration, &ws.v_mean, h, &mut ws.end);
+}
+
+/// Fraction of the kinetic energy that free flight may gain or lose in the step.
+fn drift<S: MechanicalSystem>(
+    system: &S,
+    options: &StepOptions,
+    start: Start<'_, S::Configuration>,
+) -> f64 {
+    let turn = options.time_step * system.turning(start.v);
+    if system.conserves_momenta() && turn <= MOST_TURN {
+        turn * turn * turn
+    } else {
+        0.0
     }
 }
 

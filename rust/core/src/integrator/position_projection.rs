@@ -9,11 +9,11 @@
 //! Source: Acary 2013, *Projected event-capturing time-stepping schemes for nonsmooth mechanical
 //! systems with unilateral contact and Coulomb's friction*, CMAME 256, 224–250.
 
-use super::ScratchOf;
 use super::mechanical_system::MechanicalSystem;
-use super::moreau_jean::{note, set_friction};
 use super::options::{Stabilisation, StepOptions};
 use super::report::StepReport;
+use super::scratch::ScratchOf;
+use super::step_contacts::set_friction;
 use crate::problem::{FrictionContactProblem, Operator};
 use crate::solver::{SolveReport, SolveStatus, solve};
 
@@ -60,7 +60,7 @@ pub(super) fn project<S: MechanicalSystem>(
         }
         set_friction(system, options, &ws.contacts, &mut ws.mu);
     }
-    note(report, &solved);
+    report.enter(&solved);
     let share = (limit / size(system, ws)).min(1.0);
     system.advance(&mut ws.end, &ws.dv, share);
     true

@@ -1,5 +1,7 @@
 //! Report of a step.
 
+use crate::solver::SolveReport;
+
 /// Whether the equations of the step were solved to their tolerance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum StepStatus {
@@ -47,6 +49,17 @@ impl StepReport {
     #[must_use]
     pub fn is_converged(&self) -> bool {
         self.status == StepStatus::Converged
+    }
+
+    /// Enters the report of a solve in the step.
+    pub(super) fn enter(&mut self, solved: &SolveReport) {
+        self.iterations += solved.iterations;
+        self.factorisations += solved.factorisations();
+        self.pivots += solved.pivots();
+        self.residual = self.residual.max(solved.residual);
+        if !solved.is_converged() {
+            self.status = StepStatus::NotConverged;
+        }
     }
 
     /// Adds the report of a later step.

@@ -1,6 +1,6 @@
 //! Scratch of a step, common to all systems: vectors over velocities and over contacts.
 
-use super::energy_audit::Audited;
+use super::mechanical_system::{MechanicalEnergy, MechanicalSystem};
 use crate::solver::{SolverOptions, SolverWorkspace};
 
 /// Scratch of a step of configurations `Q` and contacts `C`. Nothing in it
@@ -39,6 +39,38 @@ pub struct Scratch<Q, C> {
     pub(super) audited: Audited<Q>,
     /// Work left for the step's solves, in the solver's unit.
     pub(super) work_left: u64,
+}
+
+/// Scratch of a system's steps.
+pub type ScratchOf<S> =
+    Scratch<<S as MechanicalSystem>::Configuration, <S as MechanicalSystem>::Contact>;
+
+/// A state whose energy is known: the end of a step is the start of the next.
+#[derive(Clone, Debug)]
+pub(super) struct Audited<Q> {
+    pub(super) configuration: Q,
+    pub(super) v: Vec<f64>,
+    pub(super) energy: Option<MechanicalEnergy>,
+}
+
+impl<Q> Audited<Q> {
+    fn new(configuration: Q, nv: usize) -> Self {
+        Self {
+            configuration,
+            v: vec![f64::NAN; nv],
+            energy: None,
+        }
+    }
+}
+
+impl<Q: Clone> Audited<Q> {
+    /// Stores the energy of a state.
+    pub(super) fn is(&mut self, configuration: &Q, v: &[f64], energy: MechanicalEnergy) {
+        self.configuration.clone_from(configuration);
+        self.v.clear();
+        self.v.extend_from_slice(v);
+        self.energy = Some(energy);
+    }
 }
 
 /// Divisors of the solver's budget: for all solves of a shared step together, and for the least

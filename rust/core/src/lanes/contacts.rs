@@ -11,6 +11,7 @@
 
 use nalgebra::Vector3;
 
+use super::footing::SLOTS;
 use super::forecast::Forecast;
 use super::ground::{Ground, GroundSphere, turning};
 use super::machine::Machine;
@@ -28,9 +29,6 @@ use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 
 /// Number of the plane in every terrain that has one.
 const PLANE: u32 = 0;
-
-/// Slots of a wheel.
-pub const SLOTS: usize = 2;
 
 /// Sine of the angle between axle and normal below which a wheel has no rolling direction.
 const PARALLEL: f64 = 1e-9;

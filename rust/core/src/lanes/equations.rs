@@ -13,14 +13,11 @@
 //! of steps as it is.
 
 use super::modes::Mode;
-use super::problem::{MAX_BLOCKS, block};
+use super::problem::{MAX_BLOCKS, Triple, block};
 use crate::scalar::Lane;
 
 /// A 3 x 3 block, row-major.
 pub type Block<T> = [T; 9];
-
-/// A contact's three numbers.
-pub type Triple<T> = [T; 3];
 
 /// Block (i, j) of a symmetric `W`.
 #[inline(always)]

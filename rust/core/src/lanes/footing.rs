@@ -10,7 +10,6 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::contacts::SLOTS;
 use crate::contact::detection::visit_on_surface;
 use crate::geometry::query::disc_clearance::{TURNING, clearance};
 use crate::geometry::query::dispatch::{point_at_edge, point_at_vertex};
@@ -30,6 +29,9 @@ const MAX_PIECES: usize = 24;
 
 /// Covers the rounding of distances, m.
 const ROUNDING: f64 = 1e-6;
+
+/// Slots of a wheel.
+pub const SLOTS: usize = 2;
 
 /// A plane under a wheel.
 #[derive(Clone, Copy, Debug)]

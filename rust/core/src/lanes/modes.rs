@@ -1,7 +1,7 @@
 //! Modes of the contacts side by side, and their violation of the law, which is measured by the
 //! projection of `z = p − ρ u` (Alart and Curnier 1991).
 
-use super::equations::Triple;
+use super::problem::Triple;
 use crate::scalar::{Lane, LaneMask};
 
 /// The linearised equations of one contact.

@@ -9,9 +9,9 @@
 //! if it stuck, is barred, so that another one changes its mode. If none is left, its friction is
 //! reversed.
 
-use super::equations::{Block, Factors, Triple, correction, factorise, newton_point, velocities};
+use super::equations::{Block, Factors, correction, factorise, newton_point, velocities};
 use super::modes::{Law, Limit, Mode, Violations, is_pressed_to_slide, judge, limit};
-use super::problem::{MAX_BLOCKS, block};
+use super::problem::{MAX_BLOCKS, Triple, block};
 use super::visits::Visits;
 use crate::law::coulomb::ContactMode;
 use crate::scalar::{Lane, LaneMask};

@@ -11,6 +11,9 @@ pub const MAX_UNKNOWNS: usize = 3 * MAX_CONTACTS;
 /// Blocks of the lower triangle of `W`.
 pub const MAX_BLOCKS: usize = MAX_CONTACTS * (MAX_CONTACTS + 1) / 2;
 
+/// Entries of a contact along n, t, b.
+pub type Triple<T> = [T; 3];
+
 /// Index of block (i, j), `j <= i`, in [`ContactProblem::W`].
 #[inline(always)]
 #[must_use]

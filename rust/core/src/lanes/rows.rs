@@ -10,12 +10,9 @@ use super::contacts::Contacts;
 use super::machine::{Machine, velocity};
 use super::mass_matrix::Factor;
 use super::poses::Poses;
-use super::problem::{ContactProblem, block};
+use super::problem::{ContactProblem, Triple, block};
 use crate::multibody::model::BASE;
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
-
-/// Entries of a contact along n, t, b.
-pub type Triple<T> = [T; 3];
 
 /// What is read of a problem.
 #[derive(Clone, Copy, Debug)]

@@ -66,6 +66,43 @@ fn otherwise_carried(
     )
 }
 
+/// A body with this angular velocity, angular acceleration and acceleration of the origin, and the
+/// force and moment on it alone.
+#[inline]
+fn loaded(
+    body: &Body,
+    kinematics: &Kinematics,
+    b: usize,
+    gravity: &Vector3<f64>,
+    (omega, alpha, origin): (Vector3<f64>, Vector3<f64>, Vector3<f64>),
+) -> Moved {
+    let c = &kinematics.c[b];
+    let acceleration = if body.is_centred() {
+        origin
+    } else {
+        let lever = c - kinematics.r[b];
+        origin + alpha.cross(&lever) + omega.cross(&omega.cross(&lever))
+    };
+    let force = (acceleration - gravity) * body.mass;
+    let R = &kinematics.R[b];
+    let I = &body.principal_inertia;
+    let gyroscopic = |A: &Matrix3<f64>| {
+        let (w, a) = (A.tr_mul(&omega), A.tr_mul(&alpha));
+        A * (I.component_mul(&a) + w.cross(&I.component_mul(&w)))
+    };
+    let moment = match &body.principal_axes {
+        None => gyroscopic(R),
+        Some(P) => gyroscopic(&(R * P)),
+    };
+    Moved {
+        omega,
+        alpha,
+        origin,
+        force,
+        moment: moment + c.cross(&force),
+    }
+}
+
 /// Bias `b` in `M v̇ + b = τ`: Coriolis, centrifugal, gyroscopic and gravity terms.
 ///
 /// `v`, `out`: (nv), N along a velocity in m/s, N m about one in rad/s. `gravity`: m/s², world.
@@ -115,31 +152,7 @@ fn bias_if<const TURNS: bool>(
             }
             _ => otherwise_carried(body, kinematics, moved, b, v),
         };
-        let c = &kinematics.c[b];
-        let acceleration = if body.is_centred() {
-            origin
-        } else {
-            let lever = c - r;
-            origin + alpha.cross(&lever) + omega.cross(&omega.cross(&lever))
-        };
-        let force = (acceleration - gravity) * body.mass;
-        let R = &kinematics.R[b];
-        let I = &body.principal_inertia;
-        let gyroscopic = |A: &Matrix3<f64>| {
-            let (w, a) = (A.tr_mul(&omega), A.tr_mul(&alpha));
-            A * (I.component_mul(&a) + w.cross(&I.component_mul(&w)))
-        };
-        let moment = match &body.principal_axes {
-            None => gyroscopic(R),
-            Some(P) => gyroscopic(&(R * P)),
-        };
-        moved[b] = Moved {
-            omega,
-            alpha,
-            origin,
-            force,
-            moment: moment + c.cross(&force),
-        };
+        moved[b] = loaded(body, kinematics, b, gravity, (omega, alpha, origin));
     }
     out.fill(0.0);
     for b in (0..bodies.len()).rev() {

@@ -21,9 +21,9 @@ pub mod state;
 
 pub use bias::bias;
 pub use description::{
-    CouplingDescription, DriveDescription, FORMAT, Hold, JointKind, Limits, MassProperties,
-    ModelDescription, Shape, ShapeDescription, SolidDescription, Spring, TagDescription,
-    WheelDescription,
+    CouplingDescription, DriveDescription, FORMAT, Hold, JointKind, Limits, MAX_SHAPES, MAX_SOLIDS,
+    MassProperties, ModelDescription, Shape, ShapeDescription, SolidDescription, Spring,
+    TagDescription, WheelDescription,
 };
 pub use error::{ModelError, StateError};
 pub use joint::{Joint, JointAxis, Motion, Pose};
@@ -31,8 +31,7 @@ pub use kinematics::Kinematics;
 pub use mass_matrix::{FactoredMassMatrix, MassMatrix};
 pub(crate) use model::fingerprint;
 pub use model::{
-    BASE, Body, CollisionBox, CollisionSphere, Frame, JointProperties, MAX_SHAPES, MAX_SOLIDS,
-    Model, Passive, Tree, Wheel,
+    BASE, Body, CollisionBox, CollisionSphere, Frame, JointProperties, Model, Passive, Tree, Wheel,
 };
 pub use momentum::{Energy, EnergyScratch, Momentum};
 pub use motor::{DriveTrial, Motor, MotorRegime};

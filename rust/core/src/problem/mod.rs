@@ -16,6 +16,8 @@
 //! - `prepared`: a problem together with its scales, for iterative methods.
 //! - `passivity`: scales down an approximate answer that would add energy.
 
+mod dimension;
+mod error;
 mod friction_contact;
 mod operator;
 mod passivity;
@@ -23,7 +25,9 @@ mod prepared;
 mod residual;
 mod scales;
 
-pub use friction_contact::{Dimension, FrictionContactProblem, ProblemError};
+pub use dimension::Dimension;
+pub use error::ProblemError;
+pub use friction_contact::FrictionContactProblem;
 pub use operator::{BlockSparseDelassus, BodyPairs, Operator, PairContact, RoundPair};
 pub(crate) use operator::{Storage, dot};
 pub(crate) use passivity::passive_share;

@@ -1,7 +1,8 @@
 //! The scalar: one rover, or several to a register.
 //!
 //! - [`lane`]: the scalar and its mask, and `f64` as one lane;
-//! - [`instructions`]: what this machine can do, found at run time, and the lane types;
+//! - [`instructions`]: what this machine can do, found at run time; `registers`: lanes in its
+//!   registers;
 //! - [`elementary`]: sine, cosine and exponential with the same bits everywhere;
 //! - [`linear`]: vectors and matrices of three dimensions over lanes.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
@@ -10,6 +11,7 @@ pub mod elementary;
 pub mod instructions;
 pub mod lane;
 pub mod linear;
+mod registers;
 
 pub use instructions::{Instructions, Single};
 pub use lane::{Lane, LaneMask, MAX_LANES};

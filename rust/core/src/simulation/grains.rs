@@ -6,8 +6,7 @@ use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
 use super::active_contact::LocatedContact;
-use super::scene::{Scene, StepTaken};
-use super::snapshot::Snapshot;
+use super::scene::{Scene, Snapshot, StepTaken};
 use super::state::State;
 use super::stepping::Simulation;
 use crate::integrator::{OptionsError, Scratch, Stabilisation, StepOptions};

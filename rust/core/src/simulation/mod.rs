@@ -1,11 +1,11 @@
 //! A scene stepped through time.
 //!
-//! - [`scene`]: what can be simulated; [`stepping`]: the one simulation of all scenes;
-//! - [`state`], [`snapshot`], [`active_contact`]: its state, the data needed to continue, its
-//!   contacts;
-//! - [`rover`]: a rover on a terrain, with its [commands](rover_command), its
-//!   [contacts](rover_contacts), its [ordinary] steps, its [`reading`], what [rays](rover_rays) meet, and the [`linearisation`] of
-//!   a step;
+//! - [`scene`]: what can be simulated, and the data needed to continue; [`stepping`]: the one
+//!   simulation of all scenes;
+//! - [`state`], [`active_contact`]: its state, its contacts;
+//! - [`rover`]: a rover on a terrain, with its [command](rover_command), its
+//!   [controls](rover_controls), its [contacts](rover_contacts), its [ordinary] steps, its
+//!   [`reading`], what [rays](rover_rays) meet, and the [`linearisation`] of a step;
 //! - [`planar`]: a planar machine on a ground; [`grains`]: a bed of grains,
 //!   perhaps with a machine on it;
 //! - [`rover_in_grains`]: a rover and a bed of balls, stepped together;
@@ -20,15 +20,16 @@ pub mod linearisation;
 pub mod ordinary;
 pub mod planar;
 pub mod profile;
+mod quick;
 pub mod reading;
 pub mod rover;
 pub mod rover_command;
 pub mod rover_contacts;
+pub mod rover_controls;
 pub mod rover_in_grains;
 mod rover_quick;
 pub mod rover_rays;
 pub mod scene;
-pub mod snapshot;
 pub mod state;
 pub mod stepping;
 pub mod turns;
@@ -47,8 +48,7 @@ pub use reading::{Look, ReadingLayout, ReadingScratch, seen_from};
 pub use rover::{LastCall, Placement, RoverScene, RoverSimulation};
 pub use rover_command::RoverCommand;
 pub use rover_in_grains::{RoverInGrains, TogetherError};
-pub use scene::{DenseOperator, QuickStep, Scene, SceneKey, SceneScratch, StepTaken};
-pub use snapshot::Snapshot;
+pub use scene::{DenseOperator, QuickStep, Scene, SceneKey, SceneScratch, Snapshot, StepTaken};
 pub use state::State;
 pub use stepping::Simulation;
 pub use turns::{Done, Turn};

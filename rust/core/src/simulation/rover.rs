@@ -6,10 +6,9 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::active_contact::LocatedContact;
+use super::quick::Quick;
 use super::rover_command::RoverCommand;
-use super::rover_quick::Quick;
-use super::scene::{DenseOperator, QuickStep, Scene, SceneScratch, StepTaken};
-use super::snapshot::Snapshot;
+use super::scene::{DenseOperator, QuickStep, Scene, SceneScratch, Snapshot, StepTaken};
 use super::state::State;
 use super::stepping::Simulation;
 use crate::contact::{Contact, Opposite, Part};
@@ -211,7 +210,7 @@ impl Scene for RoverScene {
     fn energy(&self, options: &StepOptions, state: &State<Configuration>) -> Energy {
         let kinematics = Kinematics::of(&self.model, &state.configuration);
         let mut energy = momentum::energy(&self.model, &kinematics, &state.v, &options.gravity);
-        energy.potential += self.model.spring_energy(&state.configuration);
+        energy.potential += self.model.spring_energy(&state.configuration.joints);
         energy
     }
 

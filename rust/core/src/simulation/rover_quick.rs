@@ -9,32 +9,9 @@ use crate::integrator::{NoProbe, Phase, Probe, StepError, StepOptions, StepRepor
 use crate::lanes::admission::admit;
 use crate::lanes::machine::Machine;
 use crate::lanes::passenger::Passenger;
-use crate::lanes::problem::ContactProblem;
 use crate::lanes::queue;
 use crate::lanes::step::Block;
 use crate::scalar::{Lane, Single};
-
-/// A block of one lane, made when first needed. It holds no state: a copy has none.
-#[derive(Default)]
-pub(super) struct Quick {
-    block: Option<Box<Block<f64>>>,
-    problem: Box<[ContactProblem; 1]>,
-    gap_problem: Box<[ContactProblem; 1]>,
-    /// Whether the last step was taken here.
-    is_last: bool,
-}
-
-impl Clone for Quick {
-    fn clone(&self) -> Self {
-        Self::default()
-    }
-}
-
-impl std::fmt::Debug for Quick {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Quick").finish_non_exhaustive()
-    }
-}
 
 impl RoverScene {
     /// The machine of its ordinary steps; none if with these options no step is ordinary.
@@ -89,14 +66,6 @@ impl RoverScene {
         block.alight(0, &mut passenger);
         quick.is_last = true;
         Some(*block.report(0))
-    }
-}
-
-impl Quick {
-    /// The problem of the last step taken here, and its block.
-    pub(super) fn last(&self) -> Option<(&Block<f64>, &ContactProblem)> {
-        let block = self.block.as_deref().filter(|_| self.is_last)?;
-        Some((block, &self.problem[0]))
     }
 }
 

@@ -3,8 +3,7 @@
 use super::active_contact::{ActiveContact, Components, LocatedContact};
 use super::error::SnapshotError;
 use super::profile::Stopwatch;
-use super::scene::{DenseOperator, QuickStep, Scene, SceneKey, SceneScratch, StepTaken};
-use super::snapshot::Snapshot;
+use super::scene::{DenseOperator, QuickStep, Scene, SceneKey, SceneScratch, Snapshot, StepTaken};
 use super::state::State;
 use crate::integrator::{
     Integrator, NoProbe, OptionsError, Probe, Scratch, StepError, StepOptions, StepReport,

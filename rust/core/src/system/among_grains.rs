@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::composite::Coupling;
-use super::grains::detection::Search;
+use super::grains::search::Search;
 use super::grains::system::gap_law;
 use super::grains::{COORDINATES, GrainKey, GrainSystem};
 use super::tree::{TreeScratch, TreeSystem};

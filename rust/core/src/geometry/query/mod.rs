@@ -41,12 +41,16 @@ use nalgebra::Vector3;
 /// The feature number of a pair that is measured by its nearest points.
 pub const NEAREST: usize = 0;
 
+/// Feature of the lowest point of a wheel's second circle, and the distance between features of its
+/// two circles.
+pub const CIRCLE: usize = 16;
+
 /// Whether a feature of a wheel is the lowest point of its rim, or of one of its circles, or on its
 /// tread.
 #[inline]
 #[must_use]
 pub fn is_lowest(feature: usize) -> bool {
-    feature.is_multiple_of(roller_plane::CIRCLE)
+    feature.is_multiple_of(CIRCLE)
 }
 
 /// A point of a shape at a primitive of the ground.

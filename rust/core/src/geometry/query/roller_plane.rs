@@ -9,11 +9,8 @@
 
 use nalgebra::Vector3;
 
-use super::{SurfacePoint, disc_plane};
+use super::{CIRCLE, SurfacePoint, disc_plane};
 use crate::geometry::{Plane, Roller};
-
-/// Feature of the second circle's lowest point, and the distance between features of two circles.
-pub const CIRCLE: usize = 16;
 
 /// Points whose gap is at most `reach`; `base` as in [`super::dispatch`].
 #[inline]

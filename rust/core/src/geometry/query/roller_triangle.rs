@@ -11,7 +11,8 @@
 
 use nalgebra::Vector3;
 
-use super::roller_plane::{CIRCLE, rim_points, swept};
+use super::CIRCLE;
+use super::roller_plane::{rim_points, swept};
 use super::roller_sphere::{Seen, Side};
 use super::{SurfacePoint, disc_triangle};
 use crate::geometry::Roller;

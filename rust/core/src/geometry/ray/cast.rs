@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::error::RayError;
 use super::{Hit, Ray};
 use crate::geometry::terrain::Terrain;
-use crate::geometry::terrain::sphere_field::MAX_SIZE;
+use crate::geometry::terrain::limits::MAX_SIZE;
 
 /// Rays from origins (n, 3), m, along directions (n, 3) of any length, for distances up to `range`
 /// (m, may be infinite).

@@ -8,6 +8,7 @@ pub mod disc;
 pub mod oriented_box;
 pub mod roller;
 pub mod sphere;
+pub mod support_map;
 
 use nalgebra::Vector3;
 
@@ -15,18 +16,7 @@ pub use disc::Disc;
 pub use oriented_box::OrientedBox;
 pub use roller::Roller;
 pub use sphere::Sphere;
-
-/// A convex body, represented by its support map.
-pub trait SupportMap {
-    /// The point furthest along `direction`, which need not be a unit vector.
-    fn support(&self, direction: &Vector3<f64>) -> Vector3<f64>;
-
-    /// A point inside the body, m.
-    fn centre(&self) -> Vector3<f64>;
-
-    /// Radius of a bounding ball about the centre, m.
-    fn bound(&self) -> f64;
-}
+pub use support_map::SupportMap;
 
 /// The shape of a part.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,8 +9,8 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::Vector3;
 
 use super::error::TerrainError;
+use super::limits::check_entry;
 use super::plane::Plane;
-use super::sphere_field::check_entry;
 use super::surface::{Edge, Face, Hinge, MAX_SPOKES, Vertex, Wall};
 use super::{Coverage, GROUND, Primitive, Terrain};
 use crate::geometry::broad_phase::{BallTree, Bounds, BoxTree};

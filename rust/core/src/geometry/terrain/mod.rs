@@ -4,7 +4,9 @@
 //! of a machine ([`super::query`]).
 
 pub mod error;
+mod half_space;
 pub mod height_field;
+pub mod limits;
 pub mod mesh;
 pub mod plane;
 pub mod rocks;

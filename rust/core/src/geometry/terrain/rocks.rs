@@ -18,8 +18,8 @@ use std::f64::consts::PI;
 use nalgebra::Vector3;
 
 use super::error::TerrainError;
+use super::limits::{MAX_SIZE, check_count};
 use super::plane::Plane;
-use super::sphere_field::{MAX_SIZE, check_count};
 use crate::geometry::shape::Sphere;
 use crate::scalar::elementary::{exp, hypot};
 

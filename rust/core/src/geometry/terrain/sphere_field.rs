@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::error::TerrainError;
+use super::limits::{check_count, check_entry};
 use super::plane::Plane;
 use super::rocks::Rocks;
 use super::{Coverage, GROUND, Primitive, ROCK, Terrain};
@@ -12,12 +13,6 @@ use crate::geometry::broad_phase::BallTree;
 use crate::geometry::ray::{self, Hit, Ray};
 use crate::geometry::shape::Sphere;
 use crate::scalar::elementary::{hypot, sin_cos};
-
-/// Most spheres of a field: some hundred megabytes, and a second to sort them.
-pub const MAX_SPHERES: usize = 2_000_000;
-
-/// Largest coordinate and radius of a sphere, m: a double still resolves a nanometre there.
-pub const MAX_SIZE: f64 = 1e6;
 
 /// Spheres and an optional ground plane. Immutable.
 ///
@@ -157,40 +152,6 @@ impl SphereField {
     }
 }
 
-/// Refuses more spheres than a field may have.
-pub(super) fn check_count(count: usize) -> Result<(), TerrainError> {
-    if count > MAX_SPHERES {
-        return Err(TerrainError::TooMany {
-            count,
-            limit: MAX_SPHERES,
-        });
-    }
-    Ok(())
-}
-
-pub(super) fn check_entry(
-    field: &'static str,
-    index: usize,
-    value: f64,
-) -> Result<(), TerrainError> {
-    if !value.is_finite() {
-        return Err(TerrainError::EntryNotFinite {
-            field,
-            index,
-            value,
-        });
-    }
-    if value.abs() > MAX_SIZE {
-        return Err(TerrainError::TooFar {
-            field,
-            index,
-            value,
-            limit: MAX_SIZE,
-        });
-    }
-    Ok(())
-}
-
 impl Terrain for SphereField {
     fn visit_near(
         &self,
@@ -266,6 +227,7 @@ impl Terrain for SphereField {
 
 #[cfg(test)]
 mod tests {
+    use super::super::limits::MAX_SPHERES;
     use super::*;
 
     #[test]

@@ -1,6 +1,6 @@
 //! Checks of the shapes of a solid.
 
-use super::check::{in_range, length, material, place, positive};
+use super::check_values::{in_range, length, material, place, positive};
 use super::{Shape, ShapeDescription, SolidDescription};
 use crate::multibody::error::ModelError;
 

@@ -18,32 +18,38 @@ pub struct MassProperties {
 /// Relative tolerance on the sum of the shapes' masses against the solid's mass.
 const MASS_TOLERANCE: f64 = 1e-9;
 
-/// As specified, otherwise computed from the shapes.
-pub(super) fn mass_properties(solid: &SolidDescription) -> Result<MassProperties, ModelError> {
-    let centre = Vector3::from(solid.centre_of_mass.unwrap_or_default());
-    if let Some([xx, yy, zz, xy, xz, yz]) = solid.inertia {
-        let inertia = SymmetricMatrix3 {
-            xx,
-            yy,
-            zz,
-            xy,
-            xz,
-            yz,
-        };
-        return Ok(MassProperties {
-            centre,
-            inertia: inertia.to_matrix(),
-        });
+impl SolidDescription {
+    /// Mass centre (m) and inertia about it (kg m²), in the solid's frame: as specified, otherwise
+    /// computed from its shapes.
+    ///
+    /// # Errors
+    /// The field of the solid that leaves the masses of its shapes undetermined.
+    pub fn mass_properties(&self) -> Result<MassProperties, ModelError> {
+        let centre = Vector3::from(self.centre_of_mass.unwrap_or_default());
+        if let Some([xx, yy, zz, xy, xz, yz]) = self.inertia {
+            let inertia = SymmetricMatrix3 {
+                xx,
+                yy,
+                zz,
+                xy,
+                xz,
+                yz,
+            };
+            return Ok(MassProperties {
+                centre,
+                inertia: inertia.to_matrix(),
+            });
+        }
+        if let Some(shape) = self.shape {
+            let inertia = Matrix3::from_diagonal(&shape.inertia(self.mass).into());
+            return Ok(MassProperties { centre, inertia });
+        }
+        if self.shapes.is_empty() {
+            let field = "shape".to_owned();
+            return Err(ModelError::Missing { field });
+        }
+        Ok(together(&self.shapes, &shape_masses(self)?))
     }
-    if let Some(shape) = solid.shape {
-        let inertia = Matrix3::from_diagonal(&shape.inertia(solid.mass).into());
-        return Ok(MassProperties { centre, inertia });
-    }
-    if solid.shapes.is_empty() {
-        let field = "shape".to_owned();
-        return Err(ModelError::Missing { field });
-    }
-    Ok(together(&solid.shapes, &shape_masses(solid)?))
 }
 
 /// Mass of every shape of a solid, kg.

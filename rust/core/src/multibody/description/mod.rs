@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 pub(super) mod check;
 mod check_shapes;
+pub(super) mod check_values;
 mod gallery;
 pub mod joint;
 mod masses;
@@ -15,7 +16,6 @@ use super::error::ModelError;
 use super::motor::Motor;
 pub use joint::{CouplingDescription, DriveDescription, Hold, JointKind, Limits, Spring};
 pub use masses::MassProperties;
-use masses::mass_properties;
 pub use shape::{Shape, ShapeDescription};
 
 /// The built-in rover: Table 4.1 and Fig. 4.5 of the report, in SI units.
@@ -180,8 +180,15 @@ pub struct WheelDescription {
     pub steering_limit: Option<f64>,
 }
 
-/// Largest length of a description's text, bytes: a model of
-/// [`MAX_SOLIDS`](super::model::MAX_SOLIDS) solids needs a twentieth of it.
+/// Largest number of solids in a model, and of wheels and tags. Beyond it a step takes seconds and
+/// matrices take gigabytes.
+pub const MAX_SOLIDS: usize = 1000;
+
+/// Largest total number of shapes in a model.
+pub const MAX_SHAPES: usize = 4000;
+
+/// Largest length of a description's text, bytes: a model of [`MAX_SOLIDS`] solids needs a
+/// twentieth of it.
 pub const MAX_TEXT: usize = 16 << 20;
 
 /// What a text of any format says about itself.
@@ -235,15 +242,6 @@ impl SolidDescription {
         } else {
             JointKind::Free
         })
-    }
-
-    /// Mass centre (m) and inertia about it (kg m²), in the solid's frame: as specified, otherwise
-    /// computed from its shapes.
-    ///
-    /// # Errors
-    /// The field of the solid that leaves the masses of its shapes undetermined.
-    pub fn mass_properties(&self) -> Result<MassProperties, ModelError> {
-        mass_properties(self)
     }
 
     /// Radius of the disc of a wheel with this axle, m: that of the only shape, or the largest of

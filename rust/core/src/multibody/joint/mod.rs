@@ -17,6 +17,7 @@
 //! velocities.
 
 pub mod axis;
+pub mod coordinate;
 pub mod coupled;
 pub mod fixed;
 pub mod free;
@@ -26,6 +27,7 @@ pub mod revolute;
 pub mod spherical;
 
 pub use axis::JointAxis;
+pub use coordinate::Coordinate;
 pub use coupled::Coupling;
 pub use free::{Free, Pose};
 pub use motion::Motion;
@@ -99,38 +101,5 @@ impl Joint {
     #[must_use]
     pub fn coupling(&self) -> Option<&Coupling> {
         self.coordinate().and_then(|c| c.coupling.as_ref())
-    }
-}
-
-/// Source of the single coordinate of a revolute or prismatic joint.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Coordinate {
-    /// Index of the joint in [`Configuration::joints`](super::Configuration::joints): itself, or
-    /// the joint that it follows.
-    pub joint: usize,
-    /// How it follows that joint; `None` if the coordinate is its own.
-    pub coupling: Option<Coupling>,
-}
-
-impl Coordinate {
-    /// Its value, rad or m.
-    #[inline]
-    #[must_use]
-    pub fn of(&self, joints: &[f64]) -> f64 {
-        let own = joints[self.joint];
-        self.coupling.as_ref().map_or(own, |c| c.value(own))
-    }
-
-    /// Its rate, rad/s or m/s, from its own velocity or the one that it follows.
-    #[inline]
-    #[must_use]
-    pub fn rate(&self, v: f64) -> f64 {
-        self.coupling.as_ref().map_or(v, |c| c.ratio * v)
-    }
-
-    /// Number of its own velocities.
-    #[must_use]
-    pub fn nv(&self) -> usize {
-        usize::from(self.coupling.is_none())
     }
 }

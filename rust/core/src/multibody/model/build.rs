@@ -47,18 +47,7 @@ impl Model {
         let index_of: HashMap<&str, usize> = (description.solids.iter().map(|s| s.name.as_str()))
             .zip(0..)
             .collect();
-        let mut builder = Builder {
-            n_poses: 1, // the first is the first body's, whether it is free or not
-            ..Builder::default()
-        };
-        let mut solid_of_body = Vec::new();
-        for (i, solid) in description.solids.iter().enumerate() {
-            let parent = (solid.parent.as_deref()).and_then(|p| index_of.get(p).copied());
-            let frame = builder.frame_of(i, solid, parent)?;
-            solid_of_body.resize(builder.bodies.len(), i);
-            builder.carry(solid, frame)?;
-        }
-        builder.settle_masses();
+        let (builder, solid_of_body) = Builder::with_all(&description.solids, &index_of)?;
         let Builder {
             mut bodies,
             frames,
@@ -107,11 +96,7 @@ impl Model {
         let has_slides = bodies
             .iter()
             .any(|b| matches!(b.joint, Joint::Prismatic(_)));
-        let only_turns = bodies.iter().all(|body| match &body.joint {
-            Joint::Free(_) => body.parent.is_none(),
-            Joint::Revolute(joint) => body.parent.is_some() && joint.coordinate.coupling.is_none(),
-            Joint::Fixed | Joint::Prismatic(_) | Joint::Spherical(_) => false,
-        });
+        let only_turns = bodies.iter().all(is_free_or_turns);
         let text = description.to_json().unwrap_or_default();
         Ok(Self {
             mass: bodies.iter().map(|b| b.mass).sum(),
@@ -140,7 +125,36 @@ impl Model {
     }
 }
 
+/// Whether the joint of a body is free and its root's, or revolute with a coordinate of its own.
+fn is_free_or_turns(body: &Body) -> bool {
+    match &body.joint {
+        Joint::Free(_) => body.parent.is_none(),
+        Joint::Revolute(joint) => body.parent.is_some() && joint.coordinate.coupling.is_none(),
+        Joint::Fixed | Joint::Prismatic(_) | Joint::Spherical(_) => false,
+    }
+}
+
 impl Builder {
+    /// Carries all solids; the second is the first solid of each body.
+    fn with_all(
+        solids: &[SolidDescription],
+        index_of: &HashMap<&str, usize>,
+    ) -> Result<(Self, Vec<usize>), ModelError> {
+        let mut builder = Self {
+            n_poses: 1, // the first is the first body's, whether it is free or not
+            ..Self::default()
+        };
+        let mut solid_of_body = Vec::new();
+        for (i, solid) in solids.iter().enumerate() {
+            let parent = (solid.parent.as_deref()).and_then(|p| index_of.get(p).copied());
+            let frame = builder.frame_of(i, solid, parent)?;
+            solid_of_body.resize(builder.bodies.len(), i);
+            builder.carry(solid, frame)?;
+        }
+        builder.settle_masses();
+        Ok((builder, solid_of_body))
+    }
+
     /// The frame of a solid: that of a new body, or one fixed to an existing body.
     fn frame_of(
         &mut self,

@@ -2,7 +2,7 @@
 
 use super::Model;
 use crate::multibody::description::JointKind;
-use crate::multibody::description::check::{in_range, length};
+use crate::multibody::description::check_values::{in_range, length};
 use crate::multibody::error::ModelError;
 use crate::multibody::motor::Motor;
 

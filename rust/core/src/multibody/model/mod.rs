@@ -4,6 +4,7 @@
 //! Locked (welded) and fixed joints are eliminated: the inertia of the solid is merged into the
 //! body that carries it, and the coordinate disappears from every matrix.
 
+mod body;
 mod build;
 mod edit;
 mod parts;
@@ -13,8 +14,7 @@ mod tree;
 
 use std::ops::Range;
 
-use nalgebra::{Matrix3, Vector3};
-
+pub use body::Body;
 pub use parts::{CollisionBox, CollisionSphere, Frame, Wheel};
 pub use properties::{JointProperties, Passive};
 use tree::Paths;
@@ -24,70 +24,9 @@ use super::description::check::check;
 use super::description::{Hold, ModelDescription};
 use super::error::ModelError;
 use super::joint::{Joint, free};
-use super::state::Configuration;
-
-/// Largest number of solids in a model, and of wheels and tags. Beyond it a step takes seconds and
-/// matrices take gigabytes.
-pub const MAX_SOLIDS: usize = 1000;
-
-/// Largest total number of shapes in a model.
-pub const MAX_SHAPES: usize = 4000;
 
 /// Number of velocities of a free base. Every path of its tree starts with them.
 pub const BASE: usize = free::NV;
-
-/// A moving body: one or several rigidly connected solids, carried by one joint.
-#[derive(Clone, Debug)]
-pub struct Body {
-    /// Name of its first solid and of its joint.
-    pub name: String,
-    /// Index of the body that carries it; `None` for a root.
-    pub parent: Option<usize>,
-    /// Index of its tree.
-    pub tree: usize,
-    /// Joint origin in the parent's frame, m; in the world for a root.
-    pub position: Vector3<f64>,
-    /// Fixed rotation from the joint's frame to the parent's; `None` for the identity.
-    pub rotation: Option<Matrix3<f64>>,
-    /// The joint between its parent and it.
-    pub joint: Joint,
-    /// Index of its joint's first velocity; for a coupled joint, of the velocity that it follows.
-    pub velocity: usize,
-    /// Index of its joint's first motion, and the number of motions.
-    pub motion: usize,
-    /// See [`Self::motions`].
-    pub n_motions: usize,
-    /// Whether its joint follows another joint.
-    pub is_coupled: bool,
-    /// kg.
-    pub mass: f64,
-    /// Mass centre in the body's frame, m.
-    pub centre_of_mass: Vector3<f64>,
-    /// Principal moments about the mass centre, kg m².
-    pub principal_inertia: Vector3<f64>,
-    /// Principal axes as columns, in the body's frame; `None` if they are the frame's axes.
-    pub principal_axes: Option<Matrix3<f64>>,
-    /// Whether a rotation about its own joint changes only its appearance: an axisymmetric body
-    /// that spins about its axis of symmetry and carries only wheels on the same axle. A step need
-    /// not rotate it.
-    pub is_spinner: bool,
-}
-
-impl Body {
-    /// Whether its mass centre coincides with its frame's origin.
-    #[inline]
-    #[must_use]
-    pub fn is_centred(&self) -> bool {
-        self.centre_of_mass == Vector3::zeros()
-    }
-
-    /// Its joint's motions in [`Kinematics::motions`](super::Kinematics::motions).
-    #[inline]
-    #[must_use]
-    pub fn motions(&self) -> Range<usize> {
-        self.motion..self.motion + self.n_motions
-    }
-}
 
 /// Kinematic trees. Velocities are in the order of the bodies; [`super::joint`] lists those of each
 /// joint.
@@ -371,10 +310,10 @@ impl Model {
         &self.joints
     }
 
-    /// Energy stored in all springs at a configuration, J.
+    /// Energy stored in all springs at joint coordinates (n_joints), J.
     #[must_use]
-    pub fn spring_energy(&self, q: &Configuration) -> f64 {
-        let joints = self.joints.iter().zip(&q.joints);
+    pub fn spring_energy(&self, coordinates: &[f64]) -> f64 {
+        let joints = self.joints.iter().zip(coordinates);
         joints.map(|(joint, q)| joint.passive.potential(*q)).sum()
     }
 

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::Body;
+use super::body::Body;
 use crate::multibody::joint::{Joint, Prismatic, Revolute, free};
 
 /// Bodies and velocities of a tree: one root and everything it carries.

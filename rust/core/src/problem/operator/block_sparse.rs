@@ -5,7 +5,7 @@
 //! stored as lists of `d × d` blocks (block CSR): memory and the cost of a product with `W` grow
 //! with the number of contacts, not with its square.
 
-use super::{Dimension, ProblemError};
+use crate::problem::{Dimension, ProblemError};
 
 /// One contact between two bodies, for [`BlockSparseDelassus::assemble`]. `D` components, `V`
 /// velocities a body (3 in the plane, 6 in space).

@@ -14,7 +14,7 @@ pub use body_pairs::{BodyPairs, RoundPair};
 pub(crate) use dense::dot;
 pub(crate) use storage::Storage;
 
-use super::{Dimension, FrictionContactProblem, ProblemError};
+use super::Dimension;
 use dense::multiply_add;
 
 /// The Delassus operator `W` of a problem, borrowed.

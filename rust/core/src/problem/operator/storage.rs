@@ -4,7 +4,8 @@
 //! block-sparse storage. Measured on 296 contacts with 1.6% of the blocks: the same 580 Newton
 //! steps cost a twentieth.
 
-use super::{BlockSparseDelassus, FrictionContactProblem, Operator};
+use super::{BlockSparseDelassus, Operator};
+use crate::problem::FrictionContactProblem;
 
 /// Largest fraction of nonzero blocks for sparse storage.
 const SPARSE_SHARE: f64 = 0.15;

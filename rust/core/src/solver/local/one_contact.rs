@@ -116,33 +116,64 @@ fn in_the_plane<const D: usize>(
     }
 }
 
-fn in_space<const D: usize, const STEPS: usize>(
-    W: &[[f64; D]; D],
-    q: &[f64; D],
+/// A closed contact in space without its normal impulse, which the Schur complement `Ŵ` eliminates.
+struct Tangential<'a, const D: usize> {
+    W: &'a [[f64; D]; D],
+    q: &'a [f64; D],
     mu: f64,
-    last: f64,
-    solution: &mut OneContactSolution<D>,
-) {
-    let p = &mut solution.impulse;
-    let W_NN = W[0][0];
-    let inverse = 1.0 / W_NN;
-    let mut S = [[0.0; 2]; 2];
-    let mut q_hat = [0.0; 2];
-    for r in 0..2 {
-        for c in 0..2 {
-            S[r][c] = W[r + 1][c + 1] - W[r + 1][0] * W[0][c + 1] * inverse;
+    /// `1/W_NN`.
+    inverse: f64,
+    q_hat: [f64; 2],
+    a: [f64; 2],
+    /// Of `Ŵ`.
+    trace: f64,
+    determinant: f64,
+    /// `|tr W_TT|`.
+    scale: f64,
+}
+
+impl<'a, const D: usize> Tangential<'a, D> {
+    #[inline]
+    fn of(W: &'a [[f64; D]; D], q: &'a [f64; D], mu: f64) -> Self {
+        let inverse = 1.0 / W[0][0];
+        let mut S = [[0.0; 2]; 2];
+        let mut q_hat = [0.0; 2];
+        for r in 0..2 {
+            for c in 0..2 {
+                S[r][c] = W[r + 1][c + 1] - W[r + 1][0] * W[0][c + 1] * inverse;
+            }
+            q_hat[r] = q[r + 1] - W[r + 1][0] * q[0] * inverse;
         }
-        q_hat[r] = q[r + 1] - W[r + 1][0] * q[0] * inverse;
+        Self {
+            W,
+            q,
+            mu,
+            inverse,
+            q_hat,
+            a: [
+                S[1][1] * q_hat[0] - S[0][1] * q_hat[1],
+                S[0][0] * q_hat[1] - S[1][0] * q_hat[0],
+            ],
+            trace: S[0][0] + S[1][1],
+            determinant: S[0][0] * S[1][1] - S[0][1] * S[1][0],
+            scale: (W[1][1] + W[2][2]).abs(),
+        }
     }
-    let trace = S[0][0] + S[1][1];
-    let scale = (W[1][1] + W[2][2]).abs();
-    let determinant = S[0][0] * S[1][1] - S[0][1] * S[1][0];
-    let a = [
-        S[1][1] * q_hat[0] - S[0][1] * q_hat[1],
-        S[0][0] * q_hat[1] - S[1][0] * q_hat[0],
-    ];
-    // Values at one κ: (g, dg/dκ, a + κ q̂, det).
-    let at = |kappa: f64| {
+
+    /// Values at one κ: (g, dg/dκ, a + κ q̂, det).
+    #[inline]
+    fn at(&self, kappa: f64) -> (f64, f64, [f64; 2], f64) {
+        let Self {
+            W,
+            q,
+            mu,
+            inverse,
+            q_hat,
+            a,
+            trace,
+            determinant,
+            ..
+        } = *self;
         let b = [a[0] + kappa * q_hat[0], a[1] + kappa * q_hat[1]];
         let det = (kappa + trace) * kappa + determinant;
         let norm = (b[0] * b[0] + b[1] * b[1]).sqrt();
@@ -156,54 +187,99 @@ fn in_space<const D: usize, const STEPS: usize>(
             + mu * inverse
                 * (q[0] * (2.0 * kappa + trace) - (W[0][1] * q_hat[0] + W[0][2] * q_hat[1]));
         (g, slope, b, det)
-    };
-    // A singular Schur complement leaves the stick impulse undefined: shift κ by √ε, which balances
-    // the rounding of a/det against the change of the problem. An indefinite one (from an
-    // unsymmetric W) still has a stick impulse, but slides only above the largest κ with a
-    // vanishing determinant.
-    let mut smallest = 0.0;
-    let mut stick = 0.0;
-    if trace <= 0.0 || determinant <= 1e-13 * trace * trace {
+    }
+
+    /// The smallest κ of a slide, and the κ of the stick impulse.
+    ///
+    /// A singular Schur complement leaves the stick impulse undefined: κ is shifted by √ε, which
+    /// balances the rounding of a/det against the change of the problem. An indefinite one (from an
+    /// unsymmetric W) still has a stick impulse, but slides only above the largest κ with a
+    /// vanishing determinant.
+    #[inline]
+    fn bounds(&self) -> (f64, f64) {
+        let Self {
+            trace,
+            determinant,
+            scale,
+            ..
+        } = *self;
+        let is_singular = trace <= 0.0 || determinant <= 1e-13 * trace * trace;
+        if !is_singular {
+            return (0.0, 0.0);
+        }
         let vanishing = 0.5 * ((trace * trace - 4.0 * determinant).max(0.0).sqrt() - trace);
-        smallest = vanishing.max(0.0) + 1e-8 * scale;
-        stick = if vanishing > 1e-8 * scale {
+        let smallest = vanishing.max(0.0) + 1e-8 * scale;
+        let stick = if vanishing > 1e-8 * scale {
             0.0
         } else {
             smallest
         };
+        (smallest, stick)
     }
-    let (g, _, b, det) = at(stick);
-    if det.abs() > 0.0 {
+
+    /// The impulse for `a + κ q̂` and the determinant.
+    #[inline]
+    fn impulse(&self, b: [f64; 2], det: f64, p: &mut [f64; D]) {
+        let (W, q) = (self.W, self.q);
         for k in 0..2 {
             p[k + 1] = -b[k] / det;
         }
-        p[0] = -(q[0] + W[0][1] * p[1] + W[0][2] * p[2]) * inverse;
+        p[0] = -(q[0] + W[0][1] * p[1] + W[0][2] * p[2]) * self.inverse;
+    }
+
+    /// Where the search for κ starts: the answer of an isotropic block, if it is admissible.
+    #[inline]
+    fn guess(&self, smallest: f64, beside: f64) -> f64 {
+        let Self {
+            W,
+            q,
+            mu,
+            q_hat,
+            trace,
+            ..
+        } = *self;
+        let size = (q_hat[0] * q_hat[0] + q_hat[1] * q_hat[1]).sqrt();
+        let along = W[0][1] * q_hat[0] + W[0][2] * q_hat[1];
+        let guess = (size * W[0][0] / mu - along / size) / -q[0] - 0.5 * trace;
+        if guess > smallest && guess.is_finite() {
+            guess
+        } else {
+            beside
+        }
+    }
+}
+
+fn in_space<const D: usize, const STEPS: usize>(
+    W: &[[f64; D]; D],
+    q: &[f64; D],
+    mu: f64,
+    last: f64,
+    solution: &mut OneContactSolution<D>,
+) {
+    let p = &mut solution.impulse;
+    let contact = Tangential::of(W, q, mu);
+    let (smallest, stick) = contact.bounds();
+    let (g, _, b, det) = contact.at(stick);
+    if det.abs() > 0.0 {
+        contact.impulse(b, det, p);
         // At the boundary of the cone the two tests may differ by rounding.
         if tangential_norm(p) <= mu * p[0] || (det > 0.0 && g <= 0.0 && p[0] > 0.0) {
             solution.mode = ContactMode::Stick;
             return;
         }
     }
-    let beside = (smallest + scale).max(f64::MIN_POSITIVE);
+    let beside = (smallest + contact.scale).max(f64::MIN_POSITIVE);
     let start = if last > smallest {
         last
     } else {
-        // The answer of an isotropic block is a good initial guess.
-        let size = (q_hat[0] * q_hat[0] + q_hat[1] * q_hat[1]).sqrt();
-        let along = W[0][1] * q_hat[0] + W[0][2] * q_hat[1];
-        let guess = (size * W_NN / mu - along / size) / -q[0] - 0.5 * trace;
-        if guess > smallest && guess.is_finite() {
-            guess
-        } else {
-            beside
-        }
+        contact.guess(smallest, beside)
     };
     // Without a sign change (only if W is indefinite) the contact has no solution; a damped one
     // lets the iteration continue.
-    let kappa = if smallest <= 0.0 || at(smallest).0 > 0.0 {
+    let kappa = if smallest <= 0.0 || contact.at(smallest).0 > 0.0 {
         falling_root::<STEPS>(
             |kappa| {
-                let (g, slope, _, _) = at(kappa);
+                let (g, slope, _, _) = contact.at(kappa);
                 (g, slope)
             },
             smallest,
@@ -213,14 +289,11 @@ fn in_space<const D: usize, const STEPS: usize>(
     } else {
         start
     };
-    let (_, _, b, det) = at(kappa);
+    let (_, _, b, det) = contact.at(kappa);
     solution.mode = ContactMode::Slide;
     solution.kappa = kappa;
     if det > 0.0 {
-        for k in 0..2 {
-            p[k + 1] = -b[k] / det;
-        }
-        p[0] = -(q[0] + W[0][1] * p[1] + W[0][2] * p[2]) * inverse;
+        contact.impulse(b, det, p);
         let norm = tangential_norm(p);
         if norm > 0.0 {
             // On the cone exactly.

@@ -73,6 +73,42 @@ fn project<const D: usize>(
     changes
 }
 
+/// `y = −ũ` of the start with the velocity `u`, `ũ` projected into the dual cone.
+fn begin_dual<const D: usize>(mu: &[f64], shifts: bool, u: &[f64], y: &mut [f64]) {
+    for (i, &mu) in mu.iter().enumerate() {
+        let mut shifted: [f64; D] = std::array::from_fn(|k| u[D * i + k]);
+        if shifts {
+            shifted[0] += mu * tangential_norm(&shifted);
+        }
+        let inside = SecondOrderCone::new(mu).dual().project(&shifted);
+        for k in 0..D {
+            y[D * i + k] = -inside[k];
+        }
+    }
+}
+
+/// `R z − y − q − s`, where `R` is σ times the weights.
+#[inline]
+fn right_side<const D: usize>(
+    data: &Prepared<'_>,
+    shifts: bool,
+    (sigma, weights): (f64, &[f64]),
+    z: &[f64],
+    y: &[f64],
+    out: &mut [f64],
+) {
+    for (i, (&mu, weight)) in data.mu.iter().zip(weights).enumerate() {
+        let y: [f64; D] = std::array::from_fn(|k| y[D * i + k]);
+        for k in 0..D {
+            let at = D * i + k;
+            out[at] = sigma * weight * z[at] - y[k] - data.q[at];
+        }
+        if shifts {
+            out[D * i] -= mu * tangential_norm(&y);
+        }
+    }
+}
+
 /// The law that ADMM solves: Coulomb's, or another with the same matrix and projection.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::solver) struct Law<M> {
@@ -114,17 +150,7 @@ pub(in crate::solver) fn alternate<const D: usize, M: Fn(&[f64], &[f64]) -> Resi
 ) -> (SolveStatus, Residual) {
     let mut sigma = SIGMA;
     data.W.multiply_add(p, data.q, u);
-    // y = −ũ of the start, with ũ projected into the dual cone.
-    for (i, &mu) in data.mu.iter().enumerate() {
-        let mut shifted: [f64; D] = std::array::from_fn(|k| u[D * i + k]);
-        if law.shifts {
-            shifted[0] += mu * tangential_norm(&shifted);
-        }
-        let inside = SecondOrderCone::new(mu).dual().project(&shifted);
-        for k in 0..D {
-            scratch.direction[D * i + k] = -inside[k];
-        }
-    }
+    begin_dual::<D>(data.mu, law.shifts, u, &mut scratch.direction);
     if !factorise::<D>(data, sigma, scratch) {
         return (SolveStatus::Stalled, data.measure::<D>(p, u));
     }
@@ -164,16 +190,7 @@ pub(in crate::solver) fn alternate<const D: usize, M: Fn(&[f64], &[f64]) -> Resi
             ..
         } = &mut *scratch;
         let x = system.solve_weighted::<D>(data, |rhs| {
-            for (i, (&mu, weight)) in data.mu.iter().zip(&*weights).enumerate() {
-                let y: [f64; D] = std::array::from_fn(|k| dual[D * i + k]);
-                for k in 0..D {
-                    let at = D * i + k;
-                    rhs[at] = sigma * weight * p[at] - y[k] - data.q[at];
-                }
-                if law.shifts {
-                    rhs[D * i] -= mu * tangential_norm(&y);
-                }
-            }
+            right_side::<D>(data, law.shifts, (sigma, &weights[..]), p, dual, rhs);
         });
         let [primal, dual] = project::<D>(data.mu, sigma, weights, x, dual, p);
         step += 1;

@@ -118,6 +118,62 @@ fn predict<const D: usize>(
     prediction
 }
 
+/// A few sweeps out of a cycle of modes; false if the budget does not allow them.
+fn break_cycle<const D: usize>(
+    data: &Prepared<'_>,
+    course: &mut Course,
+    p: &mut [f64],
+    scratch: &mut Scratch,
+) -> bool {
+    let prox = scratch.system.prox(course.alpha);
+    if !scratch
+        .work
+        .affords(CYCLE_SWEEPS as u64 * work::sweep(data.product, data.mu.len()))
+    {
+        return false;
+    }
+    for _ in 0..CYCLE_SWEEPS {
+        sweep::sweep::<D>(data, prox, p);
+    }
+    course.last = f64::INFINITY;
+    course.factors = Factors::None;
+    true
+}
+
+/// Moves `p` to the Newton point of the predicted modes; false if the system is singular or the
+/// budget does not allow it.
+#[inline]
+fn take_step<const D: usize>(
+    data: &Prepared<'_>,
+    course: &mut Course,
+    prediction: Prediction,
+    p: &mut [f64],
+    u: &[f64],
+    scratch: &mut Scratch,
+) -> bool {
+    if course.factors == Factors::None {
+        course.factors = scratch.system.factorise::<D>(
+            data,
+            course.alpha,
+            prediction,
+            course.allow_symmetric,
+            &mut scratch.work,
+        );
+        if course.factors == Factors::None && prediction.m > 0 {
+            return false;
+        }
+    }
+    let newton_step = NewtonStep {
+        alpha: course.alpha,
+        m: prediction.m,
+        factors: course.factors,
+        on_cone: true,
+    };
+    scratch.system.newton_point::<D>(data, newton_step, p, u);
+    p.copy_from_slice(&scratch.system.trial);
+    true
+}
+
 /// Ends without an answer and restores the best impulse.
 fn give_best(
     data: &Prepared<'_>,
@@ -193,40 +249,14 @@ pub(in crate::solver) fn full_steps<const D: usize>(
         };
         *iterations += 1;
         if prediction.changed && step > 0 && step % CYCLE == 0 {
-            let prox = scratch.system.prox(course.alpha);
-            if !scratch
-                .work
-                .affords(CYCLE_SWEEPS as u64 * work::sweep(data.product, data.mu.len()))
-            {
+            if !break_cycle::<D>(data, &mut course, p, scratch) {
                 return give_best(data, best, p, u, scratch);
             }
-            for _ in 0..CYCLE_SWEEPS {
-                sweep::sweep::<D>(data, prox, p);
-            }
-            course.last = f64::INFINITY;
-            course.factors = Factors::None;
         } else {
             course.revise(progress, prediction, SMALLEST * data.mean_diagonal);
-            if course.factors == Factors::None {
-                course.factors = scratch.system.factorise::<D>(
-                    data,
-                    course.alpha,
-                    prediction,
-                    course.allow_symmetric,
-                    &mut scratch.work,
-                );
-                if course.factors == Factors::None && prediction.m > 0 {
-                    return give_best(data, best, p, u, scratch);
-                }
+            if !take_step::<D>(data, &mut course, prediction, p, u, scratch) {
+                return give_best(data, best, p, u, scratch);
             }
-            let newton_step = NewtonStep {
-                alpha: course.alpha,
-                m: prediction.m,
-                factors: course.factors,
-                on_cone: true,
-            };
-            scratch.system.newton_point::<D>(data, newton_step, p, u);
-            p.copy_from_slice(&scratch.system.trial);
         }
         data.W.multiply_add(p, data.q, u);
         step += 1;

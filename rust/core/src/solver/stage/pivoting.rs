@@ -133,6 +133,63 @@ struct Course {
     reversals: usize,
 }
 
+impl Course {
+    /// Begins with an `α` (1/kg), a residual and a number of reversals left.
+    fn new(alpha: f64, residual: f64, reversals: usize) -> Self {
+        Self {
+            alpha,
+            factors: Factors::None,
+            slides: false,
+            last: residual,
+            freed: None,
+            visits: Visits::NONE,
+            reversals,
+        }
+    }
+
+    /// Enters a full step by its residual and its `gain`, the ratio to the residual before, and
+    /// decides whether its factors serve once more.
+    #[inline]
+    fn note(&mut self, contacts: &[Linearised], residual: f64, gain: f64, tolerance: f64) {
+        self.last = residual;
+        // Factors of a turning slide serve once more if their error then vanishes.
+        if gain > LEAST_GAIN || (self.slides && gain * residual > REUSED * tolerance) {
+            self.factors = Factors::None;
+        }
+        self.visits.enter(contacts, residual);
+    }
+
+    /// Reverses the friction of barred contacts and begins anew with `alpha`, 1/kg; false if there
+    /// is nothing to reverse.
+    fn reverse<const D: usize>(
+        &mut self,
+        data: &Prepared<'_>,
+        alpha: f64,
+        contacts: &mut [Linearised],
+        p: &mut [f64],
+        u: &mut [f64],
+    ) -> bool {
+        if self.reversals == 0 || !reverse_barred::<D>(data.mu, contacts, p, u) {
+            return false;
+        }
+        data.W.multiply_add(p, data.q, u);
+        *self = Self::new(alpha, data.measure::<D>(p, u).relative, self.reversals - 1);
+        true
+    }
+}
+
+/// Bars contact `i`, which blocks after the fraction `t` of a step, if the last full step let it
+/// stick and it leaves the cone at once; a step that moves ends all bars.
+fn bar(contacts: &mut [Linearised], i: usize, t: f64, freed: Option<usize>) {
+    if t > NO_MOVE {
+        for contact in contacts {
+            contact.is_barred = false;
+        }
+    } else if freed == Some(i) {
+        contacts[i].is_barred = true;
+    }
+}
+
 /// Updates slip directions and stiffnesses at `(p, u)` and numbers the unknowns.
 fn linearise<const D: usize>(
     mu: &[f64],
@@ -224,26 +281,15 @@ pub(in crate::solver) fn pivots<const D: usize>(
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
     data.W.multiply_add(p, data.q, u);
-    let recalled = modes::recall::<D>(data.mu, p, u, &mut scratch.system.contacts);
+    let Prediction { slides, .. } = modes::recall::<D>(data.mu, p, u, &mut scratch.system.contacts);
     let mut residual = data.measure::<D>(p, u);
     scratch.history.note(*iterations, residual);
     if options.accepts(residual) {
         return (SolveStatus::Converged, residual);
     }
-    let alpha = match alpha {
-        Some(alpha) => alpha,
-        None if recalled.slides => ALPHA,
-        None => STICKING_ALPHA,
-    };
-    let mut course = Course {
-        alpha: alpha * data.mean_diagonal,
-        factors: Factors::None,
-        slides: false,
-        last: residual.relative,
-        freed: None,
-        visits: Visits::NONE,
-        reversals: REVERSALS,
-    };
+    let usual = if slides { ALPHA } else { STICKING_ALPHA };
+    let alpha = alpha.unwrap_or(usual) * data.mean_diagonal;
+    let mut course = Course::new(alpha, residual.relative, REVERSALS);
     for _ in 0..MAX_PIVOTS.min(options.max_newton_steps) {
         *iterations += 1;
         let reused = course.factors != Factors::None;
@@ -254,13 +300,7 @@ pub(in crate::solver) fn pivots<const D: usize>(
         let block = ratio_test::<D>(data.mu, contacts, p, &scratch.system.trial);
         let freed = course.freed.take();
         if let Some((i, mode)) = block.contact {
-            if block.t > NO_MOVE {
-                for contact in contacts {
-                    contact.is_barred = false;
-                }
-            } else if freed == Some(i) {
-                contacts[i].is_barred = true;
-            }
+            bar(contacts, i, block.t, freed);
             stop_at::<D>(data, block.t, (i, mode), p, u, scratch);
             course.factors = Factors::None;
             data.W.multiply_add(p, data.q, u);
@@ -277,18 +317,13 @@ pub(in crate::solver) fn pivots<const D: usize>(
             return (SolveStatus::NonFinite, residual);
         }
         let gain = residual.relative / course.last;
-        course.last = residual.relative;
-        if gain > LEAST_GAIN {
-            if residual.relative < ROUNDING_ASKED && data.is_within_rounding::<D>(p, u) {
-                return (SolveStatus::Converged, residual);
-            }
-            course.factors = Factors::None;
+        if gain > LEAST_GAIN
+            && residual.relative < ROUNDING_ASKED
+            && data.is_within_rounding::<D>(p, u)
+        {
+            return (SolveStatus::Converged, residual);
         }
-        // Factors of a turning slide serve once more if their error then vanishes.
-        if course.slides && gain * residual.relative > REUSED * options.tolerance {
-            course.factors = Factors::None;
-        }
-        course.visits.enter(contacts, residual.relative);
+        course.note(contacts, residual.relative, gain, options.tolerance);
         if gain < HOLD {
             continue;
         }
@@ -298,16 +333,7 @@ pub(in crate::solver) fn pivots<const D: usize>(
             course.alpha = (ALPHA_SHRINK * course.alpha).max(SMALLEST_ALPHA * data.mean_diagonal);
         }
         if course.visits.idle > PATIENCE || (gain > LEAST_GAIN && next.is_none()) {
-            if course.reversals > 0 && reverse_barred::<D>(data.mu, contacts, p, u) {
-                course.reversals -= 1;
-                data.W.multiply_add(p, data.q, u);
-                course = Course {
-                    alpha: alpha * data.mean_diagonal,
-                    factors: Factors::None,
-                    last: data.measure::<D>(p, u).relative,
-                    visits: Visits::NONE,
-                    ..course
-                };
+            if course.reverse::<D>(data, alpha, contacts, p, u) {
                 continue;
             }
             if course.visits.idle > PATIENCE {

@@ -97,6 +97,41 @@ impl Course {
         begins
     }
 
+    /// The next problem: a sprint with the `target` for `α`, or a proximal step. `last`: residual
+    /// of the last step; `asked`: the one required with the smallest `α`.
+    fn task(&self, sprints: bool, target: f64, last: f64, asked: f64) -> Task {
+        if sprints {
+            return Task {
+                alpha: target,
+                tolerance: 1e-2 * asked,
+                exact: false,
+                steps: SPRINT,
+            };
+        }
+        let coarse = self.alpha > target;
+        let tolerance = if coarse {
+            LOOSE.min(1e-2 * last)
+        } else {
+            1e-2 * asked
+        };
+        Task {
+            alpha: self.alpha,
+            tolerance,
+            exact: true,
+            steps: INNER_STEPS,
+        }
+    }
+
+    /// Reduces `α` along Tikhonov's path after a success; false if the path has ended.
+    fn follow_path(&mut self, target: f64) -> bool {
+        let follows = self.follows_path && self.alpha > target;
+        if follows {
+            self.proved = self.alpha;
+            self.alpha = (self.alpha * PATH_SHRINK).max(target);
+        }
+        follows
+    }
+
     fn succeed(&mut self, slow: bool, steps: usize, smallest: f64) {
         self.follows_path = false;
         self.failures = 0;
@@ -145,6 +180,17 @@ struct Task {
     exact: bool,
     /// Most Newton steps.
     steps: usize,
+}
+
+/// Accepts the answer of a sprint that gained enough; otherwise goes back to the accepted one.
+fn end_sprint(course: &mut Course, gained: bool, p: &mut [f64], scratch: &mut Scratch) {
+    if gained {
+        scratch.accepted.copy_from_slice(p);
+    } else {
+        p.copy_from_slice(&scratch.accepted);
+        course.sprint_wait *= 2;
+    }
+    scratch.system.centre.copy_from_slice(p);
 }
 
 /// Backtracks from `scratch.system.trial` towards `(p, u)` until the natural map falls; `false`,
@@ -299,29 +345,10 @@ pub(in crate::solver) fn solve<const D: usize>(
     let mut status = SolveStatus::MaxIterations;
     while *iterations < limit && !scratch.work.is_exhausted {
         let sprints = course.begins_sprint();
-        let task = if sprints {
-            let tolerance = 1e-2 * asked;
+        if sprints {
             scratch.system.centre.copy_from_slice(p);
-            Task {
-                alpha: target,
-                tolerance,
-                exact: false,
-                steps: SPRINT,
-            }
-        } else {
-            let coarse = course.alpha > target;
-            let tolerance = if coarse {
-                LOOSE.min(1e-2 * last)
-            } else {
-                1e-2 * asked
-            };
-            Task {
-                alpha: course.alpha,
-                tolerance,
-                exact: true,
-                steps: INNER_STEPS,
-            }
-        };
+        }
+        let task = course.task(sprints, target, last, asked);
         let before = *iterations;
         let solved = descend::<D>(data, task, p, u, scratch, iterations);
         // Count a round even if its start was its answer, so that the search ends.
@@ -341,22 +368,16 @@ pub(in crate::solver) fn solve<const D: usize>(
             scratch.best.copy_from_slice(p);
         }
         if sprints {
-            if residual.relative < SLOW * last {
+            let gained = residual.relative < SLOW * last;
+            if gained {
                 last = residual.relative;
-                scratch.accepted.copy_from_slice(p);
-            } else {
-                p.copy_from_slice(&scratch.accepted);
-                course.sprint_wait *= 2;
             }
-            scratch.system.centre.copy_from_slice(p);
+            end_sprint(&mut course, gained, p, scratch);
         } else if solved {
             scratch.accepted.copy_from_slice(p);
             let slow = residual.relative > SLOW * last;
             last = residual.relative;
-            if course.follows_path && course.alpha > target {
-                course.proved = course.alpha;
-                course.alpha = (course.alpha * PATH_SHRINK).max(target);
-            } else {
+            if !course.follow_path(target) {
                 scratch.system.centre.copy_from_slice(p);
                 course.succeed(slow, *iterations - before, SMALLEST * data.mean_diagonal);
             }

@@ -95,7 +95,7 @@ impl<'a> Ladder<'a> {
 
     /// Ends with the best answer and the reason of the last stage. `u` is `W p + q` on return.
     fn give_nearest<const D: usize>(
-        self,
+        &self,
         data: &Prepared<'_>,
         p: &mut [f64],
         u: &mut [f64],
@@ -121,6 +121,97 @@ impl<'a> Ladder<'a> {
     }
 }
 
+/// Many contacts: sweeps, then islands. The sweeps' answer becomes the start.
+fn sweep_many<const D: usize>(
+    data: &Prepared<'_>,
+    ladder: &mut Ladder<'_>,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &mut Scratch,
+    islands: IslandSolver<'_>,
+    iterations: &mut usize,
+) -> Option<Outcome> {
+    let options = ladder.options;
+    let budget = SweepBudget {
+        sweeps: sweep_budget(data),
+        predict: true,
+    };
+    let found = gauss_seidel::sweeps::<D>(data, options, budget, p, u, scratch, iterations);
+    if let Some(outcome) = ladder.enter(Stage::Sweeps, found, p, scratch, *iterations) {
+        return Some(outcome);
+    }
+    if found.0 == SolveStatus::NonFinite {
+        return Some(ladder.give_nearest::<D>(data, p, u, scratch));
+    }
+    let work = &mut scratch.work;
+    if let Some((method, status, residual)) =
+        islands::solve::<D>(data, options, p, u, work, islands, iterations)
+    {
+        let (stage, found) = (Stage::Islands, (status, residual));
+        scratch.history.note(*iterations, residual);
+        let entered = ladder.enter_as(method, stage, found, p, scratch, *iterations);
+        if let Some(outcome) = entered {
+            return Some(outcome);
+        }
+    }
+    scratch.start.copy_from_slice(p);
+    None
+}
+
+/// Few contacts with a warm start: pivoting from it, with larger `α`, and from its loads alone. The
+/// next stage starts from zero.
+fn pivot_from_start<const D: usize>(
+    data: &Prepared<'_>,
+    ladder: &mut Ladder<'_>,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &mut Scratch,
+    iterations: &mut usize,
+) -> Option<Outcome> {
+    let options = ladder.options;
+    let found = pivoting::pivots::<D>(data, options, None, p, u, scratch, iterations);
+    if let Some(outcome) = ladder.enter(Stage::Pivoting, found, p, scratch, *iterations) {
+        return Some(outcome);
+    }
+    let found = pivoting::further_pivots::<D>(data, options, p, u, scratch, iterations);
+    if let Some(outcome) = ladder.enter(Stage::Pivoting, found, p, scratch, *iterations) {
+        return Some(outcome);
+    }
+    // Friction may point to modes that lead nowhere: the next path starts from the loads alone.
+    for (p, start) in p.chunks_exact_mut(D).zip(scratch.start.chunks_exact(D)) {
+        p.fill(0.0);
+        p[0] = start[0];
+    }
+    let found = pivoting::pivots::<D>(data, options, None, p, u, scratch, iterations);
+    if let Some(outcome) = ladder.enter(Stage::Pivoting, found, p, scratch, *iterations) {
+        return Some(outcome);
+    }
+    // A warm start may mislead; zero does not.
+    p.fill(0.0);
+    None
+}
+
+/// Few contacts without a warm start. The next stage starts from zero.
+fn guide_from_rest<const D: usize>(
+    data: &Prepared<'_>,
+    ladder: &mut Ladder<'_>,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &mut Scratch,
+    iterations: &mut usize,
+) -> Option<Outcome> {
+    let options = ladder.options;
+    let found = match guided::solve::<D>(data, options, p, u, scratch, iterations) {
+        Some(residual) => (SolveStatus::Converged, residual),
+        None => (SolveStatus::Stalled, Residual::UNSOLVED),
+    };
+    if let Some(outcome) = ladder.enter(Stage::GuidedNewton, found, p, scratch, *iterations) {
+        return Some(outcome);
+    }
+    p.fill(0.0);
+    None
+}
+
 /// [`Method::Auto`]: cheap stages first, robust ones last.
 pub(in crate::solver) fn escalate<const D: usize>(
     data: &Prepared<'_>,
@@ -136,59 +227,17 @@ pub(in crate::solver) fn escalate<const D: usize>(
     let steps = newton::FULL_STEPS.min(options.max_newton_steps);
     let is_few = data.mu.len() <= options.direct_contacts;
     let is_warm = p.iter().any(|x| x.abs() > 0.0);
-    if !is_few {
-        let budget = SweepBudget {
-            sweeps: sweep_budget(data),
-            predict: true,
-        };
-        let found = gauss_seidel::sweeps::<D>(data, options, budget, p, u, scratch, iterations);
-        if let Some(outcome) = ladder.enter(Stage::Sweeps, found, p, scratch, *iterations) {
-            return outcome;
-        }
-        if found.0 == SolveStatus::NonFinite {
-            return ladder.give_nearest::<D>(data, p, u, scratch);
-        }
-        let work = &mut scratch.work;
-        if let Some((method, status, residual)) =
-            islands::solve::<D>(data, options, p, u, work, islands, iterations)
-        {
-            let (stage, found) = (Stage::Islands, (status, residual));
-            scratch.history.note(*iterations, residual);
-            let entered = ladder.enter_as(method, stage, found, p, scratch, *iterations);
-            if let Some(outcome) = entered {
-                return outcome;
-            }
-        }
-        scratch.start.copy_from_slice(p);
+    let found = if !is_few {
+        sweep_many::<D>(data, &mut ladder, p, u, scratch, islands, iterations)
     } else if is_warm {
-        let found = pivoting::pivots::<D>(data, options, None, p, u, scratch, iterations);
-        if let Some(outcome) = ladder.enter(Stage::Pivoting, found, p, scratch, *iterations) {
-            return outcome;
-        }
-        let found = pivoting::further_pivots::<D>(data, options, p, u, scratch, iterations);
-        if let Some(outcome) = ladder.enter(Stage::Pivoting, found, p, scratch, *iterations) {
-            return outcome;
-        }
-        // Friction may point to modes that lead nowhere: the next path starts from the loads alone.
-        for (p, start) in p.chunks_exact_mut(D).zip(scratch.start.chunks_exact(D)) {
-            p.fill(0.0);
-            p[0] = start[0];
-        }
-        let found = pivoting::pivots::<D>(data, options, None, p, u, scratch, iterations);
-        if let Some(outcome) = ladder.enter(Stage::Pivoting, found, p, scratch, *iterations) {
-            return outcome;
-        }
-        // A warm start may mislead; zero does not.
-        p.fill(0.0);
+        pivot_from_start::<D>(data, &mut ladder, p, u, scratch, iterations)
     } else if data.q.chunks_exact(D).any(|q| q[0] < 0.0) {
-        let found = match guided::solve::<D>(data, options, p, u, scratch, iterations) {
-            Some(residual) => (SolveStatus::Converged, residual),
-            None => (SolveStatus::Stalled, Residual::UNSOLVED),
-        };
-        if let Some(outcome) = ladder.enter(Stage::GuidedNewton, found, p, scratch, *iterations) {
-            return outcome;
-        }
-        p.fill(0.0);
+        guide_from_rest::<D>(data, &mut ladder, p, u, scratch, iterations)
+    } else {
+        None
+    };
+    if let Some(outcome) = found {
+        return outcome;
     }
     let found = newton::full_steps::<D>(data, options, steps, p, u, scratch, iterations);
     if let Some(outcome) = ladder.enter(Stage::Newton, found, p, scratch, *iterations) {

@@ -8,8 +8,8 @@
 //!   without overlap, from a seed;
 //! - [`cohesion`]: an attraction of contacts;
 //! - [`grid`]: the search for neighbours; [`contact`]: a contact and its key;
-//! - [`system`]: grains as a mechanical system for [`crate::integrator`]; `detection`: its
-//!   contacts; `measures`: energy, momentum, overlap;
+//! - [`system`]: grains as a mechanical system for [`crate::integrator`]; `search` and `detection`:
+//!   its contacts; `measures`: energy, momentum, overlap;
 //! - [`sleep`]: leaves out grains that rest far from anything that moves; [`removal`]: takes grains
 //!   out and renumbers the others.
 //!
@@ -25,7 +25,7 @@
 pub mod bodies;
 pub mod cohesion;
 pub mod contact;
-pub(in crate::system) mod detection;
+mod detection;
 pub mod error;
 pub mod grid;
 pub mod machine;
@@ -33,6 +33,7 @@ mod measures;
 pub mod packing;
 pub mod removal;
 pub mod scene;
+pub(in crate::system) mod search;
 mod slabs;
 pub mod sleep;
 pub mod system;

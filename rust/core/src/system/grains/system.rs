@@ -7,10 +7,10 @@ use nalgebra::SVector;
 
 use super::bodies::COORDINATES;
 use super::contact::{GrainContact, GrainKey, WALL};
-use super::detection::{Neighbour, Search};
 use super::grid::Grid;
 use super::machine::{Machine, MachineParts};
 use super::scene::GrainScene;
+use super::search::{Neighbour, Search};
 use super::slabs::Slabs;
 use crate::contact::Activation;
 use crate::geometry::Facing;

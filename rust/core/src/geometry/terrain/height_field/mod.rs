@@ -10,19 +10,18 @@
 //! along z, 4 the diagonal, 5 the vertex. Faces are computed when they are needed, so the map costs
 //! four bytes a height, and a hundredth of that for the bounds of tiles.
 
-use std::cell::Cell;
+mod terrain;
+
 use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use super::Primitive;
 use super::error::TerrainError;
+use super::limits::MAX_SIZE;
 use super::plane::Plane;
-use super::sphere_field::MAX_SIZE;
 use super::surface::{Edge, Face, Hinge, MAX_SPOKES, Vertex};
 use super::tiles::{Tile, Tiles};
-use super::{Coverage, GROUND, Primitive, Terrain};
-use crate::geometry::ray::{self, Hit, Ray};
-use crate::geometry::shape::Sphere;
 
 /// Pieces that belong to one corner.
 const PIECES: u32 = 6;
@@ -521,185 +520,6 @@ fn narrow(index: usize) -> isize {
 fn index(x: f64) -> usize {
     x as usize
 }
-
-impl Terrain for HeightField {
-    fn visit_spheres(&self, _: &Vector3<f64>, _: f64, _: &mut dyn FnMut(u32, &Sphere)) {}
-
-    fn visit_near(
-        &self,
-        centre: &Vector3<f64>,
-        reach: f64,
-        visit: &mut dyn FnMut(u32, &Primitive),
-    ) {
-        self.visit_above(centre, reach, f64::NEG_INFINITY, visit);
-    }
-
-    fn visit_above(
-        &self,
-        centre: &Vector3<f64>,
-        reach: f64,
-        floor: f64,
-        visit: &mut dyn FnMut(u32, &Primitive),
-    ) {
-        let columns = self.columns;
-        self.visit_cells_above(centre, reach, floor, |i, j| {
-            let own = [narrow(i), narrow(j)];
-            let first = number(j * columns + i);
-            let around = self.normals_around(own);
-            let hinges = self.hinges(own, &around);
-            for (k, half) in [(0, Half::Low), (1, Half::High)] {
-                if let Some(face) = self.face(own, half, &around, &hinges) {
-                    visit(first + k, &Primitive::Face(face));
-                }
-            }
-            for (k, hinge) in (2..5).zip(&hinges) {
-                let is_convex = hinge.as_ref().is_some_and(|hinge| hinge.is_convex);
-                if let Some(edge) = is_convex.then(|| self.edge(own, k, &around)).flatten() {
-                    visit(first + k, &Primitive::Edge(edge));
-                }
-            }
-            if let Some(vertex) = self.vertex(own) {
-                visit(first + 5, &Primitive::Vertex(vertex));
-            }
-        });
-    }
-
-    fn level_near(&self, centre: &Vector3<f64>, radius: f64) -> Option<Plane> {
-        let [columns, rows] = self.span(centre, radius);
-        let first = self.heights[rows[0] * self.columns + columns[0]];
-        for j in rows[0]..=rows[1] + 1 {
-            let row = &self.heights[j * self.columns..][columns[0]..=columns[1] + 1];
-            if row.iter().any(|h| h.to_bits() != first.to_bits()) {
-                return None;
-            }
-        }
-        let normal = self.normal([columns[0], rows[0]].map(narrow), Half::Low)?;
-        let place = self.point([columns[0], rows[0]].map(narrow));
-        Some(Plane::through(&place, normal))
-    }
-
-    fn can_be_passed(&self) -> bool {
-        false
-    }
-
-    fn has_surface(&self) -> bool {
-        true
-    }
-
-    fn primitive(&self, id: u32) -> Primitive {
-        let corner = (id / PIECES) as usize;
-        let place = [narrow(corner % self.columns), narrow(corner / self.columns)];
-        let piece = self.piece(place, id % PIECES);
-        piece.unwrap_or_else(|| unreachable!("invariant: piece {id} was visited"))
-    }
-
-    fn material(&self, _id: u32) -> &str {
-        self.material.as_deref().unwrap_or(GROUND)
-    }
-
-    fn n_primitives(&self) -> u32 {
-        number(self.heights.len())
-    }
-
-    fn is_inside(&self, _id: u32, point: &Vector3<f64>) -> bool {
-        let surface = self.height(point.x, point.z);
-        surface.is_some_and(|y| point.y <= y + SURFACE)
-    }
-
-    fn furthest(&self, n: &Vector3<f64>, centre: &Vector3<f64>, radius: f64) -> f64 {
-        let [columns, rows] = self.span(centre, radius);
-        let start = n.x * self.origin[0] + n.z * self.origin[1];
-        let [along, across] = [n.x * self.spacing[0], n.z * self.spacing[1]];
-        let level = |i: usize, j: usize| start + along * i as f64 + across * j as f64;
-        let furthest = Cell::new(f64::NEG_INFINITY);
-        self.tiles.visit(
-            columns,
-            rows,
-            |tile| {
-                let [w, h] = tile.size.map(|size| size as f64);
-                let rise = (along * w).max(0.0) + (across * h).max(0.0);
-                let [i, j] = tile.first;
-                level(i, j) + rise + n.y * f64::from(tile.highest) > furthest.get()
-            },
-            |[i, j]| {
-                let at = j * self.columns + i;
-                let here = level(i, j);
-                let corners = [
-                    (0, 0.0),
-                    (1, along),
-                    (self.columns, across),
-                    (self.columns + 1, along + across),
-                ];
-                let own =
-                    corners.map(|(k, rise)| here + rise + n.y * f64::from(self.heights[at + k]));
-                furthest.set(own.into_iter().fold(furthest.get(), f64::max));
-            },
-        );
-        furthest.get()
-    }
-
-    fn coverage(&self, centre: &Vector3<f64>, radius: f64) -> Coverage {
-        let [x, z] = [centre.x, centre.z];
-        let mut range = [[0; 2]; 2];
-        for (axis, (x, n)) in [(x, self.columns), (z, self.rows)].into_iter().enumerate() {
-            let local = (x - self.origin[axis]) / self.spacing[axis];
-            let half = radius / self.spacing[axis];
-            let last = (n - 1) as f64;
-            let (low, high) = (local - half, local + half);
-            if !(low >= 0.0 && high <= last) {
-                return Coverage::Unknown([centre.x, centre.z]);
-            }
-            range[axis] = [index(low.floor()), index(high.floor().min(last - 1.0))];
-        }
-        if !self.tiles.has_hole() {
-            return Coverage::Known;
-        }
-        let mut hole = None;
-        self.tiles.visit(
-            range[0],
-            range[1],
-            |tile| tile.has_hole,
-            |[i, j]| {
-                for corner in [[i, j], [i + 1, j], [i, j + 1], [i + 1, j + 1]] {
-                    let place = corner.map(narrow);
-                    if self.corner(place).is_nan() {
-                        let [i, j] = corner.map(|k| k as f64);
-                        hole = Some([
-                            self.origin[0] + i * self.spacing[0],
-                            self.origin[1] + j * self.spacing[1],
-                        ]);
-                    }
-                }
-            },
-        );
-        hole.map_or(Coverage::Known, Coverage::Unknown)
-    }
-
-    fn first_hit(&self, ray: &Ray, reach: f64) -> Option<Hit> {
-        ray::height_field::hit(ray, self, reach)
-    }
-
-    fn height(&self, x: f64, z: f64) -> Option<f64> {
-        let ([i, j], [u, v]) = self.cell_at(x, z)?;
-        let [i, j] = [narrow(i), narrow(j)];
-        let (a, d) = (self.corner([i, j]), self.corner([i + 1, j + 1]));
-        let y = if u >= v {
-            let b = self.corner([i + 1, j]);
-            a + u * (b - a) + v * (d - b)
-        } else {
-            let c = self.corner([i, j + 1]);
-            a + u * (d - c) + v * (c - a)
-        };
-        y.is_finite().then_some(y)
-    }
-
-    fn ground(&self) -> Option<&Plane> {
-        None
-    }
-}
-
-/// How far above the surface a point that is in the ground may seem to be by rounding, m.
-const SURFACE: f64 = 1e-9;
 
 /// Number of the first piece of a corner.
 #[inline]

@@ -1,0 +1,38 @@
+//! The interface of a time-stepping scheme.
+
+use super::error::StepError;
+use super::mechanical_system::{KeyOf, MechanicalSystem};
+use super::options::StepOptions;
+use super::probe::Probe;
+use super::report::StepReport;
+use super::scratch::ScratchOf;
+use super::warm_start::WarmStart;
+
+/// The state that a step advances.
+#[derive(Debug)]
+pub struct StateMut<'a, Q> {
+    /// Configuration.
+    pub configuration: &'a mut Q,
+    /// Velocity (nv).
+    pub v: &'a mut [f64],
+    /// s.
+    pub time: &'a mut f64,
+}
+
+/// A time-stepping scheme for systems `S`.
+pub trait Integrator<S: MechanicalSystem> {
+    /// Takes one step, or leaves `state` and `warm_start` as they were.
+    ///
+    /// # Errors
+    /// `NonFinite` or `SingularMassMatrix`. A solver that did not converge is not an error; the
+    /// report says so.
+    fn step(
+        &self,
+        system: &mut S,
+        options: &StepOptions,
+        state: StateMut<'_, S::Configuration>,
+        warm_start: &mut WarmStart<KeyOf<S>>,
+        scratch: &mut ScratchOf<S>,
+        probe: &mut dyn Probe,
+    ) -> Result<StepReport, StepError>;
+}

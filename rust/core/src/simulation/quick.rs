@@ -1,0 +1,34 @@
+//! Scratch of a rover's ordinary steps: a block of one lane.
+
+use crate::lanes::problem::ContactProblem;
+use crate::lanes::step::Block;
+
+/// A block of one lane, made when first needed. It holds no state: a copy has none.
+#[derive(Default)]
+pub(super) struct Quick {
+    pub(super) block: Option<Box<Block<f64>>>,
+    pub(super) problem: Box<[ContactProblem; 1]>,
+    pub(super) gap_problem: Box<[ContactProblem; 1]>,
+    /// Whether the last step was taken here.
+    pub(super) is_last: bool,
+}
+
+impl Clone for Quick {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl std::fmt::Debug for Quick {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Quick").finish_non_exhaustive()
+    }
+}
+
+impl Quick {
+    /// The problem of the last step taken here, and its block.
+    pub(super) fn last(&self) -> Option<(&Block<f64>, &ContactProblem)> {
+        let block = self.block.as_deref().filter(|_| self.is_last)?;
+        Some((block, &self.problem[0]))
+    }
+}

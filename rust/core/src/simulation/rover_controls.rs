@@ -1,0 +1,246 @@
+//! Controls of a rover: wheel torques, steering, held joints, brakes.
+
+use super::error::CommandError;
+use super::rover::RoverSimulation;
+use super::rover_command::check;
+use crate::system::{Command, HeldJoint};
+
+impl RoverSimulation {
+    /// Commanded driving torque of each wheel, positive forward, within its limit (N m).
+    #[must_use]
+    pub fn wheel_torques(&self) -> &[f64] {
+        &self.command.wheel_torque
+    }
+
+    /// Sets the driving torques (N m, positive forward); each saturates at its wheel's limit.
+    ///
+    /// # Errors
+    /// Wrong length or an entry that is not finite; nothing is changed then.
+    pub fn set_wheel_torques(&mut self, torques: &[f64]) -> Result<(), CommandError> {
+        check("torques", torques, self.scene.model.wheels().len())?;
+        self.take_wheel_torques(torques);
+        Ok(())
+    }
+
+    fn take_wheel_torques(&mut self, torques: &[f64]) {
+        let wheels = self.scene.model.wheels().iter();
+        let own = self.command.wheel_torque.iter_mut();
+        for ((own, torque), wheel) in own.zip(torques).zip(wheels) {
+            *own = torque.clamp(-wheel.torque_limit, wheel.torque_limit);
+        }
+        self.combine_torques();
+    }
+
+    /// Sets torques about the joint axes (n_joints, N m).
+    ///
+    /// A joint with a drive saturates at its limit and on its motor's line. At all others the
+    /// torque is additional to the wheels' and has no limit.
+    ///
+    /// # Errors
+    /// Wrong length or an entry that is not finite; nothing is changed then.
+    pub fn set_joint_torques(&mut self, torques: &[f64]) -> Result<(), CommandError> {
+        check("torques", torques, self.scene.model.n_joints())?;
+        let own = self.command.joint_torque.iter_mut().zip(torques);
+        for ((own, torque), joint) in own.zip(self.scene.model.joints()) {
+            let limit = joint
+                .drive
+                .map_or(f64::INFINITY, |drive| drive.torque_limit);
+            *own = torque.clamp(-limit, limit);
+        }
+        self.combine_torques();
+        Ok(())
+    }
+
+    fn combine_torques(&mut self) {
+        self.command
+            .actuators
+            .torque
+            .copy_from_slice(&self.command.joint_torque);
+        for drive in self.command.actuators.drives.iter_mut().flatten() {
+            drive.torque = 0.0;
+        }
+        let Command { torque, drives, .. } = &mut self.command.actuators;
+        for ((torque, drive), joint) in torque.iter_mut().zip(drives).zip(self.scene.model.joints())
+        {
+            if let (Some(drive), Some(_)) = (drive, joint.drive) {
+                drive.torque = std::mem::take(torque);
+            }
+        }
+        for (wheel, torque) in self
+            .scene
+            .model
+            .wheels()
+            .iter()
+            .zip(&self.command.wheel_torque)
+        {
+            if let Some(drive) = wheel
+                .joint
+                .and_then(|j| self.command.actuators.drives[j].as_mut())
+            {
+                drive.torque += wheel.drive_sign * torque;
+            }
+        }
+    }
+
+    /// Steering set-point of each wheel, rad; 0 where its steering is not held or is locked.
+    #[must_use]
+    pub fn steering(&self) -> Vec<f64> {
+        let of = |j: usize| self.command.actuators.held[j].map_or(0.0, |h| h.set_point);
+        self.model()
+            .wheels()
+            .iter()
+            .map(|w| w.steering.map_or(0.0, of))
+            .collect()
+    }
+
+    /// Holds the steering joints at set-points (rad, one a wheel) with the model's gains.
+    ///
+    /// # Errors
+    /// Wrong length, not finite, beyond the wheel's limit, or nonzero where
+    /// there is no free steering joint.
+    pub fn set_steering(&mut self, set_points: &[f64]) -> Result<(), CommandError> {
+        self.check_steering(set_points)?;
+        self.take_steering(set_points);
+        Ok(())
+    }
+
+    fn take_steering(&mut self, set_points: &[f64]) {
+        for (&set_point, wheel) in set_points.iter().zip(self.scene.model.wheels()) {
+            if let Some(j) = wheel.steering {
+                let hold = self.scene.model.hold(j);
+                let held = self.command.actuators.held[j];
+                let (stiffness, damping) =
+                    held.map_or((hold.stiffness, hold.damping), |h| (h.stiffness, h.damping));
+                self.command.actuators.held[j] = Some(HeldJoint {
+                    set_point,
+                    stiffness,
+                    damping,
+                });
+            }
+        }
+    }
+
+    fn check_steering(&self, set_points: &[f64]) -> Result<(), CommandError> {
+        check("set_points", set_points, self.scene.model.wheels().len())?;
+        for (index, (&value, wheel)) in set_points.iter().zip(self.scene.model.wheels()).enumerate()
+        {
+            let limit = if wheel.steering.is_some() {
+                wheel.steering_limit
+            } else {
+                0.0
+            };
+            if value.abs() > limit * (1.0 + 1e-12) {
+                return Err(CommandError::BeyondLimit {
+                    field: "set_points",
+                    index,
+                    value,
+                    limit,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// [`Self::set_wheel_torques`] and [`Self::set_steering`] in one: both or neither.
+    ///
+    /// # Errors
+    /// As these two; nothing is changed then.
+    pub fn set_commands(
+        &mut self,
+        torques: &[f64],
+        set_points: &[f64],
+    ) -> Result<(), CommandError> {
+        self.check_commands(torques, set_points)?;
+        self.take_commands(torques, set_points);
+        Ok(())
+    }
+
+    /// [`Self::set_commands`] after [`Self::check_commands`].
+    pub(super) fn take_commands(&mut self, torques: &[f64], set_points: &[f64]) {
+        self.take_wheel_torques(torques);
+        self.take_steering(set_points);
+    }
+
+    /// Checks whether [`Self::set_wheel_torques`] and [`Self::set_steering`] would accept these.
+    ///
+    /// # Errors
+    /// As these two.
+    pub fn check_commands(&self, torques: &[f64], set_points: &[f64]) -> Result<(), CommandError> {
+        check("torques", torques, self.scene.model.wheels().len())?;
+        self.check_steering(set_points)
+    }
+
+    /// Holds joints by name; set-points default to the current positions, gains to the model's.
+    ///
+    /// # Errors
+    /// An unknown joint, a wrong number of set-points, a gain that is
+    /// negative or not finite; nothing is changed then.
+    pub fn hold(
+        &mut self,
+        joints: &[String],
+        set_points: Option<&[f64]>,
+        stiffness: Option<f64>,
+        damping: Option<f64>,
+    ) -> Result<(), CommandError> {
+        let indices = self.joint_indices(joints)?;
+        if let Some(points) = set_points {
+            check("set_points", points, joints.len())?;
+        }
+        for (field, gain) in [("stiffness", stiffness), ("damping", damping)] {
+            if let Some(value) = gain {
+                check(field, &[value], 1)?;
+                if value < 0.0 {
+                    return Err(CommandError::Negative { field, value });
+                }
+            }
+        }
+        for (i, &j) in indices.iter().enumerate() {
+            let hold = self.scene.model.hold(j);
+            self.command.actuators.held[j] = Some(HeldJoint {
+                set_point: set_points.map_or(self.state.configuration.joints[j], |p| p[i]),
+                stiffness: stiffness.unwrap_or(hold.stiffness),
+                damping: damping.unwrap_or(hold.damping),
+            });
+        }
+        Ok(())
+    }
+
+    /// Releases joints by name.
+    ///
+    /// # Errors
+    /// An unknown joint; nothing is changed then.
+    pub fn release(&mut self, joints: &[String]) -> Result<(), CommandError> {
+        for j in self.joint_indices(joints)? {
+            self.command.actuators.held[j] = None;
+        }
+        Ok(())
+    }
+
+    /// Holds all wheels where they are and sets their torques to zero.
+    pub fn brake(&mut self) {
+        self.command.wheel_torque.fill(0.0);
+        self.combine_torques();
+        for wheel in self.scene.model.wheels() {
+            if let Some(j) = wheel.joint {
+                let hold = self.scene.model.hold(j);
+                let set_point = self.state.configuration.joints[j];
+                self.command.actuators.held[j] = Some(HeldJoint {
+                    set_point,
+                    stiffness: hold.stiffness,
+                    damping: hold.damping,
+                });
+            }
+        }
+    }
+
+    fn joint_indices(&self, joints: &[String]) -> Result<Vec<usize>, CommandError> {
+        let index = |name: &String| {
+            let found = self.scene.model.joint_index(name);
+            found.ok_or_else(|| CommandError::UnknownJoint {
+                field: "joints",
+                name: name.clone(),
+            })
+        };
+        joints.iter().map(index).collect()
+    }
+}
