@@ -6,7 +6,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from stable_baselines3 import PPO
-from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnvWrapper, VecMonitor, VecNormalize
@@ -179,10 +178,6 @@ def test_policies_of_the_package_drive_it() -> None:
     returns, lengths = evaluate_policy(policy, env, n_eval_episodes=2, return_episode_rewards=True)
     assert min(returns) > 10.0
     assert max(lengths) < 200
-
-
-def test_the_single_environment_passes_the_checker_with_everything_on() -> None:
-    check_env(RoverEnv(mass_scale=(0.9, 1.1), friction=(0.5, 0.9), observation_noise=0.01), warn=True)
 
 
 def test_ppo_learns_from_it_without_complaint() -> None:
