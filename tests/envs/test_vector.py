@@ -182,23 +182,6 @@ def test_difficulty_is_set_from_the_next_reset_on() -> None:
     assert len(set(env.get_attr("difficulty"))) == 3
 
 
-@pytest.mark.parametrize(
-    ("arguments", "field"),
-    [
-        ({"num_envs": 0}, "num_envs"),
-        ({"threads": 0}, "threads"),
-        ({"threads": 1.5}, "threads"),
-        ({"max_episode_steps": 0}, "max_episode_steps"),
-        ({"autoreset_mode": "sometimes"}, "autoreset_mode"),
-        ({"friction": -1.0}, "friction"),
-    ],
-)
-def test_bad_arguments_are_refused(arguments: dict[str, Any], field: str) -> None:
-    with pytest.raises(OptionError) as caught:
-        RoverVectorEnv(**{"num_envs": 2, **arguments})
-    assert caught.value.field == field
-
-
 @pytest.mark.parametrize("mask", [[True, False], np.ones(3, np.bool_), np.ones(2)])
 def test_bad_masks_are_refused(mask: Any) -> None:
     env = native("Rover-v0", 2)

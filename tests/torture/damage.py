@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime
 import importlib.util
 import json
 import re
@@ -32,10 +31,9 @@ from rover_gym.policy import TrainedPolicy
 from rover_gym.policy.shipped import FOLDER
 from rover_gym.record import Recorder, RoverSampler, describe, read_run
 from rover_gym.soil import SoilSimulation, SoilSnapshot, soil_packing
+from torture.hostile import NUMBERS, TEXTS, THINGS
 from torture.ledger import Ledger
 from torture.mutate import (
-    UNKIND_NUMBERS,
-    UNKIND_TEXT,
     mutate_bytes,
     mutate_hdf5,
     mutate_json,
@@ -277,28 +275,6 @@ def rocks(random: Random, ledger: Ledger) -> None:
                 use(ledger, "a damaged field", sim)
 
 
-#: What no argument should be, beside the numbers and texts of `mutate`.
-NONSENSE: tuple[Any, ...] = (
-    None,
-    True,
-    1j,
-    datetime.timedelta(seconds=1),
-    [],
-    [[]],
-    {},
-    [1e308] * 3,
-    [float("nan")] * 6,
-    [[0.0] * 6] * 6,
-    np.zeros((2, 0)),
-    np.zeros(3, dtype=complex),
-    np.array(["a", "b"]),
-    b"bytes",
-    object(),
-    lambda: None,
-    range(10**9),
-    (0.0, 10**400),
-)
-
 #: Callables with arguments that are sound; one of them is replaced.
 CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Plane": (Plane, {"normal": (0.0, 1.0, 0.0), "offset": 0.0}),
@@ -434,7 +410,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
 
 def nonsense(random: Random) -> Any:
     """A value that hardly any argument takes."""
-    kinds = (NONSENSE, UNKIND_NUMBERS, UNKIND_NUMBERS, UNKIND_TEXT)
+    kinds = (THINGS, NUMBERS, NUMBERS, TEXTS)
     chosen = kinds[random.integers(len(kinds))]
     return chosen[random.integers(len(chosen))]
 
