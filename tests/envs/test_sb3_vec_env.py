@@ -5,6 +5,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
@@ -181,6 +182,7 @@ def test_policies_of_the_package_drive_it() -> None:
 
 
 def test_ppo_learns_from_it_without_complaint() -> None:
+    torch.set_num_threads(1)  # the networks are small: a second thread slows them down
     env = VecNormalize(VecMonitor(RoverVecEnv(4, max_episode_steps=8), info_keywords=("is_success",)))
     model = PPO("MlpPolicy", env, n_steps=16, batch_size=32, n_epochs=1, seed=0, device="cpu")
     before = [p.detach().clone() for p in model.policy.parameters()]
