@@ -128,6 +128,109 @@ def network(n_in: int, width: int, n_out: int, last_gain: float) -> nn.Sequentia
     return nn.Sequential(layers[0], nn.Tanh(), layers[1], nn.Tanh(), layers[2])
 
 
+class Rollouts:
+    """Rovers that drive, and the last `n_steps` decisions of each.
+
+    Attributes:
+        recent: Success, return and length of the last 200 episodes.
+        seen: Normalised observations `(n_steps, num_envs, size)`; likewise actions, and `(n_steps, num_envs)`
+            logarithms of their probabilities, values, scaled rewards and whether the episode ended.
+    """
+
+    def __init__(self, task: str, given: Hyperparameters, seed: int) -> None:
+        name, arguments, _ = TASKS[task]
+        n, length = given.num_envs, given.n_steps
+        self.given = given
+        self.envs = gym.make_vec(
+            name,
+            n,
+            threads=1,
+            max_episode_steps=given.max_episode_steps,
+            autoreset_mode="SameStep",
+            **DECISIONS,
+            **COARSE,
+            **arguments,
+        )
+        self.n_seen: int = self.envs.single_observation_space.shape[0]  # type: ignore[index]
+        self.n_actions: int = self.envs.single_action_space.shape[0]  # type: ignore[index]
+        self.recent: deque[tuple[bool, float, float]] = deque(maxlen=200)
+        self.returns, self.return_scale = np.zeros(n), RunningScale(np.zeros(1))
+        self.earned, self.lasted = np.zeros(n), np.zeros(n)
+        self.seen = torch.zeros(length, n, self.n_seen)
+        self.acted = torch.zeros(length, n, self.n_actions)
+        self.log_probabilities, self.values, self.rewards, self.ended = (torch.zeros(length, n) for _ in range(4))
+        self.observation, _ = self.envs.reset(seed=seed)
+
+    def collect(self, agent: Agent) -> None:
+        """Drives `n_steps` decisions."""
+        given = self.given
+        for t in range(given.n_steps):
+            agent.scale.update(self.observation)
+            with torch.no_grad():
+                self.seen[t] = agent.normalise(self.observation)
+                self.acted[t] = agent.sample(self.seen[t])
+                self.log_probabilities[t] = agent.log_probability(self.seen[t], self.acted[t])
+                self.values[t] = agent.value(self.seen[t])
+            actions = self.acted[t].clamp(-1.0, 1.0).numpy()
+            self.observation, reward, terminated, truncated, infos = self.envs.step(actions)
+            over = terminated | truncated
+            # Rewards are divided by the deviation of the discounted return, as VecNormalize does.
+            self.returns = self.returns * given.gamma + reward
+            self.return_scale.update(self.returns[:, None])
+            scaled = (reward / np.sqrt(self.return_scale.variance[0] + 1e-8)).clip(-10.0, 10.0)
+            self.earned, self.lasted = self.earned + reward, self.lasted + 1.0
+            for i in np.flatnonzero(over):
+                if not terminated[i]:  # the time limit cuts an episode that would have gone on
+                    with torch.no_grad():
+                        scaled[i] += given.gamma * agent.value(agent.normalise(infos["final_obs"][i][None])).item()
+                self.recent.append((bool(infos["final_info"]["is_success"][i]), self.earned[i], self.lasted[i]))
+            self.rewards[t], self.ended[t] = torch.as_tensor(scaled), torch.as_tensor(over)
+            self.returns[over] = self.earned[over] = self.lasted[over] = 0.0
+
+    def advantages(self, agent: Agent) -> torch.Tensor:
+        """Generalised advantage estimates `(n_steps, num_envs)`."""
+        given, advantages = self.given, torch.zeros_like(self.values)
+        with torch.no_grad():
+            following, advantage = agent.value(agent.normalise(self.observation)), torch.zeros(given.num_envs)
+            for t in reversed(range(given.n_steps)):
+                going_on = 1.0 - self.ended[t]
+                error = self.rewards[t] + given.gamma * following * going_on - self.values[t]
+                advantage = error + given.gamma * given.gae_lambda * going_on * advantage
+                advantages[t], following = advantage, self.values[t]
+        return advantages
+
+
+def improve(agent: Agent, optimizer: torch.optim.Optimizer, rollouts: Rollouts) -> None:
+    """Makes one update: `n_epochs` passes over the decisions with the clipped loss."""
+    given, advantages = rollouts.given, rollouts.advantages(agent)
+    n = given.num_envs * given.n_steps
+    parts = (rollouts.seen, rollouts.acted, rollouts.log_probabilities, advantages, advantages + rollouts.values)
+    flat = [part.reshape(n, *part.shape[2:]) for part in parts]
+    for _ in range(given.n_epochs):
+        for batch in torch.randperm(n).reshape(-1, given.batch_size):
+            seen, acted, old, gains, aims = (part[batch] for part in flat)
+            gains = (gains - gains.mean()) / (gains.std() + 1e-8)
+            ratio = (agent.log_probability(seen, acted) - old).exp()
+            clipped = ratio.clamp(1.0 - given.clip_range, 1.0 + given.clip_range)
+            policy_loss = -torch.min(gains * ratio, gains * clipped).mean()
+            loss = policy_loss + given.vf_coef * (agent.value(seen) - aims).square().mean()
+            optimizer.zero_grad()
+            loss.backward()  # type: ignore[no-untyped-call] # PyTorch gives it no types
+            nn.utils.clip_grad_norm_(agent.parameters(), given.max_grad_norm)
+            optimizer.step()
+
+
+def evaluate(agent: Agent, task: str, episodes: int, folder: Path) -> None:
+    """Drives the agent over fields that the training has not seen, and writes and prints how often it succeeds."""
+    ground = {} if task == "plane" else {"terrain": "rocks"}
+    arguments = {**DECISIONS, **ground, **TASKS[task][1]}
+    drives = drive_all(lambda _env: agent, range(1_000_000, 1_000_000 + episodes), arguments=arguments)
+    summary = summarise("cleanrl_ppo", drives)
+    (folder / "evaluation.json").write_text(json.dumps(asdict(summary), indent=2) + "\n", encoding="utf-8")
+    low, high = summary.success.interval
+    typer.echo(f"held-back fields: {summary.successes} of {episodes} ({100 * low:.1f} to {100 * high:.1f}%)")
+
+
 @plain_errors
 def train(
     task: Annotated[str, typer.Option(help="plane or rocks.")] = "plane",
@@ -141,108 +244,38 @@ def train(
     """Train and evaluate."""
     if task not in TASKS:
         refuse(OptionError, "task", task, f"must be one of {', '.join(TASKS)}")
-    name, arguments, total = TASKS[task]
     given = Hyperparameters()
-    total = total if steps is None else steps
     folder = output or Path("runs") / "cleanrl" / f"{task}-seed{seed}"
     folder.mkdir(parents=True, exist_ok=True)
     torch.manual_seed(1000 * seed)
     torch.set_num_threads(1)
-    n, length, start = given.num_envs, given.n_steps, time.perf_counter()
+    start = time.perf_counter()
 
-    envs = gym.make_vec(
-        name,
-        n,
-        threads=1,
-        max_episode_steps=given.max_episode_steps,
-        autoreset_mode="SameStep",
-        **DECISIONS,
-        **COARSE,
-        **arguments,
-    )
-    n_seen, n_actions = envs.single_observation_space.shape[0], envs.single_action_space.shape[0]  # type: ignore[index]
-    agent = Agent(n_seen, n_actions, given)
+    rollouts = Rollouts(task, given, 1000 * seed)
+    agent = Agent(rollouts.n_seen, rollouts.n_actions, given)
     optimizer = torch.optim.Adam(agent.parameters(), lr=given.learning_rate, eps=1e-5)
-    returns, return_scale = np.zeros(n), RunningScale(np.zeros(1))
-    recent: deque[tuple[bool, float, float]] = deque(maxlen=200)  # success, return, length
-    earned, lasted = np.zeros(n), np.zeros(n)
-
-    seen = torch.zeros(length, n, n_seen)
-    acted = torch.zeros(length, n, n_actions)
-    log_probabilities, values, rewards, ended = (torch.zeros(length, n) for _ in range(4))
-    observation, _ = envs.reset(seed=1000 * seed)
     rows: list[tuple[float, ...]] = []
-    n_updates = -(-total // (n * length))
+    decisions_per_update = given.num_envs * given.n_steps
+    n_updates = -(-(TASKS[task][2] if steps is None else steps) // decisions_per_update)
     for update in range(n_updates):
         fraction = update / n_updates
         optimizer.param_groups[0]["lr"] = given.learning_rate + fraction * (
             given.final_learning_rate - given.learning_rate
         )
-        for t in range(length):
-            agent.scale.update(observation)
-            with torch.no_grad():
-                seen[t] = agent.normalise(observation)
-                acted[t] = agent.sample(seen[t])
-                log_probabilities[t] = agent.log_probability(seen[t], acted[t])
-                values[t] = agent.value(seen[t])
-            observation, reward, terminated, truncated, infos = envs.step(acted[t].clamp(-1.0, 1.0).numpy())
-            over = terminated | truncated
-            # Rewards are divided by the deviation of the discounted return, as VecNormalize does.
-            returns = returns * given.gamma + reward
-            return_scale.update(returns[:, None])
-            scaled = (reward / np.sqrt(return_scale.variance[0] + 1e-8)).clip(-10.0, 10.0)
-            earned, lasted = earned + reward, lasted + 1.0
-            for i in np.flatnonzero(over):
-                if not terminated[i]:  # the time limit cuts an episode that would have gone on
-                    with torch.no_grad():
-                        scaled[i] += given.gamma * agent.value(agent.normalise(infos["final_obs"][i][None])).item()
-                recent.append((bool(infos["final_info"]["is_success"][i]), earned[i], lasted[i]))
-            rewards[t], ended[t] = torch.as_tensor(scaled), torch.as_tensor(over)
-            returns[over] = earned[over] = lasted[over] = 0.0
-
-        with torch.no_grad():
-            following, advantage = agent.value(agent.normalise(observation)), torch.zeros(n)
-            advantages = torch.zeros(length, n)
-            for t in reversed(range(length)):
-                going_on = 1.0 - ended[t]
-                error = rewards[t] + given.gamma * following * going_on - values[t]
-                advantage = error + given.gamma * given.gae_lambda * going_on * advantage
-                advantages[t], following = advantage, values[t]
-            targets = advantages + values
-
-        flat = [part.reshape(n * length, *part.shape[2:]) for part in (seen, acted, log_probabilities)]
-        flat += [advantages.reshape(-1), targets.reshape(-1)]
-        for _ in range(given.n_epochs):
-            for batch in torch.randperm(n * length).reshape(-1, given.batch_size):
-                one_seen, one_acted, old, gains, aims = (part[batch] for part in flat)
-                gains = (gains - gains.mean()) / (gains.std() + 1e-8)
-                ratio = (agent.log_probability(one_seen, one_acted) - old).exp()
-                clipped = ratio.clamp(1.0 - given.clip_range, 1.0 + given.clip_range)
-                policy_loss = -torch.min(gains * ratio, gains * clipped).mean()
-                loss = policy_loss + given.vf_coef * (agent.value(one_seen) - aims).square().mean()
-                optimizer.zero_grad()
-                loss.backward()  # type: ignore[no-untyped-call] # PyTorch gives it no types
-                nn.utils.clip_grad_norm_(agent.parameters(), given.max_grad_norm)
-                optimizer.step()
-        if recent:
-            decisions = (update + 1) * n * length
-            success, mean_return, mean_length = np.array(recent, np.float64).mean(axis=0)
+        rollouts.collect(agent)
+        improve(agent, optimizer, rollouts)
+        if rollouts.recent:
+            decisions = (update + 1) * decisions_per_update
+            success, mean_return, mean_length = np.array(rollouts.recent, np.float64).mean(axis=0)
             rows.append((decisions, success, mean_return, mean_length, time.perf_counter() - start))
             typer.echo(f"{decisions} decisions: {100 * success:.0f}% of the last episodes, return {mean_return:.1f}")
 
-    envs.close()
+    rollouts.envs.close()
     with (folder / "curve.csv").open("w", encoding="utf-8", newline="") as file:
         csv.writer(file).writerows([("decisions", "success", "return", "length", "wall_seconds"), *rows])
     scale = {"mean": agent.scale.mean, "variance": agent.scale.variance}
     torch.save({"agent": agent.state_dict(), "scale": scale}, folder / "agent.pt")
-    ground = {} if task == "plane" else {"terrain": "rocks"}
-    drives = drive_all(
-        lambda _env: agent, range(1_000_000, 1_000_000 + episodes), arguments={**DECISIONS, **ground, **arguments}
-    )
-    summary = summarise("cleanrl_ppo", drives)
-    (folder / "evaluation.json").write_text(json.dumps(asdict(summary), indent=2) + "\n", encoding="utf-8")
-    low, high = summary.success.interval
-    typer.echo(f"held-back fields: {summary.successes} of {episodes} ({100 * low:.1f} to {100 * high:.1f}%)")
+    evaluate(agent, task, episodes, folder)
     say_path("policy", folder)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rover_gym import ModelError, Plane, RoverModel, Simulation, SphereField, StepError, TerrainError
+from rover_gym import ModelError, Plane, RoverModel, SphereField, StepError, TerrainError
 from rover_gym.mechanics import SoilSimulation, soil_packing
 from rover_gym.planar import BallSimulation, Line, Polyline, Sine, Spline, TwoWheelRoverSimulation
 
@@ -212,9 +212,3 @@ def test_errors_of_other_files_name_the_path(tmp_path: Path) -> None:
         assert missing.value.filename == str(nowhere)
     with pytest.raises(IsADirectoryError, match=str(tmp_path)):
         RoverModel.from_file(tmp_path)
-
-
-def test_a_long_chain_steps() -> None:
-    sim = Simulation(RoverModel.from_dict(chain(200)), gravity=(0.0, 0.0, 0.0))
-    with within(10.0):
-        sim.step(2)

@@ -1,12 +1,7 @@
 """Rovers of other builds in the environment: actions, observation, policies and batches follow the model."""
 
-import pickle
-from typing import Any
-
-import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
 from machines import MACHINES, axle, machine
 
 from rover_gym import ModelError, PDPolicy, RoverEnv, RoverModel
@@ -27,7 +22,6 @@ def test_spaces_follow_the_model(name: str) -> None:
     assert sizes["q"] == sizes["velocity"] == model.nv
     assert [sizes[f] for f in ("wheel_gap", "normal_force", "tangential_force")] == [n, n, 2 * n]
     assert sizes["previous_action"] == n_actions
-    check_env(env, skip_render_check=True)
 
 
 def test_each_entry_reaches_its_wheel_and_its_joint() -> None:
@@ -55,19 +49,6 @@ def test_the_reward_takes_means_over_wheels_and_over_joints_that_steer() -> None
     terms = env.step(np.array([0.4, 0.0, 0.0, 0.0, 0.2, 0.0], np.float32))[-1]["reward_terms"]
     assert terms["torque_change"] == pytest.approx(-0.02 * 0.4**2 / 4, rel=1e-6)
     assert terms["steering_change"] == pytest.approx(-0.02 * 0.2**2 / 2, rel=1e-6)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_rovers_of_a_batch_move_as_alone(name: str) -> None:
-    n_actions, model = MACHINES[name]
-    arguments: dict[str, Any] = {"model": model, "max_episode_steps": 9, "terrain": "rocks", "difficulty": 0.5}
-    ours = gym.make_vec("Rover-v0", 3, threads=2, **arguments)
-    assert type(ours) is RoverVectorEnv
-    alone = gym.make_vec("Rover-v0", 3, "sync", **arguments)
-    np.testing.assert_array_equal(ours.reset(seed=4)[0], alone.reset(seed=4)[0])
-    for action in np.random.default_rng(0).uniform(-0.5, 0.5, (20, 3, n_actions)).astype(np.float32):
-        for one, other in zip(ours.step(action)[:-1], alone.step(action)[:-1], strict=True):
-            np.testing.assert_array_equal(one, other)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -101,13 +82,9 @@ def test_axles_meet_in_the_turning_centre_of_the_wheels_that_do_not_steer() -> N
     assert policy.steering_angles(policy.max_curvature)[0] == pytest.approx(env.max_steering)
 
 
-def test_a_snapshot_goes_on_alike() -> None:
-    env, other = (RoverEnv(model=axle()) for _ in range(2))
+def test_another_rover_refuses_a_snapshot() -> None:
+    env = RoverEnv(model=axle())
     env.reset(seed=1)
-    action = np.array([0.2, 0.2, 0.1, 0.1, 0.3], np.float32)
-    env.step(action)
-    other.restore(pickle.loads(pickle.dumps(env.snapshot())))  # noqa: S301 - our own
-    np.testing.assert_array_equal(env.step(action)[0], other.step(action)[0])
     with pytest.raises(ValueError, match="arguments"):
         RoverEnv(model=MACHINES["all"][1]).restore(env.snapshot())
 

@@ -1,4 +1,7 @@
-"""Bad input is refused by an exception that names the field, before anything has changed."""
+"""Bad input that depends on more than one value: which entry of it, or what it contradicts, is named.
+
+Values of a wrong kind or range are refused in `test_nonsense.py`, for every argument; ends of ranges in `test_card.py`.
+"""
 
 import math
 import pickle
@@ -19,7 +22,6 @@ from rover_gym import (
     RoverGymError,
     RoverModel,
     StateError,
-    TerrainError,
 )
 from rover_gym.validation import number, span
 
@@ -27,51 +29,22 @@ NAN, INF = float("nan"), float("inf")
 
 
 @pytest.mark.parametrize(
-    ("arguments", "error", "field"),
+    ("arguments", "field"),
     [
-        ({"terrain": "swamp"}, TerrainError, "terrain"),
-        ({"terrain": None}, TerrainError, "terrain"),
-        ({"slope_deg": -1.0}, OptionError, "slope_deg"),
-        ({"slope_deg": 61.0}, OptionError, "slope_deg"),
-        ({"slope_deg": NAN}, OptionError, "slope_deg"),
-        ({"slope_deg": "steep"}, OptionError, "slope_deg"),
-        ({"slope_deg": (5.0, 1.0)}, OptionError, "slope_deg"),
-        ({"slope_deg": (1.0, 2.0, 3.0)}, OptionError, "slope_deg"),
-        ({"slope_deg": (1.0, INF)}, OptionError, "slope_deg[1]"),
-        ({"uphill_deg": INF}, OptionError, "uphill_deg"),
-        ({"heading_deg": (NAN, 0.0)}, OptionError, "heading_deg[0]"),
-        ({"goal_distance": 0.0}, OptionError, "goal_distance"),
-        ({"goal_bearing_deg": None}, OptionError, "goal_bearing_deg"),
-        ({"goal_tolerance": 0.0}, OptionError, "goal_tolerance"),
-        ({"goal_tolerance": True}, OptionError, "goal_tolerance"),
-        ({"max_steering_deg": 0.0}, OptionError, "max_steering_deg"),
-        ({"max_steering_deg": 400.0}, OptionError, "max_steering_deg"),
-        ({"max_tilt_deg": 0.0}, OptionError, "max_tilt_deg"),
-        ({"max_tilt_deg": 181.0}, OptionError, "max_tilt_deg"),
-        ({"stuck_time": -1.0}, OptionError, "stuck_time"),
-        ({"friction": -0.1}, OptionError, "friction"),
-        ({"friction": NAN}, OptionError, "friction"),
-        ({"restitution": 1.5}, OptionError, "restitution"),
-        ({"gravity": 9.81}, OptionError, "gravity"),
-        ({"gravity": (0.0, NAN, 0.0)}, OptionError, "gravity[1]"),
-        ({"gravity": (0.0, 0.0, 0.0)}, OptionError, "gravity"),
-        ({"control_frequency": 0.0}, OptionError, "control_frequency"),
-        ({"control_frequency": 30.0}, OptionError, "control_frequency"),
-        ({"control_frequency": 1000.0}, OptionError, "control_frequency"),
-        ({"time_step": 0.0}, OptionError, "time_step"),
-        ({"time_step": -0.005}, OptionError, "time_step"),
-        ({"time_step": 0.007}, OptionError, "control_frequency"),
-        ({"model": "lunokhod"}, ModelError, "model"),
-        ({"solver_options": {"colour": 1}}, OptionError, "solver_options.colour"),
-        ({"solver_options": 3}, OptionError, "solver_options"),
-        ({"solver_options": {"tolerance": -1.0}}, OptionError, "tolerance"),
-        ({"reward_weights": {"fun": 1.0}}, OptionError, "reward_weights.fun"),
-        ({"reward_weights": {"slip": INF}}, OptionError, "reward_weights.slip"),
-        ({"reward_weights": [1.0]}, OptionError, "reward_weights"),
+        ({"slope_deg": (1.0, INF)}, "slope_deg[1]"),
+        ({"heading_deg": (NAN, 0.0)}, "heading_deg[0]"),
+        ({"max_steering_deg": 400.0}, "max_steering_deg"),
+        ({"gravity": (0.0, NAN, 0.0)}, "gravity[1]"),
+        ({"gravity": (0.0, 0.0, 0.0)}, "gravity"),
+        ({"control_frequency": 30.0}, "control_frequency"),
+        ({"control_frequency": 1000.0}, "control_frequency"),
+        ({"time_step": 0.007}, "control_frequency"),
+        ({"solver_options": {"colour": 1}}, "solver_options.colour"),
+        ({"reward_weights": {"fun": 1.0}}, "reward_weights.fun"),
     ],
 )
-def test_arguments(arguments: dict[str, Any], error: type[RoverGymError], field: str) -> None:
-    with pytest.raises(error) as caught:
+def test_arguments(arguments: dict[str, Any], field: str) -> None:
+    with pytest.raises(OptionError) as caught:
         gym.make("Rover-v0", **arguments)
     assert caught.value.field == field
     assert isinstance(caught.value, ValueError)
@@ -105,11 +78,6 @@ def at(index: int, value: float) -> list[float]:
     [
         (np.zeros(11), "action"),
         (np.zeros((1, 12)), "action"),
-        (0.0, "action"),
-        (None, "action"),
-        (["a"] * 12, "action"),
-        ([[0.0], [0.0, 0.0]], "action"),
-        (np.zeros(12, complex), "action"),
         (at(3, NAN), "action[3]"),
         (at(0, INF), "action[0]"),
         (at(11, -INF), "action[11]"),
@@ -135,19 +103,13 @@ def test_actions(env: RoverEnv, action: Any, field: str) -> None:
         ({"colour": 1}, OptionError, "options.colour"),
         ({"slope_deg": 61.0}, OptionError, "options.slope_deg"),
         ({"slope_deg": (0.0, 1.0)}, OptionError, "options.slope_deg"),
-        ({"uphill_deg": "north"}, OptionError, "options.uphill_deg"),
-        ({"heading_deg": NAN}, OptionError, "options.heading_deg"),
-        ({"goal": 3.0}, OptionError, "options.goal"),
-        ({"goal": (1.0, 2.0, 3.0)}, OptionError, "options.goal"),
         ({"goal": (1.0, INF)}, OptionError, "options.goal[1]"),
-        ({"position": "here"}, OptionError, "options.position"),
         ({"q": np.zeros(20)}, StateError, "options.q"),
         ({"q": np.full(21, NAN)}, StateError, "options.q[0]"),
         ({"q": np.zeros(21), "v": np.zeros(6)}, StateError, "options.v"),
         ({"q": np.zeros(21), "v": np.full(21, INF)}, StateError, "options.v[0]"),
         ({"v": np.zeros(21)}, OptionError, "options.v"),
         ({"q": np.zeros(21), "heading_deg": 3.0}, OptionError, "options.heading_deg"),
-        (["goal"], OptionError, "options"),
     ],
 )
 def test_reset_options(env: RoverEnv, options: Any, error: type[RoverGymError], field: str) -> None:

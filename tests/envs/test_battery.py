@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from rover_gym import OptionError, PDPolicy, RoverEnv
+from rover_gym import PDPolicy, RoverEnv
 from rover_gym.policy import drive_all, summarise
 from rover_gym.vector import RoverVectorEnv
 
@@ -78,10 +78,3 @@ def test_evaluations_count_empty_batteries() -> None:
     assert summary.ends["battery_empty"] == 3
     assert sum(summary.ends.values()) == summary.episodes
     assert "battery_empty" not in summarise("pd", drive_all(PDPolicy, [0], arguments={})).ends
-
-
-@pytest.mark.parametrize("battery", [0.0, -5.0, np.inf, np.nan, "full"])
-def test_bad_batteries_are_refused(battery: Any) -> None:
-    with pytest.raises(OptionError) as caught:
-        RoverEnv(battery=battery)
-    assert caught.value.field == "battery"

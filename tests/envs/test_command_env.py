@@ -80,23 +80,6 @@ def test_an_episode_that_cannot_begin_is_refused_by_the_next_command(monkeypatch
     assert envs.step(command)[3].all()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "error", "field"),
-    [
-        ({"repeat": 0}, OptionError, "repeat"),
-        ({"repeat": 2.5}, OptionError, "repeat"),
-        ({"speed": -1.0}, OptionError, "command.speed"),
-        ({"guided": 3}, OptionError, "guided"),
-        ({"friction": -1.0}, OptionError, "friction"),
-    ],
-)
-@pytest.mark.parametrize("make", [RoverCommandEnv, RoverCommandVectorEnv])
-def test_bad_arguments_are_refused_by_name(make: Any, arguments: Any, error: Any, field: str) -> None:
-    with pytest.raises(error) as caught:
-        make(**arguments)
-    assert caught.value.field == field
-
-
 def test_a_bad_command_changes_nothing() -> None:
     env = gym.make("RoverCommand-v0")
     env.reset(seed=0)

@@ -114,9 +114,11 @@ def test_what_it_cannot_do_is_refused() -> None:
 
 def test_hindsight_replay_learns_from_it_without_complaint() -> None:
     stable_baselines3 = pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
-    from stable_baselines3.common.env_util import make_vec_env  # noqa: PLC0415 - needs the extra
+    import torch  # noqa: PLC0415 - needs the extra
+    from stable_baselines3.common.env_util import make_vec_env  # noqa: PLC0415
     from stable_baselines3.her import HerReplayBuffer  # noqa: PLC0415
 
+    torch.set_num_threads(1)  # the networks are small: a second thread slows them down
     arguments = {"control_frequency": 10, "time_step": 0.02, "max_episode_steps": 40}
     envs = make_vec_env("RoverGoal-v0", 2, seed=0, env_kwargs=arguments)
     model = stable_baselines3.SAC(

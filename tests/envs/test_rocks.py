@@ -1,6 +1,5 @@
 """`RoverRocks-v0`: fields by difficulty, start and goal clear, the height scan, the baseline among rocks."""
 
-import copy
 import inspect
 import math
 import pickle
@@ -11,9 +10,9 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
+from equal_bits import bits
 
-from rover_gym import OptionError, PDPolicy, Plane, RoverEnv, RoverGymError, SphereField, TerrainError
+from rover_gym import OptionError, PDPolicy, Plane, RoverEnv, SphereField, TerrainError
 from rover_gym.env import HeightScan
 from rover_gym.env.rocks import scan_points
 from rover_gym.ground import heights_of
@@ -38,42 +37,13 @@ def field_of(env: RoverEnv) -> SphereField:
     return terrain
 
 
-def rollout(env: Any, n_steps: int, seed: int = 7) -> list[Any]:
-    """Observations, rewards, ends and infos under random actions, across a reset."""
-    rng = np.random.default_rng(seed)
-    seen: list[Any] = []
-    for i in range(n_steps):
-        seen.append(env.step(rng.uniform(-1.0, 1.0, 12).astype(np.float32)))
-        if i == n_steps // 2:
-            seen.append(env.reset())
-    return seen
-
-
-def assert_equal_bits(a: list[Any], b: list[Any]) -> None:
-    for one, other in zip(a, b, strict=True):
-        assert one[0].tobytes() == other[0].tobytes()
-        assert one[1:] == other[1:]
-
-
-@pytest.mark.parametrize("arguments", [{}, {"height_scan": True}])
-def test_checkers_have_nothing_to_say(arguments: dict[str, Any]) -> None:
-    check_env(gym.make("RoverRocks-v0", **arguments).unwrapped)
-    checker = pytest.importorskip("stable_baselines3.common.env_checker")
-    checker.check_env(gym.make("RoverRocks-v0", **arguments).unwrapped, warn=True)
-
-
 def test_both_names_make_the_same_episodes() -> None:
     names = ({"id": "RoverRocks-v0"}, {"id": "Rover-v0", "terrain": "rocks"})
     a, b = (gym.make(**arguments) for arguments in names)
-    assert_equal_bits([a.reset(seed=4), *rollout(a, 20)], [b.reset(seed=4), *rollout(b, 20)])
-
-
-def test_same_seed_same_bits() -> None:
-    runs = []
-    for _ in range(2):
-        env = gym.make("RoverRocks-v0", difficulty=(0.0, 1.0), height_scan=True)
-        runs.append([env.reset(seed=11), *rollout(env, 40)])
-    assert_equal_bits(*runs)
+    assert bits(a.reset(seed=4)) == bits(b.reset(seed=4))
+    for action in np.random.default_rng(7).uniform(-1.0, 1.0, (20, 12)).astype(np.float32):
+        assert bits(a.step(action)) == bits(b.step(action))
+    assert bits(a.reset()) == bits(b.reset())
 
 
 def test_fields_differ_by_seed_and_from_episode_to_episode(rocks: RoverEnv) -> None:
@@ -85,31 +55,6 @@ def test_fields_differ_by_seed_and_from_episode_to_episode(rocks: RoverEnv) -> N
     rocks.reset(seed=0)
     np.testing.assert_array_equal(field_of(rocks).centres, fields[0])
     assert len({centres.tobytes() for centres in fields}) == 3
-
-
-def test_snapshot_and_copies_continue_bit_for_bit() -> None:
-    env = RoverEnv(terrain="rocks", difficulty=1.0)
-    env.reset(seed=3)
-    rollout(env, 11, seed=5)
-    snapshot = env.snapshot()
-    others = [copy.deepcopy(env), pickle.loads(pickle.dumps(env))]  # noqa: S301 - our own bytes
-    first = rollout(env, 20)
-    env.restore(snapshot)
-    assert_equal_bits(first, rollout(env, 20))
-    fresh = RoverEnv(terrain="rocks", difficulty=1.0)
-    fresh.reset(seed=99)
-    fresh.restore(pickle.loads(pickle.dumps(snapshot)))  # noqa: S301 - our own bytes
-    for other in (*others, fresh):
-        assert_equal_bits(first, rollout(other, 20))
-
-
-def test_vector_environment_equals_single_ones() -> None:
-    vector = gym.make_vec("RoverRocks-v0", num_envs=2, vectorization_mode="sync")
-    observations, _ = vector.reset(seed=[3, 4], options={"difficulty": 0.8})
-    for i in range(2):
-        single = gym.make("RoverRocks-v0")
-        np.testing.assert_array_equal(single.reset(seed=3 + i, options={"difficulty": 0.8})[0], observations[i])
-    vector.close()
 
 
 @pytest.mark.parametrize(
@@ -281,31 +226,20 @@ def test_height_scan_works_on_the_plane() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "error", "field"),
+    ("arguments", "field"),
     [
-        ({"terrain": "sphere-field"}, TerrainError, "terrain"),
-        ({"difficulty": -0.1}, OptionError, "difficulty"),
-        ({"difficulty": 2.1}, OptionError, "difficulty"),
-        ({"difficulty": NAN}, OptionError, "difficulty"),
-        ({"difficulty": (0.0, 2.5)}, OptionError, "difficulty[1]"),
-        ({"difficulty": "hard"}, OptionError, "difficulty"),
-        ({"rock_abundance": -0.1}, OptionError, "rock_abundance"),
-        ({"rock_abundance": 0.6}, OptionError, "rock_abundance"),
-        ({"rock_abundance": NAN}, OptionError, "rock_abundance"),
-        ({"max_rock_radius": 0.0}, OptionError, "max_rock_radius"),
-        ({"max_rock_radius": 11.0}, OptionError, "max_rock_radius"),
-        ({"goal_distance": (5.0, 1e6)}, OptionError, "goal_distance[1]"),
-        ({"height_scan": 3}, OptionError, "height_scan"),
-        ({"height_scan": (0, 3, 0.1)}, OptionError, "height_scan[0]"),
-        ({"height_scan": (3, 2.5, 0.1)}, OptionError, "height_scan[1]"),
-        ({"height_scan": (3, 3, 0.0)}, OptionError, "height_scan[2]"),
-        ({"terrain": "plane", "difficulty": 0.5}, OptionError, "difficulty"),
-        ({"terrain": "plane", "rock_abundance": 0.1}, OptionError, "rock_abundance"),
-        ({"terrain": "plane", "max_rock_radius": 1.0}, OptionError, "max_rock_radius"),
+        ({"difficulty": (0.0, 2.5)}, "difficulty[1]"),
+        ({"goal_distance": (5.0, 1e6)}, "goal_distance[1]"),
+        ({"height_scan": (0, 3, 0.1)}, "height_scan[0]"),
+        ({"height_scan": (3, 2.5, 0.1)}, "height_scan[1]"),
+        ({"height_scan": (3, 3, 0.0)}, "height_scan[2]"),
+        ({"terrain": "plane", "difficulty": 0.5}, "difficulty"),
+        ({"terrain": "plane", "rock_abundance": 0.1}, "rock_abundance"),
+        ({"terrain": "plane", "max_rock_radius": 1.0}, "max_rock_radius"),
     ],
 )
-def test_bad_arguments(arguments: dict[str, Any], error: type[RoverGymError], field: str) -> None:
-    with pytest.raises(error) as caught:
+def test_bad_arguments(arguments: dict[str, Any], field: str) -> None:
+    with pytest.raises(OptionError) as caught:
         gym.make("RoverRocks-v0", **arguments)
     assert caught.value.field == field
 
@@ -315,7 +249,6 @@ def test_bad_arguments(arguments: dict[str, Any], error: type[RoverGymError], fi
     [
         ({"difficulty": 2.0001}, "options.difficulty"),
         ({"difficulty": -1e-9}, "options.difficulty"),
-        ({"difficulty": NAN}, "options.difficulty"),
         ({"difficulty": (0.0, 1.0)}, "options.difficulty"),
         ({"goal": (1e6, 0.0)}, "options.goal"),
     ],

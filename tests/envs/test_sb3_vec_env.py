@@ -5,8 +5,8 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+import torch
 from stable_baselines3 import PPO
-from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnvWrapper, VecMonitor, VecNormalize
@@ -181,11 +181,8 @@ def test_policies_of_the_package_drive_it() -> None:
     assert max(lengths) < 200
 
 
-def test_the_single_environment_passes_the_checker_with_everything_on() -> None:
-    check_env(RoverEnv(mass_scale=(0.9, 1.1), friction=(0.5, 0.9), observation_noise=0.01), warn=True)
-
-
 def test_ppo_learns_from_it_without_complaint() -> None:
+    torch.set_num_threads(1)  # the networks are small: a second thread slows them down
     env = VecNormalize(VecMonitor(RoverVecEnv(4, max_episode_steps=8), info_keywords=("is_success",)))
     model = PPO("MlpPolicy", env, n_steps=16, batch_size=32, n_epochs=1, seed=0, device="cpu")
     before = [p.detach().clone() for p in model.policy.parameters()]

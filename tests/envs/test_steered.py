@@ -1,10 +1,8 @@
 """`steered=False`: the steering is welded, actions are torques, and everything else is as with the steering at zero."""
 
 import copy
-import pickle
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -48,25 +46,10 @@ def test_a_straight_drive_is_that_of_steering_held_at_zero() -> None:
     np.testing.assert_allclose(welded.simulation.q[:6], held.simulation.q[:6], atol=1e-6)
 
 
-@pytest.mark.parametrize("arguments", [{}, ROCKS, {"mass_scale": (0.8, 1.2)}])
-def test_rovers_of_a_batch_move_as_alone(arguments: dict[str, Any]) -> None:
-    ours = gym.make_vec("Rover-v0", 3, steered=False, max_episode_steps=9, threads=2, **arguments)
-    assert type(ours) is RoverVectorEnv
-    alone = gym.make_vec("Rover-v0", 3, "sync", steered=False, max_episode_steps=9, **arguments)
-    np.testing.assert_array_equal(ours.reset(seed=4)[0], alone.reset(seed=4)[0])
-    for action in torques(3, 25):
-        for one, other in zip(ours.step(action)[:-1], alone.step(action)[:-1], strict=True):
-            np.testing.assert_array_equal(one, other)
-
-
-def test_a_snapshot_and_a_pickle_go_on_alike() -> None:
-    env, other = RoverEnv(steered=False), RoverEnv(steered=False)
+def test_a_rover_that_steers_refuses_its_snapshot() -> None:
+    env = RoverEnv(steered=False)
     env.reset(seed=1)
-    env.step(np.full(6, 0.3, np.float32))
-    other.restore(pickle.loads(pickle.dumps(env.snapshot())))  # noqa: S301 - our own
     assert repr(copy.deepcopy(env.task.rules)) == "EpisodeRules(6 actions, 73 observed)"
-    action = np.full(6, -0.2, np.float32)
-    np.testing.assert_array_equal(env.step(action)[0], other.step(action)[0])
     with pytest.raises(ValueError, match="arguments"):
         RoverEnv().restore(env.snapshot())
 

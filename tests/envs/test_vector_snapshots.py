@@ -7,6 +7,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+from equal_bits import bits
 from gymnasium.error import ResetNeeded
 
 from rover_gym import RoverEnv, StateError
@@ -39,16 +40,6 @@ def actions(steps: int, n: int = 3, width: int = 12) -> Any:
 
 def copied(snapshot: Any) -> Any:
     return pickle.loads(pickle.dumps(snapshot))  # noqa: S301 - our own bytes
-
-
-def bits(result: Any) -> Any:
-    if isinstance(result, dict):
-        return {key: bits(value) for key, value in result.items()}
-    if isinstance(result, tuple | list):
-        return [bits(value) for value in result]
-    if isinstance(result, np.ndarray):
-        return (result.dtype, [bits(x) for x in result.ravel()] if result.dtype == object else result.tobytes())
-    return result
 
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime
 import importlib.util
 import json
 import re
@@ -28,14 +27,13 @@ from rover_gym import (
     solve_friction_contact,
 )
 from rover_gym.planar import BallSimulation, Line, PlanarSnapshot, Polyline, Sine, Spline, TwoWheelRoverSimulation
-from rover_gym.policy import TrainedPolicy
+from rover_gym.policy import PolicyError, TrainedPolicy
 from rover_gym.policy.shipped import FOLDER
-from rover_gym.record import Recorder, RoverSampler, describe, read_run
-from rover_gym.soil import SoilSimulation, SoilSnapshot, soil_packing
+from rover_gym.record import Recorder, RecordingError, RoverSampler, describe, read_run
+from rover_gym.soil import SoilSimulation, SoilSnapshot, read_soil_run, soil_packing
+from torture.hostile import NUMBERS, TEXTS, THINGS
 from torture.ledger import Ledger
 from torture.mutate import (
-    UNKIND_NUMBERS,
-    UNKIND_TEXT,
     mutate_bytes,
     mutate_hdf5,
     mutate_json,
@@ -90,8 +88,13 @@ def shown(text: str, length: int) -> str:
     return re.sub(r" at 0x[0-9a-f]+", "", text)[:length].encode("unicode_escape").decode()
 
 
-def attempt(ledger: Ledger, what: str, call: Callable[[], Any]) -> Any:
-    """What a call returns, None where it is refused; an error that names no field is a finding."""
+def attempt(
+    ledger: Ledger, what: str, call: Callable[[], Any], kind: type[RoverGymError] = RoverGymError, names: str = ""
+) -> Any:
+    """What a call returns, None where it is refused.
+
+    A refusal of another kind is a finding, and so is one that names no field, or not what it must name.
+    """
     ledger.steps += 1
     try:
         with ledger.timed():
@@ -100,6 +103,8 @@ def attempt(ledger: Ledger, what: str, call: Callable[[], Any]) -> Any:
         ledger.refused += 1
         if not isinstance(error, StepError) and not error.field:
             ledger.find(f"{what}: an error without a field: {shown(str(error), 120)}")
+        if not isinstance(error, kind) or names not in str(error):
+            ledger.find(f"{what}: {type(error).__name__} instead of {kind.__name__}: {shown(str(error), 120)}")
     except Exception as error:
         ledger.find(f"{what}: foreign {type(error).__name__}: {shown(str(error), 120)}")
     except BaseException as error:
@@ -129,7 +134,13 @@ def runs(random: Random, ledger: Ledger) -> None:
         path.unlink(missing_ok=True)
         path.write_bytes(_sound_run("map" if turn % 2 else "plane"))
         mutate_hdf5(random, path, _elsewhere())
-        run = attempt(ledger, "read_run", lambda: read_run(path))
+        run = attempt(ledger, "read_run", lambda: read_run(path), RecordingError, str(path))
+        try:
+            read_soil_run(path)
+        except RecordingError:
+            pass
+        else:
+            ledger.find("a rover's run was read as a soil's")
         if run is None:
             continue
         if not np.isfinite(run.positions).all():
@@ -155,7 +166,7 @@ def policies(random: Random, ledger: Ledger) -> None:
         (folder / "policy.json").write_bytes(text.encode("utf-8", errors="surrogatepass"))
         change = {1: mutate_bytes, 2: mutate_npz}.get(int(damage))
         (folder / "policy.npz").write_bytes(network if change is None else change(random, network))
-        policy = attempt(ledger, "TrainedPolicy.load", lambda: TrainedPolicy.load(_env(), folder))
+        policy = attempt(ledger, "TrainedPolicy.load", lambda: TrainedPolicy.load(_env(), folder), PolicyError)
         if policy is not None:
             observation, _ = _env().reset(seed=0)
             action, _ = policy.predict(observation)
@@ -276,28 +287,6 @@ def rocks(random: Random, ledger: Ledger) -> None:
             if sim is not None:
                 use(ledger, "a damaged field", sim)
 
-
-#: What no argument should be, beside the numbers and texts of `mutate`.
-NONSENSE: tuple[Any, ...] = (
-    None,
-    True,
-    1j,
-    datetime.timedelta(seconds=1),
-    [],
-    [[]],
-    {},
-    [1e308] * 3,
-    [float("nan")] * 6,
-    [[0.0] * 6] * 6,
-    np.zeros((2, 0)),
-    np.zeros(3, dtype=complex),
-    np.array(["a", "b"]),
-    b"bytes",
-    object(),
-    lambda: None,
-    range(10**9),
-    (0.0, 10**400),
-)
 
 #: Callables with arguments that are sound; one of them is replaced.
 CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
@@ -434,7 +423,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
 
 def nonsense(random: Random) -> Any:
     """A value that hardly any argument takes."""
-    kinds = (NONSENSE, UNKIND_NUMBERS, UNKIND_NUMBERS, UNKIND_TEXT)
+    kinds = (THINGS, NUMBERS, NUMBERS, TEXTS)
     chosen = kinds[random.integers(len(kinds))]
     return chosen[random.integers(len(chosen))]
 

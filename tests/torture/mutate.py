@@ -18,6 +18,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from torture.hostile import NUMBERS, TEXTS
+
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
@@ -27,37 +29,6 @@ if TYPE_CHECKING:
 #: Deeper than Python's recursion limit, and than a parser's that calls itself.
 DEEP = 100_000
 
-#: Text that means something to whoever prints, interprets or opens it without escaping.
-UNKIND_TEXT = (
-    "",
-    "\x00",
-    "\ud800",
-    "../../etc/passwd",
-    "</script><script>alert(1)</script>",
-    '" } ] DEF Evil Script { url "javascript:x" }',
-    "${x} {0} %s",
-    "nan",
-    "é\u202e\n\r\t",
-    "x" * 70_000,
-)
-UNKIND_NUMBERS = (
-    0,
-    -1,
-    1,
-    2**31,
-    2**63,
-    -(2**64),
-    10**400,
-    0.0,
-    -0.0,
-    5e-324,
-    1e-300,
-    1e308,
-    -1e308,
-    float("nan"),
-    float("inf"),
-    float("-inf"),
-)
 UNKIND_BYTES = (b"\x00", b"\xff", b"\x7f", b"\x80", b"\xff\xff\xff\xff", b"\xff" * 8, b"\x00" * 8, b"{", b'"', b"\n")
 
 
@@ -80,7 +51,7 @@ def mutate_json(rng: np.random.Generator, text: str) -> str:
         opening, closing = ("[", "]") if rng.random() < 0.5 else ('{"a":', "}")
         return opening * depth + ("" if rng.random() < 0.5 else "0" + closing * depth)
     if kind == 2:
-        return "".join(str(UNKIND_TEXT[rng.integers(len(UNKIND_TEXT))]) for _ in range(2))
+        return "".join(str(TEXTS[rng.integers(len(TEXTS))]) for _ in range(2))
     value = mutate_value(rng, json.loads(text))
     for _ in range(rng.integers(0, 3)):
         value = mutate_value(rng, value)
@@ -120,8 +91,8 @@ def mutate_xml(rng: np.random.Generator, text: str) -> str:
         if kind < 3 and attributes:
             place = attributes[rng.integers(len(attributes))]
             other = attributes[rng.integers(len(attributes))][0]
-            unkind = str(UNKIND_NUMBERS[rng.integers(len(UNKIND_NUMBERS))])
-            words = UNKIND_TEXT[rng.integers(len(UNKIND_TEXT))].encode("utf-8", "replace").decode()
+            unkind = str(NUMBERS[rng.integers(len(NUMBERS))])
+            words = TEXTS[rng.integers(len(TEXTS))].encode("utf-8", "replace").decode()
             numbers = " ".join([unkind] * int(rng.integers(1, 5)))
             value = (other, numbers, words)[rng.integers(3)]
             text = text[: place.start()] + value + text[place.end() :]
@@ -269,12 +240,12 @@ def _places(value: Any) -> Any:
 def _unkind(rng: np.random.Generator) -> Any:
     kind = rng.integers(4)
     if kind == 0:
-        return UNKIND_TEXT[rng.integers(len(UNKIND_TEXT))]
+        return TEXTS[rng.integers(len(TEXTS))]
     if kind == 1:
         return [None, True, False, [], {}, [[]], {"": None}][rng.integers(7)]
     if kind == 2:
-        return [UNKIND_NUMBERS[rng.integers(len(UNKIND_NUMBERS))]] * int(rng.choice([0, 1, 3, 1000]))
-    return UNKIND_NUMBERS[rng.integers(len(UNKIND_NUMBERS))]
+        return [NUMBERS[rng.integers(len(NUMBERS))]] * int(rng.choice([0, 1, 3, 1000]))
+    return NUMBERS[rng.integers(len(NUMBERS))]
 
 
 def _dump(value: Any) -> str:
@@ -310,7 +281,7 @@ def _mutate_attributes(rng: np.random.Generator, owner: h5py.Group) -> None:
         owner.attrs[name] = np.array(rng.choice([np.nan, -1.0, 1e300, 7.0]))
         return
     else:
-        text = UNKIND_TEXT[rng.integers(len(UNKIND_TEXT))]
+        text = TEXTS[rng.integers(len(TEXTS))]
     data = text.encode("utf-8", errors="replace")[:60_000]
     if rng.random() < 0.8:
         owner.attrs.create(name, np.bytes_(data or b" "))

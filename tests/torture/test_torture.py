@@ -39,6 +39,18 @@ def test_sizes_and_places_that_hung_or_aborted_are_refused_or_done_in_time() -> 
     assert not broken, "\n".join(broken)
 
 
+@pytest.mark.parametrize("name", ["damaged runs", "damaged policies"])
+def test_damaged_recordings_and_policies_are_refused_or_sound(name: str) -> None:
+    """KeyError, RecursionError and others came out; some files were read for ever, one asked for 186 GiB."""
+    row = Row(BY_NAME[name], Ledger())
+    for case in range(row.regime.cases):
+        row.ledger.merge(play(name, case), case)
+    broken = list(row.complaints())
+    assert not broken, "\n".join(broken)
+    assert row.ledger.steps >= 150
+    assert row.ledger.refused > row.ledger.steps // 2, "or nothing was damaged"
+
+
 def test_a_case_is_the_same_twice() -> None:
     first, second = (play("upside down", 3) for _ in range(2))
     first.slowest = second.slowest = 0.0

@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -55,6 +55,35 @@ CONTROL_PERIOD = 0.05  # s, of Rover-v0
 SHORTEST_STEP = 1e-5  # s: a shorter one makes no episode end
 
 
+Difficulty = Annotated[
+    float | None,
+    typer.Option(help="Difficulty of the rocks, from 0 to 2. Default: 0.5. It implies rocks."),
+]
+Slope = Annotated[
+    float | None, typer.Option(help="Slope of the ground, degrees. Default: 0; on rocks, by the difficulty.")
+]
+Uphill = Annotated[
+    float | None, typer.Option(help="Direction of steepest ascent, degrees to the left of x. Default: random.")
+]
+Heading = Annotated[float | None, typer.Option(help="Start heading, degrees to the left of x. Default: random.")]
+Goal = Annotated[tuple[float, float] | None, typer.Option(metavar="X Z", help="Goal on the map, m. Default: random.")]
+Driver = Annotated[str, typer.Option(help=DRIVERS_HELP, autocompletion=complete_policy)]
+Friction = Annotated[float, typer.Option(help="Friction coefficient.")]
+TimeStep = Annotated[float, typer.Option(help="Time step of the physics, s.")]
+TimeLimit = Annotated[float, typer.Option(min=CONTROL_PERIOD, max=1e6, help="Time limit of an episode, s.")]
+Episodes = Annotated[int, typer.Option(min=1, max=MOST_EPISODES, help="Number of episodes.")]
+Seed = Annotated[
+    int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the first episode; the others count up from it.")
+]
+Output = Annotated[
+    Path | None,
+    typer.Option(file_okay=False, help="Folder for trajectories (HDF5) and summary.json. Default: save nothing."),
+]
+Video = Annotated[
+    Path | None, typer.Option(dir_okay=False, metavar="FILE.mp4", help="Film the episodes one after the other.")
+]
+
+
 @plain_errors
 def drive(
     *,
@@ -62,41 +91,20 @@ def drive(
     spacing: Spacing = None,
     height_range: HeightRange = None,
     model: ModelName = BUILT_IN,
-    difficulty: Annotated[
-        float | None,
-        typer.Option(help="Difficulty of the rocks, from 0 to 2. Default: 0.5. It implies rocks."),
-    ] = None,
-    slope: Annotated[
-        float | None, typer.Option(help="Slope of the ground, degrees. Default: 0; on rocks, by the difficulty.")
-    ] = None,
-    uphill: Annotated[
-        float | None, typer.Option(help="Direction of steepest ascent, degrees to the left of x. Default: random.")
-    ] = None,
-    heading: Annotated[
-        float | None, typer.Option(help="Start heading, degrees to the left of x. Default: random.")
-    ] = None,
+    difficulty: Difficulty = None,
+    slope: Slope = None,
+    uphill: Uphill = None,
+    heading: Heading = None,
     start: Start = None,
-    goal: Annotated[
-        tuple[float, float] | None, typer.Option(metavar="X Z", help="Goal on the map, m. Default: random.")
-    ] = None,
-    policy: Annotated[
-        str,
-        typer.Option(help=DRIVERS_HELP, autocompletion=complete_policy),
-    ] = "pd",
-    friction: Annotated[float, typer.Option(help="Friction coefficient.")] = 0.7,
-    time_step: Annotated[float, typer.Option(help="Time step of the physics, s.")] = 0.005,
-    time_limit: Annotated[float, typer.Option(min=CONTROL_PERIOD, max=1e6, help="Time limit of an episode, s.")] = 60.0,
-    episodes: Annotated[int, typer.Option(min=1, max=MOST_EPISODES, help="Number of episodes.")] = 1,
-    seed: Annotated[
-        int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the first episode; the others count up from it.")
-    ] = 0,
-    output: Annotated[
-        Path | None,
-        typer.Option(file_okay=False, help="Folder for trajectories (HDF5) and summary.json. Default: save nothing."),
-    ] = None,
-    video: Annotated[
-        Path | None, typer.Option(dir_okay=False, metavar="FILE.mp4", help="Film the episodes one after the other.")
-    ] = None,
+    goal: Goal = None,
+    policy: Driver = "pd",
+    friction: Friction = 0.7,
+    time_step: TimeStep = 0.005,
+    time_limit: TimeLimit = 60.0,
+    episodes: Episodes = 1,
+    seed: Seed = 0,
+    output: Output = None,
+    video: Video = None,
     size: FilmSize = "640x480",
     camera: FilmCamera = "follow",
     forces: FilmForces = False,
@@ -113,68 +121,48 @@ def drive(
     terrain = chosen_terrain(terrain, difficulty)
     check_folder("output", output)
     check_file("video", video)
-    arguments: dict[str, Any] = {
-        "terrain": terrain,
-        "friction": friction,
-        "time_step": time_step,
-    }
-    arguments |= {} if difficulty is None else {"difficulty": difficulty}
-    arguments |= {} if slope is None else {"slope_deg": slope}
-    arguments |= {} if uphill is None else {"uphill_deg": uphill}
-    arguments |= {} if heading is None else {"heading_deg": heading}
-    options = {name: place for name, place in (("position", start), ("goal", goal)) if place is not None}
-    named = {"model": model, "spacing": spacing, "height_range": height_range}
-    as_given = arguments | {name: value for name, value in named.items() if value not in (None, BUILT_IN)}
-    if (rover := named_model(model)) is not None:
-        arguments["model"] = rover
-    if (ground := named_ground(terrain, spacing, height_range)) is not None:
-        arguments["terrain"] = ground
+    angles = {"slope_deg": slope, "uphill_deg": uphill, "heading_deg": heading}
+    scene = {"terrain": terrain, "friction": friction, "time_step": time_step}
+    scene |= _given({"difficulty": difficulty, **angles})
+    options = _given({"position": start, "goal": goal})
+    named = _given({"model": None if model == BUILT_IN else model, "spacing": spacing, "height_range": height_range})
+    rover, ground = named_model(model), named_ground(terrain, spacing, height_range)
     chosen = named_driver(policy, terrain, rover)
-    arguments, as_given = {**arguments, **chosen.arguments}, {**as_given, **chosen.arguments}
-    filming: dict[str, Any] = {}
+    as_given = {**scene, **named, **chosen.arguments}
+    arguments = {**scene, **_given({"model": rover, "terrain": ground}), **chosen.arguments}
     if video is not None:
-        options_of_film = film_options(size, camera, forces=forces, antialiasing=antialiasing)
-        filming = {"render_mode": "rgb_array", "render_options": options_of_film}
-    env = gym.make(
-        environment_of(terrain), max_episode_steps=round(time_limit / CONTROL_PERIOD), **arguments, **filming
-    )
+        film = film_options(size, camera, forces=forces, antialiasing=antialiasing)
+        arguments |= {"render_mode": "rgb_array", "render_options": film}
+    env = gym.make(environment_of(terrain), max_episode_steps=round(time_limit / CONTROL_PERIOD), **arguments)
     warn_of_slope(slope, friction)
-    driver, title = chosen.make(env), f"{environment_title(terrain)} with {driver_title(policy)}"
-
-    results: list[Episode] = []
-    paths: list[Path] = []
-    interrupted = False
-    with progress_bar() as bar, ExitStack() as stack:
-        stack.callback(env.close)
-        film = None if video is None else stack.enter_context(EpisodeFilm(video, env.metadata["render_fps"], title))
-        try:
-            for now in range(seed, seed + episodes):
-                path = None if output is None else output / f"episode-{now}.h5"
-                paths += [path] if path else []
-                results.append(_drive_one(env, driver, title, now, as_given, options, path, bar, film))
-        except KeyboardInterrupt:
-            interrupted = True
+    title = f"{environment_title(terrain)} with {driver_title(policy)}"
+    drives = _Drives(env, chosen.make(env), title, as_given, options)
+    drives.run(range(seed, seed + episodes), output, video)
 
     summary = {
         "environment": environment_of(terrain),
         "policy": policy,
         "arguments": as_given | options,
-        "episodes": [asdict(episode) for episode in results],
+        "episodes": [asdict(episode) for episode in drives.results],
     }
     with Results(as_json=as_json) as said:
         said.add(**summary)
-        if results:
-            said.show(_table(results, title))
+        if drives.results:
+            said.show(_table(drives.results, title))
         if output is not None:
-            paths.append(output / "summary.json")
-            paths[-1].write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-        paths += [] if video is None else [video]
-        for path in paths:
+            drives.paths.append(output / "summary.json")
+            drives.paths[-1].write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        for path in [*drives.paths, *([] if video is None else [video])]:
             if path.exists():
                 said.path("written", path)
-        if interrupted:
-            typer.echo(f"interrupted: {len(results)} of {episodes} episodes are done", err=True)
+        if drives.interrupted:
+            typer.echo(f"interrupted: {len(drives.results)} of {episodes} episodes are done", err=True)
             raise typer.Exit(INTERRUPTED)
+
+
+def _given(options: Mapping[str, Any]) -> dict[str, Any]:
+    """The options that have a value."""
+    return {name: value for name, value in options.items() if value is not None}
 
 
 def _check_time_step(time_step: float) -> None:
@@ -186,40 +174,69 @@ def _check_time_step(time_step: float) -> None:
         refuse(OptionError, "time_step", time_step, reason)
 
 
-def _drive_one(
-    env: gym.Env[Any, Any],
-    policy: Policy,
-    title: str,
-    seed: int,
-    arguments: Mapping[str, Any],
-    options: Mapping[str, Any],
-    path: Path | None,
-    bar: Progress,
-    film: EpisodeFilm | None,
-) -> Episode:
-    """Drives one episode, recorded if there is a path, filmed if there is a film."""
-    task = bar.add_task(f"seed {seed}", total=None, state="")
-    with ExitStack() as stack:
-        tape: _Tape | None = None
+@dataclass
+class _Drives:
+    """The episodes of one command.
 
-        def on_step(rover: RoverEnv, info: Mapping[str, Any]) -> None:
-            nonlocal tape
-            bar.update(task, state=f"{info['time']:.1f} s, {info['distance_to_goal']:.1f} m to go")
-            if path is not None:
-                if tape is None:  # after the reset, when the start is known
-                    tape = _Tape(path, rover, title, seed, arguments)
-                    stack.enter_context(tape.recorder)
-                tape.append(rover, info)
+    Attributes:
+        env: The environment.
+        policy: The policy that drives.
+        title: Title of results, recordings and film.
+        arguments: Arguments of the environment, for the recordings.
+        options: Options of each reset.
+        results: The finished episodes.
+        paths: The recordings, that of an interrupted episode included.
+        interrupted: Whether Ctrl-C ended the drive.
+    """
+
+    env: gym.Env[Any, Any]
+    policy: Policy
+    title: str
+    arguments: Mapping[str, Any]
+    options: Mapping[str, Any]
+    results: list[Episode] = field(default_factory=list)
+    paths: list[Path] = field(default_factory=list)
+    interrupted: bool = False
+
+    def run(self, seeds: Sequence[int], output: Path | None, video: Path | None) -> None:
+        """Drives an episode per seed, records it if there is a folder, and closes the environment."""
+        with progress_bar() as bar, ExitStack() as stack:
+            stack.callback(self.env.close)
+            film = None
+            if video is not None:
+                film = stack.enter_context(EpisodeFilm(video, self.env.metadata["render_fps"], self.title))
+            try:
+                for seed in seeds:
+                    path = None if output is None else output / f"episode-{seed}.h5"
+                    self.paths += [path] if path else []
+                    self.results.append(self._episode(seed, path, bar, film))
+            except KeyboardInterrupt:
+                self.interrupted = True
+
+    def _episode(self, seed: int, path: Path | None, bar: Progress, film: EpisodeFilm | None) -> Episode:
+        """Drives one episode, recorded if there is a path, filmed if there is a film."""
+        task = bar.add_task(f"seed {seed}", total=None, state="")
+        with ExitStack() as stack:
+            tape: _Tape | None = None
+
+            def on_step(rover: RoverEnv, info: Mapping[str, Any]) -> None:
+                nonlocal tape
+                bar.update(task, state=f"{info['time']:.1f} s, {info['distance_to_goal']:.1f} m to go")
+                if path is not None:
+                    if tape is None:  # after the reset, when the start is known
+                        tape = _Tape(path, rover, self.title, seed, self.arguments)
+                        stack.enter_context(tape.recorder)
+                    tape.append(rover, info)
+                if film is not None:
+                    film.show(rover, seed, info["time"])
+
+            episode = run_episode(self.env, self.policy, seed, options=self.options, on_step=on_step)
             if film is not None:
-                film.show(rover, seed, info["time"])
-
-        episode = run_episode(env, policy, seed, options=options, on_step=on_step)
-        if film is not None:
-            film.end(episode)
-        if tape is not None:
-            tape.recorder.note(outcome=episode.end)
-    bar.remove_task(task)
-    return episode
+                film.end(episode)
+            if tape is not None:
+                tape.recorder.note(outcome=episode.end)
+        bar.remove_task(task)
+        return episode
 
 
 class _Tape:

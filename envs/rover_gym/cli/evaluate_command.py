@@ -1,6 +1,7 @@
 """`rover evaluate`: trained policies beside the PD baseline and the scan planner, on the same seeded episodes."""
 
 import json
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -27,7 +28,7 @@ from rover_gym.policy.comparison import (
     planner_contender,
     trained_contender,
 )
-from rover_gym.policy.evaluation import EvaluatedEpisode, summarise
+from rover_gym.policy.evaluation import EvaluatedEpisode, PolicySummary, summarise
 from rover_gym.policy.films import film_episode
 from rover_gym.policy.pd_policy import PDPolicy
 from rover_gym.validation import number, refuse
@@ -88,37 +89,14 @@ def evaluate(
     output.mkdir(parents=True, exist_ok=True)
 
     seeds = range(seed, seed + episodes)
-    grounds = [Path(str(value)) for value in arguments.values() if Path(str(value)).is_file()]
-    drives: dict[str, list[EvaluatedEpisode]] = {}
-    with progress_bar() as bar:
-        for contender in contenders:
-            task = bar.add_task(contender.name, total=episodes, state="")
-            drives[contender.name] = drive_or_reuse(
-                contender,
-                output / f"episodes-{contender.name.replace(' ', '-')}.json",
-                seeds,
-                arguments=arguments,
-                files=grounds,
-                threads=threads,
-                progress=partial(_show, bar, task, episodes),
-            )
+    drives = _drives(contenders, seeds, arguments, output, threads)
     rows = [summarise(name, found) for name, found in drives.items()]
     if len(trained) > 1:
         together = [drive for contender in trained for drive in drives[contender.name]]
         rows.append(summarise(f"all {len(trained)} together", together))
 
-    table = comparison_table(rows)
-    if not as_json:
-        Console(highlight=False, soft_wrap=True).print(table, markup=False)
-    (output / "evaluation.md").write_text(table + "\n", encoding="utf-8")
     report = comparison_report(rows, arguments, seeds)
-    (output / "evaluation.json").write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
-    written = [output / "evaluation.md", output / "evaluation.json"]
-    try:
-        draw_policies(rows, output / "evaluation.png")
-        written.append(output / "evaluation.png")
-    except MissingExtraError as error:
-        typer.echo(f"no picture: {error}", err=True)
+    written = _write(rows, report, output, is_printed=not as_json)
     for contender in contenders:
         for now in seeds[:films]:
             written.append(output / "films" / f"{contender.name.replace(' ', '-')}-seed{now}.mp4")
@@ -127,6 +105,43 @@ def evaluate(
         results.add(**report)
         for path in written:
             results.path("written", path)
+
+
+def _drives(
+    contenders: Sequence[Contender], seeds: range, arguments: Mapping[str, Any], output: Path, threads: int
+) -> dict[str, list[EvaluatedEpisode]]:
+    """The episodes of each contender by its name, read from the folder where they are still valid."""
+    grounds = [Path(str(value)) for value in arguments.values() if Path(str(value)).is_file()]
+    drives: dict[str, list[EvaluatedEpisode]] = {}
+    with progress_bar() as bar:
+        for contender in contenders:
+            task = bar.add_task(contender.name, total=len(seeds), state="")
+            drives[contender.name] = drive_or_reuse(
+                contender,
+                output / f"episodes-{contender.name.replace(' ', '-')}.json",
+                seeds,
+                arguments=arguments,
+                files=grounds,
+                threads=threads,
+                progress=partial(_show, bar, task, len(seeds)),
+            )
+    return drives
+
+
+def _write(rows: Sequence[PolicySummary], report: Mapping[str, Any], output: Path, *, is_printed: bool) -> list[Path]:
+    """Writes table, data and plot, prints the table if asked, and returns the files."""
+    table = comparison_table(rows)
+    if is_printed:
+        Console(highlight=False, soft_wrap=True).print(table, markup=False)
+    (output / "evaluation.md").write_text(table + "\n", encoding="utf-8")
+    (output / "evaluation.json").write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+    written = [output / "evaluation.md", output / "evaluation.json"]
+    try:
+        draw_policies(rows, output / "evaluation.png")
+        written.append(output / "evaluation.png")
+    except MissingExtraError as error:
+        typer.echo(f"no picture: {error}", err=True)
+    return written
 
 
 def _contenders(trained: list[Contender], model: str, *, guide: bool, planner: bool) -> list[Contender]:

@@ -89,14 +89,12 @@ def train(
         typer.echo(path.read_text(encoding="utf-8"), nl=False)
         return
     check_folder("output", output)
-    chosen = list(dict.fromkeys(seeds or [1]))
-    is_alone = len(chosen) == 1
-    parent = output if output is not None and not is_alone else Path("runs") / "train"
-    folders = [output if output is not None and is_alone else parent / f"{path.stem}-seed{seed}" for seed in chosen]
+    folders, parent = _run_folders(list(dict.fromkeys(seeds or [1])), output, path.stem)
+    is_alone = len(folders) == 1
     say = partial(typer.echo, err=as_json)
     reporting = Reporting(say=say, progress=progress, films=films)
     with Results(as_json=as_json) as results:
-        for seed, folder in zip(chosen, folders, strict=True):
+        for seed, folder in folders.items():
             if not is_alone:
                 say(f"seed {seed}:")
             policy = train_ppo(
@@ -110,10 +108,18 @@ def train(
             )
             results.path("policy", policy)
             results.path("best policy in the evaluations", folder / "best")
-        done = [read_seed(folder) for folder in folders] if as_json or not is_alone else []
+        done = [read_seed(folder) for folder in folders.values()] if as_json or not is_alone else []
         results.add(seeds=done)
         if not is_alone:
             stem = parent / f"{path.stem}-seeds"
             say(write_seeds(done, stem))
             for ending in ("md", "json"):
                 results.path("written", stem.with_name(f"{stem.name}.{ending}"))
+
+
+def _run_folders(seeds: list[int], output: Path | None, name: str) -> tuple[dict[int, Path], Path]:
+    """The run's folder by seed, and the folder of their summary: the output is a single run's own folder."""
+    if output is not None and len(seeds) == 1:
+        return {seeds[0]: output}, output.parent
+    parent = Path("runs") / "train" if output is None else output
+    return {seed: parent / f"{name}-seed{seed}" for seed in seeds}, parent

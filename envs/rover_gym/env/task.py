@@ -109,48 +109,15 @@ def make_task(given: Mapping[str, Any]) -> Task:
         OptionError: Two arguments contradict each other, or the core refuses an option; `field` names one.
         TerrainError: The field has no ground plane that faces up.
     """
-    terrain, model, scan = given["terrain"], given["model"], given["height_scan"]
+    terrain, gravity, step = given["terrain"], given["gravity"], given["time_step"]
     ground = None if isinstance(terrain, str) else terrain
-    rocks: RockDistribution | None = None
-    if terrain in ("rocks", "hills"):
-        rocks = rock_distribution(given["difficulty"], given["rock_abundance"], given["max_rock_radius"])
-        nearest, farthest = given["goal_distance"]
-        distance = nearest if nearest == farthest else (nearest, farthest)
-        span("goal_distance", distance, at_most=MAX_GOAL_DISTANCE)
-        if given["waypoints"] * farthest > MAX_GOAL_DISTANCE:
-            reason = f"must give a course of at most {MAX_GOAL_DISTANCE:g} m with goal_distance up to {farthest:g} m"
-            refuse(OptionError, "waypoints", given["waypoints"], reason)
-        number("goal_tolerance", given["goal_tolerance"], at_most=MAX_GOAL_DISTANCE)
-    else:
-        for name in ("difficulty", "rock_abundance", "max_rock_radius"):
-            if given[name] is not None:
-                refuse(OptionError, name, _as_given(given[name]), "needs terrain 'rocks' or 'hills'")
-    slope_deg, hills = given["slope_deg"], _hills(terrain, given["hill_slope_deg"])
-    start = StartDistribution(
-        slope=_radians((0.0, 0.0) if slope_deg is None else slope_deg),
-        uphill=_radians(given["uphill_deg"]),
-        heading=_radians(given["heading_deg"]),
-        goal_distance=given["goal_distance"],
-        goal_bearing=_radians(given["goal_bearing_deg"]),
-        turn=_radians(given["waypoint_turn_deg"]),
-    )
-    if terrain not in ("plane", "rocks"):
-        if slope_deg is not None:
-            refuse(OptionError, "slope_deg", _as_given(slope_deg), "is the ground's own")
-        slope, uphill = slope_of(ground)
-        start = replace(start, slope=(slope, slope), uphill=(uphill, uphill))
-    domain = DomainDistribution(
-        mass_scale=given["mass_scale"],
-        friction=given["friction"],
-        actuator_gain=given["actuator_gain"],
-        gravity_scale=given["gravity_scale"],
-        observation_noise=given["observation_noise"],
-    )
-    step = given["time_step"]
+    rocks, hills = _rocks(given), _hills(terrain, given["hill_slope_deg"])
+    start = _start(given, ground)
+    properties = ("mass_scale", "friction", "actuator_gain", "gravity_scale", "observation_noise")
+    domain = DomainDistribution(**{name: given[name] for name in properties})
     substeps = _substeps(given["control_frequency"], step)
-    rover = _rover(model, steered=given["steered"])
+    rover = _rover(given["model"], steered=given["steered"])
     steering = Steering.of(rover)
-    gravity = given["gravity"]
     options = {
         "gravity": gravity,
         "friction": domain.friction[0],
@@ -159,32 +126,19 @@ def make_task(given: Mapping[str, Any]) -> Task:
         **(given["solver_options"] or {}),
     }
     simulation = Simulation(rover, Plane(), **options)  # the core validates the simulation options
-    points = None if scan is None else scan.offsets
-    goals, battery = given["waypoints"], given["battery"]
-    n_actions = len(rover.wheel_names) + len(steering.joints)
-    n_scan = 0 if points is None else len(points)
+    points = None if given["height_scan"] is None else given["height_scan"].offsets
+    goals, n_actions = given["waypoints"], len(rover.wheel_names) + len(steering.joints)
     layout = build_layout(
-        rover, math.hypot(*gravity), n_scan, n_actions, n_goals=goals, has_battery=battery is not None
+        rover,
+        math.hypot(*gravity),
+        0 if points is None else len(points),
+        n_actions,
+        n_goals=goals,
+        has_battery=given["battery"] is not None,
     )
     max_steering = _steering_limit(rover, steering, given["max_steering_deg"])
-    weights = dict(rewards.WEIGHTS) if given["reward_weights"] is None else given["reward_weights"]
-    rules = EpisodeRules(
-        rover,
-        substeps=substeps,
-        dt=substeps * step,
-        torque_limits=rover.wheel_torque_limits,
-        max_steering=max_steering,
-        goal_tolerance=given["goal_tolerance"],
-        cos_max_tilt=float(sin_cos(math.radians(given["max_tilt_deg"]))[1]),
-        stuck_time=given["stuck_time"],
-        weights=weights,
-        scale=layout.scale,
-        noise=domain.observation_noise * layout.unbounded if domain.observation_noise > 0.0 else None,
-        scan=points,
-        goals=goals,
-        battery=battery,
-    )
-    slope_by_difficulty = slope_deg is None and terrain == "rocks"
+    rules = _rules(given, rover, layout, substeps=substeps, max_steering=max_steering, scan=points)
+    slope_by_difficulty = given["slope_deg"] is None and terrain == "rocks"
     episodes = EpisodeDistribution(
         rules,
         simulation,
@@ -218,6 +172,72 @@ def make_task(given: Mapping[str, Any]) -> Task:
         reward_terms=given["reward_terms"] or {},
         rules=rules,
         episodes=episodes,
+    )
+
+
+def _rocks(given: Mapping[str, Any]) -> RockDistribution | None:
+    """Distribution of the rock fields on rocks and hills, whose course must lie within the field; None elsewhere."""
+    if given["terrain"] not in ("rocks", "hills"):
+        for name in ("difficulty", "rock_abundance", "max_rock_radius"):
+            if given[name] is not None:
+                refuse(OptionError, name, _as_given(given[name]), "needs terrain 'rocks' or 'hills'")
+        return None
+    rocks = rock_distribution(given["difficulty"], given["rock_abundance"], given["max_rock_radius"])
+    nearest, farthest = given["goal_distance"]
+    distance = nearest if nearest == farthest else (nearest, farthest)
+    span("goal_distance", distance, at_most=MAX_GOAL_DISTANCE)
+    if given["waypoints"] * farthest > MAX_GOAL_DISTANCE:
+        reason = f"must give a course of at most {MAX_GOAL_DISTANCE:g} m with goal_distance up to {farthest:g} m"
+        refuse(OptionError, "waypoints", given["waypoints"], reason)
+    number("goal_tolerance", given["goal_tolerance"], at_most=MAX_GOAL_DISTANCE)
+    return rocks
+
+
+def _start(given: Mapping[str, Any], ground: Terrain | None) -> StartDistribution:
+    """Distribution of the starts; the slope of hills and of a given ground is their own."""
+    slope_deg = given["slope_deg"]
+    start = StartDistribution(
+        slope=_radians((0.0, 0.0) if slope_deg is None else slope_deg),
+        uphill=_radians(given["uphill_deg"]),
+        heading=_radians(given["heading_deg"]),
+        goal_distance=given["goal_distance"],
+        goal_bearing=_radians(given["goal_bearing_deg"]),
+        turn=_radians(given["waypoint_turn_deg"]),
+    )
+    if given["terrain"] in ("plane", "rocks"):
+        return start
+    if slope_deg is not None:
+        refuse(OptionError, "slope_deg", _as_given(slope_deg), "is the ground's own")
+    slope, uphill = slope_of(ground)
+    return replace(start, slope=(slope, slope), uphill=(uphill, uphill))
+
+
+def _rules(
+    given: Mapping[str, Any],
+    rover: RoverModel,
+    layout: ObservationLayout,
+    *,
+    substeps: int,
+    max_steering: float,
+    scan: npt.NDArray[np.float64] | None,
+) -> EpisodeRules:
+    """What the core needs to run an episode."""
+    noise = given["observation_noise"]
+    return EpisodeRules(
+        rover,
+        substeps=substeps,
+        dt=substeps * given["time_step"],
+        torque_limits=rover.wheel_torque_limits,
+        max_steering=max_steering,
+        goal_tolerance=given["goal_tolerance"],
+        cos_max_tilt=float(sin_cos(math.radians(given["max_tilt_deg"]))[1]),
+        stuck_time=given["stuck_time"],
+        weights=dict(rewards.WEIGHTS) if given["reward_weights"] is None else given["reward_weights"],
+        scale=layout.scale,
+        noise=noise * layout.unbounded if noise > 0.0 else None,
+        scan=scan,
+        goals=given["waypoints"],
+        battery=given["battery"],
     )
 
 

@@ -75,16 +75,13 @@ def identify(
     max_iterations = whole("max_iterations", max_iterations, at_least=1)
     setup = _setup(run, model, settings)
     chosen = chosen_parameters(parameters, setup)
-    nq, nv = setup.model.nq, setup.model.nv
-    deviations = np.repeat([FIRST_DEVIATIONS["q"], FIRST_DEVIATIONS["v"]], [nq, nv])
-    if noise is not None:
-        deviations = _given_noise(noise, nq, nv)
+    deviations = _first_deviations(noise, setup.model)
     windows = _some(cut(run, window, setup.simulation().time_step), max_windows)
 
     fit = WindowFit(setup, chosen, windows)
     solution = fit.solve(_values(chosen), deviations, iterations=max_iterations, progress=progress)
     if noise is None:
-        estimated = _estimated_noise(solution, nq)
+        estimated = _estimated_noise(solution, setup.model.nq)
         solution = fit.solve(solution.values, estimated, iterations=max_iterations, progress=progress)
     scales = np.array([parameter.scale for parameter in chosen])
     sensitivities, found = open_combinations(solution.jacobian, scales, variance_of(solution, len(chosen)))
@@ -143,11 +140,14 @@ def _setup(run: RoverRun, model: RoverModel | None, settings: Mapping[str, Any] 
     return Setup(run.model if model is None else model, run.terrain, known)
 
 
-def _given_noise(noise: object, nq: int, nv: int) -> Array:
+def _first_deviations(noise: object, model: RoverModel) -> Array:
+    """(nq + nv,) deviations with which the fit begins: the given ones, or the default."""
+    if noise is None:
+        return np.repeat([FIRST_DEVIATIONS["q"], FIRST_DEVIATIONS["v"]], [model.nq, model.nv])
     if not isinstance(noise, Mapping) or set(noise) != {"q", "v"}:
         refuse(OptionError, "noise", noise, "must be a mapping with the entries 'q' and 'v'")
     given = [number(f"noise.{name}", noise[name], above=0.0) for name in ("q", "v")]
-    return np.repeat(given, [nq, nv])
+    return np.repeat(given, [model.nq, model.nv])
 
 
 def _some(windows: list[Window], most: int) -> list[Window]:

@@ -83,10 +83,7 @@ def train_ppo(
     """
     shown = reporting or Reporting()
     total = settings.total_steps if total_steps is None else total_steps
-    checkpoints = folder / "checkpoints"
-    latest = latest_checkpoint(checkpoints) if resume else None
-    if latest is not None:
-        check_resumable(read_config(folder / "config.yaml"), settings)
+    latest = _checkpoint(folder, settings) if resume else None
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "config.yaml").write_text(settings.to_yaml(), encoding="utf-8")
     origin = provenance()
@@ -99,29 +96,12 @@ def train_ppo(
     curve = folder / (f"curve-{part}.monitor.csv" if part else "curve.monitor.csv")
     rovers = Stopwatch(build_env(settings, seed=stream, monitor=curve))
     try:
-        model, envs = _model(settings, rovers, stream, checkpoints, latest)
+        model, envs = _model(settings, rovers, stream, folder / "checkpoints", latest)
         model.set_logger(configure(str(folder / (f"log-{part}" if part else "log")), ["csv", "tensorboard"]))
 
-        curriculum = None
-        if settings.curriculum is not None:
-            curriculum = CurriculumCallback(settings.curriculum, None if latest is None else latest.hardest)
-        checkpoint = CheckpointCallback(settings.checkpoint_every, checkpoints, curriculum)
         facts = {"algorithm": "stable-baselines3 PPO", "config": name, "seed": seed}
-
-        def report(found: TrainingEvaluation, is_best: bool) -> None:
-            shown.say(evaluation_line(found, is_best))
-            shown.on_evaluation(found)
-
-        evaluation = EvaluationCallback(
-            settings, folder, {**facts, **origin}, append=latest is not None, n_films=shown.films, report=report
-        )
-        metrics = MetricsCallback(total, shown.say)
-        callbacks: list[BaseCallback] = [
-            *([] if curriculum is None else [curriculum]),
-            checkpoint,
-            metrics,
-            evaluation,
-        ]
+        checkpoint, evaluation, others = _callbacks(settings, folder, latest, {**facts, **origin}, shown)
+        callbacks = [*others, checkpoint, MetricsCallback(total, shown.say), evaluation]
 
         learn_clock = time.process_time()
         model.learn(
@@ -152,6 +132,32 @@ def train_ppo(
     finally:
         rovers.close()
     return folder / "policy"
+
+
+def _checkpoint(folder: Path, settings: TrainingConfig) -> Checkpoint:
+    """The latest checkpoint of a run's folder, checked against the configuration."""
+    latest = latest_checkpoint(folder / "checkpoints")
+    check_resumable(read_config(folder / "config.yaml"), settings)
+    return latest
+
+
+def _callbacks(
+    settings: TrainingConfig, folder: Path, latest: Checkpoint | None, source: dict[str, Any], shown: Reporting
+) -> tuple[CheckpointCallback, EvaluationCallback, list[BaseCallback]]:
+    """What writes checkpoints, what evaluates, and what makes the task harder, where the configuration asks for it."""
+    curriculum = None
+    if settings.curriculum is not None:
+        curriculum = CurriculumCallback(settings.curriculum, None if latest is None else latest.hardest)
+
+    def report(found: TrainingEvaluation, is_best: bool) -> None:
+        shown.say(evaluation_line(found, is_best))
+        shown.on_evaluation(found)
+
+    evaluation = EvaluationCallback(
+        settings, folder, source, append=latest is not None, n_films=shown.films, report=report
+    )
+    checkpoint = CheckpointCallback(settings.checkpoint_every, folder / "checkpoints", curriculum)
+    return checkpoint, evaluation, [] if curriculum is None else [curriculum]
 
 
 def _model(

@@ -95,40 +95,19 @@ def drive_all(
     for i, seed in enumerate(running):
         batch.reset(i, seed)
     active = np.ones(n, np.bool_)
-    sums = np.zeros((n, 4))  # path length, slip, tilt, largest tilt
-    steps = np.zeros(n, np.int64)
     observation = batch.observation
-    places = _places(batch, observation)
+    sums = _Sums.at(_places(batch, observation))
     done: dict[int, EvaluatedEpisode] = {}
     state = None
     idle: list[int] = []  # rovers that wait for the next command
     period = 0
     while active.any() or waiting:
-        actions, state = policy.predict(observation, state, steps == 0)
+        actions, state = policy.predict(observation, state, sums.steps == 0)
         period += 1
         observation, _, terminated, _, _ = batch.step(actions, active, has_scan=period % hold == 0)
-        infos = batch.infos()
-        now = _places(batch, observation)
-        sums[:, 0] += np.linalg.norm(now - places, axis=1)
-        tilt = infos["tilt"]
-        sums[:, 1] += infos["slip_ratio"]
-        sums[:, 2] += tilt
-        np.maximum(sums[:, 3], tilt, out=sums[:, 3])
-        places = now
-        steps += active
-        for i in np.flatnonzero(active & (terminated | (steps >= limit))).tolist():
-            info = batch.info(i)
-            way, slip, lean, largest = sums[i].tolist()
-            done[running[i]] = EvaluatedEpisode(
-                seed=running[i],
-                end=info["termination"] or "time",
-                time=info["time"],
-                distance=way,
-                energy=info["energy"],
-                slip=slip / steps[i].item(),
-                tilt=lean / steps[i].item(),
-                max_tilt=largest,
-            )
+        sums.add(_places(batch, observation), batch.infos(), active)
+        for i in np.flatnonzero(active & (terminated | (sums.steps >= limit))).tolist():
+            done[running[i]] = sums.episode(i, running[i], batch.info(i))
             progress(len(done))
             active[i] = False
             idle.append(i)
@@ -137,10 +116,58 @@ def drive_all(
                 running[i] = waiting.pop()
                 batch.reset(i, running[i])
                 observation[i] = batch.observation[i]
-                places[i] = _places(batch, observation[i : i + 1])[0]
-                sums[i], steps[i], active[i] = 0.0, 0, True
+                sums.begin(i, _places(batch, observation[i : i + 1])[0])
+                active[i] = True
             idle.clear()
     return [done[seed] for seed in seeds]
+
+
+@dataclass
+class _Sums:
+    """Sums over the steps of the running episodes.
+
+    Attributes:
+        places: `(n, 2)` places of the trunks after the last step, m.
+        steps: `(n,)` steps.
+        sums: `(n, 4)` path length, sums of slip and tilt, largest tilt.
+    """
+
+    places: npt.NDArray[np.float64]
+    steps: npt.NDArray[np.int64]
+    sums: npt.NDArray[np.float64]
+
+    @classmethod
+    def at(cls, places: npt.NDArray[np.float64]) -> "_Sums":
+        """Episodes that begin at these places, `(n, 2)`."""
+        n = len(places)
+        return cls(places, np.zeros(n, np.int64), np.zeros((n, 4)))
+
+    def begin(self, i: int, place: npt.NDArray[np.float64]) -> None:
+        """Begins a new episode of rover `i` at its place."""
+        self.places[i], self.steps[i], self.sums[i] = place, 0, 0.0
+
+    def add(self, places: npt.NDArray[np.float64], infos: Mapping[str, Any], active: npt.NDArray[np.bool_]) -> None:
+        """Adds a step, which the active rovers have made."""
+        self.sums[:, 0] += np.linalg.norm(places - self.places, axis=1)
+        self.sums[:, 1] += infos["slip_ratio"]
+        self.sums[:, 2] += infos["tilt"]
+        np.maximum(self.sums[:, 3], infos["tilt"], out=self.sums[:, 3])
+        self.places = places
+        self.steps += active
+
+    def episode(self, i: int, seed: int, info: Mapping[str, Any]) -> EvaluatedEpisode:
+        """The result of rover `i`."""
+        way, slip, lean, largest = self.sums[i].tolist()
+        return EvaluatedEpisode(
+            seed=seed,
+            end=info["termination"] or "time",
+            time=info["time"],
+            distance=way,
+            energy=info["energy"],
+            slip=slip / self.steps[i].item(),
+            tilt=lean / self.steps[i].item(),
+            max_tilt=largest,
+        )
 
 
 @dataclass(frozen=True)

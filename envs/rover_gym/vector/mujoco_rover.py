@@ -64,42 +64,51 @@ def rover_xml(
     default = ElementTree.SubElement(root, "default")
     ElementTree.SubElement(default, "geom", friction=f"{friction} 0 0", condim="3")
     world = ElementTree.SubElement(root, "worldbody")
-    ground = {"contype": "1", "conaffinity": "2"}  # the links do not touch each other
-    if normal is not None:
-        ElementTree.SubElement(world, "geom", ground, type="plane", size="0 0 1", zaxis=_text(normal))
-    for x, y, z, r in np.reshape(np.asarray(spheres, dtype=float), (-1, 4)):
-        ElementTree.SubElement(world, "geom", ground, type="sphere", size=repr(float(r)), pos=_text((x, y, z)))
+    _add_ground(world, normal, spheres)
     actuator = ElementTree.SubElement(root, "actuator")
     wheels = {wheel["solid"]: i for i, wheel in enumerate(machine["wheels"])}
     steered = {wheel.get("steering") for wheel in machine["wheels"]}
     nodes: dict[str, ElementTree.Element] = {}
     for solid in machine["solids"]:
         name, parent = solid["name"], solid.get("parent")
-        node = ElementTree.SubElement(
-            nodes[parent] if parent else world, "body", name=name, pos=_text(solid.get("position") or (0.0, 0.0, 0.0))
-        )
-        nodes[name] = node
-        ElementTree.SubElement(
-            node,
-            "inertial",
-            pos=_text(solid.get("centre_of_mass") or (0.0, 0.0, 0.0)),
-            mass=repr(solid["mass"]),
-            diaginertia=_text(principal_inertia(solid)),
-        )
-        if parent:
-            ElementTree.SubElement(node, "joint", name=name, type="hinge", axis=_text(solid.get("axis") or (0, 0, 1)))
-        else:
-            ElementTree.SubElement(node, "freejoint")
+        nodes[name] = _add_solid(nodes[parent] if parent else world, solid)
         if name in wheels:
             radius = contact_radius(machine["wheels"][wheels[name]])
             rim = ("cylinder", f"{radius} {HALF_WIDTH}") if thin_wheels else ("sphere", repr(radius))
             masks = {"contype": "2", "conaffinity": "1"}
-            ElementTree.SubElement(node, "geom", masks, type=rim[0], size=rim[1], mass="0")
+            ElementTree.SubElement(nodes[name], "geom", masks, type=rim[0], size=rim[1], mass="0")
             ElementTree.SubElement(actuator, "motor", name=f"drive{wheels[name]}", joint=name)
         if name in steered or (brake and name in wheels):
             kp, kv = (repr(solid["hold"][gain]) for gain in ("stiffness", "damping"))
             ElementTree.SubElement(actuator, "position", name=f"hold_{name}", joint=name, kp=kp, kv=kv)
     return ElementTree.tostring(root, encoding="unicode")
+
+
+def _add_ground(world: ElementTree.Element, normal: Collection[float] | None, spheres: npt.ArrayLike) -> None:
+    """Adds a plane, if it has a normal, and spheres."""
+    masks = {"contype": "1", "conaffinity": "2"}  # the links do not touch each other
+    if normal is not None:
+        ElementTree.SubElement(world, "geom", masks, type="plane", size="0 0 1", zaxis=_text(normal))
+    for x, y, z, r in np.reshape(np.asarray(spheres, dtype=float), (-1, 4)):
+        ElementTree.SubElement(world, "geom", masks, type="sphere", size=repr(float(r)), pos=_text((x, y, z)))
+
+
+def _add_solid(parent: ElementTree.Element, solid: Mapping[str, Any]) -> ElementTree.Element:
+    """Adds a solid with its inertia and its joint to its parent, and returns its element."""
+    name = solid["name"]
+    node = ElementTree.SubElement(parent, "body", name=name, pos=_text(solid.get("position") or (0.0, 0.0, 0.0)))
+    ElementTree.SubElement(
+        node,
+        "inertial",
+        pos=_text(solid.get("centre_of_mass") or (0.0, 0.0, 0.0)),
+        mass=repr(solid["mass"]),
+        diaginertia=_text(principal_inertia(solid)),
+    )
+    if solid.get("parent"):
+        ElementTree.SubElement(node, "joint", name=name, type="hinge", axis=_text(solid.get("axis") or (0, 0, 1)))
+    else:
+        ElementTree.SubElement(node, "freejoint")
+    return node
 
 
 def contact_radius(wheel: Mapping[str, Any]) -> float:
