@@ -14,7 +14,12 @@ UV     := $(BIN)/uv pip install --quiet --python $(BIN)/python
 export PYO3_PYTHON := $(abspath $(BIN)/python)# one interpreter for every cargo call, so that nothing is built twice
 export VIRTUAL_ENV := $(abspath $(VENV))# where maturin installs
 
-.PHONY: help demo test check lint types deny format stub test-rust test-python wheel extras docs bench chart stability torture validate orders bits profiles train train-rllib pins clean
+# With the interpreter's description that maturin leaves, cargo's own calls compile nothing twice.
+CARGO   = $(addprefix PYO3_CONFIG_FILE=,$(firstword $(shell ls $(CURDIR)/target/maturin/pyo3-config-*.txt 2> /dev/null))) cargo
+TIER   ?= test# of the tests: quick, test or all
+MODULE := $(or $(wildcard $(STAMPS)/release),$(STAMPS)/core)# as it is installed, or for development
+
+.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras docs bench chart stability torture validate orders bits profiles train train-rllib pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -25,17 +30,34 @@ demo: $(STAMPS)/demo $(STAMPS)/core $(STAMPS)/debian-demo ## set up, drive Rover
 	$(BIN)/rover report --figures --output runs/report
 	$(BIN)/rover replay runs/drive/episode-0.h5 --html runs/replay.html
 
-test: check test-rust docs test-python ## set up and run every check and every test (what .ci/run calls)
+quick: $(STAMPS)/core $(STAMPS)/test ## while editing: formatting, lint of Python, the core's tests and the fastest Python tests (90 seconds once built)
+	cargo fmt --all --check
+	$(BIN)/ruff check --quiet
+	$(BIN)/ruff format --quiet --check
+	$(MAKE) --no-print-directory --jobs=2 --output-sync test-rust pytest-quick
+
+pytest-quick:
+	$(BIN)/pytest --quiet --numprocesses 1 --tier quick
+
+test: $(STAMPS)/test $(STAMPS)/core ## set up, and run the checks and tests that a change must pass (what .ci/run calls)
+	$(MAKE) --no-print-directory --jobs=2 --output-sync test-rust types
+	$(MAKE) --no-print-directory --jobs=2 --output-sync lint deny docs
+	$(MAKE) --no-print-directory test-python
+
+test-all: ## every test there is, as long as it takes: before a release, and before an issue is closed
+	$(MAKE) --no-print-directory test TIER=all
+	$(MAKE) --no-print-directory torture TORTURE="--rounds 1 --no-table"
+	$(MAKE) --no-print-directory same-bits
 
 check: lint types deny ## lint, types, licences and sources, Rust and Python: what the commit hooks call
 
 lint: $(STAMPS)/test ## formatting and lint, Rust and Python
 	cargo fmt --all --check
-	cargo clippy --workspace --all-targets --locked --quiet -- -D warnings
+	$(CARGO) clippy --workspace --all-targets --locked --quiet -- -D warnings
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 
-types: $(STAMPS)/test $(STAMPS)/train $(STAMPS)/core ## mypy, and the stub against the compiled module
+types: $(STAMPS)/test $(STAMPS)/core ## mypy, and the stub against the compiled module
 	$(BIN)/mypy
 	MYPYPATH=envs $(BIN)/stubtest rover_gym._core
 
@@ -52,14 +74,21 @@ stub: $(STAMPS)/test $(STAMPS)/core ## write the compiled module's docstrings in
 	$(BIN)/python rust/python/stub.py
 	$(BIN)/ruff format --quiet envs/rover_gym/_core.pyi
 
-test-rust: ## the Rust tests only
-	cargo test --locked --quiet
+test-rust: $(STAMPS)/core ## the Rust tests only
+	$(CARGO) test --workspace --tests --locked --quiet -- $(if $(filter all,$(TIER)),--include-ignored)
 
-test-python: $(STAMPS)/test $(STAMPS)/train $(STAMPS)/core $(STAMPS)/debian-demo $(STAMPS)/debian-test ## the Python tests only
-	$(BIN)/pytest --numprocesses auto
+test-python: $(STAMPS)/test $(STAMPS)/core $(STAMPS)/fmu $(STAMPS)/debian-demo $(STAMPS)/debian-test ## the Python tests only, and the longest ten
+	$(BIN)/pytest --numprocesses auto --tier $(TIER) --durations 10
 
-wheel: $(STAMPS)/demo $(STAMPS)/fmu ## build the wheel, one for every Python from 3.11 on, and the archive of the sources, into dist/
+same-bits: $(STAMPS)/test $(MODULE) ## compare the bits of the development build with those of the build that is shipped
+	$(MAKE) --no-print-directory $(STAMPS)/core
+	$(MAKE) --no-print-directory bits BITS="--save runs/bits-development.json"
+	$(MAKE) --no-print-directory $(STAMPS)/release
+	$(MAKE) --no-print-directory bits BITS="--against runs/bits-development.json"
+
+wheel: $(STAMPS)/demo ## build the wheel, one for every Python from 3.11 on, and the archive of the sources, into dist/
 	rm -rf dist
+	$(call unit,release,--release)
 	$(BIN)/python -m maturin sdist --out dist
 	CARGO_TARGET_DIR=$(abspath target) $(BIN)/python -m maturin build --release --quiet --out dist
 	@ls dist/*
@@ -67,13 +96,13 @@ wheel: $(STAMPS)/demo $(STAMPS)/fmu ## build the wheel, one for every Python fro
 extras: $(STAMPS)/test wheel ## install the wheel, without Rust, in an empty environment for every Python and for each extra, and try what it promises
 	ROVER_GYM_WHEEL=$$(ls $(abspath dist)/*.whl) $(BIN)/pytest --numprocesses 0 --capture no tests/installing
 
-docs: $(STAMPS)/test $(STAMPS)/train $(STAMPS)/core ## build the documentation, Rust and Python, warnings denied
-	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked --quiet
-	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going docs docs/_build/html
+docs: $(STAMPS)/test $(STAMPS)/core ## build the documentation, Rust and Python, warnings denied
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps --locked --quiet
+	$(BIN)/sphinx-build --jobs auto --quiet --fail-on-warning --keep-going docs docs/_build/html
 	@echo "docs/_build/html/index.html"
 	@echo "target/doc/rover_core/index.html"
 
-bench: $(STAMPS)/core ## time a step and tell where the time goes, MuJoCo's beside it where it is installed (informs, does not gate)
+bench: $(STAMPS)/release ## time a step and tell where the time goes, MuJoCo's beside it where it is installed (informs, does not gate)
 	$(COMPARE).exploring_bench
 	cargo bench --locked $(addprefix --bench ,step accuracy spheres rays solver soil)
 	@if command -v valgrind > /dev/null; then cargo build --release --locked --quiet --example drive_steps; \
@@ -82,7 +111,7 @@ bench: $(STAMPS)/core ## time a step and tell where the time goes, MuJoCo's besi
 	  awk -v a=$$(count 1) -v b=$$(count 1001) 'BEGIN { printf "\n%.0f instructions a step of the curve (callgrind)\n", (b - a) / 1000 }'; \
 	else echo "valgrind is not installed: no instruction counts"; fi
 
-train: $(STAMPS)/train $(STAMPS)/demo $(STAMPS)/core ## train a policy for the rocks (about half an hour of one core) and compare it with the baseline, under runs/
+train: $(STAMPS)/test $(STAMPS)/release ## train a policy for the rocks (about half an hour of one core) and compare it with the baseline, under runs/
 	$(BIN)/python training/train_ppo.py --config rocks --seed 1
 	$(BIN)/python training/evaluate.py runs/train/rocks-seed1 --difficulty 1
 
@@ -93,26 +122,26 @@ train-rllib: ## train Rover-v0 on a local Ray with 1 and with 2 workers; Ray wan
 # One thread for every engine, and the package of comparisons on the path.
 COMPARE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONPATH=tests $(BIN)/python -m comparison
 
-chart: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## error against CPU time beside other engines: docs/comparison/ (40 minutes; CHART=--quick is shorter and goes to runs/)
+chart: $(STAMPS)/release $(STAMPS)/peers $(STAMPS)/debian-peers ## error against CPU time beside other engines: docs/comparison/ (40 minutes; CHART=--quick is shorter and goes to runs/)
 	$(COMPARE).chart $(CHART)
 	$(COMPARE).presets $(filter --quick,$(CHART))
 	$(COMPARE).sphere_scenes $(filter --quick,$(CHART))
 	$(COMPARE).exploring_chart $(filter --quick,$(CHART))
 	$(COMPARE).surface_scenes $(filter --quick,$(CHART))
 
-stability: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## the scenes where methods fail, ours and other engines': docs/stability.md (5 minutes)
+stability: $(STAMPS)/release $(STAMPS)/peers $(STAMPS)/debian-peers ## the scenes where methods fail, ours and other engines': docs/stability.md (5 minutes)
 	$(COMPARE).stability
 
-torture: $(STAMPS)/test $(STAMPS)/core ## tries to break everything: docs/stability.md's table (5 minutes on two cores; TORTURE="--hours 2", or --regime NAME --case K)
+torture: $(STAMPS)/test $(MODULE) ## tries to break everything: docs/stability.md's table (5 minutes on two cores; TORTURE="--hours 2", or --regime NAME --case K)
 	PYTHONPATH=tests $(BIN)/python -m torture $(TORTURE)
 
-bits: $(STAMPS)/test $(STAMPS)/core ## hash trajectories bit by bit (BITS="--save runs/bits.json" before a change, BITS="--against runs/bits.json" after it)
+bits: $(STAMPS)/test $(MODULE) ## hash trajectories bit by bit (BITS="--save runs/bits.json" before a change, BITS="--against runs/bits.json" after it)
 	$(COMPARE).bits $(BITS)
 
-profiles: $(STAMPS)/test $(STAMPS)/core ## performance profiles of the contact solvers, with Siconos' where it is installed
+profiles: $(STAMPS)/test $(STAMPS)/release ## performance profiles of the contact solvers, with Siconos' where it is installed
 	$(COMPARE).solver_profiles
 
-validate: $(STAMPS)/core ## the soil beside papers and closed forms: docs/validation.md (an hour and a half on two cores; VALIDATE="packing repose" measures some)
+validate: $(STAMPS)/release ## the soil beside papers and closed forms: docs/validation.md (an hour and a half on two cores; VALIDATE="packing repose" measures some)
 	PYTHONPATH=tests $(BIN)/python -m validation $(VALIDATE)
 
 orders: $(STAMPS)/demo ## measure every time-stepping scheme: order, drift, energy, cost; redraw docs/comparison/orders.png
@@ -121,8 +150,7 @@ orders: $(STAMPS)/demo ## measure every time-stepping scheme: order, drift, ener
 
 pins: $(STAMPS)/venv ## resolve requirements/*.txt anew from pyproject.toml
 	$(call pin,demo) --extra demo --group build
-	$(call pin,test) --extra test --extra docs --group build --group lint --constraint requirements/demo.txt
-	$(call pin,train) --extra train --constraint requirements/test.txt
+	$(call pin,test) --extra test --extra docs --extra train --group build --group lint --constraint requirements/demo.txt
 	$(call pin,rllib) --extra rllib --group build
 	$(call pin,peers) --extra peers --constraint requirements/test.txt
 
@@ -150,7 +178,7 @@ $(STAMPS)/debian-%: requirements/debian/%.txt | $(STAMPS)/venv
 	else echo "not Debian: rendering and the browser tests need what these Debian packages hold:" $$(cat $<); fi
 	@touch $@
 
-$(STAMPS)/demo $(STAMPS)/test $(STAMPS)/train: $(STAMPS)/%: requirements/%.txt $(STAMPS)/venv
+$(STAMPS)/demo $(STAMPS)/test: $(STAMPS)/%: requirements/%.txt $(STAMPS)/venv
 	$(UV) --requirement $<
 	@touch $@
 
@@ -165,15 +193,21 @@ $(STAMPS)/peers: requirements/peers.txt $(STAMPS)/demo
 	$(UV) --requirement $< || for one in $$(grep -o '^[a-z-]*==[^ ;]*' $<); do $(UV) $$one || true; done
 	@touch $@
 
-# The compiled core, in release mode, and the package itself, editable.
-$(STAMPS)/core: pyproject.toml Cargo.toml Cargo.lock $(shell find rust -type f) | $(STAMPS)/demo $(STAMPS)/fmu
-	$(BIN)/python -m maturin develop --release --uv --quiet
-	@touch $@
+# The compiled core and the package itself, editable: built for development, or as it is shipped. One takes the place of
+# the other; what cargo has compiled for either stays.
+SOURCES := pyproject.toml Cargo.toml Cargo.lock $(shell find rust -type f)
 
-# The library of co-simulation units, where the package and its wheel look for it.
-$(STAMPS)/fmu: Cargo.toml Cargo.lock $(shell find rust/core rust/fmu -type f) | $(STAMPS)/venv
-	cargo build --release --locked --quiet -p rover-fmu
-	@mkdir -p envs/rover_gym/_fmu
-	@for made in target/release/{lib,}rover_fmu.{so,dylib,dll}; do [ ! -f $$made ] || cp $$made envs/rover_gym/_fmu/rover_fmu.$${made##*.}; done
-	@! command -v strip > /dev/null || strip -S envs/rover_gym/_fmu/rover_fmu.*
+$(STAMPS)/core: PROFILE := dev
+$(STAMPS)/release: PROFILE := release
+$(STAMPS)/core $(STAMPS)/release: $(SOURCES) | $(STAMPS)/demo
+	$(BIN)/python -m maturin develop --profile $(PROFILE) --uv --quiet
+	@rm -f $(STAMPS)/core $(STAMPS)/release && touch $@
+
+# The library of co-simulation units, where the package and its wheel look for it. With the module's crate beside it the
+# dependencies have the same features, and nothing is compiled twice.
+unit = $(CARGO) build $(2) --locked --quiet -p rover-python -p rover-fmu && mkdir -p envs/rover_gym/_fmu && \
+	for made in target/$(1)/{lib,}rover_fmu.{so,dylib,dll}; do [ ! -f $$made ] || cp $$made envs/rover_gym/_fmu/rover_fmu.$${made\#\#*.}; done
+
+$(STAMPS)/fmu: $(SOURCES) | $(STAMPS)/core
+	@$(call unit,debug,)
 	@touch $@

@@ -19,6 +19,9 @@ from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_ru
 
 Torque = Callable[[float], float]
 
+OTHER_SEED = pytest.mark.nightly(
+    "tests/api/test_identification.py::test_parameters_are_recovered_within_their_uncertainty"
+)
 #: Standard deviations of the noise: m and rad, m/s and rad/s.
 NOISE = {"q": 1e-3, "v": 1e-2}
 MODEL = RoverModel()
@@ -79,7 +82,8 @@ def fits(slipping: RoverRun) -> Fits:
     return fit
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.takes_long("a fit is some hundred simulations, and other tests share it")
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=OTHER_SEED), pytest.param(2, marks=OTHER_SEED)])
 def test_parameters_are_recovered_within_their_uncertainty(fits: Fits, seed: int) -> None:
     for estimate, truth in zip(fits(seed).estimates, (1.2, 0.5), strict=True):
         assert estimate.is_identified
@@ -87,6 +91,7 @@ def test_parameters_are_recovered_within_their_uncertainty(fits: Fits, seed: int
         assert abs(estimate.value - truth) < 3.5 * estimate.standard_error
 
 
+@pytest.mark.nightly("tests/api/test_identification.py::test_parameters_are_recovered_within_their_uncertainty")
 def test_most_95_percent_intervals_hold_the_truth(fits: Fits) -> None:
     intervals = [
         (one.interval, truth) for seed in range(3) for one, truth in zip(fits(seed).estimates, (1.2, 0.5), strict=True)
@@ -118,7 +123,7 @@ def test_residuals_and_covariance_belong_together(fits: Fits) -> None:
         fit["frction"]
 
 
-@pytest.mark.parametrize("seed", [None, 1])
+@pytest.mark.parametrize("seed", [None, pytest.param(1, marks=OTHER_SEED)])
 def test_a_run_without_slip_does_not_tell_the_friction(rolling: RoverRun, seed: int | None) -> None:
     run = rolling if seed is None else with_noise(rolling, seed)
     fit = identify(run, ["mass_scale", "friction"], window=0.4, **BELIEVED)
@@ -140,12 +145,14 @@ def test_a_run_that_tells_only_a_quotient_says_so(rolling: RoverRun) -> None:
     assert fit["mass_scale"].value / fit["actuator_gain"].value == pytest.approx(1.2, rel=0.01)
 
 
+@pytest.mark.nightly("tests/api/test_identification.py::test_parameters_are_recovered_within_their_uncertainty")
 def test_without_noise_the_parameters_are_exact(slipping: RoverRun) -> None:
     fit = identify(slipping, ["mass_scale", "friction"], window=0.4, **BELIEVED)
     assert fit["mass_scale"].value == pytest.approx(1.2, abs=1e-5)
     assert fit["friction"].value == pytest.approx(0.5, abs=1e-5)
 
 
+@pytest.mark.nightly("tests/api/test_identification.py::test_the_stated_noise_is_taken")
 def test_a_parameter_of_ones_own(slipping: RoverRun) -> None:
     def apply(setup: Any, value: float) -> Any:
         return replace(setup, model=setup.model.replace(masses={"trunk": value}))

@@ -62,6 +62,7 @@ def shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[BallsShown]:
         yield BallsShown(browser, run, page)
 
 
+@pytest.mark.takes_long("starts a browser and opens the page that the other tests share")
 def test_the_page_loads_without_errors_and_without_the_network(shown: BallsShown) -> None:
     asked = [params["request"]["url"] for params in messages(shown.browser, "Network.requestWillBeSent")]
     assert shown.page.as_uri() in asked
@@ -160,6 +161,7 @@ def test_the_curves_follow_the_timeline(shown: BallsShown) -> None:
     await_that(lambda: slider(browser) == pytest.approx(middle, abs=0.02), "the time that was clicked on")
 
 
+@pytest.mark.nightly("tests/browser/test_grain_page.py::test_the_timeline_moves_balls_and_rover_and_comes_back")
 def test_it_plays_and_the_wheel_of_the_mouse_zooms(shown: BallsShown) -> None:
     browser = shown.browser
     go_to(browser, 0.1)
@@ -176,6 +178,7 @@ def test_it_plays_and_the_wheel_of_the_mouse_zooms(shown: BallsShown) -> None:
     assert (np.abs(near - far).max(axis=-1) > 15.0).mean() > 0.1
 
 
+@pytest.mark.nightly("tests/browser/test_grain_page.py::test_the_page_holds_the_places_of_every_sample")
 def test_twenty_thousand_balls_cost_the_script_little(tmp_path: Path) -> None:
     """60 pictures a second leave 17 ms for each; of 50 000 balls a new sample may take 3, and time goes with balls."""
     record_grains(MovingBalls((50, 10, 40), 0.01, 0.5), 0.4, tmp_path / "run.h5")

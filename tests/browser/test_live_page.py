@@ -90,6 +90,7 @@ def at_rest(live: Live) -> None:
     await_that(lambda: live.loop.state.speed < 0.05, "rest")
 
 
+@pytest.mark.takes_long("starts a browser and opens the page that the other tests share")
 def test_a_key_moves_the_rover_and_its_release_stops_it(live: Live) -> None:
     at_rest(live)
     key(live.browser, "keydown", "w")
@@ -105,6 +106,7 @@ def test_a_key_moves_the_rover_and_its_release_stops_it(live: Live) -> None:
     at_rest(live)
 
 
+@pytest.mark.nightly("tests/browser/test_live_page.py::test_a_key_moves_the_rover_and_its_release_stops_it")
 def test_a_slider_drives_and_stop_stops(live: Live) -> None:
     slide(live.browser, "forward", -0.6)
     await_that(lambda: live.loop.state.speed > 0.3, "speed")
@@ -112,6 +114,7 @@ def test_a_slider_drives_and_stop_stops(live: Live) -> None:
     at_rest(live)
 
 
+@pytest.mark.nightly("tests/browser/test_live_page.py::test_a_key_moves_the_rover_and_its_release_stops_it")
 def test_a_gamepad_drives_until_it_is_pulled_out(live: Live) -> None:
     live.browser.execute_script(GAMEPAD)
     await_that(lambda: live.loop.state.speed > 0.5, "speed")
@@ -182,6 +185,7 @@ def test_the_scene_shows_the_ground_and_the_curves_are_drawn(live: Live) -> None
     assert min(drawn) > 10
 
 
+@pytest.mark.nightly("tests/live/test_live_server.py::test_a_browser_that_vanishes_stops_the_rover_and_frees_the_wheel")
 def test_a_second_page_watches_and_may_take_the_wheel(live: Live) -> None:
     first = live.browser.current_window_handle
     live.browser.switch_to.new_window("tab")

@@ -184,6 +184,7 @@ def messages(browser: webdriver.Chrome, method: str) -> list[dict[str, Any]]:
     return [message["params"] for message in found if message["method"] == method]
 
 
+@pytest.mark.takes_long("starts a browser and opens the page that the other tests share")
 def test_the_page_loads_without_errors_and_without_the_network(shown: Shown) -> None:
     assert_alone(shown)
     assert shown.browser.title == "a drive over rocks"
@@ -221,6 +222,7 @@ def test_the_scene_shows_rover_rocks_and_ground_the_right_way_up(shown: Shown) -
     assert dark[round(rows.mean()) :].mean() > 0.005
 
 
+@pytest.mark.nightly("tests/browser/test_replay_page.py::test_the_scene_shows_rover_rocks_and_ground_the_right_way_up")
 def test_a_map_lies_under_the_rover_and_no_rock_floats_in_the_sky(tmp_path: Path) -> None:
     """Rocks beyond the piece of the map that is shown stood in the air."""
     field = HeightField.fractal(60.0, 0.25, 0.1, hurst=0.8, craters=0.02, crater_diameter=(1.0, 4.0), seed=3)
@@ -314,6 +316,7 @@ def test_a_click_on_a_curve_goes_to_that_time(shown: Shown) -> None:
     await_that(lambda: slider(shown.browser) == pytest.approx(middle, abs=0.02), "the time that was clicked on")
 
 
+@pytest.mark.nightly("tests/browser/test_replay_page.py::test_the_timeline_moves_the_rover")
 def test_it_plays(shown: Shown) -> None:
     go_to(shown.browser, 0.2)
     shown.browser.find_element(By.CSS_SELECTOR, "#root button").click()
@@ -338,6 +341,7 @@ def soil_shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SoilShown]:
         yield SoilShown(browser, run, page)
 
 
+@pytest.mark.nightly("tests/browser/test_grain_page.py::test_the_page_loads_without_errors_and_without_the_network")
 def test_a_soils_page_loads_alone_and_shows_rover_and_disks(soil_shown: SoilShown) -> None:
     assert_alone(soil_shown)
     browser = soil_shown.browser
@@ -355,6 +359,7 @@ def test_a_soils_page_loads_alone_and_shows_rover_and_disks(soil_shown: SoilShow
     assert np.nonzero(sand)[0].min() > 0.4 * sand.shape[0]  # below
 
 
+@pytest.mark.nightly("tests/browser/test_grain_page.py::test_the_timeline_moves_balls_and_rover_and_comes_back")
 def test_a_soils_timeline_moves_disks_chains_and_wheels_and_comes_back(soil_shown: SoilShown) -> None:
     browser, run = soil_shown.browser, soil_shown.run
     go_to(browser, 0.0)

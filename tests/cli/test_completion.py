@@ -65,6 +65,7 @@ def test_names_files_and_folders_that_fit_are_offered(
     assert complete(begun) == expected
 
 
+@pytest.mark.nightly("tests/cli/test_completion.py::test_the_shell_is_offered_options_and_their_values")
 def test_the_completion_installs_itself(tmp_path: Path) -> None:
     assert "bash completion installed" in rover(
         "--install-completion", "bash", folder=tmp_path, _TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION="1"

@@ -57,6 +57,7 @@ def test_it_is_plotted_and_replayed(folder: Path) -> None:
     assert "IndexedFaceSet" in (folder / "run.wrl").read_text(encoding="utf-8")
 
 
+@pytest.mark.nightly("tests/cli/test_maps.py::test_it_is_plotted_and_replayed")
 def test_a_drive_off_the_map_is_recorded_plotted_and_replayed(tmp_path: Path) -> None:
     """Its last step has no residual, and the axes of the figure had no end."""
     env = RoverEnv(terrain=HeightField(np.zeros((21, 21)), 0.5), goal_distance=(2.0, 3.0))

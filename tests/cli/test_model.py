@@ -27,6 +27,7 @@ def test_every_model_of_the_gallery_is_shown_and_checked(name: str) -> None:
         assert what in checked.output
 
 
+@pytest.mark.takes_long("imports and draws; the only test of the picture")
 def test_an_import_writes_the_model_and_its_picture(tmp_path: Path) -> None:
     pytest.importorskip("yourdfpy")
     pytest.importorskip("matplotlib")

@@ -186,6 +186,7 @@ def test_an_interrupted_baseline_prints_what_is_done(monkeypatch: pytest.MonkeyP
     assert [(row["difficulty"], row["episodes"]) for row in json.loads(result.stdout)["rows"]] == [(0.0, 2), (0.25, 1)]
 
 
+@pytest.mark.nightly("tests/cli/test_one_line.py::test_an_interrupted_drive_keeps_and_prints_what_is_done")
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are others there")
 def test_ctrl_c_at_a_terminal_ends_a_long_run_with_its_recording(tmp_path: Path) -> None:
     command = [sys.executable, "-c", "from rover_gym.cli import main; main()", "planar", "rover"]

@@ -20,6 +20,8 @@ from rover_gym.record import RecordingError, read_trajectory
 from rover_gym.reproduction.chapter_3_balls import ball_on_incline, published
 from rover_gym.soil import read_soil_run
 
+NIGHTLY_BALL = pytest.mark.nightly("tests/cli/test_planar.py::test_a_planar_run_is_plotted_and_replayed")
+
 
 def png_size(path: Path) -> tuple[int, int]:
     head = path.read_bytes()[:24]
@@ -84,6 +86,7 @@ def test_bad_options_end_with_one_line(options: list[str], field: str, tmp_path:
 SMALL = ["--disks", "100", "--layers", "2"]
 
 
+@pytest.mark.nightly("tests/cli/test_planar.py::test_a_crossing_ends_where_the_soil_does")
 def test_a_crossing_is_recorded_drawn_filmed_and_replayed(tmp_path: Path) -> None:
     options = [*SMALL, "--duration", "0.2", "--output", str(tmp_path)]
     result = CliRunner().invoke(app, ["planar", "soil", *options])
@@ -159,6 +162,7 @@ def test_a_crossing_ends_where_the_soil_does(tmp_path: Path) -> None:
     assert read_soil_run(tmp_path / "soil.h5").time[-1] < 5.0
 
 
+@pytest.mark.nightly("tests/cli/test_planar.py::test_a_run_is_recorded_and_drawn")
 def test_a_sweep_is_drawn_and_its_numbers_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, values in (("TORQUES", (50.0,)), ("SLIPS", (0.0, 0.2, 0.5, 0.7)), ("LOADS", (10.0,))):
         monkeypatch.setattr(f"rover_gym.cli.soil_command.{name}", values)
@@ -215,6 +219,7 @@ def test_the_incline_is_the_published_figure(tmp_path: Path) -> None:
     assert np.median(np.abs(height - y)) < 0.3
 
 
+@pytest.mark.nightly("tests/cli/test_planar.py::test_the_incline_is_the_published_figure")
 def test_chapter_3_is_redrawn(tmp_path: Path) -> None:
     paths = draw_chapter_3(tmp_path)
     assert [path.name[:10] for path in paths] == ["figure-3.2", "figure-3.3", "figure-3.4", "figure-3.5"]
@@ -233,7 +238,7 @@ def test_a_default_run_ends_where_its_subject_ends(tmp_path: Path) -> None:
     assert np.ptp(axes.get_xlim()) < 9.0
 
 
-@pytest.mark.parametrize("command", ["ball", "rover"])
+@pytest.mark.parametrize("command", [pytest.param("ball", marks=NIGHTLY_BALL), "rover"])
 def test_a_planar_run_is_plotted_and_replayed(command: str, tmp_path: Path) -> None:
     runner = CliRunner()
     assert runner.invoke(app, ["planar", command, "--duration", "0.5", "--output", str(tmp_path)]).exit_code == 0

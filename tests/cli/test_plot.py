@@ -50,6 +50,8 @@ for _ in range(57):
 os.kill(os.getpid(), signal.SIGKILL)
 """
 
+LARGER = pytest.mark.nightly("tests/cli/test_plot.py::test_figures_of_other_rovers_show_their_wheels")
+
 
 def rover(*arguments: str) -> Result:
     return CliRunner(env={"COLUMNS": "120", "NO_COLOR": "1"}).invoke(app, list(arguments))
@@ -95,6 +97,7 @@ def curves(axes: Axes) -> dict[str, np.ndarray]:
     return {str(line.get_label()): np.asarray(line.get_ydata()) for line in axes.get_lines()}
 
 
+@pytest.mark.takes_long("draws every figure that there is")
 def test_a_run_gives_a_file_per_figure(recordings: dict[str, Path], tmp_path: Path) -> None:
     result = rover("plot", str(recordings["rocks"]), "--output", str(tmp_path))
     assert result.exit_code == 0, result.output
@@ -104,6 +107,7 @@ def test_a_run_gives_a_file_per_figure(recordings: dict[str, Path], tmp_path: Pa
     assert len(list(tmp_path.iterdir())) == len(DRAWINGS)
 
 
+@pytest.mark.nightly("tests/cli/test_plot.py::test_what_was_not_recorded_is_left_out")
 def test_without_a_folder_the_figures_lie_beside_the_run(
     recordings: dict[str, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -288,6 +292,7 @@ def test_smoothing_keeps_a_constant_and_the_area_of_a_spike_and_leaves_gaps() ->
     assert smooth(time, holes, 0.5) == pytest.approx(holes, nan_ok=True)
 
 
+@pytest.mark.nightly("tests/cli/test_plot.py::test_a_run_of_one_row_is_drawn")
 def test_a_killed_run_is_drawn_and_says_that_it_was_broken_off(tmp_path: Path) -> None:
     path = tmp_path / "killed.h5"
     result = subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False)
@@ -358,7 +363,7 @@ def test_without_matplotlib_the_error_names_the_extra(
     assert not (tmp_path / "plots").exists()
 
 
-@pytest.mark.parametrize("name", ["skid", "axle", "eight"])
+@pytest.mark.parametrize("name", ["axle", *(pytest.param(name, marks=LARGER) for name in ("skid", "eight"))])
 def test_figures_of_other_rovers_show_their_wheels(name: str, tmp_path: Path) -> None:
     model = MACHINES[name][1]
     simulation = Simulation(model)

@@ -24,6 +24,7 @@ FIGURES = (
 )
 
 
+@pytest.mark.nightly("tests/cli/test_report.py::test_the_run_lands_where_siconos_does")
 def test_the_scene_is_recorded_and_drawn(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["report", "--figures", "--duration", "12", "--output", str(tmp_path)])
     assert result.exit_code == 0, result.output

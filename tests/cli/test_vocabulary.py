@@ -147,6 +147,7 @@ def test_rover_alone_says_what_to_try_first() -> None:
         assert word in result.output
 
 
+@pytest.mark.takes_long("runs the first commands that a user sees")
 def test_the_first_steps_run_in_their_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for command, _ in FIRST_STEPS:

@@ -61,6 +61,7 @@ def test_the_shipped_forecast_knows_what_holds_the_trunk() -> None:
     assert foreseen[1][1] > foreseen[0][1] + 0.02
 
 
+@pytest.mark.nightly("tests/envs/test_foresight.py::test_rover_and_ground_choose_the_forecast")
 def test_the_small_rover_has_a_forecast_of_its_own() -> None:
     """Of difficulty 2, where `ScanPolicy` reaches six goals of ten in the same time, it reaches nearly all."""
     model = open_model("open-rover")

@@ -33,10 +33,13 @@ print((resident() - before) / n)
 """
 
 
+ROCKS = pytest.mark.nightly("tests/envs/test_memory.py::test_a_rover_of_a_batch_takes_as_much_memory_as_stated")
+
+
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="the memory of a process is read as Linux tells it")
 @pytest.mark.parametrize(
     ("arguments", "most"),
-    [({}, 60_000), ({"terrain": "rocks", "difficulty": 1.0}, 230_000)],
+    [({}, 60_000), pytest.param({"terrain": "rocks", "difficulty": 1.0}, 230_000, marks=ROCKS)],
     ids=["plane", "hardest rocks"],
 )
 def test_a_rover_of_a_batch_takes_as_much_memory_as_stated(arguments: dict[str, Any], most: float) -> None:

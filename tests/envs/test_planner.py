@@ -108,6 +108,7 @@ def test_an_observation_that_is_none_is_refused_before_planning() -> None:
             policy.predict(bad)
 
 
+@pytest.mark.nightly("tests/envs/test_planner.py::test_raw_actions_drive_to_the_goal")
 @pytest.mark.parametrize("method", ["cem", "mppi"])
 def test_the_planner_backs_out_of_a_dead_end(method: str) -> None:
     """Three rocks stand around the rover's front; the goal lies behind them."""

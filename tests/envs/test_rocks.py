@@ -296,12 +296,13 @@ def test_bad_abundance_of_a_field() -> None:
         assert caught.value.field == "abundance"
 
 
-def test_baseline_reaches_its_goal_where_it_is_easy_and_not_always_where_it_is_hard() -> None:
-    easy, hard = measure_baseline((0.0, 1.0), episodes=20, seed=1000)
+def test_baseline_reaches_its_goal_where_it_is_easy_and_not_always_where_it_is_hard(whole: bool) -> None:
+    episodes = 20 if whole else 8
+    easy, hard = measure_baseline((0.0, 1.0), episodes=episodes, seed=1000)
     assert easy.success_rate >= 0.95
     assert hard.success_rate <= 0.9
     for row in (easy, hard):
-        assert sum(row.ends.values()) == row.episodes == 20
+        assert sum(row.ends.values()) == row.episodes == episodes
         assert list(row.ends) == list(ENDS)
         assert row.ends["goal"] == row.successes
         assert row.ends["step_failed"] == 0
@@ -356,6 +357,7 @@ def test_a_field_without_ground_is_no_ground() -> None:
     assert caught.value.field == "slope_deg"
 
 
+@pytest.mark.nightly("tests/torture/test_torture.py::test_a_short_round_of_every_regime_holds")
 def test_ten_minutes_of_driving_over_rocks() -> None:
     env = RoverEnv(terrain="rocks", difficulty=(0.0, 1.0))
     policy = PDPolicy(env)

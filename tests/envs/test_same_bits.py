@@ -93,12 +93,18 @@ def drives_elsewhere(variables: dict[str, str]) -> dict[str, list[str]]:
     return found
 
 
+ONE_IS_ENOUGH = pytest.mark.nightly("tests/envs/test_same_bits.py::test_other_instructions_same_bits")
+
+
 @pytest.fixture(scope="module")
 def here() -> dict[str, list[str]]:
     return drives()
 
 
-@pytest.mark.parametrize("other", OTHER_MACHINES)
+@pytest.mark.takes_long("drives every kind of ground in processes that take this machine for another")
+@pytest.mark.parametrize(
+    "other", [pytest.param(one, marks=ONE_IS_ENOUGH if one != "libc" else ()) for one in OTHER_MACHINES]
+)
 def test_other_instructions_same_bits(other: str, here: dict[str, list[str]]) -> None:
     there = drives_elsewhere(OTHER_MACHINES[other])
     parted = {

@@ -38,12 +38,23 @@ EXTRAS = {
 }
 
 
+#: Blocks of the manual, not of the README or a tutorial, that take long.
+NIGHTLY = {
+    "docs/identification.md-1": pytest.mark.nightly("tests/api/test_identification.py::test_the_stated_noise_is_taken"),
+    "docs/foresight.md-2": pytest.mark.nightly(
+        "tests/envs/test_foresight.py::test_rover_and_ground_choose_the_forecast"
+    ),
+    "docs/tasks.md-5": pytest.mark.nightly("tests/envs/test_reward_terms.py"),
+}
+
+
 def blocks() -> list[pytest.param]:
     found = []
     for page in PAGES:
         text = (ROOT / page).read_text(encoding="utf-8")
         for number, code in enumerate(re.findall(r"^```python\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL), 1):
-            found.append(pytest.param(code, id=f"{page}-{number}"))
+            name = f"{page}-{number}"
+            found.append(pytest.param(code, id=name, marks=NIGHTLY.get(name, ())))
     return found
 
 

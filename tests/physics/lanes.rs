@@ -3,8 +3,9 @@
     clippy::unwrap_used,
     clippy::too_many_lines,
     clippy::cast_possible_truncation,
-    clippy::cast_sign_loss
-)] // one long comparison; numbers drawn by a sine
+    clippy::cast_sign_loss,
+    clippy::float_cmp
+)] // one long comparison; numbers drawn by a sine; equal bits are the claim
 
 use fearless_simd::{f64x4, f64x8};
 use rover_core::scalar::{Instructions, Lane, Single};

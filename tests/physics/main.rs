@@ -1,4 +1,4 @@
-//! Whole behaviour of the core: laws, closed forms, recorded references and invariants, a module a subject.
+//! Whole behaviour of the core: laws, closed forms, recorded references and invariants.
 //!
 //! One program, so that the core is linked once.
 

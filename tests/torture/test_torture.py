@@ -29,6 +29,7 @@ def complaints(tasks: list[tuple[str, int]]) -> list[str]:
     return [line for row in rows.values() for line in row.complaints()]
 
 
+@pytest.mark.takes_long("the campaign, cut to twenty seconds")
 def test_a_short_round_of_every_regime_holds() -> None:
     broken = complaints([(regime.name, 0) for regime in REGIMES])
     assert not broken, "\n".join(broken)

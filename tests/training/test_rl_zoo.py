@@ -3,15 +3,33 @@
 It runs in a separate process, because importing it changes Gymnasium's TimeLimit for all other tests.
 """
 
+import inspect
 import subprocess
 import sys
 from pathlib import Path
 
+import gymnasium as gym
 import pytest
+import yaml
+
+import rover_gym  # noqa: F401 - registers the environments
 
 CONFIGS = Path(__file__).parents[2] / "training" / "configs"
+#: What the zoo's command line takes itself.
+ZOO = {"n_envs", "n_timesteps", "normalize", "policy", "env_wrapper", "vec_env_wrapper", "callback", "env_kwargs"}
 
 
+@pytest.mark.parametrize("path", sorted(CONFIGS.glob("rl_zoo*.yml")), ids=lambda path: path.stem)
+def test_the_hyperparameters_are_the_algorithms(path: Path) -> None:
+    algorithms = pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
+    algorithm = algorithms.SAC if "sac" in path.stem else algorithms.PPO
+    known = ZOO | set(inspect.signature(algorithm).parameters)
+    for name, hyperparameters in yaml.safe_load(path.read_text(encoding="utf-8")).items():
+        assert name in gym.registry
+        assert not set(hyperparameters) - known, name
+
+
+@pytest.mark.nightly("tests/training/test_rl_zoo.py::test_the_hyperparameters_are_the_algorithms")
 @pytest.mark.parametrize(
     ("config", "algorithm", "name"),
     [

@@ -34,6 +34,7 @@ TOY = parse_config(
 )
 
 
+@pytest.mark.takes_long("the smoke training of PPO")
 def test_driving_to_a_near_goal_is_learned(tmp_path: Path) -> None:
     torch.set_num_threads(1)
     envs = normalised(build_env(TOY, seed=11), TOY)

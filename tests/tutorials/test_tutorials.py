@@ -45,7 +45,7 @@ def test_the_page_about_contact_problems(folder: Path) -> None:
     assert (folder / "stack.npz").is_file()
 
 
-@pytest.mark.slow
+@pytest.mark.takes_long("imports, drives, plots and replays, as the tutorial does")
 def test_a_rover_over_a_map(folder: Path) -> None:
     for package in ("yourdfpy", "viser", "h5py"):
         pytest.importorskip(package)
@@ -55,7 +55,7 @@ def test_a_rover_over_a_map(folder: Path) -> None:
     assert names["simulation"].q[0] > -3.9
 
 
-@pytest.mark.slow
+@pytest.mark.takes_long("trains, evaluates, films and replays, as the tutorial does")
 @pytest.mark.timeout(900)
 def test_train_a_policy(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With the page's own variables for a rehearsal."""

@@ -29,6 +29,9 @@ def held(ledger: Ledger) -> None:
     assert [f for f in findings.everywhere({"run": ledger.as_dict()}) if not f.holds] == []
 
 
+@pytest.mark.nightly(
+    "tests/physics/planar/soil.rs::a_disk_on_a_slope_rolls_below_and_slides_above_three_times_the_friction"
+)
 def test_columns_run_out_the_farther_the_taller_and_nearly_in_proportion() -> None:
     ledger = Ledger()
     runs = [run_out(220, aspect, 0, ledger, rough=True) for aspect in (0.7, 2.0)]
@@ -40,6 +43,7 @@ def test_columns_run_out_the_farther_the_taller_and_nearly_in_proportion() -> No
     held(ledger)
 
 
+@pytest.mark.nightly("tests/physics/planar/soil.rs::the_floor_carries_the_weight")
 def test_disks_without_friction_pack_at_random_and_isostatically_those_with_friction_loosely() -> None:
     ledger = Ledger()
     smooth, rough = (bed(250, mu, 0, ledger) for mu in (0.0, 1.0))
@@ -50,6 +54,9 @@ def test_disks_without_friction_pack_at_random_and_isostatically_those_with_fric
     held(ledger)
 
 
+@pytest.mark.nightly(
+    "tests/physics/planar/soil.rs::a_disk_on_a_slope_rolls_below_and_slides_above_three_times_the_friction"
+)
 def test_a_slope_stays_the_steeper_the_more_friction() -> None:
     # A bed of so few disks is off by some four degrees: the mean of three.
     ledger = Ledger()
@@ -59,6 +66,7 @@ def test_a_slope_stays_the_steeper_the_more_friction() -> None:
     held(ledger)
 
 
+@pytest.mark.nightly("tests/physics/planar/soil.rs::the_floor_carries_the_weight")
 def test_rough_walls_bear_the_filling_and_smooth_ones_do_not() -> None:
     ledger = Ledger()
     low, high = (weigh(height, 0, ledger, diameters=8.0, travel=2.0, start=1.0) for height in (0.5, 4.0))
@@ -71,6 +79,7 @@ def test_rough_walls_bear_the_filling_and_smooth_ones_do_not() -> None:
     held(ledger)
 
 
+@pytest.mark.nightly("tests/physics/planar/soil.rs::sweeps_and_the_dense_newton_give_the_same_velocities")
 def test_disks_run_out_of_a_silo_steadily_and_faster_than_in_proportion_to_the_opening() -> None:
     ledger = Ledger()
     runs = [
@@ -137,6 +146,7 @@ def test_a_number_out_of_its_range_is_marked() -> None:
     assert "**outside**" in outside.row()
 
 
+@pytest.mark.nightly("tests/physics/grains.rs::balls_fall_in_a_box_and_rest_in_it_and_their_energy_never_grows")
 def test_balls_pack_as_rigid_spheres_do() -> None:
     ledger = Ledger()
     smooth, rough = (ball_packing.bed(330, mu, 0, ledger, diameters=7.0) for mu in (0.0, 1.0))
@@ -157,6 +167,7 @@ def test_balls_keep_momentum_gain_no_energy_and_obey_froude() -> None:
     held(ledger)
 
 
+@pytest.mark.nightly("tests/physics/grains.rs::sweeps_and_a_factorisation_give_balls_the_same_velocities")
 def test_a_sphere_sinks_the_deeper_the_faster_it_strikes_balls() -> None:
     ledger = Ledger()
     width = 0.08
@@ -169,6 +180,9 @@ def test_a_sphere_sinks_the_deeper_the_faster_it_strikes_balls() -> None:
     assert ledger.overlap < 0.015, "a small sphere in a small bed; the page holds the large ones to 1%"
 
 
+@pytest.mark.nightly(
+    "tests/physics/grains.rs::on_a_slope_a_disk_slides_above_three_times_the_friction_and_a_ball_above_three_and_a_half"
+)
 def test_columns_of_balls_run_out_and_a_silo_of_them_flows() -> None:
     ledger = Ledger()
     run = ball_collapse.run_out(150, 1.0, 0, ledger)
@@ -179,6 +193,9 @@ def test_columns_of_balls_run_out_and_a_silo_of_them_flows() -> None:
     held(ledger)
 
 
+@pytest.mark.nightly(
+    "tests/physics/grains.rs::on_a_slope_a_disk_slides_above_three_times_the_friction_and_a_ball_above_three_and_a_half"
+)
 def test_a_drum_carries_balls_up_only_by_friction_or_a_rough_wall() -> None:
     ledger = Ledger()
     options = {"wall": 0.045, "rate": 0.6, "start": 0.42, "turn": 0.3}
@@ -191,6 +208,9 @@ def test_a_drum_carries_balls_up_only_by_friction_or_a_rough_wall() -> None:
     held(ledger)
 
 
+@pytest.mark.nightly(
+    "tests/physics/grains.rs::on_a_slope_a_disk_slides_above_three_times_the_friction_and_a_ball_above_three_and_a_half"
+)
 def test_a_bed_of_balls_without_friction_flows_out_farther() -> None:
     ledger = Ledger()
     low, high = (ball_repose.slope(240, mu, 1, ledger, length=12.0, width=5.0) for mu in (0.0, 0.8))
@@ -200,6 +220,7 @@ def test_a_bed_of_balls_without_friction_flows_out_farther() -> None:
     held(ledger)
 
 
+@pytest.mark.nightly("tests/physics/grains.rs::a_pyramid_of_balls_stands_on_glued_ones_which_carry_its_weight")
 def test_a_rough_tube_bears_balls_and_a_smooth_one_does_not() -> None:
     ledger = Ledger()
     low, high = (ball_janssen.weigh(count, 0, ledger, tube=0.025, travel=1.8) for count in (60, 180))

@@ -1,0 +1,108 @@
+"""Tiers of the tests, and how long one may take.
+
+`--tier quick` takes the rooms of `QUICK`, `--tier test` all tests but those marked `nightly`, `--tier all` every test.
+In the first two, a test that takes more than `LIMIT` seconds of processor time fails the run unless it is marked
+`takes_long`.
+"""
+
+import os
+from collections.abc import Generator
+from pathlib import Path
+
+import pytest
+
+# Two workers share two cores; libraries that start threads of their own only get in the way.
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(variable, "1")
+
+TESTS = Path(__file__).parent
+#: Folders and files of the quick tier.
+QUICK = ("api", "house", "models", "envs/test_registered.py", "envs/test_formulas.py", "envs/test_episode.py")
+#: Processor time of one test and the processes that it waits for, s. It depends less on the machine's load than time.
+LIMIT = 5.0
+TIER = pytest.StashKey[str]()
+#: Tests of this run over the limit.
+TOO_LONG: list[str] = []
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Adds `--tier`."""
+    parser.addoption("--tier", choices=["quick", "test", "all"], default="test", help="which tests to run")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Notes the tier."""
+    config.stash[TIER] = config.getoption("--tier")
+
+
+def is_quick(path: Path) -> bool:
+    """Whether a file is in the quick tier."""
+    place = path.relative_to(TESTS).as_posix()
+    return any(place == one or place.startswith(f"{one}/") for one in QUICK)
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leaves out the tests of the slower tiers."""
+    tier = config.stash[TIER]
+    if tier == "all":
+        return
+    out = [
+        item
+        for item in items
+        if item.get_closest_marker("nightly")
+        or (tier == "quick" and (item.get_closest_marker("takes_long") or not is_quick(item.path)))
+    ]
+    left_out = set(out)
+    items[:] = [item for item in items if item not in left_out]
+    config.hook.pytest_deselected(items=out)
+
+
+@pytest.fixture(scope="session")
+def whole(pytestconfig: pytest.Config) -> bool:
+    """Whether a test that can be cut short runs whole, as it does with `--tier all`."""
+    return pytestconfig.stash[TIER] == "all"
+
+
+def processor_time() -> float:
+    """Of this process and of those that it has waited for, s."""
+    return sum(os.times()[:4])
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    """Notes when a test begins."""
+    item.user_properties.append(("start", processor_time()))
+    return (yield)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Notes what a test took, with its fixtures."""
+    report = yield
+    if report.when == "teardown":
+        took = processor_time() - dict(item.user_properties)["start"]
+        report.user_properties = [("processor_time", took), ("takes_long", bool(item.get_closest_marker("takes_long")))]
+    return report
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """Collects the tests that took too long; with several workers this runs in the process that gathers them."""
+    noted = dict(report.user_properties)
+    took = noted.get("processor_time", 0.0)
+    if report.when == "teardown" and took > LIMIT and not noted["takes_long"]:
+        TOO_LONG.append(f"{report.nodeid}: {took:.1f} s")
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Fails the run if a test took too long."""
+    if TOO_LONG and session.config.stash[TIER] != "all" and session.exitstatus == pytest.ExitCode.OK:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Names the tests that took too long."""
+    if TOO_LONG and config.stash[TIER] != "all":
+        terminalreporter.section(f"over {LIMIT:g} s of processor time, and not marked takes_long", red=True)
+        for line in TOO_LONG:
+            terminalreporter.write_line(line)
