@@ -123,6 +123,7 @@ def test_a_crossing_is_recorded_drawn_filmed_and_replayed(tmp_path: Path) -> Non
     assert "error: --gltf" in refused.output
 
 
+@pytest.mark.nightly("tests/cli/test_planar.py::test_a_planar_run_is_plotted_and_replayed")
 def test_a_run_on_a_soil_is_plotted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     options = [*SMALL, "--duration", "0.2", "--no-video", "--output", str(tmp_path)]
     assert CliRunner().invoke(app, ["planar", "soil", *options]).exit_code == 0

@@ -50,8 +50,6 @@ for _ in range(57):
 os.kill(os.getpid(), signal.SIGKILL)
 """
 
-LARGER = pytest.mark.nightly("tests/cli/test_plot.py::test_figures_of_other_rovers_show_their_wheels")
-
 
 def rover(*arguments: str) -> Result:
     return CliRunner(env={"COLUMNS": "120", "NO_COLOR": "1"}).invoke(app, list(arguments))
@@ -363,7 +361,8 @@ def test_without_matplotlib_the_error_names_the_extra(
     assert not (tmp_path / "plots").exists()
 
 
-@pytest.mark.parametrize("name", ["axle", *(pytest.param(name, marks=LARGER) for name in ("skid", "eight"))])
+@pytest.mark.nightly("tests/cli/test_plot.py::test_a_wheel_has_one_colour_in_every_figure")
+@pytest.mark.parametrize("name", ["skid", "axle", "eight"])
 def test_figures_of_other_rovers_show_their_wheels(name: str, tmp_path: Path) -> None:
     model = MACHINES[name][1]
     simulation = Simulation(model)

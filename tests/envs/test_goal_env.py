@@ -112,6 +112,7 @@ def test_what_it_cannot_do_is_refused() -> None:
     assert refused.value.field == "achieved_goal"
 
 
+@pytest.mark.nightly("tests/envs/test_registered.py")
 def test_hindsight_replay_learns_from_it_without_complaint() -> None:
     stable_baselines3 = pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
     import torch  # noqa: PLC0415 - needs the extra

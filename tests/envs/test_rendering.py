@@ -454,7 +454,7 @@ def test_a_machine_without_opengl_is_told_what_to_install(monkeypatch: pytest.Mo
         FrameRenderer(RoverModel(), Plane())
 
 
-@pytest.mark.takes_long("imports PyTorch and VTK in a process of its own")
+@pytest.mark.nightly("tests/envs/test_rendering.py::test_stable_baselines3_records_a_video")
 def test_an_optimizer_can_be_made_after_a_frame() -> None:
     """A training that starts after a rendering ended in a segmentation fault: two LLVMs in one process."""
     code = (

@@ -67,6 +67,7 @@ def test_a_run_leaves_what_it_was_and_its_curves(run: Path) -> None:
     assert len((run / "curve.monitor.csv").read_text(encoding="utf-8").splitlines()) >= 2 + 256 // 20 - 4
 
 
+@pytest.mark.takes_long("trains once with each algorithm, for this and the next tests")
 def test_the_policy_that_is_loaded_is_the_one_that_was_evaluated(run: Path) -> None:
     policy = RawPolicy.load(run)
     assert policy.environment["control_frequency"] == 5

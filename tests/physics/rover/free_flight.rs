@@ -107,7 +107,7 @@ fn no_spin_and_no_step_add_energy() {
                 }
                 let start = simulation.state().configuration.clone();
                 simulation.set_state(start, v);
-                for step in 0..200 {
+                for step in 0..100 {
                     let before = simulation.energy();
                     simulation.step(1).unwrap();
                     let after = simulation.energy();
