@@ -17,6 +17,7 @@ export VIRTUAL_ENV := $(abspath $(VENV))# where maturin installs
 # With the interpreter's description that maturin leaves, cargo's own calls compile nothing twice.
 CARGO   = $(addprefix PYO3_CONFIG_FILE=,$(firstword $(shell ls $(CURDIR)/target/maturin/pyo3-config-*.txt 2> /dev/null))) cargo
 TIER   ?= test# of the tests: quick, test or all
+SIDE_BY_SIDE = $(MAKE) --no-print-directory --jobs=2 --output-sync
 MODULE := $(or $(wildcard $(STAMPS)/release),$(STAMPS)/core)# as it is installed, or for development
 
 .PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras docs bench chart stability torture validate orders bits profiles train train-rllib pins clean
@@ -24,25 +25,27 @@ MODULE := $(or $(wildcard $(STAMPS)/release),$(STAMPS)/core)# as it is installed
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-demo: $(STAMPS)/demo $(STAMPS)/core $(STAMPS)/debian-demo ## set up, drive Rover-v0 to a goal, plot the drive, redraw the report's sections 6.1 and 6.2, write a replay page, under runs/
+demo: ## set up, drive Rover-v0 to a goal, plot the drive, redraw the report's sections 6.1 and 6.2, write a replay page, under runs/
+	@$(SIDE_BY_SIDE) $(STAMPS)/core $(STAMPS)/debian-demo
 	$(BIN)/rover drive --output runs/drive
-	$(BIN)/rover plot runs/drive/episode-0.h5 --output runs/drive/plots
-	$(BIN)/rover report --figures --output runs/report
-	$(BIN)/rover replay runs/drive/episode-0.h5 --html runs/replay.html
+	$(BIN)/rover report --figures --output runs/report & report=$$!; \
+	$(BIN)/rover plot runs/drive/episode-0.h5 --output runs/drive/plots && \
+	$(BIN)/rover replay runs/drive/episode-0.h5 --html runs/replay.html && wait $$report
 
 quick: $(STAMPS)/core $(STAMPS)/test ## while editing: formatting, lint of Python, the core's tests and the fastest Python tests (90 seconds once built)
 	cargo fmt --all --check
 	$(BIN)/ruff check --quiet
 	$(BIN)/ruff format --quiet --check
-	$(MAKE) --no-print-directory --jobs=2 --output-sync test-rust pytest-quick
+	@$(SIDE_BY_SIDE) test-rust pytest-quick
 
 pytest-quick:
 	$(BIN)/pytest --quiet --numprocesses 1 --tier quick
 
-test: $(STAMPS)/test $(STAMPS)/core ## set up, and run the checks and tests that a change must pass (what .ci/run calls)
-	$(MAKE) --no-print-directory --jobs=2 --output-sync test-rust types
-	$(MAKE) --no-print-directory --jobs=2 --output-sync lint deny docs
-	$(MAKE) --no-print-directory test-python
+test: ## set up, and run the checks and tests that a change must pass (what .ci/run calls)
+	@$(SIDE_BY_SIDE) $(STAMPS)/core $(STAMPS)/test $(STAMPS)/debian-test
+	@$(SIDE_BY_SIDE) test-rust types
+	@$(SIDE_BY_SIDE) lint deny docs
+	@$(MAKE) --no-print-directory test-python
 
 test-all: ## every test there is, as long as it takes: before a release, and before an issue is closed
 	$(MAKE) --no-print-directory test TIER=all
@@ -88,7 +91,7 @@ same-bits: $(STAMPS)/test $(MODULE) ## compare the bits of the development build
 
 wheel: $(STAMPS)/demo ## build the wheel, one for every Python from 3.11 on, and the archive of the sources, into dist/
 	rm -rf dist
-	$(call unit,release,--release)
+	$(call unit,release,--release -p rover-fmu)
 	$(BIN)/python -m maturin sdist --out dist
 	CARGO_TARGET_DIR=$(abspath target) $(BIN)/python -m maturin build --release --quiet --out dist
 	@ls dist/*
@@ -178,6 +181,8 @@ $(STAMPS)/debian-%: requirements/debian/%.txt | $(STAMPS)/venv
 	else echo "not Debian: rendering and the browser tests need what these Debian packages hold:" $$(cat $<); fi
 	@touch $@
 
+$(STAMPS)/debian-test: | $(STAMPS)/debian-demo # one apt-get at a time
+
 $(STAMPS)/demo $(STAMPS)/test: $(STAMPS)/%: requirements/%.txt $(STAMPS)/venv
 	$(UV) --requirement $<
 	@touch $@
@@ -203,11 +208,11 @@ $(STAMPS)/core $(STAMPS)/release: $(SOURCES) | $(STAMPS)/demo
 	$(BIN)/python -m maturin develop --profile $(PROFILE) --uv --quiet
 	@rm -f $(STAMPS)/core $(STAMPS)/release && touch $@
 
-# The library of co-simulation units, where the package and its wheel look for it. With the module's crate beside it the
-# dependencies have the same features, and nothing is compiled twice.
-unit = $(CARGO) build $(2) --locked --quiet -p rover-python -p rover-fmu && mkdir -p envs/rover_gym/_fmu && \
+# The library of co-simulation units, where the package and its wheel look for it. For development it is built beside the
+# module's crate: with the same features of the dependencies nothing is compiled twice.
+unit = $(CARGO) build --locked --quiet $(2) && mkdir -p envs/rover_gym/_fmu && \
 	for made in target/$(1)/{lib,}rover_fmu.{so,dylib,dll}; do [ ! -f $$made ] || cp $$made envs/rover_gym/_fmu/rover_fmu.$${made\#\#*.}; done
 
 $(STAMPS)/fmu: $(SOURCES) | $(STAMPS)/core
-	@$(call unit,debug,)
+	@$(call unit,debug,-p rover-python -p rover-fmu)
 	@touch $@
