@@ -195,14 +195,19 @@ def test_ctrl_c_at_a_terminal_ends_a_long_run_with_its_recording(tmp_path: Path)
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        # A shell starts what runs in the background with Ctrl-C ignored.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509 - no threads run yet
     )
     path = tmp_path / "rover.h5"
-    for _ in range(1800):  # a busy machine starts slowly
-        if path.exists() and path.stat().st_size > 100_000:
-            break
-        time.sleep(0.05)
-    child.send_signal(signal.SIGINT)
-    stdout, stderr = child.communicate(timeout=120)
+    try:
+        for _ in range(1800):  # a busy machine starts slowly
+            if path.exists() and path.stat().st_size > 100_000:
+                break
+            time.sleep(0.05)
+        child.send_signal(signal.SIGINT)
+        stdout, stderr = child.communicate(timeout=120)
+    finally:
+        child.kill()
     assert (child.returncode, stderr) == (130, "interrupted\n")
     assert stdout == f"trajectory, incomplete: {path}\n"
     assert len(read_trajectory(path)["time"]) > 100
