@@ -174,3 +174,29 @@ def test_a_machine_without_shapes_is_read(tmp_path):
     inertial = '<inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>'
     text = f"<mujoco><worldbody><body name='bare'><freejoint/>{inertial}</body></worldbody></mujoco>"
     assert RoverModel.from_mjcf(write(tmp_path, text, "bare.xml")).mass == 2.0
+
+
+@pytest.mark.parametrize("declaration", ["", '<?xml version="1.0" encoding="ISO-8859-1"?>'])
+@pytest.mark.parametrize("name", ["chassis", "roll_right"])
+def test_a_name_in_another_encoding_is_refused_by_file_and_line(tmp_path, declaration, name):
+    """A campaign of damaged files ended in a UnicodeDecodeError, without the file's name: MuJoCo keeps names as bytes."""
+    text = declaration + CART.replace(f'"{name}"', f'"caf\u00e9 {name}"')
+    line = 1 + text[: text.index("caf")].count("\n")
+    path = tmp_path / "cart.xml"
+    path.write_bytes(text.encode("latin-1"))
+    with pytest.raises(ModelError, match=rf"line {line}: holds a name that is not UTF-8 text.*xe9") as caught:
+        RoverModel.from_mjcf(path)
+    assert str(caught.value).startswith(str(path))
+    included = tmp_path / "scene.xml"
+    included.write_text('<mujoco><include file="cart.xml"/></mujoco>')
+    with pytest.raises(ModelError, match=r"scene\.xml: (include|line \d+): .*UTF-8"):
+        RoverModel.from_mjcf(included)
+    path.write_text(text.replace(declaration, ""), encoding="utf-8")
+    assert RoverModel.from_mjcf(path).wheel_names == ["wheel_left", "wheel_right"]
+
+
+def test_two_equal_names_in_another_encoding_are_refused(tmp_path):
+    path = tmp_path / "cart.xml"
+    path.write_bytes(CART.replace('"slide"', '"\u00e9"').replace('"elbow"', '"\u00e9"').encode("latin-1"))
+    with pytest.raises(ModelError, match=r"cart\.xml: (line|MuJoCo)"):
+        RoverModel.from_mjcf(path)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -45,6 +45,9 @@ def read_mjcf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
     mujoco.set_mju_user_warning(warnings.append)  # else they go to a file in the current folder
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
+        bytes(model.names).decode("utf-8")
+    except UnicodeDecodeError as error:
+        _refuse_encoding(path, error)
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         refuse_in(path, "MuJoCo", path.name, f"refuses the file ({' '.join(str(error).split())})")
     finally:
@@ -63,6 +66,17 @@ def read_mjcf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
     reader.check_tendons()
     reader.add_actuators()
     return reader.tree
+
+
+def _refuse_encoding(path: Path, error: UnicodeDecodeError) -> NoReturn:
+    """Refuses a file with names that are not UTF-8; names the line, unless an included file has it."""
+    reason = "holds a name that is not UTF-8 text: save the file as UTF-8"
+    for number, line in enumerate(path.read_bytes().splitlines(), 1):
+        text = line.decode("utf-8", "backslashreplace").strip()
+        if text != line.decode("utf-8", "replace").strip():
+            refuse_in(path, f"line {number}", text, reason)
+    raw = error.object[: error.start].rpartition(b"\0")[2] + error.object[error.start :].partition(b"\0")[0]
+    refuse_in(path, "include", raw.decode("utf-8", "backslashreplace"), reason)
 
 
 class _Reader:
@@ -271,4 +285,4 @@ class _Reader:
         return self.mujoco.mj_id2name(self.model, self.mujoco.mjtObj.mjOBJ_BODY, body) or f"body{body}"
 
     def _text(self, address: int) -> str:
-        return str(bytes(self.model.names[address:]).split(b"\0")[0].decode("utf-8", "replace"))
+        return str(bytes(self.model.names[address:]).split(b"\0")[0].decode("utf-8"))
