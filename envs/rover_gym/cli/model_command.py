@@ -82,7 +82,7 @@ def import_model(
     read, report = _read(file, options)
     with Results(as_json=as_json) as results:
         _say_solids(results, read)
-        results.add(assumed=report.assumed, not_simulated=report.left_out)
+        results.add(assumed=report.assumed, not_simulated=report.left_out, warnings=report.warnings)
         for title, entries in (("assumed", report.assumed), ("not simulated", report.left_out)):
             for entry in entries:
                 results.show(f"{title}: {entry}")

@@ -268,6 +268,8 @@ class _Reader:
                 made.kind, made.size = "box", (2.0 * size[0], 2.0 * size[1], 2.0 * size[2])
             case kinds.mjGEOM_CYLINDER:
                 made.kind, made.size = "cylinder", (size[0], 2.0 * size[1])
+            case kinds.mjGEOM_CAPSULE:
+                made.kind, made.size = "capsule", (size[0], 2.0 * size[1])
             case kinds.mjGEOM_SPHERE:
                 made.kind, made.size = "sphere", (size[0],)
             case kinds.mjGEOM_MESH:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Callable, Collection
 from typing import Any
 
 from rover_gym.mechanics import ModelError, RoverModel
 from rover_gym.models.description import WheelOptions, describe
 from rover_gym.models.file_axes import axes_of
-from rover_gym.models.import_report import ImportReport, solid_rows, together
+from rover_gym.models.import_report import ImportReport, RobotFileWarning, solid_rows, together
 from rover_gym.models.joint_conventions import move_limits_to_followed_joints, turn_steering_axes_up
 from rover_gym.models.massless_links import join_massless_links
 from rover_gym.models.mjcf import read_mjcf_tree
@@ -79,7 +80,10 @@ def _read(
         model = RoverModel.from_dict(description)
     except ModelError as error:
         raise _by_name(tree, description, error) from None
-    report = ImportReport(str(place), together(tree.assumed), together(tree.left_out), solid_rows(model))
+    for warning in tree.warnings:
+        warnings.warn(warning, RobotFileWarning, stacklevel=3)
+    lists = together(tree.assumed), together(tree.left_out), solid_rows(model), tuple(tree.warnings)
+    report = ImportReport(str(place), *lists)
     return model, report
 
 

@@ -30,7 +30,8 @@ class FileShape:
 
     Attributes:
         kind: "box", "cylinder", "sphere", or what else the file calls it.
-        size: Edge lengths of a box (3), radius and length of a cylinder, radius of a sphere, m.
+        size: Edge lengths of a box (3), radius and length of a cylinder or of a capsule between the centres of its
+            caps, radius of a sphere, m.
         position: Centre in the link's frame (3,), m.
         rotation: From the shape's axes to the link's frame (3, 3). A cylinder is about its z.
         collides: Whether the file lets it touch others.
@@ -130,6 +131,7 @@ class RobotTree:
         ignore: Kinds, of `IGNORABLE`, of what changes the motion and is left out all the same.
         left_out: What the file holds and the model does not simulate.
         assumed: What the file does not state and was chosen.
+        warnings: What is probably not as the user wants it.
     """
 
     path: Path
@@ -138,6 +140,7 @@ class RobotTree:
     ignore: Collection[str] = ()
     left_out: list[str] = field(default_factory=list)
     assumed: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
 
     def refuse(self, where: str, value: object, reason: str) -> NoReturn:
         """Raises a `ModelError` that names the file, the element and the value."""
