@@ -12,8 +12,8 @@ from rover_gym.models.description import WheelOptions, describe
 from rover_gym.models.file_axes import axes_of
 from rover_gym.models.import_report import ImportReport, RobotFileWarning, solid_rows, together
 from rover_gym.models.joint_conventions import move_limits_to_followed_joints, turn_steering_axes_up
-from rover_gym.models.massless_links import join_massless_links
 from rover_gym.models.mjcf import read_mjcf_tree
+from rover_gym.models.rigid_groups import join_rigid_groups
 from rover_gym.models.robot_tree import IGNORABLE, RobotTree, check_kinds, checked_path
 from rover_gym.models.roles import Steering, Wheels, find_wheels
 from rover_gym.models.urdf import read_urdf_tree
@@ -66,7 +66,7 @@ def _read(
         }
     )
     tree = reader(place, ignore=ignored)
-    join_massless_links(tree, free_base=bool(free_base))
+    join_rigid_groups(tree, free_base=bool(free_base))
     for link in tree.links.values():
         if link.parent is None and free_base is not None and link.joint.kind in ("fixed", "free"):
             link.joint.kind = "free" if free_base else "fixed"

@@ -115,10 +115,6 @@ class FileLink:
     shapes: list[FileShape] = field(default_factory=list)
     points: list[tuple[str, Array]] = field(default_factory=list)
 
-    def has_body(self) -> bool:
-        """Whether it has a mass and an inertia of its own."""
-        return self.mass > 0.0 and bool(np.any(self.inertia))
-
 
 @dataclass
 class RobotTree:
