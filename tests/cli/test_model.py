@@ -87,6 +87,7 @@ def test_a_robot_without_wheels_is_warned_of(tmp_path: Path) -> None:
         (["import", "nothing.urdf", "--wheel", "a=b"], "the radius must be a number"),
         (["import", "nothing.urdf", "--wheel", "a=1", "--wheel", "b"], "all names or all"),
         (["import", "nothing.urdf"], "nothing.urdf"),
+        (["import", "nothing.urdf", "--package-path", "nowhere"], "--package-path"),
     ],
 )
 def test_bad_input_is_one_line(

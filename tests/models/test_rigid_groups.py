@@ -1,7 +1,5 @@
 """Links that are fixed to each other: only together must they be a body."""
 
-from xml.etree import ElementTree
-
 import numpy as np
 import pytest
 from models.robot_files import joint, write
@@ -10,6 +8,7 @@ from rover_gym import ModelError, RoverModel
 from rover_gym.models import read_urdf
 
 pytest.importorskip("yourdfpy")
+etree = pytest.importorskip("lxml.etree")
 
 ZERO, ROUND, ROD, IMPOSSIBLE = (0.0, 0.0, 0.0), (0.02, 0.02, 0.02), (0.02, 0.02, 0.0), (0.01, 0.01, 0.03)
 
@@ -58,7 +57,7 @@ FILES = {
 
 def expected_inertia(text):
     """Mass and inertia about the hip of all that turns with it, by the parallel-axis theorem over the stated links."""
-    root = ElementTree.fromstring(text)
+    root = etree.fromstring(text)
     at = {one.find("child").get("link"): one for one in root.iter("joint")}
     mass, inertia = 0.0, np.zeros((3, 3))
     for one in root.findall("link"):

@@ -35,6 +35,7 @@ SET_BY = {
     "width": ("size", "--size"),
     "height": ("size", "--size"),
     "wheels": ("wheel", "--wheel"),
+    "package_paths": ("package_path", "--package-path"),
     "slips": ("slip", "--slip"),
     "position": ("start", "--start"),
     "ground": ("terrain", "--terrain"),

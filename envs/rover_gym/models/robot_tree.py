@@ -39,6 +39,7 @@ class FileShape:
         name: Its name in the file, or "".
         mesh: The mesh's file, or its vertices (n, 3) in the shape's axes, m.
         scale: Factors of the mesh's coordinates.
+        searched: Folders in which there is no such file.
     """
 
     kind: str
@@ -50,6 +51,7 @@ class FileShape:
     name: str = ""
     mesh: Path | Array | None = None
     scale: Array | None = None
+    searched: tuple[str, ...] = ()
 
 
 @dataclass

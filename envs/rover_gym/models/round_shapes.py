@@ -138,6 +138,8 @@ def _points(link: FileLink, shape: FileShape) -> tuple[Array | None, str]:
     points: Array
     if isinstance(shape.mesh, np.ndarray):
         points = shape.mesh
+    elif shape.searched:
+        return None, f"is the mesh {shape.mesh}, which cannot be read: it is in none of {', '.join(shape.searched)}"
     else:
         try:
             loader = require("trimesh", "models")
