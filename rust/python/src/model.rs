@@ -960,9 +960,10 @@ impl RoverModel {
     /// The coordinates of the rover at rest on a terrain.
     ///
     /// On a plane the joints are at zero, the trunk is upright along the normal with its origin
-    /// above the position, and the lowest wheel has gap zero. On any other terrain the height of
-    /// the trunk, its pitch and roll and the joints that carry wheels bring all wheels down to the
-    /// ground as far as they can; no wheel is in it.
+    /// above the position, and the lowest wheel has gap zero. If that leaves wheels in the air,
+    /// pitch, roll and the joints that nothing drives bring them down, where this puts more wheels
+    /// on the ground. On any other terrain the same coordinates bring all wheels down to the ground
+    /// as far as they can. No wheel is in the ground.
     ///
     /// Args:
     ///     terrain: A terrain, or a list of several; a plane must not be vertical.
