@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -18,11 +20,9 @@ from rover_gym.record.trajectory import Trajectory
 from rover_gym.record.trajectory_format import RecordingError
 from rover_gym.rendering.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR
 from rover_gym.replay import scenery
-from rover_gym.validation import array, number, refuse, vector
+from rover_gym.validation import TERRAINS, array, checked, number, refuse, vector
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
     from types import TracebackType
 
 Array = npt.NDArray[np.float64]
@@ -73,6 +73,14 @@ class McapWriter:
         MissingExtraError: The extra `logs` is not installed.
     """
 
+    @checked(
+        path=Path,
+        model="RoverModel",
+        terrain=TERRAINS,
+        attributes=(Mapping, None),
+        way=(np.ndarray, None),
+        epoch=float,
+    )
     def __init__(
         self,
         path: str | Path,
