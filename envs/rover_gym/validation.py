@@ -236,7 +236,7 @@ def _is_of_kind(value: object, kind: Kind) -> bool:
     if kind is Sequence:
         return isinstance(value, Iterable) and isinstance(value, Sized) and not isinstance(value, (str, bytes, Mapping))
     if kind is callable:
-        return callable(value)
+        return bool(callable(value))
     if kind is np.ndarray:
         return _is_array(value)
     if isinstance(kind, list):

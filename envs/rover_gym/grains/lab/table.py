@@ -6,7 +6,7 @@ import csv
 from collections.abc import Sequence
 from dataclasses import asdict, fields, is_dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rover_gym.mechanics import OptionError
 from rover_gym.validation import checked, refuse
@@ -27,7 +27,7 @@ def write_table(points: Sequence[DataclassInstance], path: str | Path) -> Path:
         OptionError: There is no point.
         OSError: The file cannot be written.
     """
-    rows = list(points)
+    rows: list[Any] = list(points)
     if not rows or not all(is_dataclass(point) and not isinstance(point, type) for point in rows):
         refuse(OptionError, "points", points, "must be points of one test, one or more")
     path = Path(path)
