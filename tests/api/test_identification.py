@@ -146,6 +146,20 @@ def test_without_noise_the_parameters_are_exact(slipping: RoverRun) -> None:
     assert fit["friction"].value == pytest.approx(0.5, abs=1e-5)
 
 
+def test_a_fit_that_noise_does_not_explain_identifies_nothing(slipping: RoverRun) -> None:
+    """Wheels spun that held in the simulation. Their errors passed for noise, and the start came back with 0.0004."""
+    believed = BELIEVED | {"settings": {"friction": 0.9}}
+    run = with_noise(slipping, 3)
+    fit = identify(run, ["mass_scale"], window=0.4, **believed)
+    mass = fit["mass_scale"]
+    assert not mass.is_identified
+    assert mass.standard_error == np.inf
+    assert mass.reason.startswith("noise does not explain the misfit: rate of wheel_")
+    assert all("of which noise explains 0.0" in what for what in fit.not_explained)
+    assert "noise does not explain" in fit.table()
+    assert identify(run, ["mass_scale", "friction"], window=0.4, **believed).not_explained == ()
+
+
 def test_a_parameter_of_ones_own(slipping: RoverRun) -> None:
     def apply(setup: Any, value: float) -> Any:
         return replace(setup, model=setup.model.replace(masses={"trunk": value}))
