@@ -272,6 +272,7 @@ class RoverModel:
         steering_limit: float | None = None,
         wheel_width: float | None = None,
         ignore: Collection[str] = (),
+        package_paths: Collection[str | PathLike[str]] = (),
     ) -> RoverModel:
         """Reads a URDF file.
 
@@ -294,6 +295,9 @@ class RoverModel:
                 default that of the cylinder that touches for it in the file, or 0.
             ignore: Kinds of what changes the motion and is left out all the same: "friction",
                 "actuators", "closed loops", "tendons", "springs", "fluid".
+            package_paths: Folders that are searched for the packages of `package://` names, before
+                those of the environment variables `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH` and
+                the folders above the file.
 
         Returns:
             The model.
@@ -594,9 +598,10 @@ class RoverModel:
         """The coordinates of the rover at rest on a terrain.
 
         On a plane the joints are at zero, the trunk is upright along the normal with its origin
-        above the position, and the lowest wheel has gap zero. On any other terrain the height of
-        the trunk, its pitch and roll and the joints that carry wheels bring all wheels down to the
-        ground as far as they can; no wheel is in it.
+        above the position, and the lowest wheel has gap zero. If that leaves wheels in the air,
+        pitch, roll and the joints that nothing drives bring them down, where this puts more wheels
+        on the ground. On any other terrain the same coordinates bring all wheels down to the ground
+        as far as they can. No wheel is in the ground.
 
         Args:
             terrain: A terrain, or a list of several; a plane must not be vertical.
@@ -915,7 +920,7 @@ class HeightField:
         height_range: tuple[float, float] | None = None,
         scale: float | None = None,
         datum: float | None = None,
-        band: int = 1,
+        band: int | None = None,
         material: str = "ground",
     ) -> HeightField:
         """Reads a map from a GeoTIFF, a PNG or a .npy file.
@@ -932,7 +937,7 @@ class HeightField:
             scale: Factor from the file's numbers to m; of a GeoTIFF by default its own.
             datum: Height of the file that becomes 0, in its own numbers; of a GeoTIFF by default
                 its lowest, otherwise 0.
-            band: Band of a GeoTIFF, from 1.
+            band: Band of a GeoTIFF, from 1; needed if the file has several.
             material: Name of its material.
 
         Returns:
@@ -1048,6 +1053,10 @@ class TriangleMesh:
 
     Triangles turn counterclockwise, seen from outside. A closed mesh is solid; an open one is
     solid below.
+
+    Corners at exactly equal positions are joined, so triangles may each bring their own three
+    corners, as in an STL file. `triangles` then names the first of equal corners. Corners that
+    differ by rounding are not joined: wheels catch on the seam between them.
 
     Args:
         vertices: Corners, (n, 3), m.

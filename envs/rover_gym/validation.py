@@ -4,18 +4,29 @@ Every function returns the argument in its plain form (floats, tuples of floats)
 with `field` and `value` set.
 """
 
+import functools
+import inspect
 import math
 import numbers
-from collections.abc import Iterable, Mapping, Set, Sized
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set, Sized
 from decimal import Decimal
-from typing import Any, NoReturn, TypeAlias
+from pathlib import Path
+from typing import Any, NoReturn, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import OptionError, RoverGymError
 
+P = ParamSpec("P")
+R = TypeVar("R")
+
 Range: TypeAlias = tuple[float, float]
+#: Names of the classes of grounds, for `checked`.
+TERRAINS = ("Plane", "SphereField", "HeightField", "TriangleMesh", "Union")
+#: What an argument may be: see `checked`.
+Kind: TypeAlias = Any
 
 #: A message shows at most this many characters of a value.
 SHOWN = 200
@@ -149,6 +160,121 @@ def known_keys(field: str, value: Iterable[object], known: Iterable[str]) -> Non
         if not isinstance(key, str) or key not in names:
             name = key if isinstance(key, str) and len(key) <= SHOWN else shown(key)
             refuse(OptionError, f"{field}.{name}", key, f"unknown; known are {', '.join(names)}")
+
+
+def checked(**kinds: Kind) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Makes a function refuse arguments of the wrong kind by their names, before it begins.
+
+    Args:
+        **kinds: What each argument must be. `float`: a finite number. `int`: a whole number. `bool`: True or False.
+            `str`: text. `Path`: text or a path. `np.ndarray`: numbers of any shape. `Mapping`: one with text for keys.
+            `Sequence`: one that is no text. `Iterable`. `callable`: what can be called. `[Kind]`: a sequence with
+            entries of that kind. A name: an instance of the class of that name, which need not be imported for it. A
+            tuple: one of several, where None stands for itself.
+    """
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        signature = inspect.signature(function)
+
+        @functools.wraps(function)
+        def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
+            given = signature.bind(*args, **kwargs).arguments
+            for name, kind in kinds.items():
+                if name in given:
+                    _check_kind(name, given[name], kind)
+            return function(*args, **kwargs)
+
+        return guarded
+
+    return decorate
+
+
+def _check_kind(field: str, value: object, kind: Kind) -> None:
+    kinds = kind if isinstance(kind, tuple) else (kind,)
+    if value is None and None in kinds:
+        return
+    kinds = tuple(one for one in kinds if one is not None)
+    if any(_is_of_kind(value, one) for one in kinds):
+        for one in kinds:
+            if one is float:
+                number(field, value)
+            elif one is int:
+                whole(field, value)
+        return
+    words = [_in_words(one) for one in kinds]
+    if kinds != (kind if isinstance(kind, tuple) else (kind,)):
+        words.append("None")
+    refuse(OptionError, field, value, f"must be {' or '.join(words)}")
+
+
+#: Kinds of arguments in words.
+_KINDS: dict[Any, str] = {
+    float: "a number",
+    int: "a whole number",
+    bool: "True or False",
+    str: "text",
+    Path: "a path",
+    Sequence: "a sequence",
+    Mapping: "a mapping with names",
+    Iterable: "a collection",
+    callable: "callable",
+    np.ndarray: "numbers",
+}
+
+
+def _is_of_kind(value: object, kind: Kind) -> bool:
+    if kind is float:
+        return _is_number(value)
+    if kind is int:
+        return isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.timedelta64))
+    if kind is bool:
+        return isinstance(value, (bool, np.bool_))
+    if kind is Path:
+        return isinstance(value, (str, os.PathLike)) and _is_encodable(os.fspath(value))
+    if kind is Mapping:
+        return isinstance(value, Mapping) and all(isinstance(key, str) for key in value)
+    if kind is Sequence:
+        return isinstance(value, Iterable) and isinstance(value, Sized) and not isinstance(value, (str, bytes, Mapping))
+    if kind is callable:
+        return bool(callable(value))
+    if kind is np.ndarray:
+        return _is_array(value)
+    if isinstance(kind, list):
+        return _is_of_kind(value, Sequence) and all(_is_of_kind(one, kind[0]) for one in _listed(value))
+    if isinstance(kind, str):
+        return any(one.__name__ == kind for one in type(value).__mro__)
+    return isinstance(value, kind)
+
+
+def _is_encodable(path: str | bytes) -> bool:
+    try:
+        return b"\0" not in os.fsencode(path)
+    except UnicodeEncodeError:  # a lone surrogate
+        return False
+
+
+def _in_words(kind: Kind) -> str:
+    if isinstance(kind, list):
+        return f"a sequence, each entry {_in_words(kind[0])}"
+    return f"a {kind}" if isinstance(kind, str) else _KINDS[kind]
+
+
+def _is_array(value: object) -> bool:
+    try:
+        array("value", value, error=OptionError)
+    except OptionError:
+        return False
+    return True
+
+
+def _listed(value: Any) -> list[object]:
+    """The entries of what may be any collection; one that cannot be listed gives an entry of no kind."""
+    if isinstance(value, range):
+        return [None]
+    try:
+        return list(value)
+    except Exception:  # a zero-dimensional array, or a user class that raises
+        return [None]
 
 
 def _is_number(value: object) -> bool:

@@ -271,6 +271,50 @@ def test_a_geotiff_brings_spacing_unit_and_holes(tmp_path: Path) -> None:
         HeightField.from_file(save(), band=2)
 
 
+def test_a_geotiff_of_several_bands_is_refused_unless_one_is_chosen(tmp_path: Path) -> None:
+    """The first band of a map with heights and slopes was taken, and nothing said that there was a second."""
+    rasterio = pytest.importorskip("rasterio")
+    path = tmp_path / "map.tif"
+    profile = {"driver": "GTiff", "height": 2, "width": 3, "count": 2, "dtype": "float32"}
+    place = {"crs": "EPSG:32633", "transform": rasterio.Affine(1.0, 0.0, 4e5, 0.0, -1.0, 5e6)}
+    with rasterio.open(path, "w", **profile, **place) as file:
+        for band in (1, 2):
+            file.write(np.full((2, 3), 10.0 * band, np.float32), band)
+    with pytest.raises(TerrainError, match=r"band: .*map\.tif has 2 bands: say which holds the heights") as caught:
+        HeightField.from_file(path)
+    assert caught.value.field == "band"
+    for band in (1, 2):
+        assert HeightField.from_file(path, band=band, datum=0.0).grid[0, 0] == 10.0 * band
+
+
+def test_a_mesh_of_triangles_with_their_own_corners_is_the_mesh_of_shared_ones() -> None:
+    """The arrays of an STL repeat every corner: each edge was a free border, and wheels on flat ground met 18 kN."""
+    x, z = (a.ravel() for a in np.meshgrid(np.arange(-2.0, 2.01, 0.25), np.arange(-2.0, 2.01, 0.25)))
+    shared = np.stack([x, 0.0 * x, z], axis=1)
+    n = 17
+    squares = [i * n + j for i in range(n - 1) for j in range(n - 1)]
+    triangles = np.array([t for s in squares for t in ([s, s + n, s + 1], [s + 1, s + n, s + n + 1])])
+    own = shared[triangles].reshape(-1, 3)
+    own[::2, 1] = -0.0  # equal to 0
+    meshes = [TriangleMesh(shared, triangles), TriangleMesh(own, np.arange(len(own)).reshape(-1, 3))]
+    np.testing.assert_array_equal(meshes[1].vertices[meshes[1].triangles], shared[triangles])
+    assert len(np.unique(meshes[1].triangles)) == n * n
+    np.testing.assert_array_equal(TriangleMesh(meshes[1].vertices, meshes[1].triangles).triangles, meshes[1].triangles)
+    rover = RoverModel.named("skid-steered")
+    weight, states = 9.81 * rover.mass, []
+    for mesh in meshes:
+        sim = Simulation(rover, mesh)
+        sim.set_state(rover.resting_pose(mesh, (0.0, 0.0), 0.3))
+        sim.set_wheel_torques([4.0] * 4)
+        for _ in range(100):
+            sim.step()
+            assert sim.contacts.impulses[:, 0].sum() / sim.time_step < 1.5 * weight
+        states.append(sim.q)
+    np.testing.assert_allclose(states[1], states[0], atol=1e-9)
+    cube = [[corner for t in CUBE[1] for corner in (CUBE[0][k] for k in t)], np.arange(36).reshape(-1, 3)]
+    assert TriangleMesh(*cube).is_closed
+
+
 def test_meshes_are_read_from_files(tmp_path: Path) -> None:
     trimesh = pytest.importorskip("trimesh")
     ball = trimesh.creation.icosphere(subdivisions=2, radius=0.5)

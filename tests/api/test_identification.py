@@ -152,6 +152,21 @@ def test_without_noise_the_parameters_are_exact(slipping: RoverRun) -> None:
     assert fit["friction"].value == pytest.approx(0.5, abs=1e-5)
 
 
+@pytest.mark.takes_long("a fit is some hundred simulations")
+def test_a_fit_that_noise_does_not_explain_identifies_nothing(slipping: RoverRun, fits: Fits) -> None:
+    """Wheels spun that held in the simulation. Their errors passed for noise, and the start came back with 0.0004."""
+    believed = BELIEVED | {"settings": {"friction": 0.9}}
+    run = with_noise(slipping, 3)
+    fit = identify(run, ["mass_scale"], window=0.4, max_windows=2, **believed)
+    mass = fit["mass_scale"]
+    assert not mass.is_identified
+    assert mass.standard_error == np.inf
+    assert mass.reason.startswith("noise does not explain the misfit: rate of wheel_")
+    assert all("of which noise explains 0.0" in what for what in fit.not_explained)
+    assert "noise does not explain" in fit.table()
+    assert fits(0).not_explained == ()
+
+
 @pytest.mark.nightly("tests/api/test_identification.py::test_the_stated_noise_is_taken")
 def test_a_parameter_of_ones_own(slipping: RoverRun) -> None:
     def apply(setup: Any, value: float) -> Any:

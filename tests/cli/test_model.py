@@ -1,5 +1,6 @@
 """`rover model import|show|check`."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -58,6 +59,24 @@ def test_an_import_writes_the_model_and_its_picture(tmp_path: Path) -> None:
     assert (tmp_path / "small.svg").stat().st_size > 1000
 
 
+def test_a_robot_without_wheels_is_warned_of(tmp_path: Path) -> None:
+    """A robot came in with 0 wheels and exit status 0, and nothing said so."""
+    pytest.importorskip("yourdfpy")
+    text = (
+        robot_text()
+        .replace("_wheel", "_part")
+        .replace("cylinder", "box")
+        .replace('radius="0.2" length="0.1"', 'size="1 1 1"')
+    )
+    file, output = write(tmp_path, text), tmp_path / "rover.toml"
+    reason = "warning: .*no wheel was found \\(left_part has no cylinder or sphere about its axis; right_part"
+    for arguments in (("import", str(file), "--output", str(output)), ("check", str(file)), ("show", str(file))):
+        result = rover(*arguments)
+        assert re.search(reason, result.stderr), result.output
+    silent = rover("import", str(file), "--output", str(output), "--wheel", "none")
+    assert "warning" not in silent.stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
@@ -69,6 +88,7 @@ def test_an_import_writes_the_model_and_its_picture(tmp_path: Path) -> None:
         (["import", "nothing.urdf", "--wheel", "a=b"], "the radius must be a number"),
         (["import", "nothing.urdf", "--wheel", "a=1", "--wheel", "b"], "all names or all"),
         (["import", "nothing.urdf"], "nothing.urdf"),
+        (["import", "nothing.urdf", "--package-path", "nowhere"], "--package-path"),
     ],
 )
 def test_bad_input_is_one_line(

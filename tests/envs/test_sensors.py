@@ -144,6 +144,18 @@ def test_snapshots_carry_the_sensors() -> None:
     assert other.snapshot().env.random_state == before.env.random_state
 
 
+def test_encoders_are_exact_by_default() -> None:
+    """The defaults are said to be ideal, and encoders counted 4096 ticks a turn."""
+    env = SensorObservation(RoverEnv(), [WheelEncoders()])
+    env.reset(seed=3)
+    start = env.unwrapped.simulation.q
+    for _ in range(5):
+        observation, *_ = env.step(np.full(env.action_space.shape, 0.4, np.float32))
+    joints = env.unwrapped.model.wheel_joint_indices
+    turned = np.abs(env.unwrapped.simulation.q - start)[joints]
+    np.testing.assert_allclose(np.abs(observation["encoders"][0]), turned, rtol=1e-6)
+
+
 def test_encoders_count_ticks_of_the_angles_turned() -> None:
     env = SensorObservation(RoverEnv(), [WheelEncoders(ticks=500), WheelEncoders(name="exact", ticks=None)])
     env.reset(seed=0)

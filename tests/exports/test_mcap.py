@@ -98,6 +98,51 @@ def turned(rotation: Any, vector: np.ndarray) -> np.ndarray:
     return vector + 2.0 * np.cross(u, np.cross(u, vector) + rotation.w * vector)
 
 
+#: R_BS of REP 103 (x forward, y left, z up) and a solid (x forward, y up, z right).
+REP_103 = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+
+
+def rep_103(vector: Any) -> Any:
+    """A vector of REP 103 in a solid's own axes."""
+    return np.asarray(REP_103 @ np.asarray(vector))
+
+
+def test_frames_have_x_forward_and_z_up(tmp_path: Path) -> None:
+    """Frames of solids had y up, which programs of ROS take for left: REP 103 has z up."""
+    model = RoverModel()
+    sim = Simulation(model)
+    sim.set_state(model.resting_pose(sim.terrain, (0.0, 0.0), 0.0))
+    sampler = RoverSampler(model)
+    with McapWriter(tmp_path / "rest.mcap", model, sim.terrain) as log:
+        for _ in range(40):
+            log.append(sampler.row(sim))
+            sim.step(5)
+        log.imu(sim.time, np.eye(3), [0.0, 0.2, 0.0], [0.0, 9.81, 0.0])
+    found = read(tmp_path / "rest.mcap")
+    frames = {one.child_frame_id: one for one in found["/tf"][-1][1].transforms}
+    for axis, direction in (([1.0, 0.0, 0.0], [1.0, 0.0, 0.0]), ([0.0, 0.0, 1.0], [0.0, 1.0, 0.0])):
+        in_world = turned(frames["trunk"].rotation, np.array(axis))
+        assert in_world == pytest.approx(direction, abs=1e-2)
+        in_map = turned(frames["world"].rotation, in_world)
+        assert in_map == pytest.approx(axis, abs=1e-2)
+    for topic in ("/imu", "/imu/sensor"):
+        force = found[topic][-1][1].linear_acceleration
+        assert [force.x, force.y, force.z] == pytest.approx([0.0, 0.0, 9.81], abs=0.05)
+    turn = found["/imu/sensor"][0][1]
+    assert turn.angular_velocity.z == 0.2
+    assert turned(turn.orientation, np.array([0.0, 0.0, 1.0])) == pytest.approx([0.0, 0.0, 1.0])
+    points = np.array(
+        [
+            [p.x, p.y, p.z]
+            for e in found["/scene"][0][1].entities
+            if e.id == "rover/trunk"
+            for t in e.triangles
+            for p in t.points
+        ]
+    )
+    assert np.ptp(points[:, 2]) < np.ptp(points[:, 0])
+
+
 def test_a_recording_comes_back_in_the_common_schemas(tmp_path: Path) -> None:
     run = read_run(quick_run(tmp_path / "run.h5"))
     found = read(write_mcap(run, tmp_path / "run.mcap"))
@@ -112,7 +157,8 @@ def test_a_recording_comes_back_in_the_common_schemas(tmp_path: Path) -> None:
             origin, arm = frames[name].translation, np.array([0.3, -0.2, 0.1])
             assert frames[name].parent_frame_id == "world"
             assert [origin.x, origin.y, origin.z] == pytest.approx(run.positions[i, k], abs=1e-15)
-            assert turned(frames[name].rotation, arm) == pytest.approx(run.rotations[i, k] @ arm, abs=1e-12)
+            own = run.rotations[i, k] @ rep_103(arm)
+            assert turned(frames[name].rotation, arm) == pytest.approx(own, abs=1e-12)
     for i, (_, message) in enumerate(found["/joint_states"]):
         joints = {joint.name: joint for joint in message.joints}
         assert [joint.position for joint in message.joints] == run.trajectory["q"][i, 6:].tolist()
@@ -128,14 +174,16 @@ def test_the_imu_feels_gravity_and_the_change_of_velocity(tmp_path: Path) -> Non
     v, h = run.trajectory["v"], 0.005
     for i, (_, message) in enumerate(found, 1):
         turn = run.rotations[i, 0]
-        felt = turn.T @ ((v[i, :3] - v[i - 1, :3]) / h + [0.0, 3.7, 0.0])
+        felt = (turn @ REP_103).T @ ((v[i, :3] - v[i - 1, :3]) / h + [0.0, 3.7, 0.0])
         rates, force = message.angular_velocity, message.linear_acceleration
         assert [force.x, force.y, force.z] == pytest.approx(felt, abs=1e-9)
-        assert [rates.x, rates.y, rates.z] == pytest.approx(turn.T @ v[i, 3:6], abs=1e-12)
+        assert [rates.x, rates.y, rates.z] == pytest.approx((turn @ REP_103).T @ v[i, 3:6], abs=1e-12)
         ahead = turn @ [1.0, 0.0, 0.0]
         assert turned(message.orientation, np.array([1.0, 0.0, 0.0])) == pytest.approx([ahead[0], -ahead[2], ahead[1]])
+        up = turn @ [0.0, 1.0, 0.0]
+        assert turned(message.orientation, np.array([0.0, 0.0, 1.0])) == pytest.approx([up[0], -up[2], up[1]])
         assert message.header.frame_id == "trunk"
-    assert abs(found[0][1].linear_acceleration.y) < 1e-3  # it falls, and its wheels begin to turn
+    assert abs(found[0][1].linear_acceleration.z) < 1e-3  # it falls, and its wheels begin to turn
 
 
 def test_the_scene_shows_rover_rocks_and_goal(tmp_path: Path) -> None:
@@ -171,7 +219,7 @@ def test_images_and_points_come_back(tmp_path: Path) -> None:
     found = read(tmp_path / "a.mcap")
     ((stamp, cloud),) = found["/points"]
     assert stamp == 1_000_000_000_500_000_000
-    assert np.frombuffer(cloud.data, "<f4").reshape(-1, 3).tolist() == points[[0, 2]].tolist()
+    assert np.frombuffer(cloud.data, "<f4").reshape(-1, 3).tolist() == (points[[0, 2]] @ REP_103).tolist()
     assert [(field.name, field.offset) for field in cloud.fields] == [("x", 0), ("y", 4), ("z", 8)]
     ((_, picture),) = found["/camera"]
     pixels = np.asarray(image.open(io.BytesIO(picture.data))).astype(int)

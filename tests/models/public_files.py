@@ -8,13 +8,13 @@ URDF = {
     "pybullet_data/husky/husky.urdf": {},
     "pybullet_data/racecar/racecar.urdf": {},
     "pybullet_data/r2d2.urdf": {},
-    "pybullet_data/franka_panda/panda.urdf": {"free_base": False},
-    "pybullet_data/kuka_iiwa/model.urdf": {"free_base": False},
+    "pybullet_data/franka_panda/panda.urdf": {"free_base": False, "wheels": []},
+    "pybullet_data/kuka_iiwa/model.urdf": {"free_base": False, "wheels": []},
 }
 #: The same for `RoverModel.from_mjcf`.
 MJCF = {
     "gymnasium/envs/mujoco/assets/ant.xml": {"wheels": []},
-    "gymnasium/envs/mujoco/assets/inverted_double_pendulum.xml": {},
+    "gymnasium/envs/mujoco/assets/inverted_double_pendulum.xml": {"wheels": []},
 }
 
 

@@ -57,7 +57,6 @@ def test_joints_drives_and_gains_are_the_files(tmp_path):
 
 
 REFUSED = {
-    "two joints": ('<freejoint/>', '<joint type="slide" axis="1 0 0"/><joint/>', r"body\[chassis\]\.joint.*got 2"),
     "friction": ('name="slide"', 'name="slide" frictionloss="0.2"', r'joint\[slide\]\.frictionloss.*0\.2'),
     "a velocity servo": ("<position joint", '<velocity kv="2" joint="slide"/><position joint', r"actuator\["),
     "a muscle": ("<position joint", '<muscle joint="slide" lengthrange="0 1"/><position joint', r"actuator\["),
@@ -173,4 +172,75 @@ def test_numbers_that_mujoco_passes_on_are_refused_by_body(tmp_path):
 def test_a_machine_without_shapes_is_read(tmp_path):
     inertial = '<inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>'
     text = f"<mujoco><worldbody><body name='bare'><freejoint/>{inertial}</body></worldbody></mujoco>"
-    assert RoverModel.from_mjcf(write(tmp_path, text, "bare.xml")).mass == 2.0
+    assert RoverModel.from_mjcf(write(tmp_path, text, "bare.xml"), wheels=[]).mass == 2.0
+
+
+@pytest.mark.parametrize("declaration", ["", '<?xml version="1.0" encoding="ISO-8859-1"?>'])
+@pytest.mark.parametrize("name", ["chassis", "roll_right"])
+def test_a_name_in_another_encoding_is_refused_by_file_and_line(tmp_path, declaration, name):
+    """A campaign of damaged files ended in a UnicodeDecodeError, without the file's name: MuJoCo keeps names as bytes."""
+    text = declaration + CART.replace(f'"{name}"', f'"caf\u00e9 {name}"')
+    line = 1 + text[: text.index("caf")].count("\n")
+    path = tmp_path / "cart.xml"
+    path.write_bytes(text.encode("latin-1"))
+    with pytest.raises(ModelError, match=rf"line {line}: holds a name that is not UTF-8 text.*xe9") as caught:
+        RoverModel.from_mjcf(path)
+    assert str(caught.value).startswith(str(path))
+    included = tmp_path / "scene.xml"
+    included.write_text('<mujoco><include file="cart.xml"/></mujoco>')
+    with pytest.raises(ModelError, match=r"scene\.xml: (include|line \d+): .*UTF-8"):
+        RoverModel.from_mjcf(included)
+    path.write_text(text.replace(declaration, ""), encoding="utf-8")
+    assert RoverModel.from_mjcf(path).wheel_names == ["wheel_left", "wheel_right"]
+
+
+def test_two_equal_names_in_another_encoding_are_refused(tmp_path):
+    path = tmp_path / "cart.xml"
+    path.write_bytes(CART.replace('"slide"', '"\u00e9"').replace('"elbow"', '"\u00e9"').encode("latin-1"))
+    with pytest.raises(ModelError, match=r"cart\.xml: (line|MuJoCo)"):
+        RoverModel.from_mjcf(path)
+
+
+PLANAR = """
+<mujoco model="hopper"><worldbody>
+  <body name="torso" pos="0 0 1.2" euler="10 20 30">
+    <joint name="rootx" type="slide" axis="1 0 0" pos="0 0 -1"/>
+    <joint name="rootz" type="slide" axis="0 0 1" pos="0.1 0 -1"/>
+    <joint type="hinge" axis="0 1 0" pos="0.05 0.1 0.2"/>
+    <joint name="lean" type="hinge" axis="1 0 0.5" pos="0.1 -0.2 0.1"/>
+    <geom type="box" size="0.1 0.2 0.3" mass="4"/>
+    <body name="leg" pos="0 0 -0.5"><joint name="knee" axis="0 1 0"/><geom type="sphere" size="0.1" mass="1"/></body>
+  </body>
+</worldbody></mujoco>
+"""
+
+
+def test_several_joints_of_one_body_are_a_chain_with_mujocos_mass_matrix(tmp_path):
+    """Hopper, half-cheetah and walker were refused: their torso has two slides and a hinge."""
+    path = write(tmp_path, PLANAR, "hopper.xml")
+    model = RoverModel.from_mjcf(path, wheels=[])
+    assert model.nv == 5
+    assert model.solid_names == ["torso_rootx", "torso_rootz", "torso_torso_joint3", "torso", "leg"]
+    listed = [entry for entry in model.import_report.assumed if "between two joints of one body" in entry]
+    assert listed == [
+        "1e-09 kg, as it stands between two joints of one body: link torso_rootx, link torso_rootz, link torso_torso_joint3"
+    ]
+    theirs = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(theirs)
+    for seed in range(5):
+        q = np.random.default_rng(seed).uniform(-1.0, 1.0, 5)
+        data.qpos[:] = q
+        mujoco.mj_forward(theirs, data)
+        expected = np.zeros((5, 5))
+        for row, axis in zip(expected, np.eye(5), strict=True):
+            mujoco.mj_mulM(theirs, data, row, axis)
+        np.testing.assert_allclose(model.mass_matrix(q), expected, atol=3e-8)
+        x, y, z = data.xpos[2]
+        np.testing.assert_allclose(model.poses(q)["leg"][0], [x, z, -y], atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["hopper", "half_cheetah", "walker2d"])
+def test_gymnasiums_planar_runners_come_in(name):
+    assets = f"{pytest.importorskip('gymnasium.envs.mujoco').__path__[0]}/assets"
+    model = RoverModel.from_mjcf(f"{assets}/{name}.xml", wheels=[], ignore=["springs", "friction"])
+    assert model.nv == {"hopper": 6, "half_cheetah": 9, "walker2d": 9}[name]

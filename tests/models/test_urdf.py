@@ -7,7 +7,7 @@ import pytest
 from models.robot_files import LIMIT, WHEEL, body, changed, joint, rover, write
 
 from rover_gym import ModelError, RoverModel, Simulation
-from rover_gym.models import read_urdf
+from rover_gym.models import RobotFileWarning, read_robot, read_urdf
 
 pytest.importorskip("yourdfpy")
 
@@ -365,3 +365,73 @@ def test_a_steering_joint_that_follows_another_still_does_when_its_axis_is_rever
         wheels.append(model.poses(q)["right_wheel"][1])
     turned = wheels[0] @ wheels[1]  # by opposite angles about one axis
     np.testing.assert_allclose(turned, np.eye(3), atol=1e-12)
+
+
+def with_pivot_limits(lower, upper):
+    """Without the joint that follows the rocker's."""
+    text = re.sub('<mimic joint="left_pivot".*?/>', "", rover())
+    return changed(
+        text, r'name="left_pivot"(.*?)lower="-0.6" upper="0.5"', rf'name="left_pivot"\1lower="{lower}" upper="{upper}"'
+    )
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "limits", "listed"),
+    [
+        ("-1e16", "1e16", None, "limits -1e+16 and 1e+16 mean none: joint[left_pivot]"),
+        ("-0.5", "1e16", {"lower": -0.5, "upper": 1e6}, "limits -0.5 and 1e+16 are -0.5 and 1e+06: joint[left_pivot]"),
+        ("-1e6", "1e6", {"lower": -1e6, "upper": 1e6}, ""),
+    ],
+)
+def test_limits_far_away_mean_none(tmp_path, lower, upper, limits, listed):
+    """TIAGo's wheels have limits of 1e16 and were refused: there is no digit left between two angles out there."""
+    model = RoverModel.from_urdf(write(tmp_path, with_pivot_limits(lower, upper)))
+    solids = {solid["name"]: solid for solid in model.to_dict()["solids"]}
+    assert solids["left_rocker"].get("limits") == limits
+    told = [entry.replace("joint[left_pivot]: ", "") for entry in model.import_report.assumed]
+    assert any(listed.partition(": ")[0] in entry for entry in told) or not listed
+    assert ("left_pivot" in "".join(told)) == bool(listed)
+
+
+def test_limits_of_0_and_0_are_warned_of_and_mean_none(tmp_path):
+    """Exporters write them for wheels. The import took them for an error, and other programs take them for none."""
+    with pytest.warns(RobotFileWarning, match=r"joint\[left_pivot\]: its limits are 0 and 0.*without stops") as caught:
+        model = RoverModel.from_urdf(write(tmp_path, with_pivot_limits("0", "0.0")))
+    assert str(caught[0].message) in model.import_report.warnings
+    assert "limits" not in {solid["name"]: solid for solid in model.to_dict()["solids"]}["left_rocker"]
+    with pytest.raises(ModelError, match="lower limit must be below"):
+        RoverModel.from_urdf(write(tmp_path, with_pivot_limits("0.1", "0.1")))
+
+
+def test_packages_are_searched_where_ros_keeps_them(tmp_path, monkeypatch):
+    """Meshes of robots that lie in other packages were not found, and the error did not say where it had looked."""
+    trimesh = pytest.importorskip("trimesh")
+    mesh = '<collision><origin rpy="1.5707963267948966 0 0"/><geometry><mesh filename="package://small/meshes/rim.stl"/></geometry></collision>'
+    (tmp_path / "robots").mkdir()
+    path = write(tmp_path / "robots", rover(wheel=mesh))
+    source, install = tmp_path / "src", tmp_path / "install"
+    for folder, radius in ((source / "small", 0.1), (install / "share" / "small", 0.2)):
+        (folder / "meshes").mkdir(parents=True)
+        trimesh.creation.cylinder(radius=radius, height=0.05, sections=64).export(folder / "meshes" / "rim.stl")
+    for name in ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(ModelError, match=r"rim\.stl, which cannot be read: it is in none of .*robots, ") as caught:
+        RoverModel.from_urdf(path)
+    assert str(tmp_path) in str(caught.value)
+    monkeypatch.setenv("AMENT_PREFIX_PATH", f"{tmp_path / 'other'}:{install}")
+    with pytest.raises(ModelError, match="in none of"):
+        RoverModel.from_urdf(write(tmp_path / "robots", rover(wheel=mesh.replace("small/", "large/"))))
+    path = write(tmp_path / "robots", rover(wheel=mesh))
+    assert RoverModel.from_urdf(path).wheel_radii == pytest.approx([0.2] * 3, rel=1e-6)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(source))
+    assert RoverModel.from_urdf(path).wheel_radii == pytest.approx([0.1] * 3, rel=1e-6)
+    for given in (install / "share", install / "share" / "small"):
+        model, _ = read_robot(path, package_paths=[given])
+        assert model.wheel_radii == pytest.approx([0.2] * 3, rel=1e-6)
+    assert RoverModel.from_urdf(path, package_paths=[str(install / "share")]) == model
+
+
+@pytest.mark.parametrize("wrong", ["folder", 3, [3], ["nowhere"], [None], {"a": 1}])
+def test_folders_of_packages_that_are_none_are_refused(tmp_path, wrong):
+    with pytest.raises(ModelError, match="package_paths"):
+        RoverModel.from_urdf(write(tmp_path, rover()), package_paths=wrong)

@@ -6,10 +6,11 @@ import inspect
 import math
 import os
 import stat
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NoReturn, ParamSpec, TypeVar
+from typing import NoReturn, ParamSpec, TextIO, TypeVar
 
 import typer
 from rich.console import Console
@@ -18,6 +19,7 @@ from typer.models import ArgumentInfo
 
 from rover_gym.extras import MissingExtraError
 from rover_gym.mechanics import OptionError, RoverGymError
+from rover_gym.models import RobotFileWarning
 from rover_gym.validation import refuse
 
 P = ParamSpec("P")
@@ -33,6 +35,7 @@ SET_BY = {
     "width": ("size", "--size"),
     "height": ("size", "--size"),
     "wheels": ("wheel", "--wheel"),
+    "package_paths": ("package_path", "--package-path"),
     "slips": ("slip", "--slip"),
     "position": ("start", "--start"),
     "ground": ("terrain", "--terrain"),
@@ -149,12 +152,36 @@ def plain_errors(command: Callable[P, R]) -> Callable[P, R]:
 
     @functools.wraps(command)
     def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
-        with one_line(options):
+        with one_line(options), _plain_warnings():
             for name, value in kwargs.items():
                 _check_finite(name, value)
             return command(*args, **kwargs)
 
     return guarded
+
+
+@contextmanager
+def _plain_warnings() -> Iterator[None]:
+    """Prints what the package warns of within the block as one line each on standard error."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", RobotFileWarning)
+        others = warnings.showwarning
+
+        def show(
+            message: Warning | str,
+            category: type[Warning],
+            filename: str,
+            lineno: int,
+            file: TextIO | None = None,
+            line: str | None = None,
+        ) -> None:
+            if issubclass(category, RobotFileWarning):
+                typer.echo(f"warning: {message}", err=True)
+            else:
+                others(message, category, filename, lineno, file, line)
+
+        warnings.showwarning = show
+        yield
 
 
 def _as_typed(name: str, parameter: inspect.Parameter) -> str:

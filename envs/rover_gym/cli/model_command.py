@@ -63,6 +63,9 @@ def import_model(
     ignore: Annotated[
         list[str] | None, typer.Option(help="What to leave out although it changes the motion, such as friction.")
     ] = None,
+    package_path: Annotated[
+        list[Path] | None, typer.Option(help="A folder with packages that a URDF names by package://; repeat for each.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Read a URDF or MJCF, tell what was understood, and write a model file and a picture."""
@@ -77,12 +80,14 @@ def import_model(
     options: dict[str, object] = {"forward": forward, "ignore": ignore or ()}
     options |= {"torque_limit": torque_limit, "wheel_width": wheel_width}
     options |= {"wheels": _radii(wheel), "steering": _pairs(steering)}
+    if package_path:
+        options["package_paths"] = package_path
     if fixed_base:
         options["free_base"] = False
     read, report = _read(file, options)
     with Results(as_json=as_json) as results:
         _say_solids(results, read)
-        results.add(assumed=report.assumed, not_simulated=report.left_out)
+        results.add(assumed=report.assumed, not_simulated=report.left_out, warnings=report.warnings)
         for title, entries in (("assumed", report.assumed), ("not simulated", report.left_out)):
             for entry in entries:
                 results.show(f"{title}: {entry}")

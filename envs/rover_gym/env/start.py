@@ -82,8 +82,8 @@ def slope_of(terrain: Terrain | None) -> tuple[float, float]:
 
 
 def resting_pose(model: RoverModel, plane: Plane, position: Point, heading: float) -> npt.NDArray[np.float64]:
-    """`(nq,)` coordinates of the rover resting on the plane, joints at zero, trunk upright along the normal.
+    """`(nq,)` coordinates of the rover resting on the plane, the trunk's origin above `position`.
 
-    The trunk's origin is above `position`, and the lowest wheel has gap zero.
+    The trunk is upright along the normal and joints are at zero, unless another pose puts more wheels on the ground.
     """
     return model.resting_pose(plane, position, heading)

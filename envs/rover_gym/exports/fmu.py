@@ -11,7 +11,7 @@ from rover_gym.exports.fmu_description import description_text
 from rover_gym.exports.fmu_scene import scene_text
 from rover_gym.exports.fmu_variables import unit_variables
 from rover_gym.mechanics import OptionError
-from rover_gym.validation import refuse
+from rover_gym.validation import checked, refuse
 
 if TYPE_CHECKING:
     from rover_gym.mechanics import Simulation
@@ -45,6 +45,7 @@ def fmu_library() -> Path:
     return path
 
 
+@checked(simulation="Simulation", path=Path, name=str, description=str)
 def write_fmu(
     simulation: Simulation, path: str | Path, *, name: str = "rover", description: str = "a rover on its ground"
 ) -> Path:

@@ -27,6 +27,8 @@ Array = npt.NDArray[np.float64]
 MAP, WORLD = "map", "world"
 #: R_MW: x stays ahead, the world's y becomes z, and its z becomes -y.
 MAP_FROM_WORLD = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+#: R_BS: from the axes of a solid as logged (REP 103: x forward, y left, z up) to its own (x forward, y up, z right).
+SOLID_FROM_LOGGED = MAP_FROM_WORLD.T
 JPEG_QUALITY = 90
 ALL = 1  # foxglove.SceneEntityDeletion.ALL
 FLOAT32 = 7  # foxglove.PackedElementField.FLOAT32

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import ExitStack
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from rover_gym.exports.mcap_writer import McapWriter
 from rover_gym.extras import require
 from rover_gym.mechanics import Simulation
 from rover_gym.record.rover_run import RoverRun, film_rows
 from rover_gym.record.trajectory_format import RecordingError
-from rover_gym.validation import refuse
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
+from rover_gym.validation import checked, refuse
 
 #: Images a second.
 FPS = 10.0
 
 
+@checked(run="RoverRun", path=Path, images=bool, fps=float, progress=callable)
 def write_mcap(
     run: RoverRun,
     path: str | Path,

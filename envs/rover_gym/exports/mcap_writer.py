@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -18,11 +20,9 @@ from rover_gym.record.trajectory import Trajectory
 from rover_gym.record.trajectory_format import RecordingError
 from rover_gym.rendering.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR
 from rover_gym.replay import scenery
-from rover_gym.validation import array, number, refuse, vector
+from rover_gym.validation import TERRAINS, array, checked, number, refuse, vector
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
     from types import TracebackType
 
 Array = npt.NDArray[np.float64]
@@ -73,6 +73,14 @@ class McapWriter:
         MissingExtraError: The extra `logs` is not installed.
     """
 
+    @checked(
+        path=Path,
+        model="RoverModel",
+        terrain=TERRAINS,
+        attributes=(Mapping, None),
+        way=(np.ndarray, None),
+        epoch=float,
+    )
     def __init__(
         self,
         path: str | Path,
@@ -129,7 +137,9 @@ class McapWriter:
             self._file.write("/scene", stamp, self._scene(stamp, q))
         poses = self._model.poses(q, "state")
         frames = [(messages.MAP, messages.WORLD, np.zeros(3), messages.MAP_FROM_WORLD)]
-        frames += [(messages.WORLD, self._frames[name], *poses[name]) for name in self._model.solid_names]
+        for name in self._model.solid_names:
+            place, turn = poses[name]
+            frames.append((messages.WORLD, self._frames[name], place, turn @ messages.SOLID_FROM_LOGGED))
         self._file.write("/tf", stamp, messages.transforms(stamp, frames))
         efforts = {
             joint - 6: float(sign * torque)
@@ -159,10 +169,11 @@ class McapWriter:
 
         Args:
             time: s.
-            rotation: Of the sensor's frame to the world, (3, 3).
-            angular_velocity: In the sensor's frame, rad/s, (3,).
-            acceleration: Acceleration less gravity in the sensor's frame, m/s², (3,); at rest it points up.
-            frame: The sensor's frame; the trunk's by default.
+            rotation: From the sensor's axes to the world, (3, 3).
+            angular_velocity: In the sensor's axes, rad/s, (3,).
+            acceleration: Acceleration less gravity in the sensor's axes, m/s², (3,); at rest it points up.
+            frame: The sensor's frame. By default the trunk's: the sensor has the trunk's axes, and all is logged in
+                those of REP 103.
             topic: The topic.
 
         Raises:
@@ -178,7 +189,10 @@ class McapWriter:
                 self._topics["imu"] = schema
             self._file.add_channel(topic, messages.IMU_NAME, "cdr", schema)
             self._topics[topic] = schema
-        seen_from = self._frames[self._model.solid_names[0]] if frame is None else frame
+        seen_from = frame
+        if seen_from is None:
+            seen_from, axes = self._frames[self._model.solid_names[0]], messages.SOLID_FROM_LOGGED
+            turn, rates, felt = turn @ axes, axes.T @ rates, axes.T @ felt
         data = messages.imu(stamp, seen_from, messages.MAP_FROM_WORLD @ turn, rates, felt)
         self._file.write_bytes(topic, stamp, data)
 
@@ -190,7 +204,8 @@ class McapWriter:
         Args:
             time: s.
             points: (n, 3), m; rows that are not finite, where a ray met nothing, are left out.
-            frame: The frame of the points: `world` or a solid's.
+            frame: The frame of the points: `world` or a solid's, y up. Those of a solid are logged in the axes of REP
+                103.
             topic: The topic.
 
         Raises:
@@ -200,7 +215,10 @@ class McapWriter:
         if given.ndim != 2 or given.shape[1] != 3:
             refuse(RecordingError, "points", given.shape, "must have the shape (n, 3)")
         stamp = self._stamp(time)
-        self._file.write(topic, stamp, messages.point_cloud(stamp, frame, given[np.isfinite(given).all(axis=1)]))
+        seen = given[np.isfinite(given).all(axis=1)]
+        if frame in self._frames.values():
+            seen = seen @ messages.SOLID_FROM_LOGGED
+        self._file.write(topic, stamp, messages.point_cloud(stamp, frame, seen))
 
     def image(
         self, time: float, pixels: npt.NDArray[np.uint8], *, frame: str = "camera", topic: str = "/camera"
@@ -301,7 +319,11 @@ class McapWriter:
         found = messages.scene(stamp)
         for name, parts in scenery.parts_by_solid(run).items():
             if parts:
-                messages.add_meshes(found, stamp, f"rover/{name}", self._frames[name], scenery.coloured_meshes(parts))
+                meshes = [
+                    (colour, vertices @ messages.SOLID_FROM_LOGGED, faces)
+                    for colour, vertices, faces in scenery.coloured_meshes(parts)
+                ]
+                messages.add_meshes(found, stamp, f"rover/{name}", self._frames[name], meshes)
         tiles = scenery.ground_tiles(run)
         if tiles is not None:
             vertices, light, dark = tiles

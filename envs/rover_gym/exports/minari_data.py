@@ -16,7 +16,7 @@ import numpy as np
 from rover_gym.extras import require
 from rover_gym.mechanics import OptionError, __version__
 from rover_gym.registration import ENVIRONMENTS
-from rover_gym.validation import refuse, whole
+from rover_gym.validation import checked, refuse, whole
 
 if TYPE_CHECKING:
     from rover_gym.policy.episodes import Policy
@@ -27,6 +27,16 @@ NAME = re.compile(r"(?:[A-Za-z][A-Za-z0-9_-]*/)*[A-Za-z][A-Za-z0-9_-]*-v\d+")
 PLACE = "MINARI_DATASETS_PATH"
 
 
+@checked(
+    name=str,
+    environment=str,
+    make_policy=callable,
+    seeds=Iterable,
+    arguments=(Mapping, None),
+    folder=(Path, None),
+    policy_name=str,
+    progress=callable,
+)
 def write_dataset(
     name: str,
     environment: str,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,17 +18,16 @@ from rover_gym.policy.network import Network
 from rover_gym.policy.policy_card import PolicyCard
 from rover_gym.policy.policy_files import PolicyError, is_there
 from rover_gym.policy.shipped import find_policy, forecast_folder
-from rover_gym.validation import refuse
+from rover_gym.validation import checked, refuse
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from rover_gym.mechanics import RoverModel
 
 #: The file that tells a run of `training/train_raw.py`.
 RAW_FILE = "model.zip"
 
 
+@checked(policy=Path, path=Path, terrain=str, model=("RoverModel", None))
 def write_onnx(policy: str | Path, path: str | Path, terrain: str = "plane", model: RoverModel | None = None) -> Path:
     """Writes a policy's network as ONNX, with the normalisation of its inputs.
 
@@ -56,6 +56,7 @@ def write_onnx(policy: str | Path, path: str | Path, terrain: str = "plane", mod
     return path
 
 
+@checked(policy=Path, terrain=str, model=("RoverModel", None))
 def onnx_policy(policy: str | Path, terrain: str = "plane", model: RoverModel | None = None) -> Any:
     """The `onnx.ModelProto` of a policy, as `write_onnx` writes it.
 

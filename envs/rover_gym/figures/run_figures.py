@@ -11,6 +11,7 @@ from rover_gym.figures import run_curves as curves
 from rover_gym.figures.saving import check_format, save_figures
 from rover_gym.figures.style import WIDTH
 from rover_gym.figures.wheel_paths import path_from_above
+from rover_gym.validation import checked
 
 if TYPE_CHECKING:
     from rover_gym.figures.style import Sheet
@@ -49,6 +50,7 @@ def drawable(run: RoverRun) -> dict[str, Drawing]:
     return {name: drawing for name, drawing in DRAWINGS.items() if set(drawing.needs) <= run.trajectory.data.keys()}
 
 
+@checked(run="RoverRun", folder=Path, file_format=str, with_overview=bool)
 def draw_run(run: RoverRun, folder: str | Path, *, file_format: str = "png", with_overview: bool = False) -> list[Path]:
     """Draws all figures of a run for which its recording has the data.
 

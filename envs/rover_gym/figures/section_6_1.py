@@ -19,6 +19,7 @@ from rover_gym.figures.wheel_style import WheelStyle
 from rover_gym.record.trajectory import Trajectory, read_trajectory
 from rover_gym.reproduction.inclined_plane import reference_data
 from rover_gym.reproduction.report_rover import report_model
+from rover_gym.validation import checked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 PUBLISHED_STEP = 0.02  # s, of the runs behind the report's figures (inferred from the figures themselves)
 
 
+@checked(recording=Path, folder=Path)
 def draw_section_6_1(recording: str | Path, folder: str | Path) -> list[Path]:
     """Draws the report's figures 6.2 to 6.5, and our path beside Siconos', as PNG files and returns their paths.
 

@@ -15,11 +15,13 @@ from rover_gym.figures.wheel_style import WheelStyle
 from rover_gym.mechanics import SphereField
 from rover_gym.record.trajectory import Trajectory, read_trajectory
 from rover_gym.reproduction.report_rover import WHEEL_RADIUS, report_model
+from rover_gym.validation import checked
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+@checked(recording=Path, folder=Path)
 def draw_section_6_2(recording: str | Path, folder: str | Path) -> list[Path]:
     """Draws the figures of the run over the rug as PNG files into the folder and returns their paths.
 

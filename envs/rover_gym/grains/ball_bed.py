@@ -12,7 +12,7 @@ import numpy.typing as npt
 from rover_gym.grains.grain_surface import surface_map
 from rover_gym.grains.sizes import MOST_BALLS, even_radii
 from rover_gym.mechanics import GrainSimulation, OptionError, arrange_balls
-from rover_gym.validation import number, refuse, whole
+from rover_gym.validation import checked, number, refuse, whole
 
 Array = npt.NDArray[np.float64]
 
@@ -88,6 +88,7 @@ def check_memory(field: str, count: int) -> None:
         refuse(OptionError, field, count, f"needs about {needed / 1e6:.0f} MB of memory, {free / 1e6:.0f} MB are free")
 
 
+@checked(width=float, depth=float)
 def box_walls(width: float, depth: float) -> Array:
     """(5, 6) a floor at height 0 and four sides, from x = 0 and z = 0, each as a point and the normal to its free side.
 
@@ -157,6 +158,7 @@ def settled_balls(
     return BallBed(sim.radius, sim.mass, sim.position, walls, width, depth)
 
 
+@checked(sim="GrainSimulation")
 def settle(sim: GrainSimulation) -> None:
     """Steps balls until they are at rest, or for a time in which they could have fallen 12 times from their top.
 

@@ -10,11 +10,12 @@ from rover_gym.grains.ball_bed import BallBed
 from rover_gym.grains.grain_run import GrainRun
 from rover_gym.grains.pit import PitFill
 from rover_gym.mechanics import GrainSimulation, OptionError, Plane, RoverGrainSimulation, RoverModel, Simulation
-from rover_gym.validation import number, refuse
+from rover_gym.validation import checked, number, refuse
 
 CLEARANCE = 1e-3  # m, between a rover's wheels and the balls, or a sphere and the balls, at the start
 
 
+@checked(bed="BallBed")
 def striking_sphere(bed: BallBed, sphere_radius: float, density: float, drop: float, **options: Any) -> GrainSimulation:
     """A sphere at the moment at which it strikes the middle of a bed; it is the last ball.
 
@@ -50,6 +51,7 @@ def striking_sphere(bed: BallBed, sphere_radius: float, density: float, drop: fl
     return sim
 
 
+@checked(run="GrainRun")
 def penetration_depths(run: GrainRun) -> np.ndarray[Any, np.dtype[np.float64]]:
     """(n,) depth of the lowest point of the last ball below the surface that it struck, m.
 
@@ -61,6 +63,7 @@ def penetration_depths(run: GrainRun) -> np.ndarray[Any, np.dtype[np.float64]]:
     return depths
 
 
+@checked(bed="BallBed", model="RoverModel")
 def rover_on_bed(
     bed: BallBed,
     model: RoverModel,
@@ -138,6 +141,7 @@ def rover_before_pit(
     return RoverGrainSimulation(rover, grains, wheel_friction=wheel_friction)
 
 
+@checked(model="RoverModel")
 def with_wheel_width(model: RoverModel, wheel_width: float) -> RoverModel:
     """The same rover on wheels of a width, m, between whose rims balls do not slip.
 

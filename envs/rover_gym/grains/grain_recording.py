@@ -16,11 +16,11 @@ import numpy.typing as npt
 
 from rover_gym.grains.moving_window import MovingWindow
 from rover_gym.grains.stored_vessel import stored_vessel
-from rover_gym.mechanics import GrainSimulation, RoverGrainSimulation, RoverModel, Simulation
+from rover_gym.mechanics import GrainSimulation, OptionError, RoverGrainSimulation, RoverModel, Simulation
 from rover_gym.record.channels import Channel, state_channels
 from rover_gym.record.facts import row_count
 from rover_gym.record.recorder import Recorder
-from rover_gym.validation import number
+from rover_gym.validation import checked, number, refuse
 
 Array = npt.NDArray[np.float64]
 #: Balls in space, alone or under a rover.
@@ -37,6 +37,8 @@ def _both(sim: Recordable) -> tuple[GrainSimulation | MovingWindow, Simulation |
     """All the balls, and the rover among them."""
     if isinstance(sim, GrainSimulation):
         return sim, None
+    if not hasattr(sim, "grains") or not hasattr(sim, "rover"):
+        refuse(OptionError, "sim", sim, "must be a GrainSimulation, a RoverGrainSimulation or a MovingWindow")
     return (sim if isinstance(sim, MovingWindow) else sim.grains), sim.rover
 
 
@@ -173,6 +175,7 @@ def _rover_channels(model: RoverModel) -> tuple[Channel, ...]:
     )
 
 
+@checked(scene=(Mapping, None))
 def describe_grains(
     sim: Recordable,
     title: str,
@@ -206,6 +209,7 @@ def describe_grains(
     }
 
 
+@checked(scene=(Mapping, None), title=str, seed=(int, str), before_row=callable, until=callable, progress=callable)
 def record_grains(
     sim: Recordable,
     duration: float,

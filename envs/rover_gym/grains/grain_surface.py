@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import OptionError
-from rover_gym.validation import number, refuse
+from rover_gym.validation import array, number, refuse, vector
 
 Array = npt.NDArray[np.float64]
 
@@ -84,6 +84,14 @@ def _box_sum(values: Array, cells: int) -> Array:
     return result
 
 
+def _corners(bounds: object) -> tuple[Array, Array]:
+    """Least x and z and largest x and z of bounds, m."""
+    least_x, least_z, largest_x, largest_z = vector("bounds", bounds, 4)
+    if largest_x < least_x or largest_z < least_z:
+        refuse(OptionError, "bounds", bounds, "must be the least x and z, then the largest")
+    return np.array([least_x, least_z]), np.array([largest_x, largest_z])
+
+
 def surface_map(
     position: npt.ArrayLike,
     radius: npt.ArrayLike,
@@ -101,12 +109,17 @@ def surface_map(
     Raises:
         OptionError: There are no balls, or the map would have more than 4 million cells.
     """
-    places, radii = np.asarray(position, dtype=np.float64), np.asarray(radius, dtype=np.float64)
-    if not len(radii):
-        refuse(OptionError, "radius", 0, "must hold at least one ball")
+    places = array("position", position, error=OptionError)
+    radii = array("radius", radius, error=OptionError)
+    if radii.ndim != 1 or not len(radii):
+        refuse(OptionError, "radius", radius, "must hold a number for each ball, and at least one")
+    if places.shape != (len(radii), 3) or not np.isfinite(places).all():
+        refuse(OptionError, "position", position, f"must be finite, of shape ({len(radii)}, 3)")
+    if not (np.isfinite(radii) & (radii > 0.0)).all():
+        refuse(OptionError, "radius", radius, "must be positive")
     edge = float(radii.mean()) if cell is None else number("cell", cell, above=0.0)
     flat = places[:, [0, 2]]
-    low, high = (flat.min(axis=0), flat.max(axis=0)) if bounds is None else (np.array(bounds[:2]), np.array(bounds[2:]))
+    low, high = (flat.min(axis=0), flat.max(axis=0)) if bounds is None else _corners(bounds)
     n_x, n_z = (np.floor((high - low) / edge) + 1.0).tolist()
     if not n_x * n_z <= MOST_CELLS:
         refuse(OptionError, "cell", edge, f"makes a map of more than {MOST_CELLS} cells")

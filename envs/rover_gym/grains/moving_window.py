@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from rover_gym.grains.footprint import MAP, Footprint, Parts
 from rover_gym.mechanics import GrainSimulation, OptionError, RoverGrainSimulation, Simulation, StateError
-from rover_gym.validation import number, refuse, whole
+from rover_gym.validation import checked, number, refuse, whole
 
 if TYPE_CHECKING:
     from rover_gym.mechanics import Drum, RoverGrainSnapshot, Silo, StepReport
@@ -94,6 +94,7 @@ class MovingWindow:
         StateError: A part of the rover is in a ball.
     """
 
+    @checked(rover="Simulation", grains="GrainSimulation")
     def __init__(
         self,
         rover: Simulation,

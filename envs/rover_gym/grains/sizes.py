@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import OptionError
-from rover_gym.validation import number, refuse, whole
+from rover_gym.validation import array, number, refuse, whole
 
 Array = npt.NDArray[np.float64]
 
@@ -79,7 +79,8 @@ def sieved_radii(count: int, diameters: npt.ArrayLike, passing: npt.ArrayLike, s
         OptionError: The table is no sieve curve.
     """
     count, random = _count(count), _random(seed)
-    openings, shares = np.asarray(diameters, dtype=float), np.asarray(passing, dtype=float)
+    openings = array("diameters", diameters, error=OptionError)
+    shares = array("passing", passing, error=OptionError)
     if openings.ndim != 1 or len(openings) < 2 or not (np.isfinite(openings) & (openings > 0.0)).all():
         refuse(OptionError, "diameters", diameters, "must be at least two positive lengths")
     if (np.diff(openings) <= 0.0).any():

@@ -11,13 +11,14 @@ import numpy as np
 from rover_gym.grains.ball_bed import DENSITY, BallBed, box_walls, check_memory, settle, settled_balls
 from rover_gym.grains.sizes import MOST_BALLS
 from rover_gym.mechanics import OptionError
-from rover_gym.validation import number, refuse, whole
+from rover_gym.validation import checked, number, refuse, whole
 
 MOST_TILES = 10_000
 #: Share of the room in a shallow bed that settled balls fill, up to the tops of the uppermost.
 PACKING = 0.5
 
 
+@checked(bed="BallBed")
 def tiled(bed: BallBed, along: int, across: int) -> BallBed:
     """Lays a bed beside its mirror images, as often as wanted along x and z.
 

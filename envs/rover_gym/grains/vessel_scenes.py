@@ -12,7 +12,7 @@ from rover_gym.grains.grain_run import GrainRun
 from rover_gym.grains.grain_surface import surface_map
 from rover_gym.grains.sizes import MOST_BALLS
 from rover_gym.mechanics import Drum, GrainSimulation, OptionError, Silo, ball_packing
-from rover_gym.validation import number, refuse, whole
+from rover_gym.validation import checked, number, refuse, whole
 
 Array = npt.NDArray[np.float64]
 
@@ -24,6 +24,7 @@ HIGHEST, COVERED = 0.98, 0.5
 INNER = 0.6
 
 
+@checked(seed=int)
 def column(count: int, tube: float, radius: float, *, seed: int = 0, **options: Any) -> GrainSimulation:
     """A round column of settled balls on a floor, whose tube has just been taken away.
 
@@ -42,6 +43,7 @@ def column(count: int, tube: float, radius: float, *, seed: int = 0, **options: 
     return GrainSimulation(filled.radius, filled.mass, filled.position, walls=FLOOR, **options)
 
 
+@checked(seed=int)
 def silo(count: int, tube: float, hole: float, radius: float, *, seed: int = 0, **options: Any) -> GrainSimulation:
     """A tube of settled balls on a floor, whose round hole has just been opened; balls fall on a lower floor.
 
@@ -65,6 +67,7 @@ def silo(count: int, tube: float, hole: float, radius: float, *, seed: int = 0, 
     return GrainSimulation(filled.radius, filled.mass, filled.position, vessel=opened, walls=below, **options)
 
 
+@checked(seed=int)
 def drum(
     count: int, wall: float, length: float, rate: float, radius: float, *, seed: int = 0, **options: Any
 ) -> GrainSimulation:
@@ -96,6 +99,7 @@ def drum(
     return GrainSimulation(filled.radius, filled.mass, filled.position, vessel=turning, **options)
 
 
+@checked(run="GrainRun", tube=float)
 def run_out(run: GrainRun, tube: float) -> tuple[float, float]:
     """Aspect ratio of a column at the first sample, and how far its edge went by the last, in its first radii.
 
@@ -116,6 +120,7 @@ def run_out(run: GrainRun, tube: float) -> tuple[float, float]:
     return height / tube, edge / tube - 1.0
 
 
+@checked(run="GrainRun")
 def outflow(run: GrainRun) -> Array:
     """(n,) mass that has left a silo through its hole, kg.
 
@@ -127,6 +132,7 @@ def outflow(run: GrainRun) -> Array:
     return result
 
 
+@checked(run="GrainRun")
 def slopes(run: GrainRun) -> Array:
     """(n,) slope of the surface in a drum, rad, positive where it rises along x; nan where too few balls lie.
 

@@ -27,7 +27,7 @@ class Estimate:
     Attributes:
         name: Its name.
         unit: SI unit, "1" for a pure number.
-        value: The value; of what the run does not tell, where the search began.
+        value: The value; of what the run does not tell, where the search began or ended.
         standard_error: Its standard error; infinite if the run does not tell it.
         reason: Why the run does not tell it; empty if it does.
     """
@@ -70,6 +70,8 @@ class Identification:
             within the noise; the covariance contains it as a factor.
         degrees_of_freedom: Number of residuals less that of estimated quantities.
         iterations: Number of iterations.
+        not_explained: What the simulation misses by more than noise explains, in words, the worst first; empty if there
+            is nothing, and if `noise` was given. Then no parameter is identified.
     """
 
     estimates: tuple[Estimate, ...]
@@ -84,6 +86,7 @@ class Identification:
     mean_square: float
     degrees_of_freedom: float
     iterations: int
+    not_explained: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of a name.

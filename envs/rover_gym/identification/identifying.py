@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from rover_gym.identification.estimates import Estimate, Identification, open_combinations
 from rover_gym.identification.fitting import SMALLEST_CHANGE, Solution, WindowFit
+from rover_gym.identification.misfit import FROM_MEDIAN, not_explained
 from rover_gym.identification.parameters import Parameter, Setup, chosen_parameters
 from rover_gym.identification.profiles import look_around, variance_of
 from rover_gym.identification.windows import Window, cut
@@ -22,8 +23,6 @@ Array = npt.NDArray[np.float64]
 
 #: Standard deviations of measured coordinates (m, rad) and velocities (m/s, rad/s) with which a fit begins.
 FIRST_DEVIATIONS = {"q": 1e-3, "v": 1e-2}
-#: Median of the absolute value of a normal variable over its standard deviation, inverted.
-FROM_MEDIAN = 1.4826
 
 
 def identify(
@@ -60,7 +59,7 @@ def identify(
         window: Length of a window, s.
         max_windows: Largest number of windows; of more, as many are taken at equal distances.
         noise: Standard deviations of the measured coordinates, "q", m and rad, and velocities, "v", m/s and rad/s. By
-            default those of place, attitude, joints and their rates are estimated from the residuals.
+            default estimated from the residuals. If the rows are too smooth for so much noise, nothing is identified.
         max_iterations: Largest number of iterations.
         progress: Called with the number of an iteration and the mean square of the weighted residuals.
 
@@ -104,7 +103,8 @@ def identify(
             solution = replace(solution, values=_inserted(solution.values, free, best.values))
             free, told, best = _free(fit, solution, chosen, held, max_iterations)
     widened = np.array([factors[i] for i in free])
-    return _identification(chosen, windows, best, free, widened, reasons, sensitivities, setup)
+    missed = _missed(windows, best, setup.model) if noise is None else ()
+    return _identification(chosen, windows, best, free, widened, reasons, sensitivities, setup, missed)
 
 
 def _free(
@@ -174,6 +174,25 @@ def _estimated_noise(solution: Solution, nq: int) -> Array:
     return deviations
 
 
+def _missed(windows: Sequence[Window], solution: Solution, model: RoverModel) -> tuple[str, ...]:
+    """What the simulation misses by more than noise explains, in words, the worst first."""
+    names = _columns(model)
+    residuals = solution.residuals.reshape(-1, len(names))
+    missed, bound = not_explained(windows, residuals, _first_deviations(None, model))
+    worst = np.argsort(-missed / bound)
+    return tuple(
+        f"{names[i]} is missed by {missed[i]:.3g} (root mean square), of which noise explains {bound[i]:.2g}"
+        for i in worst.tolist()
+        if missed[i] > bound[i]
+    )
+
+
+def _columns(model: RoverModel) -> tuple[str, ...]:
+    """Names of the (nq + nv) measured columns."""
+    coordinates, rates = state_channels(model)
+    return (*coordinates.columns, *rates.columns[:6], *(f"rate of {name}" for name in rates.columns[6:]))
+
+
 def _identification(
     parameters: Sequence[Parameter],
     windows: Sequence[Window],
@@ -183,8 +202,12 @@ def _identification(
     reasons: Mapping[int, str],
     sensitivities: Array,
     setup: Setup,
+    missed: tuple[str, ...],
 ) -> Identification:
     n = len(parameters)
+    if missed:
+        why = f"noise does not explain the misfit: {missed[0]}"
+        reasons = {**dict.fromkeys(free, why), **reasons}
     variance = variance_of(solution, len(free))
     values = _inserted(_values(parameters), free, solution.values)
     covariance = np.full((n, n), np.nan)
@@ -203,13 +226,12 @@ def _identification(
     width = solution.deviations.size
     ends = np.cumsum([window.measured.shape[0] for window in windows])[:-1]
     residuals = tuple(np.split(solution.residuals.reshape(-1, width), ends))
-    coordinates, rates = state_channels(setup.model)
     return Identification(
         estimates=tuple(estimates),
         covariance=covariance,
         sensitivities=sensitivities,
         condition=float(sensitivities[0] / sensitivities[-1]) if sensitivities[-1] > 0.0 else np.inf,
-        columns=(*coordinates.columns, *rates.columns[:6], *(f"rate of {name}" for name in rates.columns[6:])),
+        columns=_columns(setup.model),
         deviations=solution.deviations,
         times=tuple(window.time for window in windows),
         residuals=residuals,
@@ -217,4 +239,5 @@ def _identification(
         mean_square=variance,
         degrees_of_freedom=solution.freedom - len(free),
         iterations=solution.iterations,
+        not_explained=missed,
     )

@@ -14,6 +14,7 @@ import queue
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -34,11 +35,9 @@ from rover_gym.live.live_scene import BY_HAND
 from rover_gym.live.live_state import LiveState, poses_of
 from rover_gym.live.past import Past
 from rover_gym.mechanics import CommandError, RoverGymError
-from rover_gym.validation import refuse
+from rover_gym.validation import checked, refuse
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rover_gym.live.live_rover import LiveRover
 
 #: Most commands that wait: a page sends some ten a second.
@@ -80,6 +79,7 @@ class LiveLoop:
         recorded: Files that have been recorded to, in order.
     """
 
+    @checked(rover="LiveRover", recordings=Path, mcap=bool, clock=callable)
     def __init__(
         self,
         rover: LiveRover,

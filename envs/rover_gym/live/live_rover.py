@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -16,11 +17,9 @@ from rover_gym.ground import heights_of
 from rover_gym.live.live_scene import LiveChoices, LiveScene
 from rover_gym.mechanics import OptionError, SphereField, TerrainError, Union, sin_cos
 from rover_gym.policy.command import CommandController
-from rover_gym.validation import number, refuse
+from rover_gym.validation import checked, number, refuse
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from rover_gym.env.episode_scene import EpisodeScene
     from rover_gym.env.progress import Progress
     from rover_gym.policy.episodes import Policy
@@ -104,6 +103,7 @@ class LiveRover:
         RoverGymError: As `LiveScene.checked`, `LiveScene.policy` and the environment.
     """
 
+    @checked(scene=("LiveScene", None), choices=("LiveChoices", None))
     def __init__(self, scene: LiveScene | None = None, choices: LiveChoices | None = None) -> None:
         self.choices = LiveChoices() if choices is None else choices
         self.drives = 0

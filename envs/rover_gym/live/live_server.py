@@ -20,7 +20,7 @@ from rover_gym.live.live_view import LiveView
 from rover_gym.mechanics import CommandError, RoverGymError
 from rover_gym.replay.page import WHEEL_COLOURS
 from rover_gym.replay.player import with_parts
-from rover_gym.validation import number, refuse
+from rover_gym.validation import checked, number, refuse
 
 if TYPE_CHECKING:
     from rover_gym.live.live_loop import LiveLoop
@@ -56,6 +56,7 @@ class LiveServer:
         MissingExtraError: viser is not installed.
     """
 
+    @checked(loop="LiveLoop", choices="LiveChoices", host=str, port=int, fps=float)
     def __init__(
         self, loop: LiveLoop, choices: LiveChoices, *, host: str = "127.0.0.1", port: int = 8765, fps: float = 40.0
     ) -> None:

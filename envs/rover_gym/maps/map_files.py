@@ -127,7 +127,7 @@ def read_map(
     height_range: object = None,
     scale: object = None,
     datum: object = None,
-    band: object = 1,
+    band: object = None,
 ) -> tuple[Heights, Pair, Pair]:
     """Reads a map; the arguments are those of `HeightField.from_file`.
 
@@ -172,7 +172,7 @@ def _check_suited(file: GroundFile, *, height_range: object, scale: object, datu
         refuse(TerrainError, "height_range", height_range, f"is of PNG files only, not of {file.path}")
     if height_range is not None and (scale is not None or datum is not None):
         refuse(TerrainError, "height_range", height_range, "must come without scale and datum, which say the same")
-    if file.ending in (".npy", ".png") and band != 1:
+    if file.ending in (".npy", ".png") and band not in (None, 1):
         refuse(TerrainError, "band", band, f"is of GeoTIFF files only, not of {file.path}")
 
 
@@ -234,14 +234,12 @@ def _read_geotiff(
 ) -> tuple[Heights, Pair | None]:
     """Heights, and the spacing that the file says unless the caller knows it."""
     rasterio = require("rasterio", "maps")
-    index = number("band", band, at_least=1, error=TerrainError)
+    index = None if band is None else number("band", band, at_least=1, error=TerrainError)
 
     def read() -> Any:
         with rasterio.Env(GDAL_CACHEMAX=CACHE), rasterio.open(file.path, driver="GTiff") as opened:
             _check_shape(file, (opened.height, opened.width))
-            if index != int(index) or index > opened.count:
-                refuse(TerrainError, "band", band, f"must be a whole number, from 1 to {opened.count} in {file.path}")
-            k = int(index) - 1
+            k = _index(file, opened.count, index)
             if np.dtype(opened.dtypes[k]).kind not in "fiu":
                 file.refuse(f"band {k + 1} must hold real numbers, holds {opened.dtypes[k]}")
             values, missing = _band(opened, k + 1)
@@ -258,6 +256,16 @@ def _read_geotiff(
     metres = UNITS.get((unit or "m").lower(), 1.0) if scale is None else scale
     heights = _heights(file, numbers, metres, lowest if datum is None else datum)
     return heights, None if knows_spacing else _spacing(file, transform, crs)
+
+
+def _index(file: GroundFile, count: int, band: float | None) -> int:
+    """Index of the band that was asked for; the only one by default."""
+    if band is None and count > 1:
+        refuse(TerrainError, "band", band, f"{file.path} has {count} bands: say which holds the heights, from 1")
+    index = 1.0 if band is None else band
+    if index != int(index) or index > count:
+        refuse(TerrainError, "band", band, f"must be a whole number, from 1 to {count} in {file.path}")
+    return int(index) - 1
 
 
 def _band(opened: Any, band: int) -> tuple[npt.NDArray[Any], npt.NDArray[np.bool_] | None]:

@@ -3,7 +3,7 @@
 `RoverModel.from_urdf`, `from_mjcf`, `to_urdf` and `to_mjcf` call this room.
 """
 
-from rover_gym.models.import_report import ImportReport, solid_rows
+from rover_gym.models.import_report import ImportReport, RobotFileWarning, solid_rows
 from rover_gym.models.lookup import open_model, read_robot
 from rover_gym.models.mjcf_writer import write_mjcf
 from rover_gym.models.reading import read_mjcf, read_urdf
@@ -12,6 +12,7 @@ from rover_gym.models.urdf_writer import write_urdf
 
 __all__ = [
     "ImportReport",
+    "RobotFileWarning",
     "Statics",
     "check_statics",
     "open_model",

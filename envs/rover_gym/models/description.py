@@ -224,7 +224,8 @@ def _left_out(shape: FileShape, role: WheelRole | None) -> str | None:
     """What of a shape is not simulated, in words, or None."""
     if shape.collides and role is not None:
         rim = f"cylinder {role.width:g} m wide" if role.width else "thin disc"
-        return None if shape.size == (role.radius, role.width) else f"of a wheel, which touches as a {rim}"
+        is_rim = shape.kind == "cylinder" and shape.size == (role.radius, role.width)
+        return None if is_rim else f"of a wheel, which touches as a {rim}"
     if shape.collides and shape.kind not in TOUCHING:
         is_drawn = "; it is drawn" if shape.kind == "cylinder" else ""
         return f"that touches, since only boxes and spheres can{is_drawn}"

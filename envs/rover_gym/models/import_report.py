@@ -7,6 +7,10 @@ from dataclasses import dataclass, field
 from rover_gym.mechanics import RoverModel
 
 
+class RobotFileWarning(UserWarning):
+    """A robot's file was read, and the model is probably not what its reader wants."""
+
+
 @dataclass(frozen=True)
 class ImportReport:
     """What was read from a robot's file; `str` gives it as text.
@@ -16,16 +20,19 @@ class ImportReport:
         assumed: What the file does not state and was chosen, with the value.
         left_out: What the file holds and the model does not simulate.
         solids: A row for each solid: name, joint, what carries it, mass (kg) and role.
+        warnings: What is probably not as the reader wants it, such as a robot without wheels. Each is also a Python
+            warning of the category `RobotFileWarning`.
     """
 
     path: str
     assumed: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
     solids: tuple[tuple[str, str, str, float, str], ...] = field(default=(), repr=False)
+    warnings: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         """The report as lines of text."""
-        lines = [f"{self.path}: {len(self.solids)} solids"]
+        lines = [f"{self.path}: {len(self.solids)} solids", *(f"warning: {warning}" for warning in self.warnings)]
         for name, joint, parent, mass, role in self.solids:
             lines.append(f"  {name}: {joint} on {parent}, {mass:g} kg{role and f', {role}'}")
         for title, entries in (("assumed", self.assumed), ("not simulated", self.left_out)):

@@ -1,4 +1,7 @@
-"""Brings the joints of a tree to a model's conventions: steering turns to the left, followed joints have the stops."""
+"""Brings the joints of a tree to a model's conventions.
+
+Distant stops are none, steering turns to the left, and followed joints have the stops of those that follow.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,27 @@ import numpy as np
 
 from rover_gym.models.file_axes import Array
 from rover_gym.models.robot_tree import RobotTree
+
+#: Stops this far away mean none, rad or m.
+DISTANT = 1e6
+
+
+def drop_distant_limits(tree: RobotTree) -> None:
+    """Joints whose stops are both distant lose them; a single distant stop moves to `DISTANT`. Each is listed."""
+    for link in tree.links.values():
+        limits = link.joint.limits
+        if limits is None or max(abs(limit) for limit in limits) <= DISTANT:
+            continue
+        stated = f"joint[{link.joint.name}]: limits {limits[0]:g} and {limits[1]:g}"
+        if min(abs(limit) for limit in limits) > DISTANT and limits[0] < 0.0 < limits[1]:
+            link.joint.limits = None
+            tree.assumed.append(f"{stated} mean none")
+        else:
+            lower, upper = (max(min(limit, DISTANT), -DISTANT) for limit in limits)
+            if not lower < upper:
+                tree.refuse(f"joint[{link.joint.name}].limit", list(limits), f"must be within {DISTANT:g}")
+            link.joint.limits = (lower, upper)
+            tree.assumed.append(f"{stated} are {lower:g} and {upper:g}")
 
 
 def turn_steering_axes_up(tree: RobotTree, steering: set[str], P: Array) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from rover_gym.models.robot_tree import (
     is_urdf,
     refuse_in,
 )
+
+#: Mass, kg, and inertia, kg m², of a link between two joints of one body: the least that a solid may have.
+BETWEEN = 1e-9
 
 
 def read_mjcf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
@@ -45,6 +48,9 @@ def read_mjcf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
     mujoco.set_mju_user_warning(warnings.append)  # else they go to a file in the current folder
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
+        bytes(model.names).decode("utf-8")
+    except UnicodeDecodeError as error:
+        _refuse_encoding(path, error)
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         refuse_in(path, "MuJoCo", path.name, f"refuses the file ({' '.join(str(error).split())})")
     finally:
@@ -63,6 +69,17 @@ def read_mjcf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
     reader.check_tendons()
     reader.add_actuators()
     return reader.tree
+
+
+def _refuse_encoding(path: Path, error: UnicodeDecodeError) -> NoReturn:
+    """Refuses a file with names that are not UTF-8; names the line, unless an included file has it."""
+    reason = "holds a name that is not UTF-8 text: save the file as UTF-8"
+    for number, line in enumerate(path.read_bytes().splitlines(), 1):
+        text = line.decode("utf-8", "backslashreplace").strip()
+        if text != line.decode("utf-8", "replace").strip():
+            refuse_in(path, f"line {number}", text, reason)
+    raw = error.object[: error.start].rpartition(b"\0")[2] + error.object[error.start :].partition(b"\0")[0]
+    refuse_in(path, "include", raw.decode("utf-8", "backslashreplace"), reason)
 
 
 class _Reader:
@@ -118,16 +135,8 @@ class _Reader:
         for body in range(1, m.nbody):
             if not moves[m.body_rootid[body]]:
                 continue
-            parent = int(m.body_parentid[body])
-            link = FileLink(
-                self._body(body),
-                self._body(parent) if parent else None,
-                self._joint(body),
-                np.array(m.body_pos[body]),
-                from_quaternion(m.body_quat[body]),
-                float(m.body_mass[body]),
-                np.array(m.body_ipos[body]),
-            )
+            link = self._chain(body)
+            link.mass, link.centre = float(m.body_mass[body]), np.array(m.body_ipos[body])
             R = from_quaternion(m.body_iquat[body])
             link.inertia = R @ np.diag(m.body_inertia[body]) @ R.T
             first = int(m.body_geomadr[body])
@@ -135,6 +144,23 @@ class _Reader:
             self.tree.links[link.name] = link
         if not self.tree.links:
             self.tree.refuse("worldbody", self.model.nbody - 1, "has no body that moves")
+
+    def _chain(self, body: int) -> FileLink:
+        """The link of a body; if it has several joints, adds one for each but the last, nearly without mass."""
+        m = self.model
+        parent = self._body(int(m.body_parentid[body])) if m.body_parentid[body] else None
+        position, rotation = np.array(m.body_pos[body]), from_quaternion(m.body_quat[body])
+        first, count = int(m.body_jntadr[body]), int(m.body_jntnum[body])
+        for index in range(first, first + count - 1):
+            joint = self._joint(body, index)
+            name = f"{self._body(body)}_{joint.name}"
+            while self.mujoco.mj_name2id(m, self.mujoco.mjtObj.mjOBJ_BODY, name) >= 0 or name in self.tree.links:
+                name += "_"
+            between = FileLink(name, parent, joint, position, rotation, BETWEEN, inertia=BETWEEN * np.eye(3))
+            self.tree.links[name] = between
+            self.tree.assumed.append(f"link {name}: {BETWEEN:g} kg, as it stands between two joints of one body")
+            parent, position, rotation = name, np.zeros(3), np.eye(3)
+        return FileLink(self._body(body), parent, self._joint(body, first + count - 1), position, rotation)
 
     def add_couplings(self) -> None:
         """Linear couplings of two joints are exact here; other equality constraints are refused."""
@@ -191,15 +217,14 @@ class _Reader:
             else:
                 self.tree.leave_out("actuators", where, [gain, *bias], "only motors and position servos are simulated")
 
-    def _joint(self, body: int) -> FileJoint:
+    def _joint(self, body: int, index: int) -> FileJoint:
+        """A joint of a body; fixed if it has none."""
         m, kinds = self.model, self.mujoco.mjtJoint
-        count, index = int(m.body_jntnum[body]), int(m.body_jntadr[body])
-        where = f"body[{self._body(body)}]"
-        if count == 0:
+        if m.body_jntnum[body] == 0:
             return FileJoint(f"{self._body(body)}_fixed", "fixed")
-        if count > 1:
-            self.tree.refuse(f"{where}.joint", count, "a body must have one joint: put bodies with mass between them")
-        name = self.mujoco.mj_id2name(m, self.mujoco.mjtObj.mjOBJ_JOINT, index) or f"{self._body(body)}_joint"
+        place = index - int(m.body_jntadr[body])
+        unnamed = f"{self._body(body)}_joint{place + 1 if place else ''}"
+        name = self.mujoco.mj_id2name(m, self.mujoco.mjtObj.mjOBJ_JOINT, index) or unnamed
         kind, dof = int(m.jnt_type[index]), int(m.jnt_dofadr[index])
         n_dofs = {kinds.mjJNT_FREE: 6, kinds.mjJNT_BALL: 3}.get(kind, 1)
         dofs = slice(dof, dof + n_dofs)
@@ -254,6 +279,8 @@ class _Reader:
                 made.kind, made.size = "box", (2.0 * size[0], 2.0 * size[1], 2.0 * size[2])
             case kinds.mjGEOM_CYLINDER:
                 made.kind, made.size = "cylinder", (size[0], 2.0 * size[1])
+            case kinds.mjGEOM_CAPSULE:
+                made.kind, made.size = "capsule", (size[0], 2.0 * size[1])
             case kinds.mjGEOM_SPHERE:
                 made.kind, made.size = "sphere", (size[0],)
             case kinds.mjGEOM_MESH:
@@ -271,4 +298,4 @@ class _Reader:
         return self.mujoco.mj_id2name(self.model, self.mujoco.mjtObj.mjOBJ_BODY, body) or f"body{body}"
 
     def _text(self, address: int) -> str:
-        return str(bytes(self.model.names[address:]).split(b"\0")[0].decode("utf-8", "replace"))
+        return str(bytes(self.model.names[address:]).split(b"\0")[0].decode("utf-8"))

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import functools
+import os
 import re
+import warnings
 from collections.abc import Callable, Collection
 from typing import Any
 
 from rover_gym.mechanics import ModelError, RoverModel
 from rover_gym.models.description import WheelOptions, describe
 from rover_gym.models.file_axes import axes_of
-from rover_gym.models.import_report import ImportReport, solid_rows, together
-from rover_gym.models.joint_conventions import move_limits_to_followed_joints, turn_steering_axes_up
-from rover_gym.models.massless_links import join_massless_links
+from rover_gym.models.import_report import ImportReport, RobotFileWarning, solid_rows, together
+from rover_gym.models.joint_conventions import (
+    drop_distant_limits,
+    move_limits_to_followed_joints,
+    turn_steering_axes_up,
+)
 from rover_gym.models.mjcf import read_mjcf_tree
+from rover_gym.models.packages import check_folders
+from rover_gym.models.rigid_groups import join_rigid_groups
 from rover_gym.models.robot_tree import IGNORABLE, RobotTree, check_kinds, checked_path
 from rover_gym.models.roles import Steering, Wheels, find_wheels
 from rover_gym.models.urdf import read_urdf_tree
@@ -21,9 +29,12 @@ from rover_gym.validation import number, refuse
 SOLID = re.compile(r"(solids|wheels|tags)\[(\d+)\]")
 
 
-def read_urdf(path: object, *, free_base: bool = True, **options: Any) -> tuple[RoverModel, ImportReport]:
+def read_urdf(
+    path: object, *, free_base: bool = True, package_paths: Collection[str | os.PathLike[str]] = (), **options: Any
+) -> tuple[RoverModel, ImportReport]:
     """Reads a URDF; the arguments are those of `RoverModel.from_urdf`."""
-    return _read(read_urdf_tree, path, free_base, **options)
+    reader = functools.partial(read_urdf_tree, package_paths=check_folders(package_paths))
+    return _read(reader, path, free_base, **options)
 
 
 def read_mjcf(path: object, *, free_base: bool | None = None, **options: Any) -> tuple[RoverModel, ImportReport]:
@@ -65,7 +76,8 @@ def _read(
         }
     )
     tree = reader(place, ignore=ignored)
-    join_massless_links(tree, free_base=bool(free_base))
+    drop_distant_limits(tree)
+    join_rigid_groups(tree, free_base=bool(free_base))
     for link in tree.links.values():
         if link.parent is None and free_base is not None and link.joint.kind in ("fixed", "free"):
             link.joint.kind = "free" if free_base else "fixed"
@@ -79,7 +91,10 @@ def _read(
         model = RoverModel.from_dict(description)
     except ModelError as error:
         raise _by_name(tree, description, error) from None
-    report = ImportReport(str(place), together(tree.assumed), together(tree.left_out), solid_rows(model))
+    for warning in tree.warnings:
+        warnings.warn(warning, RobotFileWarning, stacklevel=3)
+    lists = together(tree.assumed), together(tree.left_out), solid_rows(model), tuple(tree.warnings)
+    report = ImportReport(str(place), *lists)
     return model, report
 
 

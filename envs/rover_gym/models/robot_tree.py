@@ -30,7 +30,8 @@ class FileShape:
 
     Attributes:
         kind: "box", "cylinder", "sphere", or what else the file calls it.
-        size: Edge lengths of a box (3), radius and length of a cylinder, radius of a sphere, m.
+        size: Edge lengths of a box (3), radius and length of a cylinder or of a capsule between the centres of its
+            caps, radius of a sphere, m.
         position: Centre in the link's frame (3,), m.
         rotation: From the shape's axes to the link's frame (3, 3). A cylinder is about its z.
         collides: Whether the file lets it touch others.
@@ -38,6 +39,7 @@ class FileShape:
         name: Its name in the file, or "".
         mesh: The mesh's file, or its vertices (n, 3) in the shape's axes, m.
         scale: Factors of the mesh's coordinates.
+        searched: Folders in which there is no such file.
     """
 
     kind: str
@@ -49,6 +51,7 @@ class FileShape:
     name: str = ""
     mesh: Path | Array | None = None
     scale: Array | None = None
+    searched: tuple[str, ...] = ()
 
 
 @dataclass
@@ -114,10 +117,6 @@ class FileLink:
     shapes: list[FileShape] = field(default_factory=list)
     points: list[tuple[str, Array]] = field(default_factory=list)
 
-    def has_body(self) -> bool:
-        """Whether it has a mass and an inertia of its own."""
-        return self.mass > 0.0 and bool(np.any(self.inertia))
-
 
 @dataclass
 class RobotTree:
@@ -130,6 +129,7 @@ class RobotTree:
         ignore: Kinds, of `IGNORABLE`, of what changes the motion and is left out all the same.
         left_out: What the file holds and the model does not simulate.
         assumed: What the file does not state and was chosen.
+        warnings: What is probably not as the user wants it.
     """
 
     path: Path
@@ -138,6 +138,7 @@ class RobotTree:
     ignore: Collection[str] = ()
     left_out: list[str] = field(default_factory=list)
     assumed: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
 
     def refuse(self, where: str, value: object, reason: str) -> NoReturn:
         """Raises a `ModelError` that names the file, the element and the value."""

@@ -12,18 +12,20 @@ import numpy as np
 
 from rover_gym.extras import require
 from rover_gym.models.file_axes import Array
+from rover_gym.models.packages import find_file
 from rover_gym.models.robot_tree import FileJoint, FileLink, FileShape, RobotTree, refuse_in
 from rover_gym.models.urdf_schema import parse
 
 KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed"}
 
 
-def read_urdf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
+def read_urdf_tree(path: Path, *, ignore: Collection[str], package_paths: tuple[Path, ...] = ()) -> RobotTree:
     """Reads the links and joints of a URDF.
 
     Args:
         path: The file.
         ignore: Kinds of what changes the motion and is to be left out all the same.
+        package_paths: Folders that hold packages of ROS.
 
     Raises:
         ModelError: The file is malformed, contradicts itself or holds what cannot be simulated.
@@ -58,7 +60,7 @@ def read_urdf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
         link = FileLink(name, None if carrier is None else carrier.parent, joint, p, R)
         _add_body(path, links[name], link)
         link.shapes = [
-            _shape(path, one, collides=collides)
+            _shape(path, one, package_paths, collides=collides)
             for ones, collides in ((links[name].collisions, True), (links[name].visuals, False))
             for one in ones
         ]
@@ -126,7 +128,11 @@ def _joint(tree: RobotTree, source: Any) -> FileJoint:
         if source.limit is None:
             tree.refuse(f"{at}.limit", None, f"a {source.type} joint must have limits")
         joint.limits = (source.limit.lower or 0.0, source.limit.upper or 0.0)
-        if not joint.limits[0] < joint.limits[1]:
+        if joint.limits == (0.0, 0.0):
+            joint.limits = None
+            means = "0 and 0, as exporters write for none: it moves without stops. To hold it, make it fixed"
+            tree.warnings.append(f"{tree.path}: {at}: its limits are {means}")
+        elif not joint.limits[0] < joint.limits[1]:
             tree.refuse(f"{at}.limit", list(joint.limits), "the lower limit must be below the upper one")
     if source.limit is not None:
         joint.torque_limit = source.limit.effort or None
@@ -153,7 +159,7 @@ def _add_body(path: Path, source: Any, link: FileLink) -> None:
     link.inertia = R @ np.array(source.inertial.inertia, dtype=np.float64) @ R.T
 
 
-def _shape(path: Path, source: Any, *, collides: bool) -> FileShape:
+def _shape(path: Path, source: Any, folders: tuple[Path, ...], *, collides: bool) -> FileShape:
     R, p = _pose(source.origin)
     geometry = source.geometry
     made = FileShape("mesh", (), p, R, collides, not collides, source.name or "")
@@ -164,21 +170,10 @@ def _shape(path: Path, source: Any, *, collides: bool) -> FileShape:
     elif geometry.sphere is not None:
         made.kind, made.size = "sphere", (float(geometry.sphere.radius),)
     elif geometry.mesh is not None:
-        made.mesh, made.scale = _mesh_file(path, geometry.mesh.filename), _scale(geometry.mesh.scale)
+        made.mesh, made.searched = find_file(path, geometry.mesh.filename, folders)
+        made.scale = _scale(geometry.mesh.scale)
     return made
 
 
 def _scale(given: Any) -> Array:
     return np.ones(3) if given is None else np.broadcast_to(np.asarray(given, dtype=np.float64), 3).copy()
-
-
-def _mesh_file(path: Path, name: str) -> Path:
-    """The file of a mesh: beside the URDF, or for `package://` in a folder above it."""
-    relative = name.partition("://")[2] if "://" in name else name
-    pieces = Path(relative).parts
-    for folder in path.absolute().parents:
-        for skipped in range(min(2, len(pieces))):
-            found = folder.joinpath(*pieces[skipped:])
-            if found.is_file():
-                return found
-    return path.parent / relative

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from rover_gym.extras import require
+from rover_gym.models.right_angles import right_angle
 from rover_gym.models.robot_tree import MAX_LINKS, check_size, refuse_in
 
 #: Largest number of elements.
@@ -138,6 +139,8 @@ def _check(checked: CheckedUrdf, element: Any, key: str, where: str) -> None:
             element.set(name, value)
         if kind is not str:
             _check_numbers(path, at, value, kind)
+            if name == "rpy":
+                element.set(name, _with_right_angles(checked, at, value))
         elif not value.strip():
             refuse_in(path, at, value, "must not be empty")
     seen: Counter[str] = Counter()
@@ -185,6 +188,17 @@ def _without_substitutions(checked: CheckedUrdf, where: str, text: str) -> str:
     if "$(" in made or "${" in made:
         refuse_in(checked.path, where, text, "holds what xacro or roslaunch replaces by a value: put the value there")
     return made
+
+
+def _with_right_angles(checked: CheckedUrdf, where: str, text: str) -> str:
+    """Angles in which a multiple of pi/2 that was written with few digits has all of them; each is listed."""
+    words = text.split()
+    for index, word in enumerate(words):
+        angle = right_angle(word)
+        if angle is not None:
+            words[index] = repr(angle[0])
+            checked.assumed.append(f"{where}: {word} rad is read as {angle[1]}")
+    return " ".join(words)
 
 
 def _check_numbers(path: Path, where: str, text: str, count: int | tuple[int, ...]) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import RoverModel, Simulation
+from rover_gym.validation import checked
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,7 @@ class RoverSampler:
         model: The model of the simulations to sample.
     """
 
+    @checked(model="RoverModel")
     def __init__(self, model: RoverModel) -> None:
         wheels = tuple(model.wheel_names)
         n = len(wheels)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import platform
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,11 +19,9 @@ from rover_gym.record.trajectory_format import (
     RecordingError,
     import_h5py,
 )
-from rover_gym.validation import number, refuse
+from rover_gym.validation import checked, number, refuse
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     import h5py
 
 
@@ -62,6 +61,7 @@ def storable(attributes: Mapping[str, Any]) -> dict[str, Any]:
     return result
 
 
+@checked(time_step=float)
 def row_count(duration: float, time_step: float, steps_per_row: int = 1) -> int:
     """The number of rows of a run after the first.
 
@@ -85,6 +85,7 @@ def row_count(duration: float, time_step: float, steps_per_row: int = 1) -> int:
     return round(rows)
 
 
+@checked(sim="Simulation", scene=(Mapping, None))
 def describe(
     sim: Simulation, title: str, scene: Mapping[str, Any] | None = None, *, seed: int | str = "none"
 ) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import weakref
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -32,11 +33,9 @@ from rover_gym.record.trajectory_format import (
     import_h5py,
 )
 from rover_gym.record.uninterrupted import uninterrupted
-from rover_gym.validation import refuse, whole
+from rover_gym.validation import TERRAINS, checked, refuse, whole
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     import h5py
 
 #: Columns of a chunk of a packed data set: with the rows of a flush, about a megabyte.
@@ -64,6 +63,11 @@ class Recorder:
         MissingExtraError: h5py is not installed.
     """
 
+    @checked(
+        channels=["Channel"],
+        attributes=(Mapping, None),
+        terrain=(*TERRAINS, None),
+    )
     def __init__(
         self,
         path: str | Path,

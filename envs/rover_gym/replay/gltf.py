@@ -6,6 +6,7 @@ glTF uses the world's units and axes: metres, y up; its quaternions are x, y, z,
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,15 +18,15 @@ from rover_gym.mechanics import __version__
 from rover_gym.rendering.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR, Colour, Part, sphere_mesh
 from rover_gym.replay.rotation import continuous, quaternions
 from rover_gym.replay.scenery import coloured_meshes, goal_parts, ground_tiles, parts_by_solid, spheres, surfaces
+from rover_gym.validation import checked
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from rover_gym.record.rover_run import RoverRun
 
 Array = npt.NDArray[Any]
 
 
+@checked(run="RoverRun", path=Path)
 def write_gltf(run: RoverRun, path: str | Path) -> Path:
     """Writes a run as binary glTF.
 

@@ -47,6 +47,7 @@ from rover_gym.replay.scenery import (
 )
 from rover_gym.replay.vessel_meshes import vessel_meshes, vessel_poses
 from rover_gym.replay.wall_polygons import wall_polygons, wall_poses
+from rover_gym.validation import checked
 
 if TYPE_CHECKING:
     from rover_gym.grains.grain_run import GrainRun
@@ -61,6 +62,7 @@ Faces = npt.NDArray[np.int32]
 Mesh = tuple[Colour, Array, Faces]
 
 
+@checked(run="GrainRun", path=Path, follow=bool)
 def write_grain_page(run: GrainRun, path: str | Path, *, follow: bool = True) -> Path:
     """Writes a run of balls as a single browser page.
 

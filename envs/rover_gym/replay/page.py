@@ -16,6 +16,7 @@ from rover_gym.replay.rotation import continuous, quaternions
 from rover_gym.replay.scenery import first_view, trunk_path
 from rover_gym.replay.smoothing import FOLLOW_TIME, moving_mean
 from rover_gym.replay.world_nodes import add_ground, add_rover
+from rover_gym.validation import checked
 
 if TYPE_CHECKING:
     from rover_gym.record.rover_run import RoverRun
@@ -35,6 +36,7 @@ LONGEST_FACT = 100
 Array = npt.NDArray[np.float64]
 
 
+@checked(run="RoverRun", path=Path, follow=bool)
 def write_page(run: RoverRun, path: str | Path, *, follow: bool = True) -> Path:
     """Writes a run as a single browser page.
 

@@ -21,6 +21,7 @@ from rover_gym.replay.panel import Chart, load_chart, panel_contents, with_panel
 from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, shortened
 from rover_gym.replay.smoothing import FOLLOW_TIME, moving_mean
 from rover_gym.replay.soil_page import about_z, surface_mesh, wheel_meshes
+from rover_gym.validation import checked
 
 if TYPE_CHECKING:
     from rover_gym.planar.planar_run import PlanarRun
@@ -35,6 +36,7 @@ THICK = 0.4  # of a disc along its axle, in its radii
 Array = npt.NDArray[np.float64]
 
 
+@checked(run="PlanarRun", path=Path, follow=bool)
 def write_planar_page(run: PlanarRun, path: str | Path, *, follow: bool = True) -> Path:
     """Writes a planar run as a single browser page.
 

@@ -23,6 +23,7 @@ from rover_gym.rendering.appearance import (
 from rover_gym.replay.panel import Chart, load_chart, panel_contents, with_panel
 from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, rgb, shortened
 from rover_gym.replay.smoothing import FOLLOW_TIME, moving_mean
+from rover_gym.validation import checked
 
 if TYPE_CHECKING:
     from rover_gym.soil.soil_run import SoilRun
@@ -44,6 +45,7 @@ FIELD_OF_VIEW = 0.35  # rad, vertical: narrow and far away, for little perspecti
 Array = npt.NDArray[np.float64]
 
 
+@checked(run="SoilRun", path=Path, follow=bool)
 def write_soil_page(run: SoilRun, path: str | Path, *, follow: bool = True) -> Path:
     """Writes a soil run as a single browser page.
 

@@ -6,6 +6,7 @@ drives all of them. VRML uses the world's axes and units: y up, metres; its rota
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,10 +32,9 @@ from rover_gym.replay.scenery import (
     spheres,
     surfaces,
 )
+from rover_gym.validation import checked
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
     from rover_gym.record.rover_run import RoverRun
 
 #: Reserved node names: VRML's keywords, and the names defined below.
@@ -46,6 +46,7 @@ TAKEN = (
 Array = npt.NDArray[np.float64]
 
 
+@checked(run="RoverRun", path=Path)
 def write_vrml(run: RoverRun, path: str | Path) -> Path:
     """Writes a run as VRML97.
 

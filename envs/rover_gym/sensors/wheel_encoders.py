@@ -13,18 +13,18 @@ from rover_gym.validation import Range, whole
 
 @dataclass(frozen=True, kw_only=True)
 class WheelEncoders(Sensor):
-    """Angles that the wheels have turned, counted in ticks, and their rates.
+    """Angles that the wheels have turned, exact or counted in ticks, and their rates.
 
     A reading is (2, n_wheels): the angles since the episode's start, rad, positive forward, and the rates, rad/s, which
     are the difference of two samples over their interval. At the first sample the rates are the wheels' own.
 
     Args:
-        ticks: Ticks a turn of the wheel; None counts exactly.
+        ticks: Ticks a turn of the wheel, such as 4096. None measures exactly.
         gain: Angle measured over angle turned, or a range, drawn for each wheel: an error of the transmission.
     """
 
     name: str = "encoders"
-    ticks: int | None = 4096
+    ticks: int | None = None
     gain: float | Range = 1.0
 
     def __post_init__(self) -> None:
@@ -54,7 +54,7 @@ class WheelEncoders(Sensor):
         memory: Values,
         interval: float,
         drawn: Values,
-        generator: np.random.Generator,  # noqa: ARG002 - ticks are exact
+        generator: np.random.Generator,  # noqa: ARG002 - angles have no noise
     ) -> tuple[Array, Values]:
         """Counts the ticks."""
         joints = moment.model.wheel_joint_indices

@@ -130,7 +130,7 @@ impl HeightField {
     ///     scale: Factor from the file's numbers to m; of a GeoTIFF by default its own.
     ///     datum: Height of the file that becomes 0, in its own numbers; of a GeoTIFF by default
     ///         its lowest, otherwise 0.
-    ///     band: Band of a GeoTIFF, from 1.
+    ///     band: Band of a GeoTIFF, from 1; needed if the file has several.
     ///     material: Name of its material.
     ///
     /// Returns:
@@ -143,7 +143,7 @@ impl HeightField {
     #[staticmethod]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
     #[pyo3(signature = (path, *, spacing = None, origin = None, height_range = None, scale = None, datum = None, band = Given::MISSING, material = Given::MISSING),
-        text_signature = "(path, *, spacing=None, origin=None, height_range=None, scale=None, datum=None, band=1, material='ground')")]
+        text_signature = "(path, *, spacing=None, origin=None, height_range=None, scale=None, datum=None, band=None, material='ground')")]
     fn from_file<'py>(
         py: Python<'py>,
         path: &Bound<'py, PyAny>,

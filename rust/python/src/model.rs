@@ -360,6 +360,9 @@ impl RoverModel {
     ///         default that of the cylinder that touches for it in the file, or 0.
     ///     ignore: Kinds of what changes the motion and is left out all the same: "friction",
     ///         "actuators", "closed loops", "tendons", "springs", "fluid".
+    ///     package_paths: Folders that are searched for the packages of `package://` names, before
+    ///         those of the environment variables `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH` and
+    ///         the folders above the file.
     ///
     /// Returns:
     ///     The model.
@@ -373,9 +376,11 @@ impl RoverModel {
     #[pyo3(signature = (path, *, wheels = Given::MISSING, steering = Given::MISSING, free_base = Given::MISSING,
         forward = Given::MISSING, torque_limit = Given::MISSING, steering_stiffness = Given::MISSING,
         steering_damping = Given::MISSING, steering_limit = Given::MISSING,
-        wheel_width = Given::MISSING, ignore = Given::MISSING),
+        wheel_width = Given::MISSING, ignore = Given::MISSING,
+        package_paths = Given::MISSING),
         text_signature = "(path, *, wheels=None, steering=None, free_base=True, forward=\"x\", torque_limit=None, \
-        steering_stiffness=None, steering_damping=None, steering_limit=None, wheel_width=None, ignore=())")]
+        steering_stiffness=None, steering_damping=None, steering_limit=None, wheel_width=None, ignore=(), \
+        package_paths=())")]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python method
     fn from_urdf<'py>(
         path: &Bound<'py, PyAny>,
@@ -389,6 +394,7 @@ impl RoverModel {
         steering_limit: Given<'py>,
         wheel_width: Given<'py>,
         ignore: Given<'py>,
+        package_paths: Given<'py>,
     ) -> PyResult<Self> {
         let options = vec![
             ("wheels", wheels),
@@ -401,6 +407,7 @@ impl RoverModel {
             ("steering_limit", steering_limit),
             ("wheel_width", wheel_width),
             ("ignore", ignore),
+            ("package_paths", package_paths),
         ];
         Self::imported("read_urdf", path, options)
     }
@@ -953,9 +960,10 @@ impl RoverModel {
     /// The coordinates of the rover at rest on a terrain.
     ///
     /// On a plane the joints are at zero, the trunk is upright along the normal with its origin
-    /// above the position, and the lowest wheel has gap zero. On any other terrain the height of
-    /// the trunk, its pitch and roll and the joints that carry wheels bring all wheels down to the
-    /// ground as far as they can; no wheel is in it.
+    /// above the position, and the lowest wheel has gap zero. If that leaves wheels in the air,
+    /// pitch, roll and the joints that nothing drives bring them down, where this puts more wheels
+    /// on the ground. On any other terrain the same coordinates bring all wheels down to the ground
+    /// as far as they can. No wheel is in the ground.
     ///
     /// Args:
     ///     terrain: A terrain, or a list of several; a plane must not be vertical.

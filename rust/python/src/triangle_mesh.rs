@@ -19,6 +19,10 @@ use crate::rays::{Met, cast_rays};
 /// Triangles turn counterclockwise, seen from outside. A closed mesh is solid; an open one is
 /// solid below.
 ///
+/// Corners at exactly equal positions are joined, so triangles may each bring their own three
+/// corners, as in an STL file. `triangles` then names the first of equal corners. Corners that
+/// differ by rounding are not joined: wheels catch on the seam between them.
+///
 /// Args:
 ///     vertices: Corners, (n, 3), m.
 ///     triangles: Numbers of the three corners of each triangle, (m, 3).

@@ -23,7 +23,7 @@ from rover_gym.grains.lab.wheel import WheelPoint
 from rover_gym.mechanics import OptionError
 from rover_gym.soil.soil_trials import Pull
 from rover_gym.soil.traction import Traction, fit_traction
-from rover_gym.validation import number, refuse
+from rover_gym.validation import checked, number, refuse
 
 Array = npt.NDArray[np.float64]
 
@@ -98,6 +98,7 @@ class Strength:
     cohesion_error: float
 
 
+@checked(points=["PlatePoint"])
 def fit_pressure(points: Sequence[PlatePoint], *, surface: float | None = None) -> PressureLaw:
     """Fits the law to the logarithms of pressures by least squares.
 
@@ -120,6 +121,7 @@ def fit_pressure(points: Sequence[PlatePoint], *, surface: float | None = None) 
     return PressureLaw(k, k * errors[0], float(found[1]), errors[1], rms)
 
 
+@checked(points=["ShearPoint"])
 def fit_shear(points: Sequence[ShearPoint]) -> ShearLaw:
     """Fits Janosi's curve to one shear test by least squares.
 
@@ -147,6 +149,7 @@ def fit_shear(points: Sequence[ShearPoint]) -> ShearLaw:
     return ShearLaw(limit, float(errors[0]), scale, float(errors[1]), float(sigma.mean()), rms)
 
 
+@checked(laws=["ShearLaw"])
 def fit_strength(laws: Sequence[ShearLaw]) -> Strength:
     """Fits Mohr and Coulomb's line to the limits of several shear tests.
 
@@ -164,6 +167,7 @@ def fit_strength(laws: Sequence[ShearLaw]) -> Strength:
     return Strength(math.atan(slope), slope_error / (1.0 + float(slope) ** 2), float(c), c_error)
 
 
+@checked(points=["WheelPoint"])
 def fit_pull(points: Sequence[WheelPoint]) -> Traction:
     """Fits `rover_gym.soil.fit_traction`'s curve to the pulls of one wheel test.
 

@@ -18,7 +18,7 @@ from rover_gym.grains.ball_bed import BallBed
 from rover_gym.grains.lab.disc import check_room, describe_disc
 from rover_gym.grains.lab.rig import Rig, clear_height, ground, larger_than_grains, step_count
 from rover_gym.mechanics import OptionError
-from rover_gym.validation import number, refuse, whole
+from rover_gym.validation import checked, number, refuse, whole
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,7 @@ class PlatePoint:
     torque: float
 
 
+@checked(bed="BallBed")
 def plate_test(
     bed: BallBed,
     radius: float,

@@ -26,7 +26,7 @@ from rover_gym.grains.ball_bed import BallBed
 from rover_gym.grains.lab.disc import check_room, describe_disc
 from rover_gym.grains.lab.rig import Rig, clear_height, fall, ground, larger_than_grains, step_count
 from rover_gym.mechanics import OptionError
-from rover_gym.validation import number, refuse, whole
+from rover_gym.validation import checked, number, refuse, whole
 
 
 @dataclass(frozen=True)
@@ -48,6 +48,7 @@ class ShearPoint:
     sinkage: float
 
 
+@checked(bed="BallBed")
 def shear_test(
     bed: BallBed,
     normal_stress: float,

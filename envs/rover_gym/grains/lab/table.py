@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, is_dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rover_gym.mechanics import OptionError
-from rover_gym.validation import refuse
+from rover_gym.validation import checked, refuse
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 
+@checked(points=Sequence, path=Path)
 def write_table(points: Sequence[DataclassInstance], path: str | Path) -> Path:
     """Writes points of one test, a line each under the names of their fields; numbers keep all their digits.
 
@@ -26,11 +27,12 @@ def write_table(points: Sequence[DataclassInstance], path: str | Path) -> Path:
         OptionError: There is no point.
         OSError: The file cannot be written.
     """
-    if not points:
-        refuse(OptionError, "points", points, "must be one or more")
+    rows: list[Any] = list(points)
+    if not rows or not all(is_dataclass(point) and not isinstance(point, type) for point in rows):
+        refuse(OptionError, "points", points, "must be points of one test, one or more")
     path = Path(path)
     with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, [field.name for field in fields(points[0])], lineterminator="\n")
+        writer = csv.DictWriter(file, [field.name for field in fields(rows[0])], lineterminator="\n")
         writer.writeheader()
-        writer.writerows(asdict(point) for point in points)
+        writer.writerows(asdict(point) for point in rows)
     return path

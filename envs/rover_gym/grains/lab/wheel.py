@@ -27,7 +27,7 @@ import numpy as np
 from rover_gym.grains.ball_bed import BallBed
 from rover_gym.grains.lab.rig import Array, Rig, clear_height, fall, ground, larger_than_grains, step_count
 from rover_gym.mechanics import OptionError
-from rover_gym.validation import number, refuse, whole
+from rover_gym.validation import checked, number, refuse, whole
 
 #: Distance of the wheel's centre from the end walls, radii.
 CLEAR_OF_WALLS = 1.5
@@ -70,6 +70,7 @@ class WheelPoint:
     unconverged: int
 
 
+@checked(bed="BallBed", slips=[float])
 def wheel_test(
     bed: BallBed,
     slips: Sequence[float],

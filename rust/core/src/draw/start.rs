@@ -149,7 +149,9 @@ pub fn tilted_plane(slope: f64, uphill: f64) -> Result<Plane, TerrainError> {
 }
 
 /// Public coordinates (nv) of a rover that rests on a plane: joints at zero, the trunk upright
-/// along the normal with its origin over `position` (x, z, m), the lowest wheel at gap zero.
+/// along the normal with its origin over `position` (x, z, m), the lowest wheel at gap zero. If
+/// other wheels are then in the air, and pitch, roll and free joints can put more of them on the
+/// ground, they do, as in [`resting_on`].
 ///
 /// # Errors
 /// `NotFinite` if the plane is vertical or a number is not finite.
@@ -157,6 +159,37 @@ pub fn tilted_plane(slope: f64, uphill: f64) -> Result<Plane, TerrainError> {
 /// # Panics
 /// If the model has fewer than six velocities.
 pub fn resting_pose(
+    model: &Model,
+    plane: &Plane,
+    position: [f64; 2],
+    heading: f64,
+) -> Result<Vec<f64>, StateError> {
+    let q = upright_on(model, plane, position, heading)?;
+    match with_more_wheels_down(model, plane, &q) {
+        Ok(lowered) => Ok(lowered.unwrap_or(q)),
+        Err(PlacementError::State(error)) => Err(error),
+        Err(PlacementError::NoGround { .. }) => Ok(q), // a plane has ground everywhere
+    }
+}
+
+/// The coordinates of [`brought_down`], if more wheels stand there.
+fn with_more_wheels_down(
+    model: &Model,
+    plane: &Plane,
+    q: &[f64],
+) -> Result<Option<Vec<f64>>, PlacementError> {
+    let gaps = wheel_gaps(model, plane, q)?;
+    if gaps.amax() <= TOUCHING {
+        return Ok(None);
+    }
+    let lowered = brought_down(model, plane, q.to_vec())?;
+    let standing = |gaps: &DVector<f64>| gaps.iter().filter(|gap| gap.abs() <= STANDING).count();
+    let more = standing(&wheel_gaps(model, plane, &lowered)?) > standing(&gaps);
+    Ok(more.then_some(lowered))
+}
+
+/// As [`resting_pose`], with all joints at zero.
+fn upright_on(
     model: &Model,
     plane: &Plane,
     position: [f64; 2],
@@ -224,7 +257,19 @@ pub fn resting_on(
     heading: f64,
 ) -> Result<Vec<f64>, PlacementError> {
     let plane = plane_under(model, terrain, position)?;
-    let q = resting_pose(model, &plane, position, heading)?;
+    brought_down(
+        model,
+        terrain,
+        upright_on(model, &plane, position, heading)?,
+    )
+}
+
+/// The coordinates at which all wheels are on the ground, or as close to it as the joints allow.
+fn brought_down(
+    model: &Model,
+    terrain: &dyn Terrain,
+    q: Vec<f64>,
+) -> Result<Vec<f64>, PlacementError> {
     let mut best = lowered(model, terrain, q)?;
     let moved: Vec<usize> = [1, 3, 5].into_iter().chain(free_joints(model)).collect();
     let mut q = best.clone();
@@ -333,6 +378,9 @@ const LIFTS: usize = 60;
 
 /// Gap of a wheel that stands, m.
 const TOUCHING: f64 = 1e-9;
+
+/// Largest gap of a wheel that counts as standing, m.
+const STANDING: f64 = 1e-7;
 
 /// Change of a coordinate for a difference quotient, rad or m.
 const DIFFERENCE: f64 = 1e-6;

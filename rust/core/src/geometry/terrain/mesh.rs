@@ -59,6 +59,9 @@ impl TriangleMesh {
 
     /// From vertices (n, 3), m, and triangles (m, 3) of their numbers.
     ///
+    /// Corners at exactly equal positions are joined: triangles that list copies of a corner, as
+    /// those of STL do, name the first of them and become neighbours.
+    ///
     /// # Errors
     /// `EntryNotFinite`, `TooFar`, `TooMany`, `Empty`, `NoSuchVertex`, `FlatTriangle`,
     /// `NotASurface`.
@@ -75,6 +78,7 @@ impl TriangleMesh {
         for (index, vertex) in vertices.iter().enumerate() {
             (vertex.iter()).try_for_each(|&x| check_entry("vertices", index, x))?;
         }
+        let first = find_first_copies(vertices);
         let vertices: Vec<_> = vertices.iter().map(|&v| Vector3::from(v)).collect();
         let mut normals = Vec::with_capacity(triangles.len());
         let mut balls = Vec::with_capacity(triangles.len());
@@ -104,7 +108,7 @@ impl TriangleMesh {
                 .into_iter()
                 .fold(0.0, f64::max);
             balls.push(Sphere { centre, radius });
-            own.push(triangle.map(narrow));
+            own.push(triangle.map(|v| first[v]));
         }
         let neighbours = find_neighbours(&own)?;
         let (owners, begins, spokes) = find_spokes(&own, vertices.len());
@@ -287,6 +291,15 @@ fn narrow(x: usize) -> u32 {
 }
 
 /// Triangles beyond the edges of each.
+/// Number of the first vertex at the position of each; −0 equals 0.
+fn find_first_copies(vertices: &[[f64; 3]]) -> Vec<u32> {
+    let mut first = HashMap::with_capacity(vertices.len());
+    let place = |vertex: &[f64; 3]| vertex.map(|x| (x + 0.0).to_bits());
+    let all = vertices.iter().enumerate();
+    all.map(|(index, vertex)| *first.entry(place(vertex)).or_insert(narrow(index)))
+        .collect()
+}
+
 fn find_neighbours(triangles: &[[u32; 3]]) -> Result<Vec<[u32; 3]>, TerrainError> {
     let mut edges = HashMap::with_capacity(3 * triangles.len());
     for (index, triangle) in triangles.iter().enumerate() {

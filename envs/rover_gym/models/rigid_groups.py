@@ -1,4 +1,8 @@
-"""Links without mass: what is fixed to another link becomes part of it, and what moves must have a mass."""
+"""Links that are fixed to each other: what is no body by itself becomes part of what it is fixed to.
+
+A file may give a link no mass, or an inertia that no body has, and state the rest with a link that is fixed to it. Only
+the links of a rigid group together must be a body.
+"""
 
 from __future__ import annotations
 
@@ -7,27 +11,31 @@ import numpy as np
 from rover_gym.models.file_axes import Array
 from rover_gym.models.robot_tree import FileLink, RobotTree
 
+#: Smallest mass of a solid of a model, kg.
+LEAST_MASS = 1e-9
 
-def join_massless_links(tree: RobotTree, *, free_base: bool) -> None:
-    """Joins links without mass or inertia to what they are fixed to. Their origins stay as named points.
 
-    A root without mass takes over the links that are fixed to it. If it has none and the base is fixed to the world,
-    its links hang on the world.
+def join_rigid_groups(tree: RobotTree, *, free_base: bool) -> None:
+    """Joins links that are no bodies to what they are fixed to. Their origins stay as named points.
+
+    A link that moves and is no body takes over the links that are fixed to it. If a root without mass has none and the
+    base is fixed to the world, its links hang on the world.
 
     Raises:
-        ModelError: A link that moves has no mass.
+        ModelError: A link that moves has no mass, and nothing with a mass is fixed to it.
     """
     for name in reversed(list(tree.links)):
         link = tree.links[name]
-        if link.parent is not None and link.joint.kind == "fixed" and not link.has_body():
+        if link.parent is not None and link.joint.kind == "fixed" and not _is_body(link):
             _join(tree, link, tree.links[link.parent])
-    for root in [link for link in tree.links.values() if link.parent is None]:
-        while root.mass == 0.0:
-            fixed = [child for child in tree.children(root.name) if child.joint.kind == "fixed"]
+    for link in [one for one in tree.links.values() if one.parent is None or one.joint.kind != "fixed"]:
+        while not _is_body(link):
+            fixed = [child for child in tree.children(link.name) if child.joint.kind == "fixed"]
             if not fixed:
                 break
             for child in fixed:
-                _join(tree, child, root)
+                _join(tree, child, link)
+    for root in [link for link in tree.links.values() if link.parent is None]:
         if root.mass == 0.0 and root.joint.kind == "fixed":
             children = tree.children(root.name)
             is_carriage = [child.joint.kind for child in children] == ["free"]
@@ -36,10 +44,21 @@ def join_massless_links(tree: RobotTree, *, free_base: bool) -> None:
     for link in tree.links.values():
         if link.mass == 0.0:
             hint = ", or the base must be fixed: free_base=False" if link.parent is None else ""
-            tree.refuse(f"link[{link.name}].mass", link.mass, f"a link that moves must have a mass{hint}")
+            reason = "a link that moves, or what is fixed to it, must have a mass"
+            tree.refuse(f"link[{link.name}].mass", link.mass, f"{reason}{hint}")
+
+
+def _is_body(link: FileLink) -> bool:
+    """Whether mass and inertia of a link are those of a body, by the rule of a model's solids."""
+    if not (link.mass >= LEAST_MASS and np.all(np.isfinite(link.inertia))):
+        return False
+    principal = np.linalg.eigvalsh((link.inertia + link.inertia.T) / 2.0)
+    return bool(principal[0] > 0.0 and principal[2] <= (principal[0] + principal[1]) * (1.0 + 1e-9))
 
 
 def _join(tree: RobotTree, link: FileLink, other: FileLink) -> None:
+    if link.mass > 0.0:
+        tree.assumed.append(f"link[{link.name}]: joined with {other.name}, since one of the two is no body by itself")
     R, p = link.rotation, link.position
     other.inertia = other.inertia + R @ link.inertia @ R.T  # a file may state an inertia without a mass
     if link.mass > 0.0:

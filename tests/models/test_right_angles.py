@@ -1,0 +1,58 @@
+"""Angles of robot files that are multiples of pi/2 with few digits."""
+
+import math
+
+import numpy as np
+import pytest
+from models.robot_files import body, joint, rover, write
+
+from rover_gym import RoverModel
+from rover_gym.models.right_angles import right_angle
+
+pytest.importorskip("yourdfpy")
+
+
+@pytest.mark.parametrize(
+    ("word", "count", "name"),
+    [
+        ("1.5708", 1, "pi/2"),
+        ("1.5707", 1, "pi/2"),
+        ("1.57", 1, "pi/2"),
+        ("-1.571", -1, "-pi/2"),
+        ("3.14159", 2, "pi"),
+        ("3.1416", 2, "pi"),
+        ("3.14", 2, "pi"),
+        ("-3.1415926", -2, "-pi"),
+        ("4.7124", 3, "3 pi/2"),
+        ("-6.2832", -4, "-2 pi"),
+        ("15708e-4", 1, "pi/2"),
+    ],
+)
+def test_a_multiple_of_half_pi_has_all_its_digits(word, count, name):
+    assert right_angle(word) == (count * math.pi / 2, name)
+
+
+@pytest.mark.parametrize(
+    "word",
+    ["0", "0.00", "1.6", "2", "3", "3.1", "1.58", "1.5", "1.5712", "3.1420", "3.15", "0.7854", "1.0472", "1.5707963267948966", "1e9", "1.57e5", "1.5708000", "1e-400", "1.5708" + "0" * 40, "9" * 400],
+)  # fmt: skip
+def test_other_angles_stay_as_they_are(word):
+    assert right_angle(word) is None
+
+
+def test_wheels_turned_by_3_14159_stand_as_those_turned_by_pi(tmp_path):
+    """AgileX's Limo: two of its wheels are turned by 3.14159, which left them 2.65e-6 rad askew and two without load."""
+    models = []
+    for turn in ("3.14159", repr(math.pi)):
+        text = rover(
+            extra=body("camera", mass=1.0) + joint("mount", "fixed", "chassis", "camera", turn=f"1.5708 0 {turn}")
+        )
+        models.append(RoverModel.from_urdf(write(tmp_path, text)))
+    rounded, exact = models
+    assert rounded == exact
+    listed = "\n".join(rounded.import_report.assumed)
+    assert "3.14159 rad is read as pi: line" in listed
+    assert "1.5708 rad is read as pi/2: line" in listed
+    assert "joint[mount].origin.rpy" in listed
+    assert "read as pi:" not in "\n".join(exact.import_report.assumed)
+    np.testing.assert_allclose(exact.poses(np.zeros(exact.nq))["camera"][1][1], [0.0, 0.0, -1.0], atol=1e-15)
