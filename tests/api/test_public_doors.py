@@ -205,7 +205,15 @@ def names_the_argument(error: Exception, argument: str) -> bool:
     return isinstance(error, (TypeError, ValueError)) and argument in str(error)
 
 
-@pytest.mark.parametrize(("room", "name", "argument"), public(), ids=lambda part: part)
+#: Draws every figure for each value that is right.
+DRAWS = pytest.mark.nightly("tests/cli/test_plot.py::test_an_unknown_format_is_refused_before_anything_is_written")
+
+
+@pytest.mark.parametrize(
+    ("room", "name", "argument"),
+    [pytest.param(*one, marks=DRAWS if one[1] == "draw_run" else ()) for one in public()],
+    ids=lambda part: part,
+)
 def test_a_value_of_the_wrong_kind_is_refused_by_name(
     room: str, name: str, argument: str, world: World, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -44,6 +44,7 @@ NIGHTLY = {
     "docs/foresight.md-2": pytest.mark.nightly(
         "tests/envs/test_foresight.py::test_rover_and_ground_choose_the_forecast"
     ),
+    "docs/vector.md-5": pytest.mark.nightly("tests/envs/test_vector.py"),
     "docs/tasks.md-5": pytest.mark.nightly("tests/envs/test_reward_terms.py"),
 }
 
