@@ -27,8 +27,8 @@ help: ## list the targets (this list)
 
 demo: ## set up, drive Rover-v0 to a goal, plot the drive, redraw the report's sections 6.1 and 6.2, write a replay page, under runs/
 	@$(SIDE_BY_SIDE) $(STAMPS)/core $(STAMPS)/debian-demo
-	$(BIN)/rover drive --output runs/drive
 	$(BIN)/rover report --figures --output runs/report & report=$$!; \
+	$(BIN)/rover drive --output runs/drive && \
 	$(BIN)/rover plot runs/drive/episode-0.h5 --output runs/drive/plots && \
 	$(BIN)/rover replay runs/drive/episode-0.h5 --html runs/replay.html && wait $$report
 

@@ -335,6 +335,7 @@ def numbers_in(info: Any, path: str = "") -> dict[str, float]:
     return {path: float(info)} if isinstance(info, (int, float, np.number)) else {}
 
 
+@pytest.mark.takes_long("steps every environment with every number that is not finite")
 def test_no_number_that_is_not_finite_leaves_a_step() -> None:
     # Speeds and places up to what float32 holds: the physics may fail, what is said of it may not.
     env = RoverEnv(solver_options={"max_iterations": 50})
