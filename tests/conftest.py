@@ -1,6 +1,6 @@
 """Tiers of the tests, and how long one may take.
 
-`--tier quick` takes the rooms of `QUICK`, `--tier test` all tests but those marked `nightly`, `--tier all` every test.
+`--tier quick` takes the files of `QUICK`, `--tier test` all tests but those marked `nightly`, `--tier all` every test.
 In the first two, a test that takes more than `LIMIT` seconds of processor time fails the run unless it is marked
 `takes_long`.
 """
@@ -17,8 +17,19 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
 
 TESTS = Path(__file__).parent
-#: Folders and files of the quick tier.
-QUICK = ("api", "house", "models", "envs/test_registered.py", "envs/test_formulas.py", "envs/test_episode.py")
+#: Files of the quick tier.
+QUICK = (
+    "house/test_circles.py",
+    "house/test_core_arrows.py",
+    "house/test_package_arrows.py",
+    "house/test_tiers.py",
+    "api/test_friction_contact.py",
+    "api/test_mechanics.py",
+    "api/test_model.py",
+    "api/test_simulation.py",
+    "envs/test_episode.py",
+    "envs/test_formulas.py",
+)
 #: Processor time of one test and the processes that it waits for, s. It depends less on the machine's load than time.
 LIMIT = 5.0
 TIER = pytest.StashKey[str]()
