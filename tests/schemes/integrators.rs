@@ -222,7 +222,6 @@ fn what_drops_without_restitution_rests() {
 }
 
 #[test]
-#[ignore = "tests/schemes/integrators.rs::across_impacts_every_scheme_is_of_first_order_and_the_event_driven_is_exact"]
 fn in_persistent_contact_each_has_its_order() {
     // The textbook's Moreau–Jean is of order 1; contacts at the end of the
     // step with the reaction's mean direction make it 2.
