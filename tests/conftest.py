@@ -9,6 +9,7 @@ import os
 import sys
 from collections.abc import Generator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -35,6 +36,8 @@ LIMIT = 5.0
 TIER = pytest.StashKey[str]()
 #: PyTorch's first optimizer in a process imports it, which takes seconds; whose test that is depends on chance.
 COMPILER = "torch._dynamo"
+#: Processor time of the fixtures that this test set up and shares with others, s.
+SHARED: list[float] = []
 #: Tests of this run over the limit.
 TOO_LONG: list[str] = []
 
@@ -85,13 +88,25 @@ def processor_time() -> float:
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
     """Notes when a test begins."""
+    SHARED.clear()
     item.user_properties += [("start", processor_time()), ("compiler", COMPILER in sys.modules)]
     return (yield)
 
 
 @pytest.hookimpl(wrapper=True)
+def pytest_fixture_setup(fixturedef: pytest.FixtureDef[Any]) -> Generator[None, object, object]:
+    """Notes what a fixture took that several tests share: the first of them is not to blame."""
+    start = processor_time()
+    try:
+        return (yield)
+    finally:
+        if fixturedef.scope != "function":
+            SHARED.append(processor_time() - start)
+
+
+@pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Notes what a test took, with its fixtures."""
+    """Notes what a test took, with the fixtures that are its own."""
     report = yield
     if report.when == "teardown":
         noted = dict(item.user_properties)
@@ -99,7 +114,7 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
             COMPILER in sys.modules
         )
         report.user_properties = [
-            ("processor_time", processor_time() - noted["start"]),
+            ("processor_time", processor_time() - noted["start"] - sum(SHARED)),
             ("takes_long", may_take_long),
         ]
     return report

@@ -153,6 +153,7 @@ def test_a_weaker_gravity_gives_the_same_motion_slower_to_the_bit(bed: BallBed) 
     np.testing.assert_array_equal(ways[0], ways[1])
 
 
+@pytest.mark.takes_long("a mass ratio that costs the solver sweeps")
 def test_a_ball_a_hundred_thousand_times_heavier_hardly_goes_into_its_bed(bed: BallBed) -> None:
     big = 0.06
     place = [0.5 * bed.width, bed.surface + 2.0 * big, 0.5 * bed.depth]

@@ -62,7 +62,6 @@ def shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[BallsShown]:
         yield BallsShown(browser, run, page)
 
 
-@pytest.mark.takes_long("starts a browser and opens the page that the other tests share")
 def test_the_page_loads_without_errors_and_without_the_network(shown: BallsShown) -> None:
     asked = [params["request"]["url"] for params in messages(shown.browser, "Network.requestWillBeSent")]
     assert shown.page.as_uri() in asked

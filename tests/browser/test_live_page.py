@@ -203,6 +203,7 @@ def test_a_second_page_watches_and_may_take_the_wheel(live: Live) -> None:
     await_that(lambda: live.loop.state.scene.friction == 0.7, "friction")
 
 
+@pytest.mark.takes_long("waits for the page that the other tests share")
 def test_nothing_leaves_the_machine_and_nothing_fails(live: Live) -> None:
     asked = [params["request"]["url"] for params in messages(live.browser, "Network.requestWillBeSent")]
     asked += [params["url"] for params in messages(live.browser, "Network.webSocketCreated")]

@@ -184,7 +184,6 @@ def messages(browser: webdriver.Chrome, method: str) -> list[dict[str, Any]]:
     return [message["params"] for message in found if message["method"] == method]
 
 
-@pytest.mark.takes_long("starts a browser and opens the page that the other tests share")
 def test_the_page_loads_without_errors_and_without_the_network(shown: Shown) -> None:
     assert_alone(shown)
     assert shown.browser.title == "a drive over rocks"

@@ -67,7 +67,6 @@ def test_a_run_leaves_what_it_was_and_its_curves(run: Path) -> None:
     assert len((run / "curve.monitor.csv").read_text(encoding="utf-8").splitlines()) >= 2 + 256 // 20 - 4
 
 
-@pytest.mark.takes_long("trains once with each algorithm, for this and the next tests")
 def test_the_policy_that_is_loaded_is_the_one_that_was_evaluated(run: Path) -> None:
     policy = RawPolicy.load(run)
     assert policy.environment["control_frequency"] == 5
@@ -129,6 +128,7 @@ def test_an_unknown_task_is_one_line_and_writes_nothing(train_raw: Script, clean
         assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.takes_long("trains with the single-file script")
 def test_the_single_file_trains_and_writes(cleanrl: Script, tmp_path: Path) -> None:
     result = cleanrl("--steps", 12_288, "--episodes", 2, "--output", tmp_path)
     assert result.exit_code == 0, result.output

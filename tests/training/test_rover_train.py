@@ -142,6 +142,7 @@ def test_a_training_that_goes_on_keeps_the_best_policy(config: Path, tmp_path: P
     assert PolicyCard.read(path).source["decisions"] == 768
 
 
+@pytest.mark.takes_long("trains two seeds, one of them in two parts")
 def test_a_second_call_with_resume_finishes_the_seeds_that_are_missing(config: Path, tmp_path: Path) -> None:
     arguments = ("train", config, "--output", tmp_path, "--no-progress", "--steps", 256)
     assert rover(*arguments, "--seeds", 1, "--seeds", 2).exit_code == 0

@@ -139,6 +139,7 @@ def test_the_saved_policy_acts_like_the_model(run: Path) -> None:
     assert one in rover.action_space
 
 
+@pytest.mark.takes_long("trains, stops and goes on")
 def test_a_stopped_training_goes_on(run: Path, train: Script, tmp_path: Path) -> None:
     config = a_config(tmp_path, run.parent.name.rstrip("0123456789"))
     arguments = ("--config", config, "--output", tmp_path / "run", "--no-progress")
@@ -154,6 +155,7 @@ def test_a_stopped_training_goes_on(run: Path, train: Script, tmp_path: Path) ->
     assert (tmp_path / "run" / "curve-1024.monitor.csv").exists()
 
 
+@pytest.mark.takes_long("trains, stops and goes on")
 def test_a_training_goes_on_with_the_hyperparameters_that_are_given(run: Path, train: Script, tmp_path: Path) -> None:
     """It wrote the new configuration and trained with the old one."""
     folder = tmp_path / "run"
