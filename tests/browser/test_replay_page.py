@@ -120,8 +120,8 @@ def opened(page: Path, profile: Path) -> Iterator[webdriver.Chrome]:
         browser.set_script_timeout(PATIENCE)
         browser.get_log("performance")  # what the browser's own first tab did
         browser.get(page.as_uri())
-        await_that(lambda: slider(browser) is not None, "the player's timeline")
-        go_to(browser, 0.0)  # the page plays on load; the tests below set the time
+        await_that(lambda: (slider(browser) or 0.0) > 0.0, "the player, which plays on load")
+        go_to(browser, 0.0)  # typing a time pauses it
         yield browser
     finally:
         browser.quit()
