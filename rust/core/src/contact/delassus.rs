@@ -77,6 +77,16 @@ impl ContactSystem {
         }
     }
 
+    /// Adds a number for each contact (n_c), 1/kg, to the three entries on W's diagonal.
+    pub fn soften(&mut self, diagonal: impl Iterator<Item = f64>) {
+        let size = 3 * self.n_contacts();
+        for (c, term) in diagonal.enumerate() {
+            for i in 3 * c..3 * (c + 1) {
+                self.W[i * (size + 1)] += term;
+            }
+        }
+    }
+
     /// [`Self::assemble`] without W, which stays what it was.
     pub fn assemble_rows(
         &mut self,

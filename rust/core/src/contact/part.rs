@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Disc, OrientedBox, PlacedShape, Roller, Sphere};
+use crate::law::compliance::Compliance;
 use crate::multibody::{Kinematics, Model, Wheel};
 
 /// A part of the machine that can be in contact.
@@ -94,6 +95,16 @@ impl Part {
             Self::Box(i) => &model.boxes()[i].name,
             Self::Sphere(i) => &model.spheres()[i].name,
             Self::Limit(i, _) => &model.bodies()[model.joints()[i].body].name,
+        }
+    }
+
+    /// Spring and damper of its surface; `None` if it is rigid.
+    #[inline]
+    #[must_use]
+    pub fn compliance(self, model: &Model) -> Option<Compliance> {
+        match self {
+            Self::Wheel(i) => model.wheels()[i].compliance,
+            Self::Box(_) | Self::Sphere(_) | Self::Limit(..) => None,
         }
     }
 

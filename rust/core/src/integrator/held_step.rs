@@ -21,7 +21,7 @@ use super::mechanical_system::{MechanicalSystem, Start, UnilateralContact};
 use super::moreau_jean::{MOST_REVISIONS, load_explicitly, load_implicitly};
 use super::options::{Stabilisation, StepOptions};
 use super::scratch::ScratchOf;
-use super::step_contacts::assemble_contacts;
+use super::step_contacts::{assemble_contacts, shift, yielded};
 use super::warm_start::WarmStart;
 
 /// What the energy audit did to the velocity.
@@ -127,7 +127,7 @@ impl<C: Clone + UnilateralContact> HeldStep<C> {
         (held.is_gyroscopic, held.correction) = chosen;
         let fastest = v_end.iter().fold(1e-3_f64, |m, v| m.max(v.abs()));
         held.base = held.trial_with(system, start, &p, ws)?;
-        (held.response, held.W) = operators(system, p.len());
+        (held.response, held.W) = operators(system, ws, p.len());
         let weight: Vec<f64> = (0..mu.len()).map(|i| held.W[(d * i, d * i)]).collect();
         held.law = HeldLaw::new(p, held.u(&held.base).to_vec(), mu.clone(), weight.clone());
         if is_projected {
@@ -153,9 +153,8 @@ impl<C: Clone + UnilateralContact> HeldStep<C> {
         let mut displacement = self.local_displacement(&self.base).to_vec();
         let mut counts = Vec::with_capacity(mu.len());
         for (i, gap) in self.gaps(&self.base).iter().enumerate() {
-            let before = ws.u_before[d * i];
-            let shift = system.normal_shift(&self.options, &self.contacts[i], before);
-            let u_N = self.u(&self.base)[d * i] - shift;
+            let given = shift(system, &self.options, ws, i)[0] + yielded(ws, i, self.law.p[d * i]);
+            let u_N = self.u(&self.base)[d * i] - given;
             let is_counted = *gap >= 0.0 || gap + h * u_N < 0.0;
             displacement[d * i] += if is_counted { *gap } else { 0.0 };
             counts.push(is_counted);
@@ -224,6 +223,7 @@ impl<C: Clone + UnilateralContact> HeldStep<C> {
         if !system.factorise(options) {
             return None;
         }
+        ws.v.copy_from_slice(v);
         assemble_contacts(system, options, v, &no_memory, ws);
         if self.is_gyroscopic {
             load_implicitly(system, options, start, &no_memory, ws);
@@ -237,9 +237,12 @@ impl<C: Clone + UnilateralContact> HeldStep<C> {
         let mut out: Vec<f64> = v.iter().zip(&ws.dv).map(|(v, dv)| v + dv).collect();
         let mut gaps = Vec::with_capacity(ws.contacts.len());
         for (i, contact) in ws.contacts.iter().enumerate() {
-            gaps.push(contact.gap() + theta * h * u[d * i]);
-            u[d * i] += system.normal_shift(options, contact, ws.u_before[d * i]);
+            gaps.push(match ws.yielding.get(i) {
+                Some(law) if law.diagonal > 0.0 => law.unexplained,
+                _ => contact.gap() + theta * h * u[d * i],
+            });
         }
+        shift_velocities(system, options, ws, p, &mut u);
         for (u, before) in u.iter_mut().zip(&ws.u_before) {
             *u += before;
         }
@@ -367,9 +370,30 @@ impl<C: Clone + UnilateralContact> HeldStep<C> {
     }
 }
 
+/// Adds what the contacts' laws add to the local velocities `u` (d n_c) under impulses `p`.
+fn shift_velocities<S: MechanicalSystem>(
+    system: &S,
+    options: &StepOptions,
+    ws: &ScratchOf<S>,
+    p: &[f64],
+    u: &mut [f64],
+) {
+    let d = S::DIMENSION.components();
+    for (i, u) in u.chunks_exact_mut(d).enumerate() {
+        let shift = shift(system, options, ws, i);
+        for ((u, p), shift) in u.iter_mut().zip(&p[d * i..]).zip(shift) {
+            *u += shift + yielded(ws, i, *p);
+        }
+    }
+}
+
 /// `M̂⁻¹ H` and W of the assembled contacts, with so many components in all.
-fn operators<S: MechanicalSystem>(system: &S, size: usize) -> (DMatrix<f64>, DMatrix<f64>) {
-    let nv = system.nv();
+fn operators<S: MechanicalSystem>(
+    system: &S,
+    ws: &ScratchOf<S>,
+    size: usize,
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    let (nv, d) = (system.nv(), S::DIMENSION.components());
     let mut response = DMatrix::zeros(nv, size);
     let mut W = DMatrix::zeros(size, size);
     let (mut p, mut y, mut u) = (vec![0.0; size], vec![0.0; nv], vec![0.0; size]);
@@ -383,6 +407,11 @@ fn operators<S: MechanicalSystem>(system: &S, size: usize) -> (DMatrix<f64>, DMa
         response.column_mut(i).copy_from_slice(&y);
         p[i] = 0.0;
     }
+    for (i, law) in ws.yielding.iter().enumerate() {
+        for k in d * i..d * (i + 1) {
+            W[(k, k)] += law.diagonal;
+        }
+    }
     (response, W)
 }
 
@@ -394,11 +423,9 @@ pub(crate) fn law_of_last<S: MechanicalSystem>(
     ws: &ScratchOf<S>,
 ) -> (HeldLaw, bool) {
     let (n, d) = (ws.contacts.len(), S::DIMENSION.components());
-    let (_, W) = operators(system, d * n);
+    let (_, W) = operators(system, ws, d * n);
     let mut u = ws.u[..d * n].to_vec();
-    for (i, contact) in ws.contacts.iter().enumerate() {
-        u[d * i] += system.normal_shift(options, contact, ws.u_before[d * i]);
-    }
+    shift_velocities(system, options, ws, &ws.p, &mut u);
     let weight = (0..n).map(|i| W[(d * i, d * i)]).collect();
     let law = HeldLaw::new(ws.p[..d * n].to_vec(), u, ws.mu[..n].to_vec(), weight);
     let is_projected = options.stabilisation == Stabilisation::Projection

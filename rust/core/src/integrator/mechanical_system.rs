@@ -24,6 +24,7 @@ use nalgebra::Vector3;
 
 use super::options::StepOptions;
 use crate::contact::Activation;
+use crate::law::compliance::Compliance;
 use crate::law::newton_impact::rebound;
 use crate::problem::{Dimension, FrictionContactProblem};
 use crate::solver::{SolveReport, SolverOptions, SolverWorkspace, solve};
@@ -308,6 +309,20 @@ pub trait MechanicalSystem {
     ) -> f64 {
         rebound(options.restitution, u_N_before)
     }
+
+    /// Whether any contact yields. By default none does.
+    fn has_compliance(&self) -> bool {
+        false
+    }
+
+    /// Spring and damper of a contact; `None`, the default, if it is rigid.
+    fn compliance(&self, _contact: &Self::Contact) -> Option<Compliance> {
+        None
+    }
+
+    /// Adds a number for each contact (n_c), 1/kg, to its entries on the diagonal of the assembled W.
+    /// Called only for a system that [has compliance](Self::has_compliance).
+    fn soften(&mut self, _diagonal: impl Iterator<Item = f64>) {}
 
     /// Whether a solve that does not converge suggests that the problem has no answer. True by
     /// default; false where sweeps end early by design.

@@ -28,7 +28,9 @@ use super::probe::{Phase, Probe};
 use super::report::{StepReport, StepStatus};
 use super::scheme::{Integrator, StateMut};
 use super::scratch::ScratchOf;
-use super::step_contacts::{activation, add_correction, assemble_contacts, solve_contacts};
+use super::step_contacts::{
+    activation, add_correction, assemble_contacts, excuse_deflection, solve_contacts,
+};
 use super::warm_start::WarmStart;
 
 /// Relative change below which an iteration that no longer contracts has reached rounding.
@@ -95,6 +97,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
         ws.gap_end.clear();
         ws.gap_end
             .extend(ws.contacts.iter().map(UnilateralContact::gap));
+        excuse_deflection(ws);
         finish(system, options, state, warm_start, ws, report, probe)
     }
 }

@@ -1,6 +1,7 @@
 //! Scratch of a step, common to all systems: vectors over velocities and over contacts.
 
 use super::mechanical_system::{MechanicalEnergy, MechanicalSystem};
+use crate::law::compliance::Yielding;
 use crate::solver::{SolverOptions, SolverWorkspace};
 
 /// Scratch of a step of configurations `Q` and contacts `C`. Nothing in it
@@ -28,6 +29,8 @@ pub struct Scratch<Q, C> {
     pub(super) contacts: Vec<C>,
     pub(super) q_free: Vec<f64>,
     pub(super) mu: Vec<f64>,
+    /// Law of each contact along its normal; empty if all are rigid.
+    pub(super) yielding: Vec<Yielding>,
     pub(super) p: Vec<f64>,
     pub(super) p_last: Vec<f64>,
     pub(super) u: Vec<f64>,
@@ -97,6 +100,7 @@ impl<Q: Clone, C> Scratch<Q, C> {
             contacts: Vec::with_capacity(n),
             q_free: room(),
             mu: Vec::with_capacity(n),
+            yielding: Vec::new(),
             p: room(),
             p_last: room(),
             u: room(),

@@ -4,7 +4,7 @@ use super::mechanical_system::{KeyOf, MechanicalSystem, UnilateralContact};
 use super::options::StepOptions;
 use super::probe::{Phase, Probe};
 use super::report::StepReport;
-use super::scratch::ScratchOf;
+use super::scratch::{Scratch, ScratchOf};
 use super::warm_start::WarmStart;
 use crate::contact::Activation;
 use crate::solver::SolveReport;
@@ -43,11 +43,76 @@ pub(super) fn assemble_contacts<S: MechanicalSystem>(
     }
     set_friction(system, options, &ws.contacts, &mut ws.mu);
     system.assemble(&ws.contacts, v_before, &mut ws.u_before);
-    if options.warm_start {
+    let is_compliant = system.has_compliance();
+    ws.yielding.clear();
+    if options.warm_start || is_compliant {
         warm_start.recall(&ws.contacts, d, &mut ws.p);
-    } else {
+    }
+    if is_compliant {
+        yield_under_load(system, options, !warm_start.impulses.is_empty(), ws);
+    }
+    if !options.warm_start {
         ws.p.fill(0.0);
     }
+}
+
+/// `ws.yielding` of every contact, and its part in W. `ws.p` holds the last step's impulses if
+/// there are any, and `ws.v` is the velocity that led to the end pose.
+///
+/// A contact with restitution is rigid in the step in which it closes: what bounces is Newton's law.
+fn yield_under_load<S: MechanicalSystem>(
+    system: &mut S,
+    options: &StepOptions,
+    has_memory: bool,
+    ws: &mut ScratchOf<S>,
+) {
+    let (h, d) = (options.time_step, S::DIMENSION.components());
+    ws.q_free.fill(0.0);
+    system.add_local_of_velocity(&ws.contacts, &ws.v, &mut ws.q_free);
+    for (i, contact) in ws.contacts.iter().enumerate() {
+        let mut before = [0.0; 3];
+        before[..d].copy_from_slice(&ws.p[d * i..][..d]);
+        let is_new = before[0] == 0.0;
+        let bounces = is_new && system.normal_shift(options, contact, 1.0) > 0.0;
+        let compliance = system.compliance(contact).filter(|_| !bounces);
+        let law = compliance.map(|compliance| {
+            let moved = h * ws.q_free[d * i];
+            let middle = contact.gap() - options.theta * moved;
+            compliance.over(
+                h,
+                middle,
+                contact.gap() - moved,
+                has_memory.then_some(before),
+            )
+        });
+        ws.yielding.push(law.unwrap_or_default());
+    }
+    system.soften(ws.yielding.iter().map(|law| law.diagonal));
+}
+
+/// Shift of a contact's free velocity, m/s: that of its compliance, or of the impact law.
+pub(super) fn shift<S: MechanicalSystem>(
+    system: &S,
+    options: &StepOptions,
+    ws: &ScratchOf<S>,
+    i: usize,
+) -> [f64; 3] {
+    match ws.yielding.get(i) {
+        Some(law) if law.diagonal > 0.0 => law.shift,
+        _ => {
+            let before = ws.u_before[S::DIMENSION.components() * i];
+            [
+                system.normal_shift(options, &ws.contacts[i], before),
+                0.0,
+                0.0,
+            ]
+        }
+    }
+}
+
+/// What a contact yields under an impulse `p`, m/s.
+pub(super) fn yielded<Q, C>(ws: &Scratch<Q, C>, i: usize, p: f64) -> f64 {
+    ws.yielding.get(i).map_or(0.0, |law| law.diagonal * p)
 }
 
 /// μ of every contact.
@@ -148,11 +213,12 @@ pub(super) fn solve_contacts<S: MechanicalSystem>(
             solved = solve_problem(system, options, ws);
             report.retaken = 1;
         }
-        // u contains the shift: remove it.
-        for ((u, contact), before) in
-            (ws.u.chunks_exact_mut(d).zip(&ws.contacts)).zip(ws.u_before.chunks_exact(d))
-        {
-            u[0] -= system.normal_shift(law, contact, before[0]);
+        // u contains the shift and what the contacts yield: remove both.
+        for i in 0..n {
+            let shift = shift(system, law, ws, i);
+            for (k, shift) in (d * i..d * (i + 1)).zip(shift) {
+                ws.u[k] -= shift + yielded(ws, i, ws.p[k]);
+            }
         }
         report.enter(&solved);
         system.add_impulses(&ws.p, &mut ws.y);
@@ -173,9 +239,11 @@ fn add_shifts<S: MechanicalSystem>(
     sign: f64,
 ) {
     let d = S::DIMENSION.components();
-    let contacts = ws.contacts.iter().zip(ws.u_before.chunks_exact(d));
-    for (q, (contact, before)) in ws.q_free.chunks_exact_mut(d).zip(contacts) {
-        q[0] += sign * system.normal_shift(options, contact, before[0]);
+    for i in 0..ws.contacts.len() {
+        let shift = shift(system, options, ws, i);
+        for (q, shift) in ws.q_free[d * i..][..d].iter_mut().zip(shift) {
+            *q += sign * shift;
+        }
     }
 }
 
@@ -208,4 +276,15 @@ pub(super) fn place<S: MechanicalSystem>(system: &S, options: &StepOptions, ws: 
         contact.gap() + share * (u[0] - before[0])
     };
     ws.gap_end.extend(ws.contacts.iter().zip(local).map(moved));
+    excuse_deflection(ws);
+}
+
+/// Where contacts yield, leaves in `ws.gap_end` only the penetration that no elastic force
+/// explains.
+pub(super) fn excuse_deflection<Q, C>(ws: &mut Scratch<Q, C>) {
+    for (gap, law) in ws.gap_end.iter_mut().zip(&ws.yielding) {
+        if law.diagonal > 0.0 {
+            *gap = law.unexplained;
+        }
+    }
 }

@@ -44,6 +44,12 @@ pub enum NotOrdinary {
         /// Name of the wheel.
         wheel: String,
     },
+    /// A wheel yields where it touches.
+    #[error("the wheel '{wheel}' yields where it touches")]
+    SoftWheel {
+        /// Name of the wheel.
+        wheel: String,
+    },
     /// It has balls that collide.
     #[error("the machine has balls that collide")]
     Balls,
@@ -354,6 +360,15 @@ fn check(model: &Model) -> Result<(), NotOrdinary> {
     }
     if let Some(wheel) = model.wheels().iter().find(|wheel| wheel.is_wide()) {
         return Err(NotOrdinary::WideWheel {
+            wheel: wheel.name.clone(),
+        });
+    }
+    if let Some(wheel) = model
+        .wheels()
+        .iter()
+        .find(|wheel| wheel.compliance.is_some())
+    {
+        return Err(NotOrdinary::SoftWheel {
             wheel: wheel.name.clone(),
         });
     }

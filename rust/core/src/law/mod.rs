@@ -4,11 +4,13 @@
 //! - [`signorini`]: no penetration velocity, no adhesion, `0 ≤ u_N ⊥ p_N ≥ 0`;
 //! - [`newton_impact`]: restitution enters as a shift of the free normal velocity;
 //! - [`coulomb`]: friction, as De Saxcé's cone complementarity `K_μ* ∋ u + μ|u_T| n ⊥ p ∈ K_μ`;
-//! - [`materials`]: the coefficients of the two last by pair of materials.
+//! - [`compliance`]: a spring and a damper along the normal, implicit in the same problem;
+//! - [`materials`]: the coefficients of friction and restitution by pair of materials.
 //!
 //! Vectors are `[normal, tangent, (tangent)]`, velocities in m/s and
 //! impulses in N s. A law never sees a solver.
 
+pub mod compliance;
 pub mod coulomb;
 pub mod materials;
 pub mod newton_impact;

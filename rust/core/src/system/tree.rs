@@ -18,6 +18,7 @@ use crate::geometry::Terrain;
 use crate::integrator::{
     MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact,
 };
+use crate::law::compliance::Compliance;
 use crate::law::newton_impact::rebound;
 use crate::multibody::bias::{BiasScratch, bias};
 use crate::multibody::momentum::{body_momenta, energy_and_momentum};
@@ -334,6 +335,23 @@ impl MechanicalSystem for TreeSystem<'_> {
     fn normal_shift(&self, options: &StepOptions, contact: &Contact, u_N_before: f64) -> f64 {
         let of_pair = self.between_materials(options, contact);
         rebound(of_pair.map_or(options.restitution, |[_, e]| e), u_N_before)
+    }
+
+    #[inline]
+    fn has_compliance(&self) -> bool {
+        self.model.has_compliance()
+    }
+
+    fn compliance(&self, contact: &Contact) -> Option<Compliance> {
+        let other = contact.other.map(|other| other.part);
+        Compliance::in_series(
+            contact.part.compliance(self.model),
+            other.and_then(|part| part.compliance(self.model)),
+        )
+    }
+
+    fn soften(&mut self, diagonal: impl Iterator<Item = f64>) {
+        self.parts.system.soften(diagonal);
     }
 
     #[inline]

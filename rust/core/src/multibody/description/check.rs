@@ -304,6 +304,30 @@ fn check_width(at: &impl Fn(&str) -> String, wheel: &WheelDescription) -> Result
     Ok(())
 }
 
+/// Checks stiffness and damping of a wheel; `at` gives the path of its fields.
+fn check_compliance(
+    at: &impl Fn(&str) -> String,
+    wheel: &WheelDescription,
+) -> Result<(), ModelError> {
+    if let Some(stiffness) = wheel.stiffness {
+        positive(&at("stiffness"), stiffness)?;
+        in_range(&at("stiffness"), stiffness, 1e12, "at most 1e12 N/m")?;
+    }
+    let Some(damping) = wheel.damping else {
+        return Ok(());
+    };
+    not_negative(&at("damping"), damping)?;
+    in_range(&at("damping"), damping, 1e12, "at most 1e12 N s/m")?;
+    if wheel.stiffness.is_none() {
+        return Err(ModelError::OutOfRange {
+            field: at("damping"),
+            range: "given beside a stiffness",
+            value: damping,
+        });
+    }
+    Ok(())
+}
+
 fn check_wheels(
     description: &ModelDescription,
     solids: &HashMap<&str, usize>,
@@ -338,6 +362,7 @@ fn check_wheels(
             length(&at("contact_radius"), radius)?;
         }
         check_width(&at, wheel)?;
+        check_compliance(&at, wheel)?;
         material(&at("material"), wheel.material.as_ref())?;
         if let Some(radius) = description.solids[solid].disc_radius(&wheel.axle)
             && (radius - wheel.radius).abs() > 1e-9 * radius

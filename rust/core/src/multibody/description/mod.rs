@@ -162,6 +162,12 @@ pub struct WheelDescription {
     /// width for a torus.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rounding: Option<f64>,
+    /// Normal stiffness where it touches, N/m; rigid by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stiffness: Option<f64>,
+    /// Normal damping beside the stiffness, N s/m; 0 by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub damping: Option<f64>,
     /// Name of its material; `wheel` by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,

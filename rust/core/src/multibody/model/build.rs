@@ -9,6 +9,7 @@ use super::properties::{JointProperties, Passive};
 use super::spinners::mark_spinners;
 use super::tree::{Paths, Tree};
 use super::{Body, Model, fingerprint};
+use crate::law::compliance::Compliance;
 use crate::multibody::description::{
     JointKind, ModelDescription, Shape, SolidDescription, WheelDescription,
 };
@@ -104,6 +105,7 @@ impl Model {
             n_poses,
             n_rotations,
             has_slides,
+            has_compliance: wheels.iter().any(|wheel| wheel.compliance.is_some()),
             only_turns,
             armatures,
             limited,
@@ -437,6 +439,10 @@ fn wheels(
             radius: wheel.contact_radius.unwrap_or(wheel.radius),
             width: wheel.width.unwrap_or(0.0),
             rounding: wheel.rounding.unwrap_or(0.0),
+            compliance: wheel.stiffness.map(|stiffness| Compliance {
+                stiffness,
+                damping: wheel.damping.unwrap_or(0.0),
+            }),
             material: named(wheel.material.as_ref(), "wheel"),
             torque_limit: wheel.torque_limit,
             drive_sign: wheel.drive_sign,

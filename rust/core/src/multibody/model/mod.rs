@@ -51,6 +51,7 @@ pub struct Model {
     n_poses: usize,
     n_rotations: usize,
     has_slides: bool,
+    has_compliance: bool,
     only_turns: bool,
     /// Free and spherical joints, with their first velocities.
     rotating: Vec<(Joint, usize)>,
@@ -192,6 +193,13 @@ impl Model {
     #[must_use]
     pub fn has_slides(&self) -> bool {
         self.has_slides
+    }
+
+    /// Whether any wheel yields where it touches.
+    #[inline]
+    #[must_use]
+    pub fn has_compliance(&self) -> bool {
+        self.has_compliance
     }
 
     /// Whether every root is free and every other joint is revolute and uncoupled, as in a rover.

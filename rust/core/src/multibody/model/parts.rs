@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::law::compliance::Compliance;
 use crate::multibody::motor::Motor;
 use crate::scalar::elementary::hypot;
 
@@ -38,6 +39,8 @@ pub struct Wheel {
     pub width: f64,
     /// Radius of its edges, m: at most half the width.
     pub rounding: f64,
+    /// Spring and damper where it touches; `None` if it is rigid.
+    pub compliance: Option<Compliance>,
     /// Name of its material.
     pub material: String,
     /// Largest driving torque, N m.

@@ -1,0 +1,115 @@
+//! Compliance: a contact whose two sides yield.
+//!
+//! A linear spring and a damper act in parallel while the contact is closed, `f = k δ + d δ̇` with
+//! the deflection `δ = −gap ≥ 0`. Over a step of h, with the impulse `p_N = h f` and both terms
+//! implicit, `δ⁺ = δ − h u_N⁺` and `δ̇⁺ = −u_N⁺`, the force law is a complementarity problem again:
+//!
+//! ```text
+//! 0 ≤ u_N⁺ + p_N / (h (h k + d)) + k gap / (h k + d)  ⊥  p_N ≥ 0
+//! ```
+//!
+//! Compliance is thus a term on the diagonal of W and a shift of the free velocity. Its limit for
+//! k → ∞ is Signorini's law, and it is stable for every k and every step.
+//!
+//! Along the surface the contact yields by the same k and d to changes of friction, and what slips
+//! is the rest: Coulomb's law holds between p_T and `u_T + (p_T − p_T⁻) / (h (h k + d))`, with the
+//! impulse p_T⁻ of the step before. In steady rolling and at rest the two impulses are equal, so
+//! nothing creeps. The term is the same as that along the normal: W has a positive diagonal, and a
+//! machine on more contacts than it needs has one set of loads.
+//!
+//! Source: Anitescu and Potra 2002, *A time-stepping method for stiff multibody dynamics with
+//! contact and friction*, IJNME 55, 753–784; Lacoursière 2007, *Ghosts and machines*, ch. 3.
+
+/// Spring and damper of a contact, the same along the normal and along the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Compliance {
+    /// k, N/m.
+    pub stiffness: f64,
+    /// d, N s/m.
+    pub damping: f64,
+}
+
+/// Law of one contact over a step: Coulomb's law between the impulse p and `u + diagonal p + shift`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Yielding {
+    /// Term on the diagonal of W, 1/kg; 0 for a rigid contact.
+    pub diagonal: f64,
+    /// Shift of the free velocity along n, t, b, m/s.
+    pub shift: [f64; 3],
+    /// Gap that the law knows, m.
+    pub gap: f64,
+    /// Penetration that no elastic force explains, m, as a negative gap.
+    pub unexplained: f64,
+    /// k, N/m.
+    stiffness: f64,
+    /// Tangential impulse at the start, N s.
+    friction: [f64; 2],
+}
+
+/// Deflection that counts as elastic whatever the forces, m.
+const SLACK: f64 = 1e-6;
+
+impl Compliance {
+    /// Of two sides in series, of which a rigid one is `None`.
+    #[must_use]
+    pub fn in_series(first: Option<Self>, second: Option<Self>) -> Option<Self> {
+        match (first, second) {
+            (Some(a), Some(b)) => {
+                let share = b.stiffness / (a.stiffness + b.stiffness);
+                Some(Self {
+                    stiffness: a.stiffness * share,
+                    // Both deflect in proportion to their springs.
+                    damping: a.damping * share * share + b.damping * (1.0 - share) * (1.0 - share),
+                })
+            }
+            (one, other) => one.or(other),
+        }
+    }
+
+    /// The law over a step of `h`, s.
+    ///
+    /// - `gap`: of the pose that the step reaches without impulses, less (1 − θ) h u_N there, m. A
+    ///   stiff contact then comes to rest within a step.
+    /// - `start`: gap at the start of the step, m.
+    /// - `before`: impulse of the last step, N s, in the contact's frame; `None` if it is not known.
+    ///
+    /// A body that strikes a stiff contact penetrates it within the step by more than any spring
+    /// would allow. That part is not elastic and is not given back: it is `unexplained`, and
+    /// position projection removes it.
+    #[must_use]
+    pub fn over(&self, h: f64, gap: f64, start: f64, before: Option<[f64; 3]>) -> Yielding {
+        let Self { stiffness, damping } = *self;
+        let deflection = (-start).max(0.0);
+        let by_force = before.map_or(f64::INFINITY, |p| p[0] / (h * stiffness));
+        let known = gap.max(-(2.0 * deflection.min(by_force) + SLACK));
+        // A damper acts only in contact.
+        let rate = if known > 0.0 { 0.0 } else { damping };
+        let weight = h * stiffness + rate;
+        let diagonal = 1.0 / (h * weight);
+        // Of an impact's friction only what the deflection holds is elastic.
+        let held = (deflection / by_force.max(f64::MIN_POSITIVE)).min(1.0);
+        let friction = before.map_or([0.0; 2], |[_, t, b]| [held * t, held * b]);
+        let [t, b] = friction.map(|p| -diagonal * p);
+        Yielding {
+            diagonal,
+            shift: [known * stiffness / weight, t, b],
+            gap: known,
+            unexplained: gap - known,
+            stiffness,
+            friction,
+        }
+    }
+}
+
+impl Yielding {
+    /// Elastic energy that the contact gives off in a step of `h` that ends with the normal velocity
+    /// `u_N` and the impulse `p`, J; negative where it stores some.
+    #[must_use]
+    pub fn released(&self, h: f64, u_N: f64, p: [f64; 3]) -> f64 {
+        let before = self.gap.min(0.0);
+        let after = (self.gap + h * u_N).min(0.0);
+        let [t, b] = self.friction;
+        let sheared = (t * t + b * b) - (p[1] * p[1] + p[2] * p[2]);
+        0.5 * (self.stiffness * (before * before - after * after) + self.diagonal * sheared)
+    }
+}
