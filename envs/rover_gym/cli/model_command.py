@@ -60,6 +60,12 @@ def import_model(
     wheel_width: Annotated[
         float | None, typer.Option(help="Width of every wheel, m; 0 for thin discs. By default the file's.")
     ] = None,
+    wheel_stiffness: Annotated[
+        float | None,
+        typer.Option(
+            help="Stiffness of every wheel where it touches, N/m; 0 for rigid wheels. By default it yields 0.03 mm."
+        ),
+    ] = None,
     ignore: Annotated[
         list[str] | None, typer.Option(help="What to leave out although it changes the motion, such as friction.")
     ] = None,
@@ -78,7 +84,7 @@ def import_model(
             refuse(OptionError, option, str(path), "would replace the file that is read")
         check_file(option, path)
     options: dict[str, object] = {"forward": forward, "ignore": ignore or ()}
-    options |= {"torque_limit": torque_limit, "wheel_width": wheel_width}
+    options |= {"torque_limit": torque_limit, "wheel_width": wheel_width, "wheel_stiffness": wheel_stiffness}
     options |= {"wheels": _radii(wheel), "steering": _pairs(steering)}
     if package_path:
         options["package_paths"] = package_path
@@ -135,6 +141,11 @@ def check(
         results.add(name=found.name, wheels=found.wheel_names, **asdict(statics))
         results.show(f"{found.name} on level ground, 9.81 m/s²")
         results.show(table)
+        if statics.undetermined_loads:
+            results.show(
+                "these loads are one answer of many, and micrometres decide which: more rigid wheels than the chassis "
+                "needs; give them a stiffness"
+            )
         for line in _statics(statics):
             results.show(line)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,6 +19,9 @@ TORQUE_SHARE = 1.0
 #: of the weight times its radius, 1/rad, and damping over stiffness, s.
 STEERING_STIFFNESS, STEERING_TIME = 10.0, 0.0133
 STEERING_LIMIT = 0.7  # rad, where the file states none
+#: What a wheel yields under its share of the weight, m, and its damping over its stiffness, s: critical for that share.
+YIELD = 3e-5
+YIELDING_TIME = 2.0 * math.sqrt(YIELD / GRAVITY)
 #: Kinds of shapes that touch the ground; cylinders touch as wheels only.
 TOUCHING = ("box", "sphere")
 UNLIMITED = 1e9  # N m, the torque limit of a motor for which the file states none
@@ -33,6 +37,7 @@ class WheelOptions:
         steering_damping: N m s/rad.
         steering_limit: rad.
         wheel_width: Of a wheel, m.
+        wheel_stiffness: Of a wheel where it touches, N/m; 0: rigid.
     """
 
     torque_limit: float | None = None
@@ -40,6 +45,7 @@ class WheelOptions:
     steering_damping: float | None = None
     steering_limit: float | None = None
     wheel_width: float | None = None
+    wheel_stiffness: float | None = None
 
 
 def describe(tree: RobotTree, roles: list[WheelRole], P: Array, options: WheelOptions) -> dict[str, Any]:
@@ -189,6 +195,7 @@ def _wheel(tree: RobotTree, role: WheelRole, A: Array, weight: float, options: W
     }
     if role.width > 0.0:
         wheel["width"] = float(role.width)
+    wheel |= _yielding(tree, role, weight, options)
     if role.steering is not None:
         stops = tree.links[role.steering].joint.limits
         reach = STEERING_LIMIT if stops is None else min(abs(stop) for stop in stops) or max(abs(s) for s in stops)
@@ -198,6 +205,23 @@ def _wheel(tree: RobotTree, role: WheelRole, A: Array, weight: float, options: W
             tree.assumed.append(f"steering {role.steering}: set-points up to {reach:g} rad")
         wheel |= {"steering": role.steering, "steering_limit": float(reach)}
     return wheel
+
+
+def _yielding(tree: RobotTree, role: WheelRole, weight: float, options: WheelOptions) -> dict[str, float]:
+    """Stiffness, N/m, and damping, N s/m, where a wheel touches; nothing for a rigid wheel.
+
+    Without them the weight of a rigid chassis rests on three of its wheels, and micrometres decide on which.
+    """
+    stiffness = options.wheel_stiffness
+    if stiffness is None:
+        stiffness = float(f"{weight / YIELD:.2g}")
+        tree.assumed.append(
+            f"wheel {role.link}: stiffness {stiffness:g} N/m where it touches, by which it yields {1e3 * YIELD:g} mm "
+            "under its share of the weight, and critical damping"
+        )
+    if stiffness == 0.0:
+        return {}
+    return {"stiffness": stiffness, "damping": float(f"{YIELDING_TIME * stiffness:.2g}")}
 
 
 def _shapes(tree: RobotTree, link: FileLink, A: Array, anchor: Array, role: WheelRole | None) -> list[dict[str, Any]]:

@@ -65,7 +65,8 @@ def solid_rows(model: RoverModel) -> tuple[tuple[str, str, str, float, str], ...
             wheel = wheels[solid["name"]]
             width = f", {wheel['width']:g} m wide" if wheel.get("width") else ""
             radius = wheel.get("contact_radius") or wheel["radius"]
-            role = f"wheel of radius {radius:g} m{width}, {wheel['torque_limit']:.4g} N m"
+            yields = f", {wheel['stiffness']:.2g} N/m" if wheel.get("stiffness") else ""
+            role = f"wheel of radius {radius:g} m{width}{yields}, {wheel['torque_limit']:.4g} N m"
         elif solid["name"] in steered:
             role = f"steers {', '.join(steered[solid['name']])}"
         elif solid.get("drive"):

@@ -55,6 +55,7 @@ def _read(
     steering_damping: float | None = None,
     steering_limit: float | None = None,
     wheel_width: float | None = None,
+    wheel_stiffness: float | None = None,
     ignore: Collection[str] = (),
 ) -> tuple[RoverModel, ImportReport]:
     place = checked_path(path)
@@ -68,6 +69,7 @@ def _read(
         "steering_damping": steering_damping,
         "steering_limit": steering_limit,
         "wheel_width": wheel_width,
+        "wheel_stiffness": wheel_stiffness,
     }
     options = WheelOptions(
         **{

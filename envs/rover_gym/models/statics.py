@@ -39,6 +39,8 @@ class Statics:
 
     Attributes:
         loads: Normal force of the ground on each wheel, (n_wheels,).
+        undetermined_loads: Independent sets of wheel loads that balance one another, as
+            `StepReport.undetermined_loads` counts them; not 0: the loads above are one answer of many.
         rest_speed: Largest velocity that was left when the loads were read, m/s and rad/s.
         attitude: Roll and pitch at rest.
         wheelbase: Distance between the foremost and the hindmost axle.
@@ -52,6 +54,7 @@ class Statics:
     """
 
     loads: Array
+    undetermined_loads: int
     rest_speed: float
     attitude: tuple[float, float]
     wheelbase: float
@@ -81,7 +84,7 @@ def check_statics(model: RoverModel, *, friction: float = 0.7) -> Statics:
     sim = Simulation(model, friction=friction)
     sim.set_state(model.resting_pose(Plane(), (0.0, 0.0), 0.0))
     while sim.time < PATIENCE:
-        sim.step(100)
+        report = sim.step(100)
         if float(np.abs(sim.v).max()) < AT_REST:
             break
     q = sim.q
@@ -103,6 +106,7 @@ def check_statics(model: RoverModel, *, friction: float = 0.7) -> Statics:
     height, is_wall = _step(model, loads, front, friction)
     return Statics(
         loads,
+        report.undetermined_loads,
         float(np.abs(sim.v).max()),
         (float(q[3]), float(q[5])),
         float(np.ptp(x)),

@@ -358,6 +358,9 @@ impl RoverModel {
     ///     steering_limit: Largest steering set-point, rad; by default the joint's stop.
     ///     wheel_width: Width of every wheel, m, 0 for thin discs, which cost less to simulate; by
     ///         default that of the cylinder that touches for it in the file, or 0.
+    ///     wheel_stiffness: Normal stiffness of every wheel where it touches, N/m, 0 for rigid
+    ///         wheels. By default a wheel yields 0.03 mm under its share of the weight, which
+    ///         decides how the ground shares the weight among the wheels of a rigid chassis.
     ///     ignore: Kinds of what changes the motion and is left out all the same: "friction",
     ///         "actuators", "closed loops", "tendons", "springs", "fluid".
     ///     package_paths: Folders that are searched for the packages of `package://` names, before
@@ -376,10 +379,10 @@ impl RoverModel {
     #[pyo3(signature = (path, *, wheels = Given::MISSING, steering = Given::MISSING, free_base = Given::MISSING,
         forward = Given::MISSING, torque_limit = Given::MISSING, steering_stiffness = Given::MISSING,
         steering_damping = Given::MISSING, steering_limit = Given::MISSING,
-        wheel_width = Given::MISSING, ignore = Given::MISSING,
+        wheel_width = Given::MISSING, wheel_stiffness = Given::MISSING, ignore = Given::MISSING,
         package_paths = Given::MISSING),
         text_signature = "(path, *, wheels=None, steering=None, free_base=True, forward=\"x\", torque_limit=None, \
-        steering_stiffness=None, steering_damping=None, steering_limit=None, wheel_width=None, ignore=(), \
+        steering_stiffness=None, steering_damping=None, steering_limit=None, wheel_width=None, wheel_stiffness=None, ignore=(), \
         package_paths=())")]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python method
     fn from_urdf<'py>(
@@ -393,6 +396,7 @@ impl RoverModel {
         steering_damping: Given<'py>,
         steering_limit: Given<'py>,
         wheel_width: Given<'py>,
+        wheel_stiffness: Given<'py>,
         ignore: Given<'py>,
         package_paths: Given<'py>,
     ) -> PyResult<Self> {
@@ -406,6 +410,7 @@ impl RoverModel {
             ("steering_damping", steering_damping),
             ("steering_limit", steering_limit),
             ("wheel_width", wheel_width),
+            ("wheel_stiffness", wheel_stiffness),
             ("ignore", ignore),
             ("package_paths", package_paths),
         ];
@@ -431,6 +436,9 @@ impl RoverModel {
     ///     steering_limit: Largest steering set-point, rad; by default the joint's stop.
     ///     wheel_width: Width of every wheel, m, 0 for thin discs, which cost less to simulate; by
     ///         default that of the cylinder that touches for it in the file, or 0.
+    ///     wheel_stiffness: Normal stiffness of every wheel where it touches, N/m, 0 for rigid
+    ///         wheels. By default a wheel yields 0.03 mm under its share of the weight, which
+    ///         decides how the ground shares the weight among the wheels of a rigid chassis.
     ///     ignore: Kinds of what changes the motion and is left out all the same: "friction",
     ///         "actuators", "closed loops", "tendons", "springs", "fluid".
     ///
@@ -446,9 +454,9 @@ impl RoverModel {
     #[pyo3(signature = (path, *, wheels = Given::MISSING, steering = Given::MISSING, free_base = Given::MISSING,
         forward = Given::MISSING, torque_limit = Given::MISSING, steering_stiffness = Given::MISSING,
         steering_damping = Given::MISSING, steering_limit = Given::MISSING,
-        wheel_width = Given::MISSING, ignore = Given::MISSING),
+        wheel_width = Given::MISSING, wheel_stiffness = Given::MISSING, ignore = Given::MISSING),
         text_signature = "(path, *, wheels=None, steering=None, free_base=None, forward=\"x\", torque_limit=None, \
-        steering_stiffness=None, steering_damping=None, steering_limit=None, wheel_width=None, ignore=())")]
+        steering_stiffness=None, steering_damping=None, steering_limit=None, wheel_width=None, wheel_stiffness=None, ignore=())")]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python method
     fn from_mjcf<'py>(
         path: &Bound<'py, PyAny>,
@@ -461,6 +469,7 @@ impl RoverModel {
         steering_damping: Given<'py>,
         steering_limit: Given<'py>,
         wheel_width: Given<'py>,
+        wheel_stiffness: Given<'py>,
         ignore: Given<'py>,
     ) -> PyResult<Self> {
         let options = vec![
@@ -473,6 +482,7 @@ impl RoverModel {
             ("steering_damping", steering_damping),
             ("steering_limit", steering_limit),
             ("wheel_width", wheel_width),
+            ("wheel_stiffness", wheel_stiffness),
             ("ignore", ignore),
         ];
         Self::imported("read_mjcf", path, options)
@@ -526,6 +536,9 @@ impl RoverModel {
     ///     wheel_radius: Radius of all wheels, m: shape, inertia and contact change together.
     ///     contact_radius: Radius at which the wheels touch the ground, m; shape and inertia stay
     ///         as they are.
+    ///     wheel_stiffness: Normal stiffness of all wheels where they touch, N/m, 0 for rigid
+    ///         wheels, which have no damping either.
+    ///     wheel_damping: Normal damping beside the stiffness, N s/m.
     ///     masses: Masses by name of the solid, or one for each solid, kg. Inertias scale with
     ///         them.
     ///     steering_stiffness: Stiffness of every steering controller, N m/rad.
@@ -541,15 +554,17 @@ impl RoverModel {
     /// Raises:
     ///     ModelError: A number is out of its range, a solid has no such name, or a wheel radius is
     ///         given where a wheel's solid is no disc.
-    #[pyo3(signature = (*, wheel_radius = None, contact_radius = None, masses = None, steering_stiffness = None, steering_damping = None,
+    #[pyo3(signature = (*, wheel_radius = None, contact_radius = None, wheel_stiffness = None, wheel_damping = None, masses = None, steering_stiffness = None, steering_damping = None,
         wheel_torque_limit = None, mass_scale = None, motor = Given::MISSING),
-        text_signature = "($self, *, wheel_radius=None, contact_radius=None, masses=None, steering_stiffness=None, steering_damping=None, \
+        text_signature = "($self, *, wheel_radius=None, contact_radius=None, wheel_stiffness=None, wheel_damping=None, masses=None, steering_stiffness=None, steering_damping=None, \
         wheel_torque_limit=None, mass_scale=None, motor=...)")]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python method
     fn replace(
         &self,
         wheel_radius: Option<&Bound<'_, PyAny>>,
         contact_radius: Option<&Bound<'_, PyAny>>,
+        wheel_stiffness: Option<&Bound<'_, PyAny>>,
+        wheel_damping: Option<&Bound<'_, PyAny>>,
         masses: Option<&Bound<'_, PyAny>>,
         steering_stiffness: Option<&Bound<'_, PyAny>>,
         steering_damping: Option<&Bound<'_, PyAny>>,
@@ -565,6 +580,18 @@ impl RoverModel {
             for wheel in &mut description.wheels {
                 wheel.torque_limit = limit;
             }
+        }
+        let (stiffness, damping) = (
+            read(wheel_stiffness, "wheel_stiffness")?,
+            read(wheel_damping, "wheel_damping")?,
+        );
+        for wheel in &mut description.wheels {
+            if let Some(stiffness) = stiffness {
+                let yields = stiffness != 0.0;
+                wheel.stiffness = yields.then_some(stiffness);
+                wheel.damping = wheel.damping.filter(|_| yields);
+            }
+            wheel.damping = damping.or(wheel.damping);
         }
         if let Some(motor) = motor.given() {
             let motor = motor::parse(&motor)?;

@@ -8,6 +8,7 @@ use rover_core::multibody::Energy as CoreEnergy;
 #[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct StepReport {
     inner: CoreReport,
+    undetermined_loads: usize,
 }
 
 #[pymethods]
@@ -89,6 +90,16 @@ impl StepReport {
         self.inner.energy_lifted
     }
 
+    /// Number of independent sets of wheel loads that balance one another in the last step.
+    ///
+    /// 0 means that equilibrium determines the loads. Otherwise they are one of many answers, and
+    /// micrometres decide which: a rigid chassis on four rigid wheels has one such set. Wheels with
+    /// a `stiffness` have none. Friction is not considered; 0 for other machines than rovers.
+    #[getter]
+    fn undetermined_loads(&self) -> usize {
+        self.undetermined_loads
+    }
+
     /// The report of these steps and of further ones.
     ///
     /// Args:
@@ -96,7 +107,10 @@ impl StepReport {
     fn followed_by(&self, later: &Self) -> Self {
         let mut inner = self.inner;
         inner.merge(&later.inner);
-        Self { inner }
+        Self {
+            inner,
+            undetermined_loads: later.undetermined_loads,
+        }
     }
 
     fn __repr__(&self) -> String {
@@ -109,6 +123,17 @@ impl StepReport {
             r.residual,
             r.n_contacts
         )
+    }
+}
+
+impl StepReport {
+    /// With the number of sets of loads that equilibrium leaves open.
+    #[must_use]
+    pub fn with_undetermined_loads(self, undetermined_loads: usize) -> Self {
+        Self {
+            undetermined_loads,
+            ..self
+        }
     }
 }
 
@@ -148,7 +173,10 @@ impl Energy {
 
 impl From<CoreReport> for StepReport {
     fn from(inner: CoreReport) -> Self {
-        Self { inner }
+        Self {
+            inner,
+            undetermined_loads: 0,
+        }
     }
 }
 

@@ -512,7 +512,9 @@ impl Simulation {
     #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
     fn step(&self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
         let steps = n.count(1, Kind::Option, "n")?;
-        step(py, &mut *self.open()?, steps)
+        let mut simulation = self.open()?;
+        let report = step(py, &mut *simulation, steps)?;
+        Ok(report.with_undetermined_loads(simulation.undetermined_loads()))
     }
 
     /// The contacts of the last step.

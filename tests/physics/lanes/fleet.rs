@@ -74,10 +74,22 @@ fn assert_alike(a: &RoverSimulation, b: &RoverSimulation) {
     assert!(a.snapshot() == b.snapshot());
 }
 
+/// The built-in rover with rigid wheels, and with wheels that yield.
+fn models() -> [Arc<Model>; 2] {
+    let rigid = Model::rover();
+    let mut soft = rigid.description().clone();
+    for wheel in &mut soft.wheels {
+        wheel.stiffness = Some(2e6);
+        wheel.damping = Some(1e4);
+    }
+    [rigid, Model::from_description(soft).unwrap()].map(Arc::new)
+}
+
 /// Drives rovers in a fleet and alone.
 fn drive(instructions: Instructions, n: usize, torque: f64, seed: u64) {
     let mut numbers = Random(seed);
-    let model = Arc::new(Model::rover());
+    let [rigid, soft] = models();
+    let model = if n % 2 == 0 { rigid } else { soft };
     let mut together: Vec<RoverSimulation> =
         (0..n).map(|i| rover(i, &model, &mut numbers)).collect();
     let mut alone = together.clone();
@@ -113,16 +125,22 @@ proptest! {
 fn narrower_lanes_give_the_same_bits() {
     for instructions in Instructions::all_of_this_machine() {
         drive(instructions, 9, 60.0, 7);
+        drive(instructions, 8, 60.0, 7);
     }
 }
 
 #[test]
 fn the_quick_step_obeys_the_law_of_the_general_one() {
+    for model in models() {
+        obeys_the_law_of_the_general_step(&model);
+    }
+}
+
+fn obeys_the_law_of_the_general_step(model: &Arc<Model>) {
     let mut numbers = Random(11);
-    let model = Arc::new(Model::rover());
     let mut worst = Vec::new();
     for i in 0..6 {
-        let mut own = rover(i, &model, &mut numbers);
+        let mut own = rover(i, model, &mut numbers);
         own.step(100).unwrap();
         for _ in 0..10 {
             command(&mut own, 30.0, &mut numbers);

@@ -256,23 +256,15 @@ fn balance<S: MechanicalSystem>(
     }
 }
 
-/// Elastic energy that yielding contacts give off in the step, J.
-///
-/// Their force is that at the end of the step, and acts over all of it: where the approach speeds
-/// up, it does `p (u − u⁺) / 2` more work than the end of the step shows.
+/// Energy that the step may gain by contacts that yield, J.
 fn supplied_by_contacts<S: MechanicalSystem>(options: &StepOptions, ws: &ScratchOf<S>) -> f64 {
     let d = S::DIMENSION.components();
-    let supplied = ws
-        .yielding
-        .iter()
-        .enumerate()
-        .filter(|(_, law)| law.diagonal > 0.0);
-    supplied
+    let laws = ws.yielding.iter().enumerate();
+    laws.filter(|(_, law)| law.diagonal > 0.0)
         .map(|(i, law)| {
-            let (u, before) = (ws.u[d * i], ws.u_before[d * i]);
             let mut p = [0.0; 3];
             p[..d].copy_from_slice(&ws.p[d * i..][..d]);
-            law.released(options.time_step, u, p) + (0.5 * p[0] * (before - u)).max(0.0)
+            law.supplied(options.time_step, [ws.u_before[d * i], ws.u[d * i]], p)
         })
         .sum()
 }

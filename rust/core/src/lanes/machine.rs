@@ -9,6 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use nalgebra::{Matrix3, Vector3};
 use thiserror::Error;
 
+use crate::law::compliance::Compliance;
 use crate::multibody::joint::{Joint, JointAxis};
 use crate::multibody::model::BASE;
 use crate::multibody::{Body, Model};
@@ -41,12 +42,6 @@ pub enum NotOrdinary {
     /// A wheel has a width.
     #[error("the wheel '{wheel}' has a width")]
     WideWheel {
-        /// Name of the wheel.
-        wheel: String,
-    },
-    /// A wheel yields where it touches.
-    #[error("the wheel '{wheel}' yields where it touches")]
-    SoftWheel {
         /// Name of the wheel.
         wheel: String,
     },
@@ -146,6 +141,8 @@ pub struct WheelDisc {
     pub spoke: [f64; 3],
     /// Contact radius.
     pub radius: f64,
+    /// Spring and damper where it touches; `None` if it is rigid.
+    pub compliance: Option<Compliance>,
 }
 
 /// A box that collides with the ground.
@@ -178,6 +175,7 @@ impl Machine {
                     axle: wheel.axle.into(),
                     spoke: wheel.spoke.into(),
                     radius: wheel.radius,
+                    compliance: wheel.compliance,
                 })
                 .collect(),
             boxes: (model.boxes().iter())
@@ -199,6 +197,12 @@ impl Machine {
             machine.add(b, body, bodies);
         }
         Ok(machine)
+    }
+
+    /// Whether any wheel yields where it touches.
+    #[must_use]
+    pub fn yields(&self) -> bool {
+        self.wheels.iter().any(|wheel| wheel.compliance.is_some())
     }
 
     /// The machine itself, or an equal one that is in use: equal machines are one, so that rovers
@@ -360,15 +364,6 @@ fn check(model: &Model) -> Result<(), NotOrdinary> {
     }
     if let Some(wheel) = model.wheels().iter().find(|wheel| wheel.is_wide()) {
         return Err(NotOrdinary::WideWheel {
-            wheel: wheel.name.clone(),
-        });
-    }
-    if let Some(wheel) = model
-        .wheels()
-        .iter()
-        .find(|wheel| wheel.compliance.is_some())
-    {
-        return Err(NotOrdinary::SoftWheel {
             wheel: wheel.name.clone(),
         });
     }

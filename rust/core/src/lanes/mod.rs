@@ -9,7 +9,7 @@
 //!   [`inertias`]: what they need not; [`place`]: configurations;
 //! - [`poses`], [`mass_matrix`], [`bias`], [`energy`]: dynamics of the tree;
 //! - `parts`, [`ground`], `footing`, [`forecast`], [`contacts`]: what touches what; [`rows`]:
-//!   Jacobian and Delassus operator;
+//!   Jacobian and Delassus operator; [`yielding`]: wheels that yield;
 //! - [`problem`], [`modes`], [`equations`], `pivoting`, `visits`, `bench`, [`queue`]: the
 //!   friction-contact problems;
 //! - [`step`]: the step.
@@ -39,3 +39,4 @@ pub mod queue;
 pub mod rows;
 pub mod step;
 mod visits;
+pub mod yielding;

@@ -163,6 +163,16 @@ impl<T: Lane> Rows<T> {
         }
     }
 
+    /// Adds a number by slot, 1/kg, to the three entries on W's diagonal.
+    pub fn soften(&mut self, contacts: &Contacts<T>, diagonal: &[T]) {
+        for (i, &slot) in contacts.used().iter().enumerate() {
+            let own = &mut self.W[block(i, i)];
+            for k in [0, 4, 8] {
+                own[k] += diagonal[slot];
+            }
+        }
+    }
+
     /// `q = Zᵀ y + Hᵀ v` by slot: local velocities after a change `y` (nv, factor coordinates) of
     /// the velocity before the step.
     ///

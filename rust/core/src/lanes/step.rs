@@ -29,6 +29,7 @@ use super::place::Place;
 use super::poses::Poses;
 use super::problem::{ContactProblem, MAX_CONTACTS, Triple};
 use super::rows::{Answer, Rows};
+use super::yielding::Yields;
 use crate::contact::Contact;
 use crate::integrator::energy_audit::{COARSE, GAIN, RAISE, ROUNDINGS};
 use crate::integrator::position_projection::FARTHEST;
@@ -108,6 +109,7 @@ pub struct Block<T: Lane> {
     energy_scratch: EnergyScratch<T>,
     contacts: Contacts<T>,
     rows: Rows<T>,
+    yields: Yields<T>,
     /// By slot: impulses of the step and of the projection, N s; velocities, m/s.
     p: Vec<Triple<T>>,
     pushes: Vec<Triple<T>>,
@@ -177,6 +179,7 @@ impl<T: Lane> Block<T> {
             bias_scratch: BiasScratch::new(token, machine),
             energy_scratch: EnergyScratch::new(token, machine),
             rows: Rows::new(token, machine, contacts.n_slots()),
+            yields: Yields::new(token, machine, contacts.n_slots()),
             contacts,
             p: slots.clone(),
             pushes: slots.clone(),
@@ -402,11 +405,28 @@ impl<T: Lane> Block<T> {
         let (machine, end) = (&*self.machine, &self.poses_end);
         self.rows
             .assemble(machine, end, &self.factor, &self.contacts, &self.v);
+        if !self.yields.is_empty() {
+            self.soften(problems);
+        }
         probe.end(Phase::Delassus);
         self.load(problems);
         probe.end(Phase::Bias);
         self.rows
             .to_problems(&self.contacts, &self.u, self.friction, problems);
+    }
+
+    /// The laws of contacts that yield, and their part in W.
+    fn soften(&mut self, problems: &[ContactProblem]) {
+        let memories = &self.memories;
+        self.yields.update(
+            &self.machine,
+            &self.contacts,
+            &self.rows.u_before,
+            (self.options.time_step, self.options.theta),
+            problems,
+            |lane| !memories[lane].impulses.is_empty(),
+        );
+        self.rows.soften(&self.contacts, &self.yields.diagonal);
     }
 
     /// Configurations at the midpoint and at the predicted end.
@@ -558,6 +578,7 @@ impl<T: Lane> Block<T> {
         }
         self.factor.half_solve(&self.machine, &mut self.y);
         self.rows.local(&self.contacts, &self.y, &mut self.u);
+        self.yields.shift(&self.contacts, &mut self.u);
     }
 
     /// Second part of a step: the new velocity and configuration, and their energy.
@@ -624,6 +645,7 @@ impl<T: Lane> Block<T> {
             .read(&self.contacts, problems, Answer::Impulses, &mut self.p);
         self.rows
             .read(&self.contacts, problems, Answer::Velocities, &mut self.u);
+        self.yields.unshift(&self.contacts, &self.p, &mut self.u);
         self.rows
             .add_impulses(&self.contacts, self.occupied, &self.p, &mut self.y);
         self.factor.half_solve_back(&self.machine, &mut self.y);
@@ -645,7 +667,13 @@ impl<T: Lane> Block<T> {
                 .work(&self.machine, (h, theta), places, &self.v, &self.v_end);
         self.decline(Decline::Motor, has_left);
         let ([kinetic, potential], [end_kinetic, end_potential]) = (self.before, self.after);
-        let excess = (end_kinetic - kinetic) + (end_potential - potential) - work;
+        let mut supplied = work;
+        if !self.yields.is_empty() {
+            let (contacts, before) = (&self.contacts, &self.rows.u_before);
+            let h = self.options.time_step;
+            supplied += self.yields.supplied(contacts, h, &self.p, &self.u, before);
+        }
+        let excess = (end_kinetic - kinetic) + (end_potential - potential) - supplied;
         let fall = self.gravity.norm() * h;
         let least = h.like(0.5) * self.inertias.mass * fall * fall;
         let size = kinetic.max(end_kinetic).max(least);
@@ -756,7 +784,11 @@ impl<T: Lane> Block<T> {
         let zero = h.like(0.0);
         let own = self.contacts.slot(slot);
         let (u, before) = (self.u[slot][0], self.rows.u_before[slot][0]);
-        let gap = own.gap + theta * h * (u - before);
+        let mut gap = own.gap + theta * h * (u - before);
+        if !self.yields.is_empty() {
+            let is_soft = zero.lt(self.yields.diagonal[slot]);
+            gap = T::select(is_soft, self.yields.unexplained[slot], gap);
+        }
         let parts = gap.lt(zero) & !(gap + h * u).lt(zero);
         let gap = T::select(parts, zero, gap);
         T::select(own.active, gap, zero)

@@ -5,9 +5,10 @@
 //! implicit, `δ⁺ = δ − h u_N⁺` and `δ̇⁺ = −u_N⁺`, the force law is a complementarity problem again:
 //!
 //! ```text
-//! 0 ≤ u_N⁺ + p_N / (h (h k + d)) + k gap / (h k + d)  ⊥  p_N ≥ 0
+//! 0 ≤ u_N⁺ + p_N / (h (h k + d)) + k gap / (h k + d)  ⊥  p_N ≥ 0        where gap ≤ 0
 //! ```
 //!
+//! An open contact has gap/h in place of the last term: the deflection begins when it has closed.
 //! Compliance is thus a term on the diagonal of W and a shift of the free velocity. Its limit for
 //! k → ∞ is Signorini's law, and it is stable for every k and every step.
 //!
@@ -18,7 +19,7 @@
 //! machine on more contacts than it needs has one set of loads.
 //!
 //! Source: Anitescu and Potra 2002, *A time-stepping method for stiff multibody dynamics with
-//! contact and friction*, IJNME 55, 753–784; Lacoursière 2007, *Ghosts and machines*, ch. 3.
+//! contact and friction*, IJNME 55, 753–784.
 
 /// Spring and damper of a contact, the same along the normal and along the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,17 +83,21 @@ impl Compliance {
         let deflection = (-start).max(0.0);
         let by_force = before.map_or(f64::INFINITY, |p| p[0] / (h * stiffness));
         let known = gap.max(-(2.0 * deflection.min(by_force) + SLACK));
-        // A damper acts only in contact.
-        let rate = if known > 0.0 { 0.0 } else { damping };
-        let weight = h * stiffness + rate;
+        let weight = h * stiffness + damping;
         let diagonal = 1.0 / (h * weight);
+        // The damper acts on the deflection, which begins when the gap is closed.
+        let approach = if known > 0.0 {
+            known / h
+        } else {
+            known * stiffness / weight
+        };
         // Of an impact's friction only what the deflection holds is elastic.
         let held = (deflection / by_force.max(f64::MIN_POSITIVE)).min(1.0);
         let friction = before.map_or([0.0; 2], |[_, t, b]| [held * t, held * b]);
         let [t, b] = friction.map(|p| -diagonal * p);
         Yielding {
             diagonal,
-            shift: [known * stiffness / weight, t, b],
+            shift: [approach, t, b],
             gap: known,
             unexplained: gap - known,
             stiffness,
@@ -104,12 +109,21 @@ impl Compliance {
 impl Yielding {
     /// Elastic energy that the contact gives off in a step of `h` that ends with the normal velocity
     /// `u_N` and the impulse `p`, J; negative where it stores some.
-    #[must_use]
-    pub fn released(&self, h: f64, u_N: f64, p: [f64; 3]) -> f64 {
+    fn released(&self, h: f64, u_N: f64, p: [f64; 3]) -> f64 {
         let before = self.gap.min(0.0);
         let after = (self.gap + h * u_N).min(0.0);
         let [t, b] = self.friction;
         let sheared = (t * t + b * b) - (p[1] * p[1] + p[2] * p[2]);
         0.5 * (self.stiffness * (before * before - after * after) + self.diagonal * sheared)
+    }
+
+    /// Energy that a step of `h` may gain by the contact, J. `u_N`: normal velocities before and
+    /// after.
+    ///
+    /// The force is that at the end of the step, and acts over all of it: where the approach speeds
+    /// up it does `p_N (u_N − u_N⁺) / 2` more work than its spring gives off.
+    #[must_use]
+    pub fn supplied(&self, h: f64, u_N: [f64; 2], p: [f64; 3]) -> f64 {
+        self.released(h, u_N[1], p) + (0.5 * p[0] * (u_N[0] - u_N[1])).max(0.0)
     }
 }

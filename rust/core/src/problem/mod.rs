@@ -14,6 +14,7 @@
 //! - `scales`: factors between the velocity and the impulse of a contact.
 //! - `residual`: [`Residual`] judges an answer.
 //! - `prepared`: a problem together with its scales, for iterative methods.
+//! - `redundancy`: loads that equilibrium leaves open.
 //! - `passivity`: scales down an approximate answer that would add energy.
 
 mod dimension;
@@ -22,6 +23,7 @@ mod friction_contact;
 mod operator;
 mod passivity;
 mod prepared;
+mod redundancy;
 mod residual;
 mod scales;
 
@@ -32,6 +34,7 @@ pub use operator::{BlockSparseDelassus, BodyPairs, Operator, PairContact, RoundP
 pub(crate) use operator::{Storage, dot};
 pub(crate) use passivity::passive_share;
 pub(crate) use prepared::{Prepared, Proximal};
+pub use redundancy::undetermined_loads;
 pub(crate) use residual::{Magnitudes, Violations, evaluate_contact};
 pub use residual::{Residual, evaluate, evaluate_into};
 pub(crate) use scales::{ContactScales, Scales, power_of_two};

@@ -10,6 +10,7 @@ use crate::integrator::{
     WarmStart,
 };
 use crate::multibody::Energy;
+use crate::problem::undetermined_loads;
 
 /// Steps of a copy that a profile takes before it measures.
 const WARM_UP: usize = 10;
@@ -385,5 +386,13 @@ where
             self.scratch.free_velocity(),
             self.scratch.friction_coefficients(),
         )
+    }
+
+    /// Independent sets of normal forces that balance one another in the last step; see
+    /// [`undetermined_loads`].
+    #[must_use]
+    pub fn undetermined_loads(&self) -> usize {
+        let d = <S::Contact as LocatedContact>::Vector::N;
+        undetermined_loads(d, self.parts.operator(), self.scratch.impulses())
     }
 }

@@ -1,7 +1,6 @@
 //! Copies of a machine with some of its data changed.
 
 use super::Model;
-use crate::law::compliance::Compliance;
 use crate::multibody::description::JointKind;
 use crate::multibody::description::check_values::{in_range, length};
 use crate::multibody::error::ModelError;
@@ -72,19 +71,6 @@ impl Model {
         length("contact_radius", radius)?;
         for wheel in &mut description.wheels {
             wheel.contact_radius = Some(radius);
-        }
-        Self::from_description(description)
-    }
-
-    /// A copy whose wheels yield where they touch, or are rigid.
-    ///
-    /// # Errors
-    /// `NotPositive`, `Negative`, `NotFinite` or `OutOfRange` for an invalid stiffness or damping.
-    pub fn with_compliance(&self, compliance: Option<Compliance>) -> Result<Self, ModelError> {
-        let mut description = self.description.clone();
-        for wheel in &mut description.wheels {
-            wheel.stiffness = compliance.map(|c| c.stiffness);
-            wheel.damping = compliance.map(|c| c.damping).filter(|d| *d != 0.0);
         }
         Self::from_description(description)
     }
