@@ -34,8 +34,9 @@ QUICK = (
 #: Processor time of one test and the processes that it waits for, s. It depends less on the machine's load than time.
 LIMIT = 5.0
 TIER = pytest.StashKey[str]()
-#: PyTorch's first optimizer in a process imports it, which takes seconds; whose test that is depends on chance.
-COMPILER = "torch._dynamo"
+#: PyTorch, and the compiler that its first optimizer imports: each takes a process seconds, and whose test that is
+#: depends on chance.
+HEAVY = ("torch", "torch._dynamo")
 #: Processor time of the fixtures that this test set up and shares with others, s.
 SHARED: list[float] = []
 #: Tests of this run over the limit.
@@ -85,11 +86,16 @@ def processor_time() -> float:
     return sum(os.times()[:4])
 
 
+def n_imported() -> int:
+    """How many of the heavy modules this process has imported."""
+    return sum(name in sys.modules for name in HEAVY)
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
     """Notes when a test begins."""
     SHARED.clear()
-    item.user_properties += [("start", processor_time()), ("compiler", COMPILER in sys.modules)]
+    item.user_properties += [("start", processor_time()), ("imported", n_imported())]
     return (yield)
 
 
@@ -110,9 +116,7 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
     report = yield
     if report.when == "teardown":
         noted = dict(item.user_properties)
-        may_take_long = item.get_closest_marker("takes_long") is not None or noted["compiler"] != (
-            COMPILER in sys.modules
-        )
+        may_take_long = item.get_closest_marker("takes_long") is not None or noted["imported"] != n_imported()
         report.user_properties = [
             ("processor_time", processor_time() - noted["start"] - sum(SHARED)),
             ("takes_long", may_take_long),

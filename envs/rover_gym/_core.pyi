@@ -271,6 +271,7 @@ class RoverModel:
         steering_damping: float | None = None,
         steering_limit: float | None = None,
         wheel_width: float | None = None,
+        wheel_stiffness: float | None = None,
         ignore: Collection[str] = (),
         package_paths: Collection[str | PathLike[str]] = (),
     ) -> RoverModel:
@@ -293,6 +294,9 @@ class RoverModel:
             steering_limit: Largest steering set-point, rad; by default the joint's stop.
             wheel_width: Width of every wheel, m, 0 for thin discs, which cost less to simulate; by
                 default that of the cylinder that touches for it in the file, or 0.
+            wheel_stiffness: Normal stiffness of every wheel where it touches, N/m, 0 for rigid
+                wheels. By default a wheel yields 0.03 mm under its share of the weight, which
+                decides how the ground shares the weight among the wheels of a rigid chassis.
             ignore: Kinds of what changes the motion and is left out all the same: "friction",
                 "actuators", "closed loops", "tendons", "springs", "fluid".
             package_paths: Folders that are searched for the packages of `package://` names, before
@@ -321,6 +325,7 @@ class RoverModel:
         steering_damping: float | None = None,
         steering_limit: float | None = None,
         wheel_width: float | None = None,
+        wheel_stiffness: float | None = None,
         ignore: Collection[str] = (),
     ) -> RoverModel:
         """Reads an MJCF file, which MuJoCo compiles.
@@ -342,6 +347,9 @@ class RoverModel:
             steering_limit: Largest steering set-point, rad; by default the joint's stop.
             wheel_width: Width of every wheel, m, 0 for thin discs, which cost less to simulate; by
                 default that of the cylinder that touches for it in the file, or 0.
+            wheel_stiffness: Normal stiffness of every wheel where it touches, N/m, 0 for rigid
+                wheels. By default a wheel yields 0.03 mm under its share of the weight, which
+                decides how the ground shares the weight among the wheels of a rigid chassis.
             ignore: Kinds of what changes the motion and is left out all the same: "friction",
                 "actuators", "closed loops", "tendons", "springs", "fluid".
 
@@ -394,6 +402,8 @@ class RoverModel:
         *,
         wheel_radius: float | None = None,
         contact_radius: float | None = None,
+        wheel_stiffness: float | None = None,
+        wheel_damping: float | None = None,
         masses: Mapping[str, float] | Sequence[float] | None = None,
         steering_stiffness: float | None = None,
         steering_damping: float | None = None,
@@ -407,6 +417,9 @@ class RoverModel:
             wheel_radius: Radius of all wheels, m: shape, inertia and contact change together.
             contact_radius: Radius at which the wheels touch the ground, m; shape and inertia stay
                 as they are.
+            wheel_stiffness: Normal stiffness of all wheels where they touch, N/m, 0 for rigid
+                wheels, which have no damping either.
+            wheel_damping: Normal damping beside the stiffness, N s/m.
             masses: Masses by name of the solid, or one for each solid, kg. Inertias scale with
                 them.
             steering_stiffness: Stiffness of every steering controller, N m/rad.

@@ -19,7 +19,7 @@ def test_the_wheels_carry_the_weight_and_nothing_moves(name):
 
 
 def test_a_rigid_rover_on_four_wheels_has_the_loads_of_a_lever():
-    model = RoverModel.named("skid-steered")
+    model = RoverModel.named("skid-steered").replace(wheel_stiffness=0.0)
     front, back = check_statics(model).loads[:2].sum(), check_statics(model).loads[2:].sum()
     centre = model.tags(np.zeros(model.nq))["centre_of_mass"][0]
     assert (front - back) * 0.256 == pytest.approx(9.81 * model.mass * centre, rel=1e-6)

@@ -320,8 +320,8 @@ pub trait MechanicalSystem {
         None
     }
 
-    /// Adds a number for each contact (n_c), 1/kg, to its entries on the diagonal of the assembled W.
-    /// Called only for a system that [has compliance](Self::has_compliance).
+    /// Adds a number for each contact (n_c), 1/kg, to its entries on the diagonal of the assembled
+    /// W. Called only for a system that [has compliance](Self::has_compliance).
     fn soften(&mut self, _diagonal: impl Iterator<Item = f64>) {}
 
     /// Whether a solve that does not converge suggests that the problem has no answer. True by

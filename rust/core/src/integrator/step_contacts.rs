@@ -59,7 +59,7 @@ pub(super) fn assemble_contacts<S: MechanicalSystem>(
 /// `ws.yielding` of every contact, and its part in W. `ws.p` holds the last step's impulses if
 /// there are any, and `ws.v` is the velocity that led to the end pose.
 ///
-/// A contact with restitution is rigid in the step in which it closes: what bounces is Newton's law.
+/// A contact with restitution is rigid in the step in which it closes, and Newton's law bounces it.
 fn yield_under_load<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,

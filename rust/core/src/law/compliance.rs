@@ -30,7 +30,7 @@ pub struct Compliance {
     pub damping: f64,
 }
 
-/// Law of one contact over a step: Coulomb's law between the impulse p and `u + diagonal p + shift`.
+/// Law of one contact over a step: Coulomb's law between impulse p and `u + diagonal p + shift`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Yielding {
     /// Term on the diagonal of W, 1/kg; 0 for a rigid contact.
@@ -72,7 +72,7 @@ impl Compliance {
     /// - `gap`: of the pose that the step reaches without impulses, less (1 − θ) h u_N there, m. A
     ///   stiff contact then comes to rest within a step.
     /// - `start`: gap at the start of the step, m.
-    /// - `before`: impulse of the last step, N s, in the contact's frame; `None` if it is not known.
+    /// - `before`: impulse of the last step, N s, in the contact's frame; `None` if it is unknown.
     ///
     /// A body that strikes a stiff contact penetrates it within the step by more than any spring
     /// would allow. That part is not elastic and is not given back: it is `unexplained`, and
@@ -107,8 +107,8 @@ impl Compliance {
 }
 
 impl Yielding {
-    /// Elastic energy that the contact gives off in a step of `h` that ends with the normal velocity
-    /// `u_N` and the impulse `p`, J; negative where it stores some.
+    /// Elastic energy that the contact gives off in a step of `h` that ends with the normal
+    /// velocity `u_N` and the impulse `p`, J; negative where it stores some.
     fn released(&self, h: f64, u_N: f64, p: [f64; 3]) -> f64 {
         let before = self.gap.min(0.0);
         let after = (self.gap + h * u_N).min(0.0);

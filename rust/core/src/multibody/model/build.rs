@@ -105,7 +105,6 @@ impl Model {
             n_poses,
             n_rotations,
             has_slides,
-            has_compliance: wheels.iter().any(|wheel| wheel.compliance.is_some()),
             only_turns,
             armatures,
             limited,

@@ -51,7 +51,6 @@ pub struct Model {
     n_poses: usize,
     n_rotations: usize,
     has_slides: bool,
-    has_compliance: bool,
     only_turns: bool,
     /// Free and spherical joints, with their first velocities.
     rotating: Vec<(Joint, usize)>,
@@ -199,7 +198,7 @@ impl Model {
     #[inline]
     #[must_use]
     pub fn has_compliance(&self) -> bool {
-        self.has_compliance
+        self.wheels.iter().any(|wheel| wheel.compliance.is_some())
     }
 
     /// Whether every root is free and every other joint is revolute and uncoupled, as in a rover.
