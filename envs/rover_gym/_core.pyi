@@ -1257,6 +1257,14 @@ class StepReport:
     @property
     def energy_lifted(self) -> float:
         """Potential energy gained by pushing bodies out of penetration, summed over the steps, J."""
+    @property
+    def undetermined_loads(self) -> int:
+        """Number of independent sets of wheel loads that balance one another in the last step.
+
+        0 means that equilibrium determines the loads. Otherwise they are one of many answers, and
+        micrometres decide which: a rigid chassis on four rigid wheels has one such set. Wheels with
+        a `stiffness` have none. Friction is not considered; 0 for other machines than rovers.
+        """
     def followed_by(self, later: StepReport) -> StepReport:
         """The report of these steps and of further ones.
 
