@@ -111,6 +111,8 @@ fn drives_survive_both_formats_and_bad_ones_are_refused_by_field() {
             contact_radius: None,
             width: None,
             rounding: None,
+            stiffness: None,
+            damping: None,
             material: None,
             torque_limit: 1.0,
             drive_sign: 1.0,
