@@ -16,12 +16,9 @@ struct Bounds {
     not_reached: BTreeMap<String, f64>,
 }
 
-/// Work sufficient for every problem that is solved at all; the default stops four of them earlier.
-const AMPLE: u64 = 4_000_000_000;
-
-/// How well a problem is solved from rest with the default options but for
-/// the tolerance, relative and in m/s, and the budget.
-fn answer(recorded: &Recorded, tolerance: f64, budget: u64) -> SolveReport {
+/// How well a problem is solved from rest with the default options but for the tolerance, relative
+/// and in m/s.
+fn answer(recorded: &Recorded, tolerance: f64) -> SolveReport {
     let problem =
         FrictionContactProblem::new(recorded.dimension, &recorded.W, &recorded.q, &recorded.mu)
             .expect("a sound problem");
@@ -30,7 +27,6 @@ fn answer(recorded: &Recorded, tolerance: f64, budget: u64) -> SolveReport {
     let options = SolverOptions {
         tolerance,
         velocity_tolerance: tolerance.max(1e-9),
-        budget,
         ..SolverOptions::default()
     };
     solve(
@@ -57,8 +53,7 @@ fn every_problem_of_the_shelf_within_its_bound() {
         .iter()
         .filter_map(|problem| {
             let bound = bounds.not_reached.get(&problem.name);
-            let budget = bound.map_or(AMPLE, |_| SolverOptions::DEFAULT_BUDGET);
-            let report = answer(problem, bounds.aim, budget);
+            let report = answer(problem, bounds.aim);
             let holds = match bound {
                 Some(bound) => report.residual <= *bound,
                 None => report.is_converged() && report.residual <= bounds.aim,
@@ -75,7 +70,7 @@ fn the_rovers_steps_to_the_last_digits() {
     let problems = shelf(|name| name.starts_with("rover"));
     assert!(!problems.is_empty());
     for problem in problems {
-        let report = answer(&problem, 1e-12, SolverOptions::DEFAULT_BUDGET);
+        let report = answer(&problem, 1e-12);
         assert!(
             report.is_converged() && report.residual < 1e-12,
             "{}: {report:?}",
@@ -88,8 +83,8 @@ fn the_rovers_steps_to_the_last_digits() {
 #[test]
 fn the_default_budget_holds() {
     for problem in shelf(|name| name.contains("460") || name == "wall_hit") {
-        let report = answer(&problem, 1e-12, SolverOptions::DEFAULT_BUDGET);
-        assert!(report.work <= SolverOptions::DEFAULT_BUDGET);
+        let report = answer(&problem, 1e-12);
+        assert!(report.work <= SolverOptions::usual_budget(problem.mu.len()));
         assert!(report.residual < 0.1, "{}: {report:?}", problem.name);
     }
 }

@@ -104,7 +104,7 @@ fn displace<S: MechanicalSystem>(
             &mut ws.solver,
         )
     };
-    ws.work_left = ws.work_left.saturating_sub(solved.work);
+    ws.work_spent += solved.work;
     ws.y.fill(0.0);
     system.add_impulses(&ws.p_position, &mut ws.y);
     ws.half_solve_back(|y| system.half_solve_back(y));
