@@ -6,7 +6,9 @@ use crate::problem::{Operator, Prepared, Residual};
 use crate::solver::options::{Method, SolverOptions};
 use crate::solver::report::{Outcome, SolveStatus, Stage};
 use crate::solver::scratch::Scratch;
-use crate::solver::stage::{admm, gauss_seidel, guided, newton, pivoting, proximal, restarts};
+use crate::solver::stage::{
+    gauss_seidel, guided, interior_point, newton, pivoting, proximal, restarts,
+};
 use crate::solver::work::SweepBudget;
 
 /// Most sweeps over many contacts before Newton. A dense Newton step costs about as much as `n`
@@ -18,10 +20,6 @@ fn sweep_budget(data: &Prepared<'_>) -> usize {
         Operator::BlockSparse(_) => (data.mu.len() / 20).max(50),
     }
 }
-
-/// ADMM iterations that bring many contacts close enough for the proximal point method: on piles of
-/// 250 and 460 contacts it then takes a third to five sixths of the steps.
-const ALTERNATIONS: usize = 300;
 
 /// Residual below which few contacts get a second proximal point run, from the best answer.
 /// Problems without a solution mostly stay above it.
@@ -245,16 +243,9 @@ pub(in crate::solver) fn escalate<const D: usize>(
     }
     p.copy_from_slice(&scratch.start);
     if !is_few {
-        let own = SolverOptions {
-            max_sweeps: ALTERNATIONS.min(options.max_sweeps),
-            ..*options
-        };
-        let found = admm::solve::<D>(data, &own, p, u, scratch, iterations);
-        if let Some(outcome) = ladder.enter(Stage::Admm, found, p, scratch, *iterations) {
+        let found = interior_point::solve::<D>(data, options, p, u, scratch, iterations);
+        if let Some(outcome) = ladder.enter(Stage::InteriorPoint, found, p, scratch, *iterations) {
             return outcome;
-        }
-        if ladder.nearest.stage != Stage::Admm {
-            p.copy_from_slice(&scratch.start);
         }
     }
     let found = proximal::solve::<D>(data, options, p, u, scratch, iterations);
