@@ -75,7 +75,7 @@ impl<Q: Clone> Audited<Q> {
 
 /// Divisor of the solver's budget for the least that each solve of a step gets, however much the
 /// ones before it have spent.
-const SOLVE_SHARE: u64 = 64;
+const SOLVE_SHARE: u64 = 16;
 
 impl<Q: Clone, C> Scratch<Q, C> {
     /// Room for nv velocities and n contacts of d components; `q` is any

@@ -21,6 +21,9 @@ fn sweep_budget(data: &Prepared<'_>) -> usize {
     }
 }
 
+/// Newton steps of a short attempt with the proximal point method.
+const ATTEMPT: usize = 100;
+
 /// Residual below which few contacts get a second proximal point run, from the best answer.
 /// Problems without a solution mostly stay above it.
 const NEAR: f64 = 1e-4;
@@ -210,6 +213,50 @@ fn guide_from_rest<const D: usize>(
     None
 }
 
+/// The proximal point method from `p`.
+fn descend<const D: usize>(
+    data: &Prepared<'_>,
+    ladder: &mut Ladder<'_>,
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &mut Scratch,
+    iterations: &mut usize,
+) -> Option<Outcome> {
+    let found = proximal::solve::<D>(data, options, p, u, scratch, iterations);
+    ladder.enter(Stage::ProximalPoint, found, p, scratch, *iterations)
+}
+
+/// Many contacts: the proximal point method from the nearest answer, from zero, and again from the
+/// nearest one. What is near by its residual may be far by its modes, and then a start from zero
+/// takes a tenth of the steps; so the first two attempts are short.
+fn descend_many<const D: usize>(
+    data: &Prepared<'_>,
+    ladder: &mut Ladder<'_>,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &mut Scratch,
+    iterations: &mut usize,
+) -> Option<Outcome> {
+    let options = ladder.options;
+    let brief = SolverOptions {
+        max_newton_steps: ATTEMPT.min(options.max_newton_steps),
+        ..*options
+    };
+    for (is_from_zero, options) in [(false, &brief), (true, &brief), (false, options)] {
+        if is_from_zero {
+            p.fill(0.0);
+        } else {
+            p.copy_from_slice(&scratch.nearest);
+        }
+        let found = descend::<D>(data, ladder, options, p, u, scratch, iterations);
+        if found.is_some() || scratch.work.is_exhausted {
+            return found;
+        }
+    }
+    None
+}
+
 /// [`Method::Auto`]: cheap stages first, robust ones last.
 pub(in crate::solver) fn escalate<const D: usize>(
     data: &Prepared<'_>,
@@ -248,8 +295,12 @@ pub(in crate::solver) fn escalate<const D: usize>(
             return outcome;
         }
     }
-    let found = proximal::solve::<D>(data, options, p, u, scratch, iterations);
-    if let Some(outcome) = ladder.enter(Stage::ProximalPoint, found, p, scratch, *iterations) {
+    let found = if is_few {
+        descend::<D>(data, &mut ladder, options, p, u, scratch, iterations)
+    } else {
+        descend_many::<D>(data, &mut ladder, p, u, scratch, iterations)
+    };
+    if let Some(outcome) = found {
         return outcome;
     }
     if is_few && ladder.nearest.residual.is_finite() {
@@ -259,10 +310,8 @@ pub(in crate::solver) fn escalate<const D: usize>(
         }
         if ladder.nearest.residual.relative < NEAR {
             p.copy_from_slice(&scratch.nearest);
-            let found = proximal::solve::<D>(data, options, p, u, scratch, iterations);
-            if let Some(outcome) =
-                ladder.enter(Stage::ProximalPoint, found, p, scratch, *iterations)
-            {
+            let found = descend::<D>(data, &mut ladder, options, p, u, scratch, iterations);
+            if let Some(outcome) = found {
                 return outcome;
             }
         }
