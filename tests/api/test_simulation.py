@@ -309,9 +309,7 @@ def test_limits_that_exclude_each_other_are_refused():
 def boxes_on_each_other(**options):
     """Three boxes, each ten times heavier than the one below it, at rest on one another."""
     box = {"kind": "box", "size": [0.4, 0.2, 0.4]}
-    solids = [
-        {"name": f"box_{k}", "joint": "free", "mass": 10.0**k, "shape": box, "collides": True} for k in range(3)
-    ]
+    solids = [{"name": f"box_{k}", "joint": "free", "mass": 10.0**k, "shape": box, "collides": True} for k in range(3)]
     model = rover_gym.RoverModel.from_dict({"format": 1, "name": "boxes", "solids": solids})
     simulation = rover_gym.Simulation(model, friction=0.6, **options)
     q = np.zeros(model.nq)
