@@ -1224,6 +1224,12 @@ class StepReport:
     def is_converged(self) -> bool:
         """Whether the contact solver met its tolerance in every step."""
     @property
+    def budget_exhausted(self) -> bool:
+        """Whether a contact problem stayed unsolved because the solver's `budget` was spent.
+
+        With a larger `budget` it may be solved.
+        """
+    @property
     def steps(self) -> int:
         """Number of steps taken."""
     @property
@@ -1550,6 +1556,8 @@ class Simulation:
         solver: Method for the contact problem, as in `solve_friction_contact`.
         tolerance: Largest relative residual of the contact problem; 1e-12 by default.
         max_iterations: Largest number of iterations of the contact solver in a step.
+        budget: Largest amount of work of the contact solver in a step, counted and not timed, in the
+            unit of `solve_friction_contact`; None grows with the number of contacts.
         stabilisation: What is done about penetration: "projection" moves the bodies out of it,
             "none" leaves it.
         warm_start: Whether the contact solver starts from the last step's impulses.
@@ -1579,6 +1587,7 @@ class Simulation:
         solver: Literal["auto", "nsgs", "newton", "proximal", "admm"] = "auto",
         tolerance: float | None = None,
         max_iterations: int = 1000,
+        budget: int | None = None,
         stabilisation: Literal["projection", "none"] = "projection",
         warm_start: bool = True,
         accuracy: Literal["fast", "balanced", "reference"] | float | None = None,
@@ -3948,6 +3957,7 @@ class SolverReport:
         "newton",
         "proximal",
         "restarts",
+        "interior_point",
         "admm",
         "relaxed",
     ]:
@@ -4070,7 +4080,7 @@ def solve_friction_contact(
     solver: Literal["auto", "nsgs", "newton", "proximal", "admm", "relaxed"] = "auto",
     max_iterations: int = 1000,
     initial: npt.ArrayLike | None = None,
-    budget: int = 300000000,
+    budget: int | None = None,
     history: bool = False,
 ) -> FrictionContactSolution:
     """Solves the friction-contact problem K* contains W p + q + mu |u_T| n, orthogonal to p in K.
@@ -4091,7 +4101,8 @@ def solve_friction_contact(
         max_iterations: Largest number of Newton steps, sweeps or ADMM iterations.
         initial: Impulses from which the solver starts, (n_c d,), N s; zero by default.
         budget: Largest amount of work, counted and not timed: a unit is one multiplication and
-            addition in a product with W. The default takes about 0.3 s. What exceeds it is left
+            addition in a product with W. None allows 3e8 units, about 0.3 s, for up to 100 contacts,
+            and more in proportion to the square of the contacts. What exceeds the budget is left
             undone, and the report says so.
         history: Whether the solution keeps the residuals measured on the way.
 

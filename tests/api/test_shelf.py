@@ -21,14 +21,13 @@ VELOCITY = 1e-6
 @pytest.mark.parametrize("name", names())
 def test_the_law_holds_and_velocities_are_the_known_ones(name: str) -> None:
     problem, velocities = load(name)
-    # What the default budget does not allow takes seconds, and is solved all the same.
-    options = {"budget": 4_000_000_000}
+    not_reached = BOUNDS["not_reached"] | BOUNDS["not_reached_dense"]
+    budget = 300_000_000 if name in not_reached else None  # nobody waits for what is not solved
     answer = rover_gym.solve_friction_contact(
-        problem.W, problem.q, problem.mu, BOUNDS["aim"], dimension=problem.dimension, **options
+        problem.W, problem.q, problem.mu, BOUNDS["aim"], dimension=problem.dimension, budget=budget
     )
     impulses = answer.impulses.ravel()
     relative, violation = residual(problem, impulses)
-    not_reached = BOUNDS["not_reached"] | BOUNDS["not_reached_dense"]
     if name in not_reached:
         assert relative <= not_reached[name]
         return

@@ -304,3 +304,31 @@ def test_limits_that_exclude_each_other_are_refused():
         rover_gym.RoverModel.from_dict(description)
     assert caught.value.field == "solids[1].limits.lower"
     assert caught.value.value == 0.2
+
+
+def boxes_on_each_other(**options):
+    """Three boxes, each ten times heavier than the one below it, at rest on one another."""
+    box = {"kind": "box", "size": [0.4, 0.2, 0.4]}
+    solids = [{"name": f"box_{k}", "joint": "free", "mass": 10.0**k, "shape": box, "collides": True} for k in range(3)]
+    model = rover_gym.RoverModel.from_dict({"format": 1, "name": "boxes", "solids": solids})
+    simulation = rover_gym.Simulation(model, friction=0.6, **options)
+    q = np.zeros(model.nq)
+    q[1::6] = 0.1, 0.3, 0.5
+    simulation.set_state(q)
+    return simulation
+
+
+def test_a_step_that_its_budget_ended_says_so():
+    """The story: a step had a quarter of a fixed budget, took no other, and only said "not_converged"."""
+    solved = boxes_on_each_other().step(20)
+    assert solved.is_converged
+    assert not solved.budget_exhausted
+    scant = boxes_on_each_other(budget=100)
+    unsolved = scant.step(20)
+    assert unsolved.status == "not_converged"
+    assert unsolved.budget_exhausted
+    assert unsolved.followed_by(solved).budget_exhausted
+    assert copy.copy(scant).step().budget_exhausted  # a copy keeps the option
+    assert boxes_on_each_other(budget=None).step(20).is_converged
+    with pytest.raises(rover_gym.OptionError, match="budget"):
+        boxes_on_each_other(budget=-1)

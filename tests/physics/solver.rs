@@ -978,7 +978,7 @@ fn a_budget_ends_every_method_with_the_nearest_answer_known() {
         for budget in [0, 1 << 16, 1 << 18, 1 << 20, 1 << 22, 1 << 24] {
             let options = SolverOptions {
                 method,
-                budget,
+                budget: Some(budget),
                 tolerance: 1e-14,
                 velocity_tolerance: 1e-14,
                 ..SolverOptions::default()

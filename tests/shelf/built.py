@@ -154,15 +154,48 @@ def arch(n: int, thickness: float, mu: float = 0.7) -> FreeBodies:
     return scene.problem()
 
 
-def wall(courses: int, bricks: int, mu: float = 0.6) -> FreeBodies:
-    """A wall in running bond, bricks of 0.2 m x 0.1 m x 0.1 m; a brick in its middle is hit at 2 m/s along z."""
+def row_of_spheres(masses: list[float], speed: float, mu: float = 0.5) -> FreeBodies:
+    """Spheres of 0.1 m radius in a row on the floor, each touching the next; the first is struck along the row."""
+    scene, radius = Scene(), 0.1
+    along = np.array([1.0, 0.0, 0.0])
+    for k, mass in enumerate(masses):
+        inertia = 0.4 * mass * radius**2 * np.eye(3)
+        velocity = speed * along if k == 0 else None
+        scene.body(mass, inertia, 2.0 * radius * k * along + radius * UP, velocity=velocity)
+        scene.touch(GROUND, k, 2.0 * radius * k * along, UP, mu)
+    for k in range(len(masses) - 1):
+        scene.touch(k, k + 1, (2.0 * k + 1.0) * radius * along + radius * UP, along, mu)
+    return scene.problem()
+
+
+def stacks_sliding(boxes: int, mu: float = 0.5) -> FreeBodies:
+    """Two stacks of cubes of 1 m, side by side and touching; they slide along the floor towards each other at 1 m/s."""
+    scene = Scene()
+    for side in (-1.0, 1.0):
+        for level in range(boxes):
+            centre = [0.5 * side, level + 0.5, 0.0]
+            k = scene.body(1.0, box(1.0, (1.0, 1.0, 1.0)), np.array(centre), velocity=np.array([-side, 0.0, 0.2]))
+            for x, z in SQUARE:
+                scene.touch(k - 1 if level else GROUND, k, [0.5 * side + x, level, z], UP, mu)
+    for level in range(boxes):
+        for y, z in SQUARE:
+            scene.touch(level, boxes + level, [0.0, level + 0.5 + y, z], np.array([1.0, 0.0, 0.0]), mu)
+    return scene.problem()
+
+
+def wall(courses: int, bricks: int, mu: float = 0.6, top: float = 1.0) -> FreeBodies:
+    """A wall in running bond, bricks of 0.2 m x 0.1 m x 0.1 m; a brick in its middle is hit at 2 m/s along z.
+
+    The bricks of the highest course are `top` times heavier than the others.
+    """
     scene = Scene()
     centres = [0.2 * i + 0.1 * (course % 2) for course in range(courses) for i in range(bricks)]
     for k, x in enumerate(centres):
         hit = k == (courses // 2) * bricks + bricks // 2
+        mass = 4.0 * (top if k >= (courses - 1) * bricks else 1.0)
         scene.body(
-            4.0,
-            box(4.0, (0.2, 0.1, 0.1)),
+            mass,
+            box(mass, (0.2, 0.1, 0.1)),
             [x, 0.1 * (k // bricks) + 0.05, 0.0],
             velocity=np.array([0.0, 0.0, 2.0 if hit else 0.0]),
         )

@@ -27,6 +27,7 @@ SOLVER_OPTIONS = (
     "solver",
     "tolerance",
     "max_iterations",
+    "budget",
     "stabilisation",
     "warm_start",
 )

@@ -21,6 +21,7 @@ OPTIONS = (
     "forecast",
     "solver",
     "max_iterations",
+    "budget",
     "stabilisation",
     "warm_start",
 )

@@ -102,6 +102,9 @@ struct Settings {
     solver: String,
     tolerance: f64,
     max_iterations: usize,
+    /// None grows with the problem.
+    #[serde(default)]
+    budget: Option<u64>,
     stabilisation: String,
     warm_start: bool,
 }
@@ -241,6 +244,7 @@ impl Settings {
                 velocity_tolerance: self.tolerance.max(1e-9),
                 max_newton_steps: self.max_iterations,
                 max_sweeps: self.max_iterations,
+                budget: self.budget,
                 ..SolverOptions::default()
             },
             ..StepOptions::default()

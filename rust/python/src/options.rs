@@ -4,8 +4,9 @@
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::integrator::{Stabilisation, StepOptions, Variant};
+use rover_core::solver::SolverOptions;
 
-use crate::arguments::{count, flag, number, text};
+use crate::arguments::{count, flag, number, text, whole};
 use crate::errors::{BorderError, Kind, Value};
 use crate::friction_contact::{SIMULATION_SOLVERS, solver_options};
 use crate::materials;
@@ -63,6 +64,7 @@ pub struct SolverWords {
 pub struct Options {
     pub step: StepOptions,
     tolerance: f64,
+    budget: Option<u64>,
     words: SolverWords,
 }
 
@@ -71,6 +73,7 @@ impl Options {
     pub fn of(step: StepOptions) -> Self {
         Self {
             tolerance: step.solver.tolerance,
+            budget: step.solver.budget,
             words: SolverWords {
                 solver: "auto".to_owned(),
                 max_iterations: 1000,
@@ -98,6 +101,8 @@ impl Options {
             "solver" => self.words.solver = text()?,
             "tolerance" => self.tolerance = number()?,
             "max_iterations" => self.words.max_iterations = count(value, Kind::Option, field)?,
+            "budget" if value.is_none() => self.budget = None,
+            "budget" => self.budget = Some(whole(value, Kind::Option, field)?),
             _ => return Ok(false),
         }
         Ok(true)
@@ -110,7 +115,10 @@ impl Options {
             max_iterations,
         } = &self.words;
         let known = &SIMULATION_SOLVERS;
-        self.step.solver = solver_options(solver, self.tolerance, *max_iterations, known)?;
+        self.step.solver = SolverOptions {
+            budget: self.budget,
+            ..solver_options(solver, self.tolerance, *max_iterations, known)?
+        };
         Ok((self.step, self.words))
     }
 }
@@ -138,6 +146,9 @@ pub fn settings<'py>(
     settings.set_item("solver", &words.solver)?;
     settings.set_item("tolerance", options.solver.tolerance)?;
     settings.set_item("max_iterations", words.max_iterations)?;
+    if let Some(budget) = options.solver.budget {
+        settings.set_item("budget", budget)?;
+    }
     let stabilisation = name_of(options.stabilisation, &STABILISATIONS);
     settings.set_item("stabilisation", stabilisation)?;
     settings.set_item("warm_start", options.warm_start)?;

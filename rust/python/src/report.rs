@@ -31,6 +31,14 @@ impl StepReport {
         self.inner.is_converged()
     }
 
+    /// Whether a contact problem stayed unsolved because the solver's `budget` was spent.
+    ///
+    /// With a larger `budget` it may be solved.
+    #[getter]
+    fn budget_exhausted(&self) -> bool {
+        self.inner.budget_exhausted
+    }
+
     /// Number of steps taken.
     #[getter]
     fn steps(&self) -> usize {

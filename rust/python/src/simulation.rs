@@ -55,6 +55,8 @@ use crate::stepping::{Problem, problem, step};
 ///     solver: Method for the contact problem, as in `solve_friction_contact`.
 ///     tolerance: Largest relative residual of the contact problem; 1e-12 by default.
 ///     max_iterations: Largest number of iterations of the contact solver in a step.
+///     budget: Largest amount of work of the contact solver in a step, counted and not timed, in the
+///         unit of `solve_friction_contact`; None grows with the number of contacts.
 ///     stabilisation: What is done about penetration: "projection" moves the bodies out of it,
 ///         "none" leaves it.
 ///     warm_start: Whether the contact solver starts from the last step's impulses.
@@ -113,9 +115,9 @@ impl Simulation {
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
     #[pyo3(signature = (model = Given::MISSING, terrain = None, *, gravity = None, friction = Given::MISSING, restitution = Given::MISSING,
         materials = None, time_step = Given::MISSING, variant = Given::MISSING, theta = Given::MISSING, forecast = Given::MISSING,
-        solver = Given::MISSING, tolerance = Given::MISSING, max_iterations = Given::MISSING,
+        solver = Given::MISSING, tolerance = Given::MISSING, max_iterations = Given::MISSING, budget = None,
         stabilisation = Given::MISSING, warm_start = Given::MISSING, accuracy = None),
-        text_signature = "(model=None, terrain=None, *, gravity=None, friction=0.7, restitution=0.0, materials=None, time_step=None, variant=None, theta=0.5, forecast=0.5, solver='auto', tolerance=None, max_iterations=1000, stabilisation='projection', warm_start=True, accuracy=None)")]
+        text_signature = "(model=None, terrain=None, *, gravity=None, friction=0.7, restitution=0.0, materials=None, time_step=None, variant=None, theta=0.5, forecast=0.5, solver='auto', tolerance=None, max_iterations=1000, budget=None, stabilisation='projection', warm_start=True, accuracy=None)")]
     fn new(
         model: Given<'_>,
         terrain: Option<&Bound<'_, PyAny>>,
@@ -130,6 +132,7 @@ impl Simulation {
         solver: Given<'_>,
         tolerance: Given<'_>,
         max_iterations: Given<'_>,
+        budget: Option<&Bound<'_, PyAny>>,
         stabilisation: Given<'_>,
         warm_start: Given<'_>,
         accuracy: Option<&Bound<'_, PyAny>>,
@@ -148,6 +151,7 @@ impl Simulation {
             ("forecast", forecast.given()),
             ("solver", solver.given()),
             ("max_iterations", max_iterations.given()),
+            ("budget", budget.cloned()),
             ("stabilisation", stabilisation.given()),
             ("warm_start", warm_start.given()),
         ];

@@ -57,7 +57,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJean {
         probe: &mut dyn Probe,
     ) -> Result<StepReport, StepError> {
         scratch.fit(system.nv());
-        scratch.grant_work(&options.solver, system.solves_to_the_end());
+        scratch.work_spent = 0;
         let mut attempts = MOST_ATTEMPTS;
         let whole = Part {
             options,
@@ -120,7 +120,7 @@ impl Part<'_> {
             // Where sweeps end early by design they would do so in a smaller step too.
             let can_halve = self.depth < MOST_HALVINGS
                 && *self.attempts > 1
-                && ws.work_left > 0
+                && ws.has_work_left(&options.solver)
                 && system.solves_to_the_end();
             let attempted = attempt(system, options, start, warm_start, ws, is_gyroscopic, probe);
             let Some(mut report) = attempted else {

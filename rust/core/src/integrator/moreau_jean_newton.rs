@@ -59,7 +59,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
     ) -> Result<StepReport, StepError> {
         let ws = scratch;
         ws.fit(system.nv());
-        ws.grant_work(&options.solver, system.solves_to_the_end());
+        ws.work_spent = 0;
         let start = Start {
             configuration: &*state.configuration,
             v: &*state.v,
@@ -156,6 +156,7 @@ fn settle<S: MechanicalSystem>(
             }
             is_settled = true;
             report.status = solved.status;
+            report.budget_exhausted = solved.budget_exhausted;
             break;
         }
     }

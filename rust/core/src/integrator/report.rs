@@ -1,6 +1,6 @@
 //! Report of a step.
 
-use crate::solver::SolveReport;
+use crate::solver::{SolveReport, SolveStatus};
 
 /// Whether the equations of the step were solved to their tolerance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -18,6 +18,9 @@ pub enum StepStatus {
 pub struct StepReport {
     /// Worst status.
     pub status: StepStatus,
+    /// Whether a solve that did not converge ended because its
+    /// [budget](crate::solver::SolverOptions::budget) was spent: with a larger one it may converge.
+    pub budget_exhausted: bool,
     /// Steps taken.
     pub steps: usize,
     /// Iterations of the contact solver, all steps together.
@@ -59,6 +62,7 @@ impl StepReport {
         self.residual = self.residual.max(solved.residual);
         if !solved.is_converged() {
             self.status = StepStatus::NotConverged;
+            self.budget_exhausted |= solved.status == SolveStatus::BudgetExhausted;
         }
     }
 
@@ -67,6 +71,7 @@ impl StepReport {
         if later.status == StepStatus::NotConverged {
             self.status = StepStatus::NotConverged;
         }
+        self.budget_exhausted |= later.budget_exhausted;
         self.steps += later.steps;
         self.iterations += later.iterations;
         self.factorisations += later.factorisations;

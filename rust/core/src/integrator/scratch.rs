@@ -40,8 +40,8 @@ pub struct Scratch<Q, C> {
     pub(super) u_position: Vec<f64>,
     pub(super) solver: SolverWorkspace,
     pub(super) audited: Audited<Q>,
-    /// Work left for the step's solves, in the solver's unit.
-    pub(super) work_left: u64,
+    /// Work of the step's solves so far, in the solver's unit.
+    pub(super) work_spent: u64,
 }
 
 /// Scratch of a system's steps.
@@ -76,10 +76,9 @@ impl<Q: Clone> Audited<Q> {
     }
 }
 
-/// Divisors of the solver's budget: for all solves of a shared step together, and for the least
-/// that each solve gets.
-const STEP_SHARE: u64 = 4;
-const SOLVE_SHARE: u64 = 64;
+/// Divisor of the solver's budget for the least that each solve of a step gets, however much the
+/// ones before it have spent.
+const SOLVE_SHARE: u64 = 16;
 
 impl<Q: Clone, C> Scratch<Q, C> {
     /// Room for nv velocities and n contacts of d components; `q` is any
@@ -110,7 +109,7 @@ impl<Q: Clone, C> Scratch<Q, C> {
             u_position: room(),
             solver: SolverWorkspace::default(),
             audited: Audited::new(q.clone(), nv),
-            work_left: 0,
+            work_spent: 0,
         }
     }
 
@@ -143,17 +142,19 @@ impl<Q: Clone, C> Scratch<Q, C> {
         std::mem::swap(&mut self.y, &mut self.dv);
     }
 
-    /// Sets the work of a new step: all of a solve's budget, or a fraction if the step shares it.
-    pub(super) fn grant_work(&mut self, options: &SolverOptions, is_shared: bool) {
-        self.work_left = options.budget / if is_shared { STEP_SHARE } else { 1 };
-    }
-
-    /// The options of the step's next solve.
+    /// The options of the step's next solve: all solves of a step share one budget.
     pub(super) fn solver_options(&self, options: &SolverOptions) -> SolverOptions {
+        let whole = options.budget_of(self.contacts.len());
+        let left = whole.saturating_sub(self.work_spent);
         SolverOptions {
-            budget: self.work_left.max(options.budget / SOLVE_SHARE),
+            budget: Some(left.max(whole / SOLVE_SHARE)),
             ..*options
         }
+    }
+
+    /// Whether the step's solves have left some of its budget.
+    pub(super) fn has_work_left(&self, options: &SolverOptions) -> bool {
+        self.work_spent < options.budget_of(self.contacts.len())
     }
 
     /// Makes a step that was taken elsewhere the last one: `list` hands its contacts with their

@@ -261,7 +261,7 @@ fn solve_problem<S: MechanicalSystem>(
         &mut ws.u,
         &mut ws.solver,
     );
-    ws.work_left = ws.work_left.saturating_sub(solved.work);
+    ws.work_spent += solved.work;
     solved
 }
 

@@ -261,7 +261,7 @@ fn judge<const D: usize>(
     islands: IslandSolver<'_>,
 ) -> SolveReport {
     let mut iterations = 0;
-    scratch.work = Work::new(options.budget);
+    scratch.work = Work::new(options.budget_of(data.mu.len()));
     scratch.rungs = Rungs::default();
     let outcome = run::<D>(data, options, p, u, scratch, islands, &mut iterations);
     let Outcome {

@@ -95,13 +95,14 @@ pub struct SolverOptions {
     /// Measured: smaller values amplify rounding (`ε/α`) in the null space of `W`; larger ones cost
     /// refinement steps.
     pub regularisation: f64,
-    /// Most work of a solve; default [`DEFAULT_BUDGET`](Self::DEFAULT_BUDGET). Work is counted, not
-    /// timed, so that equal problems end alike on every machine.
+    /// Most work of a solve; default `None`, which grows with the problem
+    /// ([`usual_budget`](Self::usual_budget)). Work is counted, not timed, so that equal problems
+    /// end alike on every machine.
     ///
     /// The unit is one multiply–add in a product with `W`. When the budget is spent, the solve
     /// stops with [`SolveStatus::BudgetExhausted`](super::SolveStatus::BudgetExhausted) and returns
     /// the best impulse known by then.
-    pub budget: u64,
+    pub budget: Option<u64>,
     /// Most contacts for which `Auto` starts with Newton, without Gauss–Seidel first; default 32.
     pub direct_contacts: usize,
     /// Whether the workspace keeps the residuals [measured](super::SolverWorkspace::history) on the
@@ -113,8 +114,23 @@ pub struct SolverOptions {
 }
 
 impl SolverOptions {
-    /// About 0.3 s on a processor of 2024.
-    pub const DEFAULT_BUDGET: u64 = 300_000_000;
+    /// Work allowed by default: 3e8, about 0.3 s on a processor of 2024, for up to 100 contacts,
+    /// and more in proportion to the square of the contacts, as a sparse factorisation of a pile
+    /// takes more.
+    #[must_use]
+    pub fn usual_budget(n_contacts: usize) -> u64 {
+        const LEAST: u64 = 300_000_000;
+        const PER_PAIR: u64 = 30_000;
+        let n = n_contacts as u64;
+        n.saturating_mul(n).saturating_mul(PER_PAIR).max(LEAST)
+    }
+
+    /// Most work of a solve of this many contacts.
+    #[must_use]
+    pub fn budget_of(&self, n_contacts: usize) -> u64 {
+        self.budget
+            .unwrap_or_else(|| Self::usual_budget(n_contacts))
+    }
 
     /// Whether both tolerances hold.
     #[inline]
@@ -137,7 +153,7 @@ impl Default for SolverOptions {
             max_newton_steps: 500,
             max_sweeps: 10_000,
             regularisation: 1e-6,
-            budget: Self::DEFAULT_BUDGET,
+            budget: None,
             direct_contacts: 32,
             keeps_history: false,
             threads: 1,

@@ -62,6 +62,8 @@ pub enum Stage {
     ProximalPoint,
     /// Few contacts: pivoting from the nearest answer so far and from other starts.
     Restarts,
+    /// Interior point.
+    InteriorPoint,
     /// Alternating directions.
     Admm,
     /// Alternating directions on the convex relaxation.
@@ -82,6 +84,7 @@ impl Stage {
             Self::Newton => "newton",
             Self::ProximalPoint => "proximal",
             Self::Restarts => "restarts",
+            Self::InteriorPoint => "interior_point",
             Self::Admm => "admm",
             Self::Relaxed => "relaxed",
         }
@@ -95,7 +98,7 @@ impl Stage {
             Self::AtRest | Self::Pivoting | Self::GuidedNewton | Self::Newton | Self::Restarts => {
                 Method::Newton
             }
-            Self::ProximalPoint => Method::ProximalPoint,
+            Self::ProximalPoint | Self::InteriorPoint => Method::ProximalPoint,
             Self::Admm => Method::Admm,
             Self::Relaxed => Method::Relaxed,
         }

@@ -257,14 +257,14 @@ impl BlockLu {
         (d * d * d * products + 4 * d * d * (blocks + self.order.len())) as u64
     }
 
-    /// Builds and factors `Bᵀ (W + α R) C + γ` of the predicted modes; `weights` is the diagonal of
-    /// `R`, one number a contact. `false` at a singular pivot.
+    /// Builds and factors `Bᵀ (W + α I) C + γ` of the predicted modes, or with a block of each
+    /// contact in the place of `α I`. `false` at a singular pivot.
     pub fn factorise<const D: usize>(
         &mut self,
         W: &BlockSparseDelassus,
         mu: &[f64],
         alpha: f64,
-        weights: Option<&[f64]>,
+        blocks: Option<&[f64]>,
         contacts: &[Linearised],
     ) -> bool {
         for (i, contact) in contacts.iter().enumerate() {
@@ -278,9 +278,16 @@ impl BlockLu {
                 let mut reduced = reduce::<D>(block, contact, &contacts[j], mu[i], mu[j]);
                 if i == j {
                     let size = n_unknowns::<D>(contact.mode, mu[i]);
-                    let alpha = alpha * weights.map_or(1.0, |w| w[i]);
                     for r in 0..D {
                         reduced[r][r] = if r < size { reduced[r][r] + alpha } else { 1.0 };
+                    }
+                    if let Some(blocks) = blocks {
+                        let own = read::<D>(blocks, i);
+                        for r in 0..D {
+                            for c in 0..D {
+                                reduced[r][c] += own[r][c];
+                            }
+                        }
                     }
                     if size == 2 && contact.mode == ContactMode::Slide {
                         reduced[1][1] += contact.gamma;

@@ -51,6 +51,9 @@ pub(in crate::solver) struct ReducedSystem {
     /// The Newton point (n), N s, and a velocity (n), m/s.
     pub trial: Vec<f64>,
     pub trial_velocity: Vec<f64>,
+    /// What [`factorise_shifted`](Self::factorise_shifted) adds to the diagonal blocks of `W`, row
+    /// by row, 1/kg.
+    pub blocks: Vec<f64>,
     /// Right-hand side and solution, padded.
     rhs: Vec<Chunk>,
     /// Dense matrix, factored in place, and its row exchanges.
@@ -322,6 +325,7 @@ impl ReducedSystem {
     pub fn resize(&mut self, n_contacts: usize, n: usize) {
         self.contacts.resize(n_contacts, Linearised::default());
         self.rhs.resize(dense::chunks(n), [0.0; LANES]);
+        self.blocks.resize(n * n / n_contacts.max(1), 0.0);
         for buffer in [&mut self.centre, &mut self.trial, &mut self.trial_velocity] {
             buffer.resize(n, 0.0);
         }
@@ -400,13 +404,11 @@ impl ReducedSystem {
         }
     }
 
-    /// Factors `W + σ diag(weights)`, one weight per contact; `false` if that fails or the budget
-    /// does not allow it.
-    pub fn factorise_weighted<const D: usize>(
+    /// Factors `W` with the [`blocks`](Self::blocks) added; `false` if that fails or the budget does
+    /// not allow it.
+    pub fn factorise_shifted<const D: usize>(
         &mut self,
         data: &Prepared<'_>,
-        sigma: f64,
-        weights: &[f64],
         work: &mut Work,
     ) -> bool {
         for (i, contact) in self.contacts.iter_mut().enumerate() {
@@ -424,8 +426,11 @@ impl ReducedSystem {
                     return false;
                 }
                 assemble::<D>(data.mu, W, 0.0, &self.contacts, n, &mut self.matrix);
-                for k in 0..n {
-                    self.matrix[k * size + k / LANES][k % LANES] += sigma * weights[k / D];
+                for (i, block) in self.blocks.chunks_exact(D * D).enumerate() {
+                    for (k, entry) in block.iter().enumerate() {
+                        let (row, column) = (D * i + k / D, D * i + k % D);
+                        self.matrix[column * size + row / LANES][row % LANES] += entry;
+                    }
                 }
                 dense::lu(&mut self.matrix, size, &mut self.pivots)
             }
@@ -434,17 +439,17 @@ impl ReducedSystem {
                     && self.block_lu.factorise::<D>(
                         W,
                         data.mu,
-                        sigma,
-                        Some(weights),
+                        0.0,
+                        Some(&self.blocks),
                         &self.contacts,
                     )
             }
         }
     }
 
-    /// Solves the system of [`factorise_weighted`](Self::factorise_weighted) for the right-hand
+    /// Solves the system of [`factorise_shifted`](Self::factorise_shifted) for the right-hand
     /// side that `write` enters; returns the solution (n).
-    pub fn solve_weighted<const D: usize>(
+    pub fn solve_shifted<const D: usize>(
         &mut self,
         data: &Prepared<'_>,
         write: impl FnOnce(&mut [f64]),

@@ -36,12 +36,20 @@ const MAX_CHANGES: usize = 40;
 
 /// Factors `W + R`; `false` if that fails or the budget does not allow it.
 fn factorise<const D: usize>(data: &Prepared<'_>, sigma: f64, scratch: &mut Scratch) -> bool {
-    for (weight, mass) in scratch.weights.iter_mut().zip(data.masses) {
+    let blocks = scratch.system.blocks.chunks_exact_mut(D * D);
+    for ((weight, mass), block) in scratch.weights.iter_mut().zip(data.masses).zip(blocks) {
         *weight = 1.0 / mass;
+        for (k, entry) in block.iter_mut().enumerate() {
+            *entry = if k % (D + 1) == 0 {
+                sigma * *weight
+            } else {
+                0.0
+            };
+        }
     }
     scratch
         .system
-        .factorise_weighted::<D>(data, sigma, &scratch.weights, &mut scratch.work)
+        .factorise_shifted::<D>(data, &mut scratch.work)
 }
 
 /// One iteration after the linear solve: over-relaxation, projection, dual step. Squares of the
@@ -189,7 +197,7 @@ pub(in crate::solver) fn alternate<const D: usize, M: Fn(&[f64], &[f64]) -> Resi
             direction: dual,
             ..
         } = &mut *scratch;
-        let x = system.solve_weighted::<D>(data, |rhs| {
+        let x = system.solve_shifted::<D>(data, |rhs| {
             right_side::<D>(data, law.shifts, (sigma, &weights[..]), p, dual, rhs);
         });
         let [primal, dual] = project::<D>(data.mu, sigma, weights, x, dual, p);

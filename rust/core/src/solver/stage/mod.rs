@@ -15,6 +15,7 @@ mod disk_sweeps;
 pub(super) mod gauss_seidel;
 pub(super) mod guided;
 mod helpers;
+pub(super) mod interior_point;
 pub(super) mod newton;
 mod pivot_rules;
 pub(crate) mod pivoting;

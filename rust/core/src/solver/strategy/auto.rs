@@ -6,7 +6,9 @@ use crate::problem::{Operator, Prepared, Residual};
 use crate::solver::options::{Method, SolverOptions};
 use crate::solver::report::{Outcome, SolveStatus, Stage};
 use crate::solver::scratch::Scratch;
-use crate::solver::stage::{admm, gauss_seidel, guided, newton, pivoting, proximal, restarts};
+use crate::solver::stage::{
+    gauss_seidel, guided, interior_point, newton, pivoting, proximal, restarts,
+};
 use crate::solver::work::SweepBudget;
 
 /// Most sweeps over many contacts before Newton. A dense Newton step costs about as much as `n`
@@ -19,9 +21,8 @@ fn sweep_budget(data: &Prepared<'_>) -> usize {
     }
 }
 
-/// ADMM iterations that bring many contacts close enough for the proximal point method: on piles of
-/// 250 and 460 contacts it then takes a third to five sixths of the steps.
-const ALTERNATIONS: usize = 300;
+/// Newton steps of a short attempt with the proximal point method.
+const ATTEMPT: usize = 100;
 
 /// Residual below which few contacts get a second proximal point run, from the best answer.
 /// Problems without a solution mostly stay above it.
@@ -212,6 +213,50 @@ fn guide_from_rest<const D: usize>(
     None
 }
 
+/// The proximal point method from `p`.
+fn descend<const D: usize>(
+    data: &Prepared<'_>,
+    ladder: &mut Ladder<'_>,
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &mut Scratch,
+    iterations: &mut usize,
+) -> Option<Outcome> {
+    let found = proximal::solve::<D>(data, options, p, u, scratch, iterations);
+    ladder.enter(Stage::ProximalPoint, found, p, scratch, *iterations)
+}
+
+/// Many contacts: the proximal point method from the nearest answer, from zero, and again from the
+/// nearest one. What is near by its residual may be far by its modes, and then a start from zero
+/// takes a tenth of the steps; so the first two attempts are short.
+fn descend_many<const D: usize>(
+    data: &Prepared<'_>,
+    ladder: &mut Ladder<'_>,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &mut Scratch,
+    iterations: &mut usize,
+) -> Option<Outcome> {
+    let options = ladder.options;
+    let brief = SolverOptions {
+        max_newton_steps: ATTEMPT.min(options.max_newton_steps),
+        ..*options
+    };
+    for (is_from_zero, options) in [(false, &brief), (true, &brief), (false, options)] {
+        if is_from_zero {
+            p.fill(0.0);
+        } else {
+            p.copy_from_slice(&scratch.nearest);
+        }
+        let found = descend::<D>(data, ladder, options, p, u, scratch, iterations);
+        if found.is_some() || scratch.work.is_exhausted {
+            return found;
+        }
+    }
+    None
+}
+
 /// [`Method::Auto`]: cheap stages first, robust ones last.
 pub(in crate::solver) fn escalate<const D: usize>(
     data: &Prepared<'_>,
@@ -245,20 +290,17 @@ pub(in crate::solver) fn escalate<const D: usize>(
     }
     p.copy_from_slice(&scratch.start);
     if !is_few {
-        let own = SolverOptions {
-            max_sweeps: ALTERNATIONS.min(options.max_sweeps),
-            ..*options
-        };
-        let found = admm::solve::<D>(data, &own, p, u, scratch, iterations);
-        if let Some(outcome) = ladder.enter(Stage::Admm, found, p, scratch, *iterations) {
+        let found = interior_point::solve::<D>(data, options, p, u, scratch, iterations);
+        if let Some(outcome) = ladder.enter(Stage::InteriorPoint, found, p, scratch, *iterations) {
             return outcome;
         }
-        if ladder.nearest.stage != Stage::Admm {
-            p.copy_from_slice(&scratch.start);
-        }
     }
-    let found = proximal::solve::<D>(data, options, p, u, scratch, iterations);
-    if let Some(outcome) = ladder.enter(Stage::ProximalPoint, found, p, scratch, *iterations) {
+    let found = if is_few {
+        descend::<D>(data, &mut ladder, options, p, u, scratch, iterations)
+    } else {
+        descend_many::<D>(data, &mut ladder, p, u, scratch, iterations)
+    };
+    if let Some(outcome) = found {
         return outcome;
     }
     if is_few && ladder.nearest.residual.is_finite() {
@@ -268,10 +310,8 @@ pub(in crate::solver) fn escalate<const D: usize>(
         }
         if ladder.nearest.residual.relative < NEAR {
             p.copy_from_slice(&scratch.nearest);
-            let found = proximal::solve::<D>(data, options, p, u, scratch, iterations);
-            if let Some(outcome) =
-                ladder.enter(Stage::ProximalPoint, found, p, scratch, *iterations)
-            {
+            let found = descend::<D>(data, &mut ladder, options, p, u, scratch, iterations);
+            if let Some(outcome) = found {
                 return outcome;
             }
         }

@@ -127,7 +127,7 @@ pub(in crate::solver) fn solve<const D: usize>(
             continue;
         }
         let own = SolverOptions {
-            budget: work.budget.saturating_sub(work.spent),
+            budget: Some(work.budget.saturating_sub(work.spent)),
             keeps_history: false,
             ..*options
         };
