@@ -1243,7 +1243,7 @@ class StepReport:
         """Energy that the scheme would have gained and the audit removed, summed over the steps, J."""
     @property
     def energy_lifted(self) -> float:
-        """Potential energy gained by pushing bodies out of penetration, summed over the steps, J."""
+        """Energy gained by pushing bodies out of penetration, less the actuators' work, all steps, J."""
     def followed_by(self, later: StepReport) -> StepReport:
         """The report of these steps and of further ones.
 

@@ -149,7 +149,8 @@ impl WaysOut {
         })
     }
 
-    /// The deepest point that counts, and its piece, if any is deeper than [`OverSurfaces::shallow`].
+    /// The deepest point that counts, and its piece, if any is deeper than
+    /// [`OverSurfaces::shallow`].
     pub fn deepest(&mut self, part: &OverSurfaces<'_>) -> Option<&(u32, SurfacePoint)> {
         if self.are_doubtful() {
             self.sift(part);
