@@ -1,5 +1,6 @@
 //! Several trees in one model.
 
+use std::fmt::Write;
 use std::sync::Arc;
 
 use rover_core::geometry::Plane;
@@ -148,14 +149,16 @@ fn what_the_audit_counts_is_what_an_audit_from_outside_finds() {
         for k in 0..6 {
             let joint = ["revolute", "prismatic"][(scene + k) % 2];
             let (size, stop) = (numbers.between(0.2, 0.4), numbers.between(0.02, 0.2));
-            text += &format!(
+            write!(
+                text,
                 "[[solids]]\nname = \"b{k}\"\njoint = \"free\"\nmass = 3.0\ncollides = true\n\
                  shape = {{ kind = \"box\", size = [{size}, 0.2, 0.3] }}\n\
                  [[solids]]\nname = \"a{k}\"\nparent = \"b{k}\"\njoint = \"{joint}\"\n\
                  axis = [0.0, 0.0, 1.0]\nposition = [0.25, 0.0, 0.0]\nmass = 0.8\n\
                  collides = true\nshape = {{ kind = \"box\", size = [0.2, 0.08, 0.1] }}\n\
                  limits = {{ lower = -{stop}, upper = {stop} }}\n"
-            );
+            )
+            .unwrap();
         }
         let model = Model::from_description(ModelDescription::from_toml(&text).unwrap()).unwrap();
         let mut q = coordinates::to_public(&model, &Configuration::zero(&model));

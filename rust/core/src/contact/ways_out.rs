@@ -155,7 +155,7 @@ impl WaysOut {
         if self.are_doubtful() {
             self.sift(part);
         }
-        let counting = self.ways[..self.n].iter().flatten();
-        counting.filter(|_| self.has_deep).next_back()
+        let mut counting = self.ways[..self.n].iter().flatten();
+        counting.rfind(|_| self.has_deep)
     }
 }
