@@ -14,6 +14,7 @@ import pytest
 from torture.hostile import NO_NUMBERS
 
 from rover_gym import (
+    HeightField,
     Plane,
     RoverGymError,
     RoverModel,
@@ -228,3 +229,41 @@ def test_a_plane_of_a_huge_normal_is_still_ground() -> None:
     q[1] = 0.35
     sim.set_state(q)
     assert sim.step().n_contacts == 6
+
+
+class Endless:
+    """A sequence that states a length of 10^9 and counts how many entries are read."""
+
+    reads = 0
+
+    def __len__(self) -> int:
+        return 10**9
+
+    def __getitem__(self, index: int) -> float:
+        if index >= len(self):
+            raise IndexError
+        self.reads += 1
+        assert self.reads < 100, "the entries are read before the length is"
+        return 0.0
+
+
+LISTS: list[tuple[str, Callable[[Any], Any]]] = [
+    ("torques", lambda x: Simulation().set_wheel_torques(x)),
+    ("set_points", lambda x: Simulation().set_steering(x)),
+    ("torques", lambda x: Simulation().set_commands(x, np.zeros(6))),
+    ("torques", lambda x: Simulation().set_joint_torques(x)),
+    ("q", lambda x: Simulation().set_state(x)),
+    ("normal", Plane),
+    ("heights", lambda x: HeightField(x, 1.0)),
+    ("materials", lambda x: Simulation(materials=[x])),
+]
+
+
+@pytest.mark.parametrize(("field", "call"), LISTS)
+def test_a_list_of_a_billion_entries_is_refused_before_they_are_read(field: str, call: Callable[[Any], Any]) -> None:
+    """A walk over the API with `range(10**9)` took all memory."""
+    endless = Endless()
+    with pytest.raises(RoverGymError) as error:
+        call(endless)
+    assert str(error.value).startswith(field)
+    assert endless.reads <= 1

@@ -6,6 +6,7 @@ pub mod surface_scenes;
 mod completeness;
 mod convergence;
 mod falling;
+mod first_touch;
 mod flat;
 mod maps;
 mod meshes;

@@ -3,10 +3,41 @@
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn,
 };
+use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
+use pyo3::types::PyString;
 
 use crate::arguments::{number, refused, shown};
 use crate::errors::{BorderError, Kind, Value};
+
+/// Most entries of what is no array, such as lists, nested lists and ranges. Each becomes a Python
+/// object of its own before numpy has an array of them.
+const MOST_LISTED: usize = 1 << 24;
+
+/// Deepest nesting whose entries are counted.
+const DEPTH: usize = 4;
+
+/// Refuses what is no array and states more than [`MOST_LISTED`] entries, before any of them is
+/// read.
+pub fn check_size(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<()> {
+    let py = value.py();
+    let is_array = value.hasattr("__array__")? || value.is_instance_of::<PyString>();
+    let (mut count, mut entry) = (1_usize, Ok(value.clone()));
+    for _ in 0..DEPTH {
+        let length = match entry.as_ref().map(|entry| entry.len()) {
+            Ok(Ok(length)) => length,
+            Ok(Err(error)) if error.is_instance_of::<PyOverflowError>(py) => usize::MAX,
+            _ => break,
+        };
+        count = count.saturating_mul(length);
+        entry = entry.and_then(|entry| entry.get_item(0));
+    }
+    if is_array || count <= MOST_LISTED {
+        return Ok(());
+    }
+    let what = format!("an array, or at most {MOST_LISTED} numbers in lists");
+    Err(refused(value, kind, field, &what).into())
+}
 
 /// Any array-like as float64 of any shape.
 pub fn array<'py>(
@@ -21,6 +52,7 @@ pub fn array<'py>(
         field: Some(field.to_owned()),
         value: Value::Text(shown(value)),
     };
+    check_size(value, kind, field)?;
     let numpy = py.import("numpy")?;
     let found = numpy
         .call_method1("asarray", (value,))
@@ -65,6 +97,20 @@ pub fn vector(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<Vec
         .into());
     }
     Ok(view.iter().copied().collect())
+}
+
+/// The same with at most `n` entries: of more, none is read. Fewer are for the caller to refuse.
+pub fn at_most(value: &Bound<'_, PyAny>, n: usize, kind: Kind, field: &str) -> PyResult<Vec<f64>> {
+    match value.len() {
+        Ok(length) if length > n => Err(BorderError {
+            kind,
+            message: format!("{field}: needs {n} entries, has {length}"),
+            field: Some(field.to_owned()),
+            value: Value::Count(length),
+        }
+        .into()),
+        _ => vector(value, kind, field),
+    }
 }
 
 /// One number for both, or two.

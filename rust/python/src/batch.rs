@@ -95,12 +95,13 @@ impl SimulationBatch {
         threads: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let field = "simulations";
-        let items: Vec<Bound<'_, PyAny>> = simulations
-            .extract()
+        let items = simulations
+            .try_iter()
             .map_err(|_| refused(simulations, Kind::Option, field, "simulations"))?;
         let (mut rovers, mut origins) = (Vec::new(), Vec::new());
-        for (i, item) in items.iter().enumerate() {
-            let one = simulation(item, &format!("{field}[{i}]"))?.get();
+        for (i, item) in items.enumerate() {
+            let item = item?;
+            let one = simulation(&item, &format!("{field}[{i}]"))?.get();
             rovers.push(one.open()?.clone());
             origins.push(one.origin().clone());
         }

@@ -157,8 +157,9 @@ fn fixed(given: &Bound<'_, PyAny>) -> PyResult<Fixed> {
 
 /// A list with one entry for each of `n` generators.
 fn list<'py>(given: &Bound<'py, PyAny>, n: usize, field: &str) -> PyResult<Vec<Bound<'py, PyAny>>> {
-    let found = given.extract::<Vec<Bound<'py, PyAny>>>();
-    let found = found.ok().filter(|list| list.len() == n);
+    let fits = given.len().is_ok_and(|length| length == n);
+    let found = fits.then(|| given.extract::<Vec<Bound<'py, PyAny>>>().ok());
+    let found = found.flatten();
     found.ok_or_else(|| refused(given, Kind::Option, field, &format!("a list of {n}")).into())
 }
 

@@ -7,7 +7,7 @@ use pyo3::types::PyInt;
 use rover_core::draw::{Pcg64, Pcg64State};
 
 use crate::arguments::{count, refused};
-use crate::arrays::fresh_table;
+use crate::arrays::{check_size, fresh_table};
 use crate::errors::Kind;
 
 /// A new array of two dimensions.
@@ -59,6 +59,7 @@ pub fn seed_generators<'py>(
     seeds: &Bound<'_, PyAny>,
 ) -> PyResult<Bound<'py, PyArray2<u64>>> {
     let what = "whole numbers from 0";
+    check_size(seeds, Kind::Option, "seeds")?;
     let entries = seeds.try_iter();
     let entries = entries.map_err(|_| refused(seeds, Kind::Option, "seeds", what))?;
     let seeded = |(i, entry): (usize, PyResult<Bound<'_, PyAny>>)| -> PyResult<[u64; 4]> {

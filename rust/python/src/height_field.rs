@@ -8,7 +8,7 @@ use pyo3::types::PyDict;
 use rover_core::geometry::{HeightField as CoreField, Terrain};
 
 use crate::arguments::{Given, refused};
-use crate::arrays::{one_or_two, two};
+use crate::arrays::{check_size, one_or_two, two};
 use crate::errors::{BorderError, Kind, Value};
 use crate::heights::heights;
 use crate::materials;
@@ -40,6 +40,7 @@ pub struct HeightField {
 /// Numbers of two dimensions in single precision.
 fn table(value: &Bound<'_, PyAny>) -> PyResult<(Vec<f32>, [usize; 2])> {
     let wrong = || refused(value, Kind::Terrain, "heights", "an array of numbers");
+    check_size(value, Kind::Terrain, "heights")?;
     let numpy = value.py().import("numpy")?;
     let found = numpy
         .call_method1("asarray", (value,))

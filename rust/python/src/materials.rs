@@ -32,13 +32,11 @@ pub fn parse(given: &Bound<'_, PyAny>) -> PyResult<Materials> {
 
 /// The entries of a tuple or a list of this length, otherwise none.
 fn items<'py, const N: usize>(given: &Bound<'py, PyAny>) -> [Option<Bound<'py, PyAny>>; N] {
-    let listed = given
-        .extract::<Vec<Bound<'py, PyAny>>>()
-        .unwrap_or_default();
-    if listed.len() != N {
+    if !given.len().is_ok_and(|n| n == N) {
         return std::array::from_fn(|_| None);
     }
-    let mut listed = listed.into_iter();
+    let listed = given.extract::<Vec<Bound<'py, PyAny>>>();
+    let mut listed = listed.unwrap_or_default().into_iter();
     std::array::from_fn(|_| listed.next())
 }
 

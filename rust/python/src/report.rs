@@ -92,7 +92,7 @@ impl StepReport {
         self.inner.energy_removed
     }
 
-    /// Potential energy gained by pushing bodies out of penetration, summed over the steps, J.
+    /// Energy gained by pushing bodies out of penetration, less the actuators' work, all steps, J.
     #[getter]
     fn energy_lifted(&self) -> f64 {
         self.inner.energy_lifted

@@ -15,7 +15,7 @@ use std::sync::{Arc, MutexGuard};
 
 use crate::accuracy;
 use crate::arguments::{Given, number, texts};
-use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
+use crate::arrays::{at_most, fresh, fresh_matrix, fresh_rows, vector};
 use crate::contacts::Contacts;
 use crate::errors::{BorderError, Kind, Value};
 use crate::ground::Ground;
@@ -106,6 +106,11 @@ impl Simulation {
     /// What it was made with and the core does not keep.
     pub fn origin(&self) -> &Origin {
         &self.origin
+    }
+
+    /// Commands, one for each wheel.
+    fn commands(&self, value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<f64>> {
+        at_most(value, self.model.wheels().len(), Kind::Command, field)
     }
 }
 
@@ -377,7 +382,7 @@ impl Simulation {
     /// Raises:
     ///     CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
     fn set_wheel_torques(&self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
-        let torques = vector(torques, Kind::Command, "torques")?;
+        let torques = self.commands(torques, "torques")?;
         Ok(self
             .open()?
             .set_wheel_torques(&torques)
@@ -399,7 +404,7 @@ impl Simulation {
     ///     CommandError: A wrong length, an entry that is not finite or beyond the wheel's limit,
     ///         or one that is not 0 for a wheel that cannot be steered. Nothing has changed.
     fn set_steering(&self, set_points: &Bound<'_, PyAny>) -> PyResult<()> {
-        let set_points = vector(set_points, Kind::Command, "set_points")?;
+        let set_points = self.commands(set_points, "set_points")?;
         Ok(self
             .open()?
             .set_steering(&set_points)
@@ -419,8 +424,8 @@ impl Simulation {
         torques: &Bound<'_, PyAny>,
         set_points: &Bound<'_, PyAny>,
     ) -> PyResult<()> {
-        let torques = vector(torques, Kind::Command, "torques")?;
-        let set_points = vector(set_points, Kind::Command, "set_points")?;
+        let torques = self.commands(torques, "torques")?;
+        let set_points = self.commands(set_points, "set_points")?;
         Ok(self
             .open()?
             .set_commands(&torques, &set_points)
@@ -438,7 +443,8 @@ impl Simulation {
     /// Raises:
     ///     CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
     fn set_joint_torques(&self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
-        let torques = vector(torques, Kind::Command, "torques")?;
+        let n_joints = self.model.n_joints();
+        let torques = at_most(torques, n_joints, Kind::Command, "torques")?;
         Ok(self
             .open()?
             .set_joint_torques(&torques)

@@ -2,8 +2,8 @@
 
 use std::time::Instant;
 
-use rover_core::geometry::{HeightField, Terrain, TerrainError};
-use rover_core::nalgebra::Vector3;
+use rover_core::geometry::{HeightField, OrientedBox, Terrain, TerrainError, TriangleMesh};
+use rover_core::nalgebra::{Matrix3, Vector3};
 
 fn visited(field: &HeightField, reach: f64) -> (usize, usize) {
     let (mut cells, mut pieces) = (0, 0);
@@ -125,5 +125,42 @@ fn bad_maps_are_refused() {
     for (error, begin) in cases {
         assert!(error.to_string().starts_with(begin), "{error}");
         assert!(begin.starts_with(error.field()), "{error}");
+    }
+}
+
+/// A step of a box without any contact took 100 ms over a fine mesh: every piece within its
+/// bounding ball was examined.
+#[test]
+fn a_box_above_a_fine_surface_examines_only_what_is_near_its_sides() {
+    let (n, spacing) = (101, 0.02);
+    let place = |k: usize| -1.0 + spacing * k as f64;
+    let field = HeightField::new(vec![0.0; n * n], [n, n], [spacing; 2], [-1.0; 2]).unwrap();
+    let vertices: Vec<_> = (0..n * n)
+        .map(|k| [place(k % n), 0.0, place(k / n)])
+        .collect();
+    let corners = (0..n - 1).flat_map(|j| (0..n - 1).map(move |i| j * n + i));
+    let cells = corners.flat_map(|a| [[a, a + n + 1, a + 1], [a, a + n, a + n + 1]]);
+    let mesh = TriangleMesh::new(&vertices, &cells.collect::<Vec<_>>()).unwrap();
+    let grounds: [&dyn Terrain; 2] = [&field, &mesh];
+    for ground in grounds {
+        let count = |height: f64| {
+            let solid = OrientedBox {
+                centre: Vector3::new(0.1, 0.15 + height, -0.2),
+                R: Matrix3::identity(),
+                half_size: Vector3::new(0.5, 0.15, 0.3),
+            };
+            let (mut around, mut near) = (0, 0);
+            let reach = solid.half_size.norm();
+            ground.visit_around(&solid.centre, reach, &solid.grown(1e-3), &mut |_, _| {
+                around += 1;
+            });
+            ground.visit_near(&solid.centre, reach, &mut |_, _| near += 1);
+            (around, near)
+        };
+        let (around, near) = count(0.1);
+        assert!(around == 0 && near > 3000, "{around} {near}");
+        // One that stands there has the pieces of the cells under it, and of a row around them.
+        let (around, _) = count(-1e-6);
+        assert!((3000..5600).contains(&around), "{around}");
     }
 }

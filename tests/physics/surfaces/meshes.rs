@@ -11,7 +11,7 @@ use super::surface_scenes::map;
 use crate::spheres::sphere_scenes::{deepest, lone_wheel, placed};
 
 /// An octahedron's faces, cut n times and blown up to a ball.
-fn ball(radius: f64, cuts: usize, centre: Vector3<f64>) -> TriangleMesh {
+pub fn ball(radius: f64, cuts: usize, centre: Vector3<f64>) -> TriangleMesh {
     let mut vertices: Vec<Vector3<f64>> = [
         Vector3::x(),
         Vector3::y(),

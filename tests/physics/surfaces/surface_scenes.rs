@@ -8,7 +8,7 @@ use rover_core::multibody::{Model, coordinates};
 use rover_core::simulation::RoverSimulation;
 
 /// A square map of a height function about the origin.
-pub fn map(cells: u32, spacing: f64, height: impl Fn(f64, f64) -> f64) -> HeightField {
+pub fn map(cells: u32, spacing: f64, mut height: impl FnMut(f64, f64) -> f64) -> HeightField {
     let n = cells as usize + 1;
     let low = -0.5 * f64::from(cells) * spacing;
     let at = |k: usize| low + k as f64 * spacing;

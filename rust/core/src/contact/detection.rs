@@ -4,8 +4,9 @@ use nalgebra::Vector3;
 
 use super::activation::Activation;
 use super::frame::ContactFrame;
-use super::pair::{Contact, ContactKey, ON_SURFACE};
+use super::pair::{Contact, ContactKey, ON_SURFACE, Opposite};
 use super::part::{Part, wheel_shape};
+use super::ways_out::{OverSurfaces, WaysOut};
 use crate::geometry::query::sweep::{DEEP, first_touch};
 use crate::geometry::query::{
     SurfacePoint, box_sphere, disc_sphere, dispatch, is_lowest, roller_sphere, sphere_sphere,
@@ -47,6 +48,7 @@ pub fn detect(
         reach: activation.reach(),
         can_be_passed: terrain.can_be_passed(),
         unknown: None,
+        ways: WaysOut::default(),
         out,
     };
     for i in 0..model.wheels().len() {
@@ -88,6 +90,7 @@ struct Gate<'a> {
     reach: f64,
     can_be_passed: bool,
     unknown: Option<[f64; 2]>,
+    ways: WaysOut,
     out: &'a mut Vec<Contact>,
 }
 
@@ -126,6 +129,31 @@ impl Gate<'_> {
         if self.activation.admits(point.gap, u_N) {
             self.out.push(placed.contact(point, primitive));
         }
+    }
+
+    /// Of the contacts from the `first` on, those of one part, leaves out the ones with a surface
+    /// that do not lead out of it.
+    #[cold]
+    fn keep_ways_out(&mut self, first: usize, part: &OverSurfaces<'_>) {
+        let Self { ways, out, .. } = self;
+        ways.sift(part);
+        let mut kept = first;
+        for k in first..out.len() {
+            let contact = out[k];
+            let counts = match contact.key.opposite {
+                Opposite::Ground(id) if usize::from(contact.key.feature) & ON_SURFACE != 0 => {
+                    let (x, n) = (contact.point, &contact.frame.n);
+                    let point = SurfacePoint::of_normal(NEAREST, x, n, contact.gap);
+                    ways.counts(part, id, &point)
+                }
+                _ => true,
+            };
+            if counts {
+                out[kept] = contact;
+                kept += 1;
+            }
+        }
+        out.truncate(kept);
     }
 
     /// A contact with a sphere: at the nearest point, or the passing one if `touch` finds a normal.
@@ -185,14 +213,14 @@ fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Ga
     if let Coverage::Unknown(place) = terrain.coverage(&(base + centre), bound) {
         gate.unknown = Some(place);
     }
-    let floor = match &placed.shape {
-        PlacedShape::Box(solid) => base.y + solid.support(&-Vector3::y()).y - gate.reach,
-        PlacedShape::Disc(_) | PlacedShape::Roller(_) | PlacedShape::Sphere(_) => f64::NEG_INFINITY,
-    };
-    terrain.visit_above(
+    let around = placed.shape.bounding_box(base).grown(gate.reach);
+    let first = gate.out.len();
+    let shallow = OverSurfaces::shallow(&placed.shape);
+    gate.ways.clear();
+    terrain.visit_around(
         &(base + centre),
         bound + gate.reach + motion,
-        floor,
+        &around,
         &mut |id, primitive| match primitive {
             Primitive::Plane(plane) => {
                 dispatch::visit_on_plane(&placed.shape, plane, base, gate.reach, |point| {
@@ -212,11 +240,21 @@ fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Ga
             piece => {
                 let piece = (terrain, id, piece);
                 visit_on_surface(&placed.shape, piece, base, gate.reach, |point| {
+                    gate.ways.add(id, point, shallow);
                     gate.offer(&placed, &on_surface(point), id);
                 });
             }
         },
     );
+    if gate.ways.are_doubtful() {
+        let shape = &placed.shape;
+        let part = OverSurfaces {
+            shape,
+            terrain,
+            base,
+        };
+        gate.keep_ways_out(first, &part);
+    }
 }
 
 /// Visits the points of a shape on a piece of a surface whose gap is at most `reach`, m.
@@ -231,26 +269,32 @@ pub(crate) fn visit_on_surface(
     reach: f64,
     mut visit: impl FnMut(&SurfacePoint),
 ) {
-    let shallow = SHALLOW * shape.bound();
-    let is_inside = |point: &SurfacePoint, place: &Vector3<f64>| {
-        point.gap >= -shallow || terrain.is_inside(id, &(base + place))
+    let shallow = OverSurfaces::shallow(shape);
+    let still = Vector3::zeros();
+    let part = OverSurfaces {
+        shape,
+        terrain,
+        base,
     };
+    let overlaps =
+        |point: &SurfacePoint| point.gap >= -shallow || part.overlaps((id, piece), point, &still);
     match piece {
         Primitive::Face(face) => dispatch::visit_on_face(shape, face, base, reach, |point| {
-            if is_inside(point, &point.point) {
+            if overlaps(point) {
                 visit(point);
             }
         }),
         Primitive::Edge(edge) => dispatch::visit_at_edge(shape, edge, base, reach, |point| {
-            if is_inside(point, &(point.point + edge.into_wedge(&point.n, point.gap))) {
+            let within = || base + point.point + edge.into_wedge(&point.n, point.gap);
+            if overlaps(point) || terrain.is_inside(id, &within()) {
                 visit(point);
             }
         }),
         Primitive::Vertex(vertex) => {
             let near = dispatch::point_at_vertex(shape, vertex, base);
             let is_near = near.gap <= reach && vertex.admits(&near.n);
-            let inward = || vertex.place - base - vertex.inward() * near.gap;
-            if is_near && (is_inside(&near, &near.point) || is_inside(&near, &inward())) {
+            let within = || vertex.place - vertex.inward() * near.gap;
+            if is_near && (overlaps(&near) || terrain.is_inside(id, &within())) {
                 visit(&near);
             }
         }
@@ -266,10 +310,6 @@ fn on_surface(point: &SurfacePoint) -> SurfacePoint {
         ..*point
     }
 }
-
-/// Depth, in bounding radii of the shape, up to which a point is taken to be in the ground. Ground
-/// that is thinner, as near a sharp ridge, is pierced and still pushes.
-const SHALLOW: f64 = 1e-3;
 
 /// Whether a sphere's centre, relative to a shape's centre, is further than `within` from the
 /// shape, by an inexpensive bound.
@@ -455,36 +495,52 @@ fn visit_nearer(
 ) {
     let (centre, radius) = (shape.centre(), shape.bound());
     let mut gap = f64::INFINITY;
+    let mut ways = WaysOut::default();
+    let shallow = OverSurfaces::shallow(shape);
     // A primitive that is not visited is further from the centre than `reach`, hence further
     // from the wheel than reach − R.
     let is_surface = terrain.has_surface();
     let mut ahead = if is_surface { CLOSE * radius } else { radius };
     let mut reach = radius + ahead;
     while reach < FAR {
-        terrain.visit_near(&(base + centre), reach, &mut |id, primitive| {
-            let mut take = |point: &SurfacePoint| {
-                if point.gap < gap {
-                    gap = point.gap;
-                    visit(id, point);
-                }
-            };
-            match primitive {
+        ways.clear();
+        let mut take = |id: u32, point: &SurfacePoint| {
+            if point.gap < gap {
+                gap = point.gap;
+                visit(id, point);
+            }
+        };
+        terrain.visit_near(
+            &(base + centre),
+            reach,
+            &mut |id, primitive| match primitive {
                 Primitive::Plane(plane) => {
-                    take(&dispatch::lowest_on_plane(shape, plane, base));
+                    take(id, &dispatch::lowest_on_plane(shape, plane, base));
                 }
                 Primitive::Sphere(sphere) => {
-                    take(&dispatch::point_on_sphere(shape, sphere, base));
+                    take(id, &dispatch::point_on_sphere(shape, sphere, base));
                 }
                 piece => {
                     let piece = (terrain, id, piece);
                     visit_on_surface(shape, piece, base, f64::INFINITY, |point| {
                         if is_lowest(point.feature) {
-                            take(&on_surface(point));
+                            ways.add(id, point, shallow);
+                            if point.gap >= -shallow {
+                                take(id, &on_surface(point));
+                            }
                         }
                     });
                 }
-            }
-        });
+            },
+        );
+        let part = OverSurfaces {
+            shape,
+            terrain,
+            base,
+        };
+        if let Some((id, point)) = ways.deepest(&part) {
+            take(*id, &on_surface(point));
+        }
         if gap + radius <= reach {
             return;
         }

@@ -21,6 +21,7 @@ pub mod pair;
 pub mod pair_detection;
 pub mod part;
 pub mod relocation;
+pub(crate) mod ways_out;
 pub mod wheel_gaps;
 
 pub use activation::Activation;

@@ -190,7 +190,7 @@ impl Audit {
         }
         let work = system.work(options, start, &ws.v);
         let mut share = 1.0;
-        for _ in 0..MOST_SHORTENINGS {
+        for k in 0..MOST_SHORTENINGS {
             let after = system.energy(options, &ws.end, &ws.v).unwrap_or(before);
             let excess = (after.kinetic - before.kinetic) + (after.potential - before.potential)
                 - share * work;
@@ -201,7 +201,12 @@ impl Audit {
             // linear.
             let shorter = SAFE * share * before.kinetic / (excess + before.kinetic);
             let back = h * (share - shorter);
-            share = if shorter > LEAST_WAY { shorter } else { 0.0 };
+            let is_last = k + 1 == MOST_SHORTENINGS;
+            share = if shorter > LEAST_WAY && !is_last {
+                shorter
+            } else {
+                0.0
+            };
             let local = ws.u.chunks_exact(d).zip(ws.u_before.chunks_exact(d));
             for (gap, (u, before)) in ws.gap_end.iter_mut().zip(local) {
                 *gap -= back * (theta * u[0] + (1.0 - theta) * before[0]);
@@ -212,10 +217,12 @@ impl Audit {
     }
 }
 
-/// Counts the energy that a projection of `ws.end` added.
+/// Counts the energy that a projection of `ws.end` by `ws.dv` added, beyond the actuators' work on
+/// the way.
 pub(super) fn count_lift<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
+    start: Start<'_, S::Configuration>,
     ws: &mut ScratchOf<S>,
     report: &mut StepReport,
 ) {
@@ -225,7 +232,8 @@ pub(super) fn count_lift<S: MechanicalSystem>(
     let Some(after) = system.energy(options, &ws.end, &ws.v) else {
         return;
     };
-    let lifted = (after.kinetic - before.kinetic) + (after.potential - before.potential);
+    let work = system.work_of_displacement(options, start, &ws.v, &ws.dv);
+    let lifted = (after.kinetic - before.kinetic) + (after.potential - before.potential) - work;
     report.energy_lifted += lifted.max(0.0);
     ws.audited.is(&ws.end, &ws.v, after);
 }

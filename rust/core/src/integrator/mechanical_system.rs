@@ -227,6 +227,18 @@ pub trait MechanicalSystem {
         0.0
     }
 
+    /// Work of the actuators of such a step, as they are at its end, over a `displacement` (nv)
+    /// that is added to it, J.
+    fn work_of_displacement(
+        &mut self,
+        _options: &StepOptions,
+        _start: Start<'_, Self::Configuration>,
+        _v_end: &[f64],
+        _displacement: &[f64],
+    ) -> f64 {
+        0.0
+    }
+
     /// The step (or part of a step) whose work was last requested becomes the state. By default
     /// nothing is recorded.
     fn accept(&mut self) {}

@@ -339,7 +339,11 @@ pub(super) fn finish<S: MechanicalSystem>(
     let d = S::DIMENSION.components();
     if position_projection::project(system, options, ws, &mut report) {
         system.normalise(&mut ws.end);
-        count_lift(system, options, ws, &mut report);
+        let start = Start {
+            configuration: &*configuration,
+            v: &*v,
+        };
+        count_lift(system, options, start, ws, &mut report);
     }
     probe.end(Phase::Projection);
     let is_finite = system.is_finite(&ws.end) && ws.v.iter().chain(&ws.p).all(|x| x.is_finite());

@@ -17,7 +17,8 @@ use super::step_contacts::set_friction;
 use crate::problem::{FrictionContactProblem, Operator};
 use crate::solver::{SolveReport, SolveStatus, SolverOptions, solve};
 
-/// Corrects `ws.end`, where the contacts have the predicted gaps `ws.gap_end`; true if it moved.
+/// Corrects `ws.end`, where the contacts have the predicted gaps `ws.gap_end`; true if it moved, by
+/// `ws.dv`.
 pub(super) fn project<S: MechanicalSystem>(
     system: &S,
     options: &StepOptions,
@@ -66,7 +67,10 @@ pub(super) fn project<S: MechanicalSystem>(
     }
     report.enter(&solved);
     let share = (limit / size(system, ws)).min(1.0);
-    system.advance(&mut ws.end, &ws.dv, share);
+    for displacement in &mut ws.dv {
+        *displacement *= share;
+    }
+    system.advance(&mut ws.end, &ws.dv, 1.0);
     true
 }
 

@@ -43,7 +43,8 @@ pub struct StepReport {
     pub energy_gain: f64,
     /// Energy that the scheme would have gained and the audit removed, all steps together, J.
     pub energy_removed: f64,
-    /// Energy that position projection added, all steps together, J.
+    /// Energy that position projection added beyond the actuators' work on the way, all steps
+    /// together, J.
     pub energy_lifted: f64,
 }
 

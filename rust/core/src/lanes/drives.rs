@@ -238,6 +238,32 @@ impl<T: Lane> Drives<T> {
         }
         (total, has_left)
     }
+
+    /// Work of all joints over a displacement that is added to such a step, J.
+    #[inline(always)]
+    pub fn work_of_displacement(
+        &self,
+        machine: &Machine,
+        (h, theta): (T, T),
+        places: &[T],
+        [v, v_end, displacement]: [&[T]; 3],
+    ) -> T {
+        let mut total = h.like(0.0);
+        for j in 0..machine.n_joints() {
+            let k = velocity(j + 1);
+            let joint = &self.joints[j];
+            let (mut drive, mut other) = (joint.at_rest, joint.torque);
+            if self.is_implicit[j] {
+                let mean = theta * v_end[k] + (h.like(1.0) - theta) * v[k];
+                let rate = v[k] + joint.theta * (v_end[k] - v[k]);
+                drive = joint.at_rest - joint.active * rate;
+                let place = places[j] + h * joint.theta * mean;
+                other -= joint.stiffness * (place - joint.set_point);
+            }
+            total += (drive + other) * displacement[k];
+        }
+        total
+    }
 }
 
 impl<T: Lane> Joint<T> {

@@ -11,6 +11,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use crate::contact::detection::visit_on_surface;
+use crate::contact::ways_out::OverSurfaces;
 use crate::geometry::query::disc_clearance::{TURNING, clearance};
 use crate::geometry::query::dispatch::{point_at_edge, point_at_vertex};
 use crate::geometry::query::{NEAREST, SurfacePoint};
@@ -247,17 +248,20 @@ impl<T: Lane> Footing<T> {
         }
         let shape = PlacedShape::Disc(disc);
         let Self { planes, nearby, .. } = self;
-        let mut count = 0;
+        let (mut count, mut is_deep) = (0, false);
+        let shallow = OverSurfaces::shallow(&shape);
         nearby[lane].visit(terrain, &disc, &base, reach, |id, piece| {
             visit_on_surface(&shape, (terrain, id, piece), &base, reach, |point| {
                 if let Some(own) = planes.get_mut(count) {
                     own.stand_on(lane, id, piece, point, &base);
                 }
                 count += 1;
+                is_deep |= point.gap < -shallow;
             });
         });
         self.double |= u32::from(count > 1) << lane;
-        count <= SLOTS
+        // Of several deep points the general step finds out which count.
+        count <= 1 || (count <= SLOTS && !is_deep)
     }
 
     /// Whether any lane has a second plane.

@@ -13,7 +13,7 @@ use super::footing::{Footing, Wheels};
 use crate::contact::box_clearance::over_surfaces;
 use crate::contact::detection::visit_on_surface;
 use crate::geometry::query::sweep::DEEP;
-use crate::geometry::{Coverage, OrientedBox, PlacedShape, Sphere, SupportMap, Terrain};
+use crate::geometry::{Coverage, OrientedBox, PlacedShape, Sphere, Terrain};
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Mat3, Vec3};
 
 /// Most spheres near a wheel. A wheel near more is declined.
@@ -519,20 +519,15 @@ fn over_surface(
         }
     }
     // Piece by piece, and again at the next step.
-    let low = solid.support(&-Vector3::y()).y;
     let shape = PlacedShape::Box(*solid);
     let reach = near.reach + ROUNDING;
     let mut touches = false;
-    field.visit_above(
-        &solid.centre,
-        bound + reach,
-        low - reach,
-        &mut |id, piece| {
-            visit_on_surface(&shape, (field, id, piece), &nowhere, reach, |_| {
-                touches = true;
-            });
-        },
-    );
+    let around = solid.grown(reach);
+    field.visit_around(&solid.centre, bound + reach, &around, &mut |id, piece| {
+        visit_on_surface(&shape, (field, id, piece), &nowhere, reach, |_| {
+            touches = true;
+        });
+    });
     (f64::NEG_INFINITY, touches)
 }
 

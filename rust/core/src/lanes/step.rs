@@ -872,7 +872,13 @@ impl<T: Lane> Block<T> {
         let lifted = self.energy(State::End).kinetic_and_potential();
         let is_moved = self.is_deep & self.going;
         let [kinetic, potential] = self.after;
-        let gained = (lifted[0] - kinetic) + (lifted[1] - potential);
+        let work = self.drives.work_of_displacement(
+            &self.machine,
+            self.time_step(),
+            &self.start.joints,
+            [&self.v, &self.v_end, &self.y],
+        );
+        let gained = (lifted[0] - kinetic) + (lifted[1] - potential) - work;
         for (lane, report) in self.reports.iter_mut().enumerate().take(T::LANES) {
             if is_moved.get(lane) {
                 report.energy_lifted = gained.get(lane).max(0.0);

@@ -595,7 +595,8 @@ where
         Some(MechanicalEnergy {
             kinetic: a.kinetic + b.kinetic,
             potential: a.potential + b.potential,
-            momentum: a.momentum + b.momentum,
+            // No single velocity carries the total momentum.
+            momentum: nalgebra::Vector3::zeros(),
             mass: a.mass + b.mass,
         })
     }
@@ -618,6 +619,20 @@ where
         let (start_a, start_b) = self.starts(start);
         let (v_a, v_b) = v_end.split_at(self.first.nv());
         self.first.work(options, start_a, v_a) + self.second.work(options, start_b, v_b)
+    }
+
+    fn work_of_displacement(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Self::Configuration>,
+        v_end: &[f64],
+        displacement: &[f64],
+    ) -> f64 {
+        let (start_a, start_b) = self.starts(start);
+        let (v_a, v_b) = v_end.split_at(self.first.nv());
+        let (d_a, d_b) = displacement.split_at(self.first.nv());
+        let first = (self.first).work_of_displacement(options, start_a, v_a, d_a);
+        first + (self.second).work_of_displacement(options, start_b, v_b, d_b)
     }
 
     fn accept(&mut self) {

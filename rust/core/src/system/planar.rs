@@ -378,6 +378,22 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
         })
     }
 
+    fn work_of_displacement(
+        &mut self,
+        _options: &StepOptions,
+        start: Start<'_, SVector<f64, NV>>,
+        v_end: &[f64],
+        displacement: &[f64],
+    ) -> f64 {
+        let (still, none) = (SVector::zeros(), Vector2::zeros());
+        self.set_torques(start.v, v_end);
+        let parts = &*self.parts;
+        let torques = self
+            .machine
+            .force(&parts.middle, &still, &none, &parts.torques);
+        torques.iter().zip(displacement).map(|(f, d)| f * d).sum()
+    }
+
     fn work(
         &mut self,
         options: &StepOptions,

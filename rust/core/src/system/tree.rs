@@ -546,6 +546,27 @@ impl MechanicalSystem for TreeSystem<'_> {
         total
     }
 
+    fn work_of_displacement(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Configuration>,
+        v_end: &[f64],
+        displacement: &[f64],
+    ) -> f64 {
+        let trial = Trial {
+            options,
+            command: self.command,
+            start,
+            v_end,
+            motors: &self.parts.motors,
+        };
+        let mut total = 0.0;
+        trial.for_each(self.model, |joint, torque| {
+            total += (torque.drive + torque.other) * displacement[joint.velocity];
+        });
+        total
+    }
+
     #[inline]
     fn accept(&mut self) {
         let parts = &mut *self.parts;

@@ -39,19 +39,28 @@ pub fn nearest_local(
     x: &Vector3<f64>,
     half_size: &Vector3<f64>,
 ) -> (Vector3<f64>, Vector3<f64>, f64) {
-    let mut point = Vector3::from_fn(|k, _| x[k].clamp(-half_size[k], half_size[k]));
+    let point = Vector3::from_fn(|k, _| x[k].clamp(-half_size[k], half_size[k]));
     let inward = point - x;
     let distance = inward.norm();
     if distance > 0.0 {
         return (point, inward / distance, distance);
     }
-    let depth = half_size - x.abs();
-    let k = depth.imin();
-    let side = if x[k] < 0.0 { -1.0 } else { 1.0 };
-    point[k] = side * half_size[k];
-    let mut n = Vector3::zeros();
-    n[k] = -side;
-    (point, n, -depth[k])
+    through_side(x, half_size, (half_size - x.abs()).imin())
+}
+
+/// The same of a point inside, through the nearer of the sides across an axis.
+#[inline]
+#[must_use]
+pub fn through_side(
+    x: &Vector3<f64>,
+    half_size: &Vector3<f64>,
+    axis: usize,
+) -> (Vector3<f64>, Vector3<f64>, f64) {
+    let side = if x[axis] < 0.0 { -1.0 } else { 1.0 };
+    let (mut point, mut n) = (*x, Vector3::zeros());
+    point[axis] = side * half_size[axis];
+    n[axis] = -side;
+    (point, n, x[axis].abs() - half_size[axis])
 }
 
 /// The box's point over the tangent plane (normal n) at the point `touch`

@@ -8,9 +8,9 @@
 use nalgebra::Vector3;
 
 use super::{NEAREST, SurfacePoint, box_plane, box_sphere};
+use crate::geometry::OrientedBox;
 use crate::geometry::shape::oriented_box::signs;
 use crate::geometry::terrain::surface::{Edge, Face, Vertex};
-use crate::geometry::{OrientedBox, Sphere};
 
 /// Sine of the angle between two edges below which they have no common normal.
 const PARALLEL: f64 = 1e-9;
@@ -51,6 +51,11 @@ pub fn crossings(
         }
     }
     for number in 0..8 {
+        let from_start = solid.corner(number) - (edge.start - base);
+        let place = from_start.dot(&edge.along);
+        if (from_start - edge.along * place).norm_squared() > reach * reach {
+            continue;
+        }
         let (point, place) = corner_over(solid, edge, base, number);
         let supports = solid.R.tr_mul(&point.n).dot(&signs(number)) < 0.0
             && (0..3).all(|k| solid.axis(k).dot(&point.n) * signs(number)[k] <= 0.0);
@@ -146,7 +151,8 @@ fn crossing(
     Some((point, place, s))
 }
 
-/// The point that a vertex pushes, wherever it is.
+/// The point that a vertex pushes, wherever it is: for one that is inside, of the nearest of the
+/// sides through which the surface lets it.
 #[inline]
 #[must_use]
 pub fn nearest_at_vertex(
@@ -154,12 +160,16 @@ pub fn nearest_at_vertex(
     vertex: &Vertex,
     base: &Vector3<f64>,
 ) -> SurfacePoint {
-    let point = Sphere {
-        centre: vertex.place,
-        radius: 0.0,
-    };
-    SurfacePoint {
-        feature: NEAREST,
-        ..box_sphere::nearest_point(solid, &point, base)
+    let local = solid.R.tr_mul(&(vertex.place - base - solid.centre));
+    let (mut point, mut n, mut distance) = box_sphere::nearest_local(&local, &solid.half_size);
+    let admits = |n: &Vector3<f64>| vertex.admits(&(solid.R * n));
+    if distance < 0.0 && !admits(&n) {
+        let sides = (0..3).map(|k| box_sphere::through_side(&local, &solid.half_size, k));
+        let open = sides.filter(|(_, n, _)| admits(n));
+        if let Some(side) = open.max_by(|a, b| a.2.total_cmp(&b.2)) {
+            (point, n, distance) = side;
+        }
     }
+    let point = solid.centre + solid.R * point;
+    SurfacePoint::of_normal(NEAREST, point, &(solid.R * n), distance)
 }

@@ -10,7 +10,7 @@ pub mod roller;
 pub mod sphere;
 pub mod support_map;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 pub use disc::Disc;
 pub use oriented_box::OrientedBox;
@@ -29,6 +29,52 @@ pub enum PlacedShape {
     Box(OrientedBox),
     /// A ball.
     Sphere(Sphere),
+}
+
+impl PlacedShape {
+    /// A box around it; `base` (m) is added to its place.
+    #[inline]
+    #[must_use]
+    pub fn bounding_box(&self, base: &Vector3<f64>) -> OrientedBox {
+        let round = |disc: &Disc, radius: f64, half: f64| {
+            let side = disc.axle.cross(&disc.spoke);
+            OrientedBox {
+                centre: base + disc.centre,
+                R: Matrix3::from_columns(&[disc.spoke, side, disc.axle]),
+                half_size: Vector3::new(radius, radius, half),
+            }
+        };
+        match self {
+            Self::Disc(disc) => round(disc, disc.radius, 0.0),
+            Self::Roller(roller) => {
+                let half = roller.half + roller.rounding;
+                round(&roller.core, roller.radius(), half)
+            }
+            Self::Box(solid) => OrientedBox {
+                centre: base + solid.centre,
+                ..*solid
+            },
+            Self::Sphere(sphere) => OrientedBox {
+                centre: base + sphere.centre,
+                R: Matrix3::identity(),
+                half_size: Vector3::repeat(sphere.radius),
+            },
+        }
+    }
+
+    /// Whether a point (m) is in the shape; a disc has no volume, and none is.
+    #[must_use]
+    pub fn holds(&self, x: &Vector3<f64>) -> bool {
+        match self {
+            Self::Disc(_) => false,
+            Self::Roller(roller) => roller.holds(x),
+            Self::Box(solid) => {
+                let local = solid.R.tr_mul(&(x - solid.centre));
+                (local.abs() - solid.half_size).max() <= 0.0
+            }
+            Self::Sphere(sphere) => sphere.distance(x) <= 0.0,
+        }
+    }
 }
 
 impl SupportMap for PlacedShape {

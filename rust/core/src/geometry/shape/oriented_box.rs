@@ -23,6 +23,43 @@ impl OrientedBox {
         self.centre + self.R * self.half_size.component_mul(&signs(number))
     }
 
+    /// The same with each side moved out by `reach`, m.
+    #[inline]
+    #[must_use]
+    pub fn grown(&self, reach: f64) -> Self {
+        Self {
+            half_size: self.half_size.add_scalar(reach),
+            ..*self
+        }
+    }
+
+    /// Whether faces of a surface are clear of the box: they lie beyond one of its sides, with all
+    /// corners, and their unit normals do not face away from it. A box that is in the ground has
+    /// the surface beyond its sides too, but that faces away.
+    #[inline]
+    #[must_use]
+    pub fn is_clear_of<const N: usize>(
+        &self,
+        corners: &[Vector3<f64>],
+        normals: impl Fn() -> [Vector3<f64>; N],
+    ) -> bool {
+        (0..3).any(|k| {
+            let axis = self.axis(k);
+            let places = corners.iter().map(|x| axis.dot(&(x - self.centre)));
+            let (low, high) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+                (low.min(x), high.max(x))
+            });
+            let side = if low > self.half_size[k] {
+                axis
+            } else if high < -self.half_size[k] {
+                -axis
+            } else {
+                return false;
+            };
+            normals().iter().all(|n| n.dot(&side) <= AWAY)
+        })
+    }
+
     /// Unit axis by index, world axes.
     #[inline]
     #[must_use]
@@ -30,6 +67,9 @@ impl OrientedBox {
         self.R.column(k).into()
     }
 }
+
+/// Cosine of the angle to the way from a box to a face from which on the face looks away.
+const AWAY: f64 = 0.5;
 
 /// The sides of a corner along the three axes, 1 or −1.
 #[inline]

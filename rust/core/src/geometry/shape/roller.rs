@@ -59,6 +59,16 @@ impl Roller {
         if self.half > 0.0 { 2 } else { 1 }
     }
 
+    /// Whether a point (m) is in it.
+    #[must_use]
+    pub fn holds(&self, x: &Vector3<f64>) -> bool {
+        let offset = x - self.core.centre;
+        let along = self.core.axle.dot(&offset);
+        let away = (offset - self.core.axle * along).norm();
+        let beyond = [away - self.core.radius, along.abs() - self.half].map(|d| d.max(0.0));
+        hypot(beyond[0], beyond[1]) <= self.rounding
+    }
+
     /// A circle as a disc: the first lies towards the axle's head, the second towards its tail.
     #[inline]
     #[must_use]

@@ -16,7 +16,7 @@ use super::{Coverage, GROUND, Primitive, Terrain};
 use crate::geometry::broad_phase::{BallTree, Bounds, BoxTree};
 use crate::geometry::ray::triangle::Sheared;
 use crate::geometry::ray::{Hit, Ray};
-use crate::geometry::shape::Sphere;
+use crate::geometry::shape::{OrientedBox, Sphere};
 use crate::scalar::elementary::sin_cos;
 
 /// Most triangles of a mesh.
@@ -204,6 +204,30 @@ impl TriangleMesh {
         n.dot(&(place - a)) > reach || (0..3).any(is_beside)
     }
 
+    fn visit_triangles(&self, centre: &Vector3<f64>, reach: f64, mut visit: impl FnMut(u32)) {
+        self.tree.visit_near(centre, reach, |t, _| {
+            if !self.is_beyond(t as usize, centre, reach) {
+                visit(t);
+            }
+        });
+    }
+
+    /// Visits a triangle and the convex edges and vertices that are its own.
+    fn visit_pieces(&self, t: u32, visit: &mut dyn FnMut(u32, &Primitive)) {
+        let m = narrow(self.triangles.len());
+        visit(t, &Primitive::Face(self.face(t as usize)));
+        for k in 0..3 {
+            if let Some(edge) = self.edge(t as usize, k) {
+                visit(m + 3 * t + narrow(k), &Primitive::Edge(edge));
+            }
+        }
+        for v in self.triangles[t as usize] {
+            if self.owners[v as usize] == t {
+                visit(4 * m + v, &Primitive::Vertex(self.vertex(v as usize)));
+            }
+        }
+    }
+
     fn face(&self, t: usize) -> Face {
         let [a, _] = self.ends(t, 0);
         Face {
@@ -356,21 +380,20 @@ impl Terrain for TriangleMesh {
         reach: f64,
         visit: &mut dyn FnMut(u32, &Primitive),
     ) {
-        let m = narrow(self.triangles.len());
-        self.tree.visit_near(centre, reach, |t, _| {
-            if self.is_beyond(t as usize, centre, reach) {
-                return;
-            }
-            visit(t, &Primitive::Face(self.face(t as usize)));
-            for k in 0..3 {
-                if let Some(edge) = self.edge(t as usize, k) {
-                    visit(m + 3 * t + narrow(k), &Primitive::Edge(edge));
-                }
-            }
-            for v in self.triangles[t as usize] {
-                if self.owners[v as usize] == t {
-                    visit(4 * m + v, &Primitive::Vertex(self.vertex(v as usize)));
-                }
+        self.visit_triangles(centre, reach, |t| self.visit_pieces(t, visit));
+    }
+
+    fn visit_around(
+        &self,
+        centre: &Vector3<f64>,
+        reach: f64,
+        solid: &OrientedBox,
+        visit: &mut dyn FnMut(u32, &Primitive),
+    ) {
+        self.visit_triangles(centre, reach, |t| {
+            let corners = self.triangles[t as usize].map(|v| self.vertices[v as usize]);
+            if !solid.is_clear_of(&corners, || [self.normals[t as usize]]) {
+                self.visit_pieces(t, visit);
             }
         });
     }

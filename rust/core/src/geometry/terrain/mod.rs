@@ -27,7 +27,7 @@ pub use surface::{Edge, Face, Vertex};
 pub use union::Union;
 
 use super::ray::{Hit, Ray};
-use super::shape::Sphere;
+use super::shape::{OrientedBox, Sphere};
 
 /// A convex piece of ground whose distance to every shape has a closed form.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,12 +68,13 @@ pub trait Terrain: Send + Sync {
     /// must not depend on distant ones.
     fn visit_near(&self, centre: &Vector3<f64>, reach: f64, visit: &mut dyn FnMut(u32, &Primitive));
 
-    /// The same, but pieces of a surface that are below the height `floor` (m) may be left out.
-    fn visit_above(
+    /// The same, but pieces of a surface that are clear of a box (world, m) may be left out; see
+    /// [`OrientedBox::is_clear_of`].
+    fn visit_around(
         &self,
         centre: &Vector3<f64>,
         reach: f64,
-        _floor: f64,
+        _solid: &OrientedBox,
         visit: &mut dyn FnMut(u32, &Primitive),
     ) {
         self.visit_near(centre, reach, visit);

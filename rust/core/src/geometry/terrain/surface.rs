@@ -130,14 +130,18 @@ impl Edge {
     }
 
     /// Whether a place along the edge (m from its start) belongs to it, for a part that is `depth`
-    /// (m) in the ground there: it leans off a vertex by no more than it is deep.
+    /// (m) in the ground there: it leans off a vertex by no more than it is deep, and by a part of
+    /// the edge's length at most.
     #[inline]
     #[must_use]
     pub fn has(&self, place: f64, depth: f64) -> bool {
-        let over = depth.max(0.0);
+        let over = depth.clamp(0.0, LEAN * self.length);
         place >= -over && place < self.length + over
     }
 }
+
+/// How far a part may lean off an edge, in lengths of the edge.
+const LEAN: f64 = 0.2;
 
 /// Cosine of the angle between the normals of a sharp edge.
 const SHARP: f64 = 0.2;

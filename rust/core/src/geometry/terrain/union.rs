@@ -9,7 +9,7 @@ use super::error::TerrainError;
 use super::plane::Plane;
 use super::{Coverage, Primitive, Terrain};
 use crate::geometry::ray::{Hit, Ray};
-use crate::geometry::shape::Sphere;
+use crate::geometry::shape::{OrientedBox, Sphere};
 
 /// Everything that any of several terrains has. Immutable.
 ///
@@ -82,15 +82,15 @@ impl Terrain for Union {
         }
     }
 
-    fn visit_above(
+    fn visit_around(
         &self,
         centre: &Vector3<f64>,
         reach: f64,
-        floor: f64,
+        solid: &OrientedBox,
         visit: &mut dyn FnMut(u32, &Primitive),
     ) {
         for (part, first) in self.parts.iter().zip(&self.first) {
-            part.visit_above(centre, reach, floor, &mut |id, primitive| {
+            part.visit_around(centre, reach, solid, &mut |id, primitive| {
                 visit(first + id, primitive);
             });
         }

@@ -429,6 +429,28 @@ impl HeightField {
         })
     }
 
+    /// Visits the pieces that belong to a corner.
+    fn visit_pieces(&self, [i, j]: [usize; 2], visit: &mut dyn FnMut(u32, &Primitive)) {
+        let own = [narrow(i), narrow(j)];
+        let first = number(j * self.columns + i);
+        let around = self.normals_around(own);
+        let hinges = self.hinges(own, &around);
+        for (k, half) in [(0, Half::Low), (1, Half::High)] {
+            if let Some(face) = self.face(own, half, &around, &hinges) {
+                visit(first + k, &Primitive::Face(face));
+            }
+        }
+        for (k, hinge) in (2..5).zip(&hinges) {
+            let is_convex = hinge.as_ref().is_some_and(|hinge| hinge.is_convex);
+            if let Some(edge) = is_convex.then(|| self.edge(own, k, &around)).flatten() {
+                visit(first + k, &Primitive::Edge(edge));
+            }
+        }
+        if let Some(vertex) = self.vertex(own) {
+            visit(first + 5, &Primitive::Vertex(vertex));
+        }
+    }
+
     /// A vertex that may be convex.
     #[inline]
     fn vertex(&self, place: Place) -> Option<Vertex> {

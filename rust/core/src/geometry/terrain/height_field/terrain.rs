@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::{Half, HeightField, PIECES, index, narrow, number};
 use crate::geometry::ray::{self, Hit, Ray};
-use crate::geometry::shape::Sphere;
+use crate::geometry::shape::{OrientedBox, Sphere, SupportMap};
 use crate::geometry::terrain::{Coverage, GROUND, Plane, Primitive, Terrain};
 
 impl Terrain for HeightField {
@@ -18,35 +18,27 @@ impl Terrain for HeightField {
         reach: f64,
         visit: &mut dyn FnMut(u32, &Primitive),
     ) {
-        self.visit_above(centre, reach, f64::NEG_INFINITY, visit);
+        self.visit_cells(centre, reach, |i, j| self.visit_pieces([i, j], visit));
     }
 
-    fn visit_above(
+    fn visit_around(
         &self,
         centre: &Vector3<f64>,
         reach: f64,
-        floor: f64,
+        solid: &OrientedBox,
         visit: &mut dyn FnMut(u32, &Primitive),
     ) {
-        let columns = self.columns;
+        let floor = solid.support(&-Vector3::y()).y;
         self.visit_cells_above(centre, reach, floor, |i, j| {
             let own = [narrow(i), narrow(j)];
-            let first = number(j * columns + i);
-            let around = self.normals_around(own);
-            let hinges = self.hinges(own, &around);
-            for (k, half) in [(0, Half::Low), (1, Half::High)] {
-                if let Some(face) = self.face(own, half, &around, &hinges) {
-                    visit(first + k, &Primitive::Face(face));
-                }
-            }
-            for (k, hinge) in (2..5).zip(&hinges) {
-                let is_convex = hinge.as_ref().is_some_and(|hinge| hinge.is_convex);
-                if let Some(edge) = is_convex.then(|| self.edge(own, k, &around)).flatten() {
-                    visit(first + k, &Primitive::Edge(edge));
-                }
-            }
-            if let Some(vertex) = self.vertex(own) {
-                visit(first + 5, &Primitive::Vertex(vertex));
+            let corners = [[0, 0], [1, 0], [0, 1], [1, 1]];
+            let corners = corners.map(|[u, v]| self.point([own[0] + u, own[1] + v]));
+            let normals = || {
+                let half = |half| self.normal(own, half).unwrap_or_else(Vector3::y);
+                [half(Half::Low), half(Half::High)]
+            };
+            if !solid.is_clear_of(&corners, normals) {
+                self.visit_pieces([i, j], visit);
             }
         });
     }

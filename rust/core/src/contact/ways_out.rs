@@ -1,0 +1,161 @@
+//! Which of the points at which a part overlaps a surface lead out of it.
+//!
+//! A piece of a surface knows only itself: a corner that dips into a boulder at its top is also
+//! behind the face at the boulder's bottom, and one that dips into the side of a spike is far below
+//! its ridge. The overlap with such a piece is as large as the rock, wherever the part touches it.
+//!
+//! So a point counts only if no smaller overlap explains it. The points are taken in the order of
+//! their depth. The part is moved out along the normal of each that counts, by its depth; a deeper
+//! point that is then no longer in the ground was only in the way. The smallest overlap always
+//! counts. A part that has just touched has overlaps as large as its motion since then, and the
+//! points that count are no deeper.
+
+use nalgebra::Vector3;
+
+use crate::geometry::query::SurfacePoint;
+use crate::geometry::{PlacedShape, Primitive, Terrain};
+
+/// Most points that are compared, those of the smallest overlaps.
+const MOST: usize = 24;
+
+/// Depth, in bounding radii of the shape, up to which every point counts.
+const SHALLOW: f64 = 1e-3;
+
+/// How far a part is moved out, in depths: where the other point is much deeper, so far that what
+/// the part overlaps beside the first point is left behind too.
+const OUT: [f64; 2] = [1.001, 3.0];
+
+/// The same beyond that, m, for rounding.
+const ROUNDING: f64 = 1e-8;
+
+/// A part near the surfaces of a terrain.
+#[derive(Clone, Copy)]
+pub(crate) struct OverSurfaces<'a> {
+    pub shape: &'a PlacedShape,
+    pub terrain: &'a dyn Terrain,
+    /// Where the shape's coordinates have their origin, world, m.
+    pub base: &'a Vector3<f64>,
+}
+
+impl OverSurfaces<'_> {
+    /// Whether the part overlaps a piece at one of its points (behind its plane), after a motion by
+    /// `shift`, m: that point of the part is in the ground, or that of the piece is in the part.
+    /// What is behind the plane may also be beyond the far side of a ridge or a rock.
+    pub fn overlaps(
+        &self,
+        (id, piece): (u32, &Primitive),
+        point: &SurfacePoint,
+        shift: &Vector3<f64>,
+    ) -> bool {
+        let is_inside = |x: Vector3<f64>| self.terrain.is_inside(id, &(self.base + x + shift));
+        if is_inside(point.point) {
+            return true;
+        }
+        let tip = point.point - point.n * point.gap;
+        match piece {
+            Primitive::Edge(edge) => {
+                let start = edge.start - self.base;
+                let place = (tip - start).dot(&edge.along);
+                match self.shape {
+                    PlacedShape::Disc(disc) => {
+                        let to_plane = disc.axle.dot(&(disc.centre + shift - start));
+                        let place = to_plane / disc.axle.dot(&edge.along);
+                        let crossing = start + edge.along * place - disc.centre - shift;
+                        edge.has(place, 0.0) && crossing.norm() <= disc.radius
+                    }
+                    solid => edge.has(place, 0.0) && solid.holds(&(tip - shift)),
+                }
+            }
+            Primitive::Vertex(vertex) => self.shape.holds(&(vertex.place - self.base - shift)),
+            Primitive::Face(_) | Primitive::Plane(_) | Primitive::Sphere(_) => false,
+        }
+    }
+
+    /// Depth up to which every point behind a piece's plane counts, m: ground that is thinner, as
+    /// near a sharp ridge, is pierced and still pushes.
+    #[inline]
+    pub fn shallow(shape: &PlacedShape) -> f64 {
+        SHALLOW * crate::geometry::SupportMap::bound(shape)
+    }
+}
+
+/// The points at which one part overlaps surfaces.
+#[derive(Debug, Default)]
+pub(crate) struct WaysOut {
+    /// With the numbers of their pieces, in the order of their depth.
+    ways: [Option<(u32, SurfacePoint)>; MOST],
+    n: usize,
+    has_deep: bool,
+}
+
+impl WaysOut {
+    /// Begins with another part.
+    #[inline]
+    pub fn clear(&mut self) {
+        (self.n, self.has_deep) = (0, false);
+    }
+
+    /// Adds a point at a piece of a surface; `shallow` (m) of [`OverSurfaces::shallow`].
+    #[inline]
+    pub fn add(&mut self, id: u32, point: &SurfacePoint, shallow: f64) {
+        if point.gap < 0.0 {
+            self.has_deep |= point.gap < -shallow;
+            self.insert(id, point);
+        }
+    }
+
+    fn insert(&mut self, id: u32, point: &SurfacePoint) {
+        let depths = self.ways[..self.n].iter().flatten();
+        let place = depths.take_while(|(_, way)| way.gap >= point.gap).count();
+        if place < MOST {
+            self.n = (self.n + 1).min(MOST);
+            self.ways[place..self.n].rotate_right(1);
+            self.ways[place] = Some((id, *point));
+        }
+    }
+
+    /// Whether [`Self::sift`] may find a point that does not count.
+    #[inline]
+    pub fn are_doubtful(&self) -> bool {
+        self.has_deep && self.n > 1
+    }
+
+    /// Keeps the points that count.
+    #[cold]
+    pub fn sift(&mut self, part: &OverSurfaces<'_>) {
+        for k in 1..self.n {
+            if let Some((id, point)) = self.ways[k]
+                && !self.counts(part, id, &point)
+            {
+                self.ways[k] = None;
+            }
+        }
+    }
+
+    /// Whether a point at a piece counts, once the others are sifted.
+    pub fn counts(&self, part: &OverSurfaces<'_>, id: u32, point: &SurfacePoint) -> bool {
+        if point.gap >= -OverSurfaces::shallow(part.shape) {
+            return true;
+        }
+        let piece = part.terrain.primitive(id);
+        let ways = self.ways[..self.n].iter().flatten();
+        let mut smaller = ways
+            .map(|(_, way)| way)
+            .take_while(|way| way.gap > point.gap);
+        smaller.all(|way| {
+            let depths = (0.5 * point.gap / way.gap).clamp(OUT[0], OUT[1]);
+            let out = way.n * (ROUNDING - depths * way.gap);
+            part.overlaps((id, &piece), point, &out)
+        })
+    }
+
+    /// The deepest point that counts, and its piece, if any is deeper than
+    /// [`OverSurfaces::shallow`].
+    pub fn deepest(&mut self, part: &OverSurfaces<'_>) -> Option<&(u32, SurfacePoint)> {
+        if self.are_doubtful() {
+            self.sift(part);
+        }
+        let mut counting = self.ways[..self.n].iter().flatten();
+        counting.rfind(|_| self.has_deep)
+    }
+}

@@ -1,0 +1,349 @@
+//! Parts that have just touched a surface overlap it by no more than they have moved since.
+
+use std::sync::Arc;
+
+use rover_core::contact::detection::{detect, wheel_contact};
+use rover_core::contact::{Activation, Contact, Part};
+use rover_core::geometry::query::convex;
+use rover_core::geometry::{HeightField, PlacedShape, SupportMap, Terrain, TriangleMesh, Union};
+use rover_core::integrator::StepOptions;
+use rover_core::multibody::{Configuration, Kinematics, Model, ModelDescription};
+use rover_core::nalgebra::{Unit, UnitQuaternion, Vector3};
+use rover_core::simulation::RoverSimulation;
+
+use super::meshes::ball;
+use super::surface_scenes::map;
+use crate::spheres::sphere_scenes::Random;
+
+/// A triangle of a surface as a convex body.
+struct Triangle([Vector3<f64>; 3]);
+
+impl SupportMap for Triangle {
+    fn support(&self, direction: &Vector3<f64>) -> Vector3<f64> {
+        let along = |x: &&Vector3<f64>| direction.dot(x);
+        let furthest = |a: &&Vector3<f64>, b: &&Vector3<f64>| along(a).total_cmp(&along(b));
+        *self.0.iter().max_by(furthest).unwrap()
+    }
+
+    fn centre(&self) -> Vector3<f64> {
+        self.0.iter().sum::<Vector3<f64>>() / 3.0
+    }
+
+    fn bound(&self) -> f64 {
+        let centre = self.centre();
+        let distances = self.0.iter().map(|x| (x - centre).norm());
+        distances.fold(0.0, f64::max)
+    }
+}
+
+/// A ground and its triangles. Places beyond the radius, seen from above, are near its border.
+struct Ground {
+    terrain: Arc<dyn Terrain>,
+    triangles: Vec<Triangle>,
+    radius: f64,
+}
+
+fn of_mesh(mesh: &TriangleMesh) -> Vec<Triangle> {
+    let corners = |triangle: &[u32; 3]| Triangle(triangle.map(|v| mesh.vertices()[v as usize]));
+    mesh.triangles().iter().map(corners).collect()
+}
+
+fn of_map(field: &HeightField) -> Vec<Triangle> {
+    let ([rows, columns], [dx, dz], [x0, z0]) = (field.shape(), field.spacing(), field.origin());
+    let corner = |i: usize, j: usize| {
+        let y = f64::from(field.heights()[j * columns + i]);
+        Vector3::new(x0 + dx * i as f64, y, z0 + dz * j as f64)
+    };
+    let cells = (0..rows - 1).flat_map(|j| (0..columns - 1).map(move |i| (i, j)));
+    cells
+        .flat_map(|(i, j)| {
+            let far = corner(i + 1, j + 1);
+            [corner(i + 1, j), corner(i, j + 1)].map(|side| Triangle([corner(i, j), far, side]))
+        })
+        .collect()
+}
+
+fn boulder(centre: Vector3<f64>, cuts: usize) -> Ground {
+    let mesh = ball(0.15, cuts, centre);
+    Ground {
+        triangles: of_mesh(&mesh),
+        terrain: Arc::new(mesh),
+        radius: f64::INFINITY,
+    }
+}
+
+/// A flat map with one spike.
+fn spike(random: &mut Random) -> HeightField {
+    let (height, spacing) = (random.between(0.1, 0.5), random.between(0.1, 0.15));
+    map(14, spacing, |x, z| {
+        if x.abs() + z.abs() < 0.5 * spacing {
+            height
+        } else {
+            0.0
+        }
+    })
+}
+
+/// Two spikes, rough maps, boulders, and a boulder on a rough map.
+fn grounds(random: &mut Random) -> Vec<Ground> {
+    let mut rough = |cells: u32, roughness: f64| {
+        let spacing = random.between(0.08, 0.2);
+        let mut numbers = Random(random.0);
+        map(cells, spacing, |_, _| {
+            roughness * spacing * numbers.between(-1.0, 1.0)
+        })
+    };
+    let fields = [rough(12, 0.1), rough(12, 0.4), rough(12, 1.0)];
+    let stony = rough(10, 0.15);
+    let stone = ball(0.15, 1, Vector3::new(0.05, 0.03, -0.1));
+    let mut triangles = of_map(&stony);
+    triangles.extend(of_mesh(&stone));
+    let on_map = |field: HeightField| Ground {
+        triangles: of_map(&field),
+        radius: -field.origin()[0] - 2.0 * field.spacing()[0],
+        terrain: Arc::new(field),
+    };
+    let mut all: Vec<Ground> = fields.into_iter().map(on_map).collect();
+    let radius = -stony.origin()[0] - 2.0 * stony.spacing()[0];
+    let parts: Vec<Arc<dyn Terrain>> = vec![Arc::new(stony), Arc::new(stone)];
+    all.push(Ground {
+        terrain: Arc::new(Union::new(parts).unwrap()),
+        triangles,
+        radius,
+    });
+    all.extend([spike(random), spike(random)].map(on_map));
+    all.extend([0, 1, 2].map(|cuts| boulder(Vector3::new(0.0, 0.1, 0.0), cuts)));
+    all
+}
+
+/// A body that is a part of this shape and nothing else, or a wheel.
+fn body(shape: &str) -> (Model, Part) {
+    let solid = "name = \"one\"\n[[solids]]\nname = \"one\"\njoint = \"free\"\nmass = 3.0\n";
+    let (text, part) = if let Some(width) = shape.strip_prefix("wheel") {
+        let rest = "shape = { kind = \"sphere\", radius = 0.1 }\n[[wheels]]\nname = \"W\"\n\
+                    solid = \"one\"\naxle = [0.0, 0.0, 1.0]\nradius = 0.15\ntorque_limit = 1.0\n\
+                    drive_sign = -1.0\n";
+        (format!("{solid}{rest}{width}"), Part::Wheel(0))
+    } else {
+        let part = if shape.contains("box") {
+            Part::Box(0)
+        } else {
+            Part::Sphere(0)
+        };
+        (
+            format!("{solid}collides = true\nshape = {{ {shape} }}\n"),
+            part,
+        )
+    };
+    let description = ModelDescription::from_toml(&text).unwrap();
+    (Model::from_description(description).unwrap(), part)
+}
+
+/// Boxes, a thin wheel, wheels with a width (one of them a torus, one a cylinder) and a ball.
+fn bodies() -> Vec<(Model, Part)> {
+    [
+        "kind = \"box\", size = [0.6, 0.2, 0.4]",
+        "kind = \"box\", size = [1.0, 0.06, 0.5]",
+        "kind = \"box\", size = [0.1, 0.1, 0.1]",
+        "wheel",
+        "wheel\nwidth = 0.1\nrounding = 0.02",
+        "wheel\nwidth = 0.1\nrounding = 0.05",
+        "wheel\nwidth = 0.12\nrounding = 0.0",
+        "kind = \"sphere\", radius = 0.1",
+    ]
+    .map(body)
+    .into()
+}
+
+/// A body that moves along a line and turns.
+struct Path<'a> {
+    model: &'a Model,
+    part: Part,
+    start: Vector3<f64>,
+    direction: Vector3<f64>,
+    attitude: UnitQuaternion<f64>,
+    axis: Unit<Vector3<f64>>,
+    /// rad/m.
+    turning: f64,
+}
+
+impl<'a> Path<'a> {
+    /// From a place above towards one near the middle.
+    fn random((model, part): &'a (Model, Part), random: &mut Random) -> Self {
+        let mut any = || {
+            let mut x = || random.between(-1.0, 1.0);
+            Vector3::new(x(), x(), x())
+        };
+        let (target, from, turn, axis) = (0.25 * any(), any(), 3.0 * any(), any());
+        let from = Vector3::new(from.x, 0.15 + from.y.abs(), from.z).normalize();
+        Self {
+            model,
+            part: *part,
+            start: Vector3::new(target.x, 0.0, target.z) + 2.0 * from,
+            direction: -from,
+            attitude: UnitQuaternion::from_euler_angles(turn.x, turn.y, turn.z),
+            axis: Unit::new_normalize(axis),
+            turning: random.between(-2.0, 2.0).max(0.0),
+        }
+    }
+
+    fn at(&self, way: f64) -> Configuration {
+        let mut q = Configuration::zero(self.model);
+        q.position = self.start + self.direction * way;
+        q.attitude =
+            UnitQuaternion::from_axis_angle(&self.axis, self.turning * way) * self.attitude;
+        q
+    }
+
+    fn shape(&self, way: f64) -> PlacedShape {
+        let q = self.at(way);
+        let mut shape = self.part.place(self.model, &Kinematics::of(self.model, &q));
+        match &mut shape {
+            PlacedShape::Disc(disc) => disc.centre += q.position,
+            PlacedShape::Roller(roller) => roller.core.centre += q.position,
+            PlacedShape::Box(solid) => solid.centre += q.position,
+            PlacedShape::Sphere(sphere) => sphere.centre += q.position,
+        }
+        shape
+    }
+
+    /// Largest speed of a point of the body, per way.
+    fn speed(&self) -> f64 {
+        1.0 + self.turning.abs() * self.part.bound(self.model)
+    }
+
+    /// Distance from the nearest triangle, m, and the place there.
+    fn nearest(&self, ground: &Ground, way: f64) -> (f64, Vector3<f64>) {
+        let shape = self.shape(way);
+        let mut nearest = (f64::INFINITY, Vector3::zeros());
+        for triangle in &ground.triangles {
+            let apart = (triangle.centre() - shape.centre()).norm() - triangle.bound();
+            if apart - shape.bound() < nearest.0.max(1e-3) {
+                let near = convex::nearest_points(&shape, triangle);
+                if near.gap < nearest.0 {
+                    nearest = (near.gap, near.point);
+                }
+            }
+        }
+        nearest
+    }
+
+    /// The way to the first touch, away from the ground's border.
+    fn first_touch(&self, ground: &Ground) -> Option<f64> {
+        let mut way = 0.0;
+        while way < 4.0 {
+            let (distance, place) = self.nearest(ground, way);
+            if distance < 1e-9 {
+                return (place.x.abs().max(place.z.abs()) < ground.radius).then_some(way);
+            }
+            way += distance / self.speed();
+        }
+        None
+    }
+
+    fn contacts(&self, terrain: &dyn Terrain, way: f64) -> Vec<Contact> {
+        let q = self.at(way);
+        let poses = Kinematics::of(self.model, &q);
+        let (rest, touching) = (vec![0.0; self.model.nv()], Activation::default());
+        let mut contacts = Vec::new();
+        let model = self.model;
+        detect(
+            model,
+            &poses,
+            &poses,
+            terrain,
+            &rest,
+            &touching,
+            &mut contacts,
+        );
+        contacts
+    }
+
+    /// The deepest overlap, m.
+    fn depth(&self, terrain: &dyn Terrain, way: f64) -> f64 {
+        let gaps = self.contacts(terrain, way).into_iter().map(|c| c.gap);
+        -gaps.fold(0.0, f64::min)
+    }
+}
+
+/// Of every shape on every ground the deepest overlap was up to the thickness of the rock, because
+/// the face beyond it pushed too.
+#[test]
+fn an_overlap_grows_from_zero_along_random_paths_through_first_touch() {
+    let mut random = Random(7);
+    let mut tried = 0;
+    for round in 0..4 {
+        for ground in grounds(&mut random) {
+            for body in &bodies() {
+                let path = Path::random(body, &mut random);
+                let Some(touch) = path.first_touch(&ground) else {
+                    continue;
+                };
+                tried += 1;
+                let terrain = &*ground.terrain;
+                // Up to a thousandth of its size a part may be in ground that is thinner.
+                let shallow = 1.001e-3 * path.part.bound(path.model);
+                for step in [1e-6, 1e-5, 1e-4, 3e-4, 1e-3, 3e-3] {
+                    let depth = path.depth(terrain, touch + step);
+                    let moved = step * path.speed() + 2e-9;
+                    let place = || format!("{round} {:?} {step}", path.shape(touch));
+                    assert!(depth <= moved.max(shallow), "{}: {depth}", place());
+                    let (distance, _) = path.nearest(&ground, touch + step);
+                    let has_contact = depth > 0.0 || distance > -1e-7;
+                    assert!(has_contact, "{}: nothing at {distance}", place());
+                    if let Part::Wheel(i) = path.part {
+                        let poses = Kinematics::of(path.model, &path.at(touch + step));
+                        let gap = wheel_contact(path.model, &poses, terrain, i).gap;
+                        assert!(gap >= -moved.max(shallow), "{}: gap {gap}", place());
+                    }
+                }
+            }
+        }
+    }
+    assert!(tried > 150, "{tried}");
+}
+
+/// A rover that stranded on a spike or a boulder was thrown sideways: one step after its chassis
+/// had been lowered by 0.1 mm past touching it stood up to 0.75 m away.
+#[test]
+fn a_box_that_rests_on_a_spike_or_a_boulder_is_not_thrown_sideways() {
+    let mut random = Random(11);
+    let (model, part) = body("kind = \"box\", size = [0.6, 0.2, 0.4]");
+    let model = Arc::new(model);
+    let mut tried = 0;
+    for case in 0..60 {
+        let ground = if case % 2 == 0 {
+            let field = spike(&mut random);
+            Ground {
+                triangles: of_map(&field),
+                radius: -field.origin()[0] - 2.0 * field.spacing()[0],
+                terrain: Arc::new(field),
+            }
+        } else {
+            boulder(Vector3::new(0.0, 0.1, 0.0), case / 2 % 3)
+        };
+        let own = (Model::clone(&model), part);
+        let mut path = Path::random(&own, &mut random);
+        let mut beside = || random.between(-0.15, 0.15);
+        path.start = Vector3::new(beside(), 2.0, beside());
+        (path.direction, path.turning) = (-Vector3::y(), 0.0);
+        let Some(touch) = path.first_touch(&ground) else {
+            continue;
+        };
+        tried += 1;
+        let lowered = path.at(touch + 1e-4);
+        let depth = path.depth(&*ground.terrain, touch + 1e-4);
+        assert!(depth < 1.1e-4 + 4e-4, "{case}: {depth}");
+        let options = StepOptions::default();
+        let terrain = ground.terrain.clone();
+        let mut stone = RoverSimulation::new(model.clone(), terrain, options).unwrap();
+        stone.set_state(lowered.clone(), vec![0.0; 6]);
+        stone.step(1).unwrap();
+        let now = &stone.state().configuration;
+        let moved = (now.position - lowered.position).norm();
+        assert!(moved < 3e-3, "{case}: {moved}");
+        let turned = now.attitude.angle_to(&lowered.attitude);
+        assert!(turned < 0.02, "{case}: {turned}");
+    }
+    assert!(tried > 40, "{tried}");
+}
