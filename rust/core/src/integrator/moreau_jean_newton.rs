@@ -28,7 +28,9 @@ use super::probe::{Phase, Probe};
 use super::report::{StepReport, StepStatus};
 use super::scheme::{Integrator, StateMut};
 use super::scratch::ScratchOf;
-use super::step_contacts::{activation, add_correction, assemble_contacts, solve_contacts};
+use super::step_contacts::{
+    activation, add_correction, assemble_contacts, find_impacts, solve_contacts,
+};
 use super::warm_start::WarmStart;
 
 /// Relative change below which an iteration that no longer contracts has reached rounding.
@@ -76,7 +78,10 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
                 drift: drift(system, options, start),
             };
             let is_solved = report.is_converged();
-            let verdict = audit.judge(system, options, start, ws, &mut report);
+            if before.is_some() || warm_start.is_of(&ws.contacts) {
+                find_impacts(system, options, warm_start, ws);
+            }
+            let verdict = audit.judge(system, options, start, warm_start, ws, &mut report);
             if is_solved { verdict } else { Verdict::Coarse }
         } else {
             // An iterate that has not converged satisfies no law.

@@ -40,6 +40,17 @@ pub struct StepReport {
     pub energy_gain: f64,
     /// Energy that the scheme would have gained and the audit removed, all steps together, J.
     pub energy_removed: f64,
+    /// Energy that friction and impacts took by their law, all steps together, J.
+    ///
+    /// Newton's law of restitution with friction can make it negative.
+    pub energy_dissipated: f64,
+    /// Energy that the scheme lost, all steps together, J; negative where it gained.
+    ///
+    /// It is what the work of gravity and actuators, `energy_dissipated`, `energy_removed` and
+    /// `energy_lifted` leave unexplained of the change of the energy: errors of the time step, and
+    /// the normal work of contacts that persist. 0 among grains and planar soils, which are not
+    /// audited.
+    pub energy_lost: f64,
     /// Energy that position projection added, all steps together, J.
     pub energy_lifted: f64,
 }
@@ -77,6 +88,8 @@ impl StepReport {
         self.retaken += later.retaken;
         self.energy_gain = self.energy_gain.max(later.energy_gain);
         self.energy_removed += later.energy_removed;
+        self.energy_dissipated += later.energy_dissipated;
+        self.energy_lost += later.energy_lost;
         self.energy_lifted += later.energy_lifted;
     }
 }

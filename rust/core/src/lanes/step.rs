@@ -32,6 +32,7 @@ use super::rows::{Answer, Rows};
 use crate::contact::Contact;
 use crate::integrator::energy_audit::{COARSE, GAIN, RAISE, ROUNDINGS};
 use crate::integrator::position_projection::FARTHEST;
+use crate::integrator::step_contacts::STEADY;
 use crate::integrator::{Phase, Probe, Stabilisation, StepOptions, StepReport, WarmStart};
 use crate::multibody::Model;
 use crate::multibody::model::BASE;
@@ -112,6 +113,11 @@ pub struct Block<T: Lane> {
     p: Vec<Triple<T>>,
     pushes: Vec<Triple<T>>,
     u: Vec<Triple<T>>,
+    /// Impulses of the last step by slot, N s.
+    p_last: Vec<Triple<T>>,
+    /// Lanes whose contact is in impact, by slot, and lanes with an impact.
+    impact: Vec<T::Mask>,
+    has_impact: T::Mask,
     /// An impulse (nv), or its factor coordinates, or a change of the velocity.
     y: Vec<T>,
     /// Torques' impulse over the step (nv).
@@ -121,6 +127,10 @@ pub struct Block<T: Lane> {
     /// Kinetic and potential energy at the start and at the end of the step, J.
     before: [T; 2],
     after: [T; 2],
+    /// Work of the actuators, of the contacts by their law, and energy removed by the audit, J.
+    work: T,
+    contact_work: T,
+    removed: T,
     /// Linear momentum at the end of the step, kg m/s.
     momentum: Vec3<T>,
     /// Lanes whose velocity the energy audit corrected in this step.
@@ -180,12 +190,18 @@ impl<T: Lane> Block<T> {
             contacts,
             p: slots.clone(),
             pushes: slots.clone(),
+            p_last: slots.clone(),
+            impact: vec![nobody; slots.len()],
+            has_impact: nobody,
             u: slots,
             y: vector(),
             torque: vector(),
             pushed: vector(),
             before: [zero; 2],
             after: [zero; 2],
+            work: zero,
+            contact_work: zero,
+            removed: zero,
             momentum: Vec3::splat(token, [0.0; 3]),
             is_corrected: nobody,
             is_new: nobody,
@@ -495,12 +511,17 @@ impl<T: Lane> Block<T> {
     fn push_and_drive(&mut self, is_any: bool, problems: &[ContactProblem]) {
         let zero = self.number(0.0);
         let (h, _) = self.time_step();
+        self.rows
+            .read(&self.contacts, problems, Answer::Impulses, &mut self.p_last);
         if is_any {
-            self.rows
-                .read(&self.contacts, problems, Answer::Impulses, &mut self.p);
             let (contacts, end) = (&self.contacts, &self.poses_end);
-            self.rows
-                .generalized_impulse(contacts, end, self.persists, &self.p, &mut self.pushed);
+            self.rows.generalized_impulse(
+                contacts,
+                end,
+                self.persists,
+                &self.p_last,
+                &mut self.pushed,
+            );
         }
         self.torque.fill(zero);
         self.drives.add_impulse(
@@ -607,6 +628,11 @@ impl<T: Lane> Block<T> {
         if self.is_corrected.any() {
             self.weigh_again();
         }
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.report_balance(),
+        );
         probe.end(Phase::Update);
         let Some(tolerated) = self.tolerated() else {
             return false;
@@ -633,6 +659,73 @@ impl<T: Lane> Block<T> {
         let share = self.options.theta * self.options.time_step;
         self.end.set_moved(&self.middle, &self.v_end, share);
         self.end.normalise();
+        self.find_impacts();
+        self.contact_work = self.contact_work();
+    }
+
+    /// Finds the contacts in impact, as [`crate::integrator::step_contacts`] does.
+    #[inline(always)]
+    fn find_impacts(&mut self) {
+        let (h, _) = self.time_step();
+        let slow = (h.like(2.0) * self.gravity.norm() * h).max(h.like(1e-9));
+        self.has_impact = T::mask(self.token, 0);
+        for &slot in self.contacts.used() {
+            let active = self.contacts.slot(slot).active;
+            let is_fast = active & !self.rows.u_before[slot][0].abs().le(slow);
+            self.impact[slot] = is_fast;
+            self.has_impact = self.has_impact | is_fast;
+        }
+        if (self.has_impact & self.going).any() {
+            self.compare_impulses();
+        }
+    }
+
+    /// Leaves those in impact whose approach the last step's impulses would not have stopped.
+    #[inline(always)]
+    fn compare_impulses(&mut self) {
+        let zero = self.number(0.0);
+        for &slot in self.contacts.used() {
+            for ((change, p), last) in
+                (self.pushes[slot].iter_mut().zip(&self.p[slot])).zip(&self.p_last[slot])
+            {
+                *change = *p - *last;
+            }
+        }
+        self.y.fill(zero);
+        self.rows
+            .add_impulses(&self.contacts, self.occupied, &self.pushes, &mut self.y);
+        self.rows.local(&self.contacts, &self.y, &mut self.pushes);
+        self.has_impact = T::mask(self.token, 0);
+        for &slot in self.contacts.used() {
+            let before = self.rows.u_before[slot][0];
+            let change = self.pushes[slot][0] - before;
+            let is_steady = change.abs().le(zero.like(STEADY) * before.abs());
+            self.impact[slot] = self.impact[slot] & !is_steady;
+            self.has_impact = self.has_impact | self.impact[slot];
+        }
+    }
+
+    /// Work of the contacts by their law, J, as [`crate::integrator::step_contacts`] counts it.
+    #[inline(always)]
+    fn contact_work(&self) -> T {
+        let (zero, half) = (self.number(0.0), self.number(0.5));
+        let persists = self.persists & !self.has_impact;
+        let (mut steady, mut other) = (zero, zero);
+        for (v, push) in self.v.iter().zip(&self.persistent) {
+            steady += *v * *push;
+        }
+        for &slot in self.contacts.used() {
+            let ([p_n, p_t, p_b], [u_n, u_t, u_b]) = (self.p[slot], self.u[slot]);
+            let ([_, last_t, last_b], before) = (self.p_last[slot], self.rows.u_before[slot]);
+            let active = self.contacts.slot(slot).active;
+            let end = p_t * u_t + p_b * u_b;
+            let start = (p_t - last_t) * before[1] + (p_b - last_b) * before[2];
+            steady += T::select(active, end + start, zero);
+            let begin = p_n * before[0] + p_t * before[1] + p_b * before[2];
+            let struck = half * (p_n * u_n + end + begin);
+            other += T::select(active, T::select(self.impact[slot], struck, end), zero);
+        }
+        T::select(persists, half * steady, other)
     }
 
     /// Declines the lanes whose step does not balance, or whose motors left their branch.
@@ -644,6 +737,7 @@ impl<T: Lane> Block<T> {
             self.drives
                 .work(&self.machine, (h, theta), places, &self.v, &self.v_end);
         self.decline(Decline::Motor, has_left);
+        self.work = work;
         let ([kinetic, potential], [end_kinetic, end_potential]) = (self.before, self.after);
         let excess = (end_kinetic - kinetic) + (end_potential - potential) - work;
         let fall = self.gravity.norm() * h;
@@ -677,6 +771,7 @@ impl<T: Lane> Block<T> {
         let gain = (excess - rounding).max(zero) / size.max(h.like(f64::MIN_POSITIVE));
         let gain = T::select(self.is_corrected, zero, gain);
         let removed = T::select(self.is_corrected, excess.max(zero), zero);
+        self.removed = removed;
         let mut energies = [0.0; MAX_LANES];
         removed.store(&mut energies[..T::LANES]);
         for (report, removed) in self.reports.iter_mut().zip(energies) {
@@ -728,6 +823,21 @@ impl<T: Lane> Block<T> {
     fn weigh_again(&mut self) {
         let after = self.energy(State::End).kinetic_and_potential();
         self.after = select_both(self.is_corrected, after, self.after);
+    }
+
+    /// Enters what the contacts' law and what nothing explains of the change of the energy.
+    #[inline(always)]
+    fn report_balance(&mut self) {
+        let [kinetic, potential] = self.before;
+        let change = (self.after[0] - kinetic) + (self.after[1] - potential);
+        let lost = self.contact_work - (change - self.work) - self.removed;
+        let (mut taken, mut missing) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
+        self.contact_work.store(&mut taken[..T::LANES]);
+        lost.store(&mut missing[..T::LANES]);
+        for (report, (taken, missing)) in self.reports.iter_mut().zip(taken.iter().zip(missing)) {
+            report.energy_dissipated = -taken;
+            report.energy_lost = missing;
+        }
     }
 
     /// Penetration that is tolerated, m, if positions are projected.
@@ -844,6 +954,7 @@ impl<T: Lane> Block<T> {
         for (lane, report) in self.reports.iter_mut().enumerate().take(T::LANES) {
             if is_moved.get(lane) {
                 report.energy_lifted = gained.get(lane).max(0.0);
+                report.energy_lost += (-gained.get(lane)).max(0.0);
             }
         }
         self.after = select_both(is_moved, lifted, self.after);
@@ -887,15 +998,11 @@ impl<T: Lane> Block<T> {
         self.decline(Decline::NotFinite, !is_finite);
         let going = self.going;
         let (h, _) = self.time_step();
-        let slow = h.like(2.0) * self.gravity.norm() * h;
         let mut in_touch = T::mask(self.token, 0);
-        let mut is_impact = in_touch;
         for &slot in self.contacts.used() {
-            let active = self.contacts.slot(slot).active;
-            in_touch = in_touch | active;
-            is_impact = is_impact | (active & !self.rows.u_before[slot][0].abs().le(slow));
+            in_touch = in_touch | self.contacts.slot(slot).active;
         }
-        let persists = self.is_same & in_touch & !is_impact;
+        let persists = self.is_same & in_touch & !self.has_impact;
         let (contacts, end) = (&self.contacts, &self.poses_end);
         self.rows
             .generalized_impulse(contacts, end, going, &self.p, &mut self.pushed);
