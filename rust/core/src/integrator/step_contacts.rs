@@ -33,17 +33,21 @@ fn slow(options: &StepOptions) -> f64 {
 
 /// Change of the contacts' impulses since the last step, as a fraction of the approach that they
 /// stop, up to which they are forces.
-pub(crate) const STEADY: f64 = 0.5;
+///
+/// The steps of a ball that rolls through a hollow in 25 change them by up to a tenth. Of the energy
+/// that a thousand drops of the rover onto rocks dissipate, 1.2% goes in impacts like the last
+/// step's at ½, 0.4% at a fifth, 0.2% at a tenth.
+pub(crate) const STEADY: f64 = 0.25;
 
 /// Finds the contacts in impact, `ws.impact`, for the solved step.
 ///
 /// The normal velocity before the step is measured at its predicted end, so it contains the
 /// curvature of the path over ground and rim: `u_N = h a_N` with the normal acceleration `a_N`,
 /// which the impulses of persistent contact balance step after step. An impact is a fast approach
-/// that last step's impulses p_k would not have stopped:
+/// that the last step's impulses p_k would not have stopped:
 ///
 /// ```text
-/// |u_N| > 2 |g| h   and   |(W (p − p_k))_N| > ½ |u_N|
+/// |u_N| > 2 |g| h   and   |(W (p − p_k))_N| > ¼ |u_N|
 /// ```
 ///
 /// The first condition saves the product where it changes nothing: an approach of the order of h is

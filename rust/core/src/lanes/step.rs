@@ -131,6 +131,8 @@ pub struct Block<T: Lane> {
     work: T,
     contact_work: T,
     removed: T,
+    /// Gain that is left, as a fraction of the kinetic energy.
+    gain: T,
     /// Linear momentum at the end of the step, kg m/s.
     momentum: Vec3<T>,
     /// Lanes whose velocity the energy audit corrected in this step.
@@ -202,6 +204,7 @@ impl<T: Lane> Block<T> {
             work: zero,
             contact_work: zero,
             removed: zero,
+            gain: zero,
             momentum: Vec3::splat(token, [0.0; 3]),
             is_corrected: nobody,
             is_new: nobody,
@@ -710,22 +713,28 @@ impl<T: Lane> Block<T> {
     fn contact_work(&self) -> T {
         let (zero, half) = (self.number(0.0), self.number(0.5));
         let persists = self.persists & !self.has_impact;
-        let (mut steady, mut other) = (zero, zero);
-        for (v, push) in self.v.iter().zip(&self.persistent) {
-            steady += *v * *push;
-        }
+        let (mut ends, mut changes, mut struck) = (zero, zero, zero);
         for &slot in self.contacts.used() {
             let ([p_n, p_t, p_b], [u_n, u_t, u_b]) = (self.p[slot], self.u[slot]);
             let ([_, last_t, last_b], before) = (self.p_last[slot], self.rows.u_before[slot]);
             let active = self.contacts.slot(slot).active;
             let end = p_t * u_t + p_b * u_b;
-            let start = (p_t - last_t) * before[1] + (p_b - last_b) * before[2];
-            steady += T::select(active, end + start, zero);
-            let begin = p_n * before[0] + p_t * before[1] + p_b * before[2];
-            let struck = half * (p_n * u_n + end + begin);
-            other += T::select(active, T::select(self.impact[slot], struck, end), zero);
+            let change = (p_t - last_t) * before[1] + (p_b - last_b) * before[2];
+            ends += T::select(active, end, zero);
+            changes += T::select(active, change, zero);
+            if self.impact[slot].any() {
+                let both = p_n * (u_n + before[0]) + p_t * before[1] + p_b * before[2];
+                struck += T::select(self.impact[slot], half * (both - end), zero);
+            }
         }
-        T::select(persists, half * steady, other)
+        if !persists.any() {
+            return ends + struck;
+        }
+        let mut start = zero;
+        for (v, push) in self.v.iter().zip(&self.persistent) {
+            start += *v * *push;
+        }
+        T::select(persists, half * (ends + changes + start), ends + struck)
     }
 
     /// Declines the lanes whose step does not balance, or whose motors left their branch.
@@ -772,16 +781,7 @@ impl<T: Lane> Block<T> {
         let gain = T::select(self.is_corrected, zero, gain);
         let removed = T::select(self.is_corrected, excess.max(zero), zero);
         self.removed = removed;
-        let mut energies = [0.0; MAX_LANES];
-        removed.store(&mut energies[..T::LANES]);
-        for (report, removed) in self.reports.iter_mut().zip(energies) {
-            report.energy_removed = removed;
-        }
-        let mut gains = [0.0; MAX_LANES];
-        gain.store(&mut gains[..T::LANES]);
-        for (report, gain) in self.reports.iter_mut().zip(gains) {
-            report.energy_gain = gain;
-        }
+        self.gain = gain;
     }
 
     /// Removes an excess of energy from the velocity at the end of the step, as
@@ -825,18 +825,22 @@ impl<T: Lane> Block<T> {
         self.after = select_both(self.is_corrected, after, self.after);
     }
 
-    /// Enters what the contacts' law and what nothing explains of the change of the energy.
+    /// Enters the balance of the energy into the reports.
     #[inline(always)]
     fn report_balance(&mut self) {
         let [kinetic, potential] = self.before;
         let change = (self.after[0] - kinetic) + (self.after[1] - potential);
         let lost = self.contact_work - (change - self.work) - self.removed;
-        let (mut taken, mut missing) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
-        self.contact_work.store(&mut taken[..T::LANES]);
-        lost.store(&mut missing[..T::LANES]);
-        for (report, (taken, missing)) in self.reports.iter_mut().zip(taken.iter().zip(missing)) {
-            report.energy_dissipated = -taken;
-            report.energy_lost = missing;
+        let mut entries = [[0.0; MAX_LANES]; 4];
+        let balance = [self.gain, self.removed, self.contact_work, lost];
+        for (entry, x) in entries.iter_mut().zip(balance) {
+            x.store(&mut entry[..T::LANES]);
+        }
+        for (lane, report) in self.reports[..T::LANES].iter_mut().enumerate() {
+            report.energy_gain = entries[0][lane];
+            report.energy_removed = entries[1][lane];
+            report.energy_dissipated = -entries[2][lane];
+            report.energy_lost = entries[3][lane];
         }
     }
 
