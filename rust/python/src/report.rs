@@ -94,10 +94,11 @@ impl StepReport {
 
     /// Energy that the scheme lost, summed over the steps, J; negative where it gained.
     ///
-    /// The change of the energy is the work of the actuators minus `energy_dissipated`, `energy_lost`
-    /// and `energy_removed`, plus `energy_lifted`. `energy_lost` is therefore what no law explains:
-    /// errors of the time step, and the work of reactions in contacts that persist. It shrinks with
-    /// the square of the step. Always 0 with grains and planar soils, whose energy is not audited.
+    /// The change of the energy is the work of the actuators minus `energy_dissipated`,
+    /// `energy_lost` and `energy_removed`, plus `energy_lifted`. `energy_lost` is therefore what no
+    /// law explains: errors of the time step, and the work of reactions in contacts that persist.
+    /// In smooth motion it shrinks with the square of the step. Always 0 with grains and planar
+    /// soils, whose energy is not audited.
     #[getter]
     fn energy_lost(&self) -> f64 {
         self.inner.energy_lost

@@ -1,10 +1,10 @@
 //! A thin disc that rolls about its resting centre, Euler's disc without losses.
 //!
 //! With the angle α between disc and ground the centre rests at height `R sin α`, and the disc
-//! precesses at `Ω² = 4 g / (R sin α)`: the moment of the reaction `m g`, `m g R cos α`, is `Ω` times
-//! the horizontal angular momentum `¼ m R² Ω sin α cos α`. It turns at `Ω sin α` about the radius to
-//! its lowest point, which is at rest, and needs no friction. Along its instantaneous motion the rim
-//! approaches the ground with `4 g cos² α`: more than twice gravity below 45 degrees.
+//! precesses at `Ω² = 4 g / (R sin α)`: the moment `m g R cos α` of the reaction is `Ω` times the
+//! horizontal angular momentum `¼ m R² Ω sin α cos α`. The disc turns at `Ω sin α` about the radius
+//! to its lowest point, which is at rest, and needs no friction. Along its instantaneous motion the
+//! rim approaches the ground with `4 g cos² α`: more than twice gravity below 45 degrees.
 
 use std::sync::Arc;
 

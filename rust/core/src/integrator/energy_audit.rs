@@ -151,8 +151,7 @@ impl Audit {
         };
         if is_balanced {
             report.energy_gain = report.energy_gain.max(relative(excess - rounding, size));
-            report.energy_dissipated += dissipated;
-            report.energy_lost -= excess + dissipated;
+            report.enter_balance(dissipated, 0.0, excess);
             ws.audited.is(&ws.end, &ws.v, after);
             return Verdict::Sound;
         }
@@ -171,13 +170,10 @@ impl Audit {
                 self.hold_back(system, options, start, ws);
             }
         }
-        let removed = excess.max(0.0);
-        report.energy_removed += removed;
         if let Some(corrected) = system.energy(options, &ws.end, &ws.v) {
             let change =
                 (corrected.kinetic - before.kinetic) + (corrected.potential - before.potential);
-            report.energy_dissipated += dissipated;
-            report.energy_lost -= (change - work) + dissipated + removed;
+            report.enter_balance(dissipated, excess.max(0.0), change - work);
             ws.audited.is(&ws.end, &ws.v, corrected);
         }
         Verdict::Sound

@@ -73,6 +73,14 @@ impl StepReport {
         }
     }
 
+    /// Enters the balance of a step, J: what the contacts' law dissipated, what the audit removed,
+    /// and the final excess of the energy's change over the work of the actuators.
+    pub(super) fn enter_balance(&mut self, dissipated: f64, removed: f64, excess: f64) {
+        self.energy_dissipated += dissipated;
+        self.energy_removed += removed;
+        self.energy_lost -= excess + dissipated + removed;
+    }
+
     /// Adds the report of a later step.
     pub fn merge(&mut self, later: &Self) {
         if later.status == StepStatus::NotConverged {

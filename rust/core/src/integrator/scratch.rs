@@ -160,8 +160,8 @@ impl<Q: Clone, C> Scratch<Q, C> {
         }
     }
 
-    /// Begins a step: makes the velocities' vectors fit a system whose nv may have changed since the
-    /// last one.
+    /// Begins a step: makes the velocities' vectors fit a system whose nv may have changed since
+    /// the last one.
     pub(super) fn fit(&mut self, nv: usize) {
         self.whole.clear();
         for vector in [

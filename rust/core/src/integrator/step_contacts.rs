@@ -34,9 +34,9 @@ fn slow(options: &StepOptions) -> f64 {
 /// Change of the contacts' impulses since the last step, as a fraction of the approach that they
 /// stop, up to which they are forces.
 ///
-/// The steps of a ball that rolls through a hollow in 25 change them by up to a tenth. Of the energy
-/// that a thousand drops of the rover onto rocks dissipate, 1.2% goes in impacts like the last
-/// step's at ½, 0.4% at a fifth, 0.2% at a tenth.
+/// A ball that crosses a hollow in 25 steps changes them by up to a fifth in a step. Of the energy
+/// that a thousand drops of the rover onto rocks dissipate, 1.3% is lost in impacts that resemble
+/// the last step's at ½, 0.4% at a fifth, 0.2% at a tenth.
 pub(crate) const STEADY: f64 = 0.25;
 
 /// Finds the contacts in impact, `ws.impact`, for the solved step.

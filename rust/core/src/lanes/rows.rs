@@ -334,18 +334,29 @@ impl<T: Lane> Rows<T> {
     ) {
         let problems = &problems[..T::LANES];
         for &slot in contacts.used() {
-            let mut values = store_all(&out[slot]);
             let places = contacts.places(slot);
+            let own = |lane: usize| {
+                let problem = &problems[lane];
+                let all = match answer {
+                    Answer::Impulses => &problem.p,
+                    Answer::Velocities => &problem.u,
+                };
+                &all[3 * usize::from(places[lane])..][..3]
+            };
+            if T::LANES == 1 {
+                if contacts.slot(slot).active.any() {
+                    for (out, own) in out[slot].iter_mut().zip(own(0)) {
+                        *out = T::splat(self.token, *own);
+                    }
+                }
+                continue;
+            }
+            let mut values = store_all(&out[slot]);
             each::<T>(
                 contacts.slot(slot).active,
                 #[inline(always)]
                 |lane| {
-                    let problem = &problems[lane];
-                    let all = match answer {
-                        Answer::Impulses => &problem.p,
-                        Answer::Velocities => &problem.u,
-                    };
-                    let own = &all[3 * usize::from(places[lane])..][..3];
+                    let own = own(lane);
                     for i in 0..3 {
                         values[i][lane] = own[i];
                     }
