@@ -62,8 +62,7 @@ pub(super) fn find_impacts<S: MechanicalSystem>(
     let slow = slow(options);
     let is_fast = |u: &[f64]| u[0].abs() > slow;
     ws.impact.clear();
-    ws.impact
-        .extend(ws.u_before.chunks_exact(d).map(|u| is_fast(u)));
+    ws.impact.extend(ws.u_before.chunks_exact(d).map(is_fast));
     if !ws.impact.contains(&true) {
         return;
     }

@@ -288,6 +288,12 @@ impl<T: Lane> Rows<T> {
                         },
                     );
                     for &column in &contacts.used()[..=i] {
+                        if T::LANES == 1 && contacts.is_full() {
+                            let out = problems[0].W[at].iter_mut();
+                            out.zip(&self.W[at]).for_each(|(out, x)| *out = x.get(0));
+                            at += 1;
+                            continue;
+                        }
                         let of_column = contacts.places(column);
                         let [first @ .., last] = &self.W[at];
                         let (mut rows, mut ends) = ([[0.0; 8]; MAX_LANES], [0.0; MAX_LANES]);
@@ -334,29 +340,18 @@ impl<T: Lane> Rows<T> {
     ) {
         let problems = &problems[..T::LANES];
         for &slot in contacts.used() {
-            let places = contacts.places(slot);
-            let own = |lane: usize| {
-                let problem = &problems[lane];
-                let all = match answer {
-                    Answer::Impulses => &problem.p,
-                    Answer::Velocities => &problem.u,
-                };
-                &all[3 * usize::from(places[lane])..][..3]
-            };
-            if T::LANES == 1 {
-                if contacts.slot(slot).active.any() {
-                    for (out, own) in out[slot].iter_mut().zip(own(0)) {
-                        *out = T::splat(self.token, *own);
-                    }
-                }
-                continue;
-            }
             let mut values = store_all(&out[slot]);
+            let places = contacts.places(slot);
             each::<T>(
                 contacts.slot(slot).active,
                 #[inline(always)]
                 |lane| {
-                    let own = own(lane);
+                    let problem = &problems[lane];
+                    let all = match answer {
+                        Answer::Impulses => &problem.p,
+                        Answer::Velocities => &problem.u,
+                    };
+                    let own = &all[3 * usize::from(places[lane])..][..3];
                     for i in 0..3 {
                         values[i][lane] = own[i];
                     }
