@@ -1300,7 +1300,10 @@ class Contacts:
         """Gaps, (n,), m, at the configuration where the step evaluated the contacts."""
     @property
     def impulses(self) -> _Array:
-        """Impulses of the step along n, t, b, (n, 3), N s."""
+        """Impulses of the step along n, t, b, (n, 3), N s.
+
+        Where the step was split, they are sums over its parts.
+        """
     @property
     def velocities(self) -> _Array:
         """Relative velocities after the step along n, t, b, (n, 3), m/s."""
@@ -2117,7 +2120,10 @@ class PlanarContacts:
         """Gaps, (n,), m."""
     @property
     def impulses(self) -> _Array:
-        """Impulses of the step along normal and tangent, (n, 2), N s."""
+        """Impulses of the step along normal and tangent, (n, 2), N s.
+
+        Where the step was split, they are sums over its parts.
+        """
     @property
     def velocities(self) -> _Array:
         """Velocities of the rim after the step along normal and tangent, (n, 2), m/s."""

@@ -288,12 +288,6 @@ impl<T: Lane> Rows<T> {
                         },
                     );
                     for &column in &contacts.used()[..=i] {
-                        if T::LANES == 1 && contacts.is_full() {
-                            let out = problems[0].W[at].iter_mut();
-                            out.zip(&self.W[at]).for_each(|(out, x)| *out = x.get(0));
-                            at += 1;
-                            continue;
-                        }
                         let of_column = contacts.places(column);
                         let [first @ .., last] = &self.W[at];
                         let (mut rows, mut ends) = ([[0.0; 8]; MAX_LANES], [0.0; MAX_LANES]);
