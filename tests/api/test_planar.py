@@ -41,6 +41,30 @@ def test_a_ball_rolls_down_a_line_at_the_closed_form() -> None:
     assert sim.ground.height(x) == pytest.approx(y)
 
 
+def test_the_report_says_where_the_energy_went() -> None:
+    # A sliding disc rolls at two thirds of its speed: friction took a third of the kinetic energy.
+    sim = BallSimulation(Line(), mass=2.0, radius=0.3, friction=0.5)
+    sim.set_state([0.0, 0.3, 0.0], [1.0, 0.0, 0.0])
+    report = sim.step(200)
+    assert report.energy_dissipated + report.energy_lost == pytest.approx(1.0 / 3.0, rel=1e-9)
+    # Only the first two steps, before the contact persists, count the slip at their end.
+    assert report.energy_dissipated == pytest.approx(1.0 / 3.0, rel=2e-2)
+    # An impact without restitution takes the energy of the fall, to the order of the step.
+    sim.set_state([0.0, 1.3, 0.0])
+    before = sim.energy().total
+    report = sim.step(200)
+    taken = report.energy_dissipated + report.energy_lost + report.energy_removed - report.energy_lifted
+    assert taken == pytest.approx(before - sim.energy().total, rel=1e-12)
+    assert report.energy_dissipated == pytest.approx(2.0 * G, rel=1e-2)
+    # Frictionless through a hollow, from a start that no step precedes.
+    sim = BallSimulation(Sine(0.3, 6.0, 0.0), mass=2.0, radius=0.3, friction=0.0)
+    sim.set_state([-1.5, 0.0, 0.0], [4.0, 0.0, 0.0])
+    before = sim.energy().total
+    report = sim.step(30).followed_by(sim.step(30))
+    taken = report.energy_dissipated + report.energy_lost + report.energy_removed - report.energy_lifted
+    assert taken == pytest.approx(before - sim.energy().total, abs=1e-10)
+
+
 def test_the_rover_stands_drives_and_holds_its_energy_in_flight() -> None:
     sim = TwoWheelRoverSimulation(Line(), friction=0.9, wheel_mass=(50.0, 60.0))
     assert np.allclose(sim.mass_matrix(), sim.mass_matrix().T)

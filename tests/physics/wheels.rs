@@ -7,3 +7,4 @@ mod descriptions;
 mod falling;
 mod geometry;
 mod motion;
+mod precession;

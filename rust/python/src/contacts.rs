@@ -139,6 +139,8 @@ impl Contacts {
     }
 
     /// Impulses of the step along n, t, b, (n, 3), N s.
+    ///
+    /// Where the step was split, they are sums over its parts.
     #[getter]
     fn impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         self.active.impulses(py)
@@ -203,6 +205,8 @@ impl PlanarContacts {
     }
 
     /// Impulses of the step along normal and tangent, (n, 2), N s.
+    ///
+    /// Where the step was split, they are sums over its parts.
     #[getter]
     fn impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         self.active.impulses(py)

@@ -260,7 +260,7 @@ impl PlanarSimulation {
         })
     }
 
-    /// The friction-contact problem of the last step.
+    /// The friction-contact problem of the last step, of the last part of a split one.
     ///
     /// Returns:
     ///     Delassus operator W, (2 n_c, 2 n_c), 1/kg; free velocity, (2 n_c,), m/s; friction

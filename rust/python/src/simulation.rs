@@ -743,7 +743,7 @@ impl Simulation {
         Ok(restored.map_err(BorderError::from)?)
     }
 
-    /// The friction-contact problem of the last step.
+    /// The friction-contact problem of the last step, of the last part of a split one.
     ///
     /// Returns:
     ///     Delassus operator W, (3 n_c, 3 n_c), 1/kg; free velocity, (3 n_c,), m/s; friction

@@ -1,11 +1,13 @@
 //! Parked: loads on the flat, no creep on slopes, the slide beyond the friction angle.
 
 use nalgebra::Vector3;
+use rover_core::geometry::Plane;
 use rover_core::integrator::StepOptions;
+use rover_core::multibody::{Model, ModelDescription};
 use rover_core::problem::{Dimension, FrictionContactProblem};
 use rover_core::solver::{SolverOptions, SolverWorkspace, solve};
 
-use super::scenes::{VARIANTS, at_rest, on_slope};
+use super::scenes::{VARIANTS, at_rest, on_slope, simulation};
 
 /// Closed form, N: front (trunk 40/102 + group)/2, side (trunk 62/204 +
 /// group)/2, group = axle or bogie + 2 steering + 2 wheels.
@@ -37,6 +39,46 @@ fn loads_on_the_flat_are_the_closed_form() {
             }
         }
         assert!(simulation.state().v.iter().all(|v| v.abs() < 1e-12));
+    }
+}
+
+#[test]
+fn loads_of_a_step_in_parts_add_up_to_the_weight() {
+    // A step is split where a frame turns by more than 0.5 rad; the loads were those of the last
+    // part, a half, a third or a quarter. A wheel that is not round in its inertia is such a frame.
+    let mut description = ModelDescription::rover();
+    for solid in &mut description.solids {
+        if solid.name.starts_with("wheel") {
+            let across = 0.25 * solid.mass * 0.01;
+            solid.inertia = Some([across, 1.01 * across, 2.0 * across, 0.0, 0.0, 0.0]);
+        }
+    }
+    for wheel in &mut description.wheels {
+        wheel.motor = None;
+    }
+    let model = Model::from_description(description).unwrap();
+    let (mut q, mut v) = ([0.0; 21], [0.0; 21]);
+    q[1] = 0.35;
+    for (turn, parts) in [(0.4, 1), (0.9, 2), (1.4, 3), (1.9, 4), (9.8, 20)] {
+        let options = StepOptions {
+            friction_coefficient: 0.0,
+            ..StepOptions::default()
+        };
+        for wheel in model.wheels() {
+            v[model.bodies()[wheel.body].velocity] = turn / options.time_step;
+        }
+        let mut rover = simulation(model.clone(), Plane::ground(), options, &q, &v);
+        for steps in [1, 1, 20] {
+            rover.step(steps).unwrap();
+            assert_eq!(rover.contacts().len(), 6);
+            for (i, force) in rover.wheel_forces().iter().enumerate() {
+                let expected = if i < 2 { FRONT } else { SIDE };
+                assert!(
+                    (force[0] - expected).abs() < 1e-6 * expected,
+                    "{parts} parts, wheel {i}: {force:?}"
+                );
+            }
+        }
     }
 }
 

@@ -20,12 +20,20 @@
 //!
 //! The correction is of the order of the excess, so the scheme keeps its order. Position projection
 //! follows the audit, and its energy is counted separately.
+//!
+//! What the scheme itself takes from the motion or adds to it is the rest of the balance, with the
+//! work of friction and impacts by their law ([`super::step_contacts::contact_work`]):
+//!
+//! ```text
+//! Δ(K + V) = W − dissipated − lost − removed + lifted
+//! ```
 
-use super::mechanical_system::{MechanicalEnergy, MechanicalSystem, Start};
+use super::mechanical_system::{KeyOf, MechanicalEnergy, MechanicalSystem, Start};
 use super::options::StepOptions;
 use super::report::StepReport;
 use super::scratch::{Scratch, ScratchOf};
-use super::step_contacts::place;
+use super::step_contacts::{contact_work, place};
+use super::warm_start::WarmStart;
 
 /// Largest gain in a step that is tolerated, as a fraction of the kinetic energy.
 pub const GAIN: f64 = 5e-10;
@@ -96,6 +104,7 @@ impl Audit {
         system: &mut S,
         options: &StepOptions,
         start: Start<'_, S::Configuration>,
+        warm_start: &WarmStart<KeyOf<S>>,
         ws: &mut ScratchOf<S>,
         report: &mut StepReport,
     ) -> Verdict {
@@ -105,6 +114,7 @@ impl Audit {
             return Verdict::Sound;
         };
         ws.audited.energy = None;
+        let dissipated = -contact_work::<S>(options, start.v, warm_start, ws);
         let Balance {
             after,
             excess,
@@ -141,6 +151,7 @@ impl Audit {
         };
         if is_balanced {
             report.energy_gain = report.energy_gain.max(relative(excess - rounding, size));
+            report.enter_balance(dissipated, 0.0, excess);
             ws.audited.is(&ws.end, &ws.v, after);
             return Verdict::Sound;
         }
@@ -159,8 +170,10 @@ impl Audit {
                 self.hold_back(system, options, start, ws);
             }
         }
-        report.energy_removed += excess.max(0.0);
         if let Some(corrected) = system.energy(options, &ws.end, &ws.v) {
+            let change =
+                (corrected.kinetic - before.kinetic) + (corrected.potential - before.potential);
+            report.enter_balance(dissipated, excess.max(0.0), change - work);
             ws.audited.is(&ws.end, &ws.v, corrected);
         }
         Verdict::Sound
@@ -235,6 +248,7 @@ pub(super) fn count_lift<S: MechanicalSystem>(
     let work = system.work_of_displacement(options, start, &ws.v, &ws.dv);
     let lifted = (after.kinetic - before.kinetic) + (after.potential - before.potential) - work;
     report.energy_lifted += lifted.max(0.0);
+    report.energy_lost += (-lifted).max(0.0);
     ws.audited.is(&ws.end, &ws.v, after);
 }
 

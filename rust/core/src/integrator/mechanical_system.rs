@@ -82,7 +82,7 @@ pub trait MechanicalSystem {
     /// A point of the configuration space, of any size; the system defines ⊕.
     type Configuration: Clone + PartialEq;
     /// A contact: the data from which the system rebuilds its rows of Hᵀ.
-    type Contact: UnilateralContact;
+    type Contact: UnilateralContact + Clone;
 
     /// Whether contacts have one tangent or two.
     const DIMENSION: Dimension;

@@ -29,7 +29,7 @@ pub mod probe;
 pub mod report;
 mod scheme;
 pub mod scratch;
-mod step_contacts;
+pub(crate) mod step_contacts;
 mod variant;
 pub mod warm_start;
 

@@ -38,7 +38,8 @@ use super::report::StepReport;
 use super::scheme::{Integrator, StateMut};
 use super::scratch::{Scratch, ScratchOf};
 use super::step_contacts::{
-    activation, add_correction, assemble_contacts, is_persistent, place, solve_contacts,
+    activation, add_correction, assemble_contacts, find_impacts, is_persistent, place,
+    solve_contacts,
 };
 use super::warm_start::WarmStart;
 
@@ -135,13 +136,16 @@ impl Part<'_> {
                 continue;
             }
             let is_solved = report.is_converged();
+            if before.is_some() || warm_start.is_of(&ws.contacts) {
+                find_impacts(system, options, warm_start, ws);
+            }
             let audit = Audit {
                 before,
                 is_last: is_gyroscopic && !can_halve,
                 gain: GAIN * self.share,
                 drift: 0.0,
             };
-            let verdict = audit.judge(system, options, start, ws, &mut report);
+            let verdict = audit.judge(system, options, start, warm_start, ws, &mut report);
             if verdict == Verdict::Coarse && !is_gyroscopic {
                 is_gyroscopic = true;
             } else if can_halve && (verdict == Verdict::Coarse || !is_solved) {
@@ -152,10 +156,15 @@ impl Part<'_> {
         };
         probe.end(Phase::Update);
         report.steps = 1;
-        finish(system, options, state, warm_start, ws, report, probe)
+        let report = finish(system, options, state, warm_start, ws, report, probe)?;
+        if self.depth > 0 {
+            ws.add_part(S::DIMENSION.components());
+        }
+        Ok(report)
     }
 
-    /// Takes the step in `n` equal parts, or leaves everything as it was.
+    /// Takes the step in `n` equal parts, or leaves everything as it was. The remembered impulses
+    /// are those of a part meanwhile.
     fn divide<S: MechanicalSystem>(
         self,
         n: f64,
@@ -176,6 +185,7 @@ impl Part<'_> {
             ..self.options.clone()
         };
         let mut total = StepReport::default();
+        warm_start.scale(1.0 / n);
         let mut k = 0.0;
         while k < n {
             let part = Part {
@@ -201,6 +211,7 @@ impl Part<'_> {
             }
             k += 1.0;
         }
+        warm_start.scale(n);
         *time = kept.2 + self.options.time_step;
         total.steps = 1;
         total.retaken += 1;
@@ -357,9 +368,7 @@ pub(super) fn finish<S: MechanicalSystem>(
     std::mem::swap(configuration, &mut ws.end);
     v.copy_from_slice(&ws.v);
     *time += options.time_step;
-    let slow = 2.0 * options.gravity.norm() * options.time_step;
-    let is_persistent = warm_start.is_of(&ws.contacts)
-        && ws.u_before.iter().step_by(d).all(|u_N| u_N.abs() <= slow);
+    let is_persistent = warm_start.is_of(&ws.contacts) && !ws.impact.contains(&true);
     warm_start.remember(&ws.contacts, d, &ws.p);
     warm_start.persistent.clear();
     if is_persistent && !ws.contacts.is_empty() {

@@ -29,7 +29,7 @@ use super::report::{StepReport, StepStatus};
 use super::scheme::{Integrator, StateMut};
 use super::scratch::ScratchOf;
 use super::step_contacts::{
-    activation, add_correction, assemble_contacts, excuse_deflection, solve_contacts,
+    activation, add_correction, assemble_contacts, excuse_deflection, find_impacts, solve_contacts,
 };
 use super::warm_start::WarmStart;
 
@@ -78,7 +78,10 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
                 drift: drift(system, options, start),
             };
             let is_solved = report.is_converged();
-            let verdict = audit.judge(system, options, start, ws, &mut report);
+            if before.is_some() || warm_start.is_of(&ws.contacts) {
+                find_impacts(system, options, warm_start, ws);
+            }
+            let verdict = audit.judge(system, options, start, warm_start, ws, &mut report);
             if is_solved { verdict } else { Verdict::Coarse }
         } else {
             // An iterate that has not converged satisfies no law.

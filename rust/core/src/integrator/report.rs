@@ -43,6 +43,17 @@ pub struct StepReport {
     pub energy_gain: f64,
     /// Energy that the scheme would have gained and the audit removed, all steps together, J.
     pub energy_removed: f64,
+    /// Energy that friction and impacts took by their law, all steps together, J.
+    ///
+    /// Newton's law of restitution with friction can make it negative.
+    pub energy_dissipated: f64,
+    /// Energy that the scheme lost, all steps together, J; negative where it gained.
+    ///
+    /// It is what the work of gravity and actuators, `energy_dissipated`, `energy_removed` and
+    /// `energy_lifted` leave unexplained of the change of the energy: errors of the time step, and
+    /// the normal work of contacts that persist. 0 among grains and planar soils, which are not
+    /// audited.
+    pub energy_lost: f64,
     /// Energy that position projection added beyond the actuators' work on the way, all steps
     /// together, J.
     pub energy_lifted: f64,
@@ -67,6 +78,14 @@ impl StepReport {
         }
     }
 
+    /// Enters the balance of a step, J: what the contacts' law dissipated, what the audit removed,
+    /// and the final excess of the energy's change over the work of the actuators.
+    pub(super) fn enter_balance(&mut self, dissipated: f64, removed: f64, excess: f64) {
+        self.energy_dissipated += dissipated;
+        self.energy_removed += removed;
+        self.energy_lost -= excess + dissipated + removed;
+    }
+
     /// Adds the report of a later step.
     pub fn merge(&mut self, later: &Self) {
         if later.status == StepStatus::NotConverged {
@@ -83,6 +102,8 @@ impl StepReport {
         self.retaken += later.retaken;
         self.energy_gain = self.energy_gain.max(later.energy_gain);
         self.energy_removed += later.energy_removed;
+        self.energy_dissipated += later.energy_dissipated;
+        self.energy_lost += later.energy_lost;
         self.energy_lifted += later.energy_lifted;
     }
 }

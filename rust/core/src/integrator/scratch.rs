@@ -1,6 +1,6 @@
 //! Scratch of a step, common to all systems: vectors over velocities and over contacts.
 
-use super::mechanical_system::{MechanicalEnergy, MechanicalSystem};
+use super::mechanical_system::{MechanicalEnergy, MechanicalSystem, UnilateralContact};
 use crate::law::compliance::Yielding;
 use crate::solver::{SolverOptions, SolverWorkspace};
 
@@ -8,7 +8,7 @@ use crate::solver::{SolverOptions, SolverWorkspace};
 /// is state: a fresh one gives the same bits.
 ///
 /// After a step it holds the step's contacts, impulses and local velocities, all measured at its
-/// end.
+/// end. Of a step that was taken in parts it holds the sums of the impulses ([`Whole`]).
 #[derive(Clone, Debug)]
 pub struct Scratch<Q, C> {
     pub(super) middle: Q,
@@ -36,12 +36,60 @@ pub struct Scratch<Q, C> {
     pub(super) u: Vec<f64>,
     pub(super) u_before: Vec<f64>,
     pub(super) gap_end: Vec<f64>,
+    /// Which contacts are in impact (n_c).
+    pub(super) impact: Vec<bool>,
     pub(super) p_position: Vec<f64>,
     pub(super) u_position: Vec<f64>,
     pub(super) solver: SolverWorkspace,
     pub(super) audited: Audited<Q>,
     /// Work of the step's solves so far, in the solver's unit.
     pub(super) work_spent: u64,
+    pub(super) whole: Whole<C>,
+}
+
+/// The contacts of all parts of a step that was taken in parts; empty otherwise.
+#[derive(Clone, Debug)]
+pub(super) struct Whole<C> {
+    contacts: Vec<C>,
+    /// Sums over the parts (d n_c), N s, each along the contact's frame in its part.
+    p: Vec<f64>,
+    /// After the last part with the contact (d n_c), m/s.
+    u: Vec<f64>,
+}
+
+impl<C> Whole<C> {
+    const fn new() -> Self {
+        Self {
+            contacts: Vec::new(),
+            p: Vec::new(),
+            u: Vec::new(),
+        }
+    }
+
+    fn clear(&mut self) {
+        self.contacts.clear();
+        self.p.clear();
+        self.u.clear();
+    }
+}
+
+impl<C: UnilateralContact + Clone> Whole<C> {
+    /// Adds a contact of a part.
+    fn add(&mut self, contact: &C, p: &[f64], u: &[f64]) {
+        let d = p.len();
+        let known = self.contacts.iter().position(|c| c.key() == contact.key());
+        if let Some(k) = known {
+            self.contacts[k] = contact.clone();
+            for (sum, p) in self.p[d * k..].iter_mut().zip(p) {
+                *sum += p;
+            }
+            self.u[d * k..][..d].copy_from_slice(u);
+        } else {
+            self.contacts.push(contact.clone());
+            self.p.extend_from_slice(p);
+            self.u.extend_from_slice(u);
+        }
+    }
 }
 
 /// Scratch of a system's steps.
@@ -105,16 +153,20 @@ impl<Q: Clone, C> Scratch<Q, C> {
             u: room(),
             u_before: room(),
             gap_end: Vec::with_capacity(n),
+            impact: Vec::with_capacity(n),
             p_position: room(),
             u_position: room(),
             solver: SolverWorkspace::default(),
             audited: Audited::new(q.clone(), nv),
             work_spent: 0,
+            whole: Whole::new(),
         }
     }
 
-    /// Makes the velocities' vectors fit a system whose nv may have changed since the last step.
+    /// Begins a step: makes the velocities' vectors fit a system whose nv may have changed since
+    /// the last one.
     pub(super) fn fit(&mut self, nv: usize) {
+        self.whole.clear();
         for vector in [
             &mut self.impulse,
             &mut self.y,
@@ -142,6 +194,17 @@ impl<Q: Clone, C> Scratch<Q, C> {
         std::mem::swap(&mut self.y, &mut self.dv);
     }
 
+    /// Adds the contacts of a part that was taken to those of the whole step.
+    pub(super) fn add_part(&mut self, d: usize)
+    where
+        C: UnilateralContact + Clone,
+    {
+        let local = self.p.chunks_exact(d).zip(self.u.chunks_exact(d));
+        for (contact, (p, u)) in self.contacts.iter().zip(local) {
+            self.whole.add(contact, p, u);
+        }
+    }
+
     /// The options of the step's next solve: all solves of a step share one budget.
     pub(super) fn solver_options(&self, options: &SolverOptions) -> SolverOptions {
         let whole = options.budget_of(self.contacts.len());
@@ -165,6 +228,7 @@ impl<Q: Clone, C> Scratch<Q, C> {
         q: &[f64],
         mu: &[f64],
     ) {
+        self.whole.clear();
         self.contacts.clear();
         self.p.clear();
         self.u.clear();
@@ -180,25 +244,43 @@ impl<Q: Clone, C> Scratch<Q, C> {
         self.mu.extend_from_slice(&mu[..n]);
     }
 
-    /// Contacts of the last step.
+    /// Whether the last step was taken in parts, with contacts.
+    fn is_split(&self) -> bool {
+        !self.whole.contacts.is_empty()
+    }
+
+    /// Contacts of the last step, or of all its parts.
     #[must_use]
     pub fn contacts(&self) -> &[C] {
-        &self.contacts
+        if self.is_split() {
+            &self.whole.contacts
+        } else {
+            &self.contacts
+        }
     }
 
-    /// Impulses of the last step (d n_c), N s.
+    /// Impulses of the last step (d n_c), N s, summed over its parts.
     #[must_use]
     pub fn impulses(&self) -> &[f64] {
-        &self.p
+        if self.is_split() {
+            &self.whole.p
+        } else {
+            &self.p
+        }
     }
 
-    /// Local velocities after the last step (d n_c), m/s.
+    /// Local velocities after the last step, or after the last part with the contact (d n_c), m/s.
     #[must_use]
     pub fn velocities(&self) -> &[f64] {
-        &self.u
+        if self.is_split() {
+            &self.whole.u
+        } else {
+            &self.u
+        }
     }
 
-    /// Free velocity of the last step's friction-contact problem, with restitution (d n_c), m/s.
+    /// Free velocity of the last step's friction-contact problem, with restitution (d n_c), m/s. Of
+    /// a step that was taken in parts, the problem is that of its last part.
     #[must_use]
     pub fn free_velocity(&self) -> &[f64] {
         &self.q_free

@@ -20,8 +20,104 @@ pub(super) fn activation(options: &StepOptions, measured: f64) -> Activation {
     Activation {
         lead: options.forecast * h - measured,
         hover: (0.5 * g * h * h).max(1e-9),
-        slow: (2.0 * g * h).max(1e-9),
+        slow: slow(options),
         margin: 0.0,
+    }
+}
+
+/// Normal speed, m/s, up to which no approach is an impact: gravity explains it in two steps, or it
+/// is rounding.
+fn slow(options: &StepOptions) -> f64 {
+    (2.0 * options.gravity.norm() * options.time_step).max(1e-9)
+}
+
+/// Change of the contacts' impulses since the last step, as a fraction of the approach that they
+/// stop, up to which they are forces.
+///
+/// A ball that crosses a hollow in 25 steps changes them by up to a fifth in a step. Of the energy
+/// that a thousand drops of the rover onto rocks dissipate, 1.3% is lost in impacts that resemble
+/// the last step's at ½, 0.4% at a fifth, 0.2% at a tenth.
+pub(crate) const STEADY: f64 = 0.25;
+
+/// Finds the contacts in impact, `ws.impact`, for the solved step.
+///
+/// The normal velocity before the step is measured at its predicted end, so it contains the
+/// curvature of the path over ground and rim: `u_N = h a_N` with the normal acceleration `a_N`,
+/// which the impulses of persistent contact balance step after step. An impact is a fast approach
+/// that the last step's impulses p_k would not have stopped:
+///
+/// ```text
+/// |u_N| > 2 |g| h   and   |(W (p − p_k))_N| > ¼ |u_N|
+/// ```
+///
+/// The first condition saves the product where it changes nothing: an approach of the order of h is
+/// harmless. `ws.y` and `ws.p_position` are overwritten.
+pub(super) fn find_impacts<S: MechanicalSystem>(
+    system: &S,
+    options: &StepOptions,
+    warm_start: &WarmStart<KeyOf<S>>,
+    ws: &mut ScratchOf<S>,
+) {
+    let d = S::DIMENSION.components();
+    let slow = slow(options);
+    let is_fast = |u: &[f64]| u[0].abs() > slow;
+    ws.impact.clear();
+    ws.impact.extend(ws.u_before.chunks_exact(d).map(is_fast));
+    if !ws.impact.contains(&true) {
+        return;
+    }
+    ws.p_position.resize(ws.p.len(), 0.0);
+    warm_start.recall(&ws.contacts, d, &mut ws.p_position);
+    for (change, p) in ws.p_position.iter_mut().zip(&ws.p) {
+        *change = p - *change;
+    }
+    ws.y.fill(0.0);
+    system.add_impulses(&ws.p_position, &mut ws.y);
+    ws.u_position.resize(ws.p.len(), 0.0);
+    system.local(&ws.y, &mut ws.u_position);
+    let local = (ws.u_position.chunks_exact(d)).zip(ws.u_before.chunks_exact(d));
+    for (impact, (change, before)) in ws.impact.iter_mut().zip(local) {
+        *impact &= change[0].abs() > STEADY * before[0].abs();
+    }
+}
+
+/// Work of the contacts over the solved step by their law, J: friction and impacts.
+///
+/// The normal reaction of persistent contact and friction that sticks do no work. Friction takes
+/// `½ (p_k·u_k + p·u⁺)` by the trapezoidal rule, with the last step's impulses p_k and the slip
+/// velocities u_k at the start and u⁺ at the end; only their sum `p_k·u_k = v·(H p_k)` is known at
+/// the start. A change of p is charged with the velocity before the step. An impact takes `p·(u +
+/// u⁺)/2`, by its law of restitution and friction. While a contact is new or in impact, the
+/// friction of the others counts with its value at the end.
+///
+/// Call it after [`find_impacts`]; `ws.p_position` is overwritten.
+pub(super) fn contact_work<S: MechanicalSystem>(
+    options: &StepOptions,
+    v_before: &[f64],
+    warm_start: &WarmStart<KeyOf<S>>,
+    ws: &mut ScratchOf<S>,
+) -> f64 {
+    let d = S::DIMENSION.components();
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let local = ws.u.chunks_exact(d).zip(ws.u_before.chunks_exact(d));
+    let local = ws.p.chunks_exact(d).zip(local);
+    if is_persistent(options, warm_start, &ws.contacts) && !ws.impact.contains(&true) {
+        ws.p_position.resize(ws.p.len(), 0.0);
+        warm_start.recall(&ws.contacts, d, &mut ws.p_position);
+        let friction = local.zip(ws.p_position.chunks_exact(d));
+        let friction = friction.map(|((p, (u, before)), last)| {
+            dot(&p[1..], &u[1..]) + dot(&p[1..], &before[1..]) - dot(&last[1..], &before[1..])
+        });
+        0.5 * (friction.sum::<f64>() + dot(v_before, &warm_start.persistent))
+    } else {
+        let works = local.zip(&ws.impact).map(|((p, (u, before)), is_impact)| {
+            if *is_impact {
+                0.5 * (dot(p, u) + dot(p, before))
+            } else {
+                dot(&p[1..], &u[1..])
+            }
+        });
+        works.sum()
     }
 }
 

@@ -35,6 +35,14 @@ impl<K> WarmStart<K> {
         }
     }
 
+    /// Multiplies every impulse, as for a step of another length.
+    pub(super) fn scale(&mut self, share: f64) {
+        let impulses = self.impulses.iter_mut().flat_map(|(_, p)| p);
+        for x in impulses.chain(&mut self.persistent) {
+            *x *= share;
+        }
+    }
+
     /// Forgets everything.
     pub fn clear(&mut self) {
         self.impulses.clear();

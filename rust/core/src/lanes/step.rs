@@ -33,6 +33,7 @@ use super::yielding::Yields;
 use crate::contact::Contact;
 use crate::integrator::energy_audit::{COARSE, GAIN, RAISE, ROUNDINGS};
 use crate::integrator::position_projection::FARTHEST;
+use crate::integrator::step_contacts::STEADY;
 use crate::integrator::{Phase, Probe, Stabilisation, StepOptions, StepReport, WarmStart};
 use crate::multibody::Model;
 use crate::multibody::model::BASE;
@@ -114,6 +115,11 @@ pub struct Block<T: Lane> {
     p: Vec<Triple<T>>,
     pushes: Vec<Triple<T>>,
     u: Vec<Triple<T>>,
+    /// Impulses of the last step by slot, N s.
+    p_last: Vec<Triple<T>>,
+    /// Lanes whose contact is in impact, by slot, and lanes with an impact.
+    impact: Vec<T::Mask>,
+    has_impact: T::Mask,
     /// An impulse (nv), or its factor coordinates, or a change of the velocity.
     y: Vec<T>,
     /// Torques' impulse over the step (nv).
@@ -123,6 +129,12 @@ pub struct Block<T: Lane> {
     /// Kinetic and potential energy at the start and at the end of the step, J.
     before: [T; 2],
     after: [T; 2],
+    /// Work of the actuators, of the contacts by their law, and energy removed by the audit, J.
+    work: T,
+    contact_work: T,
+    removed: T,
+    /// Gain that is left, as a fraction of the kinetic energy.
+    gain: T,
     /// Linear momentum at the end of the step, kg m/s.
     momentum: Vec3<T>,
     /// Lanes whose velocity the energy audit corrected in this step.
@@ -183,12 +195,19 @@ impl<T: Lane> Block<T> {
             contacts,
             p: slots.clone(),
             pushes: slots.clone(),
+            p_last: slots.clone(),
+            impact: vec![nobody; slots.len()],
+            has_impact: nobody,
             u: slots,
             y: vector(),
             torque: vector(),
             pushed: vector(),
             before: [zero; 2],
             after: [zero; 2],
+            work: zero,
+            contact_work: zero,
+            removed: zero,
+            gain: zero,
             momentum: Vec3::splat(token, [0.0; 3]),
             is_corrected: nobody,
             is_new: nobody,
@@ -515,12 +534,17 @@ impl<T: Lane> Block<T> {
     fn push_and_drive(&mut self, is_any: bool, problems: &[ContactProblem]) {
         let zero = self.number(0.0);
         let (h, _) = self.time_step();
+        self.rows
+            .read(&self.contacts, problems, Answer::Impulses, &mut self.p_last);
         if is_any {
-            self.rows
-                .read(&self.contacts, problems, Answer::Impulses, &mut self.p);
             let (contacts, end) = (&self.contacts, &self.poses_end);
-            self.rows
-                .generalized_impulse(contacts, end, self.persists, &self.p, &mut self.pushed);
+            self.rows.generalized_impulse(
+                contacts,
+                end,
+                self.persists,
+                &self.p_last,
+                &mut self.pushed,
+            );
         }
         self.torque.fill(zero);
         self.drives.add_impulse(
@@ -628,6 +652,11 @@ impl<T: Lane> Block<T> {
         if self.is_corrected.any() {
             self.weigh_again();
         }
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.report_balance(),
+        );
         probe.end(Phase::Update);
         let Some(tolerated) = self.tolerated() else {
             return false;
@@ -655,6 +684,79 @@ impl<T: Lane> Block<T> {
         let share = self.options.theta * self.options.time_step;
         self.end.set_moved(&self.middle, &self.v_end, share);
         self.end.normalise();
+        self.find_impacts();
+        self.contact_work = self.contact_work();
+    }
+
+    /// Finds the contacts in impact, as [`crate::integrator::step_contacts`] does.
+    #[inline(always)]
+    fn find_impacts(&mut self) {
+        let (h, _) = self.time_step();
+        let slow = (h.like(2.0) * self.gravity.norm() * h).max(h.like(1e-9));
+        self.has_impact = T::mask(self.token, 0);
+        for &slot in self.contacts.used() {
+            let active = self.contacts.slot(slot).active;
+            let is_fast = active & !self.rows.u_before[slot][0].abs().le(slow);
+            self.impact[slot] = is_fast;
+            self.has_impact = self.has_impact | is_fast;
+        }
+        if (self.has_impact & self.going).any() {
+            self.compare_impulses();
+        }
+    }
+
+    /// Leaves those in impact whose approach the last step's impulses would not have stopped.
+    #[inline(always)]
+    fn compare_impulses(&mut self) {
+        let zero = self.number(0.0);
+        for &slot in self.contacts.used() {
+            for ((change, p), last) in
+                (self.pushes[slot].iter_mut().zip(&self.p[slot])).zip(&self.p_last[slot])
+            {
+                *change = *p - *last;
+            }
+        }
+        self.y.fill(zero);
+        self.rows
+            .add_impulses(&self.contacts, self.occupied, &self.pushes, &mut self.y);
+        self.rows.local(&self.contacts, &self.y, &mut self.pushes);
+        self.has_impact = T::mask(self.token, 0);
+        for &slot in self.contacts.used() {
+            let before = self.rows.u_before[slot][0];
+            let change = self.pushes[slot][0] - before;
+            let is_steady = change.abs().le(zero.like(STEADY) * before.abs());
+            self.impact[slot] = self.impact[slot] & !is_steady;
+            self.has_impact = self.has_impact | self.impact[slot];
+        }
+    }
+
+    /// Work of the contacts by their law, J, as [`crate::integrator::step_contacts`] counts it.
+    #[inline(always)]
+    fn contact_work(&self) -> T {
+        let (zero, half) = (self.number(0.0), self.number(0.5));
+        let persists = self.persists & !self.has_impact;
+        let (mut ends, mut changes, mut struck) = (zero, zero, zero);
+        for &slot in self.contacts.used() {
+            let ([p_n, p_t, p_b], [u_n, u_t, u_b]) = (self.p[slot], self.u[slot]);
+            let ([_, last_t, last_b], before) = (self.p_last[slot], self.rows.u_before[slot]);
+            let active = self.contacts.slot(slot).active;
+            let end = p_t * u_t + p_b * u_b;
+            let change = (p_t - last_t) * before[1] + (p_b - last_b) * before[2];
+            ends += T::select(active, end, zero);
+            changes += T::select(active, change, zero);
+            if self.impact[slot].any() {
+                let both = p_n * (u_n + before[0]) + p_t * before[1] + p_b * before[2];
+                struck += T::select(self.impact[slot], half * (both - end), zero);
+            }
+        }
+        if !persists.any() {
+            return ends + struck;
+        }
+        let mut start = zero;
+        for (v, push) in self.v.iter().zip(&self.persistent) {
+            start += *v * *push;
+        }
+        T::select(persists, half * (ends + changes + start), ends + struck)
     }
 
     /// Declines the lanes whose step does not balance, or whose motors left their branch.
@@ -666,6 +768,7 @@ impl<T: Lane> Block<T> {
             self.drives
                 .work(&self.machine, (h, theta), places, &self.v, &self.v_end);
         self.decline(Decline::Motor, has_left);
+        self.work = work;
         let ([kinetic, potential], [end_kinetic, end_potential]) = (self.before, self.after);
         let mut supplied = work;
         if !self.yields.is_empty() {
@@ -705,16 +808,8 @@ impl<T: Lane> Block<T> {
         let gain = (excess - rounding).max(zero) / size.max(h.like(f64::MIN_POSITIVE));
         let gain = T::select(self.is_corrected, zero, gain);
         let removed = T::select(self.is_corrected, excess.max(zero), zero);
-        let mut energies = [0.0; MAX_LANES];
-        removed.store(&mut energies[..T::LANES]);
-        for (report, removed) in self.reports.iter_mut().zip(energies) {
-            report.energy_removed = removed;
-        }
-        let mut gains = [0.0; MAX_LANES];
-        gain.store(&mut gains[..T::LANES]);
-        for (report, gain) in self.reports.iter_mut().zip(gains) {
-            report.energy_gain = gain;
-        }
+        self.removed = removed;
+        self.gain = gain;
     }
 
     /// Removes an excess of energy from the velocity at the end of the step, as
@@ -756,6 +851,25 @@ impl<T: Lane> Block<T> {
     fn weigh_again(&mut self) {
         let after = self.energy(State::End).kinetic_and_potential();
         self.after = select_both(self.is_corrected, after, self.after);
+    }
+
+    /// Enters the balance of the energy into the reports.
+    #[inline(always)]
+    fn report_balance(&mut self) {
+        let [kinetic, potential] = self.before;
+        let change = (self.after[0] - kinetic) + (self.after[1] - potential);
+        let lost = self.contact_work - (change - self.work) - self.removed;
+        let mut entries = [[0.0; MAX_LANES]; 4];
+        let balance = [self.gain, self.removed, self.contact_work, lost];
+        for (entry, x) in entries.iter_mut().zip(balance) {
+            x.store(&mut entry[..T::LANES]);
+        }
+        for (lane, report) in self.reports[..T::LANES].iter_mut().enumerate() {
+            report.energy_gain = entries[0][lane];
+            report.energy_removed = entries[1][lane];
+            report.energy_dissipated = -entries[2][lane];
+            report.energy_lost = entries[3][lane];
+        }
     }
 
     /// Penetration that is tolerated, m, if positions are projected.
@@ -882,6 +996,7 @@ impl<T: Lane> Block<T> {
         for (lane, report) in self.reports.iter_mut().enumerate().take(T::LANES) {
             if is_moved.get(lane) {
                 report.energy_lifted = gained.get(lane).max(0.0);
+                report.energy_lost += (-gained.get(lane)).max(0.0);
             }
         }
         self.after = select_both(is_moved, lifted, self.after);
@@ -925,15 +1040,11 @@ impl<T: Lane> Block<T> {
         self.decline(Decline::NotFinite, !is_finite);
         let going = self.going;
         let (h, _) = self.time_step();
-        let slow = h.like(2.0) * self.gravity.norm() * h;
         let mut in_touch = T::mask(self.token, 0);
-        let mut is_impact = in_touch;
         for &slot in self.contacts.used() {
-            let active = self.contacts.slot(slot).active;
-            in_touch = in_touch | active;
-            is_impact = is_impact | (active & !self.rows.u_before[slot][0].abs().le(slow));
+            in_touch = in_touch | self.contacts.slot(slot).active;
         }
-        let persists = self.is_same & in_touch & !is_impact;
+        let persists = self.is_same & in_touch & !self.has_impact;
         let (contacts, end) = (&self.contacts, &self.poses_end);
         self.rows
             .generalized_impulse(contacts, end, going, &self.p, &mut self.pushed);
