@@ -1279,7 +1279,7 @@ class StepReport:
         """
     @property
     def energy_lifted(self) -> float:
-        """Potential energy gained by pushing bodies out of penetration, summed over the steps, J."""
+        """Energy gained by pushing bodies out of penetration, less the actuators' work, all steps, J."""
     @property
     def undetermined_loads(self) -> int:
         """Number of independent sets of wheel loads that balance one another in the last step.
@@ -1576,8 +1576,8 @@ class Simulation:
         solver: Method for the contact problem, as in `solve_friction_contact`.
         tolerance: Largest relative residual of the contact problem; 1e-12 by default.
         max_iterations: Largest number of iterations of the contact solver in a step.
-        budget: Largest amount of work of the contact solver in a step, counted and not timed, in the
-            unit of `solve_friction_contact`; None grows with the number of contacts.
+        budget: Largest amount of work of the contact solver in a step, counted and not timed, in
+            the unit of `solve_friction_contact`; None grows with the number of contacts.
         stabilisation: What is done about penetration: "projection" moves the bodies out of it,
             "none" leaves it.
         warm_start: Whether the contact solver starts from the last step's impulses.
@@ -4124,9 +4124,9 @@ def solve_friction_contact(
         max_iterations: Largest number of Newton steps, sweeps or ADMM iterations.
         initial: Impulses from which the solver starts, (n_c d,), N s; zero by default.
         budget: Largest amount of work, counted and not timed: a unit is one multiplication and
-            addition in a product with W. None allows 3e8 units, about 0.3 s, for up to 100 contacts,
-            and more in proportion to the square of the contacts. What exceeds the budget is left
-            undone, and the report says so.
+            addition in a product with W. None allows 3e8 units, about 0.3 s, for up to 100
+            contacts, and more in proportion to the square of the contacts. What exceeds the budget
+            is left undone, and the report says so.
         history: Whether the solution keeps the residuals measured on the way.
 
     Returns:

@@ -99,6 +99,19 @@ def test_the_relaxed_law_says_that_it_is_another_law():
     assert caught.value.field == "solver"
 
 
+def test_the_last_problem_is_that_of_the_velocities_where_the_position_was_projected():
+    """It was that of the projection, whose q are gaps in metres."""
+    sim = rover_gym.Simulation(warm_start=False)  # not by the ordinary step
+    q = sim.q
+    q[1] = 0.5
+    sim.set_state(q)
+    while sim.step().energy_lifted == 0.0:
+        assert sim.time < 2.0
+    W, q_free, _ = sim.last_problem()
+    contacts = sim.contacts
+    np.testing.assert_allclose(W @ contacts.impulses.ravel() + q_free, contacts.velocities.ravel(), atol=1e-9)
+
+
 def test_a_warm_start_is_taken(sim):
     sim.step()
     problem = sim.last_problem()

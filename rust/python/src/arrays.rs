@@ -24,7 +24,7 @@ pub fn check_size(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult
     let is_array = value.hasattr("__array__")? || value.is_instance_of::<PyString>();
     let (mut count, mut entry) = (1_usize, Ok(value.clone()));
     for _ in 0..DEPTH {
-        let length = match entry.as_ref().map(|entry| entry.len()) {
+        let length = match entry.as_ref().map(PyAnyMethods::len) {
             Ok(Ok(length)) => length,
             Ok(Err(error)) if error.is_instance_of::<PyOverflowError>(py) => usize::MAX,
             _ => break,

@@ -55,8 +55,8 @@ use crate::stepping::{Problem, problem, step};
 ///     solver: Method for the contact problem, as in `solve_friction_contact`.
 ///     tolerance: Largest relative residual of the contact problem; 1e-12 by default.
 ///     max_iterations: Largest number of iterations of the contact solver in a step.
-///     budget: Largest amount of work of the contact solver in a step, counted and not timed, in the
-///         unit of `solve_friction_contact`; None grows with the number of contacts.
+///     budget: Largest amount of work of the contact solver in a step, counted and not timed, in
+///         the unit of `solve_friction_contact`; None grows with the number of contacts.
 ///     stabilisation: What is done about penetration: "projection" moves the bodies out of it,
 ///         "none" leaves it.
 ///     warm_start: Whether the contact solver starts from the last step's impulses.

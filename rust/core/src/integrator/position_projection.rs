@@ -40,7 +40,10 @@ pub(super) fn project<S: MechanicalSystem>(
     if deepest >= -options.penetration_tolerance {
         return false;
     }
-    ws.q_free.fill(0.0);
+    // The step's own problem stays to be read.
+    std::mem::swap(&mut ws.q_free, &mut ws.q_position);
+    ws.q_free.clear();
+    ws.q_free.resize(ws.p.len(), 0.0);
     for (q, gap) in ws.q_free.chunks_exact_mut(d).zip(&ws.gap_end) {
         q[0] = *gap;
     }
@@ -61,12 +64,14 @@ pub(super) fn project<S: MechanicalSystem>(
         }
         set_friction(system, options, &ws.contacts, &mut ws.mu);
     }
-    if solved.is_converged() {
-        // The report's residual is that of the velocities, which may be held to more.
-        solved.residual = solved.residual.min(options.solver.tolerance);
-    }
+    let residual = report.residual;
     report.enter(&solved);
+    if solved.is_converged() {
+        // The report's residual is that of the velocities, which are held to more.
+        report.residual = residual;
+    }
     let share = (limit / size(system, ws)).min(1.0);
+    std::mem::swap(&mut ws.q_free, &mut ws.q_position);
     for displacement in &mut ws.dv {
         *displacement *= share;
     }

@@ -38,6 +38,8 @@ pub struct Scratch<Q, C> {
     pub(super) gap_end: Vec<f64>,
     /// Which contacts are in impact (n_c).
     pub(super) impact: Vec<bool>,
+    /// The position projection's problem: gaps, m, or in its course the step's free velocity.
+    pub(super) q_position: Vec<f64>,
     pub(super) p_position: Vec<f64>,
     pub(super) u_position: Vec<f64>,
     pub(super) solver: SolverWorkspace,
@@ -154,6 +156,7 @@ impl<Q: Clone, C> Scratch<Q, C> {
             u_before: room(),
             gap_end: Vec::with_capacity(n),
             impact: Vec::with_capacity(n),
+            q_position: room(),
             p_position: room(),
             u_position: room(),
             solver: SolverWorkspace::default(),

@@ -768,7 +768,6 @@ impl<T: Lane> Block<T> {
             self.drives
                 .work(&self.machine, (h, theta), places, &self.v, &self.v_end);
         self.decline(Decline::Motor, has_left);
-        self.work = work;
         let ([kinetic, potential], [end_kinetic, end_potential]) = (self.before, self.after);
         let mut supplied = work;
         if !self.yields.is_empty() {
@@ -776,6 +775,7 @@ impl<T: Lane> Block<T> {
             let h = self.options.time_step;
             supplied += self.yields.supplied(contacts, h, &self.p, &self.u, before);
         }
+        self.work = supplied;
         let excess = (end_kinetic - kinetic) + (end_potential - potential) - supplied;
         let fall = self.gravity.norm() * h;
         let least = h.like(0.5) * self.inertias.mass * fall * fall;

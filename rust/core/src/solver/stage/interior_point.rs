@@ -18,8 +18,8 @@
 //! nearly block is repeated with a proximal term, which is withdrawn once steps are long again.
 //!
 //! The modes of an answer near the end of the path are clear wherever they can be. The stages after
-//! this one take it from there in a few factorisations. Source: Acary, Armand, Nguyen and Shpakovych
-//! 2023; Nesterov and Todd 1998.
+//! this one take it from there in a few factorisations. Source: Acary et al. 2023; Nesterov and
+//! Todd 1998.
 
 use crate::problem::{Prepared, Residual};
 use crate::solver::options::SolverOptions;
@@ -445,8 +445,8 @@ fn follow<const D: usize>(
     }
 }
 
-/// Follows the path to the answer from one start after the other; none is `p`. `u` is `W p + q` on return, and
-/// `p` the best impulse found, mostly within 1e-6 and hardly ever within the tolerance.
+/// Follows the path to the answer from one start after the other; none is `p`. `u` is `W p + q` on
+/// return, and `p` the best impulse found, mostly within 1e-6 and hardly ever within the tolerance.
 pub(in crate::solver) fn solve<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,
