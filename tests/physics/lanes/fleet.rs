@@ -89,7 +89,7 @@ fn models() -> [Arc<Model>; 2] {
 fn drive(instructions: Instructions, n: usize, torque: f64, seed: u64) {
     let mut numbers = Random(seed);
     let [rigid, soft] = models();
-    let model = if n % 2 == 0 { rigid } else { soft };
+    let model = if n.is_multiple_of(2) { rigid } else { soft };
     let mut together: Vec<RoverSimulation> =
         (0..n).map(|i| rover(i, &model, &mut numbers)).collect();
     let mut alone = together.clone();
