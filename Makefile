@@ -214,5 +214,5 @@ unit = $(CARGO) build --locked --quiet $(2) && mkdir -p envs/rover_gym/_fmu && \
 	for made in target/$(1)/{lib,}rover_fmu.{so,dylib,dll}; do [ ! -f $$made ] || cp $$made envs/rover_gym/_fmu/rover_fmu.$${made\#\#*.}; done
 
 $(STAMPS)/fmu: $(SOURCES) | $(STAMPS)/core
-	@$(call unit,debug,-p rover-python -p rover-fmu)
+	@$(call unit,debug,-p rover-module -p rover-fmu)
 	@touch $@

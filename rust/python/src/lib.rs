@@ -49,12 +49,11 @@ mod vessels;
 
 use pyo3::prelude::*;
 
-/// Compiled core of rover-gym: the border to the Rust mechanics (`rover-core`).
+/// Adds everything to the compiled module.
 ///
-/// SI units and radians everywhere. World frame: x forward, y up, z to the right. Wheels are always
-/// listed FL, FR, ML, BL, MR, BR. Every array returned is new.
-#[pymodule]
-fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+/// # Errors
+/// As Python's, where a name cannot be added.
+pub fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     errors::register(module)?;
     module.add_class::<model::RoverModel>()?;

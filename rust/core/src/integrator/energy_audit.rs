@@ -22,7 +22,7 @@
 //! follows the audit, and its energy is counted separately.
 //!
 //! What the scheme itself takes from the motion or adds to it is the rest of the balance, with the
-//! work of friction and impacts by their law ([`super::step_contacts::contact_work`]):
+//! work of friction and impacts by their law (`step_contacts::contact_work`):
 //!
 //! ```text
 //! Δ(K + V) = W − dissipated − lost − removed + lifted

@@ -8,7 +8,7 @@ use crate::solver::{SolverOptions, SolverWorkspace};
 /// is state: a fresh one gives the same bits.
 ///
 /// After a step it holds the step's contacts, impulses and local velocities, all measured at its
-/// end. Of a step that was taken in parts it holds the sums of the impulses ([`Whole`]).
+/// end. Of a step that was taken in parts it holds the sums of the impulses (`Whole`).
 #[derive(Clone, Debug)]
 pub struct Scratch<Q, C> {
     pub(super) middle: Q,
