@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rover_gym.mechanics import HeightField, ModelError, Plane, RoverModel, Simulation
+from rover_gym.mechanics import HeightField, ModelError, Plane, RoverModel, Simulation, SphereField
 
 SLOPES = (0.13, 0.21)
 SLOPE = Plane((-SLOPES[0], 1.0, -SLOPES[1]))
@@ -186,6 +186,26 @@ def test_the_report_says_when_loads_are_undetermined() -> None:
         assert count(RoverModel.named(name)) == 0
     assert count(wide("four-steered").replace(wheel_stiffness=0.0)) >= 4
     assert count(wide("four-steered")) == 0
+
+
+def test_a_step_that_is_split_counts_the_loads_of_its_last_part() -> None:
+    """Its list of contacts is longer than its last problem where a part met another rock than the next."""
+    draw = np.random.default_rng(0)
+    n = 300
+    centres = np.column_stack((draw.uniform(-2.0, 6.0, n), np.full(n, -0.06), draw.uniform(-1.0, 1.0, n)))
+    sim = Simulation(RoverModel(), SphereField(centres, [0.1] * n, Plane()))
+    q = sim.q
+    q[1] = 0.3
+    sim.set_state(q)
+    sim.step(100)
+    longer = 0
+    for k in range(100):
+        v = sim.v
+        v[[0, 3, 5]] = 3.0, 130.0 * (-1) ** k, 100.0
+        sim.set_state(sim.q, v)
+        assert sim.step().undetermined_loads >= 0
+        longer += len(sim.contacts.impulses) > len(sim.last_problem()[2])
+    assert longer > 0
 
 
 def test_rovers_on_yielding_wheels_take_the_fast_step() -> None:

@@ -289,6 +289,12 @@ impl<Q: Clone, C> Scratch<Q, C> {
         &self.q_free
     }
 
+    /// Impulses of the same problem (d n_c), N s.
+    #[must_use]
+    pub fn impulses_of_problem(&self) -> &[f64] {
+        &self.p
+    }
+
     /// Friction coefficients of the last step's contacts (n_c).
     #[must_use]
     pub fn friction_coefficients(&self) -> &[f64] {

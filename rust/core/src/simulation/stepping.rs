@@ -393,6 +393,6 @@ where
     #[must_use]
     pub fn undetermined_loads(&self) -> usize {
         let d = <S::Contact as LocatedContact>::Vector::N;
-        undetermined_loads(d, self.parts.operator(), self.scratch.impulses())
+        undetermined_loads(d, self.parts.operator(), self.scratch.impulses_of_problem())
     }
 }
