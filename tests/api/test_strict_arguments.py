@@ -46,6 +46,8 @@ NUMBERS: list[tuple[str, Callable[[Any], Any]]] = [
     ("min_diameter", lambda x: SphereField.rocks(*rocks, min_diameter=x)),
     ("wheel_radius", lambda x: RoverModel().replace(wheel_radius=x)),
     ("contact_radius", lambda x: RoverModel().replace(contact_radius=x)),
+    ("wheel_stiffness", lambda x: RoverModel().replace(wheel_stiffness=x)),
+    ("wheel_damping", lambda x: RoverModel().replace(wheel_damping=x)),
     ("mass_scale", lambda x: RoverModel().replace(mass_scale=x)),
     ("wheel_torque_limit", lambda x: RoverModel().replace(wheel_torque_limit=x)),
     ("steering_stiffness", lambda x: RoverModel().replace(steering_stiffness=x)),
@@ -72,6 +74,7 @@ COUNTS: list[tuple[str, Callable[[Any], Any]]] = [
     ("dimension", lambda n: solve_friction_contact(*one_contact, dimension=n)),
     ("max_iterations", lambda n: solve_friction_contact(*one_contact, max_iterations=n)),
     ("budget", lambda n: solve_friction_contact(*one_contact, budget=n)),
+    ("budget", lambda n: Simulation(budget=n)),
     ("n", lambda n: Simulation().step(n)),
     ("n", lambda n: Simulation().profile(n)),
     ("n", lambda n: BallSimulation(Line()).step(n)),
@@ -135,12 +138,17 @@ ARRAYS: tuple[Any, ...] = (
     "text",
     object,
 )
-NO_COUNTS: tuple[Any, ...] = (*NO_NUMBERS, 1.0, 1.5, -1, np.float64(2.0), np.int64(-3), 2**64, None)
+NO_COUNTS: tuple[Any, ...] = (*NO_NUMBERS, 1.0, 1.5, -1, np.float64(2.0), np.int64(-3), 2**64)
+#: Counts whose default is None.
+OPTIONAL = ("budget",)
 
 #: Field, call and the values that it must refuse.
 WALK = [
     *(pytest.param(*case, NO_NUMBERS, id=f"number-{i}-{case[0]}") for i, case in enumerate(NUMBERS)),
-    *(pytest.param(*case, NO_COUNTS, id=f"count-{i}-{case[0]}") for i, case in enumerate(COUNTS)),
+    *(
+        pytest.param(*case, NO_COUNTS if case[0] in OPTIONAL else (*NO_COUNTS, None), id=f"count-{i}-{case[0]}")
+        for i, case in enumerate(COUNTS)
+    ),
     *(pytest.param(*case, ARRAYS, id=f"array-{i}-{case[0]}") for i, case in enumerate(VECTORS)),
 ]
 
