@@ -77,8 +77,8 @@ stub: $(STAMPS)/test $(STAMPS)/core ## write the compiled module's docstrings in
 	$(BIN)/python rust/python/stub.py
 	$(BIN)/ruff format --quiet envs/rover_gym/_core.pyi
 
-test-rust: $(STAMPS)/core ## the Rust tests only
-	$(CARGO) test --workspace --tests --locked --quiet -- $(if $(filter all,$(TIER)),--include-ignored)
+test-rust: $(STAMPS)/core ## the Rust tests only (of tier all with checks of arithmetic)
+	$(if $(filter all,$(TIER)),CARGO_PROFILE_DEV_DEBUG_ASSERTIONS=true CARGO_PROFILE_DEV_OVERFLOW_CHECKS=true) $(CARGO) test --workspace --tests --locked --quiet -- $(if $(filter all,$(TIER)),--include-ignored)
 
 test-python: $(STAMPS)/test $(STAMPS)/core $(STAMPS)/fmu $(STAMPS)/debian-demo $(STAMPS)/debian-test ## the Python tests only, and the longest ten
 	$(BIN)/pytest --numprocesses auto --tier $(TIER) --durations 10

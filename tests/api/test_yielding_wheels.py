@@ -174,6 +174,28 @@ def test_parked_on_a_slope_it_does_not_creep() -> None:
     assert float(np.abs(sim.q - start).max()) < 1e-9
 
 
+@pytest.mark.parametrize("name", FOUR)
+@pytest.mark.parametrize("depth", [0.0, 0.02])
+def test_what_no_force_has_pressed_in_is_not_given_back(name: str, depth: float) -> None:
+    """A rover set 2 cm into the ground was shot up by 2 kJ; landings gave 100 J."""
+    model = RoverModel.named(name)
+    sim = Simulation(model, Plane(), stabilisation="none")
+    q = model.resting_pose(Plane(), (0.0, 0.0), 0.0)
+    q[1] += -depth if depth else 0.3
+    sim.set_state(q)
+    start, given = sim.energy().total, 0.0
+    for _ in range(300):
+        before = sim.energy().total
+        report = sim.step()
+        given += report.energy_released
+        change = report.energy_released - report.energy_dissipated - report.energy_lost - report.energy_removed
+        assert sim.energy().total - before == pytest.approx(change, abs=1e-9 * model.mass)
+        assert sim.energy().total < start + 1.0
+        # The weight's own deflection, no more.
+        assert given < 2.0
+    assert given != 0.0
+
+
 def test_the_report_says_when_loads_are_undetermined() -> None:
     def count(model: RoverModel) -> int:
         sim = Simulation(model)

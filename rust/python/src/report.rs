@@ -104,10 +104,10 @@ impl StepReport {
     /// Energy that the scheme lost, summed over the steps, J; negative where it gained.
     ///
     /// The change of the energy is the work of the actuators minus `energy_dissipated`,
-    /// `energy_lost` and `energy_removed`, plus `energy_lifted`. `energy_lost` is therefore what no
-    /// law explains: errors of the time step, and the work of reactions in contacts that persist.
-    /// In smooth motion it shrinks with the square of the step. Always 0 with grains and planar
-    /// soils, whose energy is not audited.
+    /// `energy_lost` and `energy_removed`, plus `energy_lifted` and `energy_released`.
+    /// `energy_lost` is therefore what no law explains: errors of the time step, and the work of
+    /// reactions in contacts that persist. In smooth motion it shrinks with the square of the step.
+    /// Always 0 with grains and planar soils, whose energy is not audited.
     #[getter]
     fn energy_lost(&self) -> f64 {
         self.inner.energy_lost
@@ -117,6 +117,17 @@ impl StepReport {
     #[getter]
     fn energy_lifted(&self) -> f64 {
         self.inner.energy_lifted
+    }
+
+    /// Energy released by yielding wheels, summed over the steps, J; negative where they stored it.
+    ///
+    /// Wheels yield where their model gives them a `stiffness`. Their springs are part of neither
+    /// the kinetic nor the potential energy. Besides what the springs give off, it holds the work
+    /// that the wheel's force does because it is constant over a step, which cancels where a wheel
+    /// comes to rest again.
+    #[getter]
+    fn energy_released(&self) -> f64 {
+        self.inner.energy_released
     }
 
     /// Number of independent sets of wheel loads that balance one another in the last step.

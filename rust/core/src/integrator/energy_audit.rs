@@ -22,10 +22,11 @@
 //! follows the audit, and its energy is counted separately.
 //!
 //! What the scheme itself takes from the motion or adds to it is the rest of the balance, with the
-//! work of friction and impacts by their law (`step_contacts::contact_work`):
+//! work of friction and impacts by their law (`step_contacts::contact_work`) and what contacts that
+//! yield release (`law::compliance`):
 //!
 //! ```text
-//! Δ(K + V) = W − dissipated − lost − removed + lifted
+//! Δ(K + V) = W + released − dissipated − lost − removed + lifted
 //! ```
 
 use super::mechanical_system::{KeyOf, MechanicalEnergy, MechanicalSystem, Start};
@@ -119,6 +120,7 @@ impl Audit {
             after,
             excess,
             work,
+            released,
         } = if self.is_last {
             shortened_balance(system, options, start, ws, &before)
         } else {
@@ -131,17 +133,7 @@ impl Audit {
                 Verdict::Coarse
             };
         }
-        // A machine at rest has no kinetic energy as a measure: use at least what gravity adds in a
-        // step of free fall.
-        let fall = options.gravity.norm() * options.time_step;
-        let least = 0.5 * after.mass * fall * fall;
-        let size = before.kinetic.max(after.kinetic).max(least);
-        let sum = before.kinetic.abs()
-            + after.kinetic.abs()
-            + before.potential.abs()
-            + after.potential.abs()
-            + work.abs();
-        let rounding = ROUNDINGS * f64::EPSILON * sum;
+        let (size, rounding) = measures(options, &before, &after, work);
         // With θ > ½ the scheme itself dissipates.
         let is_free = ws.contacts.is_empty() && options.theta <= 0.5;
         let is_balanced = if is_free {
@@ -151,7 +143,7 @@ impl Audit {
         };
         if is_balanced {
             report.energy_gain = report.energy_gain.max(relative(excess - rounding, size));
-            report.enter_balance(dissipated, 0.0, excess);
+            report.enter_balance(dissipated, 0.0, released, excess);
             ws.audited.is(&ws.end, &ws.v, after);
             return Verdict::Sound;
         }
@@ -173,7 +165,8 @@ impl Audit {
         if let Some(corrected) = system.energy(options, &ws.end, &ws.v) {
             let change =
                 (corrected.kinetic - before.kinetic) + (corrected.potential - before.potential);
-            report.enter_balance(dissipated, excess.max(0.0), change - work);
+            let left = change - work - released;
+            report.enter_balance(dissipated, excess.max(0.0), released, left);
             ws.audited.is(&ws.end, &ws.v, corrected);
         }
         Verdict::Sound
@@ -256,8 +249,31 @@ pub(super) fn count_lift<S: MechanicalSystem>(
 #[derive(Clone, Copy, Debug)]
 struct Balance {
     after: MechanicalEnergy,
+    /// Of the change of the energy over `work` and `released`.
     excess: f64,
     work: f64,
+    released: f64,
+}
+
+/// What a change of the energy is compared with, J: the kinetic energy at hand, and the rounding of
+/// the balance.
+fn measures(
+    options: &StepOptions,
+    before: &MechanicalEnergy,
+    after: &MechanicalEnergy,
+    work: f64,
+) -> (f64, f64) {
+    // A machine at rest has no kinetic energy as a measure: use at least what gravity adds in a
+    // step of free fall.
+    let fall = options.gravity.norm() * options.time_step;
+    let least = 0.5 * after.mass * fall * fall;
+    let size = before.kinetic.max(after.kinetic).max(least);
+    let sum = before.kinetic.abs()
+        + after.kinetic.abs()
+        + before.potential.abs()
+        + after.potential.abs()
+        + work.abs();
+    (size, ROUNDINGS * f64::EPSILON * sum)
 }
 
 /// The balance of the step to `ws.end` and `ws.v`.
@@ -270,11 +286,13 @@ fn balance<S: MechanicalSystem>(
 ) -> Balance {
     let work = system.work(options, start, &ws.v);
     let after = system.energy(options, &ws.end, &ws.v).unwrap_or(*before);
-    let supplied = work + supplied_by_contacts::<S>(options, ws);
+    let released = supplied_by_contacts::<S>(options, ws);
+    let supplied = work + released;
     Balance {
         after,
         excess: (after.kinetic - before.kinetic) + (after.potential - before.potential) - supplied,
         work,
+        released,
     }
 }
 

@@ -322,9 +322,9 @@ pub trait MechanicalSystem {
         rebound(options.restitution, u_N_before)
     }
 
-    /// Whether any contact yields. By default none does.
-    fn has_compliance(&self) -> bool {
-        false
+    /// Total mass, kg, of a machine of which any contact yields. By default none does.
+    fn compliant_mass(&self) -> Option<f64> {
+        None
     }
 
     /// Spring and damper of a contact; `None`, the default, if it is rigid.
@@ -333,7 +333,7 @@ pub trait MechanicalSystem {
     }
 
     /// Adds a number for each contact (n_c), 1/kg, to its entries on the diagonal of the assembled
-    /// W. Called only for a system that [has compliance](Self::has_compliance).
+    /// W. Called only for a system that has a [compliant mass](Self::compliant_mass).
     fn soften(&mut self, _diagonal: impl Iterator<Item = f64>) {}
 
     /// Whether a solve that does not converge suggests that the problem has no answer. True by

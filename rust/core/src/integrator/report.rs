@@ -49,11 +49,14 @@ pub struct StepReport {
     pub energy_dissipated: f64,
     /// Energy that the scheme lost, all steps together, J; negative where it gained.
     ///
-    /// It is what the work of gravity and actuators, `energy_dissipated`, `energy_removed` and
-    /// `energy_lifted` leave unexplained of the change of the energy: errors of the time step, and
-    /// the normal work of contacts that persist. 0 among grains and planar soils, which are not
-    /// audited.
+    /// It is what the work of gravity and actuators, `energy_dissipated`, `energy_removed`,
+    /// `energy_lifted` and `energy_released` leave unexplained of the change of the energy: errors
+    /// of the time step, and the normal work of contacts that persist. 0 among grains and planar
+    /// soils, which are not audited.
     pub energy_lost: f64,
+    /// Energy that contacts which yield gave off, all steps together, J; negative where they stored
+    /// some. See [`crate::law::compliance::Yielding::supplied`].
+    pub energy_released: f64,
     /// Energy that position projection added beyond the actuators' work on the way, all steps
     /// together, J.
     pub energy_lifted: f64,
@@ -79,10 +82,18 @@ impl StepReport {
     }
 
     /// Enters the balance of a step, J: what the contacts' law dissipated, what the audit removed,
-    /// and the final excess of the energy's change over the work of the actuators.
-    pub(super) fn enter_balance(&mut self, dissipated: f64, removed: f64, excess: f64) {
+    /// what contacts that yield released, and the final excess of the energy's change over that and
+    /// the work of the actuators.
+    pub(super) fn enter_balance(
+        &mut self,
+        dissipated: f64,
+        removed: f64,
+        released: f64,
+        excess: f64,
+    ) {
         self.energy_dissipated += dissipated;
         self.energy_removed += removed;
+        self.energy_released += released;
         self.energy_lost -= excess + dissipated + removed;
     }
 
@@ -105,5 +116,6 @@ impl StepReport {
         self.energy_dissipated += later.energy_dissipated;
         self.energy_lost += later.energy_lost;
         self.energy_lifted += later.energy_lifted;
+        self.energy_released += later.energy_released;
     }
 }

@@ -139,30 +139,36 @@ pub(super) fn assemble_contacts<S: MechanicalSystem>(
     }
     set_friction(system, options, &ws.contacts, &mut ws.mu);
     system.assemble(&ws.contacts, v_before, &mut ws.u_before);
-    let is_compliant = system.has_compliance();
+    let mass = system.compliant_mass();
     ws.yielding.clear();
-    if options.warm_start || is_compliant {
+    if options.warm_start || mass.is_some() {
         warm_start.recall(&ws.contacts, d, &mut ws.p);
     }
-    if is_compliant {
-        yield_under_load(system, options, !warm_start.impulses.is_empty(), ws);
+    if let Some(mass) = mass {
+        // Without a memory a contact may bear the weight.
+        let weight = mass * options.gravity.norm() * options.time_step;
+        let unknown = warm_start.impulses.is_empty().then_some(weight);
+        yield_under_load(system, options, unknown, ws);
     }
     if !options.warm_start {
         ws.p.fill(0.0);
     }
 }
 
-/// `ws.yielding` of every contact, and its part in W. `ws.p` holds the last step's impulses if
-/// there are any, and `ws.v` is the velocity that led to the end pose.
+/// Computes the yielding law of every contact and adds its part to W.
+///
+/// `ws.p` holds the impulses of the last step, and `ws.v` the velocity that led to the end pose.
+/// Without a last step, `unknown` replaces the normal impulses.
 ///
 /// A contact with restitution is rigid in the step in which it closes, and Newton's law bounces it.
 fn yield_under_load<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
-    has_memory: bool,
+    unknown: Option<f64>,
     ws: &mut ScratchOf<S>,
 ) {
-    let (h, d) = (options.time_step, S::DIMENSION.components());
+    let d = S::DIMENSION.components();
+    let step = (options.time_step, options.theta);
     ws.q_free.fill(0.0);
     system.add_local_of_velocity(&ws.contacts, &ws.v, &mut ws.q_free);
     for (i, contact) in ws.contacts.iter().enumerate() {
@@ -172,14 +178,8 @@ fn yield_under_load<S: MechanicalSystem>(
         let bounces = is_new && system.normal_shift(options, contact, 1.0) > 0.0;
         let compliance = system.compliance(contact).filter(|_| !bounces);
         let law = compliance.map(|compliance| {
-            let moved = h * ws.q_free[d * i];
-            let middle = contact.gap() - options.theta * moved;
-            compliance.over(
-                h,
-                middle,
-                contact.gap() - moved,
-                has_memory.then_some(before),
-            )
+            let before = unknown.map_or(before, |p| [p, 0.0, 0.0]);
+            compliance.over(step, contact.gap(), ws.q_free[d * i], before)
         });
         ws.yielding.push(law.unwrap_or_default());
     }

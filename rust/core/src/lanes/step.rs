@@ -133,6 +133,7 @@ pub struct Block<T: Lane> {
     work: T,
     contact_work: T,
     removed: T,
+    released: T,
     /// Gain that is left, as a fraction of the kinetic energy.
     gain: T,
     /// Linear momentum at the end of the step, kg m/s.
@@ -207,6 +208,7 @@ impl<T: Lane> Block<T> {
             work: zero,
             contact_work: zero,
             removed: zero,
+            released: zero,
             gain: zero,
             momentum: Vec3::splat(token, [0.0; 3]),
             is_corrected: nobody,
@@ -436,14 +438,18 @@ impl<T: Lane> Block<T> {
 
     /// The laws of contacts that yield, and their part in W.
     fn soften(&mut self, problems: &[ContactProblem]) {
-        let memories = &self.memories;
+        let (memories, h) = (&self.memories, self.options.time_step);
+        let weight = self.inertias.mass * self.gravity.norm();
         self.yields.update(
             &self.machine,
             &self.contacts,
             &self.rows.u_before,
-            (self.options.time_step, self.options.theta),
+            (h, self.options.theta),
             problems,
-            |lane| !memories[lane].impulses.is_empty(),
+            |lane| {
+                let is_unknown = memories[lane].impulses.is_empty();
+                is_unknown.then(|| weight.get(lane) * h)
+            },
         );
         self.rows.soften(&self.contacts, &self.yields.diagonal);
     }
@@ -769,12 +775,13 @@ impl<T: Lane> Block<T> {
                 .work(&self.machine, (h, theta), places, &self.v, &self.v_end);
         self.decline(Decline::Motor, has_left);
         let ([kinetic, potential], [end_kinetic, end_potential]) = (self.before, self.after);
-        let mut supplied = work;
+        self.released = h.like(0.0);
         if !self.yields.is_empty() {
             let (contacts, before) = (&self.contacts, &self.rows.u_before);
             let h = self.options.time_step;
-            supplied += self.yields.supplied(contacts, h, &self.p, &self.u, before);
+            self.released = self.yields.supplied(contacts, h, &self.p, &self.u, before);
         }
+        let supplied = work + self.released;
         self.work = supplied;
         let excess = (end_kinetic - kinetic) + (end_potential - potential) - supplied;
         let fall = self.gravity.norm() * h;
@@ -859,8 +866,14 @@ impl<T: Lane> Block<T> {
         let [kinetic, potential] = self.before;
         let change = (self.after[0] - kinetic) + (self.after[1] - potential);
         let lost = self.contact_work - (change - self.work) - self.removed;
-        let mut entries = [[0.0; MAX_LANES]; 4];
-        let balance = [self.gain, self.removed, self.contact_work, lost];
+        let mut entries = [[0.0; MAX_LANES]; 5];
+        let balance = [
+            self.gain,
+            self.removed,
+            self.contact_work,
+            lost,
+            self.released,
+        ];
         for (entry, x) in entries.iter_mut().zip(balance) {
             x.store(&mut entry[..T::LANES]);
         }
@@ -869,6 +882,7 @@ impl<T: Lane> Block<T> {
             report.energy_removed = entries[1][lane];
             report.energy_dissipated = -entries[2][lane];
             report.energy_lost = entries[3][lane];
+            report.energy_released = entries[4][lane];
         }
     }
 

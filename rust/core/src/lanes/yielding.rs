@@ -44,18 +44,19 @@ impl<T: Lane> Yields<T> {
         self.laws.is_empty()
     }
 
-    /// The laws over a step of `h` (s) with the scheme's `theta`.
+    /// The laws over a `step`: its length (s) and the scheme's θ.
     ///
     /// `u_before`: local velocities before the step by slot, m/s. `problems`: one a lane, with the
-    /// impulses of the last step; `has_memory` says of which lanes there are any.
+    /// impulses of the last step. In a lane without a last step, `unknown` replaces the normal
+    /// impulse, N s.
     pub fn update(
         &mut self,
         machine: &Machine,
         contacts: &Contacts<T>,
         u_before: &[Triple<T>],
-        (h, theta): (f64, f64),
+        step: (f64, f64),
         problems: &[ContactProblem],
-        has_memory: impl Fn(usize) -> bool,
+        unknown: impl Fn(usize) -> Option<f64>,
     ) {
         for &slot in contacts.used() {
             let compliance = machine.wheels[Contacts::<T>::wheel(slot)].compliance;
@@ -67,9 +68,11 @@ impl<T: Lane> Yields<T> {
                     .map(|compliance| {
                         let (gap, u_N) = (own.gap.get(lane), u_before[slot][0].get(lane));
                         let p = &problem.p[3 * usize::from(places[lane])..];
-                        let before = has_memory(lane).then_some([p[0], p[1], p[2]]);
-                        let moved = h * u_N;
-                        compliance.over(h, gap - theta * moved, gap - moved, before)
+                        let before = match unknown(lane) {
+                            Some(p) => [p, 0.0, 0.0],
+                            None => [p[0], p[1], p[2]],
+                        };
+                        compliance.over(step, gap, u_N, before)
                     });
                 let law = law.unwrap_or_default();
                 let [n, t, b] = law.shift;

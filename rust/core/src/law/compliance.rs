@@ -67,22 +67,27 @@ impl Compliance {
         }
     }
 
-    /// The law over a step of `h`, s.
+    /// The law over a step of `h`, s, with the scheme's `theta`.
     ///
-    /// - `gap`: of the pose that the step reaches without impulses, less (1 − θ) h u_N there, m. A
-    ///   stiff contact then comes to rest within a step.
-    /// - `start`: gap at the start of the step, m.
-    /// - `before`: impulse of the last step, N s, in the contact's frame; `None` if it is unknown.
+    /// - `gap`, `u_N`: gap (m) and normal velocity (m/s) at the pose that the step reaches without
+    ///   impulses. The law begins with the gap less θ h u_N: a stiff contact then comes to rest
+    ///   within a step.
+    /// - `before`: impulse of the last step, N s, in the contact's frame. Where none is remembered
+    ///   it is the machine's weight times h along the normal.
     ///
     /// A body that strikes a stiff contact penetrates it within the step by more than any spring
     /// would allow. That part is not elastic and is not given back: it is `unexplained`, and
-    /// position projection removes it.
+    /// position projection removes it. A deflection that the impulse before explains is elastic.
     #[must_use]
-    pub fn over(&self, h: f64, gap: f64, start: f64, before: Option<[f64; 3]>) -> Yielding {
+    pub fn over(&self, (h, theta): (f64, f64), gap: f64, u_N: f64, before: [f64; 3]) -> Yielding {
         let Self { stiffness, damping } = *self;
-        let deflection = (-start).max(0.0);
-        let by_force = before.map_or(f64::INFINITY, |p| p[0] / (h * stiffness));
-        let known = gap.max(-(2.0 * deflection.min(by_force) + SLACK));
+        let moved = h * u_N;
+        let deflection = (moved - gap).max(0.0);
+        let gap = gap - theta * moved;
+        // The damper bore a part of the force while the deflection grew.
+        let force = before[0] / h;
+        let by_force = (force + damping * u_N).clamp(0.0, force) / stiffness;
+        let known = gap.max(-((2.0 * deflection).min(by_force) + SLACK));
         let weight = h * stiffness + damping;
         let diagonal = 1.0 / (h * weight);
         // The damper acts on the deflection, which begins when the gap is closed.
@@ -93,7 +98,7 @@ impl Compliance {
         };
         // Of an impact's friction only what the deflection holds is elastic.
         let held = (deflection / by_force.max(f64::MIN_POSITIVE)).min(1.0);
-        let friction = before.map_or([0.0; 2], |[_, t, b]| [held * t, held * b]);
+        let friction = [held * before[1], held * before[2]];
         let [t, b] = friction.map(|p| -diagonal * p);
         Yielding {
             diagonal,
@@ -107,23 +112,20 @@ impl Compliance {
 }
 
 impl Yielding {
-    /// Elastic energy that the contact gives off in a step of `h` that ends with the normal
-    /// velocity `u_N` and the impulse `p`, J; negative where it stores some.
-    fn released(&self, h: f64, u_N: f64, p: [f64; 3]) -> f64 {
-        let before = self.gap.min(0.0);
-        let after = (self.gap + h * u_N).min(0.0);
-        let [t, b] = self.friction;
-        let sheared = (t * t + b * b) - (p[1] * p[1] + p[2] * p[2]);
-        0.5 * (self.stiffness * (before * before - after * after) + self.diagonal * sheared)
-    }
-
     /// Energy that a step of `h` may gain by the contact, J. `u_N`: normal velocities before and
-    /// after.
+    /// after; `p`: impulse.
     ///
-    /// The force is that at the end of the step, and acts over all of it: where the approach speeds
-    /// up it does `p_N (u_N − u_N⁺) / 2` more work than its spring gives off.
+    /// It is what the springs give off, negative where they store energy. The normal force is that
+    /// at the end of the step and acts over all of it: where it does more work, `p_N (u_N + u_N⁺) /
+    /// 2`, that counts.
     #[must_use]
     pub fn supplied(&self, h: f64, u_N: [f64; 2], p: [f64; 3]) -> f64 {
-        self.released(h, u_N[1], p) + (0.5 * p[0] * (u_N[0] - u_N[1])).max(0.0)
+        let before = self.gap.min(0.0);
+        let after = (self.gap + h * u_N[1]).min(0.0);
+        let released = 0.5 * self.stiffness * (before * before - after * after);
+        let work = 0.5 * p[0] * (u_N[0] + u_N[1]);
+        let [t, b] = self.friction;
+        let sheared = (t * t + b * b) - (p[1] * p[1] + p[2] * p[2]);
+        released.max(work) + 0.5 * self.diagonal * sheared
     }
 }

@@ -338,8 +338,9 @@ impl MechanicalSystem for TreeSystem<'_> {
     }
 
     #[inline]
-    fn has_compliance(&self) -> bool {
-        self.model.has_compliance()
+    fn compliant_mass(&self) -> Option<f64> {
+        let model = &self.model;
+        model.has_compliance().then(|| model.mass())
     }
 
     fn compliance(&self, contact: &Contact) -> Option<Compliance> {
