@@ -29,7 +29,15 @@ def rover(*arguments: str) -> Result:
 @pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is another thing there")
 def test_it_serves_its_page_and_keeps_the_recording_when_it_is_ended(tmp_path: Path) -> None:
     command = [sys.executable, "-c", RUN, "live", "--port", "0", "--output", str(tmp_path), "--policy", "pd"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        # A suite that a shell started in the background ignores Ctrl-C, and so would its children.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509 - no threads run yet
+    )
+    try:
         assert process.stdout is not None
         line = process.stdout.readline()
         found = re.fullmatch(r"live: (http://127\.0\.0\.1:\d+) \(Ctrl-C ends the drive\)\n", line)
@@ -43,6 +51,9 @@ def test_it_serves_its_page_and_keeps_the_recording_when_it_is_ended(tmp_path: P
                 assert time.monotonic() < end
         process.send_signal(signal.SIGINT)
         output, errors = process.communicate(timeout=30.0)
+    finally:
+        process.kill()
+        process.wait()
     assert process.returncode == 0, errors
     assert output.splitlines() == [f"recorded: {tmp_path / 'live-1.h5'}"]
     assert errors == ""

@@ -88,12 +88,17 @@ def test_an_interrupt_waits_for_the_rows_that_are_being_written(
     for i in range(5):
         recorder.append({"time": i})
     monkeypatch.setattr(SteadyFile, "write", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        recorder.flush()
+    # A shell starts what runs in the background with Ctrl-C ignored.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            recorder.flush()
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert interrupts
     recorder.close()
     assert read_trajectory(tmp_path / "run.h5")["time"].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_an_exception_keeps_all_rows_and_leaves_the_file_incomplete(tmp_path: Path) -> None:
