@@ -17,6 +17,25 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from pydrake.geometry import (
+    AddContactMaterial,
+    Box,
+    CollisionFilterDeclaration,
+    GeometrySet,
+    ProximityProperties,
+    Sphere,
+)
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import (
+    AddMultibodyPlantSceneGraph,
+    CoulombFriction,
+    DiscreteContactApproximation,
+    MultibodyPlant,
+)
+from pydrake.multibody.tree import PdControllerGains
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
@@ -81,14 +100,10 @@ def for_drake(path: Path, *, snap: bool = True) -> str:
     return ET.tostring(root, encoding="unicode")
 
 
-def spheres(path: Path, model: RoverModel) -> list[list[np.ndarray]]:
+def spheres(path: Path, model: RoverModel, *, snap: bool) -> list[list[np.ndarray]]:
     """Centres of the spheres of every wheel, one or two, in the frames of the file's links."""
-    from pydrake.math import RigidTransform
-    from pydrake.multibody.parsing import Parser
-    from pydrake.multibody.plant import MultibodyPlant
-
     plant = MultibodyPlant(0.0)
-    (robot,) = Parser(plant).AddModelsFromString(for_drake(path), "urdf")
+    (robot,) = Parser(plant).AddModelsFromString(for_drake(path, snap=snap), "urdf")
     plant.Finalize()
     context, poses, found = plant.CreateDefaultContext(), model.poses(np.zeros(model.nq)), []
     plant.SetFreeBodyPose(context, plant.get_body(plant.GetBodyIndices(robot)[0]), RigidTransform())
@@ -102,27 +117,20 @@ def spheres(path: Path, model: RoverModel) -> list[list[np.ndarray]]:
     return found
 
 
-def in_drake(path: Path, model: RoverModel, parts: tuple[Part, ...], step: float, stiffness: float) -> Drive:
+def in_drake(
+    path: Path, model: RoverModel, parts: tuple[Part, ...], step: float, stiffness: float, *, snap: bool = True
+) -> Drive:
     """The drive in Drake's discrete plant: contacts are springs, and its solver is that of rigid Coulomb friction."""
-    from pydrake.geometry import AddContactMaterial, Box, CollisionFilterDeclaration, GeometrySet, Sphere
-    from pydrake.geometry import ProximityProperties as Properties
-    from pydrake.math import RigidTransform, RollPitchYaw
-    from pydrake.multibody.parsing import Parser
-    from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, CoulombFriction, DiscreteContactApproximation
-    from pydrake.multibody.tree import PdControllerGains
-    from pydrake.systems.analysis import Simulator
-    from pydrake.systems.framework import DiagramBuilder
-
     builder = DiagramBuilder()
     plant, graph = AddMultibodyPlantSceneGraph(builder, step)
     plant.set_discrete_contact_approximation(DiscreteContactApproximation.kLagged)
     plant.set_stiction_tolerance(CREEP)
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -GRAVITY])
-    (robot,) = Parser(plant).AddModelsFromString(for_drake(path), "urdf")
-    properties = Properties()
+    (robot,) = Parser(plant).AddModelsFromString(for_drake(path, snap=snap), "urdf")
+    properties = ProximityProperties()
     AddContactMaterial(
         dissipation=DISSIPATION,
-        point_stiffness=stiffness,
+        point_stiffness=2.0 * stiffness,  # of each of the two sides, which act in series
         friction=CoulombFriction(FRICTION, FRICTION),
         properties=properties,
     )
@@ -131,7 +139,7 @@ def in_drake(path: Path, model: RoverModel, parts: tuple[Part, ...], step: float
     description = model.to_dict()
     wheels, solids = description["wheels"], {solid["name"]: solid for solid in description["solids"]}
     joint_of = {plant.get_joint(j).child_body().name(): plant.get_joint(j) for j in plant.GetJointIndices(robot)}
-    for wheel, places in zip(wheels, spheres(path, model), strict=True):
+    for wheel, places in zip(wheels, spheres(path, model, snap=snap), strict=True):
         for k, place in enumerate(places):
             body = plant.GetBodyByName(wheel["solid"])
             name = f"{wheel['name']}_{k}"
@@ -198,7 +206,8 @@ def table(drives: Iterator[tuple[str, Drive]]) -> None:
         loads = " ".join(f"{load:.1f}" for load in drive.loads)
         away = 1e3 * drive.distance(first)
         print(  # noqa: T201
-            f"{name:32} {drive.length():6.3f} m  ({x:.4f}, {y:.4f}, {z:.4f})  {away:8.2f} mm  loads {loads} N", flush=True
+            f"{name:32} {drive.length():6.3f} m  ({x:.4f}, {y:.4f}, {z:.4f})  {away:8.2f} mm  loads {loads} N",
+            flush=True,
         )
 
 
@@ -211,6 +220,7 @@ def main() -> None:
     parser.add_argument("--steps", nargs="+", type=float, default=[5.0], help="here, ms")
     parser.add_argument("--drake", nargs="*", type=float, default=[], help="stiffnesses of Drake's contacts, N/m")
     parser.add_argument("--drake-step", type=float, default=0.2, help="ms")
+    parser.add_argument("--as-written", action="store_true", help="Drake takes angles such as 3.14159 as they are")
     parser.add_argument("--wheel-width", type=float, default=None, help="m; the file's, if not given")
     parser.add_argument("--wheel-stiffness", type=float, default=None, help="N/m; the import's, if not given")
     given = parser.parse_args()
@@ -221,7 +231,8 @@ def main() -> None:
     def drives() -> Iterator[tuple[str, Drive]]:
         for path, model in models:
             for stiffness in given.drake:
-                drive = in_drake(path, model, parts, 1e-3 * given.drake_step, stiffness)
+                step = 1e-3 * given.drake_step
+                drive = in_drake(path, model, parts, step, stiffness, snap=not given.as_written)
                 yield f"{path.stem}, Drake, {stiffness:g} N/m", drive
         for path, model in models:
             for step in given.steps:

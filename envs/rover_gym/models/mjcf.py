@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from rover_gym.extras import require
 from rover_gym.models.file_axes import from_quaternion
+from rover_gym.models.mjcf_angles import complete_right_angles
 from rover_gym.models.mjcf_sizes import check_sizes
 from rover_gym.models.robot_tree import (
     MAX_LINKS,
@@ -42,12 +43,15 @@ def read_mjcf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
     check_size(path)
     if is_urdf(path):
         refuse_in(path, "root", "robot", "is a URDF: read it with from_urdf")
-    check_sizes(path)
+    included = check_sizes(path)
     warnings: list[str] = []
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(warnings.append)  # else they go to a file in the current folder
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
+        spec = _specification(mujoco, path, included)
+        if assumed := complete_right_angles(mujoco, spec):
+            model = spec.compile()
         bytes(model.names).decode("utf-8")
     except UnicodeDecodeError as error:
         _refuse_encoding(path, error)
@@ -61,6 +65,7 @@ def read_mjcf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
         if "nan" in warning.lower():
             refuse_in(path, "MuJoCo", path.name, f"warns of the file ({' '.join(warning.split())})")
     reader = _Reader(mujoco, model, path, ignore)
+    reader.tree.assumed += assumed
     reader.tree.left_out += [f"MuJoCo warns: {' '.join(warning.split())}" for warning in warnings]
     reader.check_numbers()
     reader.check_options()
@@ -69,6 +74,14 @@ def read_mjcf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
     reader.check_tendons()
     reader.add_actuators()
     return reader.tree
+
+
+def _specification(mujoco: Any, path: Path, included: Mapping[str, Path]) -> Any:
+    """The file before it is compiled. By its name MuJoCo would take it only if that ends in .xml."""
+    files = {name: file.read_bytes() for name, file in included.items() if file.is_file()}
+    spec = mujoco.MjSpec.from_string(path.read_bytes().decode("utf-8"), include=files)
+    spec.modelfiledir = str(path.parent)
+    return spec
 
 
 def _refuse_encoding(path: Path, error: UnicodeDecodeError) -> NoReturn:

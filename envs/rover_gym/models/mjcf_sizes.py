@@ -21,11 +21,14 @@ MAX_NUMBERS = 10**7
 MAX_FILES = 100
 
 
-def check_sizes(path: Path) -> None:
+def check_sizes(path: Path) -> dict[str, Path]:
     """Refuses a file that would become enormous. A file that is no XML is left to MuJoCo, which says where.
 
     Args:
         path: The file; what it includes is looked at too.
+
+    Returns:
+        The files that it includes, by the names that it gives them.
 
     Raises:
         ModelError: An element makes too many copies, or holds too many numbers.
@@ -33,6 +36,7 @@ def check_sizes(path: Path) -> None:
     """
     etree = require("lxml.etree", "models")
     waiting, seen = [path], {path.resolve()}
+    names: dict[str, Path] = {}
     while waiting:
         file = waiting.pop()
         parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False)
@@ -42,12 +46,14 @@ def check_sizes(path: Path) -> None:
             continue
         for element in root.iter(*COPIES, *NUMBERS, "include"):
             if element.tag == "include":
-                included = path.parent / element.get("file", "")
+                name = element.get("file", "")
+                included = names[name] = path.parent / name
                 if included.resolve() not in seen and len(seen) < MAX_FILES:
                     seen.add(included.resolve())
                     waiting.append(included)
                 continue
             _check(file, element)
+    return names
 
 
 def _check(file: Path, element: Any) -> None:
