@@ -1240,7 +1240,11 @@ class StepReport:
         """Newton iterations of the scheme, summed over the steps; 0 with the linearised scheme."""
     @property
     def residual(self) -> float:
-        """Largest relative residual of a step's contact problem, computed from its impulses."""
+        """Largest relative residual of a step's contact problem, computed from its impulses.
+
+        Where the energy audit slowed a rebound (`restitution` above 0), it contains how far the
+        rebound then falls short of Newton's law. The status is the solver's.
+        """
     @property
     def n_contacts(self) -> int:
         """Largest number of contacts in a step."""

@@ -46,7 +46,7 @@ from rover_gym.models.right_angles import right_angle
 
 GRAVITY = 9.81
 #: Of Drake's contacts: dissipation (Hunt and Crossley), s/m, and the speed below which its friction creeps, m/s. At
-#: Drake's own 1e-3 m/s, wheels that stick against each other lose what they bear in a tenth of a second.
+#: Drake's own, wheels that stick against each other lose what they bear in a second.
 DISSIPATION, CREEP = 50.0, 1e-6
 #: Edge of its ground, m.
 GROUND = 200.0

@@ -58,6 +58,9 @@ impl StepReport {
     }
 
     /// Largest relative residual of a step's contact problem, computed from its impulses.
+    ///
+    /// Where the energy audit slowed a rebound (`restitution` above 0), it contains how far the
+    /// rebound then falls short of Newton's law. The status is the solver's.
     #[getter]
     fn residual(&self) -> f64 {
         self.inner.residual

@@ -11,7 +11,8 @@
 //!
 //! - After a coarse excess the step is repeated, with implicit gyroscopic terms and then in halves.
 //! - The remaining excess is removed by scaling the velocity, `v⁺ ← s v⁺`. Signorini's condition at
-//!   e = 0 and Coulomb's law are homogeneous in the velocity, so both still hold.
+//!   e = 0 and Coulomb's law are homogeneous in the velocity, so both still hold. With restitution
+//!   the rebounds are slower than Newton's law says, which the report's residual contains.
 //! - Free flight conserves energy. There s may be above or below 1, and it scales only the motion
 //!   relative to the mass centre, so the momentum is kept.
 //!
@@ -157,6 +158,9 @@ impl Audit {
         let d = S::DIMENSION.components();
         if !(is_free && scale_relative_motion(&mut ws.v, d, &after, excess)) && excess > 0.0 {
             let share = (1.0 - excess / after.kinetic).max(0.0).sqrt();
+            if options.is_elastic() {
+                report.residual = report.residual.max(violation_by(share, ws, d));
+            }
             shorten(ws, share);
             if is_left {
                 self.hold_back(system, options, start, ws);
@@ -350,6 +354,17 @@ fn scale_relative_motion(v: &mut [f64], d: usize, after: &MechanicalEnergy, exce
         }
     }
     has_enough
+}
+
+/// Violation of the contacts' law by `v⁺ ← share v⁺`, relative to the free velocity.
+///
+/// A closed contact that is to rebound at u_N separates at `share u_N`. At e = 0 a rigid contact has
+/// u_N = 0, and the law holds.
+fn violation_by<Q, C>(share: f64, ws: &Scratch<Q, C>, d: usize) -> f64 {
+    let squares = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
+    let closed = (ws.u.chunks_exact(d).zip(ws.p.chunks_exact(d))).filter(|(_, p)| p[0] > 0.0);
+    let lost = closed.map(|(u, _)| squares(&u[..1])).sum::<f64>();
+    relative((1.0 - share) * lost.sqrt(), squares(&ws.q_free).sqrt())
 }
 
 /// `v⁺ ← share v⁺`, in the local velocities too.

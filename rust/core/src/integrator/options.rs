@@ -89,6 +89,12 @@ impl Default for StepOptions {
 }
 
 impl StepOptions {
+    /// Whether any contact rebounds.
+    #[must_use]
+    pub fn is_elastic(&self) -> bool {
+        self.restitution > 0.0 || self.materials.is_elastic()
+    }
+
     /// Checks every range.
     ///
     /// # Errors

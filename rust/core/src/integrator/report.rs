@@ -31,7 +31,8 @@ pub struct StepReport {
     pub pivots: usize,
     /// Newton iterations on the forces, all steps together (0 in the linearised variant).
     pub newton_iterations: usize,
-    /// Largest natural-map residual, recomputed from the impulses.
+    /// Largest natural-map residual, recomputed from the impulses; where the energy audit slowed a
+    /// rebound, that violation of the law of restitution too. The status is the solver's.
     pub residual: f64,
     /// Most contacts in a step.
     pub n_contacts: usize,

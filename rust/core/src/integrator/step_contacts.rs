@@ -295,8 +295,7 @@ pub(super) fn solve_contacts<S: MechanicalSystem>(
         let mut solved = solve_problem(system, options, ws);
         let inelastic;
         let mut law = options;
-        let is_elastic = options.restitution > 0.0 || options.materials.is_elastic();
-        if !solved.is_converged() && is_elastic && system.solves_to_the_end() {
+        if !solved.is_converged() && options.is_elastic() && system.solves_to_the_end() {
             inelastic = StepOptions {
                 restitution: 0.0,
                 materials: options.materials.inelastic(),
