@@ -358,11 +358,12 @@ fn scale_relative_motion(v: &mut [f64], d: usize, after: &MechanicalEnergy, exce
 
 /// Violation of the contacts' law by `v⁺ ← share v⁺`, relative to the free velocity.
 ///
-/// A closed contact that is to rebound at u_N separates at `share u_N`. At e = 0 a rigid contact has
-/// u_N = 0, and the law holds.
+/// A closed contact that is to rebound at u_N separates at `share u_N`. At e = 0 a rigid contact
+/// has u_N = 0, and the law holds.
 fn violation_by<Q, C>(share: f64, ws: &Scratch<Q, C>, d: usize) -> f64 {
     let squares = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
-    let closed = (ws.u.chunks_exact(d).zip(ws.p.chunks_exact(d))).filter(|(_, p)| p[0] > 0.0);
+    let local = ws.u.chunks_exact(d).zip(ws.p.chunks_exact(d));
+    let closed = local.filter(|(_, p)| p[0] > 0.0);
     let lost = closed.map(|(u, _)| squares(&u[..1])).sum::<f64>();
     relative((1.0 - share) * lost.sqrt(), squares(&ws.q_free).sqrt())
 }
