@@ -30,7 +30,7 @@ impl Numbers {
 pub fn heap(side: usize, seed: u64) -> RoverSimulation {
     let mut numbers = Numbers(seed);
     let count = side * side * side;
-    let boxes: String = (0..count)
+    let boxes: Vec<String> = (0..count)
         .map(|i| {
             let size = Vector3::new(0.2, 0.16, 0.24) + 0.03 * numbers.vector();
             let mass = 8.0 + 2.0 * numbers.next();
@@ -41,6 +41,7 @@ pub fn heap(side: usize, seed: u64) -> RoverSimulation {
             )
         })
         .collect();
+    let boxes = boxes.concat();
     let description = ModelDescription::from_toml(&format!("name = \"heap\"\n{boxes}")).unwrap();
     let model = Arc::new(Model::from_description(description).unwrap());
     let mut q = Configuration::zero(&model);

@@ -24,8 +24,8 @@ fn sweep_budget(data: &Prepared<'_>) -> usize {
 /// Newton steps of a short attempt with the proximal point method.
 const ATTEMPT: usize = 100;
 
-/// Residual below which few contacts get a second proximal point run, from the best answer, and many
-/// are pivoted. Problems without a solution mostly stay above it.
+/// Residual below which few contacts get a second proximal point run, from the best answer, and
+/// many are pivoted. Problems without a solution mostly stay above it.
 const NEAR: f64 = 1e-4;
 
 /// The stages of [`Method::Auto`] so far: the result of each, and the best answer.
@@ -159,8 +159,9 @@ fn sweep_many<const D: usize>(
     None
 }
 
-/// Pivoting from the start that the scratch keeps and `p` is: from it, with larger `α`, and from its
-/// loads alone. `p` is zero on return without an answer: a warm start may mislead, zero does not.
+/// Pivoting from the start that the scratch keeps and `p` is: from it, with larger `α`, and from
+/// its loads alone. `p` is zero on return without an answer: a warm start may mislead, zero does
+/// not.
 fn pivot_from_start<const D: usize>(
     data: &Prepared<'_>,
     ladder: &mut Ladder<'_>,
