@@ -3,7 +3,9 @@
 #![allow(clippy::unwrap_used)]
 
 mod contact_scenes;
+mod heap_scenes;
 
 mod derivatives;
+mod heaps;
 mod loose;
 mod self_contact;

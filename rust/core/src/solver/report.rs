@@ -140,7 +140,7 @@ pub struct Rungs {
 
 impl Rungs {
     /// Most stages of one solve; later ones would not be listed.
-    const MOST: usize = 7;
+    const MOST: usize = 16;
 
     /// Adds a stage.
     #[inline]

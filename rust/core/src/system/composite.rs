@@ -401,7 +401,7 @@ where
 }
 
 /// Report of the harder of two solves, with the work of both.
-fn harder(a: SolveReport, b: SolveReport) -> SolveReport {
+fn harder(a: &SolveReport, b: &SolveReport) -> SolveReport {
     let worst = if a.is_converged() && (!b.is_converged() || b.residual > a.residual) {
         b
     } else {
@@ -412,7 +412,7 @@ fn harder(a: SolveReport, b: SolveReport) -> SolveReport {
         work: a.work + b.work,
         residual: a.residual.max(b.residual),
         velocity_error: a.velocity_error.max(b.velocity_error),
-        ..worst
+        ..*worst
     }
 }
 
@@ -793,8 +793,8 @@ where
         let [p_a, p_b, _] = self.split_mut(p);
         let [u_a, u_b, _] = self.split_mut(u);
         harder(
-            self.first.solve(q_a, mu_a, options, p_a, u_a, workspace),
-            self.second.solve(q_b, mu_b, options, p_b, u_b, workspace),
+            &self.first.solve(q_a, mu_a, options, p_a, u_a, workspace),
+            &self.second.solve(q_b, mu_b, options, p_b, u_b, workspace),
         )
     }
 

@@ -30,7 +30,7 @@ use crate::solver::stage::pivot_rules::{
     change_mode, ratio_test, return_to_cone, reverse_barred, worst_contradiction,
 };
 
-/// Most systems to solve.
+/// Most systems to solve, unless there are more contacts.
 const MAX_PIVOTS: usize = 80;
 
 /// Initial `α` relative to the mean diagonal, where something slides and where nothing does. The
@@ -290,7 +290,8 @@ pub(in crate::solver) fn pivots<const D: usize>(
     let usual = if slides { ALPHA } else { STICKING_ALPHA };
     let alpha = alpha.unwrap_or(usual) * data.mean_diagonal;
     let mut course = Course::new(alpha, residual.relative, REVERSALS);
-    for _ in 0..MAX_PIVOTS.min(options.max_newton_steps) {
+    let most = MAX_PIVOTS.max(data.mu.len());
+    for _ in 0..most.min(options.max_newton_steps) {
         *iterations += 1;
         let reused = course.factors != Factors::None;
         if !newton_point::<D>(data, &mut course, p, u, scratch) {

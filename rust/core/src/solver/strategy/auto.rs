@@ -24,8 +24,8 @@ fn sweep_budget(data: &Prepared<'_>) -> usize {
 /// Newton steps of a short attempt with the proximal point method.
 const ATTEMPT: usize = 100;
 
-/// Residual below which few contacts get a second proximal point run, from the best answer.
-/// Problems without a solution mostly stay above it.
+/// Residual below which few contacts get a second proximal point run, from the best answer, and
+/// many are pivoted. Problems without a solution mostly stay above it.
 const NEAR: f64 = 1e-4;
 
 /// The stages of [`Method::Auto`] so far: the result of each, and the best answer.
@@ -159,8 +159,9 @@ fn sweep_many<const D: usize>(
     None
 }
 
-/// Few contacts with a warm start: pivoting from it, with larger `α`, and from its loads alone. The
-/// next stage starts from zero.
+/// Pivoting from the start that the scratch keeps and `p` is: from it, with larger `α`, and from
+/// its loads alone. `p` is zero on return without an answer: a warm start may mislead, zero does
+/// not.
 fn pivot_from_start<const D: usize>(
     data: &Prepared<'_>,
     ladder: &mut Ladder<'_>,
@@ -187,7 +188,6 @@ fn pivot_from_start<const D: usize>(
     if let Some(outcome) = ladder.enter(Stage::Pivoting, found, p, scratch, *iterations) {
         return Some(outcome);
     }
-    // A warm start may mislead; zero does not.
     p.fill(0.0);
     None
 }
@@ -227,9 +227,30 @@ fn descend<const D: usize>(
     ladder.enter(Stage::ProximalPoint, found, p, scratch, *iterations)
 }
 
+/// Many contacts: pivoting from the last attempt's answer `p`, if it is near.
+///
+/// Where bodies touch at many points, `W` has a large null space. An answer may then violate the
+/// laws by 1e-9 and lie far from a true one: impulses have to move through the null space until a
+/// contact opens. Pivoting goes there in one step, the proximal point method in thousands.
+fn pivot_from_attempt<const D: usize>(
+    data: &Prepared<'_>,
+    ladder: &mut Ladder<'_>,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &mut Scratch,
+    iterations: &mut usize,
+) -> Option<Outcome> {
+    if data.measure::<D>(p, u).relative > NEAR {
+        return None;
+    }
+    scratch.start.copy_from_slice(p);
+    pivot_from_start::<D>(data, ladder, p, u, scratch, iterations)
+}
+
 /// Many contacts: the proximal point method from the nearest answer, from zero, and again from the
-/// nearest one. What is near by its residual may be far by its modes, and then a start from zero
-/// takes a tenth of the steps; so the first two attempts are short.
+/// nearest one, with pivoting after each attempt. What is near by its residual may be far by its
+/// modes, and then a start from zero takes a tenth of the steps; so the first two attempts are
+/// short.
 fn descend_many<const D: usize>(
     data: &Prepared<'_>,
     ladder: &mut Ladder<'_>,
@@ -250,6 +271,10 @@ fn descend_many<const D: usize>(
             p.copy_from_slice(&scratch.nearest);
         }
         let found = descend::<D>(data, ladder, options, p, u, scratch, iterations);
+        if found.is_some() || scratch.work.is_exhausted {
+            return found;
+        }
+        let found = pivot_from_attempt::<D>(data, ladder, p, u, scratch, iterations);
         if found.is_some() || scratch.work.is_exhausted {
             return found;
         }

@@ -118,7 +118,7 @@ pub(in crate::solver) fn solve<const D: usize>(
         return None;
     }
     let mut hardest = Method::GaussSeidel;
-    // Small islands first: a large one may use up the budget.
+    // Small islands first, and half of the budget at most: a large one may use it up.
     let mut order: Vec<usize> = (0..n_islands).collect();
     order.sort_by_key(|&island| islands.starts[island + 1] - islands.starts[island]);
     for island in order {
@@ -127,14 +127,13 @@ pub(in crate::solver) fn solve<const D: usize>(
             continue;
         }
         let own = SolverOptions {
-            budget: Some(work.budget.saturating_sub(work.spent)),
+            budget: Some(work.budget.saturating_sub(work.spent) / 2),
             keeps_history: false,
             ..*options
         };
         let report = solve_island::<D>(data, W, &own, island, p, islands, solve);
         *iterations += report.iterations;
         work.spent += report.work;
-        work.is_exhausted |= report.status == SolveStatus::BudgetExhausted;
         if rank(report.method) > rank(hardest) {
             hardest = report.method;
         }

@@ -99,7 +99,7 @@ where
             bodies,
             options,
             (&mut *p, &mut *u),
-            report,
+            &report,
             &mut rungs,
             solve,
         );
@@ -134,7 +134,7 @@ fn search<const D: usize>(
     bodies: &ManyBodies<'_, D>,
     options: &SolverOptions,
     (p, u): (&mut [f64], &mut [f64]),
-    report: SolveReport,
+    report: &SolveReport,
     rungs: &mut Rungs,
     solve: &mut SolvePart<'_>,
 ) -> SolveReport {
@@ -163,14 +163,14 @@ fn search<const D: usize>(
         factorisations: found.factorisations(),
     });
     found.iterations += report.iterations;
-    if found.is_converged() || excess(options, &found) < excess(options, &report) {
+    if found.is_converged() || excess(options, &found) < excess(options, report) {
         return found;
     }
     p.copy_from_slice(&p_swept);
     u.copy_from_slice(&u_swept);
     SolveReport {
         iterations: found.iterations,
-        ..report
+        ..*report
     }
 }
 
