@@ -6,8 +6,8 @@
 //! Source: Luh, Walker and Paul 1980; here in world axes.
 
 use super::inertias::{Inertia, Inertias};
-use super::machine::{Link, Machine};
-use super::poses::{Pose, Poses};
+use super::machine::{Link, LinkJoint, Machine};
+use super::poses::{Motion, Pose, Poses};
 use crate::multibody::model::BASE;
 use crate::scalar::{Lane, Vec3};
 
@@ -70,13 +70,12 @@ pub fn bias<T: Lane>(
         || {
             let n = machine.links.len();
             let (links, inertias) = (&machine.links[..n], &inertias.bodies[..n]);
+            let motions = &poses.motions[..machine.n_motions()];
             let (poses, moved) = (&poses.bodies[..n], &mut scratch.bodies[..n]);
-            let (base, rates) = v.split_at(BASE);
-            let (out_base, out) = out.split_at_mut(BASE);
-            let (rates, out) = (&rates[..n - 1], &mut out[..n - 1]);
             let zero = Vec3::splat(scratch.token, [0.0; 3]);
+            out.fill(zero.x);
             moved[0] = Moved {
-                omega: Vec3::new(base[3], base[4], base[5]),
+                omega: Vec3::new(v[3], v[4], v[5]),
                 alpha: zero,
                 origin: -gravity,
                 force: zero,
@@ -87,35 +86,56 @@ pub fn bias<T: Lane>(
                 let (before, own) = moved.split_at_mut(b);
                 let (link, pose) = (&links[b], &poses[b]);
                 let carrier = &mut before[link.parent];
-                let (omega, d) = (carrier.omega, pose.lever);
-                let spin = pose.axis * rates[b - 1];
-                let mut body = Moved {
-                    omega: omega + spin,
-                    alpha: carrier.alpha + omega.cross(spin),
-                    origin: carrier.origin + carrier.alpha.cross(d) + omega.cross(omega.cross(d)),
-                    force: zero,
-                    moment: zero,
-                };
+                let mut body = carrier.carry(link, &motions[link.motion..], pose.lever, v);
                 body.load(link, &inertias[b], pose);
                 if link.is_leaf {
-                    out[b - 1] = body.rest_on(carrier, pose);
+                    body.share(link, &motions[link.motion..], out);
+                    body.rest_on(carrier, pose);
                 } else {
                     own[0] = body;
                 }
             }
             for b in (1..n).rev() {
-                if !links[b].is_leaf {
+                let link = &links[b];
+                if !link.is_leaf {
                     let (before, own) = moved.split_at_mut(b);
-                    out[b - 1] = own[0].rest_on(&mut before[links[b].parent], &poses[b]);
+                    own[0].share(link, &motions[link.motion..], out);
+                    own[0].rest_on(&mut before[link.parent], &poses[b]);
                 }
             }
             let Moved { force, moment, .. } = moved[0];
-            out_base.copy_from_slice(&[force.x, force.y, force.z, moment.x, moment.y, moment.z]);
+            out[..BASE].copy_from_slice(&[force.x, force.y, force.z, moment.x, moment.y, moment.z]);
         },
     );
 }
 
 impl<T: Lane> Moved<T> {
+    /// A body that it carries, `d` from its origin, without load.
+    #[inline(always)]
+    fn carry(&self, link: &Link, motions: &[Motion<T>], d: Vec3<T>, v: &[T]) -> Self {
+        let (omega, k) = (self.omega, link.velocity);
+        let mut origin = self.origin + self.alpha.cross(d) + omega.cross(omega.cross(d));
+        let zero = Vec3::splat(d.x.token(), [0.0; 3]);
+        let spin = match link.joint {
+            LinkJoint::Turn(_) => motions[0].axis * v[k],
+            LinkJoint::Slide(..) => {
+                origin += omega.cross(motions[0].swing * v[k]) * d.x.like(2.0);
+                zero
+            }
+            LinkJoint::Ball(_) => {
+                motions[0].axis * v[k] + motions[1].axis * v[k + 1] + motions[2].axis * v[k + 2]
+            }
+            LinkJoint::Base => zero,
+        };
+        Self {
+            omega: omega + spin,
+            alpha: self.alpha + omega.cross(spin),
+            origin,
+            force: zero,
+            moment: zero,
+        }
+    }
+
     /// Sets force and moment to those of the body alone.
     #[inline(always)]
     fn load(&mut self, link: &Link, inertia: &Inertia<T>, pose: &Pose<T>) {
@@ -139,12 +159,28 @@ impl<T: Lane> Moved<T> {
         self.moment = moment;
     }
 
-    /// Adds its force and moment to its carrier's. Returns its joint's share.
+    /// Adds the generalized force of the load on the velocities of its joint. A coupled joint adds
+    /// to the joint that it follows.
     #[inline(always)]
-    fn rest_on(&self, carrier: &mut Self, pose: &Pose<T>) -> T {
+    fn share(&self, link: &Link, motions: &[Motion<T>], out: &mut [T]) {
+        let k = link.velocity;
+        match link.joint {
+            LinkJoint::Turn(_) => out[k] += motions[0].axis.dot(self.moment),
+            LinkJoint::Slide(..) => out[k] += motions[0].swing.dot(self.force),
+            LinkJoint::Ball(_) => {
+                for i in 0..3 {
+                    out[k + i] += motions[i].axis.dot(self.moment);
+                }
+            }
+            LinkJoint::Base => {}
+        }
+    }
+
+    /// Adds its force and moment to its carrier's.
+    #[inline(always)]
+    fn rest_on(&self, carrier: &mut Self, pose: &Pose<T>) {
         carrier.force += self.force;
         carrier.moment += self.moment + pose.lever.cross(self.force);
-        pose.axis.dot(self.moment)
     }
 }
 

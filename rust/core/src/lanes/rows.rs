@@ -3,11 +3,12 @@
 //! As in [`crate::contact::delassus`]: with `M̂ = Lᵀ D L` and `Z = D^(-1/2) L^(-T) H` the operator
 //! is `W = Zᵀ Z`. A column of Z is nonzero along the path of its wheel, and a block of W is a
 //! product over the part of the path that two wheels share. Rows belong to slots
-//! ([`super::contacts`]). A slot that is active in some lanes only never changes what the others
+//! ([`super::contacts`]). A stop has one row, ±1 at its joint's velocity; the tangential diagonal of
+//! W is that of the normal, as in [`crate::contact::limit`]. A slot that is active in some lanes only never changes what the others
 //! accumulate.
 
 use super::contacts::Contacts;
-use super::machine::{Machine, velocity};
+use super::machine::{Machine, Mover};
 use super::mass_matrix::Factor;
 use super::poses::Poses;
 use super::problem::{ContactProblem, Triple, block};
@@ -27,9 +28,12 @@ pub enum Answer {
 #[derive(Clone, Debug)]
 pub struct Rows<T: Lane> {
     token: T::Token,
-    /// Bodies whose joints move a wheel, from the trunk outwards.
-    movers: Vec<Vec<usize>>,
-    /// Velocities that two wheels share: `common[a * n_wheels + b]`.
+    /// Bodies of the parts, wheels and then joints with stops, and how many are wheels.
+    bodies: Vec<usize>,
+    n_wheels: usize,
+    /// Velocities of the joints that move each part, from the trunk outwards.
+    movers: Vec<Vec<Mover>>,
+    /// Velocities that two parts share: `common[a * n_parts + b]`.
     common: Vec<usize>,
     /// Length of the longest path.
     stride: usize,
@@ -45,30 +49,27 @@ impl<T: Lane> Rows<T> {
     /// Room for a machine with `n_slots` slots.
     #[must_use]
     pub fn new(token: T::Token, machine: &Machine, n_slots: usize) -> Self {
-        let paths: Vec<&[usize]> = (machine.wheels.iter())
-            .map(|wheel| machine.path(wheel.body))
-            .collect();
+        let wheels = machine.wheels.iter().map(|wheel| wheel.body);
+        let stops = machine
+            .stops
+            .iter()
+            .map(|stop| machine.joints[stop.joint].body);
+        let bodies: Vec<usize> = wheels.chain(stops).collect();
+        let paths: Vec<&[usize]> = bodies.iter().map(|&body| machine.path(body)).collect();
         let mut common = Vec::with_capacity(paths.len() * paths.len());
         for a in &paths {
             for b in &paths {
                 common.push(a.iter().zip(*b).take_while(|(i, j)| i == j).count());
             }
         }
-        let movers = (machine.wheels.iter())
-            .map(|wheel| {
-                let own = (wheel.body > 0).then_some(wheel.body);
-                machine
-                    .ancestors(wheel.body)
-                    .iter()
-                    .copied()
-                    .chain(own)
-                    .collect()
-            })
-            .collect();
+        let movers = bodies.iter().map(|&body| machine.movers(body).to_vec());
+        let movers = movers.collect();
         let stride = paths.iter().map(|path| path.len()).max().unwrap_or(0);
         let zero = T::splat(token, 0.0);
         Self {
             token,
+            n_wheels: machine.wheels.len(),
+            bodies,
             movers,
             common,
             stride,
@@ -115,11 +116,22 @@ impl<T: Lane> Rows<T> {
         v: &[T],
         slot: usize,
     ) {
-        let wheel = Contacts::<T>::wheel(slot);
-        let movers = &self.movers[wheel][..];
+        let part = Contacts::<T>::part(slot);
+        let sign = self.sign(slot);
+        let movers = &self.movers[part][..];
         let rows = &mut self.Z[slot * self.stride..][..BASE + movers.len()];
-        let (base, joints) = rows.split_at_mut(BASE);
         let own = contacts.slot(slot);
+        if let Some(sign) = sign {
+            let zero = own.gap.like(0.0);
+            rows.fill([zero; 3]);
+            let (sign, own) = (zero.like(sign), rows.len() - 1);
+            rows[own][0] = sign;
+            let rate = movers.last().map_or(zero, |mover| v[mover.velocity]);
+            self.u_before[slot] = [sign * rate, zero, zero];
+            factor.half_solve_path(machine, self.bodies[part], rows);
+            return;
+        }
+        let (base, joints) = rows.split_at_mut(BASE);
         let (x, n, t, b) = (own.point, own.n, own.t, own.b);
         let (xn, xt, xb) = (x.cross(n), x.cross(t), x.cross(b));
         base[0] = [n.x, t.x, b.x];
@@ -132,26 +144,31 @@ impl<T: Lane> Rows<T> {
         for k in 1..BASE {
             add_scaled(&mut u, &base[k], v[k]);
         }
-        for (row, &body) in joints.iter_mut().zip(movers) {
-            let pose = &end.bodies[body];
-            let moved = pose.axis.cross(x) + pose.swing;
+        for (row, mover) in joints.iter_mut().zip(movers) {
+            let moved = end.motions[mover.motion].velocity_at(x);
             *row = [moved.dot(n), moved.dot(t), moved.dot(b)];
-            add_scaled(&mut u, row, v[velocity(body)]);
+            add_scaled(&mut u, row, v[mover.velocity]);
         }
         self.u_before[slot] = u;
-        factor.half_solve_path(machine, machine.wheels[wheel].body, rows);
+        factor.half_solve_path(machine, self.bodies[part], rows);
+    }
+
+    /// Gap rate per unit of the joint's velocity, if the slot is a stop's.
+    #[inline(always)]
+    fn sign(&self, slot: usize) -> Option<f64> {
+        (Contacts::<T>::part(slot) >= self.n_wheels).then(|| Contacts::<T>::side(slot).sign())
     }
 
     /// W from Z.
     #[inline(always)]
     fn multiply(&mut self, used: &[usize]) {
-        let n_wheels = self.movers.len();
+        let n_parts = self.movers.len();
         let mut at = 0;
         for (i, &row) in used.iter().enumerate() {
-            let a = Contacts::<T>::wheel(row);
+            let a = Contacts::<T>::part(row);
             for &column in &used[..i] {
-                let b = Contacts::<T>::wheel(column);
-                let shared = self.common[a * n_wheels + b];
+                let b = Contacts::<T>::part(column);
+                let shared = self.common[a * n_parts + b];
                 let x = &self.Z[row * self.stride..][..shared];
                 let y = &self.Z[column * self.stride..][..shared];
                 self.W[at] = product(x, y);
@@ -159,6 +176,10 @@ impl<T: Lane> Rows<T> {
             }
             let x = &self.Z[row * self.stride..][..BASE + self.movers[a].len()];
             self.W[at] = square(x);
+            if self.sign(row).is_some() {
+                let normal = self.W[at][0];
+                (self.W[at][4], self.W[at][8]) = (normal, normal);
+            }
             at += 1;
         }
     }
@@ -181,15 +202,15 @@ impl<T: Lane> Rows<T> {
     #[inline(always)]
     pub fn local(&self, contacts: &Contacts<T>, y: &[T], q: &mut [Triple<T>]) {
         for &slot in contacts.used() {
-            let movers = &self.movers[Contacts::<T>::wheel(slot)][..];
+            let movers = &self.movers[Contacts::<T>::part(slot)][..];
             let rows = &self.Z[slot * self.stride..][..BASE + movers.len()];
             let (base, joints) = rows.split_at(BASE);
             let mut sum = scaled(&base[0], y[0]);
             for k in 1..BASE {
                 add_scaled(&mut sum, &base[k], y[k]);
             }
-            for (row, &body) in joints.iter().zip(movers) {
-                add_scaled(&mut sum, row, y[velocity(body)]);
+            for (row, mover) in joints.iter().zip(movers) {
+                add_scaled(&mut sum, row, y[mover.velocity]);
             }
             let [n, t, b] = self.u_before[slot];
             q[slot] = [sum[0] + n, sum[1] + t, sum[2] + b];
@@ -210,7 +231,7 @@ impl<T: Lane> Rows<T> {
         y: &mut [T],
     ) {
         for &slot in contacts.used() {
-            let movers = &self.movers[Contacts::<T>::wheel(slot)][..];
+            let movers = &self.movers[Contacts::<T>::part(slot)][..];
             let rows = &self.Z[slot * self.stride..][..BASE + movers.len()];
             let (base, joints) = rows.split_at(BASE);
             let here = contacts.slot(slot).active & lanes;
@@ -218,8 +239,8 @@ impl<T: Lane> Rows<T> {
             for (y, row) in y[..BASE].iter_mut().zip(base) {
                 add(here, y, along(row, p));
             }
-            for (row, &body) in joints.iter().zip(movers) {
-                add(here, &mut y[velocity(body)], along(row, p));
+            for (row, mover) in joints.iter().zip(movers) {
+                add(here, &mut y[mover.velocity], along(row, p));
             }
         }
     }
@@ -246,13 +267,20 @@ impl<T: Lane> Rows<T> {
             let own = contacts.slot(slot);
             let here = own.active & lanes;
             let [p_n, p_t, p_b] = p[slot];
+            let movers = &self.movers[Contacts::<T>::part(slot)];
+            if let Some(sign) = self.sign(slot) {
+                if let Some(mover) = movers.last() {
+                    add(here, &mut out[mover.velocity], zero.like(sign) * p_n);
+                }
+                continue;
+            }
             let force = own.n * p_n + own.t * p_t + own.b * p_b;
             let moment = own.point.cross(force);
             add_vector(here, &mut total, force);
             add_vector(here, &mut couple, moment);
-            for &body in &self.movers[Contacts::<T>::wheel(slot)] {
-                let power = end.bodies[body].power(force, moment);
-                add(here, &mut out[velocity(body)], power);
+            for mover in movers {
+                let power = end.motions[mover.motion].power(force, moment);
+                add(here, &mut out[mover.velocity], power);
             }
         }
         out[..BASE].copy_from_slice(&[total.x, total.y, total.z, couple.x, couple.y, couple.z]);
@@ -286,11 +314,15 @@ impl<T: Lane> Rows<T> {
                 for (i, &row) in contacts.used().iter().enumerate() {
                     let of_row = contacts.places(row);
                     let values = store_all(&q[row]);
+                    let is_stop = self.sign(row).is_some();
                     each::<T>(
                         contacts.slot(row).active,
                         #[inline(always)]
                         |lane| {
                             let place = usize::from(of_row[lane]);
+                            if is_stop {
+                                problems[lane].mu[place] = 0.0;
+                            }
                             let q = &mut problems[lane].q[3 * place..][..3];
                             for i in 0..3 {
                                 q[i] = values[i][lane];

@@ -10,7 +10,7 @@ use crate::lanes::admission::admit;
 use crate::lanes::machine::Machine;
 use crate::lanes::passenger::Passenger;
 use crate::lanes::queue;
-use crate::lanes::step::Block;
+use crate::lanes::step::{Block, Next};
 use crate::scalar::{Lane, Single};
 
 impl RoverScene {
@@ -50,9 +50,13 @@ impl RoverScene {
         let problems = &mut quick.problem[..];
         block.prepare(problems, probe);
         let solver = &step.options.solver;
-        queue::solve_all::<f64>(token, problems, solver);
-        probe.end(Phase::Solve);
-        let is_deep = block.conclude(problems, probe);
+        let mut next = Next::Retake;
+        while next == Next::Retake {
+            queue::solve_all::<f64>(token, problems, solver);
+            probe.end(Phase::Solve);
+            next = block.conclude(problems, probe);
+        }
+        let is_deep = next == Next::Project;
         let gap_problems = &mut quick.gap_problem[..];
         if is_deep {
             gap_problems.clone_from_slice(problems);
