@@ -73,7 +73,6 @@ pub fn bias<T: Lane>(
             let motions = &poses.motions[..machine.n_motions()];
             let (poses, moved) = (&poses.bodies[..n], &mut scratch.bodies[..n]);
             let zero = Vec3::splat(scratch.token, [0.0; 3]);
-            out.fill(zero.x);
             moved[0] = Moved {
                 omega: Vec3::new(v[3], v[4], v[5]),
                 alpha: zero,
@@ -86,10 +85,15 @@ pub fn bias<T: Lane>(
                 let (before, own) = moved.split_at_mut(b);
                 let (link, pose) = (&links[b], &poses[b]);
                 let carrier = &mut before[link.parent];
-                let mut body = carrier.carry(link, &motions[link.motion..], pose.lever, v);
+                let mut body = if link.joint == LinkJoint::Turn {
+                    let spin = motions[link.motion].axis * v[link.velocity];
+                    carrier.carry(pose.lever, spin)
+                } else {
+                    carrier.carry_otherwise(link, motions, pose.lever, v)
+                };
                 body.load(link, &inertias[b], pose);
-                if link.is_leaf {
-                    body.share(link, &motions[link.motion..], out);
+                if link.is_plain_leaf {
+                    body.share(link, motions, |k, x| out[k] = x);
                     body.rest_on(carrier, pose);
                 } else {
                     own[0] = body;
@@ -97,11 +101,18 @@ pub fn bias<T: Lane>(
             }
             for b in (1..n).rev() {
                 let link = &links[b];
-                if !link.is_leaf {
-                    let (before, own) = moved.split_at_mut(b);
-                    own[0].share(link, &motions[link.motion..], out);
-                    own[0].rest_on(&mut before[link.parent], &poses[b]);
+                if link.is_plain_leaf {
+                    continue;
                 }
+                let (before, own) = moved.split_at_mut(b);
+                own[0].rest_on(&mut before[link.parent], &poses[b]);
+                if !link.is_coupled() {
+                    own[0].share(link, motions, |k, x| out[k] = x);
+                }
+            }
+            // A coupled joint adds to the joint that it follows.
+            for &b in &machine.coupled {
+                moved[b].share(&links[b], motions, |k, x| out[k] += x);
             }
             let Moved { force, moment, .. } = moved[0];
             out[..BASE].copy_from_slice(&[force.x, force.y, force.z, moment.x, moment.y, moment.z]);
@@ -110,30 +121,34 @@ pub fn bias<T: Lane>(
 }
 
 impl<T: Lane> Moved<T> {
-    /// A body that it carries, `d` from its origin, without load.
+    /// A body that it carries, `d` from its origin and turning relative to it, without load.
     #[inline(always)]
-    fn carry(&self, link: &Link, motions: &[Motion<T>], d: Vec3<T>, v: &[T]) -> Self {
-        let (omega, k) = (self.omega, link.velocity);
-        let mut origin = self.origin + self.alpha.cross(d) + omega.cross(omega.cross(d));
+    fn carry(&self, d: Vec3<T>, spin: Vec3<T>) -> Self {
+        let omega = self.omega;
         let zero = Vec3::splat(d.x.token(), [0.0; 3]);
-        let spin = match link.joint {
-            LinkJoint::Turn(_) => motions[0].axis * v[k],
-            LinkJoint::Slide(..) => {
-                origin += omega.cross(motions[0].swing * v[k]) * d.x.like(2.0);
-                zero
-            }
-            LinkJoint::Ball(_) => {
-                motions[0].axis * v[k] + motions[1].axis * v[k + 1] + motions[2].axis * v[k + 2]
-            }
-            LinkJoint::Base => zero,
-        };
         Self {
             omega: omega + spin,
             alpha: self.alpha + omega.cross(spin),
-            origin,
+            origin: self.origin + self.alpha.cross(d) + omega.cross(omega.cross(d)),
             force: zero,
             moment: zero,
         }
+    }
+
+    /// The same for a joint that is not a plain rotation.
+    #[inline(always)]
+    fn carry_otherwise(&self, link: &Link, motions: &[Motion<T>], d: Vec3<T>, v: &[T]) -> Self {
+        let (k, motions) = (link.velocity, &motions[link.motion..]);
+        let mut spin = motions[0].axis * v[k];
+        if let LinkJoint::Ball(_) = link.joint {
+            spin += motions[1].axis * v[k + 1];
+            spin += motions[2].axis * v[k + 2];
+        }
+        let mut body = self.carry(d, spin);
+        if let LinkJoint::Slide(_) = link.joint {
+            body.origin += self.omega.cross(motions[0].swing * v[k]) * d.x.like(2.0);
+        }
+        body
     }
 
     /// Sets force and moment to those of the body alone.
@@ -159,17 +174,20 @@ impl<T: Lane> Moved<T> {
         self.moment = moment;
     }
 
-    /// Adds the generalized force of the load on the velocities of its joint. A coupled joint adds
-    /// to the joint that it follows.
+    /// Calls `set(k, x)` with the generalized force x of the load on each velocity of its joint.
     #[inline(always)]
-    fn share(&self, link: &Link, motions: &[Motion<T>], out: &mut [T]) {
-        let k = link.velocity;
+    fn share(&self, link: &Link, motions: &[Motion<T>], mut set: impl FnMut(usize, T)) {
+        let (k, m) = (link.velocity, link.motion);
+        if link.joint == LinkJoint::Turn {
+            set(k, motions[m].axis.dot(self.moment));
+            return;
+        }
         match link.joint {
-            LinkJoint::Turn(_) => out[k] += motions[0].axis.dot(self.moment),
-            LinkJoint::Slide(..) => out[k] += motions[0].swing.dot(self.force),
+            LinkJoint::Turn | LinkJoint::CoupledTurn => set(k, motions[m].axis.dot(self.moment)),
+            LinkJoint::Slide(_) => set(k, motions[m].swing.dot(self.force)),
             LinkJoint::Ball(_) => {
                 for i in 0..3 {
-                    out[k + i] += motions[i].axis.dot(self.moment);
+                    set(k + i, motions[m + i].axis.dot(self.moment));
                 }
             }
             LinkJoint::Base => {}

@@ -77,6 +77,8 @@ pub struct Contacts<T: Lane> {
     twists: Vec<Twist<T>>,
     pub(super) slots: Vec<Slot<T>>,
     pub(super) used: Vec<usize>,
+    /// How many of them are the wheels'.
+    n_of_wheels: usize,
     lists: [Listed; MAX_LANES],
     /// Whether every slot in use is active in all lanes.
     is_full: bool,
@@ -134,6 +136,7 @@ impl<T: Lane> Contacts<T> {
             stops: machine.stops.clone(),
             slots: vec![slot; n_slots],
             used: Vec::with_capacity(n_slots),
+            n_of_wheels: 0,
             lists: [Listed::NONE; MAX_LANES],
             is_full: false,
             places: vec![[0; MAX_LANES]; n_slots],
@@ -151,6 +154,18 @@ impl<T: Lane> Contacts<T> {
     #[must_use]
     pub fn used(&self) -> &[usize] {
         &self.used
+    }
+
+    /// Those of the wheels.
+    #[inline(always)]
+    pub(super) fn used_by_wheels(&self) -> &[usize] {
+        &self.used[..self.n_of_wheels]
+    }
+
+    /// Those of the stops, which follow.
+    #[inline(always)]
+    pub(super) fn used_by_stops(&self) -> &[usize] {
+        &self.used[self.n_of_wheels..]
     }
 
     /// A slot.
@@ -334,6 +349,7 @@ impl<T: Lane> Contacts<T> {
                 }
             }
         }
+        self.n_of_wheels = self.used.len();
         declined | self.list_contacts(ground)
     }
 

@@ -184,9 +184,8 @@ impl<T: Lane> Drives<T> {
         v: &[T],
         inertia: impl Fn(usize) -> T,
     ) {
-        for j in 0..machine.n_joints() {
-            let k = machine.joints[j].velocity;
-            let joint = &mut self.joints[j];
+        for ((j, own), joint) in machine.joints.iter().enumerate().zip(&mut self.joints) {
+            let k = own.velocity;
             (joint.at_rest, joint.active) = (joint.command, theta.like(0.0));
             joint.theta = theta;
             if self.is_implicit[j] {
@@ -247,9 +246,8 @@ impl<T: Lane> Drives<T> {
     /// `out += h τ`, with the torques extrapolated from the start of the step.
     #[inline(always)]
     pub fn add_impulse(&self, machine: &Machine, h: T, places: &[T], v: &[T], out: &mut [T]) {
-        for j in 0..machine.n_joints() {
-            let k = machine.joints[j].velocity;
-            let joint = &self.joints[j];
+        for ((j, own), joint) in machine.joints.iter().enumerate().zip(&self.joints) {
+            let k = own.velocity;
             let mut torque = joint.torque + joint.at_rest;
             if self.is_implicit[j] {
                 torque -= joint.active * v[k];
@@ -272,9 +270,8 @@ impl<T: Lane> Drives<T> {
     ) -> T {
         let zero = h.like(0.0);
         let mut total = zero;
-        for j in 0..machine.n_joints() {
-            let k = machine.joints[j].velocity;
-            let joint = &self.joints[j];
+        for ((j, own), joint) in machine.joints.iter().enumerate().zip(&self.joints) {
+            let k = own.velocity;
             let mean = theta * v_end[k] + (h.like(1.0) - theta) * v[k];
             let turned = h * mean;
             let mut drive = joint.at_rest;
@@ -304,9 +301,8 @@ impl<T: Lane> Drives<T> {
         [v, v_end, displacement]: [&[T]; 3],
     ) -> T {
         let mut total = h.like(0.0);
-        for j in 0..machine.n_joints() {
-            let k = machine.joints[j].velocity;
-            let joint = &self.joints[j];
+        for ((j, own), joint) in machine.joints.iter().enumerate().zip(&self.joints) {
+            let k = own.velocity;
             let (mut drive, mut other) = (joint.at_rest, joint.torque);
             if self.is_implicit[j] {
                 let mean = theta * v_end[k] + (h.like(1.0) - theta) * v[k];

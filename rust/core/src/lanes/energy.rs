@@ -3,7 +3,7 @@
 use super::inertias::{Inertia, Inertias};
 use super::machine::{Link, LinkJoint, Machine};
 use super::place::Place;
-use super::poses::{NextTurn, Turns, product, rotation, times_columns};
+use super::poses::{NextTurn, Turns, product, rotation};
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Energy and linear momentum.
@@ -111,7 +111,24 @@ pub fn energy<T: Lane>(
                 let (before, own) = bodies.split_at_mut(b);
                 let link = &links[b];
                 let carrier = &before[link.parent];
-                let body = carrier.carry(link, place, v, gravity, &mut turns);
+                let lever = link.lever(&carrier.R);
+                let frame = link.frame(&carrier.R);
+                let body = if link.joint == LinkJoint::Turn {
+                    let axis = link.axis.turned(&frame);
+                    let R = if link.is_spinner {
+                        frame
+                    } else {
+                        link.axis.rotate(&frame, axis, turns.next())
+                    };
+                    Moving {
+                        R,
+                        velocity: carrier.velocity + carrier.omega.cross(lever),
+                        omega: carrier.omega + axis * v[link.velocity],
+                        fall: carrier.fall + gravity.dot(lever),
+                    }
+                } else {
+                    carrier.carry(link, (&frame, lever), (place, v, gravity), &mut turns)
+                };
                 sums.add(link, &own_inertias[b], &body, gravity);
                 if !link.is_leaf {
                     own[0] = body;
@@ -131,44 +148,38 @@ pub fn energy<T: Lane>(
 }
 
 impl<T: Lane> Moving<T> {
-    /// A body that it carries.
+    /// A body that it carries by a joint that is not a plain rotation. `frame` and `lever`: the
+    /// joint's frame, and the way to it.
     #[inline(always)]
     fn carry(
         &self,
         link: &Link,
-        place: &Place<T>,
-        v: &[T],
-        gravity: Vec3<T>,
+        (frame, mut lever): (&Mat3<T>, Vec3<T>),
+        (place, v, gravity): (&Place<T>, &[T], Vec3<T>),
         turns: &mut NextTurn<'_, T>,
     ) -> Self {
-        let mut lever = link.lever(&self.R);
-        let frame = match &link.rotation {
-            None => self.R,
-            Some(fixed) => times_columns(&self.R, fixed),
-        };
         let k = link.velocity;
-        let mut own = Self { R: frame, ..*self };
-        match &link.joint {
-            LinkJoint::Turn(axis) => {
-                let axis_in_world = axis.turned(&frame);
-                own.omega = self.omega + axis_in_world * link.rate(v[k]);
+        let mut own = Self { R: *frame, ..*self };
+        let axis = link.axis.turned(frame);
+        match link.joint {
+            LinkJoint::Turn | LinkJoint::CoupledTurn => {
+                own.omega += axis * link.rate(v[k]);
                 if !link.is_spinner {
-                    own.R = axis.rotate(&frame, axis_in_world, turns.next());
+                    own.R = link.axis.rotate(frame, axis, turns.next());
                 }
             }
-            LinkJoint::Slide(axis, coordinate) => {
-                let along = axis.turned(&frame);
-                lever += along * link.coordinate(place.joints[*coordinate]);
-                own.velocity += along * link.rate(v[k]);
+            LinkJoint::Slide(coordinate) => {
+                lever += axis * link.coordinate(place.joints[coordinate]);
+                own.velocity += axis * link.rate(v[k]);
             }
             LinkJoint::Ball(ball) => {
-                own.R = product(&frame, &rotation(&place.balls[*ball]));
-                own.omega = self.omega + frame.times(Vec3::new(v[k], v[k + 1], v[k + 2]));
+                own.R = product(frame, &rotation(&place.balls[ball]));
+                own.omega += frame.times(Vec3::new(v[k], v[k + 1], v[k + 2]));
             }
             LinkJoint::Base => {}
         }
         own.velocity += self.omega.cross(lever);
-        own.fall = self.fall + gravity.dot(lever);
+        own.fall += gravity.dot(lever);
         own
     }
 }

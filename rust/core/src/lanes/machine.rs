@@ -128,6 +128,8 @@ pub struct Link {
     pub rotation: Option<[[f64; 3]; 3]>,
     /// Its joint.
     pub joint: LinkJoint,
+    /// Axis of a revolute or prismatic joint, the same in the joint's frame and the body's.
+    pub axis: Axis,
     /// How the joint follows another one.
     pub coupling: Option<Coupled>,
     /// Its first velocity, or the one that it follows, and its first motion.
@@ -138,14 +140,16 @@ pub struct Link {
     pub is_spinner: bool,
     /// Whether it carries no other body.
     pub is_leaf: bool,
+    /// Whether, besides, its joint follows no other one.
+    pub(super) is_plain_leaf: bool,
     /// Whether its carrier carries no body with a higher index.
     pub is_last: bool,
     /// Whether its mass centre is its frame's origin.
     pub is_centred: bool,
     /// What is known of its principal axes.
     pub symmetry: Symmetry,
-    /// Rows of its own velocities.
-    pub(super) own_rows: Range<usize>,
+    /// Number of its own velocities; 0 for the trunk and if the joint follows another one.
+    pub(super) n_rows: usize,
     /// Where the last row of its path is in [`Machine::columns`].
     row: Range<usize>,
     path: Range<usize>,
@@ -157,10 +161,12 @@ pub struct Link {
 pub enum LinkJoint {
     /// The free base.
     Base,
-    /// A rotation about an axis, the same in the joint's frame and the body's.
-    Turn(Axis),
-    /// A displacement along such an axis, by the coordinate with this index.
-    Slide(Axis, usize),
+    /// A rotation about its axis by a coordinate of its own.
+    Turn,
+    /// A rotation about its axis that follows another joint.
+    CoupledTurn,
+    /// A displacement along its axis, by the coordinate with this index.
+    Slide(usize),
     /// Any rotation about a point: the index of its quaternion.
     Ball(usize),
 }
@@ -333,15 +339,16 @@ impl Machine {
         let (bodies, body) = (model.bodies(), &model.bodies()[b]);
         let (_, rest) = model.split_path(b);
         let last_row = rest.last().map(|&k| self.rows[k - BASE].clone());
-        let own_rows = match &body.joint {
-            Joint::Free(_) => 0..0,
-            joint => body.velocity - BASE..body.velocity - BASE + joint.nv(),
+        let n_rows = match &body.joint {
+            Joint::Free(_) => 0,
+            joint => joint.nv(),
         };
         let (path, movers) = (self.paths.len(), self.movers.len());
         self.paths.extend(model.path(b));
         let pairs = rest.iter().zip(model.motions(b));
         (self.movers).extend(pairs.map(|(&velocity, &motion)| Mover { velocity, motion }));
         let mut others = bodies[b + 1..].iter();
+        let is_leaf = !others.clone().any(|other| other.parent == Some(b));
         let joint = self.joint_of(body);
         self.links.push(Link {
             parent: body.parent.unwrap_or(0),
@@ -349,15 +356,17 @@ impl Machine {
             along: (0..3).find(|&k| (0..3).all(|i| i == k || body.position[i] == 0.0)),
             rotation: body.rotation.as_ref().map(columns),
             joint,
+            axis: body.joint.axis().map_or(Axis::X, Axis::of),
             coupling: body.joint.coordinate().and_then(coupled),
             velocity: body.velocity,
             motion: body.motion,
             is_spinner: body.is_spinner,
-            is_leaf: !others.clone().any(|other| other.parent == Some(b)),
+            is_leaf,
+            is_plain_leaf: is_leaf && !body.is_coupled,
             is_last: !others.any(|other| other.parent == body.parent),
             is_centred: body.is_centred(),
             symmetry: Symmetry::of(body),
-            own_rows,
+            n_rows,
             row: last_row.unwrap_or_default(),
             path: path..self.paths.len(),
             movers: movers..self.movers.len(),
@@ -368,7 +377,7 @@ impl Machine {
     fn joint_of(&mut self, body: &Body) -> LinkJoint {
         match &body.joint {
             Joint::Free(_) | Joint::Fixed => LinkJoint::Base,
-            Joint::Revolute(Revolute { axis, coordinate }) => {
+            Joint::Revolute(Revolute { coordinate, .. }) => {
                 let coupling = coupled(coordinate);
                 let rate = coupling.map_or(1.0, |coupling| coupling.ratio.ratio);
                 if coupling.is_some() || !body.is_spinner {
@@ -380,11 +389,12 @@ impl Machine {
                     }
                     self.angles.push(coordinate.joint);
                 }
-                LinkJoint::Turn(Axis::of(axis))
+                match coupling {
+                    None => LinkJoint::Turn,
+                    Some(_) => LinkJoint::CoupledTurn,
+                }
             }
-            Joint::Prismatic(Prismatic { axis, coordinate }) => {
-                LinkJoint::Slide(Axis::of(axis), coordinate.joint)
-            }
+            Joint::Prismatic(Prismatic { coordinate, .. }) => LinkJoint::Slide(coordinate.joint),
             Joint::Spherical(Spherical { rotation }) => {
                 let k = body.velocity;
                 self.balls.push(k);
@@ -453,6 +463,12 @@ impl Machine {
 }
 
 impl Link {
+    /// Whether its joint follows another one.
+    #[inline(always)]
+    pub(super) fn is_coupled(&self) -> bool {
+        self.n_rows == 0
+    }
+
     /// `R p` for its joint's origin p.
     #[inline(always)]
     pub(super) fn lever<T: Lane>(&self, R: &Mat3<T>) -> Vec3<T> {

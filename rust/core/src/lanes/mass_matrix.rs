@@ -187,27 +187,34 @@ impl<T: Lane> MassMatrix<T> {
         let (bodies, inertias) = (&poses.bodies[..n], &inertias.bodies[..n]);
         let carried = &mut self.composites[..n];
         let motions = &poses.motions[..machine.n_motions()];
-        let n_columns = machine.columns.len();
-        let (columns, entries) = (&machine.column_motions[..], &mut self.joints[..n_columns]);
-        let mut n_coupled = machine.coupled.len();
+        let n_rows = machine.rows.len();
+        let (rows, base) = (&machine.rows[..n_rows], &mut self.base[..n_rows]);
+        let columns = &machine.column_motions[..];
+        let entries = &mut self.joints[..columns.len()];
+        let (mut row, mut n_coupled) = (n_rows, machine.coupled.len());
         for b in (1..n).rev() {
             let (link, pose) = (&links[b], &bodies[b]);
             let mut composite = Composite::of(link, &inertias[b], pose);
             if !link.is_leaf {
                 composite = composite.plus(&carried[b]);
             }
-            for (i, j) in link.own_rows.clone().enumerate() {
-                let own = composite.momentum(&motions[link.motion + i]);
-                self.base[j] = own.entries();
-                let row = &machine.rows[j];
-                let (columns, row) = (&columns[row.clone()], &mut entries[row.clone()]);
-                for p in 0..columns.len() {
-                    row[p] = own.along(&motions[columns[p]]);
-                }
-            }
-            if link.coupling.is_some() {
+            if link.n_rows == 1 {
+                row -= 1;
+                let own = composite.momentum(&motions[link.motion]);
+                base[row] = own.entries();
+                let (start, end) = (rows[row].start, rows[row].end);
+                own.along_all(motions, &columns[start..end], &mut entries[start..end]);
+            } else if link.is_coupled() {
                 n_coupled -= 1;
                 self.coupled[n_coupled] = composite.momentum(&motions[link.motion]);
+            } else {
+                for m in (link.motion..link.motion + link.n_rows).rev() {
+                    row -= 1;
+                    let own = composite.momentum(&motions[m]);
+                    base[row] = own.entries();
+                    let own_row = rows[row].clone();
+                    own.along_all(motions, &columns[own_row.clone()], &mut entries[own_row]);
+                }
             }
             carried[link.parent] = if link.is_last {
                 composite
@@ -327,6 +334,14 @@ impl<T: Lane> Momentum<T> {
     fn entries(&self) -> [T; BASE] {
         let (f, l) = (self.linear, self.angular);
         [f.x, f.y, f.z, l.x, l.y, l.z]
+    }
+
+    /// Its products with motions, by their indices.
+    #[inline(always)]
+    fn along_all(&self, motions: &[Motion<T>], indices: &[usize], out: &mut [T]) {
+        for p in 0..indices.len() {
+            out[p] = self.along(&motions[indices[p]]);
+        }
     }
 
     /// Its product with a motion.

@@ -55,15 +55,14 @@ pub(super) struct Solid {
     pub carrier: usize,
 }
 
-/// A body whose twist is needed.
+/// A body whose twist is needed, or what lies between two velocities of a spherical joint.
 #[derive(Clone, Copy, Debug)]
 struct Carrier {
     body: usize,
-    /// Twist of the body that carries it.
+    /// Twist of what carries it.
     parent: usize,
-    /// Velocities of its joint, and their motions.
-    first: Mover,
-    n_velocities: usize,
+    /// The velocity that moves it beside.
+    mover: Mover,
 }
 
 /// Velocity of a body: angular, and of its material point at the trunk's origin.
@@ -76,7 +75,15 @@ pub(super) struct Twist<T> {
 impl Parts {
     /// The parts of a machine.
     pub(super) fn of(machine: &Machine) -> Self {
-        let mut carriers = vec![Carrier::of(&machine.links[0], 0, 0)];
+        let trunk = Mover {
+            velocity: 0,
+            motion: 0,
+        };
+        let mut carriers = vec![Carrier {
+            body: 0,
+            parent: 0,
+            mover: trunk, // not read
+        }];
         let some = |x: [f64; 3]| x.iter().any(|x| x.abs() > 0.0).then_some(x);
         let wheels = (machine.wheels.iter())
             .map(|wheel| {
@@ -131,34 +138,13 @@ impl Parts {
             angular: Vec3::new(v[3], v[4], v[5]),
         };
         for i in 1..n {
-            let carrier = &self.carriers[i];
-            let mut twist = twists[carrier.parent];
-            for k in 0..carrier.n_velocities {
-                let Mover { velocity, motion } = carrier.first;
-                let (motion, rate) = (&poses.motions[motion + k], v[velocity + k]);
-                twist.angular += motion.axis * rate;
-                twist.linear += motion.swing * rate;
-            }
-            twists[i] = twist;
-        }
-    }
-}
-
-impl Carrier {
-    /// The body of a link, carried by another one of the list.
-    fn of(link: &Link, body: usize, parent: usize) -> Self {
-        Self {
-            body,
-            parent,
-            first: Mover {
-                velocity: link.velocity,
-                motion: link.motion,
-            },
-            n_velocities: match link.joint {
-                LinkJoint::Base => 0,
-                LinkJoint::Turn(_) | LinkJoint::Slide(..) => 1,
-                LinkJoint::Ball(_) => 3,
-            },
+            let Carrier { parent, mover, .. } = self.carriers[i];
+            let (motion, rate) = (&poses.motions[mover.motion], v[mover.velocity]);
+            let before = twists[parent];
+            twists[i] = Twist {
+                angular: before.angular + motion.axis * rate,
+                linear: before.linear + motion.swing * rate,
+            };
         }
     }
 }
@@ -166,15 +152,13 @@ impl Carrier {
 impl Link {
     /// Whether its joint turns it about this axle.
     fn turns_about(&self, axle: Axle) -> bool {
-        let LinkJoint::Turn(axis) = self.joint else {
-            return false;
+        let k = match self.axis {
+            Axis::X => 0,
+            Axis::Y => 1,
+            Axis::Z => 2,
+            Axis::General(_) => return false,
         };
-        match (axis, axle) {
-            (Axis::X, Axle::Frame(k, _)) => k == 0,
-            (Axis::Y, Axle::Frame(k, _)) => k == 1,
-            (Axis::Z, Axle::Frame(k, _)) => k == 2,
-            _ => false,
-        }
+        self.joint == LinkJoint::Turn && matches!(axle, Axle::Frame(i, _) if i == k)
     }
 }
 
@@ -198,7 +182,11 @@ impl Wheel {
     pub(super) fn axle<T: Lane>(&self, pose: &Pose<T>) -> Vec3<T> {
         match self.axle {
             Axle::Frame(k, is_reversed) => {
-                let axis = pose.R.columns()[k];
+                let axis = match k {
+                    0 => pose.R.x,
+                    1 => pose.R.y,
+                    _ => pose.R.z,
+                };
                 if is_reversed { -axis } else { axis }
             }
             Axle::Fixed(s) => pose.R.times_shared(s),
@@ -256,11 +244,26 @@ fn axle_of(axle: [f64; 3]) -> Axle {
 
 /// Index of a body among the carriers; adds it with all that carry it.
 fn carrier_of(machine: &Machine, body: usize, carriers: &mut Vec<Carrier>) -> usize {
-    if let Some(i) = carriers.iter().position(|carrier| carrier.body == body) {
+    if let Some(i) = carriers.iter().rposition(|carrier| carrier.body == body) {
         return i;
     }
     let link = &machine.links[body];
-    let parent = carrier_of(machine, link.parent, carriers);
-    carriers.push(Carrier::of(link, body, parent));
-    carriers.len() - 1
+    let mut parent = carrier_of(machine, link.parent, carriers);
+    let n_velocities = match link.joint {
+        LinkJoint::Ball(_) => 3,
+        _ => 1,
+    };
+    for k in 0..n_velocities {
+        let mover = Mover {
+            velocity: link.velocity + k,
+            motion: link.motion + k,
+        };
+        carriers.push(Carrier {
+            body,
+            parent,
+            mover,
+        });
+        parent = carriers.len() - 1;
+    }
+    parent
 }

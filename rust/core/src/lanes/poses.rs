@@ -4,7 +4,7 @@
 //! World axes. Positions are relative to the trunk's origin, so that a rover far from the world's
 //! origin loses no precision.
 
-use super::inertias::Inertias;
+use super::inertias::{Inertia, Inertias};
 use super::machine::{Axis, Coupled, Link, LinkJoint, Machine};
 use super::place::Place;
 use crate::scalar::elementary::sines_cosines;
@@ -107,7 +107,6 @@ impl<T: Lane> Poses<T> {
         let (links, inertias) = (&machine.links[..n], &inertias.bodies[..n]);
         let bodies = &mut self.bodies[..n];
         let motions = &mut self.motions[..machine.n_motions()];
-        let nothing = Vec3::splat(self.token, [0.0; 3]);
         let mut turns = self.turns.of(machine, place);
         self.origin = place.position;
         let trunk = &mut bodies[0];
@@ -116,61 +115,84 @@ impl<T: Lane> Poses<T> {
             trunk.c = trunk.R.times(inertias[0].centre);
         }
         for b in 1..n {
+            let link = &links[b];
+            if link.joint != LinkJoint::Turn {
+                follow(link, b, inertias, place, &mut turns, (bodies, motions));
+                continue;
+            }
             let (before, own) = bodies.split_at_mut(b);
-            let (link, own) = (&links[b], &mut own[0]);
-            let carrier = &before[link.parent];
-            let mut lever = link.lever(&carrier.R);
-            let frame = match &link.rotation {
-                None => carrier.R,
-                Some(fixed) => times_columns(&carrier.R, fixed),
-            };
-            match &link.joint {
-                LinkJoint::Turn(axis) => {
-                    let turned = axis.turned(&frame);
-                    own.R = if link.is_spinner {
-                        frame
-                    } else {
-                        axis.rotate(&frame, turned, turns.next())
-                    };
-                    own.r = carrier.r + lever;
-                    motions[link.motion] = Motion {
-                        axis: turned,
-                        swing: own.r.cross(turned),
-                    };
-                }
-                LinkJoint::Slide(axis, coordinate) => {
-                    let along = axis.turned(&frame);
-                    lever += along * link.coordinate(place.joints[*coordinate]);
-                    own.R = frame;
-                    own.r = carrier.r + lever;
-                    motions[link.motion] = Motion {
-                        axis: nothing,
-                        swing: along,
-                    };
-                }
-                LinkJoint::Ball(ball) => {
-                    own.R = product(&frame, &rotation(&place.balls[*ball]));
-                    own.r = carrier.r + lever;
-                    for (motion, axis) in motions[link.motion..].iter_mut().zip(frame.columns()) {
-                        *motion = Motion {
-                            axis,
-                            swing: own.r.cross(axis),
-                        };
-                    }
-                }
-                LinkJoint::Base => {}
-            }
-            own.lever = lever;
-            own.c = if link.is_centred {
-                own.r
+            let (carrier, own) = (&before[link.parent], &mut own[0]);
+            let lever = link.lever(&carrier.R);
+            let r = carrier.r + lever;
+            let frame = link.frame(&carrier.R);
+            let axis = link.axis.turned(&frame);
+            own.R = if link.is_spinner {
+                frame
             } else {
-                own.r + own.R.times(inertias[b].centre)
+                link.axis.rotate(&frame, axis, turns.next())
             };
-            if let Some(coupled) = &link.coupling {
-                couple(motions, link.motion, coupled);
-            }
+            own.c = if link.is_centred {
+                r
+            } else {
+                r + own.R.times(inertias[b].centre)
+            };
+            (own.r, own.lever) = (r, lever);
+            let swing = r.cross(axis);
+            motions[link.motion] = Motion { axis, swing };
         }
     }
+}
+
+/// Places a body whose joint is not a plain rotation, and writes the motions of the joint.
+#[inline(always)]
+fn follow<T: Lane>(
+    link: &Link,
+    b: usize,
+    inertias: &[Inertia<T>],
+    place: &Place<T>,
+    turns: &mut NextTurn<'_, T>,
+    (bodies, motions): (&mut [Pose<T>], &mut [Motion<T>]),
+) {
+    let carrier = bodies[link.parent];
+    let mut lever = link.lever(&carrier.R);
+    let frame = link.frame(&carrier.R);
+    let mut R = frame;
+    let axis = link.axis.turned(&frame);
+    let at = carrier.r + lever;
+    match link.joint {
+        LinkJoint::Slide(coordinate) => {
+            lever += axis * link.coordinate(place.joints[coordinate]);
+            motions[link.motion] = Motion {
+                axis: Vec3::splat(at.x.token(), [0.0; 3]),
+                swing: axis,
+            };
+        }
+        LinkJoint::Turn | LinkJoint::CoupledTurn => {
+            if !link.is_spinner {
+                R = link.axis.rotate(&frame, axis, turns.next());
+            }
+            let swing = at.cross(axis);
+            motions[link.motion] = Motion { axis, swing };
+        }
+        LinkJoint::Ball(ball) => {
+            R = product(&frame, &rotation(&place.balls[ball]));
+            for (motion, axis) in motions[link.motion..].iter_mut().zip(frame.columns()) {
+                let swing = at.cross(axis);
+                *motion = Motion { axis, swing };
+            }
+        }
+        LinkJoint::Base => {}
+    }
+    if let Some(coupled) = &link.coupling {
+        couple(motions, link.motion, coupled);
+    }
+    let r = carrier.r + lever;
+    let c = if link.is_centred {
+        r
+    } else {
+        r + R.times(inertias[b].centre)
+    };
+    bodies[b] = Pose { R, r, c, lever };
 }
 
 /// The motion of a coupled joint per unit of the velocity that it follows, and the combined motion
@@ -191,6 +213,15 @@ fn couple<T: Lane>(motions: &mut [Motion<T>], m: usize, coupled: &Coupled) {
 }
 
 impl Link {
+    /// The frame of its joint, on a carrier with the attitude `R`.
+    #[inline(always)]
+    pub(super) fn frame<T: Lane>(&self, R: &Mat3<T>) -> Mat3<T> {
+        match &self.rotation {
+            None => *R,
+            Some(fixed) => times_columns(R, fixed),
+        }
+    }
+
     /// The coordinate of its joint, where that of its own or the one that it follows is `q`.
     #[inline(always)]
     pub(super) fn coordinate<T: Lane>(&self, q: T) -> T {

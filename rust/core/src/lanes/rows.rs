@@ -97,10 +97,18 @@ impl<T: Lane> Rows<T> {
             self.token,
             #[inline(always)]
             || {
-                for &slot in contacts.used() {
+                for &slot in contacts.used_by_wheels() {
                     self.build(machine, end, factor, contacts, v, slot);
                 }
+                for &slot in contacts.used_by_stops() {
+                    self.build_stop(machine, factor, v, slot);
+                }
                 self.multiply(contacts.used());
+                let n_wheels = contacts.used_by_wheels().len();
+                for i in n_wheels..contacts.used().len() {
+                    let own = &mut self.W[block(i, i)];
+                    (own[4], own[8]) = (own[0], own[0]);
+                }
             },
         );
     }
@@ -117,20 +125,9 @@ impl<T: Lane> Rows<T> {
         slot: usize,
     ) {
         let part = Contacts::<T>::part(slot);
-        let sign = self.sign(slot);
         let movers = &self.movers[part][..];
         let rows = &mut self.Z[slot * self.stride..][..BASE + movers.len()];
         let own = contacts.slot(slot);
-        if let Some(sign) = sign {
-            let zero = own.gap.like(0.0);
-            rows.fill([zero; 3]);
-            let (sign, own) = (zero.like(sign), rows.len() - 1);
-            rows[own][0] = sign;
-            let rate = movers.last().map_or(zero, |mover| v[mover.velocity]);
-            self.u_before[slot] = [sign * rate, zero, zero];
-            factor.half_solve_path(machine, self.bodies[part], rows);
-            return;
-        }
         let (base, joints) = rows.split_at_mut(BASE);
         let (x, n, t, b) = (own.point, own.n, own.t, own.b);
         let (xn, xt, xb) = (x.cross(n), x.cross(t), x.cross(b));
@@ -150,6 +147,23 @@ impl<T: Lane> Rows<T> {
             add_scaled(&mut u, row, v[mover.velocity]);
         }
         self.u_before[slot] = u;
+        factor.half_solve_path(machine, self.bodies[part], rows);
+    }
+
+    /// Z and `Hᵀ v` of a stop's slot.
+    #[inline(always)]
+    fn build_stop(&mut self, machine: &Machine, factor: &Factor<T>, v: &[T], slot: usize) {
+        let part = Contacts::<T>::part(slot);
+        let (Some(sign), Some(mover)) = (self.sign(slot), self.movers[part].last()) else {
+            return;
+        };
+        let zero = T::splat(self.token, 0.0);
+        let sign = zero.like(sign);
+        let rows = &mut self.Z[slot * self.stride..][..BASE + self.movers[part].len()];
+        rows.fill([zero; 3]);
+        let last = rows.len() - 1;
+        rows[last][0] = sign;
+        self.u_before[slot] = [sign * v[mover.velocity], zero, zero];
         factor.half_solve_path(machine, self.bodies[part], rows);
     }
 
@@ -176,10 +190,6 @@ impl<T: Lane> Rows<T> {
             }
             let x = &self.Z[row * self.stride..][..BASE + self.movers[a].len()];
             self.W[at] = square(x);
-            if self.sign(row).is_some() {
-                let normal = self.W[at][0];
-                (self.W[at][4], self.W[at][8]) = (normal, normal);
-            }
             at += 1;
         }
     }
@@ -263,24 +273,24 @@ impl<T: Lane> Rows<T> {
         out.fill(zero);
         let mut total = Vec3::new(zero, zero, zero);
         let mut couple = total;
-        for &slot in contacts.used() {
+        for &slot in contacts.used_by_wheels() {
             let own = contacts.slot(slot);
             let here = own.active & lanes;
             let [p_n, p_t, p_b] = p[slot];
-            let movers = &self.movers[Contacts::<T>::part(slot)];
-            if let Some(sign) = self.sign(slot) {
-                if let Some(mover) = movers.last() {
-                    add(here, &mut out[mover.velocity], zero.like(sign) * p_n);
-                }
-                continue;
-            }
             let force = own.n * p_n + own.t * p_t + own.b * p_b;
             let moment = own.point.cross(force);
             add_vector(here, &mut total, force);
             add_vector(here, &mut couple, moment);
-            for mover in movers {
+            for mover in &self.movers[Contacts::<T>::part(slot)] {
                 let power = end.motions[mover.motion].power(force, moment);
                 add(here, &mut out[mover.velocity], power);
+            }
+        }
+        for &slot in contacts.used_by_stops() {
+            let here = contacts.slot(slot).active & lanes;
+            let mover = self.movers[Contacts::<T>::part(slot)].last();
+            if let (Some(sign), Some(mover)) = (self.sign(slot), mover) {
+                add(here, &mut out[mover.velocity], zero.like(sign) * p[slot][0]);
             }
         }
         out[..BASE].copy_from_slice(&[total.x, total.y, total.z, couple.x, couple.y, couple.z]);
@@ -310,19 +320,23 @@ impl<T: Lane> Rows<T> {
                     problem.n_contacts = contacts.list(lane).n;
                     problem.mu[..problem.n_contacts].fill(friction[lane]);
                 }
+                for &slot in contacts.used_by_stops() {
+                    let places = contacts.places(slot);
+                    each::<T>(
+                        contacts.slot(slot).active,
+                        #[inline(always)]
+                        |lane| problems[lane].mu[usize::from(places[lane])] = 0.0,
+                    );
+                }
                 let mut at = 0;
                 for (i, &row) in contacts.used().iter().enumerate() {
                     let of_row = contacts.places(row);
                     let values = store_all(&q[row]);
-                    let is_stop = self.sign(row).is_some();
                     each::<T>(
                         contacts.slot(row).active,
                         #[inline(always)]
                         |lane| {
                             let place = usize::from(of_row[lane]);
-                            if is_stop {
-                                problems[lane].mu[place] = 0.0;
-                            }
                             let q = &mut problems[lane].q[3 * place..][..3];
                             for i in 0..3 {
                                 q[i] = values[i][lane];

@@ -471,11 +471,7 @@ impl<T: Lane> Block<T> {
             self.rows.soften(&self.contacts, &self.yields.diagonal);
         }
         probe.end(Phase::Delassus);
-        if is_first {
-            self.rows
-                .read(&self.contacts, problems, Answer::Impulses, &mut self.p_last);
-        }
-        self.load();
+        self.load(is_first.then_some(&*problems));
         probe.end(Phase::Bias);
         self.rows
             .to_problems(&self.contacts, &self.u, self.friction, problems);
@@ -570,13 +566,15 @@ impl<T: Lane> Block<T> {
     /// The free change of the velocity, `y` in factor coordinates, and the contacts' free velocity
     /// `u`: first with the forces at v, then with those at the mean velocity that follows from them
     /// and from the last step's impulses.
-    fn load(&mut self) {
+    ///
+    /// `problems`: those that hold the last step's impulses; none if they are known.
+    fn load(&mut self, problems: Option<&[ContactProblem]>) {
         let token = self.token;
         let is_any = (self.persists & self.going).any();
         T::vectorize(
             token,
             #[inline(always)]
-            || self.push_and_drive(is_any),
+            || self.push_and_drive(is_any, problems),
         );
         self.weigh(true);
         T::vectorize(
@@ -593,9 +591,13 @@ impl<T: Lane> Block<T> {
     }
 
     #[inline(always)]
-    fn push_and_drive(&mut self, is_any: bool) {
+    fn push_and_drive(&mut self, is_any: bool, problems: Option<&[ContactProblem]>) {
         let zero = self.number(0.0);
         let (h, _) = self.time_step();
+        if let Some(problems) = problems {
+            self.rows
+                .read(&self.contacts, problems, Answer::Impulses, &mut self.p_last);
+        }
         if is_any {
             let (contacts, end) = (&self.contacts, &self.poses_end);
             self.rows.generalized_impulse(

@@ -58,7 +58,7 @@ impl<T: Lane> Contacts<T> {
                     let link = &machine.links[own.body];
                     let motion = &poses.motions[link.motion];
                     let axis = match link.joint {
-                        LinkJoint::Slide(..) => motion.swing,
+                        LinkJoint::Slide(_) => motion.swing,
                         _ => motion.axis,
                     };
                     for (k, side) in [Side::Lower, Side::Upper].into_iter().enumerate() {

@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use super::active_contact::ActiveContact;
+use super::quick::solve;
 use super::rover::{RoverScene, RoverSimulation};
 use super::scene::QuickStep;
 use crate::integrator::{NoProbe, Phase, Probe, StepError, StepOptions, StepReport};
 use crate::lanes::admission::admit;
 use crate::lanes::machine::Machine;
 use crate::lanes::passenger::Passenger;
-use crate::lanes::queue;
+use crate::lanes::queue::Queue;
 use crate::lanes::step::{Block, Next};
 use crate::scalar::{Lane, Single};
 
@@ -33,6 +34,7 @@ impl RoverScene {
         let block = quick
             .block
             .get_or_insert_with(|| Box::new(Block::new(token, machine)));
+        let queue = quick.queue.get_or_insert_with(|| Queue::new(token));
         let mut passenger = Passenger {
             model: &self.model,
             terrain: &self.terrain,
@@ -52,7 +54,7 @@ impl RoverScene {
         let solver = &step.options.solver;
         let mut next = Next::Retake;
         while next == Next::Retake {
-            queue::solve_all::<f64>(token, problems, solver);
+            solve(queue, problems, solver);
             probe.end(Phase::Solve);
             next = block.conclude(problems, probe);
         }
@@ -61,7 +63,7 @@ impl RoverScene {
         if is_deep {
             gap_problems.clone_from_slice(problems);
             block.set_gaps(gap_problems);
-            queue::solve_all::<f64>(token, gap_problems, solver);
+            solve(queue, gap_problems, solver);
         }
         block.finish(is_deep.then_some(&*gap_problems), probe);
         if block.declined(0).is_some() {
