@@ -11,7 +11,9 @@ use rover_core::lanes::mass_matrix::{Factor, MassMatrix};
 use rover_core::lanes::place::Place;
 use rover_core::lanes::poses::Poses;
 use rover_core::multibody;
-use rover_core::multibody::description::{CouplingDescription, JointKind, SolidDescription};
+use rover_core::multibody::description::{
+    CouplingDescription, JointKind, Limits, SolidDescription,
+};
 use rover_core::multibody::{Configuration, Kinematics, Model, ModelDescription};
 use rover_core::scalar::{Lane, LaneMask, Single, Vec3};
 
@@ -416,6 +418,18 @@ fn a_machine_that_is_not_ordinary_is_refused_with_its_reason() {
         }),
         Err(NotOrdinary::NotOneFreeTree)
     );
+    let with_stops = |rover: &mut ModelDescription| {
+        let template = rover.solids[1].clone();
+        rover.solids.extend((0..30).map(|i| SolidDescription {
+            name: format!("arm {i}"),
+            limits: Some(Limits {
+                lower: -1.0,
+                upper: 1.0,
+            }),
+            ..template.clone()
+        }));
+    };
+    assert_eq!(reason(with_stops), Err(NotOrdinary::TooManyParts(36)));
     assert_eq!(
         reason(|rover| rover.self_contact = true),
         Err(NotOrdinary::SelfContact)

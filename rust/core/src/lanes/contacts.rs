@@ -74,6 +74,8 @@ pub struct Contacts<T: Lane> {
     pub(super) token: T::Token,
     parts: Parts,
     pub(super) stops: Vec<Stop>,
+    /// The first slot of a stop.
+    pub(super) first_stop: usize,
     twists: Vec<Twist<T>>,
     pub(super) slots: Vec<Slot<T>>,
     pub(super) used: Vec<usize>,
@@ -98,15 +100,8 @@ struct Sight<'a, T: Lane> {
 
 impl<T: Lane> Contacts<T> {
     /// Room for a machine.
-    ///
-    /// # Panics
-    /// If it has more than 128 wheels and joints with stops.
     #[must_use]
     pub fn new(token: T::Token, machine: &Machine) -> Self {
-        assert!(
-            machine.wheels.len() + machine.stops.len() <= 128,
-            "invariant: slots are numbered by 8 bits"
-        );
         let parts = Parts::of(machine);
         let n_slots = SLOTS * (parts.wheels.len() + machine.stops.len());
         let zero = T::splat(token, 0.0);
@@ -132,6 +127,7 @@ impl<T: Lane> Contacts<T> {
         Self {
             token,
             twists: vec![twist; parts.n_carriers()],
+            first_stop: SLOTS * parts.wheels.len(),
             parts,
             stops: machine.stops.clone(),
             slots: vec![slot; n_slots],
@@ -692,7 +688,7 @@ impl Listed {
 
 /// A place or a slot, of which there are less than 256.
 #[inline(always)]
-#[allow(clippy::cast_possible_truncation)] // checked where contacts are made
+#[allow(clippy::cast_possible_truncation)] // checked where machines are made
 fn small(index: usize) -> u8 {
     index as u8
 }

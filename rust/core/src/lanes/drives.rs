@@ -6,9 +6,9 @@
 
 use super::machine::Machine;
 use crate::multibody::{Motor, Passive};
-use crate::scalar::elementary::exp_m1;
 use crate::scalar::{Lane, LaneMask};
 use crate::system::Command;
+use crate::system::fitted_theta::fitted_theta;
 
 /// The branch on which the torque is the command.
 const COMMAND: f64 = 2.0;
@@ -364,13 +364,4 @@ impl<T: Lane> Joint<T> {
         self.at_rest = at_rest;
         self.active = T::select(upper | lower, self.slope, number(0.0));
     }
-}
-
-/// [`crate::system::fitted_theta`] in every lane.
-#[inline(always)]
-fn fitted_theta<T: Lane>(z: T) -> T {
-    let one = z.like(1.0);
-    let series = z.like(0.5) + z / z.like(12.0) - z * z * z / z.like(720.0);
-    let exact = one / -exp_m1(-z) - one / z;
-    T::select(z.lt(z.like(1e-2)), series, exact)
 }

@@ -18,6 +18,9 @@ use crate::multibody::model::BASE;
 use crate::multibody::{Body, JointProperties, Model};
 use crate::scalar::{Lane, Mat3, Vec3};
 
+/// Most wheels and joints with stops: the operator of a block has room for contacts of all of them.
+pub const MOST_PARTS: usize = 32;
+
 /// Why a machine has no ordinary step.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum NotOrdinary {
@@ -30,6 +33,9 @@ pub enum NotOrdinary {
         /// Name of the wheel.
         wheel: String,
     },
+    /// It has more wheels and joints with stops than lanes have room for.
+    #[error("the machine has {0} wheels and joints with stops, more than {MOST_PARTS}")]
+    TooManyParts(usize),
     /// It has balls that collide.
     #[error("the machine has balls that collide")]
     Balls,
@@ -404,8 +410,8 @@ impl Machine {
         }
     }
 
-    /// Whether a model differs from this machine in its inertias alone, so that it can be a lane of
-    /// a block. A mass centre that leaves the frame's origin, or moments that are no longer equal,
+    /// Whether a model differs from this machine only in its inertias, springs, dampers and rotors,
+    /// so that it can be a lane of a block. A joint that gains or loses such an element, a mass centre that leaves the frame's origin, or moments that are no longer equal,
     /// make another machine.
     #[must_use]
     pub fn fits(&self, model: &Model) -> bool {
@@ -516,6 +522,10 @@ fn check(model: &Model) -> Result<(), NotOrdinary> {
         return Err(NotOrdinary::WideWheel {
             wheel: wheel.name.clone(),
         });
+    }
+    let n_parts = model.wheels().len() + model.limited_joints().len();
+    if n_parts > MOST_PARTS {
+        return Err(NotOrdinary::TooManyParts(n_parts));
     }
     if !model.spheres().is_empty() {
         return Err(NotOrdinary::Balls);

@@ -152,8 +152,11 @@ impl<T: Lane> Place<T> {
         for x in &self.attitude {
             all = all & x.is_finite();
         }
-        for x in self.joints.iter().chain(self.balls.iter().flatten()) {
+        for x in &self.joints {
             all = all & x.is_finite();
+        }
+        for [x, y, z, w] in &self.balls {
+            all = all & x.is_finite() & y.is_finite() & z.is_finite() & w.is_finite();
         }
         all
     }

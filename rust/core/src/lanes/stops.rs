@@ -15,9 +15,10 @@ impl<T: Lane> Contacts<T> {
     /// The joint whose stop a slot is, if it is one.
     #[inline(always)]
     pub(super) fn stop(&self, slot: usize) -> Option<&Stop> {
-        let n_wheels = self.slots.len() / SLOTS - self.stops.len();
-        let stop = Self::part(slot).checked_sub(n_wheels)?;
-        self.stops.get(stop)
+        if slot < self.first_stop {
+            return None;
+        }
+        self.stops.get((slot - self.first_stop) / SLOTS)
     }
 
     /// Side of a stop's slot.
@@ -51,7 +52,6 @@ impl<T: Lane> Contacts<T> {
             #[inline(always)]
             || {
                 let mut too_many = T::mask(self.token, 0);
-                let first = self.slots.len() - SLOTS * self.stops.len();
                 for i in 0..self.stops.len() {
                     let Stop { joint, limits } = self.stops[i];
                     let own = machine.joints[joint];
@@ -67,7 +67,7 @@ impl<T: Lane> Contacts<T> {
                             Side::Lower => q - q.like(limits.lower),
                             Side::Upper => q.like(limits.upper) - q,
                         };
-                        let slot = first + SLOTS * i + k;
+                        let slot = self.first_stop + SLOTS * i + k;
                         let contact = &mut self.slots[slot];
                         let rate = sign * v[own.velocity];
                         contact.active = forecast.admits(gap(middle.joints[joint]), rate);
