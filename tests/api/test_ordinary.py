@@ -46,7 +46,7 @@ def test_options_that_are_not_ordinary_are_named(options: dict[str, Any], reason
         {"spring": {"stiffness": 50.0}},
         {"armature": 0.2},
         {"joint": "prismatic"},
-        {"coupled": {"joint": "front_axle", "ratio": -0.5}},
+        {"coupled": {"joint": "front_axle", "ratio": -0.5}, "hold": None},
     ],
 )
 def test_joints_and_forces_of_every_kind_step_in_lanes(changes: dict[str, Any]) -> None:

@@ -174,8 +174,8 @@ impl<T: Lane> Drives<T> {
         !self.motors.is_empty()
     }
 
-    /// Chooses each motor's branch for the rates at the start of the step, and θ_j for the `inertia`
-    /// of each joint's velocity (diagonal of M), kg m².
+    /// Chooses each motor's branch for the rates at the start of the step, and θ_j for the
+    /// `inertia` of each joint's velocity (diagonal of M), kg m².
     #[inline(always)]
     pub fn choose(
         &mut self,

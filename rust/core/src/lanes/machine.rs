@@ -411,8 +411,9 @@ impl Machine {
     }
 
     /// Whether a model differs from this machine only in its inertias, springs, dampers and rotors,
-    /// so that it can be a lane of a block. A joint that gains or loses such an element, a mass centre that leaves the frame's origin, or moments that are no longer equal,
-    /// make another machine.
+    /// so that it can be a lane of a block. A joint that gains or loses such an element, a mass
+    /// centre that leaves the frame's origin, or moments that are no longer equal, make another
+    /// machine.
     #[must_use]
     pub fn fits(&self, model: &Model) -> bool {
         Self::of(model).is_ok_and(|other| other == *self)

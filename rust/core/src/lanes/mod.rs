@@ -9,8 +9,8 @@
 //! - [`admission`]: which rovers have ordinary steps; [`machine`]: what the rovers share;
 //!   [`inertias`]: what they need not; [`place`]: configurations;
 //! - [`poses`], [`mass_matrix`], [`bias`], [`energy`]: dynamics of the tree;
-//! - `parts`, [`ground`], `footing`, [`forecast`], [`contacts`], `stops`: what touches what; [`rows`]:
-//!   Jacobian and Delassus operator; [`yielding`]: wheels that yield;
+//! - `parts`, [`ground`], `footing`, [`forecast`], [`contacts`], `stops`: what touches what;
+//!   [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield;
 //! - [`problem`], [`modes`], [`equations`], `pivoting`, `visits`, `bench`, [`queue`]: the
 //!   friction-contact problems;
 //! - [`step`]: the step.

@@ -1,5 +1,5 @@
-//! Forward kinematics: attitude, origin and mass centre of every body, and the motion of every joint
-//! velocity.
+//! Forward kinematics: attitude, origin and mass centre of every body, and the motion of every
+//! joint velocity.
 //!
 //! World axes. Positions are relative to the trunk's origin, so that a rover far from the world's
 //! origin loses no precision.
@@ -36,8 +36,8 @@ pub struct Pose<T> {
     pub lever: Vec3<T>,
 }
 
-/// The motion that a unit of a joint velocity imparts to everything the joint carries: a rotation, a
-/// translation, or both.
+/// The motion that a unit of a joint velocity imparts to everything the joint carries: a rotation,
+/// a translation, or both.
 #[derive(Clone, Copy, Debug)]
 pub struct Motion<T> {
     /// Angular velocity: the unit axis of a revolute joint, zero of a prismatic one.

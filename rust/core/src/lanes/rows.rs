@@ -3,9 +3,9 @@
 //! As in [`crate::contact::delassus`]: with `M̂ = Lᵀ D L` and `Z = D^(-1/2) L^(-T) H` the operator
 //! is `W = Zᵀ Z`. A column of Z is nonzero along the path of its wheel, and a block of W is a
 //! product over the part of the path that two wheels share. Rows belong to slots
-//! ([`super::contacts`]). A stop has one row, ±1 at its joint's velocity; the tangential diagonal of
-//! W is that of the normal, as in [`crate::contact::limit`]. A slot that is active in some lanes only never changes what the others
-//! accumulate.
+//! ([`super::contacts`]). A stop has one row, ±1 at its joint's velocity; the tangential diagonal
+//! of W is that of the normal, as in [`crate::contact::limit`]. A slot that is active in some lanes
+//! only never changes what the others accumulate.
 
 use super::contacts::Contacts;
 use super::machine::{Machine, Mover};

@@ -537,8 +537,8 @@ impl<T: Lane> Block<T> {
         self.persists = self.is_same & self.has_persistent;
     }
 
-    /// The implicit terms of motors, held joints, springs and dampers; `is_first`: their branches and
-    /// weights, too.
+    /// The implicit terms of motors, held joints, springs and dampers; `is_first`: their branches
+    /// and weights, too.
     #[inline(always)]
     fn add_implicit(&mut self, is_first: bool) {
         let machine = &*self.machine;
