@@ -12,6 +12,7 @@ use rover_core::scalar::{Instructions, Lane, Single};
 
 mod contacts;
 mod fleet;
+mod machines;
 mod solver;
 mod surfaces;
 mod tree;

@@ -105,7 +105,7 @@ impl<T: Lane> Block<T> {
                 T::vectorize(
                     token,
                     #[inline(always)]
-                    || moved.set_moved(&place, &v, h),
+                    || moved.set_moved(&machine, &place, &v, h),
                 );
                 let mut poses = Poses::new(token, &machine);
                 poses.update(&machine, &inertias, &moved);

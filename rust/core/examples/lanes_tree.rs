@@ -88,7 +88,7 @@ impl<T: Lane> Block<T> {
                 self.token,
                 #[inline(always)]
                 || {
-                    self.place.set_moved(&self.start, &self.v, 0.0025);
+                    self.place.set_moved(machine, &self.start, &self.v, 0.0025);
                 },
             ),
             "poses" => self.poses.update(machine, inertias, &self.place),

@@ -114,7 +114,7 @@ impl<T: Lane> Block<T> {
         let mut poses = Vec::new();
         for h in [(1.0 - THETA) * step.h, step.h] {
             let mut place = start.clone();
-            T::vectorize(token, || place.set_moved(&start, &v, h));
+            T::vectorize(token, || place.set_moved(machine, &start, &v, h));
             let mut of_place = Poses::new(token, machine);
             of_place.update(machine, inertias, &place);
             poses.push(of_place);
@@ -181,7 +181,7 @@ impl<T: Lane> Block<T> {
                     let slot = usize::from(list.slots[c]);
                     found
                         .keys
-                        .push((Contacts::<T>::wheel(slot), list.primitives[c]));
+                        .push((Contacts::<T>::part(slot), list.primitives[c]));
                     let own = self.contacts.slot(slot);
                     assert!(own.active.get(lane));
                     for x in [own.point, own.n, own.t, own.b] {

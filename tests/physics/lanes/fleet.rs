@@ -5,12 +5,13 @@ use std::sync::Arc;
 use proptest::prelude::*;
 use rover_core::geometry::{Plane, SphereField, Terrain};
 use rover_core::integrator::{StepError, StepOptions, moreau_jean::MoreauJean};
-use rover_core::multibody::{Configuration, Model};
+use rover_core::multibody::{Configuration, Model, ModelDescription};
 use rover_core::scalar::Instructions;
 use rover_core::simulation::RoverSimulation;
 use rover_core::simulation::fleet::{Fleet, Rider};
 
 use super::Random;
+use super::machines::equipped;
 
 fn rocks(numbers: &mut Random) -> Arc<dyn Terrain> {
     let mut centres = Vec::new();
@@ -51,8 +52,9 @@ fn rover(i: usize, model: &Arc<Model>, numbers: &mut Random) -> RoverSimulation 
 
 fn command(rover: &mut RoverSimulation, torque: f64, numbers: &mut Random) {
     let torques: Vec<f64> = (0..6).map(|_| torque * numbers.next()).collect();
-    let limit = rover.model().wheels()[0].steering_limit;
-    let steering: Vec<f64> = (0..6).map(|_| limit * numbers.next()).collect();
+    let model = Arc::clone(rover.model());
+    let limits = model.wheels().iter().map(|wheel| wheel.steering_limit);
+    let steering: Vec<f64> = limits.map(|limit| limit * numbers.next()).collect();
     rover.set_commands(&torques, &steering).unwrap();
 }
 
@@ -74,24 +76,25 @@ fn assert_alike(a: &RoverSimulation, b: &RoverSimulation) {
     assert!(a.snapshot() == b.snapshot());
 }
 
-/// The built-in rover with rigid wheels, and with wheels that yield.
-fn models() -> [Arc<Model>; 2] {
-    let rigid = Model::rover();
-    let mut soft = rigid.description().clone();
+/// The built-in rover with rigid wheels, with wheels that yield, and with all kinds of joints and
+/// forces; a rover with a differential and motors.
+fn models() -> [Arc<Model>; 4] {
+    let rigid = ModelDescription::rover();
+    let mut soft = rigid.clone();
     for wheel in &mut soft.wheels {
         wheel.stiffness = Some(2e6);
         wheel.damping = Some(1e4);
     }
-    [rigid, Model::from_description(soft).unwrap()].map(Arc::new)
+    let open = ModelDescription::named("open-rover").unwrap();
+    [rigid, soft, equipped(), open].map(|own| Arc::new(Model::from_description(own).unwrap()))
 }
 
 /// Drives rovers in a fleet and alone.
 fn drive(instructions: Instructions, n: usize, torque: f64, seed: u64) {
     let mut numbers = Random(seed);
-    let [rigid, soft] = models();
-    let model = if n.is_multiple_of(2) { rigid } else { soft };
+    let model = &models()[n % 4];
     let mut together: Vec<RoverSimulation> =
-        (0..n).map(|i| rover(i, &model, &mut numbers)).collect();
+        (0..n).map(|i| rover(i, model, &mut numbers)).collect();
     let mut alone = together.clone();
     let mut fleet = Fleet::new(instructions);
     for _ in 0..8 {
@@ -124,8 +127,9 @@ proptest! {
 #[test]
 fn narrower_lanes_give_the_same_bits() {
     for instructions in Instructions::all_of_this_machine() {
-        drive(instructions, 9, 60.0, 7);
-        drive(instructions, 8, 60.0, 7);
+        for n in 8..12 {
+            drive(instructions, n, 60.0, 7);
+        }
     }
 }
 

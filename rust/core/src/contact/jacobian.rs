@@ -88,15 +88,8 @@ fn columns_at(
     }
     let of_motion =
         |velocity: &Vector3<f64>| [velocity.dot(&n), velocity.dot(&t), velocity.dot(&b), 0.0];
-    let motions = rest.iter_mut().zip(model.motions(body));
-    if model.only_turns() {
-        for (row, &m) in motions {
-            *row = of_motion(&kinematics.motions[m].velocity_if::<true>(x));
-        }
-    } else {
-        for (row, &m) in motions {
-            *row = of_motion(&kinematics.motions[m].velocity_at(x));
-        }
+    for (row, &m) in rest.iter_mut().zip(model.motions(body)) {
+        *row = of_motion(&kinematics.motions[m].velocity_at(x));
     }
 }
 
@@ -144,15 +137,8 @@ fn push(
             out[3 + i] += moment[i];
         }
     }
-    let motions = rest.iter().zip(model.motions(body));
-    if model.only_turns() {
-        for (&k, &m) in motions {
-            out[k] += kinematics.motions[m].power_if::<true>(force, &moment);
-        }
-    } else {
-        for (&k, &m) in motions {
-            out[k] += kinematics.motions[m].power(force, &moment);
-        }
+    for (&k, &m) in rest.iter().zip(model.motions(body)) {
+        out[k] += kinematics.motions[m].power(force, &moment);
     }
 }
 

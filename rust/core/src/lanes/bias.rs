@@ -6,8 +6,8 @@
 //! Source: Luh, Walker and Paul 1980; here in world axes.
 
 use super::inertias::{Inertia, Inertias};
-use super::machine::{Link, Machine};
-use super::poses::{Pose, Poses};
+use super::machine::{Link, LinkJoint, Machine};
+use super::poses::{Motion, Pose, Poses};
 use crate::multibody::model::BASE;
 use crate::scalar::{Lane, Vec3};
 
@@ -70,13 +70,11 @@ pub fn bias<T: Lane>(
         || {
             let n = machine.links.len();
             let (links, inertias) = (&machine.links[..n], &inertias.bodies[..n]);
+            let motions = &poses.motions[..machine.n_motions()];
             let (poses, moved) = (&poses.bodies[..n], &mut scratch.bodies[..n]);
-            let (base, rates) = v.split_at(BASE);
-            let (out_base, out) = out.split_at_mut(BASE);
-            let (rates, out) = (&rates[..n - 1], &mut out[..n - 1]);
             let zero = Vec3::splat(scratch.token, [0.0; 3]);
             moved[0] = Moved {
-                omega: Vec3::new(base[3], base[4], base[5]),
+                omega: Vec3::new(v[3], v[4], v[5]),
                 alpha: zero,
                 origin: -gravity,
                 force: zero,
@@ -87,35 +85,72 @@ pub fn bias<T: Lane>(
                 let (before, own) = moved.split_at_mut(b);
                 let (link, pose) = (&links[b], &poses[b]);
                 let carrier = &mut before[link.parent];
-                let (omega, d) = (carrier.omega, pose.lever);
-                let spin = pose.axis * rates[b - 1];
-                let mut body = Moved {
-                    omega: omega + spin,
-                    alpha: carrier.alpha + omega.cross(spin),
-                    origin: carrier.origin + carrier.alpha.cross(d) + omega.cross(omega.cross(d)),
-                    force: zero,
-                    moment: zero,
+                let mut body = if link.joint == LinkJoint::Turn {
+                    let spin = motions[link.motion].axis * v[link.velocity];
+                    carrier.carry(pose.lever, spin)
+                } else {
+                    carrier.carry_otherwise(link, motions, pose.lever, v)
                 };
                 body.load(link, &inertias[b], pose);
-                if link.is_leaf {
-                    out[b - 1] = body.rest_on(carrier, pose);
+                if link.is_plain_leaf {
+                    body.share(link, motions, |k, x| out[k] = x);
+                    body.rest_on(carrier, pose);
                 } else {
                     own[0] = body;
                 }
             }
             for b in (1..n).rev() {
-                if !links[b].is_leaf {
-                    let (before, own) = moved.split_at_mut(b);
-                    out[b - 1] = own[0].rest_on(&mut before[links[b].parent], &poses[b]);
+                let link = &links[b];
+                if link.is_plain_leaf {
+                    continue;
+                }
+                let (before, own) = moved.split_at_mut(b);
+                own[0].rest_on(&mut before[link.parent], &poses[b]);
+                if !link.is_coupled() {
+                    own[0].share(link, motions, |k, x| out[k] = x);
                 }
             }
+            // A coupled joint adds to the joint that it follows.
+            for &b in &machine.coupled {
+                moved[b].share(&links[b], motions, |k, x| out[k] += x);
+            }
             let Moved { force, moment, .. } = moved[0];
-            out_base.copy_from_slice(&[force.x, force.y, force.z, moment.x, moment.y, moment.z]);
+            out[..BASE].copy_from_slice(&[force.x, force.y, force.z, moment.x, moment.y, moment.z]);
         },
     );
 }
 
 impl<T: Lane> Moved<T> {
+    /// A body that it carries, `d` from its origin and turning relative to it, without load.
+    #[inline(always)]
+    fn carry(&self, d: Vec3<T>, spin: Vec3<T>) -> Self {
+        let omega = self.omega;
+        let zero = Vec3::splat(d.x.token(), [0.0; 3]);
+        Self {
+            omega: omega + spin,
+            alpha: self.alpha + omega.cross(spin),
+            origin: self.origin + self.alpha.cross(d) + omega.cross(omega.cross(d)),
+            force: zero,
+            moment: zero,
+        }
+    }
+
+    /// The same for a joint that is not a plain rotation.
+    #[inline(always)]
+    fn carry_otherwise(&self, link: &Link, motions: &[Motion<T>], d: Vec3<T>, v: &[T]) -> Self {
+        let (k, motions) = (link.velocity, &motions[link.motion..]);
+        let mut spin = motions[0].axis * v[k];
+        if let LinkJoint::Ball(_) = link.joint {
+            spin += motions[1].axis * v[k + 1];
+            spin += motions[2].axis * v[k + 2];
+        }
+        let mut body = self.carry(d, spin);
+        if let LinkJoint::Slide(_) = link.joint {
+            body.origin += self.omega.cross(motions[0].swing * v[k]) * d.x.like(2.0);
+        }
+        body
+    }
+
     /// Sets force and moment to those of the body alone.
     #[inline(always)]
     fn load(&mut self, link: &Link, inertia: &Inertia<T>, pose: &Pose<T>) {
@@ -139,12 +174,31 @@ impl<T: Lane> Moved<T> {
         self.moment = moment;
     }
 
-    /// Adds its force and moment to its carrier's. Returns its joint's share.
+    /// Calls `set(k, x)` with the generalized force x of the load on each velocity of its joint.
     #[inline(always)]
-    fn rest_on(&self, carrier: &mut Self, pose: &Pose<T>) -> T {
+    fn share(&self, link: &Link, motions: &[Motion<T>], mut set: impl FnMut(usize, T)) {
+        let (k, m) = (link.velocity, link.motion);
+        if link.joint == LinkJoint::Turn {
+            set(k, motions[m].axis.dot(self.moment));
+            return;
+        }
+        match link.joint {
+            LinkJoint::Turn | LinkJoint::CoupledTurn => set(k, motions[m].axis.dot(self.moment)),
+            LinkJoint::Slide(_) => set(k, motions[m].swing.dot(self.force)),
+            LinkJoint::Ball(_) => {
+                for i in 0..3 {
+                    set(k + i, motions[m + i].axis.dot(self.moment));
+                }
+            }
+            LinkJoint::Base => {}
+        }
+    }
+
+    /// Adds its force and moment to its carrier's.
+    #[inline(always)]
+    fn rest_on(&self, carrier: &mut Self, pose: &Pose<T>) {
         carrier.force += self.force;
         carrier.moment += self.moment + pose.lever.cross(self.force);
-        pose.axis.dot(self.moment)
     }
 }
 

@@ -1,4 +1,4 @@
-//! Contacts of the wheels with the ground, in slots.
+//! Contacts of the wheels with the ground, in slots, and those of joints with their stops.
 //!
 //! Each wheel has two slots: most wheels touch the plane or a sphere, some both or two spheres. A
 //! slot is filled lane by lane; rovers that share it may touch different things there. Detection
@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 use super::footing::SLOTS;
 use super::forecast::Forecast;
 use super::ground::{Ground, GroundSphere, turning};
-use super::machine::Machine;
+use super::machine::{Machine, Stop};
 use super::parts::{Parts, Twist};
 use super::poses::Poses;
 use super::problem::MAX_CONTACTS;
@@ -36,7 +36,7 @@ const PARALLEL: f64 = 1e-9;
 /// Lengths below which a direction is not taken from a difference, m.
 const NO_DIRECTION: f64 = 1e-12;
 
-/// A contact, of the same wheel in every lane.
+/// A contact, of the same wheel or stop in every lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Slot<T: Lane> {
     /// Where it is a contact. Elsewhere the other fields mean nothing.
@@ -71,11 +71,16 @@ pub struct Listed {
 /// The contacts of a block.
 #[derive(Clone, Debug)]
 pub struct Contacts<T: Lane> {
-    token: T::Token,
+    pub(super) token: T::Token,
     parts: Parts,
+    pub(super) stops: Vec<Stop>,
+    /// The first slot of a stop.
+    pub(super) first_stop: usize,
     twists: Vec<Twist<T>>,
-    slots: Vec<Slot<T>>,
-    used: Vec<usize>,
+    pub(super) slots: Vec<Slot<T>>,
+    pub(super) used: Vec<usize>,
+    /// How many of them are the wheels'.
+    n_of_wheels: usize,
     lists: [Listed; MAX_LANES],
     /// Whether every slot in use is active in all lanes.
     is_full: bool,
@@ -95,17 +100,10 @@ struct Sight<'a, T: Lane> {
 
 impl<T: Lane> Contacts<T> {
     /// Room for a machine.
-    ///
-    /// # Panics
-    /// If it has more than 128 wheels.
     #[must_use]
     pub fn new(token: T::Token, machine: &Machine) -> Self {
-        assert!(
-            machine.wheels.len() <= 128,
-            "invariant: slots are numbered by 8 bits"
-        );
         let parts = Parts::of(machine);
-        let n_slots = SLOTS * parts.wheels.len();
+        let n_slots = SLOTS * (parts.wheels.len() + machine.stops.len());
         let zero = T::splat(token, 0.0);
         let nowhere = Vec3::new(zero, zero, zero);
         let slot = Slot {
@@ -129,9 +127,12 @@ impl<T: Lane> Contacts<T> {
         Self {
             token,
             twists: vec![twist; parts.n_carriers()],
+            first_stop: SLOTS * parts.wheels.len(),
             parts,
+            stops: machine.stops.clone(),
             slots: vec![slot; n_slots],
             used: Vec::with_capacity(n_slots),
+            n_of_wheels: 0,
             lists: [Listed::NONE; MAX_LANES],
             is_full: false,
             places: vec![[0; MAX_LANES]; n_slots],
@@ -151,6 +152,18 @@ impl<T: Lane> Contacts<T> {
         &self.used
     }
 
+    /// Those of the wheels.
+    #[inline(always)]
+    pub(super) fn used_by_wheels(&self) -> &[usize] {
+        &self.used[..self.n_of_wheels]
+    }
+
+    /// Those of the stops, which follow.
+    #[inline(always)]
+    pub(super) fn used_by_stops(&self) -> &[usize] {
+        &self.used[self.n_of_wheels..]
+    }
+
     /// A slot.
     #[inline(always)]
     #[must_use]
@@ -158,10 +171,10 @@ impl<T: Lane> Contacts<T> {
         &self.slots[slot]
     }
 
-    /// Wheel of a slot.
+    /// Part of a slot: a wheel, or, counted on from the wheels, a joint with stops.
     #[inline(always)]
     #[must_use]
-    pub fn wheel(slot: usize) -> usize {
+    pub fn part(slot: usize) -> usize {
         slot / SLOTS
     }
 
@@ -183,16 +196,27 @@ impl<T: Lane> Contacts<T> {
     pub fn contact(&self, machine: &Machine, lane: usize, place: usize) -> (usize, Contact) {
         let list = &self.lists[lane];
         let slot = usize::from(list.slots[place]);
-        let (own, wheel) = (&self.slots[slot], Self::wheel(slot));
-        let frame = ContactFrame {
-            n: own.n.get(lane).into(),
-            t: own.t.get(lane).into(),
-            b: own.b.get(lane).into(),
+        let (own, part) = (&self.slots[slot], Self::part(slot));
+        let n = Vector3::from(own.n.get(lane));
+        let (part, body, frame) = if let Some(stop) = self.stop(slot) {
+            let part = Part::Limit(stop.joint, Self::side(slot));
+            (
+                part,
+                machine.joints[stop.joint].body,
+                ContactFrame::of_normal(&n),
+            )
+        } else {
+            let (t, b) = (own.t.get(lane).into(), own.b.get(lane).into());
+            (
+                Part::Wheel(part),
+                machine.wheels[part].body,
+                ContactFrame { n, t, b },
+            )
         };
         let contact = Contact {
-            key: Self::key(list, place),
-            part: Part::Wheel(wheel),
-            body: machine.wheels[wheel].body,
+            key: self.key(list, place),
+            part,
+            body,
             other: None,
             point: own.point.get(lane).into(),
             frame,
@@ -209,8 +233,12 @@ impl<T: Lane> Contacts<T> {
 
     /// Key of a rover's contact, by its place in the list.
     #[inline(always)]
-    fn key(list: &Listed, place: usize) -> ContactKey {
-        let wheel = Part::Wheel(Self::wheel(usize::from(list.slots[place])));
+    fn key(&self, list: &Listed, place: usize) -> ContactKey {
+        let slot = usize::from(list.slots[place]);
+        if let Some(stop) = self.stop(slot) {
+            return ContactKey::at_limit(stop.joint, Self::side(slot));
+        }
+        let wheel = Part::Wheel(Self::part(slot));
         ContactKey::on_ground(wheel, list.features[place], list.primitives[place])
     }
 
@@ -221,7 +249,7 @@ impl<T: Lane> Contacts<T> {
         let list = &self.lists[lane];
         let mut is_same = memory.impulses.len() == list.n;
         for (place, out) in p.chunks_exact_mut(3).enumerate().take(list.n) {
-            let wanted = Self::key(list, place);
+            let wanted = self.key(list, place);
             let same = memory.impulses.get(place);
             let known = if let Some((_, known)) = same.filter(|(key, _)| *key == wanted) {
                 *known
@@ -241,7 +269,7 @@ impl<T: Lane> Contacts<T> {
         let list = &self.lists[lane];
         memory.impulses.clear();
         for (place, p) in p.chunks_exact(3).enumerate().take(list.n) {
-            let known = (Self::key(list, place), [p[0], p[1], p[2]]);
+            let known = (self.key(list, place), [p[0], p[1], p[2]]);
             memory.impulses.push(known);
         }
     }
@@ -317,6 +345,7 @@ impl<T: Lane> Contacts<T> {
                 }
             }
         }
+        self.n_of_wheels = self.used.len();
         declined | self.list_contacts(ground)
     }
 
@@ -596,44 +625,53 @@ impl<T: Lane> Contacts<T> {
         for list in &mut self.lists[..T::LANES] {
             list.n = 0;
         }
-        let mut too_many = 0;
         self.is_full = true;
-        for &slot in &self.used {
-            let own = &mut self.slots[slot];
-            let on_sphere = own.on_sphere.bits();
-            let mut numbers = [0.0; MAX_LANES];
-            if on_sphere != 0 {
-                own.sphere.number.store(&mut numbers[..T::LANES]);
+        let mut too_many = T::mask(self.token, 0);
+        for i in 0..self.used.len() {
+            too_many = too_many | self.list_slot(self.used[i], Some(ground));
+        }
+        too_many
+    }
+
+    /// Lists the contacts of a slot, of a stop's without ground, after those of the slots before
+    /// it. Returns the lanes that have too many.
+    #[inline(always)]
+    pub(super) fn list_slot(&mut self, slot: usize, ground: Option<&Ground<T>>) -> T::Mask {
+        let own = &mut self.slots[slot];
+        let on_sphere = own.on_sphere.bits();
+        let mut numbers = [0.0; MAX_LANES];
+        if on_sphere != 0 {
+            own.sphere.number.store(&mut numbers[..T::LANES]);
+        }
+        let places = &mut self.places[slot];
+        self.is_full &= own.active.all();
+        let mut too_many = 0;
+        let mut lanes = own.active.bits();
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
+            lanes &= lanes - 1;
+            let list = &mut self.lists[lane];
+            if list.n == MAX_CONTACTS {
+                too_many |= 1 << lane;
+                continue;
             }
-            let places = &mut self.places[slot];
-            self.is_full &= own.active.all();
-            let mut lanes = own.active.bits();
-            while lanes != 0 {
-                let lane = lanes.trailing_zeros() as usize;
-                lanes &= lanes - 1;
-                let list = &mut self.lists[lane];
-                if list.n == MAX_CONTACTS {
-                    too_many |= 1 << lane;
-                    continue;
-                }
-                places[lane] = small(list.n);
-                list.slots[list.n] = small(slot);
-                list.features[list.n] = NEAREST;
-                list.primitives[list.n] = if on_sphere >> lane & 1 == 1 {
-                    whole(numbers[lane])
-                } else if ground.is_surface(lane) {
-                    // Which piece was found depends on when a search was made.
-                    list.features[list.n] = NEAREST | ON_SURFACE;
-                    ANY_PIECE
-                } else {
-                    PLANE
-                };
-                list.n += 1;
-            }
-            if too_many != 0 {
-                self.is_full = false;
-                own.active = own.active & !T::mask(self.token, too_many);
-            }
+            places[lane] = small(list.n);
+            list.slots[list.n] = small(slot);
+            list.features[list.n] = NEAREST;
+            list.primitives[list.n] = if on_sphere >> lane & 1 == 1 {
+                whole(numbers[lane])
+            } else if ground.is_some_and(|ground| ground.is_surface(lane)) {
+                // Which piece was found depends on when a search was made.
+                list.features[list.n] = NEAREST | ON_SURFACE;
+                ANY_PIECE
+            } else {
+                PLANE
+            };
+            list.n += 1;
+        }
+        if too_many != 0 {
+            self.is_full = false;
+            own.active = own.active & !T::mask(self.token, too_many);
         }
         T::mask(self.token, too_many)
     }
@@ -650,7 +688,7 @@ impl Listed {
 
 /// A place or a slot, of which there are less than 256.
 #[inline(always)]
-#[allow(clippy::cast_possible_truncation)] // checked where contacts are made
+#[allow(clippy::cast_possible_truncation)] // checked where machines are made
 fn small(index: usize) -> u8 {
     index as u8
 }

@@ -1,10 +1,9 @@
 //! Energy and linear momentum of a state in one sweep, without poses for any other use.
 
 use super::inertias::{Inertia, Inertias};
-use super::machine::{Link, Machine};
+use super::machine::{Link, LinkJoint, Machine};
 use super::place::Place;
-use super::poses::{Turns, rotation, times_columns};
-use crate::multibody::model::BASE;
+use super::poses::{NextTurn, Turns, product, rotation};
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Energy and linear momentum.
@@ -94,8 +93,6 @@ pub fn energy<T: Lane>(
             let n = machine.links.len();
             let (links, own_inertias) = (&machine.links[..n], &inertias.bodies[..n]);
             let bodies = &mut scratch.bodies[..n];
-            let (base, rates) = v.split_at(BASE);
-            let rates = &rates[..n - 1];
             let mut turns = scratch.turns.of(machine, place);
             let zero = T::splat(scratch.token, 0.0);
             let mut sums = Sums {
@@ -105,48 +102,41 @@ pub fn energy<T: Lane>(
             };
             bodies[0] = Moving {
                 R: rotation(&place.attitude),
-                velocity: Vec3::new(base[0], base[1], base[2]),
-                omega: Vec3::new(base[3], base[4], base[5]),
+                velocity: Vec3::new(v[0], v[1], v[2]),
+                omega: Vec3::new(v[3], v[4], v[5]),
                 fall: zero,
             };
-            let Moving {
-                R,
-                velocity,
-                omega,
-                fall,
-            } = &bodies[0];
-            sums.add(
-                &links[0],
-                &own_inertias[0],
-                (R, *velocity, *omega, *fall),
-                gravity,
-            );
+            sums.add(&links[0], &own_inertias[0], &bodies[0], gravity);
             for b in 1..n {
                 let (before, own) = bodies.split_at_mut(b);
                 let link = &links[b];
                 let carrier = &before[link.parent];
                 let lever = link.lever(&carrier.R);
-                let velocity = carrier.velocity + carrier.omega.cross(lever);
-                let fall = carrier.fall + gravity.dot(lever);
-                let frame = match &link.rotation {
-                    None => carrier.R,
-                    Some(fixed) => times_columns(&carrier.R, fixed),
+                let frame = link.frame(&carrier.R);
+                let body = if link.joint == LinkJoint::Turn {
+                    let axis = link.axis.turned(&frame);
+                    let R = if link.is_spinner {
+                        frame
+                    } else {
+                        link.axis.rotate(&frame, axis, turns.next())
+                    };
+                    Moving {
+                        R,
+                        velocity: carrier.velocity + carrier.omega.cross(lever),
+                        omega: carrier.omega + axis * v[link.velocity],
+                        fall: carrier.fall + gravity.dot(lever),
+                    }
+                } else {
+                    carrier.carry(link, (&frame, lever), (place, v, gravity), &mut turns)
                 };
-                let axis = link.axis.turned(&frame);
-                let omega = carrier.omega + axis * rates[b - 1];
-                let inertia = &own_inertias[b];
-                if link.is_spinner {
-                    sums.add(link, inertia, (&frame, velocity, omega, fall), gravity);
-                    continue;
+                sums.add(link, &own_inertias[b], &body, gravity);
+                if !link.is_leaf {
+                    own[0] = body;
                 }
-                let R = link.axis.rotate(&frame, axis, turns.next());
-                sums.add(link, inertia, (&R, velocity, omega, fall), gravity);
-                own[0] = Moving {
-                    R,
-                    velocity,
-                    omega,
-                    fall,
-                };
+            }
+            for (&joint, &inertia) in machine.rotors.iter().zip(&inertias.rotors) {
+                let rate = v[machine.joints[joint].velocity];
+                sums.twice_kinetic += inertia * (rate * rate);
             }
             Energy {
                 kinetic: sums.twice_kinetic * zero.like(0.5),
@@ -157,22 +147,59 @@ pub fn energy<T: Lane>(
     )
 }
 
-impl<T: Lane> Sums<T> {
-    /// Adds a body with the entries of a [`Moving`].
+impl<T: Lane> Moving<T> {
+    /// A body that it carries by a joint that is not a plain rotation. `frame` and `lever`: the
+    /// joint's frame, and the way to it.
     #[inline(always)]
-    fn add(
-        &mut self,
+    fn carry(
+        &self,
         link: &Link,
-        inertia: &Inertia<T>,
-        (R, mut velocity, omega, mut fall): (&Mat3<T>, Vec3<T>, Vec3<T>, T),
-        gravity: Vec3<T>,
-    ) {
+        (frame, mut lever): (&Mat3<T>, Vec3<T>),
+        (place, v, gravity): (&Place<T>, &[T], Vec3<T>),
+        turns: &mut NextTurn<'_, T>,
+    ) -> Self {
+        let k = link.velocity;
+        let mut own = Self { R: *frame, ..*self };
+        let axis = link.axis.turned(frame);
+        match link.joint {
+            LinkJoint::Turn | LinkJoint::CoupledTurn => {
+                own.omega += axis * link.rate(v[k]);
+                if !link.is_spinner {
+                    own.R = link.axis.rotate(frame, axis, turns.next());
+                }
+            }
+            LinkJoint::Slide(coordinate) => {
+                lever += axis * link.coordinate(place.joints[coordinate]);
+                own.velocity += axis * link.rate(v[k]);
+            }
+            LinkJoint::Ball(ball) => {
+                own.R = product(frame, &rotation(&place.balls[ball]));
+                own.omega += frame.times(Vec3::new(v[k], v[k + 1], v[k + 2]));
+            }
+            LinkJoint::Base => {}
+        }
+        own.velocity += self.omega.cross(lever);
+        own.fall += gravity.dot(lever);
+        own
+    }
+}
+
+impl<T: Lane> Sums<T> {
+    /// Adds a body.
+    #[inline(always)]
+    fn add(&mut self, link: &Link, inertia: &Inertia<T>, body: &Moving<T>, gravity: Vec3<T>) {
+        let Moving {
+            R,
+            mut velocity,
+            omega,
+            mut fall,
+        } = *body;
         if !link.is_centred {
             let lever = R.times(inertia.centre);
             velocity += omega.cross(lever);
             fall += gravity.dot(lever);
         }
-        let (a, b) = inertia.axes(link.symmetry, R);
+        let (a, b) = inertia.axes(link.symmetry, &R);
         let along = a.dot(omega);
         let mut turning = inertia.rest * omega.dot(omega) + inertia.first * (along * along);
         if let Some(b) = b {

@@ -8,6 +8,8 @@ use crate::scalar::{Lane, Mat3, Vec3};
 #[derive(Clone, Debug)]
 pub struct Inertias<T: Lane> {
     pub(super) bodies: Vec<Inertia<T>>,
+    /// Inertias of the rotors, kg m² or kg, in the order of the machine's joints that have one.
+    pub(super) rotors: Vec<T>,
     /// Total mass, kg.
     pub mass: T,
 }
@@ -43,6 +45,7 @@ impl<T: Lane> Inertias<T> {
         };
         Self {
             bodies: vec![inertia; machine.n_bodies()],
+            rotors: vec![zero; machine.rotors.len()],
             mass: one,
         }
     }
@@ -52,6 +55,9 @@ impl<T: Lane> Inertias<T> {
         let own = self.bodies.iter_mut().zip(&machine.links);
         for ((own, link), body) in own.zip(model.bodies()) {
             own.set_lane(lane, link, body);
+        }
+        for (own, &joint) in self.rotors.iter_mut().zip(&machine.rotors) {
+            own.set(lane, model.joints()[joint].passive.armature);
         }
         self.mass.set(lane, model.mass());
     }

@@ -1,15 +1,17 @@
 //! Mass matrix by the composite rigid body algorithm, and its factor `M = Lᵀ D L`.
 //!
-//! Entries are stored as in [`crate::multibody::mass_matrix`], along paths: the row of a joint is
-//! its six entries with the base, then those with its ancestors, then its own. The block of the
-//! base is apart, by the rows of its lower triangle.
+//! Entries are stored as in [`crate::multibody::mass_matrix`], along paths: the row of a joint's
+//! velocity is its six entries with the base, then those with the velocities before it on its path,
+//! then its own. The block of the base is apart, by the rows of its lower triangle.
 //!
 //! Source: Featherstone 2008, *Rigid Body Dynamics Algorithms*, ch. 6 (composite bodies), ch. 8
 //! (branch-induced sparsity).
 
+use std::cmp::Ordering;
+
 use super::inertias::{Inertia, Inertias};
-use super::machine::{Link, Machine, velocity};
-use super::poses::{Pose, Poses};
+use super::machine::{Link, Machine};
+use super::poses::{Motion, Pose, Poses};
 use crate::multibody::model::BASE;
 use crate::scalar::{Lane, Vec3};
 
@@ -21,10 +23,19 @@ const BLOCK: usize = BASE * (BASE + 1) / 2;
 pub struct MassMatrix<T: Lane> {
     token: T::Token,
     block: [T; BLOCK],
-    /// Of each joint.
+    /// Of each row.
     base: Vec<[T; BASE]>,
     joints: Vec<T>,
     composites: Vec<Composite<T>>,
+    /// Momenta at a unit of each coupled joint's motion.
+    coupled: Vec<Momentum<T>>,
+}
+
+/// Momentum, and angular momentum about the trunk's origin.
+#[derive(Clone, Copy, Debug)]
+struct Momentum<T> {
+    linear: Vec3<T>,
+    angular: Vec3<T>,
 }
 
 /// Mass, first moment and inertia of a body and everything it carries, about the trunk's origin.
@@ -98,6 +109,15 @@ impl<T: Lane> Composite<T> {
         }
     }
 
+    /// Momentum at unit rate of a motion.
+    #[inline(always)]
+    fn momentum(&self, motion: &Motion<T>) -> Momentum<T> {
+        Momentum {
+            linear: motion.swing * self.mass + motion.axis.cross(self.moment),
+            angular: self.inertia.times(motion.axis) + self.moment.cross(motion.swing),
+        }
+    }
+
     #[inline(always)]
     fn plus(&self, other: &Self) -> Self {
         let (a, b) = (&self.inertia, &other.inertia);
@@ -133,16 +153,21 @@ impl<T: Lane> MassMatrix<T> {
                 yz: zero,
             },
         };
+        let nothing = Momentum {
+            linear: composite.moment,
+            angular: composite.moment,
+        };
         Self {
             token,
             block: [zero; BLOCK],
-            base: vec![[zero; BASE]; machine.n_joints()],
-            joints: vec![zero; machine.entries().len()],
+            base: vec![[zero; BASE]; machine.rows.len()],
+            joints: vec![zero; machine.columns.len()],
             composites: vec![composite; machine.n_bodies()],
+            coupled: vec![nothing; machine.coupled.len()],
         }
     }
 
-    /// Recomputes M at the poses.
+    /// Recomputes M at the poses, rotors included.
     ///
     /// # Panics
     /// If an argument is of another machine.
@@ -158,32 +183,38 @@ impl<T: Lane> MassMatrix<T> {
     fn update_here(&mut self, machine: &Machine, inertias: &Inertias<T>, poses: &Poses<T>) {
         let n = machine.links.len();
         let links = &machine.links[..n];
+        let rotors = &inertias.rotors;
         let (bodies, inertias) = (&poses.bodies[..n], &inertias.bodies[..n]);
         let carried = &mut self.composites[..n];
-        let base = &mut self.base[..n - 1];
-        let columns = machine.entries();
+        let motions = &poses.motions[..machine.n_motions()];
+        let n_rows = machine.rows.len();
+        let (rows, base) = (&machine.rows[..n_rows], &mut self.base[..n_rows]);
+        let columns = &machine.column_motions[..];
         let entries = &mut self.joints[..columns.len()];
-        let mut end = columns.len();
+        let (mut row, mut n_coupled) = (n_rows, machine.coupled.len());
         for b in (1..n).rev() {
             let (link, pose) = (&links[b], &bodies[b]);
             let mut composite = Composite::of(link, &inertias[b], pose);
             if !link.is_leaf {
                 composite = composite.plus(&carried[b]);
             }
-            let Composite {
-                mass,
-                moment,
-                inertia,
-            } = composite;
-            // Momentum, and angular momentum about the trunk's origin, at unit rate of the joint.
-            let f = pose.swing * mass + pose.axis.cross(moment);
-            let l = inertia.times(pose.axis) + moment.cross(pose.swing);
-            base[b - 1] = [f.x, f.y, f.z, l.x, l.y, l.z];
-            let start = link.row();
-            let (columns, row) = (&columns[start..end], &mut entries[start..end]);
-            end = start;
-            for p in 0..columns.len() {
-                row[p] = bodies[columns[p]].power(f, l);
+            if link.n_rows == 1 {
+                row -= 1;
+                let own = composite.momentum(&motions[link.motion]);
+                base[row] = own.entries();
+                let (start, end) = (rows[row].start, rows[row].end);
+                own.along_all(motions, &columns[start..end], &mut entries[start..end]);
+            } else if link.is_coupled() {
+                n_coupled -= 1;
+                self.coupled[n_coupled] = composite.momentum(&motions[link.motion]);
+            } else {
+                for m in (link.motion..link.motion + link.n_rows).rev() {
+                    row -= 1;
+                    let own = composite.momentum(&motions[m]);
+                    base[row] = own.entries();
+                    let own_row = rows[row].clone();
+                    own.along_all(motions, &columns[own_row.clone()], &mut entries[own_row]);
+                }
             }
             carried[link.parent] = if link.is_last {
                 composite
@@ -205,18 +236,51 @@ impl<T: Lane> MassMatrix<T> {
             s.z, o, -s.x, I.xy, I.yy, //
             -s.y, s.x, o, I.xz, I.yz, I.zz,
         ];
+        for k in 0..machine.coupled.len() {
+            self.add_coupled(machine, poses, k);
+        }
+        for (&joint, &inertia) in machine.rotors.iter().zip(rotors) {
+            self.add_to_diagonal(machine, machine.joints[joint].velocity, inertia);
+        }
     }
 
-    /// Diagonal entry of the joint of body `b`.
+    /// Adds the products of a coupled joint's motion with all motions that move its carrier, and
+    /// with itself.
     #[inline(always)]
-    pub fn diagonal(&self, machine: &Machine, b: usize) -> T {
-        self.joints[machine.links[b].diagonal()]
+    fn add_coupled(&mut self, machine: &Machine, poses: &Poses<T>, number: usize) {
+        let (link, own) = (
+            &machine.links[machine.coupled[number]],
+            self.coupled[number],
+        );
+        let k = link.velocity;
+        let row = &machine.rows[k - BASE];
+        let at = row.len() - 1;
+        self.joints[row.end - 1] += own.along(&poses.motions[link.motion]);
+        for (entry, x) in self.base[k - BASE].iter_mut().zip(own.entries()) {
+            *entry += x;
+        }
+        for (p, mover) in machine.movers(link.parent).iter().enumerate() {
+            let shared = own.along(&poses.motions[mover.motion]);
+            match mover.velocity.cmp(&k) {
+                Ordering::Less => self.joints[row.start + p] += shared,
+                Ordering::Equal => self.joints[row.end - 1] += shared + shared,
+                Ordering::Greater => {
+                    self.joints[machine.rows[mover.velocity - BASE].start + at] += shared;
+                }
+            }
+        }
     }
 
-    /// Adds the implicit terms of a held joint to the diagonal entry of the joint of body `b`.
+    /// Diagonal entry of a joint's velocity.
     #[inline(always)]
-    pub fn add_to_diagonal(&mut self, machine: &Machine, b: usize, value: T) {
-        self.joints[machine.links[b].diagonal()] += value;
+    pub fn diagonal(&self, machine: &Machine, velocity: usize) -> T {
+        self.joints[machine.rows[velocity - BASE].end - 1]
+    }
+
+    /// Adds the implicit terms of a held joint to the diagonal entry of its velocity.
+    #[inline(always)]
+    pub fn add_to_diagonal(&mut self, machine: &Machine, velocity: usize, value: T) {
+        self.joints[machine.rows[velocity - BASE].end - 1] += value;
     }
 
     /// Lane `lane` as a full symmetric matrix (nv, nv).
@@ -233,12 +297,15 @@ impl<T: Lane> MassMatrix<T> {
                 set(i, j, self.block[i * (i + 1) / 2 + j]);
             }
         }
-        for b in 1..machine.n_bodies() {
-            let row = self.base[b - 1]
+        for (k, row) in machine.rows.iter().enumerate() {
+            for (j, x) in self.base[k].iter().enumerate() {
+                set(k + BASE, j, *x);
+            }
+            for (j, x) in machine.columns[row.clone()]
                 .iter()
-                .chain(&self.joints[machine.links[b].row()..]);
-            for (&j, &x) in machine.path(b).iter().zip(row) {
-                set(velocity(b), j, x);
+                .zip(&self.joints[row.clone()])
+            {
+                set(k + BASE, j + BASE, *x);
             }
         }
         dense
@@ -261,11 +328,26 @@ impl<T: Lane> MassMatrix<T> {
     }
 }
 
-impl<T: Lane> Pose<T> {
-    /// Generalized force on its joint of a force and its moment about the trunk's origin.
+impl<T: Lane> Momentum<T> {
+    /// Its products with the motions of the base.
     #[inline(always)]
-    pub fn power(&self, force: Vec3<T>, moment: Vec3<T>) -> T {
-        self.axis.dot(moment) + self.swing.dot(force)
+    fn entries(&self) -> [T; BASE] {
+        let (f, l) = (self.linear, self.angular);
+        [f.x, f.y, f.z, l.x, l.y, l.z]
+    }
+
+    /// Its products with motions, by their indices.
+    #[inline(always)]
+    fn along_all(&self, motions: &[Motion<T>], indices: &[usize], out: &mut [T]) {
+        for p in 0..indices.len() {
+            out[p] = self.along(&motions[indices[p]]);
+        }
+    }
+
+    /// Its product with a motion.
+    #[inline(always)]
+    fn along(&self, motion: &Motion<T>) -> T {
+        motion.power(self.linear, self.angular)
     }
 }
 
@@ -276,7 +358,7 @@ pub struct Factor<T: Lane> {
     base: Vec<[T; BASE]>,
     joints: Vec<T>,
     block_root: [T; BASE],
-    /// Of each joint.
+    /// Of each row.
     root: Vec<T>,
 }
 
@@ -287,18 +369,18 @@ impl<T: Lane> Factor<T> {
         let zero = T::splat(token, 0.0);
         Self {
             block: [zero; BLOCK],
-            base: vec![[zero; BASE]; machine.n_joints()],
-            joints: vec![zero; machine.entries().len()],
+            base: vec![[zero; BASE]; machine.rows.len()],
+            joints: vec![zero; machine.columns.len()],
             block_root: [zero; BASE],
-            root: vec![zero; machine.n_joints()],
+            root: vec![zero; machine.rows.len()],
         }
     }
 
     /// Turns the entries of M into those of its factor.
     #[inline(always)]
     fn factorise_here(&mut self, machine: &Machine) -> T::Mask {
-        let n = machine.n_joints();
-        let (links, columns) = (&machine.links[1..=n], machine.entries());
+        let n = machine.rows.len();
+        let (own_rows, columns) = (&machine.rows[..n], &machine.columns[..]);
         let (base_rows, roots) = (&mut self.base[..n], &mut self.root[..n]);
         let entries = &mut self.joints[..columns.len()];
         let mut block = self.block;
@@ -306,7 +388,7 @@ impl<T: Lane> Factor<T> {
         let mut is_positive = zero.lt(one);
         let mut end = columns.len();
         for j in (0..n).rev() {
-            let start = links[j].row();
+            let start = own_rows[j].start;
             let columns = &columns[start..end];
             let (above, own) = entries[..end].split_at_mut(start);
             let (base_above, base_row) = base_rows.split_at_mut(j);
@@ -320,9 +402,9 @@ impl<T: Lane> Factor<T> {
             roots[j] = inverse.sqrt();
             for p in (0..last).rev() {
                 let a = own[p] * inverse;
-                let ancestor = columns[p] - 1;
+                let ancestor = columns[p];
                 subtract(&mut base_above[ancestor], a, &base);
-                let row = &mut above[links[ancestor].row()..][..=p];
+                let row = &mut above[own_rows[ancestor].start..][..=p];
                 for i in 0..=p {
                     row[i] -= a * own[i];
                 }
@@ -346,8 +428,8 @@ impl<T: Lane> Factor<T> {
     /// `y ← D^(-1/2) L^(-T) y` (nv).
     #[inline(always)]
     pub fn half_solve(&self, machine: &Machine, y: &mut [T]) {
-        let n = machine.n_joints();
-        let (links, columns) = (&machine.links[1..=n], machine.entries());
+        let n = machine.rows.len();
+        let (own_rows, columns) = (&machine.rows[..n], &machine.columns[..]);
         let (rows, roots) = (&self.base[..n], &self.root[..n]);
         let entries = &self.joints[..columns.len()];
         let (base, joints) = y.split_at_mut(BASE);
@@ -355,13 +437,13 @@ impl<T: Lane> Factor<T> {
         let mut sum = [base[0], base[1], base[2], base[3], base[4], base[5]];
         let mut end = columns.len();
         for j in (0..n).rev() {
-            let start = links[j].row();
+            let start = own_rows[j].start;
             let (columns, entries) = (&columns[start..end], &entries[start..end]);
             end = start;
             let value = joints[j];
             subtract(&mut sum, value, &rows[j]);
             for p in 0..columns.len() - 1 {
-                joints[columns[p] - 1] -= entries[p] * value;
+                joints[columns[p]] -= entries[p] * value;
             }
             joints[j] = value * roots[j];
         }
@@ -378,8 +460,8 @@ impl<T: Lane> Factor<T> {
     /// vector.
     #[inline(always)]
     pub fn half_solve_back(&self, machine: &Machine, x: &mut [T]) {
-        let n = machine.n_joints();
-        let (links, columns) = (&machine.links[1..=n], machine.entries());
+        let n = machine.rows.len();
+        let (own_rows, columns) = (&machine.rows[..n], &machine.columns[..]);
         let (rows, roots) = (&self.base[..n], &self.root[..n]);
         let entries = &self.joints[..columns.len()];
         let (base, joints) = x.split_at_mut(BASE);
@@ -398,10 +480,10 @@ impl<T: Lane> Factor<T> {
             for i in 0..BASE {
                 value -= rows[j][i] * known[i];
             }
-            let (start, end) = (links[j].row(), links[j].diagonal());
+            let (start, end) = (own_rows[j].start, own_rows[j].end - 1);
             let (columns, entries) = (&columns[start..end], &entries[start..end]);
             for p in 0..columns.len() {
-                value -= entries[p] * joints[columns[p] - 1];
+                value -= entries[p] * joints[columns[p]];
             }
             joints[j] = value;
         }
@@ -416,13 +498,13 @@ impl<T: Lane> Factor<T> {
         let columns = machine.row(b);
         let joints = &mut joints[..columns.len()];
         for p in (0..columns.len()).rev() {
-            let j = columns[p] - 1;
+            let j = columns[p];
             let value = joints[p];
             let row = &self.base[j];
             for i in 0..BASE {
                 subtract_columns(&mut sum[i], row[i], &value);
             }
-            let entries = &self.joints[machine.links[j + 1].row()..][..p];
+            let entries = &self.joints[machine.rows[j].start..][..p];
             for i in 0..p {
                 subtract_columns(&mut joints[i], entries[i], &value);
             }

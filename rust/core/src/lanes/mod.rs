@@ -1,15 +1,16 @@
 //! The ordinary step of a rover, one or several to a register.
 //!
-//! Most steps of a wheeled rover are alike: a tree of revolute joints on a free base, wheels that
-//! roll and slip, motors and held joints. These sources take such a step over a scalar
-//! ([`crate::scalar`]) that is one rover or four or eight. A step that is not ordinary is declined,
+//! Most steps of a wheeled rover are alike: a tree of joints on a free base, wheels that roll and
+//! slip, motors, springs and stops. These sources take such a step over a scalar
+//! ([`crate::scalar`]) that is one rover or four or eight. They branch on the kind of joint body by
+//! body, since the rovers of a block share their tree. A step that is not ordinary is declined,
 //! rover by rover, before anything has changed; [`crate::integrator`] then takes it.
 //!
 //! - [`admission`]: which rovers have ordinary steps; [`machine`]: what the rovers share;
 //!   [`inertias`]: what they need not; [`place`]: configurations;
 //! - [`poses`], [`mass_matrix`], [`bias`], [`energy`]: dynamics of the tree;
-//! - `parts`, [`ground`], `footing`, [`forecast`], [`contacts`]: what touches what; [`rows`]:
-//!   Jacobian and Delassus operator; [`yielding`]: wheels that yield;
+//! - `parts`, [`ground`], `footing`, [`forecast`], [`contacts`], `stops`: what touches what;
+//!   [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield;
 //! - [`problem`], [`modes`], [`equations`], `pivoting`, `visits`, `bench`, [`queue`]: the
 //!   friction-contact problems;
 //! - [`step`]: the step.
@@ -38,5 +39,6 @@ pub mod problem;
 pub mod queue;
 pub mod rows;
 pub mod step;
+mod stops;
 mod visits;
 pub mod yielding;

@@ -5,7 +5,7 @@
 
 use nalgebra::Vector3;
 
-use super::machine::{Axis, Machine, velocity};
+use super::machine::{Axis, Link, LinkJoint, Machine, Mover};
 use super::poses::{Pose, Poses, times_columns};
 use crate::scalar::{Lane, Mat3, Vec3};
 
@@ -36,8 +36,8 @@ pub(super) struct Wheel {
 /// Where a wheel's axle comes from.
 #[derive(Clone, Copy, Debug)]
 enum Axle {
-    /// Along the joint's axis, or against it.
-    Joint(bool),
+    /// Along an axis of the body's frame, or against it.
+    Frame(usize, bool),
     /// A direction in the body's frame.
     Fixed([f64; 3]),
 }
@@ -55,12 +55,14 @@ pub(super) struct Solid {
     pub carrier: usize,
 }
 
-/// A body whose twist is needed.
+/// A body whose twist is needed, or what lies between two velocities of a spherical joint.
 #[derive(Clone, Copy, Debug)]
 struct Carrier {
     body: usize,
-    /// Twist of the body that carries it.
+    /// Twist of what carries it.
     parent: usize,
+    /// The velocity that moves it beside.
+    mover: Mover,
 }
 
 /// Velocity of a body: angular, and of its material point at the trunk's origin.
@@ -73,17 +75,21 @@ pub(super) struct Twist<T> {
 impl Parts {
     /// The parts of a machine.
     pub(super) fn of(machine: &Machine) -> Self {
-        let mut carriers = vec![Carrier { body: 0, parent: 0 }];
+        let trunk = Mover {
+            velocity: 0,
+            motion: 0,
+        };
+        let mut carriers = vec![Carrier {
+            body: 0,
+            parent: 0,
+            mover: trunk, // not read
+        }];
         let some = |x: [f64; 3]| x.iter().any(|x| x.abs() > 0.0).then_some(x);
         let wheels = (machine.wheels.iter())
             .map(|wheel| {
                 let link = &machine.links[wheel.body];
-                let axle = if wheel.body > 0 {
-                    axle_of(&link.axis, wheel.axle)
-                } else {
-                    Axle::Fixed(wheel.axle)
-                };
-                let spins = link.is_spinner && matches!(axle, Axle::Joint(_));
+                let axle = axle_of(wheel.axle);
+                let spins = link.is_spinner && link.coupling.is_none() && link.turns_about(axle);
                 let mover = if spins { link.parent } else { wheel.body };
                 Wheel {
                     body: wheel.body,
@@ -92,7 +98,7 @@ impl Parts {
                     spoke: wheel.spoke,
                     radius: wheel.radius,
                     carrier: carrier_of(machine, mover, &mut carriers),
-                    spin: spins.then(|| velocity(wheel.body)),
+                    spin: spins.then_some(link.velocity),
                 }
             })
             .collect();
@@ -132,13 +138,27 @@ impl Parts {
             angular: Vec3::new(v[3], v[4], v[5]),
         };
         for i in 1..n {
-            let Carrier { body, parent } = self.carriers[i];
-            let (pose, rate, before) = (&poses.bodies[body], v[velocity(body)], twists[parent]);
+            let Carrier { parent, mover, .. } = self.carriers[i];
+            let (motion, rate) = (&poses.motions[mover.motion], v[mover.velocity]);
+            let before = twists[parent];
             twists[i] = Twist {
-                angular: before.angular + pose.axis * rate,
-                linear: before.linear + pose.swing * rate,
+                angular: before.angular + motion.axis * rate,
+                linear: before.linear + motion.swing * rate,
             };
         }
+    }
+}
+
+impl Link {
+    /// Whether its joint turns it about this axle.
+    fn turns_about(&self, axle: Axle) -> bool {
+        let k = match self.axis {
+            Axis::X => 0,
+            Axis::Y => 1,
+            Axis::Z => 2,
+            Axis::General(_) => return false,
+        };
+        self.joint == LinkJoint::Turn && matches!(axle, Axle::Frame(i, _) if i == k)
     }
 }
 
@@ -161,12 +181,13 @@ impl Wheel {
     #[inline(always)]
     pub(super) fn axle<T: Lane>(&self, pose: &Pose<T>) -> Vec3<T> {
         match self.axle {
-            Axle::Joint(is_reversed) => {
-                if is_reversed {
-                    -pose.axis
-                } else {
-                    pose.axis
-                }
+            Axle::Frame(k, is_reversed) => {
+                let axis = match k {
+                    0 => pose.R.x,
+                    1 => pose.R.y,
+                    _ => pose.R.z,
+                };
+                if is_reversed { -axis } else { axis }
             }
             Axle::Fixed(s) => pose.R.times_shared(s),
         }
@@ -215,34 +236,34 @@ fn place<T: Lane>(pose: &Pose<T>, x: Option<&[f64; 3]>) -> Vec3<T> {
     }
 }
 
-/// The axle of a wheel whose body has a joint with this axis.
-fn axle_of(axis: &Axis, axle: [f64; 3]) -> Axle {
-    let axis = match axis {
-        Axis::X => [1.0, 0.0, 0.0],
-        Axis::Y => [0.0, 1.0, 0.0],
-        Axis::Z => [0.0, 0.0, 1.0],
-        Axis::General(u) => *u,
-    };
-    let is_axis = |sign: f64| {
-        axle.iter()
-            .zip(axis)
-            .all(|(a, b)| (a - sign * b).abs() <= 0.0)
-    };
-    if is_axis(1.0) {
-        Axle::Joint(false)
-    } else if is_axis(-1.0) {
-        Axle::Joint(true)
-    } else {
-        Axle::Fixed(axle)
-    }
+/// A unit axle in the body's frame.
+fn axle_of(axle: [f64; 3]) -> Axle {
+    let along = (0..3).find(|&k| (0..3).all(|i| i == k || axle[i].abs() <= 0.0));
+    along.map_or(Axle::Fixed(axle), |k| Axle::Frame(k, axle[k] < 0.0))
 }
 
 /// Index of a body among the carriers; adds it with all that carry it.
 fn carrier_of(machine: &Machine, body: usize, carriers: &mut Vec<Carrier>) -> usize {
-    if let Some(i) = carriers.iter().position(|carrier| carrier.body == body) {
+    if let Some(i) = carriers.iter().rposition(|carrier| carrier.body == body) {
         return i;
     }
-    let parent = carrier_of(machine, machine.links[body].parent, carriers);
-    carriers.push(Carrier { body, parent });
-    carriers.len() - 1
+    let link = &machine.links[body];
+    let mut parent = carrier_of(machine, link.parent, carriers);
+    let n_velocities = match link.joint {
+        LinkJoint::Ball(_) => 3,
+        _ => 1,
+    };
+    for k in 0..n_velocities {
+        let mover = Mover {
+            velocity: link.velocity + k,
+            motion: link.motion + k,
+        };
+        carriers.push(Carrier {
+            body,
+            parent,
+            mover,
+        });
+        parent = carriers.len() - 1;
+    }
+    parent
 }

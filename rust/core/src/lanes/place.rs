@@ -2,6 +2,7 @@
 
 use super::machine::Machine;
 use crate::multibody::Configuration;
+use crate::multibody::model::BASE;
 use crate::scalar::elementary::sin_cos;
 use crate::scalar::{Lane, LaneMask, Vec3};
 use nalgebra::Quaternion;
@@ -13,8 +14,11 @@ pub struct Place<T: Lane> {
     pub position: Vec3<T>,
     /// Attitude of the trunk: a unit quaternion x, y, z, w.
     pub attitude: [T; 4],
-    /// Angles of the joints, rad (n_joints).
+    /// Coordinates of the revolute (rad) and prismatic (m) joints (n_joints).
     pub joints: Vec<T>,
+    /// Rotations of the spherical joints, from the body's frame to the joint's: unit quaternions
+    /// x, y, z, w.
+    pub balls: Vec<[T; 4]>,
 }
 
 impl<T: Lane> Place<T> {
@@ -26,6 +30,7 @@ impl<T: Lane> Place<T> {
             position: Vec3::new(zero, zero, zero),
             attitude: [zero, zero, zero, T::splat(token, 1.0)],
             joints: vec![zero; machine.n_joints()],
+            balls: vec![[zero, zero, zero, T::splat(token, 1.0)]; machine.balls.len()],
         }
     }
 
@@ -47,6 +52,8 @@ impl<T: Lane> Place<T> {
                 .iter()
                 .zip(&q.joints)
                 .all(|(own, x)| is_same(own, x))
+            && (self.balls.iter().zip(&q.rotations))
+                .all(|(own, q)| own.iter().zip(&q.coords).all(|(own, x)| is_same(own, x)))
     }
 
     /// Replaces the configuration of a lane.
@@ -58,44 +65,66 @@ impl<T: Lane> Place<T> {
         for (own, angle) in self.joints.iter_mut().zip(&q.joints) {
             own.set(lane, *angle);
         }
+        for (own, q) in self.balls.iter_mut().zip(&q.rotations) {
+            for (own, x) in own.iter_mut().zip(&q.coords) {
+                own.set(lane, *x);
+            }
+        }
     }
 
     /// Writes the configuration of a lane.
     pub fn to_lane(&self, lane: usize, q: &mut Configuration) {
         q.position = self.position.get(lane).into();
-        let [x, y, z, w] = self.attitude.map(|x| x.get(lane));
-        q.attitude = nalgebra::Unit::new_unchecked(Quaternion::new(w, x, y, z));
+        let quaternion = |own: &[T; 4]| {
+            let [x, y, z, w] = own.map(|x| x.get(lane));
+            nalgebra::Unit::new_unchecked(Quaternion::new(w, x, y, z))
+        };
+        q.attitude = quaternion(&self.attitude);
         for (angle, own) in q.joints.iter_mut().zip(&self.joints) {
             *angle = own.get(lane);
         }
+        for (q, own) in q.rotations.iter_mut().zip(&self.balls) {
+            *q = quaternion(own);
+        }
     }
 
-    /// `self = from ⊕ h v`: moves with the velocity `v` (nv) for `h` seconds, the trunk along the
-    /// exponential map.
+    /// `self = from ⊕ h v`: moves with the velocity `v` (nv) for `h` seconds, along the exponential
+    /// maps of the base and of the spherical joints.
     ///
     /// # Panics
-    /// If sizes differ.
+    /// If an argument is of another machine.
     #[inline(always)]
-    pub fn set_moved(&mut self, from: &Self, v: &[T], h: f64) {
+    pub fn set_moved(&mut self, machine: &Machine, from: &Self, v: &[T], h: f64) {
         let n = self.joints.len();
-        let (base, rates) = v.split_at(6);
-        assert!(from.joints.len() == n && rates.len() == n);
+        let (base, rates) = v.split_at(BASE);
+        assert!(from.joints.len() == n && machine.joints.len() == n && rates.len() >= n);
         let h = from.position.x.like(h);
-        for j in 0..n {
-            self.joints[j] = from.joints[j] + h * rates[j];
+        if rates.len() == n {
+            // The joints' velocities are in the order of their coordinates.
+            for j in 0..n {
+                self.joints[j] = from.joints[j] + h * rates[j];
+            }
+        } else {
+            for j in 0..n {
+                self.joints[j] = from.joints[j] + h * v[machine.joints[j].velocity];
+            }
         }
         self.position = from.position + Vec3::new(base[0], base[1], base[2]) * h;
         let turn = exp_rotation(Vec3::new(base[3], base[4], base[5]) * h);
         self.attitude = product(&turn, &from.attitude);
+        for ((own, before), &k) in self.balls.iter_mut().zip(&from.balls).zip(&machine.balls) {
+            let turn = exp_rotation(Vec3::new(v[k], v[k + 1], v[k + 2]) * h);
+            *own = product(&turn, before);
+        }
     }
 
-    /// Renormalises the attitude, which rounding has left within 1e-7 of unit length.
+    /// Renormalises the quaternions, which rounding has left within 1e-7 of unit length.
     #[inline(always)]
     pub fn normalise(&mut self) {
-        let [x, y, z, w] = self.attitude;
-        let square = x * x + y * y + z * z + w * w;
-        let factor = x.like(0.5) * (x.like(3.0) - square);
-        self.attitude = [x * factor, y * factor, z * factor, w * factor];
+        self.attitude = normalised(&self.attitude);
+        for own in &mut self.balls {
+            *own = normalised(own);
+        }
     }
 
     /// Takes another configuration in the lanes of a mask.
@@ -107,6 +136,11 @@ impl<T: Lane> Place<T> {
         }
         for (own, other) in self.joints.iter_mut().zip(&other.joints) {
             *own = T::select(lanes, *other, *own);
+        }
+        for (own, other) in self.balls.iter_mut().zip(&other.balls) {
+            for (own, other) in own.iter_mut().zip(other) {
+                *own = T::select(lanes, *other, *own);
+            }
         }
     }
 
@@ -120,6 +154,9 @@ impl<T: Lane> Place<T> {
         }
         for x in &self.joints {
             all = all & x.is_finite();
+        }
+        for [x, y, z, w] in &self.balls {
+            all = all & x.is_finite() & y.is_finite() & z.is_finite() & w.is_finite();
         }
         all
     }
@@ -148,6 +185,15 @@ fn exp_rotation<T: Lane>(phi: Vec3<T>) -> [T; 4] {
         s = T::select(is_small, s, number(0.5) * sin / half);
     }
     [s * phi.x, s * phi.y, s * phi.z, w]
+}
+
+/// A quaternion of nearly unit length, renormalised.
+#[inline(always)]
+fn normalised<T: Lane>(q: &[T; 4]) -> [T; 4] {
+    let [x, y, z, w] = *q;
+    let square = x * x + y * y + z * z + w * w;
+    let factor = x.like(0.5) * (x.like(3.0) - square);
+    [x * factor, y * factor, z * factor, w * factor]
 }
 
 /// Product of two quaternions x, y, z, w.

@@ -3,11 +3,12 @@
 //! As in [`crate::contact::delassus`]: with `M̂ = Lᵀ D L` and `Z = D^(-1/2) L^(-T) H` the operator
 //! is `W = Zᵀ Z`. A column of Z is nonzero along the path of its wheel, and a block of W is a
 //! product over the part of the path that two wheels share. Rows belong to slots
-//! ([`super::contacts`]). A slot that is active in some lanes only never changes what the others
-//! accumulate.
+//! ([`super::contacts`]). A stop has one row, ±1 at its joint's velocity; the tangential diagonal
+//! of W is that of the normal, as in [`crate::contact::limit`]. A slot that is active in some lanes
+//! only never changes what the others accumulate.
 
 use super::contacts::Contacts;
-use super::machine::{Machine, velocity};
+use super::machine::{Machine, Mover};
 use super::mass_matrix::Factor;
 use super::poses::Poses;
 use super::problem::{ContactProblem, Triple, block};
@@ -27,9 +28,12 @@ pub enum Answer {
 #[derive(Clone, Debug)]
 pub struct Rows<T: Lane> {
     token: T::Token,
-    /// Bodies whose joints move a wheel, from the trunk outwards.
-    movers: Vec<Vec<usize>>,
-    /// Velocities that two wheels share: `common[a * n_wheels + b]`.
+    /// Bodies of the parts, wheels and then joints with stops, and how many are wheels.
+    bodies: Vec<usize>,
+    n_wheels: usize,
+    /// Velocities of the joints that move each part, from the trunk outwards.
+    movers: Vec<Vec<Mover>>,
+    /// Velocities that two parts share: `common[a * n_parts + b]`.
     common: Vec<usize>,
     /// Length of the longest path.
     stride: usize,
@@ -45,30 +49,27 @@ impl<T: Lane> Rows<T> {
     /// Room for a machine with `n_slots` slots.
     #[must_use]
     pub fn new(token: T::Token, machine: &Machine, n_slots: usize) -> Self {
-        let paths: Vec<&[usize]> = (machine.wheels.iter())
-            .map(|wheel| machine.path(wheel.body))
-            .collect();
+        let wheels = machine.wheels.iter().map(|wheel| wheel.body);
+        let stops = machine
+            .stops
+            .iter()
+            .map(|stop| machine.joints[stop.joint].body);
+        let bodies: Vec<usize> = wheels.chain(stops).collect();
+        let paths: Vec<&[usize]> = bodies.iter().map(|&body| machine.path(body)).collect();
         let mut common = Vec::with_capacity(paths.len() * paths.len());
         for a in &paths {
             for b in &paths {
                 common.push(a.iter().zip(*b).take_while(|(i, j)| i == j).count());
             }
         }
-        let movers = (machine.wheels.iter())
-            .map(|wheel| {
-                let own = (wheel.body > 0).then_some(wheel.body);
-                machine
-                    .ancestors(wheel.body)
-                    .iter()
-                    .copied()
-                    .chain(own)
-                    .collect()
-            })
-            .collect();
+        let movers = bodies.iter().map(|&body| machine.movers(body).to_vec());
+        let movers = movers.collect();
         let stride = paths.iter().map(|path| path.len()).max().unwrap_or(0);
         let zero = T::splat(token, 0.0);
         Self {
             token,
+            n_wheels: machine.wheels.len(),
+            bodies,
             movers,
             common,
             stride,
@@ -96,10 +97,18 @@ impl<T: Lane> Rows<T> {
             self.token,
             #[inline(always)]
             || {
-                for &slot in contacts.used() {
+                for &slot in contacts.used_by_wheels() {
                     self.build(machine, end, factor, contacts, v, slot);
                 }
+                for &slot in contacts.used_by_stops() {
+                    self.build_stop(machine, factor, v, slot);
+                }
                 self.multiply(contacts.used());
+                let n_wheels = contacts.used_by_wheels().len();
+                for i in n_wheels..contacts.used().len() {
+                    let own = &mut self.W[block(i, i)];
+                    (own[4], own[8]) = (own[0], own[0]);
+                }
             },
         );
     }
@@ -115,11 +124,11 @@ impl<T: Lane> Rows<T> {
         v: &[T],
         slot: usize,
     ) {
-        let wheel = Contacts::<T>::wheel(slot);
-        let movers = &self.movers[wheel][..];
+        let part = Contacts::<T>::part(slot);
+        let movers = &self.movers[part][..];
         let rows = &mut self.Z[slot * self.stride..][..BASE + movers.len()];
-        let (base, joints) = rows.split_at_mut(BASE);
         let own = contacts.slot(slot);
+        let (base, joints) = rows.split_at_mut(BASE);
         let (x, n, t, b) = (own.point, own.n, own.t, own.b);
         let (xn, xt, xb) = (x.cross(n), x.cross(t), x.cross(b));
         base[0] = [n.x, t.x, b.x];
@@ -132,26 +141,48 @@ impl<T: Lane> Rows<T> {
         for k in 1..BASE {
             add_scaled(&mut u, &base[k], v[k]);
         }
-        for (row, &body) in joints.iter_mut().zip(movers) {
-            let pose = &end.bodies[body];
-            let moved = pose.axis.cross(x) + pose.swing;
+        for (row, mover) in joints.iter_mut().zip(movers) {
+            let moved = end.motions[mover.motion].velocity_at(x);
             *row = [moved.dot(n), moved.dot(t), moved.dot(b)];
-            add_scaled(&mut u, row, v[velocity(body)]);
+            add_scaled(&mut u, row, v[mover.velocity]);
         }
         self.u_before[slot] = u;
-        factor.half_solve_path(machine, machine.wheels[wheel].body, rows);
+        factor.half_solve_path(machine, self.bodies[part], rows);
+    }
+
+    /// Z and `Hᵀ v` of a stop's slot.
+    #[inline(always)]
+    fn build_stop(&mut self, machine: &Machine, factor: &Factor<T>, v: &[T], slot: usize) {
+        let part = Contacts::<T>::part(slot);
+        let (Some(sign), Some(mover)) = (self.sign(slot), self.movers[part].last()) else {
+            return;
+        };
+        let zero = T::splat(self.token, 0.0);
+        let sign = zero.like(sign);
+        let rows = &mut self.Z[slot * self.stride..][..BASE + self.movers[part].len()];
+        rows.fill([zero; 3]);
+        let last = rows.len() - 1;
+        rows[last][0] = sign;
+        self.u_before[slot] = [sign * v[mover.velocity], zero, zero];
+        factor.half_solve_path(machine, self.bodies[part], rows);
+    }
+
+    /// Gap rate per unit of the joint's velocity, if the slot is a stop's.
+    #[inline(always)]
+    fn sign(&self, slot: usize) -> Option<f64> {
+        (Contacts::<T>::part(slot) >= self.n_wheels).then(|| Contacts::<T>::side(slot).sign())
     }
 
     /// W from Z.
     #[inline(always)]
     fn multiply(&mut self, used: &[usize]) {
-        let n_wheels = self.movers.len();
+        let n_parts = self.movers.len();
         let mut at = 0;
         for (i, &row) in used.iter().enumerate() {
-            let a = Contacts::<T>::wheel(row);
+            let a = Contacts::<T>::part(row);
             for &column in &used[..i] {
-                let b = Contacts::<T>::wheel(column);
-                let shared = self.common[a * n_wheels + b];
+                let b = Contacts::<T>::part(column);
+                let shared = self.common[a * n_parts + b];
                 let x = &self.Z[row * self.stride..][..shared];
                 let y = &self.Z[column * self.stride..][..shared];
                 self.W[at] = product(x, y);
@@ -181,15 +212,15 @@ impl<T: Lane> Rows<T> {
     #[inline(always)]
     pub fn local(&self, contacts: &Contacts<T>, y: &[T], q: &mut [Triple<T>]) {
         for &slot in contacts.used() {
-            let movers = &self.movers[Contacts::<T>::wheel(slot)][..];
+            let movers = &self.movers[Contacts::<T>::part(slot)][..];
             let rows = &self.Z[slot * self.stride..][..BASE + movers.len()];
             let (base, joints) = rows.split_at(BASE);
             let mut sum = scaled(&base[0], y[0]);
             for k in 1..BASE {
                 add_scaled(&mut sum, &base[k], y[k]);
             }
-            for (row, &body) in joints.iter().zip(movers) {
-                add_scaled(&mut sum, row, y[velocity(body)]);
+            for (row, mover) in joints.iter().zip(movers) {
+                add_scaled(&mut sum, row, y[mover.velocity]);
             }
             let [n, t, b] = self.u_before[slot];
             q[slot] = [sum[0] + n, sum[1] + t, sum[2] + b];
@@ -210,7 +241,7 @@ impl<T: Lane> Rows<T> {
         y: &mut [T],
     ) {
         for &slot in contacts.used() {
-            let movers = &self.movers[Contacts::<T>::wheel(slot)][..];
+            let movers = &self.movers[Contacts::<T>::part(slot)][..];
             let rows = &self.Z[slot * self.stride..][..BASE + movers.len()];
             let (base, joints) = rows.split_at(BASE);
             let here = contacts.slot(slot).active & lanes;
@@ -218,8 +249,8 @@ impl<T: Lane> Rows<T> {
             for (y, row) in y[..BASE].iter_mut().zip(base) {
                 add(here, y, along(row, p));
             }
-            for (row, &body) in joints.iter().zip(movers) {
-                add(here, &mut y[velocity(body)], along(row, p));
+            for (row, mover) in joints.iter().zip(movers) {
+                add(here, &mut y[mover.velocity], along(row, p));
             }
         }
     }
@@ -242,7 +273,7 @@ impl<T: Lane> Rows<T> {
         out.fill(zero);
         let mut total = Vec3::new(zero, zero, zero);
         let mut couple = total;
-        for &slot in contacts.used() {
+        for &slot in contacts.used_by_wheels() {
             let own = contacts.slot(slot);
             let here = own.active & lanes;
             let [p_n, p_t, p_b] = p[slot];
@@ -250,9 +281,16 @@ impl<T: Lane> Rows<T> {
             let moment = own.point.cross(force);
             add_vector(here, &mut total, force);
             add_vector(here, &mut couple, moment);
-            for &body in &self.movers[Contacts::<T>::wheel(slot)] {
-                let power = end.bodies[body].power(force, moment);
-                add(here, &mut out[velocity(body)], power);
+            for mover in &self.movers[Contacts::<T>::part(slot)] {
+                let power = end.motions[mover.motion].power(force, moment);
+                add(here, &mut out[mover.velocity], power);
+            }
+        }
+        for &slot in contacts.used_by_stops() {
+            let here = contacts.slot(slot).active & lanes;
+            let mover = self.movers[Contacts::<T>::part(slot)].last();
+            if let (Some(sign), Some(mover)) = (self.sign(slot), mover) {
+                add(here, &mut out[mover.velocity], zero.like(sign) * p[slot][0]);
             }
         }
         out[..BASE].copy_from_slice(&[total.x, total.y, total.z, couple.x, couple.y, couple.z]);
@@ -281,6 +319,14 @@ impl<T: Lane> Rows<T> {
                 for (lane, problem) in problems.iter_mut().enumerate() {
                     problem.n_contacts = contacts.list(lane).n;
                     problem.mu[..problem.n_contacts].fill(friction[lane]);
+                }
+                for &slot in contacts.used_by_stops() {
+                    let places = contacts.places(slot);
+                    each::<T>(
+                        contacts.slot(slot).active,
+                        #[inline(always)]
+                        |lane| problems[lane].mu[usize::from(places[lane])] = 0.0,
+                    );
                 }
                 let mut at = 0;
                 for (i, &row) in contacts.used().iter().enumerate() {

@@ -6,7 +6,8 @@
 //!
 //! 1. [`Block::prepare`] — poses, contacts, forces, the friction-contact problem;
 //! 2. [`Block::conclude`] — the new velocity and configuration, energy audit, and where contacts
-//!    penetrate, the problem of the position projection;
+//!    penetrate, the problem of the position projection; where a motor has left the branch of its
+//!    line, the friction-contact problem anew;
 //! 3. [`Block::finish`] — the projected configuration, and what the next step remembers.
 //!
 //! Whatever is not ordinary declines the lane: its state stays as it was.
@@ -22,7 +23,7 @@ use super::energy::{Energy, EnergyScratch, energy};
 use super::forecast::Forecast;
 use super::ground::Ground;
 use super::inertias::Inertias;
-use super::machine::{Machine, velocity};
+use super::machine::Machine;
 use super::mass_matrix::{Factor, MassMatrix};
 use super::passenger::Passenger;
 use super::place::Place;
@@ -32,6 +33,7 @@ use super::rows::{Answer, Rows};
 use super::yielding::Yields;
 use crate::contact::Contact;
 use crate::integrator::energy_audit::{COARSE, GAIN, RAISE, ROUNDINGS};
+use crate::integrator::moreau_jean::MOST_REVISIONS;
 use crate::integrator::position_projection::FARTHEST;
 use crate::integrator::step_contacts::STEADY;
 use crate::integrator::{Phase, Probe, Stabilisation, StepOptions, StepReport, WarmStart};
@@ -52,14 +54,24 @@ pub enum Decline {
     MassMatrix,
     /// The contact problem was not solved.
     Solver,
-    /// A motor changed its branch.
-    Motor,
     /// The energy audit asks for a safer step.
     Energy,
     /// The position projection was not solved, or moves too far.
     Projection,
     /// Something is not finite.
     NotFinite,
+}
+
+/// What follows [`Block::conclude`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Next {
+    /// The problems of the lanes that are [retaken](Block::is_retaken) are solved anew, and the
+    /// step is concluded again.
+    Retake,
+    /// Positions must be projected: [`Block::set_gaps`], then [`Block::finish`].
+    Project,
+    /// [`Block::finish`].
+    Finish,
 }
 
 /// Whether two rovers may share a block: gravity and friction may differ.
@@ -151,6 +163,9 @@ pub struct Block<T: Lane> {
     going: T::Mask,
     reasons: [Option<Decline>; MAX_LANES],
     reports: [StepReport; MAX_LANES],
+    /// Lanes whose step is taken again, and how often each lane's was.
+    retaken: T::Mask,
+    n_retaken: [usize; MAX_LANES],
 }
 
 impl<T: Lane> Block<T> {
@@ -219,6 +234,8 @@ impl<T: Lane> Block<T> {
             going: nobody,
             reasons: [None; MAX_LANES],
             reports: [StepReport::default(); MAX_LANES],
+            retaken: nobody,
+            n_retaken: [0; MAX_LANES],
             machine: Arc::clone(machine),
         }
     }
@@ -235,7 +252,14 @@ impl<T: Lane> Block<T> {
         self.options.clone_from(rover.options);
         self.friction.set(lane, rover.options.friction_coefficient);
         self.ground.set_lane(lane, rover.terrain);
-        self.drives.set_lane(lane, rover.command, rover.drive_work);
+        let joints = rover.model.joints();
+        self.drives.set_lane(
+            lane,
+            &self.machine,
+            rover.command,
+            |joint| joints[joint].passive,
+            rover.drive_work,
+        );
         self.time.set(lane, *rover.time);
         let memory = &mut self.memories[lane].impulses;
         memory.clone_from(&rover.warm_start.impulses);
@@ -345,6 +369,12 @@ impl<T: Lane> Block<T> {
         self.going.get(lane)
     }
 
+    /// Whether a lane's problem must be solved anew, see [`Next::Retake`].
+    #[must_use]
+    pub fn is_retaken(&self, lane: usize) -> bool {
+        (self.retaken & self.going).get(lane)
+    }
+
     /// Report of a lane's last step.
     #[must_use]
     pub fn report(&self, lane: usize) -> &StepReport {
@@ -400,6 +430,7 @@ impl<T: Lane> Block<T> {
         let token = self.token;
         self.going = self.occupied;
         self.reasons = [None; MAX_LANES];
+        self.n_retaken = [0; MAX_LANES];
         T::vectorize(
             token,
             #[inline(always)]
@@ -412,12 +443,19 @@ impl<T: Lane> Block<T> {
         probe.end(Phase::Kinematics);
         self.detect(problems);
         probe.end(Phase::Detection);
+        self.set_up(problems, true, probe);
+    }
+
+    /// The friction-contact problems of the contacts found, from the mass matrix on; `is_first`:
+    /// unless the step is taken again.
+    fn set_up(&mut self, problems: &mut [ContactProblem], is_first: bool, probe: &mut dyn Probe) {
+        let token = self.token;
         self.mass_matrix
             .update(&self.machine, &self.inertias, &self.poses_middle);
         T::vectorize(
             token,
             #[inline(always)]
-            || self.add_implicit(),
+            || self.add_implicit(is_first),
         );
         probe.end(Phase::MassMatrix);
         let is_definite = self.mass_matrix.factorise(&self.machine, &mut self.factor);
@@ -427,17 +465,20 @@ impl<T: Lane> Block<T> {
         self.rows
             .assemble(machine, end, &self.factor, &self.contacts, &self.v);
         if !self.yields.is_empty() {
-            self.soften(problems);
+            if is_first {
+                self.find_laws(problems);
+            }
+            self.rows.soften(&self.contacts, &self.yields.diagonal);
         }
         probe.end(Phase::Delassus);
-        self.load(problems);
+        self.load(is_first.then_some(&*problems));
         probe.end(Phase::Bias);
         self.rows
             .to_problems(&self.contacts, &self.u, self.friction, problems);
     }
 
-    /// The laws of contacts that yield, and their part in W.
-    fn soften(&mut self, problems: &[ContactProblem]) {
+    /// The laws of contacts that yield.
+    fn find_laws(&mut self, problems: &[ContactProblem]) {
         let (memories, h) = (&self.memories, self.options.time_step);
         let weight = self.inertias.mass * self.gravity.norm();
         self.yields.update(
@@ -451,7 +492,6 @@ impl<T: Lane> Block<T> {
                 is_unknown.then(|| weight.get(lane) * h)
             },
         );
-        self.rows.soften(&self.contacts, &self.yields.diagonal);
     }
 
     /// Configurations at the midpoint and at the predicted end.
@@ -464,9 +504,10 @@ impl<T: Lane> Block<T> {
             | self.number(MOST_JOINT_TURN).lt(step * (base + joints))
             | self.number(MOST_SPIN).lt(step * spin);
         self.decline(Decline::Turning, is_fast);
+        let machine = &*self.machine;
         self.middle
-            .set_moved(&self.start, &self.v, (1.0 - theta) * h);
-        self.end.set_moved(&self.start, &self.v, h);
+            .set_moved(machine, &self.start, &self.v, (1.0 - theta) * h);
+        self.end.set_moved(machine, &self.start, &self.v, h);
     }
 
     fn detect(&mut self, problems: &mut [ContactProblem]) {
@@ -477,6 +518,14 @@ impl<T: Lane> Block<T> {
             .contacts
             .detect(ground, middle, end, &self.v, &forecast);
         self.decline(Decline::Contact, declined);
+        if !self.machine.stops.is_empty() {
+            let (machine, places) = (&*self.machine, (&self.middle, &self.end));
+            let end = &self.poses_end;
+            let too_many = self
+                .contacts
+                .detect_stops(machine, places, end, &self.v, &forecast);
+            self.decline(Decline::Contact, too_many);
+        }
         let mut is_same = 0;
         for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
             let is_own = self
@@ -488,17 +537,20 @@ impl<T: Lane> Block<T> {
         self.persists = self.is_same & self.has_persistent;
     }
 
-    /// The implicit terms of motors and held joints.
+    /// The implicit terms of motors, held joints, springs and dampers; `is_first`: their branches
+    /// and weights, too.
     #[inline(always)]
-    fn add_implicit(&mut self) {
+    fn add_implicit(&mut self, is_first: bool) {
         let machine = &*self.machine;
         let (h, theta) = self.time_step();
         let mass_matrix = &mut self.mass_matrix;
-        self.drives.choose(machine, (h, theta), &self.v, |b| {
-            mass_matrix.diagonal(machine, b)
-        });
-        self.drives.add_implicit(machine, (h, theta), |b, a| {
-            mass_matrix.add_to_diagonal(machine, b, a);
+        if is_first {
+            self.drives.choose(machine, (h, theta), &self.v, |k| {
+                mass_matrix.diagonal(machine, k)
+            });
+        }
+        self.drives.add_implicit(machine, (h, theta), |k, a| {
+            mass_matrix.add_to_diagonal(machine, k, a);
         });
     }
 
@@ -514,7 +566,9 @@ impl<T: Lane> Block<T> {
     /// The free change of the velocity, `y` in factor coordinates, and the contacts' free velocity
     /// `u`: first with the forces at v, then with those at the mean velocity that follows from them
     /// and from the last step's impulses.
-    fn load(&mut self, problems: &[ContactProblem]) {
+    ///
+    /// `problems`: those that hold the last step's impulses; none if they are known.
+    fn load(&mut self, problems: Option<&[ContactProblem]>) {
         let token = self.token;
         let is_any = (self.persists & self.going).any();
         T::vectorize(
@@ -537,11 +591,13 @@ impl<T: Lane> Block<T> {
     }
 
     #[inline(always)]
-    fn push_and_drive(&mut self, is_any: bool, problems: &[ContactProblem]) {
+    fn push_and_drive(&mut self, is_any: bool, problems: Option<&[ContactProblem]>) {
         let zero = self.number(0.0);
         let (h, _) = self.time_step();
-        self.rows
-            .read(&self.contacts, problems, Answer::Impulses, &mut self.p_last);
+        if let Some(problems) = problems {
+            self.rows
+                .read(&self.contacts, problems, Answer::Impulses, &mut self.p_last);
+        }
         if is_any {
             let (contacts, end) = (&self.contacts, &self.poses_end);
             self.rows.generalized_impulse(
@@ -613,12 +669,11 @@ impl<T: Lane> Block<T> {
 
     /// Second part of a step: the new velocity and configuration, and their energy.
     ///
-    /// `problems`: those of [`Self::prepare`], solved. Returns whether a lane's position must be
-    /// projected; [`Self::set_gaps`] follows then.
+    /// `problems`: those of [`Self::prepare`], solved.
     ///
     /// # Panics
     /// If there are fewer problems than lanes.
-    pub fn conclude(&mut self, problems: &[ContactProblem], probe: &mut dyn Probe) -> bool {
+    pub fn conclude(&mut self, problems: &mut [ContactProblem], probe: &mut dyn Probe) -> Next {
         let token = self.token;
         let mut solved = 0;
         for (lane, problem) in problems[..T::LANES].iter().enumerate() {
@@ -626,6 +681,7 @@ impl<T: Lane> Block<T> {
             solved |= u32::from(has_answer) << lane;
             self.reports[lane] = StepReport {
                 steps: 1,
+                retaken: self.n_retaken[lane],
                 n_contacts: problem.n_contacts,
                 iterations: problem.iterations,
                 factorisations: problem.iterations,
@@ -637,6 +693,7 @@ impl<T: Lane> Block<T> {
             if problem.n_contacts == 0 {
                 self.reports[lane] = StepReport {
                     steps: 1,
+                    retaken: self.n_retaken[lane],
                     ..StepReport::default()
                 };
             }
@@ -647,6 +704,9 @@ impl<T: Lane> Block<T> {
             #[inline(always)]
             || self.move_on(problems),
         );
+        if self.drives.has_motors() && self.revise(problems, probe) {
+            return Next::Retake;
+        }
         let after = self.energy(State::End);
         self.after = after.kinetic_and_potential();
         self.momentum = after.momentum;
@@ -664,14 +724,40 @@ impl<T: Lane> Block<T> {
             || self.report_balance(),
         );
         probe.end(Phase::Update);
-        let Some(tolerated) = self.tolerated() else {
-            return false;
-        };
-        T::vectorize(
-            token,
+        let is_deep = self.tolerated().is_some_and(|tolerated| {
+            T::vectorize(
+                token,
+                #[inline(always)]
+                || self.measure(tolerated),
+            )
+        });
+        if is_deep { Next::Project } else { Next::Finish }
+    }
+
+    /// Where a motor has left its branch, sets up the step with the next branch; true if any has.
+    /// The other lanes keep their answers.
+    fn revise(&mut self, problems: &mut [ContactProblem], probe: &mut dyn Probe) -> bool {
+        let mut may_revise = 0;
+        for (lane, n) in self.n_retaken[..T::LANES].iter().enumerate() {
+            may_revise |= u32::from(*n < MOST_REVISIONS) << lane;
+        }
+        let lanes = self.going & T::mask(self.token, may_revise);
+        let (drives, machine) = (&mut self.drives, &*self.machine);
+        let (v, v_end) = (&self.v, &self.v_end);
+        self.retaken = T::vectorize(
+            self.token,
             #[inline(always)]
-            || self.measure(tolerated),
-        )
+            || drives.revise(machine, lanes, v, v_end),
+        );
+        if !self.retaken.any() {
+            return false;
+        }
+        for lane in (0..T::LANES).filter(|&lane| self.retaken.get(lane)) {
+            self.n_retaken[lane] += 1;
+            (self.contacts).recall(lane, &self.memories[lane], &mut problems[lane].p);
+        }
+        self.set_up(problems, false, probe);
+        true
     }
 
     #[inline(always)]
@@ -688,7 +774,8 @@ impl<T: Lane> Block<T> {
             *end = *v + *change;
         }
         let share = self.options.theta * self.options.time_step;
-        self.end.set_moved(&self.middle, &self.v_end, share);
+        self.end
+            .set_moved(&self.machine, &self.middle, &self.v_end, share);
         self.end.normalise();
         self.find_impacts();
         self.contact_work = self.contact_work();
@@ -765,15 +852,14 @@ impl<T: Lane> Block<T> {
         T::select(persists, half * (ends + changes + start), ends + struck)
     }
 
-    /// Declines the lanes whose step does not balance, or whose motors left their branch.
+    /// Declines the lanes whose step does not balance.
     #[inline(always)]
     fn audit(&mut self) {
         let (h, theta) = self.time_step();
         let places = &self.start.joints;
-        let (work, has_left) =
-            self.drives
-                .work(&self.machine, (h, theta), places, &self.v, &self.v_end);
-        self.decline(Decline::Motor, has_left);
+        let work = self
+            .drives
+            .work(&self.machine, (h, theta), places, &self.v, &self.v_end);
         let ([kinetic, potential], [end_kinetic, end_potential]) = (self.before, self.after);
         self.released = h.like(0.0);
         if !self.yields.is_empty() {
@@ -1039,7 +1125,8 @@ impl<T: Lane> Block<T> {
         let limit = zero.like(-FARTHEST) * self.deepest;
         self.decline(Decline::Projection, !size.le(limit) & self.is_deep);
         let is_moved = self.is_deep & self.going;
-        self.middle.set_moved(&self.end, &self.y, 1.0);
+        self.middle
+            .set_moved(&self.machine, &self.end, &self.y, 1.0);
         self.middle.normalise();
         self.end.select_from(is_moved, &self.middle);
     }
@@ -1098,13 +1185,11 @@ fn fastest<T: Lane>(machine: &Machine, v: &[T]) -> (T, T, T) {
     let [x, y, z] = [v[3], v[4], v[5]];
     let zero = x.like(0.0);
     let (mut joints, mut spin) = (zero, zero);
-    for (b, link) in machine.links.iter().enumerate().skip(1) {
-        let rate = v[velocity(b)].abs();
-        if link.is_spinner {
-            spin = rate.max(spin);
-        } else {
-            joints = rate.max(joints);
-        }
+    for &(k, ratio) in &machine.turning {
+        joints = (v[k].abs() * v[k].like(ratio)).max(joints);
+    }
+    for &k in &machine.spinning {
+        spin = v[k].abs().max(spin);
     }
     ((x * x + y * y + z * z).sqrt(), joints, spin)
 }

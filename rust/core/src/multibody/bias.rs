@@ -114,33 +114,17 @@ pub fn bias(
     scratch: &mut BiasScratch,
     out: &mut [f64],
 ) {
-    if model.only_turns() {
-        bias_if::<true>(model, kinematics, v, gravity, scratch, out);
-    } else {
-        bias_if::<false>(model, kinematics, v, gravity, scratch, out);
-    }
-}
-
-/// The same. With `TURNS` every root must be free and every other joint a rotation.
-fn bias_if<const TURNS: bool>(
-    model: &Model,
-    kinematics: &Kinematics,
-    v: &[f64],
-    gravity: &Vector3<f64>,
-    scratch: &mut BiasScratch,
-    out: &mut [f64],
-) {
     let bodies = model.bodies();
     let moved = &mut scratch.bodies[..bodies.len()];
     for (b, body) in bodies.iter().enumerate() {
         let r = &kinematics.r[b];
         let (omega, alpha, origin) = match body.parent {
-            None if TURNS || matches!(body.joint, Joint::Free(_)) => {
+            None if matches!(body.joint, Joint::Free(_)) => {
                 let k = body.velocity + 3;
                 let omega = Vector3::new(v[k], v[k + 1], v[k + 2]);
                 (omega, Vector3::zeros(), Vector3::zeros())
             }
-            Some(parent) if TURNS || matches!(body.joint, Joint::Revolute(_)) => {
+            Some(parent) if matches!(body.joint, Joint::Revolute(_)) => {
                 let carrier = &moved[parent];
                 let d = r - kinematics.r[parent];
                 let spin = kinematics.motions[body.motion].axis() * v[body.velocity];
@@ -159,18 +143,14 @@ fn bias_if<const TURNS: bool>(
         let body = &bodies[b];
         let Moved { force, moment, .. } = moved[b];
         let k = body.velocity;
-        if body.parent.is_none() && (TURNS || matches!(body.joint, Joint::Free(_))) {
+        if matches!(body.joint, Joint::Free(_)) {
             out[k..k + 3].copy_from_slice(force.as_slice());
             out[k + 3..k + 6].copy_from_slice(moment.as_slice());
             continue;
         }
         // A coupled joint adds to the joint that it follows.
-        if TURNS || body.n_motions == 1 {
-            out[k] += kinematics.motions[body.motion].power_if::<TURNS>(&force, &moment);
-        } else {
-            for (i, m) in body.motions().enumerate() {
-                out[k + i] += kinematics.motions[m].power(&force, &moment);
-            }
+        for (i, m) in body.motions().enumerate() {
+            out[k + i] += kinematics.motions[m].power(&force, &moment);
         }
         if let Some(parent) = body.parent {
             let carrier = &mut moved[parent];

@@ -59,30 +59,17 @@ impl Kinematics {
 
     /// Recomputes all poses.
     pub fn update(&mut self, model: &Model, configuration: &Configuration) {
-        if model.only_turns() {
-            self.update_poses::<true, true>(model, configuration);
-        } else {
-            self.update_poses::<true, false>(model, configuration);
-        }
+        self.update_poses(model, configuration, true);
     }
 
     /// Recomputes the poses that a step needs. Spinners ([`super::Body::is_spinner`]) are not
     /// rotated about their own axis.
     pub fn update_for_step(&mut self, model: &Model, configuration: &Configuration) {
-        if model.only_turns() {
-            self.update_poses::<false, true>(model, configuration);
-        } else {
-            self.update_poses::<false, false>(model, configuration);
-        }
+        self.update_poses(model, configuration, false);
     }
 
-    /// With `SPIN` spinners are rotated, too. With `TURNS` every root must be free and every other
-    /// joint revolute and uncoupled.
-    fn update_poses<const SPIN: bool, const TURNS: bool>(
-        &mut self,
-        model: &Model,
-        configuration: &Configuration,
-    ) {
+    /// `spins`: whether spinners are rotated, too.
+    fn update_poses(&mut self, model: &Model, configuration: &Configuration, spins: bool) {
         let (world, nowhere) = (Matrix3::identity(), Vector3::zeros());
         let joints = &configuration.joints;
         for (b, body) in model.bodies().iter().enumerate() {
@@ -106,24 +93,14 @@ impl Kinematics {
             match &body.joint {
                 Joint::Revolute(Revolute { axis, coordinate }) => {
                     let turned;
-                    (*own, turned) = if SPIN || !body.is_spinner {
-                        let angle = if TURNS {
-                            joints[coordinate.joint]
-                        } else {
-                            coordinate.of(joints)
-                        };
-                        axis.rotate(frame, angle)
+                    (*own, turned) = if spins || !body.is_spinner {
+                        axis.rotate(frame, coordinate.of(joints))
                     } else {
                         (*frame, axis.turned(frame))
                     };
                     let motion = Motion::turn(turned, r);
-                    if TURNS {
-                        self.motions[body.motion] = motion;
-                    } else {
-                        set_motion(&mut self.motions, body.motion, coordinate, motion);
-                    }
+                    set_motion(&mut self.motions, body.motion, coordinate, motion);
                 }
-                _ if TURNS => {}
                 Joint::Prismatic(Prismatic { axis, coordinate }) => {
                     let axis = axis.turned(frame);
                     *own = *frame;

@@ -39,8 +39,8 @@ struct Composite {
 impl Composite {
     /// Linear momentum, and angular momentum about the tree's origin, at unit rate of a motion.
     #[inline]
-    fn momentum<const TURN: bool>(&self, motion: &Motion) -> (Vector3<f64>, Vector3<f64>) {
-        let (a, v) = motion.twist_if::<TURN>();
+    fn momentum(&self, motion: &Motion) -> (Vector3<f64>, Vector3<f64>) {
+        let (a, v) = motion.twist();
         let f = v * self.mass + a.cross(&self.moment);
         let n = self.inertia.times(&a) + self.moment.cross(&v);
         (f, n)
@@ -76,10 +76,10 @@ impl MassMatrix {
             };
         }
         for tree in model.trees() {
-            match (model.only_turns(), tree.is_free) {
-                (true, _) => self.update_tree::<BASE, true>(model, tree, kinematics),
-                (_, true) => self.update_tree::<BASE, false>(model, tree, kinematics),
-                _ => self.update_tree::<0, false>(model, tree, kinematics),
+            if tree.is_free {
+                self.update_tree::<BASE>(model, tree, kinematics);
+            } else {
+                self.update_tree::<0>(model, tree, kinematics);
             }
         }
         for &b in model.coupled_bodies() {
@@ -90,9 +90,9 @@ impl MassMatrix {
         }
     }
 
-    /// Rows of a tree in which `LEAD` velocities belong to a free root and, with `TURNS`, all
-    /// others to rotations. Coupled joints contribute only the composite inertia that they carry.
-    fn update_tree<const LEAD: usize, const TURNS: bool>(
+    /// Rows of a tree in which `LEAD` velocities belong to a free root. Coupled joints contribute
+    /// only the composite inertia that they carry.
+    fn update_tree<const LEAD: usize>(
         &mut self,
         model: &Model,
         tree: &Tree,
@@ -100,25 +100,20 @@ impl MassMatrix {
     ) {
         let bodies = model.bodies();
         let Range { start, end } = tree.bodies;
-        // With `TURNS` the root has neither rows of this kind nor a carrier.
-        for b in (start + usize::from(TURNS)..end).rev() {
+        for b in (start..end).rev() {
             let body = &bodies[b];
             let composite = self.composites[b];
-            let n_rows = match body.is_coupled {
-                _ if TURNS => 1,
-                true => 0,
-                false => body.n_motions,
-            };
+            let n_rows = if body.is_coupled { 0 } else { body.n_motions };
             for i in 0..n_rows {
                 let motion = &kinematics.motions[body.motion + i];
-                let (f, n) = composite.momentum::<TURNS>(motion);
+                let (f, n) = composite.momentum(motion);
                 let row = &mut self.rows[(body.velocity + i) * self.stride..];
                 let (base, joints) = row.split_at_mut(LEAD);
                 if let Some(base) = base.first_chunk_mut::<BASE>() {
                     *base = [f.x, f.y, f.z, n.x, n.y, n.z];
                 }
                 for (entry, &m) in joints.iter_mut().zip(model.motions(b)) {
-                    *entry = kinematics.motions[m].power_if::<TURNS>(&f, &n);
+                    *entry = kinematics.motions[m].power(&f, &n);
                 }
             }
             if let Some(parent) = body.parent {
@@ -151,7 +146,7 @@ impl MassMatrix {
     fn add_coupled(&mut self, model: &Model, kinematics: &Kinematics, b: usize) {
         let body = &model.bodies()[b];
         let (k, own) = (body.velocity, &kinematics.motions[body.motion]);
-        let (f, n) = self.composites[b].momentum::<false>(own);
+        let (f, n) = self.composites[b].momentum(own);
         let at = last(model, k);
         let w = self.stride;
         self.rows[k * w + at] += own.power(&f, &n);

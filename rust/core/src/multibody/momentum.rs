@@ -44,34 +44,19 @@ pub fn body_momenta(
     about: impl Fn(usize) -> Vector3<f64>,
     out: &mut [Momentum],
 ) -> f64 {
-    if model.only_turns() {
-        body_momenta_if::<true>(model, kinematics, v, about, out)
-    } else {
-        body_momenta_if::<false>(model, kinematics, v, about, out)
-    }
-}
-
-/// The same. With `TURNS` every root must be free and every other joint a rotation.
-fn body_momenta_if<const TURNS: bool>(
-    model: &Model,
-    kinematics: &Kinematics,
-    v: &[f64],
-    about: impl Fn(usize) -> Vector3<f64>,
-    out: &mut [Momentum],
-) -> f64 {
     let mut kinetic = 0.0;
     // `out` holds each body's angular velocity and the velocity of its frame's origin until
     // overwritten.
     for (b, body) in model.bodies().iter().enumerate() {
         let (origin, omega) = match body.parent {
-            None if TURNS || matches!(body.joint, Joint::Free(_)) => {
+            None if matches!(body.joint, Joint::Free(_)) => {
                 let v = &v[body.velocity..];
                 (
                     Vector3::new(v[0], v[1], v[2]),
                     Vector3::new(v[3], v[4], v[5]),
                 )
             }
-            Some(parent) if TURNS || matches!(body.joint, Joint::Revolute(_)) => {
+            Some(parent) if matches!(body.joint, Joint::Revolute(_)) => {
                 let p = &out[parent];
                 let d = kinematics.r[b] - kinematics.r[parent];
                 (
@@ -169,21 +154,6 @@ pub fn energy_and_momentum(
     gravity: &Vector3<f64>,
     scratch: &mut EnergyScratch,
 ) -> (Energy, Vector3<f64>) {
-    if model.only_turns() {
-        energy_and_momentum_if::<true>(model, q, v, gravity, scratch)
-    } else {
-        energy_and_momentum_if::<false>(model, q, v, gravity, scratch)
-    }
-}
-
-/// The same. With `TURNS` every root must be free and every other joint revolute and uncoupled.
-fn energy_and_momentum_if<const TURNS: bool>(
-    model: &Model,
-    q: &Configuration,
-    v: &[f64],
-    gravity: &Vector3<f64>,
-    scratch: &mut EnergyScratch,
-) -> (Energy, Vector3<f64>) {
     let bodies = model.bodies();
     let moving = &mut scratch.moving[..bodies.len()];
     let mut sums = Sums::default();
@@ -207,8 +177,7 @@ fn energy_and_momentum_if<const TURNS: bool>(
                 };
                 height += pose.position * model.trees()[body.tree].mass;
             }
-            Joint::Revolute(joint) => own.turn::<TURNS>(carrier(), body, joint, q, v),
-            _ if TURNS => {}
+            Joint::Revolute(joint) => own.turn(carrier(), body, joint, q, v),
             _ => own.follow(carrier(), body, q, v),
         }
         sums.add(body, own);
@@ -224,9 +193,9 @@ fn energy_and_momentum_if<const TURNS: bool>(
 }
 
 impl Moving {
-    /// Adds a body under a revolute joint to its carrier; with `OWN` the joint follows no other.
+    /// Adds a body under a revolute joint to its carrier.
     #[inline]
-    fn turn<const OWN: bool>(
+    fn turn(
         &mut self,
         carrier: &Self,
         body: &Body,
@@ -243,19 +212,9 @@ impl Moving {
         (self.R, axis) = if body.is_spinner {
             (*frame, joint.axis.turned(frame))
         } else {
-            let angle = if OWN {
-                q.joints[joint.coordinate.joint]
-            } else {
-                joint.coordinate.of(&q.joints)
-            };
-            joint.axis.rotate(frame, angle)
+            joint.axis.rotate(frame, joint.coordinate.of(&q.joints))
         };
-        let rate = if OWN {
-            v[body.velocity]
-        } else {
-            joint.coordinate.rate(v[body.velocity])
-        };
-        self.omega = carrier.omega + axis * rate;
+        self.omega = carrier.omega + axis * joint.coordinate.rate(v[body.velocity]);
     }
 
     /// Adds any other body to its carrier.

@@ -143,6 +143,12 @@ pub struct Mat3<T> {
 }
 
 impl<T: Lane> Mat3<T> {
+    /// Its columns.
+    #[inline(always)]
+    pub fn columns(&self) -> [Vec3<T>; 3] {
+        [self.x, self.y, self.z]
+    }
+
     /// `A v`.
     #[inline(always)]
     pub fn times(&self, v: Vec3<T>) -> Vec3<T> {

@@ -12,7 +12,7 @@ use crate::integrator::{NoProbe, StepError, StepReport};
 use crate::lanes::machine::Machine;
 use crate::lanes::problem::ContactProblem;
 use crate::lanes::queue::Queue;
-use crate::lanes::step::{Block, are_alike};
+use crate::lanes::step::{Block, Next, are_alike};
 use crate::scalar::{Instructions, Lane};
 
 /// Rovers that together cost less alone than as a block, as a fraction of its lanes.
@@ -259,17 +259,26 @@ impl<T: Lane> Lanes<T> {
         (self.queue).enter(b, &mut self.problems, |lane| block.is_going(lane));
     }
 
-    /// The rest of a block's step, once its problems have ended. Returns whether those of the
-    /// position projection must be solved before.
+    /// The rest of a block's step, once its problems have ended. Returns whether others must be
+    /// solved before: with the next branch of a motor, or those of the position projection.
     fn conclude(&mut self, b: usize) -> bool {
         let (block, course) = (&mut self.blocks[b], &mut self.courses[b]);
         let problems = &mut self.problems[b * T::LANES..][..T::LANES];
         let projects = std::mem::take(&mut course.projects);
-        if !projects && block.conclude(problems, &mut NoProbe) {
-            block.set_gaps(problems);
-            course.projects = true;
-            self.queue.enter(b, &mut self.problems, |_| true);
-            return true;
+        if !projects {
+            match block.conclude(problems, &mut NoProbe) {
+                Next::Retake => {
+                    (self.queue).enter(b, &mut self.problems, |lane| block.is_retaken(lane));
+                    return true;
+                }
+                Next::Project => {
+                    block.set_gaps(problems);
+                    course.projects = true;
+                    self.queue.enter(b, &mut self.problems, |_| true);
+                    return true;
+                }
+                Next::Finish => {}
+            }
         }
         block.finish(projects.then_some(problems), &mut NoProbe);
         false

@@ -1,12 +1,16 @@
 //! Scratch of a rover's ordinary steps: a block of one lane.
 
 use crate::lanes::problem::ContactProblem;
+use crate::lanes::queue::Queue;
 use crate::lanes::step::Block;
+use crate::solver::SolverOptions;
 
 /// A block of one lane, made when first needed. It holds no state: a copy has none.
 #[derive(Default)]
 pub(super) struct Quick {
     pub(super) block: Option<Box<Block<f64>>>,
+    /// The solver's scratch.
+    pub(super) queue: Option<Queue<f64>>,
     pub(super) problem: Box<[ContactProblem; 1]>,
     pub(super) gap_problem: Box<[ContactProblem; 1]>,
     /// Whether the last step was taken here.
@@ -31,4 +35,15 @@ impl Quick {
         let block = self.block.as_deref().filter(|_| self.is_last)?;
         Some((block, &self.problem[0]))
     }
+}
+
+/// Solves one problem.
+pub(super) fn solve(
+    queue: &mut Queue<f64>,
+    problem: &mut [ContactProblem],
+    options: &SolverOptions,
+) {
+    queue.begin(1);
+    queue.enter(0, problem, |_| true);
+    while queue.next_group(problem, options).is_some() {}
 }

@@ -3,14 +3,15 @@
 use std::sync::Arc;
 
 use super::active_contact::ActiveContact;
+use super::quick::solve;
 use super::rover::{RoverScene, RoverSimulation};
 use super::scene::QuickStep;
 use crate::integrator::{NoProbe, Phase, Probe, StepError, StepOptions, StepReport};
 use crate::lanes::admission::admit;
 use crate::lanes::machine::Machine;
 use crate::lanes::passenger::Passenger;
-use crate::lanes::queue;
-use crate::lanes::step::Block;
+use crate::lanes::queue::Queue;
+use crate::lanes::step::{Block, Next};
 use crate::scalar::{Lane, Single};
 
 impl RoverScene {
@@ -33,6 +34,7 @@ impl RoverScene {
         let block = quick
             .block
             .get_or_insert_with(|| Box::new(Block::new(token, machine)));
+        let queue = quick.queue.get_or_insert_with(|| Queue::new(token));
         let mut passenger = Passenger {
             model: &self.model,
             terrain: &self.terrain,
@@ -50,14 +52,18 @@ impl RoverScene {
         let problems = &mut quick.problem[..];
         block.prepare(problems, probe);
         let solver = &step.options.solver;
-        queue::solve_all::<f64>(token, problems, solver);
-        probe.end(Phase::Solve);
-        let is_deep = block.conclude(problems, probe);
+        let mut next = Next::Retake;
+        while next == Next::Retake {
+            solve(queue, problems, solver);
+            probe.end(Phase::Solve);
+            next = block.conclude(problems, probe);
+        }
+        let is_deep = next == Next::Project;
         let gap_problems = &mut quick.gap_problem[..];
         if is_deep {
             gap_problems.clone_from_slice(problems);
             block.set_gaps(gap_problems);
-            queue::solve_all::<f64>(token, gap_problems, solver);
+            solve(queue, gap_problems, solver);
         }
         block.finish(is_deep.then_some(&*gap_problems), probe);
         if block.declined(0).is_some() {

@@ -7,16 +7,18 @@
 //!
 //! Source: Liniger and Willoughby 1970, *SIAM J. Numer. Anal.* 7, 47–66.
 
+use crate::scalar::Lane;
 use crate::scalar::elementary::exp_m1;
 
 /// θ(z) in [½, 1] for `z ≥ 0`.
+#[allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
+#[inline(always)]
 #[must_use]
-pub fn fitted_theta(z: f64) -> f64 {
-    if z < 1e-2 {
-        0.5 + z / 12.0 - z * z * z / 720.0
-    } else {
-        1.0 / -exp_m1(-z) - 1.0 / z
-    }
+pub fn fitted_theta<T: Lane>(z: T) -> T {
+    let one = z.like(1.0);
+    let series = z.like(0.5) + z / z.like(12.0) - z * z * z / z.like(720.0);
+    let exact = one / -exp_m1(-z) - one / z;
+    T::select(z.lt(z.like(1e-2)), series, exact)
 }
 
 #[cfg(test)]

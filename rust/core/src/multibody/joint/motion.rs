@@ -67,16 +67,10 @@ impl Motion {
     #[inline]
     #[must_use]
     pub fn twist(&self) -> (Vector3<f64>, Vector3<f64>) {
-        self.twist_if::<false>()
-    }
-
-    /// The same. With `TURN` the motion must be a rotation, and there is no branch.
-    #[inline]
-    pub(crate) fn twist_if<const TURN: bool>(&self) -> (Vector3<f64>, Vector3<f64>) {
         match self.kind {
-            Kind::Slide if !TURN => (Vector3::zeros(), self.axis),
-            Kind::Screw if !TURN => (self.axis, self.place),
-            _ => (self.axis, self.place.cross(&self.axis)),
+            Kind::Turn => (self.axis, self.place.cross(&self.axis)),
+            Kind::Slide => (Vector3::zeros(), self.axis),
+            Kind::Screw => (self.axis, self.place),
         }
     }
 
@@ -84,16 +78,10 @@ impl Motion {
     #[inline]
     #[must_use]
     pub fn velocity_at(&self, x: &Vector3<f64>) -> Vector3<f64> {
-        self.velocity_if::<false>(x)
-    }
-
-    /// The same. With `TURN` the motion must be a rotation, and there is no branch.
-    #[inline]
-    pub(crate) fn velocity_if<const TURN: bool>(&self, x: &Vector3<f64>) -> Vector3<f64> {
         match self.kind {
-            Kind::Slide if !TURN => self.axis,
-            Kind::Screw if !TURN => self.place + self.axis.cross(x),
-            _ => self.axis.cross(&(x - self.place)),
+            Kind::Turn => self.axis.cross(&(x - self.place)),
+            Kind::Slide => self.axis,
+            Kind::Screw => self.place + self.axis.cross(x),
         }
     }
 
@@ -102,21 +90,11 @@ impl Motion {
     #[inline]
     #[must_use]
     pub fn power(&self, force: &Vector3<f64>, moment: &Vector3<f64>) -> f64 {
-        self.power_if::<false>(force, moment)
-    }
-
-    /// The same. With `TURN` the motion must be a rotation, and there is no branch.
-    #[inline]
-    pub(crate) fn power_if<const TURN: bool>(
-        &self,
-        force: &Vector3<f64>,
-        moment: &Vector3<f64>,
-    ) -> f64 {
         match self.kind {
-            Kind::Slide if !TURN => self.axis.dot(force),
-            Kind::Screw if !TURN => self.axis.dot(moment) + self.place.dot(force),
             // a · ((x − r) × f) = a · (x × f − r × f)
-            _ => self.axis.dot(&(moment - self.place.cross(force))),
+            Kind::Turn => self.axis.dot(&(moment - self.place.cross(force))),
+            Kind::Slide => self.axis.dot(force),
+            Kind::Screw => self.axis.dot(moment) + self.place.dot(force),
         }
     }
 }

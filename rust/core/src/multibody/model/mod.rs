@@ -202,7 +202,6 @@ impl Model {
     }
 
     /// Whether every root is free and every other joint is revolute and uncoupled, as in a rover.
-    /// Hot loops then run without a branch on the joint type.
     #[inline]
     #[must_use]
     pub fn only_turns(&self) -> bool {

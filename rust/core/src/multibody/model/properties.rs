@@ -86,7 +86,7 @@ impl Passive {
     }
 
     /// Both in parallel at one joint. Two springs act as one, with a rest position between theirs.
-    pub(super) fn with(&self, other: &Self) -> Self {
+    pub(crate) fn with(&self, other: &Self) -> Self {
         let stiffness = self.stiffness + other.stiffness;
         let moment = self.stiffness * self.rest + other.stiffness * other.rest;
         Self {

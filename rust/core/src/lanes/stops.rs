@@ -1,0 +1,88 @@
+//! Joints at their stops: slots behind those of the wheels, the lower stop of a joint first.
+//!
+//! The formulas are those of [`crate::contact::limit`].
+
+use super::contacts::Contacts;
+use super::footing::SLOTS;
+use super::forecast::Forecast;
+use super::machine::{LinkJoint, Machine, Stop};
+use super::place::Place;
+use super::poses::Poses;
+use crate::contact::Side;
+use crate::scalar::{Lane, LaneMask};
+
+impl<T: Lane> Contacts<T> {
+    /// The joint whose stop a slot is, if it is one.
+    #[inline(always)]
+    pub(super) fn stop(&self, slot: usize) -> Option<&Stop> {
+        if slot < self.first_stop {
+            return None;
+        }
+        self.stops.get((slot - self.first_stop) / SLOTS)
+    }
+
+    /// Side of a stop's slot.
+    #[inline(always)]
+    pub(super) fn side(slot: usize) -> Side {
+        if slot.is_multiple_of(SLOTS) {
+            Side::Lower
+        } else {
+            Side::Upper
+        }
+    }
+
+    /// Finds the stops that a step must consider, after the other contacts.
+    ///
+    /// `middle` and `end`: configurations at the midpoint of the step, where gaps are measured, and
+    /// at its predicted end. `poses`: at its end; `v`: velocity (nv) before the step. Returns the
+    /// lanes that have too many contacts.
+    ///
+    /// # Panics
+    /// If an argument is of another machine.
+    pub fn detect_stops(
+        &mut self,
+        machine: &Machine,
+        (middle, end): (&Place<T>, &Place<T>),
+        poses: &Poses<T>,
+        v: &[T],
+        forecast: &Forecast<T>,
+    ) -> T::Mask {
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || {
+                let mut too_many = T::mask(self.token, 0);
+                for i in 0..self.stops.len() {
+                    let Stop { joint, limits } = self.stops[i];
+                    let own = machine.joints[joint];
+                    let link = &machine.links[own.body];
+                    let motion = &poses.motions[link.motion];
+                    let axis = match link.joint {
+                        LinkJoint::Slide(_) => motion.swing,
+                        _ => motion.axis,
+                    };
+                    for (k, side) in [Side::Lower, Side::Upper].into_iter().enumerate() {
+                        let sign = v[own.velocity].like(side.sign());
+                        let gap = |q: T| match side {
+                            Side::Lower => q - q.like(limits.lower),
+                            Side::Upper => q.like(limits.upper) - q,
+                        };
+                        let slot = self.first_stop + SLOTS * i + k;
+                        let contact = &mut self.slots[slot];
+                        let rate = sign * v[own.velocity];
+                        contact.active = forecast.admits(gap(middle.joints[joint]), rate);
+                        if !contact.active.any() {
+                            continue;
+                        }
+                        contact.gap = gap(end.joints[joint]);
+                        contact.point = poses.bodies[own.body].r;
+                        contact.n = axis * sign;
+                        self.used.push(slot);
+                        too_many = too_many | self.list_slot(slot, None);
+                    }
+                }
+                too_many
+            },
+        )
+    }
+}

@@ -1,0 +1,211 @@
+//! Machines with every kind of joint and force take their steps in lanes, as the general step does.
+
+use std::sync::Arc;
+
+use rover_core::geometry::Plane;
+use rover_core::integrator::moreau_jean::MoreauJean;
+use rover_core::integrator::{Phase, Probe, StepOptions};
+use rover_core::multibody::description::{
+    CouplingDescription, JointKind, Limits, SolidDescription, Spring,
+};
+use rover_core::multibody::{Configuration, Model, ModelDescription, Motor};
+use rover_core::simulation::RoverSimulation;
+
+use super::Random;
+
+/// The built-in rover with springs, dampers, rotors, stops and motors, a mast that slides, a ball
+/// joint, and joints that follow another one beside and below it.
+pub fn equipped() -> ModelDescription {
+    let mut rover = ModelDescription::rover();
+    let template = rover.solids[1].clone();
+    let solid = |name: &str, parent: &str, joint, position| SolidDescription {
+        name: name.into(),
+        parent: Some(parent.into()),
+        joint: Some(joint),
+        position: Some(position),
+        axis: None,
+        mass: 20.0,
+        hold: None,
+        ..template.clone()
+    };
+    for body in &mut rover.solids {
+        if body.name == "front_axle" {
+            body.spring = Some(Spring {
+                stiffness: 900.0,
+                rest: 0.02,
+            });
+            body.damping = Some(40.0);
+            body.armature = Some(3.0);
+            body.limits = Some(Limits {
+                lower: -0.06,
+                upper: 0.06,
+            });
+        } else if body.name.ends_with("bogie") {
+            body.damping = Some(5.0);
+        } else if body.name.starts_with("wheel") {
+            body.armature = Some(0.05);
+        }
+    }
+    for wheel in &mut rover.wheels {
+        wheel.motor = Some(Motor {
+            stall_torque: 120.0,
+            no_load_speed: 5.0,
+            regenerating: wheel.name.starts_with('F'),
+        });
+    }
+    let follow = |joint: &str, ratio| {
+        Some(CouplingDescription {
+            joint: joint.into(),
+            ratio,
+            offset: 0.1,
+        })
+    };
+    rover.solids.extend([
+        SolidDescription {
+            axis: Some([0.1, 1.0, 0.0]),
+            spring: Some(Spring {
+                stiffness: 6e3,
+                rest: 0.0,
+            }),
+            damping: Some(60.0),
+            limits: Some(Limits {
+                lower: -0.035,
+                upper: 0.02,
+            }),
+            ..solid("mast", "trunk", JointKind::Prismatic, [0.3, 0.3, 0.0])
+        },
+        SolidDescription {
+            centre_of_mass: Some([0.02, -0.2, 0.0]),
+            ..solid("bob", "mast", JointKind::Spherical, [0.0, 0.5, 0.1])
+        },
+        SolidDescription {
+            axis: Some([0.0, 0.0, 1.0]),
+            coupled: follow("mast", 4.0),
+            ..solid("flag", "mast", JointKind::Revolute, [0.0, 0.1, 0.0])
+        },
+        SolidDescription {
+            axis: Some([1.0, 0.0, 0.2]),
+            coupled: follow("front_axle", -0.7),
+            ..solid("balance", "trunk", JointKind::Revolute, [-0.4, 0.2, 0.0])
+        },
+    ]);
+    rover
+}
+
+/// How a step went.
+#[derive(Default)]
+struct Parts {
+    kinematics: usize,
+    mass_matrices: usize,
+}
+
+impl Probe for Parts {
+    fn end(&mut self, phase: Phase) {
+        self.kinematics += usize::from(phase == Phase::Kinematics);
+        self.mass_matrices += usize::from(phase == Phase::MassMatrix);
+    }
+}
+
+/// What was met on a drive.
+#[derive(Default)]
+struct Met {
+    steps: usize,
+    general: usize,
+    retaken: usize,
+    stops: usize,
+    differences: Vec<f64>,
+}
+
+fn drive(model: &Arc<Model>, h: f64, torque: f64) -> Met {
+    let mut numbers = Random(5);
+    let options = StepOptions {
+        time_step: h,
+        ..StepOptions::default()
+    };
+    let ground = Arc::new(Plane::ground());
+    let mut rover = RoverSimulation::new(Arc::clone(model), ground, options).unwrap();
+    assert_eq!(rover.never_ordinary(), None);
+    let mut start = Configuration::zero(model);
+    let wheels = model.wheels().iter();
+    let lowest = wheels.map(|wheel| {
+        let kinematics = rover.kinematics();
+        kinematics.point(wheel.body, &wheel.centre).y - wheel.radius
+    });
+    start.position.y = 0.03 - lowest.fold(f64::INFINITY, f64::min);
+    rover.set_state(start, vec![0.0; model.nv()]);
+    let mut met = Met::default();
+    for _ in 0..60 {
+        let wheels = model.wheels().iter();
+        let torques: Vec<f64> = (wheels.clone())
+            .map(|wheel| torque * wheel.torque_limit * numbers.next())
+            .collect();
+        let steering: Vec<f64> = wheels
+            .map(|wheel| 0.7 * wheel.steering_limit * numbers.next())
+            .collect();
+        rover.set_commands(&torques, &steering).unwrap();
+        for _ in 0..10 {
+            let mut general = rover.clone();
+            general.step_with(&MoreauJean, 1).unwrap();
+            let mut parts = Parts::default();
+            let report = rover.step_probed(1, &mut parts).unwrap();
+            let is_general = parts.kinematics > 1;
+            met.steps += 1;
+            met.general += usize::from(is_general);
+            met.retaken += usize::from(!is_general && report.retaken > 0);
+            if !is_general {
+                assert_eq!(parts.mass_matrices, 1 + report.retaken);
+            }
+            let is_stop = |key: rover_core::contact::ContactKey| {
+                matches!(key.opposite, rover_core::contact::Opposite::Stop)
+            };
+            let stops = rover.contacts().iter().filter(|a| is_stop(a.contact.key));
+            for stop in stops {
+                met.stops += usize::from(!is_general);
+                assert!(stop.impulse[0] >= 0.0 && stop.impulse[1..] == [0.0; 2]);
+                assert_eq!(stop.velocity[1..], [0.0; 2]);
+            }
+            let pairs = rover.v().iter().zip(general.v());
+            let difference = pairs.fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+            met.differences.push(difference);
+            if difference < 1e-9 {
+                assert_eq!(report.retaken > 0, general.last_report().retaken > 0);
+                assert_eq!(rover.contacts().len(), general.contacts().len());
+            }
+        }
+    }
+    met.differences.sort_by(f64::total_cmp);
+    met
+}
+
+#[test]
+fn every_joint_and_force_obeys_the_law_of_the_general_step() {
+    let models = ["mars-rover", "open-rover", "four-steered", "skid-steered"];
+    let mut models: Vec<ModelDescription> = models
+        .map(|name| ModelDescription::named(name).unwrap())
+        .to_vec();
+    models.push(equipped());
+    for description in models {
+        let name = description.name.clone();
+        let model = Arc::new(Model::from_description(description).unwrap());
+        for h in [0.005, 0.02] {
+            let met = drive(&model, h, 0.6);
+            let Met {
+                steps,
+                general,
+                retaken,
+                stops,
+                ..
+            } = met;
+            assert!(
+                general * 6 < steps,
+                "{name}: {general} of {steps} are general"
+            );
+            // A few friction problems have several answers.
+            let typical = met.differences[steps * 95 / 100];
+            assert!(typical < 1e-9, "{name} {h}: {typical:e}");
+            if name == "rover" {
+                assert!(retaken > 5 && stops > 100, "{retaken} {stops}");
+            }
+        }
+    }
+}
