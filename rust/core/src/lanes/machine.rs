@@ -9,10 +9,15 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use nalgebra::{Matrix3, Vector3};
 use thiserror::Error;
 
+#[cfg(doc)]
+use crate::geometry::Roller;
+use super::problem::MAX_CONTACTS;
 use crate::law::compliance::Compliance;
 use crate::multibody::joint::{Joint, JointAxis};
 use crate::multibody::model::BASE;
-use crate::multibody::{Body, Model};
+
+use crate::multibody::{Body, Model, Wheel};
+use crate::scalar::elementary::hypot;
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Why a machine has no ordinary step.
@@ -39,11 +44,11 @@ pub enum NotOrdinary {
         /// Name of the body.
         body: String,
     },
-    /// A wheel has a width.
-    #[error("the wheel '{wheel}' has a width")]
-    WideWheel {
-        /// Name of the wheel.
-        wheel: String,
+    /// Its wheels can have more contacts than a problem.
+    #[error("{n_wheels} wheels with a width can have more than {MAX_CONTACTS} contacts")]
+    TooManyWheels {
+        /// Their number.
+        n_wheels: usize,
     },
     /// It has balls that collide.
     #[error("the machine has balls that collide")]
@@ -127,7 +132,7 @@ pub enum Symmetry {
     Turned,
 }
 
-/// A wheel: a disc of zero width.
+/// A wheel: a disc of zero width, or a [`Roller`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct WheelDisc {
     /// Body that it is fixed to.
@@ -141,6 +146,10 @@ pub struct WheelDisc {
     pub spoke: [f64; 3],
     /// Contact radius.
     pub radius: f64,
+    /// Distance of its circles from the middle; 0 if it has one.
+    pub half: f64,
+    /// Rounding of its edges.
+    pub rounding: f64,
     /// Spring and damper where it touches; `None` if it is rigid.
     pub compliance: Option<Compliance>,
 }
@@ -169,14 +178,7 @@ impl Machine {
         let mut machine = Self {
             links: Vec::with_capacity(bodies.len()),
             wheels: (model.wheels().iter())
-                .map(|wheel| WheelDisc {
-                    body: wheel.body,
-                    centre: wheel.centre.into(),
-                    axle: wheel.axle.into(),
-                    spoke: wheel.spoke.into(),
-                    radius: wheel.radius,
-                    compliance: wheel.compliance,
-                })
+                .map(WheelDisc::of)
                 .collect(),
             boxes: (model.boxes().iter())
                 .map(|part| BodyBox {
@@ -197,6 +199,18 @@ impl Machine {
             machine.add(b, body, bodies);
         }
         Ok(machine)
+    }
+
+    /// Whether a wheel has a width.
+    #[must_use]
+    pub fn has_wide_wheels(&self) -> bool {
+        self.wheels.iter().any(WheelDisc::is_wide)
+    }
+
+    /// Whether a wheel touches a plane at two points.
+    #[must_use]
+    pub fn has_lines(&self) -> bool {
+        self.wheels.iter().any(|wheel| wheel.n_circles() > 1)
     }
 
     /// Whether any wheel yields where it touches.
@@ -308,6 +322,54 @@ impl Machine {
     }
 }
 
+impl WheelDisc {
+    fn of(wheel: &Wheel) -> Self {
+        let is_wide = wheel.is_wide();
+        Self {
+            body: wheel.body,
+            centre: wheel.centre.into(),
+            axle: wheel.axle.into(),
+            spoke: wheel.spoke.into(),
+            radius: wheel.radius,
+            half: if is_wide {
+                0.5 * wheel.width - wheel.rounding
+            } else {
+                0.0
+            },
+            rounding: if is_wide { wheel.rounding } else { 0.0 },
+            compliance: wheel.compliance,
+        }
+    }
+
+    /// Whether it has a width.
+    #[must_use]
+    pub fn is_wide(&self) -> bool {
+        self.half > 0.0 || self.rounding > 0.0
+    }
+
+    /// Number of its slots for contacts.
+    #[must_use]
+    pub fn n_slots(&self) -> usize {
+        2 * self.n_circles()
+    }
+
+    /// Radius of a bounding ball about its centre.
+    #[must_use]
+    pub fn bound(&self) -> f64 {
+        if self.is_wide() {
+            hypot(self.radius - self.rounding, self.half) + self.rounding
+        } else {
+            self.radius
+        }
+    }
+
+    /// Number of its circles: [`Roller::n_circles`].
+    #[must_use]
+    pub fn n_circles(&self) -> usize {
+        if self.half > 0.0 { 2 } else { 1 }
+    }
+}
+
 impl Link {
     /// `R p` for its joint's origin p.
     #[inline(always)]
@@ -362,9 +424,11 @@ fn check(model: &Model) -> Result<(), NotOrdinary> {
             return Err(NotOrdinary::LimitedJoint { body: body() });
         }
     }
-    if let Some(wheel) = model.wheels().iter().find(|wheel| wheel.is_wide()) {
-        return Err(NotOrdinary::WideWheel {
-            wheel: wheel.name.clone(),
+    let wheels: Vec<WheelDisc> = model.wheels().iter().map(WheelDisc::of).collect();
+    let has_lines = wheels.iter().any(|wheel| wheel.n_circles() > 1);
+    if has_lines && wheels.iter().map(WheelDisc::n_slots).sum::<usize>() > MAX_CONTACTS {
+        return Err(NotOrdinary::TooManyWheels {
+            n_wheels: wheels.len(),
         });
     }
     if !model.spheres().is_empty() {

@@ -6,9 +6,12 @@
 //! ([`super::contacts`]). A slot that is active in some lanes only never changes what the others
 //! accumulate.
 
+use std::sync::Arc;
+
 use super::contacts::Contacts;
 use super::machine::{Machine, velocity};
 use super::mass_matrix::Factor;
+use super::pattern::Pattern;
 use super::poses::Poses;
 use super::problem::{ContactProblem, Triple, block};
 use crate::multibody::model::BASE;
@@ -35,8 +38,13 @@ pub struct Rows<T: Lane> {
     stride: usize,
     /// Z along the path of each slot's wheel: `Z[slot * stride + k]`.
     Z: Vec<Triple<T>>,
-    /// Blocks of W for the slots in use, row-major: [`block`] of their positions among them.
+    /// Blocks of W for the slots in use, row-major: [`block`] of their positions among them. Of a
+    /// machine with a pattern: the diagonal blocks by slot.
     W: Vec<[T; 9]>,
+    /// Where W is used by its factors.
+    pattern: Option<Arc<Pattern>>,
+    /// What [`Self::soften`] added to the diagonal of W by slot, with a pattern, 1/kg.
+    softness: Vec<T>,
     /// Local velocity `Hᵀ v` before the step by slot, m/s.
     pub u_before: Vec<Triple<T>>,
 }
@@ -74,6 +82,8 @@ impl<T: Lane> Rows<T> {
             stride,
             Z: vec![[zero; 3]; n_slots * stride],
             W: vec![[zero; 9]; n_slots * (n_slots + 1) / 2],
+            pattern: machine.has_lines().then(|| Arc::new(Pattern::of(machine))),
+            softness: vec![zero; n_slots],
             u_before: vec![[zero; 3]; n_slots],
         }
     }
@@ -99,7 +109,11 @@ impl<T: Lane> Rows<T> {
                 for &slot in contacts.used() {
                     self.build(machine, end, factor, contacts, v, slot);
                 }
-                self.multiply(contacts.used());
+                if self.pattern.is_some() {
+                    self.multiply_diagonal(contacts);
+                } else {
+                    self.multiply(contacts);
+                }
             },
         );
     }
@@ -115,7 +129,7 @@ impl<T: Lane> Rows<T> {
         v: &[T],
         slot: usize,
     ) {
-        let wheel = Contacts::<T>::wheel(slot);
+        let wheel = contacts.wheel(slot);
         let movers = &self.movers[wheel][..];
         let rows = &mut self.Z[slot * self.stride..][..BASE + movers.len()];
         let (base, joints) = rows.split_at_mut(BASE);
@@ -142,15 +156,26 @@ impl<T: Lane> Rows<T> {
         factor.half_solve_path(machine, machine.wheels[wheel].body, rows);
     }
 
+    /// Diagonal blocks of W from Z.
+    #[inline(always)]
+    fn multiply_diagonal(&mut self, contacts: &Contacts<T>) {
+        for &slot in contacts.used() {
+            let wheel = contacts.wheel(slot);
+            let z = &self.Z[slot * self.stride..][..BASE + self.movers[wheel].len()];
+            self.W[slot] = square(z);
+        }
+    }
+
     /// W from Z.
     #[inline(always)]
-    fn multiply(&mut self, used: &[usize]) {
+    fn multiply(&mut self, contacts: &Contacts<T>) {
+        let used = contacts.used();
         let n_wheels = self.movers.len();
         let mut at = 0;
         for (i, &row) in used.iter().enumerate() {
-            let a = Contacts::<T>::wheel(row);
+            let a = contacts.wheel(row);
             for &column in &used[..i] {
-                let b = Contacts::<T>::wheel(column);
+                let b = contacts.wheel(column);
                 let shared = self.common[a * n_wheels + b];
                 let x = &self.Z[row * self.stride..][..shared];
                 let y = &self.Z[column * self.stride..][..shared];
@@ -166,7 +191,12 @@ impl<T: Lane> Rows<T> {
     /// Adds a number by slot, 1/kg, to the three entries on W's diagonal.
     pub fn soften(&mut self, contacts: &Contacts<T>, diagonal: &[T]) {
         for (i, &slot) in contacts.used().iter().enumerate() {
-            let own = &mut self.W[block(i, i)];
+            let own = if self.pattern.is_some() {
+                self.softness[slot] = diagonal[slot];
+                &mut self.W[slot]
+            } else {
+                &mut self.W[block(i, i)]
+            };
             for k in [0, 4, 8] {
                 own[k] += diagonal[slot];
             }
@@ -181,7 +211,7 @@ impl<T: Lane> Rows<T> {
     #[inline(always)]
     pub fn local(&self, contacts: &Contacts<T>, y: &[T], q: &mut [Triple<T>]) {
         for &slot in contacts.used() {
-            let movers = &self.movers[Contacts::<T>::wheel(slot)][..];
+            let movers = &self.movers[contacts.wheel(slot)][..];
             let rows = &self.Z[slot * self.stride..][..BASE + movers.len()];
             let (base, joints) = rows.split_at(BASE);
             let mut sum = scaled(&base[0], y[0]);
@@ -210,7 +240,7 @@ impl<T: Lane> Rows<T> {
         y: &mut [T],
     ) {
         for &slot in contacts.used() {
-            let movers = &self.movers[Contacts::<T>::wheel(slot)][..];
+            let movers = &self.movers[contacts.wheel(slot)][..];
             let rows = &self.Z[slot * self.stride..][..BASE + movers.len()];
             let (base, joints) = rows.split_at(BASE);
             let here = contacts.slot(slot).active & lanes;
@@ -250,7 +280,7 @@ impl<T: Lane> Rows<T> {
             let moment = own.point.cross(force);
             add_vector(here, &mut total, force);
             add_vector(here, &mut couple, moment);
-            for &body in &self.movers[Contacts::<T>::wheel(slot)] {
+            for &body in &self.movers[contacts.wheel(slot)] {
                 let power = end.bodies[body].power(force, moment);
                 add(here, &mut out[velocity(body)], power);
             }
@@ -258,7 +288,7 @@ impl<T: Lane> Rows<T> {
         out[..BASE].copy_from_slice(&[total.x, total.y, total.z, couple.x, couple.y, couple.z]);
     }
 
-    /// Writes each lane's problem: W, q, μ. Starting impulses stay as they are.
+    /// Writes each lane's problem: W or its factors, q, μ. Starting impulses stay as they are.
     ///
     /// `q`: free velocity by slot, m/s; `mu`: friction coefficient. `problems`: one a lane.
     ///
@@ -276,6 +306,12 @@ impl<T: Lane> Rows<T> {
             #[inline(always)]
             || {
                 let problems = &mut problems[..T::LANES];
+                if let Some(pattern) = &self.pattern {
+                    for problem in &mut *problems {
+                        problem.factored.adopt(pattern);
+                        problem.factored.slots = 0;
+                    }
+                }
                 let mut friction = [0.0; MAX_LANES];
                 mu.store(&mut friction[..T::LANES]);
                 for (lane, problem) in problems.iter_mut().enumerate() {
@@ -297,6 +333,10 @@ impl<T: Lane> Rows<T> {
                             }
                         },
                     );
+                    if self.pattern.is_some() {
+                        self.write_factors(contacts, row, problems);
+                        continue;
+                    }
                     for &column in &contacts.used()[..=i] {
                         let of_column = contacts.places(column);
                         let [first @ .., last] = &self.W[at];
@@ -327,6 +367,46 @@ impl<T: Lane> Rows<T> {
                 }
             },
         );
+    }
+
+    /// Writes a slot's part of the factors.
+    #[inline(always)]
+    fn write_factors(
+        &self,
+        contacts: &Contacts<T>,
+        slot: usize,
+        problems: &mut [ContactProblem],
+    ) {
+        let (places, active) = (contacts.places(slot), contacts.slot(slot).active);
+        let n = BASE + self.movers[contacts.wheel(slot)].len();
+        let softness = store_all(&[self.softness[slot]]);
+        let diagonal = store_all(&self.W[slot]);
+        each::<T>(
+            active,
+            #[inline(always)]
+            |lane| {
+                let (contact, out) = (usize::from(places[lane]), &mut problems[lane].factored);
+                out.slots |= 1 << slot;
+                out.softness[contact] = softness[0][lane];
+                for (out, values) in out.diagonal[contact].iter_mut().zip(&diagonal) {
+                    *out = values[lane];
+                }
+            },
+        );
+        for (k, z) in self.Z[slot * self.stride..][..n].iter().enumerate() {
+            let values = store_all(z);
+            each::<T>(
+                active,
+                #[inline(always)]
+                |lane| {
+                    let at = usize::from(places[lane]) * self.stride + k;
+                    let out = &mut problems[lane].factored.Z[at];
+                    for i in 0..3 {
+                        out[i] = values[i][lane];
+                    }
+                },
+            );
+        }
     }
 
     /// Reads an answer of the problems by slot. Slots that a lane does not use are left as they

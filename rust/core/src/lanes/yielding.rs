@@ -59,7 +59,7 @@ impl<T: Lane> Yields<T> {
         unknown: impl Fn(usize) -> Option<f64>,
     ) {
         for &slot in contacts.used() {
-            let compliance = machine.wheels[Contacts::<T>::wheel(slot)].compliance;
+            let compliance = machine.wheels[contacts.wheel(slot)].compliance;
             let (own, places) = (contacts.slot(slot), contacts.places(slot));
             let mut columns = [[0.0; MAX_LANES]; 5];
             for (lane, problem) in problems[..T::LANES].iter().enumerate() {

@@ -3,21 +3,34 @@
 use std::sync::Arc;
 
 use super::active_contact::ActiveContact;
+use super::quick::solve;
 use super::rover::{RoverScene, RoverSimulation};
 use super::scene::QuickStep;
 use crate::integrator::{NoProbe, Phase, Probe, StepError, StepOptions, StepReport};
-use crate::lanes::admission::admit;
+use crate::lanes::admission::{NeverOrdinary, admit};
 use crate::lanes::machine::Machine;
 use crate::lanes::passenger::Passenger;
-use crate::lanes::queue;
 use crate::lanes::step::Block;
 use crate::scalar::{Lane, Single};
 
 impl RoverScene {
     /// The machine of its ordinary steps; none if with these options no step is ordinary.
     fn ordinary_machine(&self, options: &StepOptions) -> Option<&Arc<Machine>> {
-        admit(options).ok()?;
-        self.machine.as_ref().ok()
+        match self.never_ordinary(options) {
+            None => self.machine.as_ref().ok(),
+            Some(_) => None,
+        }
+    }
+
+    /// Why with these options no step is ordinary.
+    #[inline]
+    pub(super) fn never_ordinary(&self, options: &StepOptions) -> Option<NeverOrdinary> {
+        match (admit(options), &self.machine) {
+            (Err(why), _) => Some(why),
+            (Ok(()), Err(why)) => Some(why.clone().into()),
+            (Ok(()), Ok(machine)) => (machine.has_wide_wheels() && self.terrain.has_surface())
+                .then_some(NeverOrdinary::WideWheelsOnSurface),
+        }
     }
 
     /// Takes an ordinary step; None if it is not ordinary, and nothing has changed.
@@ -47,19 +60,19 @@ impl RoverScene {
         };
         block.board(0, &passenger);
         block.begin();
-        let problems = &mut quick.problem[..];
-        block.prepare(problems, probe);
+        let (problem, queue) = (&mut *quick.problem, &mut quick.queue);
+        block.prepare(problem, probe);
         let solver = &step.options.solver;
-        queue::solve_all::<f64>(token, problems, solver);
+        solve(problem, queue, solver);
         probe.end(Phase::Solve);
-        let is_deep = block.conclude(problems, probe);
-        let gap_problems = &mut quick.gap_problem[..];
+        let is_deep = block.conclude(problem, probe);
+        let gap_problem = &mut *quick.gap_problem;
         if is_deep {
-            gap_problems.clone_from_slice(problems);
-            block.set_gaps(gap_problems);
-            queue::solve_all::<f64>(token, gap_problems, solver);
+            gap_problem.clone_from_slice(problem);
+            block.set_gaps(gap_problem);
+            solve(gap_problem, queue, solver);
         }
-        block.finish(is_deep.then_some(&*gap_problems), probe);
+        block.finish(is_deep.then_some(&gap_problem[..]), probe);
         if block.declined(0).is_some() {
             return None;
         }
