@@ -58,7 +58,10 @@ impl Ground {
     }
 
     const fn has_rocks(self) -> bool {
-        matches!(self, Self::Rocks | Self::CylindersOnRocks | Self::ToriOnRocks)
+        matches!(
+            self,
+            Self::Rocks | Self::CylindersOnRocks | Self::ToriOnRocks
+        )
     }
 
     /// Width and rounding of the wheels, m, if they have any.

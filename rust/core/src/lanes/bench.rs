@@ -15,6 +15,9 @@ use crate::solver::FURTHER_ALPHAS;
 /// Most steps of an attempt. What is unsolved then goes in circles, mostly.
 const MAX_STEPS: usize = 80;
 
+/// Share of the squared residual that a correction leaves if another one follows.
+const GAIN: f64 = 0.01;
+
 /// Most steps of a solve: those of the first attempt and of all further ones.
 pub const MAX_ITERATIONS: usize = MAX_STEPS * (1 + FURTHER_ALPHAS.len());
 
@@ -175,9 +178,16 @@ impl<T: Lane, const C: usize, S: System<T, C>> Bench<T, C, S> {
         let active = T::mask(token, self.active);
         own.correct(active);
         own.step(active);
-        let nearly = active & own.is_near() & !own.is_solved(tolerances);
-        if nearly.any() {
+        let mut nearly = active & own.is_near() & !own.is_solved(tolerances);
+        for _ in 0..S::CORRECTIONS {
+            if !nearly.any() {
+                break;
+            }
+            let [before, _] = own.residual();
             own.refine(nearly);
+            let [after, _] = own.residual();
+            let gains = after.lt(before.like(GAIN) * before);
+            nearly = nearly & gains & !own.is_solved(tolerances);
         }
         self.late = 0;
         for lane in 0..T::LANES {
@@ -235,7 +245,6 @@ impl<T: Lane, const C: usize, S: System<T, C>> Bench<T, C, S> {
             let ended = self.active & ends;
             if ended == 0 {
                 self.step(token, tolerances);
-                if std::env::var("TRACE").is_ok() { self.pivoting.trace(self.steps[0]); }
                 continue;
             }
             self.active &= !ended;

@@ -308,7 +308,10 @@ pub(super) struct DenseSystem<T: Lane, const C: usize> {
 impl<T: Lane, const C: usize> System<T, C> for DenseSystem<T, C> {
     type Places = std::ops::Range<usize>;
 
+    const ALPHA: f64 = 1e-8;
+    const PARKED_ALPHA: f64 = 1e-6;
     const SMALLEST_ALPHA: f64 = 1e-14;
+    const CORRECTIONS: usize = 1;
 
     #[inline(always)]
     fn new(token: T::Token) -> Self {

@@ -282,8 +282,9 @@ impl<T: Lane> Ground<T> {
     /// Rovers whose ground is a surface.
     #[inline(always)]
     pub(super) fn on_surface(&self) -> T::Mask {
-        let bits = (self.surfaces.iter().enumerate())
-            .fold(0, |bits, (lane, own)| bits | u32::from(own.is_some()) << lane);
+        let bits = (self.surfaces.iter().enumerate()).fold(0, |bits, (lane, own)| {
+            bits | u32::from(own.is_some()) << lane
+        });
         T::mask(self.offset.token(), bits)
     }
 

@@ -9,9 +9,9 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use nalgebra::{Matrix3, Vector3};
 use thiserror::Error;
 
+use super::problem::MAX_CONTACTS;
 #[cfg(doc)]
 use crate::geometry::Roller;
-use super::problem::MAX_CONTACTS;
 use crate::law::compliance::Compliance;
 use crate::multibody::joint::{Joint, JointAxis};
 use crate::multibody::model::BASE;
@@ -177,9 +177,7 @@ impl Machine {
         let bodies = model.bodies();
         let mut machine = Self {
             links: Vec::with_capacity(bodies.len()),
-            wheels: (model.wheels().iter())
-                .map(WheelDisc::of)
-                .collect(),
+            wheels: (model.wheels().iter()).map(WheelDisc::of).collect(),
             boxes: (model.boxes().iter())
                 .map(|part| BodyBox {
                     body: part.body,

@@ -17,13 +17,6 @@ use crate::law::coulomb::ContactMode;
 use crate::scalar::{Lane, LaneMask};
 use crate::solver::solve_one_contact;
 
-/// First `α` of the proximal term `α (p − c)`, relative to the mean diagonal of `W`. A step's error
-/// is `α` times the change of the impulse, and the rounding of `W p + q`, divided by `α`, drifts
-/// into the null space of `W`. The ratio test bounds that where wheels slide. A parked rover, whose
-/// impulses hardly change, collects it step by step: its `α` is larger.
-const ALPHA: f64 = 1e-8;
-const PARKED_ALPHA: f64 = 1e-6;
-
 /// Squared relative residual below which a rover without a slide counts as parked.
 const PARKED: f64 = 1e-12;
 
@@ -101,7 +94,6 @@ pub(super) struct Pivoting<T: Lane, const C: usize, S: System<T, C>> {
     last: T,
     visits: Visits<T>,
     reversals: T,
-    debug_first: T,
 }
 
 impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
@@ -132,7 +124,6 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
             last: zero,
             visits: Visits::new(zero),
             reversals: zero,
-            debug_first: zero,
         }
     }
 
@@ -173,7 +164,7 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
         let [relative, _] = self.residual();
         self.last = T::select(lanes, relative, self.last);
         let is_parked = !slides & relative.lt(zero.like(PARKED));
-        let first = T::select(is_parked, zero.like(PARKED_ALPHA), zero.like(ALPHA));
+        let first = T::select(is_parked, zero.like(S::PARKED_ALPHA), zero.like(S::ALPHA));
         let first = T::select(zero.lt(self.asked), self.asked, first) * self.mean;
         self.first_alpha = T::select(lanes, first, self.first_alpha);
         self.alpha = T::select(lanes, first, self.alpha);
@@ -197,13 +188,8 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
         let (zero, one) = (self.mean.like(0.0), self.mean.like(1.0));
         self.find_modes();
         self.system.factorise(self.alpha, &self.modes);
-        self.system.newton_point(
-            &self.q,
-            &self.p,
-            self.alpha,
-            &self.modes,
-            &mut self.trial,
-        );
+        self.system
+            .newton_point(&self.q, &self.p, self.alpha, &self.modes, &mut self.trial);
         let mut first = one;
         let mut limits = [Limit {
             t: one,
@@ -218,7 +204,6 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
             first = limits[i].t.min(first);
         }
         let blocked = active & first.lt(one);
-        self.debug_first = first;
         if blocked.any() {
             self.stop_at(blocked, first, &limits);
         } else {
@@ -249,11 +234,6 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
         }
     }
 
-    pub(super) fn trace(&self, step: usize) {
-        let [r, l] = self.residual();
-        let modes: String = self.system.places().map(|i| if !self.closed[i].get(0) {'.'} else if self.sticks[i].get(0) {'#'} else {'~'}).collect();
-        println!("  it {step} full {} res {:.2e} {:.2e} alpha {:.1e} modes {modes} first {:.2e}", self.full.get(0), r.get(0).sqrt(), l.get(0).sqrt(), (self.alpha/self.mean).get(0), self.debug_first.get(0));
-    }
     /// Where the last step was a full one and came near the answer.
     #[inline(always)]
     pub(super) fn is_near(&self) -> T::Mask {

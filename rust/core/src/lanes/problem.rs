@@ -91,7 +91,9 @@ impl Factored {
         let (Some(first), Some(second)) = (path(a), path(b)) else {
             return 0.0;
         };
-        let shared = (first.iter().zip(second)).take_while(|(k, l)| k == l).count();
+        let shared = (first.iter().zip(second))
+            .take_while(|(k, l)| k == l)
+            .count();
         let row = |contact: usize| self.Z[contact * pattern.stride()..].iter().take(shared);
         row(a).zip(row(b)).map(|(x, y)| x[i % 3] * y[j % 3]).sum()
     }

@@ -31,20 +31,22 @@ pub enum Answer {
 pub struct Rows<T: Lane> {
     token: T::Token,
     /// Bodies whose joints move a wheel, from the trunk outwards.
-    movers: Vec<Vec<usize>>,
+    pub(super) movers: Vec<Vec<usize>>,
     /// Velocities that two wheels share: `common[a * n_wheels + b]`.
     common: Vec<usize>,
     /// Length of the longest path.
-    stride: usize,
+    pub(super) stride: usize,
     /// Z along the path of each slot's wheel: `Z[slot * stride + k]`.
-    Z: Vec<Triple<T>>,
+    pub(super) Z: Vec<Triple<T>>,
     /// Blocks of W for the slots in use, row-major: [`block`] of their positions among them. Of a
     /// machine with a pattern: the diagonal blocks by slot.
-    W: Vec<[T; 9]>,
+    pub(super) W: Vec<[T; 9]>,
     /// Where W is used by its factors.
     pattern: Option<Arc<Pattern>>,
     /// What [`Self::soften`] added to the diagonal of W by slot, with a pattern, 1/kg.
-    softness: Vec<T>,
+    pub(super) softness: Vec<T>,
+    /// The motion in [`Self::sweep`] (nv, factor coordinates).
+    pub(super) swept: Vec<T>,
     /// Local velocity `Hᵀ v` before the step by slot, m/s.
     pub u_before: Vec<Triple<T>>,
 }
@@ -84,8 +86,16 @@ impl<T: Lane> Rows<T> {
             W: vec![[zero; 9]; n_slots * (n_slots + 1) / 2],
             pattern: machine.has_lines().then(|| Arc::new(Pattern::of(machine))),
             softness: vec![zero; n_slots],
+            swept: vec![zero; machine.nv()],
             u_before: vec![[zero; 3]; n_slots],
         }
+    }
+
+    /// Whether W is used by its factors.
+    #[inline(always)]
+    #[must_use]
+    pub fn is_factored(&self) -> bool {
+        self.pattern.is_some()
     }
 
     /// Builds Z, W and `u_before = Hᵀ v` at the end of the step.
@@ -371,12 +381,7 @@ impl<T: Lane> Rows<T> {
 
     /// Writes a slot's part of the factors.
     #[inline(always)]
-    fn write_factors(
-        &self,
-        contacts: &Contacts<T>,
-        slot: usize,
-        problems: &mut [ContactProblem],
-    ) {
+    fn write_factors(&self, contacts: &Contacts<T>, slot: usize, problems: &mut [ContactProblem]) {
         let (places, active) = (contacts.places(slot), contacts.slot(slot).active);
         let n = BASE + self.movers[contacts.wheel(slot)].len();
         let softness = store_all(&[self.softness[slot]]);
@@ -450,7 +455,7 @@ impl<T: Lane> Rows<T> {
 
 /// `x += y` where the mask is true.
 #[inline(always)]
-fn add<T: Lane>(mask: T::Mask, x: &mut T, y: T) {
+pub(super) fn add<T: Lane>(mask: T::Mask, x: &mut T, y: T) {
     *x = T::select(mask, *x + y, *x);
 }
 
@@ -461,7 +466,7 @@ fn add_vector<T: Lane>(mask: T::Mask, x: &mut Vec3<T>, y: Vec3<T>) {
 
 /// A row of Z times an impulse.
 #[inline(always)]
-fn along<T: Lane>(z: &Triple<T>, p: &Triple<T>) -> T {
+pub(super) fn along<T: Lane>(z: &Triple<T>, p: &Triple<T>) -> T {
     z[0] * p[0] + z[1] * p[1] + z[2] * p[2]
 }
 
@@ -473,7 +478,7 @@ fn scaled<T: Lane>(x: &Triple<T>, a: T) -> Triple<T> {
 
 /// `sums += a x`.
 #[inline(always)]
-fn add_scaled<T: Lane>(sums: &mut Triple<T>, x: &Triple<T>, a: T) {
+pub(super) fn add_scaled<T: Lane>(sums: &mut Triple<T>, x: &Triple<T>, a: T) {
     for i in 0..3 {
         sums[i] += a * x[i];
     }

@@ -11,8 +11,20 @@ pub(super) trait System<T: Lane, const C: usize>: Sized {
     /// Places of contacts, ascending.
     type Places: Iterator<Item = usize>;
 
+    /// First `α` of the proximal term `α (p − c)`, relative to the mean diagonal of `W`. A step's
+    /// error is `α` times the change of the impulse, and the rounding of `W p + q`, divided by `α`,
+    /// drifts into the null space of `W`. The ratio test bounds that where wheels slide. A parked
+    /// rover, whose impulses hardly change, collects it step by step: its `α` may be larger.
+    const ALPHA: f64;
+
+    /// The same for a parked rover.
+    const PARKED_ALPHA: f64;
+
     /// Smallest `α`, relative to the mean diagonal of `W`, for which the systems are accurate.
     const SMALLEST_ALPHA: f64;
+
+    /// Most corrections with the same factors.
+    const CORRECTIONS: usize;
 
     /// Without problems.
     fn new(token: T::Token) -> Self;

@@ -269,7 +269,10 @@ impl<T: Lane, const C: usize> VelocitySystem<T, C> {
 impl<T: Lane, const C: usize> System<T, C> for VelocitySystem<T, C> {
     type Places = Bits;
 
-    const SMALLEST_ALPHA: f64 = 1e-10;
+    const ALPHA: f64 = 1e-4;
+    const PARKED_ALPHA: f64 = 1e-4;
+    const SMALLEST_ALPHA: f64 = 1e-6;
+    const CORRECTIONS: usize = 3;
 
     fn new(token: T::Token) -> Self {
         let zero = T::splat(token, 0.0);
