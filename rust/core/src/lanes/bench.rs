@@ -98,6 +98,12 @@ impl<T: Lane, const C: usize, S: System<T, C>> Bench<T, C, S> {
             law.inverse[0].set(lane, 1.0 / rho_N);
             law.inverse[1].set(lane, 1.0 / rho_T);
             law.mass_squared.set(lane, scales.mass * scales.mass);
+            if S::RETURNS {
+                let last = S::last_of(problem, contact);
+                for k in 0..3 {
+                    own.centre[i][k].set(lane, if is_used { last[k] } else { 0.0 });
+                }
+            }
             for k in 0..3 {
                 let at = 3 * contact + k;
                 let (p, q) = if is_used {
@@ -141,6 +147,12 @@ impl<T: Lane, const C: usize, S: System<T, C>> Bench<T, C, S> {
             if let Some(contact) = S::contact_at(problem, i) {
                 for k in 0..3 {
                     own.p[i][k].set(lane, problem.p[3 * contact + k]);
+                }
+                if S::RETURNS {
+                    let last = S::last_of(problem, contact);
+                    for k in 0..3 {
+                        own.centre[i][k].set(lane, last[k]);
+                    }
                 }
             }
         }

@@ -311,6 +311,7 @@ impl<T: Lane, const C: usize> System<T, C> for DenseSystem<T, C> {
     const ALPHA: f64 = 1e-8;
     const PARKED_ALPHA: f64 = 1e-6;
     const SMALLEST_ALPHA: f64 = 1e-14;
+    const RETURNS: bool = false;
     const CORRECTIONS: usize = 1;
 
     #[inline(always)]
@@ -338,6 +339,11 @@ impl<T: Lane, const C: usize> System<T, C> for DenseSystem<T, C> {
     #[inline(always)]
     fn contact_at(problem: &ContactProblem, place: usize) -> Option<usize> {
         (place < problem.n_contacts).then_some(place)
+    }
+
+    #[inline(always)]
+    fn last_of(_: &ContactProblem, _: usize) -> Triple<f64> {
+        [0.0; 3]
     }
 
     #[inline(always)]

@@ -9,6 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use nalgebra::{Matrix3, Vector3};
 use thiserror::Error;
 
+use super::pattern::Pattern;
 use super::problem::MAX_CONTACTS;
 #[cfg(doc)]
 use crate::geometry::Roller;
@@ -72,6 +73,8 @@ pub struct Machine {
     entries: Vec<usize>,
     turning: Vec<usize>,
     paths: Vec<usize>,
+    /// Pattern of its contact problems, if they are solved by the factors of their operator.
+    pub(super) pattern: Option<Arc<Pattern>>,
 }
 
 /// A body and its joint.
@@ -192,9 +195,13 @@ impl Machine {
                 .filter(|&joint| !bodies[joint + 1].is_spinner)
                 .collect(),
             paths: Vec::new(),
+            pattern: None,
         };
         for (b, body) in bodies.iter().enumerate() {
             machine.add(b, body, bodies);
+        }
+        if machine.has_lines() {
+            machine.pattern = Some(Arc::new(Pattern::of(&machine)));
         }
         Ok(machine)
     }

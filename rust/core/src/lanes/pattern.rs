@@ -16,6 +16,8 @@ pub struct Pattern {
     paths: Vec<Vec<usize>>,
     /// Length of the longest path.
     stride: usize,
+    /// Velocities that two slots share: `shared[a * n + b]`.
+    shared: Vec<usize>,
 }
 
 impl Pattern {
@@ -54,6 +56,9 @@ impl Pattern {
             ancestors,
             rows,
             stride: paths.iter().map(Vec::len).max().unwrap_or(0),
+            shared: (paths.iter())
+                .flat_map(|a| paths.iter().map(move |b| shared(a, b)))
+                .collect(),
             paths,
         }
     }
@@ -92,10 +97,20 @@ impl Pattern {
         &self.paths[slot]
     }
 
+    /// Number of velocities that move the contacts of two slots.
+    #[must_use]
+    pub fn shared(&self, a: usize, b: usize) -> usize {
+        self.shared[a * self.paths.len() + b]
+    }
+
     /// Length of the longest path.
     #[inline(always)]
     #[must_use]
     pub fn stride(&self) -> usize {
         self.stride
     }
+}
+
+fn shared(a: &[usize], b: &[usize]) -> usize {
+    a.iter().zip(b).take_while(|(i, j)| i == j).count()
 }

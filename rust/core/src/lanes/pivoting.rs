@@ -79,6 +79,8 @@ pub(super) struct Pivoting<T: Lane, const C: usize, S: System<T, C>> {
     /// `α` that an attempt asks for, relative to the mean diagonal of `W`; 0 for that which suits
     /// the start.
     pub(super) asked: T,
+    /// Impulses that a step stays near, where the system [returns](System::RETURNS) to them.
+    pub(super) centre: [Triple<T>; C],
     alpha: T,
     first_alpha: T,
     trial: [Triple<T>; C],
@@ -114,6 +116,7 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
             asked: zero,
             alpha: one,
             first_alpha: one,
+            centre: [[zero; 3]; C],
             trial: [[zero; 3]; C],
             modes: [Mode::open(zero); C],
             closed: [none; C],
@@ -188,8 +191,9 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
         let (zero, one) = (self.mean.like(0.0), self.mean.like(1.0));
         self.find_modes();
         self.system.factorise(self.alpha, &self.modes);
+        let centre = if S::RETURNS { &self.centre } else { &self.p };
         self.system
-            .newton_point(&self.q, &self.p, self.alpha, &self.modes, &mut self.trial);
+            .newton_point(&self.q, centre, self.alpha, &self.modes, &mut self.trial);
         let mut first = one;
         let mut limits = [Limit {
             t: one,
@@ -215,6 +219,9 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
             self.freed[i] = self.freed[i] & !active;
         }
         self.full = active & !blocked;
+        if S::RETURNS {
+            select(self.system.places(), self.full, &self.p, &mut self.centre);
+        }
         (self.system).velocities(&self.q, &self.p, &mut self.u);
         self.judge();
     }

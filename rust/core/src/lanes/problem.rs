@@ -65,6 +65,9 @@ pub struct Factored {
     pub slots: u32,
     /// Z along the path of each contact: `Z[contact * stride + k]`, kg^(-1/2).
     pub Z: Vec<Triple<f64>>,
+    /// Impulses of the last step, N s. Of answers that the machine cannot tell apart one near them
+    /// is found.
+    pub last: Vec<Triple<f64>>,
     /// Diagonal blocks of W, 1/kg.
     pub diagonal: Vec<[f64; 9]>,
     /// Diagonal of D by contact, 1/kg.
@@ -86,16 +89,18 @@ impl Factored {
         if a == b {
             return self.diagonal[a][3 * (i % 3) + j % 3];
         }
-        let slots = (0..u32::BITS as usize).filter(|slot| self.slots >> slot & 1 == 1);
-        let path = |contact| slots.clone().nth(contact).map(|slot| pattern.path(slot));
-        let (Some(first), Some(second)) = (path(a), path(b)) else {
-            return 0.0;
-        };
-        let shared = (first.iter().zip(second))
-            .take_while(|(k, l)| k == l)
-            .count();
+        let shared = pattern.shared(self.slot_of(a), self.slot_of(b));
         let row = |contact: usize| self.Z[contact * pattern.stride()..].iter().take(shared);
         row(a).zip(row(b)).map(|(x, y)| x[i % 3] * y[j % 3]).sum()
+    }
+
+    /// Slot of a contact.
+    fn slot_of(&self, contact: usize) -> usize {
+        let mut slots = self.slots;
+        for _ in 0..contact {
+            slots &= slots - 1;
+        }
+        slots.trailing_zeros() as usize
     }
 
     /// Makes room for the contacts of a machine.
@@ -103,6 +108,7 @@ impl Factored {
         if !(self.pattern.as_ref()).is_some_and(|own| Arc::ptr_eq(own, pattern)) {
             self.pattern = Some(Arc::clone(pattern));
             self.Z.resize(MAX_CONTACTS * pattern.stride(), [0.0; 3]);
+            self.last.resize(MAX_CONTACTS, [0.0; 3]);
             self.diagonal.resize(MAX_CONTACTS, [0.0; 9]);
             self.softness.resize(MAX_CONTACTS, 0.0);
         }
@@ -112,6 +118,7 @@ impl Factored {
         self.pattern.clone_from(&other.pattern);
         self.slots = other.slots;
         self.Z.clone_from(&other.Z);
+        self.last.clone_from(&other.last);
         self.diagonal.clone_from(&other.diagonal);
         self.softness.clone_from(&other.softness);
     }

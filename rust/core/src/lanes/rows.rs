@@ -84,7 +84,7 @@ impl<T: Lane> Rows<T> {
             stride,
             Z: vec![[zero; 3]; n_slots * stride],
             W: vec![[zero; 9]; n_slots * (n_slots + 1) / 2],
-            pattern: machine.has_lines().then(|| Arc::new(Pattern::of(machine))),
+            pattern: machine.pattern.clone(),
             softness: vec![zero; n_slots],
             swept: vec![zero; machine.nv()],
             u_before: vec![[zero; 3]; n_slots],

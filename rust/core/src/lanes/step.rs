@@ -436,6 +436,8 @@ impl<T: Lane> Block<T> {
         }
         probe.end(Phase::Delassus);
         self.load(problems);
+        self.rows
+            .to_problems(&self.contacts, &self.u, self.friction, problems);
         probe.end(Phase::Bias);
         if self.rows.is_factored() {
             T::vectorize(
@@ -444,8 +446,6 @@ impl<T: Lane> Block<T> {
                 || self.begin_near(problems),
             );
         }
-        self.rows
-            .to_problems(&self.contacts, &self.u, self.friction, problems);
     }
 
     /// Improves the impulses that the problems start from.
@@ -960,6 +960,7 @@ impl<T: Lane> Block<T> {
                     let n = problem.n_unknowns();
                     problem.q[..n].fill(0.0);
                     problem.p[..n].fill(0.0);
+                    problem.factored.last.fill([0.0; 3]);
                 }
                 for &slot in self.contacts.used() {
                     let gap = self.gap_at_end(slot, h, theta);

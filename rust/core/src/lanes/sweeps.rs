@@ -65,7 +65,10 @@ fn friction<T: Lane>([a, b, c]: [T; 3], f: [T; 2], limit: T) -> [T; 2] {
     }
     let scale = T::select(limit.lt(norm), limit / norm, one);
     let holds = zero.lt(limit);
-    p.map(|p| T::select(holds, p * scale, zero))
+    [
+        T::select(holds, p[0] * scale, zero),
+        T::select(holds, p[1] * scale, zero),
+    ]
 }
 
 impl<T: Lane> Rows<T> {
@@ -83,9 +86,10 @@ impl<T: Lane> Rows<T> {
         self.swept.fill(zero);
         for &slot in contacts.used() {
             let active = contacts.slot(slot).active;
-            let start = p[slot].map(|p| T::select(active, p, zero));
-            p[slot] = start;
-            self.push(contacts, slot, &start);
+            for p in &mut p[slot] {
+                *p = T::select(active, *p, zero);
+            }
+            self.push(contacts, slot, &p[slot]);
         }
         for _ in 0..n {
             for &slot in contacts.used() {
@@ -144,7 +148,8 @@ impl<T: Lane> Rows<T> {
         u
     }
 
-    /// Writes impulses by slot as the start of each lane's problem.
+    /// Writes impulses by slot as the start of each lane's problem, whose impulses are those of the
+    /// last step.
     #[inline(always)]
     pub(super) fn write_start(
         &self,
@@ -157,9 +162,12 @@ impl<T: Lane> Rows<T> {
             let places = contacts.places(slot);
             for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
                 if active.get(lane) {
-                    let own = &mut problem.p[3 * usize::from(places[lane])..][..3];
-                    for (own, p) in own.iter_mut().zip(&p[slot]) {
-                        *own = p.get(lane);
+                    let contact = usize::from(places[lane]);
+                    let own = &mut problem.p[3 * contact..][..3];
+                    let last = &mut problem.factored.last[contact];
+                    for (k, own) in own.iter_mut().enumerate() {
+                        last[k] = *own;
+                        *own = p[slot][k].get(lane);
                     }
                 }
             }

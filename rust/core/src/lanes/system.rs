@@ -23,6 +23,10 @@ pub(super) trait System<T: Lane, const C: usize>: Sized {
     /// Smallest `α`, relative to the mean diagonal of `W`, for which the systems are accurate.
     const SMALLEST_ALPHA: f64;
 
+    /// Whether a solve's first full step stays near the impulses of the last step, rather than near
+    /// those from which it starts.
+    const RETURNS: bool;
+
     /// Most corrections with the same factors.
     const CORRECTIONS: usize;
 
@@ -34,6 +38,9 @@ pub(super) trait System<T: Lane, const C: usize>: Sized {
 
     /// Number of a problem's contact at a place, if it has one there.
     fn contact_at(problem: &ContactProblem, place: usize) -> Option<usize>;
+
+    /// Impulse of a problem's contact in the last step, N s.
+    fn last_of(problem: &ContactProblem, contact: usize) -> Triple<f64>;
 
     /// Diagonal block of a problem's contact.
     fn block_of(problem: &ContactProblem, contact: usize) -> &[f64; 9];

@@ -272,6 +272,7 @@ impl<T: Lane, const C: usize> System<T, C> for VelocitySystem<T, C> {
     const ALPHA: f64 = 1e-4;
     const PARKED_ALPHA: f64 = 1e-4;
     const SMALLEST_ALPHA: f64 = 1e-6;
+    const RETURNS: bool = true;
     const CORRECTIONS: usize = 3;
 
     fn new(token: T::Token) -> Self {
@@ -334,6 +335,11 @@ impl<T: Lane, const C: usize> System<T, C> for VelocitySystem<T, C> {
     #[inline(always)]
     fn contact_at(problem: &ContactProblem, place: usize) -> Option<usize> {
         problem.factored.contact_at(place)
+    }
+
+    #[inline(always)]
+    fn last_of(problem: &ContactProblem, contact: usize) -> Triple<f64> {
+        problem.factored.last[contact]
     }
 
     #[inline(always)]
