@@ -122,7 +122,7 @@ def test_a_rover_on_wide_wheels_stands_on_two_points_a_wheel() -> None:
     sim.step(200)
     wheels = [kind for kind in sim.contacts.kinds if kind == "wheel"]
     assert len(wheels) == 12
-    assert "'FL' has a width" in str(sim.never_ordinary)
+    assert sim.never_ordinary is None
     assert sim.wheel_forces[:, 0].sum() == pytest.approx(sim.model.mass * 9.81, rel=1e-2)
 
 

@@ -22,11 +22,27 @@ pub enum Ground {
     LargeWheels,
     /// Rocks of difficulty 0.5 on a slope, the rover halfway to its goal.
     Rocks,
+    /// Flat ground, wheels that touch at 0.20 m, cylinders 0.15 m wide.
+    Cylinders,
+    /// The same wheels with fully rounded edges.
+    Tori,
+    /// The cylinders among the rocks.
+    CylindersOnRocks,
+    /// The wheels with fully rounded edges among the rocks.
+    ToriOnRocks,
 }
 
 impl Ground {
     /// All grounds.
-    pub const ALL: [Self; 3] = [Self::Plane, Self::LargeWheels, Self::Rocks];
+    pub const ALL: [Self; 7] = [
+        Self::Plane,
+        Self::LargeWheels,
+        Self::Rocks,
+        Self::Cylinders,
+        Self::Tori,
+        Self::CylindersOnRocks,
+        Self::ToriOnRocks,
+    ];
 
     /// Name in tables and on command lines.
     pub const fn name(self) -> &'static str {
@@ -34,7 +50,44 @@ impl Ground {
             Self::Plane => "plane",
             Self::LargeWheels => "plane, wheels 0.20 m",
             Self::Rocks => "rocks",
+            Self::Cylinders => "plane, cylinders",
+            Self::Tori => "plane, tori",
+            Self::CylindersOnRocks => "rocks, cylinders",
+            Self::ToriOnRocks => "rocks, tori",
         }
+    }
+
+    const fn has_rocks(self) -> bool {
+        matches!(
+            self,
+            Self::Rocks | Self::CylindersOnRocks | Self::ToriOnRocks
+        )
+    }
+
+    /// Width and rounding of the wheels, m, if they have any.
+    const fn tread(self) -> Option<[f64; 2]> {
+        match self {
+            Self::Cylinders | Self::CylindersOnRocks => Some([0.15, 0.0]),
+            Self::Tori | Self::ToriOnRocks => Some([0.15, 0.075]),
+            Self::Plane | Self::LargeWheels | Self::Rocks => None,
+        }
+    }
+
+    /// The built-in rover on the wheels of the scene.
+    pub fn model(self) -> Model {
+        let model = Model::rover();
+        if matches!(self, Self::Plane | Self::Rocks) {
+            return model;
+        }
+        let model = model.with_contact_radius(LARGE).unwrap();
+        let Some([width, rounding]) = self.tread() else {
+            return model;
+        };
+        let mut wide = model.description().clone();
+        for wheel in &mut wide.wheels {
+            (wheel.width, wheel.rounding) = (Some(width), Some(rounding));
+        }
+        Model::from_description(wide).unwrap()
     }
 
     /// The ground of a name.
@@ -42,6 +95,9 @@ impl Ground {
         Self::ALL.into_iter().find(|ground| ground.name() == name)
     }
 }
+
+/// Contact radius of large wheels, m.
+const LARGE: f64 = 0.20;
 
 /// Largest torques, N m; with 0 the rover only steers.
 pub const TORQUES: [f64; 4] = [0.0, 20.0, 60.0, 150.0];
@@ -74,6 +130,12 @@ impl Drive {
         let Command { torques, steering } = &self.commands[command];
         self.simulation.set_wheel_torques(torques).unwrap();
         self.simulation.set_steering(steering).unwrap();
+    }
+
+    /// Torques and set-points of one of the commands.
+    pub fn command(&self, command: usize) -> ([f64; 6], [f64; 6]) {
+        let Command { torques, steering } = &self.commands[command];
+        (*torques, *steering)
     }
 
     /// Plays the whole drive.
@@ -113,10 +175,7 @@ pub fn drives(ground: Ground, torque: f64, options: &StepOptions) -> Vec<Drive> 
 }
 
 fn drive(record: &Value, ground: Ground, torque: f64, options: &StepOptions) -> Drive {
-    let mut model = Model::rover();
-    if ground == Ground::LargeWheels {
-        model = model.with_contact_radius(0.20).unwrap();
-    }
+    let model = ground.model();
     let [first, ..] = model.wheels() else {
         panic!("a rover has wheels")
     };
@@ -124,8 +183,11 @@ fn drive(record: &Value, ground: Ground, torque: f64, options: &StepOptions) -> 
     let mut q = vec![0.0; 21];
     q[1] = 0.25 + first.radius;
     let mut terrain: Arc<dyn Terrain> = Arc::new(Plane::ground());
-    if ground == Ground::Rocks {
+    if ground.has_rocks() {
+        // Recorded with wheels of 0.10 m.
+        let raised = first.radius - 0.10;
         q = numbers(&record["q"]);
+        q[1] += raised + if raised > 0.0 { 0.05 } else { 0.0 };
         terrain = Arc::new(rocks(record));
     }
     let commands = record["actions"].as_array().unwrap().iter().map(|row| {

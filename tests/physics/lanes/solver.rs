@@ -5,7 +5,7 @@ use std::sync::Arc;
 use proptest::prelude::*;
 use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, UnilateralContact};
-use rover_core::lanes::problem::{ContactProblem, MAX_CONTACTS, block};
+use rover_core::lanes::problem::{ContactProblem, MAX_DENSE, block};
 use rover_core::lanes::queue::{MAX_ITERATIONS, Queue, solve_all};
 use rover_core::multibody::{Configuration, Model};
 use rover_core::problem::{Dimension, FrictionContactProblem, evaluate};
@@ -188,7 +188,7 @@ fn drive_of(model: Model, height: f64, largest: f64, steps: usize) -> Vec<Contac
         simulation.step(1).expect("a step");
         let contacts = simulation.contacts();
         let (W, q, mu) = simulation.last_problem();
-        if q.len() != 3 * contacts.len() || mu.len() > MAX_CONTACTS {
+        if q.len() != 3 * contacts.len() || mu.len() > MAX_DENSE {
             continue;
         }
         let recalled = contacts.iter().flat_map(|contact| {
@@ -392,7 +392,7 @@ proptest! {
     #[test]
     fn every_answer_has_the_bits_of_the_problem_alone(
         seed in 1..u64::MAX,
-        sizes in prop::collection::vec((0..=MAX_CONTACTS, 3..20_usize, any::<bool>()), 0..40),
+        sizes in prop::collection::vec((0..=MAX_DENSE, 3..20_usize, any::<bool>()), 0..40),
     ) {
         let mut draw = Draw(seed);
         let mut problems: Vec<ContactProblem> = sizes

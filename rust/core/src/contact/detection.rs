@@ -396,7 +396,7 @@ pub(crate) fn touch_of_disc(
 }
 
 /// The same for a wheel with a width.
-fn touch_of_roller(
+pub(crate) fn touch_of_roller(
     roller: &Roller,
     ground: &Sphere,
     base: &Vector3<f64>,

@@ -15,6 +15,9 @@ pub enum NeverOrdinary {
     /// The variant is not [`Variant::Linearised`].
     #[error("the variant is Newton's")]
     Variant,
+    /// The ground is a surface and wheels have a width.
+    #[error("wheels with a width are on a surface")]
+    WideWheelsOnSurface,
     /// Contacts bounce.
     #[error("the restitution is {0}, not 0")]
     Restitution(f64),

@@ -3,15 +3,20 @@
 //! A lane takes the next problem when its own is done, so that the cost follows the mean of the
 //! steps and not the largest. No lane's bits depend on its neighbours.
 
-use super::equations::Factors;
+use super::equations::DenseSystem;
 use super::pivoting::Pivoting;
-use super::problem::{ContactProblem, block};
+use super::problem::{ContactProblem, MAX_CONTACTS};
+use super::system::System;
+use super::velocity_equations::VelocitySystem;
 use crate::problem::{ContactScales, Magnitudes, Residual};
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::solver::FURTHER_ALPHAS;
 
 /// Most steps of an attempt. What is unsolved then goes in circles, mostly.
 const MAX_STEPS: usize = 80;
+
+/// Share of the squared residual that a correction leaves if another one follows.
+const GAIN: f64 = 0.01;
 
 /// Most steps of a solve: those of the first attempt and of all further ones.
 pub const MAX_ITERATIONS: usize = MAX_STEPS * (1 + FURTHER_ALPHAS.len());
@@ -28,10 +33,15 @@ pub(super) trait Line {
     fn may_leave(&self, n_active: usize) -> bool;
 }
 
+/// Lanes for problems with their whole operator.
+pub(super) type DenseBench<T, const C: usize> = Bench<T, C, DenseSystem<T, C>>;
+
+/// Lanes for problems with a factored operator.
+pub(super) type FactoredBench<T> = Bench<T, MAX_CONTACTS, VelocitySystem<T, MAX_CONTACTS>>;
+
 /// Lanes with their problems of at most `C` contacts.
-pub(super) struct Bench<T: Lane, const C: usize> {
-    pivoting: Pivoting<T, C>,
-    factors: Factors<T, C>,
+pub(super) struct Bench<T: Lane, const C: usize, S: System<T, C>> {
+    pivoting: Pivoting<T, C, S>,
     /// Lanes with a problem, those that have taken all steps of an attempt, and those that begin
     /// another one.
     active: u32,
@@ -45,13 +55,11 @@ pub(super) struct Bench<T: Lane, const C: usize> {
     before: [usize; MAX_LANES],
 }
 
-impl<T: Lane, const C: usize> Bench<T, C> {
+impl<T: Lane, const C: usize, S: System<T, C>> Bench<T, C, S> {
     #[inline(always)]
     pub(super) fn new(token: T::Token) -> Self {
-        let zero = T::splat(token, 0.0);
         Self {
             pivoting: Pivoting::new(token),
-            factors: [[[zero; 9]; C]; C],
             active: 0,
             late: 0,
             again: 0,
@@ -70,21 +78,11 @@ impl<T: Lane, const C: usize> Bench<T, C> {
         let mut data = Magnitudes::default();
         let own = &mut self.pivoting;
         assert!(lane < T::LANES, "a lane");
-        for (b, (own, w)) in own
-            .W
-            .iter_mut()
-            .zip(&problem.W)
-            .take(block(C, 0))
-            .enumerate()
-        {
-            let is_used = b < block(n, 0);
-            for k in 0..9 {
-                own[k].set(lane, if is_used { w[k] } else { 0.0 });
-            }
-        }
-        for i in 0..C {
-            let is_used = i < n;
-            let w = &problem.W[block(i, i)];
+        for i in own.system.load(lane, problem) {
+            let contact = S::contact_at(problem, i);
+            let is_used = contact.is_some();
+            let contact = contact.unwrap_or(0);
+            let w = S::block_of(problem, contact);
             let (normal, tangential) = if is_used {
                 (w[0], w[4] + w[8])
             } else {
@@ -93,14 +91,21 @@ impl<T: Lane, const C: usize> Bench<T, C> {
             let scales = ContactScales::new::<3>(normal, tangential);
             let [rho_N, rho_T] = scales.modes;
             let law = &mut own.laws[i];
-            law.mu.set(lane, if is_used { problem.mu[i] } else { 0.0 });
+            law.mu
+                .set(lane, if is_used { problem.mu[contact] } else { 0.0 });
             law.rho[0].set(lane, rho_N);
             law.rho[1].set(lane, rho_T);
             law.inverse[0].set(lane, 1.0 / rho_N);
             law.inverse[1].set(lane, 1.0 / rho_T);
             law.mass_squared.set(lane, scales.mass * scales.mass);
+            if S::RETURNS {
+                let last = S::last_of(problem, contact);
+                for k in 0..3 {
+                    own.centre[i][k].set(lane, if is_used { last[k] } else { 0.0 });
+                }
+            }
             for k in 0..3 {
-                let at = 3 * i + k;
+                let at = 3 * contact + k;
                 let (p, q) = if is_used {
                     (problem.p[at], problem.q[at])
                 } else {
@@ -111,7 +116,7 @@ impl<T: Lane, const C: usize> Bench<T, C> {
             }
             if is_used {
                 trace += normal + tangential;
-                data.add(&problem.q[3 * i..3 * i + 3], scales.mass);
+                data.add(&problem.q[3 * contact..3 * contact + 3], scales.mass);
             }
         }
         let mean = trace / (3 * n) as f64;
@@ -138,9 +143,17 @@ impl<T: Lane, const C: usize> Bench<T, C> {
         self.steps[lane] = 0;
         let own = &mut self.pivoting;
         own.asked.set(lane, *alpha);
-        for i in 0..problem.n_contacts {
-            for k in 0..3 {
-                own.p[i][k].set(lane, problem.p[3 * i + k]);
+        for i in own.system.places() {
+            if let Some(contact) = S::contact_at(problem, i) {
+                for k in 0..3 {
+                    own.p[i][k].set(lane, problem.p[3 * contact + k]);
+                }
+                if S::RETURNS {
+                    let last = S::last_of(problem, contact);
+                    for k in 0..3 {
+                        own.centre[i][k].set(lane, last[k]);
+                    }
+                }
             }
         }
         true
@@ -160,10 +173,12 @@ impl<T: Lane, const C: usize> Bench<T, C> {
             relative: relative.get(lane).sqrt(),
             velocity: largest.get(lane).sqrt(),
         };
-        for i in 0..problem.n_contacts {
-            for k in 0..3 {
-                problem.p[3 * i + k] = own.p[i][k].get(lane);
-                problem.u[3 * i + k] = own.u[i][k].get(lane);
+        for i in own.system.places() {
+            if let Some(contact) = S::contact_at(problem, i) {
+                for k in 0..3 {
+                    problem.p[3 * contact + k] = own.p[i][k].get(lane);
+                    problem.u[3 * contact + k] = own.u[i][k].get(lane);
+                }
             }
         }
     }
@@ -174,10 +189,17 @@ impl<T: Lane, const C: usize> Bench<T, C> {
         let own = &mut self.pivoting;
         let active = T::mask(token, self.active);
         own.correct(active);
-        own.step(active, &mut self.factors);
-        let nearly = active & own.is_near() & !own.is_solved(tolerances);
-        if nearly.any() {
-            own.refine(nearly, &self.factors);
+        own.step(active);
+        let mut nearly = active & own.is_near() & !own.is_solved(tolerances);
+        for _ in 0..S::CORRECTIONS {
+            if !nearly.any() {
+                break;
+            }
+            let [before, _] = own.residual();
+            own.refine(nearly);
+            let [after, _] = own.residual();
+            let gains = after.lt(before.like(GAIN) * before);
+            nearly = nearly & gains & !own.is_solved(tolerances);
         }
         self.late = 0;
         for lane in 0..T::LANES {

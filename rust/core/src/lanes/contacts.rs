@@ -1,29 +1,34 @@
 //! Contacts of the wheels with the ground, in slots, and those of joints with their stops.
 //!
-//! Each wheel has two slots: most wheels touch the plane or a sphere, some both or two spheres. A
-//! slot is filled lane by lane; rovers that share it may touch different things there. Detection
-//! at the midpoint of the step and relocation to its end follow [`crate::contact`] and
-//! [`crate::geometry::query`]. With the unit normal n, the unit axle s and the rolling direction
-//! `t = n × s / |n × s|`, a wheel's lowest point over a plane lies along `t × s` from its centre.
+//! A wheel with one circle, a thin disc or a torus, has two slots: most touch the plane or a sphere,
+//! some both or two spheres. A wheel with two circles has four: one for each circle on the plane,
+//! and two for spheres. A slot is filled lane by lane; rovers that share it may touch different
+//! things there. Detection at the midpoint of the step and relocation to its end follow
+//! [`crate::contact`] and [`crate::geometry::query`]. With the unit normal n, the unit axle s and
+//! the rolling direction `t = n × s / |n × s|`, the lowest point of a circle over a plane lies along
+//! `t × s` from its centre.
 //!
 //! What is rare is declined: a wheel that nearly lies flat, passes a sphere within the step or
-//! touches more than two things, a box near the ground, more than [`MAX_CONTACTS`] contacts.
+//! touches more things than it has slots, a box near the ground, more contacts than a problem has.
+
+use std::ops::Range;
 
 use nalgebra::Vector3;
 
-use super::footing::SLOTS;
+use super::footing::SLOTS as PLANES;
 use super::forecast::Forecast;
 use super::ground::{Ground, GroundSphere, turning};
 use super::machine::{Machine, Stop};
 use super::parts::{Parts, Twist};
 use super::poses::Poses;
-use super::problem::MAX_CONTACTS;
-use crate::contact::detection::touch_of_disc;
+use super::problem::{MAX_CONTACTS, MAX_DENSE};
+use super::stops::SIDES;
+use crate::contact::detection::{touch_of_disc, touch_of_roller};
 use crate::contact::pair::{ANY_PIECE, ON_SURFACE};
 use crate::contact::{Contact, ContactFrame, ContactKey, Part};
-use crate::geometry::query::NEAREST;
 use crate::geometry::query::sweep::DEEP;
-use crate::geometry::{Disc, Sphere};
+use crate::geometry::query::{CIRCLE, NEAREST};
+use crate::geometry::{Disc, Roller, Sphere};
 use crate::integrator::WarmStart;
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 
@@ -78,6 +83,10 @@ pub struct Contacts<T: Lane> {
     pub(super) first_stop: usize,
     twists: Vec<Twist<T>>,
     pub(super) slots: Vec<Slot<T>>,
+    /// Part of each slot: a wheel, or, counted on from the wheels, a joint with stops.
+    part_of: Vec<usize>,
+    /// Most contacts of a rover.
+    most: usize,
     pub(super) used: Vec<usize>,
     /// How many of them are the wheels'.
     n_of_wheels: usize,
@@ -100,10 +109,21 @@ struct Sight<'a, T: Lane> {
 
 impl<T: Lane> Contacts<T> {
     /// Room for a machine.
+    ///
+    /// # Panics
+    /// If it has more than 256 slots.
     #[must_use]
     pub fn new(token: T::Token, machine: &Machine) -> Self {
         let parts = Parts::of(machine);
-        let n_slots = SLOTS * (parts.wheels.len() + machine.stops.len());
+        let n_wheels = parts.wheels.len();
+        let mut part_of: Vec<usize> = (parts.wheels.iter().enumerate())
+            .flat_map(|(w, wheel)| std::iter::repeat_n(w, wheel.slots.len()))
+            .collect();
+        let first_stop = part_of.len();
+        let stops = n_wheels..n_wheels + machine.stops.len();
+        part_of.extend(stops.flat_map(|part| [part; SIDES]));
+        let n_slots = part_of.len();
+        assert!(n_slots <= 256, "invariant: slots are numbered by 8 bits");
         let zero = T::splat(token, 0.0);
         let nowhere = Vec3::new(zero, zero, zero);
         let slot = Slot {
@@ -127,10 +147,16 @@ impl<T: Lane> Contacts<T> {
         Self {
             token,
             twists: vec![twist; parts.n_carriers()],
-            first_stop: SLOTS * parts.wheels.len(),
+            first_stop,
             parts,
             stops: machine.stops.clone(),
             slots: vec![slot; n_slots],
+            part_of,
+            most: if machine.has_lines() {
+                MAX_CONTACTS
+            } else {
+                MAX_DENSE
+            },
             used: Vec::with_capacity(n_slots),
             n_of_wheels: 0,
             lists: [Listed::NONE; MAX_LANES],
@@ -174,8 +200,8 @@ impl<T: Lane> Contacts<T> {
     /// Part of a slot: a wheel, or, counted on from the wheels, a joint with stops.
     #[inline(always)]
     #[must_use]
-    pub fn part(slot: usize) -> usize {
-        slot / SLOTS
+    pub fn part(&self, slot: usize) -> usize {
+        self.part_of[slot]
     }
 
     /// The contacts of a rover.
@@ -196,10 +222,10 @@ impl<T: Lane> Contacts<T> {
     pub fn contact(&self, machine: &Machine, lane: usize, place: usize) -> (usize, Contact) {
         let list = &self.lists[lane];
         let slot = usize::from(list.slots[place]);
-        let (own, part) = (&self.slots[slot], Self::part(slot));
+        let (own, part) = (&self.slots[slot], self.part(slot));
         let n = Vector3::from(own.n.get(lane));
-        let (part, body, frame) = if let Some(stop) = self.stop(slot) {
-            let part = Part::Limit(stop.joint, Self::side(slot));
+        let (part, body, frame) = if let Some((stop, side)) = self.stop(slot) {
+            let part = Part::Limit(stop.joint, side);
             (
                 part,
                 machine.joints[stop.joint].body,
@@ -235,10 +261,10 @@ impl<T: Lane> Contacts<T> {
     #[inline(always)]
     fn key(&self, list: &Listed, place: usize) -> ContactKey {
         let slot = usize::from(list.slots[place]);
-        if let Some(stop) = self.stop(slot) {
-            return ContactKey::at_limit(stop.joint, Self::side(slot));
+        if let Some((stop, side)) = self.stop(slot) {
+            return ContactKey::at_limit(stop.joint, side);
         }
-        let wheel = Part::Wheel(Self::part(slot));
+        let wheel = Part::Wheel(self.part(slot));
         ContactKey::on_ground(wheel, list.features[place], list.primitives[place])
     }
 
@@ -318,8 +344,8 @@ impl<T: Lane> Contacts<T> {
         let height_at_end = ground.height(end.origin);
         for w in 0..self.parts.wheels.len() {
             declined = declined | self.look_at_wheel(w, ground, sight);
-            let first = SLOTS * w;
-            if !self.slots[first].active.any() && !self.slots[first + 1].active.any() {
+            let slots = self.parts.wheels[w].slots.clone();
+            if !self.slots[slots.clone()].iter().any(|own| own.active.any()) {
                 continue;
             }
             let pose = &end.bodies[self.parts.wheels[w].body];
@@ -331,16 +357,20 @@ impl<T: Lane> Contacts<T> {
             if ground.has_surfaces() {
                 ground.follow_footing(w, (end.origin, centre, s), radius);
             }
-            for k in 0..SLOTS {
-                let slot = first + k;
+            for slot in slots.clone() {
                 if self.slots[slot].active.any() {
                     self.used.push(slot);
+                    let place = slot - slots.start;
                     let plane = if ground.has_surfaces() {
-                        ground.under_wheel(w, k, end.origin)
+                        ground.under_wheel(w, place % PLANES, end.origin)
                     } else {
                         (ground.normal, height_at_end)
                     };
-                    let flat = self.relocate(slot, plane, end, s, centre);
+                    let flat = if self.parts.wheels[w].is_wide() {
+                        self.relocate_wide((slot, place), plane, end, s, centre)
+                    } else {
+                        self.relocate(slot, plane, end, s, centre)
+                    };
                     declined = declined | flat;
                 }
             }
@@ -392,25 +422,32 @@ impl<T: Lane> Contacts<T> {
             || wheel.speed(&self.twists[wheel.carrier], centre, sight.v),
         );
         let mut declined = T::mask(self.token, 0);
-        let first = SLOTS * w;
+        let (first, is_line) = (wheel.slots.start, wheel.n_circles() > 1);
         let mut plane = (ground.normal, sight.height);
         let mut has_second = false;
         if ground.has_surfaces() {
             let origin = sight.middle.origin;
             declined = ground.find_footing(w, (origin, centre, s), wheel.radius, reach);
+            if wheel.is_wide() {
+                declined = declined | ground.on_surface();
+            }
             plane = ground.under_wheel(w, 0, origin);
             has_second = ground.has_second_plane(w);
         }
         let none = T::mask(self.token, 0);
-        for slot in &mut self.slots[first..first + SLOTS] {
+        for slot in &mut self.slots[wheel.slots.clone()] {
             (slot.active, slot.on_sphere) = (none, none);
         }
-        let (admitted, lies) = self.stands(w, plane, sight, (s, centre), reach);
+        let (admitted, lies) = self.stands((w, 0), plane, sight, (s, centre), reach);
         self.slots[first].active = admitted;
         declined = declined | lies;
-        if has_second {
+        if is_line {
+            let (admitted, lies) = self.stands((w, 1), plane, sight, (s, centre), reach);
+            self.slots[first + 1].active = admitted;
+            declined = declined | lies;
+        } else if has_second {
             let plane = ground.under_wheel(w, 1, sight.middle.origin);
-            let (admitted, lies) = self.stands(w, plane, sight, (s, centre), reach);
+            let (admitted, lies) = self.stands((w, 0), plane, sight, (s, centre), reach);
             self.slots[first + 1].active = admitted;
             declined = declined | lies;
         }
@@ -420,13 +457,13 @@ impl<T: Lane> Contacts<T> {
         declined
     }
 
-    /// Where a wheel with the axle `s` and the centre `centre` touches a plane of normal n at the
-    /// midpoint, the trunk's origin being at the given height (m) over it, and where it lies so
-    /// flat that more than one point does.
+    /// Where a circle of a wheel with the axle `s` and the centre `centre` touches a plane of normal
+    /// n at the midpoint, the trunk's origin being at the given height (m) over it, and where it
+    /// lies so flat that more than one point does.
     #[inline(always)]
     fn stands(
         &self,
-        w: usize,
+        (w, circle): (usize, usize),
         (n, base): (Vec3<T>, T),
         sight: &Sight<'_, T>,
         (s, centre): (Vec3<T>, Vec3<T>),
@@ -436,11 +473,18 @@ impl<T: Lane> Contacts<T> {
         let radius = T::splat(self.token, wheel.radius);
         let (across, along) = (n.cross(s), n.dot(s));
         let length = across.norm();
-        let height = base + n.dot(centre);
+        let mut height = base + n.dot(centre);
+        if wheel.is_wide() {
+            height += along * radius.like(wheel.along(circle)) - radius.like(wheel.rounding);
+        }
         let gap = height - radius * length;
         let twist = &self.twists[wheel.carrier];
         let u_N = if sight.forecast.needs_velocity(gap) {
-            let lever = centre.cross(n) - across * (radius * along / length);
+            let mut share = radius * along / length;
+            if wheel.is_wide() {
+                share += radius.like(wheel.along(circle));
+            }
+            let lever = centre.cross(n) - across * share;
             n.dot(twist.linear) + twist.angular.dot(lever)
         } else {
             radius
@@ -468,7 +512,10 @@ impl<T: Lane> Contacts<T> {
         let half_way = sight.end.origin - origin + at_end - centre;
         let motion = half_way.norm();
         let need = reach + motion;
-        let mut declined = ground.look_around_wheel(w, origin + centre, wheel.radius, need);
+        let mut declined = ground.look_around_wheel(w, origin + centre, wheel.bound, need);
+        if wheel.is_wide() {
+            return declined | self.look_with_tread(w, ground, sight, (s, centre), half_way);
+        }
         let radius = T::splat(self.token, wheel.radius);
         let zero = radius.like(0.0);
         let twist = self.twists[wheel.carrier];
@@ -497,17 +544,64 @@ impl<T: Lane> Contacts<T> {
                 // Normal or rolling direction are not defined by differences.
                 let least = radius.like(NO_DIRECTION);
                 declined = declined | (admitted & (in_plane_length.le(least) | distance.le(least)));
-                declined = declined | self.enter(SLOTS * w, admitted, sphere);
+                let slots = self.parts.wheels[w].slots.clone();
+                declined = declined | self.enter(slots, admitted, sphere);
             }
         }
         declined
     }
 
-    /// Enters a contact with a sphere into the first free slot of a wheel. Returns where none is.
+    /// The same for a wheel with a width.
     #[inline(always)]
-    fn enter(&mut self, first: usize, admitted: T::Mask, sphere: &GroundSphere<T>) -> T::Mask {
+    fn look_with_tread(
+        &mut self,
+        w: usize,
+        ground: &Ground<T>,
+        sight: &Sight<'_, T>,
+        (s, centre): (Vec3<T>, Vec3<T>),
+        half_way: Vec3<T>,
+    ) -> T::Mask {
+        let motion = half_way.norm();
+        let wheel = &self.parts.wheels[w];
+        let twist = self.twists[wheel.carrier];
+        // Those before are for the circles on the plane.
+        let mut slots = wheel.slots.clone();
+        if wheel.n_circles() > 1 {
+            slots.start += 2;
+        }
+        let mut declined = T::mask(self.token, 0);
+        for sphere in ground.near_wheel(w) {
+            let offset = sphere.centre - sight.middle.origin - centre;
+            let near = self.parts.wheels[w].nearest(s, offset);
+            let gap = near.distance - sphere.radius;
+            let is_deep = (gap - motion).lt(-(motion.like(DEEP) * sphere.radius));
+            if is_deep.any() {
+                declined = declined | self.passing(w, is_deep, sphere, sight, half_way);
+            }
+            let u_N = if sight.forecast.needs_velocity(gap) {
+                near.n.dot(twist.velocity(centre + near.point))
+            } else {
+                motion
+            };
+            let admitted = sight.forecast.admits(gap, u_N);
+            if admitted.any() {
+                declined = declined | (admitted & near.undefined);
+                declined = declined | self.enter(slots.clone(), admitted, sphere);
+            }
+        }
+        declined
+    }
+
+    /// Enters a contact with a sphere into the first free one of some slots. Returns where none is.
+    #[inline(always)]
+    fn enter(
+        &mut self,
+        slots: Range<usize>,
+        admitted: T::Mask,
+        sphere: &GroundSphere<T>,
+    ) -> T::Mask {
         let mut rest = admitted;
-        for slot in &mut self.slots[first..first + SLOTS] {
+        for slot in &mut self.slots[slots] {
             let here = rest & !slot.active;
             rest = rest & slot.active;
             if here.any() {
@@ -553,7 +647,17 @@ impl<T: Lane> Contacts<T> {
             };
             let base = Vector3::from(sight.middle.origin.get(lane));
             let half_way = Vector3::from(half_way.get(lane));
-            if touch_of_disc(&disc, &ball, &base, &half_way).is_some() {
+            let touch = if wheel.is_wide() {
+                let roller = Roller {
+                    core: disc,
+                    half: wheel.half,
+                    rounding: wheel.rounding,
+                };
+                touch_of_roller(&roller, &ball, &base, &half_way)
+            } else {
+                touch_of_disc(&disc, &ball, &base, &half_way)
+            };
+            if touch.is_some() {
                 passes |= 1 << lane;
             }
         }
@@ -572,7 +676,7 @@ impl<T: Lane> Contacts<T> {
         s: Vec3<T>,
         centre: Vec3<T>,
     ) -> T::Mask {
-        let wheel = &self.parts.wheels[slot / SLOTS];
+        let wheel = &self.parts.wheels[self.part_of[slot]];
         let slot = &mut self.slots[slot];
         let radius = T::splat(self.token, wheel.radius);
         let parallel = radius.like(PARALLEL);
@@ -619,6 +723,56 @@ impl<T: Lane> Contacts<T> {
         undefined
     }
 
+    /// The same for a wheel with a width; `place`: which of its slots it is.
+    #[inline(always)]
+    fn relocate_wide(
+        &mut self,
+        (slot, place): (usize, usize),
+        (n, height): (Vec3<T>, T),
+        end: &Poses<T>,
+        s: Vec3<T>,
+        centre: Vec3<T>,
+    ) -> T::Mask {
+        let wheel = &self.parts.wheels[self.part_of[slot]];
+        let slot = &mut self.slots[slot];
+        let radius = T::splat(self.token, wheel.radius);
+        let (one, rounding) = (radius.like(1.0), radius.like(wheel.rounding));
+        let parallel = radius.like(PARALLEL);
+        let on_plane = slot.active & !slot.on_sphere;
+        let mut undefined = T::mask(self.token, 0);
+        if on_plane.any() {
+            let across = n.cross(s);
+            let length = across.norm();
+            let along = radius.like(wheel.along(place));
+            slot.n = n;
+            slot.t = across * (one / length);
+            slot.point = centre + s * along + slot.t.cross(s) * radius - n * rounding;
+            slot.gap = height + n.dot(centre) + along * n.dot(s) - radius * length - rounding;
+            undefined = on_plane & length.le(parallel);
+        }
+        if slot.on_sphere.any() {
+            let here = slot.on_sphere;
+            let near = wheel.nearest(s, slot.sphere.centre - end.origin - centre);
+            let across = near.n.cross(s);
+            let length = across.norm();
+            let rolls = length.gt(parallel);
+            let mut t = across * (one / length);
+            if (here & !rolls).any() {
+                // A side face touches: along the rim.
+                let rim = s.cross(near.outward);
+                let rim = rim - near.n * near.n.dot(rim);
+                t = Vec3::select(rolls, t, rim * (one / rim.norm()));
+            }
+            undefined = undefined | (here & near.undefined);
+            slot.n = Vec3::select(here, near.n, slot.n);
+            slot.t = Vec3::select(here, t, slot.t);
+            slot.point = Vec3::select(here, centre + near.point, slot.point);
+            slot.gap = T::select(here, near.distance - slot.sphere.radius, slot.gap);
+        }
+        slot.b = slot.t.cross(slot.n);
+        undefined
+    }
+
     /// Lists the contacts of every lane. Returns the lanes with too many.
     #[inline(always)]
     fn list_contacts(&mut self, ground: &Ground<T>) -> T::Mask {
@@ -637,6 +791,10 @@ impl<T: Lane> Contacts<T> {
     /// it. Returns the lanes that have too many.
     #[inline(always)]
     pub(super) fn list_slot(&mut self, slot: usize, ground: Option<&Ground<T>>) -> T::Mask {
+        let feature = match self.parts.wheels.get(self.part_of[slot]) {
+            Some(wheel) if wheel.n_circles() > 1 && slot > wheel.slots.start => CIRCLE,
+            _ => NEAREST,
+        };
         let own = &mut self.slots[slot];
         let on_sphere = own.on_sphere.bits();
         let mut numbers = [0.0; MAX_LANES];
@@ -651,7 +809,7 @@ impl<T: Lane> Contacts<T> {
             let lane = lanes.trailing_zeros() as usize;
             lanes &= lanes - 1;
             let list = &mut self.lists[lane];
-            if list.n == MAX_CONTACTS {
+            if list.n == self.most {
                 too_many |= 1 << lane;
                 continue;
             }
@@ -665,6 +823,7 @@ impl<T: Lane> Contacts<T> {
                 list.features[list.n] = NEAREST | ON_SURFACE;
                 ANY_PIECE
             } else {
+                list.features[list.n] = feature;
                 PLANE
             };
             list.n += 1;

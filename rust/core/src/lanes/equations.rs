@@ -13,7 +13,8 @@
 //! of steps as it is.
 
 use super::modes::Mode;
-use super::problem::{MAX_BLOCKS, Triple, block};
+use super::problem::{ContactProblem, MAX_BLOCKS, Triple, block};
+use super::system::System;
 use crate::scalar::Lane;
 
 /// A 3 x 3 block, row-major.
@@ -234,7 +235,7 @@ fn subtract<T: Lane>(own: &mut Triple<T>, x: &Block<T>, y: &Triple<T>) {
 
 /// `Bᵀ x` of a contact.
 #[inline(always)]
-fn across<T: Lane>(mode: &Mode<T>, x: [T; 3]) -> Triple<T> {
+pub(super) fn across<T: Lane>(mode: &Mode<T>, x: [T; 3]) -> Triple<T> {
     let Mode {
         closed, b, stick, ..
     } = mode;
@@ -248,7 +249,7 @@ fn across<T: Lane>(mode: &Mode<T>, x: [T; 3]) -> Triple<T> {
 
 /// `C y` of a contact.
 #[inline(always)]
-fn impulse<T: Lane>(mode: &Mode<T>, [y0, y1, y2]: Triple<T>) -> Triple<T> {
+pub(super) fn impulse<T: Lane>(mode: &Mode<T>, [y0, y1, y2]: Triple<T>) -> Triple<T> {
     let Mode { a, b, .. } = mode;
     [y0, a[0] * y0 + b[0] * y1, a[1] * y0 + b[1] * y1 + y2]
 }
@@ -294,5 +295,96 @@ pub fn correction<T: Lane, const C: usize>(
     solve(factors, y);
     for k in 0..C {
         y[k] = impulse(&modes[k], y[k]);
+    }
+}
+
+/// Operators with all their blocks; a contact's place is its number.
+#[derive(Clone, Debug)]
+pub(super) struct DenseSystem<T: Lane, const C: usize> {
+    W: [Block<T>; MAX_BLOCKS],
+    factors: Factors<T, C>,
+}
+
+impl<T: Lane, const C: usize> System<T, C> for DenseSystem<T, C> {
+    type Places = std::ops::Range<usize>;
+
+    const ALPHA: f64 = 1e-8;
+    const PARKED_ALPHA: f64 = 1e-6;
+    const SMALLEST_ALPHA: f64 = 1e-14;
+    const RETURNS: bool = false;
+    const CORRECTIONS: usize = 1;
+
+    #[inline(always)]
+    fn new(token: T::Token) -> Self {
+        let zero = T::splat(token, 0.0);
+        Self {
+            W: [[zero; 9]; MAX_BLOCKS],
+            factors: [[[zero; 9]; C]; C],
+        }
+    }
+
+    #[inline(always)]
+    fn load(&mut self, lane: usize, problem: &ContactProblem) -> Self::Places {
+        let n = problem.n_contacts;
+        let blocks = self.W.iter_mut().zip(&problem.W).take(block(C, 0));
+        for (b, (own, w)) in blocks.enumerate() {
+            let is_used = b < block(n, 0);
+            for k in 0..9 {
+                own[k].set(lane, if is_used { w[k] } else { 0.0 });
+            }
+        }
+        0..C
+    }
+
+    #[inline(always)]
+    fn contact_at(problem: &ContactProblem, place: usize) -> Option<usize> {
+        (place < problem.n_contacts).then_some(place)
+    }
+
+    #[inline(always)]
+    fn last_of(_: &ContactProblem, _: usize) -> Triple<f64> {
+        [0.0; 3]
+    }
+
+    #[inline(always)]
+    fn block_of(problem: &ContactProblem, contact: usize) -> &[f64; 9] {
+        &problem.W[block(contact, contact)]
+    }
+
+    #[inline(always)]
+    fn places(&self) -> Self::Places {
+        0..C
+    }
+
+    #[inline(always)]
+    fn diagonal(&self, place: usize) -> &Block<T> {
+        &self.W[block(place, place)]
+    }
+
+    #[inline(always)]
+    fn velocities(&mut self, q: &[Triple<T>; C], p: &[Triple<T>; C], u: &mut [Triple<T>; C]) {
+        velocities(&self.W, q, p, u);
+    }
+
+    #[inline(always)]
+    fn factorise(&mut self, alpha: T, modes: &[Mode<T>; C]) {
+        factorise(&self.W, alpha, modes, &mut self.factors);
+    }
+
+    #[inline(always)]
+    fn newton_point(
+        &mut self,
+        q: &[Triple<T>; C],
+        centre: &[Triple<T>; C],
+        alpha: T,
+        modes: &[Mode<T>; C],
+        y: &mut [Triple<T>; C],
+    ) {
+        newton_point(&self.factors, q, centre, alpha, modes, y);
+    }
+
+    #[inline(always)]
+    fn correction(&mut self, u: &[Triple<T>; C], modes: &[Mode<T>; C], y: &mut [Triple<T>; C]) {
+        correction(&self.factors, u, modes, y);
     }
 }

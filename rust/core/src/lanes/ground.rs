@@ -279,6 +279,15 @@ impl<T: Lane> Ground<T> {
         self.surfaces[lane].is_some()
     }
 
+    /// Rovers whose ground is a surface.
+    #[inline(always)]
+    pub(super) fn on_surface(&self) -> T::Mask {
+        let bits = (self.surfaces.iter().enumerate()).fold(0, |bits, (lane, own)| {
+            bits | u32::from(own.is_some()) << lane
+        });
+        T::mask(self.offset.token(), bits)
+    }
+
     /// Height of a point over the plane, m.
     #[inline(always)]
     pub(super) fn height(&self, x: Vec3<T>) -> T {

@@ -11,11 +11,17 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use nalgebra::{Matrix3, Vector3};
 use thiserror::Error;
 
+use super::pattern::Pattern;
+use super::problem::MAX_CONTACTS;
+use super::stops::SIDES;
+#[cfg(doc)]
+use crate::geometry::Roller;
 use crate::law::compliance::Compliance;
 use crate::multibody::description::Limits;
 use crate::multibody::joint::{Coordinate, Joint, JointAxis, Prismatic, Revolute, Spherical};
 use crate::multibody::model::BASE;
-use crate::multibody::{Body, JointProperties, Model};
+use crate::multibody::{Body, JointProperties, Model, Wheel};
+use crate::scalar::elementary::hypot;
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Most wheels and joints with stops: the operator of a block has room for contacts of all of them.
@@ -27,12 +33,12 @@ pub enum NotOrdinary {
     /// It has several trees, or its root is fixed.
     #[error("the machine is not one tree on a free base")]
     NotOneFreeTree,
-    /// A wheel has a width.
-    #[error("the wheel '{wheel}' has a width")]
-    WideWheel {
-        /// Name of the wheel.
-        wheel: String,
-    },
+    /// Its wheels and stops can have more contacts than a problem.
+    #[error("wheels with a width and stops can have {0} contacts, more than {MAX_CONTACTS}")]
+    TooManyContacts(usize),
+    /// A coupled joint on the way to a contact follows a joint with other carriers.
+    #[error("a coupled joint follows a joint with other carriers, and a wheel has a width")]
+    BranchedCoupling,
     /// It has more wheels and joints with stops than lanes have room for.
     #[error("the machine has {0} wheels and joints with stops, more than {MOST_PARTS}")]
     TooManyParts(usize),
@@ -81,6 +87,8 @@ pub struct Machine {
     n_motions: usize,
     paths: Vec<usize>,
     movers: Vec<Mover>,
+    /// Pattern of its contact problems, if they are solved by the factors of their operator.
+    pub(super) pattern: Option<Arc<Pattern>>,
 }
 
 /// A joint with a coordinate of its own.
@@ -215,7 +223,7 @@ pub enum Symmetry {
     Turned,
 }
 
-/// A wheel: a disc of zero width.
+/// A wheel: a disc of zero width, or a [`Roller`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct WheelDisc {
     /// Body that it is fixed to.
@@ -229,6 +237,10 @@ pub struct WheelDisc {
     pub spoke: [f64; 3],
     /// Contact radius.
     pub radius: f64,
+    /// Distance of its circles from the middle; 0 if it has one.
+    pub half: f64,
+    /// Rounding of its edges.
+    pub rounding: f64,
     /// Spring and damper where it touches; `None` if it is rigid.
     pub compliance: Option<Compliance>,
 }
@@ -256,16 +268,7 @@ impl Machine {
         let bodies = model.bodies();
         let mut machine = Self {
             links: Vec::with_capacity(bodies.len()),
-            wheels: (model.wheels().iter())
-                .map(|wheel| WheelDisc {
-                    body: wheel.body,
-                    centre: wheel.centre.into(),
-                    axle: wheel.axle.into(),
-                    spoke: wheel.spoke.into(),
-                    radius: wheel.radius,
-                    compliance: wheel.compliance,
-                })
-                .collect(),
+            wheels: (model.wheels().iter()).map(WheelDisc::of).collect(),
             boxes: (model.boxes().iter())
                 .map(|part| BodyBox {
                     body: part.body,
@@ -300,6 +303,7 @@ impl Machine {
             n_motions: model.n_motions(),
             paths: Vec::new(),
             movers: Vec::new(),
+            pattern: None,
         };
         for k in BASE..model.nv() {
             machine.add_row(model, k);
@@ -307,7 +311,23 @@ impl Machine {
         for b in 0..bodies.len() {
             machine.add_link(model, b);
         }
+        if machine.has_lines() {
+            let pattern = Pattern::of(&machine).ok_or(NotOrdinary::BranchedCoupling)?;
+            machine.pattern = Some(Arc::new(pattern));
+        }
         Ok(machine)
+    }
+
+    /// Whether a wheel has a width.
+    #[must_use]
+    pub fn has_wide_wheels(&self) -> bool {
+        self.wheels.iter().any(WheelDisc::is_wide)
+    }
+
+    /// Whether a wheel touches a plane at two points.
+    #[must_use]
+    pub fn has_lines(&self) -> bool {
+        self.wheels.iter().any(|wheel| wheel.n_circles() > 1)
     }
 
     /// Whether any wheel yields where it touches.
@@ -469,6 +489,54 @@ impl Machine {
     }
 }
 
+impl WheelDisc {
+    fn of(wheel: &Wheel) -> Self {
+        let is_wide = wheel.is_wide();
+        Self {
+            body: wheel.body,
+            centre: wheel.centre.into(),
+            axle: wheel.axle.into(),
+            spoke: wheel.spoke.into(),
+            radius: wheel.radius,
+            half: if is_wide {
+                0.5 * wheel.width - wheel.rounding
+            } else {
+                0.0
+            },
+            rounding: if is_wide { wheel.rounding } else { 0.0 },
+            compliance: wheel.compliance,
+        }
+    }
+
+    /// Whether it has a width.
+    #[must_use]
+    pub fn is_wide(&self) -> bool {
+        self.half > 0.0 || self.rounding > 0.0
+    }
+
+    /// Number of its slots for contacts.
+    #[must_use]
+    pub fn n_slots(&self) -> usize {
+        2 * self.n_circles()
+    }
+
+    /// Radius of a bounding ball about its centre.
+    #[must_use]
+    pub fn bound(&self) -> f64 {
+        if self.is_wide() {
+            hypot(self.radius - self.rounding, self.half) + self.rounding
+        } else {
+            self.radius
+        }
+    }
+
+    /// Number of its circles: [`Roller::n_circles`].
+    #[must_use]
+    pub fn n_circles(&self) -> usize {
+        if self.half > 0.0 { 2 } else { 1 }
+    }
+}
+
 impl Link {
     /// Whether its joint follows another one.
     #[inline(always)]
@@ -519,10 +587,12 @@ fn check(model: &Model) -> Result<(), NotOrdinary> {
     if !model.is_free_tree() {
         return Err(NotOrdinary::NotOneFreeTree);
     }
-    if let Some(wheel) = model.wheels().iter().find(|wheel| wheel.is_wide()) {
-        return Err(NotOrdinary::WideWheel {
-            wheel: wheel.name.clone(),
-        });
+    let wheels: Vec<WheelDisc> = model.wheels().iter().map(WheelDisc::of).collect();
+    let has_lines = wheels.iter().any(|wheel| wheel.n_circles() > 1);
+    let n_slots = wheels.iter().map(WheelDisc::n_slots).sum::<usize>();
+    let n_slots = n_slots + SIDES * model.limited_joints().len();
+    if has_lines && n_slots > MAX_CONTACTS {
+        return Err(NotOrdinary::TooManyContacts(n_slots));
     }
     let n_parts = model.wheels().len() + model.limited_joints().len();
     if n_parts > MOST_PARTS {

@@ -128,9 +128,10 @@ fn slide_along<T: Lane>(p: &Triple<T>, u: &Triple<T>) -> ([T; 2], T, T) {
     ([p[1] * inverse, p[2] * inverse], gamma, norm)
 }
 
-/// Violations of the law at impulses `p` and velocities `u`.
+/// Violations of the law at impulses `p` and velocities `u` of the contacts at some places.
 #[inline(always)]
 pub fn judge<T: Lane, const C: usize>(
+    places: impl Iterator<Item = usize>,
     laws: &[Law<T>; C],
     p: &[Triple<T>; C],
     u: &[Triple<T>; C],
@@ -138,7 +139,7 @@ pub fn judge<T: Lane, const C: usize>(
     let zero = p[0][0].like(0.0);
     let one = zero.like(1.0);
     let mut sums = Violations::none(zero);
-    for i in 0..C {
+    for i in places {
         let (law, p, u) = (&laws[i], &p[i], &u[i]);
         // The normal part: min(u_N, p_N/ρ_N).
         let pressed = p[0] * law.inverse[0];

@@ -3,6 +3,8 @@
 //! The spin of a wheel moves its nearest point to the ground along the ground alone, so its
 //! normal velocity comes from the carrier.
 
+use std::ops::Range;
+
 use nalgebra::Vector3;
 
 use super::machine::{Axis, Link, LinkJoint, Machine, Mover};
@@ -22,11 +24,19 @@ pub(super) struct Parts {
 #[derive(Clone, Debug)]
 pub(super) struct Wheel {
     pub body: usize,
+    /// Its slots for contacts.
+    pub slots: Range<usize>,
     centre: Option<[f64; 3]>,
     axle: Axle,
     pub spoke: [f64; 3],
-    /// m.
+    /// Of its circles, m.
     pub radius: f64,
+    /// Distance of its circles from the middle, m; 0 if it has one.
+    pub half: f64,
+    /// Rounding of its edges, m.
+    pub rounding: f64,
+    /// Radius of a bounding ball, m.
+    pub bound: f64,
     /// Twist of the body that moves its centre.
     pub carrier: usize,
     /// Velocity of the spin about its own axle that the carrier's twist lacks.
@@ -85,18 +95,25 @@ impl Parts {
             mover: trunk, // not read
         }];
         let some = |x: [f64; 3]| x.iter().any(|x| x.abs() > 0.0).then_some(x);
+        let mut n_slots = 0;
         let wheels = (machine.wheels.iter())
             .map(|wheel| {
+                let first = n_slots;
+                n_slots += wheel.n_slots();
                 let link = &machine.links[wheel.body];
                 let axle = axle_of(wheel.axle);
                 let spins = link.is_spinner && link.coupling.is_none() && link.turns_about(axle);
                 let mover = if spins { link.parent } else { wheel.body };
                 Wheel {
                     body: wheel.body,
+                    slots: first..n_slots,
                     centre: some(wheel.centre),
                     axle,
                     spoke: wheel.spoke,
-                    radius: wheel.radius,
+                    radius: wheel.radius - wheel.rounding,
+                    half: wheel.half,
+                    rounding: wheel.rounding,
+                    bound: wheel.bound(),
                     carrier: carrier_of(machine, mover, &mut carriers),
                     spin: spins.then_some(link.velocity),
                 }
@@ -171,6 +188,18 @@ impl<T: Lane> Twist<T> {
 }
 
 impl Wheel {
+    /// Whether it has a width.
+    #[inline(always)]
+    pub(super) fn is_wide(&self) -> bool {
+        self.half > 0.0 || self.rounding > 0.0
+    }
+
+    /// Number of its circles.
+    #[inline(always)]
+    pub(super) fn n_circles(&self) -> usize {
+        if self.half > 0.0 { 2 } else { 1 }
+    }
+
     /// Centre relative to the trunk's origin, m.
     #[inline(always)]
     pub(super) fn centre<T: Lane>(&self, pose: &Pose<T>) -> Vec3<T> {
@@ -200,7 +229,7 @@ impl Wheel {
             Some(k) => v[k].abs(),
             None => v[0].like(0.0),
         };
-        twist.velocity(centre).norm() + (twist.angular.norm() + spin) * spin.like(self.radius)
+        twist.velocity(centre).norm() + (twist.angular.norm() + spin) * spin.like(self.bound)
     }
 }
 

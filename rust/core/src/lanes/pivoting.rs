@@ -9,28 +9,19 @@
 //! if it stuck, is barred, so that another one changes its mode. If none is left, its friction is
 //! reversed.
 
-use super::equations::{Block, Factors, correction, factorise, newton_point, velocities};
 use super::modes::{Law, Limit, Mode, Violations, is_pressed_to_slide, judge, limit};
-use super::problem::{MAX_BLOCKS, Triple, block};
+use super::problem::{MAX_CONTACTS, Triple};
+use super::system::System;
 use super::visits::Visits;
 use crate::law::coulomb::ContactMode;
 use crate::scalar::{Lane, LaneMask};
 use crate::solver::solve_one_contact;
 
-/// First `α` of the proximal term `α (p − c)`, relative to the mean diagonal of `W`. A step's error
-/// is `α` times the change of the impulse, and the rounding of `W p + q`, divided by `α`, drifts
-/// into the null space of `W`. The ratio test bounds that where wheels slide. A parked rover, whose
-/// impulses hardly change, collects it step by step: its `α` is larger.
-const ALPHA: f64 = 1e-8;
-const PARKED_ALPHA: f64 = 1e-6;
-
 /// Squared relative residual below which a rover without a slide counts as parked.
 const PARKED: f64 = 1e-12;
 
-/// Factor by which `α` shrinks when a full step with the right modes gains nothing, and its
-/// smallest value.
+/// Factor by which `α` shrinks when a full step with the right modes gains nothing.
 const SHRINK: f64 = 1e-3;
-const SMALLEST: f64 = 1e-14;
 
 /// Share of the squared residual that a full step must leave, if it gains nothing, and if it gains
 /// so much that the modes stay.
@@ -57,10 +48,21 @@ const REVERSALS: f64 = 2.0;
 /// Impulses that stick may leave the cone by this share, which is rounding.
 const BEYOND: f64 = 1.0 + 1e-12;
 
+/// The weights of the modes in their number: exact for as many contacts as a problem can have.
+const POWERS_OF_3: [f64; MAX_CONTACTS + 1] = {
+    let mut powers = [1.0; MAX_CONTACTS + 1];
+    let mut i = 1;
+    while i <= MAX_CONTACTS {
+        powers[i] = 3.0 * powers[i - 1];
+        i += 1;
+    }
+    powers
+};
+
 /// Problems of at most `C` contacts that are being solved, one a lane.
 #[derive(Clone, Debug)]
-pub(super) struct Pivoting<T: Lane, const C: usize> {
-    pub(super) W: [Block<T>; MAX_BLOCKS],
+pub(super) struct Pivoting<T: Lane, const C: usize, S: System<T, C>> {
+    pub(super) system: S,
     pub(super) q: [Triple<T>; C],
     pub(super) laws: [Law<T>; C],
     /// Mean diagonal of `W`, 1/kg.
@@ -77,6 +79,8 @@ pub(super) struct Pivoting<T: Lane, const C: usize> {
     /// `α` that an attempt asks for, relative to the mean diagonal of `W`; 0 for that which suits
     /// the start.
     pub(super) asked: T,
+    /// Impulses that a step stays near, where the system [returns](System::RETURNS) to them.
+    pub(super) centre: [Triple<T>; C],
     alpha: T,
     first_alpha: T,
     trial: [Triple<T>; C],
@@ -94,13 +98,13 @@ pub(super) struct Pivoting<T: Lane, const C: usize> {
     reversals: T,
 }
 
-impl<T: Lane, const C: usize> Pivoting<T, C> {
+impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
     #[inline(always)]
     pub(super) fn new(token: T::Token) -> Self {
         let (zero, one) = (T::splat(token, 0.0), T::splat(token, 1.0));
         let none = T::mask(token, 0);
         Self {
-            W: [[zero; 9]; MAX_BLOCKS],
+            system: S::new(token),
             q: [[zero; 3]; C],
             laws: [Law::new(zero); C],
             mean: one,
@@ -112,6 +116,7 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
             asked: zero,
             alpha: one,
             first_alpha: one,
+            centre: [[zero; 3]; C],
             trial: [[zero; 3]; C],
             modes: [Mode::open(zero); C],
             closed: [none; C],
@@ -145,9 +150,9 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
     pub(super) fn begin(&mut self, lanes: T::Mask) {
         let zero = self.mean.like(0.0);
         self.renew_velocities(lanes);
-        self.sums = judge(&self.laws, &self.p, &self.u);
+        self.judge();
         let mut slides = !lanes & lanes;
-        for i in 0..C {
+        for i in self.system.places() {
             let (p, mu) = (&self.p[i], self.laws[i].mu);
             let pressed = zero.lt(p[0]);
             let approaches = self.u[i][0].lt(zero);
@@ -162,7 +167,7 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
         let [relative, _] = self.residual();
         self.last = T::select(lanes, relative, self.last);
         let is_parked = !slides & relative.lt(zero.like(PARKED));
-        let first = T::select(is_parked, zero.like(PARKED_ALPHA), zero.like(ALPHA));
+        let first = T::select(is_parked, zero.like(S::PARKED_ALPHA), zero.like(S::ALPHA));
         let first = T::select(zero.lt(self.asked), self.asked, first) * self.mean;
         self.first_alpha = T::select(lanes, first, self.first_alpha);
         self.alpha = T::select(lanes, first, self.alpha);
@@ -175,31 +180,26 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
     /// `u = W p + q` in the lanes of a mask.
     #[inline(always)]
     fn renew_velocities(&mut self, lanes: T::Mask) {
-        velocities(&self.W, &self.q, &self.p, &mut self.trial);
-        select(lanes, &self.trial, &mut self.u);
+        (self.system).velocities(&self.q, &self.p, &mut self.trial);
+        select(self.system.places(), lanes, &self.trial, &mut self.u);
     }
 
     /// A step of the lanes of a mask, as far as the cones allow; a blocking contact changes its
     /// mode.
     #[inline(always)]
-    pub(super) fn step(&mut self, active: T::Mask, factors: &mut Factors<T, C>) {
+    pub(super) fn step(&mut self, active: T::Mask) {
         let (zero, one) = (self.mean.like(0.0), self.mean.like(1.0));
         self.find_modes();
-        factorise(&self.W, self.alpha, &self.modes, factors);
-        newton_point(
-            factors,
-            &self.q,
-            &self.p,
-            self.alpha,
-            &self.modes,
-            &mut self.trial,
-        );
+        self.system.factorise(self.alpha, &self.modes);
+        let centre = if S::RETURNS { &self.centre } else { &self.p };
+        self.system
+            .newton_point(&self.q, centre, self.alpha, &self.modes, &mut self.trial);
         let mut first = one;
         let mut limits = [Limit {
             t: one,
             slides: active,
         }; C];
-        for i in 0..C {
+        for i in self.system.places() {
             let trial = &mut self.trial[i];
             let slides = self.closed[i] & !self.sticks[i] & zero.lt(trial[0]);
             return_to_cone::<T>(slides, self.laws[i].mu, trial);
@@ -211,20 +211,31 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
         if blocked.any() {
             self.stop_at(blocked, first, &limits);
         } else {
-            self.p = self.trial;
+            for i in self.system.places() {
+                self.p[i] = self.trial[i];
+            }
         }
-        for freed in &mut self.freed {
-            *freed = *freed & !active;
+        for i in self.system.places() {
+            self.freed[i] = self.freed[i] & !active;
         }
         self.full = active & !blocked;
-        velocities(&self.W, &self.q, &self.p, &mut self.u);
-        self.sums = judge(&self.laws, &self.p, &self.u);
+        if S::RETURNS {
+            select(self.system.places(), self.full, &self.p, &mut self.centre);
+        }
+        (self.system).velocities(&self.q, &self.p, &mut self.u);
+        self.judge();
+    }
+
+    /// Violations by the present impulses.
+    #[inline(always)]
+    fn judge(&mut self) {
+        self.sums = judge(self.system.places(), &self.laws, &self.p, &self.u);
     }
 
     /// Modes at the present impulses.
     #[inline(always)]
     fn find_modes(&mut self) {
-        for i in 0..C {
+        for i in self.system.places() {
             let (mu, p, u) = (self.laws[i].mu, &self.p[i], &self.u[i]);
             self.modes[i] = Mode::of(mu, self.closed[i], self.sticks[i], p, u);
         }
@@ -240,12 +251,12 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
     /// Corrects the impulses of the lanes of a mask with the factors of their last step, where that
     /// makes the violations smaller.
     #[inline(always)]
-    pub(super) fn refine(&mut self, lanes: T::Mask, factors: &Factors<T, C>) {
+    pub(super) fn refine(&mut self, lanes: T::Mask) {
         let zero = self.mean.like(0.0);
         self.find_modes();
-        correction(factors, &self.u, &self.modes, &mut self.trial);
+        (self.system).correction(&self.u, &self.modes, &mut self.trial);
         let mut u = self.u;
-        for i in 0..C {
+        for i in self.system.places() {
             let trial = &mut self.trial[i];
             for (trial, p) in trial.iter_mut().zip(self.p[i]) {
                 *trial += p;
@@ -253,11 +264,11 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
             let slides = self.closed[i] & !self.sticks[i] & zero.lt(trial[0]);
             return_to_cone::<T>(slides, self.laws[i].mu, trial);
         }
-        velocities(&self.W, &self.q, &self.trial, &mut u);
-        let sums = judge(&self.laws, &self.trial, &u);
+        (self.system).velocities(&self.q, &self.trial, &mut u);
+        let sums = judge(self.system.places(), &self.laws, &self.trial, &u);
         let better = lanes & sums.weighted.lt(self.sums.weighted);
-        select(better, &self.trial, &mut self.p);
-        select(better, &u, &mut self.u);
+        select(self.system.places(), better, &self.trial, &mut self.p);
+        select(self.system.places(), better, &u, &mut self.u);
         self.sums = Violations::select(better, &sums, &self.sums);
     }
 
@@ -267,7 +278,7 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
     fn stop_at(&mut self, blocked: T::Mask, first: T, limits: &[Limit<T>; C]) {
         let (zero, one) = (first.like(0.0), first.like(1.0));
         let moves = zero.like(NO_MOVE).lt(first);
-        for i in 0..C {
+        for i in self.system.places() {
             let (p, trial) = (&mut self.p[i], &self.trial[i]);
             for k in 0..3 {
                 let between = p[k] + first * (trial[k] - p[k]);
@@ -308,7 +319,8 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
         let (found, worst) = self.worst_contradiction(looks);
         // With the right modes nothing but α is left in the way.
         let is_settled = gains_nothing & looks & !zero.lt(worst);
-        let smaller = (like.like(SHRINK) * self.alpha).max(like.like(SMALLEST) * self.mean);
+        let least = like.like(S::SMALLEST_ALPHA) * self.mean;
+        let smaller = (like.like(SHRINK) * self.alpha).max(least);
         self.alpha = T::select(is_settled, smaller, self.alpha);
         let circles = looks & like.like(PATIENCE).lt(self.visits.idle);
         let stuck = circles | is_settled;
@@ -319,7 +331,7 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
         };
         self.lost = self.lost | (circles & !reversed);
         let mut moved = reversed;
-        for i in 0..C {
+        for i in self.system.places() {
             let here = found[i] & !reversed;
             self.freed[i] = here;
             if here.any() {
@@ -330,7 +342,7 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
             self.renew_velocities(moved);
         }
         if reversed.any() {
-            self.sums = judge(&self.laws, &self.p, &self.u);
+            self.judge();
             let [relative, _] = self.residual();
             self.last = T::select(reversed, relative, self.last);
         }
@@ -342,9 +354,9 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
         let one = self.mean.like(1.0);
         let (zero, two) = (one.like(0.0), one.like(2.0));
         let mut number = one;
-        for (closed, sticks) in self.closed.iter().zip(&self.sticks) {
-            let digit = T::select(*closed, T::select(*sticks, one, two), zero);
-            number = number * one.like(3.0) + digit;
+        for i in self.system.places() {
+            let digit = T::select(self.closed[i], T::select(self.sticks[i], one, two), zero);
+            number += digit * one.like(POWERS_OF_3[i + 1]);
         }
         number
     }
@@ -357,7 +369,7 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
         let mut worst = zero;
         let mut found = [!lanes & lanes; C];
         let mut amounts = [zero; C];
-        for i in 0..C {
+        for i in self.system.places() {
             let (p, u, mu) = (&self.p[i], &self.u[i], self.laws[i].mu);
             let norm = (p[1] * p[1] + p[2] * p[2]).sqrt();
             let beyond = zero.lt(p[0]) & (mu * p[0] * zero.like(BEYOND)).lt(norm);
@@ -373,7 +385,7 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
         }
         let least = worst * zero.like(ALIKE);
         let is_any = zero.lt(worst);
-        for i in 0..C {
+        for i in self.system.places() {
             found[i] = is_any & least.le(amounts[i]);
         }
         (found, worst)
@@ -386,7 +398,7 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
         let zero = self.mean.like(0.0);
         let may = stuck & zero.lt(self.reversals);
         let mut reversed = !stuck & stuck;
-        for i in 0..C {
+        for i in self.system.places() {
             let (p, u, mu) = (&mut self.p[i], &self.u[i], self.laws[i].mu);
             let slip = (u[1] * u[1] + u[2] * u[2]).sqrt();
             let here = may & self.barred[i] & zero.lt(slip);
@@ -434,7 +446,7 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
     /// once.
     #[inline(always)]
     fn close(&mut self, i: usize, lane: usize) {
-        let [a, b, c, d, e, f, g, h, k] = self.W[block(i, i)].map(|w| w.get(lane));
+        let [a, b, c, d, e, f, g, h, k] = self.system.diagonal(i).map(|w| w.get(lane));
         // Its impulse is zero, so that u is its free velocity.
         let free = self.u[i].map(|u| u.get(lane));
         let mu = self.laws[i].mu.get(lane);
@@ -458,8 +470,13 @@ fn replaced<T: Lane>(lanes: T::Mask, new: T::Mask, old: T::Mask) -> T::Mask {
 
 /// `out = new` in the lanes of a mask.
 #[inline(always)]
-fn select<T: Lane, const C: usize>(lanes: T::Mask, new: &[Triple<T>; C], out: &mut [Triple<T>; C]) {
-    for i in 0..C {
+fn select<T: Lane, const C: usize>(
+    places: impl Iterator<Item = usize>,
+    lanes: T::Mask,
+    new: &[Triple<T>; C],
+    out: &mut [Triple<T>; C],
+) {
+    for i in places {
         for k in 0..3 {
             out[i][k] = T::select(lanes, new[i][k], out[i][k]);
         }

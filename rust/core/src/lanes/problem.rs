@@ -1,15 +1,21 @@
 //! One rover's friction-contact problem, handed from a block to the solver and back.
 
+use std::sync::Arc;
+
+use super::pattern::Pattern;
 use crate::problem::Residual;
 
 /// Most contacts of a problem.
-pub const MAX_CONTACTS: usize = 8;
+pub const MAX_CONTACTS: usize = 32;
+
+/// Most contacts of a problem with `W` itself.
+pub const MAX_DENSE: usize = 8;
 
 /// Most unknowns.
 pub const MAX_UNKNOWNS: usize = 3 * MAX_CONTACTS;
 
 /// Blocks of the lower triangle of `W`.
-pub const MAX_BLOCKS: usize = MAX_CONTACTS * (MAX_CONTACTS + 1) / 2;
+pub const MAX_BLOCKS: usize = MAX_DENSE * (MAX_DENSE + 1) / 2;
 
 /// Entries of a contact along n, t, b.
 pub type Triple<T> = [T; 3];
@@ -24,11 +30,13 @@ pub const fn block(i: usize, j: usize) -> usize {
 /// The problem `K_μ* ∋ ũ ⊥ p ∈ K_μ`, `u = W p + q`, of one rover's active contacts, and its answer.
 ///
 /// Contacts are numbered without gaps; entries beyond the last are not read. A contact's three
-/// unknowns are its normal and two tangents.
-#[derive(Clone, Debug)]
+/// unknowns are its normal and two tangents. A problem has either `W` or its factors.
+#[derive(Debug)]
 pub struct ContactProblem {
-    /// Number of contacts, at most [`MAX_CONTACTS`].
+    /// Number of contacts, at most [`MAX_DENSE`], or [`MAX_CONTACTS`] with factors.
     pub n_contacts: usize,
+    /// Factors of the operator; without a pattern there are none.
+    pub factored: Factored,
     /// Lower triangle of the symmetric Delassus operator by 3 x 3 blocks, each row-major, 1/kg:
     /// block (i, j), `j <= i`, is at [`block`]. Diagonal blocks are read whole.
     pub W: [[f64; 9]; MAX_BLOCKS],
@@ -48,10 +56,99 @@ pub struct ContactProblem {
     pub is_solved: bool,
 }
 
+/// An operator `W = Zᵀ Z + D` of a machine with many contacts.
+#[derive(Debug, Default)]
+pub struct Factored {
+    /// The machine's.
+    pub pattern: Option<Arc<Pattern>>,
+    /// Slots with a contact, in the order of the contacts.
+    pub slots: u32,
+    /// Z along the path of each contact: `Z[contact * stride + k]`, kg^(-1/2).
+    pub Z: Vec<Triple<f64>>,
+    /// Impulses of the last step, N s. Of answers that the machine cannot tell apart one near them
+    /// is found.
+    pub last: Vec<Triple<f64>>,
+    /// Diagonal blocks of W, 1/kg.
+    pub diagonal: Vec<[f64; 9]>,
+    /// Diagonal of D by contact, 1/kg.
+    pub softness: Vec<f64>,
+}
+
+impl Factored {
+    /// Number of the contact in a slot, if there is one.
+    #[inline(always)]
+    #[must_use]
+    pub fn contact_at(&self, slot: usize) -> Option<usize> {
+        let is_used = self.slots >> slot & 1 == 1;
+        is_used.then(|| (self.slots & ((1 << slot) - 1)).count_ones() as usize)
+    }
+
+    /// Entry of W, 1/kg.
+    fn entry(&self, pattern: &Pattern, i: usize, j: usize) -> f64 {
+        let [a, b] = [i / 3, j / 3];
+        if a == b {
+            return self.diagonal[a][3 * (i % 3) + j % 3];
+        }
+        let shared = pattern.shared(self.slot_of(a), self.slot_of(b));
+        let row = |contact: usize| self.Z[contact * pattern.stride()..].iter().take(shared);
+        row(a).zip(row(b)).map(|(x, y)| x[i % 3] * y[j % 3]).sum()
+    }
+
+    /// Slot of a contact.
+    fn slot_of(&self, contact: usize) -> usize {
+        let mut slots = self.slots;
+        for _ in 0..contact {
+            slots &= slots - 1;
+        }
+        slots.trailing_zeros() as usize
+    }
+
+    /// Makes room for the contacts of a machine.
+    pub(super) fn adopt(&mut self, pattern: &Arc<Pattern>) {
+        if !(self.pattern.as_ref()).is_some_and(|own| Arc::ptr_eq(own, pattern)) {
+            self.pattern = Some(Arc::clone(pattern));
+            self.Z.resize(MAX_CONTACTS * pattern.stride(), [0.0; 3]);
+            self.last.resize(MAX_CONTACTS, [0.0; 3]);
+            self.diagonal.resize(MAX_CONTACTS, [0.0; 9]);
+            self.softness.resize(MAX_CONTACTS, 0.0);
+        }
+    }
+
+    fn copy_from(&mut self, other: &Self) {
+        self.pattern.clone_from(&other.pattern);
+        self.slots = other.slots;
+        self.Z.clone_from(&other.Z);
+        self.last.clone_from(&other.last);
+        self.diagonal.clone_from(&other.diagonal);
+        self.softness.clone_from(&other.softness);
+    }
+}
+
+impl Clone for ContactProblem {
+    fn clone(&self) -> Self {
+        let mut copy = Self::default();
+        copy.clone_from(self);
+        copy
+    }
+
+    /// Copies without allocating where there is room.
+    fn clone_from(&mut self, other: &Self) {
+        self.n_contacts = other.n_contacts;
+        self.factored.copy_from(&other.factored);
+        self.W = other.W;
+        (self.q, self.mu) = (other.q, other.mu);
+        (self.p, self.u) = (other.p, other.u);
+        self.residual = other.residual;
+        self.iterations = other.iterations;
+        self.is_solved = other.is_solved;
+    }
+}
+
 impl Default for ContactProblem {
     fn default() -> Self {
         Self {
             n_contacts: 0,
+            factored: Factored::default(),
             W: [[0.0; 9]; MAX_BLOCKS],
             q: [0.0; MAX_UNKNOWNS],
             mu: [0.0; MAX_CONTACTS],
@@ -65,6 +162,13 @@ impl Default for ContactProblem {
 }
 
 impl ContactProblem {
+    /// Whether it has the factors of its operator.
+    #[inline(always)]
+    #[must_use]
+    pub fn is_factored(&self) -> bool {
+        self.factored.pattern.is_some()
+    }
+
     /// Number of unknowns.
     #[inline(always)]
     #[must_use]
@@ -76,6 +180,9 @@ impl ContactProblem {
     #[must_use]
     pub fn entry(&self, i: usize, j: usize) -> f64 {
         let (i, j) = (i.max(j), i.min(j));
+        if let Some(pattern) = &self.factored.pattern {
+            return self.factored.entry(pattern, i, j);
+        }
         self.W[block(i / 3, j / 3)][3 * (i % 3) + j % 3]
     }
 }

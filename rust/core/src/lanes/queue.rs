@@ -10,8 +10,8 @@
 
 use std::collections::VecDeque;
 
-use super::bench::{Bench, Line};
-use super::problem::{ContactProblem, MAX_CONTACTS};
+use super::bench::{DenseBench, FactoredBench, Line};
+use super::problem::{ContactProblem, MAX_CONTACTS, MAX_DENSE};
 use crate::problem::Residual;
 use crate::scalar::Lane;
 use crate::solver::SolverOptions;
@@ -21,7 +21,7 @@ pub use super::bench::MAX_ITERATIONS;
 /// Contacts up to which the smaller system serves, that of a rover with six wheels on the plane.
 const FEW: usize = 6;
 
-/// Solves all problems. Up to the list's end each lane has one to work on.
+/// Solves all problems, which have no factors. Up to the list's end each lane has one to work on.
 ///
 /// A problem that takes too long, or goes in circles, is tried again from its start with another
 /// `α`. One that resists, or has numbers that are not finite, keeps its starting impulse.
@@ -52,7 +52,7 @@ pub fn solve_all<T: Lane>(
         T::vectorize(
             token,
             #[inline(always)]
-            || solve_some::<T, MAX_CONTACTS>(token, problems, tolerances, FEW + 1),
+            || solve_some::<T, MAX_DENSE>(token, problems, tolerances, FEW + 1),
         );
     }
 }
@@ -69,10 +69,12 @@ impl ContactProblem {
     /// # Panics
     /// If there are more contacts than fit.
     fn begin(&mut self) {
-        assert!(
-            self.n_contacts <= MAX_CONTACTS,
-            "at most {MAX_CONTACTS} contacts"
-        );
+        let most = if self.is_factored() {
+            MAX_CONTACTS
+        } else {
+            MAX_DENSE
+        };
+        assert!(self.n_contacts <= most, "at most {most} contacts");
         let n = self.n_unknowns();
         let at_rest = self.q[..n].iter().all(|x| *x == 0.0);
         self.iterations = 0;
@@ -104,7 +106,7 @@ fn solve_some<T: Lane, const C: usize>(
         least,
         most: C,
     };
-    Bench::<T, C>::new(token).run(token, problems, tolerances, &mut line);
+    DenseBench::<T, C>::new(token).run(token, problems, tolerances, &mut line);
 }
 
 /// The problems of a list with `least` to `most` contacts that are to be solved.
@@ -139,11 +141,32 @@ impl Line for List {
 /// has lanes: problem `k` is of group `k / T::LANES`.
 pub struct Queue<T: Lane> {
     token: T::Token,
-    few: Box<Bench<T, FEW>>,
-    many: Box<Bench<T, MAX_CONTACTS>>,
-    /// Problems that wait for a lane, for each of the two.
-    waiting: [VecDeque<usize>; 2],
+    few: Box<DenseBench<T, FEW>>,
+    many: Box<DenseBench<T, MAX_DENSE>>,
+    factored: Box<FactoredBench<T>>,
+    /// Problems that wait for a lane, by [`Kind`].
+    waiting: [VecDeque<usize>; 3],
     groups: Groups,
+}
+
+/// Which of the benches a problem needs.
+#[derive(Clone, Copy, Debug)]
+enum Kind {
+    Few,
+    Many,
+    Factored,
+}
+
+impl Kind {
+    fn of(problem: &ContactProblem) -> Self {
+        if problem.is_factored() {
+            Self::Factored
+        } else if problem.n_contacts > FEW {
+            Self::Many
+        } else {
+            Self::Few
+        }
+    }
 }
 
 /// How far the groups are.
@@ -160,7 +183,7 @@ struct Groups {
 struct Waiting<'a> {
     problems: &'a mut VecDeque<usize>,
     groups: &'a mut Groups,
-    /// Problems of the other bench.
+    /// Problems of the other bench that has most.
     n_others: usize,
 }
 
@@ -198,9 +221,10 @@ impl<T: Lane> Queue<T> {
     pub fn new(token: T::Token) -> Self {
         Self {
             token,
-            few: Box::new(Bench::new(token)),
-            many: Box::new(Bench::new(token)),
-            waiting: [VecDeque::new(), VecDeque::new()],
+            few: Box::new(DenseBench::new(token)),
+            many: Box::new(DenseBench::new(token)),
+            factored: Box::new(FactoredBench::new(token)),
+            waiting: [const { VecDeque::new() }; 3],
             groups: Groups {
                 n_lanes: T::LANES,
                 ..Groups::default()
@@ -212,6 +236,7 @@ impl<T: Lane> Queue<T> {
     pub fn begin(&mut self, n: usize) {
         self.few.clear();
         self.many.clear();
+        self.factored.clear();
         self.waiting.iter_mut().for_each(VecDeque::clear);
         self.groups.left.clear();
         self.groups.left.resize(n, 0);
@@ -235,8 +260,7 @@ impl<T: Lane> Queue<T> {
         for (place, problem) in own.iter_mut().enumerate().filter(|(k, _)| is_asked(*k)) {
             problem.begin();
             if !problem.is_solved {
-                let is_large = problem.n_contacts > FEW;
-                self.waiting[usize::from(is_large)].push_back(first + place);
+                self.waiting[Kind::of(problem) as usize].push_back(first + place);
                 left += 1;
             }
         }
@@ -255,45 +279,76 @@ impl<T: Lane> Queue<T> {
     ) -> Option<usize> {
         let tolerances = squares::<T>(self.token, options);
         loop {
-            let few = self.waiting[0].len() + self.few.n_active();
-            let many = self.waiting[1].len() + self.many.n_active();
-            let is_starved = few.max(many) < T::LANES;
-            if is_starved && let Some(group) = self.groups.ready.pop_front() {
+            let mut counts = self.waiting.each_ref().map(VecDeque::len);
+            counts[0] += self.few.n_active();
+            counts[1] += self.many.n_active();
+            counts[2] += self.factored.n_active();
+            let (mut kind, mut most, mut n_others) = (Kind::Few, counts[0], 0);
+            for other in [Kind::Many, Kind::Factored] {
+                let count = counts[other as usize];
+                n_others = n_others.max(count.min(most));
+                if count > most {
+                    (kind, most) = (other, count);
+                }
+            }
+            if most < T::LANES
+                && let Some(group) = self.groups.ready.pop_front()
+            {
                 return Some(group);
             }
-            if few + many == 0 {
+            if most == 0 {
                 return None;
             }
-            self.work(problems, tolerances, many > few, few.min(many));
+            self.work(problems, tolerances, kind, n_others);
         }
     }
 
-    /// Lets one of the benches work; `n_others`: problems of the other one.
+    /// Solves problems, a whole number of groups.
+    pub fn solve_all(&mut self, problems: &mut [ContactProblem], options: &SolverOptions) {
+        let n = problems.len() / T::LANES;
+        self.begin(n);
+        for group in 0..n {
+            self.enter(group, problems, |_| true);
+        }
+        while self.next_group(problems, options).is_some() {}
+    }
+
+    /// Lets one of the benches work; `n_others`: as of [`Waiting`].
     fn work(
         &mut self,
         problems: &mut [ContactProblem],
         tolerances: [T; 2],
-        is_many: bool,
+        kind: Kind,
         n_others: usize,
     ) {
-        let (token, few, many) = (self.token, &mut *self.few, &mut *self.many);
+        let token = self.token;
+        let Self {
+            few,
+            many,
+            factored,
+            ..
+        } = self;
         let mut line = Waiting {
-            problems: &mut self.waiting[usize::from(is_many)],
+            problems: &mut self.waiting[kind as usize],
             groups: &mut self.groups,
             n_others,
         };
-        if is_many {
-            T::vectorize(
-                token,
-                #[inline(always)]
-                || many.run(token, problems, tolerances, &mut line),
-            );
-        } else {
-            T::vectorize(
+        match kind {
+            Kind::Few => T::vectorize(
                 token,
                 #[inline(always)]
                 || few.run(token, problems, tolerances, &mut line),
-            );
+            ),
+            Kind::Many => T::vectorize(
+                token,
+                #[inline(always)]
+                || many.run(token, problems, tolerances, &mut line),
+            ),
+            Kind::Factored => T::vectorize(
+                token,
+                #[inline(always)]
+                || factored.run(token, problems, tolerances, &mut line),
+            ),
         }
     }
 }

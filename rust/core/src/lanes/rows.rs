@@ -7,9 +7,12 @@
 //! of W is that of the normal, as in [`crate::contact::limit`]. A slot that is active in some lanes
 //! only never changes what the others accumulate.
 
+use std::sync::Arc;
+
 use super::contacts::Contacts;
 use super::machine::{Machine, Mover};
 use super::mass_matrix::Factor;
+use super::pattern::Pattern;
 use super::poses::Poses;
 use super::problem::{ContactProblem, Triple, block};
 use crate::multibody::model::BASE;
@@ -28,19 +31,25 @@ pub enum Answer {
 #[derive(Clone, Debug)]
 pub struct Rows<T: Lane> {
     token: T::Token,
-    /// Bodies of the parts, wheels and then joints with stops, and how many are wheels.
+    /// Bodies of the parts, wheels and then joints with stops.
     bodies: Vec<usize>,
-    n_wheels: usize,
     /// Velocities of the joints that move each part, from the trunk outwards.
-    movers: Vec<Vec<Mover>>,
+    pub(super) movers: Vec<Vec<Mover>>,
     /// Velocities that two parts share: `common[a * n_parts + b]`.
     common: Vec<usize>,
     /// Length of the longest path.
-    stride: usize,
+    pub(super) stride: usize,
     /// Z along the path of each slot's wheel: `Z[slot * stride + k]`.
-    Z: Vec<Triple<T>>,
-    /// Blocks of W for the slots in use, row-major: [`block`] of their positions among them.
-    W: Vec<[T; 9]>,
+    pub(super) Z: Vec<Triple<T>>,
+    /// Blocks of W for the slots in use, row-major: [`block`] of their positions among them. Of a
+    /// machine with a pattern: the diagonal blocks by slot.
+    pub(super) W: Vec<[T; 9]>,
+    /// Where W is used by its factors.
+    pattern: Option<Arc<Pattern>>,
+    /// What [`Self::soften`] added to the diagonal of W by slot, with a pattern, 1/kg.
+    pub(super) softness: Vec<T>,
+    /// The motion in [`Self::sweep`] (nv, factor coordinates).
+    pub(super) swept: Vec<T>,
     /// Local velocity `Hᵀ v` before the step by slot, m/s.
     pub u_before: Vec<Triple<T>>,
 }
@@ -68,15 +77,24 @@ impl<T: Lane> Rows<T> {
         let zero = T::splat(token, 0.0);
         Self {
             token,
-            n_wheels: machine.wheels.len(),
             bodies,
             movers,
             common,
             stride,
             Z: vec![[zero; 3]; n_slots * stride],
             W: vec![[zero; 9]; n_slots * (n_slots + 1) / 2],
+            pattern: machine.pattern.clone(),
+            softness: vec![zero; n_slots],
+            swept: vec![zero; machine.nv()],
             u_before: vec![[zero; 3]; n_slots],
         }
+    }
+
+    /// Whether W is used by its factors.
+    #[inline(always)]
+    #[must_use]
+    pub fn is_factored(&self) -> bool {
+        self.pattern.is_some()
     }
 
     /// Builds Z, W and `u_before = Hᵀ v` at the end of the step.
@@ -101,12 +119,22 @@ impl<T: Lane> Rows<T> {
                     self.build(machine, end, factor, contacts, v, slot);
                 }
                 for &slot in contacts.used_by_stops() {
-                    self.build_stop(machine, factor, v, slot);
+                    self.build_stop(machine, factor, contacts, v, slot);
                 }
-                self.multiply(contacts.used());
+                if self.pattern.is_some() {
+                    self.multiply_diagonal(contacts);
+                } else {
+                    self.multiply(contacts);
+                }
                 let n_wheels = contacts.used_by_wheels().len();
-                for i in n_wheels..contacts.used().len() {
-                    let own = &mut self.W[block(i, i)];
+                for (i, &slot) in contacts.used_by_stops().iter().enumerate() {
+                    let i = n_wheels + i;
+                    let at = if self.pattern.is_some() {
+                        slot
+                    } else {
+                        block(i, i)
+                    };
+                    let own = &mut self.W[at];
                     (own[4], own[8]) = (own[0], own[0]);
                 }
             },
@@ -124,7 +152,7 @@ impl<T: Lane> Rows<T> {
         v: &[T],
         slot: usize,
     ) {
-        let part = Contacts::<T>::part(slot);
+        let part = contacts.part(slot);
         let movers = &self.movers[part][..];
         let rows = &mut self.Z[slot * self.stride..][..BASE + movers.len()];
         let own = contacts.slot(slot);
@@ -152,13 +180,20 @@ impl<T: Lane> Rows<T> {
 
     /// Z and `Hᵀ v` of a stop's slot.
     #[inline(always)]
-    fn build_stop(&mut self, machine: &Machine, factor: &Factor<T>, v: &[T], slot: usize) {
-        let part = Contacts::<T>::part(slot);
-        let (Some(sign), Some(mover)) = (self.sign(slot), self.movers[part].last()) else {
+    fn build_stop(
+        &mut self,
+        machine: &Machine,
+        factor: &Factor<T>,
+        contacts: &Contacts<T>,
+        v: &[T],
+        slot: usize,
+    ) {
+        let part = contacts.part(slot);
+        let (Some((_, side)), Some(mover)) = (contacts.stop(slot), self.movers[part].last()) else {
             return;
         };
         let zero = T::splat(self.token, 0.0);
-        let sign = zero.like(sign);
+        let sign = zero.like(side.sign());
         let rows = &mut self.Z[slot * self.stride..][..BASE + self.movers[part].len()];
         rows.fill([zero; 3]);
         let last = rows.len() - 1;
@@ -167,21 +202,26 @@ impl<T: Lane> Rows<T> {
         factor.half_solve_path(machine, self.bodies[part], rows);
     }
 
-    /// Gap rate per unit of the joint's velocity, if the slot is a stop's.
+    /// Diagonal blocks of W from Z.
     #[inline(always)]
-    fn sign(&self, slot: usize) -> Option<f64> {
-        (Contacts::<T>::part(slot) >= self.n_wheels).then(|| Contacts::<T>::side(slot).sign())
+    fn multiply_diagonal(&mut self, contacts: &Contacts<T>) {
+        for &slot in contacts.used() {
+            let movers = &self.movers[contacts.part(slot)];
+            let z = &self.Z[slot * self.stride..][..BASE + movers.len()];
+            self.W[slot] = square(z);
+        }
     }
 
     /// W from Z.
     #[inline(always)]
-    fn multiply(&mut self, used: &[usize]) {
+    fn multiply(&mut self, contacts: &Contacts<T>) {
+        let used = contacts.used();
         let n_parts = self.movers.len();
         let mut at = 0;
         for (i, &row) in used.iter().enumerate() {
-            let a = Contacts::<T>::part(row);
+            let a = contacts.part(row);
             for &column in &used[..i] {
-                let b = Contacts::<T>::part(column);
+                let b = contacts.part(column);
                 let shared = self.common[a * n_parts + b];
                 let x = &self.Z[row * self.stride..][..shared];
                 let y = &self.Z[column * self.stride..][..shared];
@@ -197,7 +237,12 @@ impl<T: Lane> Rows<T> {
     /// Adds a number by slot, 1/kg, to the three entries on W's diagonal.
     pub fn soften(&mut self, contacts: &Contacts<T>, diagonal: &[T]) {
         for (i, &slot) in contacts.used().iter().enumerate() {
-            let own = &mut self.W[block(i, i)];
+            let own = if self.pattern.is_some() {
+                self.softness[slot] = diagonal[slot];
+                &mut self.W[slot]
+            } else {
+                &mut self.W[block(i, i)]
+            };
             for k in [0, 4, 8] {
                 own[k] += diagonal[slot];
             }
@@ -212,7 +257,7 @@ impl<T: Lane> Rows<T> {
     #[inline(always)]
     pub fn local(&self, contacts: &Contacts<T>, y: &[T], q: &mut [Triple<T>]) {
         for &slot in contacts.used() {
-            let movers = &self.movers[Contacts::<T>::part(slot)][..];
+            let movers = &self.movers[contacts.part(slot)][..];
             let rows = &self.Z[slot * self.stride..][..BASE + movers.len()];
             let (base, joints) = rows.split_at(BASE);
             let mut sum = scaled(&base[0], y[0]);
@@ -241,7 +286,7 @@ impl<T: Lane> Rows<T> {
         y: &mut [T],
     ) {
         for &slot in contacts.used() {
-            let movers = &self.movers[Contacts::<T>::part(slot)][..];
+            let movers = &self.movers[contacts.part(slot)][..];
             let rows = &self.Z[slot * self.stride..][..BASE + movers.len()];
             let (base, joints) = rows.split_at(BASE);
             let here = contacts.slot(slot).active & lanes;
@@ -281,22 +326,26 @@ impl<T: Lane> Rows<T> {
             let moment = own.point.cross(force);
             add_vector(here, &mut total, force);
             add_vector(here, &mut couple, moment);
-            for mover in &self.movers[Contacts::<T>::part(slot)] {
+            for mover in &self.movers[contacts.part(slot)] {
                 let power = end.motions[mover.motion].power(force, moment);
                 add(here, &mut out[mover.velocity], power);
             }
         }
         for &slot in contacts.used_by_stops() {
             let here = contacts.slot(slot).active & lanes;
-            let mover = self.movers[Contacts::<T>::part(slot)].last();
-            if let (Some(sign), Some(mover)) = (self.sign(slot), mover) {
-                add(here, &mut out[mover.velocity], zero.like(sign) * p[slot][0]);
+            let mover = self.movers[contacts.part(slot)].last();
+            if let (Some((_, side)), Some(mover)) = (contacts.stop(slot), mover) {
+                add(
+                    here,
+                    &mut out[mover.velocity],
+                    zero.like(side.sign()) * p[slot][0],
+                );
             }
         }
         out[..BASE].copy_from_slice(&[total.x, total.y, total.z, couple.x, couple.y, couple.z]);
     }
 
-    /// Writes each lane's problem: W, q, μ. Starting impulses stay as they are.
+    /// Writes each lane's problem: W or its factors, q, μ. Starting impulses stay as they are.
     ///
     /// `q`: free velocity by slot, m/s; `mu`: friction coefficient. `problems`: one a lane.
     ///
@@ -314,6 +363,12 @@ impl<T: Lane> Rows<T> {
             #[inline(always)]
             || {
                 let problems = &mut problems[..T::LANES];
+                if let Some(pattern) = &self.pattern {
+                    for problem in &mut *problems {
+                        problem.factored.adopt(pattern);
+                        problem.factored.slots = 0;
+                    }
+                }
                 let mut friction = [0.0; MAX_LANES];
                 mu.store(&mut friction[..T::LANES]);
                 for (lane, problem) in problems.iter_mut().enumerate() {
@@ -343,6 +398,10 @@ impl<T: Lane> Rows<T> {
                             }
                         },
                     );
+                    if self.pattern.is_some() {
+                        self.write_factors(contacts, row, problems);
+                        continue;
+                    }
                     for &column in &contacts.used()[..=i] {
                         let of_column = contacts.places(column);
                         let [first @ .., last] = &self.W[at];
@@ -373,6 +432,41 @@ impl<T: Lane> Rows<T> {
                 }
             },
         );
+    }
+
+    /// Writes a slot's part of the factors.
+    #[inline(always)]
+    fn write_factors(&self, contacts: &Contacts<T>, slot: usize, problems: &mut [ContactProblem]) {
+        let (places, active) = (contacts.places(slot), contacts.slot(slot).active);
+        let n = BASE + self.movers[contacts.part(slot)].len();
+        let softness = store_all(&[self.softness[slot]]);
+        let diagonal = store_all(&self.W[slot]);
+        each::<T>(
+            active,
+            #[inline(always)]
+            |lane| {
+                let (contact, out) = (usize::from(places[lane]), &mut problems[lane].factored);
+                out.slots |= 1 << slot;
+                out.softness[contact] = softness[0][lane];
+                for (out, values) in out.diagonal[contact].iter_mut().zip(&diagonal) {
+                    *out = values[lane];
+                }
+            },
+        );
+        for (k, z) in self.Z[slot * self.stride..][..n].iter().enumerate() {
+            let values = store_all(z);
+            each::<T>(
+                active,
+                #[inline(always)]
+                |lane| {
+                    let at = usize::from(places[lane]) * self.stride + k;
+                    let out = &mut problems[lane].factored.Z[at];
+                    for i in 0..3 {
+                        out[i] = values[i][lane];
+                    }
+                },
+            );
+        }
     }
 
     /// Reads an answer of the problems by slot. Slots that a lane does not use are left as they
@@ -416,7 +510,7 @@ impl<T: Lane> Rows<T> {
 
 /// `x += y` where the mask is true.
 #[inline(always)]
-fn add<T: Lane>(mask: T::Mask, x: &mut T, y: T) {
+pub(super) fn add<T: Lane>(mask: T::Mask, x: &mut T, y: T) {
     *x = T::select(mask, *x + y, *x);
 }
 
@@ -427,7 +521,7 @@ fn add_vector<T: Lane>(mask: T::Mask, x: &mut Vec3<T>, y: Vec3<T>) {
 
 /// A row of Z times an impulse.
 #[inline(always)]
-fn along<T: Lane>(z: &Triple<T>, p: &Triple<T>) -> T {
+pub(super) fn along<T: Lane>(z: &Triple<T>, p: &Triple<T>) -> T {
     z[0] * p[0] + z[1] * p[1] + z[2] * p[2]
 }
 
@@ -439,7 +533,7 @@ fn scaled<T: Lane>(x: &Triple<T>, a: T) -> Triple<T> {
 
 /// `sums += a x`.
 #[inline(always)]
-fn add_scaled<T: Lane>(sums: &mut Triple<T>, x: &Triple<T>, a: T) {
+pub(super) fn add_scaled<T: Lane>(sums: &mut Triple<T>, x: &Triple<T>, a: T) {
     for i in 0..3 {
         sums[i] += a * x[i];
     }

@@ -3,7 +3,6 @@
 //! The formulas are those of [`crate::contact::limit`].
 
 use super::contacts::Contacts;
-use super::footing::SLOTS;
 use super::forecast::Forecast;
 use super::machine::{LinkJoint, Machine, Stop};
 use super::place::Place;
@@ -11,24 +10,20 @@ use super::poses::Poses;
 use crate::contact::Side;
 use crate::scalar::{Lane, LaneMask};
 
-impl<T: Lane> Contacts<T> {
-    /// The joint whose stop a slot is, if it is one.
-    #[inline(always)]
-    pub(super) fn stop(&self, slot: usize) -> Option<&Stop> {
-        if slot < self.first_stop {
-            return None;
-        }
-        self.stops.get((slot - self.first_stop) / SLOTS)
-    }
+/// Slots of a joint with stops.
+pub(super) const SIDES: usize = 2;
 
-    /// Side of a stop's slot.
+impl<T: Lane> Contacts<T> {
+    /// The joint whose stop a slot is, and the side, if it is one.
     #[inline(always)]
-    pub(super) fn side(slot: usize) -> Side {
-        if slot.is_multiple_of(SLOTS) {
+    pub(super) fn stop(&self, slot: usize) -> Option<(&Stop, Side)> {
+        let own = slot.checked_sub(self.first_stop)?;
+        let side = if own.is_multiple_of(SIDES) {
             Side::Lower
         } else {
             Side::Upper
-        }
+        };
+        self.stops.get(own / SIDES).map(|stop| (stop, side))
     }
 
     /// Finds the stops that a step must consider, after the other contacts.
@@ -67,7 +62,7 @@ impl<T: Lane> Contacts<T> {
                             Side::Lower => q - q.like(limits.lower),
                             Side::Upper => q.like(limits.upper) - q,
                         };
-                        let slot = self.first_stop + SLOTS * i + k;
+                        let slot = self.first_stop + SIDES * i + k;
                         let contact = &mut self.slots[slot];
                         let rate = sign * v[own.velocity];
                         contact.active = forecast.admits(gap(middle.joints[joint]), rate);

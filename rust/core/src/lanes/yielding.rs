@@ -59,7 +59,7 @@ impl<T: Lane> Yields<T> {
         unknown: impl Fn(usize) -> Option<f64>,
     ) {
         for &slot in contacts.used() {
-            let wheel = machine.wheels.get(Contacts::<T>::part(slot)); // None for a stop
+            let wheel = machine.wheels.get(contacts.part(slot)); // None for a stop
             let compliance = wheel.and_then(|wheel| wheel.compliance);
             let (own, places) = (contacts.slot(slot), contacts.places(slot));
             let mut columns = [[0.0; MAX_LANES]; 5];

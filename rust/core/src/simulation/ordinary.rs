@@ -1,7 +1,7 @@
 //! Whether a rover's steps are ordinary, and how many rovers share a register then.
 
 use super::rover::RoverSimulation;
-use crate::lanes::admission::{NeverOrdinary, admit};
+use crate::lanes::admission::NeverOrdinary;
 use crate::scalar::Instructions;
 
 impl RoverSimulation {
@@ -9,8 +9,7 @@ impl RoverSimulation {
     /// declines.
     #[must_use]
     pub fn never_ordinary(&self) -> Option<NeverOrdinary> {
-        let of_machine = || self.scene.machine.as_ref().err().cloned();
-        (admit(&self.options).err()).or_else(|| of_machine().map(NeverOrdinary::from))
+        self.scene.never_ordinary(&self.options)
     }
 
     /// Rovers to a register in its ordinary steps, in a batch on this machine; 1 if it has none.

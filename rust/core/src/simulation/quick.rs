@@ -10,7 +10,7 @@ use crate::solver::SolverOptions;
 pub(super) struct Quick {
     pub(super) block: Option<Box<Block<f64>>>,
     /// The solver's scratch.
-    pub(super) queue: Option<Queue<f64>>,
+    pub(super) queue: Option<Box<Queue<f64>>>,
     pub(super) problem: Box<[ContactProblem; 1]>,
     pub(super) gap_problem: Box<[ContactProblem; 1]>,
     /// Whether the last step was taken here.

@@ -7,7 +7,7 @@ use super::quick::solve;
 use super::rover::{RoverScene, RoverSimulation};
 use super::scene::QuickStep;
 use crate::integrator::{NoProbe, Phase, Probe, StepError, StepOptions, StepReport};
-use crate::lanes::admission::admit;
+use crate::lanes::admission::{NeverOrdinary, admit};
 use crate::lanes::machine::Machine;
 use crate::lanes::passenger::Passenger;
 use crate::lanes::queue::Queue;
@@ -17,8 +17,21 @@ use crate::scalar::{Lane, Single};
 impl RoverScene {
     /// The machine of its ordinary steps; none if with these options no step is ordinary.
     fn ordinary_machine(&self, options: &StepOptions) -> Option<&Arc<Machine>> {
-        admit(options).ok()?;
-        self.machine.as_ref().ok()
+        match self.never_ordinary(options) {
+            None => self.machine.as_ref().ok(),
+            Some(_) => None,
+        }
+    }
+
+    /// Why with these options no step is ordinary.
+    #[inline]
+    pub(super) fn never_ordinary(&self, options: &StepOptions) -> Option<NeverOrdinary> {
+        match (admit(options), &self.machine) {
+            (Err(why), _) => Some(why),
+            (Ok(()), Err(why)) => Some(why.clone().into()),
+            (Ok(()), Ok(machine)) => (machine.has_wide_wheels() && self.terrain.has_surface())
+                .then_some(NeverOrdinary::WideWheelsOnSurface),
+        }
     }
 
     /// Takes an ordinary step; None if it is not ordinary, and nothing has changed.
@@ -34,7 +47,9 @@ impl RoverScene {
         let block = quick
             .block
             .get_or_insert_with(|| Box::new(Block::new(token, machine)));
-        let queue = quick.queue.get_or_insert_with(|| Queue::new(token));
+        let queue = quick
+            .queue
+            .get_or_insert_with(|| Box::new(Queue::new(token)));
         let mut passenger = Passenger {
             model: &self.model,
             terrain: &self.terrain,
@@ -49,23 +64,23 @@ impl RoverScene {
         };
         block.board(0, &passenger);
         block.begin();
-        let problems = &mut quick.problem[..];
-        block.prepare(problems, probe);
+        let problem = &mut *quick.problem;
+        block.prepare(problem, probe);
         let solver = &step.options.solver;
         let mut next = Next::Retake;
         while next == Next::Retake {
-            solve(queue, problems, solver);
+            solve(queue, problem, solver);
             probe.end(Phase::Solve);
-            next = block.conclude(problems, probe);
+            next = block.conclude(problem, probe);
         }
         let is_deep = next == Next::Project;
-        let gap_problems = &mut quick.gap_problem[..];
+        let gap_problem = &mut *quick.gap_problem;
         if is_deep {
-            gap_problems.clone_from_slice(problems);
-            block.set_gaps(gap_problems);
-            solve(queue, gap_problems, solver);
+            gap_problem.clone_from_slice(problem);
+            block.set_gaps(gap_problem);
+            solve(queue, gap_problem, solver);
         }
-        block.finish(is_deep.then_some(&*gap_problems), probe);
+        block.finish(is_deep.then_some(&gap_problem[..]), probe);
         if block.declined(0).is_some() {
             return None;
         }

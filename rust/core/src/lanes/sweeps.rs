@@ -1,0 +1,177 @@
+//! Impulses to start pivoting from, where a machine has many contacts: Gauss–Seidel sweeps over a
+//! block's contacts.
+//!
+//! When commands change, many of the contacts of a machine on lines change their modes, and pivoting
+//! corrects little more than one of them a step. A few sweeps find most of them for the price of one
+//! step, for all lanes of the block at once. They leave impulses that the contacts cannot tell apart
+//! near those of the last step.
+
+use super::contacts::Contacts;
+use super::problem::Triple;
+use super::rows::{Rows, add, add_scaled, along};
+use crate::multibody::model::BASE;
+use crate::scalar::{Lane, LaneMask};
+
+/// Newton steps on the multiplier of a slide, and passes over normal and tangents of a contact.
+const SLIDE_STEPS: usize = 3;
+const PASSES: usize = 1;
+
+/// The impulse of a contact by its law, all others fixed, where it has the impulse `p` and the
+/// velocity `u`; `w`: its block of W. The normal and the tangents are solved in turn.
+#[inline(always)]
+fn solve<T: Lane>(w: &[T; 9], mu: T, p: &Triple<T>, u: &Triple<T>) -> Triple<T> {
+    let zero = mu.like(0.0);
+    let mut free = *u;
+    for (k, free) in free.iter_mut().enumerate() {
+        *free -= along(&[w[3 * k], w[3 * k + 1], w[3 * k + 2]], p);
+    }
+    let inverse = mu.like(1.0) / w[0];
+    let mut new = *p;
+    for _ in 0..PASSES {
+        let pushed = free[0] + (w[1] * new[1] + w[2] * new[2]);
+        new[0] = (-(pushed * inverse)).max(zero);
+        let slip = [free[1] + w[3] * new[0], free[2] + w[6] * new[0]];
+        let [t, b] = friction([w[4], w[5], w[8]], slip, mu * new[0]);
+        (new[1], new[2]) = (t, b);
+    }
+    new
+}
+
+/// The tangential impulse of at most `limit` against the slip `f` without it: `−(W + λ 1)⁻¹ f` with
+/// `λ >= 0`, so that it opposes what remains of the slip. `w`: entries tt, tb, bb.
+#[inline(always)]
+fn friction<T: Lane>([a, b, c]: [T; 3], f: [T; 2], limit: T) -> [T; 2] {
+    let (zero, one) = (limit.like(0.0), limit.like(1.0));
+    let mut lambda = zero;
+    let mut p = [zero; 2];
+    let mut norm = zero;
+    for step in 0..=SLIDE_STEPS {
+        let (a, c) = (a + lambda, c + lambda);
+        let inverse = one / (a * c - b * b);
+        p = [
+            (b * f[1] - c * f[0]) * inverse,
+            (b * f[0] - a * f[1]) * inverse,
+        ];
+        let square = p[0] * p[0] + p[1] * p[1];
+        norm = square.sqrt();
+        let slides = limit.lt(norm);
+        if step == SLIDE_STEPS || !slides.any() {
+            break;
+        }
+        let two_b = b + b;
+        let rate = (c * p[0] * p[0] - two_b * p[0] * p[1] + a * p[1] * p[1]) * inverse;
+        let more = (norm - limit) / limit * (square / rate);
+        lambda = T::select(slides, lambda + more, lambda);
+    }
+    let scale = T::select(limit.lt(norm), limit / norm, one);
+    let holds = zero.lt(limit);
+    [
+        T::select(holds, p[0] * scale, zero),
+        T::select(holds, p[1] * scale, zero),
+    ]
+}
+
+impl<T: Lane> Rows<T> {
+    /// Improves impulses by slot, N s, with `n` sweeps; `q`: free velocity by slot, m/s. Slots that
+    /// a lane does not use get zero.
+    #[inline(always)]
+    pub(super) fn sweep(
+        &mut self,
+        contacts: &Contacts<T>,
+        n: usize,
+        (q, mu): (&[Triple<T>], T),
+        p: &mut [Triple<T>],
+    ) {
+        let zero = mu.like(0.0);
+        self.swept.fill(zero);
+        for &slot in contacts.used() {
+            let active = contacts.slot(slot).active;
+            for p in &mut p[slot] {
+                *p = T::select(active, *p, zero);
+            }
+            self.push(contacts, slot, &p[slot]);
+        }
+        for _ in 0..n {
+            for &slot in contacts.used() {
+                let u = self.velocity(contacts, slot, &q[slot], &p[slot]);
+                let mu = if contacts.stop(slot).is_some() {
+                    zero
+                } else {
+                    mu
+                };
+                let new = solve(&self.W[slot], mu, &p[slot], &u);
+                let active = contacts.slot(slot).active;
+                let mut change = [zero; 3];
+                for k in 0..3 {
+                    change[k] = T::select(active, new[k] - p[slot][k], zero);
+                    p[slot][k] += change[k];
+                }
+                self.push(contacts, slot, &change);
+            }
+        }
+    }
+
+    /// Adds the motion that an impulse causes.
+    #[inline(always)]
+    fn push(&mut self, contacts: &Contacts<T>, slot: usize, p: &Triple<T>) {
+        let movers = &self.movers[contacts.part(slot)][..];
+        let rows = &self.Z[slot * self.stride..][..BASE + movers.len()];
+        let (base, joints) = rows.split_at(BASE);
+        let here = contacts.slot(slot).active;
+        for (w, row) in self.swept[..BASE].iter_mut().zip(base) {
+            add(here, w, along(row, p));
+        }
+        for (row, mover) in joints.iter().zip(movers) {
+            add(here, &mut self.swept[mover.velocity], along(row, p));
+        }
+    }
+
+    /// Velocity of a contact with the motion so far.
+    #[inline(always)]
+    fn velocity(
+        &self,
+        contacts: &Contacts<T>,
+        slot: usize,
+        q: &Triple<T>,
+        p: &Triple<T>,
+    ) -> Triple<T> {
+        let movers = &self.movers[contacts.part(slot)][..];
+        let rows = &self.Z[slot * self.stride..][..BASE + movers.len()];
+        let (base, joints) = rows.split_at(BASE);
+        let mut u = *q;
+        add_scaled(&mut u, p, self.softness[slot]);
+        for (row, w) in base.iter().zip(&self.swept) {
+            add_scaled(&mut u, row, *w);
+        }
+        for (row, mover) in joints.iter().zip(movers) {
+            add_scaled(&mut u, row, self.swept[mover.velocity]);
+        }
+        u
+    }
+
+    /// Writes impulses by slot as the start of each lane's problem, whose impulses are those of the
+    /// last step.
+    #[inline(always)]
+    pub(super) fn write_start(
+        &self,
+        contacts: &Contacts<T>,
+        p: &[Triple<T>],
+        problems: &mut [super::problem::ContactProblem],
+    ) {
+        for &slot in contacts.used() {
+            let active = contacts.slot(slot).active;
+            let places = contacts.places(slot);
+            for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
+                if active.get(lane) {
+                    let contact = usize::from(places[lane]);
+                    let own = &mut problem.p[3 * contact..][..3];
+                    let last = &mut problem.factored.last[contact];
+                    for (k, own) in own.iter_mut().enumerate() {
+                        last[k] = *own;
+                        *own = p[slot][k].get(lane);
+                    }
+                }
+            }
+        }
+    }
+}
