@@ -14,19 +14,19 @@ fn solve_every_step(side: usize, seed: u64, steps: usize) -> usize {
     most
 }
 
-/// The story: 27 boxes left 23 of 200 steps unsolved, all within 1e-7 of an answer that lay far
-/// away in the null space of `W`. Seed 3 is the worst of twenty.
+/// The story: steps 337 to 343 were not solved within the budget, four of them within 1e-7 of an
+/// answer that lay far away in the null space of `W`. Seed 3 is the worst of twenty.
 #[test]
 fn every_step_of_27_boxes_is_solved_while_they_pile_up() {
-    let most = solve_every_step(3, 3, 260);
-    assert!(most > 60, "{most} contacts");
+    let most = solve_every_step(3, 3, 344);
+    assert!(most > 90, "{most} contacts");
 }
 
 #[test]
 #[ignore = "tests/physics/contacts/heaps.rs::every_step_of_27_boxes_is_solved_while_they_pile_up"]
 fn every_step_of_27_boxes_is_solved_until_they_lie() {
     let most = solve_every_step(3, 3, 480);
-    assert!(most > 90, "{most} contacts");
+    assert!(most > 110, "{most} contacts");
 }
 
 /// From the first touch until the lower half lies.

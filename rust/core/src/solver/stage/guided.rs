@@ -4,22 +4,15 @@
 //! Sweeps depend on the order of the contacts. The answer does not, since it takes only modes and
 //! slip directions from them. If a mode is ambiguous or the guess was wrong, the stage gives no
 //! answer and the caller continues.
-//!
-//! Bodies that lean on each other mislead the sweeps. A [handful](PIVOTED) of contacts is then
-//! pivoted from Newton's first step, and the modes of that answer are the second guess. Cubes that
-//! are dragged under cubes 100 and 1e6 times heavier take 5 steps to these modes and 2 to the
-//! answer, where Newton alone takes 15 and 20.
 
 use crate::cone::tangential_norm;
 use crate::law::coulomb::ContactMode;
 use crate::problem::{Operator, Prepared, Residual};
 use crate::solver::linear::reduced_system::{Factors, NewtonStep};
-use crate::solver::local::modes::{self, Linearised, Prediction};
+use crate::solver::local::modes::{self, Linearised};
 use crate::solver::local::one_contact::estimate_one_contact;
 use crate::solver::options::SolverOptions;
-use crate::solver::report::SolveStatus;
 use crate::solver::scratch::Scratch;
-use crate::solver::stage::{newton, pivoting};
 
 /// Number of sweeps, and of Newton steps that try their modes.
 const SWEEPS: usize = 4;
@@ -39,21 +32,6 @@ const ROUNDING_ASKED: f64 = 1e-7;
 
 /// Slip or separation speed, relative to the largest free velocity, that decides a mode.
 const DECIDED: f64 = 1e-8;
-
-/// Numbers of contacts for which pivoting makes the second guess: with fewer Newton needs no more
-/// than five steps, with many more pivoting takes longer than Newton.
-const PIVOTED: std::ops::RangeInclusive<usize> = 7..=12;
-
-/// Most systems of the second guess. Where pivoting takes more it mostly goes round in circles.
-const MOST_PIVOTS: usize = 8;
-
-/// What Newton from zero makes of guessed modes.
-enum Trial {
-    Solved(Residual),
-    /// A mode is ambiguous.
-    Undecided,
-    Wrong,
-}
 
 /// Whether every sliding contact slips and every open one separates. Otherwise a mode is ambiguous.
 /// A sweep would choose it by the order of the contacts, on which the loads of a statically
@@ -133,51 +111,6 @@ pub(in crate::solver) fn solve<const D: usize>(
     *iterations += SWEEPS;
     data.W.multiply_add(p, data.q, u);
     let prediction = modes::recall::<D>(data.mu, p, u, &mut scratch.system.contacts);
-    let trial = try_modes::<D>(data, options, prediction, p, u, scratch, iterations);
-    match trial {
-        Trial::Solved(residual) => Some(residual),
-        Trial::Wrong if PIVOTED.contains(&data.mu.len()) => {
-            let prediction = pivot_to_modes::<D>(data, options, p, u, scratch, iterations)?;
-            let trial = try_modes::<D>(data, options, prediction, p, u, scratch, iterations);
-            match trial {
-                Trial::Solved(residual) => Some(residual),
-                Trial::Undecided | Trial::Wrong => None,
-            }
-        }
-        Trial::Undecided | Trial::Wrong => None,
-    }
-}
-
-/// The modes that pivoting finds from Newton's first step.
-fn pivot_to_modes<const D: usize>(
-    data: &Prepared<'_>,
-    options: &SolverOptions,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut Scratch,
-    iterations: &mut usize,
-) -> Option<Prediction> {
-    p.fill(0.0);
-    let _ = newton::full_steps::<D>(data, options, 1, p, u, scratch, iterations);
-    let few = SolverOptions {
-        max_newton_steps: MOST_PIVOTS.min(options.max_newton_steps),
-        ..*options
-    };
-    let (status, _) = pivoting::pivots::<D>(data, &few, None, p, u, scratch, iterations);
-    (status == SolveStatus::Converged)
-        .then(|| modes::recall::<D>(data.mu, p, u, &mut scratch.system.contacts))
-}
-
-/// Newton from zero with the modes of the scratch; changes no mode.
-fn try_modes<const D: usize>(
-    data: &Prepared<'_>,
-    options: &SolverOptions,
-    prediction: Prediction,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut Scratch,
-    iterations: &mut usize,
-) -> Trial {
     p.fill(0.0);
     u.copy_from_slice(data.q);
     let alpha = options.regularisation * data.mean_diagonal;
@@ -192,7 +125,7 @@ fn try_modes<const D: usize>(
                     .factorise::<D>(data, alpha, prediction, true, &mut scratch.work);
         }
         if factors == Factors::None && prediction.m > 0 {
-            return Trial::Wrong;
+            return None;
         }
         // The centre stays at zero until the slip directions are known. Otherwise the guess would
         // remain in the null space of W.
@@ -217,14 +150,10 @@ fn try_modes<const D: usize>(
                 && residual.relative < ROUNDING_ASKED
                 && data.is_within_rounding::<D>(p, u));
         if is_solved {
-            return if is_decided::<D>(data, &scratch.system.contacts, u) {
-                Trial::Solved(residual)
-            } else {
-                Trial::Undecided
-            };
+            return is_decided::<D>(data, &scratch.system.contacts, u).then_some(residual);
         }
         if step >= SETTLED && (progress > LEAST_GAIN || progress.is_nan()) {
-            return Trial::Wrong;
+            return None;
         }
         if progress > REUSE_CONTRACTION {
             factors = Factors::None;
@@ -241,5 +170,5 @@ fn try_modes<const D: usize>(
             }
         }
     }
-    Trial::Wrong
+    None
 }
