@@ -229,9 +229,7 @@ def draw(profiles: dict[str, dict[str, list[float]]], taus: Array, n_problems: i
     plt.close(figure)
 
 
-def compare(
-    problems: list[Problem], siconos: str | None, ours: Sequence[str] = OURS
-) -> dict[str, dict[str, Run]]:
+def compare(problems: list[Problem], siconos: str | None, ours: Sequence[str] = OURS) -> dict[str, dict[str, Run]]:
     """Every solver on every problem: solver, then problem."""
     solvers: dict[str, Callable[[Problem, float], tuple[float, int, Array]]] = {
         name: lambda problem, tolerance, name=name: solve_ours(problem, name, tolerance) for name in ours
@@ -260,7 +258,7 @@ def compare(
 
 
 def print_ratios(results: dict[str, dict[str, Run]]) -> None:
-    """Time of the fastest of Siconos' methods over that of `auto`, where both solve a problem, and the geometric mean."""
+    """Time of the fastest of Siconos' methods over that of `auto` where both solve a problem, and the mean."""
     ratios = []
     for name, ours in results["auto"].items():
         peers = {
