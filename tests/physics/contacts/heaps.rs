@@ -39,5 +39,6 @@ fn every_step_of_64_boxes_is_solved() {
 #[test]
 #[ignore = "tests/physics/contacts/heaps.rs::every_step_of_27_boxes_is_solved_while_they_pile_up"]
 fn every_step_of_125_boxes_is_solved() {
-    solve_every_step(5, 1, 170);
+    let most = solve_every_step(5, 1, 225);
+    assert!(most > 200, "{most} contacts");
 }
