@@ -1,6 +1,6 @@
 """Dolan–Moré performance profiles of the contact solvers: ours, and Siconos' where an interpreter has it.
 
-    python -m comparison.solver_profiles [--problems FOLDER] [--siconos PYTHON] [--output FOLDER]
+    python -m comparison.solver_profiles [--problems FOLDER] [--siconos PYTHON] [--output FOLDER] [--ratios]
 
 Each solver starts every problem from zero. Its answer is judged here and not by itself: the natural map of the
 returned impulses, relative to the data, must be 1e-8 or less, and the velocity right to 1e-6 m/s at every contact.
@@ -22,7 +22,7 @@ import select
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -229,10 +229,10 @@ def draw(profiles: dict[str, dict[str, list[float]]], taus: Array, n_problems: i
     plt.close(figure)
 
 
-def compare(problems: list[Problem], siconos: str | None) -> dict[str, dict[str, Run]]:
+def compare(problems: list[Problem], siconos: str | None, ours: Sequence[str] = OURS) -> dict[str, dict[str, Run]]:
     """Every solver on every problem: solver, then problem."""
     solvers: dict[str, Callable[[Problem, float], tuple[float, int, Array]]] = {
-        name: lambda problem, tolerance, name=name: solve_ours(problem, name, tolerance) for name in OURS
+        name: lambda problem, tolerance, name=name: solve_ours(problem, name, tolerance) for name in ours
     }
     with tempfile.TemporaryDirectory() as folder:
         peer = Siconos(siconos, Path(folder)) if siconos and Siconos.is_installed(siconos) else None
@@ -257,6 +257,26 @@ def compare(problems: list[Problem], siconos: str | None) -> dict[str, dict[str,
     return results
 
 
+def print_ratios(results: dict[str, dict[str, Run]]) -> None:
+    """Time of the fastest of Siconos' methods over that of `auto` where both solve a problem, and the mean."""
+    ratios = []
+    for name, ours in results["auto"].items():
+        peers = {
+            solver: row[name].seconds
+            for solver, row in results.items()
+            if solver.startswith("Siconos") and row[name].is_solved
+        }
+        if not (peers and ours.is_solved):
+            print(f"{name:44} auto {'solved' if ours.is_solved else 'no'}, Siconos {'solved' if peers else 'no'}")
+            continue
+        best = min(peers, key=lambda solver: peers[solver])
+        ratios.append(peers[best] / ours.seconds)
+        print(f"{name:44} {1e6 * ours.seconds:9.1f} us, {best} {1e6 * peers[best]:9.1f} us: {ratios[-1]:8.2f}")
+    if ratios:
+        mean = np.exp(np.mean(np.log(ratios)))
+        print(f"geometric mean of {len(ratios)} problems: {mean:.2f}; least {min(ratios):.2f}")
+
+
 def short(value: float, digits: int) -> float | None:
     """A number of so many digits; None for infinity, which JSON has not."""
     return float(f"{value:.{digits}g}") if np.isfinite(value) else None
@@ -269,7 +289,14 @@ def main() -> None:
     parser.add_argument("--siconos", default="/usr/bin/python3", help="interpreter that can import siconos")
     parser.add_argument("--output", type=Path, default=ROOT / "docs" / "comparison")
     parser.add_argument("--only", default="", help="part of the names of the problems to run")
+    parser.add_argument(
+        "--ratios", action="store_true", help="only print auto's speed on the recorded problems beside Siconos' best"
+    )
     arguments = parser.parse_args()
+    if arguments.ratios:
+        problems = [p for p in recorded(arguments.problems) if arguments.only in p.name]
+        print_ratios(compare(problems, arguments.siconos, ("auto",)))
+        return
     if arguments.problems is None:
         print("no folder of recorded problems: the synthetic families only")
     problems = [p for p in recorded(arguments.problems) + synthetic() if arguments.only in p.name]

@@ -15,6 +15,7 @@ mod shapes;
 mod solver;
 mod solver_methods;
 mod solver_npz;
+mod solver_row;
 mod solver_scenes;
 mod solver_shelf;
 mod spheres;

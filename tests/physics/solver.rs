@@ -812,7 +812,7 @@ fn a_problem_without_contacts_is_solved_by_every_method() {
 fn the_report_names_the_stage_that_answered_and_those_before_it() {
     let stages = |report: &SolveReport| -> Vec<(Stage, SolveStatus)> {
         let rungs = report.rungs.as_slice();
-        let total: usize = rungs.iter().map(|rung| rung.iterations).sum();
+        let total: usize = rungs.iter().map(|rung| rung.iterations as usize).sum();
         assert_eq!(total, report.iterations);
         rungs.iter().map(|rung| (rung.stage, rung.status)).collect()
     };
@@ -944,7 +944,7 @@ fn free_bodies_list_their_sweeps_and_what_came_after_them() {
         ]
     );
     assert_eq!(report.stage, Stage::ProximalPoint);
-    let total: usize = rungs.iter().map(|rung| rung.iterations).sum();
+    let total: usize = rungs.iter().map(|rung| rung.iterations as usize).sum();
     assert_eq!(total, report.iterations);
     // m v of the whole column stops at the floor, that of all above the k-th at the k-th.
     for (k, p) in p.chunks_exact(2).enumerate() {

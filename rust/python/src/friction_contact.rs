@@ -76,7 +76,7 @@ impl SolverReport {
     /// Reasons are "converged", "max_iterations", "stalled", "budget_exhausted", "non_finite" and
     /// "relaxed".
     #[getter]
-    fn stages(&self) -> Vec<(&'static str, &'static str, usize)> {
+    fn stages(&self) -> Vec<(&'static str, &'static str, u32)> {
         let rungs = self.inner.rungs.as_slice().iter();
         rungs
             .map(|rung| (rung.stage.name(), rung.status.name(), rung.iterations))

@@ -125,10 +125,10 @@ pub struct Rung {
     pub stage: Stage,
     /// Why it ended.
     pub status: SolveStatus,
-    /// Its sweeps and linear solves.
-    pub iterations: usize,
+    /// Its sweeps and linear solves. Short, since every step copies the list.
+    pub iterations: u32,
     /// Matrices that it factored for them; islands and sweeps over bodies count none.
-    pub factorisations: usize,
+    pub factorisations: u32,
 }
 
 /// The stages that were tried, in their order.
@@ -136,6 +136,13 @@ pub struct Rung {
 pub struct Rungs {
     list: [Rung; Self::MOST],
     len: usize,
+}
+
+impl Rung {
+    /// As many iterations as the list can hold.
+    pub(super) fn count(iterations: usize) -> u32 {
+        u32::try_from(iterations).unwrap_or(u32::MAX)
+    }
 }
 
 impl Rungs {
@@ -202,7 +209,8 @@ impl SolveReport {
     /// Matrices factored by all stages together.
     #[must_use]
     pub fn factorisations(&self) -> usize {
-        self.rungs.as_slice().iter().map(|r| r.factorisations).sum()
+        let rungs = self.rungs.as_slice().iter();
+        rungs.map(|rung| rung.factorisations as usize).sum()
     }
 
     /// Systems solved while pivoting: one contact changes its mode between two of them.
@@ -210,7 +218,7 @@ impl SolveReport {
     pub fn pivots(&self) -> usize {
         let rungs = self.rungs.as_slice().iter();
         let pivoting = rungs.filter(|rung| rung.stage == Stage::Pivoting);
-        pivoting.map(|rung| rung.iterations).sum()
+        pivoting.map(|rung| rung.iterations as usize).sum()
     }
 
     /// Whether the answer meets the tolerances.

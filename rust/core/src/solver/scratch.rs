@@ -77,7 +77,7 @@ impl Scratch {
         self.rungs.push(Rung {
             stage,
             status,
-            iterations,
+            iterations: Rung::count(iterations),
             factorisations: std::mem::take(&mut self.work.factorisations),
         });
         status

@@ -20,7 +20,7 @@ pub(in crate::solver) struct Work {
     /// Whether some work was refused for lack of budget.
     pub is_exhausted: bool,
     /// Factorisations since the last stage that was listed.
-    pub factorisations: usize,
+    pub factorisations: u32,
 }
 
 impl Work {

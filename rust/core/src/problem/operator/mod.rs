@@ -98,6 +98,18 @@ impl Operator<'_> {
         }
     }
 
+    /// Whether no contact has an entry with another one. Costs one look where the first two have.
+    pub(crate) fn is_uncoupled<const D: usize>(self, n: usize) -> bool {
+        match self {
+            Self::Dense(W) => W.chunks_exact(n).enumerate().all(|(r, row)| {
+                let own = D * (r / D);
+                let others = row[..own].iter().chain(&row[own + D..]);
+                others.into_iter().all(|w| *w == 0.0)
+            }),
+            Self::BlockSparse(W) => W.n_blocks() == W.n_contacts(),
+        }
+    }
+
     /// First entry that is not finite: row, column, value.
     pub(crate) fn first_non_finite(self, n: usize) -> Option<(usize, usize, f64)> {
         match self {

@@ -142,7 +142,7 @@ where
     report.rungs.push(Rung {
         stage: report.stage,
         status: report.status,
-        iterations: report.iterations,
+        iterations: Rung::count(report.iterations),
         ..Rung::default()
     });
     report

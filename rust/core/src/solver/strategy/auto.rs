@@ -192,6 +192,29 @@ fn pivot_from_start<const D: usize>(
     None
 }
 
+/// Few contacts that share no body, without a warm start: one sweep solves each exactly, and as
+/// nothing couples them, their order does not matter. `p` is zero on return without an answer.
+fn sweep_separate<const D: usize>(
+    data: &Prepared<'_>,
+    ladder: &mut Ladder<'_>,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &mut Scratch,
+    iterations: &mut usize,
+) -> Option<Outcome> {
+    let once = SweepBudget {
+        sweeps: 1,
+        predict: false,
+    };
+    let options = ladder.options;
+    let found = gauss_seidel::sweeps::<D>(data, options, once, p, u, scratch, iterations);
+    let outcome = ladder.enter(Stage::Sweeps, found, p, scratch, *iterations);
+    if outcome.is_none() {
+        p.fill(0.0);
+    }
+    outcome
+}
+
 /// Few contacts without a warm start. The next stage starts from zero.
 fn guide_from_rest<const D: usize>(
     data: &Prepared<'_>,
@@ -201,6 +224,12 @@ fn guide_from_rest<const D: usize>(
     scratch: &mut Scratch,
     iterations: &mut usize,
 ) -> Option<Outcome> {
+    if data.mu.len() > 1 && data.W.is_uncoupled::<D>(data.n) {
+        let found = sweep_separate::<D>(data, ladder, p, u, scratch, iterations);
+        if found.is_some() {
+            return found;
+        }
+    }
     let options = ladder.options;
     let found = match guided::solve::<D>(data, options, p, u, scratch, iterations) {
         Some(residual) => (SolveStatus::Converged, residual),

@@ -159,8 +159,8 @@ fn search<const D: usize>(
     rungs.push(Rung {
         stage: found.stage,
         status: found.status,
-        iterations: found.iterations,
-        factorisations: found.factorisations(),
+        iterations: Rung::count(found.iterations),
+        factorisations: Rung::count(found.factorisations()),
     });
     found.iterations += report.iterations;
     if found.is_converged() || excess(options, &found) < excess(options, report) {
