@@ -484,18 +484,25 @@ impl<T: Lane> Block<T> {
             T::vectorize(
                 token,
                 #[inline(always)]
-                || self.begin_near(problems),
+                || self.begin_near(problems, is_first),
             );
         }
     }
 
-    /// Improves the impulses that the problems start from.
+    /// Improves the impulses that the problems start from, those of lanes that are retaken unless
+    /// `is_first`: the others have their answers.
     #[inline(always)]
-    fn begin_near(&mut self, problems: &mut [ContactProblem]) {
+    fn begin_near(&mut self, problems: &mut [ContactProblem], is_first: bool) {
+        let lanes = if is_first {
+            self.occupied
+        } else {
+            self.retaken
+        };
         self.p.copy_from_slice(&self.p_last);
         let data = (&self.u[..], self.friction);
         self.rows.sweep(&self.contacts, SWEEPS, data, &mut self.p);
-        self.rows.write_start(&self.contacts, &self.p, problems);
+        self.rows
+            .write_start(&self.contacts, lanes, &self.p, problems);
     }
 
     /// The laws of contacts that yield.

@@ -149,17 +149,18 @@ impl<T: Lane> Rows<T> {
         u
     }
 
-    /// Writes impulses by slot as the start of each lane's problem, whose impulses are those of the
-    /// last step.
+    /// Writes impulses by slot as the start of the problems of a mask's lanes, whose impulses are
+    /// those of the last step.
     #[inline(always)]
     pub(super) fn write_start(
         &self,
         contacts: &Contacts<T>,
+        lanes: T::Mask,
         p: &[Triple<T>],
         problems: &mut [super::problem::ContactProblem],
     ) {
         for &slot in contacts.used() {
-            let active = contacts.slot(slot).active;
+            let active = contacts.slot(slot).active & lanes;
             let places = contacts.places(slot);
             for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
                 if active.get(lane) {
