@@ -152,9 +152,8 @@ impl Audit {
             return Verdict::Sound;
         }
         let coarse = if is_free { excess.abs() } else { excess };
-        // The excess that remains at v⁺ = 0.
-        let left = excess - after.kinetic;
-        let is_left = left > rounding + self.gain * size;
+        // An excess remains at v⁺ = 0.
+        let is_left = excess - after.kinetic > rounding + self.gain * size;
         if (coarse > COARSE * size || is_left) && !self.is_last {
             return Verdict::Coarse;
         }
@@ -163,8 +162,7 @@ impl Audit {
         let relative = share_of_relative_motion(&after, excess)
             .filter(|_| nothing_outside && (is_free || excess > 0.0));
         if relative.is_some() || excess > 0.0 {
-            let whole = || (1.0 - excess / after.kinetic).max(0.0).sqrt();
-            let share = relative.unwrap_or_else(whole);
+            let share = relative.unwrap_or((1.0 - excess / after.kinetic).max(0.0).sqrt());
             if options.is_elastic() && !is_free {
                 report.residual = report.residual.max(violation_by(share, ws, d));
             }
