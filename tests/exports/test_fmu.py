@@ -456,7 +456,7 @@ def test_every_function_of_the_standard_is_there() -> None:
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
-        (lambda text: text.replace('"format": 1', '"format": 3'), "format: must be 2, is 3"),
+        (lambda text: text.replace('"format": 2', '"format": 3'), "format: must be 2, is 3"),
         (lambda text: text[:500], "scene.json: EOF while parsing"),
         (lambda text: text.replace('"friction": 0.7', '"friction": -0.7'), "settings.friction: must be finite"),
         (lambda text: text.replace('"token": "', '"token": "x'), "instantiationToken: must be"),
