@@ -193,6 +193,48 @@ def test_the_inertial_unit_tells_means_over_the_communication_step(master: Calla
     assert np.ptp(forces, axis=0).min() > 0.1  # it was shaken along every axis
 
 
+def test_a_unit_in_the_axes_of_rep_103_turns_every_vector_and_pose(tmp_path: Path) -> None:
+    """World and trunk with x forward, y left, z up: the same motion as in the simulator's axes."""
+    sim = simulation_on(GROUNDS["rocks"], gravity=(0.1, -3.7, 0.2))
+    path = write_fmu(sim, tmp_path / "a.fmu", axes="rep103")
+    starts = {one.name: one.start for one in read_model_description(str(path)).modelVariables}
+    assert [float(starts[f"gravity.{axis}"]) for axis in "xyz"] == [0.1, -0.2, -3.7]
+    unit, own = (
+        Master(unpacked(write_fmu(sim, tmp_path / f"{axes}.fmu", axes=axes), tmp_path / axes))
+        for axes in ("rep103", "world")
+    )
+    turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    unit.start(gravity__y=-0.3, gravity__z=-1.6)
+    own.start(gravity__y=-1.6, gravity__z=0.3)
+    for _ in range(10):
+        for one in (unit, own):
+            one.set_all("wheel_torque", sim.model.wheel_names, [60.0, 50.0, 40.0, 30.0, 20.0, 10.0])
+            one.step()
+        q, v = own.get("q"), own.get("v")
+        assert np.array_equal(unit.get("q")[:3], turn @ q[:3])
+        assert np.array_equal(unit.get("v"), [*(turn @ v[:3]), *(turn @ v[3:6]), *v[6:]])
+        assert np.array_equal(unit.get("q")[6:], q[6:])
+        ours, theirs = (Rotation.from_quat(one.get("attitude"), scalar_first=True).as_matrix() for one in (unit, own))
+        np.testing.assert_allclose(ours, turn @ theirs @ turn.T, atol=1e-15)
+        roll, heading, pitch = unit.get("q")[3:6]
+        fixed = Rotation.from_euler("xyz", [roll, pitch, heading]).as_matrix()
+        np.testing.assert_allclose(ours, fixed, atol=1e-12)
+        imu = own.get("imu")
+        assert np.array_equal(unit.get("imu"), [*(turn @ imu[:3]), *(turn @ imu[3:])])
+        assert unit.get("kinetic_energy") == own.get("kinetic_energy")
+    assert np.abs(own.get("q")[3:6]).min() > 1e-3  # it leans about every axis
+    for one in (unit, own):
+        one.fmu.freeInstance()
+
+
+def test_axes_that_are_unknown_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(OptionError, match="axes: must be one of world, rep103"):
+        write_fmu(simulation_on(Plane()), tmp_path / "a.fmu", axes="ned")  # type: ignore[arg-type]
+    result = CliRunner().invoke(app, ["export", "fmu", "-o", str(tmp_path / "a.fmu"), "--axes", "ned"])
+    assert result.exit_code == 2
+    assert not (tmp_path / "a.fmu").exists()
+
+
 def test_the_common_importer_runs_it_whole(tmp_path: Path) -> None:
     """Without a line of our own: the importer's `simulate_fmu`, with its inputs as a table."""
     sim = simulation_on(GROUNDS["rocks"])
@@ -414,7 +456,7 @@ def test_every_function_of_the_standard_is_there() -> None:
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
-        (lambda text: text.replace('"format": 1', '"format": 2'), "format: must be 1, is 2"),
+        (lambda text: text.replace('"format": 2', '"format": 3'), "format: must be 2, is 3"),
         (lambda text: text[:500], "scene.json: EOF while parsing"),
         (lambda text: text.replace('"friction": 0.7', '"friction": -0.7'), "settings.friction: must be finite"),
         (lambda text: text.replace('"token": "', '"token": "x'), "instantiationToken: must be"),

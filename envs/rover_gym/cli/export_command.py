@@ -93,6 +93,9 @@ def fmu(
     friction: Annotated[float, typer.Option(help="Friction coefficient.")] = FRICTION,
     time_step: Annotated[float, typer.Option(help="Time step of the physics, s.")] = 0.005,
     seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of ground and start.")] = 0,
+    axes: Annotated[
+        str, typer.Option(help="Of vectors and poses: 'world' (y up) or 'rep103' (x forward, y left, z up).")
+    ] = "world",
 ) -> None:
     """Write a rover at the start of an episode as an FMI 3.0 co-simulation unit."""
     fmu_library()
@@ -110,5 +113,5 @@ def fmu(
     env = gym.make("Rover-v0", **arguments)
     env.reset(seed=seed, options=None if start is None else {"position": start})
     simulation = env.unwrapped.simulation  # type: ignore[attr-defined]
-    say_path("FMU", write_fmu(simulation, output, name=simulation.model.name))
+    say_path("FMU", write_fmu(simulation, output, name=simulation.model.name, axes=axes))  # type: ignore[arg-type]
     env.close()

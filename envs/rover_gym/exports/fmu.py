@@ -7,6 +7,7 @@ import zipfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rover_gym.exports.axes import AXES, Axes
 from rover_gym.exports.fmu_description import description_text
 from rover_gym.exports.fmu_scene import scene_text
 from rover_gym.exports.fmu_variables import unit_variables
@@ -47,7 +48,12 @@ def fmu_library() -> Path:
 
 @checked(simulation="Simulation", path=Path, name=str, description=str)
 def write_fmu(
-    simulation: Simulation, path: str | Path, *, name: str = "rover", description: str = "a rover on its ground"
+    simulation: Simulation,
+    path: str | Path,
+    *,
+    name: str = "rover",
+    description: str = "a rover on its ground",
+    axes: Axes = "world",
 ) -> Path:
     """Writes a simulation in its present state as an FMI 3.0 co-simulation unit for this system.
 
@@ -59,13 +65,17 @@ def write_fmu(
         path: The file to write, usually .fmu, with its folder.
         name: Name of the model.
         description: In words.
+        axes: Of vectors and poses: "world", the simulator's own with y up, or "rep103", x forward, y left, z up, for
+            world and trunk alike.
 
     Raises:
-        OptionError: The library has not been built.
+        OptionError: The library has not been built, or `axes` is none of the two.
         OSError: The file cannot be written.
     """
+    if axes not in AXES:
+        refuse(OptionError, "axes", axes, f"must be one of {', '.join(AXES)}")
     library = fmu_library()
-    variables = unit_variables(simulation)
+    variables = unit_variables(simulation, axes)
     scene, token = scene_text(simulation, variables)
     _, system = ENDINGS.get(platform.system(), ENDINGS["Linux"])
     machine = MACHINES.get(platform.machine(), platform.machine())

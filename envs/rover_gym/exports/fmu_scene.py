@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rover_gym.exports.fmu_variables import UnitVariable
 
 #: The version that `rust/fmu/src/scene_file.rs` reads.
-FORMAT = 1
+FORMAT = 2
 
 
 def scene_text(simulation: Simulation, variables: Sequence[UnitVariable]) -> tuple[str, str]:
@@ -28,7 +28,13 @@ def scene_text(simulation: Simulation, variables: Sequence[UnitVariable]) -> tup
         "settings": simulation.settings,
         "snapshot": list(simulation.snapshot().to_bytes()),
         "variables": [
-            {"reference": one.reference, "name": one.name, "channel": one.channel, "index": one.index}
+            {
+                "reference": one.reference,
+                "name": one.name,
+                "channel": one.channel,
+                "index": one.index,
+                "sign": one.sign,
+            }
             for one in variables
         ],
     }

@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
+from rover_gym.exports.axes import pitch_sign, vector_components
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from rover_gym.exports.axes import Axes
     from rover_gym.mechanics import Simulation
 
 #: What a variable is to the importer.
@@ -27,6 +30,7 @@ class UnitVariable:
         unit: SI unit, or "1".
         description: In words.
         start: Value at the start, of parameters and inputs.
+        sign: 1 or -1: of the variable, where that of the channel is positive.
     """
 
     reference: int
@@ -37,18 +41,24 @@ class UnitVariable:
     unit: str
     description: str
     start: float | str | None = None
+    sign: float = 1.0
 
 
-def unit_variables(simulation: Simulation) -> tuple[UnitVariable, ...]:
+def unit_variables(simulation: Simulation, axes: Axes = "world") -> tuple[UnitVariable, ...]:
     """The variables of a simulation, in the order of their references."""
-    rows = enumerate(_rows(simulation))
+    rows = enumerate(_rows(simulation, axes))
     return tuple(UnitVariable(reference, *row) for reference, row in rows)
 
 
-Row = tuple[str, Causality, str, int, str, str, float | str | None]
+Row = (
+    tuple[str, Causality, str, int, str, str, float | str | None]
+    | tuple[str, Causality, str, int, str, str, float | str | None, float]
+)
+#: The world's axis that points up.
+UP = {"world": "y", "rep103": "z"}
 
 
-def _rows(simulation: Simulation) -> Iterator[Row]:
+def _rows(simulation: Simulation, axes: Axes) -> Iterator[Row]:
     model, settings = simulation.model, simulation.settings
     yield "time", "independent", "time", 0, "s", "time", None
     for name, unit, what in (
@@ -57,8 +67,9 @@ def _rows(simulation: Simulation) -> Iterator[Row]:
         ("time_step", "s", "time step of the unit; communication steps are whole multiples of it"),
     ):
         yield name, "parameter", name, 0, unit, what, settings[name]
-    for i, axis in enumerate("xyz"):
-        yield f"gravity.{axis}", "parameter", "gravity", i, "m/s2", "gravity, world, y up", settings["gravity"][i]
+    what = f"gravity, world, {UP[axes]} up"
+    for axis, (i, sign) in zip("xyz", vector_components(axes), strict=True):
+        yield f"gravity.{axis}", "parameter", "gravity", i, "m/s2", what, sign * settings["gravity"][i], sign
     what = "text of a model's file (TOML or JSON) with the same joints and wheels; empty for the exported one"
     yield "model", "parameter", "model", 0, "1", what, ""
     wheels = list(enumerate(zip(model.wheel_names, model.to_dict()["wheels"], strict=True)))
@@ -69,21 +80,35 @@ def _rows(simulation: Simulation) -> Iterator[Row]:
         if wheel.get("steering") in model.joint_names:
             what = "set-point of the steering"
             yield f"steering.{name}", "input", "steering", i, "rad", what, float(simulation.steering[i])
-    yield from _outputs(simulation)
+    yield from _motion(simulation, axes)
+    yield from _outputs(simulation, axes)
 
 
-def _outputs(simulation: Simulation) -> Iterator[Row]:
+def _motion(simulation: Simulation, axes: Axes) -> Iterator[Row]:
+    """Pose and velocity."""
+    joints = list(enumerate(simulation.model.dof_names[6:], 6))
+    vector = list(zip("xyz", vector_components(axes), strict=True))
+    for axis, (i, sign) in vector:
+        yield f"q.{axis}", "output", "q", i, "m", "trunk's origin, world", None, sign
+    for i, (name, sign) in enumerate((("roll", 1.0), ("heading", 1.0), ("pitch", pitch_sign(axes))), 3):
+        yield f"q.{name}", "output", "q", i, "rad", "trunk's attitude", None, sign
+    for i, name in joints:
+        yield f"q.{name}", "output", "q", i, "rad", "joint", None
+    for axis, (i, sign) in vector:
+        yield f"v.v_{axis}", "output", "v", i, "m/s", "trunk's origin, world", None, sign
+    for axis, (i, sign) in vector:
+        yield f"v.omega_{axis}", "output", "v", 3 + i, "rad/s", "trunk's angular velocity, world", None, sign
+    for i, name in joints:
+        yield f"v.{name}", "output", "v", i, "rad/s", "joint", None
+    what = "trunk to world, unit quaternion"
+    yield "attitude.w", "output", "attitude", 0, "1", what, None
+    for axis, (i, sign) in vector:
+        yield f"attitude.{axis}", "output", "attitude", 1 + i, "1", what, None, sign
+
+
+def _outputs(simulation: Simulation, axes: Axes) -> Iterator[Row]:
+    """Contacts, forces, readings and what the steps took."""
     model = simulation.model
-    names = (*model.dof_names[:6], *model.dof_names[6:])
-    for i, name in enumerate(names):
-        what = "trunk's origin, world" if i < 3 else "trunk's attitude" if i < 6 else "joint"
-        yield f"q.{name}", "output", "q", i, "m" if i < 3 else "rad", what, None
-    rates = ("v_x", "v_y", "v_z", "omega_x", "omega_y", "omega_z", *model.dof_names[6:])
-    for i, name in enumerate(rates):
-        what = "trunk's origin, world" if i < 3 else "trunk's angular velocity, world" if i < 6 else "joint"
-        yield f"v.{name}", "output", "v", i, "m/s" if i < 3 else "rad/s", what, None
-    for i, name in enumerate("wxyz"):
-        yield f"attitude.{name}", "output", "attitude", i, "1", "trunk to world, unit quaternion", None
     for i, name in enumerate(model.wheel_names):
         yield f"wheel_gap.{name}", "output", "wheel_gap", i, "m", "to the ground, negative where they overlap", None
     for i, name in enumerate(model.wheel_names):
@@ -95,8 +120,8 @@ def _outputs(simulation: Simulation) -> Iterator[Row]:
         yield f"motor_torque.{name}", "output", "motor_torque", i, "N.m", what, None
     for i, name in enumerate(("specific_force", "angular_velocity")):
         what = "mean over the last communication step, at the trunk's origin, in its frame"
-        for k, axis in enumerate("xyz"):
-            yield f"imu.{name}.{axis}", "output", "inertial", 3 * i + k, ("m/s2", "rad/s")[i], what, None
+        for axis, (k, sign) in zip("xyz", vector_components(axes), strict=True):
+            yield f"imu.{name}.{axis}", "output", "inertial", 3 * i + k, ("m/s2", "rad/s")[i], what, None, sign
     for name, unit, what in (
         ("trunk_force", "N", "mean normal force of the last time step on all that is no wheel"),
         ("kinetic_energy", "J", "of the whole rover"),

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.exports.axes import MAP_FROM_WORLD
 from rover_gym.extras import MissingExtraError, require
 from rover_gym.replay.rotation import quaternions
 
@@ -25,8 +26,6 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 MAP, WORLD = "map", "world"
-#: R_MW: x stays ahead, the world's y becomes z, and its z becomes -y.
-MAP_FROM_WORLD = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 #: R_BS: from the axes of a solid as logged (REP 103: x forward, y left, z up) to its own (x forward, y up, z right).
 SOLID_FROM_LOGGED = MAP_FROM_WORLD.T
 JPEG_QUALITY = 90

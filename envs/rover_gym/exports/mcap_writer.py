@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.exports import mcap_messages as messages
+from rover_gym.exports.axes import MAP_FROM_WORLD
 from rover_gym.exports.mcap_file import McapFile
 from rover_gym.mechanics import RoverModel, Terrain
 from rover_gym.record.channels import RoverSampler
@@ -136,7 +137,7 @@ class McapWriter:
             self._topics["scene"] = 0
             self._file.write("/scene", stamp, self._scene(stamp, q))
         poses = self._model.poses(q, "state")
-        frames = [(messages.MAP, messages.WORLD, np.zeros(3), messages.MAP_FROM_WORLD)]
+        frames = [(messages.MAP, messages.WORLD, np.zeros(3), MAP_FROM_WORLD)]
         for name in self._model.solid_names:
             place, turn = poses[name]
             frames.append((messages.WORLD, self._frames[name], place, turn @ messages.SOLID_FROM_LOGGED))
@@ -193,7 +194,7 @@ class McapWriter:
         if seen_from is None:
             seen_from, axes = self._frames[self._model.solid_names[0]], messages.SOLID_FROM_LOGGED
             turn, rates, felt = turn @ axes, axes.T @ rates, axes.T @ felt
-        data = messages.imu(stamp, seen_from, messages.MAP_FROM_WORLD @ turn, rates, felt)
+        data = messages.imu(stamp, seen_from, MAP_FROM_WORLD @ turn, rates, felt)
         self._file.write_bytes(topic, stamp, data)
 
     def points(

@@ -15,7 +15,7 @@ use serde::Deserialize;
 use crate::refusal::Refusal;
 
 /// The version of the format that is read.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// What a variable of the unit is.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
@@ -52,6 +52,8 @@ pub struct Variable {
     pub name: String,
     pub channel: Channel,
     pub index: usize,
+    /// 1 or -1: of the variable, where that of the channel is positive.
+    pub sign: f64,
 }
 
 /// A ground.

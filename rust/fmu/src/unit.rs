@@ -176,7 +176,7 @@ impl Unit {
                 Channel::Steering => self.steering().get(variable.index).copied(),
                 channel => reading.get(channel, variable.index),
             };
-            *value = found.ok_or(Refusal::NoVariable { reference })?;
+            *value = variable.sign * found.ok_or(Refusal::NoVariable { reference })?;
         }
         Ok(())
     }
@@ -210,7 +210,7 @@ impl Unit {
                     return Err(Refusal::ReadOnly { name, mode });
                 }
             };
-            *place.ok_or(Refusal::NoVariable { reference })? = value;
+            *place.ok_or(Refusal::NoVariable { reference })? = variable.sign * value;
         }
         self.take(parameters, inputs)
     }

@@ -143,8 +143,7 @@ fn a_collision_keeps_the_momentum_and_takes_energy() {
                 has_touched |= !simulation.contacts().is_empty();
                 let after = simulation.momentum();
                 let linear = (after.linear - before.linear).norm();
-                // The audit scales away what persistent contact gains by the scheme's third order.
-                assert!(linear < 3e-7, "{shapes:?} {linear}");
+                assert!(linear < 1e-9, "{shapes:?} {linear}");
                 let angular = (after.angular - before.angular).norm();
                 // The impulse acts at the predicted end of the step, displaced from the true one by
                 // half a step of relative sliding.

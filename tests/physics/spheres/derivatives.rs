@@ -24,6 +24,7 @@ fn contact_at(
         point: Vector3::zeros(),
         frame: ContactFrame::of_normal(&Vector3::y()),
         gap: 0.0,
+        excess: 0.0,
     };
     relocate(
         model,

@@ -113,6 +113,7 @@ impl Placed {
             point: point.point,
             frame: ContactFrame::on_ground(&self.shape, point),
             gap: point.gap,
+            excess: 0.0,
         }
     }
 }
@@ -139,11 +140,14 @@ impl Gate<'_> {
         ways.sift(part);
         let mut kept = first;
         for k in first..out.len() {
-            let contact = out[k];
+            let mut contact = out[k];
             let counts = match contact.key.opposite {
                 Opposite::Ground(id) if usize::from(contact.key.feature) & ON_SURFACE != 0 => {
                     let (x, n) = (contact.point, &contact.frame.n);
                     let point = SurfacePoint::of_normal(NEAREST, x, n, contact.gap);
+                    let piece = part.terrain.primitive(id);
+                    contact.excess = part.excess((id, &piece), &point);
+                    contact.gap += contact.excess;
                     ways.counts(part, id, &point)
                 }
                 _ => true,
@@ -539,7 +543,7 @@ fn visit_nearer(
             base,
         };
         if let Some((id, point)) = ways.deepest(&part) {
-            take(*id, &on_surface(point));
+            take(id, &on_surface(&point));
         }
         if gap + radius <= reach {
             return;

@@ -102,5 +102,6 @@ fn contact(model: &Model, kinematics: &Kinematics, joint: usize, side: Side, gap
         point: kinematics.r[body],
         frame: ContactFrame::of_normal(&(axis * side.sign())),
         gap,
+        excess: 0.0,
     }
 }

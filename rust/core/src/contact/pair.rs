@@ -134,4 +134,6 @@ pub struct Contact {
     pub frame: ContactFrame,
     /// Signed distance, m, positive when separated.
     pub gap: f64,
+    /// Depth behind a piece of a surface that is no way out, and that the gap leaves out, m.
+    pub excess: f64,
 }

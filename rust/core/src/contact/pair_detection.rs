@@ -96,6 +96,7 @@ pub fn detect_pairs(
                 point: point.point,
                 frame: ContactFrame::of_pair(&second, point),
                 gap: point.gap,
+                excess: 0.0,
             };
             let u_N = || (contact.frame.n).dot(&relative_velocity(model, kinematics, &contact, v));
             if activation.admits(contact.gap, u_N) {

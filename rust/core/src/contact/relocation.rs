@@ -41,7 +41,7 @@ pub fn relocate(
         Primitive::Vertex(vertex) => dispatch::point_at_vertex(&shape, &vertex, base),
     };
     contact.frame = ContactFrame::on_ground(&shape, &point);
-    (contact.point, contact.gap) = (point.point, point.gap);
+    (contact.point, contact.gap) = (point.point, point.gap + contact.excess);
 }
 
 fn relocate_pair(model: &Model, kinematics: &Kinematics, other: OtherSide, contact: &mut Contact) {

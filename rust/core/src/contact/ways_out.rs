@@ -9,6 +9,11 @@
 //! point that is then no longer in the ground was only in the way. The smallest overlap always
 //! counts. A part that has just touched has overlaps as large as its motion since then, and the
 //! points that count are no deeper.
+//!
+//! Up is a way out too, whatever the slopes. A point that is out of the ground when the part is
+//! raised by three quarters of the overlap is deep behind a piece that it does not touch, such as
+//! the far face of another ridge. It does not count beside a smaller overlap. Every overlap that
+//! counts is only as deep as the part must rise: [`OverSurfaces::excess`].
 
 use nalgebra::Vector3;
 
@@ -27,6 +32,18 @@ const OUT: [f64; 2] = [1.001, 3.0];
 
 /// The same beyond that, m, for rounding.
 const ROUNDING: f64 = 1e-8;
+
+/// Fraction of an overlap by which a part is raised to see whether the point is then out of the
+/// ground.
+///
+/// Of 20 000 buried wheels in a map of 0.1 m of noise in cells of 0.25 m, 154 had an overlap that
+/// exceeds the way up by more than 1 cm, and 145 moved out by 2 cm more than that. Now these are 6
+/// and 8; with a fraction of ½, 33 move further, with 1 a single one. But a point that is nearly as
+/// deep as the part must rise may be the only one that holds it.
+const FAR_UP: f64 = 0.75;
+
+/// Bisections for the height by which a part must rise: to 1e-9 of its overlap.
+const BISECTIONS: usize = 30;
 
 /// A part near the surfaces of a terrain.
 #[derive(Clone, Copy)]
@@ -69,6 +86,41 @@ impl OverSurfaces<'_> {
             Primitive::Vertex(vertex) => self.shape.holds(&(vertex.place - self.base - shift)),
             Primitive::Face(_) | Primitive::Plane(_) | Primitive::Sphere(_) => false,
         }
+    }
+
+    /// What an overlap at a point exceeds the way up by, m: zero unless the part, raised by less
+    /// than the overlap, leaves the ground there. What remains is continuous in the pose.
+    #[inline]
+    pub fn excess(&self, (id, piece): (u32, &Primitive), point: &SurfacePoint) -> f64 {
+        if point.gap >= -Self::shallow(self.shape) {
+            return 0.0;
+        }
+        self.excess_of_deep((id, piece), point)
+    }
+
+    #[cold]
+    fn excess_of_deep(&self, piece: (u32, &Primitive), point: &SurfacePoint) -> f64 {
+        let overlaps_at = |rise: f64| self.overlaps(piece, point, &(Vector3::y() * rise));
+        let shallow = Self::shallow(self.shape);
+        if !overlaps_at(0.0) {
+            // The place just behind a sharp crest or a tip is in the ground. A tip pierces a part
+            // no deeper than that.
+            let is_tip = matches!(piece.1, Primitive::Vertex(_));
+            return if is_tip { -point.gap - shallow } else { 0.0 };
+        }
+        if overlaps_at(-point.gap) {
+            return 0.0;
+        }
+        let (mut low, mut high) = (0.0, -point.gap);
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (low + high);
+            if overlaps_at(middle) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        -point.gap - high.max(shallow)
     }
 
     /// Depth up to which every point behind a piece's plane counts, m: ground that is thinner, as
@@ -114,10 +166,10 @@ impl WaysOut {
         }
     }
 
-    /// Whether [`Self::sift`] may find a point that does not count.
+    /// Whether [`Self::sift`] may find a point that does not count, or one with an excess.
     #[inline]
     pub fn are_doubtful(&self) -> bool {
-        self.has_deep && self.n > 1
+        self.has_deep
     }
 
     /// Keeps the points that count.
@@ -141,7 +193,12 @@ impl WaysOut {
         let ways = self.ways[..self.n].iter().flatten();
         let mut smaller = ways
             .map(|(_, way)| way)
-            .take_while(|way| way.gap > point.gap);
+            .take_while(|way| way.gap > point.gap)
+            .peekable();
+        let up = Vector3::y() * (FAR_UP * -point.gap);
+        if smaller.peek().is_some() && !part.overlaps((id, &piece), point, &up) {
+            return false;
+        }
         smaller.all(|way| {
             let depths = (0.5 * point.gap / way.gap).clamp(OUT[0], OUT[1]);
             let out = way.n * (ROUNDING - depths * way.gap);
@@ -149,13 +206,15 @@ impl WaysOut {
         })
     }
 
-    /// The deepest point that counts, and its piece, if any is deeper than
+    /// The deepest point that counts, without its excess, and its piece, if any is deeper than
     /// [`OverSurfaces::shallow`].
-    pub fn deepest(&mut self, part: &OverSurfaces<'_>) -> Option<&(u32, SurfacePoint)> {
-        if self.are_doubtful() {
-            self.sift(part);
+    pub fn deepest(&mut self, part: &OverSurfaces<'_>) -> Option<(u32, SurfacePoint)> {
+        if !self.has_deep {
+            return None;
         }
-        let mut counting = self.ways[..self.n].iter().flatten();
-        counting.rfind(|_| self.has_deep)
+        self.sift(part);
+        let (id, mut point) = *self.ways[..self.n].iter().flatten().next_back()?;
+        point.gap += part.excess((id, &part.terrain.primitive(id)), &point);
+        Some((id, point))
     }
 }

@@ -13,8 +13,9 @@
 //! - The remaining excess is removed by scaling the velocity, `v⁺ ← s v⁺`. Signorini's condition at
 //!   e = 0 and Coulomb's law are homogeneous in the velocity, so both still hold. With restitution
 //!   the rebounds are slower than Newton's law says, which the report's residual contains.
-//! - Free flight conserves energy. There s may be above or below 1, and it scales only the motion
-//!   relative to the mass centre, so the momentum is kept.
+//! - Where nothing outside touches the system only the motion relative to the mass centre of the
+//!   whole is scaled, so the linear momentum is kept. Contacts among its own parts feel relative
+//!   velocities alone. Free flight conserves energy too: without any contact s may be above 1.
 //!
 //! - If even v⁺ = 0 leaves an excess, the displacement is shortened too: a contact ended the motion
 //!   within the step.
@@ -30,7 +31,9 @@
 //! Δ(K + V) = W + released − dissipated − lost − removed + lifted
 //! ```
 
-use super::mechanical_system::{KeyOf, MechanicalEnergy, MechanicalSystem, Start};
+use super::mechanical_system::{
+    KeyOf, MechanicalEnergy, MechanicalSystem, Start, UnilateralContact,
+};
 use super::options::StepOptions;
 use super::report::StepReport;
 use super::scratch::{Scratch, ScratchOf};
@@ -149,19 +152,25 @@ impl Audit {
             return Verdict::Sound;
         }
         let coarse = if is_free { excess.abs() } else { excess };
-        // The excess that remains at v⁺ = 0.
-        let left = excess - after.kinetic;
-        let is_left = left > rounding + self.gain * size;
+        // An excess remains at v⁺ = 0.
+        let is_left = excess - after.kinetic > rounding + self.gain * size;
         if (coarse > COARSE * size || is_left) && !self.is_last {
             return Verdict::Coarse;
         }
         let d = S::DIMENSION.components();
-        if !(is_free && scale_relative_motion(&mut ws.v, d, &after, excess)) && excess > 0.0 {
-            let share = (1.0 - excess / after.kinetic).max(0.0).sqrt();
-            if options.is_elastic() {
+        let nothing_outside = is_free || ws.contacts.iter().all(UnilateralContact::is_internal);
+        let relative = share_of_relative_motion(&after, excess)
+            .filter(|_| nothing_outside && (is_free || excess > 0.0));
+        if relative.is_some() || excess > 0.0 {
+            let share = relative.unwrap_or((1.0 - excess / after.kinetic).max(0.0).sqrt());
+            if options.is_elastic() && !is_free {
                 report.residual = report.residual.max(violation_by(share, ws, d));
             }
-            shorten(ws, share);
+            if relative.is_some() {
+                scale_relative_motion(system, ws, share, &after);
+            } else {
+                shorten(ws, share);
+            }
             if is_left {
                 self.hold_back(system, options, start, ws);
             }
@@ -339,21 +348,31 @@ fn shortened_balance<S: MechanicalSystem>(
     found
 }
 
-/// Scales the motion relative to the mass centre, whose translation has d components, to remove an
-/// excess; false where the excess is larger than the energy of that motion.
-fn scale_relative_motion(v: &mut [f64], d: usize, after: &MechanicalEnergy, excess: f64) -> bool {
+/// Scale of the motion relative to the mass centre that removes an excess; none where the excess is
+/// larger than the energy of that motion.
+fn share_of_relative_motion(after: &MechanicalEnergy, excess: f64) -> Option<f64> {
     let whole = after.momentum.norm_squared() / (2.0 * after.mass);
     let relative_kinetic = after.kinetic - whole;
-    let has_enough = excess < relative_kinetic;
-    if has_enough {
-        let share = (1.0 - excess / relative_kinetic).min(1.0 + RAISE).sqrt();
-        let translation = after.momentum / after.mass;
-        for (k, v) in v.iter_mut().enumerate() {
-            let common = if k < d { translation[k] } else { 0.0 };
-            *v = common + share * (*v - common);
-        }
+    let share = || (1.0 - excess / relative_kinetic).min(1.0 + RAISE).sqrt();
+    (excess < relative_kinetic).then(share)
+}
+
+/// Scales the motion relative to the mass centre, in the local velocities too.
+fn scale_relative_motion<S: MechanicalSystem>(
+    system: &S,
+    ws: &mut ScratchOf<S>,
+    share: f64,
+    after: &MechanicalEnergy,
+) {
+    let translation = after.momentum / after.mass;
+    for (k, v) in ws.v.iter_mut().enumerate() {
+        let axis = system.translation_axis(k);
+        let common = axis.map_or(0.0, |axis| translation[axis]);
+        *v = common + share * (*v - common);
     }
-    has_enough
+    for u in &mut ws.u {
+        *u *= share;
+    }
 }
 
 /// Violation of the contacts' law by `v⁺ ← share v⁺`, relative to the free velocity.

@@ -39,6 +39,12 @@ pub trait UnilateralContact {
 
     /// Signed distance where the contact was last measured, m, positive when apart.
     fn gap(&self) -> f64;
+
+    /// Whether both its sides belong to the system, so that its impulses keep the momentum. By
+    /// default it is one with the world.
+    fn is_internal(&self) -> bool {
+        false
+    }
 }
 
 /// Key of a system's contacts.
@@ -209,6 +215,12 @@ pub trait MechanicalSystem {
     /// Largest angular speed of a frame whose pose matters, rad/s. By default 0.
     fn turning(&self, _v: &[f64]) -> f64 {
         0.0
+    }
+
+    /// The axis along which a velocity translates all that its root carries; none for any other
+    /// velocity. By default the first velocities are those of the only root.
+    fn translation_axis(&self, velocity: usize) -> Option<usize> {
+        (velocity < Self::DIMENSION.components()).then_some(velocity)
     }
 
     /// Whether [`Self::balance`] conserves the momenta of free flight at any step, so that no

@@ -247,6 +247,7 @@ impl<T: Lane> Contacts<T> {
             point: own.point.get(lane).into(),
             frame,
             gap: own.gap.get(lane),
+            excess: 0.0,
         };
         (slot, contact)
     }

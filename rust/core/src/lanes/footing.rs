@@ -248,8 +248,13 @@ impl<T: Lane> Footing<T> {
         }
         let shape = PlacedShape::Disc(disc);
         let Self { planes, nearby, .. } = self;
-        let (mut count, mut is_deep) = (0, false);
+        let (mut count, mut is_deep, mut has_excess) = (0, false, false);
         let shallow = OverSurfaces::shallow(&shape);
+        let part = OverSurfaces {
+            shape: &shape,
+            terrain,
+            base: &base,
+        };
         nearby[lane].visit(terrain, &disc, &base, reach, |id, piece| {
             visit_on_surface(&shape, (terrain, id, piece), &base, reach, |point| {
                 if let Some(own) = planes.get_mut(count) {
@@ -257,11 +262,12 @@ impl<T: Lane> Footing<T> {
                 }
                 count += 1;
                 is_deep |= point.gap < -shallow;
+                has_excess |= part.excess((id, piece), point) > 0.0;
             });
         });
         self.double |= u32::from(count > 1) << lane;
         // Of several deep points the general step finds out which count.
-        count <= 1 || (count <= SLOTS && !is_deep)
+        !has_excess && (count <= 1 || (count <= SLOTS && !is_deep))
     }
 
     /// Whether any lane has a second plane.

@@ -924,7 +924,7 @@ impl<T: Lane> Block<T> {
         self.decline(Decline::Energy, is_coarse & !is_balanced);
         self.is_corrected = !is_balanced & self.going;
         if self.is_corrected.any() {
-            self.correct(excess, is_free);
+            self.correct(excess, !in_touch, is_free);
         }
         let gain = (excess - rounding).max(zero) / size.max(h.like(f64::MIN_POSITIVE));
         let gain = T::select(self.is_corrected, zero, gain);
@@ -936,7 +936,7 @@ impl<T: Lane> Block<T> {
     /// Removes an excess of energy from the velocity at the end of the step, as
     /// [`crate::integrator::energy_audit`] does.
     #[inline(always)]
-    fn correct(&mut self, excess: T, is_free: T::Mask) {
+    fn correct(&mut self, excess: T, untouched: T::Mask, is_free: T::Mask) {
         let zero = excess.like(0.0);
         let one = excess.like(1.0);
         let [kinetic, _] = self.after;
@@ -944,7 +944,7 @@ impl<T: Lane> Block<T> {
         let momentum = self.momentum;
         let whole = momentum.dot(momentum) / (mass.like(2.0) * mass);
         let relative = kinetic - whole;
-        let is_relative = is_free & excess.lt(relative);
+        let is_relative = untouched & (is_free | zero.lt(excess)) & excess.lt(relative);
         let all = (one - excess / kinetic).max(zero).sqrt();
         let of_relative = (one - excess / relative).min(one.like(1.0 + RAISE)).sqrt();
         let share = T::select(is_relative, of_relative, all);

@@ -217,6 +217,7 @@ impl<'a, 'b> Coupling<Bed<'a>, TreeSystem<'b>> for AmongGrains<'_> {
                             point: point.on_first(),
                             frame: ContactFrame::of_normal(&point.n),
                             gap: point.gap,
+                            excess: 0.0,
                         },
                         gap_start: point.gap,
                     };

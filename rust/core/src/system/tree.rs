@@ -40,6 +40,10 @@ impl UnilateralContact for Contact {
     fn gap(&self) -> f64 {
         self.gap
     }
+
+    fn is_internal(&self) -> bool {
+        self.other.is_some() || self.key.opposite == Opposite::Stop
+    }
 }
 
 /// Impulse and work of a joint's drive.
@@ -431,6 +435,13 @@ impl MechanicalSystem for TreeSystem<'_> {
         self.turning_of_bases(v) + self.turning_of_joints(v)
     }
 
+    fn translation_axis(&self, velocity: usize) -> Option<usize> {
+        let mut trees = self.model.trees().iter();
+        let tree = trees.find(|tree| tree.velocities.contains(&velocity))?;
+        let axis = velocity - tree.velocities.start;
+        (tree.is_free && axis < 3).then_some(axis)
+    }
+
     fn conserves_momenta(&self) -> bool {
         self.model.is_free_tree()
     }
@@ -499,9 +510,8 @@ impl MechanicalSystem for TreeSystem<'_> {
         Some(MechanicalEnergy {
             kinetic: energy.kinetic,
             potential: energy.potential,
-            // With several trees, or one on a fixed base, no single velocity carries the total
-            // momentum.
-            momentum: if self.model.is_free_tree() {
+            // A tree on a fixed base passes momentum on to the world.
+            momentum: if self.model.is_free() {
                 momentum
             } else {
                 Vector3::zeros()

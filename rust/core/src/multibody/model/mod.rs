@@ -174,6 +174,12 @@ impl Model {
         self.trees.len() == 1 && self.trees[0].is_free
     }
 
+    /// Whether all trees are on free bases.
+    #[must_use]
+    pub fn is_free(&self) -> bool {
+        self.trees.iter().all(|tree| tree.is_free)
+    }
+
     /// A number that two models share only if they have the same description and the same locked
     /// joints.
     #[must_use]
