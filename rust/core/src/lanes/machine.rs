@@ -201,7 +201,13 @@ impl Machine {
             machine.add(b, body, bodies);
         }
         if machine.has_lines() {
-            machine.pattern = Some(Arc::new(Pattern::of(&machine)));
+            let paths = (machine.wheels.iter())
+                .flat_map(|wheel| {
+                    let path = machine.path(wheel.body).to_vec();
+                    std::iter::repeat_n(path, wheel.n_slots())
+                })
+                .collect();
+            machine.pattern = Some(Arc::new(Pattern::new(machine.nv(), paths)));
         }
         Ok(machine)
     }

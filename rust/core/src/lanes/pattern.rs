@@ -2,8 +2,6 @@
 
 use std::ops::Range;
 
-use super::machine::Machine;
-
 /// The branch-induced sparsity of a matrix `1 + Z K Zᵀ` over the velocities of a machine
 /// (Featherstone 2008, ch. 6): entries (k, a) and (a, k) for every velocity k and those that carry
 /// it, its ancestors.
@@ -21,19 +19,13 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// That of a machine's contacts with the ground.
+    /// That of contacts along paths over `nv` velocities, a path a slot.
     ///
     /// # Panics
     /// If a velocity has other ancestors on another path.
     #[must_use]
-    pub fn of(machine: &Machine) -> Self {
-        let paths: Vec<Vec<usize>> = (machine.wheels.iter())
-            .flat_map(|wheel| {
-                let path = machine.path(wheel.body).to_vec();
-                std::iter::repeat_n(path, wheel.n_slots())
-            })
-            .collect();
-        let mut of_velocity: Vec<&[usize]> = vec![&[]; machine.nv()];
+    pub fn new(nv: usize, paths: Vec<Vec<usize>>) -> Self {
+        let mut of_velocity: Vec<&[usize]> = vec![&[]; nv];
         for path in &paths {
             for (k, &velocity) in path.iter().enumerate() {
                 let own = &mut of_velocity[velocity];

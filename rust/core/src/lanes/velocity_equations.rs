@@ -55,7 +55,7 @@ pub(super) struct VelocitySystem<T: Lane, const C: usize> {
 }
 
 /// The bits of a number, ascending.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Bits(u32);
 
 impl Iterator for Bits {
@@ -249,15 +249,15 @@ impl<T: Lane, const C: usize> VelocitySystem<T, C> {
     /// The impulses, in place of the right-hand sides `r` of the contacts.
     #[inline(always)]
     fn solve(&mut self, modes: &[Mode<T>; C], r: &mut [Triple<T>; C]) {
-        let (used, zero, inverse) = (Bits(self.used), self.zero, self.inverse);
+        let (used, zero, inverse) = (self.used, self.zero, self.inverse);
         let (pattern, mut parts) = self.split();
         parts.w.fill(zero);
-        for i in used {
+        for i in Bits(used) {
             let p = impulse(&modes[i], scaled(&inverse[i], &r[i]));
             parts.push(pattern, i, &p);
         }
         parts.solve(pattern);
-        for i in used {
+        for i in Bits(used) {
             let taken = across(&modes[i], parts.local(pattern, i));
             let [r0, r1, r2] = r[i];
             let rest = [r0 - taken[0], r1 - taken[1], r2 - taken[2]];
@@ -359,13 +359,13 @@ impl<T: Lane, const C: usize> System<T, C> for VelocitySystem<T, C> {
 
     #[inline(always)]
     fn velocities(&mut self, q: &[Triple<T>; C], p: &[Triple<T>; C], u: &mut [Triple<T>; C]) {
-        let (used, zero, softness) = (Bits(self.used), self.zero, self.softness);
+        let (used, zero, softness) = (self.used, self.zero, self.softness);
         let (pattern, mut parts) = self.split();
         parts.w.fill(zero);
-        for i in used {
+        for i in Bits(used) {
             parts.push(pattern, i, &p[i]);
         }
-        for i in used {
+        for i in Bits(used) {
             let local = parts.local(pattern, i);
             for k in 0..3 {
                 u[i][k] = local[k] + softness[i] * p[i][k] + q[i][k];
@@ -375,9 +375,9 @@ impl<T: Lane, const C: usize> System<T, C> for VelocitySystem<T, C> {
 
     #[inline(always)]
     fn factorise(&mut self, alpha: T, modes: &[Mode<T>; C]) {
-        let (used, zero) = (Bits(self.used), self.zero);
+        let (used, zero) = (self.used, self.zero);
         let one = zero.like(1.0);
-        for i in used {
+        for i in Bits(used) {
             let Mode {
                 b,
                 closed,
@@ -396,7 +396,7 @@ impl<T: Lane, const C: usize> System<T, C> for VelocitySystem<T, C> {
         let inverse = self.inverse;
         let (pattern, mut parts) = self.split();
         parts.clear(zero);
-        for i in used {
+        for i in Bits(used) {
             parts.add(pattern, i, &modes[i], &inverse[i]);
         }
         parts.factorise(pattern);
@@ -449,7 +449,7 @@ mod tests {
             wheel.width = Some(0.1);
         }
         let model = Model::from_description(description).unwrap();
-        Arc::new(Pattern::of(&Machine::of(&model).unwrap()))
+        Machine::of(&model).unwrap().pattern.unwrap()
     }
 
     /// A problem of the first slots of the rover with both forms of its operator.
