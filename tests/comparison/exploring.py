@@ -34,11 +34,13 @@ DIFFICULTY = 0.5
 HUB_DEPTH = 0.25
 #: Largest torques, N m; with 0 the rover only steers.
 TORQUES = (0.0, 20.0, 60.0, 150.0)
-#: Name of a ground, whether rocks lie on it, and the radius at which the wheels touch it (None: the model's), m.
-GROUNDS: dict[str, tuple[bool, float | None]] = {
-    "plane": (False, None),
-    "plane, wheels 0.20 m": (False, 0.20),
-    "rocks": (True, None),
+#: Name of a ground, whether rocks lie on it, and the wheels: their radius (None: the model's), width and rounding, m.
+GROUNDS: dict[str, tuple[bool, float | None, float, float]] = {
+    "plane": (False, None, 0.0, 0.0),
+    "plane, wheels 0.20 m": (False, 0.20, 0.0, 0.0),
+    "rocks": (True, None, 0.0, 0.0),
+    "plane, cylinders": (False, 0.20, 0.15, 0.0),
+    "plane, tori": (False, 0.20, 0.15, 0.075),
 }
 
 
@@ -73,9 +75,11 @@ def drives() -> tuple[Drive, ...]:
 
 def scene(drive: Drive, ground: str, torque: float, periods: int = PERIODS) -> RoverScene:
     """A drive with torques of up to `torque` (N m) on one of the `GROUNDS`, cut after so many commands."""
-    has_rocks, radius = GROUNDS[ground]
+    has_rocks, radius, width, rounding = GROUNDS[ground]
     model = RoverModel() if radius is None else RoverModel().replace(contact_radius=radius)
     machine = model.replace(motor=None).to_dict()
+    if width > 0.0:
+        machine["wheels"] = [wheel | {"width": width, "rounding": rounding} for wheel in machine["wheels"]]
     limit = model.steering_limit
     q = np.zeros(model.nq)
     q[1] = HUB_DEPTH + contact_radius(machine["wheels"][0])

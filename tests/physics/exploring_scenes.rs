@@ -26,22 +26,16 @@ pub enum Ground {
     Cylinders,
     /// The same wheels with fully rounded edges.
     Tori,
-    /// The cylinders among the rocks.
-    CylindersOnRocks,
-    /// The wheels with fully rounded edges among the rocks.
-    ToriOnRocks,
 }
 
 impl Ground {
     /// All grounds.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 5] = [
         Self::Plane,
         Self::LargeWheels,
         Self::Rocks,
         Self::Cylinders,
         Self::Tori,
-        Self::CylindersOnRocks,
-        Self::ToriOnRocks,
     ];
 
     /// Name in tables and on command lines.
@@ -52,23 +46,14 @@ impl Ground {
             Self::Rocks => "rocks",
             Self::Cylinders => "plane, cylinders",
             Self::Tori => "plane, tori",
-            Self::CylindersOnRocks => "rocks, cylinders",
-            Self::ToriOnRocks => "rocks, tori",
         }
-    }
-
-    const fn has_rocks(self) -> bool {
-        matches!(
-            self,
-            Self::Rocks | Self::CylindersOnRocks | Self::ToriOnRocks
-        )
     }
 
     /// Width and rounding of the wheels, m, if they have any.
     const fn tread(self) -> Option<[f64; 2]> {
         match self {
-            Self::Cylinders | Self::CylindersOnRocks => Some([0.15, 0.0]),
-            Self::Tori | Self::ToriOnRocks => Some([0.15, 0.075]),
+            Self::Cylinders => Some([0.15, 0.0]),
+            Self::Tori => Some([0.15, 0.075]),
             Self::Plane | Self::LargeWheels | Self::Rocks => None,
         }
     }
@@ -183,11 +168,8 @@ fn drive(record: &Value, ground: Ground, torque: f64, options: &StepOptions) -> 
     let mut q = vec![0.0; 21];
     q[1] = 0.25 + first.radius;
     let mut terrain: Arc<dyn Terrain> = Arc::new(Plane::ground());
-    if ground.has_rocks() {
-        // Recorded with wheels of 0.10 m.
-        let raised = first.radius - 0.10;
+    if ground == Ground::Rocks {
         q = numbers(&record["q"]);
-        q[1] += raised + if raised > 0.0 { 0.05 } else { 0.0 };
         terrain = Arc::new(rocks(record));
     }
     let commands = record["actions"].as_array().unwrap().iter().map(|row| {

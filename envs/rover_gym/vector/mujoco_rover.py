@@ -40,8 +40,9 @@ def rover_xml(
         spheres: Centres and radii, (n, 4), m.
         friction: Coulomb's coefficient.
         gravity: m/s².
-        thin_wheels: Whether wheels are cylinders 4 mm wide. Otherwise they are spheres, which touch flat ground at the
-            same point as discs on axles parallel to it.
+        thin_wheels: Whether wheels without a width are cylinders 4 mm wide. Otherwise they are spheres, which touch
+            flat ground at the same point as discs on axles parallel to it. Wheels with a width are cylinders of it, or
+            ellipsoids if their edges are fully rounded.
         brake: Whether the wheels are held, too.
         integrator: MuJoCo's.
         cone: Of friction.
@@ -73,8 +74,7 @@ def rover_xml(
         name, parent = solid["name"], solid.get("parent")
         nodes[name] = _add_solid(nodes[parent] if parent else world, solid)
         if name in wheels:
-            radius = contact_radius(machine["wheels"][wheels[name]])
-            rim = ("cylinder", f"{radius} {HALF_WIDTH}") if thin_wheels else ("sphere", repr(radius))
+            rim = _rim(machine["wheels"][wheels[name]], thin=thin_wheels)
             masks = {"contype": "2", "conaffinity": "1"}
             ElementTree.SubElement(nodes[name], "geom", masks, type=rim[0], size=rim[1], mass="0")
             ElementTree.SubElement(actuator, "motor", name=f"drive{wheels[name]}", joint=name)
@@ -82,6 +82,16 @@ def rover_xml(
             kp, kv = (repr(solid["hold"][gain]) for gain in ("stiffness", "damping"))
             ElementTree.SubElement(actuator, "position", name=f"hold_{name}", joint=name, kp=kp, kv=kv)
     return ElementTree.tostring(root, encoding="unicode")
+
+
+def _rim(wheel: Mapping[str, Any], *, thin: bool) -> tuple[str, str]:
+    """Type and size of a wheel's geom."""
+    radius, half = contact_radius(wheel), 0.5 * (wheel.get("width") or 0.0)
+    if half > 0.0 and (wheel.get("rounding") or 0.0) >= half:
+        return "ellipsoid", f"{radius} {radius} {half}"
+    if half > 0.0 or thin:
+        return "cylinder", f"{radius} {half or HALF_WIDTH}"
+    return "sphere", repr(radius)
 
 
 def _add_ground(world: ElementTree.Element, normal: Collection[float] | None, spheres: npt.ArrayLike) -> None:

@@ -301,7 +301,8 @@ fn is_rare(model: &Model, contacts: &[Contact]) -> bool {
             .count()
     };
     let is_common = |c: &Contact| {
-        matches!(c.part, Part::Wheel(_)) && (usize::from(c.key.feature) & !ON_SURFACE) % CIRCLE == 0
+        matches!(c.part, Part::Wheel(_))
+            && (usize::from(c.key.feature) & !ON_SURFACE).is_multiple_of(CIRCLE)
     };
     let has_lines = Machine::of(model).unwrap().has_lines();
     let is_full = |i| {

@@ -1,12 +1,12 @@
 //! Contacts of the wheels with the ground, in slots, and those of joints with their stops.
 //!
-//! A wheel with one circle, a thin disc or a torus, has two slots: most touch the plane or a sphere,
-//! some both or two spheres. A wheel with two circles has four: one for each circle on the plane,
-//! and two for spheres. A slot is filled lane by lane; rovers that share it may touch different
-//! things there. Detection at the midpoint of the step and relocation to its end follow
+//! A wheel with one circle, a thin disc or a torus, has two slots: most touch the plane or a
+//! sphere, some both or two spheres. A wheel with two circles has four: one for each circle on the
+//! plane, and two for spheres. A slot is filled lane by lane; rovers that share it may touch
+//! different things there. Detection at the midpoint of the step and relocation to its end follow
 //! [`crate::contact`] and [`crate::geometry::query`]. With the unit normal n, the unit axle s and
-//! the rolling direction `t = n × s / |n × s|`, the lowest point of a circle over a plane lies along
-//! `t × s` from its centre.
+//! the rolling direction `t = n × s / |n × s|`, the lowest point of a circle over a plane lies
+//! along `t × s` from its centre.
 //!
 //! What is rare is declined: a wheel that nearly lies flat, passes a sphere within the step or
 //! touches more things than it has slots, a box near the ground, more contacts than a problem has.
@@ -458,9 +458,9 @@ impl<T: Lane> Contacts<T> {
         declined
     }
 
-    /// Where a circle of a wheel with the axle `s` and the centre `centre` touches a plane of normal
-    /// n at the midpoint, the trunk's origin being at the given height (m) over it, and where it
-    /// lies so flat that more than one point does.
+    /// Where a circle of a wheel with the axle `s` and the centre `centre` touches a plane of the
+    /// normal n at the midpoint, the trunk's origin being at the given height (m) over it, and
+    /// where it lies so flat that more than one point does.
     #[inline(always)]
     fn stands(
         &self,

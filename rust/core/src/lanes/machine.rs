@@ -312,8 +312,15 @@ impl Machine {
             machine.add_link(model, b);
         }
         if machine.has_lines() {
-            let pattern = Pattern::of(&machine).ok_or(NotOrdinary::BranchedCoupling)?;
-            machine.pattern = Some(Arc::new(pattern));
+            let path = |body: usize| machine.path(body).to_vec();
+            let wheels = (machine.wheels.iter())
+                .flat_map(|wheel| std::iter::repeat_n(path(wheel.body), wheel.n_slots()));
+            let stops = machine.stops.iter().flat_map(|stop| {
+                let body = machine.joints[stop.joint].body;
+                std::iter::repeat_n(path(body), SIDES)
+            });
+            let pattern = Pattern::new(machine.nv(), wheels.chain(stops).collect());
+            machine.pattern = Some(Arc::new(pattern.ok_or(NotOrdinary::BranchedCoupling)?));
         }
         Ok(machine)
     }

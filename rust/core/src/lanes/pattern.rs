@@ -2,9 +2,6 @@
 
 use std::ops::Range;
 
-use super::machine::Machine;
-use super::stops::SIDES;
-
 /// The branch-induced sparsity of a matrix `1 + Z K Zᵀ` over the velocities of a machine
 /// (Featherstone 2008, ch. 6): entries (k, a) and (a, k) for every velocity k and those that carry
 /// it, its ancestors.
@@ -22,19 +19,11 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// That of a machine's contacts, in the order of their slots; none if a velocity has other
-    /// ancestors on another path.
+    /// That of contacts along paths over `nv` velocities, a path a slot; none if a velocity has
+    /// other ancestors on another path.
     #[must_use]
-    pub fn of(machine: &Machine) -> Option<Self> {
-        let path = |body: usize| machine.path(body).to_vec();
-        let mut paths: Vec<Vec<usize>> = (machine.wheels.iter())
-            .flat_map(|wheel| std::iter::repeat_n(path(wheel.body), wheel.n_slots()))
-            .collect();
-        for stop in &machine.stops {
-            let path = path(machine.joints[stop.joint].body);
-            paths.extend(std::iter::repeat_n(path, SIDES));
-        }
-        let mut of_velocity: Vec<&[usize]> = vec![&[]; machine.nv()];
+    pub fn new(nv: usize, paths: Vec<Vec<usize>>) -> Option<Self> {
+        let mut of_velocity: Vec<&[usize]> = vec![&[]; nv];
         for path in &paths {
             for (k, &velocity) in path.iter().enumerate() {
                 let own = &mut of_velocity[velocity];

@@ -30,6 +30,7 @@ use super::place::Place;
 use super::poses::Poses;
 use super::problem::{ContactProblem, MAX_CONTACTS, Triple};
 use super::rows::{Answer, Rows};
+use super::sweeps::write_start;
 use super::yielding::Yields;
 use crate::contact::Contact;
 use crate::integrator::energy_audit::{COARSE, GAIN, RAISE, ROUNDINGS};
@@ -42,9 +43,9 @@ use crate::multibody::model::BASE;
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 use crate::system::tree::{JOINT_ARM, MOST_JOINT_TURN, MOST_SPIN, MOST_TURN};
 
-/// Sweeps before pivoting, of machines with many contacts. Measured on six cylinders with torques of
-/// up to 60 N m, drawn anew every ten steps: 9.7 systems a problem without, 3.7 with four, 3.3 with
-/// six; a sweep costs about a third of a system.
+/// Sweeps before pivoting, of machines with many contacts. Measured on six cylinders with torques
+/// of up to 60 N m, drawn anew every ten steps: 9.7 systems a problem without, 3.7 with four, 3.3
+/// with six; a sweep costs about a third of a system.
 const SWEEPS: usize = 4;
 
 /// Why a lane was declined in its last step.
@@ -501,8 +502,7 @@ impl<T: Lane> Block<T> {
         self.p.copy_from_slice(&self.p_last);
         let data = (&self.u[..], self.friction);
         self.rows.sweep(&self.contacts, SWEEPS, data, &mut self.p);
-        self.rows
-            .write_start(&self.contacts, lanes, &self.p, problems);
+        write_start(&self.contacts, lanes, &self.p, problems);
     }
 
     /// The laws of contacts that yield.

@@ -1,10 +1,9 @@
 //! Impulses to start pivoting from, where a machine has many contacts: Gauss–Seidel sweeps over a
 //! block's contacts.
 //!
-//! When commands change, many of the contacts of a machine on lines change their modes, and pivoting
-//! corrects little more than one of them a step. A few sweeps find most of them for the price of one
-//! step, for all lanes of the block at once. They leave impulses that the contacts cannot tell apart
-//! near those of the last step.
+//! When commands change, many of the contacts of a machine on lines change their modes, and
+//! pivoting corrects little more than one of them a step. A few sweeps find most of them for the
+//! price of one step, for all lanes of the block at once.
 
 use super::contacts::Contacts;
 use super::problem::Triple;
@@ -12,7 +11,7 @@ use super::rows::{Rows, add, add_scaled, along};
 use crate::multibody::model::BASE;
 use crate::scalar::{Lane, LaneMask};
 
-/// Newton steps on the multiplier of a slide, and passes over normal and tangents of a contact.
+/// Newton steps on the multiplier of a slide, and passes over a contact's normal and tangents.
 const SLIDE_STEPS: usize = 3;
 const PASSES: usize = 1;
 
@@ -148,29 +147,28 @@ impl<T: Lane> Rows<T> {
         }
         u
     }
+}
 
-    /// Writes impulses by slot as the start of the problems of a mask's lanes, whose impulses are
-    /// those of the last step.
-    #[inline(always)]
-    pub(super) fn write_start(
-        &self,
-        contacts: &Contacts<T>,
-        lanes: T::Mask,
-        p: &[Triple<T>],
-        problems: &mut [super::problem::ContactProblem],
-    ) {
-        for &slot in contacts.used() {
-            let active = contacts.slot(slot).active & lanes;
-            let places = contacts.places(slot);
-            for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
-                if active.get(lane) {
-                    let contact = usize::from(places[lane]);
-                    let own = &mut problem.p[3 * contact..][..3];
-                    let last = &mut problem.factored.last[contact];
-                    for (k, own) in own.iter_mut().enumerate() {
-                        last[k] = *own;
-                        *own = p[slot][k].get(lane);
-                    }
+/// Writes impulses by slot as the start of the problems of a mask's lanes, whose impulses are those
+/// of the last step.
+#[inline(always)]
+pub(super) fn write_start<T: Lane>(
+    contacts: &Contacts<T>,
+    lanes: T::Mask,
+    p: &[Triple<T>],
+    problems: &mut [super::problem::ContactProblem],
+) {
+    for &slot in contacts.used() {
+        let active = contacts.slot(slot).active & lanes;
+        let places = contacts.places(slot);
+        for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
+            if active.get(lane) {
+                let contact = usize::from(places[lane]);
+                let own = &mut problem.p[3 * contact..][..3];
+                let last = &mut problem.factored.last[contact];
+                for (k, own) in own.iter_mut().enumerate() {
+                    last[k] = *own;
+                    *own = p[slot][k].get(lane);
                 }
             }
         }

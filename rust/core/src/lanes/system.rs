@@ -1,6 +1,5 @@
 //! What pivoting needs of the operator of its problems.
 
-use super::equations::Block;
 use super::modes::Mode;
 use super::problem::{ContactProblem, Triple};
 use crate::scalar::Lane;
@@ -49,7 +48,7 @@ pub(super) trait System<T: Lane, const C: usize>: Sized {
     fn places(&self) -> Self::Places;
 
     /// Diagonal block of a place.
-    fn diagonal(&self, place: usize) -> &Block<T>;
+    fn diagonal(&self, place: usize) -> &[T; 9];
 
     /// `u = W p + q`.
     fn velocities(&mut self, q: &[Triple<T>; C], p: &[Triple<T>; C], u: &mut [Triple<T>; C]);

@@ -55,7 +55,7 @@ pub(super) struct VelocitySystem<T: Lane, const C: usize> {
 }
 
 /// The bits of a number, ascending.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Bits(u32);
 
 impl Iterator for Bits {
@@ -249,15 +249,15 @@ impl<T: Lane, const C: usize> VelocitySystem<T, C> {
     /// The impulses, in place of the right-hand sides `r` of the contacts.
     #[inline(always)]
     fn solve(&mut self, modes: &[Mode<T>; C], r: &mut [Triple<T>; C]) {
-        let (used, zero, inverse) = (Bits(self.used), self.zero, self.inverse);
+        let (used, zero, inverse) = (self.used, self.zero, self.inverse);
         let (pattern, mut parts) = self.split();
         parts.w.fill(zero);
-        for i in used {
+        for i in Bits(used) {
             let p = impulse(&modes[i], scaled(&inverse[i], &r[i]));
             parts.push(pattern, i, &p);
         }
         parts.solve(pattern);
-        for i in used {
+        for i in Bits(used) {
             let taken = across(&modes[i], parts.local(pattern, i));
             let [r0, r1, r2] = r[i];
             let rest = [r0 - taken[0], r1 - taken[1], r2 - taken[2]];
@@ -359,13 +359,13 @@ impl<T: Lane, const C: usize> System<T, C> for VelocitySystem<T, C> {
 
     #[inline(always)]
     fn velocities(&mut self, q: &[Triple<T>; C], p: &[Triple<T>; C], u: &mut [Triple<T>; C]) {
-        let (used, zero, softness) = (Bits(self.used), self.zero, self.softness);
+        let (used, zero, softness) = (self.used, self.zero, self.softness);
         let (pattern, mut parts) = self.split();
         parts.w.fill(zero);
-        for i in used {
+        for i in Bits(used) {
             parts.push(pattern, i, &p[i]);
         }
-        for i in used {
+        for i in Bits(used) {
             let local = parts.local(pattern, i);
             for k in 0..3 {
                 u[i][k] = local[k] + softness[i] * p[i][k] + q[i][k];
@@ -375,9 +375,9 @@ impl<T: Lane, const C: usize> System<T, C> for VelocitySystem<T, C> {
 
     #[inline(always)]
     fn factorise(&mut self, alpha: T, modes: &[Mode<T>; C]) {
-        let (used, zero) = (Bits(self.used), self.zero);
+        let (used, zero) = (self.used, self.zero);
         let one = zero.like(1.0);
-        for i in used {
+        for i in Bits(used) {
             let Mode {
                 b,
                 closed,
@@ -396,7 +396,7 @@ impl<T: Lane, const C: usize> System<T, C> for VelocitySystem<T, C> {
         let inverse = self.inverse;
         let (pattern, mut parts) = self.split();
         parts.clear(zero);
-        for i in used {
+        for i in Bits(used) {
             parts.add(pattern, i, &modes[i], &inverse[i]);
         }
         parts.factorise(pattern);
@@ -430,5 +430,112 @@ impl<T: Lane, const C: usize> System<T, C> for VelocitySystem<T, C> {
             y[i] = across(&modes[i], [-u0, -u1, -u2]);
         }
         self.solve(modes, y);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::equations::DenseSystem;
+    use crate::lanes::machine::Machine;
+    use crate::lanes::problem::{MAX_CONTACTS, MAX_DENSE, block};
+    use crate::multibody::{Model, ModelDescription};
+    use crate::scalar::Single;
+    use proptest::prelude::*;
+
+    fn pattern() -> Arc<Pattern> {
+        let mut description = ModelDescription::rover();
+        for wheel in &mut description.wheels {
+            wheel.width = Some(0.1);
+        }
+        let model = Model::from_description(description).unwrap();
+        Machine::of(&model).unwrap().pattern.unwrap()
+    }
+
+    /// A problem of the first slots of the rover with both forms of its operator.
+    fn problem(pattern: &Arc<Pattern>, numbers: &mut impl Iterator<Item = f64>) -> ContactProblem {
+        let mut problem = ContactProblem {
+            n_contacts: MAX_DENSE,
+            ..ContactProblem::default()
+        };
+        problem.factored.adopt(pattern);
+        problem.factored.slots = (1 << MAX_DENSE) - 1;
+        for (z, x) in problem.factored.Z.iter_mut().flatten().zip(numbers) {
+            *z = x;
+        }
+        let row = |Z: &[Triple<f64>], i: usize| -> Vec<Triple<f64>> {
+            Z[i * pattern.stride()..][..pattern.stride()].to_vec()
+        };
+        for i in 0..MAX_DENSE {
+            problem.factored.softness[i] = 0.01 * i as f64;
+            for j in 0..=i {
+                let shared = pattern.shared(i, j);
+                let (a, b) = (row(&problem.factored.Z, i), row(&problem.factored.Z, j));
+                for k in 0..9 {
+                    let products = a.iter().zip(&b).take(shared);
+                    let mut w: f64 = products.map(|(x, y)| x[k / 3] * y[k % 3]).sum();
+                    if i == j && k % 4 == 0 {
+                        w += problem.factored.softness[i];
+                    }
+                    problem.W[block(i, j)][k] = w;
+                    if i == j {
+                        problem.factored.diagonal[i][k] = w;
+                    }
+                }
+            }
+        }
+        problem
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn systems_in_velocities_have_the_answers_of_those_in_impulses(
+            numbers in prop::collection::vec(-1.0..1.0_f64, 600), modes in prop::collection::vec(0..3, MAX_DENSE),
+        ) {
+            let token = Single::best();
+            let pattern = pattern();
+            let problem = problem(&pattern, &mut numbers.iter().copied());
+            let mut dense = DenseSystem::<f64, MAX_DENSE>::new(token);
+            let mut own = VelocitySystem::<f64, MAX_CONTACTS>::new(token);
+            dense.load(0, &problem);
+            prop_assert_eq!(own.load(0, &problem).count(), MAX_DENSE);
+            let mut few = [[[0.0; 3]; MAX_DENSE]; 4];
+            let mut many = [[[0.0; 3]; MAX_CONTACTS]; 4];
+            let mut of_few = [Mode::open(0.0); MAX_DENSE];
+            let mut of_many = [Mode::open(0.0); MAX_CONTACTS];
+            let mut more = numbers.iter().rev();
+            for i in 0..MAX_DENSE {
+                for (few, many) in few.iter_mut().zip(&mut many) {
+                    for k in 0..3 {
+                        few[i][k] = *more.next().unwrap();
+                        many[i][k] = few[i][k];
+                    }
+                }
+                // Friction that opposes the slip, so that its direction turns.
+                let (p, u) = (&few[0][i], [0.0, -few[0][i][1], -few[0][i][2]]);
+                of_few[i] = Mode::of(0.3, modes[i] > 0, modes[i] == 1, p, &u);
+                of_many[i] = of_few[i];
+            }
+            let close = |few: &[Triple<f64>; MAX_DENSE], many: &[Triple<f64>; MAX_CONTACTS]| {
+                let scale = few.iter().flatten().fold(1.0, |most: f64, x| most.max(x.abs()));
+                few.iter().flatten().zip(many.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-7 * scale)
+            };
+            let [p, q, centre, _] = few;
+            let [p_many, q_many, centre_many, _] = many;
+            dense.velocities(&q, &p, &mut few[3]);
+            own.velocities(&q_many, &p_many, &mut many[3]);
+            prop_assert!(close(&few[3], &many[3]));
+            dense.factorise(0.1, &of_few);
+            own.factorise(0.1, &of_many);
+            dense.newton_point(&q, &centre, 0.1, &of_few, &mut few[3]);
+            own.newton_point(&q_many, &centre_many, 0.1, &of_many, &mut many[3]);
+            prop_assume!(few[3].iter().flatten().all(|x| x.abs() < 1e3));
+            prop_assert!(close(&few[3], &many[3]), "{:?} {:?}", few[3], &many[3][..MAX_DENSE]);
+            dense.correction(&q, &of_few, &mut few[3]);
+            own.correction(&q_many, &of_many, &mut many[3]);
+            prop_assume!(few[3].iter().flatten().all(|x| x.abs() < 1e3));
+            prop_assert!(close(&few[3], &many[3]));
+        }
     }
 }
