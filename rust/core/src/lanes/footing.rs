@@ -12,21 +12,14 @@ use nalgebra::Vector3;
 
 use crate::contact::detection::visit_on_surface;
 use crate::contact::ways_out::OverSurfaces;
-use crate::geometry::query::disc_clearance::{TURNING, clearance};
 use crate::geometry::query::dispatch::{point_at_edge, point_at_vertex};
 use crate::geometry::query::{NEAREST, SurfacePoint};
-use crate::geometry::{Coverage, Disc, PlacedShape, Plane, Primitive, Terrain};
+use crate::geometry::{Coverage, Disc, Neighbourhood, PlacedShape, Plane, Primitive, Terrain};
 use crate::scalar::{Lane, MAX_LANES, Vec3};
 
 /// How far beyond its reach a search for a plane looks, m. Twice as far examines four times as many
 /// pieces and searches half as often.
 const AHEAD: f64 = 0.1;
-
-/// The same of a search for pieces, m.
-const AHEAD_FOR_PIECES: f64 = 0.02;
-
-/// Most pieces near a wheel that are kept. With more they are searched at every step.
-const MAX_PIECES: usize = 24;
 
 /// Covers the rounding of distances, m.
 const ROUNDING: f64 = 1e-6;
@@ -60,71 +53,6 @@ pub struct Footing<T> {
     flat: u32,
     /// Lanes with a second plane.
     double: u32,
-    nearby: [Nearby; MAX_LANES],
-}
-
-/// The pieces that a rover's wheel may soon touch.
-#[derive(Clone, Debug)]
-struct Nearby {
-    /// The wheel when they were searched: its centre, world, m, and its axle.
-    from: Vector3<f64>,
-    axle: Vector3<f64>,
-    /// They are all with a clearance of at most this, m.
-    within: f64,
-    /// Their numbers in the terrain and clearances, m, in the order of the terrain.
-    pieces: [(u32, f64); MAX_PIECES],
-    n: usize,
-}
-
-impl Nearby {
-    const NOTHING: Self = Self {
-        from: Vector3::new(0.0, 0.0, 0.0),
-        axle: Vector3::new(0.0, 0.0, 0.0),
-        within: f64::NEG_INFINITY,
-        pieces: [(0, 0.0); MAX_PIECES],
-        n: 0,
-    };
-
-    /// Visits all pieces that the wheel may touch with a gap of at most `reach`, m, and others.
-    fn visit(
-        &mut self,
-        terrain: &dyn Terrain,
-        disc: &Disc,
-        base: &Vector3<f64>,
-        reach: f64,
-        mut visit: impl FnMut(u32, &Primitive),
-    ) {
-        let centre = base + disc.centre;
-        let turn = (disc.axle - self.axle).norm() * disc.radius * TURNING;
-        let need = (centre - self.from).norm() + turn + reach + ROUNDING;
-        if need <= self.within {
-            for &(id, clearance) in &self.pieces[..self.n] {
-                if clearance <= need {
-                    visit(id, &terrain.primitive(id));
-                }
-            }
-            return;
-        }
-        let within = reach + ROUNDING + AHEAD_FOR_PIECES;
-        (self.from, self.axle, self.n) = (centre, disc.axle, 0);
-        self.within = within;
-        terrain.visit_near(&centre, disc.radius + within, &mut |id, piece| {
-            let clearance = clearance(disc, piece, base);
-            if clearance > within {
-                return;
-            }
-            match self.pieces.get_mut(self.n) {
-                Some(place) => {
-                    *place = (id, clearance);
-                    self.n += 1;
-                }
-                None => self.within = f64::NEG_INFINITY,
-            }
-            if clearance <= reach + ROUNDING {
-                visit(id, piece);
-            }
-        });
-    }
 }
 
 /// The wheels of a block at one instant, lane by lane; coordinates relative to `base`.
@@ -169,7 +97,6 @@ impl<T: Lane> Footing<T> {
             within: [f64::NEG_INFINITY; MAX_LANES],
             flat: 0,
             double: 0,
-            nearby: [Nearby::NOTHING; MAX_LANES],
         }
     }
 
@@ -183,7 +110,6 @@ impl<T: Lane> Footing<T> {
         self.within[lane] = f64::NEG_INFINITY;
         self.flat &= !(1 << lane);
         self.double &= !(1 << lane);
-        self.nearby[lane].within = f64::NEG_INFINITY;
     }
 
     /// Finds the planes of all lanes on a surface; `reach` (m) as for a plane. Returns the lanes
@@ -247,10 +173,11 @@ impl<T: Lane> Footing<T> {
             }
         }
         let shape = PlacedShape::Disc(disc);
-        let Self { planes, nearby, .. } = self;
+        let planes = &mut self.planes;
         let (mut count, mut is_deep) = (0, false);
         let shallow = OverSurfaces::shallow(&shape);
-        nearby[lane].visit(terrain, &disc, &base, reach, |id, piece| {
+        let around = Neighbourhood::new(&shape, &base, reach);
+        terrain.visit_around(&around, &mut |id, piece| {
             visit_on_surface(&shape, (terrain, id, piece), &base, reach, |point| {
                 if let Some(own) = planes.get_mut(count) {
                     own.stand_on(lane, id, piece, point, &base);

@@ -1,0 +1,300 @@
+//! Which pieces of a height field a part may touch.
+//!
+//! Heights decide about most. Of the cells under a part those count that reach up to it, and with a
+//! wheel those in a strip along its rim. Of a cell's faces those count whose plane is within reach
+//! of the part's lowest point over it, with a disc only if that point is about over the face; of
+//! its edges those that are convex, by four heights, and between two such planes. What is left is
+//! built.
+
+use nalgebra::Vector3;
+
+use super::{Half, HeightField, index, narrow, number};
+use crate::geometry::shape::{Disc, PlacedShape, SupportMap};
+use crate::geometry::terrain::{Neighbourhood, Primitive};
+
+/// Cosine of the angle to the way from a part to a face from which on the face looks away, as in
+/// [`OrientedBox::is_clear_of`](crate::geometry::OrientedBox::is_clear_of).
+const AWAY: f64 = 0.5;
+
+/// How deep a wheel may be in the ground, in bounding radii, so that faces as far beside it are all
+/// that matter.
+const SHALLOW: f64 = 0.1;
+
+/// Most cells of a strip.
+const MOST_CELLS: usize = 48;
+
+/// Slope up to which a lowest point is off its face, seen from above, by so many gaps at most. The
+/// normals lean by 45 degrees then, and walls by as much from their face's: sin 45° + tan 45°.
+const GENTLE: f64 = 1.0;
+const OFF: f64 = 1.75;
+
+/// Covers the rounding of places, m.
+const ROUNDING: f64 = 1e-6;
+
+impl HeightField {
+    /// The pieces that a part may touch: [`Terrain::visit_around`](super::super::Terrain).
+    pub(super) fn visit_pieces_around(
+        &self,
+        part: &Neighbourhood<'_>,
+        visit: &mut dyn FnMut(u32, &Primitive),
+    ) {
+        match part.shape {
+            PlacedShape::Disc(disc) => self.visit_under_wheel(part, (&disc.axle, 0.0), visit),
+            PlacedShape::Roller(roller) => {
+                let half = roller.half + roller.rounding;
+                self.visit_under_wheel(part, (&roller.core.axle, half), visit);
+            }
+            PlacedShape::Box(_) | PlacedShape::Sphere(_) => {
+                let solid = part.solid();
+                let floor = solid.support(&-Vector3::y()).y;
+                self.visit_cells_above(&part.centre, part.radius(), floor, |i, j| {
+                    if !solid.is_clear_of(&self.corners(i, j), || self.upright_normals(i, j)) {
+                        self.visit_reachable([i, j], part, None, visit);
+                    }
+                });
+            }
+        }
+    }
+
+    /// Under a wheel, whose axle has this half length (m) within it.
+    ///
+    /// A point of the wheel that is in the ground by no more than a depth has no face further
+    /// beside the wheel than this depth in its way. It is no deeper if the ground is outside a
+    /// smaller wheel: then the surface lies between the point and the place to which it comes when
+    /// the wheel shrinks. So a strip of cells along the wheel suffices, unless one that the wheel
+    /// crosses reaches into the smaller wheel.
+    fn visit_under_wheel(
+        &self,
+        part: &Neighbourhood<'_>,
+        (axle, half): (&Vector3<f64>, f64),
+        visit: &mut dyn FnMut(u32, &Primitive),
+    ) {
+        let c = &part.centre;
+        let radius = part.shape.bound() + part.reach;
+        let depth = SHALLOW * radius;
+        let around = |axis: &Vector3<f64>| part.extent(axis) + part.reach + depth;
+        let Some([columns, rows]) =
+            self.cells_within(c, [around(&Vector3::x()), around(&Vector3::z())])
+        else {
+            return;
+        };
+        let beyond = |[a, b]: [usize; 2], n: usize| [a.saturating_sub(1), (b + 1).min(n - 2)];
+        let slope = (self.tiles).steepest(beyond(columns, self.columns), beyond(rows, self.rows));
+        let lowest = match part.shape {
+            PlacedShape::Disc(disc) if slope <= GENTLE * GENTLE => Some(disc),
+            _ => None,
+        };
+        // No face looks away from the wheel that lies beside it.
+        let is_even = (slope / (1.0 + slope)).sqrt() + axle.y.abs() <= AWAY;
+        let floor = c.y - around(&Vector3::y());
+        let [dx, dz] = self.spacing;
+        // Half the width of what the wheel crosses, by the cells' middles along the axle, for all
+        // heights that it spans; and of the strip.
+        let of_cell = 0.5 * (axle.x.abs() * dx + axle.z.abs() * dz);
+        let crossed = half + part.reach + axle.y.abs() * radius + of_cell + ROUNDING;
+        let wide = crossed + depth;
+        let mut cells = [[0; 2]; MOST_CELLS];
+        let (mut n, mut is_shallow) = (0, true);
+        let middle = (c.x - self.origin[0]) / dx - 0.5;
+        let per_column = axle.x * dx;
+        for j in rows[0]..=rows[1] {
+            let z = self.origin[1] + (j as f64 + 0.5) * dz - c.z;
+            let [first, last] = columns.map(|k| k as f64);
+            let (mut low, mut high) = (first, last);
+            if per_column.abs() > ROUNDING * dx {
+                let (place, beside) = (middle - axle.z * z / per_column, (wide / per_column).abs());
+                (low, high) = ((place - beside).ceil(), (place + beside).floor());
+            } else if (axle.z * z).abs() > wide {
+                continue;
+            }
+            if !(low <= last && high >= first) {
+                continue;
+            }
+            for i in index(low.max(first))..=index(high.min(last)) {
+                if self.is_below([i, j], c, radius, floor) {
+                    continue;
+                }
+                let beside = per_column * (i as f64 - middle) + axle.z * z;
+                is_shallow &= is_even
+                    || beside.abs() > crossed
+                    || self.is_below([i, j], c, radius - depth, f64::NEG_INFINITY)
+                    || self.is_under([i, j], c, radius - depth);
+                match cells.get_mut(n) {
+                    Some(cell) => *cell = [i, j],
+                    None => is_shallow = false,
+                }
+                n += 1;
+            }
+        }
+        if is_shallow {
+            for &cell in &cells[..n] {
+                self.visit_reachable(cell, part, lowest, visit);
+            }
+            return;
+        }
+        let solid = part.solid();
+        for j in rows[0]..=rows[1] {
+            for i in columns[0]..=columns[1] {
+                let is_clear =
+                    || solid.is_clear_of(&self.corners(i, j), || self.upright_normals(i, j));
+                if !self.is_below([i, j], c, radius, floor) && !is_clear() {
+                    self.visit_reachable([i, j], part, lowest, visit);
+                }
+            }
+        }
+    }
+
+    /// First and last columns and rows of the cells within distances along x and z (m) of a place;
+    /// None if there are none.
+    #[inline]
+    pub(super) fn cells_within(
+        &self,
+        centre: &Vector3<f64>,
+        reach: [f64; 2],
+    ) -> Option<[[usize; 2]; 2]> {
+        let range = |axis: usize, x: f64, n: usize| {
+            let local = (x - self.origin[axis]) / self.spacing[axis];
+            let half = reach[axis] / self.spacing[axis];
+            let low = (local - half).floor().max(0.0);
+            let high = (local + half).floor().min((n - 2) as f64);
+            (low <= high).then(|| [index(low), index(high)])
+        };
+        let columns = range(0, centre.x, self.columns)?;
+        Some([columns, range(1, centre.z, self.rows)?])
+    }
+
+    /// Whether a cell lies below the height `floor` (m) and a ball.
+    #[inline]
+    fn is_below(&self, [i, j]: [usize; 2], centre: &Vector3<f64>, radius: f64, floor: f64) -> bool {
+        let [a, b, c, d] = self.cell_heights([i, j]);
+        let highest = f64::from(a.max(b).max(c.max(d)));
+        let beyond = |axis: usize, k: usize, x: f64| {
+            let low = self.origin[axis] + k as f64 * self.spacing[axis] - x;
+            low.max(-low - self.spacing[axis]).max(0.0)
+        };
+        let (x, z) = (beyond(0, i, centre.x), beyond(1, j, centre.z));
+        let drop = (centre.y - highest).max(0.0);
+        // A cell without heights has no highest.
+        !(highest >= floor && x * x + z * z + drop * drop <= radius * radius)
+    }
+
+    /// Whether a ball is over the planes of both faces of a cell.
+    fn is_under(&self, cell: [usize; 2], centre: &Vector3<f64>, radius: f64) -> bool {
+        let from = centre - self.point(cell.map(narrow));
+        let [a, b, c, d] = self.cell_heights(cell).map(f64::from);
+        [[b - a, d - b], [d - c, c - a]].iter().all(|[x, z]| {
+            let m = Vector3::new(-x / self.spacing[0], 1.0, -z / self.spacing[1]);
+            m.dot(&from) > radius * m.norm()
+        })
+    }
+
+    fn corners(&self, i: usize, j: usize) -> [Vector3<f64>; 4] {
+        let [i, j] = [narrow(i), narrow(j)];
+        [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[u, v]| self.point([i + u, j + v]))
+    }
+
+    fn upright_normals(&self, i: usize, j: usize) -> [Vector3<f64>; 2] {
+        let own = [narrow(i), narrow(j)];
+        [Half::Low, Half::High].map(|half| self.normal(own, half).unwrap_or_else(Vector3::y))
+    }
+
+    /// Visits the pieces that belong to a corner and are within reach. `lowest`: the disc that the
+    /// part is, if its lowest point over a face tells whether it may touch the face.
+    #[inline]
+    fn visit_reachable(
+        &self,
+        cell: [usize; 2],
+        part: &Neighbourhood<'_>,
+        lowest: Option<&Disc>,
+        visit: &mut dyn FnMut(u32, &Primitive),
+    ) {
+        let first = number(cell[1] * self.columns + cell[0]);
+        let place = cell.map(narrow);
+        let [a, b, c, d] = self.cell_heights(cell).map(f64::from);
+        let corner = self.point(place);
+        let from = part.centre - corner;
+        // Height of the part over a face's plane, from any corner of the edge that it shares.
+        let side = |x: f64, z: f64| {
+            let m = Vector3::new(-x / self.spacing[0], 1.0, -z / self.spacing[1]);
+            let height = m.dot(&from);
+            let is_beyond = part.is_beyond(&m, height);
+            Side {
+                m,
+                height,
+                is_beyond,
+            }
+        };
+        let mut known = None;
+        let mut patch = || *known.get_or_insert_with(|| self.patch(cell));
+        let (low, high) = (side(b - a, d - b), side(d - c, c - a));
+        for (k, half, own) in [(0, Half::Low, &low), (1, Half::High, &high)] {
+            let is_near = !own.is_beyond
+                && lowest.is_none_or(|disc| self.is_over(own, (disc, part), &from, half));
+            if let Some(face) = is_near.then(|| patch().face(half)).flatten() {
+                visit(first + k, &Primitive::Face(face));
+            }
+        }
+        let [i, j] = place;
+        let may_be_at =
+            |own: &Side, other: &Side| !part.is_beyond_edge([own.is_beyond, other.is_beyond]);
+        // Convex where the middle of the edge is above that of the corners on its sides.
+        let (before, left) = (self.corner([i, j - 1]), self.corner([i - 1, j]));
+        let edges = [
+            a + b > d + before && may_be_at(&low, &side(b - a, a - before)),
+            a + c > d + left && may_be_at(&high, &side(a - left, c - a)),
+            a + d > b + c && may_be_at(&low, &high),
+        ];
+        for (k, is_near) in (2..5).zip(edges) {
+            if let Some(edge) = is_near.then(|| patch().edge(k)).flatten() {
+                visit(first + k, &Primitive::Edge(edge));
+            }
+        }
+        let radius = part.radius() + ROUNDING;
+        if from.norm_squared() <= radius * radius
+            && let Some(vertex) = patch().vertex()
+        {
+            visit(first + 5, &Primitive::Vertex(vertex));
+        }
+    }
+
+    /// Whether the lowest point of a disc over the plane of a face may be over the face, or other
+    /// points may be near it. `from`: place of the disc's centre from the cell's corner, m.
+    #[inline]
+    fn is_over(
+        &self,
+        side: &Side,
+        (disc, part): (&Disc, &Neighbourhood<'_>),
+        from: &Vector3<f64>,
+        half: Half,
+    ) -> bool {
+        let along = side.m.dot(&disc.axle);
+        let across = side.m - disc.axle * along;
+        let length = across.norm();
+        let low = from - across * (disc.radius / length);
+        // At least the gap.
+        let off = OFF * (side.height - disc.radius * length).abs() + ROUNDING;
+        let [dx, dz] = self.spacing;
+        let is_beside = low.x < -off || low.x > dx + off || low.z < -off || low.z > dz + off;
+        let ahead = low.x / dx - low.z / dz;
+        let beyond = off / dx + off / dz;
+        let is_in_other = match half {
+            Half::Low => ahead < -beyond,
+            Half::High => ahead > beyond,
+        };
+        // The second and third point of the rim are higher by one and a half radii.
+        let others = side.height + 0.5 * disc.radius * length;
+        let is_upright = others > (part.reach + ROUNDING) * side.m.norm();
+        !((is_beside || is_in_other) && is_upright)
+    }
+}
+
+/// The plane of a face and the part over it.
+#[derive(Clone, Copy, Debug)]
+struct Side {
+    /// Normal with a vertical component of 1.
+    m: Vector3<f64>,
+    /// Of the part's centre over the plane, in units of this length, m.
+    height: f64,
+    /// Whether the part is out of reach of the plane.
+    is_beyond: bool,
+}
