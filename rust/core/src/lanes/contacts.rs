@@ -1,7 +1,7 @@
 //! Contacts of the wheels with the ground, in slots.
 //!
-//! Each wheel has two slots: most wheels touch the plane or a sphere, some both or two spheres. A
-//! slot is filled lane by lane; rovers that share it may touch different things there. Detection
+//! Each wheel has three slots: most wheels touch the plane or a sphere, some both or two spheres,
+//! and on rough maps two or three faces. A slot is filled lane by lane; rovers that share it may touch different things there. Detection
 //! at the midpoint of the step and relocation to its end follow [`crate::contact`] and
 //! [`crate::geometry::query`]. With the unit normal n, the unit axle s and the rolling direction
 //! `t = n × s / |n × s|`, a wheel's lowest point over a plane lies along `t × s` from its centre.
@@ -97,11 +97,11 @@ impl<T: Lane> Contacts<T> {
     /// Room for a machine.
     ///
     /// # Panics
-    /// If it has more than 128 wheels.
+    /// If it has more than 85 wheels.
     #[must_use]
     pub fn new(token: T::Token, machine: &Machine) -> Self {
         assert!(
-            machine.wheels.len() <= 128,
+            machine.wheels.len() <= 85,
             "invariant: slots are numbered by 8 bits"
         );
         let parts = Parts::of(machine);
@@ -291,7 +291,7 @@ impl<T: Lane> Contacts<T> {
         for w in 0..self.parts.wheels.len() {
             declined = declined | self.look_at_wheel(w, ground, sight);
             let first = SLOTS * w;
-            if !self.slots[first].active.any() && !self.slots[first + 1].active.any() {
+            if !(self.slots[first..first + SLOTS].iter()).any(|slot| slot.active.any()) {
                 continue;
             }
             let pose = &end.bodies[self.parts.wheels[w].body];
@@ -365,12 +365,10 @@ impl<T: Lane> Contacts<T> {
         let mut declined = T::mask(self.token, 0);
         let first = SLOTS * w;
         let mut plane = (ground.normal, sight.height);
-        let mut has_second = false;
         if ground.has_surfaces() {
             let origin = sight.middle.origin;
             declined = ground.find_footing(w, (origin, centre, s), wheel.radius, reach);
             plane = ground.under_wheel(w, 0, origin);
-            has_second = ground.has_second_plane(w);
         }
         let none = T::mask(self.token, 0);
         for slot in &mut self.slots[first..first + SLOTS] {
@@ -379,10 +377,13 @@ impl<T: Lane> Contacts<T> {
         let (admitted, lies) = self.stands(w, plane, sight, (s, centre), reach);
         self.slots[first].active = admitted;
         declined = declined | lies;
-        if has_second {
-            let plane = ground.under_wheel(w, 1, sight.middle.origin);
+        for k in 1..SLOTS {
+            if !ground.has_plane(w, k) {
+                break;
+            }
+            let plane = ground.under_wheel(w, k, sight.middle.origin);
             let (admitted, lies) = self.stands(w, plane, sight, (s, centre), reach);
-            self.slots[first + 1].active = admitted;
+            self.slots[first + k].active = admitted;
             declined = declined | lies;
         }
         if ground.has_spheres() {

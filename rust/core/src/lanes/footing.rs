@@ -11,7 +11,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use crate::contact::detection::visit_on_surface;
-use crate::contact::ways_out::OverSurfaces;
+use crate::contact::ways_out::{OverSurfaces, WaysOut};
 use crate::geometry::query::dispatch::{point_at_edge, point_at_vertex};
 use crate::geometry::query::{NEAREST, SurfacePoint};
 use crate::geometry::{Coverage, Disc, Neighbourhood, PlacedShape, Plane, Primitive, Terrain};
@@ -24,8 +24,11 @@ const AHEAD: f64 = 0.1;
 /// Covers the rounding of distances, m.
 const ROUNDING: f64 = 1e-6;
 
+/// Most points at which a wheel and the pieces of a surface are compared.
+const MOST_POINTS: usize = 12;
+
 /// Slots of a wheel.
-pub const SLOTS: usize = 2;
+pub const SLOTS: usize = 3;
 
 /// A plane under a wheel.
 #[derive(Clone, Copy, Debug)]
@@ -51,8 +54,8 @@ pub struct Footing<T> {
     within: [f64; MAX_LANES],
     /// Lanes where it found a plane.
     flat: u32,
-    /// Lanes with a second plane.
-    double: u32,
+    /// Lanes with planes beyond the first, slot by slot.
+    filled: [u32; SLOTS],
 }
 
 /// The wheels of a block at one instant, lane by lane; coordinates relative to `base`.
@@ -96,7 +99,7 @@ impl<T: Lane> Footing<T> {
             from: [Vector3::zeros(); MAX_LANES],
             within: [f64::NEG_INFINITY; MAX_LANES],
             flat: 0,
-            double: 0,
+            filled: [0; SLOTS],
         }
     }
 
@@ -109,7 +112,7 @@ impl<T: Lane> Footing<T> {
         self.planes[0].offset.set(lane, offset);
         self.within[lane] = f64::NEG_INFINITY;
         self.flat &= !(1 << lane);
-        self.double &= !(1 << lane);
+        self.empty(lane);
     }
 
     /// Finds the planes of all lanes on a surface; `reach` (m) as for a plane. Returns the lanes
@@ -154,7 +157,7 @@ impl<T: Lane> Footing<T> {
         let (disc, base) = wheels.disc(lane);
         let centre = base + disc.centre;
         self.flat &= !own;
-        self.double &= !own;
+        self.empty(lane);
         for plane in &mut self.planes {
             plane.clear(lane);
         }
@@ -173,28 +176,57 @@ impl<T: Lane> Footing<T> {
             }
         }
         let shape = PlacedShape::Disc(disc);
-        let planes = &mut self.planes;
-        let (mut count, mut is_deep) = (0, false);
+        let (mut found, mut n) = ([None; MOST_POINTS], 0);
+        let mut ways = WaysOut::default();
         let shallow = OverSurfaces::shallow(&shape);
         let around = Neighbourhood::new(&shape, &base, reach);
         terrain.visit_around(&around, &mut |id, piece| {
             visit_on_surface(&shape, (terrain, id, piece), &base, reach, |point| {
-                if let Some(own) = planes.get_mut(count) {
-                    own.stand_on(lane, id, piece, point, &base);
+                ways.add(id, point, shallow);
+                if let Some(place) = found.get_mut(n) {
+                    *place = Some((id, *piece, *point));
                 }
-                count += 1;
-                is_deep |= point.gap < -shallow;
+                n += 1;
             });
         });
-        self.double |= u32::from(count > 1) << lane;
-        // Of several deep points the general step finds out which count.
-        count <= 1 || (count <= SLOTS && !is_deep)
+        if n > MOST_POINTS {
+            return false;
+        }
+        let part = OverSurfaces {
+            shape: &shape,
+            terrain,
+            base: &base,
+        };
+        let is_doubtful = ways.are_doubtful();
+        if is_doubtful {
+            ways.sift(&part);
+        }
+        let mut count = 0;
+        for (id, piece, point) in found.iter().flatten() {
+            if is_doubtful && !ways.counts(&part, *id, point) {
+                continue;
+            }
+            if let Some(own) = self.planes.get_mut(count) {
+                own.stand_on(lane, *id, piece, point, &base);
+            }
+            count += 1;
+        }
+        for filled in &mut self.filled[..count.min(SLOTS)] {
+            *filled |= own;
+        }
+        count <= SLOTS
     }
 
-    /// Whether any lane has a second plane.
+    /// Whether any lane has a plane in a slot beyond the first.
     #[inline(always)]
-    pub fn has_second(&self) -> bool {
-        self.double != 0
+    pub fn has_plane(&self, slot: usize) -> bool {
+        self.filled[slot] != 0
+    }
+
+    fn empty(&mut self, lane: usize) {
+        for filled in &mut self.filled {
+            *filled &= !(1 << lane);
+        }
     }
 }
 

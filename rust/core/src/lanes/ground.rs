@@ -267,10 +267,10 @@ impl<T: Lane> Ground<T> {
         (plane.normal, plane.normal.dot(x) + plane.offset)
     }
 
-    /// Whether any rover's wheel has a second one.
+    /// Whether any rover's wheel has a plane under a slot beyond the first.
     #[inline(always)]
-    pub(super) fn has_second_plane(&self, wheel: usize) -> bool {
-        self.footings[wheel].has_second()
+    pub(super) fn has_plane(&self, wheel: usize, slot: usize) -> bool {
+        self.has_surfaces && self.footings[wheel].has_plane(slot)
     }
 
     /// Whether a rover's ground is a surface.
