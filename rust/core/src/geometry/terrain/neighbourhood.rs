@@ -68,15 +68,16 @@ impl<'a> Neighbourhood<'a> {
         }
     }
 
-    /// Whether the whole shape is out of reach of a plane, whatever the rounding. `m`: a normal of
-    /// the plane of length at least 1; `height`: of the shape's centre over the plane, in units of
-    /// that length, m.
+    /// Whether the whole shape is further from a plane than `reach` (m), whatever the rounding. `m`:
+    /// a normal of the plane of length at least 1; `height`: of the shape's centre over the plane,
+    /// in units of that length, m.
     #[inline]
-    pub(super) fn is_beyond(&self, m: &Vector3<f64>, height: f64) -> bool {
+    pub(super) fn is_beyond(&self, m: &Vector3<f64>, height: f64, reach: f64) -> bool {
         let square = m.norm_squared();
-        // At least the length.
+        // At least the length, and the reach in its units.
         let length = 0.5 * (1.0 + square);
-        let rest = height - (self.reach + ROUNDING) * length;
+        let reach = reach + ROUNDING;
+        let rest = height - reach.max(reach * length);
         // Whether a circle about an axle is below what is left.
         let clears = |rest: f64, radius: f64, along: f64| {
             rest > 0.0 && rest * rest > radius * radius * (square - along * along)

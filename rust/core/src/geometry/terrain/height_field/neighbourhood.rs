@@ -28,6 +28,19 @@ const MOST_CELLS: usize = 48;
 const GENTLE: f64 = 1.0;
 const OFF: f64 = 1.75;
 
+/// How deep a disc must be to touch a piece beside it, in the distance between them: walls that lean
+/// move the point by less than [`OFF`] depths, and an edge has points beyond its ends that are less
+/// than one depth away.
+const SHARE: f64 = 0.5;
+
+/// Sine of the angle up to which an axle is level enough: a vertex that pierces the face of the disc
+/// has a slope beside it of more than 1.5.
+const STANDS: f64 = 0.4;
+
+/// Square of the length of a normal with a vertical component of 1 up to which an edge cannot be
+/// sharp: slopes of up to 0.8.
+const UNSHARP: f64 = 1.64;
+
 /// Covers the rounding of places, m.
 const ROUNDING: f64 = 1e-6;
 
@@ -111,13 +124,16 @@ impl HeightField {
                 continue;
             }
             for i in index(low.max(first))..=index(high.min(last)) {
-                if self.is_below([i, j], c, radius, floor) {
+                let (highest, square) = self.distance_squared([i, j], c);
+                // A cell without heights has no highest.
+                let is_near = highest >= floor && square <= radius * radius;
+                if !is_near {
                     continue;
                 }
                 let beside = per_column * (i as f64 - middle) + axle.z * z;
                 is_shallow &= is_even
                     || beside.abs() > crossed
-                    || self.is_below([i, j], c, radius - depth, f64::NEG_INFINITY)
+                    || square > (radius - depth) * (radius - depth)
                     || self.is_under([i, j], c, radius - depth);
                 match cells.get_mut(n) {
                     Some(cell) => *cell = [i, j],
@@ -137,7 +153,8 @@ impl HeightField {
             for i in columns[0]..=columns[1] {
                 let is_clear =
                     || solid.is_clear_of(&self.corners(i, j), || self.upright_normals(i, j));
-                if !self.is_below([i, j], c, radius, floor) && !is_clear() {
+                let (highest, square) = self.distance_squared([i, j], c);
+                if highest >= floor && square <= radius * radius && !is_clear() {
                     self.visit_reachable([i, j], part, lowest, visit);
                 }
             }
@@ -163,19 +180,19 @@ impl HeightField {
         Some([columns, range(1, centre.z, self.rows)?])
     }
 
-    /// Whether a cell lies below the height `floor` (m) and a ball.
+    /// Highest point of a cell, m, and the square of the distance of a place from all that is at most
+    /// as high over the cell, m².
     #[inline]
-    fn is_below(&self, [i, j]: [usize; 2], centre: &Vector3<f64>, radius: f64, floor: f64) -> bool {
+    fn distance_squared(&self, [i, j]: [usize; 2], place: &Vector3<f64>) -> (f64, f64) {
         let [a, b, c, d] = self.cell_heights([i, j]);
         let highest = f64::from(a.max(b).max(c.max(d)));
         let beyond = |axis: usize, k: usize, x: f64| {
             let low = self.origin[axis] + k as f64 * self.spacing[axis] - x;
             low.max(-low - self.spacing[axis]).max(0.0)
         };
-        let (x, z) = (beyond(0, i, centre.x), beyond(1, j, centre.z));
-        let drop = (centre.y - highest).max(0.0);
-        // A cell without heights has no highest.
-        !(highest >= floor && x * x + z * z + drop * drop <= radius * radius)
+        let (x, z) = (beyond(0, i, place.x), beyond(1, j, place.z));
+        let drop = (place.y - highest).max(0.0);
+        (highest, x * x + z * z + drop * drop)
     }
 
     /// Whether a ball is over the planes of both faces of a cell.
@@ -199,7 +216,7 @@ impl HeightField {
     }
 
     /// Visits the pieces that belong to a corner and are within reach. `lowest`: the disc that the
-    /// part is, if its lowest point over a face tells whether it may touch the face.
+    /// part is, if its lowest points over the faces tell what it may touch.
     #[inline]
     fn visit_reachable(
         &self,
@@ -209,15 +226,31 @@ impl HeightField {
         visit: &mut dyn FnMut(u32, &Primitive),
     ) {
         let first = number(cell[1] * self.columns + cell[0]);
-        let place = cell.map(narrow);
+        let [i, j] = cell.map(narrow);
         let [a, b, c, d] = self.cell_heights(cell).map(f64::from);
-        let corner = self.point(place);
-        let from = part.centre - corner;
-        // Height of the part over a face's plane, from any corner of the edge that it shares.
+        let [dx, dz] = self.spacing;
+        let from = part.centre - self.point([i, j]);
+        // A disc touches what lies beside it only if it is about as deep in the ground.
+        let beside = lowest.map_or(0.0, |disc| {
+            let s = &disc.axle;
+            let (x, z) = (s.x * dx, s.z * dz);
+            let places = [
+                0.0,
+                x + s.y * (b - a),
+                z + s.y * (c - a),
+                x + z + s.y * (d - a),
+            ];
+            let along = places.map(|place| place - s.dot(&from));
+            let nearest = along.iter().fold(f64::INFINITY, |low, x| low.min(*x));
+            let furthest = along.iter().fold(f64::NEG_INFINITY, |high, x| high.max(*x));
+            nearest.max(-furthest).max(0.0)
+        });
+        let reach = part.reach - SHARE * beside;
+        // The part over a face's plane, from any corner of the edge that it shares.
         let side = |x: f64, z: f64| {
-            let m = Vector3::new(-x / self.spacing[0], 1.0, -z / self.spacing[1]);
+            let m = Vector3::new(-x / dx, 1.0, -z / dz);
             let height = m.dot(&from);
-            let is_beyond = part.is_beyond(&m, height);
+            let is_beyond = part.is_beyond(&m, height, reach);
             Side {
                 m,
                 height,
@@ -234,23 +267,39 @@ impl HeightField {
                 visit(first + k, &Primitive::Face(face));
             }
         }
-        let [i, j] = place;
-        let may_be_at =
-            |own: &Side, other: &Side| !part.is_beyond_edge([own.is_beyond, other.is_beyond]);
-        // Convex where the middle of the edge is above that of the corners on its sides.
         let (before, left) = (self.corner([i, j - 1]), self.corner([i - 1, j]));
+        let may_touch = |first: &Side, second: &Side, x: f64, y: f64, z: f64| {
+            !part.is_beyond_edge([first.is_beyond, second.is_beyond])
+                && lowest.is_none_or(|disc| {
+                    Side::may_touch_between([first, second], disc, &from, &Vector3::new(x, y, z))
+                })
+        };
+        let is_out = |side: &Side| part.is_beyond_edge([side.is_beyond, false]);
+        // Convex where the middle of the edge is above that of the corners on its sides.
         let edges = [
-            a + b > d + before && may_be_at(&low, &side(b - a, a - before)),
-            a + c > d + left && may_be_at(&high, &side(a - left, c - a)),
-            a + d > b + c && may_be_at(&low, &high),
+            a + b > d + before
+                && !is_out(&low)
+                && may_touch(&side(b - a, a - before), &low, dx, b - a, 0.0),
+            a + c > d + left
+                && !is_out(&high)
+                && may_touch(&high, &side(a - left, c - a), 0.0, c - a, dz),
+            a + d > b + c && may_touch(&low, &high, dx, d - a, dz),
         ];
         for (k, is_near) in (2..5).zip(edges) {
             if let Some(edge) = is_near.then(|| patch().edge(k)).flatten() {
                 visit(first + k, &Primitive::Edge(edge));
             }
         }
-        let radius = part.radius() + ROUNDING;
-        if from.norm_squared() <= radius * radius
+        let is_high = 2.0 * a >= b + left && 2.0 * a >= c + before;
+        let is_near = || match lowest {
+            // Nothing but a needle pierces a disc that stands.
+            Some(disc) if disc.axle.y.abs() < STANDS => {
+                disc.axle.dot(&from).abs() <= part.reach + ROUNDING
+            }
+            _ => from.norm() <= part.radius() + ROUNDING,
+        };
+        if is_high
+            && is_near()
             && let Some(vertex) = patch().vertex()
         {
             visit(first + 5, &Primitive::Vertex(vertex));
@@ -267,10 +316,7 @@ impl HeightField {
         from: &Vector3<f64>,
         half: Half,
     ) -> bool {
-        let along = side.m.dot(&disc.axle);
-        let across = side.m - disc.axle * along;
-        let length = across.norm();
-        let low = from - across * (disc.radius / length);
+        let (low, length) = side.lowest(disc, from);
         // At least the gap.
         let off = OFF * (side.height - disc.radius * length).abs() + ROUNDING;
         let [dx, dz] = self.spacing;
@@ -297,4 +343,35 @@ struct Side {
     height: f64,
     /// Whether the part is out of reach of the plane.
     is_beyond: bool,
+}
+
+impl Side {
+    /// The lowest point of a disc over the plane, from where its centre is `from` (m), and the
+    /// length of the normal's part in the disc's plane.
+    #[inline]
+    fn lowest(&self, disc: &Disc, from: &Vector3<f64>) -> (Vector3<f64>, f64) {
+        let across = self.m - disc.axle * self.m.dot(&disc.axle);
+        let length = across.norm();
+        (from - across * (disc.radius / length), length)
+    }
+
+    /// Whether a disc may touch the edge between two planes at a normal between theirs: its lowest
+    /// points over them lie off the faces, beyond the edge. `along`: the edge, from the corner from
+    /// which the disc's centre is `from`, m.
+    #[inline]
+    fn may_touch_between(
+        sides: [&Self; 2],
+        disc: &Disc,
+        from: &Vector3<f64>,
+        along: &Vector3<f64>,
+    ) -> bool {
+        if sides.iter().any(|side| side.m.norm_squared() > UNSHARP) {
+            return true;
+        }
+        let [one, two] = sides.map(|side| {
+            let (low, _) = side.lowest(disc, from);
+            side.m.cross(along).dot(&low)
+        });
+        one < ROUNDING && two > -ROUNDING
+    }
 }
