@@ -1,13 +1,14 @@
 //! Contacts of the wheels with the ground, in slots.
 //!
 //! Each wheel has three slots: most wheels touch the plane or a sphere, some both or two spheres,
-//! and on rough maps two or three faces. A slot is filled lane by lane; rovers that share it may touch different things there. Detection
-//! at the midpoint of the step and relocation to its end follow [`crate::contact`] and
-//! [`crate::geometry::query`]. With the unit normal n, the unit axle s and the rolling direction
-//! `t = n × s / |n × s|`, a wheel's lowest point over a plane lies along `t × s` from its centre.
+//! and on rough maps two or three pieces. A slot is filled lane by lane; rovers that share it may
+//! touch different things there. Detection at the midpoint of the step and relocation to its end
+//! follow [`crate::contact`] and [`crate::geometry::query`]. With the unit normal n, the unit axle
+//! s and the rolling direction `t = n × s / |n × s|`, a wheel's lowest point over a plane lies
+//! along `t × s` from its centre.
 //!
 //! What is rare is declined: a wheel that nearly lies flat, passes a sphere within the step or
-//! touches more than two things, a box near the ground, more than [`MAX_CONTACTS`] contacts.
+//! touches more than three things, a box near the ground, more than [`MAX_CONTACTS`] contacts.
 
 use nalgebra::Vector3;
 

@@ -1,10 +1,11 @@
-//! What a wheel stands on where the ground is a surface: at most two planes for each rover.
+//! What a wheel stands on where the ground is a surface: up to [`SLOTS`] planes for each rover.
 //!
 //! A plane is that of a face under the wheel, or the one through a convex edge or vertex with the
 //! contact's normal. Where all pieces near a wheel lie in one plane the wheel keeps it until it has
 //! moved further than the search looked ahead, and costs what a wheel on a plane costs. Elsewhere
-//! it keeps the numbers of the pieces that it may soon touch, and these are examined at every step,
-//! rover by rover. A wheel that three pieces could touch is declined.
+//! the pieces are searched at every step, rover by rover, and of those that the wheel overlaps the
+//! ones count that lead out of the ground, as in [`crate::contact`]. A wheel on more than [`SLOTS`]
+//! of them is declined.
 
 use std::sync::Arc;
 

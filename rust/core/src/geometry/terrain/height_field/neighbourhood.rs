@@ -28,13 +28,13 @@ const MOST_CELLS: usize = 48;
 const GENTLE: f64 = 1.0;
 const OFF: f64 = 1.75;
 
-/// How deep a disc must be to touch a piece beside it, in the distance between them: walls that lean
-/// move the point by less than [`OFF`] depths, and an edge has points beyond its ends that are less
-/// than one depth away.
+/// How deep a disc must be to touch a piece beside it, in the distance between them: walls that
+/// lean move the point by less than [`OFF`] depths, and an edge has points beyond its ends that are
+/// less than one depth away.
 const SHARE: f64 = 0.5;
 
-/// Sine of the angle up to which an axle is level enough: a vertex that pierces the face of the disc
-/// has a slope beside it of more than 1.5.
+/// Sine of the angle up to which an axle is level enough: a vertex that pierces the face of the
+/// disc has a slope beside it of more than 1.5.
 const STANDS: f64 = 0.4;
 
 /// Square of the length of a normal with a vertical component of 1 up to which an edge cannot be
@@ -112,18 +112,10 @@ impl HeightField {
         let per_column = axle.x * dx;
         for j in rows[0]..=rows[1] {
             let z = self.origin[1] + (j as f64 + 0.5) * dz - c.z;
-            let [first, last] = columns.map(|k| k as f64);
-            let (mut low, mut high) = (first, last);
-            if per_column.abs() > ROUNDING * dx {
-                let (place, beside) = (middle - axle.z * z / per_column, (wide / per_column).abs());
-                (low, high) = ((place - beside).ceil(), (place + beside).floor());
-            } else if (axle.z * z).abs() > wide {
+            let Some([begin, end]) = across(columns, middle, [per_column, axle.z * z], wide) else {
                 continue;
-            }
-            if !(low <= last && high >= first) {
-                continue;
-            }
-            for i in index(low.max(first))..=index(high.min(last)) {
+            };
+            for i in begin..=end {
                 let (highest, square) = self.distance_squared([i, j], c);
                 // A cell without heights has no highest.
                 let is_near = highest >= floor && square <= radius * radius;
@@ -148,12 +140,26 @@ impl HeightField {
             }
             return;
         }
+        self.visit_not_clear(part, [columns, rows], (radius, floor), lowest, visit);
+    }
+
+    /// In ranges of columns and rows, above the height `floor` and within `radius` of the part's
+    /// centre, m.
+    #[cold]
+    fn visit_not_clear(
+        &self,
+        part: &Neighbourhood<'_>,
+        [columns, rows]: [[usize; 2]; 2],
+        (radius, floor): (f64, f64),
+        lowest: Option<&Disc>,
+        visit: &mut dyn FnMut(u32, &Primitive),
+    ) {
         let solid = part.solid();
         for j in rows[0]..=rows[1] {
             for i in columns[0]..=columns[1] {
                 let is_clear =
                     || solid.is_clear_of(&self.corners(i, j), || self.upright_normals(i, j));
-                let (highest, square) = self.distance_squared([i, j], c);
+                let (highest, square) = self.distance_squared([i, j], &part.centre);
                 if highest >= floor && square <= radius * radius && !is_clear() {
                     self.visit_reachable([i, j], part, lowest, visit);
                 }
@@ -180,8 +186,8 @@ impl HeightField {
         Some([columns, range(1, centre.z, self.rows)?])
     }
 
-    /// Highest point of a cell, m, and the square of the distance of a place from all that is at most
-    /// as high over the cell, m².
+    /// Highest point of a cell, m, and the square of the distance of a place from all that is at
+    /// most as high over the cell, m².
     #[inline]
     fn distance_squared(&self, [i, j]: [usize; 2], place: &Vector3<f64>) -> (f64, f64) {
         let [a, b, c, d] = self.cell_heights([i, j]);
@@ -230,21 +236,8 @@ impl HeightField {
         let [a, b, c, d] = self.cell_heights(cell).map(f64::from);
         let [dx, dz] = self.spacing;
         let from = part.centre - self.point([i, j]);
-        // A disc touches what lies beside it only if it is about as deep in the ground.
-        let beside = lowest.map_or(0.0, |disc| {
-            let s = &disc.axle;
-            let (x, z) = (s.x * dx, s.z * dz);
-            let places = [
-                0.0,
-                x + s.y * (b - a),
-                z + s.y * (c - a),
-                x + z + s.y * (d - a),
-            ];
-            let along = places.map(|place| place - s.dot(&from));
-            let nearest = along.iter().fold(f64::INFINITY, |low, x| low.min(*x));
-            let furthest = along.iter().fold(f64::NEG_INFINITY, |high, x| high.max(*x));
-            nearest.max(-furthest).max(0.0)
-        });
+        let rises = [0.0, b - a, c - a, d - a];
+        let beside = lowest.map_or(0.0, |disc| self.beside(disc, &from, rises));
         let reach = part.reach - SHARE * beside;
         // The part over a face's plane, from any corner of the edge that it shares.
         let side = |x: f64, z: f64| {
@@ -306,6 +299,21 @@ impl HeightField {
         }
     }
 
+    /// Distance of a cell from a disc's plane, m: what lies beside a disc is touched only if the
+    /// disc is about as deep in the ground. `rises`: heights of the cell's corners over the first,
+    /// m.
+    #[inline]
+    fn beside(&self, disc: &Disc, from: &Vector3<f64>, rises: [f64; 4]) -> f64 {
+        let (s, [dx, dz]) = (&disc.axle, self.spacing);
+        let (x, z) = (s.x * dx, s.z * dz);
+        let (mut nearest, mut furthest) = (f64::INFINITY, f64::NEG_INFINITY);
+        for (level, rise) in [0.0, x, z, x + z].into_iter().zip(rises) {
+            let place = level + s.y * rise - s.dot(from);
+            (nearest, furthest) = (nearest.min(place), furthest.max(place));
+        }
+        nearest.max(-furthest).max(0.0)
+    }
+
     /// Whether the lowest point of a disc over the plane of a face may be over the face, or other
     /// points may be near it. `from`: place of the disc's centre from the cell's corner, m.
     #[inline]
@@ -332,6 +340,25 @@ impl HeightField {
         let is_upright = others > (part.reach + ROUNDING) * side.m.norm();
         !((is_beside || is_in_other) && is_upright)
     }
+}
+
+/// First and last of the columns in which `|per_column (i − middle) + rest|` is at most `wide`;
+/// None if there are none.
+#[inline]
+fn across(
+    columns: [usize; 2],
+    middle: f64,
+    [per_column, rest]: [f64; 2],
+    wide: f64,
+) -> Option<[usize; 2]> {
+    if per_column.abs() * 1e6 <= wide {
+        let first = columns[0] as f64 - middle;
+        return ((per_column * first + rest).abs() <= 2.0 * wide).then_some(columns);
+    }
+    let [first, last] = columns.map(|k| k as f64);
+    let (place, beside) = (middle - rest / per_column, (wide / per_column).abs());
+    let (low, high) = ((place - beside).ceil(), (place + beside).floor());
+    (low <= last && high >= first).then(|| [index(low.max(first)), index(high.min(last))])
 }
 
 /// The plane of a face and the part over it.
@@ -373,5 +400,98 @@ impl Side {
             side.m.cross(along).dot(&low)
         });
         one < ROUNDING && two > -ROUNDING
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::query::dispatch;
+    use crate::geometry::{OrientedBox, Roller, Sphere, Terrain};
+    use nalgebra::Rotation3;
+    use proptest::prelude::*;
+
+    /// Gap of the point of a shape at a piece that is nearest to zero, m.
+    fn shallowest(shape: &PlacedShape, piece: &Primitive, base: &Vector3<f64>, reach: f64) -> f64 {
+        let mut gap = f64::NEG_INFINITY;
+        match piece {
+            Primitive::Face(face) => {
+                dispatch::visit_on_face(shape, face, base, reach, |x| gap = gap.max(x.gap));
+            }
+            Primitive::Edge(edge) => {
+                dispatch::visit_at_edge(shape, edge, base, reach, |x| gap = gap.max(x.gap));
+            }
+            Primitive::Vertex(vertex) => {
+                let near = dispatch::point_at_vertex(shape, vertex, base);
+                if near.gap <= reach && vertex.admits(&near.n) {
+                    gap = near.gap;
+                }
+            }
+            Primitive::Plane(_) | Primitive::Sphere(_) => {}
+        }
+        gap
+    }
+
+    fn shapes(angles: [f64; 3]) -> [PlacedShape; 5] {
+        let R = *Rotation3::from_euler_angles(angles[0], angles[1], angles[2]).matrix();
+        let centre = Vector3::new(0.02, -0.01, 0.03);
+        let disc = |radius: f64| Disc {
+            centre,
+            axle: R.column(2).into(),
+            spoke: R.column(0).into(),
+            radius,
+        };
+        [
+            PlacedShape::Disc(disc(0.2)),
+            PlacedShape::Disc(disc(0.05)),
+            PlacedShape::Roller(Roller::new(disc(0.15), 0.1, 0.03)),
+            PlacedShape::Box(OrientedBox {
+                centre,
+                R,
+                half_size: Vector3::new(0.2, 0.05, 0.1),
+            }),
+            PlacedShape::Sphere(Sphere {
+                centre,
+                radius: 0.12,
+            }),
+        ]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(400))]
+        /// A search around a part finds all pieces that it touches, of all that are near.
+        #[test]
+        fn no_piece_is_left_out_that_a_part_touches(
+            heights in prop::collection::vec(-1.0..1.0, 21 * 21),
+            steepness in 0.0..1.0_f64,
+            spacing in prop::sample::select(vec![0.05, 0.25]),
+            turn in [-0.5..0.5, -3.2..3.2, -0.5..0.5_f64],
+            (x, z, height) in (-0.1..0.1, -0.1..0.1, -0.02..0.03_f64),
+            reach in 0.0..2e-3_f64,
+        ) {
+            #[allow(clippy::cast_possible_truncation)] // a map is single
+            let heights = heights.iter().map(|h: &f64| (h * 0.5 * steepness * spacing) as f32);
+            let origin = [-10.0 * spacing; 2];
+            let field = HeightField::new(heights.collect(), [21, 21], [spacing; 2], origin).unwrap();
+            for shape in shapes(turn) {
+                let low = shape.support(&-Vector3::y());
+                let under = field.height(x + low.x, z + low.z).unwrap();
+                let base = Vector3::new(x, under + height - low.y, z);
+                let part = Neighbourhood::new(&shape, &base, reach);
+                let mut visited = Vec::new();
+                field.visit_around(&part, &mut |id, _| visited.push(id));
+                // Deeper ones may be in the way only, and a box leaves out more of those.
+                let is_wheel = matches!(shape, PlacedShape::Disc(_) | PlacedShape::Roller(_));
+                let least = if is_wheel { -0.4 * SHALLOW } else { -1e-3 } * shape.bound();
+                let mut left_out = Vec::new();
+                field.visit_near(&part.centre, part.radius(), &mut |id, piece| {
+                    let gap = shallowest(&shape, piece, &base, reach);
+                    if gap >= least && !visited.contains(&id) {
+                        left_out.push((id % 6, gap));
+                    }
+                });
+                prop_assert!(left_out.is_empty(), "{shape:?} {left_out:?}");
+            }
+        }
     }
 }
