@@ -201,7 +201,7 @@ const LONGEST: f64 = 8.0;
 const OCTAVE: f64 = 8.0;
 
 /// Self-affine hills of exponent 0.7: a sum of waves in all directions, down to those of two cells.
-/// `tests/comparison/exploring.py` makes the same.
+/// They are no wilder than `HeightField.fractal(40.0, spacing, 0.15, longest_wave=20.0)` in Python.
 pub fn hills(spacing: f64) -> HeightField {
     let waves: Vec<[f64; 4]> = (0..)
         .map(|n| (f64::from(n), LONGEST * (-f64::from(n) / OCTAVE).exp2()))
