@@ -5,7 +5,7 @@
 
 #![allow(dead_code, clippy::unwrap_used)] // each program uses some of them; the record is ours
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use rover_core::geometry::{HeightField, Plane, SphereField, Terrain};
 use rover_core::integrator::{StepError, StepOptions, StepReport};
@@ -156,7 +156,9 @@ fn drive(record: &Value, ground: Ground, torque: f64, options: &StepOptions) -> 
         terrain = Arc::new(rocks(record));
     }
     if let Some(spacing) = ground.spacing() {
-        let hills = hills(spacing);
+        static HILLS: [OnceLock<HeightField>; 2] = [const { OnceLock::new() }; 2];
+        let made = &HILLS[usize::from(ground == Ground::FineHills)];
+        let hills = made.get_or_init(|| hills(spacing)).clone();
         let around =
             (-4..=4).flat_map(|i| (-4..=4).map(move |j| [i, j].map(|k| 0.2 * f64::from(k))));
         let highest = around
