@@ -404,8 +404,6 @@ fn grounds() -> Vec<Arc<dyn Terrain>> {
         Arc::new(SphereField::new(&[], &[], Some(Plane::ground())).unwrap()),
         super::surfaces::flat(0.3),
         super::surfaces::hills(0.25, 5),
-        super::surfaces::rough(0.25, 7),
-        super::surfaces::rough(0.05, 8),
         super::surfaces::hills_with_rocks(6),
     ]
 }
@@ -582,7 +580,6 @@ fn what_a_search_keeps_does_not_show() {
         Arc::new(SphereField::rug()) as Arc<dyn Terrain>,
         super::surfaces::flat(0.1),
         super::surfaces::hills(0.2, 3),
-        super::surfaces::rough(0.05, 9),
         super::surfaces::hills_with_rocks(4),
     ] {
         let mut rover = rover(&model, &terrain, &mut random, 0.01, 0.05);

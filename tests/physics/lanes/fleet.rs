@@ -27,10 +27,9 @@ fn rocks(numbers: &mut Random) -> Arc<dyn Terrain> {
     Arc::new(SphereField::new(&centres, &radii, Some(Plane::ground())).unwrap())
 }
 
-/// A rover on its ground: a plane, rocks, a flat map, hills, rough ground, or hills with rocks.
+/// A rover on its ground: a plane, rocks, a flat map, hills, or hills with rocks.
 fn rover(i: usize, model: &Arc<Model>, numbers: &mut Random) -> RoverSimulation {
-    let terrain: Arc<dyn Terrain> = match i % 8 {
-        7 => super::surfaces::rough(0.05, i as u64),
+    let terrain: Arc<dyn Terrain> = match i % 7 {
         6 => super::surfaces::hills(0.02, i as u64),
         1 => super::surfaces::flat(0.25),
         3 => super::surfaces::hills(0.15, i as u64),

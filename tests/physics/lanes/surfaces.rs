@@ -37,16 +37,6 @@ pub fn hills(spacing: f64, seed: u64) -> Arc<dyn Terrain> {
     waves(spacing, seed)
 }
 
-/// Rough ground, with bumps of one to a few cells.
-pub fn rough(spacing: f64, seed: u64) -> Arc<dyn Terrain> {
-    let waves = [1.0, 2.3, 5.1].map(|k| k / spacing);
-    let phase = seed as f64;
-    map(spacing, |x, z| {
-        let all = waves.map(|k| (k * x + phase).sin() * (1.3 * k * z - phase).cos());
-        0.1 * spacing * all.iter().sum::<f64>()
-    })
-}
-
 pub fn hills_with_rocks(seed: u64) -> Arc<dyn Terrain> {
     let hills = waves(0.2, seed);
     let rocks = Rocks {
