@@ -5,9 +5,9 @@
 
 #![allow(dead_code, clippy::unwrap_used)] // each program uses some of them; the record is ours
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
-use rover_core::geometry::{Plane, SphereField, Terrain};
+use rover_core::geometry::{HeightField, Plane, SphereField, Terrain};
 use rover_core::integrator::{StepError, StepOptions, StepReport};
 use rover_core::multibody::{Model, coordinates};
 use rover_core::simulation::RoverSimulation;
@@ -26,16 +26,22 @@ pub enum Ground {
     Cylinders,
     /// The same wheels with fully rounded edges.
     Tori,
+    /// Rough hills with cells of 0.25 m, wheels that touch at 0.20 m.
+    Hills,
+    /// The same hills with cells of 0.05 m, and the roughness that those can show.
+    FineHills,
 }
 
 impl Ground {
     /// All grounds.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 7] = [
         Self::Plane,
         Self::LargeWheels,
         Self::Rocks,
         Self::Cylinders,
         Self::Tori,
+        Self::Hills,
+        Self::FineHills,
     ];
 
     /// Name in tables and on command lines.
@@ -46,6 +52,17 @@ impl Ground {
             Self::Rocks => "rocks",
             Self::Cylinders => "plane, cylinders",
             Self::Tori => "plane, tori",
+            Self::Hills => "hills, cells 0.25 m",
+            Self::FineHills => "hills, cells 0.05 m",
+        }
+    }
+
+    /// Distance of the heights of its map, m.
+    const fn spacing(self) -> Option<f64> {
+        match self {
+            Self::Plane | Self::LargeWheels | Self::Rocks | Self::Cylinders | Self::Tori => None,
+            Self::Hills => Some(0.25),
+            Self::FineHills => Some(0.05),
         }
     }
 
@@ -54,7 +71,7 @@ impl Ground {
         match self {
             Self::Cylinders => Some([0.15, 0.0]),
             Self::Tori => Some([0.15, 0.075]),
-            Self::Plane | Self::LargeWheels | Self::Rocks => None,
+            Self::Plane | Self::LargeWheels | Self::Rocks | Self::Hills | Self::FineHills => None,
         }
     }
 
@@ -110,17 +127,17 @@ impl Drive {
         self.commands.len()
     }
 
-    /// Gives one of the commands.
-    pub fn give(&mut self, command: usize) {
-        let Command { torques, steering } = &self.commands[command];
-        self.simulation.set_wheel_torques(torques).unwrap();
-        self.simulation.set_steering(steering).unwrap();
+    /// Torques and steering of one of the commands.
+    pub fn command(&self, command: usize) -> ([f64; 6], [f64; 6]) {
+        let Command { torques, steering } = self.commands[command];
+        (torques, steering)
     }
 
-    /// Torques and set-points of one of the commands.
-    pub fn command(&self, command: usize) -> ([f64; 6], [f64; 6]) {
-        let Command { torques, steering } = &self.commands[command];
-        (*torques, *steering)
+    /// Gives one of the commands.
+    pub fn give(&mut self, command: usize) {
+        let (torques, steering) = self.command(command);
+        self.simulation.set_wheel_torques(&torques).unwrap();
+        self.simulation.set_steering(&steering).unwrap();
     }
 
     /// Plays the whole drive.
@@ -172,6 +189,18 @@ fn drive(record: &Value, ground: Ground, torque: f64, options: &StepOptions) -> 
         q = numbers(&record["q"]);
         terrain = Arc::new(rocks(record));
     }
+    if let Some(spacing) = ground.spacing() {
+        static HILLS: [OnceLock<HeightField>; 2] = [const { OnceLock::new() }; 2];
+        let made = &HILLS[usize::from(ground == Ground::FineHills)];
+        let hills = made.get_or_init(|| hills(spacing)).clone();
+        let around =
+            (-4..=4).flat_map(|i| (-4..=4).map(move |j| [i, j].map(|k| 0.2 * f64::from(k))));
+        let highest = around
+            .filter_map(|[x, z]| hills.height(x, z))
+            .fold(0.0, f64::max);
+        q[1] += highest;
+        terrain = Arc::new(hills);
+    }
     let commands = record["actions"].as_array().unwrap().iter().map(|row| {
         let row = numbers(row);
         Command {
@@ -200,6 +229,37 @@ fn rocks(record: &Value) -> SphereField {
     let radii: Vec<f64> = spheres.iter().map(|s| s[3]).collect();
     let plane = Plane::new(normal, 0.0).unwrap();
     SphereField::new(&centres, &radii, Some(plane)).unwrap()
+}
+
+/// Side of the hills, m, their longest wave, m, and the waves of an octave.
+const SIDE: f64 = 20.0;
+const LONGEST: f64 = 8.0;
+const OCTAVE: f64 = 8.0;
+
+/// Self-affine hills of exponent 0.7: a sum of waves in all directions, down to those of two cells.
+/// They are no wilder than `HeightField.fractal(40.0, spacing, 0.15, longest_wave=20.0)` in Python.
+pub fn hills(spacing: f64) -> HeightField {
+    let waves: Vec<[f64; 4]> = (0..)
+        .map(|n| (f64::from(n), LONGEST * (-f64::from(n) / OCTAVE).exp2()))
+        .take_while(|(_, length)| *length >= 2.0 * spacing)
+        .map(|(n, length)| {
+            let (sine, cosine) = (2.4 * n).sin_cos();
+            let k = std::f64::consts::TAU / length;
+            [k * cosine, k * sine, n * n, 0.009 * length.powf(0.7)]
+        })
+        .collect();
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few hundred
+    let n = (SIDE / spacing).round() as usize + 1;
+    let place = |k: usize| spacing * k as f64 - 0.5 * SIDE;
+    let height = |x: f64, z: f64| {
+        let waves = waves.iter();
+        let all = waves.map(|[k, l, phase, size]| size * (k * x + l * z + phase).sin());
+        all.sum::<f64>()
+    };
+    #[allow(clippy::cast_possible_truncation)] // a map is single
+    let heights = (0..n * n).map(|at| height(place(at % n), place(at / n)) as f32);
+    let corner = [-0.5 * SIDE; 2];
+    HeightField::new(heights.collect(), [n, n], [spacing; 2], corner).unwrap()
 }
 
 fn numbers(list: &Value) -> Vec<f64> {

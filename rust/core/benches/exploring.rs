@@ -3,7 +3,9 @@
 //!
 //! It only reports. The drives are those of `tests/comparison/exploring.json`: random torques and
 //! set-points, redrawn every ten steps of 5 ms. A time is the median of eleven rounds; each plays
-//! all drives at both tolerances. `-- --json GROUND TORQUE` measures one scene and prints JSON, for
+//! all drives at both tolerances. A batch has 64 rovers, all drives eight times over with commands
+//! in another order; its time is a rover's. Steps that the general code took count as general.
+//! `-- --json GROUND TORQUE` measures one scene and prints JSON, for
 //! `make bench`, which sets other figures beside these.
 
 #![allow(clippy::print_stdout, clippy::unwrap_used)] // prints; stops at an impossible scene
@@ -15,8 +17,9 @@ mod exploring_scenes;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use exploring_scenes::{Drive, Ground, TORQUES, drives};
-use rover_core::integrator::{StepError, StepOptions};
+use exploring_scenes::{Drive, Ground, STEPS_A_COMMAND, TORQUES, drives};
+use rover_core::integrator::{Phase, Probe, StepError, StepOptions};
+use rover_core::simulation::Batch;
 use rover_core::solver::SolverOptions;
 use serde_json::{Value, json};
 
@@ -25,6 +28,10 @@ const TOLERANCES: [f64; 2] = [1e-12, 1e-6];
 
 const ROUNDS: usize = 11;
 
+/// Rovers of a batch, and how far apart in a record copies of a drive begin.
+const ROVERS: usize = 64;
+const SHIFT: usize = 13;
+
 /// Number of steps by the size of something.
 type Histogram = BTreeMap<usize, usize>;
 
@@ -32,7 +39,11 @@ type Histogram = BTreeMap<usize, usize>;
 struct Measured {
     /// Microseconds a step at each tolerance.
     microseconds: [f64; 2],
+    /// The same of a rover in a batch, at the first tolerance.
+    batch_microseconds: f64,
     steps: usize,
+    /// Steps that the general code took.
+    general: usize,
     not_converged: usize,
     iterations: Histogram,
     factorisations: Histogram,
@@ -61,26 +72,82 @@ fn time(drives: &[Drive]) -> Result<f64, StepError> {
     Ok(1e6 * seconds / steps as f64)
 }
 
+/// Microseconds a step of a rover in a batch on one thread.
+fn time_of_batch(drives: &[Drive]) -> f64 {
+    let rovers = (0..ROVERS).map(|i| drives[i % drives.len()].simulation.clone());
+    let mut batch = Batch::new(rovers.collect(), Vec::new(), Some(1)).unwrap();
+    let mut rows = vec![0.0; ROVERS * batch.layout().size()];
+    let n_commands = drives[0].n_commands();
+    let mut seconds = 0.0;
+    for command in 0..n_commands {
+        let (mut torques, mut steering) = (Vec::new(), Vec::new());
+        for i in 0..ROVERS {
+            let place = (command + SHIFT * (i / drives.len())) % n_commands;
+            let (own_torques, own_steering) = drives[i % drives.len()].command(place);
+            torques.extend(own_torques);
+            steering.extend(own_steering);
+        }
+        let start = Instant::now();
+        batch
+            .step(&torques, &steering, STEPS_A_COMMAND, None, &mut rows)
+            .unwrap();
+        seconds += start.elapsed().as_secs_f64();
+    }
+    1e6 * seconds / (ROVERS * n_commands * STEPS_A_COMMAND) as f64
+}
+
+/// Counts how often a step was begun.
+struct Begun(usize);
+
+impl Probe for Begun {
+    fn end(&mut self, phase: Phase) {
+        self.0 += usize::from(phase == Phase::Kinematics);
+    }
+}
+
+/// Steps of a drive that were begun anew by the general code.
+fn count_general(mut drive: Drive) -> Result<usize, StepError> {
+    let mut general = 0;
+    for command in 0..drive.n_commands() {
+        drive.give(command);
+        for _ in 0..STEPS_A_COMMAND {
+            let mut begun = Begun(0);
+            drive.simulation.step_probed(1, &mut begun)?;
+            general += usize::from(begun.0 > 1);
+        }
+    }
+    Ok(general)
+}
+
+fn median(mut times: Vec<f64>) -> f64 {
+    times.sort_by(f64::total_cmp);
+    times[times.len() / 2]
+}
+
 fn measure(ground: Ground, torque: f64) -> Result<Measured, StepError> {
     let drives = TOLERANCES.map(|tolerance| drives(ground, torque, &options(tolerance)));
     let mut times = [Vec::new(), Vec::new()];
-    for _ in 0..ROUNDS {
+    let mut in_batch = Vec::new();
+    for round in 0..ROUNDS {
+        if round % 4 == 0 {
+            in_batch.push(time_of_batch(&drives[0]));
+        }
         for (times, drives) in times.iter_mut().zip(&drives) {
             times.push(time(drives)?);
         }
     }
     let mut measured = Measured {
-        microseconds: times.map(|mut times| {
-            times.sort_by(f64::total_cmp);
-            times[ROUNDS / 2]
-        }),
+        microseconds: times.map(median),
+        batch_microseconds: median(in_batch),
         steps: 0,
+        general: 0,
         not_converged: 0,
         iterations: Histogram::new(),
         factorisations: Histogram::new(),
         pivots: Histogram::new(),
     };
     for drive in &drives[0] {
+        measured.general += count_general(drive.clone())?;
         drive.clone().play_by_step(|report| {
             measured.steps += 1;
             measured.not_converged += usize::from(!report.is_converged());
@@ -122,7 +189,9 @@ fn as_json(measured: &Measured) -> Value {
     json!({
         "tolerances": TOLERANCES,
         "microseconds": measured.microseconds,
+        "batch_microseconds": measured.batch_microseconds,
         "steps": measured.steps,
+        "general": measured.general,
         "not_converged": measured.not_converged,
         "iterations": iterations,
         "factorisations": factorisations,
@@ -143,24 +212,28 @@ fn main() -> Result<(), StepError> {
         return Ok(());
     }
     println!(
-        "{:<22} {:>6} {:>9} {:>9} {:>6} {:^20} {:^20} {:^20}",
+        "{:<22} {:>6} {:>9} {:>9} {:>9} {:>7} {:>6} {:^20} {:^20} {:^20}",
         "exploring, 5 ms",
         "N m",
         "us, 1e-12",
         "us, 1e-6",
+        "us, batch",
+        "general",
         "failed",
         "iterations",
         "factors",
         "pivots"
     );
-    println!("{:<56} {}", "", "  mean med 99% most  ".repeat(3));
+    println!("{:<74} {}", "", "  mean med 99% most  ".repeat(3));
     for ground in Ground::ALL {
         for torque in TORQUES {
             let measured = measure(ground, torque)?;
             let [fine, coarse] = measured.microseconds;
             println!(
-                "{:<22} {torque:>6} {fine:>9.2} {coarse:>9.2} {:>6}  {}   {}   {}",
+                "{:<22} {torque:>6} {fine:>9.2} {coarse:>9.2} {:>9.2} {:>7} {:>6}  {}   {}   {}",
                 ground.name(),
+                measured.batch_microseconds,
+                measured.general,
                 measured.not_converged,
                 summary(&measured.iterations),
                 summary(&measured.factorisations),

@@ -2,7 +2,9 @@
 
 use std::time::Instant;
 
-use rover_core::geometry::{HeightField, OrientedBox, Terrain, TerrainError, TriangleMesh};
+use rover_core::geometry::{
+    HeightField, Neighbourhood, OrientedBox, PlacedShape, Terrain, TerrainError, TriangleMesh,
+};
 use rover_core::nalgebra::{Matrix3, Vector3};
 
 fn visited(field: &HeightField, reach: f64) -> (usize, usize) {
@@ -151,8 +153,9 @@ fn a_box_above_a_fine_surface_examines_only_what_is_near_its_sides() {
             };
             let (mut around, mut near) = (0, 0);
             let reach = solid.half_size.norm();
-            ground.visit_around(&solid.centre, reach, &solid.grown(1e-3), &mut |_, _| {
-                around += 1;
+            let (shape, base) = (PlacedShape::Box(solid), Vector3::zeros());
+            ground.visit_around(&Neighbourhood::new(&shape, &base, 1e-3), &mut |_, _| {
+                around += 1
             });
             ground.visit_near(&solid.centre, reach, &mut |_, _| near += 1);
             (around, near)

@@ -12,7 +12,7 @@ use crate::geometry::query::{
     SurfacePoint, box_sphere, disc_sphere, dispatch, is_lowest, roller_sphere, sphere_sphere,
 };
 use crate::geometry::{
-    Coverage, Disc, PlacedShape, Primitive, Roller, Sphere, SupportMap, Terrain,
+    Coverage, Disc, Neighbourhood, PlacedShape, Primitive, Roller, Sphere, SupportMap, Terrain,
 };
 use crate::multibody::{Kinematics, Model};
 
@@ -217,39 +217,37 @@ fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Ga
     if let Coverage::Unknown(place) = terrain.coverage(&(base + centre), bound) {
         gate.unknown = Some(place);
     }
-    let around = placed.shape.bounding_box(base).grown(gate.reach);
+    let around = Neighbourhood {
+        motion,
+        ..Neighbourhood::new(&placed.shape, base, gate.reach)
+    };
     let first = gate.out.len();
     let shallow = OverSurfaces::shallow(&placed.shape);
     gate.ways.clear();
-    terrain.visit_around(
-        &(base + centre),
-        bound + gate.reach + motion,
-        &around,
-        &mut |id, primitive| match primitive {
-            Primitive::Plane(plane) => {
-                dispatch::visit_on_plane(&placed.shape, plane, base, gate.reach, |point| {
-                    gate.offer(&placed, point, id);
-                });
+    terrain.visit_around(&around, &mut |id, primitive| match primitive {
+        Primitive::Plane(plane) => {
+            dispatch::visit_on_plane(&placed.shape, plane, base, gate.reach, |point| {
+                gate.offer(&placed, point, id);
+            });
+        }
+        Primitive::Sphere(sphere) => {
+            let between = sphere.centre - base - centre;
+            if is_far(&placed.shape, &between, sphere.radius + gate.reach + motion) {
+                return;
             }
-            Primitive::Sphere(sphere) => {
-                let between = sphere.centre - base - centre;
-                if is_far(&placed.shape, &between, sphere.radius + gate.reach + motion) {
-                    return;
-                }
-                let near = dispatch::point_on_sphere(&placed.shape, sphere, base);
-                gate.offer_sphere(&placed, (id, sphere), &near, motion, || {
-                    touch(&placed, end, model, sphere, base, &half_way)
-                });
-            }
-            piece => {
-                let piece = (terrain, id, piece);
-                visit_on_surface(&placed.shape, piece, base, gate.reach, |point| {
-                    gate.ways.add(id, point, shallow);
-                    gate.offer(&placed, &on_surface(point), id);
-                });
-            }
-        },
-    );
+            let near = dispatch::point_on_sphere(&placed.shape, sphere, base);
+            gate.offer_sphere(&placed, (id, sphere), &near, motion, || {
+                touch(&placed, end, model, sphere, base, &half_way)
+            });
+        }
+        piece => {
+            let piece = (terrain, id, piece);
+            visit_on_surface(&placed.shape, piece, base, gate.reach, |point| {
+                gate.ways.add(id, point, shallow);
+                gate.offer(&placed, &on_surface(point), id);
+            });
+        }
+    });
     if gate.ways.are_doubtful() {
         let shape = &placed.shape;
         let part = OverSurfaces {

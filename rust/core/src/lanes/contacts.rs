@@ -1,12 +1,12 @@
 //! Contacts of the wheels with the ground, in slots, and those of joints with their stops.
 //!
-//! A wheel with one circle, a thin disc or a torus, has two slots: most touch the plane or a
-//! sphere, some both or two spheres. A wheel with two circles has four: one for each circle on the
-//! plane, and two for spheres. A slot is filled lane by lane; rovers that share it may touch
-//! different things there. Detection at the midpoint of the step and relocation to its end follow
-//! [`crate::contact`] and [`crate::geometry::query`]. With the unit normal n, the unit axle s and
-//! the rolling direction `t = n × s / |n × s|`, the lowest point of a circle over a plane lies
-//! along `t × s` from its centre.
+//! A wheel with one circle, a thin disc or a torus, has three slots: most touch the plane or a
+//! sphere, some both or two spheres, and on rough maps two or three pieces. A wheel with two
+//! circles has four: one for each circle on the plane, and two for spheres. A slot is filled lane
+//! by lane; rovers that share it may touch different things there. Detection at the midpoint of
+//! the step and relocation to its end follow [`crate::contact`] and [`crate::geometry::query`].
+//! With the unit normal n, the unit axle s and the rolling direction `t = n × s / |n × s|`, the
+//! lowest point of a circle over a plane lies along `t × s` from its centre.
 //!
 //! What is rare is declined: a wheel that nearly lies flat, passes a sphere within the step or
 //! touches more things than it has slots, a box near the ground, more contacts than a problem has.
@@ -425,7 +425,6 @@ impl<T: Lane> Contacts<T> {
         let mut declined = T::mask(self.token, 0);
         let (first, is_line) = (wheel.slots.start, wheel.n_circles() > 1);
         let mut plane = (ground.normal, sight.height);
-        let mut has_second = false;
         if ground.has_surfaces() {
             let origin = sight.middle.origin;
             declined = ground.find_footing(w, (origin, centre, s), wheel.radius, reach);
@@ -433,7 +432,6 @@ impl<T: Lane> Contacts<T> {
                 declined = declined | ground.on_surface();
             }
             plane = ground.under_wheel(w, 0, origin);
-            has_second = ground.has_second_plane(w);
         }
         let none = T::mask(self.token, 0);
         for slot in &mut self.slots[wheel.slots.clone()] {
@@ -446,10 +444,14 @@ impl<T: Lane> Contacts<T> {
             let (admitted, lies) = self.stands((w, 1), plane, sight, (s, centre), reach);
             self.slots[first + 1].active = admitted;
             declined = declined | lies;
-        } else if has_second {
-            let plane = ground.under_wheel(w, 1, sight.middle.origin);
+        }
+        for k in 1..PLANES {
+            if is_line || !ground.has_plane(w, k) {
+                break;
+            }
+            let plane = ground.under_wheel(w, k, sight.middle.origin);
             let (admitted, lies) = self.stands((w, 0), plane, sight, (s, centre), reach);
-            self.slots[first + 1].active = admitted;
+            self.slots[first + k].active = admitted;
             declined = declined | lies;
         }
         if ground.has_spheres() {

@@ -1,38 +1,35 @@
-//! What a wheel stands on where the ground is a surface: at most two planes for each rover.
+//! What a wheel stands on where the ground is a surface: up to [`SLOTS`] planes for each rover.
 //!
 //! A plane is that of a face under the wheel, or the one through a convex edge or vertex with the
 //! contact's normal. Where all pieces near a wheel lie in one plane the wheel keeps it until it has
 //! moved further than the search looked ahead, and costs what a wheel on a plane costs. Elsewhere
-//! it keeps the numbers of the pieces that it may soon touch, and these are examined at every step,
-//! rover by rover. A wheel that three pieces could touch is declined.
+//! the pieces are searched at every step, rover by rover, and of those that the wheel overlaps the
+//! ones count that lead out of the ground, as in [`crate::contact`]. A wheel on more than [`SLOTS`]
+//! of them is declined.
 
 use std::sync::Arc;
 
 use nalgebra::Vector3;
 
 use crate::contact::detection::visit_on_surface;
-use crate::contact::ways_out::OverSurfaces;
-use crate::geometry::query::disc_clearance::{TURNING, clearance};
+use crate::contact::ways_out::{OverSurfaces, WaysOut};
 use crate::geometry::query::dispatch::{point_at_edge, point_at_vertex};
 use crate::geometry::query::{NEAREST, SurfacePoint};
-use crate::geometry::{Coverage, Disc, PlacedShape, Plane, Primitive, Terrain};
+use crate::geometry::{Coverage, Disc, Neighbourhood, PlacedShape, Plane, Primitive, Terrain};
 use crate::scalar::{Lane, MAX_LANES, Vec3};
 
 /// How far beyond its reach a search for a plane looks, m. Twice as far examines four times as many
 /// pieces and searches half as often.
 const AHEAD: f64 = 0.1;
 
-/// The same of a search for pieces, m.
-const AHEAD_FOR_PIECES: f64 = 0.02;
-
-/// Most pieces near a wheel that are kept. With more they are searched at every step.
-const MAX_PIECES: usize = 24;
-
 /// Covers the rounding of distances, m.
 const ROUNDING: f64 = 1e-6;
 
+/// Most points at which a wheel and the pieces of a surface are compared.
+const MOST_POINTS: usize = 12;
+
 /// Slots of a wheel.
-pub const SLOTS: usize = 2;
+pub const SLOTS: usize = 3;
 
 /// A plane under a wheel.
 #[derive(Clone, Copy, Debug)]
@@ -58,73 +55,8 @@ pub struct Footing<T> {
     within: [f64; MAX_LANES],
     /// Lanes where it found a plane.
     flat: u32,
-    /// Lanes with a second plane.
-    double: u32,
-    nearby: [Nearby; MAX_LANES],
-}
-
-/// The pieces that a rover's wheel may soon touch.
-#[derive(Clone, Debug)]
-struct Nearby {
-    /// The wheel when they were searched: its centre, world, m, and its axle.
-    from: Vector3<f64>,
-    axle: Vector3<f64>,
-    /// They are all with a clearance of at most this, m.
-    within: f64,
-    /// Their numbers in the terrain and clearances, m, in the order of the terrain.
-    pieces: [(u32, f64); MAX_PIECES],
-    n: usize,
-}
-
-impl Nearby {
-    const NOTHING: Self = Self {
-        from: Vector3::new(0.0, 0.0, 0.0),
-        axle: Vector3::new(0.0, 0.0, 0.0),
-        within: f64::NEG_INFINITY,
-        pieces: [(0, 0.0); MAX_PIECES],
-        n: 0,
-    };
-
-    /// Visits all pieces that the wheel may touch with a gap of at most `reach`, m, and others.
-    fn visit(
-        &mut self,
-        terrain: &dyn Terrain,
-        disc: &Disc,
-        base: &Vector3<f64>,
-        reach: f64,
-        mut visit: impl FnMut(u32, &Primitive),
-    ) {
-        let centre = base + disc.centre;
-        let turn = (disc.axle - self.axle).norm() * disc.radius * TURNING;
-        let need = (centre - self.from).norm() + turn + reach + ROUNDING;
-        if need <= self.within {
-            for &(id, clearance) in &self.pieces[..self.n] {
-                if clearance <= need {
-                    visit(id, &terrain.primitive(id));
-                }
-            }
-            return;
-        }
-        let within = reach + ROUNDING + AHEAD_FOR_PIECES;
-        (self.from, self.axle, self.n) = (centre, disc.axle, 0);
-        self.within = within;
-        terrain.visit_near(&centre, disc.radius + within, &mut |id, piece| {
-            let clearance = clearance(disc, piece, base);
-            if clearance > within {
-                return;
-            }
-            match self.pieces.get_mut(self.n) {
-                Some(place) => {
-                    *place = (id, clearance);
-                    self.n += 1;
-                }
-                None => self.within = f64::NEG_INFINITY,
-            }
-            if clearance <= reach + ROUNDING {
-                visit(id, piece);
-            }
-        });
-    }
+    /// Lanes with planes beyond the first, slot by slot.
+    filled: [u32; SLOTS],
 }
 
 /// The wheels of a block at one instant, lane by lane; coordinates relative to `base`.
@@ -168,8 +100,7 @@ impl<T: Lane> Footing<T> {
             from: [Vector3::zeros(); MAX_LANES],
             within: [f64::NEG_INFINITY; MAX_LANES],
             flat: 0,
-            double: 0,
-            nearby: [Nearby::NOTHING; MAX_LANES],
+            filled: [0; SLOTS],
         }
     }
 
@@ -182,8 +113,7 @@ impl<T: Lane> Footing<T> {
         self.planes[0].offset.set(lane, offset);
         self.within[lane] = f64::NEG_INFINITY;
         self.flat &= !(1 << lane);
-        self.double &= !(1 << lane);
-        self.nearby[lane].within = f64::NEG_INFINITY;
+        self.empty(lane);
     }
 
     /// Finds the planes of all lanes on a surface; `reach` (m) as for a plane. Returns the lanes
@@ -228,7 +158,7 @@ impl<T: Lane> Footing<T> {
         let (disc, base) = wheels.disc(lane);
         let centre = base + disc.centre;
         self.flat &= !own;
-        self.double &= !own;
+        self.empty(lane);
         for plane in &mut self.planes {
             plane.clear(lane);
         }
@@ -247,33 +177,60 @@ impl<T: Lane> Footing<T> {
             }
         }
         let shape = PlacedShape::Disc(disc);
-        let Self { planes, nearby, .. } = self;
-        let (mut count, mut is_deep, mut has_excess) = (0, false, false);
+        let (mut found, mut n) = ([None; MOST_POINTS], 0);
+        let mut ways = WaysOut::default();
         let shallow = OverSurfaces::shallow(&shape);
         let part = OverSurfaces {
             shape: &shape,
             terrain,
             base: &base,
         };
-        nearby[lane].visit(terrain, &disc, &base, reach, |id, piece| {
+        let around = Neighbourhood::new(&shape, &base, reach);
+        terrain.visit_around(&around, &mut |id, piece| {
             visit_on_surface(&shape, (terrain, id, piece), &base, reach, |point| {
-                if let Some(own) = planes.get_mut(count) {
-                    own.stand_on(lane, id, piece, point, &base);
+                ways.add(id, point, shallow);
+                if let Some(place) = found.get_mut(n) {
+                    *place = Some((id, *piece, *point));
                 }
-                count += 1;
-                is_deep |= point.gap < -shallow;
-                has_excess |= part.excess((id, piece), point) > 0.0;
+                n += 1;
             });
         });
-        self.double |= u32::from(count > 1) << lane;
-        // Of several deep points the general step finds out which count.
-        !has_excess && (count <= 1 || (count <= SLOTS && !is_deep))
+        if n > MOST_POINTS {
+            return false;
+        }
+        let is_doubtful = ways.are_doubtful();
+        if is_doubtful {
+            ways.sift(&part);
+        }
+        let mut count = 0;
+        for (id, piece, point) in found.iter().flatten() {
+            if is_doubtful && !ways.counts(&part, *id, point) {
+                continue;
+            }
+            if part.excess((*id, piece), point) > 0.0 {
+                return false;
+            }
+            if let Some(own) = self.planes.get_mut(count) {
+                own.stand_on(lane, *id, piece, point, &base);
+            }
+            count += 1;
+        }
+        for filled in &mut self.filled[..count.min(SLOTS)] {
+            *filled |= own;
+        }
+        count <= SLOTS
     }
 
-    /// Whether any lane has a second plane.
+    /// Whether any lane has a plane in a slot beyond the first.
     #[inline(always)]
-    pub fn has_second(&self) -> bool {
-        self.double != 0
+    pub fn has_plane(&self, slot: usize) -> bool {
+        self.filled[slot] != 0
+    }
+
+    fn empty(&mut self, lane: usize) {
+        for filled in &mut self.filled {
+            *filled &= !(1 << lane);
+        }
     }
 }
 

@@ -13,7 +13,7 @@ use super::footing::{Footing, Wheels};
 use crate::contact::box_clearance::over_surfaces;
 use crate::contact::detection::visit_on_surface;
 use crate::geometry::query::sweep::DEEP;
-use crate::geometry::{Coverage, OrientedBox, PlacedShape, Sphere, Terrain};
+use crate::geometry::{Coverage, Neighbourhood, OrientedBox, PlacedShape, Sphere, Terrain};
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Mat3, Vec3};
 
 /// Most spheres near a wheel. A wheel near more is declined.
@@ -267,10 +267,10 @@ impl<T: Lane> Ground<T> {
         (plane.normal, plane.normal.dot(x) + plane.offset)
     }
 
-    /// Whether any rover's wheel has a second one.
+    /// Whether any rover's wheel has a plane under a slot beyond the first.
     #[inline(always)]
-    pub(super) fn has_second_plane(&self, wheel: usize) -> bool {
-        self.footings[wheel].has_second()
+    pub(super) fn has_plane(&self, wheel: usize, slot: usize) -> bool {
+        self.has_surfaces && self.footings[wheel].has_plane(slot)
     }
 
     /// Whether a rover's ground is a surface.
@@ -531,8 +531,8 @@ fn over_surface(
     let shape = PlacedShape::Box(*solid);
     let reach = near.reach + ROUNDING;
     let mut touches = false;
-    let around = solid.grown(reach);
-    field.visit_around(&solid.centre, bound + reach, &around, &mut |id, piece| {
+    let around = Neighbourhood::new(&shape, &nowhere, reach);
+    field.visit_around(&around, &mut |id, piece| {
         visit_on_surface(&shape, (field, id, piece), &nowhere, reach, |_| {
             touches = true;
         });

@@ -11,6 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use nalgebra::{Matrix3, Vector3};
 use thiserror::Error;
 
+use super::footing::SLOTS as PLANES;
 use super::pattern::Pattern;
 use super::problem::MAX_CONTACTS;
 use super::stops::SIDES;
@@ -524,7 +525,7 @@ impl WheelDisc {
     /// Number of its slots for contacts.
     #[must_use]
     pub fn n_slots(&self) -> usize {
-        2 * self.n_circles()
+        if self.n_circles() > 1 { 4 } else { PLANES }
     }
 
     /// Radius of a bounding ball about its centre.

@@ -22,7 +22,6 @@ pub mod box_sphere;
 pub mod box_triangle;
 pub mod convex;
 pub mod disc_box;
-pub mod disc_clearance;
 pub mod disc_disc;
 pub mod disc_plane;
 pub mod disc_sphere;

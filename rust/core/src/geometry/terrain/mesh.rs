@@ -12,11 +12,11 @@ use super::error::TerrainError;
 use super::limits::check_entry;
 use super::plane::Plane;
 use super::surface::{Edge, Face, Hinge, MAX_SPOKES, Vertex, Wall};
-use super::{Coverage, GROUND, Primitive, Terrain};
+use super::{Coverage, GROUND, Neighbourhood, Primitive, Terrain};
 use crate::geometry::broad_phase::{BallTree, Bounds, BoxTree};
 use crate::geometry::ray::triangle::Sheared;
 use crate::geometry::ray::{Hit, Ray};
-use crate::geometry::shape::{OrientedBox, Sphere};
+use crate::geometry::shape::Sphere;
 use crate::scalar::elementary::sin_cos;
 
 /// Most triangles of a mesh.
@@ -383,14 +383,9 @@ impl Terrain for TriangleMesh {
         self.visit_triangles(centre, reach, |t| self.visit_pieces(t, visit));
     }
 
-    fn visit_around(
-        &self,
-        centre: &Vector3<f64>,
-        reach: f64,
-        solid: &OrientedBox,
-        visit: &mut dyn FnMut(u32, &Primitive),
-    ) {
-        self.visit_triangles(centre, reach, |t| {
+    fn visit_around(&self, part: &Neighbourhood<'_>, visit: &mut dyn FnMut(u32, &Primitive)) {
+        let solid = part.solid();
+        self.visit_triangles(&part.centre, part.radius(), |t| {
             let corners = self.triangles[t as usize].map(|v| self.vertices[v as usize]);
             if !solid.is_clear_of(&corners, || [self.normals[t as usize]]) {
                 self.visit_pieces(t, visit);

@@ -8,6 +8,7 @@ mod half_space;
 pub mod height_field;
 pub mod limits;
 pub mod mesh;
+mod neighbourhood;
 pub mod plane;
 pub mod rocks;
 pub mod sphere_field;
@@ -20,6 +21,7 @@ use nalgebra::Vector3;
 pub use error::TerrainError;
 pub use height_field::HeightField;
 pub use mesh::TriangleMesh;
+pub use neighbourhood::Neighbourhood;
 pub use plane::Plane;
 pub use rocks::{Clearing, Rocks};
 pub use sphere_field::SphereField;
@@ -27,7 +29,7 @@ pub use surface::{Edge, Face, Vertex};
 pub use union::Union;
 
 use super::ray::{Hit, Ray};
-use super::shape::{OrientedBox, Sphere};
+use super::shape::Sphere;
 
 /// A convex piece of ground whose distance to every shape has a closed form.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,16 +70,10 @@ pub trait Terrain: Send + Sync {
     /// must not depend on distant ones.
     fn visit_near(&self, centre: &Vector3<f64>, reach: f64, visit: &mut dyn FnMut(u32, &Primitive));
 
-    /// The same, but pieces of a surface that are clear of a box (world, m) may be left out; see
-    /// [`OrientedBox::is_clear_of`].
-    fn visit_around(
-        &self,
-        centre: &Vector3<f64>,
-        reach: f64,
-        _solid: &OrientedBox,
-        visit: &mut dyn FnMut(u32, &Primitive),
-    ) {
-        self.visit_near(centre, reach, visit);
+    /// Visits every primitive that a part may touch, as [`Self::visit_near`] does. Pieces of a
+    /// surface that are clear of the part or out of its reach may be left out.
+    fn visit_around(&self, part: &Neighbourhood<'_>, visit: &mut dyn FnMut(u32, &Primitive)) {
+        self.visit_near(&part.centre, part.radius(), visit);
     }
 
     /// The same of spheres alone.

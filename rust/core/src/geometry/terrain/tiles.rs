@@ -1,4 +1,4 @@
-//! Bounds of the tiles of a height field, level by level.
+//! Bounds of the tiles of a height field, level by level: height and slope.
 //!
 //! A tile of the first level has 16 x 16 cells, one of each further level 4 x 4 tiles of that
 //! before, up to a single one. A search descends from the top, so it costs the tiles that it finds
@@ -10,10 +10,12 @@ const FIRST: usize = 16;
 /// Tiles of one level along the side of a tile of the next.
 const FACTOR: usize = 4;
 
-/// Highest point of a tile, and whether a height is missing.
+/// Highest point of a tile, the square of its faces' steepest slope, and whether a height is
+/// missing.
 #[derive(Clone, Copy, Debug)]
 struct Bound {
     highest: f32,
+    steepest: f32,
     has_hole: bool,
 }
 
@@ -45,8 +47,8 @@ pub(in crate::geometry) struct Tiles {
 }
 
 impl Tiles {
-    /// Of a map of `columns` x `rows` heights.
-    pub(super) fn new(heights: &[f32], columns: usize, rows: usize) -> Self {
+    /// Of a map of `columns` x `rows` heights at a spacing (dx, dz, m).
+    pub(super) fn new(heights: &[f32], [columns, rows]: [usize; 2], spacing: [f64; 2]) -> Self {
         let cells = [columns - 1, rows - 1];
         let [wide, high] = cells.map(|n| n.div_ceil(FIRST));
         let mut bounds = Vec::with_capacity(wide * high);
@@ -54,11 +56,16 @@ impl Tiles {
             for column in 0..wide {
                 let mut bound = Bound::NOTHING;
                 let (begin, end) = (column * FIRST, (column * FIRST + FIRST + 1).min(columns));
-                for j in row * FIRST..(row * FIRST + FIRST + 1).min(rows) {
-                    for &h in &heights[j * columns + begin..j * columns + end] {
+                let (top, bottom) = (row * FIRST, (row * FIRST + FIRST + 1).min(rows));
+                let of = |j: usize| &heights[j * columns + begin..j * columns + end];
+                for j in top..bottom {
+                    for &h in of(j) {
                         bound.highest = bound.highest.max(h);
                         bound.has_hole |= h.is_nan();
                     }
+                }
+                for j in top..bottom - 1 {
+                    bound.climb(of(j), of(j + 1), spacing);
                 }
                 bounds.push(bound);
             }
@@ -109,6 +116,28 @@ impl Tiles {
             let highest = level.bounds[row * level.columns + column].highest;
             wants(first, size, highest).then_some((first, size))
         })
+    }
+
+    /// Bound on the square of the slope (dy/dx, dy/dz) of all faces in ranges of columns and rows of
+    /// cells (first and last).
+    #[inline]
+    pub(super) fn steepest(&self, columns: [usize; 2], rows: [usize; 2]) -> f64 {
+        let few = |level: &&Level| {
+            let [w, h] = [columns, rows].map(|[a, b]| b / level.side - a / level.side + 1);
+            w * h <= FACTOR
+        };
+        let Some(level) = self.levels.iter().find(few).or(self.levels.last()) else {
+            return f64::INFINITY;
+        };
+        let mut steepest = 0.0_f32;
+        for row in rows[0] / level.side..=rows[1] / level.side {
+            let first = row * level.columns;
+            let tiles = first + columns[0] / level.side..=first + columns[1] / level.side;
+            steepest = level.bounds[tiles]
+                .iter()
+                .fold(steepest, |s, own| s.max(own.steepest));
+        }
+        f64::from(steepest)
     }
 
     /// Bytes.
@@ -189,6 +218,7 @@ impl Level {
             let (row, column) = (at / self.columns / FACTOR, at % self.columns / FACTOR);
             let own = &mut bounds[row * columns + column];
             own.highest = own.highest.max(bound.highest);
+            own.steepest = own.steepest.max(bound.steepest);
             own.has_hole |= bound.has_hole;
         }
         Self {
@@ -203,6 +233,22 @@ impl Level {
 impl Bound {
     const NOTHING: Self = Self {
         highest: f32::NEG_INFINITY,
+        steepest: 0.0,
         has_hole: false,
     };
+
+    /// Takes in the slopes of the faces between two rows of heights.
+    fn climb(&mut self, near: &[f32], far: &[f32], spacing: [f64; 2]) {
+        let [along, across] = spacing.map(|d| (1.0 / d) as f32);
+        for (near, far) in near.windows(2).zip(far.windows(2)) {
+            let slope = |rise: f32, run: f32| (rise * run) * (rise * run);
+            let low = slope(near[1] - near[0], along) + slope(far[1] - near[1], across);
+            let high = slope(far[1] - far[0], along) + slope(far[0] - near[0], across);
+            // Of a face without data it is not a number, which no maximum is.
+            self.steepest = self.steepest.max(low * ROUND_UP).max(high * ROUND_UP);
+        }
+    }
 }
+
+/// More than the rounding of a slope.
+const ROUND_UP: f32 = 1.0 + 1e-5;

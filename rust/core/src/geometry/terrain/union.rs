@@ -7,9 +7,9 @@ use nalgebra::Vector3;
 
 use super::error::TerrainError;
 use super::plane::Plane;
-use super::{Coverage, Primitive, Terrain};
+use super::{Coverage, Neighbourhood, Primitive, Terrain};
 use crate::geometry::ray::{Hit, Ray};
-use crate::geometry::shape::{OrientedBox, Sphere};
+use crate::geometry::shape::Sphere;
 
 /// Everything that any of several terrains has. Immutable.
 ///
@@ -82,17 +82,9 @@ impl Terrain for Union {
         }
     }
 
-    fn visit_around(
-        &self,
-        centre: &Vector3<f64>,
-        reach: f64,
-        solid: &OrientedBox,
-        visit: &mut dyn FnMut(u32, &Primitive),
-    ) {
-        for (part, first) in self.parts.iter().zip(&self.first) {
-            part.visit_around(centre, reach, solid, &mut |id, primitive| {
-                visit(first + id, primitive);
-            });
+    fn visit_around(&self, part: &Neighbourhood<'_>, visit: &mut dyn FnMut(u32, &Primitive)) {
+        for (own, first) in self.parts.iter().zip(&self.first) {
+            own.visit_around(part, &mut |id, primitive| visit(first + id, primitive));
         }
     }
 

@@ -10,6 +10,8 @@
 //! along z, 4 the diagonal, 5 the vertex. Faces are computed when they are needed, so the map costs
 //! four bytes a height, and a hundredth of that for the bounds of tiles.
 
+mod neighbourhood;
+mod pieces;
 mod terrain;
 
 use std::sync::Arc;
@@ -19,8 +21,6 @@ use nalgebra::Vector3;
 use super::Primitive;
 use super::error::TerrainError;
 use super::limits::MAX_SIZE;
-use super::plane::Plane;
-use super::surface::{Edge, Face, Hinge, MAX_SPOKES, Vertex};
 use super::tiles::{Tile, Tiles};
 
 /// Pieces that belong to one corner.
@@ -28,9 +28,6 @@ const PIECES: u32 = 6;
 
 /// Most heights: their pieces are numbered with 32 bits.
 pub const MAX_HEIGHTS: usize = (u32::MAX / PIECES) as usize;
-
-/// Neighbours of a vertex: columns and rows.
-const SPOKES: [[isize; 2]; 6] = [[1, 0], [1, 1], [0, 1], [-1, 0], [-1, -1], [0, -1]];
 
 /// A map of heights. Immutable.
 #[derive(Clone, Debug)]
@@ -55,6 +52,22 @@ pub(in crate::geometry) enum Half {
     Low,
     /// u < v.
     High,
+}
+
+impl Half {
+    /// Unit normal, from the heights of its corners: of the cell's, the one that is its own, and
+    /// the last; None without them. `spacing`: dx, dz, m.
+    #[inline]
+    fn normal(self, [a, other, d]: [f64; 3], [dx, dz]: [f64; 2]) -> Option<Vector3<f64>> {
+        let (x, z) = match self {
+            Self::Low => ((other - a) / dx, (d - other) / dz),
+            Self::High => ((d - other) / dx, (other - a) / dz),
+        };
+        let square = 1.0 + x * x + z * z;
+        square
+            .is_finite()
+            .then(|| Vector3::new(-x, 1.0, -z) / square.sqrt())
+    }
 }
 
 /// A cell or corner: column and row, which may be off the map.
@@ -125,7 +138,7 @@ impl HeightField {
                 limit: MAX_SIZE,
             });
         }
-        let tiles = Tiles::new(&heights, columns, rows);
+        let tiles = Tiles::new(&heights, [columns, rows], spacing);
         let field = Self {
             material: None,
             heights,
@@ -224,18 +237,11 @@ impl HeightField {
         floor: f64,
         mut visit: impl FnMut(usize, usize),
     ) {
-        let along = |axis: usize, x: f64| (x - self.origin[axis]) / self.spacing[axis];
-        let local = [along(0, centre.x), along(1, centre.z)];
-        let range = |axis: usize, n: usize| {
-            let half = reach / self.spacing[axis];
-            let last = (n - 2) as f64;
-            let low = (local[axis] - half).floor().max(0.0);
-            let high = (local[axis] + half).floor().min(last);
-            (low <= high).then(|| [index(low), index(high)])
-        };
-        let (Some(columns), Some(rows)) = (range(0, self.columns), range(1, self.rows)) else {
+        let Some([columns, rows]) = self.cells_within(centre, [reach; 2]) else {
             return;
         };
+        let along = |axis: usize, x: f64| (x - self.origin[axis]) / self.spacing[axis];
+        let local = [along(0, centre.x), along(1, centre.z)];
         // Lowest height of the ball over a rectangle of cells.
         let bottom = |[i, j]: [usize; 2], [w, h]: [usize; 2]| {
             let beyond = |axis: usize, first: usize, n: usize| {
@@ -310,191 +316,20 @@ impl HeightField {
     #[inline]
     fn normal(&self, [i, j]: Place, half: Half) -> Option<Vector3<f64>> {
         let (a, d) = (self.corner([i, j]), self.corner([i + 1, j + 1]));
-        let [dx, dz] = self.spacing;
-        let (x, z) = match half {
-            Half::Low => {
-                let b = self.corner([i + 1, j]);
-                ((b - a) / dx, (d - b) / dz)
-            }
-            Half::High => {
-                let c = self.corner([i, j + 1]);
-                ((d - c) / dx, (c - a) / dz)
-            }
+        let other = match half {
+            Half::Low => self.corner([i + 1, j]),
+            Half::High => self.corner([i, j + 1]),
         };
-        let square = 1.0 + x * x + z * z;
-        square
-            .is_finite()
-            .then(|| Vector3::new(-x, 1.0, -z) / square.sqrt())
-    }
-
-    /// Normals of a cell's faces and of those beyond its sides.
-    #[inline]
-    fn normals_around(&self, [i, j]: Place) -> Around {
-        Around {
-            low: self.normal([i, j], Half::Low),
-            high: self.normal([i, j], Half::High),
-            before: self.normal([i, j - 1], Half::High),
-            left: self.normal([i - 1, j], Half::Low),
-            right: self.normal([i + 1, j], Half::High),
-            behind: self.normal([i, j + 1], Half::Low),
-        }
-    }
-
-    /// End of the edge k = 2, 3, 4 of a corner.
-    #[inline]
-    fn end([i, j]: Place, k: u32) -> Place {
-        match k {
-            2 => [i + 1, j],
-            3 => [i, j + 1],
-            _ => [i + 1, j + 1],
-        }
-    }
-
-    /// The hinge at an edge of a face, from the normals of its two faces in the order of [`Hinge`];
-    /// a face without a neighbour there is bounded as if the surface went on flat.
-    #[inline]
-    fn hinge(&self, (place, k): (Place, u32), normals: Normals) -> Option<Hinge> {
-        let normals = match &normals {
-            [Some(first), Some(second)] => [first, second],
-            [Some(own), None] | [None, Some(own)] => [own, own],
-            [None, None] => return None,
-        };
-        Some(Hinge::new(
-            &self.point(place),
-            &self.point(Self::end(place, k)),
-            normals,
-        ))
-    }
-
-    /// The hinges at the cell's near edges along x and z, its diagonal, and its far edges along z
-    /// and x.
-    #[inline]
-    fn hinges(&self, [i, j]: Place, around: &Around) -> [Option<Hinge>; 5] {
-        let edges = [
-            ([i, j], 2),
-            ([i, j], 3),
-            ([i, j], 4),
-            ([i + 1, j], 3),
-            ([i, j + 1], 2),
-        ];
-        let faces = [
-            [around.before, around.low],
-            [around.high, around.left],
-            [around.low, around.high],
-            [around.right, around.low],
-            [around.high, around.behind],
-        ];
-        std::array::from_fn(|k| self.hinge(edges[k], faces[k]))
-    }
-
-    /// A face of a cell.
-    #[inline]
-    fn face(
-        &self,
-        place: Place,
-        half: Half,
-        around: &Around,
-        hinges: &[Option<Hinge>; 5],
-    ) -> Option<Face> {
-        let wall = |hinge: usize, side: usize| hinges[hinge].as_ref().map(|h| h.walls[side]);
-        let (n, walls) = match half {
-            Half::Low => (around.low?, [wall(0, 1)?, wall(3, 1)?, wall(2, 0)?]),
-            Half::High => (around.high?, [wall(4, 0)?, wall(1, 0)?, wall(2, 1)?]),
-        };
-        Some(Face {
-            plane: Plane::through(&self.point(place), n),
-            walls,
-        })
-    }
-
-    /// The edge k = 2, 3, 4 of a corner, if it is convex.
-    #[inline]
-    fn edge(&self, place: Place, k: u32, around: &Around) -> Option<Edge> {
-        let normals = match k {
-            2 => [around.before?, around.low?],
-            3 => [around.high?, around.left?],
-            _ => [around.low?, around.high?],
-        };
-        let (start, end) = (self.point(place), self.point(Self::end(place, k)));
-        let hinge = Hinge::new(&start, &end, [&normals[0], &normals[1]]);
-        if !hinge.is_convex {
-            return None;
-        }
-        let length = (end - start).norm();
-        Some(Edge {
-            start,
-            along: (end - start) / length,
-            length,
-            normals,
-        })
+        half.normal([a, other, d], self.spacing)
     }
 
     /// Visits the pieces that belong to a corner.
     fn visit_pieces(&self, [i, j]: [usize; 2], visit: &mut dyn FnMut(u32, &Primitive)) {
-        let own = [narrow(i), narrow(j)];
         let first = number(j * self.columns + i);
-        let around = self.normals_around(own);
-        let hinges = self.hinges(own, &around);
-        for (k, half) in [(0, Half::Low), (1, Half::High)] {
-            if let Some(face) = self.face(own, half, &around, &hinges) {
-                visit(first + k, &Primitive::Face(face));
-            }
-        }
-        for (k, hinge) in (2..5).zip(&hinges) {
-            let is_convex = hinge.as_ref().is_some_and(|hinge| hinge.is_convex);
-            if let Some(edge) = is_convex.then(|| self.edge(own, k, &around)).flatten() {
-                visit(first + k, &Primitive::Edge(edge));
-            }
-        }
-        if let Some(vertex) = self.vertex(own) {
-            visit(first + 5, &Primitive::Vertex(vertex));
-        }
-    }
-
-    /// A vertex that may be convex.
-    #[inline]
-    fn vertex(&self, place: Place) -> Option<Vertex> {
-        let height = self.corner(place);
-        let [i, j] = place;
-        let mut is_flat = true;
-        for [di, dj] in &SPOKES[..3] {
-            let mean = 0.5 * (self.corner([i + di, j + dj]) + self.corner([i - di, j - dj]));
-            // Not convex where the height beside it is not known either.
-            let may_be_convex = height >= mean;
-            if !may_be_convex {
-                return None;
-            }
-            is_flat &= height <= mean;
-        }
-        if is_flat {
-            return None;
-        }
-        let own = self.point(place);
-        let mut spokes = [Vector3::zeros(); MAX_SPOKES];
-        for (spoke, [di, dj]) in spokes.iter_mut().zip(SPOKES) {
-            *spoke = self.point([i + di, j + dj]) - own;
-        }
-        Some(Vertex {
-            place: own,
-            spokes,
-            n: SPOKES.len(),
-        })
-    }
-
-    /// A piece of a corner.
-    fn piece(&self, place: Place, k: u32) -> Option<Primitive> {
-        match k {
-            0 | 1 => {
-                let half = if k == 0 { Half::Low } else { Half::High };
-                let around = self.normals_around(place);
-                let hinges = self.hinges(place, &around);
-                self.face(place, half, &around, &hinges)
-                    .map(Primitive::Face)
-            }
-            5 => self.vertex(place).map(Primitive::Vertex),
-            _ => {
-                let around = self.normals_around(place);
-                self.edge(place, k, &around).map(Primitive::Edge)
+        let patch = self.patch([i, j]);
+        for k in 0..PIECES {
+            if let Some(piece) = patch.piece(k) {
+                visit(first + k, &piece);
             }
         }
     }
@@ -513,20 +348,6 @@ impl HeightField {
         let ((i, u), (j, v)) = (cell(0, x, self.columns)?, cell(1, z, self.rows)?);
         Some(([i, j], [u, v]))
     }
-}
-
-/// Unit normals of two faces; None off the map or in a hole.
-type Normals = [Option<Vector3<f64>>; 2];
-
-/// Unit normals of a cell's two faces and of the four beside it, which lie before and behind it
-/// along z, and left and right of it along x.
-struct Around {
-    low: Option<Vector3<f64>>,
-    high: Option<Vector3<f64>>,
-    before: Option<Vector3<f64>>,
-    behind: Option<Vector3<f64>>,
-    left: Option<Vector3<f64>>,
-    right: Option<Vector3<f64>>,
 }
 
 /// Smallest spacing, m.

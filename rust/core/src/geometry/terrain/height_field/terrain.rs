@@ -6,8 +6,8 @@ use nalgebra::Vector3;
 
 use super::{Half, HeightField, PIECES, index, narrow, number};
 use crate::geometry::ray::{self, Hit, Ray};
-use crate::geometry::shape::{OrientedBox, Sphere, SupportMap};
-use crate::geometry::terrain::{Coverage, GROUND, Plane, Primitive, Terrain};
+use crate::geometry::shape::Sphere;
+use crate::geometry::terrain::{Coverage, GROUND, Neighbourhood, Plane, Primitive, Terrain};
 
 impl Terrain for HeightField {
     fn visit_spheres(&self, _: &Vector3<f64>, _: f64, _: &mut dyn FnMut(u32, &Sphere)) {}
@@ -21,26 +21,8 @@ impl Terrain for HeightField {
         self.visit_cells(centre, reach, |i, j| self.visit_pieces([i, j], visit));
     }
 
-    fn visit_around(
-        &self,
-        centre: &Vector3<f64>,
-        reach: f64,
-        solid: &OrientedBox,
-        visit: &mut dyn FnMut(u32, &Primitive),
-    ) {
-        let floor = solid.support(&-Vector3::y()).y;
-        self.visit_cells_above(centre, reach, floor, |i, j| {
-            let own = [narrow(i), narrow(j)];
-            let corners = [[0, 0], [1, 0], [0, 1], [1, 1]];
-            let corners = corners.map(|[u, v]| self.point([own[0] + u, own[1] + v]));
-            let normals = || {
-                let half = |half| self.normal(own, half).unwrap_or_else(Vector3::y);
-                [half(Half::Low), half(Half::High)]
-            };
-            if !solid.is_clear_of(&corners, normals) {
-                self.visit_pieces([i, j], visit);
-            }
-        });
+    fn visit_around(&self, part: &Neighbourhood<'_>, visit: &mut dyn FnMut(u32, &Primitive)) {
+        self.visit_pieces_around(part, visit);
     }
 
     fn level_near(&self, centre: &Vector3<f64>, radius: f64) -> Option<Plane> {
@@ -67,8 +49,8 @@ impl Terrain for HeightField {
 
     fn primitive(&self, id: u32) -> Primitive {
         let corner = (id / PIECES) as usize;
-        let place = [narrow(corner % self.columns), narrow(corner / self.columns)];
-        let piece = self.piece(place, id % PIECES);
+        let patch = self.patch([corner % self.columns, corner / self.columns]);
+        let piece = patch.piece(id % PIECES);
         piece.unwrap_or_else(|| unreachable!("invariant: piece {id} was visited"))
     }
 
