@@ -239,7 +239,7 @@ const OCTAVE: f64 = 8.0;
 /// Self-affine hills of exponent 0.7: a sum of waves in all directions, down to those of two cells.
 /// They are no wilder than `HeightField.fractal(40.0, spacing, 0.15, longest_wave=20.0)` in Python.
 pub fn hills(spacing: f64) -> HeightField {
-    let waves: Vec<[f64; 4]> = (0..)
+    let waves: Vec<[f64; 4]> = (0..u8::MAX)
         .map(|n| (f64::from(n), LONGEST * (-f64::from(n) / OCTAVE).exp2()))
         .take_while(|(_, length)| *length >= 2.0 * spacing)
         .map(|(n, length)| {

@@ -155,7 +155,7 @@ fn a_box_above_a_fine_surface_examines_only_what_is_near_its_sides() {
             let reach = solid.half_size.norm();
             let (shape, base) = (PlacedShape::Box(solid), Vector3::zeros());
             ground.visit_around(&Neighbourhood::new(&shape, &base, 1e-3), &mut |_, _| {
-                around += 1
+                around += 1;
             });
             ground.visit_near(&solid.centre, reach, &mut |_, _| near += 1);
             (around, near)

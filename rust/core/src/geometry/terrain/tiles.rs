@@ -239,6 +239,7 @@ impl Bound {
 
     /// Takes in the slopes of the faces between two rows of heights.
     fn climb(&mut self, near: &[f32], far: &[f32], spacing: [f64; 2]) {
+        #[allow(clippy::cast_possible_truncation)] // slopes are bounded as heights are kept: single
         let [along, across] = spacing.map(|d| (1.0 / d) as f32);
         for (near, far) in near.windows(2).zip(far.windows(2)) {
             let slope = |rise: f32, run: f32| (rise * run) * (rise * run);
