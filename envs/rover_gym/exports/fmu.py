@@ -72,7 +72,7 @@ def write_fmu(
         OptionError: The library has not been built, or `axes` is none of the two.
         OSError: The file cannot be written.
     """
-    if axes not in AXES:
+    if not isinstance(axes, str) or axes not in AXES:
         refuse(OptionError, "axes", axes, f"must be one of {', '.join(AXES)}")
     library = fmu_library()
     variables = unit_variables(simulation, axes)

@@ -14,7 +14,6 @@ use thiserror::Error;
 use super::footing::SLOTS as PLANES;
 use super::pattern::Pattern;
 use super::problem::MAX_CONTACTS;
-use super::stops::SIDES;
 #[cfg(doc)]
 use crate::geometry::Roller;
 use crate::law::compliance::Compliance;
@@ -27,6 +26,9 @@ use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Most wheels and joints with stops: the operator of a block has room for contacts of all of them.
 pub const MOST_PARTS: usize = 32;
+
+/// Slots of a joint with stops.
+pub const SIDES: usize = 2;
 
 /// Why a machine has no ordinary step.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]

@@ -403,33 +403,45 @@ impl<T: Lane> Rows<T> {
                         continue;
                     }
                     for &column in &contacts.used()[..=i] {
-                        let of_column = contacts.places(column);
-                        let [first @ .., last] = &self.W[at];
-                        let (mut rows, mut ends) = ([[0.0; 8]; MAX_LANES], [0.0; MAX_LANES]);
-                        T::transpose(first, &mut rows);
-                        last.store(&mut ends[..T::LANES]);
-                        if contacts.is_full() {
-                            for (lane, problem) in problems.iter_mut().enumerate() {
-                                let out = &mut problem.W[at];
-                                out[..8].copy_from_slice(&rows[lane]);
-                                out[8] = ends[lane];
-                            }
-                        } else {
-                            let both = contacts.slot(row).active & contacts.slot(column).active;
-                            each::<T>(
-                                both,
-                                #[inline(always)]
-                                |lane| {
-                                    let (c, d) = (of_row[lane], of_column[lane]);
-                                    let out = &mut problems[lane].W[block(c.into(), d.into())];
-                                    out[..8].copy_from_slice(&rows[lane]);
-                                    out[8] = ends[lane];
-                                },
-                            );
-                        }
+                        self.write_block(contacts, [row, column], at, problems);
                         at += 1;
                     }
                 }
+            },
+        );
+    }
+
+    /// Writes the block of W of two slots, which is at `at`.
+    #[inline(always)]
+    fn write_block(
+        &self,
+        contacts: &Contacts<T>,
+        [row, column]: [usize; 2],
+        at: usize,
+        problems: &mut [ContactProblem],
+    ) {
+        let (of_row, of_column) = (contacts.places(row), contacts.places(column));
+        let [first @ .., last] = &self.W[at];
+        let (mut rows, mut ends) = ([[0.0; 8]; MAX_LANES], [0.0; MAX_LANES]);
+        T::transpose(first, &mut rows);
+        last.store(&mut ends[..T::LANES]);
+        if contacts.is_full() {
+            for (lane, problem) in problems.iter_mut().enumerate() {
+                let out = &mut problem.W[at];
+                out[..8].copy_from_slice(&rows[lane]);
+                out[8] = ends[lane];
+            }
+            return;
+        }
+        let both = contacts.slot(row).active & contacts.slot(column).active;
+        each::<T>(
+            both,
+            #[inline(always)]
+            |lane| {
+                let (c, d) = (of_row[lane], of_column[lane]);
+                let out = &mut problems[lane].W[block(c.into(), d.into())];
+                out[..8].copy_from_slice(&rows[lane]);
+                out[8] = ends[lane];
             },
         );
     }

@@ -4,14 +4,11 @@
 
 use super::contacts::Contacts;
 use super::forecast::Forecast;
-use super::machine::{LinkJoint, Machine, Stop};
+use super::machine::{LinkJoint, Machine, SIDES, Stop};
 use super::place::Place;
 use super::poses::Poses;
 use crate::contact::Side;
 use crate::scalar::{Lane, LaneMask};
-
-/// Slots of a joint with stops.
-pub(super) const SIDES: usize = 2;
 
 impl<T: Lane> Contacts<T> {
     /// The joint whose stop a slot is, and the side, if it is one.

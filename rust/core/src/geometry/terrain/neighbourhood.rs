@@ -68,9 +68,9 @@ impl<'a> Neighbourhood<'a> {
         }
     }
 
-    /// Whether the whole shape is further from a plane than `reach` (m), whatever the rounding. `m`:
-    /// a normal of the plane of length at least 1; `height`: of the shape's centre over the plane,
-    /// in units of that length, m.
+    /// Whether the whole shape is further from a plane than `reach` (m), whatever the rounding.
+    /// `m`: a normal of the plane of length at least 1; `height`: of the shape's centre over the
+    /// plane, in units of that length, m.
     #[inline]
     pub(super) fn is_beyond(&self, m: &Vector3<f64>, height: f64, reach: f64) -> bool {
         let square = m.norm_squared();

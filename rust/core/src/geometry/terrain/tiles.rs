@@ -118,8 +118,8 @@ impl Tiles {
         })
     }
 
-    /// Bound on the square of the slope (dy/dx, dy/dz) of all faces in ranges of columns and rows of
-    /// cells (first and last).
+    /// Bound on the square of the slope (dy/dx, dy/dz) of all faces in ranges of columns and rows
+    /// of cells (first and last).
     #[inline]
     pub(super) fn steepest(&self, columns: [usize; 2], rows: [usize; 2]) -> f64 {
         let few = |level: &&Level| {
