@@ -46,7 +46,7 @@ def fmu_library() -> Path:
     return path
 
 
-@checked(simulation="Simulation", path=Path, name=str, description=str)
+@checked(simulation="Simulation", path=Path, name=str, description=str, axes=str)
 def write_fmu(
     simulation: Simulation,
     path: str | Path,
@@ -72,7 +72,7 @@ def write_fmu(
         OptionError: The library has not been built, or `axes` is none of the two.
         OSError: The file cannot be written.
     """
-    if not isinstance(axes, str) or axes not in AXES:
+    if axes not in AXES:
         refuse(OptionError, "axes", axes, f"must be one of {', '.join(AXES)}")
     library = fmu_library()
     variables = unit_variables(simulation, axes)
