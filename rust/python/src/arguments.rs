@@ -142,6 +142,11 @@ pub fn number(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<f64
 
 /// A whole number that is not negative.
 pub fn whole(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<u64> {
+    if let Ok(plain) = value.cast_exact::<PyInt>()
+        && let Ok(count) = plain.extract()
+    {
+        return Ok(count);
+    }
     let is_whole = match scalar_kind(value) {
         Some(letter) => "iu".contains(letter),
         None => value.is_instance_of::<PyInt>() && !value.is_instance_of::<PyBool>(),

@@ -45,6 +45,9 @@ pub fn array<'py>(
     kind: Kind,
     field: &str,
 ) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
+    if let Ok(ready) = value.cast::<PyArrayDyn<f64>>() {
+        return Ok(ready.readonly());
+    }
     let py = value.py();
     let refuse = |e: &PyErr| BorderError {
         kind,

@@ -1,6 +1,6 @@
 //! A friction-contact problem as users give it: `W` dense or sparse, `mu` one number or many.
 
-use numpy::PyUntypedArrayMethods;
+use numpy::{PyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use rover_core::problem::{BlockSparseDelassus, Dimension, ProblemError};
@@ -17,7 +17,8 @@ pub enum Delassus {
 impl Delassus {
     /// A square array, one of SciPy's sparse arrays, or block rows `(indptr, indices, data)`.
     pub fn read(W: &Bound<'_, PyAny>, dimension: Dimension) -> PyResult<Self> {
-        if W.hasattr("tobsr")? {
+        let is_array = W.is_instance_of::<PyArrayDyn<f64>>();
+        if !is_array && W.hasattr("tobsr")? {
             return Self::read_scipy(W, dimension);
         }
         if let Ok(rows) = W.cast::<PyTuple>()
