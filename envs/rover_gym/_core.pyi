@@ -15,8 +15,7 @@ from typing_extensions import disjoint_base
 _Array: TypeAlias = npt.NDArray[np.float64]
 _Rows: TypeAlias = npt.NDArray[np.uint64]
 _Observation: TypeAlias = npt.NDArray[np.float32]
-_Terrain: TypeAlias = "Plane | SphereField | HeightField | TriangleMesh | Union"
-_Terrains: TypeAlias = Sequence[_Terrain]
+_Terrains: TypeAlias = "Sequence[Terrain]"
 _Coordinates: TypeAlias = Literal["report", "state"]
 _Range: TypeAlias = tuple[float, float]
 _Outcome: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike, str]
@@ -76,6 +75,7 @@ __all__ = [
     "StateError",
     "StepError",
     "StepReport",
+    "Terrain",
     "TerrainError",
     "TriangleMesh",
     "TwoWheelRoverSimulation",
@@ -589,9 +589,7 @@ class RoverModel:
             StateError: `q` has a wrong length or an entry that is not finite.
             OptionError: `coordinates` is neither of the two.
         """
-    def wheel_gaps(
-        self, q: npt.ArrayLike, terrain: _Terrain | _Terrains, coordinates: _Coordinates = "state"
-    ) -> _Array:
+    def wheel_gaps(self, q: npt.ArrayLike, terrain: Terrain | _Terrains, coordinates: _Coordinates = "state") -> _Array:
         """The distance of each wheel to the terrain.
 
         Args:
@@ -607,7 +605,7 @@ class RoverModel:
             TerrainError: `terrain` is not a terrain.
             OptionError: `coordinates` is neither of the two.
         """
-    def resting_pose(self, terrain: _Terrain | _Terrains, position: Sequence[float], heading: float) -> _Array:
+    def resting_pose(self, terrain: Terrain | _Terrains, position: Sequence[float], heading: float) -> _Array:
         """The coordinates of the rover at rest on a terrain.
 
         On a plane the joints are at zero, the trunk is upright along the normal with its origin
@@ -630,7 +628,7 @@ class RoverModel:
             StateError: A number is not finite, or the plane is vertical.
         """
     def wheel_contact_points(
-        self, q: npt.ArrayLike, terrain: _Terrain | _Terrains, coordinates: _Coordinates = "state"
+        self, q: npt.ArrayLike, terrain: Terrain | _Terrains, coordinates: _Coordinates = "state"
     ) -> _Array:
         """The point of each wheel's rim that is nearest to the terrain.
 
@@ -648,7 +646,7 @@ class RoverModel:
             OptionError: `coordinates` is neither of the two.
         """
     def wheel_jacobians(
-        self, q: npt.ArrayLike, terrain: _Terrain | _Terrains, coordinates: _Coordinates = "state"
+        self, q: npt.ArrayLike, terrain: Terrain | _Terrains, coordinates: _Coordinates = "state"
     ) -> _Array:
         """The contact Jacobian of each wheel: u = J v is the velocity of its contact point.
 
@@ -695,8 +693,48 @@ class RoverModel:
         """
     def __reduce__(self) -> Any: ...
 
+@disjoint_base
+class Terrain:
+    """Ground of any kind. Immutable.
+
+    `Plane`, `SphereField`, `HeightField`, `TriangleMesh` and `Union` are its kinds.
+    """
+
+    def heights(self, points: npt.ArrayLike) -> _Array:
+        """The height of the visible surface at places of the map.
+
+        Args:
+            points: Places (x, z), (m, 2), m.
+
+        Returns:
+            Heights y, (m,), m; nan where there is no ground or no data.
+
+        Raises:
+            TerrainError: `points` has a wrong shape.
+        """
+    def cast_rays(
+        self, origins: npt.ArrayLike, directions: npt.ArrayLike, max_range: float | None = None
+    ) -> tuple[_Array, _Array]:
+        """Where rays meet the ground first.
+
+        A surface is met from either side. What depth cameras and laser scanners measure.
+
+        Args:
+            origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
+            directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
+            max_range: Distance to which they are followed, m; without end by default.
+
+        Returns:
+            Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
+            world frame, (n, 3), nan where nothing is met.
+
+        Raises:
+            OptionError: An array has a wrong shape or an entry that is not finite, a direction is
+                zero, an origin is beyond 1e6 m, or `max_range` is not positive.
+        """
+
 @final
-class Plane:
+class Plane(Terrain):
     """A plane as ground: the half-space `normal · x + offset >= 0` is free, the ground lies below.
 
     A normal of unit length is taken as it is, so a plane's own `normal` and `offset` make the same
@@ -746,30 +784,10 @@ class Plane:
         Raises:
             TerrainError: The plane is vertical, or an argument is not a number.
         """
-    def cast_rays(
-        self, origins: npt.ArrayLike, directions: npt.ArrayLike, max_range: float | None = None
-    ) -> tuple[_Array, _Array]:
-        """Where rays meet the ground first.
-
-        A surface is met from either side. What depth cameras and laser scanners measure.
-
-        Args:
-            origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
-            directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
-            max_range: Distance to which they are followed, m; without end by default.
-
-        Returns:
-            Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
-            world frame, (n, 3), nan where nothing is met.
-
-        Raises:
-            OptionError: An array has a wrong shape or an entry that is not finite, a direction is
-                zero, an origin is beyond 1e6 m, or `max_range` is not positive.
-        """
     def __reduce__(self) -> Any: ...
 
 @final
-class SphereField:
+class SphereField(Terrain):
     """Fixed spheres, with or without a plane under them. Immutable.
 
     Args:
@@ -820,7 +838,7 @@ class SphereField:
         max_diameter: float = 0.5,
         min_diameter: float = 0.05,
         burial: float | tuple[float, float] | None = None,
-        ground: _Terrain | _Terrains | None = None,
+        ground: Terrain | _Terrains | None = None,
         clear: npt.ArrayLike | None = None,
         material: str = "rock",
     ) -> SphereField:
@@ -861,43 +879,11 @@ class SphereField:
     @property
     def ground(self) -> Plane | None:
         """The plane under the spheres, or None."""
-    def heights(self, points: npt.ArrayLike) -> _Array:
-        """The height of the visible surface at places of the map.
-
-        Args:
-            points: Places (x, z), (m, 2), m.
-
-        Returns:
-            Heights y, (m,), m; nan where there is no ground.
-
-        Raises:
-            TerrainError: `points` has a wrong shape.
-        """
-    def cast_rays(
-        self, origins: npt.ArrayLike, directions: npt.ArrayLike, max_range: float | None = None
-    ) -> tuple[_Array, _Array]:
-        """Where rays meet the ground first.
-
-        A surface is met from either side. What depth cameras and laser scanners measure.
-
-        Args:
-            origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
-            directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
-            max_range: Distance to which they are followed, m; without end by default.
-
-        Returns:
-            Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
-            world frame, (n, 3), nan where nothing is met.
-
-        Raises:
-            OptionError: An array has a wrong shape or an entry that is not finite, a direction is
-                zero, an origin is beyond 1e6 m, or `max_range` is not positive.
-        """
     def __len__(self) -> int: ...
     def __reduce__(self) -> Any: ...
 
 @final
-class HeightField:
+class HeightField(Terrain):
     """A map of heights as ground: two triangles a cell, solid below. Immutable.
 
     Row j and column i stand at z = origin[1] + j spacing[1] and x = origin[0] + i spacing[0]. Each
@@ -1026,42 +1012,10 @@ class HeightField:
     @property
     def bounds(self) -> tuple[float, float, float, float]:
         """Corners x_min, z_min, x_max, z_max of the map, m."""
-    def heights(self, points: npt.ArrayLike) -> _Array:
-        """The height of the surface at places of the map.
-
-        Args:
-            points: Places (x, z), (m, 2), m.
-
-        Returns:
-            Heights y, (m,), m; nan off the map and where there is no data.
-
-        Raises:
-            TerrainError: `points` has a wrong shape.
-        """
-    def cast_rays(
-        self, origins: npt.ArrayLike, directions: npt.ArrayLike, max_range: float | None = None
-    ) -> tuple[_Array, _Array]:
-        """Where rays meet the ground first.
-
-        A surface is met from either side. What depth cameras and laser scanners measure.
-
-        Args:
-            origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
-            directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
-            max_range: Distance to which they are followed, m; without end by default.
-
-        Returns:
-            Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
-            world frame, (n, 3), nan where nothing is met.
-
-        Raises:
-            OptionError: An array has a wrong shape or an entry that is not finite, a direction is
-                zero, an origin is beyond 1e6 m, or `max_range` is not positive.
-        """
     def __reduce__(self) -> tuple[Any, ...]: ...
 
 @final
-class TriangleMesh:
+class TriangleMesh(Terrain):
     """A mesh of triangles as ground: rocks, or anything else that stands still. Immutable.
 
     Triangles turn counterclockwise, seen from outside. A closed mesh is solid; an open one is
@@ -1122,43 +1076,11 @@ class TriangleMesh:
     @property
     def is_closed(self) -> bool:
         """Whether no triangle has a free border."""
-    def heights(self, points: npt.ArrayLike) -> _Array:
-        """The height of the highest triangle that faces up at places of the map.
-
-        Args:
-            points: Places (x, z), (m, 2), m.
-
-        Returns:
-            Heights y, (m,), m; nan where there is none.
-
-        Raises:
-            TerrainError: `points` has a wrong shape.
-        """
-    def cast_rays(
-        self, origins: npt.ArrayLike, directions: npt.ArrayLike, max_range: float | None = None
-    ) -> tuple[_Array, _Array]:
-        """Where rays meet the ground first.
-
-        A surface is met from either side. What depth cameras and laser scanners measure.
-
-        Args:
-            origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
-            directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
-            max_range: Distance to which they are followed, m; without end by default.
-
-        Returns:
-            Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
-            world frame, (n, 3), nan where nothing is met.
-
-        Raises:
-            OptionError: An array has a wrong shape or an entry that is not finite, a direction is
-                zero, an origin is beyond 1e6 m, or `max_range` is not positive.
-        """
     def __len__(self) -> int: ...
     def __reduce__(self) -> tuple[Any, ...]: ...
 
 @final
-class Union:
+class Union(Terrain):
     """Several terrains as one ground: a map with rocks on it, say. Immutable.
 
     A rover touches whatever of them it meets. Where a part has a plane, the ground is known
@@ -1173,40 +1095,8 @@ class Union:
 
     def __new__(cls, parts: _Terrains) -> Union: ...
     @property
-    def parts(self) -> list[_Terrain]:
+    def parts(self) -> list[Terrain]:
         """The terrains, in the order they were given."""
-    def heights(self, points: npt.ArrayLike) -> _Array:
-        """The height of the visible surface at places of the map.
-
-        Args:
-            points: Places (x, z), (m, 2), m.
-
-        Returns:
-            Heights y, (m,), m; nan where there is no ground.
-
-        Raises:
-            TerrainError: `points` has a wrong shape.
-        """
-    def cast_rays(
-        self, origins: npt.ArrayLike, directions: npt.ArrayLike, max_range: float | None = None
-    ) -> tuple[_Array, _Array]:
-        """Where rays meet the ground first.
-
-        A surface is met from either side. What depth cameras and laser scanners measure.
-
-        Args:
-            origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
-            directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
-            max_range: Distance to which they are followed, m; without end by default.
-
-        Returns:
-            Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
-            world frame, (n, 3), nan where nothing is met.
-
-        Raises:
-            OptionError: An array has a wrong shape or an entry that is not finite, a direction is
-                zero, an origin is beyond 1e6 m, or `max_range` is not positive.
-        """
     def __len__(self) -> int: ...
     def __reduce__(self) -> tuple[Any, ...]: ...
 
@@ -1607,7 +1497,7 @@ class Simulation:
     def __new__(
         cls,
         model: RoverModel | None = None,
-        terrain: _Terrain | _Terrains | None = None,
+        terrain: Terrain | _Terrains | None = None,
         *,
         gravity: npt.ArrayLike | None = None,
         friction: float = 0.7,
@@ -1629,7 +1519,7 @@ class Simulation:
     def model(self) -> RoverModel:
         """The machine."""
     @property
-    def terrain(self) -> _Terrain:
+    def terrain(self) -> Terrain:
         """The ground."""
     @property
     def time(self) -> float:
@@ -2733,7 +2623,7 @@ class EpisodeDistribution:
         trunk_load_limit: float,
         rocks: Mapping[str, Any] | None = None,
         slope_by_difficulty: bool = False,
-        ground: _Terrain | _Terrains | None = None,
+        ground: Terrain | _Terrains | None = None,
         hills: float | None = None,
     ) -> EpisodeDistribution: ...
     def draw(
@@ -3575,7 +3465,7 @@ class GrainSimulation:
         walls: npt.ArrayLike | None = None,
         wall_velocity: npt.ArrayLike | None = None,
         vessel: Drum | Silo | None = None,
-        terrain: _Terrain | _Terrains | None = None,
+        terrain: Terrain | _Terrains | None = None,
         friction: float = 0.5,
         wall_friction: float = 0.5,
         cohesion: float = 0.0,
@@ -3620,7 +3510,7 @@ class GrainSimulation:
     def asleep(self) -> npt.NDArray[np.bool_]:
         """Which balls sleep, (n,); kinematic ones always do."""
     @property
-    def terrain(self) -> _Terrain | None:
+    def terrain(self) -> Terrain | None:
         """The terrain below the balls, or None."""
     @property
     def vessel(self) -> Drum | Silo | None:

@@ -10,7 +10,7 @@ from rover_gym.mechanics import HeightField, Plane, SphereField, Terrain, Triang
 Array = npt.NDArray[np.float64]
 
 
-def parts_of(terrain: Terrain) -> Iterator[Plane | SphereField | HeightField | TriangleMesh]:
+def parts_of(terrain: Terrain) -> Iterator[Terrain]:
     """The terrains of a union, and of unions in it; the terrain itself if it is none."""
     if isinstance(terrain, Union):
         for part in terrain.parts:

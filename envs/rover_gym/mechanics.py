@@ -5,8 +5,6 @@ Lengths are in m, masses in kg, times in s, angles in rad. The world has x forwa
 listed FL, FR, ML, BL, MR, BR.
 """
 
-from typing import TypeAlias
-
 from rover_gym._core import (
     BallSimulation,
     BusyError,
@@ -55,6 +53,7 @@ from rover_gym._core import (
     StateError,
     StepError,
     StepReport,
+    Terrain,
     TerrainError,
     TriangleMesh,
     TwoWheelRoverSimulation,
@@ -71,9 +70,6 @@ from rover_gym._core import (
     solve_friction_contact,
     standard_normals,
 )
-
-#: Any ground; wherever one is taken, so is a list of several.
-Terrain: TypeAlias = Plane | SphereField | HeightField | TriangleMesh | Union
 
 __all__ = [
     "BallSimulation",

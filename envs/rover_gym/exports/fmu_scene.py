@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rover_gym.mechanics import HeightField, Plane, Simulation, SphereField, Terrain, TriangleMesh, Union
+from rover_gym.mechanics import HeightField, OptionError, Plane, Simulation, SphereField, Terrain, TriangleMesh, Union
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -66,7 +66,9 @@ def _ground(terrain: Terrain) -> dict[str, Any]:
             "origin": list(terrain.origin),
             "material": terrain.material,
         }
-    return _mesh(terrain)
+    if isinstance(terrain, TriangleMesh):
+        return _mesh(terrain)
+    raise OptionError(f"terrain: a unit cannot have {terrain!r}")
 
 
 def _mesh(terrain: TriangleMesh) -> dict[str, Any]:

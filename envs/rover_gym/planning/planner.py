@@ -163,8 +163,10 @@ def _words(terrain: Terrain) -> str:
             words.append(f"map of {columns} x {rows} heights")
         elif isinstance(part, TriangleMesh):
             words.append(f"mesh of {len(part.triangles)} triangles")
+        elif isinstance(part, SphereField):
+            words.append(f"{len(part)} spheres in a ball tree")
         else:
-            words.append("plane" if isinstance(part, Plane) else f"{len(part)} spheres in a ball tree")
+            words.append("plane")
     return " and ".join(words)
 
 

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use numpy::PyArray2;
 use pyo3::prelude::*;
+use rover_core::draw::DrawnGround;
 use rover_core::geometry::{Support, TerrainSupport};
 use rover_core::integrator::StepOptions;
 use rover_core::nalgebra::Vector3;
@@ -13,8 +14,8 @@ use crate::arguments::{Given, refused};
 use crate::arrays::fresh_rows;
 use crate::bed_arguments::{self, StepArguments, Usual, check_rows, grain_error, rows};
 use crate::errors::{BorderError, Kind, Value};
-use crate::ground::Ground;
 use crate::planar_ground::quantity;
+use crate::terrain::parse;
 use crate::vessels::Vessel;
 
 /// Velocities of a ball: of its centre, then its spin.
@@ -47,7 +48,7 @@ pub struct Balls {
     pub sleep: Option<SleepOptions>,
     /// Centres, (3 n,).
     pub q: Vec<f64>,
-    pub terrain: Option<Ground>,
+    pub terrain: Option<DrawnGround>,
     pub vessel: Option<Vessel>,
 }
 
@@ -80,7 +81,7 @@ impl BallArguments<'_, '_> {
         };
         let walls = moving(bed_arguments::walls(self.walls)?, self.wall_velocity)?;
         let vessel = self.vessel.map(Vessel::parse).transpose()?;
-        let terrain = self.terrain.map(Ground::parse).transpose()?;
+        let terrain = self.terrain.map(parse).transpose()?;
         let ground: Option<Arc<dyn Support<3>>> = match (&terrain, &vessel) {
             (Some(terrain), None) => Some(Arc::new(TerrainSupport::new(terrain.terrain()))),
             (None, Some(vessel)) => Some(vessel.support()),

@@ -8,6 +8,7 @@ use rover_core::draw::{
     Pcg64, Range, RockDistribution, RockDraw, SceneDistribution, Start, StartDistribution,
 };
 use rover_core::episode::{Beginning, EpisodeBatch, EpisodeDistribution as CoreDistribution};
+use rover_core::geometry::Plane as CorePlane;
 use rover_core::simulation::RoverSimulation;
 
 use crate::arguments::{Given, count, number, refused, whole};
@@ -15,12 +16,12 @@ use crate::arrays::{fresh_table, two, vector};
 use crate::episode::{self, EpisodeRun};
 use crate::errors::{BorderError, Kind};
 use crate::generators::{generators, halves};
-use crate::ground::Ground;
 use crate::options::SolverWords;
 use crate::plane::Plane;
 use crate::reading::points;
 use crate::shared::Watch;
 use crate::simulation::{Origin, Simulation};
+use crate::terrain;
 
 /// Positional and keyword arguments.
 type NewArguments<'py> = ((Bound<'py, PyAny>, Bound<'py, PyAny>), Bound<'py, PyDict>);
@@ -373,7 +374,7 @@ fn ground_distribution(
 ) -> PyResult<GroundDistribution> {
     match (ground, hills) {
         (None, None) => Ok(GroundDistribution::Tilted),
-        (Some(ground), None) => Ok(GroundDistribution::Given(Ground::parse(ground)?.drawn())),
+        (Some(ground), None) => Ok(GroundDistribution::Given(terrain::parse(ground)?)),
         (None, Some(hills)) => {
             let what = "a number from 0 to 10, or nan";
             let wrong = || refused(hills, Kind::Option, "hills", what);
@@ -531,7 +532,7 @@ impl DrawnEpisodes {
         py: Python<'py>,
         index: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        Ground::of(&self.at(index)?.scene.ground).to_object(py)
+        terrain::object(py, &self.at(index)?.scene.ground)
     }
 
     /// The plane of an episode, under rocks too; None where the ground has none.
@@ -541,9 +542,10 @@ impl DrawnEpisodes {
     ///
     /// Raises:
     ///     OptionError: There is no such episode.
-    fn plane(&self, index: &Bound<'_, PyAny>) -> PyResult<Option<Plane>> {
+    fn plane<'py>(&self, index: &Bound<'py, PyAny>) -> PyResult<Option<Bound<'py, Plane>>> {
         let terrain = &self.at(index)?.scene.placement.scene.terrain;
-        Ok(terrain.ground().map(|plane| Plane { inner: *plane }))
+        let plane = |plane: &CorePlane| Bound::new(index.py(), Plane::of(*plane));
+        terrain.ground().map(plane).transpose()
     }
 
     /// A new simulation of the rover at the start of an episode.
@@ -558,7 +560,7 @@ impl DrawnEpisodes {
         let made = RoverSimulation::placed(one.scene.placement.clone());
         let made = made.map_err(BorderError::from)?;
         let origin = Origin {
-            terrain: Ground::of(&one.scene.ground),
+            terrain: one.scene.ground.clone(),
             words: self.words.clone(),
         };
         Ok(Simulation::of(made, origin))

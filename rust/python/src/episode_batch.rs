@@ -3,7 +3,7 @@
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rover_core::draw::Pcg64;
+use rover_core::draw::{DrawnGround, Pcg64};
 use rover_core::episode::{
     Autoreset, EpisodeBatch as CoreBatch, EpisodeError, Origin as Began, Stepped, Succession,
 };
@@ -18,11 +18,12 @@ use crate::draw::{
 use crate::episode::{EpisodeRun, actions, rules, simulation};
 use crate::errors::{BorderError, Kind};
 use crate::generators::halves;
-use crate::ground::Ground;
 use crate::infos::{Told, info, infos};
 use crate::options::SolverWords;
 use crate::shared::{Shared, Watch};
 use crate::simulation::{Origin, Simulation};
+
+use crate::terrain;
 
 /// Observations, rewards, which episodes have ended, which have reached the time limit, and the
 /// indices of both.
@@ -103,7 +104,7 @@ impl Inner {
     fn set_origin(&mut self, index: usize, words: &SolverWords) -> PyResult<()> {
         let origin = self.batch.origin(index).map_err(BorderError::from)?;
         self.origins[index] = Origin {
-            terrain: Ground::of(&origin.ground),
+            terrain: origin.ground.clone(),
             words: words.clone(),
         };
         Ok(())
@@ -132,7 +133,7 @@ fn distribution<'a, 'py>(
 }
 
 /// Where and on what an episode has begun, as `EpisodeBatch.origin` tells it.
-fn origin(given: &Bound<'_, PyAny>, terrain: &Ground) -> PyResult<Began> {
+fn origin(given: &Bound<'_, PyAny>, terrain: &DrawnGround) -> PyResult<Began> {
     let what = "what `EpisodeBatch.origin` returns";
     let refuse = || refused(given, Kind::Option, "origin", what);
     let found: Option<OriginRows> = given.extract().ok();
@@ -144,7 +145,7 @@ fn origin(given: &Bound<'_, PyAny>, terrain: &Ground) -> PyResult<Began> {
     Ok(Began {
         start: start_of(&start).ok_or_else(refuse)?,
         rocks: rocks_of(rocks, seed),
-        ground: terrain.drawn(),
+        ground: terrain.clone(),
     })
 }
 
@@ -618,7 +619,7 @@ impl EpisodeBatch {
     ) -> PyResult<Bound<'py, PyAny>> {
         let held = self.0.open()?;
         let index = self::index(index, held.batch.rovers())?;
-        held.origins[index].terrain.to_object(py)
+        terrain::object(py, &held.origins[index].terrain)
     }
 
     /// Returns a copy of one rover.

@@ -3,6 +3,7 @@
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use rover_core::draw::DrawnGround;
 use rover_core::nalgebra::Vector3;
 use rover_core::simulation::GrainSimulation as CoreSimulation;
 use rover_core::system::grains::{GrainContact, Packing, arranged};
@@ -14,11 +15,11 @@ use crate::balls::{self, BallArguments};
 use crate::bed_arguments::{self, StepArguments, grain_error, setup_error};
 use crate::contacts::GrainContacts;
 use crate::errors::{BorderError, Kind};
-use crate::ground::Ground;
 use crate::report::{Energy, StepReport};
 use crate::shared::Shared;
 use crate::snapshot::{GrainSnapshot, belonging};
 use crate::stepping::step;
+use crate::terrain;
 use crate::vessels::{Drum, Silo, Vessel};
 
 type Core = CoreSimulation<3>;
@@ -85,7 +86,7 @@ type Packed<'py> = (
 #[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct GrainSimulation {
     inner: Shared<Core>,
-    terrain: Option<Ground>,
+    terrain: Option<DrawnGround>,
     vessel: Option<Vessel>,
 }
 
@@ -235,7 +236,10 @@ impl GrainSimulation {
     /// The terrain below the balls, or None.
     #[getter]
     fn terrain<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        self.terrain.as_ref().map(|t| t.to_object(py)).transpose()
+        let terrain = self.terrain.as_ref();
+        terrain
+            .map(|ground| terrain::object(py, ground))
+            .transpose()
     }
 
     /// The vessel around the balls, or None.

@@ -5,14 +5,14 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rover_core::geometry::{HeightField as CoreField, Terrain};
+use rover_core::draw::DrawnGround;
+use rover_core::geometry::{HeightField as CoreField, Terrain as _};
 
 use crate::arguments::{Given, refused};
 use crate::arrays::{check_size, one_or_two, two};
 use crate::errors::{BorderError, Kind, Value};
-use crate::heights::heights;
 use crate::materials;
-use crate::rays::{Met, cast_rays};
+use crate::terrain::Terrain;
 
 /// A map of heights as ground: two triangles a cell, solid below. Immutable.
 ///
@@ -31,8 +31,7 @@ use crate::rays::{Met, cast_rays};
 /// Raises:
 ///     TerrainError: The array has a wrong shape, a height is infinite or beyond 1e6 m, no cell
 ///         has data, or the spacing is not positive.
-#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
-#[derive(Clone)]
+#[pyclass(module = "rover_gym.mechanics", frozen, extends = Terrain)]
 pub struct HeightField {
     pub inner: Arc<CoreField>,
 }
@@ -78,12 +77,20 @@ fn from_package<'py>(
     arguments: impl pyo3::call::PyCallArgs<'py>,
     options: Option<&Bound<'py, PyDict>>,
     material: Given<'py>,
-) -> PyResult<HeightField> {
+) -> PyResult<Bound<'py, HeightField>> {
     let maps = py.import("rover_gym.maps")?;
     let made = maps.getattr(name)?.call(arguments, options)?;
     let (heights, spacing, origin) =
         made.extract::<(Bound<'_, PyAny>, Bound<'_, PyAny>, Bound<'_, PyAny>)>()?;
-    HeightField::new(py, &heights, &spacing, Some(&origin), material)
+    let field = HeightField::new(py, &heights, &spacing, Some(&origin), material)?;
+    Bound::new(py, field)
+}
+
+impl HeightField {
+    /// A map of the core, for Python.
+    pub fn of(inner: Arc<CoreField>) -> PyClassInitializer<Self> {
+        Terrain::base(DrawnGround::Map(inner.clone())).add_subclass(Self { inner })
+    }
 }
 
 #[pymethods]
@@ -97,7 +104,7 @@ impl HeightField {
         spacing: &Bound<'_, PyAny>,
         origin: Option<&Bound<'_, PyAny>>,
         material: Given<'_>,
-    ) -> PyResult<Self> {
+    ) -> PyResult<PyClassInitializer<Self>> {
         let material = materials::name(material)?;
         let (heights, shape) = table(heights)?;
         let spacing = one_or_two(spacing, Kind::Terrain, "spacing")?;
@@ -112,9 +119,7 @@ impl HeightField {
         if let Some(material) = material {
             field = field.with_material(&material);
         }
-        Ok(Self {
-            inner: Arc::new(field),
-        })
+        Ok(Self::of(Arc::new(field)))
     }
 
     /// Reads a map from a GeoTIFF, a PNG or a .npy file.
@@ -155,7 +160,7 @@ impl HeightField {
         datum: Option<&Bound<'py, PyAny>>,
         band: Given<'py>,
         material: Given<'py>,
-    ) -> PyResult<Self> {
+    ) -> PyResult<Bound<'py, Self>> {
         let options = PyDict::new(py);
         options.set_item(
             "spacing",
@@ -218,7 +223,7 @@ impl HeightField {
         roughness: &Bound<'py, PyAny>,
         material: Given<'py>,
         options: Option<&Bound<'py, PyDict>>,
-    ) -> PyResult<Self> {
+    ) -> PyResult<Bound<'py, Self>> {
         from_package(
             py,
             "fractal_map",
@@ -265,52 +270,6 @@ impl HeightField {
         let [x, z] = self.inner.origin();
         let end = |low: f64, n: usize, step: f64| low + (n - 1) as f64 * step;
         (x, z, end(x, columns, dx), end(z, rows, dz))
-    }
-
-    /// The height of the surface at places of the map.
-    ///
-    /// Args:
-    ///     points: Places (x, z), (m, 2), m.
-    ///
-    /// Returns:
-    ///     Heights y, (m,), m; nan off the map and where there is no data.
-    ///
-    /// Raises:
-    ///     TerrainError: `points` has a wrong shape.
-    fn heights<'py>(
-        &self,
-        py: Python<'py>,
-        points: &Bound<'_, PyAny>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        heights(&*self.inner, py, points)
-    }
-
-    /// Where rays meet the ground first.
-    ///
-    /// A surface is met from either side. What depth cameras and laser scanners measure.
-    ///
-    /// Args:
-    ///     origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
-    ///     directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
-    ///     max_range: Distance to which they are followed, m; without end by default.
-    ///
-    /// Returns:
-    ///     Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
-    ///     world frame, (n, 3), nan where nothing is met.
-    ///
-    /// Raises:
-    ///     OptionError: An array has a wrong shape or an entry that is not finite, a direction is
-    ///         zero, an origin is beyond 1e6 m, or `max_range` is not positive.
-    #[pyo3(signature = (origins, directions, max_range = Given::MISSING),
-        text_signature = "($self, origins, directions, max_range=None)")]
-    fn cast_rays<'py>(
-        &self,
-        py: Python<'py>,
-        origins: &Bound<'_, PyAny>,
-        directions: &Bound<'_, PyAny>,
-        max_range: Given<'_>,
-    ) -> PyResult<Met<'py>> {
-        cast_rays(&*self.inner, py, origins, directions, max_range)
     }
 
     fn __repr__(&self) -> String {

@@ -7,7 +7,7 @@ use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
 use rover_core::contact::{Contact, detection::wheel_contacts};
-use rover_core::draw::{resting_on, resting_pose, rocks::clear_radius};
+use rover_core::draw::{DrawnGround, resting_on, resting_pose, rocks::clear_radius};
 use rover_core::multibody::bias::BiasScratch;
 use rover_core::multibody::{
     Configuration, Joint, Kinematics, MassMatrix, Model, ModelDescription, ModelError, bias,
@@ -19,9 +19,9 @@ use crate::arguments::{self, Given, number};
 use crate::arrays::{fresh, fresh_blocks, fresh_matrix, fresh_rows, triple, two, vector};
 use crate::errors::{BorderError, Kind, Value};
 use crate::files::{self, in_file, read_text, write_text};
-use crate::ground::Ground;
 use crate::model_files;
 use crate::motor::{self, Motor};
+use crate::terrain::parse;
 
 /// A pair of fresh vectors.
 pub type Pair<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
@@ -146,11 +146,7 @@ impl RoverModel {
         coordinates: Given<'_>,
     ) -> PyResult<(Vec<f64>, Coordinates, Kinematics, Vec<Contact>)> {
         let (q, kind, kinematics) = self.placed(q, coordinates)?;
-        let contacts = wheel_contacts(
-            &self.inner,
-            &kinematics,
-            &*Ground::parse(terrain)?.terrain(),
-        );
+        let contacts = wheel_contacts(&self.inner, &kinematics, &*parse(terrain)?.terrain());
         Ok((q, kind, kinematics, contacts))
     }
 
@@ -1011,11 +1007,11 @@ impl RoverModel {
         position: &Bound<'_, PyAny>,
         heading: &Bound<'_, PyAny>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let ground = Ground::parse(terrain)?;
+        let ground = parse(terrain)?;
         let place = two(position, Kind::State, "position")?;
         let heading = number(heading, Kind::State, "heading")?;
-        let q = if let Ground::Plane(plane) = &ground {
-            resting_pose(&self.inner, &plane.inner, place, heading).map_err(BorderError::from)?
+        let q = if let DrawnGround::Plane(plane) = &ground {
+            resting_pose(&self.inner, plane, place, heading).map_err(BorderError::from)?
         } else {
             let terrain = ground.terrain();
             let q = py.detach(|| resting_on(&self.inner, &*terrain, place, heading));

@@ -2,13 +2,13 @@
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use rover_core::draw::tilted_plane;
+use rover_core::draw::{DrawnGround, tilted_plane};
 use rover_core::geometry::Plane as CorePlane;
 
 use crate::arguments::{Given, number};
 use crate::arrays::{fresh, triple};
 use crate::errors::{BorderError, Kind, Value};
-use crate::rays::{Met, cast_rays};
+use crate::terrain::Terrain;
 
 type Normal = (f64, f64, f64);
 
@@ -25,22 +25,30 @@ type Normal = (f64, f64, f64);
 /// Raises:
 ///     TerrainError: A number is not finite, the normal has no direction, or the offset is beyond
 ///         1e6 m.
-#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
-#[derive(Clone)]
+#[pyclass(module = "rover_gym.mechanics", frozen, extends = Terrain)]
 pub struct Plane {
     pub inner: CorePlane,
+}
+
+impl Plane {
+    /// A plane of the core, for Python.
+    pub fn of(inner: CorePlane) -> PyClassInitializer<Self> {
+        Terrain::base(DrawnGround::Plane(inner)).add_subclass(Self { inner })
+    }
 }
 
 #[pymethods]
 impl Plane {
     #[new]
     #[pyo3(signature = (normal = None, offset = Given::MISSING), text_signature = "(normal=None, offset=0.0)")]
-    fn new(normal: Option<&Bound<'_, PyAny>>, offset: Given<'_>) -> PyResult<Self> {
+    fn new(
+        normal: Option<&Bound<'_, PyAny>>,
+        offset: Given<'_>,
+    ) -> PyResult<PyClassInitializer<Self>> {
         let offset = offset.number(0.0, Kind::Terrain, "offset")?;
         let normal = normal.map_or(Ok([0.0, 1.0, 0.0]), |n| triple(n, Kind::Terrain, "normal"))?;
-        Ok(Self {
-            inner: CorePlane::new(normal, offset).map_err(BorderError::from)?,
-        })
+        let inner = CorePlane::new(normal, offset).map_err(BorderError::from)?;
+        Ok(Self::of(inner))
     }
 
     /// The plane through the origin that rises by a slope in a direction.
@@ -55,12 +63,15 @@ impl Plane {
     /// Raises:
     ///     TerrainError: An angle is no finite number.
     #[staticmethod]
-    fn tilted(slope: &Bound<'_, PyAny>, uphill: &Bound<'_, PyAny>) -> PyResult<Self> {
+    fn tilted<'py>(
+        slope: &Bound<'py, PyAny>,
+        uphill: &Bound<'_, PyAny>,
+    ) -> PyResult<Bound<'py, Self>> {
+        let py = slope.py();
         let slope = number(slope, Kind::Terrain, "slope")?;
         let uphill = number(uphill, Kind::Terrain, "uphill")?;
-        Ok(Self {
-            inner: tilted_plane(slope, uphill).map_err(BorderError::from)?,
-        })
+        let inner = tilted_plane(slope, uphill).map_err(BorderError::from)?;
+        Bound::new(py, Self::of(inner))
     }
 
     /// Unit normal out of the ground, (3,).
@@ -102,34 +113,6 @@ impl Plane {
             .into());
         }
         Ok(-(n.x * x + n.z * z + self.inner.offset()) / n.y)
-    }
-
-    /// Where rays meet the ground first.
-    ///
-    /// A surface is met from either side. What depth cameras and laser scanners measure.
-    ///
-    /// Args:
-    ///     origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
-    ///     directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
-    ///     max_range: Distance to which they are followed, m; without end by default.
-    ///
-    /// Returns:
-    ///     Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
-    ///     world frame, (n, 3), nan where nothing is met.
-    ///
-    /// Raises:
-    ///     OptionError: An array has a wrong shape or an entry that is not finite, a direction is
-    ///         zero, an origin is beyond 1e6 m, or `max_range` is not positive.
-    #[pyo3(signature = (origins, directions, max_range = Given::MISSING),
-        text_signature = "($self, origins, directions, max_range=None)")]
-    fn cast_rays<'py>(
-        &self,
-        py: Python<'py>,
-        origins: &Bound<'_, PyAny>,
-        directions: &Bound<'_, PyAny>,
-        max_range: Given<'_>,
-    ) -> PyResult<Met<'py>> {
-        cast_rays(&self.inner, py, origins, directions, max_range)
     }
 
     fn __repr__(&self) -> String {

@@ -2,8 +2,8 @@
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use rover_core::geometry::ray::{self, Hit, Ray, check_rays};
-use rover_core::geometry::{RayError, Terrain};
+use rover_core::geometry::RayError;
+use rover_core::geometry::ray::{Hit, Ray, check_rays};
 
 use crate::arguments::{Given, shown};
 use crate::arrays::{array, fresh, fresh_rows};
@@ -77,17 +77,4 @@ pub fn met<'py>(py: Python<'py>, hits: &[Option<Hit>]) -> PyResult<Met<'py>> {
     let distances: Vec<f64> = hits.iter().map(distance).collect();
     let normals: Vec<[f64; 3]> = hits.iter().map(normal).collect();
     Ok((fresh(py, &distances), fresh_rows(py, &normals)?))
-}
-
-/// Casts rays against a terrain.
-pub fn cast_rays<'py>(
-    terrain: &dyn Terrain,
-    py: Python<'py>,
-    origins: &Bound<'_, PyAny>,
-    directions: &Bound<'_, PyAny>,
-    max_range: Given<'_>,
-) -> PyResult<Met<'py>> {
-    let (rays, range) = rays(origins, directions, max_range)?;
-    let hits = py.detach(|| ray::cast(terrain, &rays, range));
-    met(py, &hits)
 }

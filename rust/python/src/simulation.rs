@@ -4,6 +4,8 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use rover_core::contact::Part;
+use rover_core::draw::DrawnGround;
+use rover_core::geometry::Plane;
 use rover_core::integrator::{Accuracy, StepOptions};
 use rover_core::multibody::{Model, coordinates};
 use rover_core::nalgebra::DMatrix;
@@ -18,17 +20,16 @@ use crate::arguments::{Given, number, texts};
 use crate::arrays::{at_most, fresh, fresh_matrix, fresh_rows, vector};
 use crate::contacts::Contacts;
 use crate::errors::{BorderError, Kind, Value};
-use crate::ground::Ground;
 use crate::linearisation::Linearisation;
 use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
 use crate::options::{Options, SolverWords, settings};
-use crate::plane::Plane;
 use crate::rays::{Met, met, rays};
 use crate::reading::{place, scan_points, slices};
 use crate::report::{Energy, StepReport};
 use crate::shared::{Shared, Watch};
 use crate::snapshot::{Snapshot, belonging};
 use crate::stepping::{Problem, problem, step};
+use crate::terrain;
 
 /// A rover on a terrain, stepped through time.
 ///
@@ -79,7 +80,7 @@ pub struct Simulation {
 /// What a simulation was made with and the core does not keep, for pickling.
 #[derive(Clone)]
 pub struct Origin {
-    pub terrain: Ground,
+    pub terrain: DrawnGround,
     pub words: SolverWords,
 }
 
@@ -163,10 +164,8 @@ impl Simulation {
         let model = model.object::<RoverModel>(Kind::Model, "model", "a RoverModel")?;
         let model = model.map_or_else(|| Arc::new(Model::rover()), |m| m.inner);
         let terrain = match terrain {
-            None => Ground::Plane(Plane {
-                inner: rover_core::geometry::Plane::ground(),
-            }),
-            Some(given) => Ground::parse(given)?,
+            None => DrawnGround::Plane(Plane::ground()),
+            Some(given) => terrain::parse(given)?,
         };
         let chosen = match (accuracy, clash) {
             (None, _) => Accuracy::BALANCED,
@@ -207,7 +206,7 @@ impl Simulation {
     /// The ground.
     #[getter]
     fn terrain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.origin.terrain.to_object(py)
+        terrain::object(py, &self.origin.terrain)
     }
 
     /// Time since the last call of `set_state`, s.

@@ -1,22 +1,21 @@
-//! Methods of `SphereField`.
+//! `SphereField`.
 
 use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
+use rover_core::draw::DrawnGround;
 use rover_core::geometry::{
-    Clearing, Plane as CorePlane, Rocks, SphereField as CoreField, Terrain,
+    Clearing, Plane as CorePlane, Rocks, SphereField as CoreField, Terrain as _,
 };
 
 use crate::arguments::{Given, number, refused, whole};
 use crate::arrays::{fresh_rows, one_or_two, rows, vector};
 use crate::errors::{BorderError, Kind, Value};
 use crate::files::{self, in_file, read_text};
-use crate::ground::{Ground, SphereField};
-use crate::heights::heights;
 use crate::materials;
 use crate::plane::Plane;
-use crate::rays::{Met, cast_rays};
+use crate::terrain::{Terrain, parse};
 
 /// Longest file of spheres, bytes.
 const MAX_FILE: usize = 1 << 28;
@@ -25,34 +24,50 @@ fn build(
     py: Python<'_>,
     centres: &[[f64; 3]],
     radii: &[f64],
-    ground: Option<Plane>,
-) -> Result<SphereField, BorderError> {
-    let ground = ground.map(|plane| plane.inner);
-    let field = py.detach(|| CoreField::new(centres, radii, ground))?;
-    Ok(SphereField {
-        inner: Arc::new(field),
-    })
+    ground: Option<CorePlane>,
+) -> Result<CoreField, BorderError> {
+    Ok(py.detach(|| CoreField::new(centres, radii, ground))?)
 }
 
 /// A plane, or none.
-fn plane(given: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Plane>> {
-    let read = |given: &Bound<'_, PyAny>| {
-        let found = given.extract::<Plane>();
-        found.map_err(|_| refused(given, Kind::Terrain, "ground", "a Plane").into())
+fn plane(given: Option<&Bound<'_, PyAny>>) -> PyResult<Option<CorePlane>> {
+    let read = |given: &Bound<'_, PyAny>| match given.cast::<Plane>() {
+        Ok(plane) => Ok(plane.get().inner),
+        Err(_) => Err(refused(given, Kind::Terrain, "ground", "a Plane").into()),
     };
     given.map(read).transpose()
 }
 
+/// Fixed spheres, with or without a plane under them. Immutable.
+///
+/// Args:
+///     centres: Centres of the spheres, (n, 3), m.
+///     radii: Their radii, (n,), m.
+///     ground: The plane under them; none by default. Its material is "ground".
+///     material: Name of the spheres' material, for the laws of a `Simulation` by pair of
+///         materials.
+///
+/// Raises:
+///     TerrainError: An array has a wrong shape, an entry is not finite or out of its range, or
+///         there are no spheres or too many of them.
+#[pyclass(module = "rover_gym.mechanics", frozen, extends = Terrain)]
+pub struct SphereField {
+    pub inner: Arc<CoreField>,
+}
+
 impl SphereField {
-    /// The same of another material, if one is given.
-    fn of(self, material: Option<String>) -> Self {
-        let Some(material) = material else {
-            return self;
-        };
-        Self {
-            inner: Arc::new(Arc::unwrap_or_clone(self.inner).with_material(&material)),
-        }
+    /// A field of the core, for Python.
+    pub fn of(inner: Arc<CoreField>) -> PyClassInitializer<Self> {
+        Terrain::base(DrawnGround::Field(inner.clone())).add_subclass(Self { inner })
     }
+}
+
+/// A field of a material, if one is given.
+fn made(field: CoreField, material: Option<String>) -> PyClassInitializer<SphereField> {
+    SphereField::of(Arc::new(match material {
+        Some(material) => field.with_material(&material),
+        None => field,
+    }))
 }
 
 #[pymethods]
@@ -66,12 +81,12 @@ impl SphereField {
         radii: &Bound<'_, PyAny>,
         ground: Option<&Bound<'_, PyAny>>,
         material: Given<'_>,
-    ) -> PyResult<Self> {
+    ) -> PyResult<PyClassInitializer<Self>> {
         let material = materials::name(material)?;
         let centres = rows::<3>(centres, "centres")?;
         let radii = vector(radii, Kind::Terrain, "radii")?;
         let field = build(py, &centres, &radii, plane(ground)?)?;
-        Ok(field.of(material))
+        Ok(made(field, material))
     }
 
     /// Reads spheres from a CSV file with the header `x,y,z,radius`, in m.
@@ -90,12 +105,12 @@ impl SphereField {
     #[staticmethod]
     #[pyo3(signature = (path, ground = None, material = Given::MISSING),
         text_signature = "(path, ground=None, material='rock')")]
-    fn from_file(
-        py: Python<'_>,
+    fn from_file<'py>(
+        py: Python<'py>,
         path: &Bound<'_, PyAny>,
         ground: Option<&Bound<'_, PyAny>>,
         material: Given<'_>,
-    ) -> PyResult<Self> {
+    ) -> PyResult<Bound<'py, Self>> {
         let material = materials::name(material)?;
         let ground = plane(ground)?;
         let path = files::path(path, Kind::Terrain)?;
@@ -143,7 +158,7 @@ impl SphereField {
         let centres: Vec<[f64; 3]> = table.iter().map(|r| [r[0], r[1], r[2]]).collect();
         let radii: Vec<f64> = table.iter().map(|r| r[3]).collect();
         let field = build(py, &centres, &radii, ground).map_err(|e| in_file(e, &path))?;
-        Ok(field.of(material))
+        Bound::new(py, made(field, material))
     }
 
     /// The wavy ground of the 2010 report's Fig. 6.6.
@@ -152,10 +167,8 @@ impl SphereField {
     ///
     /// Source: Yang 2010, Fig. 6.6.
     #[staticmethod]
-    fn rug() -> Self {
-        Self {
-            inner: Arc::new(CoreField::rug()),
-        }
+    fn rug(py: Python<'_>) -> PyResult<Bound<'_, Self>> {
+        Bound::new(py, Self::of(Arc::new(CoreField::rug())))
     }
 
     /// Rocks on a plane, with the size-frequency distribution of rocks on Mars.
@@ -188,8 +201,8 @@ impl SphereField {
         clear = None, material = Given::MISSING),
         text_signature = "(abundance, area, seed, *, max_diameter=0.5, min_diameter=0.05, burial=None, ground=None, clear=None, \
         material='rock')")]
-    fn rocks(
-        py: Python<'_>,
+    fn rocks<'py>(
+        py: Python<'py>,
         abundance: &Bound<'_, PyAny>,
         area: &Bound<'_, PyAny>,
         seed: &Bound<'_, PyAny>,
@@ -199,7 +212,7 @@ impl SphereField {
         ground: Option<&Bound<'_, PyAny>>,
         clear: Option<&Bound<'_, PyAny>>,
         material: Given<'_>,
-    ) -> PyResult<Self> {
+    ) -> PyResult<Bound<'py, Self>> {
         let material = materials::name(material)?;
         let burial = burial.map_or(Ok([0.5; 2]), |given| {
             one_or_two(given, Kind::Terrain, "burial")
@@ -210,9 +223,9 @@ impl SphereField {
             return Err(refused(area, Kind::Terrain, "area", what).into());
         };
         let clear = clear.map_or_else(|| Ok(Vec::new()), |c| rows::<3>(c, "clear"))?;
-        let ground = ground.map(Ground::parse).transpose()?;
+        let ground = ground.map(parse).transpose()?;
         let plane = match &ground {
-            Some(Ground::Plane(plane)) => plane.inner,
+            Some(DrawnGround::Plane(plane)) => *plane,
             _ => CorePlane::ground(),
         };
         let rocks = Rocks {
@@ -230,13 +243,11 @@ impl SphereField {
             ground: plane,
         };
         let field = py.detach(|| match ground {
-            None | Some(Ground::Plane(_)) => CoreField::rocks(&rocks),
+            None | Some(DrawnGround::Plane(_)) => CoreField::rocks(&rocks),
             Some(other) => CoreField::rocks_on(&rocks, &*other.terrain()),
         });
-        let field = Self {
-            inner: Arc::new(field.map_err(BorderError::from)?),
-        };
-        Ok(field.of(material))
+        let field = field.map_err(BorderError::from)?;
+        Bound::new(py, made(field, material))
     }
 
     /// Name of the spheres' material.
@@ -260,54 +271,11 @@ impl SphereField {
 
     /// The plane under the spheres, or None.
     #[getter]
-    fn ground(&self) -> Option<Plane> {
-        self.inner.ground().map(|plane| Plane { inner: *plane })
-    }
-
-    /// The height of the visible surface at places of the map.
-    ///
-    /// Args:
-    ///     points: Places (x, z), (m, 2), m.
-    ///
-    /// Returns:
-    ///     Heights y, (m,), m; nan where there is no ground.
-    ///
-    /// Raises:
-    ///     TerrainError: `points` has a wrong shape.
-    fn heights<'py>(
-        &self,
-        py: Python<'py>,
-        points: &Bound<'_, PyAny>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        heights(&*self.inner, py, points)
-    }
-
-    /// Where rays meet the ground first.
-    ///
-    /// A surface is met from either side. What depth cameras and laser scanners measure.
-    ///
-    /// Args:
-    ///     origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
-    ///     directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
-    ///     max_range: Distance to which they are followed, m; without end by default.
-    ///
-    /// Returns:
-    ///     Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
-    ///     world frame, (n, 3), nan where nothing is met.
-    ///
-    /// Raises:
-    ///     OptionError: An array has a wrong shape or an entry that is not finite, a direction is
-    ///         zero, an origin is beyond 1e6 m, or `max_range` is not positive.
-    #[pyo3(signature = (origins, directions, max_range = Given::MISSING),
-        text_signature = "($self, origins, directions, max_range=None)")]
-    fn cast_rays<'py>(
-        &self,
-        py: Python<'py>,
-        origins: &Bound<'_, PyAny>,
-        directions: &Bound<'_, PyAny>,
-        max_range: Given<'_>,
-    ) -> PyResult<Met<'py>> {
-        cast_rays(&*self.inner, py, origins, directions, max_range)
+    fn ground<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, Plane>>> {
+        let plane = self.inner.ground();
+        plane
+            .map(|plane| Bound::new(py, Plane::of(*plane)))
+            .transpose()
     }
 
     fn __len__(&self) -> usize {
@@ -332,7 +300,7 @@ impl SphereField {
         let arguments = (
             own.centres(py)?,
             own.radii(py),
-            own.ground(),
+            own.ground(py)?,
             own.material(),
         );
         Ok((

@@ -5,14 +5,14 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rover_core::geometry::{Terrain, TriangleMesh as CoreMesh};
+use rover_core::draw::DrawnGround;
+use rover_core::geometry::{Terrain as _, TriangleMesh as CoreMesh};
 
 use crate::arguments::{Given, refused};
 use crate::arrays::{array, fresh_rows, rows};
 use crate::errors::{BorderError, Kind};
-use crate::heights::heights;
 use crate::materials;
-use crate::rays::{Met, cast_rays};
+use crate::terrain::Terrain;
 
 /// A mesh of triangles as ground: rocks, or anything else that stands still. Immutable.
 ///
@@ -31,8 +31,7 @@ use crate::rays::{Met, cast_rays};
 /// Raises:
 ///     TerrainError: An array has a wrong shape, an entry is not finite, a triangle has no area or
 ///         names a corner that is not there, or two triangles turn opposite ways.
-#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
-#[derive(Clone)]
+#[pyclass(module = "rover_gym.mechanics", frozen, extends = Terrain)]
 pub struct TriangleMesh {
     pub inner: Arc<CoreMesh>,
 }
@@ -54,6 +53,13 @@ fn indices(value: &Bound<'_, PyAny>) -> PyResult<Vec<[usize; 3]>> {
     Ok(flat.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect())
 }
 
+impl TriangleMesh {
+    /// A mesh of the core, for Python.
+    pub fn of(inner: Arc<CoreMesh>) -> PyClassInitializer<Self> {
+        Terrain::base(DrawnGround::Mesh(inner.clone())).add_subclass(Self { inner })
+    }
+}
+
 #[pymethods]
 impl TriangleMesh {
     #[new]
@@ -64,7 +70,7 @@ impl TriangleMesh {
         vertices: &Bound<'_, PyAny>,
         triangles: &Bound<'_, PyAny>,
         material: Given<'_>,
-    ) -> PyResult<Self> {
+    ) -> PyResult<PyClassInitializer<Self>> {
         let material = materials::name(material)?;
         let vertices = rows::<3>(vertices, "vertices")?;
         let triangles = indices(triangles)?;
@@ -73,9 +79,7 @@ impl TriangleMesh {
         if let Some(material) = material {
             mesh = mesh.with_material(&material);
         }
-        Ok(Self {
-            inner: Arc::new(mesh),
-        })
+        Ok(Self::of(Arc::new(mesh)))
     }
 
     /// Reads a mesh from a file: OBJ, PLY, STL, GLB and what else `trimesh` reads.
@@ -99,16 +103,16 @@ impl TriangleMesh {
     #[staticmethod]
     #[pyo3(signature = (path, *, material = Given::MISSING, **options),
         text_signature = "(path, *, scale=1.0, position=(0.0, 0.0, 0.0), up='y', material='ground')")]
-    fn from_file(
-        py: Python<'_>,
-        path: &Bound<'_, PyAny>,
+    fn from_file<'py>(
+        py: Python<'py>,
+        path: &Bound<'py, PyAny>,
         material: Given<'_>,
         options: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<Self> {
+    ) -> PyResult<Bound<'py, Self>> {
         let maps = py.import("rover_gym.maps")?;
         let made = maps.getattr("read_mesh")?.call((path,), options)?;
         let (vertices, triangles) = made.extract::<(Bound<'_, PyAny>, Bound<'_, PyAny>)>()?;
-        Self::new(py, &vertices, &triangles, material)
+        Bound::new(py, Self::new(py, &vertices, &triangles, material)?)
     }
 
     /// Name of its material.
@@ -135,52 +139,6 @@ impl TriangleMesh {
     #[getter]
     fn is_closed(&self) -> bool {
         self.inner.is_closed()
-    }
-
-    /// The height of the highest triangle that faces up at places of the map.
-    ///
-    /// Args:
-    ///     points: Places (x, z), (m, 2), m.
-    ///
-    /// Returns:
-    ///     Heights y, (m,), m; nan where there is none.
-    ///
-    /// Raises:
-    ///     TerrainError: `points` has a wrong shape.
-    fn heights<'py>(
-        &self,
-        py: Python<'py>,
-        points: &Bound<'_, PyAny>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        heights(&*self.inner, py, points)
-    }
-
-    /// Where rays meet the ground first.
-    ///
-    /// A surface is met from either side. What depth cameras and laser scanners measure.
-    ///
-    /// Args:
-    ///     origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
-    ///     directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
-    ///     max_range: Distance to which they are followed, m; without end by default.
-    ///
-    /// Returns:
-    ///     Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
-    ///     world frame, (n, 3), nan where nothing is met.
-    ///
-    /// Raises:
-    ///     OptionError: An array has a wrong shape or an entry that is not finite, a direction is
-    ///         zero, an origin is beyond 1e6 m, or `max_range` is not positive.
-    #[pyo3(signature = (origins, directions, max_range = Given::MISSING),
-        text_signature = "($self, origins, directions, max_range=None)")]
-    fn cast_rays<'py>(
-        &self,
-        py: Python<'py>,
-        origins: &Bound<'_, PyAny>,
-        directions: &Bound<'_, PyAny>,
-        max_range: Given<'_>,
-    ) -> PyResult<Met<'py>> {
-        cast_rays(&*self.inner, py, origins, directions, max_range)
     }
 
     fn __len__(&self) -> usize {
