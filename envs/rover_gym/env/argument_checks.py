@@ -9,7 +9,7 @@ import os
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Any
 
 from rover_gym.env import rewards
 from rover_gym.maps.terrain_files import is_terrain_file, open_terrain
@@ -115,7 +115,7 @@ def check_terrain(field: str, value: object) -> str | Terrain:
         return Union(value)
     if is_terrain_file(value):
         return open_terrain(value)  # type: ignore[arg-type]
-    if not isinstance(value, get_args(Terrain)):
+    if not isinstance(value, Terrain):
         refuse(
             TerrainError,
             field,

@@ -1,7 +1,7 @@
 """The user's description of a scene: the rover, its terrain, and the commands that will not occur."""
 
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -61,7 +61,7 @@ def check_scene(scene: Scene) -> None:
     """Checks the types of a scene's parts and the names of its options."""
     if not isinstance(scene, Scene):
         refuse(OptionError, "scene", scene, "must be a Scene")
-    if not isinstance(scene.terrain, get_args(Terrain)):
+    if not isinstance(scene.terrain, Terrain):
         refuse(TerrainError, "terrain", scene.terrain, "must be a terrain; several make a Union")
     if not isinstance(scene.model, RoverModel):
         refuse(ModelError, "model", scene.model, "must be a RoverModel")

@@ -21,7 +21,7 @@ use crate::plane::Plane;
 use crate::reading::points;
 use crate::shared::Watch;
 use crate::simulation::{Origin, Simulation};
-use crate::terrain;
+use crate::{terrain, union};
 
 /// Positional and keyword arguments.
 type NewArguments<'py> = ((Bound<'py, PyAny>, Bound<'py, PyAny>), Bound<'py, PyDict>);
@@ -532,7 +532,7 @@ impl DrawnEpisodes {
         py: Python<'py>,
         index: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        terrain::object(py, &self.at(index)?.scene.ground)
+        union::object(py, &self.at(index)?.scene.ground)
     }
 
     /// The plane of an episode, under rocks too; None where the ground has none.

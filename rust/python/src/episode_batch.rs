@@ -23,7 +23,7 @@ use crate::options::SolverWords;
 use crate::shared::{Shared, Watch};
 use crate::simulation::{Origin, Simulation};
 
-use crate::terrain;
+use crate::union;
 
 /// Observations, rewards, which episodes have ended, which have reached the time limit, and the
 /// indices of both.
@@ -619,7 +619,7 @@ impl EpisodeBatch {
     ) -> PyResult<Bound<'py, PyAny>> {
         let held = self.0.open()?;
         let index = self::index(index, held.batch.rovers())?;
-        terrain::object(py, &held.origins[index].terrain)
+        union::object(py, &held.origins[index].terrain)
     }
 
     /// Returns a copy of one rover.

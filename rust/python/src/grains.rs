@@ -19,7 +19,7 @@ use crate::report::{Energy, StepReport};
 use crate::shared::Shared;
 use crate::snapshot::{GrainSnapshot, belonging};
 use crate::stepping::step;
-use crate::terrain;
+use crate::union;
 use crate::vessels::{Drum, Silo, Vessel};
 
 type Core = CoreSimulation<3>;
@@ -237,9 +237,7 @@ impl GrainSimulation {
     #[getter]
     fn terrain<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let terrain = self.terrain.as_ref();
-        terrain
-            .map(|ground| terrain::object(py, ground))
-            .transpose()
+        terrain.map(|ground| union::object(py, ground)).transpose()
     }
 
     /// The vessel around the balls, or None.

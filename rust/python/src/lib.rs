@@ -44,6 +44,7 @@ mod sphere_field;
 mod stepping;
 mod terrain;
 mod triangle_mesh;
+mod union;
 mod vessels;
 
 use pyo3::prelude::*;
@@ -62,7 +63,7 @@ pub fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<sphere_field::SphereField>()?;
     module.add_class::<height_field::HeightField>()?;
     module.add_class::<triangle_mesh::TriangleMesh>()?;
-    module.add_class::<terrain::Union>()?;
+    module.add_class::<union::Union>()?;
     module.add_class::<contacts::Contacts>()?;
     module.add_class::<simulation::Simulation>()?;
     module.add_class::<linearisation::Linearisation>()?;

@@ -29,7 +29,7 @@ use crate::report::{Energy, StepReport};
 use crate::shared::{Shared, Watch};
 use crate::snapshot::{Snapshot, belonging};
 use crate::stepping::{Problem, problem, step};
-use crate::terrain;
+use crate::{terrain, union};
 
 /// A rover on a terrain, stepped through time.
 ///
@@ -206,7 +206,7 @@ impl Simulation {
     /// The ground.
     #[getter]
     fn terrain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        terrain::object(py, &self.origin.terrain)
+        union::object(py, &self.origin.terrain)
     }
 
     /// Time since the last call of `set_state`, s.

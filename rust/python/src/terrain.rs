@@ -1,4 +1,4 @@
-//! `Terrain`, the base of every ground, and `Union`, which is made of others.
+//! `Terrain`, the base of every ground.
 
 use std::sync::Arc;
 
@@ -11,11 +11,7 @@ use rover_core::geometry::{Union as CoreUnion, ray};
 use crate::arguments::{Given, refused, shown};
 use crate::arrays::{fresh, rows};
 use crate::errors::{BorderError, Kind, Value};
-use crate::height_field::HeightField;
-use crate::plane::Plane;
 use crate::rays::{Met, met, rays};
-use crate::sphere_field::SphereField;
-use crate::triangle_mesh::TriangleMesh;
 
 /// Ground of any kind. Immutable.
 ///
@@ -53,21 +49,8 @@ pub fn parse(given: &Bound<'_, PyAny>) -> PyResult<DrawnGround> {
     .into())
 }
 
-/// Back to Python.
-pub fn object<'py>(py: Python<'py>, ground: &DrawnGround) -> PyResult<Bound<'py, PyAny>> {
-    Ok(match ground {
-        DrawnGround::Plane(plane) => Bound::new(py, Plane::of(*plane))?.into_any(),
-        DrawnGround::Field(field) => Bound::new(py, SphereField::of(field.clone()))?.into_any(),
-        DrawnGround::Map(map) => Bound::new(py, HeightField::of(map.clone()))?.into_any(),
-        DrawnGround::Mesh(mesh) => Bound::new(py, TriangleMesh::of(mesh.clone()))?.into_any(),
-        DrawnGround::Union(..) => {
-            Bound::new(py, Terrain::base(ground.clone()).add_subclass(Union))?.into_any()
-        }
-    })
-}
-
 /// Several terrains as one.
-fn union(parts: &Bound<'_, PyAny>) -> PyResult<DrawnGround> {
+pub fn union(parts: &Bound<'_, PyAny>) -> PyResult<DrawnGround> {
     let listed = parts
         .try_iter()
         .map_err(|_| refused(parts, Kind::Terrain, "parts", "a list of terrains"))?;
@@ -129,60 +112,5 @@ impl Terrain {
             (self.ground.terrain(), rays(origins, directions, max_range)?);
         let hits = py.detach(|| ray::cast(&*terrain, &rays, range));
         met(py, &hits)
-    }
-}
-
-/// Several terrains as one ground: a map with rocks on it, say. Immutable.
-///
-/// A rover touches whatever of them it meets. Where a part has a plane, the ground is known
-/// everywhere; otherwise it is known where a height field knows it.
-///
-/// Args:
-///     parts: Terrains of any kind, at least one; at most one of them may have a plane.
-///
-/// Raises:
-///     TerrainError: A part is no terrain, there is none, or two have a plane.
-#[pyclass(module = "rover_gym.mechanics", frozen, extends = Terrain)]
-pub struct Union;
-
-impl Union {
-    /// The terrains of one.
-    fn grounds<'a>(slf: &'a PyRef<'_, Self>) -> &'a [DrawnGround] {
-        match &slf.as_super().ground {
-            DrawnGround::Union(_, parts) => parts,
-            _ => &[],
-        }
-    }
-}
-
-#[pymethods]
-impl Union {
-    #[new]
-    fn new(parts: &Bound<'_, PyAny>) -> PyResult<PyClassInitializer<Self>> {
-        Ok(Terrain::base(union(parts)?).add_subclass(Self))
-    }
-
-    /// The terrains, in the order they were given.
-    #[getter]
-    fn parts<'py>(slf: PyRef<'py, Self>) -> PyResult<Vec<Bound<'py, PyAny>>> {
-        let grounds = Self::grounds(&slf).iter();
-        grounds.map(|ground| object(slf.py(), ground)).collect()
-    }
-
-    fn __len__(slf: PyRef<'_, Self>) -> usize {
-        Self::grounds(&slf).len()
-    }
-
-    fn __repr__(slf: PyRef<'_, Self>) -> PyResult<String> {
-        let parts = Self::parts(slf)?;
-        let shown = parts.iter().map(|part| Ok(part.repr()?.to_string()));
-        let shown = shown.collect::<PyResult<Vec<_>>>()?;
-        Ok(format!("Union([{}])", shown.join(", ")))
-    }
-
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-        let parts = (Self::parts(slf.borrow())?,);
-        let parts = parts.into_pyobject(slf.py())?.into_any();
-        Ok((slf.get_type().into_any(), parts))
     }
 }

@@ -1,0 +1,78 @@
+//! `Union`, the ground that is made of others.
+
+use pyo3::prelude::*;
+use rover_core::draw::DrawnGround;
+
+use crate::height_field::HeightField;
+use crate::plane::Plane;
+use crate::sphere_field::SphereField;
+use crate::terrain::{Terrain, union};
+use crate::triangle_mesh::TriangleMesh;
+
+/// A ground of the core as the object of its kind.
+pub fn object<'py>(py: Python<'py>, ground: &DrawnGround) -> PyResult<Bound<'py, PyAny>> {
+    Ok(match ground {
+        DrawnGround::Plane(plane) => Bound::new(py, Plane::of(*plane))?.into_any(),
+        DrawnGround::Field(field) => Bound::new(py, SphereField::of(field.clone()))?.into_any(),
+        DrawnGround::Map(map) => Bound::new(py, HeightField::of(map.clone()))?.into_any(),
+        DrawnGround::Mesh(mesh) => Bound::new(py, TriangleMesh::of(mesh.clone()))?.into_any(),
+        DrawnGround::Union(..) => {
+            Bound::new(py, Terrain::base(ground.clone()).add_subclass(Union))?.into_any()
+        }
+    })
+}
+
+/// Several terrains as one ground: a map with rocks on it, say. Immutable.
+///
+/// A rover touches whatever of them it meets. Where a part has a plane, the ground is known
+/// everywhere; otherwise it is known where a height field knows it.
+///
+/// Args:
+///     parts: Terrains of any kind, at least one; at most one of them may have a plane.
+///
+/// Raises:
+///     TerrainError: A part is no terrain, there is none, or two have a plane.
+#[pyclass(module = "rover_gym.mechanics", frozen, extends = Terrain)]
+pub struct Union;
+
+impl Union {
+    /// The terrains of one.
+    fn grounds<'a>(slf: &'a PyRef<'_, Self>) -> &'a [DrawnGround] {
+        match &slf.as_super().ground {
+            DrawnGround::Union(_, parts) => parts,
+            _ => &[],
+        }
+    }
+}
+
+#[pymethods]
+impl Union {
+    #[new]
+    fn new(parts: &Bound<'_, PyAny>) -> PyResult<PyClassInitializer<Self>> {
+        Ok(Terrain::base(union(parts)?).add_subclass(Self))
+    }
+
+    /// The terrains, in the order they were given.
+    #[getter]
+    fn parts<'py>(slf: PyRef<'py, Self>) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        let grounds = Self::grounds(&slf).iter();
+        grounds.map(|ground| object(slf.py(), ground)).collect()
+    }
+
+    fn __len__(slf: PyRef<'_, Self>) -> usize {
+        Self::grounds(&slf).len()
+    }
+
+    fn __repr__(slf: PyRef<'_, Self>) -> PyResult<String> {
+        let parts = Self::parts(slf)?;
+        let shown = parts.iter().map(|part| Ok(part.repr()?.to_string()));
+        let shown = shown.collect::<PyResult<Vec<_>>>()?;
+        Ok(format!("Union([{}])", shown.join(", ")))
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let parts = (Self::parts(slf.borrow())?,);
+        let parts = parts.into_pyobject(slf.py())?.into_any();
+        Ok((slf.get_type().into_any(), parts))
+    }
+}
