@@ -22,7 +22,14 @@ pytestmark = pytest.mark.timeout(1200)
 WIDTHS = {"desk": 1280, "phone": 390}  # CSS pixels
 
 # Pages of every kind: start, tables, formulas, code, commands, a chapter of the reference.
-SAMPLE = ("index.html", "accuracy.html", "notation.html", "first-steps.html", "tables/comparison.html", "api/simulation.html")
+SAMPLE = (
+    "index.html",
+    "accuracy.html",
+    "notation.html",
+    "first-steps.html",
+    "tables/comparison.html",
+    "api/simulation.html",
+)
 
 # What sticks out to the right of the window, but for what can be scrolled by itself within the text.
 STICKING_OUT = """

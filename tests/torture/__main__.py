@@ -1,6 +1,6 @@
 """Plays all regimes, or some: `python -m torture [--regime NAME] [--case K] [--hours H]`.
 
-Without arguments every regime plays one round, which takes minutes, and the table of `docs/tables/torture.md` is written.
+Without arguments every regime plays one round, which takes minutes, and `docs/tables/torture.md` is written.
 """
 
 import argparse
