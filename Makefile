@@ -125,17 +125,17 @@ train-rllib: ## train Rover-v0 on a local Ray with 1 and with 2 workers; Ray wan
 # One thread for every engine, and the package of comparisons on the path.
 COMPARE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONPATH=tests $(BIN)/python -m comparison
 
-chart: $(STAMPS)/release $(STAMPS)/peers $(STAMPS)/debian-peers ## error against CPU time beside other engines: docs/comparison/ (40 minutes; CHART=--quick is shorter and goes to runs/)
+chart: $(STAMPS)/release $(STAMPS)/peers $(STAMPS)/debian-peers ## error against CPU time beside other engines: docs/comparison/, docs/tables/ (40 minutes; CHART=--quick is shorter and goes to runs/)
 	$(COMPARE).chart $(CHART)
 	$(COMPARE).presets $(filter --quick,$(CHART))
 	$(COMPARE).sphere_scenes $(filter --quick,$(CHART))
 	$(COMPARE).exploring_chart $(filter --quick,$(CHART))
 	$(COMPARE).surface_scenes $(filter --quick,$(CHART))
 
-stability: $(STAMPS)/release $(STAMPS)/peers $(STAMPS)/debian-peers ## the scenes where methods fail, ours and other engines': docs/stability.md (5 minutes)
+stability: $(STAMPS)/release $(STAMPS)/peers $(STAMPS)/debian-peers ## the scenes where methods fail, ours and other engines': docs/tables/stability.md (5 minutes)
 	$(COMPARE).stability
 
-torture: $(STAMPS)/test $(MODULE) ## tries to break everything: docs/stability.md's table (5 minutes on two cores; TORTURE="--hours 2", or --regime NAME --case K)
+torture: $(STAMPS)/test $(MODULE) ## tries to break everything: docs/tables/torture.md (5 minutes on two cores; TORTURE="--hours 2", or --regime NAME --case K)
 	PYTHONPATH=tests $(BIN)/python -m torture $(TORTURE)
 
 bits: $(STAMPS)/test $(MODULE) ## hash trajectories bit by bit (BITS="--save runs/bits.json" before a change, BITS="--against runs/bits.json" after it)
@@ -144,7 +144,7 @@ bits: $(STAMPS)/test $(MODULE) ## hash trajectories bit by bit (BITS="--save run
 profiles: $(STAMPS)/test $(STAMPS)/release ## performance profiles of the contact solvers, with Siconos' where it is installed
 	$(COMPARE).solver_profiles
 
-validate: $(STAMPS)/release ## the soil beside papers and closed forms: docs/validation.md (an hour and a half on two cores; VALIDATE="packing repose" measures some)
+validate: $(STAMPS)/release ## the soil beside papers and closed forms: docs/tables/validation.md (an hour and a half on two cores; VALIDATE="packing repose" measures some)
 	PYTHONPATH=tests $(BIN)/python -m validation $(VALIDATE)
 
 orders: $(STAMPS)/demo ## measure every time-stepping scheme: order, drift, energy, cost; redraw docs/comparison/orders.png

@@ -10,7 +10,7 @@ from rover_gym.cli import app as rover
 
 INTRODUCTION = """# The command line
 
-`rover --help` and `rover COMMAND --help` say in the terminal what stands here.
+The same text as `rover --help` and `rover COMMAND --help`.
 """
 
 

@@ -7,7 +7,7 @@ from sphinx.environment import BuildEnvironment
 
 START = "index"
 MARK = "% Pages that no list on this page names follow here.\n"
-CAPTION = "Guides: live and among other tools"
+CAPTION = "More how-to"
 
 
 def unlisted(text: str, pages: set[str]) -> list[str]:

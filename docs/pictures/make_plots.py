@@ -1,4 +1,4 @@
-"""Draws the pictures of docs/plots.md anew: `.venv/bin/python docs/pictures/make_plots.py`."""
+"""Draws the pictures of docs/watching.md anew: `.venv/bin/python docs/pictures/make_plots.py`."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory

@@ -2,7 +2,7 @@
 
 All engines of one scene and one step run one after the other, so that a busy machine is busy for all; a run that took
 less than a second is repeated and the least time kept. One thread. Writes `chart.json`, the pictures and the tables of
-`docs/comparison.md`.
+`docs/tables/comparison.md`.
 """
 
 import argparse

@@ -3,7 +3,7 @@
 Each scene is an ensemble of the drives of `comparison.exploring`, cut after `HORIZON`: contacts that make and break
 part the ways of any two computations in the end, and from then on a distance says nothing about either. The references
 are this project's own, with steps halved until the path changes by less than `SETTLED`; `--references` makes them (ten
-minutes). Writes `exploring.json`, the picture and the tables of `docs/comparison.md`.
+minutes). Writes `exploring.json`, the picture and the tables of `docs/tables/comparison.md`.
 """
 
 import argparse

@@ -4,18 +4,20 @@ import shutil
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-#: The chart's JSON and pictures; the page beside it has the tables.
+#: The chart's JSON and pictures, and the page of its tables.
 CHART = ROOT / "docs" / "comparison"
+TABLES = ROOT / "docs" / "tables" / "comparison.md"
 #: The same of a quick run, with a copy of the page.
 QUICK = ROOT / "runs" / "comparison"
 
 
 def page_of(output: Path) -> Path:
     """The page whose tables a run fills: the documentation's, or a fresh copy of it for a quick run."""
+    if output == CHART:
+        return TABLES
     page = output.with_suffix(".md")
-    if output == QUICK:
-        page.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(CHART.with_suffix(".md"), page)
+    page.parent.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(TABLES, page)
     return page
 
 

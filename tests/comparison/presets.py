@@ -1,8 +1,8 @@
 """What the named accuracies give over ensembles of drives: `python -m comparison.presets [--quick] [--newton]`.
 
 For every scene the median and the quartiles of the members' errors and the median of their costs. Writes
-`docs/comparison/presets.json` and its table in `docs/comparison.md`. `--newton` instead sets "reference" beside the
-same with the Newton variant, under `runs/`.
+`docs/comparison/presets.json` and its table in `docs/tables/comparison.md`. `--newton` instead sets "reference" beside
+the same with the Newton variant, under `runs/`.
 """
 
 import argparse

@@ -2,7 +2,8 @@
 
 Ours is the program `free_spheres` of `rust/comparison`, which also hands out the scenes, so that all begin alike.
 Positions and velocities are read every 10 ms (outside the timing), and errors are taken from them in the same way for
-all. Writes `docs/comparison/spheres.json`, `spheres.png` and the tables of `docs/comparison.md` between their marks.
+all. Writes `docs/comparison/spheres.json`, `spheres.png` and the tables of `docs/tables/comparison.md` between their
+marks.
 """
 
 import argparse

@@ -1,6 +1,6 @@
 """Every scene on which methods fail, for ours and the installed peers: `python -m comparison.stability [--quick]`.
 
-Writes `docs/comparison/stability.json` and the tables of `docs/stability.md` from it.
+Writes `docs/comparison/stability.json` and `docs/tables/stability.md` from it.
 """
 
 import argparse
@@ -135,7 +135,7 @@ def main() -> None:
             return
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
-    text = DOCS / "stability.md"
+    text = DOCS / "tables" / "stability.md"
     head = text.read_text(encoding="utf-8").split(MARK)[0]
     text.write_text(head + MARK + "\n\n" + page(json.loads(path.read_text(encoding="utf-8"))), encoding="utf-8")
 

@@ -1,8 +1,8 @@
 """Drives over maps, ours beside the peers: `python -m comparison.surface_scenes [--quick]`.
 
 A ball over the inner edges of a flat map and over a sine, and a box at rest, whose true paths are known; the rover over
-level ground and hills. Writes `docs/comparison/surfaces.json`, `surfaces.png` and the tables of `docs/comparison.md`
-between their marks.
+level ground and hills. Writes `docs/comparison/surfaces.json`, `surfaces.png` and the tables of
+`docs/tables/comparison.md` between their marks.
 """
 
 import argparse

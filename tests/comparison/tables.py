@@ -1,4 +1,4 @@
-"""The tables of `docs/comparison.md`, made from `chart.json`."""
+"""The tables of `docs/tables/comparison.md` that are made from `chart.json`."""
 
 from itertools import pairwise
 from pathlib import Path

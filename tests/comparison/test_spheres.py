@@ -51,6 +51,7 @@ def test_text_goes_between_its_marks_and_a_page_without_them_is_refused(
 ) -> None:
     page = tmp_path / "page.md"
     monkeypatch.setattr(output, "CHART", tmp_path / "page")
+    monkeypatch.setattr(output, "TABLES", page)
     page.write_text("a\n<b>\nold\n<e>\nz\n")
     output.between(tmp_path / "page", "<b>", "<e>", "new")
     assert page.read_text() == "a\n<b>\n\nnew\n\n<e>\nz\n"

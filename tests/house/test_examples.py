@@ -11,21 +11,24 @@ from rover_gym.cli import app
 ROOT = Path(__file__).parents[2]
 PAGES = (
     "README.md",
+    "docs/accuracy.md",
     "docs/economy.md",
-    "docs/foresight.md",
+    "docs/exchange.md",
+    "docs/first-steps.md",
+    "docs/grains.md",
     "docs/identification.md",
     "docs/linearise.md",
-    "docs/live.md",
-    "docs/logs.md",
+    "docs/models.md",
     "docs/planar.md",
+    "docs/policies.md",
     "docs/recording.md",
-    "docs/replay.md",
-    "docs/snippets.md",
-    "docs/seeing.md",
     "docs/sensors.md",
-    "docs/soil.md",
+    "docs/solvers.md",
     "docs/tasks.md",
+    "docs/training.md",
     "docs/vector.md",
+    "docs/watching.md",
+    "docs/your-map.md",
     "docs/your-rover.md",
 )
 #: Packages of extras that a block needs if it holds these words.
@@ -41,9 +44,8 @@ EXTRAS = {
 #: Blocks of the manual, not of the README or a tutorial, that take long.
 NIGHTLY = {
     "docs/identification.md-1": pytest.mark.nightly("tests/api/test_identification.py::test_the_stated_noise_is_taken"),
-    "docs/foresight.md-2": pytest.mark.nightly(
-        "tests/envs/test_foresight.py::test_rover_and_ground_choose_the_forecast"
-    ),
+    "docs/grains.md-3": pytest.mark.nightly("tests/api/test_grains_lab.py"),
+    "docs/training.md-2": pytest.mark.nightly("tests/training/test_raw_actions.py"),
     "docs/vector.md-5": pytest.mark.nightly("tests/envs/test_vector.py"),
     "docs/tasks.md-5": pytest.mark.nightly("tests/envs/test_reward_terms.py"),
 }
@@ -69,7 +71,7 @@ def test_example_runs(code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def test_the_commands_of_the_readme_are_known() -> None:
-    text = "".join((ROOT / page).read_text(encoding="utf-8") for page in ("README.md", "docs/commands.md"))
+    text = "".join((ROOT / page).read_text(encoding="utf-8") for page in ("README.md", "docs/first-steps.md"))
     commands = re.findall(r"^rover (\w+)", text, flags=re.MULTILINE)
     assert commands
     for command in commands:

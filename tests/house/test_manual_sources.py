@@ -43,7 +43,7 @@ def test_a_page_that_no_list_names_is_listed(extension: Callable[[str], ModuleTy
     contents = extension("contents")
     text = (DOCS / "index.md").read_text(encoding="utf-8")
     assert contents.MARK in text
-    pages = {"index", "readme", "gallery", "something-new", "tutorials/train-a-policy"}
+    pages = {"index", "installing", "glossary", "something-new", "tutorials/train-a-policy"}
     assert contents.unlisted(text, pages) == ["something-new"]
 
 

@@ -1,6 +1,6 @@
 """Plays all regimes, or some: `python -m torture [--regime NAME] [--case K] [--hours H]`.
 
-Without arguments every regime plays one round, which takes minutes, and the table of `docs/stability.md` is written.
+Without arguments every regime plays one round, which takes minutes, and `docs/tables/torture.md` is written.
 """
 
 import argparse
@@ -37,7 +37,7 @@ def main() -> int:
     parser.add_argument("--rounds", type=int, default=1, help="of every regime's cases")
     parser.add_argument("--hours", type=float, default=0.0, help="more rounds, with other cases, for so long")
     parser.add_argument("--workers", type=int, default=2, help="processes")
-    parser.add_argument("--no-table", action="store_true", help="leave docs/stability.md as it is")
+    parser.add_argument("--no-table", action="store_true", help="leave docs/tables/torture.md as it is")
     arguments = parser.parse_args()
     console = Console(width=180)
     wanted = arguments.regime or [""]

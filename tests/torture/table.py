@@ -1,4 +1,4 @@
-"""The table, regime by regime: on the console, in `docs/torture.json` and between the marks of `docs/stability.md`."""
+"""The table, regime by regime: on the console and between the marks of `docs/tables/torture.md`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rich.table import Table
 from torture.ledger import Ledger
 from torture.regime import Regime
 
-PAGE = Path(__file__).parents[2] / "docs" / "stability.md"
+PAGE = Path(__file__).parents[2] / "docs" / "tables" / "torture.md"
 BEGIN = "<!-- campaign: made by `make torture`, not by hand -->"
 END = "<!-- end of the campaign's table -->"
 COLUMNS = {

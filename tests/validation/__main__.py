@@ -1,6 +1,6 @@
 """Measures all parts, or some: `python -m validation [collapse packing ... plate_on_balls]`.
 
-Writes `docs/validation/*.json` and pictures, and the tables of `docs/validation.md` from all that is there.
+Writes `docs/validation/*.json` and pictures, and the tables of `docs/tables/validation.md` from all that is there.
 """
 
 import argparse
@@ -125,7 +125,7 @@ def main() -> None:
     for name in parts.keys() & PICTURES.keys():
         PICTURES[name](parts[name], FOLDER / f"{name}.png")
     text, found = page(parts)
-    target = DOCS / "validation.md"
+    target = DOCS / "tables" / "validation.md"
     head = target.read_text(encoding="utf-8").split(MARK)[0]
     target.write_text(head + MARK + "\n\n" + text, encoding="utf-8")
     for f in found:

@@ -184,7 +184,7 @@ def balance(data: dict[str, Any]) -> Iterator[Finding]:
         yield Finding(
             f"growth of the energy in a box, {name}",
             "0",
-            "proof in soil.md",
+            "proof in the manual",
             worst,
             0.0,
             1e-12,
@@ -227,7 +227,7 @@ def ball_packing(data: dict[str, Any]) -> Iterator[Finding]:
 def ball_balance(data: dict[str, Any]) -> Iterator[Finding]:
     """Energy, momentum and similarity of balls."""
     grown = max(row["grown"] for row in data["boxes"])
-    yield Finding("balls: growth of the energy in a box, e = 0, any µ", "0", "proof in soil.md", grown, 0.0, 1e-12)
+    yield Finding("balls: growth of the energy in a box, e = 0, any µ", "0", "proof in the manual", grown, 0.0, 1e-12)
     error = max(row["momentum_error"] for row in data["clouds"])
     yield Finding("balls: momentum of two clouds that meet", "0", "exact", error, 0.0, 1e-12, digits=".1e")
     apart = max(row["difference"] for row in data["froude"])
@@ -367,7 +367,7 @@ def everywhere(ledgers: dict[str, dict[str, float]]) -> Iterator[Finding]:
             yield Finding(
                 f"{part}: energy regained",
                 "0",
-                "proof in soil.md",
+                "proof in the manual",
                 ledger["regained"],
                 0.0,
                 1e-6,

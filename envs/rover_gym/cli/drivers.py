@@ -4,7 +4,7 @@ from rover_gym.mechanics import RoverModel
 from rover_gym.planning.planner_policy import PlannerPolicy
 from rover_gym.policy.named_policy import NAMES_HELP, NamedPolicy, named_policy, policy_title
 
-DRIVERS_HELP = f"{NAMES_HELP[:-1]}; 'planner' tries out futures in the simulator, see the manual's page on planning."
+DRIVERS_HELP = f"{NAMES_HELP[:-1]}; 'planner' tries out futures in the simulator, see the manual's page on policies."
 
 
 def named_driver(name: str, terrain: str, model: RoverModel | None = None) -> NamedPolicy:

@@ -17,7 +17,7 @@ A scene states what will never happen in it, and the plan leaves out only what t
 left out is refused. `docs/economy.md` gives the error and the cost of each economy, and the command that measures them.
 
 `PlannerPolicy` drives a rover by planning: `FieldPlan` knows the way over a whole field, `Futures` drives copies of the
-rover by many sequences of commands (`docs/planning.md`).
+rover by many sequences of commands (`docs/policies.md`).
 """
 
 from rover_gym.planning.economy import Economy, measure_economies

@@ -96,8 +96,8 @@ class ScanPolicy:
     - where the cheapest path begins backward.
 
     It remembers up to 12 such places and avoids them. Where a rock has stopped it, it pushes with most of its torque.
-    The longer it makes no progress, the farther it backs off and the more it risks. docs/baseline.md says how often it
-    reaches its goal.
+    The longer it makes no progress, the farther it backs off and the more it risks. Success rates are in
+    docs/policy-results.md.
 
     Example:
         >>> env = gym.make("RoverRocks-v0", difficulty=1.0, **ScanPolicy.arguments())

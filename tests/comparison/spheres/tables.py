@@ -1,4 +1,4 @@
-"""The tables of `docs/comparison.md`, made from `spheres.json`."""
+"""The tables of `docs/tables/comparison.md` that are made from `spheres.json`."""
 
 from dataclasses import dataclass
 from pathlib import Path

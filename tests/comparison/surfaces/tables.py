@@ -1,4 +1,4 @@
-"""The tables of `docs/comparison.md`, made from `surfaces.json`."""
+"""The tables of `docs/tables/comparison.md` that are made from `surfaces.json`."""
 
 from collections.abc import Callable
 from pathlib import Path

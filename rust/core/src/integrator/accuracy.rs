@@ -3,7 +3,7 @@
 //! The numbers are measured (`make chart`, `docs/accuracy.md`). The error of a path is proportional
 //! to the step: over 22 m of a curve on flat ground its root mean square is 0.21 m/s times the
 //! step, for steps from 0.1 to 50 ms. On rocks the error is larger and a single drive is not
-//! representative: `docs/comparison.md` gives medians and quartiles over ensembles.
+//! representative: `docs/tables/comparison.md` has medians and quartiles over ensembles.
 
 use super::options::{StepOptions, Variant};
 
