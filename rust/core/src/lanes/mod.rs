@@ -44,6 +44,7 @@ mod stops;
 mod sweeps;
 mod system;
 mod tread;
+mod tree_matrix;
 mod velocity_equations;
 mod visits;
 pub mod yielding;

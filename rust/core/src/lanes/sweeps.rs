@@ -116,12 +116,14 @@ impl<T: Lane> Rows<T> {
         let movers = &self.movers[contacts.part(slot)][..];
         let rows = &self.Z[slot * self.stride..][..BASE + movers.len()];
         let (base, joints) = rows.split_at(BASE);
+        let joints = &joints[..movers.len()];
         let here = contacts.slot(slot).active;
-        for (w, row) in self.swept[..BASE].iter_mut().zip(base) {
-            add(here, w, along(row, p));
+        let swept = &mut self.swept[..];
+        for k in 0..BASE {
+            add(here, &mut swept[k], along(&base[k], p));
         }
-        for (row, mover) in joints.iter().zip(movers) {
-            add(here, &mut self.swept[mover.velocity], along(row, p));
+        for k in 0..movers.len() {
+            add(here, &mut swept[movers[k].velocity], along(&joints[k], p));
         }
     }
 
@@ -137,13 +139,15 @@ impl<T: Lane> Rows<T> {
         let movers = &self.movers[contacts.part(slot)][..];
         let rows = &self.Z[slot * self.stride..][..BASE + movers.len()];
         let (base, joints) = rows.split_at(BASE);
+        let joints = &joints[..movers.len()];
+        let swept = &self.swept[..];
         let mut u = *q;
         add_scaled(&mut u, p, self.softness[slot]);
-        for (row, w) in base.iter().zip(&self.swept) {
-            add_scaled(&mut u, row, *w);
+        for k in 0..BASE {
+            add_scaled(&mut u, &base[k], swept[k]);
         }
-        for (row, mover) in joints.iter().zip(movers) {
-            add_scaled(&mut u, row, self.swept[mover.velocity]);
+        for k in 0..movers.len() {
+            add_scaled(&mut u, &joints[k], swept[movers[k].velocity]);
         }
         u
     }
