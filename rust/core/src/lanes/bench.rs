@@ -16,7 +16,7 @@ use crate::solver::FURTHER_ALPHAS;
 const MAX_STEPS: usize = 80;
 
 /// Share of the squared residual that a correction leaves if another one follows.
-const GAIN: f64 = 0.01;
+const GAIN: f64 = 0.1;
 
 /// Most steps of a solve: those of the first attempt and of all further ones.
 pub const MAX_ITERATIONS: usize = MAX_STEPS * (1 + FURTHER_ALPHAS.len());
