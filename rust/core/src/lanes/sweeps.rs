@@ -165,9 +165,9 @@ pub(super) fn write_start<T: Lane>(
                 let contact = usize::from(places[lane]);
                 let own = &mut problem.p[3 * contact..][..3];
                 let last = &mut problem.factored.last[contact];
-                for (k, own) in own.iter_mut().enumerate() {
-                    last[k] = *own;
-                    *own = p[slot][k].get(lane);
+                for k in 0..3 {
+                    last[k] = own[k];
+                    own[k] = p[slot][k].get(lane);
                 }
             }
         }

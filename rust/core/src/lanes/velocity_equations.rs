@@ -240,10 +240,9 @@ impl<T: Lane, const C: usize> System<T, C> for VelocitySystem<T, C> {
     fn load(&mut self, lane: usize, problem: &ContactProblem) -> Bits {
         let factored = &problem.factored;
         let pattern = Self::pattern(factored.pattern.as_ref());
-        if !(self.pattern.as_deref()).is_some_and(|own| std::ptr::eq(own, pattern)) {
-            if let Some(pattern) = &factored.pattern {
-                self.adopt(pattern);
-            }
+        let is_own = (self.pattern.as_deref()).is_some_and(|own| std::ptr::eq(own, pattern));
+        if let (false, Some(pattern)) = (is_own, &factored.pattern) {
+            self.adopt(pattern);
         }
         let changed = self.slots[lane] | factored.slots;
         self.slots[lane] = factored.slots;
