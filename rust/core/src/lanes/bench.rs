@@ -5,21 +5,19 @@
 
 use super::equations::DenseSystem;
 use super::pivoting::Pivoting;
-use super::problem::{ContactProblem, MAX_CONTACTS};
+use super::problem::{ContactProblem, MAX_CONTACTS, MAX_DENSE};
 use super::system::System;
 use super::velocity_equations::VelocitySystem;
 use crate::problem::{ContactScales, Magnitudes, Residual};
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::solver::FURTHER_ALPHAS;
 
-/// Most steps of an attempt. What is unsolved then goes in circles, mostly.
-const MAX_STEPS: usize = 80;
-
 /// Share of the squared residual that a correction leaves if another one follows.
-const GAIN: f64 = 0.01;
+const GAIN: f64 = 0.1;
 
 /// Most steps of a solve: those of the first attempt and of all further ones.
-pub const MAX_ITERATIONS: usize = MAX_STEPS * (1 + FURTHER_ALPHAS.len());
+pub const MAX_ITERATIONS: usize =
+    <DenseSystem<f64, MAX_DENSE> as System<f64, MAX_DENSE>>::MAX_STEPS * (1 + FURTHER_ALPHAS.len());
 
 /// Where a bench gets its problems and leaves their answers.
 pub(super) trait Line {
@@ -131,7 +129,8 @@ impl<T: Lane, const C: usize, S: System<T, C>> Bench<T, C, S> {
         self.problem[lane] = index;
     }
 
-    /// Lets a lane try its problem again from the start, with another `α`, if there is one left.
+    /// Lets a lane try its problem again from the start, or from the last step's impulses where the
+    /// system [returns](System::RETURNS) to them, with another `α`, if there is one left.
     /// [`Pivoting::begin`] follows.
     #[inline(always)]
     fn retry(&mut self, lane: usize, problem: &ContactProblem) -> bool {
@@ -146,13 +145,14 @@ impl<T: Lane, const C: usize, S: System<T, C>> Bench<T, C, S> {
         for i in own.system.places() {
             if let Some(contact) = S::contact_at(problem, i) {
                 for k in 0..3 {
-                    own.p[i][k].set(lane, problem.p[3 * contact + k]);
-                }
-                if S::RETURNS {
-                    let last = S::last_of(problem, contact);
-                    for k in 0..3 {
-                        own.centre[i][k].set(lane, last[k]);
-                    }
+                    let start = if S::RETURNS {
+                        let last = S::last_of(problem, contact)[k];
+                        own.centre[i][k].set(lane, last);
+                        last
+                    } else {
+                        problem.p[3 * contact + k]
+                    };
+                    own.p[i][k].set(lane, start);
                 }
             }
         }
@@ -204,7 +204,7 @@ impl<T: Lane, const C: usize, S: System<T, C>> Bench<T, C, S> {
         self.late = 0;
         for lane in 0..T::LANES {
             self.steps[lane] += 1;
-            self.late |= u32::from(self.steps[lane] >= MAX_STEPS) << lane;
+            self.late |= u32::from(self.steps[lane] >= S::MAX_STEPS) << lane;
         }
     }
 

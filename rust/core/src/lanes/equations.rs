@@ -312,7 +312,10 @@ impl<T: Lane, const C: usize> System<T, C> for DenseSystem<T, C> {
     const PARKED_ALPHA: f64 = 1e-6;
     const SMALLEST_ALPHA: f64 = 1e-14;
     const RETURNS: bool = false;
+    // A rover that sticks is solved then.
+    const NEAR: f64 = 1e-6;
     const CORRECTIONS: usize = 1;
+    const MAX_STEPS: usize = 80;
 
     #[inline(always)]
     fn new(token: T::Token) -> Self {

@@ -322,7 +322,8 @@ impl Machine {
                 let body = machine.joints[stop.joint].body;
                 std::iter::repeat_n(path(body), SIDES)
             });
-            let pattern = Pattern::new(machine.nv(), wheels.chain(stops).collect());
+            let paths: Vec<_> = wheels.chain(stops).collect();
+            let pattern = Pattern::new(machine.nv(), &paths);
             machine.pattern = Some(Arc::new(pattern.ok_or(NotOrdinary::BranchedCoupling)?));
         }
         Ok(machine)

@@ -11,8 +11,8 @@
 //! - [`poses`], [`mass_matrix`], [`bias`], [`energy`]: dynamics of the tree;
 //! - `parts`, [`ground`], `footing`, [`forecast`], [`contacts`], `stops`: what touches what;
 //!   [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield;
-//! - [`problem`], [`modes`], [`equations`], `pivoting`, `visits`, `bench`, [`queue`]: the
-//!   friction-contact problems;
+//! - [`problem`], [`modes`], [`equations`], [`pattern`], `tree_matrix`, `velocity_equations`,
+//!   `sweeps`, `pivoting`, `visits`, `bench`, [`queue`]: the friction-contact problems;
 //! - [`step`]: the step.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
@@ -44,6 +44,7 @@ mod stops;
 mod sweeps;
 mod system;
 mod tread;
+mod tree_matrix;
 mod velocity_equations;
 mod visits;
 pub mod yielding;

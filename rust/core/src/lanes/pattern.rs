@@ -2,15 +2,18 @@
 
 use std::ops::Range;
 
+use crate::multibody::model::BASE;
+
 /// The branch-induced sparsity of a matrix `1 + Z K Zᵀ` over the velocities of a machine
-/// (Featherstone 2008, ch. 6): entries (k, a) and (a, k) for every velocity k and those that carry
-/// it, its ancestors.
+/// (Featherstone 2008, ch. 6): all entries of the base's six velocities, and (k, a) and (a, k) for
+/// every joint's velocity k and those that carry it, its ancestors. Joints' velocities are numbered
+/// from 0, after those of the base.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Pattern {
-    /// Ancestors of all velocities, from the root: those of velocity k are `ancestors[rows[k]]`.
+    /// Joint ancestors of all joints, from the root: those of joint k are `ancestors[rows[k]]`.
     ancestors: Vec<usize>,
     rows: Vec<Range<usize>>,
-    /// Velocities that move the contact of a slot, from the root.
+    /// Joints that move the contact of a slot, from the root.
     paths: Vec<Vec<usize>>,
     /// Length of the longest path.
     stride: usize,
@@ -19,25 +22,31 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// That of contacts along paths over `nv` velocities, a path a slot; none if a velocity has
-    /// other ancestors on another path.
+    /// That of contacts along paths over `nv` velocities, a path a slot. None if a path does not
+    /// begin with the base, or if a velocity has other ancestors on another path.
     #[must_use]
-    pub fn new(nv: usize, paths: Vec<Vec<usize>>) -> Option<Self> {
-        let mut of_velocity: Vec<&[usize]> = vec![&[]; nv];
-        for path in &paths {
-            for (k, &velocity) in path.iter().enumerate() {
-                let own = &mut of_velocity[velocity];
-                if !own.is_empty() && **own != path[..k] {
+    pub fn new(nv: usize, paths: &[Vec<usize>]) -> Option<Self> {
+        let mut of_joint: Vec<Option<&[usize]>> = vec![None; nv.checked_sub(BASE)?];
+        let mut own_paths = Vec::new();
+        for path in paths {
+            let (base, joints) = path.split_at_checked(BASE)?;
+            if !base.iter().copied().eq(0..BASE) {
+                return None;
+            }
+            own_paths.push(joints.iter().map(|k| k - BASE).collect());
+            for (k, &velocity) in joints.iter().enumerate() {
+                let own = &mut of_joint[velocity - BASE];
+                if own.is_some_and(|own| *own != joints[..k]) {
                     return None;
                 }
-                *own = &path[..k];
+                *own = Some(&joints[..k]);
             }
         }
         let mut ancestors = Vec::new();
-        let rows = (of_velocity.iter())
+        let rows = (of_joint.iter())
             .map(|own| {
                 let first = ancestors.len();
-                ancestors.extend_from_slice(own);
+                ancestors.extend(own.unwrap_or_default().iter().map(|k| k - BASE));
                 first..ancestors.len()
             })
             .collect();
@@ -48,41 +57,41 @@ impl Pattern {
             shared: (paths.iter())
                 .flat_map(|a| paths.iter().map(move |b| shared(a, b)))
                 .collect(),
-            paths,
+            paths: own_paths,
         })
     }
 
-    /// Number of velocities.
+    /// Number of joints' velocities.
     #[inline(always)]
     #[must_use]
-    pub fn nv(&self) -> usize {
+    pub fn n_joints(&self) -> usize {
         self.rows.len()
     }
 
-    /// Number of entries below the diagonal.
+    /// Number of entries between joints below the diagonal.
     #[must_use]
     pub fn n_entries(&self) -> usize {
         self.ancestors.len()
     }
 
-    /// Ancestors of a velocity, from the root.
+    /// Joint ancestors of a joint, from the root.
     #[inline(always)]
     #[must_use]
-    pub fn ancestors(&self, velocity: usize) -> &[usize] {
-        &self.ancestors[self.rows[velocity].clone()]
+    pub fn ancestors(&self, joint: usize) -> &[usize] {
+        &self.ancestors[self.rows[joint].clone()]
     }
 
-    /// Entries of a velocity's row, left of the diagonal.
+    /// Entries of a joint's row with its ancestors.
     #[inline(always)]
     #[must_use]
-    pub fn row(&self, velocity: usize) -> Range<usize> {
-        self.rows[velocity].clone()
+    pub fn row(&self, joint: usize) -> Range<usize> {
+        self.rows[joint].clone()
     }
 
-    /// Velocities that move the contact of a slot, from the root.
+    /// Joints that move the contact of a slot, from the root.
     #[inline(always)]
     #[must_use]
-    pub fn path(&self, slot: usize) -> &[usize] {
+    pub fn joints(&self, slot: usize) -> &[usize] {
         &self.paths[slot]
     }
 
@@ -92,7 +101,7 @@ impl Pattern {
         self.shared[a * self.paths.len() + b]
     }
 
-    /// Length of the longest path.
+    /// Number of velocities on the longest path.
     #[inline(always)]
     #[must_use]
     pub fn stride(&self) -> usize {

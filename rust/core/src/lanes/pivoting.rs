@@ -28,10 +28,6 @@ const SHRINK: f64 = 1e-3;
 const NO_GAIN: f64 = 0.25;
 const HOLD: f64 = 1e-4;
 
-/// Squared relative residual after a full step below which the same factors may correct the rest: a
-/// rover that sticks is solved then. Where the slides still turn, a fresh step gains more.
-const NEAR: f64 = 1e-6;
-
 /// Fraction of a step below which the impulse stays where it was.
 const NO_MOVE: f64 = 1e-6;
 
@@ -245,7 +241,7 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
     #[inline(always)]
     pub(super) fn is_near(&self) -> T::Mask {
         let [relative, _] = self.residual();
-        self.full & relative.lt(relative.like(NEAR))
+        self.full & relative.lt(relative.like(S::NEAR))
     }
 
     /// Corrects the impulses of the lanes of a mask with the factors of their last step, where that

@@ -176,6 +176,14 @@ impl ContactProblem {
         3 * self.n_contacts
     }
 
+    /// W, row-major, 1/kg.
+    #[must_use]
+    pub fn operator(&self) -> Vec<f64> {
+        let n = self.n_unknowns();
+        let rows = (0..n).flat_map(|i| (0..n).map(move |j| self.entry(i, j)));
+        rows.collect()
+    }
+
     /// Entry of W, 1/kg.
     #[must_use]
     pub fn entry(&self, i: usize, j: usize) -> f64 {

@@ -169,10 +169,12 @@ impl<T: Lane> Rows<T> {
         for k in 1..BASE {
             add_scaled(&mut u, &base[k], v[k]);
         }
-        for (row, mover) in joints.iter_mut().zip(movers) {
-            let moved = end.motions[mover.motion].velocity_at(x);
-            *row = [moved.dot(n), moved.dot(t), moved.dot(b)];
-            add_scaled(&mut u, row, v[mover.velocity]);
+        let joints = &mut joints[..movers.len()];
+        for k in 0..movers.len() {
+            let moved = end.motions[movers[k].motion].velocity_at(x);
+            let row = [moved.dot(n), moved.dot(t), moved.dot(b)];
+            joints[k] = row;
+            add_scaled(&mut u, &row, v[movers[k].velocity]);
         }
         self.u_before[slot] = u;
         factor.half_solve_path(machine, self.bodies[part], rows);
@@ -264,8 +266,9 @@ impl<T: Lane> Rows<T> {
             for k in 1..BASE {
                 add_scaled(&mut sum, &base[k], y[k]);
             }
-            for (row, mover) in joints.iter().zip(movers) {
-                add_scaled(&mut sum, row, y[mover.velocity]);
+            let joints = &joints[..movers.len()];
+            for k in 0..movers.len() {
+                add_scaled(&mut sum, &joints[k], y[movers[k].velocity]);
             }
             let [n, t, b] = self.u_before[slot];
             q[slot] = [sum[0] + n, sum[1] + t, sum[2] + b];
@@ -291,11 +294,12 @@ impl<T: Lane> Rows<T> {
             let (base, joints) = rows.split_at(BASE);
             let here = contacts.slot(slot).active & lanes;
             let p = &p[slot];
-            for (y, row) in y[..BASE].iter_mut().zip(base) {
-                add(here, y, along(row, p));
+            let joints = &joints[..movers.len()];
+            for k in 0..BASE {
+                add(here, &mut y[k], along(&base[k], p));
             }
-            for (row, mover) in joints.iter().zip(movers) {
-                add(here, &mut y[mover.velocity], along(row, p));
+            for k in 0..movers.len() {
+                add(here, &mut y[movers[k].velocity], along(&joints[k], p));
             }
         }
     }
@@ -460,13 +464,15 @@ impl<T: Lane> Rows<T> {
                 let (contact, out) = (usize::from(places[lane]), &mut problems[lane].factored);
                 out.slots |= 1 << slot;
                 out.softness[contact] = softness[0][lane];
-                for (out, values) in out.diagonal[contact].iter_mut().zip(&diagonal) {
-                    *out = values[lane];
+                let out = &mut out.diagonal[contact];
+                for k in 0..9 {
+                    out[k] = diagonal[k][lane];
                 }
             },
         );
-        for (k, z) in self.Z[slot * self.stride..][..n].iter().enumerate() {
-            let values = store_all(z);
+        let Z = &self.Z[slot * self.stride..][..n];
+        for k in 0..n {
+            let values = store_all(&Z[k]);
             each::<T>(
                 active,
                 #[inline(always)]
@@ -513,8 +519,8 @@ impl<T: Lane> Rows<T> {
                     }
                 },
             );
-            for (out, values) in out[slot].iter_mut().zip(&values) {
-                *out = T::load(self.token, &values[..T::LANES]);
+            for k in 0..3 {
+                out[slot][k] = T::load(self.token, &values[k][..T::LANES]);
             }
         }
     }
@@ -566,10 +572,11 @@ fn product<T: Lane>(x: &[Triple<T>], y: &[Triple<T>]) -> [T; 9] {
         c * e,
         c * f,
     ];
-    for (x, y) in x[1..].iter().zip(&y[1..]) {
+    let y = &y[..x.len()];
+    for k in 1..x.len() {
         for i in 0..3 {
             for j in 0..3 {
-                sums[3 * i + j] += x[i] * y[j];
+                sums[3 * i + j] += x[k][i] * y[k][j];
             }
         }
     }
@@ -597,8 +604,8 @@ fn square<T: Lane>(x: &[Triple<T>]) -> [T; 9] {
 #[inline(always)]
 fn store_all<T: Lane, const N: usize>(x: &[T; N]) -> [[f64; MAX_LANES]; N] {
     let mut out = [[0.0; MAX_LANES]; N];
-    for (out, x) in out.iter_mut().zip(x) {
-        x.store(&mut out[..T::LANES]);
+    for k in 0..N {
+        x[k].store(&mut out[k][..T::LANES]);
     }
     out
 }

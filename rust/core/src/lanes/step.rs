@@ -44,9 +44,9 @@ use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 use crate::system::tree::{JOINT_ARM, MOST_JOINT_TURN, MOST_SPIN, MOST_TURN};
 
 /// Sweeps before pivoting, of machines with many contacts. Measured on six cylinders with torques
-/// of up to 60 N m, drawn anew every ten steps: 9.7 systems a problem without, 3.7 with four, 3.3
-/// with six; a sweep costs about a third of a system.
-const SWEEPS: usize = 4;
+/// of up to 60 N m, drawn anew every ten steps: 5.2 systems a problem after one, 4.8 after two, 4.7
+/// after four; a sweep costs about a third of a system.
+const SWEEPS: usize = 2;
 
 /// Why a lane was declined in its last step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -11,12 +11,11 @@ use super::rows::{Rows, add, add_scaled, along};
 use crate::multibody::model::BASE;
 use crate::scalar::{Lane, LaneMask};
 
-/// Newton steps on the multiplier of a slide, and passes over a contact's normal and tangents.
-const SLIDE_STEPS: usize = 3;
-const PASSES: usize = 1;
+/// Newton steps on the multiplier of a slide.
+const SLIDE_STEPS: usize = 2;
 
 /// The impulse of a contact by its law, all others fixed, where it has the impulse `p` and the
-/// velocity `u`; `w`: its block of W. The normal and the tangents are solved in turn.
+/// velocity `u`; `w`: its block of W. The normal is solved first, with the tangents as they are.
 #[inline(always)]
 fn solve<T: Lane>(w: &[T; 9], mu: T, p: &Triple<T>, u: &Triple<T>) -> Triple<T> {
     let zero = mu.like(0.0);
@@ -25,15 +24,11 @@ fn solve<T: Lane>(w: &[T; 9], mu: T, p: &Triple<T>, u: &Triple<T>) -> Triple<T> 
         *free -= along(&[w[3 * k], w[3 * k + 1], w[3 * k + 2]], p);
     }
     let inverse = mu.like(1.0) / w[0];
-    let mut new = *p;
-    for _ in 0..PASSES {
-        let pushed = free[0] + (w[1] * new[1] + w[2] * new[2]);
-        new[0] = (-(pushed * inverse)).max(zero);
-        let slip = [free[1] + w[3] * new[0], free[2] + w[6] * new[0]];
-        let [t, b] = friction([w[4], w[5], w[8]], slip, mu * new[0]);
-        (new[1], new[2]) = (t, b);
-    }
-    new
+    let pushed = free[0] + (w[1] * p[1] + w[2] * p[2]);
+    let normal = (-(pushed * inverse)).max(zero);
+    let slip = [free[1] + w[3] * normal, free[2] + w[6] * normal];
+    let [t, b] = friction([w[4], w[5], w[8]], slip, mu * normal);
+    [normal, t, b]
 }
 
 /// The tangential impulse of at most `limit` against the slip `f` without it: `−(W + λ 1)⁻¹ f` with
@@ -116,12 +111,14 @@ impl<T: Lane> Rows<T> {
         let movers = &self.movers[contacts.part(slot)][..];
         let rows = &self.Z[slot * self.stride..][..BASE + movers.len()];
         let (base, joints) = rows.split_at(BASE);
+        let joints = &joints[..movers.len()];
         let here = contacts.slot(slot).active;
-        for (w, row) in self.swept[..BASE].iter_mut().zip(base) {
-            add(here, w, along(row, p));
+        let swept = &mut self.swept[..];
+        for k in 0..BASE {
+            add(here, &mut swept[k], along(&base[k], p));
         }
-        for (row, mover) in joints.iter().zip(movers) {
-            add(here, &mut self.swept[mover.velocity], along(row, p));
+        for k in 0..movers.len() {
+            add(here, &mut swept[movers[k].velocity], along(&joints[k], p));
         }
     }
 
@@ -137,13 +134,15 @@ impl<T: Lane> Rows<T> {
         let movers = &self.movers[contacts.part(slot)][..];
         let rows = &self.Z[slot * self.stride..][..BASE + movers.len()];
         let (base, joints) = rows.split_at(BASE);
+        let joints = &joints[..movers.len()];
+        let swept = &self.swept[..];
         let mut u = *q;
         add_scaled(&mut u, p, self.softness[slot]);
-        for (row, w) in base.iter().zip(&self.swept) {
-            add_scaled(&mut u, row, *w);
+        for k in 0..BASE {
+            add_scaled(&mut u, &base[k], swept[k]);
         }
-        for (row, mover) in joints.iter().zip(movers) {
-            add_scaled(&mut u, row, self.swept[mover.velocity]);
+        for k in 0..movers.len() {
+            add_scaled(&mut u, &joints[k], swept[movers[k].velocity]);
         }
         u
     }
@@ -166,9 +165,9 @@ pub(super) fn write_start<T: Lane>(
                 let contact = usize::from(places[lane]);
                 let own = &mut problem.p[3 * contact..][..3];
                 let last = &mut problem.factored.last[contact];
-                for (k, own) in own.iter_mut().enumerate() {
-                    last[k] = *own;
-                    *own = p[slot][k].get(lane);
+                for k in 0..3 {
+                    last[k] = own[k];
+                    own[k] = p[slot][k].get(lane);
                 }
             }
         }

@@ -26,8 +26,13 @@ pub(super) trait System<T: Lane, const C: usize>: Sized {
     /// those from which it starts.
     const RETURNS: bool;
 
-    /// Most corrections with the same factors.
+    /// Squared relative residual after a full step below which the same factors may correct the
+    /// rest, and most such corrections. Where the slides still turn, a fresh step gains more.
+    const NEAR: f64;
     const CORRECTIONS: usize;
+
+    /// Most steps of an attempt. What is unsolved then goes in circles, mostly.
+    const MAX_STEPS: usize;
 
     /// Without problems.
     fn new(token: T::Token) -> Self;

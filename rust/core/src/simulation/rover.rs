@@ -88,7 +88,7 @@ pub struct RoverParts {
 
 impl DenseOperator for RoverParts {
     fn operator(&self) -> &[f64] {
-        self.tree.operator()
+        self.quick.operator().unwrap_or(self.tree.operator())
     }
 }
 
@@ -152,6 +152,7 @@ impl Scene for RoverScene {
         _memory: &'a Vec<f64>,
         parts: &'a mut RoverParts,
     ) -> TreeSystem<'a> {
+        parts.quick.set_last(false);
         parts.tree.begin_step();
         TreeSystem {
             model: &self.model,
@@ -194,9 +195,7 @@ impl Scene for RoverScene {
     fn publish(&self, parts: &mut RoverParts, scratch: &mut SceneScratch<Self>) {
         let RoverParts { tree, quick, .. } = parts;
         if let Some((block, problem)) = quick.last() {
-            tree.show(block.origin(0), problem.n_unknowns(), |i, j| {
-                problem.entry(i, j)
-            });
+            tree.show(block.origin(0));
             scratch.show(
                 |show| {
                     block.visit_contacts(0, |contact, _, p, u| show(contact, p, u));

@@ -41,7 +41,7 @@ impl RoverScene {
         probe: &mut dyn Probe,
     ) -> Option<StepReport> {
         let quick = &mut step.parts.quick;
-        quick.is_last = false;
+        quick.set_last(false);
         let machine = self.ordinary_machine(step.options)?;
         let token = Single::best();
         let block = quick
@@ -85,8 +85,9 @@ impl RoverScene {
             return None;
         }
         block.alight(0, &mut passenger);
-        quick.is_last = true;
-        Some(*block.report(0))
+        let report = *block.report(0);
+        quick.set_last(true);
+        Some(report)
     }
 }
 

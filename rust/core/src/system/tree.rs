@@ -130,13 +130,9 @@ impl TreeScratch {
     }
 
     /// Makes a step of the first tree that was taken elsewhere the last one: the world position of
-    /// its origin where contacts were evaluated (m), and the entries of its (n, n) operator.
-    pub(crate) fn show(&mut self, origin: [f64; 3], n: usize, entry: impl Fn(usize, usize) -> f64) {
+    /// its origin where contacts were evaluated, m.
+    pub(crate) fn show(&mut self, origin: [f64; 3]) {
         self.kinematics_end.set_origin(0, origin.into());
-        self.system.W.clear();
-        for i in 0..n {
-            self.system.W.extend((0..n).map(|j| entry(i, j)));
-        }
     }
 
     /// Delassus operator of the last step, row-major, 1/kg.
