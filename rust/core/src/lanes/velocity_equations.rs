@@ -211,8 +211,8 @@ impl<T: Lane, const C: usize> System<T, C> for VelocitySystem<T, C> {
     const PARKED_ALPHA: f64 = 1e-4;
     const SMALLEST_ALPHA: f64 = 1e-6;
     const RETURNS: bool = true;
-    // Measured on six cylinders with torques of up to 60 N m: corrections from 1e-6 on, up to three,
-    // save a hundredth of the systems and cost a sixth more instructions.
+    // Six cylinders with torques of up to 60 N m: three corrections from 1e-6 on save a twentieth
+    // of the systems and cost a sixth more instructions.
     const NEAR: f64 = 1e-14;
     const CORRECTIONS: usize = 2;
     const MAX_STEPS: usize = 40;
