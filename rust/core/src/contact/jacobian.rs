@@ -89,7 +89,7 @@ fn columns_at(
     let of_motion =
         |velocity: &Vector3<f64>| [velocity.dot(&n), velocity.dot(&t), velocity.dot(&b), 0.0];
     for (row, &m) in rest.iter_mut().zip(model.motions(body)) {
-        *row = of_motion(&kinematics.motions[m].velocity_at(x));
+        *row = of_motion(&kinematics.velocity_at(m, x));
     }
 }
 
@@ -138,7 +138,7 @@ fn push(
         }
     }
     for (&k, &m) in rest.iter().zip(model.motions(body)) {
-        out[k] += kinematics.motions[m].power(force, &moment);
+        out[k] += kinematics.power(m, force, &moment);
     }
 }
 

@@ -94,9 +94,11 @@ pub fn coriolis_matrix(
         } else {
             let carrier = (body.parent).map_or(Spatial::default(), |parent| s.velocity[parent]);
             let mut velocity = carrier;
-            for (i, motion) in kinematics.motions[body.motions()].iter().enumerate() {
-                let (angular, linear) = motion.twist();
-                let S = Spatial { angular, linear };
+            for (i, motion) in kinematics.motions()[body.motions()].iter().enumerate() {
+                let S = Spatial {
+                    angular: motion.axis.into(),
+                    linear: motion.swing.into(),
+                };
                 let k = body.velocity + i;
                 velocity = velocity + S * v[k];
                 s.screws.push(Screw {
@@ -223,13 +225,10 @@ impl Composite {
     /// I and B of a single body with velocity V.
     #[inline]
     fn of(body: &Body, kinematics: &Kinematics, b: usize, V: &Spatial) -> Self {
-        let (c, m) = (&kinematics.c[b], body.mass);
-        let R = &kinematics.R[b];
-        let mut J = match &body.principal_axes {
-            None => SymmetricMatrix3::rotated_diagonal(R, &body.principal_inertia),
-            Some(P) => SymmetricMatrix3::rotated_diagonal(&(R * P), &body.principal_inertia),
-        };
-        J += SymmetricMatrix3::point_mass(m, c);
+        let (c, m) = (kinematics.c(b), body.mass);
+        let A = body.principal_attitude(kinematics.R(b));
+        let mut J = SymmetricMatrix3::rotated_diagonal(&A, &body.principal_inertia);
+        J += SymmetricMatrix3::point_mass(m, &c);
         let (w, v) = (&V.angular, &V.linear);
         let turned = w.cross_matrix() * J.to_matrix();
         let moved = c * v.transpose() * m;
@@ -293,8 +292,7 @@ mod tests {
     use nalgebra::DVector;
 
     use super::*;
-    use crate::multibody::bias::{BiasScratch, bias};
-    use crate::multibody::{Configuration, MassMatrix};
+    use crate::multibody::Configuration;
 
     fn somewhere(model: &Model) -> (Configuration, Vec<f64>) {
         let mut q = Configuration::zero(model);
@@ -329,16 +327,7 @@ mod tests {
                 &mut C,
             );
             let product = &C * DVector::from_column_slice(&v);
-            let mut expected = vec![0.0; model.nv()];
-            let mut scratch = BiasScratch::new(&model);
-            bias(
-                &model,
-                &kinematics,
-                &v,
-                &Vector3::zeros(),
-                &mut scratch,
-                &mut expected,
-            );
+            let expected = kinematics.bias(&model, &v, &Vector3::zeros());
             let expected = DVector::from_vec(expected);
             assert!((product - &expected).norm() < 1e-12 * expected.norm());
         }
@@ -361,9 +350,7 @@ mod tests {
             let mass_matrix_at = |time: f64| {
                 let mut moved = q.clone();
                 moved.advance(&model, &v, time);
-                let mut M = MassMatrix::new(&model);
-                M.update(&model, &Kinematics::of(&model, &moved));
-                M.to_dense(&model)
+                Kinematics::of(&model, &moved).mass_matrix(&model)
             };
             let rate = (mass_matrix_at(h) - mass_matrix_at(-h)) / (2.0 * h);
             assert!((&C + C.transpose() - &rate).norm() < 1e-8 * rate.norm());

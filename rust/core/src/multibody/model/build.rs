@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
+use super::links::{inertias_of, mechanism_of};
 use super::parts::{CollisionBox, CollisionSphere, Frame, Wheel};
 use super::properties::{JointProperties, Passive};
 use super::spinners::mark_spinners;
@@ -67,11 +68,13 @@ impl Model {
         let wheels = wheels(&description.wheels, &index_of, &frames, &bodies);
         let carriers = (boxes.iter().map(|x| x.body)).chain(spheres.iter().map(|x| x.body));
         mark_spinners(&mut bodies, &wheels, carriers);
-        let trees = (0..n_trees).map(|t| tree(t, &bodies, &paths)).collect();
+        let trees: Vec<Tree> = (0..n_trees).map(|t| tree(t, &bodies, &paths)).collect();
         for joint in &mut joints {
             joint.velocity = bodies[joint.body].velocity;
             joint.is_passive = joint.passive.stiffness > 0.0 || joint.passive.damping > 0.0;
         }
+        let mechanism = mechanism_of(&bodies, &trees, &joints, &paths);
+        let inertias = inertias_of(&mechanism, &bodies, &trees, &joints);
         let limited = (0..joints.len())
             .filter(|&joint| joints[joint].limits.is_some())
             .collect();
@@ -114,6 +117,8 @@ impl Model {
             coupled,
             rotating,
             trees,
+            mechanism,
+            inertias,
             joints,
             description,
             bodies,

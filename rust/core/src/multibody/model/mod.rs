@@ -7,6 +7,7 @@
 mod body;
 mod build;
 mod edit;
+mod links;
 mod parts;
 mod properties;
 mod spinners;
@@ -23,10 +24,10 @@ pub use tree::Tree;
 use super::description::check::check;
 use super::description::{Hold, ModelDescription};
 use super::error::ModelError;
-use super::joint::{Joint, free};
-
-/// Number of velocities of a free base. Every path of its tree starts with them.
-pub const BASE: usize = free::NV;
+use super::inertias::Inertias;
+use super::joint::Joint;
+pub use super::mechanism::BASE;
+use super::mechanism::Mechanism;
 
 /// Kinematic trees. Velocities are in the order of the bodies; [`super::joint`] lists those of each
 /// joint.
@@ -35,6 +36,8 @@ pub struct Model {
     description: ModelDescription,
     bodies: Vec<Body>,
     trees: Vec<Tree>,
+    mechanism: Mechanism,
+    inertias: Inertias<f64>,
     frames: Vec<Frame>,
     wheels: Vec<Wheel>,
     boxes: Vec<CollisionBox>,
@@ -99,6 +102,20 @@ impl Model {
     #[must_use]
     pub fn trees(&self) -> &[Tree] {
         &self.trees
+    }
+
+    /// The bodies and joints, as the sources of the dynamics read them.
+    #[inline]
+    #[must_use]
+    pub fn mechanism(&self) -> &Mechanism {
+        &self.mechanism
+    }
+
+    /// Inertias of the bodies of [`Self::mechanism`].
+    #[inline]
+    #[must_use]
+    pub fn inertias(&self) -> &Inertias<f64> {
+        &self.inertias
     }
 
     /// Frames of all solids, in description order.
