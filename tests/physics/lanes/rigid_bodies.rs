@@ -2,6 +2,7 @@
 //! places and velocities: an independent reference.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitQuaternion, Vector3};
+use rover_core::multibody::joint::Coordinate;
 use rover_core::multibody::{Body, Configuration, Joint, Model};
 
 /// A body in world axes and in a state.
@@ -51,21 +52,20 @@ pub fn moving(model: &Model, q: &Configuration, v: &[f64]) -> Vec<Moving> {
                 spin = frame * Vector3::new(v[k], v[k + 1], v[k + 2]);
             }
             Joint::Revolute(joint) => {
-                let own = joint.coordinate;
                 let axis = joint.axis.direction();
                 // A spinner is not turned about its own axis.
                 let angle = if body.is_spinner {
                     0.0
                 } else {
-                    own.of(&q.joints)
+                    coordinate(&joint.coordinate, q)
                 };
                 turn = *Rotation3::new(axis * angle).matrix();
-                spin = frame * axis * own.rate(v[k]);
+                spin = frame * axis * ratio(&joint.coordinate) * v[k];
             }
             Joint::Prismatic(joint) => {
                 let axis = frame * joint.axis.direction();
-                r += axis * joint.coordinate.of(&q.joints);
-                slide = axis * joint.coordinate.rate(v[k]);
+                r += axis * coordinate(&joint.coordinate, q);
+                slide = axis * (ratio(&joint.coordinate) * v[k]);
             }
         }
         // A free root's frame is turned from the world's.
@@ -87,6 +87,16 @@ pub fn moving(model: &Model, q: &Configuration, v: &[f64]) -> Vec<Moving> {
         });
     }
     all
+}
+
+/// Rate of a joint per unit of its own velocity, or the one that it follows.
+fn ratio(own: &Coordinate) -> f64 {
+    own.coupling.map_or(1.0, |coupling| coupling.ratio)
+}
+
+fn coordinate(own: &Coordinate, q: &Configuration) -> f64 {
+    let offset = own.coupling.map_or(0.0, |coupling| coupling.offset);
+    ratio(own) * q.joints[own.joint] + offset
 }
 
 fn rotation(q: &UnitQuaternion<f64>) -> Matrix3<f64> {

@@ -301,8 +301,9 @@ fn rovers(description: &ModelDescription, seed: u64, speed: f64) -> Vec<Rover> {
     (0..8).map(rover).collect()
 }
 
-/// A random tree whose root has a joint: fixed rotations, axes along and across the frame, mass centres off
-/// the axes and principal axes of their own, some of them symmetric bodies; joints of every kind,
+/// A random tree on a root with this joint: fixed rotations, axes along and across the frame, mass
+/// centres off the axes and principal axes of their own, some of them symmetric bodies; joints of
+/// every kind,
 /// rotors, and joints that follow another one beside or below it.
 fn tree(seed: u64, n: usize, root: JointKind) -> ModelDescription {
     let mut description = ModelDescription::rover();

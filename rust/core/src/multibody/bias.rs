@@ -33,17 +33,10 @@ impl<T: Lane> BiasScratch<T> {
     /// Room for a mechanism.
     #[must_use]
     pub fn new(token: T::Token, mechanism: &Mechanism) -> Self {
-        let zero = Vec3::splat(token, [0.0; 3]);
-        let moved = Moved {
-            omega: zero,
-            alpha: zero,
-            origin: zero,
-            force: zero,
-            moment: zero,
-        };
+        let at_rest = Moved::at_rest(Vec3::splat(token, [0.0; 3]));
         Self {
             token,
-            bodies: vec![moved; mechanism.n_bodies()],
+            bodies: vec![at_rest; mechanism.n_bodies()],
         }
     }
 }
@@ -71,16 +64,9 @@ pub fn bias<T: Lane>(
             let (links, inertias) = (&mechanism.links[..n], &inertias.bodies[..n]);
             let motions = &poses.motions[..mechanism.n_motions()];
             let (poses, moved) = (&poses.bodies[..n], &mut scratch.bodies[..n]);
-            let zero = Vec3::splat(scratch.token, [0.0; 3]);
-            let world = Moved {
-                omega: zero,
-                alpha: zero,
-                origin: -gravity,
-                force: zero,
-                moment: zero,
-            };
+            let world = Moved::at_rest(-gravity);
             for tree in &mechanism.trees {
-                let root = tree.bodies.start;
+                let (root, end) = (tree.bodies.start, tree.bodies.end.min(n)); // below n: no checks
                 moved[root] = if tree.is_free {
                     let v = &v[tree.velocities.start..][..BASE];
                     Moved {
@@ -91,7 +77,7 @@ pub fn bias<T: Lane>(
                     world.carry_root(&links[root], motions, poses[root].lever, v)
                 };
                 moved[root].load(&links[root], &inertias[root], &poses[root]);
-                for b in root + 1..tree.bodies.end {
+                for b in root + 1..end {
                     let (before, own) = moved.split_at_mut(b);
                     let (link, pose) = (&links[b], &poses[b]);
                     let carrier = &mut before[link.parent];
@@ -109,7 +95,7 @@ pub fn bias<T: Lane>(
                         own[0] = body;
                     }
                 }
-                for b in (root + 1..tree.bodies.end).rev() {
+                for b in (root + 1..end).rev() {
                     let link = &links[b];
                     if link.is_plain_leaf {
                         continue;
@@ -137,6 +123,19 @@ pub fn bias<T: Lane>(
 }
 
 impl<T: Lane> Moved<T> {
+    /// A body that does not turn, without load.
+    #[inline(always)]
+    fn at_rest(origin: Vec3<T>) -> Self {
+        let zero = Vec3::splat(origin.x.token(), [0.0; 3]);
+        Self {
+            omega: zero,
+            alpha: zero,
+            origin,
+            force: zero,
+            moment: zero,
+        }
+    }
+
     /// A body that it carries, `d` from its origin and turning relative to it, without load.
     #[inline(always)]
     fn carry(&self, d: Vec3<T>, spin: Vec3<T>) -> Self {

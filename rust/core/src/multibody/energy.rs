@@ -3,7 +3,8 @@
 use super::inertias::{Inertia, Inertias};
 use super::mechanism::{BASE, Link, LinkJoint, Mechanism};
 use super::place::Place;
-use super::poses::{NextTurn, Turns, rotation};
+use super::poses::{NextTurn, Turns};
+use crate::scalar::quaternion::rotation;
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Kinetic and potential energy, J.
@@ -98,7 +99,7 @@ pub fn energy<T: Lane>(
                 fall: zero,
             };
             for (tree, &mass) in mechanism.trees.iter().zip(&inertias.trees) {
-                let root = tree.bodies.start;
+                let (root, end) = (tree.bodies.start, tree.bodies.end.min(n)); // below n: no checks
                 bodies[root] = if tree.is_free {
                     let (position, attitude) = place.pose(tree.pose);
                     sums.fall += gravity.dot(*position) * mass;
@@ -113,7 +114,7 @@ pub fn energy<T: Lane>(
                     world.carry_root(&links[root], (place, v, gravity), &mut turns)
                 };
                 sums.add(&links[root], &own_inertias[root], &bodies[root], gravity);
-                for b in root + 1..tree.bodies.end {
+                for b in root + 1..end {
                     let (before, own) = bodies.split_at_mut(b);
                     let link = &links[b];
                     let carrier = &before[link.parent];

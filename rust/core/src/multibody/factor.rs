@@ -2,11 +2,9 @@
 //!
 //! Source: Featherstone 2008, *Rigid Body Dynamics Algorithms*, ch. 8 (branch-induced sparsity).
 
+use super::composite::BLOCK;
 use super::mechanism::{BASE, Mechanism, TreeSpan};
 use crate::scalar::Lane;
-
-/// Entries of the base's lower triangle.
-pub(super) const BLOCK: usize = BASE * (BASE + 1) / 2;
 
 /// A symmetric matrix or its factor along the paths of a mechanism; see
 /// [`super::mass_matrix`].
@@ -133,7 +131,15 @@ impl<T: Lane> Factor<T> {
                 }
                 own[p] = a;
             }
-            let factors = scaled(&base, inverse);
+            let [a, b, c, d, e, f] = base;
+            let factors = [
+                a * inverse,
+                b * inverse,
+                c * inverse,
+                d * inverse,
+                e * inverse,
+                f * inverse,
+            ];
             subtract_product(&mut block, &factors, &base);
             base_row[0] = factors;
         }
@@ -157,10 +163,12 @@ impl<T: Lane> Factor<T> {
             let own_rows = &mechanism.rows[tree.rows.clone()][..n];
             let rows = &self.rows.base[tree.rows.clone()][..n];
             let roots = &self.roots[tree.rows.clone()][..n];
-            let (base, joints) = y[tree.velocities.clone()].split_at_mut(tree.lead());
+            let (block, block_roots) = (&self.rows.blocks[t], &self.block_roots[t]);
+            let mut nothing = [block[0].like(0.0); BASE];
+            let y = &mut y[tree.velocities.clone()];
+            let (base, joints) = split_base(y, &mut nothing, tree.is_free);
             let joints = &mut joints[..n];
-            let block = &self.rows.blocks[t];
-            let mut sum = first_chunk(base, block[0].like(0.0));
+            let mut sum = *base;
             let mut end = own_rows.last().map_or(0, |row| row.end);
             for j in (0..n).rev() {
                 let start = own_rows[j].start;
@@ -173,15 +181,12 @@ impl<T: Lane> Factor<T> {
                 }
                 joints[j] = value * roots[j];
             }
-            if let Some(base) = base.first_chunk_mut::<BASE>() {
-                let roots = &self.block_roots[t];
-                for k in (0..BASE).rev() {
-                    let value = sum[k];
-                    for i in 0..k {
-                        sum[i] -= block[k * (k + 1) / 2 + i] * value;
-                    }
-                    base[k] = value * roots[k];
+            for k in (0..BASE).rev() {
+                let value = sum[k];
+                for i in 0..k {
+                    sum[i] -= block[k * (k + 1) / 2 + i] * value;
                 }
+                base[k] = value * block_roots[k];
             }
         }
     }
@@ -196,20 +201,19 @@ impl<T: Lane> Factor<T> {
             let own_rows = &mechanism.rows[tree.rows.clone()][..n];
             let rows = &self.rows.base[tree.rows.clone()][..n];
             let roots = &self.roots[tree.rows.clone()][..n];
-            let (base, joints) = x[tree.velocities.clone()].split_at_mut(tree.lead());
+            let (block, block_roots) = (&self.rows.blocks[t], &self.block_roots[t]);
+            let mut nothing = [block[0].like(0.0); BASE];
+            let x = &mut x[tree.velocities.clone()];
+            let (base, joints) = split_base(x, &mut nothing, tree.is_free);
             let joints = &mut joints[..n];
-            let block = &self.rows.blocks[t];
-            let mut known = [block[0].like(0.0); BASE];
-            if let Some(base) = base.first_chunk_mut::<BASE>() {
-                let block_roots = &self.block_roots[t];
-                for k in 0..BASE {
-                    let mut value = base[k] * block_roots[k];
-                    for i in 0..k {
-                        value -= block[k * (k + 1) / 2 + i] * known[i];
-                    }
-                    known[k] = value;
-                    base[k] = value;
+            let mut known = *base;
+            for k in 0..BASE {
+                let mut value = base[k] * block_roots[k];
+                for i in 0..k {
+                    value -= block[k * (k + 1) / 2 + i] * known[i];
                 }
+                known[k] = value;
+                base[k] = value;
             }
             for j in 0..n {
                 let mut value = joints[j] * roots[j];
@@ -237,9 +241,10 @@ impl<T: Lane> Factor<T> {
     ) {
         let (t, columns) = (mechanism.links[b].tree, mechanism.row(b));
         let tree = &mechanism.trees[t];
-        let (base, joints) = y.split_at_mut(tree.lead());
-        let block = &self.rows.blocks[t];
-        let mut sum = first_chunk(base, [block[0].like(0.0); N]);
+        let (block, block_roots) = (&self.rows.blocks[t], &self.block_roots[t]);
+        let mut nothing = [[block[0].like(0.0); N]; BASE];
+        let (base, joints) = split_base(y, &mut nothing, tree.is_free);
+        let mut sum = *base;
         let joints = &mut joints[..columns.len()];
         for p in (0..columns.len()).rev() {
             let j = tree.rows.start + columns[p];
@@ -254,14 +259,12 @@ impl<T: Lane> Factor<T> {
             }
             joints[p] = scaled(&value, self.roots[j]);
         }
-        if let Some(base) = base.first_chunk_mut::<BASE>() {
-            for k in (0..BASE).rev() {
-                let value = sum[k];
-                for i in 0..k {
-                    subtract_columns(&mut sum[i], block[k * (k + 1) / 2 + i], &value);
-                }
-                base[k] = scaled(&value, self.block_roots[t][k]);
+        for k in (0..BASE).rev() {
+            let value = sum[k];
+            for i in 0..k {
+                subtract_columns(&mut sum[i], block[k * (k + 1) / 2 + i], &value);
             }
+            base[k] = scaled(&value, block_roots[k]);
         }
     }
 
@@ -302,10 +305,20 @@ impl<T: Lane> Factor<T> {
     }
 }
 
-/// The entries with a base; those of a tree without one are `zero`.
+/// The entries with the base of a tree, and all others. A tree without one has `nothing`.
 #[inline(always)]
-fn first_chunk<T: Copy>(base: &[T], zero: T) -> [T; BASE] {
-    base.first_chunk().copied().unwrap_or([zero; BASE])
+fn split_base<'a, T>(
+    y: &'a mut [T],
+    nothing: &'a mut [T; BASE],
+    is_free: bool,
+) -> (&'a mut [T; BASE], &'a mut [T]) {
+    if !is_free {
+        return (nothing, y);
+    }
+    match y.split_first_chunk_mut() {
+        Some(parts) => parts,
+        None => unreachable!("invariant: a free root has six velocities"),
+    }
 }
 
 /// `x −= a y`.
@@ -327,10 +340,11 @@ fn subtract_columns<T: Lane, const N: usize>(x: &mut [T; N], a: T, y: &[T; N]) {
 /// `a y`.
 #[inline(always)]
 fn scaled<T: Lane, const N: usize>(y: &[T; N], a: T) -> [T; N] {
-    y.map(
-        #[inline(always)]
-        |y| y * a,
-    )
+    let mut product = *y;
+    for c in 0..N {
+        product[c] *= a;
+    }
+    product
 }
 
 /// Eliminates velocity K of the base, when all after it are. Returns where its pivot is positive. K

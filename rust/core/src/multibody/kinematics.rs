@@ -97,7 +97,7 @@ impl Kinematics {
         self.poses.bodies[b].c.into()
     }
 
-    /// Motion of each joint velocity, indexed like [`Model::motions`].
+    /// Motion of each joint velocity, in the order of the bodies.
     #[inline]
     #[must_use]
     pub fn motions(&self) -> &[Motion<f64>] {
@@ -135,15 +135,15 @@ impl Kinematics {
         x: &Vector3<f64>,
         v: &[f64],
     ) -> Vector3<f64> {
-        let (lead, rest) = model.split_path(b);
+        let (lead, _) = model.split_path(b);
         let mut velocity = match v[lead].first_chunk() {
             Some(&[x_dot, y_dot, z_dot, w_x, w_y, w_z]) => {
                 Vector3::new(x_dot, y_dot, z_dot) + Vector3::new(w_x, w_y, w_z).cross(x)
             }
             None => Vector3::zeros(),
         };
-        for (&k, &m) in rest.iter().zip(model.motions(b)) {
-            velocity += self.velocity_at(m, x) * v[k];
+        for mover in model.movers(b) {
+            velocity += self.velocity_at(mover.motion, x) * v[mover.velocity];
         }
         velocity
     }
@@ -182,8 +182,8 @@ impl Kinematics {
             linear.copy_from_slice(d.as_slice());
             angular.copy_from_slice(moment.as_slice());
         }
-        for (entry, &m) in rest.iter_mut().zip(model.motions(b)) {
-            *entry = self.power(m, d, &moment);
+        for (entry, mover) in rest.iter_mut().zip(model.movers(b)) {
+            *entry = self.power(mover.motion, d, &moment);
         }
     }
 

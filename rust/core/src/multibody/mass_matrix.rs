@@ -14,11 +14,12 @@ use std::cmp::Ordering;
 
 use nalgebra::DMatrix;
 
-use super::factor::{BLOCK, Factor, Rows};
-use super::inertias::{Inertia, Inertias};
-use super::mechanism::{BASE, Link, Mechanism, TreeSpan};
-use super::poses::{Motion, Pose, Poses};
-use crate::scalar::{Lane, Vec3};
+use super::composite::{Composite, Momentum};
+use super::factor::{Factor, Rows};
+use super::inertias::Inertias;
+use super::mechanism::{Mechanism, TreeSpan};
+use super::poses::Poses;
+use crate::scalar::Lane;
 
 /// The mass matrix; kg, kg m, kg m².
 #[derive(Clone, Debug)]
@@ -30,152 +31,16 @@ pub struct MassMatrix<T: Lane> {
     coupled: Vec<Momentum<T>>,
 }
 
-/// Momentum, and angular momentum about the tree's origin.
-#[derive(Clone, Copy, Debug)]
-struct Momentum<T> {
-    linear: Vec3<T>,
-    angular: Vec3<T>,
-}
-
-/// Mass, first moment and inertia of a body and everything it carries, about the tree's origin.
-#[derive(Clone, Copy, Debug)]
-struct Composite<T> {
-    mass: T,
-    moment: Vec3<T>,
-    inertia: Symmetric<T>,
-}
-
-/// A symmetric matrix.
-#[derive(Clone, Copy, Debug)]
-struct Symmetric<T> {
-    xx: T,
-    yy: T,
-    zz: T,
-    xy: T,
-    xz: T,
-    yz: T,
-}
-
-impl<T: Lane> Symmetric<T> {
-    #[inline(always)]
-    fn times(&self, v: Vec3<T>) -> Vec3<T> {
-        Vec3::new(
-            self.xx * v.x + self.xy * v.y + self.xz * v.z,
-            self.xy * v.x + self.yy * v.y + self.yz * v.z,
-            self.xz * v.x + self.yz * v.y + self.zz * v.z,
-        )
-    }
-
-    /// Adds `k a aᵀ`.
-    #[inline(always)]
-    fn add_square(&mut self, k: T, a: Vec3<T>) {
-        let ka = a * k;
-        self.xx += ka.x * a.x;
-        self.yy += ka.y * a.y;
-        self.zz += ka.z * a.z;
-        self.xy += ka.x * a.y;
-        self.xz += ka.x * a.z;
-        self.yz += ka.y * a.z;
-    }
-}
-
-impl<T: Lane> Composite<T> {
-    /// A single body.
-    #[inline(always)]
-    fn of(link: &Link, inertia: &Inertia<T>, pose: &Pose<T>) -> Self {
-        let Inertia { mass, rest, .. } = *inertia;
-        let Vec3 { x, y, z } = pose.c;
-        let moment = pose.c * mass;
-        let (xx, yy, zz) = (moment.x * x, moment.y * y, moment.z * z);
-        // About the tree's origin: m (|c|² 1 − c cᵀ) more than about the mass centre.
-        let mut sum = Symmetric {
-            xx: rest + (yy + zz),
-            yy: rest + (xx + zz),
-            zz: rest + (xx + yy),
-            xy: -(moment.x * y),
-            xz: -(moment.x * z),
-            yz: -(moment.y * z),
-        };
-        let (a, b) = inertia.axes(link.symmetry, &pose.R);
-        sum.add_square(inertia.first, a);
-        if let Some(b) = b {
-            sum.add_square(inertia.second, b);
-        }
-        Self {
-            mass,
-            moment,
-            inertia: sum,
-        }
-    }
-
-    /// Momentum at unit rate of a motion.
-    #[inline(always)]
-    fn momentum(&self, motion: &Motion<T>) -> Momentum<T> {
-        Momentum {
-            linear: motion.swing * self.mass + motion.axis.cross(self.moment),
-            angular: self.inertia.times(motion.axis) + self.moment.cross(motion.swing),
-        }
-    }
-
-    /// Its products with the motions of a free root.
-    #[inline(always)]
-    fn block(&self) -> [T; BLOCK] {
-        let (m, s, I) = (self.mass, self.moment, self.inertia);
-        let o = m.like(0.0);
-        [
-            m, //
-            o, m, //
-            o, o, m, //
-            o, -s.z, s.y, I.xx, //
-            s.z, o, -s.x, I.xy, I.yy, //
-            -s.y, s.x, o, I.xz, I.yz, I.zz,
-        ]
-    }
-
-    #[inline(always)]
-    fn plus(&self, other: &Self) -> Self {
-        let (a, b) = (&self.inertia, &other.inertia);
-        Self {
-            mass: self.mass + other.mass,
-            moment: self.moment + other.moment,
-            inertia: Symmetric {
-                xx: a.xx + b.xx,
-                yy: a.yy + b.yy,
-                zz: a.zz + b.zz,
-                xy: a.xy + b.xy,
-                xz: a.xz + b.xz,
-                yz: a.yz + b.yz,
-            },
-        }
-    }
-}
-
 impl<T: Lane> MassMatrix<T> {
     /// Room for a mechanism.
     #[must_use]
     pub fn new(token: T::Token, mechanism: &Mechanism) -> Self {
         let zero = T::splat(token, 0.0);
-        let composite = Composite {
-            mass: zero,
-            moment: Vec3::new(zero, zero, zero),
-            inertia: Symmetric {
-                xx: zero,
-                yy: zero,
-                zz: zero,
-                xy: zero,
-                xz: zero,
-                yz: zero,
-            },
-        };
-        let nothing = Momentum {
-            linear: composite.moment,
-            angular: composite.moment,
-        };
         Self {
             token,
             rows: Rows::new(token, mechanism),
-            composites: vec![composite; mechanism.n_bodies()],
-            coupled: vec![nothing; mechanism.coupled.len()],
+            composites: vec![Composite::zero(zero); mechanism.n_bodies()],
+            coupled: vec![Momentum::zero(zero); mechanism.coupled.len()],
         }
     }
 
@@ -205,8 +70,8 @@ impl<T: Lane> MassMatrix<T> {
         let entries = &mut self.rows.joints[..columns.len()];
         let (mut row, mut n_coupled) = (n_rows, mechanism.coupled.len());
         for (t, tree) in mechanism.trees.iter().enumerate().rev() {
-            let root = tree.bodies.start;
-            for b in (root + 1..tree.bodies.end).rev() {
+            let (root, end) = (tree.bodies.start, tree.bodies.end.min(n)); // below n: no checks
+            for b in (root + 1..end).rev() {
                 let (link, pose) = (&links[b], &bodies[b]);
                 let mut composite = Composite::of(link, &inertias[b], pose);
                 if !link.is_leaf {
@@ -381,28 +246,5 @@ impl<T: Lane> MassMatrix<T> {
     pub fn factorise_in_place(&mut self, mechanism: &Mechanism, factor: &mut Factor<T>) -> T::Mask {
         std::mem::swap(&mut factor.rows, &mut self.rows);
         factor.update(self.token, mechanism)
-    }
-}
-
-impl<T: Lane> Momentum<T> {
-    /// Its products with the motions of the base.
-    #[inline(always)]
-    fn entries(&self) -> [T; BASE] {
-        let (f, l) = (self.linear, self.angular);
-        [f.x, f.y, f.z, l.x, l.y, l.z]
-    }
-
-    /// Its products with motions, by their indices.
-    #[inline(always)]
-    fn along_all(&self, motions: &[Motion<T>], indices: &[usize], out: &mut [T]) {
-        for p in 0..indices.len() {
-            out[p] = self.along(&motions[indices[p]]);
-        }
-    }
-
-    /// Its product with a motion.
-    #[inline(always)]
-    fn along(&self, motion: &Motion<T>) -> T {
-        motion.power(self.linear, self.angular)
     }
 }

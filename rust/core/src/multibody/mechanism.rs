@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use super::joint::{JointAxis, free};
+use super::joint::{Coupling, JointAxis, free};
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Number of velocities of a free root. Every path of its tree starts with them.
@@ -34,7 +34,7 @@ pub struct Mechanism {
     /// Coordinates of the joints that a step turns, in the order of the bodies, and how those of
     /// coupled joints follow from them.
     pub(super) angles: Vec<usize>,
-    pub(super) coupled_angles: Vec<(usize, Ratio)>,
+    pub(super) coupled_angles: Vec<(usize, Coupling)>,
     /// Of each row, where its entries are.
     pub(super) rows: Vec<Range<usize>>,
     /// The columns of each row in the mass matrix, row after row: the rows of the velocities that
@@ -44,8 +44,11 @@ pub struct Mechanism {
     pub(super) column_motions: Vec<usize>,
     /// Of each velocity, where its diagonal entry is; not used for those of a free root.
     pub(super) diagonals: Vec<usize>,
-    /// Of each velocity, its tree.
+    /// Of each velocity, its tree, and its body with the number of entries of the body's path up to
+    /// the velocity.
     pub(super) tree_of: Vec<usize>,
+    pub(super) up_to: Vec<(usize, usize)>,
+    pub(super) longest_path: usize,
     pub(super) n_motions: usize,
     pub(super) paths: Vec<usize>,
     pub(super) movers: Vec<Mover>,
@@ -84,15 +87,6 @@ pub struct Mover {
     pub motion: usize,
 }
 
-/// A linear function of a coordinate: that of a coupled joint, `ratio q + offset`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ratio {
-    /// Per unit of the joint that it follows.
-    pub ratio: f64,
-    /// At that joint's zero, rad or m.
-    pub offset: f64,
-}
-
 /// A body and its joint.
 #[allow(clippy::struct_excessive_bools)] // facts that do not depend on each other
 #[derive(Clone, Debug, PartialEq)]
@@ -113,7 +107,7 @@ pub struct Link {
     /// Axis of a revolute or prismatic joint, the same in the joint's frame and the body's.
     pub axis: JointAxis,
     /// How the joint follows another one.
-    pub coupling: Option<Coupled>,
+    pub coupling: Option<Coupling>,
     /// Coordinate of a spinner's joint, or the one that it follows.
     pub(super) spin: Option<usize>,
     /// Its first velocity, or the one that it follows, and its first motion.
@@ -153,16 +147,6 @@ pub enum LinkJoint {
     Slide(usize),
     /// Any rotation about a point: the index of its quaternion.
     Ball(usize),
-}
-
-/// How a joint follows another one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Coupled {
-    /// Its coordinate.
-    pub ratio: Ratio,
-    /// If it is further along the path of the joint that it follows: the motion of that velocity
-    /// for its carrier, and the one for everything that it carries.
-    pub combined: Option<(usize, usize)>,
 }
 
 /// Principal axes of a body.
@@ -223,6 +207,19 @@ impl Mechanism {
         velocity - (tree.velocities.start + tree.lead()) + tree.rows.start
     }
 
+    /// Velocities from the root up to and including velocity `k`.
+    #[inline]
+    pub(super) fn velocity_path(&self, k: usize) -> &[usize] {
+        let (b, length) = self.up_to[k];
+        &self.path(b)[..length]
+    }
+
+    /// Length of the longest path; at least 1.
+    #[inline]
+    pub(super) fn longest_path(&self) -> usize {
+        self.longest_path
+    }
+
     /// Velocities that move body `b`: those of a free root, then of the joints outwards.
     #[inline(always)]
     #[must_use]
@@ -280,7 +277,7 @@ impl Link {
     pub(super) fn coordinate<T: Lane>(&self, q: T) -> T {
         match &self.coupling {
             None => q,
-            Some(coupled) => coupled.ratio.of(q),
+            Some(coupling) => coupling.value(q),
         }
     }
 
@@ -289,15 +286,7 @@ impl Link {
     pub(super) fn rate<T: Lane>(&self, v: T) -> T {
         match &self.coupling {
             None => v,
-            Some(coupled) => v.like(coupled.ratio.ratio) * v,
+            Some(coupling) => v.like(coupling.ratio) * v,
         }
-    }
-}
-
-impl Ratio {
-    /// Its coordinate, where the other joint has the coordinate `q`.
-    #[inline(always)]
-    pub(super) fn of<T: Lane>(&self, q: T) -> T {
-        q.like(self.ratio) * q + q.like(self.offset)
     }
 }

@@ -13,6 +13,7 @@
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 pub mod bias;
+mod composite;
 pub mod coordinates;
 pub mod coriolis;
 pub mod description;

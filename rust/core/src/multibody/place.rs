@@ -4,8 +4,8 @@ use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 
 use super::mechanism::Mechanism;
 use super::state::Configuration;
-use crate::scalar::elementary::sin_cos;
-use crate::scalar::{Lane, LaneMask, Vec3};
+use crate::scalar::quaternion::{exp_rotation, normalised, product};
+use crate::scalar::{Lane, Vec3};
 
 /// A configuration a lane.
 #[derive(Clone, Debug)]
@@ -138,13 +138,24 @@ impl<T: Lane> Place<T> {
         if trees[0].is_free {
             (self.position, self.attitude) = moved((&from.position, &from.attitude), v, h);
         }
-        for tree in trees[1..].iter().filter(|tree| tree.is_free) {
-            let before = from.pose(tree.pose);
-            self.others[tree.pose - 1] = moved(before, &v[tree.velocities.clone()], h);
+        if !self.others.is_empty() {
+            self.move_others(mechanism, from, v, h);
         }
         for ((own, before), &k) in self.balls.iter_mut().zip(&from.balls).zip(&mechanism.balls) {
             let turn = exp_rotation(Vec3::new(v[k], v[k + 1], v[k + 2]) * h);
             *own = product(&turn, before);
+        }
+    }
+
+    /// Moves the free bodies other than the first.
+    #[cold]
+    #[inline(never)]
+    fn move_others(&mut self, mechanism: &Mechanism, from: &Self, v: &[T], h: T) {
+        for tree in mechanism.trees.iter().filter(|tree| tree.pose > 0) {
+            if tree.is_free {
+                let before = from.pose(tree.pose);
+                self.others[tree.pose - 1] = moved(before, &v[tree.velocities.clone()], h);
+            }
         }
     }
 
@@ -212,50 +223,4 @@ fn moved<T: Lane>((position, attitude): (&Vec3<T>, &[T; 4]), v: &[T], h: T) -> (
         *position + Vec3::new(v[0], v[1], v[2]) * h,
         product(&turn, attitude),
     )
-}
-
-/// Rotation by the vector `phi` (rad, world axes): the quaternion `exp(phi / 2)`, by the formulas
-/// of [`crate::spatial::exp_rotation`].
-#[inline(always)]
-fn exp_rotation<T: Lane>(phi: Vec3<T>) -> [T; 4] {
-    let number = |x: f64| phi.x.like(x);
-    let one = number(1.0);
-    let square = phi.dot(phi) * number(0.25);
-    let is_small = square.lt(number(1e-4));
-    let nested = |a: f64, b: f64, c: f64| {
-        let inner = one - square * number(1.0 / b) * (one - square * number(1.0 / c));
-        one - square * number(1.0 / a) * inner
-    };
-    let (mut w, mut s) = (
-        nested(2.0, 12.0, 30.0),
-        nested(6.0, 20.0, 42.0) * number(0.5),
-    );
-    if !is_small.all() {
-        let half = square.sqrt();
-        let (sin, cos) = sin_cos(half);
-        w = T::select(is_small, w, cos);
-        s = T::select(is_small, s, number(0.5) * sin / half);
-    }
-    [s * phi.x, s * phi.y, s * phi.z, w]
-}
-
-/// A quaternion of nearly unit length, renormalised.
-#[inline(always)]
-fn normalised<T: Lane>(q: &[T; 4]) -> [T; 4] {
-    let [x, y, z, w] = *q;
-    let square = x * x + y * y + z * z + w * w;
-    let factor = x.like(0.5) * (x.like(3.0) - square);
-    [x * factor, y * factor, z * factor, w * factor]
-}
-
-/// Product of two quaternions x, y, z, w.
-#[inline(always)]
-fn product<T: Lane>(a: &[T; 4], b: &[T; 4]) -> [T; 4] {
-    let ([ax, ay, az, aw], [bx, by, bz, bw]) = (*a, *b);
-    [
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    ]
 }

@@ -1,13 +1,15 @@
 //! Forward kinematics: attitude, origin and mass centre of every body, and the motion of every
 //! joint velocity.
 //!
-//! World axes. Positions in a tree are relative to its origin: that of its root if the root is free,
-//! otherwise the world's. A rover far from the world's origin thus loses no precision.
+//! World axes. Positions in a tree are relative to its origin: that of its root if the root is
+//! free, otherwise the world's. A rover far from the world's origin thus loses no precision.
 
 use super::inertias::{Inertia, Inertias};
-use super::mechanism::{Coupled, Link, LinkJoint, Mechanism};
+use super::joint::Coupling;
+use super::mechanism::{Link, LinkJoint, Mechanism};
 use super::place::Place;
 use crate::scalar::elementary::{sin_cos, sines_cosines};
+use crate::scalar::quaternion::rotation;
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Poses of all bodies.
@@ -20,7 +22,7 @@ pub struct Poses<T: Lane> {
     pub(super) other_origins: Vec<Vec3<T>>,
     /// One entry a body.
     pub bodies: Vec<Pose<T>>,
-    /// Motion of each joint velocity, indexed like [`crate::multibody::Model::motions`].
+    /// Motion of each joint velocity, in the order of the bodies; see [`Mechanism::movers`].
     pub motions: Vec<Motion<T>>,
     turns: Turns<T>,
 }
@@ -45,8 +47,8 @@ pub struct Pose<T> {
 pub struct Motion<T> {
     /// Angular velocity: the unit axis of a revolute joint, zero of a prismatic one.
     pub axis: Vec3<T>,
-    /// Velocity of the material point at the tree's origin: `r × axis` of a revolute joint, the unit
-    /// axis of a prismatic one.
+    /// Velocity of the material point at the tree's origin: `r × axis` of a revolute joint, the
+    /// unit axis of a prismatic one.
     pub swing: Vec3<T>,
 }
 
@@ -104,7 +106,7 @@ impl<T: Lane> Poses<T> {
         let mut turns = self.turns.of(mechanism, place);
         self.origin = place.position;
         for (t, tree) in mechanism.trees.iter().enumerate() {
-            let root = tree.bodies.start;
+            let (root, end) = (tree.bodies.start, tree.bodies.end.min(n)); // below n: no checks
             if tree.is_free {
                 let (position, attitude) = place.pose(tree.pose);
                 if t > 0 {
@@ -120,7 +122,7 @@ impl<T: Lane> Poses<T> {
                 let (link, inertia) = (&links[root], &inertias[root]);
                 bodies[root] = follow_world(link, inertia, &world, place, &mut turns, motions);
             }
-            for b in root + 1..tree.bodies.end {
+            for b in root + 1..end {
                 let link = &links[b];
                 let (before, own) = bodies.split_at_mut(b);
                 let (carrier, own) = (&before[link.parent], &mut own[0]);
@@ -235,8 +237,8 @@ fn follow<T: Lane>(
         }
         LinkJoint::Base => {}
     }
-    if let Some(coupled) = &link.coupling {
-        couple(motions, link.motion, coupled);
+    if let Some(coupling) = &link.coupling {
+        couple(motions, link.motion, coupling);
     }
     let r = carrier.r + lever;
     let c = if link.is_centred {
@@ -250,12 +252,12 @@ fn follow<T: Lane>(
 /// The motion of a coupled joint per unit of the velocity that it follows, and the combined motion
 /// of what it carries.
 #[inline(always)]
-fn couple<T: Lane>(motions: &mut [Motion<T>], m: usize, coupled: &Coupled) {
+fn couple<T: Lane>(motions: &mut [Motion<T>], m: usize, coupling: &Coupling) {
     let own = &mut motions[m];
-    let ratio = own.axis.x.like(coupled.ratio.ratio);
+    let ratio = own.axis.x.like(coupling.ratio);
     (own.axis, own.swing) = (own.axis * ratio, own.swing * ratio);
     let own = *own;
-    if let Some((before, combined)) = coupled.combined {
+    if let Some((before, combined)) = coupling.combined {
         let before = motions[before];
         motions[combined] = Motion {
             axis: before.axis + own.axis,
@@ -300,8 +302,8 @@ impl<T: Lane> Turns<T> {
         for k in 0..turning.len() {
             angles[k] = place.joints[turning[k]];
         }
-        for (k, ratio) in &mechanism.coupled_angles {
-            angles[*k] = ratio.of(angles[*k]);
+        for (k, coupling) in &mechanism.coupled_angles {
+            angles[*k] = coupling.value(angles[*k]);
         }
         sines_cosines(angles, sines, cosines);
         NextTurn {
@@ -318,20 +320,5 @@ impl<T: Lane> NextTurn<'_, T> {
         let k = self.at;
         self.at += 1;
         (self.sines[k], self.cosines[k])
-    }
-}
-
-/// Rotation matrix of a unit quaternion x, y, z, w.
-#[inline(always)]
-pub(super) fn rotation<T: Lane>(q: &[T; 4]) -> Mat3<T> {
-    let [x, y, z, w] = *q;
-    let (xx, yy, zz, ww) = (x * x, y * y, z * z, w * w);
-    let two = x.like(2.0);
-    let (xy, xz, yz) = (two * x * y, two * x * z, two * y * z);
-    let (wx, wy, wz) = (two * w * x, two * w * y, two * w * z);
-    Mat3 {
-        x: Vec3::new(ww + xx - yy - zz, xy + wz, xz - wy),
-        y: Vec3::new(xy - wz, ww - xx + yy - zz, yz + wx),
-        z: Vec3::new(xz + wy, yz - wx, ww - xx - yy + zz),
     }
 }

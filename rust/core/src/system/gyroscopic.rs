@@ -9,7 +9,7 @@
 //! rotates by radians in a step. It is then left out, and the audit
 //! ([`crate::integrator::energy_audit`]) corrects the resulting change of the energy.
 
-use nalgebra::{DMatrix, DVector, DVectorView, Vector3};
+use nalgebra::{DMatrix, DVector, DVectorView};
 
 use crate::multibody::coriolis::{CoriolisScratch, coriolis_matrix};
 use crate::multibody::{Kinematics, MassMatrix, Model};
@@ -22,31 +22,6 @@ pub(super) struct GyroscopicScratch {
     matrix: DMatrix<f64>,
     /// `h (τ − G − C v) + J`, then Δv.
     load: DVector<f64>,
-}
-
-/// `out = −G` (nv), N and N m: the force of gravity.
-pub(super) fn gravity_load(
-    model: &Model,
-    kinematics: &Kinematics,
-    gravity: &Vector3<f64>,
-    out: &mut [f64],
-) {
-    let bodies = model.bodies();
-    out.fill(0.0);
-    for (b, body) in bodies.iter().enumerate() {
-        let weight = gravity * body.mass;
-        let moment = kinematics.c(b).cross(&weight);
-        let (lead, rest) = model.split_path(b);
-        if let Some((linear, angular)) = out[lead].split_at_mut_checked(3) {
-            for k in 0..3 {
-                linear[k] += weight[k];
-                angular[k] += moment[k];
-            }
-        }
-        for (&k, &m) in rest.iter().zip(model.motions(b)) {
-            out[k] += kinematics.power(m, &weight, &moment);
-        }
-    }
 }
 
 impl GyroscopicScratch {

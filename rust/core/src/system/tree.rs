@@ -8,7 +8,7 @@
 use nalgebra::Vector3;
 
 use super::command::{Command, HeldJoint};
-use super::gyroscopic::{GyroscopicScratch, gravity_load};
+use super::gyroscopic::GyroscopicScratch;
 use super::motor_branch::{MotorBranch, line_slope};
 use crate::contact::{
     Activation, Contact, ContactKey, ContactSystem, Opposite, PairSearch, detect, detect_limits,
@@ -202,14 +202,8 @@ impl TreeSystem<'_> {
     /// Largest rate of a joint that turns a frame, rad/s.
     #[inline]
     fn turning_of_joints(&self, v: &[f64]) -> f64 {
-        let bodies = self.model.bodies();
-        let mut joints = fastest(self.model.turning_joints(), v);
-        for &b in self.model.coupled_bodies() {
-            if let Joint::Revolute(joint) = &bodies[b].joint {
-                joints = joints.max(joint.coordinate.rate(v[bodies[b].velocity]).abs());
-            }
-        }
-        joints
+        let turning = self.model.mechanism().turning.iter();
+        turning.fold(0.0, |most, &(k, ratio)| most.max(v[k].abs() * ratio))
     }
 
     /// Upper bound on the speed of all points of a tree, m/s.
@@ -229,11 +223,9 @@ impl TreeSystem<'_> {
             let farthest = (tree.bodies.clone()).map(|b| (kinematics.r(b) - root).norm());
             reach = farthest.fold(reach, f64::max);
         }
-        let ratio = |b: &usize| {
-            let coupling = self.model.bodies()[*b].joint.coupling();
-            coupling.map_or(0.0, |c| c.ratio.abs())
-        };
-        let coupled: f64 = self.model.coupled_bodies().iter().map(ratio).sum();
+        let links = self.model.mechanism().links.iter();
+        let couplings = links.filter_map(|link| link.coupling);
+        let coupled: f64 = couplings.map(|coupling| coupling.ratio.abs()).sum();
         linear + turning * reach * (1.0 + coupled)
     }
 }
@@ -432,7 +424,7 @@ impl MechanicalSystem for TreeSystem<'_> {
         let h = options.time_step;
         let (base, spin) = (
             self.turning_of_bases(v),
-            fastest(self.model.spinning_joints(), v),
+            fastest(&self.model.mechanism().spinning, v),
         );
         h * base > MOST_TURN
             || h * (base + self.turning_of_joints(v)) > MOST_JOINT_TURN
@@ -465,10 +457,19 @@ impl MechanicalSystem for TreeSystem<'_> {
     ) {
         let parts = &mut *self.parts;
         let model = self.model;
-        let gravity_impulse = &mut parts.force;
-        gravity_load(model, &parts.kinematics, &options.gravity, gravity_impulse);
-        for (y, f) in y.iter_mut().zip(&*gravity_impulse) {
-            *y = options.time_step * f;
+        // The bias at rest is gravity's.
+        y.fill(0.0);
+        bias(
+            model.mechanism(),
+            model.inertias(),
+            parts.kinematics.poses(),
+            y,
+            options.gravity.into(),
+            &mut parts.bias_scratch,
+            &mut parts.force,
+        );
+        for (y, f) in y.iter_mut().zip(&parts.force) {
+            *y = -options.time_step * f;
         }
         add_command(
             self.model,

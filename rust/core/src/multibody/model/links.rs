@@ -4,11 +4,11 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::Body;
 use super::properties::JointProperties;
-use super::tree::{Paths, Tree};
+use super::tree::{Path, Paths, Tree};
 use crate::multibody::inertias::{Inertia, Inertias};
-use crate::multibody::joint::{Coordinate, Joint, JointAxis, Prismatic, Revolute, Spherical};
+use crate::multibody::joint::{Joint, JointAxis, Prismatic, Revolute, Spherical};
 use crate::multibody::mechanism::{
-    Coupled, Link, LinkJoint, Mechanism, Mover, OwnJoint, Ratio, Symmetry, TreeSpan,
+    Link, LinkJoint, Mechanism, Mover, OwnJoint, Symmetry, TreeSpan,
 };
 use crate::scalar::{Single, Vec3};
 
@@ -35,6 +35,7 @@ pub(super) fn mechanism_of(
             .map(|b| bodies[b].velocity)
             .collect(),
         n_motions: paths.n_motions,
+        longest_path: (paths.of.iter().map(|path| path.velocities.len())).fold(1, usize::max),
         ..Mechanism::default()
     };
     let mut pose = 0;
@@ -43,7 +44,10 @@ pub(super) fn mechanism_of(
         pose += usize::from(tree.is_free && t > 0);
         let first = mechanism.rows.len();
         for k in tree.velocities.clone() {
+            let b = paths.body_of_velocity[k];
+            let path = paths.of[b].velocities.iter();
             mechanism.tree_of.push(t);
+            (mechanism.up_to).push((b, path.take_while(|&&i| i <= k).count()));
             add_row(&mut mechanism, bodies, paths, tree, k);
         }
         mechanism.trees.push(TreeSpan {
@@ -64,12 +68,12 @@ pub(super) fn mechanism_of(
 fn add_row(mechanism: &mut Mechanism, bodies: &[Body], paths: &Paths, tree: &Tree, k: usize) {
     let b = paths.body_of_velocity[k];
     if !matches!(bodies[b].joint, Joint::Free(_)) {
-        let path = &paths.velocity_path(k)[tree.lead()..];
+        let own = &paths.of[b];
+        let path = &own.velocities[tree.lead()..mechanism.up_to[k].1];
         let start = mechanism.columns.len();
         let first = tree.velocities.start + tree.lead();
         mechanism.columns.extend(path.iter().map(|&k| k - first));
-        let motions = &paths.motions(b)[..path.len()];
-        mechanism.column_motions.extend_from_slice(motions);
+        (mechanism.column_motions).extend_from_slice(&own.motions[..path.len()]);
         mechanism.rows.push(start..mechanism.columns.len());
     }
     mechanism
@@ -79,8 +83,12 @@ fn add_row(mechanism: &mut Mechanism, bodies: &[Body], paths: &Paths, tree: &Tre
 
 fn add_link(mechanism: &mut Mechanism, bodies: &[Body], paths: &Paths, b: usize) {
     let body = &bodies[b];
-    let (_, rest) = paths.split(b);
     let span = &mechanism.trees[body.tree];
+    let Path {
+        velocities,
+        motions,
+    } = &paths.of[b];
+    let rest = &velocities[span.lead()..];
     let first = span.velocities.start + span.lead();
     let last_row = (rest.last()).map(|&k| mechanism.rows[span.rows.start + k - first].clone());
     let n_rows = match &body.joint {
@@ -88,8 +96,8 @@ fn add_link(mechanism: &mut Mechanism, bodies: &[Body], paths: &Paths, b: usize)
         joint => joint.nv(),
     };
     let (path, movers) = (mechanism.paths.len(), mechanism.movers.len());
-    mechanism.paths.extend(paths.path(b));
-    let pairs = rest.iter().zip(paths.motions(b));
+    mechanism.paths.extend(velocities);
+    let pairs = rest.iter().zip(motions);
     (mechanism.movers).extend(pairs.map(|(&velocity, &motion)| Mover { velocity, motion }));
     let mut others = bodies[b + 1..].iter();
     let is_leaf = !others.clone().any(|other| other.parent == Some(b));
@@ -99,10 +107,10 @@ fn add_link(mechanism: &mut Mechanism, bodies: &[Body], paths: &Paths, b: usize)
         parent: body.parent.unwrap_or(b),
         position: body.position.into(),
         along: (0..3).find(|&k| (0..3).all(|i| i == k || body.position[i] == 0.0)),
-        rotation: body.rotation.as_ref().map(columns),
+        rotation: body.rotation.map(Into::into),
         joint,
         axis: body.joint.axis().copied().unwrap_or(JointAxis::X),
-        coupling: body.joint.coordinate().and_then(coupled),
+        coupling: body.joint.coupling().copied(),
         spin: (body.joint.coordinate().filter(|_| body.is_spinner)).map(|own| own.joint),
         velocity: body.velocity,
         motion: body.motion,
@@ -124,16 +132,14 @@ fn joint_of(mechanism: &mut Mechanism, body: &Body) -> LinkJoint {
     match &body.joint {
         Joint::Free(_) | Joint::Fixed => LinkJoint::Base,
         Joint::Revolute(Revolute { coordinate, .. }) => {
-            let coupling = coupled(coordinate);
-            let rate = coupling.map_or(1.0, |coupling| coupling.ratio.ratio);
+            let coupling = coordinate.coupling;
+            let rate = coupling.map_or(1.0, |coupling| coupling.ratio);
             if coupling.is_some() || !body.is_spinner {
                 mechanism.turning.push((body.velocity, rate.abs()));
             }
             if !body.is_spinner {
-                if let Some(Coupled { ratio, .. }) = coupling {
-                    let own = mechanism.angles.len();
-                    mechanism.coupled_angles.push((own, ratio));
-                }
+                let own = mechanism.angles.len();
+                (mechanism.coupled_angles).extend(coupling.map(|coupling| (own, coupling)));
                 mechanism.angles.push(coordinate.joint);
             }
             match coupling {
@@ -200,18 +206,4 @@ fn symmetry_of(body: &Body) -> Symmetry {
     } else {
         Symmetry::None
     }
-}
-
-fn coupled(coordinate: &Coordinate) -> Option<Coupled> {
-    coordinate.coupling.map(|coupling| Coupled {
-        ratio: Ratio {
-            ratio: coupling.ratio,
-            offset: coupling.offset,
-        },
-        combined: coupling.combined,
-    })
-}
-
-fn columns(R: &Matrix3<f64>) -> [[f64; 3]; 3] {
-    (*R).into()
 }
