@@ -174,17 +174,15 @@ pub fn bias(
         at.advance(model, v, steps * h);
         let bodies = moving(model, &at, v);
         let own = model.bodies().iter().zip(bodies);
-        own.map(|(body, own)| (own.c_dot * body.mass, inertia(body, &own) * own.omega))
+        own.map(|(body, own)| [own.c_dot * body.mass, inertia(body, &own) * own.omega])
             .collect::<Vec<_>>()
     };
     let [a, b, c, d] = [-2.0, -1.0, 1.0, 2.0].map(momenta);
-    let rate = |i: usize, of: fn(&(Vector3<f64>, Vector3<f64>)) -> Vector3<f64>| {
-        ((of(&c[i]) - of(&b[i])) * 8.0 - (of(&d[i]) - of(&a[i]))) / (12.0 * h)
-    };
+    let rate = |i: usize, k: usize| ((c[i][k] - b[i][k]) * 8.0 - (d[i][k] - a[i][k])) / (12.0 * h);
     let mut bias = DVector::zeros(model.nv());
     for (i, body) in model.bodies().iter().enumerate() {
-        let force = rate(i, |m| m.0) - gravity * body.mass;
-        let moment = rate(i, |m| m.1);
+        let force = rate(i, 0) - gravity * body.mass;
+        let moment = rate(i, 1);
         for (k, unit) in units.iter().enumerate() {
             bias[k] += unit[i].c_dot.dot(&force) + unit[i].omega.dot(&moment);
         }

@@ -81,17 +81,17 @@ impl<T: Lane> Factor<T> {
 
     /// Turns the entries of M into those of its factor.
     pub(super) fn update(&mut self, token: T::Token, mechanism: &Mechanism) -> T::Mask {
-        T::vectorize(
-            token,
-            #[inline(always)]
-            || {
-                let mut is_positive = T::mask(token, u32::MAX >> (32 - T::LANES));
-                for t in (0..mechanism.trees.len()).rev() {
-                    is_positive = is_positive & self.update_tree(mechanism, t);
-                }
-                is_positive
-            },
-        )
+        let mut is_positive = T::mask(token, u32::MAX >> (32 - T::LANES));
+        for t in 0..mechanism.trees.len() {
+            // The loop is out here: in the closure, registers are moved in circles.
+            let of_tree = T::vectorize(
+                token,
+                #[inline(always)]
+                || self.update_tree(mechanism, t),
+            );
+            is_positive = is_positive & of_tree;
+        }
+        is_positive
     }
 
     #[inline(always)]
