@@ -13,6 +13,7 @@ use rover_core::scalar::{Instructions, Lane, Single};
 mod contacts;
 mod fleet;
 mod machines;
+mod rigid_bodies;
 mod solver;
 mod surfaces;
 mod tree;

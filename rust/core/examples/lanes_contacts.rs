@@ -20,14 +20,14 @@ use rover_core::integrator::StepOptions;
 use rover_core::lanes::contacts::Contacts;
 use rover_core::lanes::forecast::Forecast;
 use rover_core::lanes::ground::Ground as LaneGround;
-use rover_core::lanes::inertias::Inertias;
 use rover_core::lanes::machine::Machine;
-use rover_core::lanes::mass_matrix::{Factor, MassMatrix};
-use rover_core::lanes::place::Place;
-use rover_core::lanes::poses::Poses;
 use rover_core::lanes::problem::ContactProblem;
 use rover_core::lanes::rows::Rows;
+use rover_core::multibody::inertias::Inertias;
+use rover_core::multibody::place::Place;
+use rover_core::multibody::poses::Poses;
 use rover_core::multibody::{Configuration, Model};
+use rover_core::multibody::{Factor, MassMatrix};
 use rover_core::scalar::{Instructions, Lane, LaneMask, Single, Vec3};
 
 const PHASES: [&str; 4] = ["replay", "detect", "assemble", "problems"];
@@ -86,7 +86,7 @@ impl<T: Lane> Block<T> {
         let mut inertias = Inertias::new(token, &machine);
         let mut ground = LaneGround::new(token, machine.wheels.len(), machine.boxes.len());
         for lane in 0..T::LANES {
-            inertias.set_lane(lane, &machine, model);
+            inertias.set_lane(lane, model.inertias());
             ground.set_lane(lane, &records[lane].terrain);
         }
         let mut states = Vec::with_capacity(STEPS);

@@ -8,14 +8,14 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use rover_core::lanes::bias::{BiasScratch, bias};
-use rover_core::lanes::energy::{EnergyScratch, energy};
-use rover_core::lanes::inertias::Inertias;
 use rover_core::lanes::machine::Machine;
-use rover_core::lanes::mass_matrix::{Factor, MassMatrix};
-use rover_core::lanes::place::Place;
-use rover_core::lanes::poses::Poses;
+use rover_core::multibody::bias::{BiasScratch, bias};
+use rover_core::multibody::energy::{EnergyScratch, energy};
+use rover_core::multibody::inertias::Inertias;
+use rover_core::multibody::place::Place;
+use rover_core::multibody::poses::Poses;
 use rover_core::multibody::{Configuration, Model};
+use rover_core::multibody::{Factor, MassMatrix};
 use rover_core::scalar::{Instructions, Lane, Single, Vec3};
 
 const PHASES: [&str; 7] = [
@@ -67,7 +67,7 @@ impl<T: Lane> Block<T> {
             let mut q = Configuration::zero(model);
             let turns: Vec<f64> = (0..model.nv()).map(number).collect();
             q.advance(model, &turns, 0.3);
-            block.inertias.set_lane(lane, &block.machine, model);
+            block.inertias.set_lane(lane, model.inertias());
             block.start.set_lane(lane, &q);
             for k in 0..model.nv() {
                 block.v[k].set(lane, number(k + 7));
@@ -94,7 +94,7 @@ impl<T: Lane> Block<T> {
             "poses" => self.poses.update(machine, inertias, &self.place),
             "mass matrix" => self.M.update(machine, inertias, &self.poses),
             "factor" => {
-                black_box(self.M.factorise(machine, &mut self.factor));
+                black_box(self.M.factorise_in_place(machine, &mut self.factor));
             }
             "bias" => bias(
                 machine,

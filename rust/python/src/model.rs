@@ -8,10 +8,9 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
 use rover_core::contact::{Contact, detection::wheel_contacts};
 use rover_core::draw::{DrawnGround, resting_on, resting_pose, rocks::clear_radius};
-use rover_core::multibody::bias::BiasScratch;
 use rover_core::multibody::{
-    Configuration, Joint, Kinematics, MassMatrix, Model, ModelDescription, ModelError, bias,
-    coordinates, description::MAX_TEXT, momentum,
+    Configuration, Joint, Kinematics, Model, ModelDescription, ModelError, coordinates,
+    description::MAX_TEXT, momentum,
 };
 use rover_core::nalgebra::{DMatrix, DVector, Vector3};
 
@@ -180,7 +179,7 @@ pub fn tags<'py>(
         }
     }
     for wheel in model.wheels() {
-        let s = kinematics.R[wheel.body] * wheel.axle;
+        let s = kinematics.R(wheel.body) * wheel.axle;
         tags.set_item(format!("axle_{}", wheel.name), fresh(py, s.as_slice()))?;
     }
     let centre = momentum::centre_of_mass(model, kinematics);
@@ -197,7 +196,7 @@ pub fn poses<'py>(
     let poses = PyDict::new(py);
     for frame in model.frames() {
         let x = kinematics.origin(frame.body) + kinematics.point(frame.body, &frame.position);
-        let R = kinematics.R[frame.body] * frame.rotation;
+        let R = kinematics.R(frame.body) * frame.rotation;
         let R = DMatrix::from_iterator(3, 3, R.iter().copied());
         poses.set_item(
             &frame.name,
@@ -806,7 +805,7 @@ impl RoverModel {
         coordinates: Given<'py>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (q, kind, kinematics) = self.placed(q, coordinates)?;
-        let dense = dense_mass_matrix(&self.inner, &kinematics);
+        let dense = kinematics.mass_matrix(&self.inner);
         match kind {
             Coordinates::State => fresh_matrix(py, &dense),
             Coordinates::Report => fresh_matrix(
@@ -846,21 +845,12 @@ impl RoverModel {
         let qdot = vector(qdot, Kind::State, "qdot")?;
         let v = kind.velocity(&self.inner, &q, &qdot)?;
         let gravity = checked_gravity(gravity)?;
-        let mut out = vec![0.0; v.len()];
-        bias(
-            &self.inner,
-            &kinematics,
-            &v,
-            &gravity,
-            &mut BiasScratch::new(&self.inner),
-            &mut out,
-        );
+        let out = kinematics.bias(&self.inner, &v, &gravity);
         if kind == Coordinates::State {
             return Ok(fresh(py, &out));
         }
         let angles = coordinates::report_angles(&self.inner, &q);
-        let drift =
-            dense_mass_matrix(&self.inner, &kinematics) * coordinates::rate_drift(&angles, &qdot);
+        let drift = kinematics.mass_matrix(&self.inner) * coordinates::rate_drift(&angles, &qdot);
         let pulled = coordinates::pull_back(&(DVector::from_vec(out) + drift), &angles);
         Ok(fresh(py, pulled.as_slice()))
     }
@@ -906,7 +896,9 @@ impl RoverModel {
     ) -> PyResult<f64> {
         let (q, kind, kinematics) = self.placed(q, coordinates)?;
         let v = kind.velocity(&self.inner, &q, &vector(qdot, Kind::State, "qdot")?)?;
-        Ok(momentum::energy(&self.inner, &kinematics, &v, &Vector3::zeros()).kinetic)
+        Ok(kinematics
+            .energy(&self.inner, &v, &Vector3::zeros())
+            .kinetic)
     }
 
     /// Named points and axes of the machine in the world frame.
@@ -1229,12 +1221,6 @@ fn replace_masses(description: &mut ModelDescription, masses: &Bound<'_, PyAny>)
         solid.set_mass(mass);
     }
     Ok(())
-}
-
-fn dense_mass_matrix(model: &Model, kinematics: &Kinematics) -> DMatrix<f64> {
-    let mut M = MassMatrix::new(model);
-    M.update(model, kinematics);
-    M.to_dense(model)
 }
 
 /// Three finite numbers, by default Earth's.

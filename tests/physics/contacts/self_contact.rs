@@ -29,7 +29,7 @@ fn a_folded_arm_rests_on_the_chassis() {
             assert!(before.kinetic < 1e-4, "{tip} {variant:?}: {before:?}");
             // The tip lies on the chassis: its centre is its own height over the chassis' top.
             let kinematics = simulation.kinematics();
-            let height = kinematics.r[3].dot(&kinematics.R[0].column(1));
+            let height = kinematics.r(3).dot(&kinematics.R(0).column(1));
             assert!((height - 0.1 - half_height).abs() < 1e-3, "{tip}: {height}");
             let weight: f64 = (simulation.contacts().iter())
                 .filter(|a| a.contact.other.is_some())

@@ -199,7 +199,7 @@ fn an_arm_on_a_turned_base_is_held() {
     run.hold(&["arm".into()], Some(&[0.4]), None, None).unwrap();
     run.step(500).unwrap();
     let kinematics: Kinematics = run.kinematics();
-    let place = kinematics.origin(1) + kinematics.r[1];
+    let place = kinematics.origin(1) + kinematics.r(1);
     // The x axis of the base is the world's −z.
     assert!(
         (place - Vector3::new(0.0, 1.0, -0.4)).norm() < 1e-6,

@@ -64,7 +64,7 @@ fn a_follower_on_a_free_body_stays_where_the_ratio_says() {
         run.step(1000).unwrap();
         let q = run.state().configuration.joints[0];
         let kinematics: Kinematics = run.kinematics();
-        let relative = kinematics.R[0].transpose() * kinematics.R[2];
+        let relative = kinematics.R(0).transpose() * kinematics.R(2);
         let angle = relative[(1, 0)].atan2(relative[(0, 0)]);
         assert!((angle - (0.3 - 0.5 * q)).abs() < 1e-12);
         // The fall releases some 150 J.

@@ -97,6 +97,6 @@ fn a_locked_slide_stands_where_the_free_one_is() {
     moved.joints[0] = 0.7;
     let kinematics = rover_core::multibody::Kinematics::of(&free, &moved);
     let frame = &locked.frames()[1];
-    assert!((frame.position - kinematics.r[1]).norm() < 1e-15);
-    assert!((frame.rotation - kinematics.R[1]).norm() < 1e-15);
+    assert!((frame.position - kinematics.r(1)).norm() < 1e-15);
+    assert!((frame.rotation - kinematics.R(1)).norm() < 1e-15);
 }

@@ -14,14 +14,14 @@ use rover_core::integrator::WarmStart;
 use rover_core::lanes::contacts::Contacts;
 use rover_core::lanes::forecast::Forecast;
 use rover_core::lanes::ground::Ground;
-use rover_core::lanes::inertias::Inertias;
 use rover_core::lanes::machine::Machine;
-use rover_core::lanes::mass_matrix::{Factor, MassMatrix};
-use rover_core::lanes::place::Place;
-use rover_core::lanes::poses::Poses;
 use rover_core::lanes::problem::ContactProblem;
 use rover_core::lanes::rows::{Answer, Rows};
-use rover_core::multibody::{self, Configuration, Kinematics, Model};
+use rover_core::multibody::inertias::Inertias;
+use rover_core::multibody::place::Place;
+use rover_core::multibody::poses::Poses;
+use rover_core::multibody::{Configuration, Kinematics, Model};
+use rover_core::multibody::{Factor, MassMatrix};
 use rover_core::scalar::{Lane, LaneMask, Single, Vec3};
 
 use super::{OverLanes, Random, on_every_register, spread};
@@ -82,7 +82,7 @@ impl<T: Lane> Block<T> {
         let mut inertias = Inertias::new(token, &machine);
         let mut ground = Ground::new(token, machine.wheels.len(), machine.boxes.len());
         for (lane, rover) in rovers.iter().enumerate() {
-            inertias.set_lane(lane, &machine, model);
+            inertias.set_lane(lane, model.inertias());
             ground.set_lane(lane, &rover.terrain);
         }
         let contacts = Contacts::new(token, &machine);
@@ -246,10 +246,11 @@ fn expected(model: &Model, rover: &Rover, step: Step) -> (Found, bool) {
     for contact in &mut contacts {
         relocate(model, &end, &*rover.terrain, contact);
     }
-    let mut M = multibody::MassMatrix::new(model);
-    M.update(model, &middle);
-    let mut factor = multibody::FactoredMassMatrix::new(model);
-    assert!(M.factorise(model, &mut factor));
+    let (token, mechanism) = (Single::best(), model.mechanism());
+    let mut M = MassMatrix::new(token, mechanism);
+    M.update(mechanism, model.inertias(), middle.poses());
+    let mut factor = Factor::new(token, mechanism);
+    assert!(M.factorise(mechanism, &mut factor));
     let mut system = ContactSystem::with_capacity(model, contacts.len());
     system.assemble(model, &end, &factor, &contacts, &rover.v);
     let change: Vec<f64> = (0..model.nv()).map(number).collect();

@@ -5,10 +5,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, SVector, Vector2, Vector3};
 use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
-use rover_core::multibody::bias::BiasScratch;
-use rover_core::multibody::{
-    Kinematics, Limits, MassMatrix, Model, ModelDescription, Motor, bias, coordinates,
-};
+use rover_core::multibody::{Kinematics, Limits, Model, ModelDescription, Motor, coordinates};
 use rover_core::planar::{ContactRule, Line, MirroredRover, PlanarError, PlanarMachine, Sine};
 use rover_core::simulation::{MirroredRoverSimulation, RoverSimulation};
 
@@ -52,23 +49,12 @@ fn mass_matrix_and_bias_are_the_full_ones_projected() {
         let (full_q, full_v) = (&P * q, &P * w);
         let place = coordinates::from_public(model, full_q.as_slice()).unwrap();
         let kinematics = Kinematics::of(model, &place);
-        let mut M = MassMatrix::new(model);
-        M.update(model, &kinematics);
-        let expected = P.transpose() * M.to_dense(model) * &P;
+        let expected = P.transpose() * kinematics.mass_matrix(model) * &P;
         let ours = rover.mass_matrix(&q);
         assert!((expected - ours).norm() < 1e-12 * ours.norm());
 
-        let mut b = vec![0.0; model.nv()];
         let gravity = Vector3::new(0.3, -G, 0.0);
-        let mut scratch = BiasScratch::new(model);
-        bias(
-            model,
-            &kinematics,
-            full_v.as_slice(),
-            &gravity,
-            &mut scratch,
-            &mut b,
-        );
+        let b = kinematics.bias(model, full_v.as_slice(), &gravity);
         let force = rover.force(&q, &w, &Vector2::new(0.3, -G), &[0.0; 3]);
         let expected = P.transpose() * DVector::from_vec(b);
         assert!((expected + force).norm() < 1e-12 * force.norm());

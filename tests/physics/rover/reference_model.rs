@@ -4,10 +4,7 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 use rover_core::contact::detection::wheel_contacts;
 use rover_core::geometry::Plane;
-use rover_core::multibody::bias::BiasScratch;
-use rover_core::multibody::{
-    Kinematics, MassMatrix, Model, ModelDescription, bias, coordinates, momentum,
-};
+use rover_core::multibody::{Kinematics, Model, ModelDescription, coordinates, momentum};
 
 use super::scenes::{golden, numbers, set_contact_radius};
 
@@ -38,23 +35,13 @@ fn dynamics_agree_with_the_reference() {
             let (q, qdot) = (numbers(&case["q"]), numbers(&case["qdot"]));
             let angles = coordinates::report_angles(&model, &q);
             let kinematics = Kinematics::of(&model, &coordinates::from_report(&model, &q).unwrap());
-            let mut M = MassMatrix::new(&model);
-            M.update(&model, &kinematics);
-            let M = M.to_dense(&model);
+            let M = kinematics.mass_matrix(&model);
             let expected = &case[table];
             let dense: DMatrix<f64> = coordinates::congruence(&M, &angles);
             assert_close("M", dense.transpose().as_slice(), &numbers(&expected["M"]));
             for (rates, name) in [(qdot.clone(), "bias"), (vec![0.0; 21], "gravity")] {
                 let v = coordinates::velocity_from_report(&model, &q, &rates).unwrap();
-                let mut out = vec![0.0; 21];
-                bias(
-                    &model,
-                    &kinematics,
-                    &v,
-                    &gravity,
-                    &mut BiasScratch::new(&model),
-                    &mut out,
-                );
+                let out = kinematics.bias(&model, &v, &gravity);
                 let full = DVector::from_vec(out) + &M * coordinates::rate_drift(&angles, &rates);
                 assert_close(
                     name,
@@ -62,7 +49,7 @@ fn dynamics_agree_with_the_reference() {
                     &numbers(&expected[name]),
                 );
                 if name == "bias" {
-                    let kinetic = momentum::energy(&model, &kinematics, &v, &gravity).kinetic;
+                    let kinetic = kinematics.energy(&model, &v, &gravity).kinetic;
                     assert_close(
                         "kinetic energy",
                         &[kinetic],

@@ -3,15 +3,13 @@
 use nalgebra::DMatrix;
 use rover_core::geometry::Plane;
 use rover_core::integrator::StepOptions;
-use rover_core::multibody::{Kinematics, MassMatrix, Model, coordinates, momentum};
+use rover_core::multibody::{Kinematics, Model, coordinates, momentum};
 
 use super::scenes::simulation;
 
 fn dense(model: &Model, q: &[f64]) -> DMatrix<f64> {
     let kinematics = Kinematics::of(model, &coordinates::from_public(model, q).unwrap());
-    let mut M = MassMatrix::new(model);
-    M.update(model, &kinematics);
-    M.to_dense(model)
+    kinematics.mass_matrix(model)
 }
 
 /// Full and welded model, and which of the full velocities the welded one keeps.

@@ -9,7 +9,7 @@ use std::ops::Range;
 use super::jacobian::{Columns, columns, columns_of_other, relative_velocity};
 use super::limit;
 use super::pair::{Contact, Opposite};
-use crate::multibody::{BASE, FactoredMassMatrix, Kinematics, Model};
+use crate::multibody::{BASE, Factor, Kinematics, Model};
 
 /// The contacts of a step in matrix form. The storage grows to the largest step and is then reused.
 #[derive(Clone, Debug, Default)]
@@ -62,7 +62,7 @@ impl ContactSystem {
         &mut self,
         model: &Model,
         kinematics: &Kinematics,
-        factor: &FactoredMassMatrix,
+        factor: &Factor<f64>,
         contacts: &[Contact],
         v: &[f64],
     ) {
@@ -92,7 +92,7 @@ impl ContactSystem {
         &mut self,
         model: &Model,
         kinematics: &Kinematics,
-        factor: &FactoredMassMatrix,
+        factor: &Factor<f64>,
         contacts: &[Contact],
         v: &[f64],
     ) {
@@ -123,7 +123,7 @@ impl ContactSystem {
             columns(model, kinematics, contact, rows);
             let u = path_product(model.split_path(contact.body), rows, v);
             self.u[3 * c..][..3].copy_from_slice(&u[..3]);
-            factor.half_solve_path(path, rows);
+            factor.half_solve_path(model.mechanism(), contact.body, rows);
         }
     }
 
@@ -164,7 +164,7 @@ impl ContactSystem {
     fn stop(
         &mut self,
         model: &Model,
-        factor: &FactoredMassMatrix,
+        factor: &Factor<f64>,
         (k, sign): (usize, f64),
         v: &[f64],
     ) -> Columns {
@@ -174,7 +174,7 @@ impl ContactSystem {
             self.full[j] = [0.0; 4];
         }
         self.full[k][0] = sign;
-        factor.half_solve_columns(model, path.iter().copied(), &mut self.full);
+        factor.half_solve_columns(model.mechanism(), path.iter().copied(), &mut self.full);
         self.unions.extend(path.iter().map(|&j| (j, self.full[j])));
         [sign * v[k], 0.0, 0.0, 0.0]
     }
@@ -198,7 +198,7 @@ impl ContactSystem {
         &mut self,
         model: &Model,
         kinematics: &Kinematics,
-        factor: &FactoredMassMatrix,
+        factor: &Factor<f64>,
         contact: &Contact,
         other: usize,
         v: &[f64],
@@ -236,7 +236,7 @@ impl ContactSystem {
             add(&mut u, v[*k], &self.full[*k]);
         }
         let velocities = self.unions[begin..].iter().map(|(k, _)| *k);
-        factor.half_solve_columns(model, velocities, &mut self.full);
+        factor.half_solve_columns(model.mechanism(), velocities, &mut self.full);
         for (k, z) in &mut self.unions[begin..] {
             *z = self.full[*k];
         }

@@ -207,7 +207,7 @@ fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Ga
         let half_way = end.origin(body) - base + end_centre() - centre;
         let turning = match &placed.shape {
             // The sweep of a box includes its rotation; the other shapes are treated as round.
-            PlacedShape::Box(_) => (end.R[body] - kinematics.R[body]).norm() * bound,
+            PlacedShape::Box(_) => (end.R(body) - kinematics.R(body)).norm() * bound,
             PlacedShape::Disc(_) | PlacedShape::Roller(_) | PlacedShape::Sphere(_) => 0.0,
         };
         (half_way, half_way.norm() + turning)

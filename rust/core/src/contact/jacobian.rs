@@ -88,8 +88,8 @@ fn columns_at(
     }
     let of_motion =
         |velocity: &Vector3<f64>| [velocity.dot(&n), velocity.dot(&t), velocity.dot(&b), 0.0];
-    for (row, &m) in rest.iter_mut().zip(model.motions(body)) {
-        *row = of_motion(&kinematics.motions[m].velocity_at(x));
+    for (row, mover) in rest.iter_mut().zip(model.movers(body)) {
+        *row = of_motion(&kinematics.velocity_at(mover.motion, x));
     }
 }
 
@@ -130,15 +130,15 @@ fn push(
     out: &mut [f64],
 ) {
     let moment = x.cross(force);
-    let (lead, rest) = model.split_path(body);
+    let (lead, _) = model.split_path(body);
     if let Some(out) = out[lead].first_chunk_mut::<BASE>() {
         for i in 0..3 {
             out[i] += force[i];
             out[3 + i] += moment[i];
         }
     }
-    for (&k, &m) in rest.iter().zip(model.motions(body)) {
-        out[k] += kinematics.motions[m].power(force, &moment);
+    for mover in model.movers(body) {
+        out[mover.velocity] += kinematics.power(mover.motion, force, &moment);
     }
 }
 

@@ -6,11 +6,13 @@
 //! s. Its tangential rows are zero and μ = 0. The tangential diagonal of W is set to that of the
 //! normal, without coupling, so the tangential impulse is zero and W stays regular.
 
+use nalgebra::Vector3;
+
 use super::activation::Activation;
 use super::frame::ContactFrame;
 use super::pair::{Contact, ContactKey, Opposite};
 use super::part::{Part, Side};
-use crate::multibody::{Kinematics, Model};
+use crate::multibody::{Joint, Kinematics, Model};
 
 impl Side {
     /// Gap rate per unit of the joint's velocity.
@@ -93,13 +95,17 @@ fn gap(model: &Model, joints: &[f64], joint: usize, side: Side) -> f64 {
 /// direction of the axis that opens the gap.
 fn contact(model: &Model, kinematics: &Kinematics, joint: usize, side: Side, gap: f64) -> Contact {
     let body = model.joints()[joint].body;
-    let axis = kinematics.motions[model.bodies()[body].motion].axis();
+    let motion = &kinematics.motions()[model.bodies()[body].motion];
+    let axis: Vector3<f64> = match model.bodies()[body].joint {
+        Joint::Prismatic(_) => motion.swing.into(),
+        _ => motion.axis.into(),
+    };
     Contact {
         key: ContactKey::at_limit(joint, side),
         part: Part::Limit(joint, side),
         body,
         other: None,
-        point: kinematics.r[body],
+        point: kinematics.r(body),
         frame: ContactFrame::of_normal(&(axis * side.sign())),
         gap,
         excess: 0.0,

@@ -161,7 +161,7 @@ impl Part {
                 let solid = &model.boxes()[i];
                 PlacedShape::Box(OrientedBox {
                     centre: kinematics.point(solid.body, &solid.centre),
-                    R: kinematics.R[solid.body] * solid.rotation,
+                    R: kinematics.R(solid.body) * solid.rotation,
                     half_size: solid.half_size,
                 })
             }
@@ -173,7 +173,7 @@ impl Part {
                 })
             }
             Self::Limit(i, _) => PlacedShape::Sphere(Sphere {
-                centre: kinematics.r[model.joints()[i].body],
+                centre: kinematics.r(model.joints()[i].body),
                 radius: 0.0,
             }),
         }
@@ -203,7 +203,7 @@ pub fn shape_about(wheel: &Wheel, disc: Disc) -> PlacedShape {
 #[inline]
 #[must_use]
 pub fn place_wheel(wheel: &Wheel, kinematics: &Kinematics) -> Disc {
-    let R = &kinematics.R[wheel.body];
+    let R = kinematics.R(wheel.body);
     Disc {
         centre: kinematics.point(wheel.body, &wheel.centre),
         axle: R * wheel.axle,

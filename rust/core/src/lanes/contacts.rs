@@ -20,7 +20,6 @@ use super::forecast::Forecast;
 use super::ground::{Ground, GroundSphere, turning};
 use super::machine::{Machine, SIDES, Stop};
 use super::parts::{Parts, Twist};
-use super::poses::Poses;
 use super::problem::{MAX_CONTACTS, MAX_DENSE};
 use crate::contact::detection::{touch_of_disc, touch_of_roller};
 use crate::contact::pair::{ANY_PIECE, ON_SURFACE};
@@ -29,6 +28,7 @@ use crate::geometry::query::sweep::DEEP;
 use crate::geometry::query::{CIRCLE, NEAREST};
 use crate::geometry::{Disc, Roller, Sphere};
 use crate::integrator::WarmStart;
+use crate::multibody::Poses;
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 
 /// Number of the plane in every terrain that has one.

@@ -6,9 +6,9 @@
 //! body, since the rovers of a block share their tree. A step that is not ordinary is declined,
 //! rover by rover, before anything has changed; [`crate::integrator`] then takes it.
 //!
+//! The dynamics of the tree are those of [`crate::multibody`].
+//!
 //! - [`admission`]: which rovers have ordinary steps; [`machine`]: what the rovers share;
-//!   [`inertias`]: what they need not; [`place`]: configurations;
-//! - [`poses`], [`mass_matrix`], [`bias`], [`energy`]: dynamics of the tree;
 //! - `parts`, [`ground`], `footing`, [`forecast`], [`contacts`], `stops`: what touches what;
 //!   [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield;
 //! - [`problem`], [`modes`], [`equations`], [`pattern`], `tree_matrix`, `velocity_equations`,
@@ -18,24 +18,18 @@
 
 pub mod admission;
 mod bench;
-pub mod bias;
 pub mod contacts;
 pub mod drives;
-pub mod energy;
 pub mod equations;
 mod footing;
 pub mod forecast;
 pub mod ground;
-pub mod inertias;
 pub mod machine;
-pub mod mass_matrix;
 pub mod modes;
 mod parts;
 pub mod passenger;
 pub mod pattern;
 mod pivoting;
-pub mod place;
-pub mod poses;
 pub mod problem;
 pub mod queue;
 pub mod rows;

@@ -7,8 +7,10 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
-use super::machine::{Axis, Link, LinkJoint, Machine, Mover};
-use super::poses::{Pose, Poses, times_columns};
+use super::machine::Machine;
+use crate::multibody::JointAxis;
+use crate::multibody::mechanism::{Link, LinkJoint, Mover};
+use crate::multibody::poses::{Pose, Poses};
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Wheels and boxes.
@@ -170,10 +172,10 @@ impl Link {
     /// Whether its joint turns it about this axle.
     fn turns_about(&self, axle: Axle) -> bool {
         let k = match self.axis {
-            Axis::X => 0,
-            Axis::Y => 1,
-            Axis::Z => 2,
-            Axis::General(_) => return false,
+            JointAxis::X => 0,
+            JointAxis::Y => 1,
+            JointAxis::Z => 2,
+            JointAxis::General(_) => return false,
         };
         self.joint == LinkJoint::Turn && matches!(axle, Axle::Frame(i, _) if i == k)
     }
@@ -245,7 +247,7 @@ impl Solid {
     pub(super) fn axes<T: Lane>(&self, pose: &Pose<T>) -> Mat3<T> {
         match &self.rotation {
             None => pose.R,
-            Some(rotation) => times_columns(&pose.R, rotation),
+            Some(rotation) => pose.R.times_columns(rotation),
         }
     }
 

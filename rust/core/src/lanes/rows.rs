@@ -10,12 +10,11 @@
 use std::sync::Arc;
 
 use super::contacts::Contacts;
-use super::machine::{Machine, Mover};
-use super::mass_matrix::Factor;
+use super::machine::Machine;
 use super::pattern::Pattern;
-use super::poses::Poses;
 use super::problem::{ContactProblem, Triple, block};
-use crate::multibody::model::BASE;
+use crate::multibody::mechanism::{BASE, Mover};
+use crate::multibody::{Factor, Poses};
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 
 /// What is read of a problem.

@@ -16,18 +16,12 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::bias::{BiasScratch, bias};
 use super::contacts::Contacts;
 use super::drives::Drives;
-use super::energy::{Energy, EnergyScratch, energy};
 use super::forecast::Forecast;
 use super::ground::Ground;
-use super::inertias::Inertias;
 use super::machine::Machine;
-use super::mass_matrix::{Factor, MassMatrix};
 use super::passenger::Passenger;
-use super::place::Place;
-use super::poses::Poses;
 use super::problem::{ContactProblem, MAX_CONTACTS, Triple};
 use super::rows::{Answer, Rows};
 use super::sweeps::write_start;
@@ -38,8 +32,10 @@ use crate::integrator::moreau_jean::MOST_REVISIONS;
 use crate::integrator::position_projection::FARTHEST;
 use crate::integrator::step_contacts::STEADY;
 use crate::integrator::{Phase, Probe, Stabilisation, StepOptions, StepReport, WarmStart};
-use crate::multibody::Model;
-use crate::multibody::model::BASE;
+use crate::multibody::bias::{BiasScratch, bias};
+use crate::multibody::energy::energy;
+use crate::multibody::mechanism::BASE;
+use crate::multibody::{Energy, EnergyScratch, Factor, Inertias, MassMatrix, Model, Place, Poses};
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 use crate::system::tree::{JOINT_ARM, MOST_JOINT_TURN, MOST_SPIN, MOST_TURN};
 
@@ -292,7 +288,7 @@ impl<T: Lane> Block<T> {
     /// Gives a lane the inertia and the state of a rover.
     fn seat(&mut self, lane: usize, rover: &Passenger<'_>) {
         if !(self.models[lane].as_ref()).is_some_and(|own| Arc::ptr_eq(own, rover.model)) {
-            self.inertias.set_lane(lane, &self.machine, rover.model);
+            self.inertias.set_lane(lane, rover.model.inertias());
             self.models[lane] = Some(Arc::clone(rover.model));
         }
         self.gravity.set(lane, rover.options.gravity.into());
@@ -335,14 +331,14 @@ impl<T: Lane> Block<T> {
     pub fn begin(&mut self) {
         self.drives.finish_loading();
         if self.is_new.any() {
-            let energy = self.energy(State::Start);
+            let (energy, _) = self.energy(State::Start);
             self.before = select_both(self.is_new, energy.kinetic_and_potential(), self.before);
             self.is_new = T::mask(self.token, 0);
         }
     }
 
     /// Energy of the start or of the end of the step.
-    fn energy(&mut self, state: State) -> Energy<T> {
+    fn energy(&mut self, state: State) -> (Energy<T>, Vec3<T>) {
         let (place, v) = match state {
             State::Start => (&self.start, &self.v),
             State::End => (&self.end, &self.v_end),
@@ -464,7 +460,9 @@ impl<T: Lane> Block<T> {
             || self.add_implicit(is_first),
         );
         probe.end(Phase::MassMatrix);
-        let is_definite = self.mass_matrix.factorise(&self.machine, &mut self.factor);
+        let is_definite = self
+            .mass_matrix
+            .factorise_in_place(&self.machine, &mut self.factor);
         self.decline(Decline::MassMatrix, !is_definite);
         probe.end(Phase::Factor);
         let (machine, end) = (&*self.machine, &self.poses_end);
@@ -735,9 +733,9 @@ impl<T: Lane> Block<T> {
         if self.drives.has_motors() && self.revise(problems, probe) {
             return Next::Retake;
         }
-        let after = self.energy(State::End);
+        let (after, momentum) = self.energy(State::End);
         self.after = after.kinetic_and_potential();
-        self.momentum = after.momentum;
+        self.momentum = momentum;
         T::vectorize(
             token,
             #[inline(always)]
@@ -970,7 +968,7 @@ impl<T: Lane> Block<T> {
 
     /// Energy of the lanes whose velocity was corrected.
     fn weigh_again(&mut self) {
-        let after = self.energy(State::End).kinetic_and_potential();
+        let after = self.energy(State::End).0.kinetic_and_potential();
         self.after = select_both(self.is_corrected, after, self.after);
     }
 
@@ -1112,7 +1110,7 @@ impl<T: Lane> Block<T> {
             #[inline(always)]
             || self.displace(problems),
         );
-        let lifted = self.energy(State::End).kinetic_and_potential();
+        let lifted = self.energy(State::End).0.kinetic_and_potential();
         let is_moved = self.is_deep & self.going;
         let [kinetic, potential] = self.after;
         let work = self.drives.work_of_displacement(

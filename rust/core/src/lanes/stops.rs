@@ -4,10 +4,10 @@
 
 use super::contacts::Contacts;
 use super::forecast::Forecast;
-use super::machine::{LinkJoint, Machine, SIDES, Stop};
-use super::place::Place;
-use super::poses::Poses;
+use super::machine::{Machine, SIDES, Stop};
 use crate::contact::Side;
+use crate::multibody::mechanism::LinkJoint;
+use crate::multibody::{Place, Poses};
 use crate::scalar::{Lane, LaneMask};
 
 impl<T: Lane> Contacts<T> {

@@ -1,161 +1,234 @@
 //! Bias `N(q, v) v + G(q)` by recursive Newton–Euler: the generalized force at zero acceleration.
 //!
-//! Source: Luh, Walker and Paul 1980; here in world axes about each tree's origin of places.
+//! Moments are about each body's own origin. Gravity is an acceleration of the roots. What a body
+//! without others on it needs is passed to its carrier at once, so only carriers are swept twice.
+//!
+//! Source: Luh, Walker and Paul 1980; here in world axes.
 
-use nalgebra::{Matrix3, Vector3};
+use super::inertias::{Inertia, Inertias};
+use super::mechanism::{BASE, Link, LinkJoint, Mechanism};
+use super::poses::{Motion, Pose, Poses};
+use crate::scalar::{Lane, Vec3};
 
-use super::joint::Joint;
-use super::kinematics::{JointRate, Kinematics, joint_rate};
-use super::model::{Body, Model};
-
-/// Scratch of [`bias`], allocated once for a model.
+/// Scratch of the bias.
 #[derive(Clone, Debug)]
-pub struct BiasScratch {
-    bodies: Vec<Moved>,
+pub struct BiasScratch<T: Lane> {
+    token: T::Token,
+    bodies: Vec<Moved<T>>,
 }
 
 /// A body at zero joint accelerations.
-#[derive(Clone, Copy, Debug, Default)]
-struct Moved {
-    omega: Vector3<f64>,
-    alpha: Vector3<f64>,
-    /// Acceleration of its frame's origin, m/s².
-    origin: Vector3<f64>,
-    /// Force (N) and moment about the tree's origin (N m) on it and everything it carries.
-    force: Vector3<f64>,
-    moment: Vector3<f64>,
+#[derive(Clone, Copy, Debug)]
+struct Moved<T> {
+    omega: Vec3<T>,
+    alpha: Vec3<T>,
+    /// Acceleration of its origin, relative to free fall, m/s².
+    origin: Vec3<T>,
+    /// Force (N) and moment about its origin (N m) on it and everything it carries.
+    force: Vec3<T>,
+    moment: Vec3<T>,
 }
 
-impl BiasScratch {
-    /// Room for a model.
+impl<T: Lane> BiasScratch<T> {
+    /// Room for a mechanism.
     #[must_use]
-    pub fn new(model: &Model) -> Self {
+    pub fn new(token: T::Token, mechanism: &Mechanism) -> Self {
+        let at_rest = Moved::at_rest(Vec3::splat(token, [0.0; 3]));
         Self {
-            bodies: vec![Moved::default(); model.bodies().len()],
+            token,
+            bodies: vec![at_rest; mechanism.n_bodies()],
         }
-    }
-}
-
-impl Moved {
-    /// Acceleration of a point fixed to it at `d` from its frame's origin.
-    #[inline]
-    fn accelerates(&self, d: &Vector3<f64>) -> Vector3<f64> {
-        self.origin + self.alpha.cross(d) + self.omega.cross(&self.omega.cross(d))
-    }
-}
-
-/// Angular velocity, angular acceleration and acceleration of the origin of a body that no revolute
-/// joint ties to another one.
-#[cold]
-fn otherwise_carried(
-    body: &Body,
-    kinematics: &Kinematics,
-    moved: &[Moved],
-    b: usize,
-    v: &[f64],
-) -> (Vector3<f64>, Vector3<f64>, Vector3<f64>) {
-    let (carrier, d) = match body.parent {
-        Some(parent) => (moved[parent], kinematics.r[b] - kinematics.r[parent]),
-        None => (Moved::default(), Vector3::zeros()),
-    };
-    let JointRate { spin, slide } = joint_rate(body, kinematics, v);
-    (
-        carrier.omega + spin,
-        carrier.alpha + carrier.omega.cross(&spin),
-        carrier.accelerates(&d) + carrier.omega.cross(&slide) * 2.0,
-    )
-}
-
-/// A body with this angular velocity, angular acceleration and acceleration of the origin, and the
-/// force and moment on it alone.
-#[inline]
-fn loaded(
-    body: &Body,
-    kinematics: &Kinematics,
-    b: usize,
-    gravity: &Vector3<f64>,
-    (omega, alpha, origin): (Vector3<f64>, Vector3<f64>, Vector3<f64>),
-) -> Moved {
-    let c = &kinematics.c[b];
-    let acceleration = if body.is_centred() {
-        origin
-    } else {
-        let lever = c - kinematics.r[b];
-        origin + alpha.cross(&lever) + omega.cross(&omega.cross(&lever))
-    };
-    let force = (acceleration - gravity) * body.mass;
-    let R = &kinematics.R[b];
-    let I = &body.principal_inertia;
-    let gyroscopic = |A: &Matrix3<f64>| {
-        let (w, a) = (A.tr_mul(&omega), A.tr_mul(&alpha));
-        A * (I.component_mul(&a) + w.cross(&I.component_mul(&w)))
-    };
-    let moment = match &body.principal_axes {
-        None => gyroscopic(R),
-        Some(P) => gyroscopic(&(R * P)),
-    };
-    Moved {
-        omega,
-        alpha,
-        origin,
-        force,
-        moment: moment + c.cross(&force),
     }
 }
 
 /// Bias `b` in `M v̇ + b = τ`: Coriolis, centrifugal, gyroscopic and gravity terms.
 ///
 /// `v`, `out`: (nv), N along a velocity in m/s, N m about one in rad/s. `gravity`: m/s², world.
-pub fn bias(
-    model: &Model,
-    kinematics: &Kinematics,
-    v: &[f64],
-    gravity: &Vector3<f64>,
-    scratch: &mut BiasScratch,
-    out: &mut [f64],
+///
+/// # Panics
+/// If an argument is of another mechanism.
+pub fn bias<T: Lane>(
+    mechanism: &Mechanism,
+    inertias: &Inertias<T>,
+    poses: &Poses<T>,
+    v: &[T],
+    gravity: Vec3<T>,
+    scratch: &mut BiasScratch<T>,
+    out: &mut [T],
 ) {
-    let bodies = model.bodies();
-    let moved = &mut scratch.bodies[..bodies.len()];
-    for (b, body) in bodies.iter().enumerate() {
-        let r = &kinematics.r[b];
-        let (omega, alpha, origin) = match body.parent {
-            None if matches!(body.joint, Joint::Free(_)) => {
-                let k = body.velocity + 3;
-                let omega = Vector3::new(v[k], v[k + 1], v[k + 2]);
-                (omega, Vector3::zeros(), Vector3::zeros())
+    T::vectorize(
+        scratch.token,
+        #[inline(always)]
+        || {
+            let n = mechanism.links.len();
+            let (links, inertias) = (&mechanism.links[..n], &inertias.bodies[..n]);
+            let motions = &poses.motions[..mechanism.n_motions()];
+            let (poses, moved) = (&poses.bodies[..n], &mut scratch.bodies[..n]);
+            let world = Moved::at_rest(-gravity);
+            for tree in &mechanism.trees {
+                let (root, end) = (tree.bodies.start, tree.bodies.end.min(n)); // below n: no checks
+                moved[root] = if tree.is_free {
+                    let v = &v[tree.velocities.start..][..BASE];
+                    Moved {
+                        omega: Vec3::new(v[3], v[4], v[5]),
+                        ..world
+                    }
+                } else {
+                    world.carry_root(&links[root], motions, poses[root].lever, v)
+                };
+                moved[root].load(&links[root], &inertias[root], &poses[root]);
+                for b in root + 1..end {
+                    let (before, own) = moved.split_at_mut(b);
+                    let (link, pose) = (&links[b], &poses[b]);
+                    let carrier = &mut before[link.parent];
+                    let mut body = if link.joint == LinkJoint::Turn {
+                        let spin = motions[link.motion].axis * v[link.velocity];
+                        carrier.carry(pose.lever, spin)
+                    } else {
+                        carrier.carry_otherwise(link, motions, pose.lever, v)
+                    };
+                    body.load(link, &inertias[b], pose);
+                    if link.is_plain_leaf {
+                        body.share(link, motions, |k, x| out[k] = x);
+                        body.rest_on(carrier, pose);
+                    } else {
+                        own[0] = body;
+                    }
+                }
+                for b in (root + 1..end).rev() {
+                    let link = &links[b];
+                    if link.is_plain_leaf {
+                        continue;
+                    }
+                    let (before, own) = moved.split_at_mut(b);
+                    own[0].rest_on(&mut before[link.parent], &poses[b]);
+                    if !link.is_coupled() {
+                        own[0].share(link, motions, |k, x| out[k] = x);
+                    }
+                }
+                let Moved { force, moment, .. } = moved[root];
+                if tree.is_free {
+                    let own = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
+                    out[tree.velocities.start..][..BASE].copy_from_slice(&own);
+                } else {
+                    moved[root].share(&links[root], motions, |k, x| out[k] = x);
+                }
             }
-            Some(parent) if matches!(body.joint, Joint::Revolute(_)) => {
-                let carrier = &moved[parent];
-                let d = r - kinematics.r[parent];
-                let spin = kinematics.motions[body.motion].axis() * v[body.velocity];
-                (
-                    carrier.omega + spin,
-                    carrier.alpha + carrier.omega.cross(&spin),
-                    carrier.accelerates(&d),
-                )
+            // A coupled joint adds to the joint that it follows.
+            for &b in &mechanism.coupled {
+                moved[b].share(&links[b], motions, |k, x| out[k] += x);
             }
-            _ => otherwise_carried(body, kinematics, moved, b, v),
-        };
-        moved[b] = loaded(body, kinematics, b, gravity, (omega, alpha, origin));
-    }
-    out.fill(0.0);
-    for b in (0..bodies.len()).rev() {
-        let body = &bodies[b];
-        let Moved { force, moment, .. } = moved[b];
-        let k = body.velocity;
-        if matches!(body.joint, Joint::Free(_)) {
-            out[k..k + 3].copy_from_slice(force.as_slice());
-            out[k + 3..k + 6].copy_from_slice(moment.as_slice());
-            continue;
-        }
-        // A coupled joint adds to the joint that it follows.
-        for (i, m) in body.motions().enumerate() {
-            out[k + i] += kinematics.motions[m].power(&force, &moment);
-        }
-        if let Some(parent) = body.parent {
-            let carrier = &mut moved[parent];
-            carrier.force += force;
-            carrier.moment += moment;
+        },
+    );
+}
+
+impl<T: Lane> Moved<T> {
+    /// A body that does not turn, without load.
+    #[inline(always)]
+    fn at_rest(origin: Vec3<T>) -> Self {
+        let zero = Vec3::splat(origin.x.token(), [0.0; 3]);
+        Self {
+            omega: zero,
+            alpha: zero,
+            origin,
+            force: zero,
+            moment: zero,
         }
     }
+
+    /// A body that it carries, `d` from its origin and turning relative to it, without load.
+    #[inline(always)]
+    fn carry(&self, d: Vec3<T>, spin: Vec3<T>) -> Self {
+        let omega = self.omega;
+        let zero = Vec3::splat(d.x.token(), [0.0; 3]);
+        Self {
+            omega: omega + spin,
+            alpha: self.alpha + omega.cross(spin),
+            origin: self.origin + self.alpha.cross(d) + omega.cross(omega.cross(d)),
+            force: zero,
+            moment: zero,
+        }
+    }
+
+    /// The same for a root that a joint connects to the world.
+    #[cold]
+    fn carry_root(&self, link: &Link, motions: &[Motion<T>], d: Vec3<T>, v: &[T]) -> Self {
+        if link.joint == LinkJoint::Base {
+            *self
+        } else {
+            self.carry_otherwise(link, motions, d, v)
+        }
+    }
+
+    /// The same for a joint that is not a plain rotation.
+    #[inline(always)]
+    fn carry_otherwise(&self, link: &Link, motions: &[Motion<T>], d: Vec3<T>, v: &[T]) -> Self {
+        let (k, motions) = (link.velocity, &motions[link.motion..]);
+        let mut spin = motions[0].axis * v[k];
+        if let LinkJoint::Ball(_) = link.joint {
+            spin += motions[1].axis * v[k + 1];
+            spin += motions[2].axis * v[k + 2];
+        }
+        let mut body = self.carry(d, spin);
+        if let LinkJoint::Slide(_) = link.joint {
+            body.origin += self.omega.cross(motions[0].swing * v[k]) * d.x.like(2.0);
+        }
+        body
+    }
+
+    /// Sets force and moment to those of the body alone.
+    #[inline(always)]
+    fn load(&mut self, link: &Link, inertia: &Inertia<T>, pose: &Pose<T>) {
+        let Self { omega, alpha, .. } = *self;
+        // A symmetric part of the inertia has no gyroscopic moment; the part k a aᵀ has
+        // a k (a · α) + (ω × a) k (a · ω).
+        let (a, b) = inertia.axes(link.symmetry, &pose.R);
+        let mut moment = alpha * inertia.rest + turning(inertia.first, a, omega, alpha);
+        if let Some(b) = b {
+            moment += turning(inertia.second, b, omega, alpha);
+        }
+        let mut acceleration = self.origin;
+        if link.is_centred {
+            self.force = acceleration * inertia.mass;
+        } else {
+            let lever = pose.c - pose.r;
+            acceleration += alpha.cross(lever) + omega.cross(omega.cross(lever));
+            self.force = acceleration * inertia.mass;
+            moment += lever.cross(self.force);
+        }
+        self.moment = moment;
+    }
+
+    /// Calls `set(k, x)` with the generalized force x of the load on each velocity of its joint.
+    #[inline(always)]
+    fn share(&self, link: &Link, motions: &[Motion<T>], mut set: impl FnMut(usize, T)) {
+        let (k, m) = (link.velocity, link.motion);
+        if link.joint == LinkJoint::Turn {
+            set(k, motions[m].axis.dot(self.moment));
+            return;
+        }
+        match link.joint {
+            LinkJoint::Turn | LinkJoint::CoupledTurn => set(k, motions[m].axis.dot(self.moment)),
+            LinkJoint::Slide(_) => set(k, motions[m].swing.dot(self.force)),
+            LinkJoint::Ball(_) => {
+                for i in 0..3 {
+                    set(k + i, motions[m + i].axis.dot(self.moment));
+                }
+            }
+            LinkJoint::Base => {}
+        }
+    }
+
+    /// Adds its force and moment to its carrier's.
+    #[inline(always)]
+    fn rest_on(&self, carrier: &mut Self, pose: &Pose<T>) {
+        carrier.force += self.force;
+        carrier.moment += self.moment + pose.lever.cross(self.force);
+    }
+}
+
+/// Moment of the inertia `k a aᵀ` at the angular velocity ω and acceleration α.
+#[inline(always)]
+fn turning<T: Lane>(k: T, a: Vec3<T>, omega: Vec3<T>, alpha: Vec3<T>) -> Vec3<T> {
+    a * (k * a.dot(alpha)) + omega.cross(a) * (k * a.dot(omega))
 }

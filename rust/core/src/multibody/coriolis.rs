@@ -26,20 +26,22 @@
 //! Source: Echeandia and Wensing 2021, *Numerical methods to compute the Coriolis matrix and
 //! Christoffel symbols for rigid-body systems*, J. Comput. Nonlinear Dynam. 16, 091004.
 
-use std::ops::{Add, AddAssign, Mul, Range};
+use std::ops::Range;
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::DMatrix;
 
+use super::composite::{Composite, Momentum, Symmetric};
 use super::joint::Joint;
 use super::kinematics::Kinematics;
-use super::model::{Body, Model};
-use crate::spatial::SymmetricMatrix3;
+use super::model::Model;
+use super::poses::Motion;
+use crate::scalar::Vec3;
 
 /// Scratch of [`coriolis_matrix`], allocated once for a model.
 #[derive(Clone, Debug, Default)]
 pub struct CoriolisScratch {
-    velocity: Vec<Spatial>,
-    composites: Vec<Composite>,
+    velocity: Vec<Motion<f64>>,
+    turning: Vec<Turning>,
     screws: Vec<Screw>,
     /// The screws of each body's joint.
     own: Vec<Range<usize>>,
@@ -49,26 +51,17 @@ pub struct CoriolisScratch {
 #[derive(Clone, Copy, Debug)]
 struct Screw {
     velocity: usize,
-    S: Spatial,
-    S_dot: Spatial,
+    S: Motion<f64>,
+    S_dot: Motion<f64>,
 }
 
-/// A motion vector (linear part: velocity of the point at the tree's origin) or a force vector
-/// (moment about the origin).
-#[derive(Clone, Copy, Debug, Default)]
-struct Spatial {
-    angular: Vector3<f64>,
-    linear: Vector3<f64>,
-}
-
-/// I and B of a composite body: a body and everything it carries.
-#[derive(Clone, Copy, Debug, Default)]
-struct Composite {
-    mass: f64,
-    moment: Vector3<f64>,
-    J: SymmetricMatrix3,
-    K: SymmetricMatrix3,
-    momentum: Spatial,
+/// I and B of a composite body.
+#[derive(Clone, Copy, Debug)]
+struct Turning {
+    I: Composite<f64>,
+    K: Symmetric<f64>,
+    /// I V.
+    P: Momentum<f64>,
 }
 
 /// `C(q, v)` (nv, nv) at the poses of `kinematics`, without gravity; `out` is overwritten.
@@ -83,95 +76,98 @@ pub fn coriolis_matrix(
 ) {
     let bodies = model.bodies();
     let s = scratch;
-    s.velocity.resize(bodies.len(), Spatial::default());
-    s.composites.resize(bodies.len(), Composite::default());
+    s.velocity.clear();
+    s.turning.clear();
     s.screws.clear();
     s.own.clear();
     for (b, body) in bodies.iter().enumerate() {
         let first = s.screws.len();
-        s.velocity[b] = if let Joint::Free(_) = body.joint {
+        let velocity = if let Joint::Free(_) = body.joint {
             s.add_free(body.velocity, v)
         } else {
-            let carrier = (body.parent).map_or(Spatial::default(), |parent| s.velocity[parent]);
+            let carrier = body.parent.map_or(still(), |parent| s.velocity[parent]);
             let mut velocity = carrier;
-            for (i, motion) in kinematics.motions[body.motions()].iter().enumerate() {
-                let (angular, linear) = motion.twist();
-                let S = Spatial { angular, linear };
+            for (i, &S) in kinematics.motions()[body.motions()].iter().enumerate() {
                 let k = body.velocity + i;
-                velocity = velocity + S * v[k];
+                velocity.axis += S.axis * v[k];
+                velocity.swing += S.swing * v[k];
                 s.screws.push(Screw {
                     velocity: k,
                     S,
-                    S_dot: carrier.moves(&S),
+                    S_dot: moved(&carrier, &S),
                 });
             }
             velocity
         };
+        s.velocity.push(velocity);
         s.own.push(first..s.screws.len());
-        s.composites[b] = Composite::of(body, kinematics, b, &s.velocity[b]);
+        let (link, pose) = (&model.mechanism().links[b], &kinematics.poses().bodies[b]);
+        let own = Composite::of(link, &model.inertias().bodies[b], pose);
+        s.turning.push(Turning::of(own, &velocity));
     }
     out.fill(0.0);
     for (b, body) in bodies.iter().enumerate().rev() {
-        let composite = s.composites[b];
+        let turning = s.turning[b];
         for t in s.own[b].clone() {
             let Screw {
                 velocity: k,
                 S,
                 S_dot,
             } = &s.screws[t];
-            let F1 = composite.times(S_dot) + composite.B_times(S);
-            let F2 = composite.times(S);
-            let F3 = composite.B_transposed_times(S);
+            let F1 = turning.I.momentum(S_dot).plus(&turning.B_times(S));
+            let F2 = turning.I.momentum(S);
+            let F3 = turning.B_transposed_times(S);
             let mut carrier = Some(b);
             while let Some(a) = carrier {
                 for before in s.screws[s.own[a].clone()]
                     .iter()
                     .take_while(|x| a < b || x.velocity < *k)
                 {
-                    out[(before.velocity, *k)] += before.S.dot(&F1);
-                    out[(*k, before.velocity)] += before.S_dot.dot(&F2) + before.S.angular.dot(&F3);
+                    out[(before.velocity, *k)] += F1.along(&before.S);
+                    out[(*k, before.velocity)] += F2.along(&before.S_dot) + before.S.axis.dot(F3);
                 }
                 carrier = bodies[a].parent;
             }
-            out[(*k, *k)] += S.dot(&F1);
+            out[(*k, *k)] += F1.along(S);
         }
         if let Some(parent) = body.parent {
-            s.composites[parent] += composite;
+            s.turning[parent] = s.turning[parent].plus(&turning);
         }
     }
 }
 
 impl CoriolisScratch {
     /// Adds the six screws of a free body and returns its velocity.
-    fn add_free(&mut self, first: usize, v: &[f64]) -> Spatial {
+    fn add_free(&mut self, first: usize, v: &[f64]) -> Motion<f64> {
         let v = &v[first..];
-        let base = Spatial {
-            angular: Vector3::new(v[3], v[4], v[5]),
-            linear: Vector3::new(v[0], v[1], v[2]),
+        let base = Motion {
+            axis: Vec3::new(v[3], v[4], v[5]),
+            swing: Vec3::new(v[0], v[1], v[2]),
         };
-        let zero = Vector3::zeros();
-        for k in 0..3 {
+        let Motion { axis: zero, .. } = still();
+        let units = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let units = units.map(|[x, y, z]| Vec3::new(x, y, z));
+        for (k, e) in units.into_iter().enumerate() {
             self.screws.push(Screw {
                 velocity: first + k,
-                S: Spatial {
-                    angular: zero,
-                    linear: Vector3::ith(k, 1.0),
+                S: Motion {
+                    axis: zero,
+                    swing: e,
                 },
-                S_dot: Spatial::default(),
+                S_dot: still(),
             });
         }
-        for k in 0..3 {
-            let e = Vector3::ith(k, 1.0);
+        for (k, e) in units.into_iter().enumerate() {
             // The body rotates about its own origin, which moves.
             self.screws.push(Screw {
                 velocity: first + 3 + k,
-                S: Spatial {
-                    angular: e,
-                    linear: zero,
+                S: Motion {
+                    axis: e,
+                    swing: zero,
                 },
-                S_dot: Spatial {
-                    angular: zero,
-                    linear: base.linear.cross(&e),
+                S_dot: Motion {
+                    axis: zero,
+                    swing: base.swing.cross(e),
                 },
             });
         }
@@ -179,122 +175,79 @@ impl CoriolisScratch {
     }
 }
 
-impl Spatial {
-    #[inline]
-    fn dot(&self, other: &Self) -> f64 {
-        self.angular.dot(&other.angular) + self.linear.dot(&other.linear)
-    }
-
-    /// `V× S`: the rate of a motion vector S carried along at the velocity V.
-    #[inline]
-    fn moves(&self, S: &Self) -> Self {
-        Self {
-            angular: self.angular.cross(&S.angular),
-            linear: self.linear.cross(&S.angular) + self.angular.cross(&S.linear),
-        }
+fn still() -> Motion<f64> {
+    let zero = Vec3::new(0.0, 0.0, 0.0);
+    Motion {
+        axis: zero,
+        swing: zero,
     }
 }
 
-impl Add for Spatial {
-    type Output = Self;
-
-    #[inline]
-    fn add(self, other: Self) -> Self {
-        Self {
-            angular: self.angular + other.angular,
-            linear: self.linear + other.linear,
-        }
+/// `V× S`: the rate of a motion vector S carried along at the velocity V.
+#[inline]
+fn moved(V: &Motion<f64>, S: &Motion<f64>) -> Motion<f64> {
+    Motion {
+        axis: V.axis.cross(S.axis),
+        swing: V.swing.cross(S.axis) + V.axis.cross(S.swing),
     }
 }
 
-impl Mul<f64> for Spatial {
-    type Output = Self;
-
+impl Turning {
+    /// Of a single body with velocity V.
     #[inline]
-    fn mul(self, factor: f64) -> Self {
-        Self {
-            angular: self.angular * factor,
-            linear: self.linear * factor,
-        }
-    }
-}
-
-impl Composite {
-    /// I and B of a single body with velocity V.
-    #[inline]
-    fn of(body: &Body, kinematics: &Kinematics, b: usize, V: &Spatial) -> Self {
-        let (c, m) = (&kinematics.c[b], body.mass);
-        let R = &kinematics.R[b];
-        let mut J = match &body.principal_axes {
-            None => SymmetricMatrix3::rotated_diagonal(R, &body.principal_inertia),
-            Some(P) => SymmetricMatrix3::rotated_diagonal(&(R * P), &body.principal_inertia),
+    fn of(I: Composite<f64>, V: &Motion<f64>) -> Self {
+        let (J, w, v, s) = (&I.inertia, V.axis, V.swing, I.moment);
+        let x = w.cross(Vec3::new(J.xx, J.xy, J.xz));
+        let y = w.cross(Vec3::new(J.xy, J.yy, J.yz));
+        let z = w.cross(Vec3::new(J.xz, J.yz, J.zz));
+        let along = s.dot(v);
+        let K = Symmetric {
+            xx: x.x - s.x * v.x + along,
+            yy: y.y - s.y * v.y + along,
+            zz: z.z - s.z * v.z + along,
+            xy: 0.5 * (x.y + y.x - s.x * v.y - s.y * v.x),
+            xz: 0.5 * (x.z + z.x - s.x * v.z - s.z * v.x),
+            yz: 0.5 * (y.z + z.y - s.y * v.z - s.z * v.y),
         };
-        J += SymmetricMatrix3::point_mass(m, c);
-        let (w, v) = (&V.angular, &V.linear);
-        let turned = w.cross_matrix() * J.to_matrix();
-        let moved = c * v.transpose() * m;
-        let K = (turned + turned.transpose() - moved - moved.transpose()) * 0.5;
-        let mut K = SymmetricMatrix3::from_matrix(&K);
-        let along = m * c.dot(v);
-        K.xx += along;
-        K.yy += along;
-        K.zz += along;
-        let mut own = Self {
-            mass: m,
-            moment: c * m,
-            J,
+        Self {
+            I,
             K,
-            momentum: Spatial::default(),
-        };
-        own.momentum = own.times(V);
-        own
-    }
-
-    /// `I S`.
-    #[inline]
-    fn times(&self, S: &Spatial) -> Spatial {
-        Spatial {
-            angular: self.J.times(&S.angular) + self.moment.cross(&S.linear),
-            linear: S.linear * self.mass - self.moment.cross(&S.angular),
+            P: I.momentum(V),
         }
     }
 
     /// `B S`.
     #[inline]
-    fn B_times(&self, S: &Spatial) -> Spatial {
-        let P = &self.momentum;
-        Spatial {
-            angular: self.K.times(&S.angular) - P.angular.cross(&S.angular) * 0.5,
-            linear: -P.linear.cross(&S.angular),
+    fn B_times(&self, S: &Motion<f64>) -> Momentum<f64> {
+        Momentum {
+            angular: self.K.times(S.axis) - self.P.angular.cross(S.axis) * 0.5,
+            linear: -self.P.linear.cross(S.axis),
         }
     }
 
     /// `Bᵀ S`, whose linear part is zero.
     #[inline]
-    fn B_transposed_times(&self, S: &Spatial) -> Vector3<f64> {
-        let P = &self.momentum;
-        self.K.times(&S.angular) + P.angular.cross(&S.angular) * 0.5 + P.linear.cross(&S.linear)
+    fn B_transposed_times(&self, S: &Motion<f64>) -> Vec3<f64> {
+        let P = &self.P;
+        self.K.times(S.axis) + P.angular.cross(S.axis) * 0.5 + P.linear.cross(S.swing)
     }
-}
 
-impl AddAssign for Composite {
     #[inline]
-    fn add_assign(&mut self, other: Self) {
-        self.mass += other.mass;
-        self.moment += other.moment;
-        self.J += other.J;
-        self.K += other.K;
-        self.momentum = self.momentum + other.momentum;
+    fn plus(&self, other: &Self) -> Self {
+        Self {
+            I: self.I.plus(&other.I),
+            K: self.K.plus(&other.K),
+            P: self.P.plus(&other.P),
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::DVector;
+    use nalgebra::{DVector, Vector3};
 
     use super::*;
-    use crate::multibody::bias::{BiasScratch, bias};
-    use crate::multibody::{Configuration, MassMatrix};
+    use crate::multibody::Configuration;
 
     fn somewhere(model: &Model) -> (Configuration, Vec<f64>) {
         let mut q = Configuration::zero(model);
@@ -329,16 +282,7 @@ mod tests {
                 &mut C,
             );
             let product = &C * DVector::from_column_slice(&v);
-            let mut expected = vec![0.0; model.nv()];
-            let mut scratch = BiasScratch::new(&model);
-            bias(
-                &model,
-                &kinematics,
-                &v,
-                &Vector3::zeros(),
-                &mut scratch,
-                &mut expected,
-            );
+            let expected = kinematics.bias(&model, &v, &Vector3::zeros());
             let expected = DVector::from_vec(expected);
             assert!((product - &expected).norm() < 1e-12 * expected.norm());
         }
@@ -361,9 +305,7 @@ mod tests {
             let mass_matrix_at = |time: f64| {
                 let mut moved = q.clone();
                 moved.advance(&model, &v, time);
-                let mut M = MassMatrix::new(&model);
-                M.update(&model, &Kinematics::of(&model, &moved));
-                M.to_dense(&model)
+                Kinematics::of(&model, &moved).mass_matrix(&model)
             };
             let rate = (mass_matrix_at(h) - mass_matrix_at(-h)) / (2.0 * h);
             assert!((&C + C.transpose() - &rate).norm() < 1e-8 * rate.norm());

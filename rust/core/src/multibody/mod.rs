@@ -5,34 +5,52 @@
 //! tree are expressed in **world axes about one origin**: the origin of its root if the root is
 //! free, otherwise the world's. Composite inertias then add without a transformation, and a rover
 //! far from the world's origin loses no precision.
+//!
+//! The dynamics are written once, over the scalar ([`crate::scalar`]) that is one machine or
+//! several to a register: [`mechanism`], what machines in one register share; [`inertias`], what
+//! they need not; [`place`], their configurations; [`poses`], [`mass_matrix`], [`factor`], [`bias`]
+//! and [`energy`]. They branch on the kind of joint body by body.
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 pub mod bias;
+mod composite;
 pub mod coordinates;
 pub mod coriolis;
 pub mod description;
+pub mod energy;
 pub mod error;
+pub mod factor;
+pub mod inertias;
 pub mod joint;
 pub mod kinematics;
 pub mod mass_matrix;
+pub mod mechanism;
 pub mod model;
 pub mod momentum;
 pub mod motor;
+pub mod place;
+pub mod poses;
 pub mod state;
 
-pub use bias::bias;
 pub use description::{
     CouplingDescription, DriveDescription, FORMAT, Hold, JointKind, Limits, MAX_SHAPES, MAX_SOLIDS,
     MassProperties, ModelDescription, Shape, ShapeDescription, SolidDescription, Spring,
     TagDescription, WheelDescription,
 };
+pub use energy::{Energy, EnergyScratch};
 pub use error::{ModelError, StateError};
-pub use joint::{Joint, JointAxis, Motion, Pose};
+pub use factor::Factor;
+pub use inertias::Inertias;
+pub use joint::{Joint, JointAxis, Pose};
 pub use kinematics::Kinematics;
-pub use mass_matrix::{FactoredMassMatrix, MassMatrix};
+pub use mass_matrix::MassMatrix;
+pub use mechanism::Mechanism;
 pub(crate) use model::fingerprint;
 pub use model::{
     BASE, Body, CollisionBox, CollisionSphere, Frame, JointProperties, Model, Passive, Tree, Wheel,
 };
-pub use momentum::{Energy, EnergyScratch, Momentum};
+pub use momentum::Momentum;
 pub use motor::{DriveTrial, Motor, MotorRegime};
+pub use place::Place;
+pub use poses::{Motion, Poses};
 pub use state::Configuration;

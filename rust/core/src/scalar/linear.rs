@@ -2,6 +2,8 @@
 
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
+use nalgebra::{Matrix3, Vector3};
+
 use super::lane::Lane;
 
 /// A vector.
@@ -161,9 +163,64 @@ impl<T: Lane> Mat3<T> {
         self.times(Vec3::splat(self.x.x.token(), v))
     }
 
+    /// `A B`.
+    #[inline(always)]
+    #[must_use]
+    pub fn product(&self, other: &Self) -> Self {
+        Self {
+            x: self.times(other.x),
+            y: self.times(other.y),
+            z: self.times(other.z),
+        }
+    }
+
+    /// `A B` for a matrix that all lanes share, by its columns.
+    #[inline(always)]
+    #[must_use]
+    pub fn times_columns(&self, columns: &[[f64; 3]; 3]) -> Self {
+        Self {
+            x: self.times_shared(columns[0]),
+            y: self.times_shared(columns[1]),
+            z: self.times_shared(columns[2]),
+        }
+    }
+
     /// `Aᵀ v`.
     #[inline(always)]
     pub fn transpose_times(&self, v: Vec3<T>) -> Vec3<T> {
         Vec3::new(self.x.dot(v), self.y.dot(v), self.z.dot(v))
+    }
+}
+
+impl From<Vector3<f64>> for Vec3<f64> {
+    #[inline(always)]
+    fn from(v: Vector3<f64>) -> Self {
+        Self::new(v.x, v.y, v.z)
+    }
+}
+
+impl From<Vec3<f64>> for Vector3<f64> {
+    #[inline(always)]
+    fn from(v: Vec3<f64>) -> Self {
+        Self::new(v.x, v.y, v.z)
+    }
+}
+
+impl From<Mat3<f64>> for Matrix3<f64> {
+    #[inline(always)]
+    fn from(A: Mat3<f64>) -> Self {
+        Self::from_columns(&A.columns().map(Vector3::from))
+    }
+}
+
+impl From<Matrix3<f64>> for Mat3<f64> {
+    #[inline(always)]
+    fn from(A: Matrix3<f64>) -> Self {
+        let [x, y, z]: [[f64; 3]; 3] = A.into();
+        Self {
+            x: Vec3::new(x[0], x[1], x[2]),
+            y: Vec3::new(y[0], y[1], y[2]),
+            z: Vec3::new(z[0], z[1], z[2]),
+        }
     }
 }

@@ -208,7 +208,7 @@ impl Scene for RoverScene {
 
     fn energy(&self, options: &StepOptions, state: &State<Configuration>) -> Energy {
         let kinematics = Kinematics::of(&self.model, &state.configuration);
-        let mut energy = momentum::energy(&self.model, &kinematics, &state.v, &options.gravity);
+        let mut energy = kinematics.energy(&self.model, &state.v, &options.gravity);
         energy.potential += self.model.spring_energy(&state.configuration.joints);
         energy
     }

@@ -9,25 +9,13 @@
 use nalgebra::{Matrix3, Quaternion, Unit, UnitQuaternion, Vector3};
 
 use crate::scalar::elementary::{atan2, hypot, sin_cos};
+use crate::scalar::quaternion;
 
 /// Rotation by the vector `phi` (rad, world axes): the quaternion `exp(phi / 2)`.
-///
-/// The series at small angles keeps full precision where `sin(x) / x` would not.
 #[must_use]
 pub fn exp_rotation(phi: &Vector3<f64>) -> UnitQuaternion<f64> {
-    let half2 = 0.25 * phi.norm_squared();
-    let (w, s) = if half2 < 1e-4 {
-        // sin(x)/x and cos(x) with x² = half2: error below 1e-19 at the switch.
-        (
-            1.0 - half2 / 2.0 * (1.0 - half2 / 12.0 * (1.0 - half2 / 30.0)),
-            0.5 * (1.0 - half2 / 6.0 * (1.0 - half2 / 20.0 * (1.0 - half2 / 42.0))),
-        )
-    } else {
-        let half = half2.sqrt();
-        let (sin, cos) = sin_cos(half);
-        (cos, 0.5 * sin / half)
-    };
-    UnitQuaternion::new_unchecked(Quaternion::new(w, s * phi.x, s * phi.y, s * phi.z))
+    let [x, y, z, w] = quaternion::exp_rotation::<f64>((*phi).into());
+    UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z))
 }
 
 /// Matrix of the rotation by an angle (rad) about an axis.

@@ -1,7 +1,5 @@
 //! Symmetric 3×3 matrix, six numbers: rotational inertia in world axes.
 
-use std::ops::AddAssign;
-
 use nalgebra::{Matrix3, Vector3};
 
 /// Symmetric 3×3 matrix (kg m² when it is an inertia).
@@ -43,28 +41,6 @@ impl SymmetricMatrix3 {
         )
     }
 
-    /// True where the off-diagonal entries are exactly zero.
-    #[must_use]
-    pub fn is_diagonal(&self) -> bool {
-        self.xy == 0.0 && self.xz == 0.0 && self.yz == 0.0
-    }
-
-    /// `R diag(d) Rᵀ`.
-    #[inline]
-    #[must_use]
-    pub fn rotated_diagonal(R: &Matrix3<f64>, d: &Vector3<f64>) -> Self {
-        let (a, b, c) = (R.column(0) * d.x, R.column(1) * d.y, R.column(2) * d.z);
-        let (p, q, r) = (R.column(0), R.column(1), R.column(2));
-        Self {
-            xx: a[0] * p[0] + b[0] * q[0] + c[0] * r[0],
-            yy: a[1] * p[1] + b[1] * q[1] + c[1] * r[1],
-            zz: a[2] * p[2] + b[2] * q[2] + c[2] * r[2],
-            xy: a[0] * p[1] + b[0] * q[1] + c[0] * r[1],
-            xz: a[0] * p[2] + b[0] * q[2] + c[0] * r[2],
-            yz: a[1] * p[2] + b[1] * q[2] + c[1] * r[2],
-        }
-    }
-
     /// `m (|c|² 1 − c cᵀ)`: inertia of a point mass at `c` about the origin (Huygens–Steiner).
     #[inline]
     #[must_use]
@@ -78,29 +54,6 @@ impl SymmetricMatrix3 {
             xz: -m * x * z,
             yz: -m * y * z,
         }
-    }
-
-    /// Product with a vector.
-    #[inline]
-    #[must_use]
-    pub fn times(&self, v: &Vector3<f64>) -> Vector3<f64> {
-        Vector3::new(
-            self.xx * v.x + self.xy * v.y + self.xz * v.z,
-            self.xy * v.x + self.yy * v.y + self.yz * v.z,
-            self.xz * v.x + self.yz * v.y + self.zz * v.z,
-        )
-    }
-}
-
-impl AddAssign for SymmetricMatrix3 {
-    #[inline]
-    fn add_assign(&mut self, o: Self) {
-        self.xx += o.xx;
-        self.yy += o.yy;
-        self.zz += o.zz;
-        self.xy += o.xy;
-        self.xz += o.xz;
-        self.yz += o.yz;
     }
 }
 
@@ -116,12 +69,9 @@ mod tests {
             .matrix();
         let d = Vector3::new(1.0, 2.0, 3.5);
         let full = R * Matrix3::from_diagonal(&d) * R.transpose();
-        let sym = SymmetricMatrix3::rotated_diagonal(&R, &d);
-        assert!((sym.to_matrix() - full).norm() < 1e-14);
         assert!((SymmetricMatrix3::from_matrix(&full).to_matrix() - full).norm() < 1e-14);
         let c = Vector3::new(0.1, 0.2, -0.4);
         let steiner = -2.0 * c.cross_matrix() * c.cross_matrix();
         assert!((SymmetricMatrix3::point_mass(2.0, &c).to_matrix() - steiner).norm() < 1e-15);
-        assert!((sym.times(&c) - full * c).norm() < 1e-14);
     }
 }

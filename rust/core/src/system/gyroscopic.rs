@@ -9,7 +9,7 @@
 //! rotates by radians in a step. It is then left out, and the audit
 //! ([`crate::integrator::energy_audit`]) corrects the resulting change of the energy.
 
-use nalgebra::{DMatrix, DVector, DVectorView, Vector3};
+use nalgebra::{DMatrix, DVector, DVectorView};
 
 use crate::multibody::coriolis::{CoriolisScratch, coriolis_matrix};
 use crate::multibody::{Kinematics, MassMatrix, Model};
@@ -24,31 +24,6 @@ pub(super) struct GyroscopicScratch {
     load: DVector<f64>,
 }
 
-/// `out = −G` (nv), N and N m: the force of gravity.
-pub(super) fn gravity_load(
-    model: &Model,
-    kinematics: &Kinematics,
-    gravity: &Vector3<f64>,
-    out: &mut [f64],
-) {
-    let bodies = model.bodies();
-    out.fill(0.0);
-    for (b, body) in bodies.iter().enumerate() {
-        let weight = gravity * body.mass;
-        let moment = kinematics.c[b].cross(&weight);
-        let (lead, rest) = model.split_path(b);
-        if let Some((linear, angular)) = out[lead].split_at_mut_checked(3) {
-            for k in 0..3 {
-                linear[k] += weight[k];
-                angular[k] += moment[k];
-            }
-        }
-        for (&k, &m) in rest.iter().zip(model.motions(b)) {
-            out[k] += kinematics.motions[m].power(&weight, &moment);
-        }
-    }
-}
-
 impl GyroscopicScratch {
     /// Turns the impulse `y = h (τ − G)` (nv) into `M̂ Δv − J`, see the page above.
     ///
@@ -59,7 +34,7 @@ impl GyroscopicScratch {
         &mut self,
         model: &Model,
         kinematics: &Kinematics,
-        mass_matrix: &MassMatrix,
+        mass_matrix: &MassMatrix<f64>,
         (h, theta): (f64, f64),
         (v, v_frozen): (&[f64], &[f64]),
         impulse: &[f64],
@@ -81,7 +56,7 @@ impl GyroscopicScratch {
             for (entry, c) in self.matrix.as_mut_slice().iter_mut().zip(C) {
                 *entry = theta * h * c;
             }
-            mass_matrix.add_to_dense(model, &mut self.matrix);
+            mass_matrix.add_to_dense(model.mechanism(), 0, &mut self.matrix);
             let load = self.load.as_mut_slice();
             for ((load, y), impulse) in load.iter_mut().zip(&*y).zip(impulse) {
                 *load = y + impulse;
@@ -91,7 +66,7 @@ impl GyroscopicScratch {
             // exchanges.
             let change = self.load.as_mut_slice();
             if eliminate(model, &mut self.matrix, change, is_skew) {
-                mass_matrix.times(model, change, y);
+                mass_matrix.times(model.mechanism(), change, y);
                 for (y, impulse) in y.iter_mut().zip(impulse) {
                     *y -= impulse;
                 }
@@ -177,13 +152,12 @@ mod tests {
             &mut CoriolisScratch::default(),
             &mut C,
         );
-        let mut M = MassMatrix::new(&model);
-        M.update(&model, &kinematics);
-        let A = M.to_dense(&model) + C * 0.01;
+        let M = kinematics.mass_matrix(&model);
+        let A = &M + C * 0.01;
         let mut x = DVector::from_column_slice(&v);
         assert!(eliminate(&model, &mut A.clone(), x.as_mut_slice(), false));
         assert!((A * x - DVector::from_column_slice(&v)).norm() < 1e-12);
-        let mut turned_round = -M.to_dense(&model);
+        let mut turned_round = -M;
         let mut x = v;
         assert!(!eliminate(&model, &mut turned_round, &mut x, false));
     }

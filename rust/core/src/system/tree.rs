@@ -8,7 +8,7 @@
 use nalgebra::Vector3;
 
 use super::command::{Command, HeldJoint};
-use super::gyroscopic::{GyroscopicScratch, gravity_load};
+use super::gyroscopic::GyroscopicScratch;
 use super::motor_branch::{MotorBranch, line_slope};
 use crate::contact::{
     Activation, Contact, ContactKey, ContactSystem, Opposite, PairSearch, detect, detect_limits,
@@ -21,12 +21,14 @@ use crate::integrator::{
 use crate::law::compliance::Compliance;
 use crate::law::newton_impact::rebound;
 use crate::multibody::bias::{BiasScratch, bias};
-use crate::multibody::momentum::{body_momenta, energy_and_momentum};
+use crate::multibody::energy::energy;
+use crate::multibody::momentum::body_momenta;
 use crate::multibody::{
-    Configuration, EnergyScratch, FactoredMassMatrix, Joint, JointProperties, Kinematics,
-    MassMatrix, Model, Momentum, Passive, Tree,
+    Configuration, EnergyScratch, Factor, Joint, JointProperties, Kinematics, MassMatrix, Model,
+    Momentum, Passive, Place, Tree,
 };
 use crate::problem::{Dimension, FrictionContactProblem};
+use crate::scalar::Single;
 
 impl UnilateralContact for Contact {
     type Key = ContactKey;
@@ -60,9 +62,9 @@ pub struct DriveAction {
 pub struct TreeScratch {
     pub(super) kinematics: Kinematics,
     pub(super) kinematics_end: Kinematics,
-    mass_matrix: MassMatrix,
-    pub(super) factor: FactoredMassMatrix,
-    bias_scratch: BiasScratch,
+    mass_matrix: MassMatrix<f64>,
+    pub(super) factor: Factor<f64>,
+    bias_scratch: BiasScratch<f64>,
     momenta: Vec<Momentum>,
     momenta_end: Vec<Momentum>,
     sums: Vec<Momentum>,
@@ -70,7 +72,8 @@ pub struct TreeScratch {
     motors: Vec<MotorBranch>,
     drives_tried: Vec<DriveAction>,
     drives: Vec<DriveAction>,
-    energy: EnergyScratch,
+    place: Place<f64>,
+    energy: EnergyScratch<f64>,
     gyroscopic: GyroscopicScratch,
     force: Vec<f64>,
     pairs: PairSearch,
@@ -88,6 +91,7 @@ impl TreeScratch {
     #[must_use]
     pub fn new(model: &Model, n: usize) -> Self {
         let momenta = vec![Momentum::default(); model.bodies().len()];
+        let (token, mechanism) = (Single::best(), model.mechanism());
         let limited = if model.limited_joints().is_empty() {
             Vec::new()
         } else {
@@ -96,9 +100,9 @@ impl TreeScratch {
         Self {
             kinematics: Kinematics::new(model),
             kinematics_end: Kinematics::new(model),
-            mass_matrix: MassMatrix::new(model),
-            factor: FactoredMassMatrix::new(model),
-            bias_scratch: BiasScratch::new(model),
+            mass_matrix: MassMatrix::new(token, mechanism),
+            factor: Factor::new(token, mechanism),
+            bias_scratch: BiasScratch::new(token, mechanism),
             momenta: momenta.clone(),
             momenta_end: momenta.clone(),
             sums: momenta,
@@ -106,7 +110,8 @@ impl TreeScratch {
             motors: vec![MotorBranch::default(); model.n_joints()],
             drives_tried: vec![DriveAction::default(); model.n_joints()],
             drives: vec![DriveAction::default(); model.n_joints()],
-            energy: EnergyScratch::new(model),
+            place: Place::new(token, mechanism),
+            energy: EnergyScratch::new(token, mechanism),
             gyroscopic: GyroscopicScratch::default(),
             force: vec![0.0; model.nv()],
             pairs: PairSearch::new(model),
@@ -193,14 +198,8 @@ impl TreeSystem<'_> {
     /// Largest rate of a joint that turns a frame, rad/s.
     #[inline]
     fn turning_of_joints(&self, v: &[f64]) -> f64 {
-        let bodies = self.model.bodies();
-        let mut joints = fastest(self.model.turning_joints(), v);
-        for &b in self.model.coupled_bodies() {
-            if let Joint::Revolute(joint) = &bodies[b].joint {
-                joints = joints.max(joint.coordinate.rate(v[bodies[b].velocity]).abs());
-            }
-        }
-        joints
+        let turning = self.model.mechanism().turning.iter();
+        turning.fold(0.0, |most, &(k, ratio)| most.max(v[k].abs() * ratio))
     }
 
     /// Upper bound on the speed of all points of a tree, m/s.
@@ -215,15 +214,14 @@ impl TreeSystem<'_> {
         let turning: f64 = v[half..].iter().map(|w| w.abs()).sum();
         let mut reach = tree.reach + 1.0;
         if self.model.has_slides() {
-            let places = &self.parts.kinematics.r[tree.bodies.clone()];
-            let farthest = places.iter().map(|r| (r - places[0]).norm());
+            let kinematics = &self.parts.kinematics;
+            let root = kinematics.r(tree.bodies.start);
+            let farthest = (tree.bodies.clone()).map(|b| (kinematics.r(b) - root).norm());
             reach = farthest.fold(reach, f64::max);
         }
-        let ratio = |b: &usize| {
-            let coupling = self.model.bodies()[*b].joint.coupling();
-            coupling.map_or(0.0, |c| c.ratio.abs())
-        };
-        let coupled: f64 = self.model.coupled_bodies().iter().map(ratio).sum();
+        let links = self.model.mechanism().links.iter();
+        let couplings = links.filter_map(|link| link.coupling);
+        let coupled: f64 = couplings.map(|coupling| coupling.ratio.abs()).sum();
         linear + turning * reach * (1.0 + coupled)
     }
 }
@@ -357,9 +355,11 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn update_mass_matrix(&mut self, options: &StepOptions) {
-        self.parts
-            .mass_matrix
-            .update(self.model, &self.parts.kinematics);
+        self.parts.mass_matrix.update(
+            self.model.mechanism(),
+            self.model.inertias(),
+            self.parts.kinematics.poses(),
+        );
         set_held_theta(self.model, options, self.command, self.parts);
     }
 
@@ -373,14 +373,14 @@ impl MechanicalSystem for TreeSystem<'_> {
             if damping > 0.0 || stiffness > 0.0 {
                 let implicit = h * motor.theta() * (damping + h * theta * stiffness);
                 let k = joint.velocity;
-                parts.mass_matrix.add_to_diagonal(self.model, k, implicit);
+                (parts.mass_matrix).add_to_diagonal(self.model.mechanism(), k, implicit);
             }
         }
-        parts.mass_matrix.factorise(self.model, &mut parts.factor)
+        (parts.mass_matrix).factorise(self.model.mechanism(), &mut parts.factor)
     }
 
     fn multiply_mass(&self, v: &[f64], out: &mut [f64]) {
-        self.parts.mass_matrix.times(self.model, v, out);
+        (self.parts.mass_matrix).times(self.model.mechanism(), v, out);
     }
 
     #[inline]
@@ -393,10 +393,11 @@ impl MechanicalSystem for TreeSystem<'_> {
     ) {
         let parts = &mut *self.parts;
         bias(
-            self.model,
-            &parts.kinematics,
+            self.model.mechanism(),
+            self.model.inertias(),
+            parts.kinematics.poses(),
             v_mean,
-            &options.gravity,
+            options.gravity.into(),
             &mut parts.bias_scratch,
             &mut parts.force,
         );
@@ -419,7 +420,7 @@ impl MechanicalSystem for TreeSystem<'_> {
         let h = options.time_step;
         let (base, spin) = (
             self.turning_of_bases(v),
-            fastest(self.model.spinning_joints(), v),
+            fastest(&self.model.mechanism().spinning, v),
         );
         h * base > MOST_TURN
             || h * (base + self.turning_of_joints(v)) > MOST_JOINT_TURN
@@ -452,10 +453,19 @@ impl MechanicalSystem for TreeSystem<'_> {
     ) {
         let parts = &mut *self.parts;
         let model = self.model;
-        let gravity_impulse = &mut parts.force;
-        gravity_load(model, &parts.kinematics, &options.gravity, gravity_impulse);
-        for (y, f) in y.iter_mut().zip(&*gravity_impulse) {
-            *y = options.time_step * f;
+        // The bias at rest is gravity's.
+        y.fill(0.0);
+        bias(
+            model.mechanism(),
+            model.inertias(),
+            parts.kinematics.poses(),
+            y,
+            options.gravity.into(),
+            &mut parts.bias_scratch,
+            &mut parts.force,
+        );
+        for (y, f) in y.iter_mut().zip(&parts.force) {
+            *y = -options.time_step * f;
         }
         add_command(
             self.model,
@@ -475,7 +485,7 @@ impl MechanicalSystem for TreeSystem<'_> {
             impulse,
             y,
         );
-        parts.factor.half_solve(model, y);
+        parts.factor.half_solve(model.mechanism(), y);
     }
 
     #[inline]
@@ -501,14 +511,21 @@ impl MechanicalSystem for TreeSystem<'_> {
         q: &Configuration,
         v: &[f64],
     ) -> Option<MechanicalEnergy> {
-        let scratch = &mut self.parts.energy;
-        let (energy, momentum) = energy_and_momentum(self.model, q, v, &options.gravity, scratch);
+        let TreeScratch {
+            place,
+            energy: scratch,
+            ..
+        } = &mut *self.parts;
+        place.set_lane(0, q);
+        let (mechanism, inertias) = (self.model.mechanism(), self.model.inertias());
+        let gravity = options.gravity.into();
+        let (energy, momentum) = energy(mechanism, inertias, place, v, gravity, scratch);
         Some(MechanicalEnergy {
             kinetic: energy.kinetic,
             potential: energy.potential,
             // A tree on a fixed base passes momentum on to the world.
             momentum: if self.model.is_free() {
-                momentum
+                momentum.into()
             } else {
                 Vector3::zeros()
             },
@@ -588,7 +605,9 @@ impl MechanicalSystem for TreeSystem<'_> {
         parts
             .kinematics
             .update_for_step(self.model, start.configuration);
-        parts.c_start.copy_from_slice(&parts.kinematics.c);
+        for (b, c) in parts.c_start.iter_mut().enumerate() {
+            *c = parts.kinematics.c(b);
+        }
         body_momenta(
             self.model,
             &parts.kinematics,
@@ -630,12 +649,12 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn half_solve(&self, y: &mut [f64]) {
-        self.parts.factor.half_solve(self.model, y);
+        self.parts.factor.half_solve(self.model.mechanism(), y);
     }
 
     #[inline]
     fn half_solve_back(&self, y: &mut [f64]) {
-        self.parts.factor.half_solve_back(self.model, y);
+        (self.parts.factor).half_solve_back(self.model.mechanism(), y);
     }
 
     #[inline]
@@ -749,7 +768,7 @@ fn set_held_theta(
 ) {
     let joints = (parts.motors.iter_mut().zip(&command.held)).zip(&command.drives);
     for (((motor, held), drive), joint) in joints.zip(model.joints()) {
-        let inertia = parts.mass_matrix.diagonal(model, joint.velocity);
+        let inertia = (parts.mass_matrix).diagonal(model.mechanism(), joint.velocity);
         let feedback = feedback(line_slope(drive.as_ref()), held.as_ref(), &joint.passive);
         motor.set_theta((options.time_step, options.theta), feedback, inertia);
     }
@@ -879,7 +898,7 @@ fn momentum_residual(
             // Both mass centres relative to the reference point: the tree's origin at the start of
             // the step.
             let centre =
-                (parts.kinematics_end.c[b] + end) * theta + parts.c_start[b] * (1.0 - theta);
+                (parts.kinematics_end.c(b) + end) * theta + parts.c_start[b] * (1.0 - theta);
             sum.linear -= begin.linear + weight;
             sum.angular -= begin.angular + centre.cross(&weight);
         }
@@ -899,7 +918,7 @@ fn momentum_residual(
                 }
             } else {
                 for (y, m) in y[body.velocity..].iter_mut().zip(body.motions()) {
-                    *y -= parts.kinematics.motions[m].power(&P, &about_middle);
+                    *y -= parts.kinematics.power(m, &P, &about_middle);
                 }
             }
             if let Some(parent) = body.parent {

@@ -1,9 +1,8 @@
 //! Direction of a joint's axis.
 
-use nalgebra::{Matrix3, Unit, Vector3};
+use nalgebra::{Unit, Vector3};
 
-use crate::scalar::elementary::sin_cos;
-use crate::spatial::rotation_about;
+use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Direction of a revolute or prismatic joint. The coordinate axes are separate variants because a
 /// rotation about one of them changes only two columns.
@@ -48,57 +47,80 @@ impl JointAxis {
     }
 
     /// The axis in the frame that `R` maps to.
-    #[inline]
+    #[inline(always)]
     #[must_use]
-    pub fn turned(&self, R: &Matrix3<f64>) -> Vector3<f64> {
+    pub fn turned<T: Lane>(&self, R: &Mat3<T>) -> Vec3<T> {
         match self {
-            Self::X => R.column(0).into(),
-            Self::Y => R.column(1).into(),
-            Self::Z => R.column(2).into(),
-            Self::General(u) => R * u.into_inner(),
+            Self::X => R.x,
+            Self::Y => R.y,
+            Self::Z => R.z,
+            Self::General(u) => R.times_shared(u.into_inner().into()),
         }
     }
 
-    /// `R · Rot(axis, angle)` and the axis in the frame that `R` maps to.
-    #[inline]
+    /// `R · Rot(axis, angle)` for the sine and cosine of the angle; `turned` is the axis in the
+    /// frame that `R` maps to.
+    #[inline(always)]
     #[must_use]
-    pub fn rotate(&self, R: &Matrix3<f64>, angle: f64) -> (Matrix3<f64>, Vector3<f64>) {
-        let columns = |fixed: usize| {
-            let (s, c) = sin_cos(angle);
-            let (i, j) = ((fixed + 1) % 3, (fixed + 2) % 3);
-            let (a, b): (Vector3<f64>, Vector3<f64>) = (R.column(i).into(), R.column(j).into());
-            let mut out = *R;
-            out.set_column(i, &(a * c + b * s));
-            out.set_column(j, &(b * c - a * s));
-            out
-        };
-        let turned = match self {
-            Self::X => columns(0),
-            Self::Y => columns(1),
-            Self::Z => columns(2),
-            Self::General(u) => R * rotation_about(u, angle),
-        };
-        (turned, self.turned(R))
+    pub fn rotate<T: Lane>(&self, R: &Mat3<T>, turned: Vec3<T>, sin_cos: (T, T)) -> Mat3<T> {
+        let (s, c) = sin_cos;
+        let Mat3 { x, y, z } = *R;
+        match self {
+            Self::X => {
+                let (y, z) = (y * c + z * s, z * c - y * s);
+                Mat3 { x, y, z }
+            }
+            Self::Y => {
+                let (z, x) = (z * c + x * s, x * c - z * s);
+                Mat3 { x, y, z }
+            }
+            Self::Z => {
+                let (x, y) = (x * c + y * s, y * c - x * s);
+                Mat3 { x, y, z }
+            }
+            Self::General(u) => {
+                // Rodrigues: e ↦ c e + s (u × e) + (1 − c) (u · e) u, with R (u × e) = R u × R e.
+                let rest = c.like(1.0) - c;
+                let column = |e: Vec3<T>, along: f64| {
+                    e * c + turned.cross(e) * s + turned * (rest * c.like(along))
+                };
+                Mat3 {
+                    x: column(x, u[0]),
+                    y: column(y, u[1]),
+                    z: column(z, u[2]),
+                }
+            }
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Rotation3;
+    use crate::scalar::elementary::sin_cos;
+    use nalgebra::{Matrix3, Rotation3};
 
     #[test]
     fn coordinate_axes_agree_with_the_general_one() {
-        let R = *Rotation3::from_euler_angles(0.2, -0.5, 1.1).matrix();
+        let R = Rotation3::from_euler_angles(0.2, -0.5, 1.1);
+        let frame = Mat3::from(*R.matrix());
+        let rotate = |axis: &JointAxis| {
+            let turned = axis.turned(&frame);
+            let own = axis.rotate(&frame, turned, sin_cos(0.7));
+            (Matrix3::from(own), Vector3::from(turned))
+        };
         for (axis, e) in [
             (JointAxis::X, Vector3::x()),
             (JointAxis::Y, Vector3::y()),
             (JointAxis::Z, Vector3::z()),
         ] {
             assert_eq!(JointAxis::from_direction(&(e * 2.0)), Some(axis));
-            let (special, a) = axis.rotate(&R, 0.7);
-            let (general, b) = JointAxis::General(Unit::new_normalize(e)).rotate(&R, 0.7);
+            let unit = Unit::new_normalize(e);
+            let (special, a) = rotate(&axis);
+            let (general, b) = rotate(&JointAxis::General(unit));
             assert!((special - general).norm() < 1e-15 && (a - b).norm() < 1e-15);
+            let expected = R * Rotation3::from_axis_angle(&unit, 0.7);
+            assert!((special - expected.matrix()).norm() < 1e-15);
         }
         assert_eq!(JointAxis::from_direction(&Vector3::zeros()), None);
     }

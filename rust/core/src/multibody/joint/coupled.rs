@@ -12,6 +12,8 @@
 //! tree if both joints lie on one path or are mounted on the same body; other couplings are
 //! rejected.
 
+use crate::scalar::Lane;
+
 /// How a joint follows another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coupling {
@@ -26,10 +28,10 @@ pub struct Coupling {
 }
 
 impl Coupling {
-    /// Its coordinate, rad or m.
-    #[inline]
+    /// Its coordinate, rad or m, where the other joint has the coordinate `q`.
+    #[inline(always)]
     #[must_use]
-    pub fn value(&self, other: f64) -> f64 {
-        self.ratio * other + self.offset
+    pub fn value<T: Lane>(&self, q: T) -> T {
+        q.like(self.ratio) * q + q.like(self.offset)
     }
 }

@@ -6,6 +6,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::JointAxis;
+use crate::scalar::Mat3;
+use crate::scalar::elementary::sin_cos;
 
 /// A joint locked at one value of its coordinate: rad about its axis, or m along it.
 #[derive(Clone, Copy, Debug)]
@@ -24,8 +26,12 @@ impl Lock {
     pub fn place(&self, R: &Matrix3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
         match self {
             Self::AtZero => (Vector3::zeros(), *R),
-            Self::Turned(axis, angle) => (Vector3::zeros(), axis.rotate(R, *angle).0),
-            Self::Displaced(axis, way) => (axis.turned(R) * *way, *R),
+            Self::Turned(axis, angle) => {
+                let frame = Mat3::from(*R);
+                let turned = axis.rotate(&frame, axis.turned(&frame), sin_cos(*angle));
+                (Vector3::zeros(), turned.into())
+            }
+            Self::Displaced(axis, way) => (R * axis.direction() * *way, *R),
         }
     }
 }

@@ -9,7 +9,7 @@
 //! | [`spherical`] | unit quaternion | 3 | about a point |
 //! | [`coupled`] | – | – | as a revolute or prismatic joint, in proportion to another |
 //!
-//! Each velocity has a [`Motion`]: the screw that a unit of it imparts to everything the joint
+//! Each velocity has a [motion](crate::multibody::Motion): the screw that a unit of it imparts to everything the joint
 //! carries.
 //!
 //! Source: Featherstone 2008, *Rigid Body Dynamics Algorithms*, ch. 4; Carpentier et al. 2019, *The
@@ -21,7 +21,6 @@ pub mod coordinate;
 pub mod coupled;
 pub mod fixed;
 pub mod free;
-pub mod motion;
 pub mod prismatic;
 pub mod revolute;
 pub mod spherical;
@@ -30,7 +29,6 @@ pub use axis::JointAxis;
 pub use coordinate::Coordinate;
 pub use coupled::Coupling;
 pub use free::{Free, Pose};
-pub use motion::Motion;
 pub use prismatic::Prismatic;
 pub use revolute::Revolute;
 pub use spherical::Spherical;
@@ -63,7 +61,7 @@ impl Joint {
         }
     }
 
-    /// Number of [`Motion`]s: one per velocity, not counting those of a free base, and one for a
+    /// Number of motions: one per velocity, not counting those of a free base, and one for a
     /// coupled joint.
     #[must_use]
     pub fn n_motions(&self) -> usize {

@@ -4,9 +4,8 @@
 //! which is fixed in the carrier. The motions of its three velocities are therefore rotations about
 //! axes fixed in the carrier, like the motion of a revolute joint.
 
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector3};
 
-use super::Motion;
 use crate::spatial::exp_rotation;
 
 /// Number of velocities.
@@ -20,13 +19,6 @@ pub struct Spherical {
 }
 
 impl Spherical {
-    /// The motions of its velocities: rotations about the axes of the joint's frame `R` through
-    /// `place`.
-    #[must_use]
-    pub fn motions(R: &Matrix3<f64>, place: &Vector3<f64>) -> [Motion; NV] {
-        std::array::from_fn(|i| Motion::turn(R.column(i).into(), *place))
-    }
-
     /// The rotation after `h` seconds at velocity `v` (3), along the exponential map.
     ///
     /// The velocity is in the carrier's axes, so the increment multiplies from the left.

@@ -51,6 +51,16 @@ impl Body {
         self.centre_of_mass == Vector3::zeros()
     }
 
+    /// Attitude of its principal axes, where `R` is that of its frame.
+    #[inline]
+    #[must_use]
+    pub fn principal_attitude(&self, R: Matrix3<f64>) -> Matrix3<f64> {
+        match &self.principal_axes {
+            None => R,
+            Some(P) => R * P,
+        }
+    }
+
     /// Its joint's motions in [`Kinematics::motions`](crate::multibody::Kinematics::motions).
     #[inline]
     #[must_use]

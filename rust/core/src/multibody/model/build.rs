@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
+use super::links::{inertias_of, mechanism_of};
 use super::parts::{CollisionBox, CollisionSphere, Frame, Wheel};
 use super::properties::{JointProperties, Passive};
 use super::spinners::mark_spinners;
@@ -67,22 +68,18 @@ impl Model {
         let wheels = wheels(&description.wheels, &index_of, &frames, &bodies);
         let carriers = (boxes.iter().map(|x| x.body)).chain(spheres.iter().map(|x| x.body));
         mark_spinners(&mut bodies, &wheels, carriers);
-        let trees = (0..n_trees).map(|t| tree(t, &bodies, &paths)).collect();
+        let trees: Vec<Tree> = (0..n_trees).map(|t| tree(t, &bodies, &paths)).collect();
         for joint in &mut joints {
             joint.velocity = bodies[joint.body].velocity;
             joint.is_passive = joint.passive.stiffness > 0.0 || joint.passive.damping > 0.0;
         }
+        let common = paths.common(&bodies);
+        let mechanism = mechanism_of(&bodies, &trees, &joints, &paths);
+        let inertias = inertias_of(&mechanism, &bodies, &trees, &joints);
         let limited = (0..joints.len())
             .filter(|&joint| joints[joint].limits.is_some())
             .collect();
         let joint_velocities = joints.iter().map(|joint| joint.velocity).collect();
-        let is_turn = |k: &usize| {
-            let body = &bodies[paths.body_of_velocity[*k]];
-            matches!(body.joint, Joint::Revolute(_) | Joint::Spherical(_))
-        };
-        let (spinning, turning) = (0..paths.body_of_velocity.len())
-            .filter(is_turn)
-            .partition(|&k| bodies[paths.body_of_velocity[k]].is_spinner);
         let armatures = (joints.iter())
             .filter(|joint| joint.passive.armature > 0.0)
             .map(|joint| (joint.velocity, joint.passive.armature))
@@ -91,13 +88,9 @@ impl Model {
             .filter(|body| matches!(body.joint, Joint::Free(_) | Joint::Spherical(_)))
             .map(|body| (body.joint.clone(), body.velocity))
             .collect();
-        let coupled = (0..bodies.len())
-            .filter(|&b| bodies[b].joint.coupling().is_some())
-            .collect();
         let has_slides = bodies
             .iter()
             .any(|b| matches!(b.joint, Joint::Prismatic(_)));
-        let only_turns = bodies.iter().all(is_free_or_turns);
         let text = description.to_json().unwrap_or_default();
         Ok(Self {
             mass: bodies.iter().map(|b| b.mass).sum(),
@@ -105,15 +98,13 @@ impl Model {
             n_poses,
             n_rotations,
             has_slides,
-            only_turns,
             armatures,
             limited,
             joint_velocities,
-            spinning,
-            turning,
-            coupled,
             rotating,
             trees,
+            mechanism,
+            inertias,
             joints,
             description,
             bodies,
@@ -121,17 +112,9 @@ impl Model {
             wheels,
             boxes,
             spheres,
-            paths,
+            common,
+            body_of_velocity: paths.body_of_velocity,
         })
-    }
-}
-
-/// Whether the joint of a body is free and its root's, or revolute with a coordinate of its own.
-fn is_free_or_turns(body: &Body) -> bool {
-    match &body.joint {
-        Joint::Free(_) => body.parent.is_none(),
-        Joint::Revolute(joint) => body.parent.is_some() && joint.coordinate.coupling.is_none(),
-        Joint::Fixed | Joint::Prismatic(_) | Joint::Spherical(_) => false,
     }
 }
 

@@ -7,6 +7,7 @@
 mod body;
 mod build;
 mod edit;
+mod links;
 mod parts;
 mod properties;
 mod spinners;
@@ -17,16 +18,15 @@ use std::ops::Range;
 pub use body::Body;
 pub use parts::{CollisionBox, CollisionSphere, Frame, Wheel};
 pub use properties::{JointProperties, Passive};
-use tree::Paths;
 pub use tree::Tree;
 
 use super::description::check::check;
 use super::description::{Hold, ModelDescription};
 use super::error::ModelError;
-use super::joint::{Joint, free};
-
-/// Number of velocities of a free base. Every path of its tree starts with them.
-pub const BASE: usize = free::NV;
+use super::inertias::Inertias;
+use super::joint::Joint;
+pub use super::mechanism::BASE;
+use super::mechanism::{Mechanism, Mover};
 
 /// Kinematic trees. Velocities are in the order of the bodies; [`super::joint`] lists those of each
 /// joint.
@@ -35,15 +35,17 @@ pub struct Model {
     description: ModelDescription,
     bodies: Vec<Body>,
     trees: Vec<Tree>,
+    mechanism: Mechanism,
+    inertias: Inertias<f64>,
     frames: Vec<Frame>,
     wheels: Vec<Wheel>,
     boxes: Vec<CollisionBox>,
     spheres: Vec<CollisionSphere>,
-    paths: Paths,
+    body_of_velocity: Vec<usize>,
+    /// Number of leading path entries that bodies `a` and `b` share: `common[a * n_bodies + b]`.
+    common: Vec<usize>,
     joints: Vec<JointProperties>,
     joint_velocities: Vec<usize>,
-    /// Bodies with coupled joints.
-    coupled: Vec<usize>,
     /// Velocities of joints with rotors, and the rotor inertias.
     armatures: Vec<(usize, f64)>,
     /// Indices of the joints with stops.
@@ -51,13 +53,9 @@ pub struct Model {
     n_poses: usize,
     n_rotations: usize,
     has_slides: bool,
-    only_turns: bool,
     /// Free and spherical joints, with their first velocities.
     rotating: Vec<(Joint, usize)>,
     mass: f64,
-    /// Velocity indices of the joints of spinners, and of all other joints that rotate.
-    spinning: Vec<usize>,
-    turning: Vec<usize>,
     fingerprint: u64,
 }
 
@@ -101,6 +99,20 @@ impl Model {
         &self.trees
     }
 
+    /// The bodies and joints, as the sources of the dynamics read them.
+    #[inline]
+    #[must_use]
+    pub fn mechanism(&self) -> &Mechanism {
+        &self.mechanism
+    }
+
+    /// Inertias of the bodies of [`Self::mechanism`].
+    #[inline]
+    #[must_use]
+    pub fn inertias(&self) -> &Inertias<f64> {
+        &self.inertias
+    }
+
     /// Frames of all solids, in description order.
     #[must_use]
     pub fn frames(&self) -> &[Frame] {
@@ -138,7 +150,7 @@ impl Model {
     #[inline]
     #[must_use]
     pub fn nv(&self) -> usize {
-        self.paths.body_of_velocity.len()
+        self.mechanism.nv()
     }
 
     /// Number of joints with one coordinate of their own: revolute and prismatic joints that are
@@ -149,10 +161,10 @@ impl Model {
         self.joints.len()
     }
 
-    /// Number of motions; see [`Self::motions`].
+    /// Number of motions; see [`Self::movers`].
     #[must_use]
     pub fn n_motions(&self) -> usize {
-        self.paths.n_motions
+        self.mechanism.n_motions()
     }
 
     /// Number of poses in a configuration: the first body's and those of all other free bodies.
@@ -207,38 +219,11 @@ impl Model {
         self.wheels.iter().any(|wheel| wheel.compliance.is_some())
     }
 
-    /// Whether every root is free and every other joint is revolute and uncoupled, as in a rover.
-    #[inline]
-    #[must_use]
-    pub fn only_turns(&self) -> bool {
-        self.only_turns
-    }
-
     /// Free and spherical joints, whose coordinates are quaternions, with their first velocities.
     #[inline]
     #[must_use]
     pub fn rotating_joints(&self) -> &[(Joint, usize)] {
         &self.rotating
-    }
-
-    /// Velocity indices of the joints whose rotation changes only the appearance; see
-    /// [`Body::is_spinner`].
-    #[must_use]
-    pub fn spinning_joints(&self) -> &[usize] {
-        &self.spinning
-    }
-
-    /// Velocity indices of all other joints that rotate.
-    #[must_use]
-    pub fn turning_joints(&self) -> &[usize] {
-        &self.turning
-    }
-
-    /// Bodies with coupled joints.
-    #[inline]
-    #[must_use]
-    pub fn coupled_bodies(&self) -> &[usize] {
-        &self.coupled
     }
 
     /// Velocities of joints with rotors, and the rotor inertias (kg m² or kg).
@@ -259,28 +244,28 @@ impl Model {
     #[inline]
     #[must_use]
     pub fn path(&self, b: usize) -> &[usize] {
-        self.paths.path(b)
+        self.mechanism.path(b)
     }
 
     /// Velocity indices from the root up to and including velocity `k`.
     #[inline]
     #[must_use]
     pub(crate) fn velocity_path(&self, k: usize) -> &[usize] {
-        self.paths.velocity_path(k)
+        self.mechanism.velocity_path(k)
     }
 
     /// Length of the longest path: the stride of all arrays stored along paths.
     #[inline]
     #[must_use]
     pub fn path_stride(&self) -> usize {
-        self.paths.stride
+        self.mechanism.longest_path()
     }
 
     /// Number of leading path entries that two bodies share.
     #[inline]
     #[must_use]
     pub fn common_path(&self, a: usize, b: usize) -> usize {
-        self.paths.common(a, b)
+        self.common[a * self.bodies.len() + b]
     }
 
     /// Number of velocities of a free base at the start of body `b`'s path: 6, or 0 in a tree
@@ -288,14 +273,14 @@ impl Model {
     #[inline]
     #[must_use]
     pub fn lead(&self, b: usize) -> usize {
-        self.paths.lead(b)
+        self.trees[self.bodies[b].tree].lead()
     }
 
     /// The body whose joint has velocity `k`.
     #[inline]
     #[must_use]
     pub fn body_of_velocity(&self, k: usize) -> usize {
-        self.paths.body_of_velocity[k]
+        self.body_of_velocity[k]
     }
 
     /// The path of body `b` in two parts: the velocities of a free base, which are consecutive, and
@@ -303,15 +288,17 @@ impl Model {
     #[inline]
     #[must_use]
     pub fn split_path(&self, b: usize) -> (Range<usize>, &[usize]) {
-        self.paths.split(b)
+        let tree = &self.trees[self.bodies[b].tree];
+        let (first, lead) = (tree.velocities.start, tree.lead());
+        (first..first + lead, &self.path(b)[lead..])
     }
 
-    /// The motions ([`Kinematics::motions`](super::Kinematics::motions)) that move body `b`, one
-    /// for each velocity of its path beyond [`Self::lead`], in path order.
+    /// The velocities that move body `b` beyond [`Self::lead`], in path order, and their motions
+    /// ([`Kinematics::motions`](super::Kinematics::motions)).
     #[inline]
     #[must_use]
-    pub fn motions(&self, b: usize) -> &[usize] {
-        self.paths.motions(b)
+    pub fn movers(&self, b: usize) -> &[Mover] {
+        self.mechanism.movers(b)
     }
 
     /// Joints with one coordinate of their own, in the order of commands and of

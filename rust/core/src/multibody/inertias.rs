@@ -1,15 +1,16 @@
 //! Masses, mass centres and moments of inertia of the bodies, lane by lane.
 
-use super::machine::{Link, Machine, Symmetry};
-use crate::multibody::{Body, Model};
+use super::mechanism::{Mechanism, Symmetry};
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Inertias of all bodies.
 #[derive(Clone, Debug)]
 pub struct Inertias<T: Lane> {
     pub(super) bodies: Vec<Inertia<T>>,
-    /// Inertias of the rotors, kg m² or kg, in the order of the machine's joints that have one.
+    /// Inertias of the rotors, kg m² or kg, in the order of the joints that have one.
     pub(super) rotors: Vec<T>,
+    /// Mass of each tree, kg.
+    pub(super) trees: Vec<T>,
     /// Total mass, kg.
     pub mass: T,
 }
@@ -33,7 +34,7 @@ pub(super) struct Inertia<T> {
 impl<T: Lane> Inertias<T> {
     /// Unit masses, until [`Self::set_lane`].
     #[must_use]
-    pub fn new(token: T::Token, machine: &Machine) -> Self {
+    pub fn new(token: T::Token, mechanism: &Mechanism) -> Self {
         let (zero, one) = (T::splat(token, 0.0), T::splat(token, 1.0));
         let inertia = Inertia {
             mass: one,
@@ -44,43 +45,37 @@ impl<T: Lane> Inertias<T> {
             axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(|axis| Vec3::splat(token, axis)),
         };
         Self {
-            bodies: vec![inertia; machine.n_bodies()],
-            rotors: vec![zero; machine.rotors.len()],
+            bodies: vec![inertia; mechanism.n_bodies()],
+            rotors: vec![zero; mechanism.rotors.len()],
+            trees: vec![one; mechanism.trees.len()],
             mass: one,
         }
     }
 
-    /// Gives a lane the inertias of a model that the machine [fits](Machine::fits).
-    pub fn set_lane(&mut self, lane: usize, machine: &Machine, model: &Model) {
-        let own = self.bodies.iter_mut().zip(&machine.links);
-        for ((own, link), body) in own.zip(model.bodies()) {
-            own.set_lane(lane, link, body);
+    /// Gives a lane the inertias of a machine with the same mechanism.
+    pub fn set_lane(&mut self, lane: usize, other: &Inertias<f64>) {
+        for (own, other) in self.bodies.iter_mut().zip(&other.bodies) {
+            own.set_lane(lane, other);
         }
-        for (own, &joint) in self.rotors.iter_mut().zip(&machine.rotors) {
-            own.set(lane, model.joints()[joint].passive.armature);
+        for (own, other) in self.rotors.iter_mut().zip(&other.rotors) {
+            own.set(lane, *other);
         }
-        self.mass.set(lane, model.mass());
+        for (own, other) in self.trees.iter_mut().zip(&other.trees) {
+            own.set(lane, *other);
+        }
+        self.mass.set(lane, other.mass);
     }
 }
 
 impl<T: Lane> Inertia<T> {
-    fn set_lane(&mut self, lane: usize, link: &Link, body: &Body) {
-        let I = &body.principal_inertia;
-        let [rest, first, second] = match link.symmetry {
-            Symmetry::AboutX => [I.y, I.x - I.y, 0.0],
-            Symmetry::AboutY => [I.x, I.y - I.x, 0.0],
-            Symmetry::AboutZ => [I.x, I.z - I.x, 0.0],
-            Symmetry::None | Symmetry::Turned => [I.z, I.x - I.z, I.y - I.z],
-        };
-        self.mass.set(lane, body.mass);
-        self.centre.set(lane, body.centre_of_mass.into());
-        self.rest.set(lane, rest);
-        self.first.set(lane, first);
-        self.second.set(lane, second);
-        if let Some(P) = &body.principal_axes {
-            for (k, axis) in self.axes.iter_mut().enumerate() {
-                axis.set(lane, P.column(k).into_owned().into());
-            }
+    fn set_lane(&mut self, lane: usize, other: &Inertia<f64>) {
+        self.mass.set(lane, other.mass);
+        self.centre.set(lane, other.centre.get(0));
+        self.rest.set(lane, other.rest);
+        self.first.set(lane, other.first);
+        self.second.set(lane, other.second);
+        for (own, axis) in self.axes.iter_mut().zip(&other.axes) {
+            own.set(lane, axis.get(0));
         }
     }
 

@@ -1,0 +1,292 @@
+//! The mechanism: trees of bodies and joints, without their masses.
+//!
+//! Machines with the same mechanism can stand side by side in the lanes of a register. Bodies,
+//! velocities, motions and joints are numbered as in the model. A *row* is a velocity of a joint,
+//! counted over all trees without the velocities of their free roots. Lengths are in m.
+
+use std::ops::Range;
+
+use super::joint::{Coupling, JointAxis, free};
+use crate::scalar::{Lane, Mat3, Vec3};
+
+/// Number of velocities of a free root. Every path of its tree starts with them.
+pub const BASE: usize = free::NV;
+
+/// Trees of bodies.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mechanism {
+    /// The bodies, carriers before what they carry, tree after tree.
+    pub links: Vec<Link>,
+    /// The trees.
+    pub trees: Vec<TreeSpan>,
+    /// Joints with a coordinate of their own, in the model's order.
+    pub joints: Vec<OwnJoint>,
+    /// Joints with rotors, ascending.
+    pub(crate) rotors: Vec<usize>,
+    /// Bodies with coupled joints, ascending.
+    pub(crate) coupled: Vec<usize>,
+    /// Velocities of the spherical joints.
+    pub(crate) balls: Vec<usize>,
+    /// Velocities that turn a frame and their rates per unit, and velocities of the spinners.
+    pub(crate) turning: Vec<(usize, f64)>,
+    /// See above.
+    pub(crate) spinning: Vec<usize>,
+    /// Coordinates of the joints that a step turns, in the order of the bodies, and how those of
+    /// coupled joints follow from them.
+    pub(super) angles: Vec<usize>,
+    pub(super) coupled_angles: Vec<(usize, Coupling)>,
+    /// Of each row, where its entries are.
+    pub(super) rows: Vec<Range<usize>>,
+    /// The columns of each row in the mass matrix, row after row: the rows of the velocities that
+    /// precede it on its path, then its own, counted from the first row of its tree.
+    pub(super) columns: Vec<usize>,
+    /// The motion of each of these columns.
+    pub(super) column_motions: Vec<usize>,
+    /// Of each velocity, where its diagonal entry is; not used for those of a free root.
+    pub(super) diagonals: Vec<usize>,
+    /// Of each velocity, its tree, and its body with the number of entries of the body's path up to
+    /// the velocity.
+    pub(super) tree_of: Vec<usize>,
+    pub(super) up_to: Vec<(usize, usize)>,
+    pub(super) longest_path: usize,
+    pub(super) n_motions: usize,
+    pub(super) paths: Vec<usize>,
+    pub(super) movers: Vec<Mover>,
+}
+
+/// Bodies, velocities and rows of a tree.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TreeSpan {
+    /// Its bodies; the first is the root.
+    pub bodies: Range<usize>,
+    /// Its velocities; those of a free root come first.
+    pub velocities: Range<usize>,
+    /// Its rows.
+    pub rows: Range<usize>,
+    /// Whether its root is free; otherwise a joint connects it to the world.
+    pub is_free: bool,
+    /// Of a free root, the index of its pose in a configuration.
+    pub pose: usize,
+}
+
+/// A joint with a coordinate of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OwnJoint {
+    /// The body that it carries.
+    pub body: usize,
+    /// Its velocity.
+    pub velocity: usize,
+}
+
+/// A velocity that moves a body, and the motion that a unit of it imparts to the body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mover {
+    /// Index among all velocities.
+    pub velocity: usize,
+    /// Index in [`Poses::motions`](super::poses::Poses::motions).
+    pub motion: usize,
+}
+
+/// A body and its joint.
+#[allow(clippy::struct_excessive_bools)] // facts that do not depend on each other
+#[derive(Clone, Debug, PartialEq)]
+pub struct Link {
+    /// Its tree.
+    pub(super) tree: usize,
+    /// The body that carries it; a root itself.
+    pub parent: usize,
+    /// Origin of the joint in the carrier's frame.
+    pub position: [f64; 3],
+    /// The axis of the carrier's frame that it lies on.
+    pub(super) along: Option<usize>,
+    /// Columns of the fixed rotation from the joint's frame to the carrier's; `None` for the
+    /// identity.
+    pub rotation: Option<[[f64; 3]; 3]>,
+    /// Its joint.
+    pub joint: LinkJoint,
+    /// Axis of a revolute or prismatic joint, the same in the joint's frame and the body's.
+    pub axis: JointAxis,
+    /// How the joint follows another one.
+    pub coupling: Option<Coupling>,
+    /// Coordinate of a spinner's joint, or the one that it follows.
+    pub(super) spin: Option<usize>,
+    /// Its first velocity, or the one that it follows, and its first motion.
+    pub velocity: usize,
+    /// See above.
+    pub motion: usize,
+    /// Whether a step need not turn it: [`Body::is_spinner`](super::Body::is_spinner).
+    pub is_spinner: bool,
+    /// Whether it carries no other body.
+    pub is_leaf: bool,
+    /// Whether, besides, its joint follows no other one.
+    pub(super) is_plain_leaf: bool,
+    /// Whether its carrier carries no body with a higher index.
+    pub is_last: bool,
+    /// Whether its mass centre is its frame's origin.
+    pub is_centred: bool,
+    /// What is known of its principal axes.
+    pub symmetry: Symmetry,
+    /// Number of its own rows; 0 for a free root and if the joint follows another one.
+    pub(super) n_rows: usize,
+    /// Where the last row of its path is in [`Mechanism::columns`].
+    pub(super) row: Range<usize>,
+    pub(super) path: Range<usize>,
+    pub(super) movers: Range<usize>,
+}
+
+/// The joint of a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LinkJoint {
+    /// Of a root: free, or fixed to the world.
+    Base,
+    /// A rotation about its axis by a coordinate of its own.
+    Turn,
+    /// A rotation about its axis that follows another joint.
+    CoupledTurn,
+    /// A displacement along its axis, by the coordinate with this index.
+    Slide(usize),
+    /// Any rotation about a point: the index of its quaternion.
+    Ball(usize),
+}
+
+/// Principal axes of a body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Symmetry {
+    /// The frame's axes, with equal moments across x.
+    AboutX,
+    /// The frame's axes, with equal moments across y.
+    AboutY,
+    /// The frame's axes, with equal moments across z.
+    AboutZ,
+    /// The frame's axes, with three moments.
+    None,
+    /// Other axes than the frame's.
+    Turned,
+}
+
+impl Mechanism {
+    /// Number of bodies.
+    #[inline]
+    #[must_use]
+    pub fn n_bodies(&self) -> usize {
+        self.links.len()
+    }
+
+    /// Number of joints with a coordinate of their own.
+    #[inline]
+    #[must_use]
+    pub fn n_joints(&self) -> usize {
+        self.joints.len()
+    }
+
+    /// Number of velocities.
+    #[inline]
+    #[must_use]
+    pub fn nv(&self) -> usize {
+        self.diagonals.len()
+    }
+
+    /// Number of motions.
+    #[inline]
+    #[must_use]
+    pub fn n_motions(&self) -> usize {
+        self.n_motions
+    }
+
+    /// The rows of the velocities that move body `b`, in order, counted from the first row of its
+    /// tree; empty for a free root.
+    #[inline(always)]
+    pub(super) fn row(&self, b: usize) -> &[usize] {
+        &self.columns[self.links[b].row.clone()]
+    }
+
+    /// The row of a joint's velocity.
+    #[inline(always)]
+    pub(super) fn row_of(&self, velocity: usize) -> usize {
+        let tree = &self.trees[self.tree_of[velocity]];
+        velocity - (tree.velocities.start + tree.lead()) + tree.rows.start
+    }
+
+    /// Velocities from the root up to and including velocity `k`.
+    #[inline]
+    pub(super) fn velocity_path(&self, k: usize) -> &[usize] {
+        let (b, length) = self.up_to[k];
+        &self.path(b)[..length]
+    }
+
+    /// Length of the longest path; at least 1.
+    #[inline]
+    pub(super) fn longest_path(&self) -> usize {
+        self.longest_path
+    }
+
+    /// Velocities that move body `b`: those of a free root, then of the joints outwards.
+    #[inline(always)]
+    #[must_use]
+    pub fn path(&self, b: usize) -> &[usize] {
+        &self.paths[self.links[b].path.clone()]
+    }
+
+    /// The velocities of the joints that move body `b`, outwards.
+    #[inline(always)]
+    #[must_use]
+    pub fn movers(&self, b: usize) -> &[Mover] {
+        &self.movers[self.links[b].movers.clone()]
+    }
+}
+
+impl TreeSpan {
+    /// Number of velocities of a free root: 6 or 0.
+    #[inline(always)]
+    #[must_use]
+    pub fn lead(&self) -> usize {
+        if self.is_free { BASE } else { 0 }
+    }
+}
+
+impl Link {
+    /// Whether its joint follows another one; not of a root.
+    #[inline(always)]
+    pub(super) fn is_coupled(&self) -> bool {
+        self.n_rows == 0
+    }
+
+    /// `R p` for its joint's origin p.
+    #[inline(always)]
+    pub(crate) fn lever<T: Lane>(&self, R: &Mat3<T>) -> Vec3<T> {
+        let one = |column: Vec3<T>, k: usize| column * column.x.like(self.position[k]);
+        match self.along {
+            Some(0) => one(R.x, 0),
+            Some(1) => one(R.y, 1),
+            Some(2) => one(R.z, 2),
+            _ => R.times_shared(self.position),
+        }
+    }
+
+    /// The frame of its joint, on a carrier with the attitude `R`.
+    #[inline(always)]
+    pub(super) fn frame<T: Lane>(&self, R: &Mat3<T>) -> Mat3<T> {
+        match &self.rotation {
+            None => *R,
+            Some(fixed) => R.times_columns(fixed),
+        }
+    }
+
+    /// The coordinate of its joint, where that of its own or the one that it follows is `q`.
+    #[inline(always)]
+    pub(super) fn coordinate<T: Lane>(&self, q: T) -> T {
+        match &self.coupling {
+            None => q,
+            Some(coupling) => coupling.value(q),
+        }
+    }
+
+    /// The rate of its joint, where that of its own or the one that it follows is `v`.
+    #[inline(always)]
+    pub(super) fn rate<T: Lane>(&self, v: T) -> T {
+        match &self.coupling {
+            None => v,
+            Some(coupling) => v.like(coupling.ratio) * v,
+        }
+    }
+}

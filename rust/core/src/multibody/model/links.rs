@@ -1,0 +1,209 @@
+//! The mechanism of a model and its inertias, as the sources of the dynamics read them.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::Body;
+use super::properties::JointProperties;
+use super::tree::{Path, Paths, Tree};
+use crate::multibody::inertias::{Inertia, Inertias};
+use crate::multibody::joint::{Joint, JointAxis, Prismatic, Revolute, Spherical};
+use crate::multibody::mechanism::{
+    Link, LinkJoint, Mechanism, Mover, OwnJoint, Symmetry, TreeSpan,
+};
+use crate::scalar::{Single, Vec3};
+
+/// The mechanism of bodies with their paths.
+pub(super) fn mechanism_of(
+    bodies: &[Body],
+    trees: &[Tree],
+    joints: &[JointProperties],
+    paths: &Paths,
+) -> Mechanism {
+    let own = |has: fn(&Body) -> bool| (0..bodies.len()).filter(move |&b| has(&bodies[b]));
+    let mut mechanism = Mechanism {
+        joints: (joints.iter())
+            .map(|joint| OwnJoint {
+                body: joint.body,
+                velocity: joint.velocity,
+            })
+            .collect(),
+        rotors: (0..joints.len())
+            .filter(|&joint| joints[joint].passive.armature > 0.0)
+            .collect(),
+        coupled: own(|body| body.is_coupled).collect(),
+        spinning: own(|body| body.is_spinner && !body.is_coupled)
+            .map(|b| bodies[b].velocity)
+            .collect(),
+        n_motions: paths.n_motions,
+        longest_path: (paths.of.iter().map(|path| path.velocities.len())).fold(1, usize::max),
+        ..Mechanism::default()
+    };
+    let mut pose = 0;
+    for (t, tree) in trees.iter().enumerate() {
+        // The first pose is the first body's, whether it is free or not.
+        pose += usize::from(tree.is_free && t > 0);
+        let first = mechanism.rows.len();
+        for k in tree.velocities.clone() {
+            let b = paths.body_of_velocity[k];
+            let path = paths.of[b].velocities.iter();
+            mechanism.tree_of.push(t);
+            (mechanism.up_to).push((b, path.take_while(|&&i| i <= k).count()));
+            add_row(&mut mechanism, bodies, paths, tree, k);
+        }
+        mechanism.trees.push(TreeSpan {
+            bodies: tree.bodies.clone(),
+            velocities: tree.velocities.clone(),
+            rows: first..mechanism.rows.len(),
+            is_free: tree.is_free,
+            pose: if t > 0 { pose } else { 0 },
+        });
+    }
+    for b in 0..bodies.len() {
+        add_link(&mut mechanism, bodies, paths, b);
+    }
+    mechanism
+}
+
+/// Adds the row of velocity `k`, if it is a joint's.
+fn add_row(mechanism: &mut Mechanism, bodies: &[Body], paths: &Paths, tree: &Tree, k: usize) {
+    let b = paths.body_of_velocity[k];
+    if !matches!(bodies[b].joint, Joint::Free(_)) {
+        let own = &paths.of[b];
+        let path = &own.velocities[tree.lead()..mechanism.up_to[k].1];
+        let start = mechanism.columns.len();
+        let first = tree.velocities.start + tree.lead();
+        mechanism.columns.extend(path.iter().map(|&k| k - first));
+        (mechanism.column_motions).extend_from_slice(&own.motions[..path.len()]);
+        mechanism.rows.push(start..mechanism.columns.len());
+    }
+    mechanism
+        .diagonals
+        .push(mechanism.columns.len().saturating_sub(1));
+}
+
+fn add_link(mechanism: &mut Mechanism, bodies: &[Body], paths: &Paths, b: usize) {
+    let body = &bodies[b];
+    let span = &mechanism.trees[body.tree];
+    let Path {
+        velocities,
+        motions,
+    } = &paths.of[b];
+    let rest = &velocities[span.lead()..];
+    let first = span.velocities.start + span.lead();
+    let last_row = (rest.last()).map(|&k| mechanism.rows[span.rows.start + k - first].clone());
+    let n_rows = match &body.joint {
+        Joint::Free(_) => 0,
+        joint => joint.nv(),
+    };
+    let (path, movers) = (mechanism.paths.len(), mechanism.movers.len());
+    mechanism.paths.extend(velocities);
+    let pairs = rest.iter().zip(motions);
+    (mechanism.movers).extend(pairs.map(|(&velocity, &motion)| Mover { velocity, motion }));
+    let mut others = bodies[b + 1..].iter();
+    let is_leaf = !others.clone().any(|other| other.parent == Some(b));
+    let joint = joint_of(mechanism, body);
+    mechanism.links.push(Link {
+        tree: body.tree,
+        parent: body.parent.unwrap_or(b),
+        position: body.position.into(),
+        along: (0..3).find(|&k| (0..3).all(|i| i == k || body.position[i] == 0.0)),
+        rotation: body.rotation.map(Into::into),
+        joint,
+        axis: body.joint.axis().copied().unwrap_or(JointAxis::X),
+        coupling: body.joint.coupling().copied(),
+        spin: (body.joint.coordinate().filter(|_| body.is_spinner)).map(|own| own.joint),
+        velocity: body.velocity,
+        motion: body.motion,
+        is_spinner: body.is_spinner,
+        is_leaf,
+        is_plain_leaf: is_leaf && !body.is_coupled,
+        is_last: !others.any(|other| other.parent == body.parent),
+        is_centred: body.is_centred(),
+        symmetry: symmetry_of(body),
+        n_rows,
+        row: last_row.unwrap_or_default(),
+        path: path..mechanism.paths.len(),
+        movers: movers..mechanism.movers.len(),
+    });
+}
+
+/// The joint of a body, whose angles and velocities are noted.
+fn joint_of(mechanism: &mut Mechanism, body: &Body) -> LinkJoint {
+    match &body.joint {
+        Joint::Free(_) | Joint::Fixed => LinkJoint::Base,
+        Joint::Revolute(Revolute { coordinate, .. }) => {
+            let coupling = coordinate.coupling;
+            let rate = coupling.map_or(1.0, |coupling| coupling.ratio);
+            if coupling.is_some() || !body.is_spinner {
+                mechanism.turning.push((body.velocity, rate.abs()));
+            }
+            if !body.is_spinner {
+                let own = mechanism.angles.len();
+                (mechanism.coupled_angles).extend(coupling.map(|coupling| (own, coupling)));
+                mechanism.angles.push(coordinate.joint);
+            }
+            match coupling {
+                None => LinkJoint::Turn,
+                Some(_) => LinkJoint::CoupledTurn,
+            }
+        }
+        Joint::Prismatic(Prismatic { coordinate, .. }) => LinkJoint::Slide(coordinate.joint),
+        Joint::Spherical(Spherical { rotation }) => {
+            let k = body.velocity;
+            mechanism.balls.push(k);
+            (mechanism.turning).extend([k, k + 1, k + 2].map(|k| (k, 1.0)));
+            LinkJoint::Ball(*rotation)
+        }
+    }
+}
+
+/// The inertias of bodies.
+pub(super) fn inertias_of(
+    mechanism: &Mechanism,
+    bodies: &[Body],
+    trees: &[Tree],
+    joints: &[JointProperties],
+) -> Inertias<f64> {
+    let mut inertias = Inertias::new(Single::best(), mechanism);
+    inertias.bodies = bodies.iter().map(inertia_of).collect();
+    let rotors = mechanism.rotors.iter();
+    inertias.rotors = rotors.map(|&j| joints[j].passive.armature).collect();
+    inertias.trees = trees.iter().map(|tree| tree.mass).collect();
+    inertias.mass = bodies.iter().map(|body| body.mass).sum();
+    inertias
+}
+
+fn inertia_of(body: &Body) -> Inertia<f64> {
+    let I = &body.principal_inertia;
+    let [rest, first, second] = match symmetry_of(body) {
+        Symmetry::AboutX => [I.y, I.x - I.y, 0.0],
+        Symmetry::AboutY => [I.x, I.y - I.x, 0.0],
+        Symmetry::AboutZ => [I.x, I.z - I.x, 0.0],
+        Symmetry::None | Symmetry::Turned => [I.z, I.x - I.z, I.y - I.z],
+    };
+    let P = body.principal_axes.unwrap_or_else(Matrix3::identity);
+    Inertia {
+        mass: body.mass,
+        centre: body.centre_of_mass.into(),
+        rest,
+        first,
+        second,
+        axes: [0, 1].map(|k| Vec3::from(Vector3::from(P.column(k)))),
+    }
+}
+
+fn symmetry_of(body: &Body) -> Symmetry {
+    let I: &Vector3<f64> = &body.principal_inertia;
+    let is_equal = |a: f64, b: f64| (a - b).abs() <= 1e-14 * I.sum();
+    if body.principal_axes.is_some() {
+        Symmetry::Turned
+    } else if is_equal(I.x, I.y) {
+        Symmetry::AboutZ
+    } else if is_equal(I.x, I.z) {
+        Symmetry::AboutY
+    } else if is_equal(I.y, I.z) {
+        Symmetry::AboutX
+    } else {
+        Symmetry::None
+    }
+}

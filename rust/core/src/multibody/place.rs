@@ -1,0 +1,226 @@
+//! Configurations over the scalar.
+
+use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
+
+use super::mechanism::Mechanism;
+use super::state::Configuration;
+use crate::scalar::quaternion::{exp_rotation, normalised, product};
+use crate::scalar::{Lane, Vec3};
+
+/// A configuration a lane.
+#[derive(Clone, Debug)]
+pub struct Place<T: Lane> {
+    /// Origin of the first body, world, m; zero where that body is not free.
+    pub position: Vec3<T>,
+    /// Attitude of the first body: a unit quaternion x, y, z, w.
+    pub attitude: [T; 4],
+    /// Coordinates of the revolute (rad) and prismatic (m) joints (n_joints).
+    pub joints: Vec<T>,
+    /// Rotations of the spherical joints, from the body's frame to the joint's: unit quaternions
+    /// x, y, z, w.
+    pub balls: Vec<[T; 4]>,
+    /// Positions and attitudes of the free bodies other than the first.
+    others: Vec<(Vec3<T>, [T; 4])>,
+}
+
+impl<T: Lane> Place<T> {
+    /// The zero configuration.
+    #[must_use]
+    pub fn new(token: T::Token, mechanism: &Mechanism) -> Self {
+        let zero = T::splat(token, 0.0);
+        let (nowhere, unturned) = (
+            Vec3::new(zero, zero, zero),
+            [zero, zero, zero, T::splat(token, 1.0)],
+        );
+        let n_others = mechanism.trees.iter().map(|tree| tree.pose).max();
+        Self {
+            position: nowhere,
+            attitude: unturned,
+            joints: vec![zero; mechanism.n_joints()],
+            balls: vec![unturned; mechanism.balls.len()],
+            others: vec![(nowhere, unturned); n_others.unwrap_or(0)],
+        }
+    }
+
+    /// Position and attitude of a free body, by the index of its pose.
+    #[inline(always)]
+    pub(super) fn pose(&self, pose: usize) -> (&Vec3<T>, &[T; 4]) {
+        match pose.checked_sub(1) {
+            None => (&self.position, &self.attitude),
+            Some(other) => (&self.others[other].0, &self.others[other].1),
+        }
+    }
+
+    /// Whether a lane has this configuration, to the last bit.
+    pub fn is_lane(&self, lane: usize, q: &Configuration) -> bool {
+        let is_same = |own: &T, x: &f64| own.get(lane).to_bits() == x.to_bits();
+        let is_place = |own: &Vec3<T>, x: &Vector3<f64>| {
+            let Vec3 { x: a, y: b, z: c } = own;
+            is_same(a, &x.x) && is_same(b, &x.y) && is_same(c, &x.z)
+        };
+        let is_turn = |own: &[T; 4], x: &UnitQuaternion<f64>| {
+            (own.iter().zip(&x.coords)).all(|(own, x)| is_same(own, x))
+        };
+        is_place(&self.position, &q.position)
+            && is_turn(&self.attitude, &q.attitude)
+            && (self.joints.iter().zip(&q.joints)).all(|(own, x)| is_same(own, x))
+            && (self.balls.iter().zip(&q.rotations)).all(|(own, q)| is_turn(own, q))
+            && (self.others.iter().zip(&q.others)).all(|((position, attitude), q)| {
+                is_place(position, &q.position) && is_turn(attitude, &q.attitude)
+            })
+    }
+
+    /// Replaces the configuration of a lane.
+    #[inline]
+    pub fn set_lane(&mut self, lane: usize, q: &Configuration) {
+        let turn = |own: &mut [T; 4], x: &UnitQuaternion<f64>| {
+            for (own, x) in own.iter_mut().zip(&x.coords) {
+                own.set(lane, *x);
+            }
+        };
+        self.position.set(lane, q.position.into());
+        turn(&mut self.attitude, &q.attitude);
+        for (own, angle) in self.joints.iter_mut().zip(&q.joints) {
+            own.set(lane, *angle);
+        }
+        for (own, q) in self.balls.iter_mut().zip(&q.rotations) {
+            turn(own, q);
+        }
+        for ((position, attitude), q) in self.others.iter_mut().zip(&q.others) {
+            position.set(lane, q.position.into());
+            turn(attitude, &q.attitude);
+        }
+    }
+
+    /// Writes the configuration of a lane.
+    pub fn to_lane(&self, lane: usize, q: &mut Configuration) {
+        q.position = self.position.get(lane).into();
+        let quaternion = |own: &[T; 4]| {
+            let [x, y, z, w] = own.map(|x| x.get(lane));
+            Unit::new_unchecked(Quaternion::new(w, x, y, z))
+        };
+        q.attitude = quaternion(&self.attitude);
+        for (angle, own) in q.joints.iter_mut().zip(&self.joints) {
+            *angle = own.get(lane);
+        }
+        for (q, own) in q.rotations.iter_mut().zip(&self.balls) {
+            *q = quaternion(own);
+        }
+        for (q, (position, attitude)) in q.others.iter_mut().zip(&self.others) {
+            q.position = position.get(lane).into();
+            q.attitude = quaternion(attitude);
+        }
+    }
+
+    /// `self = from ⊕ h v`: moves with the velocity `v` (nv) for `h` seconds, along the exponential
+    /// maps of the base and of the spherical joints.
+    ///
+    /// # Panics
+    /// If an argument is of another mechanism.
+    #[inline(always)]
+    pub fn set_moved(&mut self, mechanism: &Mechanism, from: &Self, v: &[T], h: f64) {
+        let n = self.joints.len();
+        let (trees, joints) = (&mechanism.trees[..], &mechanism.joints[..n]);
+        assert!(from.joints.len() == n && v.len() == mechanism.nv());
+        let h = from.position.x.like(h);
+        let first = trees[0].lead();
+        if v.len() == first + n && trees.len() == 1 {
+            // The joints' velocities are in the order of their coordinates.
+            let rates = &v[first..][..n];
+            for j in 0..n {
+                self.joints[j] = from.joints[j] + h * rates[j];
+            }
+        } else {
+            for j in 0..n {
+                self.joints[j] = from.joints[j] + h * v[joints[j].velocity];
+            }
+        }
+        if trees[0].is_free {
+            (self.position, self.attitude) = moved((&from.position, &from.attitude), v, h);
+        }
+        if !self.others.is_empty() {
+            self.move_others(mechanism, from, v, h);
+        }
+        for ((own, before), &k) in self.balls.iter_mut().zip(&from.balls).zip(&mechanism.balls) {
+            let turn = exp_rotation(Vec3::new(v[k], v[k + 1], v[k + 2]) * h);
+            *own = product(&turn, before);
+        }
+    }
+
+    /// Moves the free bodies other than the first.
+    #[cold]
+    #[inline(never)]
+    fn move_others(&mut self, mechanism: &Mechanism, from: &Self, v: &[T], h: T) {
+        for tree in mechanism.trees.iter().filter(|tree| tree.pose > 0) {
+            if tree.is_free {
+                let before = from.pose(tree.pose);
+                self.others[tree.pose - 1] = moved(before, &v[tree.velocities.clone()], h);
+            }
+        }
+    }
+
+    /// Renormalises the quaternions, which rounding has left within 1e-7 of unit length.
+    #[inline(always)]
+    pub fn normalise(&mut self) {
+        self.attitude = normalised(&self.attitude);
+        for own in &mut self.balls {
+            *own = normalised(own);
+        }
+        for (_, attitude) in &mut self.others {
+            *attitude = normalised(attitude);
+        }
+    }
+
+    /// Takes another configuration in the lanes of a mask.
+    #[inline(always)]
+    pub fn select_from(&mut self, lanes: T::Mask, other: &Self) {
+        let select = |own: &mut [T], other: &[T]| {
+            for (own, other) in own.iter_mut().zip(other) {
+                *own = T::select(lanes, *other, *own);
+            }
+        };
+        self.position = Vec3::select(lanes, other.position, self.position);
+        select(&mut self.attitude, &other.attitude);
+        select(&mut self.joints, &other.joints);
+        for (own, other) in self.balls.iter_mut().zip(&other.balls) {
+            select(own, other);
+        }
+        for ((position, attitude), other) in self.others.iter_mut().zip(&other.others) {
+            *position = Vec3::select(lanes, other.0, *position);
+            select(attitude, &other.1);
+        }
+    }
+
+    /// Whether every entry is finite.
+    #[inline(always)]
+    pub fn is_finite(&self) -> T::Mask {
+        let Vec3 { x, y, z } = self.position;
+        let mut all = x.is_finite() & y.is_finite() & z.is_finite();
+        for x in &self.attitude {
+            all = all & x.is_finite();
+        }
+        for x in &self.joints {
+            all = all & x.is_finite();
+        }
+        for [x, y, z, w] in &self.balls {
+            all = all & x.is_finite() & y.is_finite() & z.is_finite() & w.is_finite();
+        }
+        for (Vec3 { x, y, z }, attitude) in &self.others {
+            all = all & x.is_finite() & y.is_finite() & z.is_finite();
+            for x in attitude {
+                all = all & x.is_finite();
+            }
+        }
+        all
+    }
+}
+
+/// A pose after `h` seconds at the velocity `v` of its free body.
+#[inline(always)]
+fn moved<T: Lane>((position, attitude): (&Vec3<T>, &[T; 4]), v: &[T], h: T) -> (Vec3<T>, [T; 4]) {
+    let turn = exp_rotation(Vec3::new(v[3], v[4], v[5]) * h);
+    (
+        *position + Vec3::new(v[0], v[1], v[2]) * h,
+        product(&turn, attitude),
+    )
+}
