@@ -1,15 +1,17 @@
-//! The ordinary step of a rover, one or several to a register.
+//! The fast step of a rover, one or several to a register.
 //!
 //! Most steps of a wheeled rover are alike: a tree of joints on a free base, wheels that roll and
 //! slip, motors, springs and stops. These sources take such a step over a scalar
 //! ([`crate::scalar`]) that is one rover or four or eight. They branch on the kind of joint body by
-//! body, since the rovers of a block share their tree. A step that is not ordinary is declined,
-//! rover by rover, before anything has changed; [`crate::integrator`] then takes it.
+//! body, since the rovers of a block share their tree. What is rare, such as a body that touches
+//! the ground, is found rover by rover. A step that cannot be taken so falls back to
+//! [`crate::integrator`], rover by rover, before anything has changed.
 //!
-//! - [`admission`]: which rovers have ordinary steps; [`machine`]: what the rovers share;
+//! - [`admission`]: which options have a fast step; [`machine`]: what the rovers share;
 //!   [`inertias`]: what they need not; [`place`]: configurations;
 //! - [`poses`], [`mass_matrix`], [`bias`], [`energy`]: dynamics of the tree;
-//! - `parts`, [`ground`], `footing`, [`forecast`], [`contacts`], `stops`: what touches what;
+//! - `parts`, [`ground`], `footing`, [`forecast`], [`contacts`], `by_lane`,
+//!   `spares`, `stops`: what touches what;
 //!   [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield;
 //! - [`problem`], [`modes`], [`equations`], `pivoting`, `visits`, `bench`, [`queue`]: the
 //!   friction-contact problems;
@@ -19,6 +21,7 @@
 pub mod admission;
 mod bench;
 pub mod bias;
+mod by_lane;
 pub mod contacts;
 pub mod drives;
 pub mod energy;
@@ -39,6 +42,7 @@ pub mod poses;
 pub mod problem;
 pub mod queue;
 pub mod rows;
+mod spares;
 pub mod step;
 mod stops;
 mod sweeps;

@@ -9,6 +9,7 @@ use nalgebra::Vector3;
 
 use super::machine::{Axis, Link, LinkJoint, Machine, Mover};
 use super::poses::{Pose, Poses, times_columns};
+use crate::contact::Part;
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Wheels and boxes.
@@ -35,6 +36,8 @@ pub(super) struct Wheel {
     pub half: f64,
     /// Rounding of its edges, m.
     pub rounding: f64,
+    /// Whether it yields where it touches.
+    pub is_soft: bool,
     /// Radius of a bounding ball, m.
     pub bound: f64,
     /// Twist of the body that moves its centre.
@@ -55,6 +58,7 @@ enum Axle {
 /// A box, as contacts need it.
 #[derive(Clone, Debug)]
 pub(super) struct Solid {
+    pub part: Part,
     pub body: usize,
     centre: Option<[f64; 3]>,
     rotation: Option<[[f64; 3]; 3]>,
@@ -113,6 +117,7 @@ impl Parts {
                     radius: wheel.radius - wheel.rounding,
                     half: wheel.half,
                     rounding: wheel.rounding,
+                    is_soft: wheel.compliance.is_some(),
                     bound: wheel.bound(),
                     carrier: carrier_of(machine, mover, &mut carriers),
                     spin: spins.then_some(link.velocity),
@@ -124,6 +129,7 @@ impl Parts {
                 let is_plain =
                     solid.rotation == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
                 Solid {
+                    part: solid.part,
                     body: solid.body,
                     centre: some(solid.centre),
                     rotation: (!is_plain).then_some(solid.rotation),
