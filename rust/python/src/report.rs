@@ -81,10 +81,10 @@ impl StepReport {
         self.inner.retaken
     }
 
-    /// Steps that the general step took, since the fast one does not take them; 0 of machines in the
-    /// plane and of grains, which have no fast one.
+    /// Steps that the general step took, since the fast one does not take them.
     ///
-    /// `Simulation.fallback_reason` says whether it takes none of a simulation.
+    /// 0 of machines in the plane and of grains, which have no fast one.
+    /// `Simulation.fallback_reason` says whether a simulation has fast steps.
     #[getter]
     fn fallbacks(&self) -> usize {
         self.inner.fallbacks

@@ -215,7 +215,7 @@ fn every_joint_and_force_obeys_the_law_of_the_general_step() {
 }
 
 /// The built-in rover on its back, on its side or pushed against the ground, whose boxes touch the
-/// ground; with the same materials everywhere, or bodies that can touch each other.
+/// ground, also with friction by pair of materials, and with bodies that can touch each other.
 #[test]
 fn bodies_on_the_ground_obey_the_law_of_the_general_step() {
     let mut touching = ModelDescription::rover();
@@ -279,12 +279,11 @@ fn bodies_on_the_ground_obey_the_law_of_the_general_step() {
         }
     }
     differences.sort_by(f64::total_cmp);
-    println!(
-        "{steps} {fallbacks} {boxes} {pairs} {:?}",
-        [80, 90, 95, 99].map(|k| differences[steps * k / 100])
-    );
     assert!(fallbacks * 10 < steps, "{fallbacks} of {steps}");
-    assert!(boxes > 1000, "{boxes} contacts of boxes, {pairs} of pairs");
+    assert!(
+        boxes > 1000 && pairs > 100,
+        "{boxes} contacts of boxes, {pairs} of pairs"
+    );
     // A few friction problems have several answers.
     let typical = differences[steps * 90 / 100];
     assert!(typical < 1e-9, "{typical:e}");

@@ -1,5 +1,5 @@
-//! Contacts of a block, in slots: of the wheels with the ground, of other bodies, and of joints with
-//! their stops.
+//! Contacts of a block, in slots: of the wheels with the ground, of other bodies, and of joints
+//! with their stops.
 //!
 //! A wheel with one circle, a thin disc or a torus, has three slots: most touch the plane or a
 //! sphere, some both or two spheres. A wheel with two circles has four: one for each circle on the
@@ -9,7 +9,7 @@
 //! the rolling direction `t = n × s / |n × s|`, the lowest point of a circle over a plane lies
 //! along `t × s` from its centre.
 //!
-//! What is rare is found lane by lane (`by_lane`): a wheel that nearly lies flat, passes a sphere
+//! What is rare is found lane by lane (`rare`): a wheel that nearly lies flat, passes a sphere
 //! within the step, touches more things than it has slots or stands on rough ground, and a body
 //! near the ground or another one. A lane with more contacts than a problem has is declined.
 
@@ -314,8 +314,8 @@ impl<T: Lane> Contacts<T> {
             let known = if let Some((_, known)) = same.filter(|(key, _)| *key == wanted) {
                 *known
             } else {
-                is_same = false;
                 let found = memory.impulses.iter().find(|(key, _)| *key == wanted);
+                is_same &= found.is_some();
                 found.map_or([0.0; 3], |(_, known)| *known)
             };
             out.copy_from_slice(&known);
@@ -450,8 +450,8 @@ impl<T: Lane> Contacts<T> {
         (near_plane | near, reach)
     }
 
-    /// Fills the slots of a wheel with its contacts at the midpoint. Returns where they must be found
-    /// lane by lane, and how near the wheel must come to the ground to touch it, m.
+    /// Fills the slots of a wheel with its contacts at the midpoint. Returns where they must be
+    /// found lane by lane, and how near the wheel must come to the ground to touch it, m.
     #[inline(always)]
     fn look_at_wheel(
         &mut self,
@@ -826,8 +826,8 @@ impl<T: Lane> Contacts<T> {
         too_many
     }
 
-    /// Chooses the lanes whose problems have the factors of their operator: those with many contacts,
-    /// and with contacts between bodies.
+    /// Chooses the lanes whose problems have the factors of their operator: those with many
+    /// contacts, and with contacts between bodies.
     #[inline(always)]
     pub(super) fn choose_forms(&mut self) {
         let mut factored = self.by_lane.with_pairs();

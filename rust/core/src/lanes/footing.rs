@@ -1,8 +1,8 @@
 //! The plane that a wheel stands on where the ground is a surface.
 //!
-//! Where all pieces near a wheel lie in one plane the wheel keeps it until it has moved further than
-//! the search looked ahead, and costs what a wheel on a plane costs. Elsewhere its contacts are
-//! found lane by lane.
+//! Where all pieces near a wheel lie in one plane the wheel keeps it until it has moved further
+//! than the search looked ahead, and costs what a wheel on a plane costs. Elsewhere its contacts
+//! are found lane by lane.
 
 use std::sync::Arc;
 

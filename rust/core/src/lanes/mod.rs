@@ -11,7 +11,7 @@
 //!   [`inertias`]: what they need not; [`place`]: configurations;
 //! - [`poses`], [`mass_matrix`], [`bias`], [`energy`]: dynamics of the tree;
 //! - `parts`, [`ground`], `footing`, [`forecast`], [`contacts`], `by_lane`,
-//!   `spares`, `stops`: what touches what;
+//!   `rare`, `spares`, `stops`: what touches what;
 //!   [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield;
 //! - [`problem`], [`modes`], [`equations`], `pivoting`, `visits`, `bench`, [`queue`]: the
 //!   friction-contact problems;
@@ -41,6 +41,7 @@ pub mod place;
 pub mod poses;
 pub mod problem;
 pub mod queue;
+mod rare;
 pub mod rows;
 mod spares;
 pub mod step;
