@@ -67,7 +67,7 @@ impl<T: Lane> Contacts<T> {
             };
             let (middle, end) = (at(sight.middle), at(sight.end));
             let machine = Moving {
-                model: &**model,
+                model,
                 middle: &middle,
                 end: &end,
             };
