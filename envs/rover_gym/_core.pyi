@@ -1146,6 +1146,13 @@ class StepReport:
         for implicit gyroscopic terms, or when Newton's law of restitution had no solution.
         """
     @property
+    def fallbacks(self) -> int:
+        """Steps that the general step took, since the fast one does not take them.
+
+        0 of machines in the plane and of grains, which have no fast one.
+        `Simulation.fallback_reason` says whether a simulation has fast steps.
+        """
+    @property
     def energy_gain(self) -> float:
         """Largest unexplained gain of energy in a step, relative to the kinetic energy.
 
@@ -1546,13 +1553,13 @@ class Simulation:
     def lanes(self) -> Literal[1, 4, 8]:
         """Rovers that a batch steps together in one register of this machine.
 
-        Either 8, 4 or 1, and always 1 if no step is ordinary, as `never_ordinary` then says.
+        Either 8, 4 or 1, and always 1 if all steps are general: see `fallback_reason`.
         """
     @property
-    def never_ordinary(self) -> str | None:
-        """Why none of the steps is ordinary, so that all are taken the general way; None if they are.
+    def fallback_reason(self) -> str | None:
+        """Why all steps are general, one rover at a time; None if they are fast, in lanes.
 
-        Single steps may still turn out not to be ordinary, as when the trunk touches the ground.
+        Of fast steps, `StepReport.fallbacks` counts those that had to be general after all.
         """
     @property
     def q(self) -> _Array:

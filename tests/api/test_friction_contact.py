@@ -101,7 +101,7 @@ def test_the_relaxed_law_says_that_it_is_another_law():
 
 def test_the_last_problem_is_that_of_the_velocities_where_the_position_was_projected():
     """It was that of the projection, whose q are gaps in metres."""
-    sim = rover_gym.Simulation(warm_start=False)  # not by the ordinary step
+    sim = rover_gym.Simulation(warm_start=False)  # not by the fast step
     q = sim.q
     q[1] = 0.5
     sim.set_state(q)

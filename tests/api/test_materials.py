@@ -40,7 +40,7 @@ def test_a_mapping_and_rows_say_the_same_and_survive() -> None:
     assert Simulation(**sim.settings).settings == sim.settings
     assert "materials" not in Simulation().settings
     assert Simulation().materials == {}
-    assert "materials" in str(sim.never_ordinary)
+    assert "two materials" in str(sim.fallback_reason)
 
 
 def test_a_pair_decides_and_the_rest_keeps_the_common_coefficients() -> None:
@@ -56,7 +56,6 @@ def test_a_pair_decides_and_the_rest_keeps_the_common_coefficients() -> None:
         sim.set_wheel_torques([30.0] * 6)
         sim.step(100)
         paths.append(sim.q)
-    # The first is stepped the ordinary way, the others the general way.
     assert np.array_equal(paths[1], paths[2])
     assert paths[1] == pytest.approx(paths[0], abs=1e-3)
 
@@ -122,7 +121,7 @@ def test_a_rover_on_wide_wheels_stands_on_two_points_a_wheel() -> None:
     sim.step(200)
     wheels = [kind for kind in sim.contacts.kinds if kind == "wheel"]
     assert len(wheels) == 12
-    assert sim.never_ordinary is None
+    assert sim.fallback_reason is None
     assert sim.wheel_forces[:, 0].sum() == pytest.approx(sim.model.mass * 9.81, rel=1e-2)
 
 

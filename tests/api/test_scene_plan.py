@@ -121,12 +121,12 @@ def decided(scene: Scene, part: str) -> tuple[str, str]:
     return next((row["built"], row["reason"]) for row in plan(scene).explain() if row["part"] == part)
 
 
-def test_a_plan_says_which_steps_are_ordinary() -> None:
+def test_a_plan_says_which_steps_are_fast() -> None:
     width = SimulationBatch([Simulation()])
     lanes = Simulation().lanes
     for scene in (Scene(), Scene(SphereField.rug(), start=np.zeros(21)), Scene(steered=False)):
         built, _ = decided(scene, "steps")
-        assert built.startswith("ordinary: in lanes")
+        assert built.startswith("fast: in lanes")
         assert width.instruction_set in built
         assert lanes == 1 or f"{lanes} rovers to a register" in built
     for scene, why in (

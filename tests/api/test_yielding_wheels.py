@@ -264,7 +264,7 @@ def test_a_step_that_is_split_counts_the_loads_of_its_last_part() -> None:
 
 
 def test_rovers_on_yielding_wheels_take_the_fast_step() -> None:
-    assert Simulation(RoverModel.named("four-steered")).never_ordinary is None
+    assert Simulation(RoverModel.named("four-steered")).fallback_reason is None
 
 
 @pytest.mark.parametrize(

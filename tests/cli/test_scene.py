@@ -26,7 +26,7 @@ def test_explain_lists_every_part_with_its_reason() -> None:
     for part in ("ground", "steering", "base", "scheme", "contact solver", "step", "6 joints welded", "no search"):
         assert part in result.output
     assert "general, one rover at a time" in result.output
-    assert "ordinary: in lanes" in rover("--explain").output
+    assert "fast: in lanes" in rover("--explain").output
 
 
 @pytest.mark.parametrize("terrain", ["plane", "rocks", "rug"])

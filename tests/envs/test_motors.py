@@ -72,7 +72,7 @@ def test_no_step_is_worth_more_than_a_hundred_whatever_the_physics_did(control_f
     assert np.abs(rewards).max() > 20.0, "the bounds were reached"
 
 
-def test_an_ordinary_step_is_far_from_the_bounds() -> None:
+def test_a_fast_step_is_far_from_the_bounds() -> None:
     env = RoverEnv(control_frequency=0.5, goal_distance=9.0)
     env.reset(seed=0)
     distance = env.reset(seed=0)[1]["distance_to_goal"]

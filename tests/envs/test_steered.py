@@ -23,7 +23,7 @@ def test_spaces_hold_torques_and_what_still_moves() -> None:
     sizes = {field.name: field.size for field in env.observation_layout.fields}
     assert (sizes["q"], sizes["velocity"], sizes["previous_action"]) == (15, 15, 6)
     assert env.model.steering_joint_indices == [-1] * 6
-    assert env.simulation.never_ordinary is None
+    assert env.simulation.fallback_reason is None
     observation, _ = env.reset(seed=0)
     assert observation in env.observation_space
     action = np.array([0.1, -0.2, 0.3, 0.0, 0.2, 0.1], np.float32)

@@ -7,7 +7,6 @@ use crate::spheres::sphere_scenes::{field, lone_wheel};
 use crate::surfaces::surface_scenes::map;
 use rover_core::geometry::{Plane, Terrain, Union};
 use rover_core::integrator::StepOptions;
-use rover_core::lanes::admission::NeverOrdinary;
 use rover_core::law::materials::{MaterialPair, Materials};
 use rover_core::multibody::{Configuration, Model, ModelDescription};
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
@@ -155,7 +154,7 @@ fn two_bodies_meet_by_the_law_of_their_materials() {
 }
 
 #[test]
-fn pairs_are_checked_by_name_and_are_not_ordinary() {
+fn pairs_are_checked_by_name() {
     let refused = |laws: &[(&str, &str, f64, f64)]| {
         let error = options(pairs(laws)).check().unwrap_err();
         error.to_string()
@@ -170,16 +169,13 @@ fn pairs_are_checked_by_name_and_are_not_ordinary() {
 
     let laws = options(pairs(&[("wheel", "rock", 0.5, 0.0)]));
     let rover = RoverSimulation::new(Arc::new(Model::rover()), Arc::new(Plane::ground()), laws);
-    assert_eq!(
-        rover.unwrap().never_ordinary(),
-        Some(NeverOrdinary::Materials)
-    );
+    assert_eq!(rover.unwrap().fallback_reason(), None);
     let none = RoverSimulation::new(
         Arc::new(Model::rover()),
         Arc::new(Plane::ground()),
         options(pairs(&[])),
     );
-    assert_eq!(none.unwrap().never_ordinary(), None);
+    assert_eq!(none.unwrap().fallback_reason(), None);
 }
 
 #[test]

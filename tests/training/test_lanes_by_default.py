@@ -19,7 +19,7 @@ def test_make_vec_makes_the_vector_of_the_core(name: str) -> None:
     envs = gym.make_vec(name, 64).unwrapped
     assert type(envs) is RoverVectorEnv
     assert envs.batch.episodes.threads == len(os.sched_getaffinity(0))
-    assert envs.prototype.simulation.never_ordinary is None
+    assert envs.prototype.simulation.fallback_reason is None
 
 
 @pytest.mark.parametrize("name", ["plane", "rocks"])
@@ -34,7 +34,7 @@ def test_train_ppo_trains_on_the_vector_of_the_core(name: str) -> None:
     rovers = build_env(config).unwrapped
     assert type(rovers) is RoverVecEnv
     assert rovers.num_envs == config.num_envs
-    assert rovers.prototype.simulation.never_ordinary is None
+    assert rovers.prototype.simulation.fallback_reason is None
 
 
 def test_an_env_runner_of_rllib_has_one_vector_of_the_core(monkeypatch: pytest.MonkeyPatch) -> None:

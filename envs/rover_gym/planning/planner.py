@@ -265,13 +265,13 @@ def _obstacle(scene: Scene, terrain: Terrain, start: Array, *, steers: bool) -> 
 def _steps(simulation: Simulation, kind: Kind) -> Decision:
     if kind == "planar":
         return Decision("steps", "general, one rover at a time", "the planar image has steps of its own, without lanes")
-    if (why := simulation.never_ordinary) is not None:
+    if (why := simulation.fallback_reason) is not None:
         return Decision("steps", "general, one rover at a time", why)
     register = "one rover to a register" if simulation.lanes == 1 else f"{simulation.lanes} rovers to a register"
     return Decision(
         "steps",
-        f"ordinary: in lanes, {register} ({SimulationBatch([simulation]).instruction_set})",
-        "wheels on fixed ground, inelastic; a step that is not ordinary, as when the trunk touches, is general",
+        f"fast: in lanes, {register} ({SimulationBatch([simulation]).instruction_set})",
+        "a machine on fixed ground, inelastic; `report.fallbacks` counts steps that are general after all",
     )
 
 

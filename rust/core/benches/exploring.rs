@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use exploring_scenes::{Drive, Ground, STEPS_A_COMMAND, TORQUES, drives};
-use rover_core::integrator::{Phase, Probe, StepError, StepOptions};
+use rover_core::integrator::{StepError, StepOptions};
 use rover_core::simulation::Batch;
 use rover_core::solver::SolverOptions;
 use serde_json::{Value, json};
@@ -96,29 +96,6 @@ fn time_of_batch(drives: &[Drive]) -> f64 {
     1e6 * seconds / (ROVERS * n_commands * STEPS_A_COMMAND) as f64
 }
 
-/// Counts how often a step was begun.
-struct Begun(usize);
-
-impl Probe for Begun {
-    fn end(&mut self, phase: Phase) {
-        self.0 += usize::from(phase == Phase::Kinematics);
-    }
-}
-
-/// Steps of a drive that were begun anew by the general code.
-fn count_general(mut drive: Drive) -> Result<usize, StepError> {
-    let mut general = 0;
-    for command in 0..drive.n_commands() {
-        drive.give(command);
-        for _ in 0..STEPS_A_COMMAND {
-            let mut begun = Begun(0);
-            drive.simulation.step_probed(1, &mut begun)?;
-            general += usize::from(begun.0 > 1);
-        }
-    }
-    Ok(general)
-}
-
 fn median(mut times: Vec<f64>) -> f64 {
     times.sort_by(f64::total_cmp);
     times[times.len() / 2]
@@ -147,9 +124,9 @@ fn measure(ground: Ground, torque: f64) -> Result<Measured, StepError> {
         pivots: Histogram::new(),
     };
     for drive in &drives[0] {
-        measured.general += count_general(drive.clone())?;
         drive.clone().play_by_step(|report| {
             measured.steps += 1;
+            measured.general += report.fallbacks;
             measured.not_converged += usize::from(!report.is_converged());
             *measured.iterations.entry(report.iterations).or_default() += 1;
             let factorisations = &mut measured.factorisations;

@@ -17,7 +17,7 @@ use std::time::Instant;
 use exploring_scenes::{Ground, STEPS_A_COMMAND, drives};
 use rover_core::geometry::Terrain;
 use rover_core::integrator::StepOptions;
-use rover_core::lanes::contacts::Contacts;
+use rover_core::lanes::contacts::{Contacts, Sight};
 use rover_core::lanes::forecast::Forecast;
 use rover_core::lanes::ground::Ground as LaneGround;
 use rover_core::lanes::machine::Machine;
@@ -73,6 +73,7 @@ struct Block<T: Lane> {
     /// Poses at the midpoint and at the end, and velocity, of every step.
     states: Vec<(Poses<T>, Poses<T>, Vec<T>)>,
     factor: Factor<T>,
+    models: Vec<Option<Arc<Model>>>,
     contacts: Contacts<T>,
     rows: Rows<T>,
     q: Vec<[T; 3]>,
@@ -82,7 +83,7 @@ struct Block<T: Lane> {
 
 impl<T: Lane> Block<T> {
     fn new(token: T::Token, model: &Model, records: &[Record]) -> Self {
-        let machine = Machine::of(model).expect("the rover is ordinary");
+        let machine = Machine::of(model).expect("the rover has fast steps");
         let mut inertias = Inertias::new(token, &machine);
         let mut ground = LaneGround::new(token, machine.wheels.len(), machine.boxes.len());
         for lane in 0..T::LANES {
@@ -123,6 +124,7 @@ impl<T: Lane> Block<T> {
             rows: Rows::new(token, &machine, contacts.n_slots()),
             q: vec![[T::splat(token, 0.0); 3]; contacts.n_slots()],
             machine,
+            models: vec![Some(Arc::new(model.clone())); T::LANES],
             ground,
             states,
             factor,
@@ -138,7 +140,17 @@ impl<T: Lane> Block<T> {
         if last >= 1 {
             let gravity = Vec3::splat(self.token, [0.0, -9.81, 0.0]);
             let forecast = Forecast::new(gravity, H, 0.5, 0.5 * H);
-            let declined = (self.contacts).detect(&mut self.ground, middle, end, v, &forecast);
+            let sight = Sight {
+                machine: &self.machine,
+                models: &self.models,
+                going: (1 << T::LANES) - 1,
+                middle,
+                end,
+                v,
+                needs_pieces: false,
+                forecast: &forecast,
+            };
+            let declined = self.contacts.detect(&mut self.ground, &sight);
             self.declined += declined.bits().count_ones();
         }
         if last >= 2 {
@@ -146,9 +158,9 @@ impl<T: Lane> Block<T> {
                 .assemble(&self.machine, end, &self.factor, &self.contacts, v);
         }
         if last >= 3 {
-            let mu = T::splat(self.token, 0.7);
+            let mu = vec![T::splat(self.token, 0.7); self.contacts.n_slots()];
             self.rows
-                .to_problems(&self.contacts, &self.q, mu, &mut self.problems);
+                .to_problems(&self.contacts, &self.q, &mu, &mut self.problems);
         }
         black_box(&mut self.problems);
     }

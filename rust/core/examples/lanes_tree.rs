@@ -46,7 +46,7 @@ struct Block<T: Lane> {
 
 impl<T: Lane> Block<T> {
     fn new(token: T::Token, model: &Model) -> Self {
-        let machine = Machine::of(model).expect("the rover is ordinary");
+        let machine = Machine::of(model).expect("the rover has fast steps");
         let mut block = Self {
             token,
             inertias: Inertias::new(token, &machine),

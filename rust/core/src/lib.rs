@@ -22,7 +22,7 @@
 //! - [`integrator`]: one step of any mechanical system;
 //! - [`planar`]: grounds and machines in the plane; [`system`]: the mechanical systems that a step
 //!   moves, such as the multibody tree;
-//! - [`lanes`]: the ordinary step of one rover or several to a register;
+//! - [`lanes`]: the fast step of one rover or several to a register;
 //! - [`simulation`]: many steps of any scene;
 //! - [`draw`]: random numbers, for scenes that are drawn;
 //! - [`episode`]: the episodes of a driving task: actions, observations, rewards, ends;

@@ -81,6 +81,15 @@ impl StepReport {
         self.inner.retaken
     }
 
+    /// Steps that the general step took, since the fast one does not take them.
+    ///
+    /// 0 of machines in the plane and of grains, which have no fast one.
+    /// `Simulation.fallback_reason` says whether a simulation has fast steps.
+    #[getter]
+    fn fallbacks(&self) -> usize {
+        self.inner.fallbacks
+    }
+
     /// Largest unexplained gain of energy in a step, relative to the kinetic energy.
     ///
     /// Unexplained is what exceeds the work of gravity and actuators.

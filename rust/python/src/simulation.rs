@@ -263,18 +263,18 @@ impl Simulation {
 
     /// Rovers that a batch steps together in one register of this machine.
     ///
-    /// Either 8, 4 or 1, and always 1 if no step is ordinary, as `never_ordinary` then says.
+    /// Either 8, 4 or 1, and always 1 if all steps are general: see `fallback_reason`.
     #[getter]
     fn lanes(&self) -> PyResult<usize> {
         Ok(self.open()?.lanes())
     }
 
-    /// Why none of the steps is ordinary, so that all are taken the general way; None if they are.
+    /// Why all steps are general, one rover at a time; None if they are fast, in lanes.
     ///
-    /// Single steps may still turn out not to be ordinary, as when the trunk touches the ground.
+    /// Of fast steps, `StepReport.fallbacks` counts those that had to be general after all.
     #[getter]
-    fn never_ordinary(&self) -> PyResult<Option<String>> {
-        Ok(self.open()?.never_ordinary().map(|why| why.to_string()))
+    fn fallback_reason(&self) -> PyResult<Option<String>> {
+        Ok(self.open()?.fallback_reason().map(|why| why.to_string()))
     }
 
     /// Coordinates, (nq,), m and rad.

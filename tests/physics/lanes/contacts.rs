@@ -1,27 +1,29 @@
-//! Contacts of the wheels, their Jacobian and operator: within rounding of the sources for any
-//! machine, every lane with the bits of the same source run as `f64`, and what is rare declined.
+//! Contacts, their Jacobian and operator: within rounding of the sources for any machine, every
+//! lane with the bits of the same source run as `f64`.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::{UnitQuaternion, Vector3};
-use rover_core::contact::pair::ON_SURFACE;
 use rover_core::contact::{
-    self, Activation, Contact, ContactSystem, Part, generalized_impulse, relocate,
+    self, Activation, Contact, ContactKey, ContactSystem, PairSearch, Part, generalized_impulse,
+    relocate,
 };
-use rover_core::geometry::query::CIRCLE;
 use rover_core::geometry::{Plane, Rocks, SphereField, Terrain};
 use rover_core::integrator::WarmStart;
-use rover_core::lanes::contacts::Contacts;
+use rover_core::lanes::contacts::{Contacts, Sight};
 use rover_core::lanes::forecast::Forecast;
 use rover_core::lanes::ground::Ground;
 use rover_core::lanes::machine::Machine;
 use rover_core::lanes::problem::ContactProblem;
 use rover_core::lanes::rows::{Answer, Rows};
+use rover_core::multibody::description::SolidDescription;
 use rover_core::multibody::inertias::Inertias;
 use rover_core::multibody::place::Place;
 use rover_core::multibody::poses::Poses;
-use rover_core::multibody::{Configuration, Kinematics, Model};
-use rover_core::multibody::{Factor, MassMatrix};
+use rover_core::multibody::{
+    Configuration, Factor, Kinematics, MassMatrix, Model, ModelDescription,
+};
 use rover_core::scalar::{Lane, LaneMask, Single, Vec3};
 
 use super::{OverLanes, Random, on_every_register, spread};
@@ -55,7 +57,7 @@ impl Step {
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Found {
     is_declined: bool,
-    keys: Vec<(usize, u32)>,
+    keys: Vec<ContactKey>,
     geometry: Vec<f64>,
     u_before: Vec<f64>,
     operator: Vec<f64>,
@@ -68,6 +70,7 @@ struct Found {
 struct Block<T: Lane> {
     token: T::Token,
     machine: Machine,
+    models: Vec<Option<Arc<Model>>>,
     inertias: Inertias<T>,
     ground: Ground<T>,
     contacts: Contacts<T>,
@@ -90,6 +93,7 @@ impl<T: Lane> Block<T> {
             token,
             rows: Rows::new(token, &machine, contacts.n_slots()),
             machine,
+            models: vec![Some(Arc::new(model.clone())); T::LANES],
             inertias,
             ground,
             contacts,
@@ -123,9 +127,17 @@ impl<T: Lane> Block<T> {
         let (middle, end) = (&poses[0], &poses[1]);
         let gravity = Vec3::splat(token, [0.0, -G, 0.0]);
         let forecast = Forecast::new(gravity, step.h, step.gamma, (1.0 - THETA) * step.h);
-        let declined = self
-            .contacts
-            .detect(&mut self.ground, middle, end, &v, &forecast);
+        let sight = Sight {
+            machine,
+            models: &self.models,
+            going: (1 << T::LANES) - 1,
+            middle,
+            end,
+            v: &v,
+            needs_pieces: false,
+            forecast: &forecast,
+        };
+        let declined = self.contacts.detect(&mut self.ground, &sight);
         let mut M = MassMatrix::new(token, machine);
         M.update(machine, inertias, middle);
         let mut factor = Factor::new(token, machine);
@@ -136,9 +148,9 @@ impl<T: Lane> Block<T> {
         let mut q = vec![[zero; 3]; self.contacts.n_slots()];
         let change = spread(token, rovers, |_| (0..v.len()).map(number).collect());
         T::vectorize(token, || self.rows.local(&self.contacts, &change, &mut q));
-        let mu = T::splat(token, MU);
+        let mu = vec![T::splat(token, MU); self.contacts.n_slots()];
         self.rows
-            .to_problems(&self.contacts, &q, mu, &mut self.problems);
+            .to_problems(&self.contacts, &q, &mu, &mut self.problems);
         for problem in &mut self.problems {
             for (k, p) in problem.p.iter_mut().enumerate() {
                 *p = number(k);
@@ -153,7 +165,7 @@ impl<T: Lane> Block<T> {
                 .read(&self.contacts, &self.problems, Answer::Impulses, &mut p);
             self.rows.add_impulses(&self.contacts, all, &p, &mut y);
             self.rows
-                .generalized_impulse(&self.contacts, end, all, &p, &mut impulse);
+                .generalized_impulse(machine, &self.contacts, end, all, &p, &mut impulse);
         });
         (0..T::LANES)
             .map(|lane| {
@@ -180,9 +192,8 @@ impl<T: Lane> Block<T> {
                 );
                 for c in 0..n {
                     let slot = usize::from(list.slots[c]);
-                    found
-                        .keys
-                        .push((self.contacts.part(slot), list.primitives[c]));
+                    let (_, contact) = self.contacts.contact(machine, lane, c);
+                    found.keys.push(contact.key);
                     let own = self.contacts.slot(slot);
                     assert!(own.active.get(lane));
                     for x in [own.point, own.n, own.t, own.b] {
@@ -216,8 +227,10 @@ fn number(k: usize) -> f64 {
     (1.3 * k as f64 + 0.4).sin()
 }
 
-/// The same by the sources for any machine, and whether a step of it must be declined.
-fn expected(model: &Model, rover: &Rover, step: Step) -> (Found, bool) {
+/// The same by the sources for any machine, contacts in the same order; none where the ground is
+/// unknown, and where there are more contacts than slots if the other has been declined.
+fn expected(model: &Model, rover: &Rover, step: Step, found: &Found) -> Option<Found> {
+    let keys = &found.keys[..];
     let moved = |h: f64| {
         let mut q = rover.q.clone();
         q.set_moved(model, &rover.q, &rover.v, h);
@@ -233,7 +246,7 @@ fn expected(model: &Model, rover: &Rover, step: Step) -> (Found, bool) {
         margin: 50.0 * step.lead().abs(),
     };
     let mut contacts = Vec::new();
-    contact::detect(
+    let unknown = contact::detect(
         model,
         &middle,
         &end,
@@ -242,7 +255,28 @@ fn expected(model: &Model, rover: &Rover, step: Step) -> (Found, bool) {
         &activation,
         &mut contacts,
     );
-    let is_rare = is_rare(model, &contacts);
+    if unknown.is_some() {
+        return None;
+    }
+    let mut pairs = PairSearch::new(model);
+    contact::detect_pairs(
+        model,
+        &middle,
+        &rover.v,
+        &activation,
+        &mut pairs,
+        &mut contacts,
+    );
+    if found.is_declined && contacts.len() > 6 {
+        return None;
+    }
+    assert_eq!(contacts.len(), keys.len(), "{contacts:?}, {keys:?}");
+    let place = |contact: &Contact| {
+        let is_own = |key: &ContactKey| [contact.key, contact.key.lasting()].contains(key);
+        let place = keys.iter().position(is_own);
+        place.unwrap_or_else(|| panic!("{contact:?} is not among {keys:?}"))
+    };
+    contacts.sort_by_key(place);
     for contact in &mut contacts {
         relocate(model, &end, &*rover.terrain, contact);
     }
@@ -275,12 +309,6 @@ fn expected(model: &Model, rover: &Rover, step: Step) -> (Found, bool) {
         ..Found::default()
     };
     for contact in &contacts {
-        let contact::Opposite::Ground(primitive) = contact.key.lasting().opposite else {
-            panic!("only the ground")
-        };
-        if let Part::Wheel(wheel) = contact.part {
-            found.keys.push((wheel, primitive));
-        }
         for x in [
             contact.point,
             contact.frame.n,
@@ -291,60 +319,7 @@ fn expected(model: &Model, rover: &Rover, step: Step) -> (Found, bool) {
         }
         found.geometry.push(contact.gap);
     }
-    (found, is_rare)
-}
-
-/// Whether lanes have no place for these contacts.
-fn is_rare(model: &Model, contacts: &[Contact]) -> bool {
-    let of = |i: usize, on_plane: bool| {
-        let own = contacts.iter().filter(|c| c.part == Part::Wheel(i));
-        own.filter(|c| (c.key.opposite == contact::Opposite::Ground(0)) == on_plane)
-            .count()
-    };
-    let is_common = |c: &Contact| {
-        matches!(c.part, Part::Wheel(_))
-            && (usize::from(c.key.feature) & !ON_SURFACE).is_multiple_of(CIRCLE)
-    };
-    let has_lines = Machine::of(model).unwrap().has_lines();
-    let is_full = |i| {
-        if has_lines {
-            // A field without a plane counts its spheres from 0.
-            of(i, false) > 2 || of(i, true) > 2
-        } else {
-            of(i, true) + of(i, false) > 2
-        }
-    };
-    let most = if has_lines { 32 } else { 8 };
-    contacts.len() > most || !contacts.iter().all(is_common) || (0..6).any(is_full)
-}
-
-/// Whether a step is rare if parts are in contact from somewhat further off.
-fn is_nearly_rare(model: &Model, rover: &Rover, step: Step) -> bool {
-    let fastest = rover.v.iter().map(|v| v.abs()).sum::<f64>() * 2.0;
-    let near = |h: f64| {
-        let mut q = rover.q.clone();
-        q.set_moved(model, &rover.q, &rover.v, h);
-        let mut kinematics = Kinematics::new(model);
-        kinematics.update_for_step(model, &q);
-        let activation = Activation {
-            lead: 0.0,
-            hover: 0.01 + step.h * fastest,
-            slow: f64::INFINITY,
-            margin: 0.0,
-        };
-        let mut contacts = Vec::new();
-        contact::detect(
-            model,
-            &kinematics,
-            &kinematics,
-            &*rover.terrain,
-            &rover.v,
-            &activation,
-            &mut contacts,
-        );
-        is_rare(model, &contacts)
-    };
-    near(0.5 * step.h)
+    Some(found)
 }
 
 fn assert_close(name: &str, a: &[f64], b: &[f64], tolerance: f64) {
@@ -425,20 +400,13 @@ fn grounds() -> Vec<Arc<dyn Terrain>> {
     ]
 }
 
+/// Returns whether the lanes have taken the step.
 fn check(model: &Model, rover: &Rover, step: Step, found: &Found) -> bool {
-    let (right, is_rare) = expected(model, rover, step);
-    if is_rare {
-        assert!(found.is_declined, "{right:?}");
-    }
-    if found.is_declined {
-        let has_surface = rover.terrain.has_surface();
-        assert!(
-            has_surface || is_nearly_rare(model, rover, step),
-            "declined: {right:?}"
-        );
+    let Some(right) = expected(model, rover, step, found) else {
+        assert!(found.is_declined);
         return false;
-    }
-    assert_eq!(found.keys, right.keys);
+    };
+    assert!(!found.is_declined);
     assert_close("geometry", &found.geometry, &right.geometry, 1e-13);
     assert_close("velocity before", &found.u_before, &right.u_before, 1e-12);
     assert_close("operator", &found.operator, &right.operator, 1e-12);
@@ -504,14 +472,43 @@ fn wide(width: f64, rounding: f64) -> Model {
     Model::from_description(description).unwrap()
 }
 
-fn contacts_agree(model: &Model) {
+/// The built-in rover with a box and a ball below its trunk, which can touch the ground and other
+/// bodies.
+fn cluttered() -> Model {
+    let mut description = ModelDescription::rover();
+    let shapes = "name = \"one\"\n[[solids]]\nname = \"a\"\nmass = 2.0\nshapes = [\n\
+                  { kind = \"box\", size = [0.5, 0.5, 0.1], collides = true },\n\
+                  { kind = \"sphere\", radius = 0.12, position = [0.3, -0.25, 0.1], collides = true },\n]\n";
+    let template = description.solids[1].clone();
+    description.solids.push(SolidDescription {
+        name: "mast".into(),
+        parent: Some("trunk".into()),
+        position: Some([-0.2, -0.05, 0.1]),
+        hold: None,
+        shape: None,
+        collides: false,
+        shapes: ModelDescription::from_toml(shapes).unwrap().solids[0]
+            .shapes
+            .clone(),
+        ..template
+    });
+    description.self_contact = true;
+    Model::from_description(description).unwrap()
+}
+
+#[test]
+fn contacts_of_boxes_and_balls_agree() {
+    let kinds = contacts_agree(&cluttered());
+    for (kind, least) in [("box", 10), ("ball", 40)] {
+        assert!(kinds.get(kind).is_some_and(|n| *n > least), "{kinds:?}");
+    }
+}
+
+/// Returns the numbers of contacts by kind.
+fn contacts_agree(model: &Model) -> BTreeMap<&'static str, usize> {
     let mut random = Random(1);
-    let (mut ordinary, mut declined, mut n_contacts, mut on_spheres) = (0, 0, 0, 0);
-    let is_wide = Machine::of(model).unwrap().has_wide_wheels();
+    let mut kinds = BTreeMap::new();
     for terrain in grounds() {
-        if is_wide && terrain.has_surface() {
-            continue;
-        }
         for k in 0..40 {
             let depth = [1e-4, 0.01, 0.05][k % 3];
             let tilt = [0.0, 0.1, 0.3, 1.5][k / 10];
@@ -519,29 +516,35 @@ fn contacts_agree(model: &Model) {
             let step = STEPS[k % 2 + usize::from(k % 7 == 0)];
             let mut block = Block::<f64>::new(Single::best(), model, std::slice::from_ref(&rover));
             let found = &block.step(std::slice::from_ref(&rover), step)[0];
-            if check(model, &rover, step, found) {
-                ordinary += 1;
-                n_contacts += found.keys.len();
-                on_spheres += found
-                    .keys
-                    .iter()
-                    .filter(|(_, primitive)| *primitive > 0)
-                    .count();
-            } else {
-                declined += 1;
+            if !check(model, &rover, step, found) {
+                *kinds.entry("fallback").or_default() += 1;
+            }
+            for key in &found.keys {
+                let kind = match (key.opposite, key.part >> 14) {
+                    (contact::Opposite::Part(_), _) => "pair",
+                    (_, 1) => "ball",
+                    (_, 2) => "box",
+                    (contact::Opposite::Ground(0), _) => "plane",
+                    _ => "rock",
+                };
+                *kinds.entry(kind).or_default() += 1;
             }
         }
     }
     assert!(
-        ordinary > 100 && (is_wide || declined > 6) && n_contacts > 160 && on_spheres > 30,
-        "{ordinary} ordinary, {declined} declined, {n_contacts} contacts, {on_spheres} on spheres"
+        kinds["plane"] > 100
+            && kinds["rock"] > 30
+            && kinds["box"] > 1
+            && *kinds.get("fallback").unwrap_or(&0) < 30,
+        "{kinds:?}"
     );
+    kinds
 }
 
 fn lanes_agree<T: Lane>(token: T::Token) {
-    lanes_agree_on::<T>(token, &Model::rover(), &grounds());
-    let mut grounds = grounds();
-    grounds.retain(|ground| !ground.has_surface());
+    let grounds = grounds();
+    lanes_agree_on::<T>(token, &Model::rover(), &grounds);
+    lanes_agree_on::<T>(token, &cluttered(), &grounds);
     for [width, rounding] in TREADS {
         lanes_agree_on::<T>(token, &wide(width, rounding), &grounds);
     }
@@ -587,7 +590,7 @@ fn every_lane_has_the_bits_of_a_rover_alone() {
 
 /// The trunk moves by four times its distance from the rock in half a step, along it.
 #[test]
-fn a_trunk_close_over_a_rock_that_it_does_not_touch_is_ordinary() {
+fn a_trunk_touches_a_rock_no_sooner_than_it_should() {
     let model = Model::rover();
     let mut random = Random(5);
     let plane: Arc<dyn Terrain> = Arc::new(Plane::ground());
@@ -598,7 +601,10 @@ fn a_trunk_close_over_a_rock_that_it_does_not_touch_is_ordinary() {
         let centre = [rover.q.position.x, y, rover.q.position.z];
         let rock = SphereField::new(&[centre], &[0.1], Some(Plane::ground())).unwrap();
         rover.terrain = Arc::new(rock);
-        expected(&model, rover, step).1
+        let own = std::slice::from_ref(&*rover);
+        let found = &Block::<f64>::new(Single::best(), &model, own).step(own, step)[0];
+        assert!(check(&model, rover, step, found));
+        found.keys.iter().any(|key| key.part >= Part::Box(0).code())
     };
     let (mut below, mut above) = (-0.1, rover.q.position.y);
     assert!(!put(&mut rover, below) && put(&mut rover, above));
@@ -611,11 +617,8 @@ fn a_trunk_close_over_a_rock_that_it_does_not_touch_is_ordinary() {
         }) = y;
     }
     rover.v[0] = 1.0;
-    for (distance, is_ordinary) in [(-1e-3, false), (2.5e-3, true), (5e-3, true)] {
-        put(&mut rover, below - distance);
-        let mut block = Block::<f64>::new(Single::best(), &model, std::slice::from_ref(&rover));
-        let found = &block.step(std::slice::from_ref(&rover), step)[0];
-        assert_eq!(check(&model, &rover, step, found), is_ordinary);
+    for (distance, touches) in [(-1e-3, true), (2.5e-3, false), (5e-3, false)] {
+        assert_eq!(put(&mut rover, below - distance), touches);
     }
 }
 

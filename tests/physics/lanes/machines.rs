@@ -2,9 +2,12 @@
 
 use std::sync::Arc;
 
-use rover_core::geometry::Plane;
+use nalgebra::{UnitQuaternion, Vector3};
+use rover_core::contact::Part;
+use rover_core::geometry::{Plane, Terrain};
 use rover_core::integrator::moreau_jean::MoreauJean;
 use rover_core::integrator::{Phase, Probe, StepOptions};
+use rover_core::law::materials::{MaterialPair, Materials};
 use rover_core::multibody::description::{
     CouplingDescription, JointKind, Limits, SolidDescription, Spring,
 };
@@ -124,7 +127,7 @@ fn drive(model: &Arc<Model>, h: f64, torque: f64) -> Met {
     };
     let ground = Arc::new(Plane::ground());
     let mut rover = RoverSimulation::new(Arc::clone(model), ground, options).unwrap();
-    assert_eq!(rover.never_ordinary(), None);
+    assert_eq!(rover.fallback_reason(), None);
     let mut start = Configuration::zero(model);
     let wheels = model.wheels().iter();
     let lowest = wheels.map(|wheel| {
@@ -148,7 +151,8 @@ fn drive(model: &Arc<Model>, h: f64, torque: f64) -> Met {
             general.step_with(&MoreauJean, 1).unwrap();
             let mut parts = Parts::default();
             let report = rover.step_probed(1, &mut parts).unwrap();
-            let is_general = parts.kinematics > 1;
+            let is_general = report.fallbacks > 0;
+            assert_eq!(is_general, parts.kinematics > 1);
             met.steps += 1;
             met.general += usize::from(is_general);
             met.retaken += usize::from(!is_general && report.retaken > 0);
@@ -208,4 +212,79 @@ fn every_joint_and_force_obeys_the_law_of_the_general_step() {
             }
         }
     }
+}
+
+/// The built-in rover on its back, on its side or pushed against the ground, whose boxes touch the
+/// ground, also with friction by pair of materials, and with bodies that can touch each other.
+#[test]
+fn bodies_on_the_ground_obey_the_law_of_the_general_step() {
+    let mut touching = ModelDescription::rover();
+    touching.self_contact = true;
+    let materials = Materials::new(vec![MaterialPair {
+        materials: ["body".into(), "ground".into()],
+        friction_coefficient: 0.3,
+        restitution: 0.0,
+    }]);
+    let grounds: [Arc<dyn Terrain>; 3] = [
+        Arc::new(Plane::ground()),
+        super::surfaces::hills(0.25, 3),
+        super::surfaces::hills_with_rocks(4),
+    ];
+    let mut numbers = Random(9);
+    let (mut steps, mut fallbacks, mut boxes, mut pairs) = (0, 0, 0, 0);
+    let mut differences = Vec::new();
+    for (k, ground) in grounds.iter().cycle().take(9).enumerate() {
+        let own = if k % 2 == 0 {
+            ModelDescription::rover()
+        } else {
+            touching.clone()
+        };
+        let model = Arc::new(Model::from_description(own).unwrap());
+        let options = StepOptions {
+            materials: if k > 5 {
+                materials.clone()
+            } else {
+                Materials::default()
+            },
+            ..StepOptions::default()
+        };
+        let mut rover =
+            RoverSimulation::new(Arc::clone(&model), Arc::clone(ground), options).unwrap();
+        let mut start = Configuration::zero(&model);
+        start.position.y = 0.6;
+        let turn = [3.1, 1.5, 2.8][k / 3];
+        start.attitude = UnitQuaternion::from_scaled_axis(Vector3::x() * turn);
+        rover.set_state(
+            start,
+            (0..model.nv()).map(|_| 0.5 * numbers.next()).collect(),
+        );
+        for step in 0..200 {
+            if step % 20 == 0 {
+                let torques: Vec<f64> = (0..6).map(|_| 60.0 * numbers.next()).collect();
+                rover.set_commands(&torques, &[0.0; 6]).unwrap();
+            }
+            let mut general = rover.clone();
+            general.step_with(&MoreauJean, 1).unwrap();
+            let report = rover.step(1).unwrap();
+            steps += 1;
+            fallbacks += report.fallbacks;
+            let kinds = rover.contacts().iter().map(|a| a.contact);
+            boxes += kinds
+                .clone()
+                .filter(|c| matches!(c.part, Part::Box(_)))
+                .count();
+            pairs += kinds.filter(|c| c.other.is_some()).count();
+            let both = rover.v().iter().zip(general.v());
+            differences.push(both.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs())));
+        }
+    }
+    differences.sort_by(f64::total_cmp);
+    assert!(fallbacks * 10 < steps, "{fallbacks} of {steps}");
+    assert!(
+        boxes > 1000 && pairs > 100,
+        "{boxes} contacts of boxes, {pairs} of pairs"
+    );
+    // A few friction problems have several answers.
+    let typical = differences[steps * 90 / 100];
+    assert!(typical < 1e-9, "{typical:e}");
 }

@@ -58,7 +58,7 @@ fn a_wide_wheel_is_written_and_read_and_tells_models_apart() {
 }
 
 #[test]
-fn wheels_of_any_width_are_ordinary() {
+fn wheels_of_any_width_have_a_fast_step() {
     for (width, rounding) in [(0.0, 0.0), (0.2, 0.05), (0.15, 0.075)] {
         assert!(Machine::of(&wide_rover(width, rounding)).is_ok());
     }

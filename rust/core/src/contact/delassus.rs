@@ -9,6 +9,7 @@ use std::ops::Range;
 use super::jacobian::{Columns, columns, columns_of_other, relative_velocity};
 use super::limit;
 use super::pair::{Contact, Opposite};
+use super::stance::Still;
 use crate::multibody::{BASE, Factor, Kinematics, Model};
 
 /// The contacts of a step in matrix form. The storage grows to the largest step and is then reused.
@@ -333,7 +334,14 @@ impl ContactSystem {
                 values[0] += sign * v[k];
                 continue;
             }
-            let velocity = relative_velocity(model, kinematics, contact, v);
+            let velocity = relative_velocity(
+                &Still {
+                    model,
+                    kinematics,
+                    v,
+                },
+                contact,
+            );
             for (value, d) in values.iter_mut().zip(contact.frame.rows()) {
                 *value += velocity.dot(&d);
             }

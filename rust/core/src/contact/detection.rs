@@ -6,6 +6,7 @@ use super::activation::Activation;
 use super::frame::ContactFrame;
 use super::pair::{Contact, ContactKey, ON_SURFACE, Opposite};
 use super::part::{Part, wheel_shape};
+use super::stance::{Stance, Still};
 use super::ways_out::{OverSurfaces, WaysOut};
 use crate::geometry::query::sweep::{DEEP, first_touch};
 use crate::geometry::query::{
@@ -40,10 +41,47 @@ pub fn detect(
     out: &mut Vec<Contact>,
 ) -> Option<[f64; 2]> {
     out.clear();
-    let mut gate = Gate {
+    let at = |kinematics, v| Still {
         model,
         kinematics,
         v,
+    };
+    let machine = Moving {
+        model,
+        middle: &at(kinematics, v),
+        end: &at(end, v),
+    };
+    let parts = (0..model.wheels().len()).map(Part::Wheel);
+    let parts = parts.chain((0..model.boxes().len()).map(Part::Box));
+    detect_parts(
+        parts.chain((0..model.spheres().len()).map(Part::Sphere)),
+        &machine,
+        terrain,
+        activation,
+        out,
+    )
+}
+
+/// A machine in a step: at its midpoint, where gaps and velocities are measured, and at its
+/// predicted end.
+#[derive(Clone, Copy)]
+pub(crate) struct Moving<'a, S> {
+    pub model: &'a Model,
+    pub middle: &'a S,
+    pub end: &'a S,
+}
+
+/// [`detect`] for some parts; adds to `out`.
+#[inline]
+pub(crate) fn detect_parts<S: Stance>(
+    parts: impl Iterator<Item = Part>,
+    machine: &Moving<'_, S>,
+    terrain: &dyn Terrain,
+    activation: &Activation,
+    out: &mut Vec<Contact>,
+) -> Option<[f64; 2]> {
+    let mut gate = Gate {
+        machine,
         activation,
         reach: activation.reach(),
         can_be_passed: terrain.can_be_passed(),
@@ -51,14 +89,8 @@ pub fn detect(
         ways: WaysOut::default(),
         out,
     };
-    for i in 0..model.wheels().len() {
-        candidates(Part::Wheel(i), end, terrain, &mut gate);
-    }
-    for i in 0..model.boxes().len() {
-        candidates(Part::Box(i), end, terrain, &mut gate);
-    }
-    for i in 0..model.spheres().len() {
-        candidates(Part::Sphere(i), end, terrain, &mut gate);
+    for part in parts {
+        candidates(part, terrain, &mut gate);
     }
     gate.unknown
 }
@@ -82,10 +114,8 @@ pub fn deepest_overlap(model: &Model, kinematics: &Kinematics, terrain: &dyn Ter
 }
 
 /// Admits the candidates that become contacts.
-struct Gate<'a> {
-    model: &'a Model,
-    kinematics: &'a Kinematics,
-    v: &'a [f64],
+struct Gate<'a, S> {
+    machine: &'a Moving<'a, S>,
     activation: &'a Activation,
     reach: f64,
     can_be_passed: bool,
@@ -118,14 +148,14 @@ impl Placed {
     }
 }
 
-impl Gate<'_> {
+impl<S: Stance> Gate<'_, S> {
     #[inline]
     fn offer(&mut self, placed: &Placed, point: &SurfacePoint, primitive: u32) {
         let u_N = || {
-            let velocity =
-                self.kinematics
-                    .point_velocity(self.model, placed.body, &point.point, self.v);
-            point.n.dot(&velocity)
+            let middle = self.machine.middle;
+            point
+                .n
+                .dot(&middle.point_velocity(placed.body, &point.point))
         };
         if self.activation.admits(point.gap, u_N) {
             self.out.push(placed.contact(point, primitive));
@@ -187,14 +217,15 @@ impl Gate<'_> {
 
 /// Offers the ground contacts of one part.
 #[inline]
-fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Gate<'_>) {
-    let (model, kinematics) = (gate.model, gate.kinematics);
+fn candidates<S: Stance>(part: Part, terrain: &dyn Terrain, gate: &mut Gate<'_, S>) {
+    let Moving { model, middle, end } = *gate.machine;
     let body = part.body(model);
-    let base = kinematics.origin(body);
+    let base = &middle.origin(body);
+    let (R, r) = middle.pose(body);
     let placed = Placed {
         part,
         body,
-        shape: part.place(model, kinematics),
+        shape: part.place_at(model, (&R, &r)),
     };
     let (centre, bound) = match &placed.shape {
         PlacedShape::Disc(disc) => (disc.centre, disc.radius),
@@ -202,12 +233,12 @@ fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Ga
         PlacedShape::Box(solid) => (solid.centre, solid.half_size.norm()),
         PlacedShape::Sphere(sphere) => (sphere.centre, sphere.radius),
     };
-    let end_centre = || end.point(body, &part.centre(model));
     let (half_way, motion) = if gate.can_be_passed {
-        let half_way = end.origin(body) - base + end_centre() - centre;
+        let (R_end, r_end) = end.pose(body);
+        let half_way = end.origin(body) - base + (r_end + R_end * part.centre(model)) - centre;
         let turning = match &placed.shape {
             // The sweep of a box includes its rotation; the other shapes are treated as round.
-            PlacedShape::Box(_) => (end.R(body) - kinematics.R(body)).norm() * bound,
+            PlacedShape::Box(_) => (R_end - R).norm() * bound,
             PlacedShape::Disc(_) | PlacedShape::Roller(_) | PlacedShape::Sphere(_) => 0.0,
         };
         (half_way, half_way.norm() + turning)
@@ -237,7 +268,7 @@ fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Ga
             }
             let near = dispatch::point_on_sphere(&placed.shape, sphere, base);
             gate.offer_sphere(&placed, (id, sphere), &near, motion, || {
-                touch(&placed, end, model, sphere, base, &half_way)
+                touch(&placed, gate.machine, sphere, base, &half_way)
             });
         }
         piece => {
@@ -334,10 +365,9 @@ fn is_far(shape: &PlacedShape, between: &Vector3<f64>, within: f64) -> bool {
 
 /// Normal from a sphere of the ground to a part at their first contact in this step, if the part
 /// passes the sphere.
-fn touch(
+fn touch<S: Stance>(
     placed: &Placed,
-    end: &Kinematics,
-    model: &Model,
+    machine: &Moving<'_, S>,
     ground: &Sphere,
     base: &Vector3<f64>,
     half_way: &Vector3<f64>,
@@ -347,10 +377,11 @@ fn touch(
         PlacedShape::Roller(roller) => touch_of_roller(roller, ground, base, half_way),
         PlacedShape::Box(solid) => {
             let middle = solid.R.tr_mul(&(ground.centre - base - solid.centre));
-            let PlacedShape::Box(at_end) = placed.part.place(model, end) else {
+            let (R, r) = machine.end.pose(placed.body);
+            let PlacedShape::Box(at_end) = placed.part.place_at(machine.model, (&R, &r)) else {
                 return None;
             };
-            let origin = end.origin(placed.body);
+            let origin = machine.end.origin(placed.body);
             let last = (at_end.R).tr_mul(&(ground.centre - origin - at_end.centre));
             let distance = |x: &Vector3<f64>| {
                 let (_, n, distance) = box_sphere::nearest_local(x, &solid.half_size);

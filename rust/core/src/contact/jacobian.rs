@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 
 use super::limit;
 use super::pair::Contact;
+use super::stance::Stance;
 use crate::multibody::{BASE, Kinematics, Model};
 
 /// Entries of a contact's three rows n, t, b for one velocity, padded to two pairs of SIMD lanes.
@@ -22,18 +23,13 @@ fn place_in_tree_of(kinematics: &Kinematics, contact: &Contact, body: usize) -> 
 /// Velocity (m/s, world) of the contact's part relative to its other side, at the contact point.
 #[inline]
 #[must_use]
-pub fn relative_velocity(
-    model: &Model,
-    kinematics: &Kinematics,
-    contact: &Contact,
-    v: &[f64],
-) -> Vector3<f64> {
-    let velocity = kinematics.point_velocity(model, contact.body, &contact.point, v);
+pub(crate) fn relative_velocity(stance: &impl Stance, contact: &Contact) -> Vector3<f64> {
+    let velocity = stance.point_velocity(contact.body, &contact.point);
     let Some(other) = contact.other else {
         return velocity;
     };
-    let x = place_in_tree_of(kinematics, contact, other.body);
-    velocity - kinematics.point_velocity(model, other.body, &x, v)
+    let x = contact.point + (stance.origin(contact.body) - stance.origin(other.body));
+    velocity - stance.point_velocity(other.body, &x)
 }
 
 /// Rows of Hᵀ along the path of the contact's own body: velocity of the body's point along n, t, b

@@ -4,7 +4,8 @@
 //! A contact ([`pair`]) connects a part of a body to the ground or to a part of another body.
 //! [`detection`] finds contacts with the ground, [`pair_detection`] contacts between bodies, and
 //! [`limit`] joints at their stops. The broad phase selects candidates, [`crate::geometry::query`]
-//! computes gaps and normals, and [`activation`] decides which contacts enter the step.
+//! computes gaps and normals of a machine in a `stance`, and [`activation`] decides which contacts
+//! enter the step.
 //! [`wheel_gaps`] measures how far the wheels are from the ground and nothing else,
 //! `box_clearance` how far a box is from a surface at least.
 //! [`relocation`] re-evaluates them in another configuration. [`jacobian`] and [`delassus`]
@@ -21,6 +22,7 @@ pub mod pair;
 pub mod pair_detection;
 pub mod part;
 pub mod relocation;
+pub(crate) mod stance;
 pub(crate) mod ways_out;
 pub mod wheel_gaps;
 

@@ -11,6 +11,9 @@ use serde::{Deserialize, Serialize};
 
 use super::frame::ContactFrame;
 use super::part::Part;
+use crate::geometry::Terrain;
+use crate::law::materials::Materials;
+use crate::multibody::Model;
 
 /// The other side of a contact, by index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -71,6 +74,16 @@ impl ContactKey {
             part: part.code(),
             feature: narrow(feature),
             opposite: Opposite::Ground(primitive),
+        }
+    }
+
+    /// The same on a surface.
+    #[inline]
+    #[must_use]
+    pub fn on_surface(self) -> Self {
+        Self {
+            feature: self.feature | narrow(ON_SURFACE),
+            ..self
         }
     }
 
@@ -136,4 +149,23 @@ pub struct Contact {
     pub gap: f64,
     /// Depth behind a piece of a surface that is no way out, and that the gap leaves out, m.
     pub excess: f64,
+}
+
+impl Contact {
+    /// μ and e where its two materials have a law of their own.
+    #[must_use]
+    pub fn between_materials(
+        &self,
+        model: &Model,
+        terrain: &dyn Terrain,
+        materials: &Materials,
+    ) -> Option<[f64; 2]> {
+        let own = self.part.material(model);
+        let opposite = match (self.key.opposite, self.other) {
+            (Opposite::Ground(primitive), _) => terrain.material(primitive),
+            (Opposite::Part(_), Some(other)) => other.part.material(model),
+            (Opposite::Part(_), None) | (Opposite::Grain(_) | Opposite::Stop, _) => return None,
+        };
+        materials.between(own, opposite)
+    }
 }

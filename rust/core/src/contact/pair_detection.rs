@@ -11,6 +11,7 @@ use super::jacobian::relative_velocity;
 use super::pair::{Contact, ContactKey, OtherSide};
 use super::part::Part;
 use super::relocation::place_pair;
+use super::stance::{Stance, Still};
 use crate::geometry::Sphere;
 use crate::geometry::broad_phase::IntervalSweep;
 use crate::geometry::query::dispatch;
@@ -59,6 +60,22 @@ pub fn detect_pairs(
     search: &mut PairSearch,
     out: &mut Vec<Contact>,
 ) {
+    let machine = Still {
+        model,
+        kinematics,
+        v,
+    };
+    detect_pairs_of(model, &machine, activation, search, out);
+}
+
+/// The same by the stance of a machine.
+pub(crate) fn detect_pairs_of(
+    model: &Model,
+    stance: &impl Stance,
+    activation: &Activation,
+    search: &mut PairSearch,
+    out: &mut Vec<Contact>,
+) {
     let PairSearch {
         parts,
         balls,
@@ -68,13 +85,14 @@ pub fn detect_pairs(
         return;
     }
     let reach = activation.hover.max(2.0 * activation.margin);
-    let first_origin = kinematics.origin(parts[0].body(model));
+    let first_origin = stance.origin(parts[0].body(model));
     balls.clear();
     balls.extend(parts.iter().map(|part| {
         let body = part.body(model);
-        let shift = kinematics.origin(body) - first_origin;
+        let shift = stance.origin(body) - first_origin;
+        let (R, r) = stance.pose(body);
         Sphere {
-            centre: kinematics.point(body, &part.centre(model)) + shift,
+            centre: r + R * part.centre(model) + shift,
             radius: part.bound(model),
         }
     }));
@@ -86,7 +104,7 @@ pub fn detect_pairs(
             part: other,
             body: other.body(model),
         };
-        let (first, second) = place_pair(model, kinematics, other.part, part);
+        let (first, second) = place_pair(model, stance, other.part, part);
         dispatch::visit_pair(&first, &second, reach, |point| {
             let contact = Contact {
                 key: ContactKey::between(part, point.feature, other.part),
@@ -98,7 +116,7 @@ pub fn detect_pairs(
                 gap: point.gap,
                 excess: 0.0,
             };
-            let u_N = || (contact.frame.n).dot(&relative_velocity(model, kinematics, &contact, v));
+            let u_N = || (contact.frame.n).dot(&relative_velocity(stance, &contact));
             if activation.admits(contact.gap, u_N) {
                 out.push(contact);
             }

@@ -1,6 +1,6 @@
 //! The collision parts of a model and their placement.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Disc, OrientedBox, PlacedShape, Roller, Sphere};
@@ -146,35 +146,37 @@ impl Part {
     #[inline]
     #[must_use]
     pub fn place(self, model: &Model, kinematics: &Kinematics) -> PlacedShape {
+        let body = self.body(model);
+        self.place_at(model, (&kinematics.R(body), &kinematics.r(body)))
+    }
+
+    /// The same where its body has an attitude and an origin, m.
+    #[inline]
+    #[must_use]
+    pub fn place_at(self, model: &Model, pose: (&Matrix3<f64>, &Vector3<f64>)) -> PlacedShape {
         if let Self::Wheel(i) = self {
-            wheel_shape(&model.wheels()[i], kinematics)
+            let wheel = &model.wheels()[i];
+            shape_about(wheel, disc_at(wheel, pose))
         } else {
-            self.place_solid(model, kinematics)
+            self.place_solid(model, pose)
         }
     }
 
     /// The same for balls and boxes, kept separate so that the short code for wheels is inlined.
-    fn place_solid(self, model: &Model, kinematics: &Kinematics) -> PlacedShape {
+    fn place_solid(self, model: &Model, (R, r): (&Matrix3<f64>, &Vector3<f64>)) -> PlacedShape {
+        let centre = r + R * self.centre(model);
         match self {
-            Self::Wheel(i) => wheel_shape(&model.wheels()[i], kinematics),
             Self::Box(i) => {
                 let solid = &model.boxes()[i];
                 PlacedShape::Box(OrientedBox {
-                    centre: kinematics.point(solid.body, &solid.centre),
-                    R: kinematics.R(solid.body) * solid.rotation,
+                    centre,
+                    R: R * solid.rotation,
                     half_size: solid.half_size,
                 })
             }
-            Self::Sphere(i) => {
-                let ball = &model.spheres()[i];
-                PlacedShape::Sphere(Sphere {
-                    centre: kinematics.point(ball.body, &ball.centre),
-                    radius: ball.radius,
-                })
-            }
-            Self::Limit(i, _) => PlacedShape::Sphere(Sphere {
-                centre: kinematics.r(model.joints()[i].body),
-                radius: 0.0,
+            Self::Wheel(_) | Self::Sphere(_) | Self::Limit(..) => PlacedShape::Sphere(Sphere {
+                centre,
+                radius: self.bound(model),
             }),
         }
     }
@@ -203,9 +205,16 @@ pub fn shape_about(wheel: &Wheel, disc: Disc) -> PlacedShape {
 #[inline]
 #[must_use]
 pub fn place_wheel(wheel: &Wheel, kinematics: &Kinematics) -> Disc {
-    let R = kinematics.R(wheel.body);
+    disc_at(
+        wheel,
+        (&kinematics.R(wheel.body), &kinematics.r(wheel.body)),
+    )
+}
+
+#[inline]
+fn disc_at(wheel: &Wheel, (R, r): (&Matrix3<f64>, &Vector3<f64>)) -> Disc {
     Disc {
-        centre: kinematics.point(wheel.body, &wheel.centre),
+        centre: r + R * wheel.centre,
         axle: R * wheel.axle,
         spoke: R * wheel.spoke,
         radius: wheel.radius,

@@ -6,6 +6,7 @@ use super::detection::PASSING;
 use super::frame::ContactFrame;
 use super::pair::{Contact, ON_SURFACE, Opposite, OtherSide};
 use super::part::Part;
+use super::stance::{Stance, Still};
 use crate::geometry::query::dispatch;
 use crate::geometry::{PlacedShape, Primitive, Sphere, Terrain};
 use crate::multibody::{Kinematics, Model};
@@ -18,17 +19,35 @@ pub fn relocate(
     terrain: &dyn Terrain,
     contact: &mut Contact,
 ) {
+    let v = &[];
+    let machine = Still {
+        model,
+        kinematics,
+        v,
+    };
+    relocate_to(model, &machine, terrain, contact);
+}
+
+/// The same by the stance of a machine.
+#[inline]
+pub(crate) fn relocate_to(
+    model: &Model,
+    stance: &impl Stance,
+    terrain: &dyn Terrain,
+    contact: &mut Contact,
+) {
     let primitive = match (contact.key.opposite, contact.other) {
         (Opposite::Ground(primitive), _) => primitive,
         (Opposite::Part(_), Some(other)) => {
-            relocate_pair(model, kinematics, other, contact);
+            relocate_pair(model, stance, other, contact);
             return;
         }
         (Opposite::Part(_), None) | (Opposite::Grain(_) | Opposite::Stop, _) => return,
     };
-    let base = kinematics.origin(contact.body);
+    let base = &stance.origin(contact.body);
     let feature = usize::from(contact.key.feature) & !ON_SURFACE;
-    let shape = contact.part.place(model, kinematics);
+    let (R, r) = stance.pose(contact.body);
+    let shape = contact.part.place_at(model, (&R, &r));
     let point = match terrain.primitive(primitive) {
         Primitive::Plane(plane) => dispatch::point_on_plane(&shape, &plane, base, feature),
         Primitive::Sphere(sphere) if contact.key.feature == PASSING => {
@@ -44,8 +63,8 @@ pub fn relocate(
     (contact.point, contact.gap) = (point.point, point.gap + contact.excess);
 }
 
-fn relocate_pair(model: &Model, kinematics: &Kinematics, other: OtherSide, contact: &mut Contact) {
-    let (first, second) = place_pair(model, kinematics, other.part, contact.part);
+fn relocate_pair(model: &Model, stance: &impl Stance, other: OtherSide, contact: &mut Contact) {
+    let (first, second) = place_pair(model, stance, other.part, contact.part);
     let feature = usize::from(contact.key.feature);
     let point = dispatch::point_of_pair(&first, &second, feature);
     contact.frame = ContactFrame::of_pair(&second, &point);
@@ -55,19 +74,23 @@ fn relocate_pair(model: &Model, kinematics: &Kinematics, other: OtherSide, conta
 /// Two parts, both relative to the origin of the second one's tree.
 pub(super) fn place_pair(
     model: &Model,
-    kinematics: &Kinematics,
+    stance: &impl Stance,
     first: Part,
     second: Part,
 ) -> (PlacedShape, PlacedShape) {
-    let shift = kinematics.origin(first.body(model)) - kinematics.origin(second.body(model));
-    let mut shape = first.place(model, kinematics);
+    let place = |part: Part| {
+        let (R, r) = stance.pose(part.body(model));
+        part.place_at(model, (&R, &r))
+    };
+    let shift = stance.origin(first.body(model)) - stance.origin(second.body(model));
+    let mut shape = place(first);
     match &mut shape {
         PlacedShape::Disc(disc) => disc.centre += shift,
         PlacedShape::Roller(roller) => roller.core.centre += shift,
         PlacedShape::Box(solid) => solid.centre += shift,
         PlacedShape::Sphere(sphere) => sphere.centre += shift,
     }
-    (shape, second.place(model, kinematics))
+    (shape, place(second))
 }
 
 /// The sphere's point with the outward normal n, relative to `base`.

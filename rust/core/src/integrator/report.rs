@@ -39,6 +39,8 @@ pub struct StepReport {
     /// Repeated steps: a motor changed its branch, the energy audit required it, or Newton's law of
     /// restitution had no solution.
     pub retaken: usize,
+    /// Steps of a machine that the general step took, since the fast one does not take them.
+    pub fallbacks: usize,
     /// Largest energy gain in a step beyond the work of gravity and actuators, as a fraction of its
     /// kinetic energy.
     pub energy_gain: f64,
@@ -112,6 +114,7 @@ impl StepReport {
         self.residual = self.residual.max(later.residual);
         self.n_contacts = self.n_contacts.max(later.n_contacts);
         self.retaken += later.retaken;
+        self.fallbacks += later.fallbacks;
         self.energy_gain = self.energy_gain.max(later.energy_gain);
         self.energy_removed += later.energy_removed;
         self.energy_dissipated += later.energy_dissipated;

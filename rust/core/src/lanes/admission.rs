@@ -1,29 +1,26 @@
-//! Whether the steps of a rover are ordinary, and if not, why.
+//! Which options have a fast step.
 
 use thiserror::Error;
 
-use super::machine::NotOrdinary;
+use super::machine::Unsupported;
 use crate::integrator::{StepOptions, Variant};
 use crate::solver::Method;
 
-/// Why no step of a rover is ordinary.
+/// Why all steps of a rover are general.
 #[derive(Clone, Debug, Error, PartialEq)]
-pub enum NeverOrdinary {
-    /// The machine has no ordinary step.
+pub enum FallbackReason {
+    /// The machine has no fast step.
     #[error(transparent)]
-    Machine(#[from] NotOrdinary),
+    Machine(#[from] Unsupported),
     /// The variant is not [`Variant::Linearised`].
     #[error("the variant is Newton's")]
     Variant,
-    /// The ground is a surface and wheels have a width.
-    #[error("wheels with a width are on a surface")]
-    WideWheelsOnSurface,
     /// Contacts bounce.
     #[error("the restitution is {0}, not 0")]
     Restitution(f64),
-    /// Pairs of materials have laws of their own.
-    #[error("pairs of materials have laws of their own")]
-    Materials,
+    /// Contacts of two materials bounce.
+    #[error("the restitution between two materials is not 0")]
+    ElasticMaterials,
     /// The solver does not start from the last impulses.
     #[error("the warm start is off")]
     WarmStart,
@@ -32,22 +29,22 @@ pub enum NeverOrdinary {
     Method,
 }
 
-/// Whether steps with these options can be ordinary.
+/// Whether these options have a fast step.
 ///
 /// # Errors
-/// Why they cannot.
+/// Why they have none.
 #[inline]
-pub fn admit(options: &StepOptions) -> Result<(), NeverOrdinary> {
+pub fn admit(options: &StepOptions) -> Result<(), FallbackReason> {
     if options.variant != Variant::Linearised {
-        Err(NeverOrdinary::Variant)
+        Err(FallbackReason::Variant)
     } else if options.restitution != 0.0 {
-        Err(NeverOrdinary::Restitution(options.restitution))
-    } else if !options.materials.is_empty() {
-        Err(NeverOrdinary::Materials)
+        Err(FallbackReason::Restitution(options.restitution))
+    } else if options.materials.is_elastic() {
+        Err(FallbackReason::ElasticMaterials)
     } else if !options.warm_start {
-        Err(NeverOrdinary::WarmStart)
+        Err(FallbackReason::WarmStart)
     } else if options.solver.method != Method::Auto {
-        Err(NeverOrdinary::Method)
+        Err(FallbackReason::Method)
     } else {
         Ok(())
     }

@@ -80,6 +80,9 @@ impl<T: Lane, const C: usize, S: System<T, C>> Bench<T, C, S> {
             let contact = S::contact_at(problem, i);
             let is_used = contact.is_some();
             let contact = contact.unwrap_or(0);
+            if !is_used {
+                own.vacate(i, lane);
+            }
             let w = S::block_of(problem, contact);
             let (normal, tangential) = if is_used {
                 (w[0], w[4] + w[8])

@@ -1,34 +1,36 @@
-//! Contacts of the wheels with the ground, in slots, and those of joints with their stops.
+//! Contacts of a block, in slots: of the wheels with the ground, of other bodies, and of joints
+//! with their stops.
 //!
 //! A wheel with one circle, a thin disc or a torus, has three slots: most touch the plane or a
-//! sphere, some both or two spheres, and on rough maps two or three pieces. A wheel with two
-//! circles has four: one for each circle on the plane, and two for spheres. A slot is filled lane
-//! by lane; rovers that share it may touch different things there. Detection at the midpoint of
-//! the step and relocation to its end follow [`crate::contact`] and [`crate::geometry::query`].
-//! With the unit normal n, the unit axle s and the rolling direction `t = n × s / |n × s|`, the
-//! lowest point of a circle over a plane lies along `t × s` from its centre.
+//! sphere, some both or two spheres. A wheel with two circles has four: one for each circle on the
+//! plane, and two for spheres. A slot is filled lane by lane; rovers that share it may touch
+//! different things there. Detection at the midpoint of the step and relocation to its end follow
+//! [`crate::contact`] and [`crate::geometry::query`]. With the unit normal n, the unit axle s and
+//! the rolling direction `t = n × s / |n × s|`, the lowest point of a circle over a plane lies
+//! along `t × s` from its centre.
 //!
-//! What is rare is declined: a wheel that nearly lies flat, passes a sphere within the step or
-//! touches more things than it has slots, a box near the ground, more contacts than a problem has.
+//! What is rare is found lane by lane (`rare`): a wheel that nearly lies flat, passes a sphere
+//! within the step, touches more things than it has slots or stands on rough ground, and a body
+//! near the ground or another one. A lane with more contacts than a problem has is declined.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::footing::SLOTS as PLANES;
+use super::by_lane::ByLane;
 use super::forecast::Forecast;
 use super::ground::{Ground, GroundSphere, turning};
 use super::machine::{Machine, SIDES, Stop};
 use super::parts::{Parts, Twist};
 use super::problem::{MAX_CONTACTS, MAX_DENSE};
 use crate::contact::detection::{touch_of_disc, touch_of_roller};
-use crate::contact::pair::{ANY_PIECE, ON_SURFACE};
-use crate::contact::{Contact, ContactFrame, ContactKey, Part};
+use crate::contact::{Contact, ContactFrame, ContactKey, Opposite, Part};
 use crate::geometry::query::sweep::DEEP;
 use crate::geometry::query::{CIRCLE, NEAREST};
 use crate::geometry::{Disc, Roller, Sphere};
 use crate::integrator::WarmStart;
-use crate::multibody::Poses;
+use crate::multibody::{Model, Poses};
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 
 /// Number of the plane in every terrain that has one.
@@ -66,29 +68,34 @@ pub struct Listed {
     pub n: usize,
     /// Slot of each.
     pub slots: [u8; MAX_CONTACTS],
-    /// Number of the ground's primitive of each.
-    pub primitives: [u32; MAX_CONTACTS],
-    /// Feature of each.
-    features: [usize; MAX_CONTACTS],
+    /// What the next step knows each by.
+    pub keys: [ContactKey; MAX_CONTACTS],
 }
 
 /// The contacts of a block.
 #[derive(Clone, Debug)]
 pub struct Contacts<T: Lane> {
     pub(super) token: T::Token,
-    parts: Parts,
+    pub(super) parts: Parts,
+    pub(super) by_lane: ByLane<T>,
     pub(super) stops: Vec<Stop>,
-    /// The first slot of a stop.
+    /// The first spare slot, and the first slot of a stop.
+    first_spare: usize,
     pub(super) first_stop: usize,
     twists: Vec<Twist<T>>,
     pub(super) slots: Vec<Slot<T>>,
-    /// Part of each slot: a wheel, or, counted on from the wheels, a joint with stops.
-    part_of: Vec<usize>,
-    /// Most contacts of a rover.
+    /// Part of each slot: a wheel, or, counted on from the wheels, a spare slot or a joint with
+    /// stops.
+    pub(super) part_of: Vec<usize>,
+    /// Most contacts of a rover, and most of one whose problem has the whole operator.
     most: usize,
+    most_dense: usize,
     pub(super) used: Vec<usize>,
-    /// How many of them are the wheels'.
-    n_of_wheels: usize,
+    /// How many of them are not of stops.
+    n_of_shapes: usize,
+    /// Lanes whose problem has factors, and slots in use by the others.
+    factored: u32,
+    dense: Vec<usize>,
     lists: [Listed; MAX_LANES],
     /// Whether every slot in use is active in all lanes.
     is_full: bool,
@@ -96,14 +103,24 @@ pub struct Contacts<T: Lane> {
     places: Vec<[u8; MAX_LANES]>,
 }
 
-/// What one detection looks at.
-struct Sight<'a, T: Lane> {
-    middle: &'a Poses<T>,
-    end: &'a Poses<T>,
-    v: &'a [T],
-    forecast: &'a Forecast<T>,
-    /// Height of the trunk's origin over the plane at the midpoint, m.
-    height: T,
+/// What a detection looks at.
+pub struct Sight<'a, T: Lane> {
+    /// The machine.
+    pub machine: &'a Machine,
+    /// Model of each lane.
+    pub models: &'a [Option<Arc<Model>>],
+    /// Lanes of the step.
+    pub going: u32,
+    /// Poses at the midpoint of the step, where gaps are measured, and at its predicted end.
+    pub middle: &'a Poses<T>,
+    /// See above.
+    pub end: &'a Poses<T>,
+    /// Velocity (nv) before the step.
+    pub v: &'a [T],
+    /// Whether it matters which piece of a surface a wheel touches.
+    pub needs_pieces: bool,
+    /// Which candidates are contacts.
+    pub forecast: &'a Forecast<T>,
 }
 
 impl<T: Lane> Contacts<T> {
@@ -118,8 +135,11 @@ impl<T: Lane> Contacts<T> {
         let mut part_of: Vec<usize> = (parts.wheels.iter().enumerate())
             .flat_map(|(w, wheel)| std::iter::repeat_n(w, wheel.slots.len()))
             .collect();
+        let first_spare = part_of.len();
+        part_of.extend(n_wheels..n_wheels + machine.spares.len());
         let first_stop = part_of.len();
-        let stops = n_wheels..n_wheels + machine.stops.len();
+        let n_shapes = n_wheels + machine.spares.len();
+        let stops = n_shapes..n_shapes + machine.stops.len();
         part_of.extend(stops.flat_map(|part| [part; SIDES]));
         let n_slots = part_of.len();
         assert!(n_slots <= 256, "invariant: slots are numbered by 8 bits");
@@ -146,18 +166,23 @@ impl<T: Lane> Contacts<T> {
         Self {
             token,
             twists: vec![twist; parts.n_carriers()],
+            first_spare,
             first_stop,
             parts,
             stops: machine.stops.clone(),
             slots: vec![slot; n_slots],
+            by_lane: ByLane::new(machine, first_spare),
             part_of,
-            most: if machine.has_lines() {
+            most: if machine.pattern.is_some() {
                 MAX_CONTACTS
             } else {
                 MAX_DENSE
             },
+            most_dense: if machine.has_lines() { 0 } else { MAX_DENSE },
             used: Vec::with_capacity(n_slots),
-            n_of_wheels: 0,
+            n_of_shapes: 0,
+            factored: 0,
+            dense: Vec::with_capacity(n_slots),
             lists: [Listed::NONE; MAX_LANES],
             is_full: false,
             places: vec![[0; MAX_LANES]; n_slots],
@@ -177,16 +202,32 @@ impl<T: Lane> Contacts<T> {
         &self.used
     }
 
-    /// Those of the wheels.
+    /// Those that are not of stops.
     #[inline(always)]
-    pub(super) fn used_by_wheels(&self) -> &[usize] {
-        &self.used[..self.n_of_wheels]
+    pub(super) fn used_by_shapes(&self) -> &[usize] {
+        &self.used[..self.n_of_shapes]
     }
 
     /// Those of the stops, which follow.
     #[inline(always)]
     pub(super) fn used_by_stops(&self) -> &[usize] {
-        &self.used[self.n_of_wheels..]
+        &self.used[self.n_of_shapes..]
+    }
+
+    /// Those in use in a lane whose problem has the whole operator.
+    #[inline(always)]
+    pub(super) fn used_densely(&self) -> &[usize] {
+        if self.factored == 0 {
+            &self.used
+        } else {
+            &self.dense
+        }
+    }
+
+    /// Lanes whose problem has the factors of its operator.
+    #[inline(always)]
+    pub(super) fn factored(&self) -> u32 {
+        self.factored
     }
 
     /// A slot.
@@ -196,7 +237,7 @@ impl<T: Lane> Contacts<T> {
         &self.slots[slot]
     }
 
-    /// Part of a slot: a wheel, or, counted on from the wheels, a joint with stops.
+    /// Part of a slot: a wheel, or, counted on from the wheels, a spare slot or a joint with stops.
     #[inline(always)]
     #[must_use]
     pub fn part(&self, slot: usize) -> usize {
@@ -221,6 +262,9 @@ impl<T: Lane> Contacts<T> {
     pub fn contact(&self, machine: &Machine, lane: usize, place: usize) -> (usize, Contact) {
         let list = &self.lists[lane];
         let slot = usize::from(list.slots[place]);
+        if let Some(contact) = self.by_lane.contact(slot, lane) {
+            return (slot, *contact);
+        }
         let (own, part) = (&self.slots[slot], self.part(slot));
         let n = Vector3::from(own.n.get(lane));
         let (part, body, frame) = if let Some((stop, side)) = self.stop(slot) {
@@ -239,7 +283,7 @@ impl<T: Lane> Contacts<T> {
             )
         };
         let contact = Contact {
-            key: self.key(list, place),
+            key: list.keys[place],
             part,
             body,
             other: None,
@@ -257,17 +301,6 @@ impl<T: Lane> Contacts<T> {
         &self.places[slot]
     }
 
-    /// Key of a rover's contact, by its place in the list.
-    #[inline(always)]
-    fn key(&self, list: &Listed, place: usize) -> ContactKey {
-        let slot = usize::from(list.slots[place]);
-        if let Some((stop, side)) = self.stop(slot) {
-            return ContactKey::at_limit(stop.joint, side);
-        }
-        let wheel = Part::Wheel(self.part(slot));
-        ContactKey::on_ground(wheel, list.features[place], list.primitives[place])
-    }
-
     /// Fills `p` (3 n_c) with the impulses that a rover remembers of its contacts, N s, zero for
     /// new ones. Returns whether the last step had exactly these contacts.
     #[inline(always)]
@@ -275,13 +308,13 @@ impl<T: Lane> Contacts<T> {
         let list = &self.lists[lane];
         let mut is_same = memory.impulses.len() == list.n;
         for (place, out) in p.chunks_exact_mut(3).enumerate().take(list.n) {
-            let wanted = self.key(list, place);
+            let wanted = list.keys[place];
             let same = memory.impulses.get(place);
             let known = if let Some((_, known)) = same.filter(|(key, _)| *key == wanted) {
                 *known
             } else {
-                is_same = false;
                 let found = memory.impulses.iter().find(|(key, _)| *key == wanted);
+                is_same &= found.is_some();
                 found.map_or([0.0; 3], |(_, known)| *known)
             };
             out.copy_from_slice(&known);
@@ -295,39 +328,20 @@ impl<T: Lane> Contacts<T> {
         let list = &self.lists[lane];
         memory.impulses.clear();
         for (place, p) in p.chunks_exact(3).enumerate().take(list.n) {
-            let known = (self.key(list, place), [p[0], p[1], p[2]]);
+            let known = (list.keys[place], [p[0], p[1], p[2]]);
             memory.impulses.push(known);
         }
     }
 
-    /// Finds the contacts of a step and moves them to its end.
-    ///
-    /// `middle` and `end`: poses at the midpoint of the step, where gaps are measured, and at its
-    /// predicted end. `v`: velocity (nv) before the step. Returns the lanes that are declined.
+    /// Finds the contacts of a step and moves them to its end. Returns the lanes that are declined.
     ///
     /// # Panics
     /// If an argument is of another machine.
-    pub fn detect(
-        &mut self,
-        ground: &mut Ground<T>,
-        middle: &Poses<T>,
-        end: &Poses<T>,
-        v: &[T],
-        forecast: &Forecast<T>,
-    ) -> T::Mask {
+    pub fn detect(&mut self, ground: &mut Ground<T>, sight: &Sight<'_, T>) -> T::Mask {
         T::vectorize(
             self.token,
             #[inline(always)]
-            || {
-                let sight = Sight {
-                    middle,
-                    end,
-                    v,
-                    forecast,
-                    height: ground.height(middle.origin),
-                };
-                self.look(ground, &sight)
-            },
+            || self.look(ground, sight),
         )
     }
 
@@ -336,57 +350,81 @@ impl<T: Lane> Contacts<T> {
     fn look(&mut self, ground: &mut Ground<T>, sight: &Sight<'_, T>) -> T::Mask {
         let Sight { middle, end, v, .. } = *sight;
         self.parts.find_twists(middle, v, &mut self.twists);
-        let mut declined = ground.mixed;
-        for b in 0..self.parts.boxes.len() {
-            declined = declined | self.look_at_box(b, ground, sight);
-        }
+        self.by_lane.clear();
+        let height = ground.height(middle.origin);
         self.used.clear();
         let height_at_end = ground.height(end.origin);
         for w in 0..self.parts.wheels.len() {
-            declined = declined | self.look_at_wheel(w, ground, sight);
+            let (mut rest, reach) = self.look_at_wheel(w, height, ground, sight);
             let slots = self.parts.wheels[w].slots.clone();
-            if !self.slots[slots.clone()].iter().any(|own| own.active.any()) {
-                continue;
-            }
-            let pose = &end.bodies[self.parts.wheels[w].body];
-            let (s, centre) = (
-                self.parts.wheels[w].axle(pose),
-                self.parts.wheels[w].centre(pose),
-            );
-            let radius = self.parts.wheels[w].radius;
-            if ground.has_surfaces() {
-                ground.follow_footing(w, (end.origin, centre, s), radius);
-            }
-            for slot in slots.clone() {
-                if self.slots[slot].active.any() {
-                    self.used.push(slot);
-                    let place = slot - slots.start;
-                    let plane = if ground.has_surfaces() {
-                        ground.under_wheel(w, place % PLANES, end.origin)
-                    } else {
-                        (ground.normal, height_at_end)
-                    };
-                    let flat = if self.parts.wheels[w].is_wide() {
-                        self.relocate_wide((slot, place), plane, end, s, centre)
-                    } else {
-                        self.relocate(slot, plane, end, s, centre)
-                    };
-                    declined = declined | flat;
+            if self.slots[slots.clone()].iter().any(|own| own.active.any()) {
+                let pose = &end.bodies[self.parts.wheels[w].body];
+                let (s, centre) = (
+                    self.parts.wheels[w].axle(pose),
+                    self.parts.wheels[w].centre(pose),
+                );
+                let plane = if ground.has_surfaces() {
+                    ground.under_wheel(w, end.origin)
+                } else {
+                    (ground.normal, height_at_end)
+                };
+                for slot in slots.clone() {
+                    if self.slots[slot].active.any() {
+                        self.used.push(slot);
+                        let place = slot - slots.start;
+                        let flat = if self.parts.wheels[w].is_wide() {
+                            self.relocate_wide((slot, place), plane, end, s, centre)
+                        } else {
+                            self.relocate(slot, plane, end, s, centre)
+                        };
+                        rest = rest | flat;
+                    }
                 }
             }
+            if rest.any() {
+                for slot in &mut self.slots[slots] {
+                    slot.active = slot.active & !rest;
+                }
+                self.ask(Part::Wheel(w), rest, reach, sight);
+            }
         }
-        self.n_of_wheels = self.used.len();
+        for b in 0..self.parts.boxes.len() {
+            let (near, reach) = self.look_at_box(b, height, ground, sight);
+            self.ask(self.parts.boxes[b].part, near, reach, sight);
+        }
+        let mut declined = T::mask(self.token, 0);
+        if self.by_lane.is_asked() || sight.machine.has_pairs {
+            for slot in &mut self.slots[self.first_spare..self.first_stop] {
+                slot.active = declined;
+            }
+            declined = self.find_by_lane(ground, sight);
+            let slots = self.slots[..self.first_stop].iter().enumerate();
+            let used = slots.filter(|(_, own)| own.active.any());
+            self.used.clear();
+            self.used.extend(used.map(|(slot, _)| slot));
+        }
+        self.n_of_shapes = self.used.len();
         declined | self.list_contacts(ground)
     }
 
-    /// Whether a box may touch the ground.
+    /// Asks for the contacts of a part in the lanes of a mask.
+    #[inline(always)]
+    fn ask(&mut self, part: Part, lanes: T::Mask, reach: T, sight: &Sight<'_, T>) {
+        let lanes = lanes.bits() & sight.going;
+        if lanes != 0 {
+            self.by_lane.ask(part, lanes, reach);
+        }
+    }
+
+    /// Whether a box may touch the ground, and how near it must come for that, m.
     #[inline(always)]
     fn look_at_box(
         &mut self,
         number: usize,
+        height: T,
         ground: &mut Ground<T>,
         sight: &Sight<'_, T>,
-    ) -> T::Mask {
+    ) -> (T::Mask, T) {
         let solid = &self.parts.boxes[number];
         let pose = &sight.middle.bodies[solid.body];
         let n = ground.normal;
@@ -398,21 +436,29 @@ impl<T: Lane> Contacts<T> {
         let local = R.transpose_times(n);
         let half = Vec3::splat(self.token, solid.half_size);
         let drop = (local.x * half.x).abs() + (local.y * half.y).abs() + (local.z * half.z).abs();
-        let near_plane = (sight.height + n.dot(centre) - drop).le(reach);
+        let near_plane = (height + n.dot(centre) - drop).le(reach);
         if !ground.has_spheres() && !ground.has_surfaces() {
-            return near_plane;
+            return (near_plane, reach);
         }
         let at_end = &sight.end.bodies[solid.body];
         let shift = sight.end.origin - sight.middle.origin + (solid.centre(at_end) - centre);
         let bound = T::splat(self.token, solid.bound);
         let motion = shift.norm() + turning(&at_end.R, &pose.R) * bound;
         let world = sight.middle.origin + centre;
-        near_plane | ground.is_near_box(number, world, &R, solid.half_size, (reach, motion))
+        let near = ground.is_near_box(number, world, &R, solid.half_size, (reach, motion));
+        (near_plane | near, reach)
     }
 
-    /// Fills the slots of a wheel with its contacts at the midpoint.
+    /// Fills the slots of a wheel with its contacts at the midpoint. Returns where they must be
+    /// found lane by lane, and how near the wheel must come to the ground to touch it, m.
     #[inline(always)]
-    fn look_at_wheel(&mut self, w: usize, ground: &mut Ground<T>, sight: &Sight<'_, T>) -> T::Mask {
+    fn look_at_wheel(
+        &mut self,
+        w: usize,
+        height: T,
+        ground: &mut Ground<T>,
+        sight: &Sight<'_, T>,
+    ) -> (T::Mask, T) {
         let wheel = &self.parts.wheels[w];
         let pose = &sight.middle.bodies[wheel.body];
         let (s, centre) = (wheel.axle(pose), wheel.centre(pose));
@@ -421,42 +467,31 @@ impl<T: Lane> Contacts<T> {
             #[inline(always)]
             || wheel.speed(&self.twists[wheel.carrier], centre, sight.v),
         );
-        let mut declined = T::mask(self.token, 0);
-        let (first, is_line) = (wheel.slots.start, wheel.n_circles() > 1);
-        let mut plane = (ground.normal, sight.height);
+        let none = T::mask(self.token, 0);
+        let mut rest = none;
+        let (first, n_circles) = (wheel.slots.start, wheel.n_circles());
+        let mut plane = (ground.normal, height);
         if ground.has_surfaces() {
             let origin = sight.middle.origin;
-            declined = ground.find_footing(w, (origin, centre, s), wheel.radius, reach);
-            if wheel.is_wide() {
-                declined = declined | ground.on_surface();
+            rest = ground.find_footing(w, origin + centre, wheel.bound, reach);
+            plane = ground.under_wheel(w, origin);
+            // Where a wheel sinks in, a piece counts by how deep each circle is.
+            if sight.needs_pieces || (wheel.n_circles() > 1 && wheel.is_soft) {
+                rest = rest | ground.on_surface();
             }
-            plane = ground.under_wheel(w, 0, origin);
         }
-        let none = T::mask(self.token, 0);
         for slot in &mut self.slots[wheel.slots.clone()] {
             (slot.active, slot.on_sphere) = (none, none);
         }
-        let (admitted, lies) = self.stands((w, 0), plane, sight, (s, centre), reach);
-        self.slots[first].active = admitted;
-        declined = declined | lies;
-        if is_line {
-            let (admitted, lies) = self.stands((w, 1), plane, sight, (s, centre), reach);
-            self.slots[first + 1].active = admitted;
-            declined = declined | lies;
-        }
-        for k in 1..PLANES {
-            if is_line || !ground.has_plane(w, k) {
-                break;
-            }
-            let plane = ground.under_wheel(w, k, sight.middle.origin);
-            let (admitted, lies) = self.stands((w, 0), plane, sight, (s, centre), reach);
-            self.slots[first + k].active = admitted;
-            declined = declined | lies;
+        for circle in 0..n_circles {
+            let (admitted, lies) = self.stands((w, circle), plane, sight, (s, centre), reach);
+            self.slots[first + circle].active = admitted;
+            rest = rest | lies;
         }
         if ground.has_spheres() {
-            declined = declined | self.look_at_spheres(w, ground, sight, s, centre, reach);
+            rest = rest | self.look_at_spheres(w, ground, sight, s, centre, reach);
         }
-        declined
+        (rest, reach)
     }
 
     /// Where a circle of a wheel with the axle `s` and the centre `centre` touches a plane of the
@@ -786,17 +821,44 @@ impl<T: Lane> Contacts<T> {
         for i in 0..self.used.len() {
             too_many = too_many | self.list_slot(self.used[i], Some(ground));
         }
+        self.choose_forms();
         too_many
+    }
+
+    /// Chooses the lanes whose problems have the factors of their operator: those with many
+    /// contacts, and with contacts between bodies.
+    #[inline(always)]
+    pub(super) fn choose_forms(&mut self) {
+        let mut factored = self.by_lane.with_pairs();
+        for (lane, list) in self.lists[..T::LANES].iter().enumerate() {
+            factored |= u32::from(list.n > self.most_dense) << lane;
+        }
+        self.factored = factored;
+        if factored != 0 {
+            let slots = &self.slots;
+            let is_dense = |slot: &&usize| slots[**slot].active.bits() & !factored != 0;
+            self.dense.clear();
+            self.dense.extend(self.used.iter().filter(is_dense));
+        }
     }
 
     /// Lists the contacts of a slot, of a stop's without ground, after those of the slots before
     /// it. Returns the lanes that have too many.
     #[inline(always)]
     pub(super) fn list_slot(&mut self, slot: usize, ground: Option<&Ground<T>>) -> T::Mask {
-        let feature = match self.parts.wheels.get(self.part_of[slot]) {
-            Some(wheel) if wheel.n_circles() > 1 && slot > wheel.slots.start => CIRCLE,
-            _ => NEAREST,
+        let shown = match self.stop(slot) {
+            Some((stop, side)) => ContactKey::at_limit(stop.joint, side),
+            None => match self.parts.wheels.get(self.part_of[slot]) {
+                Some(wheel) => {
+                    let is_second = wheel.n_circles() > 1 && slot > wheel.slots.start;
+                    let feature = if is_second { CIRCLE } else { NEAREST };
+                    ContactKey::on_ground(Part::Wheel(self.part_of[slot]), feature, PLANE)
+                }
+                None => NO_KEY,
+            },
         };
+        let by_lane = &self.by_lane;
+        let given = by_lane.given(slot);
         let own = &mut self.slots[slot];
         let on_sphere = own.on_sphere.bits();
         let mut numbers = [0.0; MAX_LANES];
@@ -817,17 +879,19 @@ impl<T: Lane> Contacts<T> {
             }
             places[lane] = small(list.n);
             list.slots[list.n] = small(slot);
-            list.features[list.n] = NEAREST;
-            list.primitives[list.n] = if on_sphere >> lane & 1 == 1 {
-                whole(numbers[lane])
+            let mut key = shown;
+            if given >> lane & 1 == 1 {
+                if let Some(contact) = by_lane.contact(slot, lane) {
+                    key = contact.key.lasting();
+                }
+            } else if on_sphere >> lane & 1 == 1 {
+                key.feature = 0;
+                key.opposite = Opposite::Ground(whole(numbers[lane]));
             } else if ground.is_some_and(|ground| ground.is_surface(lane)) {
                 // Which piece was found depends on when a search was made.
-                list.features[list.n] = NEAREST | ON_SURFACE;
-                ANY_PIECE
-            } else {
-                list.features[list.n] = feature;
-                PLANE
-            };
+                key = key.on_surface().lasting();
+            }
+            list.keys[list.n] = key;
             list.n += 1;
         }
         if too_many != 0 {
@@ -838,12 +902,18 @@ impl<T: Lane> Contacts<T> {
     }
 }
 
+/// The key of no contact.
+const NO_KEY: ContactKey = ContactKey {
+    part: 0,
+    feature: 0,
+    opposite: Opposite::Stop,
+};
+
 impl Listed {
     const NONE: Self = Self {
         n: 0,
         slots: [0; MAX_CONTACTS],
-        primitives: [0; MAX_CONTACTS],
-        features: [NEAREST; MAX_CONTACTS],
+        keys: [NO_KEY; MAX_CONTACTS],
     };
 }
 

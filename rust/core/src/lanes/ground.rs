@@ -9,11 +9,10 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::footing::{Footing, Wheels};
+use super::footing::Footing;
 use crate::contact::box_clearance::over_surfaces;
-use crate::contact::detection::visit_on_surface;
 use crate::geometry::query::sweep::DEEP;
-use crate::geometry::{Coverage, Neighbourhood, OrientedBox, PlacedShape, Sphere, Terrain};
+use crate::geometry::{Coverage, OrientedBox, Sphere, Terrain};
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Mat3, Vec3};
 
 /// Most spheres near a wheel. A wheel near more is declined.
@@ -113,8 +112,8 @@ pub struct Ground<T: Lane> {
     /// Those with a surface.
     surfaces: Vec<Option<Arc<dyn Terrain>>>,
     has_surfaces: bool,
-    /// Rovers on a surface and a plane, which have no ordinary step.
-    pub(super) mixed: T::Mask,
+    /// Rovers on a surface and a plane.
+    mixed: T::Mask,
     footings: Vec<Footing<T>>,
     wheels: Vec<Near<T>>,
     boxes: Vec<Around<T>>,
@@ -223,54 +222,29 @@ impl<T: Lane> Ground<T> {
         self.has_surfaces
     }
 
-    /// Finds what the rovers' wheel stands on where the ground is a surface: [`Footing::find`].
+    /// Finds the plane that the rovers' wheel stands on where the ground is a surface: see
+    /// [`Footing::find`].
     #[inline(always)]
     pub(super) fn find_footing(
         &mut self,
         wheel: usize,
-        (base, centre, axle): (Vec3<T>, Vec3<T>, Vec3<T>),
-        radius: f64,
+        centre: Vec3<T>,
+        bound: f64,
         reach: T,
     ) -> T::Mask {
-        let wheels = Wheels {
-            base,
-            centre,
-            axle,
-            radius,
-            surfaces: &self.surfaces,
-        };
-        self.footings[wheel].find(&wheels, reach)
+        self.footings[wheel].find(&self.surfaces, centre, bound, reach) | self.mixed
     }
 
-    /// Moves it to another instant: [`Footing::follow`].
+    /// Normal of the plane under a wheel and the height of a point over it, m.
     #[inline(always)]
-    pub(super) fn follow_footing(
-        &mut self,
-        wheel: usize,
-        (base, centre, axle): (Vec3<T>, Vec3<T>, Vec3<T>),
-        radius: f64,
-    ) {
-        let wheels = Wheels {
-            base,
-            centre,
-            axle,
-            radius,
-            surfaces: &self.surfaces,
-        };
-        self.footings[wheel].follow(&wheels);
+    pub(super) fn under_wheel(&self, wheel: usize, x: Vec3<T>) -> (Vec3<T>, T) {
+        let Footing { normal, offset, .. } = &self.footings[wheel];
+        (*normal, normal.dot(x) + *offset)
     }
 
-    /// Normal of the plane under a slot of a wheel and the height of a point over it, m.
-    #[inline(always)]
-    pub(super) fn under_wheel(&self, wheel: usize, slot: usize, x: Vec3<T>) -> (Vec3<T>, T) {
-        let plane = &self.footings[wheel].planes[slot];
-        (plane.normal, plane.normal.dot(x) + plane.offset)
-    }
-
-    /// Whether any rover's wheel has a plane under a slot beyond the first.
-    #[inline(always)]
-    pub(super) fn has_plane(&self, wheel: usize, slot: usize) -> bool {
-        self.has_surfaces && self.footings[wheel].has_plane(slot)
+    /// The ground of a lane.
+    pub(super) fn terrain(&self, lane: usize) -> Option<&Arc<dyn Terrain>> {
+        self.terrains[lane].as_ref()
     }
 
     /// Whether a rover's ground is a surface.
@@ -280,7 +254,6 @@ impl<T: Lane> Ground<T> {
     }
 
     /// Rovers whose ground is a surface.
-    #[inline(always)]
     pub(super) fn on_surface(&self) -> T::Mask {
         let bits = (self.surfaces.iter().enumerate()).fold(0, |bits, (lane, own)| {
             bits | u32::from(own.is_some()) << lane
@@ -507,8 +480,8 @@ impl Kept {
     }
 }
 
-/// A distance (m) that no piece of a surface comes nearer to a box than, and whether one may touch
-/// it or its ground is unknown.
+/// A distance (m) that no piece of a surface comes nearer to a box than, and whether one may be
+/// near or its ground is unknown.
 #[cold]
 fn over_surface(
     field: &dyn Terrain,
@@ -516,7 +489,6 @@ fn over_surface(
     bound: f64,
     near: Nearness,
 ) -> (f64, bool) {
-    let nowhere = Vector3::zeros();
     if field.coverage(&solid.centre, bound) != Coverage::Known {
         return (f64::NEG_INFINITY, true);
     }
@@ -527,17 +499,7 @@ fn over_surface(
             return (clearance, false);
         }
     }
-    // Piece by piece, and again at the next step.
-    let shape = PlacedShape::Box(*solid);
-    let reach = near.reach + ROUNDING;
-    let mut touches = false;
-    let around = Neighbourhood::new(&shape, &nowhere, reach);
-    field.visit_around(&around, &mut |id, piece| {
-        visit_on_surface(&shape, (field, id, piece), &nowhere, reach, |_| {
-            touches = true;
-        });
-    });
-    (f64::NEG_INFINITY, touches)
+    (f64::NEG_INFINITY, true)
 }
 
 /// Distance of a sphere from a box, m; at least minus the radius.

@@ -4,13 +4,14 @@
 //! the model. Lengths are in m.
 
 use std::ops::Deref;
-use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::sync::Arc;
 
+use nalgebra::{Matrix3, Vector3};
 use thiserror::Error;
 
-use super::footing::SLOTS as PLANES;
 use super::pattern::Pattern;
 use super::problem::MAX_CONTACTS;
+use crate::contact::Part;
 #[cfg(doc)]
 use crate::geometry::Roller;
 use crate::law::compliance::Compliance;
@@ -24,27 +25,18 @@ pub const MOST_PARTS: usize = 32;
 /// Slots of a joint with stops.
 pub const SIDES: usize = 2;
 
-/// Why a machine has no ordinary step.
+/// Why a machine has no fast step.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-pub enum NotOrdinary {
+pub enum Unsupported {
     /// It has several trees, or its root is fixed.
     #[error("the machine is not one tree on a free base")]
     NotOneFreeTree,
     /// Its wheels and stops can have more contacts than a problem.
     #[error("wheels with a width and stops can have {0} contacts, more than {MAX_CONTACTS}")]
     TooManyContacts(usize),
-    /// A coupled joint on the way to a contact follows a joint with other carriers.
-    #[error("a coupled joint follows a joint with other carriers, and a wheel has a width")]
-    BranchedCoupling,
     /// It has more wheels and joints with stops than lanes have room for.
     #[error("the machine has {0} wheels and joints with stops, more than {MOST_PARTS}")]
     TooManyParts(usize),
-    /// It has balls that collide.
-    #[error("the machine has balls that collide")]
-    Balls,
-    /// Its bodies can touch each other.
-    #[error("bodies of the machine can touch each other")]
-    SelfContact,
 }
 
 /// What a block of rovers has in common: a mechanism, and its wheels, boxes and stops.
@@ -53,13 +45,18 @@ pub struct Machine {
     mechanism: Mechanism,
     /// Wheels, in the model's order.
     pub wheels: Vec<WheelDisc>,
-    /// Boxes that collide with the ground, in the model's order.
+    /// Boxes and balls that collide with the ground, in the model's order.
     pub boxes: Vec<BodyBox>,
     /// Joints with stops, ascending.
     pub stops: Vec<Stop>,
+    /// Slots between those of the wheels and the stops: [`Self::find_spares`].
+    pub(super) spares: Vec<Option<usize>>,
+    /// Whether its bodies can touch each other.
+    pub(super) has_pairs: bool,
     /// Joints with springs or dampers, ascending.
     pub(super) passive: Vec<usize>,
-    /// Pattern of its contact problems, if they are solved by the factors of their operator.
+    /// Pattern of its contact problems; none if they cannot be solved by the factors of their
+    /// operator.
     pub(super) pattern: Option<Arc<Pattern>>,
 }
 
@@ -103,9 +100,11 @@ pub struct WheelDisc {
     pub compliance: Option<Compliance>,
 }
 
-/// A box that collides with the ground.
+/// A box that collides with the ground, or that has a ball in it which does.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyBox {
+    /// The model's part.
+    pub part: Part,
     /// Body that carries it.
     pub body: usize,
     /// Centre in the body's frame.
@@ -120,19 +119,14 @@ impl Machine {
     /// The machine of a model.
     ///
     /// # Errors
-    /// What makes its step not ordinary.
-    pub fn of(model: &Model) -> Result<Self, NotOrdinary> {
+    /// Why it has no fast step.
+    pub fn of(model: &Model) -> Result<Self, Unsupported> {
         check(model)?;
         let mut machine = Self {
             mechanism: model.mechanism().clone(),
             wheels: (model.wheels().iter()).map(WheelDisc::of).collect(),
-            boxes: (model.boxes().iter())
-                .map(|part| BodyBox {
-                    body: part.body,
-                    centre: part.centre.into(),
-                    rotation: part.rotation.into(),
-                    half_size: part.half_size.into(),
-                })
+            boxes: (Part::all(model).skip(model.wheels().len()))
+                .map(|part| BodyBox::of(model, part))
                 .collect(),
             stops: (model.limited_joints().iter())
                 .filter_map(|&joint| {
@@ -140,30 +134,16 @@ impl Machine {
                     Some(Stop { joint, limits })
                 })
                 .collect(),
+            spares: Vec::new(),
+            has_pairs: model.description().self_contact,
             passive: (0..model.n_joints())
                 .filter(|&joint| model.joints()[joint].is_passive)
                 .collect(),
             pattern: None,
         };
-        if machine.has_lines() {
-            let path = |body: usize| machine.path(body).to_vec();
-            let wheels = (machine.wheels.iter())
-                .flat_map(|wheel| std::iter::repeat_n(path(wheel.body), wheel.n_slots()));
-            let stops = machine.stops.iter().flat_map(|stop| {
-                let body = machine.joints[stop.joint].body;
-                std::iter::repeat_n(path(body), SIDES)
-            });
-            let paths: Vec<_> = wheels.chain(stops).collect();
-            let pattern = Pattern::new(machine.nv(), &paths);
-            machine.pattern = Some(Arc::new(pattern.ok_or(NotOrdinary::BranchedCoupling)?));
-        }
+        machine.spares = machine.find_spares(machine.has_pairs);
+        machine.pattern = machine.find_pattern();
         Ok(machine)
-    }
-
-    /// Whether a wheel has a width.
-    #[must_use]
-    pub fn has_wide_wheels(&self) -> bool {
-        self.wheels.iter().any(WheelDisc::is_wide)
     }
 
     /// Whether a wheel touches a plane at two points.
@@ -178,21 +158,6 @@ impl Machine {
         self.wheels.iter().any(|wheel| wheel.compliance.is_some())
     }
 
-    /// The machine itself, or an equal one that is in use: equal machines are one, so that rovers
-    /// which can share a block know each other by it.
-    #[must_use]
-    pub fn shared(self) -> Arc<Self> {
-        static IN_USE: Mutex<Vec<Weak<Machine>>> = Mutex::new(Vec::new());
-        let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
-        in_use.retain(|machine| machine.strong_count() > 0);
-        let equal = (in_use.iter().filter_map(Weak::upgrade)).find(|machine| **machine == self);
-        equal.unwrap_or_else(|| {
-            let own = Arc::new(self);
-            in_use.push(Arc::downgrade(&own));
-            own
-        })
-    }
-
     /// Whether a model differs from this machine only in its inertias, springs, dampers and rotors,
     /// so that it can be a lane of a block. A joint that gains or loses such an element, a mass
     /// centre that leaves the frame's origin, or moments that are no longer equal, make another
@@ -200,6 +165,22 @@ impl Machine {
     #[must_use]
     pub fn fits(&self, model: &Model) -> bool {
         Self::of(model).is_ok_and(|other| other == *self)
+    }
+}
+
+impl BodyBox {
+    fn of(model: &Model, part: Part) -> Self {
+        let (rotation, half_size) = match part {
+            Part::Box(i) => (model.boxes()[i].rotation, model.boxes()[i].half_size),
+            _ => (Matrix3::identity(), Vector3::repeat(part.bound(model))),
+        };
+        Self {
+            part,
+            body: part.body(model),
+            centre: part.centre(model).into(),
+            rotation: rotation.into(),
+            half_size: half_size.into(),
+        }
     }
 }
 
@@ -231,7 +212,7 @@ impl WheelDisc {
     /// Number of its slots for contacts.
     #[must_use]
     pub fn n_slots(&self) -> usize {
-        if self.n_circles() > 1 { 4 } else { PLANES }
+        if self.n_circles() > 1 { 4 } else { 3 }
     }
 
     /// Radius of a bounding ball about its centre.
@@ -251,26 +232,20 @@ impl WheelDisc {
     }
 }
 
-fn check(model: &Model) -> Result<(), NotOrdinary> {
+fn check(model: &Model) -> Result<(), Unsupported> {
     if !model.is_free_tree() {
-        return Err(NotOrdinary::NotOneFreeTree);
+        return Err(Unsupported::NotOneFreeTree);
     }
     let wheels: Vec<WheelDisc> = model.wheels().iter().map(WheelDisc::of).collect();
     let has_lines = wheels.iter().any(|wheel| wheel.n_circles() > 1);
     let n_slots = wheels.iter().map(WheelDisc::n_slots).sum::<usize>();
     let n_slots = n_slots + SIDES * model.limited_joints().len();
     if has_lines && n_slots > MAX_CONTACTS {
-        return Err(NotOrdinary::TooManyContacts(n_slots));
+        return Err(Unsupported::TooManyContacts(n_slots));
     }
     let n_parts = model.wheels().len() + model.limited_joints().len();
     if n_parts > MOST_PARTS {
-        return Err(NotOrdinary::TooManyParts(n_parts));
-    }
-    if !model.spheres().is_empty() {
-        return Err(NotOrdinary::Balls);
-    }
-    if model.description().self_contact {
-        return Err(NotOrdinary::SelfContact);
+        return Err(Unsupported::TooManyParts(n_parts));
     }
     Ok(())
 }

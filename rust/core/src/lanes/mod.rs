@@ -1,15 +1,17 @@
-//! The ordinary step of a rover, one or several to a register.
+//! The fast step of a rover, one or several to a register.
 //!
 //! Most steps of a wheeled rover are alike: a tree of joints on a free base, wheels that roll and
 //! slip, motors, springs and stops. These sources take such a step over a scalar
 //! ([`crate::scalar`]) that is one rover or four or eight. They branch on the kind of joint body by
-//! body, since the rovers of a block share their tree. A step that is not ordinary is declined,
-//! rover by rover, before anything has changed; [`crate::integrator`] then takes it.
+//! body, since the rovers of a block share their tree. What is rare, such as a body that touches
+//! the ground, is found rover by rover. A step that cannot be taken so falls back to
+//! [`crate::integrator`], rover by rover, before anything has changed.
 //!
 //! The dynamics of the tree are those of [`crate::multibody`].
 //!
-//! - [`admission`]: which rovers have ordinary steps; [`machine`]: what the rovers share;
-//! - `parts`, [`ground`], `footing`, [`forecast`], [`contacts`], `stops`: what touches what;
+//! - [`admission`]: which options have a fast step; [`machine`]: what the rovers share;
+//! - `parts`, [`ground`], `footing`, [`forecast`], [`contacts`], `by_lane`, `rare`, `spares`,
+//!   `stops`: what touches what;
 //!   [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield;
 //! - [`problem`], [`modes`], [`equations`], [`pattern`], `tree_matrix`, `velocity_equations`,
 //!   `sweeps`, `pivoting`, `visits`, `bench`, [`queue`]: the friction-contact problems;
@@ -18,6 +20,7 @@
 
 pub mod admission;
 mod bench;
+mod by_lane;
 pub mod contacts;
 pub mod drives;
 pub mod equations;
@@ -32,7 +35,9 @@ pub mod pattern;
 mod pivoting;
 pub mod problem;
 pub mod queue;
+mod rare;
 pub mod rows;
+mod spares;
 pub mod step;
 mod stops;
 mod sweeps;

@@ -8,6 +8,7 @@ use std::ops::Range;
 use nalgebra::Vector3;
 
 use super::machine::Machine;
+use crate::contact::Part;
 use crate::multibody::JointAxis;
 use crate::multibody::mechanism::{Link, LinkJoint, Mover};
 use crate::multibody::poses::{Pose, Poses};
@@ -37,6 +38,8 @@ pub(super) struct Wheel {
     pub half: f64,
     /// Rounding of its edges, m.
     pub rounding: f64,
+    /// Whether it yields where it touches.
+    pub is_soft: bool,
     /// Radius of a bounding ball, m.
     pub bound: f64,
     /// Twist of the body that moves its centre.
@@ -57,6 +60,7 @@ enum Axle {
 /// A box, as contacts need it.
 #[derive(Clone, Debug)]
 pub(super) struct Solid {
+    pub part: Part,
     pub body: usize,
     centre: Option<[f64; 3]>,
     rotation: Option<[[f64; 3]; 3]>,
@@ -115,6 +119,7 @@ impl Parts {
                     radius: wheel.radius - wheel.rounding,
                     half: wheel.half,
                     rounding: wheel.rounding,
+                    is_soft: wheel.compliance.is_some(),
                     bound: wheel.bound(),
                     carrier: carrier_of(machine, mover, &mut carriers),
                     spin: spins.then_some(link.velocity),
@@ -126,6 +131,7 @@ impl Parts {
                 let is_plain =
                     solid.rotation == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
                 Solid {
+                    part: solid.part,
                     body: solid.body,
                     centre: some(solid.centre),
                     rotation: (!is_plain).then_some(solid.rotation),

@@ -141,6 +141,21 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
         relative.le(tolerances[0]) & largest.le(tolerances[1])
     }
 
+    /// Forgets the mode of a place where a lane has no contact. It may be in use in other lanes,
+    /// where the mode would count among this one's.
+    #[inline(always)]
+    pub(super) fn vacate(&mut self, place: usize, lane: usize) {
+        let others = !T::mask(self.mean.token(), 1 << lane);
+        for modes in [
+            &mut self.closed,
+            &mut self.sticks,
+            &mut self.barred,
+            &mut self.freed,
+        ] {
+            modes[place] = modes[place] & others;
+        }
+    }
+
     /// Begins the lanes of a mask: velocities, violations and modes of their impulses.
     #[inline(always)]
     pub(super) fn begin(&mut self, lanes: T::Mask) {

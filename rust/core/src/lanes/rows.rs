@@ -9,10 +9,14 @@
 
 use std::sync::Arc;
 
+use nalgebra::Vector3;
+
+use super::by_lane::{add_impulse, write_rows};
 use super::contacts::Contacts;
 use super::machine::Machine;
 use super::pattern::Pattern;
 use super::problem::{ContactProblem, Triple, block};
+use crate::contact::Contact;
 use crate::multibody::mechanism::{BASE, Mover};
 use crate::multibody::{Factor, Poses};
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
@@ -30,8 +34,9 @@ pub enum Answer {
 #[derive(Clone, Debug)]
 pub struct Rows<T: Lane> {
     token: T::Token,
-    /// Bodies of the parts, wheels and then joints with stops.
-    bodies: Vec<usize>,
+    /// Bodies of the parts: wheels, spare slots, and joints with stops; none of a spare slot with
+    /// all velocities.
+    bodies: Vec<Option<usize>>,
     /// Velocities of the joints that move each part, from the trunk outwards.
     pub(super) movers: Vec<Vec<Mover>>,
     /// Velocities that two parts share: `common[a * n_parts + b]`.
@@ -40,12 +45,13 @@ pub struct Rows<T: Lane> {
     pub(super) stride: usize,
     /// Z along the path of each slot's wheel: `Z[slot * stride + k]`.
     pub(super) Z: Vec<Triple<T>>,
-    /// Blocks of W for the slots in use, row-major: [`block`] of their positions among them. Of a
-    /// machine with a pattern: the diagonal blocks by slot.
+    /// Blocks of W for the slots in use by lanes without factors, row-major: [`block`] of their
+    /// positions among them.
     pub(super) W: Vec<[T; 9]>,
-    /// Where W is used by its factors.
+    /// Pattern of the problems with factors.
     pattern: Option<Arc<Pattern>>,
-    /// What [`Self::soften`] added to the diagonal of W by slot, with a pattern, 1/kg.
+    /// Where any has: diagonal blocks of W by slot, and what [`Self::soften`] added to them, 1/kg.
+    pub(super) diagonal: Vec<[T; 9]>,
     pub(super) softness: Vec<T>,
     /// The motion in [`Self::sweep`] (nv, factor coordinates).
     pub(super) swept: Vec<T>,
@@ -57,21 +63,31 @@ impl<T: Lane> Rows<T> {
     /// Room for a machine with `n_slots` slots.
     #[must_use]
     pub fn new(token: T::Token, machine: &Machine, n_slots: usize) -> Self {
-        let wheels = machine.wheels.iter().map(|wheel| wheel.body);
-        let stops = machine
-            .stops
-            .iter()
-            .map(|stop| machine.joints[stop.joint].body);
-        let bodies: Vec<usize> = wheels.chain(stops).collect();
-        let paths: Vec<&[usize]> = bodies.iter().map(|&body| machine.path(body)).collect();
+        let wheels = machine.wheels.iter().map(|wheel| Some(wheel.body));
+        let spares = machine.spares.iter().copied();
+        let stops = machine.stops.iter();
+        let stops = stops.map(|stop| Some(machine.joints[stop.joint].body));
+        let bodies: Vec<Option<usize>> = wheels.chain(spares).chain(stops).collect();
+        let whole: Vec<usize> = (0..machine.nv()).collect();
+        let paths: Vec<&[usize]> = (bodies.iter())
+            .map(|body| body.map_or(&whole[..], |body| machine.path(body)))
+            .collect();
         let mut common = Vec::with_capacity(paths.len() * paths.len());
         for a in &paths {
             for b in &paths {
                 common.push(a.iter().zip(*b).take_while(|(i, j)| i == j).count());
             }
         }
-        let movers = bodies.iter().map(|&body| machine.movers(body).to_vec());
-        let movers = movers.collect();
+        let all = (BASE..machine.nv()).map(|velocity| Mover {
+            velocity,
+            motion: 0, // not read
+        });
+        let movers = (bodies.iter())
+            .map(|body| match body {
+                Some(body) => machine.movers(*body).to_vec(),
+                None => all.clone().collect(),
+            })
+            .collect();
         let stride = paths.iter().map(|path| path.len()).max().unwrap_or(0);
         let zero = T::splat(token, 0.0);
         Self {
@@ -83,17 +99,11 @@ impl<T: Lane> Rows<T> {
             Z: vec![[zero; 3]; n_slots * stride],
             W: vec![[zero; 9]; n_slots * (n_slots + 1) / 2],
             pattern: machine.pattern.clone(),
+            diagonal: vec![[zero; 9]; n_slots],
             softness: vec![zero; n_slots],
             swept: vec![zero; machine.nv()],
             u_before: vec![[zero; 3]; n_slots],
         }
-    }
-
-    /// Whether W is used by its factors.
-    #[inline(always)]
-    #[must_use]
-    pub fn is_factored(&self) -> bool {
-        self.pattern.is_some()
     }
 
     /// Builds Z, W and `u_before = Hᵀ v` at the end of the step.
@@ -114,27 +124,21 @@ impl<T: Lane> Rows<T> {
             self.token,
             #[inline(always)]
             || {
-                for &slot in contacts.used_by_wheels() {
+                for &slot in contacts.used_by_shapes() {
                     self.build(machine, end, factor, contacts, v, slot);
                 }
                 for &slot in contacts.used_by_stops() {
                     self.build_stop(machine, factor, contacts, v, slot);
                 }
-                if self.pattern.is_some() {
-                    self.multiply_diagonal(contacts);
-                } else {
-                    self.multiply(contacts);
+                self.multiply(contacts);
+                for (i, &slot) in contacts.used_densely().iter().enumerate() {
+                    if contacts.stop(slot).is_some() {
+                        let own = &mut self.W[block(i, i)];
+                        (own[4], own[8]) = (own[0], own[0]);
+                    }
                 }
-                let n_wheels = contacts.used_by_wheels().len();
-                for (i, &slot) in contacts.used_by_stops().iter().enumerate() {
-                    let i = n_wheels + i;
-                    let at = if self.pattern.is_some() {
-                        slot
-                    } else {
-                        block(i, i)
-                    };
-                    let own = &mut self.W[at];
-                    (own[4], own[8]) = (own[0], own[0]);
+                if contacts.factored() != 0 {
+                    self.multiply_diagonal(contacts);
                 }
             },
         );
@@ -175,8 +179,25 @@ impl<T: Lane> Rows<T> {
             joints[k] = row;
             add_scaled(&mut u, &row, v[movers[k].velocity]);
         }
+        for guest in contacts.by_lane.guests(slot) {
+            let lane = guest.0;
+            write_rows(machine, end, guest, movers, rows);
+            let mut own = [0.0; 3];
+            let velocities = (0..BASE).chain(movers.iter().map(|mover| mover.velocity));
+            for (row, k) in rows.iter().zip(velocities) {
+                for (own, row) in own.iter_mut().zip(row) {
+                    *own += row.get(lane) * v[k].get(lane);
+                }
+            }
+            for (u, own) in u.iter_mut().zip(own) {
+                u.set(lane, own);
+            }
+        }
         self.u_before[slot] = u;
-        factor.half_solve_path(machine, self.bodies[part], rows);
+        match self.bodies[part] {
+            Some(body) => factor.half_solve_path(machine, body, rows),
+            None => half_solve_whole(machine, factor, rows),
+        }
     }
 
     /// Z and `Hᵀ v` of a stop's slot.
@@ -200,7 +221,9 @@ impl<T: Lane> Rows<T> {
         let last = rows.len() - 1;
         rows[last][0] = sign;
         self.u_before[slot] = [sign * v[mover.velocity], zero, zero];
-        factor.half_solve_path(machine, self.bodies[part], rows);
+        if let Some(body) = self.bodies[part] {
+            factor.half_solve_path(machine, body, rows);
+        }
     }
 
     /// Diagonal blocks of W from Z.
@@ -209,14 +232,18 @@ impl<T: Lane> Rows<T> {
         for &slot in contacts.used() {
             let movers = &self.movers[contacts.part(slot)];
             let z = &self.Z[slot * self.stride..][..BASE + movers.len()];
-            self.W[slot] = square(z);
+            let own = &mut self.diagonal[slot];
+            *own = square(z);
+            if contacts.stop(slot).is_some() {
+                (own[4], own[8]) = (own[0], own[0]);
+            }
         }
     }
 
     /// W from Z.
     #[inline(always)]
     fn multiply(&mut self, contacts: &Contacts<T>) {
-        let used = contacts.used();
+        let used = contacts.used_densely();
         let n_parts = self.movers.len();
         let mut at = 0;
         for (i, &row) in used.iter().enumerate() {
@@ -237,15 +264,18 @@ impl<T: Lane> Rows<T> {
 
     /// Adds a number by slot, 1/kg, to the three entries on W's diagonal.
     pub fn soften(&mut self, contacts: &Contacts<T>, diagonal: &[T]) {
-        for (i, &slot) in contacts.used().iter().enumerate() {
-            let own = if self.pattern.is_some() {
-                self.softness[slot] = diagonal[slot];
-                &mut self.W[slot]
-            } else {
-                &mut self.W[block(i, i)]
-            };
+        let soften = |own: &mut [T; 9], slot: usize| {
             for k in [0, 4, 8] {
                 own[k] += diagonal[slot];
+            }
+        };
+        for (i, &slot) in contacts.used_densely().iter().enumerate() {
+            soften(&mut self.W[block(i, i)], slot);
+        }
+        if contacts.factored() != 0 {
+            for &slot in contacts.used() {
+                self.softness[slot] = diagonal[slot];
+                soften(&mut self.diagonal[slot], slot);
             }
         }
     }
@@ -311,6 +341,7 @@ impl<T: Lane> Rows<T> {
     #[inline(always)]
     pub fn generalized_impulse(
         &self,
+        machine: &Machine,
         contacts: &Contacts<T>,
         end: &Poses<T>,
         lanes: T::Mask,
@@ -321,9 +352,19 @@ impl<T: Lane> Rows<T> {
         out.fill(zero);
         let mut total = Vec3::new(zero, zero, zero);
         let mut couple = total;
-        for &slot in contacts.used_by_wheels() {
+        for &slot in contacts.used_by_shapes() {
             let own = contacts.slot(slot);
-            let here = own.active & lanes;
+            let mut here = own.active & lanes;
+            for guest in contacts.by_lane.guests(slot) {
+                if here.get(guest.0) {
+                    here = here & !T::mask(self.token, 1 << guest.0);
+                    let p = p[slot].map(|p| p.get(guest.0));
+                    add_impulse(machine, end, guest, p, out);
+                    if guest.1.other.is_none() {
+                        add_to_base(guest, p, &mut total, &mut couple);
+                    }
+                }
+            }
             let [p_n, p_t, p_b] = p[slot];
             let force = own.n * p_n + own.t * p_t + own.b * p_b;
             let moment = own.point.cross(force);
@@ -358,7 +399,7 @@ impl<T: Lane> Rows<T> {
         &self,
         contacts: &Contacts<T>,
         q: &[Triple<T>],
-        mu: T,
+        mu: &[T],
         problems: &mut [ContactProblem],
     ) {
         T::vectorize(
@@ -366,46 +407,41 @@ impl<T: Lane> Rows<T> {
             #[inline(always)]
             || {
                 let problems = &mut problems[..T::LANES];
-                if let Some(pattern) = &self.pattern {
-                    for problem in &mut *problems {
-                        problem.factored.adopt(pattern);
-                        problem.factored.slots = 0;
-                    }
-                }
-                let mut friction = [0.0; MAX_LANES];
-                mu.store(&mut friction[..T::LANES]);
+                let factored = contacts.factored();
                 for (lane, problem) in problems.iter_mut().enumerate() {
                     problem.n_contacts = contacts.list(lane).n;
-                    problem.mu[..problem.n_contacts].fill(friction[lane]);
+                    match &self.pattern {
+                        Some(pattern) if factored >> lane & 1 == 1 => {
+                            problem.factored.adopt(pattern);
+                            problem.factored.slots = 0;
+                        }
+                        _ => problem.factored.pattern = None,
+                    }
                 }
-                for &slot in contacts.used_by_stops() {
+                for &slot in contacts.used() {
                     let places = contacts.places(slot);
+                    let [n, t, b] = q[slot];
+                    let values = store_all(&[n, t, b, mu[slot]]);
                     each::<T>(
                         contacts.slot(slot).active,
                         #[inline(always)]
-                        |lane| problems[lane].mu[usize::from(places[lane])] = 0.0,
-                    );
-                }
-                let mut at = 0;
-                for (i, &row) in contacts.used().iter().enumerate() {
-                    let of_row = contacts.places(row);
-                    let values = store_all(&q[row]);
-                    each::<T>(
-                        contacts.slot(row).active,
-                        #[inline(always)]
                         |lane| {
-                            let place = usize::from(of_row[lane]);
+                            let place = usize::from(places[lane]);
                             let q = &mut problems[lane].q[3 * place..][..3];
                             for i in 0..3 {
                                 q[i] = values[i][lane];
                             }
+                            problems[lane].mu[place] = values[3][lane];
                         },
                     );
-                    if self.pattern.is_some() {
-                        self.write_factors(contacts, row, problems);
-                        continue;
+                    if factored != 0 {
+                        self.write_factors(contacts, slot, problems);
                     }
-                    for &column in &contacts.used()[..=i] {
+                }
+                let mut at = 0;
+                let dense = contacts.used_densely();
+                for (i, &row) in dense.iter().enumerate() {
+                    for &column in &dense[..=i] {
                         self.write_block(contacts, [row, column], at, problems);
                         at += 1;
                     }
@@ -436,7 +472,8 @@ impl<T: Lane> Rows<T> {
             }
             return;
         }
-        let both = contacts.slot(row).active & contacts.slot(column).active;
+        let dense = T::mask(self.token, !contacts.factored());
+        let both = contacts.slot(row).active & contacts.slot(column).active & dense;
         each::<T>(
             both,
             #[inline(always)]
@@ -452,10 +489,16 @@ impl<T: Lane> Rows<T> {
     /// Writes a slot's part of the factors.
     #[inline(always)]
     fn write_factors(&self, contacts: &Contacts<T>, slot: usize, problems: &mut [ContactProblem]) {
-        let (places, active) = (contacts.places(slot), contacts.slot(slot).active);
-        let n = BASE + self.movers[contacts.part(slot)].len();
+        let Some(pattern) = &self.pattern else {
+            return;
+        };
+        let places = contacts.places(slot);
+        let active = contacts.slot(slot).active & T::mask(self.token, contacts.factored());
+        let movers = &self.movers[contacts.part(slot)];
+        let n = BASE + movers.len();
+        let (stride, length) = (pattern.stride(), BASE + pattern.joints(slot).len());
         let softness = store_all(&[self.softness[slot]]);
-        let diagonal = store_all(&self.W[slot]);
+        let diagonal = store_all(&self.diagonal[slot]);
         each::<T>(
             active,
             #[inline(always)]
@@ -463,20 +506,28 @@ impl<T: Lane> Rows<T> {
                 let (contact, out) = (usize::from(places[lane]), &mut problems[lane].factored);
                 out.slots |= 1 << slot;
                 out.softness[contact] = softness[0][lane];
-                let out = &mut out.diagonal[contact];
+                let own = &mut out.diagonal[contact];
                 for k in 0..9 {
-                    out[k] = diagonal[k][lane];
+                    own[k] = diagonal[k][lane];
+                }
+                if length > n {
+                    out.Z[contact * stride..][..length].fill([0.0; 3]);
                 }
             },
         );
         let Z = &self.Z[slot * self.stride..][..n];
         for k in 0..n {
             let values = store_all(&Z[k]);
+            // Its place on a path of all velocities is the velocity.
+            let k = match k.checked_sub(BASE) {
+                Some(k) if length > n => movers[k].velocity,
+                _ => k,
+            };
             each::<T>(
                 active,
                 #[inline(always)]
                 |lane| {
-                    let at = usize::from(places[lane]) * self.stride + k;
+                    let at = usize::from(places[lane]) * stride + k;
                     let out = &mut problems[lane].factored.Z[at];
                     for i in 0..3 {
                         out[i] = values[i][lane];
@@ -523,6 +574,36 @@ impl<T: Lane> Rows<T> {
             }
         }
     }
+}
+
+/// `Z` of rows of all velocities, in their place.
+#[cold]
+fn half_solve_whole<T: Lane>(machine: &Machine, factor: &Factor<T>, rows: &mut [Triple<T>]) {
+    for j in 0..3 {
+        let mut column: Vec<T> = rows.iter().map(|row| row[j]).collect();
+        factor.half_solve(machine, &mut column);
+        for (row, x) in rows.iter_mut().zip(column) {
+            row[j] = x;
+        }
+    }
+}
+
+/// Adds the impulse of a contact with the ground, N s, and its moment about the trunk's origin.
+fn add_to_base<T: Lane>(
+    (lane, contact): (usize, &Contact),
+    p: [f64; 3],
+    total: &mut Vec3<T>,
+    couple: &mut Vec3<T>,
+) {
+    let [n, t, b] = contact.frame.rows();
+    let force = n * p[0] + t * p[1] + b * p[2];
+    let moment = contact.point.cross(&force);
+    let add = |sum: &mut Vec3<T>, x: Vector3<f64>| {
+        let own = Vector3::from(sum.get(lane));
+        sum.set(lane, (own + x).into());
+    };
+    add(total, force);
+    add(couple, moment);
 }
 
 /// `x += y` where the mask is true.

@@ -1,4 +1,4 @@
-//! The ordinary step of a block of rovers.
+//! The fast step of a block of rovers.
 //!
 //! The formulas are those of [`crate::integrator::moreau_jean`] with explicit gyroscopic terms and
 //! inelastic contact. A step has three parts, between which its contact problems are solved with
@@ -10,13 +10,13 @@
 //!    line, the friction-contact problem anew;
 //! 3. [`Block::finish`] — the projected configuration, and what the next step remembers.
 //!
-//! Whatever is not ordinary declines the lane: its state stays as it was.
+//! A lane whose step cannot be taken falls back to the general one: its state stays as it was.
 
 use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::contacts::Contacts;
+use super::contacts::{Contacts, Sight};
 use super::drives::Drives;
 use super::forecast::Forecast;
 use super::ground::Ground;
@@ -49,8 +49,7 @@ const SWEEPS: usize = 2;
 pub enum Decline {
     /// It turns too fast for explicit gyroscopic terms.
     Turning,
-    /// A contact that is not ordinary: a body near the ground, a wheel on its side, more contacts
-    /// than slots.
+    /// It has more contacts than a problem, or its ground is unknown.
     Contact,
     /// The mass matrix has no factor.
     MassMatrix,
@@ -87,7 +86,7 @@ pub fn are_alike(a: &StepOptions, b: &StepOptions) -> bool {
     *a == own
 }
 
-/// Rovers in the lanes of a register, one ordinary step at a time.
+/// Rovers in the lanes of a register, one fast step at a time.
 pub struct Block<T: Lane> {
     token: T::Token,
     machine: Arc<Machine>,
@@ -95,7 +94,9 @@ pub struct Block<T: Lane> {
     models: [Option<Arc<Model>>; MAX_LANES],
     inertias: Inertias<T>,
     gravity: Vec3<T>,
+    /// Friction coefficient of contacts without a law of their materials, and of each slot.
     friction: T,
+    mu: Vec<T>,
     ground: Ground<T>,
     drives: Drives<T>,
     /// Impulses of each lane's last step, and their generalized impulse (nv) where the contacts
@@ -216,6 +217,7 @@ impl<T: Lane> Block<T> {
             p_last: slots.clone(),
             impact: vec![nobody; slots.len()],
             has_impact: nobody,
+            mu: vec![zero; slots.len()],
             u: slots,
             y: vector(),
             torque: vector(),
@@ -477,9 +479,9 @@ impl<T: Lane> Block<T> {
         probe.end(Phase::Delassus);
         self.load(is_first.then_some(&*problems));
         self.rows
-            .to_problems(&self.contacts, &self.u, self.friction, problems);
+            .to_problems(&self.contacts, &self.u, &self.mu, problems);
         probe.end(Phase::Bias);
-        if self.rows.is_factored() {
+        if self.contacts.factored() != 0 {
             T::vectorize(
                 token,
                 #[inline(always)]
@@ -497,8 +499,9 @@ impl<T: Lane> Block<T> {
         } else {
             self.retaken
         };
+        let lanes = lanes & T::mask(self.token, self.contacts.factored());
         self.p.copy_from_slice(&self.p_last);
-        let data = (&self.u[..], self.friction);
+        let data = (&self.u[..], &self.mu[..]);
         self.rows.sweep(&self.contacts, SWEEPS, data, &mut self.p);
         write_start(&self.contacts, lanes, &self.p, problems);
     }
@@ -539,10 +542,17 @@ impl<T: Lane> Block<T> {
     fn detect(&mut self, problems: &mut [ContactProblem]) {
         let (h, theta) = (self.options.time_step, self.options.theta);
         let forecast = Forecast::new(self.gravity, h, self.options.forecast, (1.0 - theta) * h);
-        let (ground, middle, end) = (&mut self.ground, &self.poses_middle, &self.poses_end);
-        let declined = self
-            .contacts
-            .detect(ground, middle, end, &self.v, &forecast);
+        let sight = Sight {
+            machine: &self.machine,
+            models: &self.models,
+            going: self.going.bits(),
+            middle: &self.poses_middle,
+            end: &self.poses_end,
+            v: &self.v,
+            needs_pieces: !self.options.materials.is_empty(),
+            forecast: &forecast,
+        };
+        let declined = self.contacts.detect(&mut self.ground, &sight);
         self.decline(Decline::Contact, declined);
         if !self.machine.stops.is_empty() {
             let (machine, places) = (&*self.machine, (&self.middle, &self.end));
@@ -551,6 +561,17 @@ impl<T: Lane> Block<T> {
                 .contacts
                 .detect_stops(machine, places, end, &self.v, &forecast);
             self.decline(Decline::Contact, too_many);
+        }
+        for &slot in self.contacts.used() {
+            let is_stop = self.contacts.stop(slot).is_some();
+            self.mu[slot] = if is_stop {
+                self.number(0.0)
+            } else {
+                self.friction
+            };
+        }
+        if !self.options.materials.is_empty() {
+            self.mix_materials();
         }
         let mut is_same = 0;
         for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
@@ -561,6 +582,24 @@ impl<T: Lane> Block<T> {
         }
         self.is_same = T::mask(self.token, is_same);
         self.persists = self.is_same & self.has_persistent;
+    }
+
+    /// Friction of contacts whose two materials have a law of their own.
+    #[cold]
+    fn mix_materials(&mut self) {
+        for lane in (0..T::LANES).filter(|&lane| self.going.get(lane)) {
+            let (Some(model), Some(terrain)) = (&self.models[lane], self.ground.terrain(lane))
+            else {
+                continue;
+            };
+            for place in 0..self.contacts.list(lane).n {
+                let (slot, contact) = self.contacts.contact(&self.machine, lane, place);
+                let law = contact.between_materials(model, &**terrain, &self.options.materials);
+                if let Some([mu, _]) = law {
+                    self.mu[slot].set(lane, mu);
+                }
+            }
+        }
     }
 
     /// The implicit terms of motors, held joints, springs and dampers; `is_first`: their branches
@@ -627,6 +666,7 @@ impl<T: Lane> Block<T> {
         if is_any {
             let (contacts, end) = (&self.contacts, &self.poses_end);
             self.rows.generalized_impulse(
+                &self.machine,
                 contacts,
                 end,
                 self.persists,
@@ -1174,8 +1214,14 @@ impl<T: Lane> Block<T> {
         }
         let persists = self.is_same & in_touch & !self.has_impact;
         let (contacts, end) = (&self.contacts, &self.poses_end);
-        self.rows
-            .generalized_impulse(contacts, end, going, &self.p, &mut self.pushed);
+        self.rows.generalized_impulse(
+            &self.machine,
+            contacts,
+            end,
+            going,
+            &self.p,
+            &mut self.pushed,
+        );
         for (own, pushed) in self.persistent.iter_mut().zip(&self.pushed) {
             *own = T::select(going, *pushed, *own);
         }

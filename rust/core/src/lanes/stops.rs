@@ -1,4 +1,4 @@
-//! Joints at their stops: slots behind those of the wheels, the lower stop of a joint first.
+//! Joints at their stops: slots behind all others, the lower stop of a joint first.
 //!
 //! The formulas are those of [`crate::contact::limit`].
 
@@ -73,6 +73,7 @@ impl<T: Lane> Contacts<T> {
                         too_many = too_many | self.list_slot(slot, None);
                     }
                 }
+                self.choose_forms();
                 too_many
             },
         )

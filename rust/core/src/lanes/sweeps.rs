@@ -73,10 +73,10 @@ impl<T: Lane> Rows<T> {
         &mut self,
         contacts: &Contacts<T>,
         n: usize,
-        (q, mu): (&[Triple<T>], T),
+        (q, mu): (&[Triple<T>], &[T]),
         p: &mut [Triple<T>],
     ) {
-        let zero = mu.like(0.0);
+        let zero = T::splat(contacts.token, 0.0);
         self.swept.fill(zero);
         for &slot in contacts.used() {
             let active = contacts.slot(slot).active;
@@ -88,12 +88,7 @@ impl<T: Lane> Rows<T> {
         for _ in 0..n {
             for &slot in contacts.used() {
                 let u = self.velocity(contacts, slot, &q[slot], &p[slot]);
-                let mu = if contacts.stop(slot).is_some() {
-                    zero
-                } else {
-                    mu
-                };
-                let new = solve(&self.W[slot], mu, &p[slot], &u);
+                let new = solve(&self.diagonal[slot], mu[slot], &p[slot], &u);
                 let active = contacts.slot(slot).active;
                 let mut change = [zero; 3];
                 for k in 0..3 {

@@ -6,7 +6,8 @@
 use super::contacts::Contacts;
 use super::machine::Machine;
 use super::problem::{ContactProblem, Triple};
-use crate::law::compliance::Yielding;
+use crate::contact::Part;
+use crate::law::compliance::{Compliance, Yielding};
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 
 /// The laws of a block's contacts. Empty where all wheels are rigid.
@@ -59,12 +60,22 @@ impl<T: Lane> Yields<T> {
         unknown: impl Fn(usize) -> Option<f64>,
     ) {
         for &slot in contacts.used() {
-            let wheel = machine.wheels.get(contacts.part(slot)); // None for a stop
-            let compliance = wheel.and_then(|wheel| wheel.compliance);
+            let of_wheel = |w: usize| machine.wheels.get(w).and_then(|wheel| wheel.compliance);
+            let compliance = |lane| match contacts.by_lane.contact(slot, lane) {
+                None => of_wheel(contacts.part(slot)), // None for a stop
+                Some(contact) => {
+                    let of = |part| match part {
+                        Part::Wheel(w) => of_wheel(w),
+                        _ => None,
+                    };
+                    let other = contact.other.and_then(|other| of(other.part));
+                    Compliance::in_series(of(contact.part), other)
+                }
+            };
             let (own, places) = (contacts.slot(slot), contacts.places(slot));
             let mut columns = [[0.0; MAX_LANES]; 5];
             for (lane, problem) in problems[..T::LANES].iter().enumerate() {
-                let law = compliance
+                let law = compliance(lane)
                     .filter(|_| own.active.get(lane))
                     .map(|compliance| {
                         let (gap, u_N) = (own.gap.get(lane), u_before[slot][0].get(lane));

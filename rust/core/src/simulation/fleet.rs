@@ -2,13 +2,13 @@
 //!
 //! Rovers of one machine with alike options fill the lanes of blocks ([`crate::lanes`]). The
 //! contact problems of all blocks wait in one queue; a block goes on to its next step as soon as
-//! its own are solved, whatever the others do. A lane whose step is not ordinary is taken by the
-//! general step, alone, and comes back. Every rover moves as it would alone, to the last bit.
+//! its own are solved, whatever the others do. A lane that has no fast step is taken by the general
+//! step, alone, and comes back. Every rover moves as it would alone, to the last bit.
 
 use std::sync::Arc;
 
 use super::rover::RoverSimulation;
-use crate::integrator::{NoProbe, StepError, StepReport};
+use crate::integrator::{NoProbe, StepError, StepOptions, StepReport};
 use crate::lanes::machine::Machine;
 use crate::lanes::problem::ContactProblem;
 use crate::lanes::queue::Queue;
@@ -167,21 +167,19 @@ impl<T: Lane> Lanes<T> {
 
     /// Gives the rovers that can share blocks their seats, in order; returns how many seats the
     /// blocks have.
-    fn seat(&mut self, riders: &[Rider<'_>]) -> usize {
+    fn seat(&mut self, riders: &mut [Rider<'_>]) -> usize {
         self.seats.clear();
-        let Some(first) = riders
-            .iter()
-            .position(|rider| rider.rover.machine().is_some())
-        else {
+        let mut machines = riders.iter().filter_map(|rider| rider.rover.machine());
+        let Some(machine) = machines.next().cloned() else {
             return 0;
         };
-        let leader = &*riders[first].rover;
-        for (k, rider) in riders.iter().enumerate() {
-            let is_like = match (rider.rover.machine(), leader.machine()) {
-                (Some(own), Some(other)) => Arc::ptr_eq(own, other),
-                _ => false,
-            };
-            if is_like && are_alike(rider.rover.options(), leader.options()) {
+        let mut leader: Option<StepOptions> = None;
+        for (k, rider) in riders.iter_mut().enumerate() {
+            if !rider.rover.shares(&machine) {
+                continue;
+            }
+            let own = rider.rover.options();
+            if are_alike(own, leader.get_or_insert_with(|| own.clone())) {
                 self.seats.push(Some(Seat {
                     rider: k,
                     report: StepReport::default(),
@@ -196,19 +194,16 @@ impl<T: Lane> Lanes<T> {
         }
         let n_seats = self.seats.len().next_multiple_of(T::LANES);
         self.seats.resize(n_seats, None);
-        let Some(machine) = leader.machine() else {
-            return 0;
-        };
         if !self
             .machine
             .as_ref()
-            .is_some_and(|own| Arc::ptr_eq(own, machine))
+            .is_some_and(|own| Arc::ptr_eq(own, &machine))
         {
-            self.machine = Some(Arc::clone(machine));
+            self.machine = Some(Arc::clone(&machine));
             self.blocks.clear();
         }
         while self.blocks.len() < n_seats / T::LANES {
-            self.blocks.push(Block::new(self.token, machine));
+            self.blocks.push(Block::new(self.token, &machine));
         }
         if self.problems.len() < n_seats {
             self.problems.resize_with(n_seats, ContactProblem::default);
@@ -284,7 +279,7 @@ impl<T: Lane> Lanes<T> {
         false
     }
 
-    /// Notes the reports of a block's step; rovers whose step was not ordinary take it alone.
+    /// Notes the reports of a block's step; rovers that need the general step take it alone.
     fn settle(&mut self, b: usize, riders: &mut [Rider<'_>]) {
         let block = &mut self.blocks[b];
         let seats = &mut self.seats[b * T::LANES..][..T::LANES];
@@ -302,7 +297,10 @@ impl<T: Lane> Lanes<T> {
             rover.alight(block, lane);
             match rover.step_generally() {
                 Ok(report) => {
-                    seat.report.merge(&report);
+                    seat.report.merge(&StepReport {
+                        fallbacks: 1,
+                        ..report
+                    });
                     seat.is_general = true;
                     rover.board(block, lane);
                 }

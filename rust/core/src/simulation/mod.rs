@@ -4,7 +4,7 @@
 //!   simulation of all scenes;
 //! - [`state`], [`active_contact`]: its state, its contacts;
 //! - [`rover`]: a rover on a terrain, with its [command](rover_command), its
-//!   [controls](rover_controls), its [contacts](rover_contacts), its [ordinary] steps, its
+//!   [controls](rover_controls), its [contacts](rover_contacts), its [fast steps](fallback), its
 //!   [`reading`], what [rays](rover_rays) meet, and the [`linearisation`] of a step;
 //! - [`planar`]: a planar machine on a ground; [`grains`]: a bed of grains,
 //!   perhaps with a machine on it;
@@ -14,10 +14,10 @@
 pub mod active_contact;
 pub mod batch;
 pub mod error;
+pub mod fallback;
 pub mod fleet;
 pub mod grains;
 pub mod linearisation;
-pub mod ordinary;
 pub mod planar;
 pub mod profile;
 mod quick;

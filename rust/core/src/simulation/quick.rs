@@ -1,4 +1,4 @@
-//! Scratch of a rover's ordinary steps: a block of one lane.
+//! Scratch of a rover's fast steps: a block of one lane.
 
 use std::sync::OnceLock;
 

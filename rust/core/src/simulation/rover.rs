@@ -14,7 +14,7 @@ use super::stepping::Simulation;
 use crate::contact::{Contact, Opposite, Part};
 use crate::geometry::Terrain;
 use crate::integrator::{OptionsError, Probe, StepOptions, StepReport};
-use crate::lanes::machine::{Machine, NotOrdinary};
+use crate::lanes::machine::{Machine, Unsupported};
 use crate::multibody::{Configuration, Energy, Kinematics, Model, Momentum, momentum};
 use crate::system::{TreeScratch, TreeSystem};
 
@@ -25,15 +25,15 @@ pub struct RoverScene {
     pub model: Arc<Model>,
     /// The ground.
     pub terrain: Arc<dyn Terrain>,
-    /// The machine of its ordinary steps, or why it has none.
-    pub(super) machine: Result<Arc<Machine>, NotOrdinary>,
+    /// The machine of its fast steps, or why it has none.
+    pub(super) machine: Result<Arc<Machine>, Unsupported>,
 }
 
 impl RoverScene {
     /// A machine on a terrain.
     #[must_use]
     pub fn new(model: Arc<Model>, terrain: Arc<dyn Terrain>) -> Self {
-        let machine = Machine::of(&model).map(Machine::shared);
+        let machine = Machine::of(&model).map(Arc::new);
         Self {
             model,
             terrain,
@@ -115,6 +115,8 @@ impl Scene for RoverScene {
     type Parts = RoverParts;
     type System<'a> = TreeSystem<'a>;
 
+    const HAS_FAST_STEP: bool = true;
+
     fn nv(&self) -> usize {
         self.model.nv()
     }
@@ -189,7 +191,7 @@ impl Scene for RoverScene {
         step: &mut QuickStep<'_, Self>,
         probe: &mut dyn Probe,
     ) -> Option<StepReport> {
-        self.take_ordinary_step(step, probe)
+        self.take_fast_step(step, probe)
     }
 
     fn publish(&self, parts: &mut RoverParts, scratch: &mut SceneScratch<Self>) {

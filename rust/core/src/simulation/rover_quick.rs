@@ -1,4 +1,4 @@
-//! The ordinary steps of a rover, alone and as a passenger of a block.
+//! The fast steps of a rover, alone and as a passenger of a block.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use super::quick::solve;
 use super::rover::{RoverScene, RoverSimulation};
 use super::scene::QuickStep;
 use crate::integrator::{NoProbe, Phase, Probe, StepError, StepOptions, StepReport};
-use crate::lanes::admission::{NeverOrdinary, admit};
+use crate::lanes::admission::{FallbackReason, admit};
 use crate::lanes::machine::Machine;
 use crate::lanes::passenger::Passenger;
 use crate::lanes::queue::Queue;
@@ -15,34 +15,33 @@ use crate::lanes::step::{Block, Next};
 use crate::scalar::{Lane, Single};
 
 impl RoverScene {
-    /// The machine of its ordinary steps; none if with these options no step is ordinary.
-    fn ordinary_machine(&self, options: &StepOptions) -> Option<&Arc<Machine>> {
-        match self.never_ordinary(options) {
+    /// The machine of its fast steps; none if with these options it has none.
+    fn fast_machine(&self, options: &StepOptions) -> Option<&Arc<Machine>> {
+        match self.fallback_reason(options) {
             None => self.machine.as_ref().ok(),
             Some(_) => None,
         }
     }
 
-    /// Why with these options no step is ordinary.
+    /// Why with these options it has no fast steps.
     #[inline]
-    pub(super) fn never_ordinary(&self, options: &StepOptions) -> Option<NeverOrdinary> {
+    pub(super) fn fallback_reason(&self, options: &StepOptions) -> Option<FallbackReason> {
         match (admit(options), &self.machine) {
             (Err(why), _) => Some(why),
             (Ok(()), Err(why)) => Some(why.clone().into()),
-            (Ok(()), Ok(machine)) => (machine.has_wide_wheels() && self.terrain.has_surface())
-                .then_some(NeverOrdinary::WideWheelsOnSurface),
+            (Ok(()), Ok(_)) => None,
         }
     }
 
-    /// Takes an ordinary step; None if it is not ordinary, and nothing has changed.
-    pub(super) fn take_ordinary_step(
+    /// Takes a fast step; None if that is not possible, and nothing has changed.
+    pub(super) fn take_fast_step(
         &self,
         step: &mut QuickStep<'_, Self>,
         probe: &mut dyn Probe,
     ) -> Option<StepReport> {
         let quick = &mut step.parts.quick;
         quick.set_last(false);
-        let machine = self.ordinary_machine(step.options)?;
+        let machine = self.fast_machine(step.options)?;
         let token = Single::best();
         let block = quick
             .block
@@ -92,9 +91,24 @@ impl RoverScene {
 }
 
 impl RoverSimulation {
-    /// The machine of its ordinary steps; none if its steps are never ordinary.
+    /// The machine of its fast steps; none if it has none.
     pub(super) fn machine(&self) -> Option<&Arc<Machine>> {
-        self.scene.ordinary_machine(&self.options)
+        self.scene.fast_machine(&self.options)
+    }
+
+    /// Whether the machine of another rover is its own. An equal one becomes its own.
+    pub(super) fn shares(&mut self, other: &Arc<Machine>) -> bool {
+        let Some(own) = self.machine() else {
+            return false;
+        };
+        if Arc::ptr_eq(own, other) {
+            return true;
+        }
+        let is_equal = **own == **other;
+        if is_equal {
+            self.scene.machine = Ok(Arc::clone(other));
+        }
+        is_equal
     }
 
     /// Takes a lane of a block. [`Block::begin`] follows.
@@ -121,7 +135,7 @@ impl RoverSimulation {
         });
     }
 
-    /// A step that is not ordinary.
+    /// A general step.
     pub(super) fn step_generally(&mut self) -> Result<StepReport, StepError> {
         let variant = self.options.variant;
         self.general_step(&variant, &mut NoProbe)

@@ -71,6 +71,9 @@ pub trait Scene: Clone {
     /// default there are none.
     fn begin_call(&self, _parts: &mut Self::Parts) {}
 
+    /// Whether [`Self::quick_step`] takes any.
+    const HAS_FAST_STEP: bool = false;
+
     /// Called after each accepted step. By default it does nothing.
     fn after_step(&self, _taken: StepTaken<'_, Self>) {}
 

@@ -265,7 +265,10 @@ impl<S: Scene> Simulation<S> {
             let quick = may_be_quick.then(|| self.quick_step(probe)).flatten();
             let report = match quick {
                 Some(report) => report,
-                None => self.general_step(integrator, probe)?,
+                None => StepReport {
+                    fallbacks: usize::from(may_be_quick && S::HAS_FAST_STEP),
+                    ..self.general_step(integrator, probe)?
+                },
             };
             total.merge(&report);
             if !go_on() {

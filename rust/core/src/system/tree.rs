@@ -172,13 +172,7 @@ impl TreeSystem<'_> {
         if options.materials.is_empty() {
             return None;
         }
-        let own = contact.part.material(self.model);
-        let opposite = match (contact.key.opposite, contact.other) {
-            (Opposite::Ground(primitive), _) => self.terrain.material(primitive),
-            (Opposite::Part(_), Some(other)) => other.part.material(self.model),
-            (Opposite::Part(_), None) | (Opposite::Grain(_) | Opposite::Stop, _) => return None,
-        };
-        options.materials.between(own, opposite)
+        contact.between_materials(self.model, self.terrain, &options.materials)
     }
 
     /// Largest angular speed of a free base, rad/s.
@@ -200,29 +194,6 @@ impl TreeSystem<'_> {
     fn turning_of_joints(&self, v: &[f64]) -> f64 {
         let turning = self.model.mechanism().turning.iter();
         turning.fold(0.0, |most, &(k, ratio)| most.max(v[k].abs() * ratio))
-    }
-
-    /// Upper bound on the speed of all points of a tree, m/s.
-    fn fastest_point(&self, tree: &Tree, v: &[f64]) -> f64 {
-        let v = &v[tree.velocities.clone()];
-        let linear = match v {
-            [x, y, z, ..] if tree.is_free => (x * x + y * y + z * z).sqrt(),
-            _ => 0.0,
-        };
-        let half = tree.lead() / 2;
-        // A translation counts as a rotation at an arm of more than one metre.
-        let turning: f64 = v[half..].iter().map(|w| w.abs()).sum();
-        let mut reach = tree.reach + 1.0;
-        if self.model.has_slides() {
-            let kinematics = &self.parts.kinematics;
-            let root = kinematics.r(tree.bodies.start);
-            let farthest = (tree.bodies.clone()).map(|b| (kinematics.r(b) - root).norm());
-            reach = farthest.fold(reach, f64::max);
-        }
-        let links = self.model.mechanism().links.iter();
-        let couplings = links.filter_map(|link| link.coupling);
-        let coupled: f64 = couplings.map(|coupling| coupling.ratio.abs()).sum();
-        linear + turning * reach * (1.0 + coupled)
     }
 }
 
@@ -274,7 +245,8 @@ impl MechanicalSystem for TreeSystem<'_> {
         // Two trees may approach each other.
         let (mut fastest, mut next) = (0.0_f64, 0.0_f64);
         for tree in self.model.trees() {
-            let speed = self.fastest_point(tree, v);
+            let places = |body: usize| self.parts.kinematics.r(body);
+            let speed = self.model.fastest_point(tree, places, v);
             (fastest, next) = (fastest.max(speed), next.max(fastest.min(speed)));
         }
         activation.margin = activation.lead.abs() * (fastest + next);

@@ -1,7 +1,8 @@
-"""Which simulations take ordinary steps, in lanes, and why the others do not."""
+"""Which simulations take fast steps, in lanes, and why the others do not."""
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField
@@ -19,7 +20,7 @@ def steering_joints(model: RoverModel) -> list[str]:
 def test_the_rover_steps_in_lanes_welded_or_not(terrain: Plane | SphereField, welded: bool) -> None:
     model = RoverModel()
     simulation = Simulation(model.weld(steering_joints(model)) if welded else model, terrain)
-    assert simulation.never_ordinary is None
+    assert simulation.fallback_reason is None
     assert simulation.lanes == LANES[SimulationBatch([simulation]).instruction_set]
 
 
@@ -32,9 +33,9 @@ def test_the_rover_steps_in_lanes_welded_or_not(terrain: Plane | SphereField, we
         ({"warm_start": False}, "the warm start is off"),
     ],
 )
-def test_options_that_are_not_ordinary_are_named(options: dict[str, Any], reason: str) -> None:
+def test_options_without_a_fast_step_are_named(options: dict[str, Any], reason: str) -> None:
     simulation = Simulation(**options)
-    assert simulation.never_ordinary == reason
+    assert simulation.fallback_reason == reason
     assert simulation.lanes == 1
 
 
@@ -54,17 +55,28 @@ def test_joints_and_forces_of_every_kind_step_in_lanes(changes: dict[str, Any]) 
     bogie = next(solid for solid in description["solids"] if solid["name"] == "left_bogie")
     bogie.update(changes)
     simulation = Simulation(RoverModel.from_dict(description))
-    assert simulation.never_ordinary is None
+    assert simulation.fallback_reason is None
 
 
 @pytest.mark.parametrize("name", ["mars-rover", "open-rover", "four-steered", "skid-steered"])
 def test_rovers_of_the_gallery_step_in_lanes(name: str) -> None:
-    assert Simulation(RoverModel.named(name)).never_ordinary is None
+    assert Simulation(RoverModel.named(name)).fallback_reason is None
 
 
-def test_a_machine_that_is_not_ordinary_gives_its_reason() -> None:
+def test_bodies_that_touch_the_ground_or_each_other_step_in_lanes() -> None:
     description = RoverModel().to_dict()
     description["self_contact"] = True
     simulation = Simulation(RoverModel.from_dict(description))
-    assert simulation.never_ordinary == "bodies of the machine can touch each other"
-    assert simulation.lanes == 1
+    assert simulation.fallback_reason is None
+    q = simulation.q
+    q[1], q[3] = 0.6, np.pi
+    simulation.set_state(q)
+    report = simulation.step(200)
+    assert "box" in simulation.contacts.kinds
+    assert report.fallbacks < 40
+
+
+def test_a_report_counts_steps_that_are_general() -> None:
+    simulation = Simulation(warm_start=False)
+    assert simulation.step(3).fallbacks == 3
+    assert Simulation().step(3).fallbacks == 0

@@ -1,0 +1,161 @@
+//! Contacts that are found lane by lane, as the general step finds them ([`crate::contact`]): those
+//! of boxes and balls, of bodies with each other, and of wheels that touch more than a plane or a
+//! few spheres. They take free slots whose path of velocities begins with their body's.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::by_lane::{Asked, Found, motion};
+use super::contacts::{Contacts, Sight};
+use super::ground::Ground;
+use super::machine::Machine;
+use crate::contact::detection::{Moving, detect_parts};
+use crate::contact::pair_detection::detect_pairs_of;
+use crate::contact::relocation::relocate_to;
+use crate::contact::stance::Stance;
+use crate::contact::{Activation, Contact, PairSearch, Part};
+use crate::multibody::Poses;
+use crate::scalar::{Lane, LaneMask};
+
+/// A lane of a block.
+struct OneLane<'a, T: Lane> {
+    machine: &'a Machine,
+    poses: &'a Poses<T>,
+    v: &'a [T],
+    lane: usize,
+}
+
+impl<T: Lane> Stance for OneLane<'_, T> {
+    #[inline]
+    fn origin(&self, _: usize) -> Vector3<f64> {
+        self.poses.origin.get(self.lane).into()
+    }
+
+    #[inline]
+    fn pose(&self, body: usize) -> (Matrix3<f64>, Vector3<f64>) {
+        let own = &self.poses.bodies[body];
+        let columns = [own.R.x, own.R.y, own.R.z].map(|x| Vector3::from(x.get(self.lane)));
+        (Matrix3::from_columns(&columns), own.r.get(self.lane).into())
+    }
+
+    #[inline]
+    fn point_velocity(&self, body: usize, x: &Vector3<f64>) -> Vector3<f64> {
+        let v = |k: usize| self.v[k].get(self.lane);
+        let turning = Vector3::new(v(3), v(4), v(5));
+        let mut velocity = Vector3::new(v(0), v(1), v(2)) + turning.cross(x);
+        for mover in self.machine.movers(body) {
+            let [axis, swing] = motion(self.poses, *mover, self.lane);
+            velocity += (axis.cross(x) + swing) * v(mover.velocity);
+        }
+        velocity
+    }
+}
+
+impl<T: Lane> Contacts<T> {
+    /// Finds what was asked for. Returns the lanes with unknown ground or too few slots.
+    #[cold]
+    pub(super) fn find_by_lane(&mut self, ground: &Ground<T>, sight: &Sight<'_, T>) -> T::Mask {
+        let mut declined = 0;
+        for lane in 0..T::LANES {
+            let (Some(model), Some(terrain)) = (&sight.models[lane], ground.terrain(lane)) else {
+                continue;
+            };
+            let at = |poses| OneLane {
+                machine: sight.machine,
+                poses,
+                v: sight.v,
+                lane,
+            };
+            let (middle, end) = (at(sight.middle), at(sight.end));
+            let machine = Moving {
+                model,
+                middle: &middle,
+                end: &end,
+            };
+            let mut contacts = std::mem::take(&mut self.by_lane.scratch);
+            contacts.clear();
+            let activation = |margin| Activation {
+                lead: sight.forecast.lead,
+                hover: sight.forecast.hover.get(lane),
+                slow: sight.forecast.slow.get(lane),
+                margin,
+            };
+            let own = |asked: &&Asked<T>| asked.lanes >> lane & 1 == 1;
+            for asked in self.by_lane.asked.iter().filter(own) {
+                let activation = activation(asked.reach.get(lane));
+                let parts = std::iter::once(asked.part);
+                let unknown = detect_parts(parts, &machine, &**terrain, &activation, &mut contacts);
+                declined |= u32::from(unknown.is_some()) << lane;
+            }
+            if sight.machine.has_pairs && sight.going >> lane & 1 == 1 {
+                let v: Vec<f64> = sight.v.iter().map(|v| v.get(lane)).collect();
+                let places = |body: usize| sight.middle.bodies[body].r.get(lane).into();
+                let fastest = model.fastest_point(&model.trees()[0], places, &v);
+                let activation = activation(sight.forecast.lead.abs() * fastest);
+                let pairs = self
+                    .by_lane
+                    .pairs
+                    .get_or_insert_with(|| PairSearch::new(model));
+                detect_pairs_of(model, &middle, &activation, pairs, &mut contacts);
+            }
+            for contact in &mut contacts {
+                relocate_to(model, &end, &**terrain, contact);
+                declined |= u32::from(!self.give(sight.machine, lane, contact)) << lane;
+            }
+            self.by_lane.scratch = contacts;
+        }
+        T::mask(self.token, declined)
+    }
+
+    /// Enters a contact into a free slot. False if none is.
+    fn give(&mut self, machine: &Machine, lane: usize, contact: &Contact) -> bool {
+        let Self {
+            parts,
+            slots,
+            part_of,
+            by_lane,
+            token,
+            ..
+        } = self;
+        let own = match contact.part {
+            Part::Wheel(w) if contact.other.is_none() => parts.wheels[w].slots.clone(),
+            _ => 0..0,
+        };
+        let hosts = match contact.other {
+            None => &by_lane.hosts[contact.body],
+            Some(_) => &by_lane.of_pairs,
+        };
+        let mut hosts = own.chain(hosts.iter().copied());
+        let Some(slot) = hosts.find(|&slot| !slots[slot].active.get(lane)) else {
+            return false;
+        };
+        let Ok(place) = u16::try_from(by_lane.found.len()) else {
+            return false;
+        };
+        let is_own = |w: usize| {
+            machine
+                .wheels
+                .get(w)
+                .is_some_and(|w| w.body == contact.body)
+        };
+        by_lane.found.push(Found {
+            lane,
+            contact: *contact,
+            is_guest: contact.other.is_some() || !is_own(part_of[slot]),
+        });
+        by_lane.given[slot] |= 1 << lane;
+        by_lane.places[slot][lane] = place;
+        let slot = &mut slots[slot];
+        slot.active = slot.active | T::mask(*token, 1 << lane);
+        let [n, t, b] = contact.frame.rows().map(<[f64; 3]>::from);
+        for (own, x) in [
+            (&mut slot.point, contact.point.into()),
+            (&mut slot.n, n),
+            (&mut slot.t, t),
+            (&mut slot.b, b),
+        ] {
+            own.set(lane, x);
+        }
+        slot.gap.set(lane, contact.gap);
+        true
+    }
+}
