@@ -176,9 +176,13 @@ fn obeys_the_law_of_the_general_step(model: &Arc<Model>) {
         }
     }
     worst.sort_by(f64::total_cmp);
-    // A few friction problems have several answers.
+    // A few friction problems have several answers, most of them those of rigid cylinders, which
+    // touch at twelve points.
+    let is_rigid = (model.wheels().iter())
+        .any(|wheel| wheel.width > 2.0 * wheel.rounding && wheel.compliance.is_none());
+    let share = if is_rigid { 90 } else { 97 };
     assert!(
-        worst[worst.len() * 95 / 100] < 1e-9,
+        worst[worst.len() * share / 100] < 1e-9,
         "{:?}",
         &worst[worst.len() - 20..]
     );
