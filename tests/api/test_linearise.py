@@ -110,7 +110,7 @@ def test_columns_that_hold_are_the_differences_of_real_steps(scene, modes, least
     assert linear.a.shape == (2 * NV, 2 * NV)
     assert linear.b.shape == (2 * NV, 12)
     assert linear.holds.sum() >= least
-    assert difference_error(sim, linear).max() < 1e-6
+    assert difference_error(sim, linear).max() < 2e-6  # the differences' own error
 
 
 def test_a_projection_is_differentiated():
