@@ -23,7 +23,7 @@ from rover_gym.validation import checked, refuse
 if TYPE_CHECKING:
     from rover_gym.mechanics import RoverModel
 
-#: The file that tells a run of `training/train_raw.py`.
+#: The file that tells a run of `RawPolicy.save`.
 RAW_FILE = "model.zip"
 
 
@@ -35,7 +35,7 @@ def write_onnx(policy: str | Path, path: str | Path, terrain: str = "plane", mod
     |---|---|---|
     | "trained", or the folder of a trained policy | `features` | `command`: three entries in [-1, 1] |
     | "foresight", or the folder of a forecast | `features` | `outcomes`: way, stuck, failed |
-    | the folder of a run of `training/train_raw.py` | `observation` | `action` |
+    | the folder of a run of `RawPolicy.save` | `observation` | `action` |
 
     Args:
         policy: The policy.
