@@ -17,7 +17,7 @@ from rover_gym.grains import (
     settled_track,
     with_wheel_width,
 )
-from rover_gym.grains.footprint import Footprint, Parts
+from rover_gym.grains.grain_surface import Footprint, Parts
 from rover_gym.mechanics import GrainSimulation, Plane, RoverGrainSimulation, Simulation
 
 OPTIONS: dict[str, Any] = {"gravity": (0.0, -3.71, 0.0), "time_step": 0.004}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rover_gym import OptionError
-from rover_gym.figures.soil_frames import draw_soil
+from rover_gym.figures.grain_frames import draw_soil
 from rover_gym.figures.soil_run_figures import draw_soil_run
 from rover_gym.planar import BallSimulation, Line, describe_planar, record_planar
 from rover_gym.record import RecordingError

@@ -18,7 +18,7 @@ from selenium.webdriver.common.by import By
 from rover_gym.grains import GrainRun, read_grain_run, record_grains
 from rover_gym.rendering.appearance import SAND_COLOUR
 from rover_gym.replay import write_grain_page
-from rover_gym.replay.smoothing import LOAD_TIME, moving_mean
+from rover_gym.replay.panel import LOAD_TIME, moving_mean
 
 # Time of the script for a new sample, on any thread: rebuilt from its differences, and given to the graphics card.
 SAMPLE_TIMES = """

@@ -23,7 +23,7 @@ from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_ru
 from rover_gym.rendering.appearance import GROUND_COLOUR, TRUNK_COLOUR
 from rover_gym.replay import write_page, write_soil_page
 from rover_gym.replay.page import WHEEL_NAMES
-from rover_gym.replay.smoothing import LOAD_TIME, moving_mean
+from rover_gym.replay.panel import LOAD_TIME, moving_mean
 from rover_gym.soil import SoilRun, read_soil_run, record_soil, rover_on_soil, settled_bed
 
 ROCKS = SphereField([[1.6, 0.0, 0.6], [1.2, 0.05, -1.3], [-0.9, 0.0, 1.3]], [0.25, 0.2, 0.15], Plane())

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from rover_gym.cli import app
-from rover_gym.policy.films import ENDING
+from rover_gym.policy.comparison import ENDING
 from rover_gym.record import read_run, read_trajectory
 
 

@@ -23,9 +23,8 @@ from rover_gym.extras import MissingExtraError
 from rover_gym.figures import draw_run
 from rover_gym.figures.derived_signals import contact_velocities, motor_work, slip_ratios, smooth
 from rover_gym.figures.run_figures import DRAWINGS, drawable
-from rover_gym.figures.style import COLOURS, STYLE, WHEELS
+from rover_gym.figures.style import COLOURS, STYLE, WHEELS, WheelStyle
 from rover_gym.figures.wheel_paths import footprints
-from rover_gym.figures.wheel_style import WheelStyle
 from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_run
 from rover_gym.reproduction import inclined_plane, sphere_rug
 

@@ -10,7 +10,7 @@ from typer.main import get_command
 from typer.testing import CliRunner, Result
 
 from rover_gym.cli import app
-from rover_gym.cli.first_steps import FIRST_STEPS
+from rover_gym.cli.console import FIRST_STEPS
 from rover_gym.policy import policy_folder
 from rover_gym.record import read_trajectory
 

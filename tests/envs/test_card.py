@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from rover_gym import OptionError, RoverEnv, RoverGymError
-from rover_gym.env import ARGUMENTS, rewards
-from rover_gym.env.argument_checks import shortest
+from rover_gym.env import ARGUMENTS
+from rover_gym.env.arguments import shortest
 from rover_gym.env.episode_scene import RESET_OPTIONS
 from rover_gym.env.observation import build_layout
+from rover_gym.env.reward_terms import WEIGHTS
 from rover_gym.vector import RoverBatch, RoverVectorEnv
 from rover_gym.vector.sb3 import RoverVecEnv
 
@@ -79,7 +80,7 @@ def test_observation_space_holds_every_finite_observation_and_no_other(env: Rove
 def test_reward_table_is_the_reward(env: RoverEnv) -> None:
     _, _, _, _, info = env.step(np.zeros(12, np.float32))
     rows = {name: float(weight) for name, _, weight in table("Reward")}
-    assert rows == dict(rewards.WEIGHTS)
+    assert rows == dict(WEIGHTS)
     assert list(rows) == list(info["reward_terms"]) == list(env.task.rules.terms)
 
 

@@ -9,8 +9,8 @@ import pytest
 from rover_gym import OptionError, Plane, RoverEnv, RoverModel, SphereField
 from rover_gym.models import open_model
 from rover_gym.policy import FORECAST_FILE, ForesightCosts, ForesightPolicy, Network, PolicyError, ScanPolicy
-from rover_gym.policy.arc_forecast import OUTPUTS, ArcFeatures, ArcForecast, with_speed
 from rover_gym.policy.evaluation import drive_all
+from rover_gym.policy.foresight_policy import OUTPUTS, ArcFeatures, ArcForecast, with_speed
 from rover_gym.policy.named_policy import named_policy
 from rover_gym.policy.shipped import FOLDER
 

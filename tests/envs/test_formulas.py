@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rover_gym import CommandError, OptionError, RoverEnv
-from rover_gym.env.rewards import WEIGHTS
+from rover_gym.env.reward_terms import WEIGHTS
 from rover_gym.mechanics import EpisodeBatch, EpisodeRules, EpisodeRun, seed_generators
 from rover_gym.vector import RoverVectorEnv
 from rover_gym.vector.sb3 import RoverVecEnv

@@ -22,7 +22,7 @@ from rover_gym.learning.several_seeds import seed_estimate, student_quantile
 from rover_gym.learning.training_config import parse_config, read_config
 from rover_gym.learning.training_evaluation import TrainingEvaluation, read_evaluations
 from rover_gym.policy import PolicyCard, TrainedPolicy, drive_all
-from rover_gym.policy.films import ENDING, film_episode
+from rover_gym.policy.comparison import ENDING, film_episode
 
 TINY: dict[str, Any] = {
     "environment": {"terrain": "plane", "goal_distance": 1.2, "control_frequency": 10, "time_step": 0.02},

@@ -7,7 +7,7 @@ import gymnasium as gym
 import typer
 
 from rover_gym.cli.console import LARGEST_SEED, check_file, plain_errors, progress_bar, say_path
-from rover_gym.cli.scene_options import (
+from rover_gym.cli.options import (
     BUILT_IN,
     FRICTION,
     HeightRange,

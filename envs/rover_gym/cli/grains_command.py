@@ -5,8 +5,8 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from rover_gym.cli.console import check_folder, plain_errors
-from rover_gym.cli.grains_options import (
+from rover_gym.cli.console import AsJson, Results, check_folder, plain_errors, row, status
+from rover_gym.cli.grains_lab_commands import (
     EARTH,
     FOLDER,
     Balls,
@@ -27,7 +27,6 @@ from rover_gym.cli.grains_options import (
     recorded,
     say,
 )
-from rover_gym.cli.results import AsJson, Results, row, status
 
 grains = typer.Typer(
     help="Balls in space: a column that collapses, a silo, a drum, a sphere that strikes a bed, a rover on beds.",
@@ -56,7 +55,7 @@ def collapse(
     as_json: AsJson = False,
 ) -> None:
     """Let a round column of balls collapse on a floor; record it and say how far it spreads."""
-    from rover_gym.grains.vessel_scenes import column, run_out  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.grains.bed_scenes import column, run_out  # noqa: PLC0415 - h5py is slow to load
 
     check_folder("output", output)
     options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
@@ -95,8 +94,8 @@ def silo(
     as_json: AsJson = False,
 ) -> None:
     """Empty a silo of balls through a round hole; record it and say how fast they leave."""
-    from rover_gym.grains.vessel_scenes import outflow  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.grains.vessel_scenes import silo as scene  # noqa: PLC0415 - as above
+    from rover_gym.grains.bed_scenes import outflow  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.grains.bed_scenes import silo as scene  # noqa: PLC0415 - as above
 
     check_folder("output", output)
     options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
@@ -139,8 +138,8 @@ def drum(
     as_json: AsJson = False,
 ) -> None:
     """Turn a drum with balls; record it and say how steep they lie."""
-    from rover_gym.grains.vessel_scenes import drum as scene  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.grains.vessel_scenes import slopes  # noqa: PLC0415 - as above
+    from rover_gym.grains.bed_scenes import drum as scene  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.grains.bed_scenes import slopes  # noqa: PLC0415 - as above
 
     check_folder("output", output)
     options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from rover_gym.cli.console import check_folder, plain_errors
-from rover_gym.cli.grains_options import (
+from rover_gym.cli.console import AsJson, Results, Row, check_folder, plain_errors, row, status
+from rover_gym.cli.grains_lab_commands import (
     EARTH,
     FOLDER,
     MARS,
@@ -29,8 +29,7 @@ from rover_gym.cli.grains_options import (
     recorded,
     say,
 )
-from rover_gym.cli.results import AsJson, Results, Row, row, status
-from rover_gym.cli.scene_options import ModelName, named_model
+from rover_gym.cli.options import ModelName, named_model
 from rover_gym.mechanics import Motor, OptionError, RoverModel
 from rover_gym.validation import number, refuse
 
@@ -127,9 +126,9 @@ def track(
     as_json: AsJson = False,
 ) -> None:
     """Drive a rover along a long bed, of which only the balls about its wheels are simulated. It ends with the bed."""
+    from rover_gym.grains.ball_bed import settled_track  # noqa: PLC0415 - as above
     from rover_gym.grains.bed_scenes import rover_on_bed  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.grains.moving_window import MovingWindow  # noqa: PLC0415 - as above
-    from rover_gym.grains.tiling import settled_track  # noqa: PLC0415 - as above
 
     check_folder("output", output)
     chosen = _on_wheels(model, wheel_width, wheel_radius, _motor(torque, speed, wheel_radius))

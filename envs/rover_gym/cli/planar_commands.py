@@ -8,9 +8,8 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from rover_gym.cli.console import check_folder, plain_errors, progress_bar
-from rover_gym.cli.results import AsJson, Results, row
-from rover_gym.cli.scene_options import warn_of_slope
+from rover_gym.cli.console import AsJson, Results, check_folder, plain_errors, progress_bar, row
+from rover_gym.cli.options import warn_of_slope
 from rover_gym.cli.soil_command import soil
 from rover_gym.mechanics import (
     BallSimulation,
@@ -22,8 +21,7 @@ from rover_gym.mechanics import (
     Spline,
     TwoWheelRoverSimulation,
 )
-from rover_gym.planar.planar_recording import PlanarGround, describe_planar, record_planar
-from rover_gym.planar.planar_run import read_planar_run
+from rover_gym.planar.planar_run import PlanarGround, describe_planar, read_planar_run, record_planar
 from rover_gym.validation import number, refuse
 
 planar = typer.Typer(

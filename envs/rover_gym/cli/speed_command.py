@@ -8,8 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rover_gym.cli.console import plain_errors, progress_bar
-from rover_gym.cli.results import AsJson, Results
+from rover_gym.cli.console import AsJson, Results, plain_errors, progress_bar
 from rover_gym.mechanics import __version__
 from rover_gym.vector.throughput import ExploringSpeed, VectorSpeed, measure_exploring, measure_speed, processor
 

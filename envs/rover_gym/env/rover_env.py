@@ -12,16 +12,13 @@ from gymnasium.error import ResetNeeded
 
 from rover_gym.env.arguments import RoverArguments, check_arguments, takes_arguments, with_argument_table
 from rover_gym.env.beginning import draw_episodes
-from rover_gym.env.env_snapshot import EnvSnapshot, check_random_state, check_snapshot
+from rover_gym.env.env_snapshot import EnvSnapshot, Progress, check_random_state, check_snapshot
 from rover_gym.env.episode_scene import EpisodeScene, check_difficulty, check_reset_options, scene_of
-from rover_gym.env.generators import check_seed, row_of, seeded, set_row
+from rover_gym.env.generators import check_seed, keys_to_action, pushed, row_of, seeded, set_row
 from rover_gym.env.observation import ObservationLayout
-from rover_gym.env.play_keys import keys_to_action, pushed
-from rover_gym.env.progress import Progress
-from rover_gym.env.randomisation import Domain
 from rover_gym.env.reward_terms import earn, total
 from rover_gym.env.rocks import Rocks
-from rover_gym.env.start import Start
+from rover_gym.env.start import Domain, Start
 from rover_gym.env.task import Task, make_task
 from rover_gym.mechanics import EpisodeRun, Plane, RoverGrainSimulation, Simulation, standard_normals
 from rover_gym.rendering.render_options import RENDER_MODES, RenderOptions

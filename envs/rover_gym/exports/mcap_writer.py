@@ -12,10 +12,9 @@ import numpy.typing as npt
 
 from rover_gym.exports import mcap_messages as messages
 from rover_gym.exports.axes import MAP_FROM_WORLD
-from rover_gym.exports.mcap_file import McapFile
+from rover_gym.exports.mcap_messages import McapFile
 from rover_gym.mechanics import RoverModel, Terrain
-from rover_gym.record.channels import RoverSampler
-from rover_gym.record.facts import storable, versions
+from rover_gym.record.channels import RoverSampler, storable, versions
 from rover_gym.record.rover_run import RoverRun
 from rover_gym.record.trajectory import Trajectory
 from rover_gym.record.trajectory_format import RecordingError

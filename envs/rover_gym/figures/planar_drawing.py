@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.figures.saving import check_format, save_figures
-from rover_gym.figures.style import DARK, QUANTITY_COLOURS, circle, panel_legend, plain
+from rover_gym.figures.style import DARK, QUANTITY_COLOURS, check_format, circle, panel_legend, plain, save_figures
 from rover_gym.mechanics import Polyline
 from rover_gym.rendering.appearance import PLANAR_WHEEL_COLOURS
 

@@ -17,8 +17,7 @@ import numpy.typing as npt
 from rover_gym.grains.moving_window import MovingWindow
 from rover_gym.grains.stored_vessel import stored_vessel
 from rover_gym.mechanics import GrainSimulation, OptionError, RoverGrainSimulation, RoverModel, Simulation
-from rover_gym.record.channels import Channel, state_channels
-from rover_gym.record.facts import row_count
+from rover_gym.record.channels import Channel, row_count, state_channels
 from rover_gym.record.recorder import Recorder
 from rover_gym.validation import checked, number, refuse
 

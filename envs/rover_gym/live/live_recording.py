@@ -11,8 +11,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from rover_gym.exports import McapWriter
-from rover_gym.record.channels import Channel, RoverSampler
-from rover_gym.record.facts import describe
+from rover_gym.record.channels import Channel, RoverSampler, describe
 from rover_gym.record.recorder import Recorder
 
 if TYPE_CHECKING:

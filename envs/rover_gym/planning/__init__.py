@@ -25,8 +25,7 @@ from rover_gym.planning.field_plan import FieldPlan
 from rover_gym.planning.futures import Ends, Futures
 from rover_gym.planning.planner import plan
 from rover_gym.planning.planner_policy import PlannerOptions, PlannerPolicy
-from rover_gym.planning.scene import Accuracy, Scene
-from rover_gym.planning.scene_plan import Decision, PlannedRover, ScenePlan
+from rover_gym.planning.scene_plan import Accuracy, Decision, PlannedRover, Scene, ScenePlan
 
 __all__ = [
     "Accuracy",

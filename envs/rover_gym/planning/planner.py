@@ -23,8 +23,17 @@ from rover_gym.mechanics import (
     TriangleMesh,
     accuracy_options,
 )
-from rover_gym.planning.scene import Accuracy, Array, Scene, check_scene, gravity_of, steering_joints
-from rover_gym.planning.scene_plan import Decision, Kind, ScenePlan
+from rover_gym.planning.scene_plan import (
+    Accuracy,
+    Array,
+    Decision,
+    Kind,
+    Scene,
+    ScenePlan,
+    check_scene,
+    gravity_of,
+    steering_joints,
+)
 from rover_gym.validation import flag, number, refuse, vector
 
 # The bounds hold for 10 s from rest on a plane while the wheels do not slip; `docs/economy.md` lists the measurements.

@@ -19,12 +19,11 @@ from rover_gym.env.start import Point, Start
 from rover_gym.mechanics import OptionError, RoverModel, StateError, Terrain
 from rover_gym.planning.field_plan import FieldPlan
 from rover_gym.planning.futures import Ends, Futures
-from rover_gym.planning.raw_actions import RawActions
-from rover_gym.planning.scanned_ground import ScannedGround
+from rover_gym.planning.scanned_ground import RawActions, ScannedGround
 from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimits
-from rover_gym.policy.observed import check_observed
+from rover_gym.policy.features import check_observed
 from rover_gym.policy.pd_policy import find_rover_env
-from rover_gym.policy.scan_grid import scan_grid
+from rover_gym.policy.scan_memory import scan_grid
 from rover_gym.validation import array, number, refuse, vector, whole
 
 Array = npt.NDArray[np.float64]

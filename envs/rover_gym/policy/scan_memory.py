@@ -7,11 +7,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import StateError
+from rover_gym.env.rocks import HeightScan
+from rover_gym.env.rover_env import RoverEnv
+from rover_gym.mechanics import OptionError, StateError
 from rover_gym.policy.command import N_COMMANDS
 from rover_gym.validation import refuse
 
 Array = npt.NDArray[np.float64]
+
 Counts = npt.NDArray[np.int64]
 
 #: Traps that are remembered; a further one replaces the oldest.
@@ -121,3 +124,19 @@ class ScanMemory:
     def known_traps(self, i: int) -> Array:
         """`(m, 3)` the traps of rover i."""
         return self.traps[i, : min(int(self.n_traps[i]), TRAPS)]
+
+
+def scan_grid(rover: RoverEnv) -> HeightScan:
+    """The grid of an environment's height scan.
+
+    Raises:
+        OptionError: It has none, or one of a single row or column.
+    """
+    offsets = rover.task.scan
+    if offsets is None:
+        refuse(OptionError, "height_scan", False, "must be given, as by ScanPolicy.arguments(), to plan over")
+    columns = int(np.count_nonzero(offsets[:, 0] == offsets[0, 0]))
+    rows = len(offsets) // columns
+    if rows < 2 or columns < 2:
+        refuse(OptionError, "height_scan", (rows, columns), "must have two rows and columns at least")
+    return HeightScan(rows, columns, float(offsets[0, 0] - offsets[columns, 0]))

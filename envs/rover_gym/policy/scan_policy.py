@@ -8,19 +8,16 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.env.wheels import wheel_centres
+from rover_gym.env.start import wheel_centres
 from rover_gym.mechanics import OptionError, RoverModel, StateError, exp, sin_cos
 from rover_gym.policy.arc_search import ArcSearch, PathCosts, SearchTask
 from rover_gym.policy.command import CommandController, CommandLimits
-from rover_gym.policy.features import ground_slope
+from rover_gym.policy.features import check_observed, ground_slope
 from rover_gym.policy.ground_map import GroundMap, MapOptions
-from rover_gym.policy.observed import check_observed
-from rover_gym.policy.pd_policy import find_rover_env
+from rover_gym.policy.pd_policy import Turning, find_rover_env
 from rover_gym.policy.rover_outline import RoverOutline
-from rover_gym.policy.scan_grid import scan_grid
-from rover_gym.policy.scan_memory import ScanMemory
+from rover_gym.policy.scan_memory import ScanMemory, scan_grid
 from rover_gym.policy.sweeps import Arcs
-from rover_gym.policy.turning import Turning
 from rover_gym.validation import array, number, refuse
 
 Array = npt.NDArray[np.float64]

@@ -4,10 +4,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from rover_gym.env.argument_checks import terrain_name
+from rover_gym.env.arguments import terrain_name
 from rover_gym.mechanics import RoverModel
-from rover_gym.policy.policy_card import PolicyCard
-from rover_gym.policy.policy_files import PolicyError, is_there
+from rover_gym.policy.policy_card import PolicyCard, PolicyError, is_there
 from rover_gym.validation import refuse
 
 #: Folder names of the shipped policies, by terrain.

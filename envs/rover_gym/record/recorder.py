@@ -19,9 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import Terrain
-from rover_gym.record.channels import Channel
-from rover_gym.record.facts import storable, versions, write_attribute, write_description
-from rover_gym.record.steady_file import FileInUseError, SteadyFile
+from rover_gym.record.channels import Channel, storable, versions, write_attribute, write_description
+from rover_gym.record.steady_file import FileInUseError, SteadyFile, uninterrupted
 from rover_gym.record.stored_terrain import write_terrain
 from rover_gym.record.trajectory import read_trajectory
 from rover_gym.record.trajectory_format import (
@@ -32,7 +31,6 @@ from rover_gym.record.trajectory_format import (
     file_path,
     import_h5py,
 )
-from rover_gym.record.uninterrupted import uninterrupted
 from rover_gym.validation import TERRAINS, checked, refuse, whole
 
 if TYPE_CHECKING:

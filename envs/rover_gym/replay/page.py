@@ -9,13 +9,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.record.outcomes import outcome_words
-from rover_gym.replay.panel import Chart, load_chart, panel_contents, with_panel
+from rover_gym.record.channels import outcome_words
+from rover_gym.replay.panel import (
+    FOLLOW_TIME,
+    Chart,
+    continuous,
+    load_chart,
+    moving_mean,
+    panel_contents,
+    quaternions,
+    with_panel,
+)
 from rover_gym.replay.player import add_surroundings, hidden_server, shortened
-from rover_gym.replay.rotation import continuous, quaternions
 from rover_gym.replay.scenery import first_view, trunk_path
-from rover_gym.replay.smoothing import FOLLOW_TIME, moving_mean
-from rover_gym.replay.world_nodes import add_ground, add_rover
+from rover_gym.replay.vrml import add_ground, add_rover
 from rover_gym.validation import checked
 
 if TYPE_CHECKING:

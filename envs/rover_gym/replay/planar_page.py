@@ -17,9 +17,8 @@ from rover_gym.rendering.appearance import (
     Colour,
     Part,
 )
-from rover_gym.replay.panel import Chart, load_chart, panel_contents, with_panel
+from rover_gym.replay.panel import FOLLOW_TIME, Chart, load_chart, moving_mean, panel_contents, with_panel
 from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, shortened
-from rover_gym.replay.smoothing import FOLLOW_TIME, moving_mean
 from rover_gym.replay.soil_page import about_z, surface_mesh, wheel_meshes
 from rover_gym.validation import checked
 

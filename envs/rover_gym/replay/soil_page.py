@@ -20,9 +20,8 @@ from rover_gym.rendering.appearance import (
     Part,
     part_mesh,
 )
-from rover_gym.replay.panel import Chart, load_chart, panel_contents, with_panel
+from rover_gym.replay.panel import FOLLOW_TIME, Chart, load_chart, moving_mean, panel_contents, with_panel
 from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, rgb, shortened
-from rover_gym.replay.smoothing import FOLLOW_TIME, moving_mean
 from rover_gym.validation import checked
 
 if TYPE_CHECKING:

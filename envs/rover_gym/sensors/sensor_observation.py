@@ -14,8 +14,7 @@ from rover_gym.env.generators import row_of
 from rover_gym.env.grains_env import RoverGrainsEnv
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError, StateError
-from rover_gym.sensors.moment import Moment
-from rover_gym.sensors.sensor import Sensor
+from rover_gym.sensors.sensor import Moment, Sensor
 from rover_gym.sensors.sensor_suite import STATE, Readings, SensorSuite, SuiteState
 from rover_gym.validation import refuse
 

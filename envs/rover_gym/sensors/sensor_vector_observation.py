@@ -12,13 +12,12 @@ from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorWrapper
 from gymnasium.vector.utils import batch_space
 
-from rover_gym.env.quantities import Array, Mask
+from rover_gym.env.observation import Array, Mask
 from rover_gym.mechanics import OptionError, StateError
-from rover_gym.sensors.moment import Moment
-from rover_gym.sensors.sensor import Sensor
+from rover_gym.sensors.sensor import Moment, Sensor
 from rover_gym.sensors.sensor_suite import STATE, SensorSuite, SuiteState
 from rover_gym.validation import refuse
-from rover_gym.vector.batch_snapshot import BatchSnapshot
+from rover_gym.vector.batch import BatchSnapshot
 from rover_gym.vector.vector_env import RoverVectorEnv
 
 

@@ -12,8 +12,16 @@ from rover_gym.soil.bed import Bed, settled_bed
 from rover_gym.soil.soil_recording import SoilSampler, record_soil
 from rover_gym.soil.soil_rover import rover_on_soil
 from rover_gym.soil.soil_run import SoilRun, read_soil_run
-from rover_gym.soil.soil_trials import Pull, SoilDrive, drawbar_pull, drive_on_soil, over_beds
-from rover_gym.soil.traction import BedEstimate, Traction, fit_traction
+from rover_gym.soil.soil_trials import (
+    BedEstimate,
+    Pull,
+    SoilDrive,
+    Traction,
+    drawbar_pull,
+    drive_on_soil,
+    fit_traction,
+    over_beds,
+)
 
 __all__ = [
     "Bed",

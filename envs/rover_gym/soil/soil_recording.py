@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import SoilSimulation
-from rover_gym.record.channels import Channel
-from rover_gym.record.facts import row_count
+from rover_gym.record.channels import Channel, row_count
 from rover_gym.record.recorder import Recorder
 from rover_gym.soil.bed import Array
 

@@ -4,8 +4,7 @@
 library.
 """
 
-from rover_gym.vector.batch import BatchRover, RoverBatch
-from rover_gym.vector.batch_snapshot import BatchSnapshot
+from rover_gym.vector.batch import BatchRover, BatchSnapshot, RoverBatch
 from rover_gym.vector.throughput import ExploringSpeed, VectorSpeed, measure_exploring, measure_speed
 from rover_gym.vector.vector_env import RoverVectorEnv
 

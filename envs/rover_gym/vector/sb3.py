@@ -22,8 +22,7 @@ from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
 from rover_gym.extras import MissingExtraError
 from rover_gym.mechanics import OptionError, StateError
 from rover_gym.validation import Range, refuse
-from rover_gym.vector.batch import BatchRover, Drawn, RoverBatch
-from rover_gym.vector.batch_snapshot import BatchSnapshot
+from rover_gym.vector.batch import BatchRover, BatchSnapshot, Drawn, RoverBatch
 
 try:
     from stable_baselines3.common.vec_env import VecEnv

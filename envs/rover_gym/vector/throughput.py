@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
-from rover_gym.env.quantities import Array
+from rover_gym.env.observation import Array
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.start import tilted_plane
 from rover_gym.mechanics import Simulation, SimulationBatch
