@@ -1,4 +1,4 @@
-"""`RoverGoal-v0`: `Dict` observations for hindsight replay (Andrychowicz et al. 2017). The class docstring is the card."""
+"""`RoverGoal-v0`: `Dict` observations for hindsight replay (Andrychowicz et al. 2017). The class has the card."""
 
 from typing import Any, Literal, SupportsFloat
 
