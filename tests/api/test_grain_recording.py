@@ -11,9 +11,10 @@ import pytest
 from balls import MovingBalls, RoverOnMovingBalls
 
 from rover_gym import OptionError, RoverModel
-from rover_gym.grains import SurfaceMap, read_grain_run, record_grains, surface_map
+from rover_gym.grains import SurfaceMap, record_grains, surface_map
 from rover_gym.mechanics import GrainSimulation, ball_packing
 from rover_gym.record import RecordingError, read_frames
+from rover_gym.runs import open_run
 
 FLOOR = [[0.0, 0.0, 0.0, 0.0, 1.0, 0.0]]
 
@@ -31,7 +32,7 @@ def test_places_are_stored_within_the_resolution_and_facts_beside_them(tmp_path:
     unconverged = record_grains(
         sim, 0.4, path, 50.0, title="a fall", seed=3, until=lambda now: places.append(now.position) or False
     )
-    run = read_grain_run(path)
+    run = open_run(path)
     resolution = run.trajectory.attributes["scene"]["resolution"]
     assert 0.0 < resolution <= 0.02 / 250.0
     assert run.n_frames == 21
@@ -67,7 +68,7 @@ def test_a_bed_at_rest_takes_little_room(tmp_path: Path) -> None:
 def test_a_resampled_run_reads_its_own_rows(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     record_grains(MovingBalls(), 2.0, path)
-    run = read_grain_run(path)
+    run = open_run(path)
     coarse = run.resample(5.0)
     assert coarse.n_frames == 11
     np.testing.assert_array_equal(coarse.positions, run.positions[coarse.rows])
@@ -82,7 +83,7 @@ def test_a_rover_among_balls_is_recorded_with_its_forces_and_sinkage(tmp_path: P
     sim = RoverOnMovingBalls((60, 2, 30), 0.03, 0.02)
     path = tmp_path / "rover.h5"
     record_grains(sim, 0.4, path)
-    run = read_grain_run(path)
+    run = open_run(path)
     assert run.model is not None
     assert run.model.to_dict() == RoverModel().to_dict()
     assert run.rover is not None
@@ -108,7 +109,7 @@ def test_a_killed_run_keeps_what_it_had(tmp_path: Path) -> None:
         time.sleep(0.01)
     os.kill(process.pid or 0, 9)
     process.join()
-    run = read_grain_run(path)
+    run = open_run(path)
     assert run.n_frames >= 16
     assert run.n_frames % 16 == 0
     assert not run.trajectory.attributes["complete"]
@@ -121,13 +122,13 @@ def test_a_run_of_something_else_is_refused(tmp_path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file["frames/position"][0, 3] = np.nan
     with pytest.raises(RecordingError, match="must be finite"):
-        _ = read_grain_run(path).positions
+        _ = open_run(path).positions
     with h5py.File(path, "r+") as file:
         radius = file.attrs["grain_radius"]
         del file.attrs["grain_radius"]
         file.attrs["grain_radius"] = -radius
     with pytest.raises(RecordingError, match="positive radius"):
-        read_grain_run(path)
+        open_run(path)
     with h5py.File(path, "r+") as file:
         del file.attrs["grain_radius"]
         file.attrs["grain_radius"] = radius[:-1]
@@ -137,7 +138,7 @@ def test_a_run_of_something_else_is_refused(tmp_path: Path) -> None:
         del file.attrs["grain_kinematic"]
         file.attrs["grain_kinematic"] = kinematic[:-1]
     with pytest.raises(RecordingError, match="frames/position"):
-        _ = read_grain_run(path).positions
+        _ = open_run(path).positions
 
 
 @pytest.mark.parametrize(("duration", "fps"), [(0.0, 25.0), (-1.0, 25.0), (1.0, 0.0), (np.nan, 25.0), (1.0, np.inf)])

@@ -11,7 +11,6 @@ from rover_gym import ModelError, OptionError, RoverModel, StateError
 from rover_gym.grains import (
     BallBed,
     MovingWindow,
-    read_grain_run,
     record_grains,
     rover_on_bed,
     settled_track,
@@ -19,6 +18,7 @@ from rover_gym.grains import (
 )
 from rover_gym.grains.grain_surface import Footprint, Parts
 from rover_gym.mechanics import GrainSimulation, Plane, RoverGrainSimulation, Simulation
+from rover_gym.runs import open_run
 
 OPTIONS: dict[str, Any] = {"gravity": (0.0, -3.71, 0.0), "time_step": 0.004}
 MODEL = with_wheel_width(RoverModel().replace(wheel_radius=0.25), 0.2)
@@ -208,7 +208,7 @@ def test_a_drive_is_recorded_with_all_balls(bed: BallBed, tmp_path: Path) -> Non
     push(sim, 1.0)
     path = tmp_path / "track.h5"
     record_grains(sim, 0.12, path)
-    run = read_grain_run(path)
+    run = open_run(path)
     assert run.positions.shape == (4, len(bed.radius), 3)
     np.testing.assert_allclose(run.positions[-1], sim.position, atol=1e-3)
     assert not run.kinematic.any()

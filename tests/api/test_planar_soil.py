@@ -8,20 +8,21 @@ import numpy as np
 import pytest
 
 from rover_gym import OptionError
+from rover_gym.figures import draw_run
 from rover_gym.figures.grain_frames import draw_soil
-from rover_gym.figures.soil_run_figures import draw_soil_run
 from rover_gym.planar import BallSimulation, Line, describe_planar, record_planar
 from rover_gym.record import RecordingError
+from rover_gym.runs import open_run
 from rover_gym.soil import (
     Bed,
     Pull,
+    SoilRun,
     SoilSimulation,
     SoilSnapshot,
     drawbar_pull,
     drive_on_soil,
     fit_traction,
     over_beds,
-    read_soil_run,
     record_soil,
     rover_on_soil,
     settled_bed,
@@ -135,7 +136,7 @@ def test_the_rover_drives_and_a_snapshot_continues_bit_for_bit(bed: Bed, tmp_pat
         impulse += sim.impulse_on_wheels()
     np.testing.assert_array_equal(sim.position, end)
 
-    run = read_soil_run(path)
+    run = open_run(path)
     assert run.title == "a test"
     assert run.n_frames == 5
     np.testing.assert_allclose(run.time, [0.04, 0.06, 0.08, 0.1, 0.12])
@@ -154,19 +155,19 @@ def test_the_rover_drives_and_a_snapshot_continues_bit_for_bit(bed: Bed, tmp_pat
 def test_a_soil_without_a_machine_is_recorded_and_drawn(bed: Bed, tmp_path: Path) -> None:
     sim = SoilSimulation(bed.radius, bed.mass, bed.position, walls=bed.walls)
     record_soil(sim, tmp_path / "soil.h5", "disks alone", duration=0.04, steps_per_row=20, walls=bed.walls)
-    run = read_soil_run(tmp_path / "soil.h5")
+    run = open_run(tmp_path / "soil.h5")
     assert run.wheels.shape == (3, 0, 3)
     np.testing.assert_array_equal(run.positions[-1], sim.position)
     assert draw_soil(run, tmp_path / "soil.png").exists()
-    paths = draw_soil_run(run, tmp_path / "plots", with_overview=True)
+    paths = draw_run(run, tmp_path / "plots", with_overview=True)
     assert [path.name for path in paths] == ["disks-and-contacts.png", "overview.png"]
 
 
 def test_a_file_without_a_soil_is_refused(tmp_path: Path) -> None:
     sim = BallSimulation(Line())
     record_planar(sim, tmp_path / "ball.h5", describe_planar(sim, "a ball"), duration=0.01)
-    with pytest.raises(RecordingError, match="holds no soil"):
-        read_soil_run(tmp_path / "ball.h5")
+    with pytest.raises(RecordingError, match="holds a PlanarRun, no SoilRun"):
+        open_run(tmp_path / "ball.h5", SoilRun)
 
 
 def test_a_weaker_gravity_gives_the_same_motion_slower() -> None:

@@ -13,8 +13,9 @@ from typer.testing import CliRunner
 from rover_gym.cli import app
 from rover_gym.figures.grain_frames import draw_grains
 from rover_gym.figures.grain_run_figures import GRAIN_DRAWINGS, slip_of_wheels
-from rover_gym.grains import read_grain_run, record_grains
+from rover_gym.grains import record_grains
 from rover_gym.rendering.appearance import SAND_COLOUR
+from rover_gym.runs import open_run
 
 
 def rover(*arguments: str) -> str:
@@ -39,7 +40,7 @@ def test_a_run_is_recorded_and_its_result_told(command: str, options: list[str],
     output = rover("grains", command, *options, "--time-step", "0.002", "--duration", "0.1", "--output", str(tmp_path))
     assert said in output
     assert "rows not converged" in output
-    run = read_grain_run(tmp_path / f"{command}.h5")
+    run = open_run(tmp_path / f"{command}.h5")
     assert run.trajectory.attributes["complete"]
     assert run.time[-1] == pytest.approx(0.1, abs=0.02)
     assert run.trajectory["penetration"].max() < 0.01 * run.radius.min()
@@ -92,7 +93,7 @@ def test_a_run_is_plotted(name: str, runs: dict[str, Path], tmp_path: Path) -> N
 
 def test_the_slip_of_rolling_wheels_is_small(runs: dict[str, Path]) -> None:
     """The rover of the fixture drives on a firm plane."""
-    slip = slip_of_wheels(read_grain_run(runs["rover"]))
+    slip = slip_of_wheels(open_run(runs["rover"]))
     assert slip.shape == (26, 6)
     assert np.nanmax(np.abs(slip[13:])) < 0.05
 
@@ -109,7 +110,7 @@ def test_a_run_is_filmed(name: str, runs: dict[str, Path], tmp_path: Path) -> No
 
 
 def test_a_frame_shows_sand(runs: dict[str, Path], tmp_path: Path) -> None:
-    image = imread(draw_grains(read_grain_run(runs["bed"]), tmp_path / "bed.png", row=3))[..., :3]
+    image = imread(draw_grains(open_run(runs["bed"]), tmp_path / "bed.png", row=3))[..., :3]
     ratio = image / np.maximum(image.max(axis=-1, keepdims=True), 1e-6)
     near = np.abs(ratio - np.array(SAND_COLOUR) / max(SAND_COLOUR)).max(axis=-1) < 0.06
     assert near.mean() > 0.05

@@ -24,11 +24,11 @@ from rover_gym import (
     StepError,
     TerrainError,
 )
+from rover_gym.economy import Scene, plan
 from rover_gym.env import ARGUMENTS as LIMITS
 from rover_gym.env.arguments import SOLVER_OPTIONS, Number, NumberOrRange
 from rover_gym.env.episode_scene import RESET_OPTIONS
 from rover_gym.env.reward_terms import WEIGHTS
-from rover_gym.planning import Scene, plan
 from rover_gym.policy import (
     CommandController,
     CommandLimits,

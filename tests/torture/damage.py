@@ -32,7 +32,8 @@ from rover_gym.planar import BallSimulation, Line, PlanarSnapshot, Polyline, Sin
 from rover_gym.policy import PolicyError, TrainedPolicy
 from rover_gym.policy.shipped import FOLDER
 from rover_gym.record import Recorder, RecordingError, RoverSampler, describe, read_run
-from rover_gym.soil import SoilSimulation, SoilSnapshot, read_soil_run, soil_packing
+from rover_gym.runs import open_run
+from rover_gym.soil import SoilSimulation, SoilSnapshot, soil_packing
 from torture.hostile import NUMBERS, TEXTS, THINGS
 from torture.ledger import Ledger
 from torture.mutate import (
@@ -138,7 +139,7 @@ def runs(random: Random, ledger: Ledger) -> None:
         mutate_hdf5(random, path, _elsewhere())
         run = attempt(ledger, "read_run", lambda: read_run(path), RecordingError, str(path))
         try:
-            read_soil_run(path)
+            open_run(path)
         except RecordingError:
             pass
         else:

@@ -55,6 +55,7 @@ from rover_gym.policy.comparison import EpisodeFilm
 from rover_gym.policy.episodes import Episode, Policy, run_episode
 from rover_gym.record.channels import Channel, RoverSampler, describe
 from rover_gym.record.recorder import Recorder
+from rover_gym.record.rover_run import OF_EPISODES
 from rover_gym.validation import number, refuse
 
 CONTROL_PERIOD = 0.05  # s, of Rover-v0
@@ -252,9 +253,7 @@ class _Tape:
         self._sampler = RoverSampler(rover.model)
         channels = (
             *self._sampler.channels,
-            Channel("distance_to_goal", "m", "horizontal distance from the trunk's origin to the goal"),
-            Channel("slip_ratio", "1", "mean over the wheels in contact of rim slip over the faster of rim and ground"),
-            Channel("motor_energy", "J", "work through the wheel motors since the start, driving or braking"),
+            *OF_EPISODES,
             Channel("reward_terms", "1", "terms of the step's reward", (len(WEIGHTS),), tuple(WEIGHTS)),
         )
         scene = {**arguments, **asdict(rover.start), **_rocks(rover), "control_period": rover.dt}

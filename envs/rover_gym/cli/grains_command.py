@@ -5,28 +5,9 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from rover_gym.cli.console import AsJson, Results, check_folder, plain_errors, row, status
-from rover_gym.cli.grains_lab_commands import (
-    EARTH,
-    FOLDER,
-    Balls,
-    Duration,
-    Film,
-    Fps,
-    Friction,
-    Gravity,
-    Output,
-    Radius,
-    Seed,
-    Sleep,
-    TimeStep,
-    Tolerance,
-    WallFriction,
-    grain_options,
-    radii,
-    recorded,
-    say,
-)
+from rover_gym.cli.console import Results, plain_errors, row, status
+from rover_gym.cli.grains_options import Balls, Radius, Scene, radii, recorded, say
+from rover_gym.cli.shared_options import takes
 
 grains = typer.Typer(
     help="Balls in space: a column that collapses, a silo, a drum, a sphere that strikes a bed, a rover on beds.",
@@ -36,34 +17,23 @@ grains = typer.Typer(
 
 @grains.command()
 @plain_errors
+@takes(Scene, fps=50.0)
 def collapse(
+    given: Scene,
     *,
     balls: Balls = 2000,
     radius: Radius = 0.005,
     tube: Annotated[float, typer.Option(help="Radius of the column, m.")] = 0.06,
-    friction: Friction = 0.5,
-    wall_friction: WallFriction = 0.5,
-    gravity: Gravity = EARTH,
-    time_step: TimeStep = 0.001,
-    tolerance: Tolerance = 1e-3,
-    sleep: Sleep = False,
-    seed: Seed = 0,
-    duration: Duration = 1.0,
-    fps: Fps = 50.0,
-    film: Film = False,
-    output: Output = FOLDER,
-    as_json: AsJson = False,
 ) -> None:
     """Let a round column of balls collapse on a floor; record it and say how far it spreads."""
     from rover_gym.grains.bed_scenes import column, run_out  # noqa: PLC0415 - h5py is slow to load
 
-    check_folder("output", output)
-    options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
+    options = given.options
     with status("filling the tube"):
-        sim = column(balls, tube, radius, seed=seed, **options)
+        sim = column(balls, tube, radius, seed=given.seed, **options)
     title = f"a column of {balls} balls collapses"
-    with Results(as_json=as_json) as results:
-        run = recorded(results, sim, "collapse", title, duration, fps, seed, output, film=film, scene={"tube": tube})
+    with Results(as_json=given.as_json) as results:
+        run = recorded(results, given, sim, "collapse", title, scene={"tube": tube})
         aspect, spread = run_out(run, tube)
         rows = [
             row("height of the column", f"{aspect:.2f} radii", height_in_radii=aspect),
@@ -74,36 +44,25 @@ def collapse(
 
 @grains.command()
 @plain_errors
+@takes(Scene, duration=2.0, fps=50.0)
 def silo(
+    given: Scene,
     *,
     balls: Balls = 2000,
     radius: Radius = 0.005,
     tube: Annotated[float, typer.Option(help="Radius of the silo, m.")] = 0.06,
     hole: Annotated[float, typer.Option(help="Radius of the hole in its floor, m.")] = 0.03,
-    friction: Friction = 0.5,
-    wall_friction: WallFriction = 0.5,
-    gravity: Gravity = EARTH,
-    time_step: TimeStep = 0.001,
-    tolerance: Tolerance = 1e-3,
-    sleep: Sleep = False,
-    seed: Seed = 0,
-    duration: Duration = 2.0,
-    fps: Fps = 50.0,
-    film: Film = False,
-    output: Output = FOLDER,
-    as_json: AsJson = False,
 ) -> None:
     """Empty a silo of balls through a round hole; record it and say how fast they leave."""
     from rover_gym.grains.bed_scenes import outflow  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.grains.bed_scenes import silo as scene  # noqa: PLC0415 - as above
 
-    check_folder("output", output)
-    options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
+    options = given.options
     with status("filling the silo"):
-        sim = scene(balls, tube, hole, radius, seed=seed, **options)
+        sim = scene(balls, tube, hole, radius, seed=given.seed, **options)
     title = f"a silo of {balls} balls empties"
-    with Results(as_json=as_json) as results:
-        run = recorded(results, sim, "silo", title, duration, fps, seed, output, film=film)
+    with Results(as_json=given.as_json) as results:
+        run = recorded(results, given, sim, "silo", title)
         out = outflow(run)
         steady = (out > 0.2 * out[-1]) & (out < 0.8 * out[-1])
         rate = float(np.polyfit(run.time[steady], out[steady], 1)[0]) if steady.sum() > 1 else float("nan")
@@ -117,37 +76,26 @@ def silo(
 
 @grains.command()
 @plain_errors
+@takes(Scene, duration=4.0)
 def drum(
+    given: Scene,
     *,
     balls: Balls = 700,
     radius: Radius = 0.005,
     wall: Annotated[float, typer.Option(help="Radius of the drum, m.")] = 0.1,
     length: Annotated[float, typer.Option(help="Length of the drum, m.")] = 0.06,
     rate: Annotated[float, typer.Option(help="Angular velocity, rad/s.")] = 0.6,
-    friction: Friction = 0.5,
-    wall_friction: WallFriction = 0.5,
-    gravity: Gravity = EARTH,
-    time_step: TimeStep = 0.001,
-    tolerance: Tolerance = 1e-3,
-    sleep: Sleep = False,
-    seed: Seed = 0,
-    duration: Duration = 4.0,
-    fps: Fps = 25.0,
-    film: Film = False,
-    output: Output = FOLDER,
-    as_json: AsJson = False,
 ) -> None:
     """Turn a drum with balls; record it and say how steep they lie."""
     from rover_gym.grains.bed_scenes import drum as scene  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.grains.bed_scenes import slopes  # noqa: PLC0415 - as above
 
-    check_folder("output", output)
-    options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
+    options = given.options
     with status("filling the drum"):
-        sim = scene(balls, wall, length, rate, radius, seed=seed, **options)
+        sim = scene(balls, wall, length, rate, radius, seed=given.seed, **options)
     title = f"a drum with {balls} balls turns at {rate:g} rad/s"
-    with Results(as_json=as_json) as results:
-        run = recorded(results, sim, "drum", title, duration, fps, seed, output, film=film)
+    with Results(as_json=given.as_json) as results:
+        run = recorded(results, given, sim, "drum", title)
         angles = np.degrees(slopes(run)[run.n_frames // 2 :])
         mean, spread = float(np.nanmean(angles)), float(np.nanstd(angles))
         text = f"{mean:.1f} ± {spread:.1f} degrees"
@@ -156,7 +104,9 @@ def drum(
 
 @grains.command()
 @plain_errors
+@takes(Scene, duration=0.5, fps=100.0)
 def sphere(
+    given: Scene,
     *,
     balls: Balls = 3000,
     radius: Radius = 0.005,
@@ -164,31 +114,18 @@ def sphere(
     sphere_radius: Annotated[float, typer.Option(help="Radius of the sphere, m.")] = 0.02,
     density: Annotated[float, typer.Option(help="Density of the sphere, kg/m^3; the balls have 2600.")] = 7800.0,
     drop: Annotated[float, typer.Option(help="Height from which the sphere fell, m.")] = 0.3,
-    friction: Friction = 0.5,
-    wall_friction: WallFriction = 0.5,
-    gravity: Gravity = EARTH,
-    time_step: TimeStep = 0.001,
-    tolerance: Tolerance = 1e-3,
-    sleep: Sleep = False,
-    seed: Seed = 0,
-    duration: Duration = 0.5,
-    fps: Fps = 100.0,
-    film: Film = False,
-    output: Output = FOLDER,
-    as_json: AsJson = False,
 ) -> None:
     """Let a sphere strike a bed of balls; record it and say how deep it goes."""
     from rover_gym.grains.ball_bed import settled_balls  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.grains.bed_scenes import penetration_depths, striking_sphere  # noqa: PLC0415 - as above
 
-    check_folder("output", output)
-    options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
+    options = given.options
     with status("settling the bed"):
-        bed = settled_balls(balls, width, width, **radii(radius), seed=seed, **options)
+        bed = settled_balls(balls, width, width, **radii(radius), seed=given.seed, **options)
     sim = striking_sphere(bed, sphere_radius, density, drop, **options)
     title = f"a sphere of {2e3 * sphere_radius:g} mm strikes {balls} balls"
-    with Results(as_json=as_json) as results:
-        run = recorded(results, sim, "sphere", title, duration, fps, seed, output, film=film)
+    with Results(as_json=given.as_json) as results:
+        run = recorded(results, given, sim, "sphere", title)
         deepest = float(penetration_depths(run).max())
         rows = [
             row("bed", f"{1e3 * bed.surface:.1f} mm deep", bed_depth=bed.surface),

@@ -6,30 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from rover_gym.cli.console import AsJson, Results, Row, check_folder, plain_errors, row, status
-from rover_gym.cli.grains_lab_commands import (
-    EARTH,
-    FOLDER,
-    MARS,
-    Balls,
-    Duration,
-    Film,
-    Fps,
-    Friction,
-    Gravity,
-    Output,
-    Radius,
-    Seed,
-    Sleep,
-    TimeStep,
-    Tolerance,
-    WallFriction,
-    grain_options,
-    radii,
-    recorded,
-    say,
-)
+from rover_gym.cli.console import Results, Row, plain_errors, row, status
+from rover_gym.cli.grains_options import MARS, Balls, Radius, Scene, radii, recorded, say
 from rover_gym.cli.options import ModelName, named_model
+from rover_gym.cli.shared_options import takes
 from rover_gym.mechanics import Motor, OptionError, RoverModel
 from rover_gym.validation import number, refuse
 
@@ -50,7 +30,9 @@ WheelRadius = Annotated[float, typer.Option(help="Radius of the wheels, m.")]
 
 
 @plain_errors
+@takes(Scene, time_step=0.002, sleep=True, duration=4.0)
 def rover(
+    given: Scene,
     *,
     balls: Balls = 3000,
     radius: Radius = 0.025,
@@ -59,29 +41,16 @@ def rover(
     width: Annotated[float, typer.Option(help="Length of the bed along x, m.")] = 2.4,
     depth: Annotated[float, typer.Option(help="Width of the bed across, m.")] = 1.2,
     torque: Torque = 8.0,
-    friction: Friction = 0.5,
-    wall_friction: WallFriction = 0.5,
     wheel_friction: WheelFriction = 0.9,
-    gravity: Gravity = EARTH,
-    time_step: TimeStep = 0.002,
-    tolerance: Tolerance = 1e-3,
-    sleep: Sleep = True,
-    seed: Seed = 0,
-    duration: Duration = 4.0,
-    fps: Fps = 25.0,
-    film: Film = False,
-    output: Output = FOLDER,
-    as_json: AsJson = False,
 ) -> None:
     """Drive a rover over a bed of balls; record forces, sinkage and ruts. It ends where the bed ends."""
     from rover_gym.grains.ball_bed import settled_balls  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.grains.bed_scenes import rover_on_bed  # noqa: PLC0415 - as above
 
-    check_folder("output", output)
     chosen = _on_wheels(model, wheel_width)
-    options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
+    options = given.options
     with status("settling the bed"):
-        bed = settled_balls(balls, width, depth, **radii(radius), seed=seed, **options)
+        bed = settled_balls(balls, width, depth, **radii(radius), seed=given.seed, **options)
     sim = rover_on_bed(bed, chosen, torque, wheel_friction=wheel_friction, **options)
     end = width - chosen.clear_radius - END
 
@@ -89,13 +58,15 @@ def rover(
         return bool(now.rover.q[0] > end)
 
     title = f"{model} on {balls} balls"
-    with Results(as_json=as_json) as results:
-        run = recorded(results, sim, "rover", title, duration, fps, seed, output, film=film, until=is_across)
-        say(results, run, _drive(run, bed.surface, chosen.mass * gravity))
+    with Results(as_json=given.as_json) as results:
+        run = recorded(results, given, sim, "rover", title, until=is_across)
+        say(results, run, _drive(run, bed.surface, chosen.mass * given.gravity))
 
 
 @plain_errors
+@takes(Scene, gravity=MARS, time_step=0.004, sleep=True, duration=10.0)
 def track(
+    given: Scene,
     *,
     length: Annotated[float, typer.Option(help="Length of the bed along x, m.")] = 6.0,
     depth: Annotated[float, typer.Option(help="Width of the bed across, m.")] = 2.0,
@@ -111,34 +82,21 @@ def track(
     speed: MotorSpeed = 0.6,
     reach: Annotated[float, typer.Option(help="Distance from a wheel within which balls are simulated, m.")] = 0.3,
     stride: Annotated[float, typer.Option(help="How far a wheel moves before the window follows, m.")] = 0.1,
-    friction: Friction = 0.5,
-    wall_friction: WallFriction = 0.5,
     wheel_friction: WheelFriction = 0.9,
-    gravity: Gravity = MARS,
-    time_step: TimeStep = 0.004,
-    tolerance: Tolerance = 1e-3,
-    sleep: Sleep = True,
-    seed: Seed = 0,
-    duration: Duration = 10.0,
-    fps: Fps = 25.0,
-    film: Film = False,
-    output: Output = FOLDER,
-    as_json: AsJson = False,
 ) -> None:
     """Drive a rover along a long bed, of which only the balls about its wheels are simulated. It ends with the bed."""
     from rover_gym.grains.ball_bed import settled_track  # noqa: PLC0415 - as above
     from rover_gym.grains.bed_scenes import rover_on_bed  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.grains.moving_window import MovingWindow  # noqa: PLC0415 - as above
 
-    check_folder("output", output)
     chosen = _on_wheels(model, wheel_width, wheel_radius, _motor(torque, speed, wheel_radius))
     if number("length", length) < 2.0 * chosen.clear_radius:
         refuse(
             OptionError, "length", length, f"must be at least {2.0 * chosen.clear_radius:.2f} m, for the rover to turn"
         )
-    options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
+    options = given.options
     with status("settling a tile"):
-        bed = settled_track(length, depth, layers, tile=tile, **radii(radius), seed=seed, **options)
+        bed = settled_track(length, depth, layers, tile=tile, **radii(radius), seed=given.seed, **options)
     both = rover_on_bed(bed, chosen, torque, wheel_friction=wheel_friction, **options)
     window = MovingWindow(both.rover, both.grains, wheel_friction=wheel_friction, reach=reach, stride=stride)
     simulated: list[int] = []
@@ -148,19 +106,21 @@ def track(
         return bool(now.rover.q[0] > bed.width - chosen.clear_radius - END)
 
     title = f"{model} on {len(bed.radius)} balls"
-    with Results(as_json=as_json) as results:
-        run = recorded(results, window, "track", title, duration, fps, seed, output, film=film, until=ends)
+    with Results(as_json=given.as_json) as results:
+        run = recorded(results, given, window, "track", title, until=ends)
         mean, total, frozen = float(np.mean(simulated)), len(bed.radius), window.frozen_momentum
         about_the_window = [
             row("balls simulated", f"{mean:.0f} on average, of {total}", mean_balls_simulated=mean, balls=total),
             row("window moved", f"{window.moves} times", window_moves=window.moves),
             row("momentum frozen", f"{frozen:.3g} N s", frozen_momentum=frozen),
         ]
-        say(results, run, [*_drive(run, bed.surface, chosen.mass * gravity), *about_the_window])
+        say(results, run, [*_drive(run, bed.surface, chosen.mass * given.gravity), *about_the_window])
 
 
 @plain_errors
+@takes(Scene, gravity=MARS, time_step=0.005, sleep=True, duration=15.0)
 def pit(
+    given: Scene,
     *,
     radius: Radius = 0.027,
     length: Annotated[float, typer.Option(help="Length of the pit's rim along x, m.")] = 1.8,
@@ -172,33 +132,20 @@ def pit(
     wheel_width: WheelWidth = 0.2,
     torque: StallTorque = 90.0,
     speed: MotorSpeed = 0.6,
-    friction: Friction = 0.5,
-    wall_friction: WallFriction = 0.5,
     wheel_friction: WheelFriction = 0.9,
-    gravity: Gravity = MARS,
-    time_step: TimeStep = 0.005,
-    tolerance: Tolerance = 1e-3,
-    sleep: Sleep = True,
-    seed: Seed = 0,
     threads: Annotated[int, typer.Option(min=1, max=1024, help="Threads that solve the contact problem.")] = 1,
-    duration: Duration = 15.0,
-    fps: Fps = 25.0,
-    film: Film = False,
-    output: Output = FOLDER,
-    as_json: AsJson = False,
 ) -> None:
     """Drive a rover into a pit of balls, across, and out of it; record forces, sinkage and ruts."""
     from rover_gym.grains.bed_scenes import rover_before_pit  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.grains.pit import Pit  # noqa: PLC0415 - as above
 
-    check_folder("output", output)
     chosen = _on_wheels(model, wheel_width, wheel_radius, _motor(torque, speed, wheel_radius))
     hole = Pit(begin=chosen.clear_radius, length=length, width=width, depth=depth, bank_deg=bank_deg)
-    options = grain_options(friction, wall_friction, gravity, time_step, tolerance, sleep=sleep)
+    options = given.options
     with status("filling the pit"):
-        fill = hole.fill(**radii(radius), seed=seed, **options)
+        fill = hole.fill(**radii(radius), seed=given.seed, **options)
     # Far from the rover balls tremble by what the tolerance allows; one that falls is faster after a step.
-    options["sleep_speed"] = 0.5 * gravity * time_step
+    options["sleep_speed"] = 0.5 * given.gravity * given.time_step
     sim = rover_before_pit(fill, chosen, torque, wheel_friction=wheel_friction, threads=threads, **options)
     end = hole.begin + hole.length + chosen.clear_radius
 
@@ -206,14 +153,14 @@ def pit(
         return bool(now.rover.q[0] > end)
 
     title = f"{model} through a pit of {len(fill.radius)} balls"
-    with Results(as_json=as_json) as results:
-        run = recorded(results, sim, "pit", title, duration, fps, seed, output, film=film, until=is_out)
+    with Results(as_json=given.as_json) as results:
+        run = recorded(results, given, sim, "pit", title, until=is_out)
         out, count = is_out(sim), len(fill.radius)
         rows = [
             row("balls", str(count), balls=count),
             row("out of the pit", f"yes, after {run.time[-1]:.2f} s" if out else "no", out_of_the_pit=out),
         ]
-        say(results, run, [*rows, *_drive(run, hole.depth, chosen.mass * gravity)])
+        say(results, run, [*rows, *_drive(run, hole.depth, chosen.mass * given.gravity)])
 
 
 def _motor(torque: float, speed: float, wheel_radius: float) -> Motor:

@@ -23,11 +23,11 @@ from rover_gym.cli.options import (
     named_model,
     warn_of_slope,
 )
+from rover_gym.economy.economies import Economy, measure_economies
+from rover_gym.economy.planner import plan
+from rover_gym.economy.scene_plan import Accuracy, Scene, ScenePlan
 from rover_gym.env.start import tilted_plane
 from rover_gym.mechanics import OptionError, Plane, RoverModel, SphereField, Terrain
-from rover_gym.planning.economy import Economy, measure_economies
-from rover_gym.planning.planner import plan
-from rover_gym.planning.scene_plan import Accuracy, Scene, ScenePlan
 from rover_gym.reproduction.sphere_rug import START
 from rover_gym.validation import number, refuse
 

@@ -123,10 +123,11 @@ def _cross(
     video: bool,
 ) -> None:
     from rover_gym.figures.grain_frames import draw_soil, film_soil  # noqa: PLC0415 - matplotlib is slow to load
+    from rover_gym.runs import open_run  # noqa: PLC0415 - as above
     from rover_gym.soil.bed import settled_bed  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.soil.soil_recording import record_soil  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.soil.soil_rover import rover_on_soil  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.soil.soil_run import read_soil_run  # noqa: PLC0415 - as above
+    from rover_gym.soil.soil_run import SoilRun  # noqa: PLC0415 - as above
 
     _check_width("disks", disks, layers, CROSSING)
     bed = settled_bed(disks, layers, seed=seed, **options)
@@ -147,7 +148,7 @@ def _cross(
             until=lambda now: bool(now.wheels[-1, 0] + now.wheels[-1, 2] > bed.width - END),
             progress=lambda time: bar.update(task, completed=time, state=f"{time:.1f} s"),
         )
-    run = read_soil_run(path)
+    run = open_run(path, SoilRun)
     machine = run.trajectory["machine"]
     distance = float(machine[-1, 0] - machine[0, 0])
     rims = -float((run.wheels[0, :, 2] * (machine[-1] - machine[0])[3:]).mean())

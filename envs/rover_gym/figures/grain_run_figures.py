@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
-from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rover_gym.env.start import SLIP_SPEED
 from rover_gym.figures.derived_signals import SMOOTHED, WINDOW, Array, of_wheels, plot_raw_and_smooth, smooth
-from rover_gym.figures.style import DARK, QUANTITY_COLOURS, WheelStyle, check_format, panel_legend, plain, save_figures
+from rover_gym.figures.style import (
+    DARK,
+    QUANTITY_COLOURS,
+    Drawing,
+    WheelStyle,
+    panel_legend,
+    title,
+)
 from rover_gym.grains.grain_surface import SurfaceMap, surface_map
 from rover_gym.mechanics import RoverModel
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from matplotlib.axes import Axes
 
     from rover_gym.figures.style import Sheet
     from rover_gym.grains.grain_run import GrainRun
 
-
-__all__ = ["GRAIN_DRAWINGS", "draw_grain_run", "slip_of_wheels"]
 
 POINTS = 400  # of a section
 
@@ -130,34 +131,6 @@ def _section(axes: Axes, before: SurfaceMap, after: SurfaceMap, places: Array, w
     axes.set(ylabel="height (mm)")
 
 
-def draw_grain_run(
-    run: GrainRun, folder: str | Path, *, file_format: str = "png", with_overview: bool = False
-) -> list[Path]:
-    """Draws the figures of a run of balls.
-
-    Args:
-        run: From `read_grain_run`.
-        folder: Output folder; created if it does not exist. Without a rover its wheels are not drawn.
-        file_format: "png", "svg" or "pdf".
-        with_overview: Whether to add one page with all figures.
-
-    Returns:
-        Paths of the files.
-
-    Raises:
-        OptionError: The file format is unknown.
-        MissingExtraError: matplotlib is not installed.
-    """
-    check_format(file_format)
-    chosen = {name: draw for name, draw in GRAIN_DRAWINGS.items() if run.model is not None or name not in OF_WHEELS}
-    drawings = {name: partial(_fill, draw=draw, run=run) for name, draw in chosen.items()}
-    paths = save_figures(drawings, folder, height=6.5, file_format=file_format)
-    if with_overview:
-        page = {"overview": partial(_overview, draws=list(chosen.values()), run=run)}
-        paths += save_figures(page, folder, height=6.5 * len(chosen), file_format=file_format)
-    return paths
-
-
 def wheel_forces(figure: Sheet, run: GrainRun) -> None:
     """Load, thrust and side force of each wheel."""
     panels = figure.subplots(3, 1, sharex=True)
@@ -178,7 +151,7 @@ def wheel_forces(figure: Sheet, run: GrainRun) -> None:
         axes.set(ylabel=f"{name} (N)")
     panels[-1].set(xlabel="time (s)")
     style.legend(figure, note=SMOOTHED)
-    _title(figure, "Force of balls and ground on the wheels, mean since the row before", run)
+    title(figure, "Force of balls and ground on the wheels, mean since the row before", run)
 
 
 def sinkage_and_slip(figure: Sheet, run: GrainRun) -> None:
@@ -195,7 +168,7 @@ def sinkage_and_slip(figure: Sheet, run: GrainRun) -> None:
     speed.plot(run.time, smooth(run.time, rate, WINDOW), color=DARK)
     speed.set(ylabel="speed of the trunk (m/s)", xlabel="time (s)")
     style.legend(figure, note=f"slip and speed: smoothed over {WINDOW:g} s")
-    _title(figure, "Sinkage and slip of the wheels, speed", run)
+    title(figure, "Sinkage and slip of the wheels, speed", run)
 
 
 def slip_of_wheels(run: GrainRun) -> Array:
@@ -243,49 +216,30 @@ def balls_and_contacts(figure: Sheet, run: GrainRun) -> None:
         residual.axhline(tolerance, color=DARK, linewidth=0.8, linestyle="--", label="tolerance")
     for axes in (energy, contacts, overlap, residual):
         panel_legend(axes)
-    _title(figure, "Balls and contacts", run)
+    title(figure, "Balls and contacts", run)
 
 
 def ruts(figure: Sheet, run: GrainRun) -> None:
     """The surface at the first and the last sample, and what changed."""
     rut_maps(figure, run)
-    _title(figure, "Surface of the balls", run)
+    title(figure, "Surface of the balls", run)
 
 
 def sections(figure: Sheet, run: GrainRun) -> None:
     """Sections along and across a track, or through the middle of the bed."""
     rut_sections(figure, run)
-    _title(figure, "Sections through the surface of the balls", run)
+    title(figure, "Sections through the surface of the balls", run)
 
 
 #: By file name.
-GRAIN_DRAWINGS: dict[str, Callable[[Sheet, GrainRun], None]] = {
-    "wheel-forces": wheel_forces,
-    "sinkage-and-slip": sinkage_and_slip,
-    "ruts": ruts,
-    "sections": sections,
-    "balls-and-contacts": balls_and_contacts,
+GRAIN_DRAWINGS = {
+    "wheel-forces": Drawing(wheel_forces, fits=lambda run: run.model is not None),
+    "sinkage-and-slip": Drawing(sinkage_and_slip, fits=lambda run: run.model is not None),
+    "ruts": Drawing(ruts),
+    "sections": Drawing(sections),
+    "balls-and-contacts": Drawing(balls_and_contacts),
 }
-
-#: Figures that need wheels.
-OF_WHEELS = frozenset({"wheel-forces", "sinkage-and-slip"})
 
 
 def _model(run: GrainRun) -> RoverModel:
     return RoverModel() if run.model is None else run.model
-
-
-def _fill(figure: Sheet, draw: Callable[[Sheet, GrainRun], None], run: GrainRun) -> None:
-    draw(figure, run)
-
-
-def _title(figure: Sheet, what: str, run: GrainRun) -> None:
-    broken_off = "" if run.trajectory.attributes.get("complete", True) else " (the recording was broken off)"
-    figure.suptitle(f"{what}\n{plain(run.title)}{broken_off}")
-
-
-def _overview(figure: Sheet, draws: list[Callable[[Sheet, GrainRun], None]], run: GrainRun) -> None:
-    """All figures stacked on one page."""
-    parts = figure.subfigures(len(draws), 1, squeeze=False).flat
-    for part, draw in zip(parts, draws, strict=True):
-        draw(part, run)

@@ -6,7 +6,6 @@ Signals that jump from row to row are drawn twice: every sample as a light line,
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,49 +15,22 @@ import numpy as np
 from rover_gym.env.start import SLIP_SPEED
 from rover_gym.extras import MissingExtraError
 from rover_gym.figures.derived_signals import WINDOW, Array, smooth
-from rover_gym.figures.style import DARK, QUANTITY_COLOURS, check_format, panel_legend, plain, save_figures
+from rover_gym.figures.style import (
+    DARK,
+    QUANTITY_COLOURS,
+    Drawing,
+    panel_legend,
+    title,
+)
 from rover_gym.rendering.appearance import PLANAR_WHEEL_COLOURS
 from rover_gym.soil.soil_trials import Pull, SoilDrive
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from matplotlib.axes import Axes
 
     from rover_gym.figures.style import Sheet
     from rover_gym.soil.soil_run import SoilRun
     from rover_gym.soil.soil_trials import Traction
-
-
-__all__ = ["SOIL_DRAWINGS", "draw_curves", "draw_soil_run"]
-
-
-def draw_soil_run(
-    run: SoilRun, folder: str | Path, *, file_format: str = "png", with_overview: bool = False
-) -> list[Path]:
-    """Draws the curves of a run on a soil.
-
-    Args:
-        run: From `read_soil_run`.
-        folder: Output folder; created if it does not exist. For a soil without wheels only the disks are drawn.
-        file_format: "png", "svg" or "pdf".
-        with_overview: Whether to add one page with all figures.
-
-    Returns:
-        Paths of the files.
-
-    Raises:
-        OptionError: The file format is unknown.
-        MissingExtraError: matplotlib is not installed.
-    """
-    check_format(file_format)
-    chosen = {name: draw for name, draw in SOIL_DRAWINGS.items() if run.wheels.shape[1] or name not in OF_WHEELS}
-    drawings = {name: partial(_fill, draw=draw, run=run) for name, draw in chosen.items()}
-    paths = save_figures(drawings, folder, height=6.5, file_format=file_format)
-    if with_overview:
-        page = {"overview": partial(_overview, draws=list(chosen.values()), run=run)}
-        paths += save_figures(page, folder, height=6.5 * len(chosen), file_format=file_format)
-    return paths
 
 
 def driving(figure: Sheet, run: SoilRun) -> None:
@@ -116,18 +88,11 @@ def disks_and_contacts(figure: Sheet, run: SoilRun) -> None:
 
 
 #: By file name.
-SOIL_DRAWINGS: dict[str, Callable[[Sheet, SoilRun], None]] = {
-    "driving": driving,
-    "wheel-forces": wheel_forces,
-    "disks-and-contacts": disks_and_contacts,
+SOIL_DRAWINGS = {
+    "driving": Drawing(driving, fits=lambda run: run.wheels.shape[1] > 0),
+    "wheel-forces": Drawing(wheel_forces, fits=lambda run: run.wheels.shape[1] > 0),
+    "disks-and-contacts": Drawing(disks_and_contacts),
 }
-
-#: Figures that need wheels.
-OF_WHEELS = frozenset({"driving", "wheel-forces"})
-
-
-def _fill(figure: Sheet, draw: Callable[[Sheet, SoilRun], None], run: SoilRun) -> None:
-    draw(figure, run)
 
 
 def _wheels(run: SoilRun) -> list[tuple[str, str]]:
@@ -147,15 +112,7 @@ def _finish(figure: Sheet, panels: tuple[Axes, ...], what: str, run: SoilRun) ->
     """Adds legends, and a title naming the figure and the run."""
     for axes in panels:
         panel_legend(axes)
-    broken_off = "" if run.trajectory.attributes.get("complete", True) else " (the recording was broken off)"
-    figure.suptitle(f"{what}\n{plain(run.title)}{broken_off}")
-
-
-def _overview(figure: Sheet, draws: list[Callable[[Sheet, SoilRun], None]], run: SoilRun) -> None:
-    """All figures stacked on one page."""
-    parts = figure.subfigures(len(draws), 1, squeeze=False).flat
-    for part, draw in zip(parts, draws, strict=True):
-        draw(part, run)
+    title(figure, what, run)
 
 
 #: Load colours (Okabe and Ito's palette).

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-    from rover_gym.record.rover_run import RoverRun
+    from rover_gym.record.rover_run import Run
 
     Sheet: TypeAlias = Figure | SubFigure
     from matplotlib.figure import Figure
@@ -77,10 +77,28 @@ def plain(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def title(figure: Sheet, what: str, run: RoverRun) -> None:
+class Drawing(NamedTuple):
+    """A figure of a run.
+
+    Attributes:
+        draw: Fills an empty figure.
+        height: Figure height, inches.
+        fits: Whether the run has what the figure needs.
+    """
+
+    draw: Callable[[Sheet, Any], None]
+    height: float = 6.5
+    fits: Callable[[Any], bool] = lambda _run: True
+
+
+def title(figure: Sheet, what: str, run: Run) -> None:
     """Titles a figure with its subject and its run."""
-    broken_off = "" if run.trajectory.attributes.get("complete", True) else " (the recording was broken off)"
-    figure.suptitle(f"{what}\n{plain(run.title)}{broken_off}")
+    figure.suptitle(f"{what}\n{plain(run.title)}{broken_off(run)}")
+
+
+def broken_off(run: Run) -> str:
+    """What a title adds where the recording did not come to its end."""
+    return "" if run.is_complete else " (the recording was broken off)"
 
 
 def panel_legend(axes: Axes, columns: int = 4) -> None:

@@ -30,7 +30,7 @@ from rover_gym.grains.bed_scenes import (
     with_wheel_width,
 )
 from rover_gym.grains.grain_recording import GrainSampler, describe_grains, record_grains
-from rover_gym.grains.grain_run import GrainRun, read_grain_run
+from rover_gym.grains.grain_run import GrainRun
 from rover_gym.grains.grain_surface import SurfaceMap, surface_map
 from rover_gym.grains.moving_window import BedEnergy, MovingWindow, WindowSnapshot
 from rover_gym.grains.pit import Pit, PitFill
@@ -53,7 +53,6 @@ __all__ = [
     "lognormal_radii",
     "outflow",
     "penetration_depths",
-    "read_grain_run",
     "record_grains",
     "rover_on_bed",
     "run_out",

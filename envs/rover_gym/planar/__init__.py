@@ -29,7 +29,6 @@ from rover_gym.planar.planar_run import (
     describe_planar,
     is_planar,
     planar_run_of,
-    read_planar_run,
     record_planar,
 )
 
@@ -50,6 +49,5 @@ __all__ = [
     "describe_planar",
     "is_planar",
     "planar_run_of",
-    "read_planar_run",
     "record_planar",
 ]

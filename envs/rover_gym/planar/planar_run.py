@@ -1,13 +1,13 @@
 """Saved planar runs, read back: a ball, a two-wheel rover or the straight-driving rover over its ground.
 
-run = read_planar_run("rover.h5").resample(25.0)
+run = open_run("rover.h5").resample(25.0)
 run.discs[-1, 0, :2]
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +22,14 @@ from rover_gym.mechanics import (
     Sine,
     Spline,
 )
-from rover_gym.record.channels import Channel, row_count
-from rover_gym.record.recorder import Recorder
-from rover_gym.record.rover_run import LARGEST, check_rows, check_time, film_rows, title_of
-from rover_gym.record.trajectory import Trajectory, read_trajectory
+from rover_gym.record.channels import RESIDUAL, TIME, Channel, Sampler, energy_channels, row_count
+from rover_gym.record.recorder import record_rows
+from rover_gym.record.rover_run import LARGEST, Run, check_rows, check_time, title_of
+from rover_gym.record.trajectory import Trajectory
 from rover_gym.record.trajectory_format import RecordingError, sound
 from rover_gym.validation import refuse
 
+Array = npt.NDArray[np.float64]
 PlanarGround = Line | Sine | Spline | Polyline
 
 COORDINATES = {
@@ -40,58 +41,55 @@ COORDINATES = {
 DISCS = {1: ("ball",), 2: ("wheel A", "wheel B"), 3: ("front wheels", "middle wheels", "back wheels")}
 
 
-class PlanarSampler:
+def planar_channels(coordinates: int, discs: int) -> tuple[Channel, ...]:
+    """The channels of a machine with so many coordinates and discs."""
+    names, of_discs = COORDINATES[coordinates], DISCS[discs]
+    impulses = (
+        "impulses of the last step along the normal (out of the ground) and the tangent (forward), summed"
+        " over the contacts of a disc"
+    )
+    rates = tuple(f"{name}_rate" for name in names)
+    gaps = "distance from disc to ground, negative where they overlap"
+    return (
+        TIME,
+        Channel("q", "m, rad", "coordinates, angles turn to the left", (coordinates,), names, read="sim.q"),
+        Channel("v", "m/s, rad/s", "their rates", (coordinates,), rates, read="sim.v"),
+        Channel("centres", "m", "centres of the discs: x forward, y up", (discs, 2), of_discs, read="sim.centres"),
+        Channel("gaps", "m", gaps, (discs,), of_discs, read="sim.gaps"),
+        Channel("impulses", "N s", impulses, (discs, 2), of_discs, read="impulses"),
+        Channel("torques", "N m", "driving torques, positive drives forward", (discs,), of_discs, read="sim.torques"),
+        *energy_channels("", "the mass centre at height 0"),
+        RESIDUAL,
+    )
+
+
+class PlanarSampler(Sampler):
     """Makes rows of a planar simulation for a `Recorder`.
 
     Args:
-        sim: A simulation of the kind to sample.
+        sim: The simulation.
     """
 
     def __init__(self, sim: PlanarSimulation) -> None:
-        names, discs = COORDINATES[len(sim.q)], DISCS[len(sim.centres)]
-        n = len(discs)
-        self.channels = (
-            Channel("time", "s", "time since the run's start"),
-            Channel("q", "m, rad", "coordinates, angles turn to the left", (len(names),), names),
-            Channel("v", "m/s, rad/s", "their rates", (len(names),), tuple(f"{name}_rate" for name in names)),
-            Channel("centres", "m", "centres of the discs: x forward, y up", (n, 2), discs),
-            Channel("gaps", "m", "distance from disc to ground, negative where they overlap", (n,), discs),
-            Channel(
-                "impulses",
-                "N s",
-                "impulses of the last step along the normal (out of the ground) and the tangent (forward), summed"
-                " over the contacts of a disc",
-                (n, 2),
-                discs,
-            ),
-            Channel("torques", "N m", "driving torques, positive drives forward", (n,), discs),
-            Channel("kinetic_energy", "J", "kinetic energy"),
-            Channel("potential_energy", "J", "potential energy, zero with the mass centre at height 0"),
-            Channel("solver_residual", "1", "largest residual of the contact solver since the last row"),
-        )
+        super().__init__(sim)
+        self.channels = planar_channels(len(sim.q), len(sim.centres))
 
-    def row(self, sim: PlanarSimulation, *, residual: float = 0.0) -> dict[str, npt.ArrayLike]:
-        """One row of `channels`; the simulation is not changed.
-
-        Args:
-            sim: The simulation to sample.
-            residual: Largest residual since the previous row, from the step report.
-        """
-        contacts, energy = sim.contacts, sim.energy()
-        impulses = np.zeros((len(sim.centres), 2))
+    @property
+    def impulses(self) -> Array:
+        """(n_discs, 2) impulses of the last step, N s."""
+        contacts, impulses = self.sim.contacts, np.zeros((len(self.sim.centres), 2))
         np.add.at(impulses, contacts.discs, contacts.impulses)
-        return {
-            "time": sim.time,
-            "q": sim.q,
-            "v": sim.v,
-            "centres": sim.centres,
-            "gaps": sim.gaps,
-            "impulses": impulses,
-            "torques": sim.torques,
-            "kinetic_energy": energy.kinetic,
-            "potential_energy": energy.potential,
-            "solver_residual": residual,
-        }
+        return impulses
+
+    def step(self, n: int) -> bool:
+        """Takes the steps that the next row covers; returns whether all of them converged to the tolerance.
+
+        Raises:
+            StepError: A step failed.
+        """
+        report = self.sim.step(n)
+        self.residual = report.residual
+        return bool(report.is_converged)
 
 
 def describe_planar(sim: PlanarSimulation, title: str) -> dict[str, Any]:
@@ -141,7 +139,7 @@ def record_planar(
         duration: Time to simulate, s.
         steps_per_row: Steps from one row to the next.
         until: Asked after each row whether the run ends before its time.
-        progress: Called periodically with the simulated time.
+        progress: Called with the simulated time after each row.
 
     Returns:
         Number of rows with steps that did not converge to the tolerance.
@@ -152,24 +150,10 @@ def record_planar(
         MissingExtraError: h5py is not installed.
         StepError: A step failed; the rows before it are on disk.
     """
-    sampler = PlanarSampler(sim)
-    unconverged = 0
     rows = row_count(duration, sim.time_step, steps_per_row)
-    with Recorder(path, sampler.channels, attributes) as recorder:
-        recorder.append(sampler.row(sim))
-        for row in range(1, rows + 1):
-            report = sim.step(steps_per_row)
-            recorder.append(sampler.row(sim, residual=report.residual))
-            unconverged += not report.is_converged
-            if row % 100 == 0:
-                progress(sim.time)
-            if until(sim):
-                break
-        recorder.note(unconverged_rows=unconverged)
-    return unconverged
+    sampler = PlanarSampler(sim)
+    return record_rows(sampler, path, attributes, rows, steps_per_row, until=until, progress=progress)
 
-
-Array = npt.NDArray[np.float64]
 
 GROUNDS = {"line": Line, "sine": Sine, "spline": Spline, "polyline": Polyline}
 
@@ -178,7 +162,7 @@ ANGLES = {3: (2,), 5: (3, 4), 7: (3, 5, 6)}
 
 
 @dataclass(frozen=True)
-class PlanarRun:
+class PlanarRun(Run):
     """A recorded planar run.
 
     Attributes:
@@ -192,16 +176,6 @@ class PlanarRun:
     ground: PlanarGround
     radius: Array
     title: str
-
-    @property
-    def n_frames(self) -> int:
-        """Number of samples in the run."""
-        return len(self.time)
-
-    @property
-    def time(self) -> Array:
-        """(n,) sample times, s."""
-        return self.trajectory["time"]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -238,33 +212,11 @@ class PlanarRun:
         result: Array = rims - v[:, :1]
         return result
 
-    def resample(self, fps: float) -> PlanarRun:
-        """The run reduced to the samples nearest to the frame times of a video, each at most once.
-
-        Args:
-            fps: Frames per second; a run sampled more coarsely keeps all its samples.
-
-        Raises:
-            OptionError: `fps` is not a positive number.
-        """
-        return replace(self, trajectory=self.trajectory.at(film_rows(self.time, fps)))
-
 
 def is_planar(trajectory: Trajectory) -> bool:
     """Whether a trajectory is a planar run on a line."""
     scene = trajectory.attributes.get("scene")
     return isinstance(scene, dict) and isinstance(scene.get("ground"), dict) and isinstance(scene.get("machine"), dict)
-
-
-def read_planar_run(path: str | Path) -> PlanarRun:
-    """Reads a run that `record_planar` saved, complete or not.
-
-    Raises:
-        RecordingError: The file is not a trajectory, not a planar run, or holds no samples.
-        OSError: The file does not exist or cannot be read.
-        MissingExtraError: h5py is not installed.
-    """
-    return planar_run_of(read_trajectory(path), path)
 
 
 def planar_run_of(trajectory: Trajectory, path: str | Path) -> PlanarRun:
@@ -281,13 +233,8 @@ def planar_run_of(trajectory: Trajectory, path: str | Path) -> PlanarRun:
     coordinates = trajectory["q"].shape[1] if trajectory["q"].ndim == 2 else 0
     if discs not in DISCS or coordinates not in COORDINATES or len(ANGLES[coordinates]) != discs:
         refuse(RecordingError, f"{path}: centres", discs, "must be one, two or three discs with their coordinates")
-    shapes: dict[str, tuple[int, ...]] = {"q": (coordinates,), "v": (coordinates,), "centres": (discs, 2)}
-    shapes |= {"gaps": (discs,), "impulses": (discs, 2), "torques": (discs,)}
-    shapes |= dict.fromkeys(("kinetic_energy", "potential_energy", "solver_residual"), ())
-    for name in shapes:
-        if name not in trajectory.data:
-            refuse(RecordingError, f"{path}: {name}", None, "is missing")
-    check_rows(trajectory, path, shapes, bounded=("q", "v", "centres"))
+    channels = planar_channels(coordinates, discs)
+    check_rows(trajectory, path, channels, bounded=("q", "v", "centres"), needed=True)
     with sound(path, "scene"):
         ground = _ground(scene["ground"])
         radius = _radii(scene["machine"], discs)

@@ -7,6 +7,7 @@ import math
 import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,6 +40,7 @@ class Channel:
         columns: Names along the first axis of a row, or empty.
         packed: Whether the data set is large: it is stored in single precision, compressed, in the group `frames`,
             and read by `read_frames`.
+        read: Attribute of the sampler that is or gives its row, with dots; empty where the rows are given.
     """
 
     name: str
@@ -47,30 +49,115 @@ class Channel:
     shape: tuple[int, ...] = ()
     columns: tuple[str, ...] = ()
     packed: bool = False
+    read: str = ""
 
 
-def state_channels(model: RoverModel) -> tuple[Channel, Channel]:
-    """The channels `q` and `v` of every recording of a rover."""
+class Sampler:
+    """Steps a simulation from row to row, and reads the rows of its channels.
+
+    Attributes:
+        sim: The simulation.
+        channels: What a row holds.
+        steps: Steps since the last row.
+        residual: Largest residual since the last row.
+        iterations: Iterations since the last row.
+        energy: Kinetic and potential energy in the row.
+    """
+
+    channels: tuple[Channel, ...]
+
+    def __init__(self, sim: Any) -> None:
+        self.sim = sim
+        self.energy: Any = None
+        self.clear()
+
+    def measure(self) -> None:
+        """Measures what several channels read."""
+        self.energy = self.sim.energy()
+
+    def clear(self) -> None:
+        """Resets what is gathered from row to row."""
+        self.steps, self.residual, self.iterations = 0, 0.0, 0
+
+    def step(self, n: int) -> bool:
+        """Takes the steps that the next row covers; returns whether all of them converged to the tolerance.
+
+        Raises:
+            StepError: A step failed.
+        """
+        converged = True
+        for _ in range(n):
+            report = self.sim.step()
+            self.steps += 1
+            self.residual = max(self.residual, report.residual)
+            self.iterations += report.iterations
+            converged &= report.is_converged
+            self.gather(report)
+        return converged
+
+    def gather(self, report: Any) -> None:
+        """Adds what else a row says of its steps, from the report of each."""
+
+    def read(self) -> dict[str, npt.ArrayLike]:
+        """One row of `channels`: the current state, and what happened since the previous row."""
+        self.measure()
+        row = {}
+        for channel in self.channels:
+            value = attrgetter(channel.read)(self)
+            row[channel.name] = value() if callable(value) else value
+        self.clear()
+        return row
+
+
+def rover_channels(model: RoverModel, forces: str, force_columns: str) -> tuple[Channel, ...]:
+    """What every recording of a rover holds; `forces` is the attribute with the forces on its wheels."""
+    wheels = tuple(model.wheel_names)
+    n = len(wheels)
+    positions = (
+        "public coordinates: trunk x, y (up), z (m); roll, heading, pitch, joint angles (rad);"
+        " trunk attitude R = Ry(heading) Rz(pitch) Rx(roll)"
+    )
+    rates = "trunk origin's velocity, world (m/s); trunk's angular velocity, world (rad/s); joint rates (rad/s)"
+    of_trunk = ("v_x", "v_y", "v_z", "omega_x", "omega_y", "omega_z")
+    torques = "commanded driving torques, positive drives forward"
     return (
+        Channel("q", "m, rad", positions, (model.nq,), tuple(model.dof_names), read="rover.q"),
+        Channel("v", "m/s, rad/s", rates, (model.nv,), (*of_trunk, *model.dof_names[6:]), read="rover.v"),
+        Channel("wheel_forces", "N", force_columns, (n, 3), wheels, read=forces),
+        Channel("wheel_centres", "m", "world: x forward, y up, z to the right", (n, 3), wheels, read="wheel_centres"),
+        Channel("wheel_torques", "N m", torques, (n,), wheels, read="rover.wheel_torques"),
         Channel(
-            "q",
-            "m, rad",
-            "public coordinates: trunk x, y (up), z (m); roll, heading, pitch, joint angles (rad);"
-            " trunk attitude R = Ry(heading) Rz(pitch) Rx(roll)",
-            (model.nq,),
-            tuple(model.dof_names),
-        ),
-        Channel(
-            "v",
-            "m/s, rad/s",
-            "trunk origin's velocity, world (m/s); trunk's angular velocity, world (rad/s); joint rates (rad/s)",
-            (model.nv,),
-            ("v_x", "v_y", "v_z", "omega_x", "omega_y", "omega_z", *model.dof_names[6:]),
+            "steering_set_points", "rad", "set-points of the steering controllers", (n,), wheels, read="rover.steering"
         ),
     )
 
 
-class RoverSampler:
+def wheel_solids(model: RoverModel) -> list[str]:
+    """Names of the solids that carry the wheels."""
+    return [wheel["solid"] for wheel in model.to_dict()["wheels"]]
+
+
+def origins(sim: Simulation, solids: Sequence[str]) -> npt.NDArray[np.float64]:
+    """(n, 3) origins of some solids, m, world."""
+    poses = sim.poses()
+    return np.array([poses[solid][0] for solid in solids]).reshape(-1, 3)
+
+
+#: What every recording says of time, energy and the contact solver; the energy's zero differs.
+TIME = Channel("time", "s", "time since the run's start", read="sim.time")
+RESIDUAL = Channel("solver_residual", "1", "largest residual of the contact solver since the last row", read="residual")
+ITERATIONS = Channel("solver_iterations", "1", "iterations of the contact solver since the last row", read="iterations")
+
+
+def energy_channels(whose: str, zero: str) -> tuple[Channel, Channel]:
+    """Kinetic energy, and potential energy with what its zero is."""
+    return (
+        Channel("kinetic_energy", "J", f"kinetic energy{whose}", read="energy.kinetic"),
+        Channel("potential_energy", "J", f"potential energy, zero with {zero}", read="energy.potential"),
+    )
+
+
+class RoverSampler(Sampler):
     """Samples rows from a simulation.
 
     Args:
@@ -79,35 +166,33 @@ class RoverSampler:
 
     @checked(model="RoverModel")
     def __init__(self, model: RoverModel) -> None:
+        super().__init__(None)
         wheels = tuple(model.wheel_names)
         n = len(wheels)
-        self._wheel_solids = [wheel["solid"] for wheel in model.to_dict()["wheels"]]
+        self._solids = wheel_solids(model)
+        gaps = "distance from wheel to ground, negative where they overlap"
+        forces = "mean contact force of the last step along n (ground to wheel), t (rolling direction), b = t x n"
+        torques = "mean torque that each drive gave in the last step, positive drives forward"
         self.channels = (
-            Channel("time", "s", "time since the run's start"),
-            *state_channels(model),
-            Channel("wheel_gaps", "m", "distance from wheel to ground, negative where they overlap", (n,), wheels),
-            Channel(
-                "wheel_forces",
-                "N",
-                "mean contact force of the last step along n (ground to wheel), t (rolling direction), b = t x n",
-                (n, 3),
-                wheels,
-            ),
-            Channel("wheel_centres", "m", "world: x forward, y up, z to the right", (n, 3), wheels),
-            Channel("wheel_torques", "N m", "commanded driving torques, positive drives forward", (n,), wheels),
-            Channel(
-                "motor_torques",
-                "N m",
-                "mean torque that each drive gave in the last step, positive drives forward",
-                (n,),
-                wheels,
-            ),
-            Channel("steering_set_points", "rad", "set-points of the steering controllers", (n,), wheels),
-            Channel("kinetic_energy", "J", "kinetic energy of the whole rover"),
-            Channel("potential_energy", "J", "potential energy, zero with all mass centres at the world's origin"),
-            Channel("solver_residual", "1", "largest residual of the contact solver since the last row"),
-            Channel("solver_iterations", "1", "iterations of the contact solver since the last row"),
+            TIME,
+            *rover_channels(model, "sim.wheel_forces", forces),
+            Channel("wheel_gaps", "m", gaps, (n,), wheels, read="sim.wheel_gaps"),
+            Channel("motor_torques", "N m", torques, (n,), wheels, read="sim.motor_torques"),
+            *energy_channels(" of the whole rover", "all mass centres at the world's origin"),
+            RESIDUAL,
+            ITERATIONS,
         )
+
+    @property
+    def rover(self) -> Simulation:
+        """The simulation that is sampled."""
+        sim: Simulation = self.sim
+        return sim
+
+    @property
+    def wheel_centres(self) -> npt.NDArray[np.float64]:
+        """(n_wheels, 3) m, world."""
+        return origins(self.rover, self._solids)
 
     def row(self, sim: Simulation, *, residual: float = 0.0, iterations: int = 0) -> dict[str, npt.ArrayLike]:
         """Samples one row of `channels`.
@@ -117,23 +202,8 @@ class RoverSampler:
             residual: Largest residual since the last row, from the step report.
             iterations: Iterations since the last row, from the step report.
         """
-        energy = sim.energy()
-        poses = sim.poses()
-        return {
-            "time": sim.time,
-            "q": sim.q,
-            "v": sim.v,
-            "wheel_gaps": sim.wheel_gaps,
-            "wheel_forces": sim.wheel_forces,
-            "wheel_centres": np.array([poses[solid][0] for solid in self._wheel_solids]),
-            "wheel_torques": sim.wheel_torques,
-            "motor_torques": sim.motor_torques,
-            "steering_set_points": sim.steering,
-            "kinetic_energy": energy.kinetic,
-            "potential_energy": energy.potential,
-            "solver_residual": residual,
-            "solver_iterations": iterations,
-        }
+        self.sim, self.residual, self.iterations = sim, residual, iterations
+        return self.read()
 
 
 #: Most rows of a run, which limits file size and run time.

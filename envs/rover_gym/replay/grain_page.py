@@ -14,7 +14,6 @@ import json
 import zlib
 from importlib import resources
 from itertools import cycle
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -50,9 +49,10 @@ from rover_gym.replay.scenery import (
     wall_polygons,
     wall_poses,
 )
-from rover_gym.validation import checked
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from rover_gym.grains.grain_run import GrainRun
     from rover_gym.mechanics import Terrain
 
@@ -131,18 +131,11 @@ Faces = npt.NDArray[np.int32]
 Mesh = tuple[Colour, Array, Faces]
 
 
-@checked(run="GrainRun", path=Path, follow=bool)
-def write_grain_page(run: GrainRun, path: str | Path, *, follow: bool = True) -> Path:
-    """Writes a run of balls as a single browser page.
-
-    Args:
-        run: The run; every sample becomes a frame of the replay, and the page goes smoothly from one to the next.
-        path: The file to write, usually `.html`. Its folder is created.
-        follow: Whether the eye follows the rover; otherwise the ground stays fixed.
+def grain_page(run: GrainRun, *, follow: bool) -> Iterator[str]:
+    """A run of balls as a page in pieces, which goes smoothly from one sample to the next.
 
     Raises:
         RecordingError: The recording is damaged.
-        OSError: The file cannot be written.
     """
     places, low, extent = _quantised(run)
     meshes, poses = _meshes(run)
@@ -171,14 +164,10 @@ def write_grain_page(run: GrainRun, path: str | Path, *, follow: bool = True) ->
         **_packed_meshes([mesh for _, mesh in meshes]),
         **{f"piece-{i}": _differences(piece) for i, piece in enumerate(pieces)},
     }
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", encoding="utf-8") as file:
-        file.writelines(_page(run.title, scene, blobs, grain_curves(run)))
-    return path
+    return _page(run.title, scene, blobs, grain_curves(run))
 
 
-def _page(title: str, scene: dict[str, Any], blobs: dict[str, bytes], curves: dict[str, Any]) -> Any:
+def _page(title: str, scene: dict[str, Any], blobs: dict[str, bytes], curves: dict[str, Any]) -> Iterator[str]:
     """The page in pieces."""
     files = resources.files("rover_gym.replay")
 

@@ -18,7 +18,9 @@ from rover_gym.extras import require
 from rover_gym.rendering.appearance import GROUND_COLOUR, SKY_COLOUR, SKY_COLOUR_2, Colour
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
+
+    from rover_gym.record.rover_run import Run
 
 Array = npt.NDArray[np.float64]
 
@@ -73,6 +75,44 @@ def shortened(values: Array, bits: int = 18) -> Array:
     """Values rounded to 2^-bits (4 micrometres or microradians): the trailing zero bits compress well."""
     result: Array = np.round(values * 2.0**bits) / 2.0**bits
     return result
+
+
+def recorded_page(
+    run: Run,
+    centre: Array,
+    build: Callable[[Any], Callable[[int], None]],
+    eye: npt.ArrayLike,
+    target: npt.ArrayLike,
+    field_of_view: float,
+) -> str:
+    """Viser's page of a run, every sample a frame of the replay.
+
+    Args:
+        run: The run.
+        centre: (n, 3) what stands in the middle in each sample, m: the world moves, and the eye stays.
+        build: Builds the scene in the frame `/world`, and gives the function that shows a sample.
+        eye: Where the eye stands, m.
+        target: Where it looks, m.
+        field_of_view: Vertical, rad.
+
+    Raises:
+        MissingExtraError: viser is not installed.
+    """
+    with hidden_server() as server:
+        add_surroundings(server.scene)
+        world = server.scene.add_frame("/world", show_axes=False)
+        show = build(server.scene)
+        server.initial_camera.position = eye
+        server.initial_camera.look_at = target
+        server.initial_camera.fov = field_of_view
+        recording = server.get_scene_serializer()
+        with server.atomic():  # otherwise each of the thousands of updates would wake the server's thread
+            for frame, pause in enumerate(np.diff(run.time, append=run.time[-1])):
+                world.position = shortened(-centre[frame])
+                show(frame)
+                recording.insert_sleep(float(pause))
+        page: str = recording.as_html()
+        return page
 
 
 def with_parts(page: str, title: str, parts: str) -> str:

@@ -11,7 +11,7 @@ from rover_gym.mechanics import SoilContacts, SoilSimulation, SoilSnapshot, soil
 from rover_gym.soil.bed import Bed, settled_bed
 from rover_gym.soil.soil_recording import SoilSampler, record_soil
 from rover_gym.soil.soil_rover import rover_on_soil
-from rover_gym.soil.soil_run import SoilRun, read_soil_run
+from rover_gym.soil.soil_run import SoilRun
 from rover_gym.soil.soil_trials import (
     BedEstimate,
     Pull,
@@ -38,7 +38,6 @@ __all__ = [
     "drive_on_soil",
     "fit_traction",
     "over_beds",
-    "read_soil_run",
     "record_soil",
     "rover_on_soil",
     "settled_bed",

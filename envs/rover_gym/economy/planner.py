@@ -5,6 +5,17 @@ from typing import Any
 
 import numpy as np
 
+from rover_gym.economy.scene_plan import (
+    Accuracy,
+    Array,
+    Decision,
+    Kind,
+    Scene,
+    ScenePlan,
+    check_scene,
+    gravity_of,
+    steering_joints,
+)
 from rover_gym.ground import parts_of, plane_of, surfaces_of
 from rover_gym.mechanics import (
     HeightField,
@@ -22,17 +33,6 @@ from rover_gym.mechanics import (
     TerrainError,
     TriangleMesh,
     accuracy_options,
-)
-from rover_gym.planning.scene_plan import (
-    Accuracy,
-    Array,
-    Decision,
-    Kind,
-    Scene,
-    ScenePlan,
-    check_scene,
-    gravity_of,
-    steering_joints,
 )
 from rover_gym.validation import flag, number, refuse, vector
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.economy.scene_plan import PlannedRover, ScenePlan
 from rover_gym.mechanics import Simulation
-from rover_gym.planning.scene_plan import PlannedRover, ScenePlan
 
 #: Interval between comparisons of the trunk's position, s.
 SAMPLE = 0.1

@@ -1,17 +1,18 @@
-"""Export of a soil run as a browser page: disks, wheels and force chains on a timeline, with curves."""
+"""Browser pages of runs in the plane: a ball or a two-wheel rover over its ground, and disks of a soil."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.extras import require
+from rover_gym.mechanics import Polyline
 from rover_gym.rendering.appearance import (
     AXLE_COLOUR,
     GROUND_COLOUR,
+    GROUND_COLOUR_2,
     HUB_COLOUR,
     PLANAR_WHEEL_COLOURS,
     ROCK_COLOUR,
@@ -21,10 +22,12 @@ from rover_gym.rendering.appearance import (
     part_mesh,
 )
 from rover_gym.replay.panel import FOLLOW_TIME, Chart, load_chart, moving_mean, panel_contents, with_panel
-from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, rgb, shortened
-from rover_gym.validation import checked
+from rover_gym.replay.player import add_meshes, recorded_page, rgb, shortened
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rover_gym.planar.planar_run import PlanarRun
     from rover_gym.soil.soil_run import SoilRun
 
 SAND_COLOURS: tuple[Colour, Colour] = (
@@ -36,52 +39,63 @@ CHAIN_COLOUR: Colour = (0.80, 0.0, 0.10)
 DEPTH = 1.0  # out-of-plane thickness of disks, in mean diameters
 BATCH = 100  # disks per batch: a batch in which nothing moves needs no update
 CHAINS = 300  # strongest contacts drawn
-SEEN = 1.8  # m of soil in view at most
+SOIL_SEEN = 1.8  # m of soil in view at most
 SKIRT = 1.04  # width of the picture, in widths of the bed
-ASPECT = 1.2  # width over height of the picture
+SOIL_ASPECT = 1.2  # width over height of the picture
 FIELD_OF_VIEW = 0.35  # rad, vertical: narrow and far away, for little perspective
+
+SEEN = 9.0  # width of the picture, in diameters of the largest disc
+ASPECT = 1.5  # width over height of the picture
+LAND = 1.5  # picture widths of ground beyond the way
+TILE = 0.5  # m, length of the ground's squares
+THICK = 0.4  # of a disc along its axle, in its radii
+
 
 Array = npt.NDArray[np.float64]
 
 
-@checked(run="SoilRun", path=Path, follow=bool)
-def write_soil_page(run: SoilRun, path: str | Path, *, follow: bool = True) -> Path:
-    """Writes a soil run as a single browser page.
+def planar_page(run: PlanarRun, *, follow: bool) -> str:
+    """A planar run as a page."""
+    centre = np.column_stack((_planar_eye(run, follow=follow), np.zeros(run.n_frames)))
+    largest = float(run.radius.max())
+    distance = SEEN * largest / (ASPECT * np.tan(0.5 * FIELD_OF_VIEW))
 
-    Args:
-        run: The run; every sample becomes a frame of the replay.
-        path: The file to write, usually `.html`. Its folder is created.
-        follow: Whether the eye follows the rover over a soil wider than the picture.
+    def build(scene: Any) -> Callable[[int], None]:
+        scene.add_light_directional("/front", intensity=1.0, position=(1.0, 3.0, 6.0))  # the discs face this way
+        wheels = _Wheels(scene, run.discs, run.radius, THICK * run.radius, 0.25 * largest, 0.4 * largest)
+        add_meshes(scene, "/world/ground", _ground(run), cast_shadow=False)
+        return wheels.show
 
-    Raises:
-        MissingExtraError: viser is not installed.
-        OSError: The file cannot be written.
-    """
-    with hidden_server() as server:
-        scene = server.scene
-        add_surroundings(scene)
+    page = recorded_page(run, centre, build, (0.0, 0.18 * distance, distance), (0.0, 0.0, 0.0), FIELD_OF_VIEW)
+    return with_panel(page, _planar_curves(run))
+
+
+def soil_page(run: SoilRun, *, follow: bool) -> str:
+    """A run on a soil as a page."""
+    eye = _soil_eye(run, follow=follow)
+    centre = np.column_stack((eye[:, 0], np.zeros((run.n_frames, 2))))
+    distance = 0.5 * _seen(run) / (SOIL_ASPECT * np.tan(0.5 * FIELD_OF_VIEW))
+
+    def build(scene: Any) -> Callable[[int], None]:
         scene.set_background_image(np.full((2, 2, 3), BACKGROUND, dtype=np.uint8), format="png")
         scene.add_light_directional("/front", intensity=1.5, position=(1.0, 2.0, 6.0))  # the disks face this way
-        world = scene.add_frame("/world", show_axes=False)
-        moving: list[_Disks | _Wheels | _Chains] = [_Disks(run, scene), _Wheels(run, scene), _Chains(run, scene)]
+        depth, radius = _depth(run), run.wheels[0, :, 2]
+        poses = np.concatenate((run.wheels[..., :2], run.wheel_angles[..., None]), axis=2)
+        wheels = _Wheels(scene, poses, radius, np.full(len(radius), depth), 0.05, 0.8 * depth)
+        parts = (_Disks(run, scene), wheels, _Chains(run, scene))
         _add_walls(run, scene)
-        eye = _eye(run, follow=follow)
-        distance = 0.5 * _seen(run) / (ASPECT * np.tan(0.5 * FIELD_OF_VIEW))
-        server.initial_camera.position = (0.0, eye[0, 1] + 0.1 * distance, distance)
-        server.initial_camera.look_at = (0.0, eye[0, 1], 0.0)
-        server.initial_camera.fov = FIELD_OF_VIEW
-        recording = server.get_scene_serializer()
-        with server.atomic():
-            for frame, pause in enumerate(np.diff(run.time, append=run.time[-1])):
-                world.position = shortened(np.array([-eye[frame, 0], 0.0, 0.0]))
-                for part in moving:
-                    part.show(frame)
-                recording.insert_sleep(float(pause))
-        page = recording.as_html()
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(with_panel(page, _curves(run)), encoding="utf-8")
-    return path
+
+        def show(frame: int) -> None:
+            for part in parts:
+                part.show(frame)
+
+        return show
+
+    height = float(eye[0, 1])
+    page = recorded_page(
+        run, centre, build, (0.0, height + 0.1 * distance, distance), (0.0, height, 0.0), FIELD_OF_VIEW
+    )
+    return with_panel(page, _soil_curves(run))
 
 
 def about_z(angles: Array) -> Array:
@@ -93,6 +107,41 @@ def about_z(angles: Array) -> Array:
 
 def _depth(run: SoilRun) -> float:
     return 2.0 * DEPTH * float(run.radius.mean())
+
+
+class _Wheels:
+    """Wheels or a ball and, between the first and the last of several, the body.
+
+    Args:
+        scene: Viser's.
+        poses: (n, n_wheels, 3) centres, m, and angles, rad.
+        radius: (n_wheels,) m.
+        depth: (n_wheels,) thickness, m.
+        body: Height of the body, m.
+        ahead: How far the body stands before the wheels, m.
+    """
+
+    def __init__(self, scene: Any, poses: Array, radius: Array, depth: Array, body: float, ahead: float) -> None:
+        self._poses, self._handles = poses, []
+        for k, (r, thick) in enumerate(zip(radius, depth, strict=True)):
+            self._handles.append(scene.add_frame(f"/world/wheel_{k}", show_axes=False))
+            add_meshes(scene, f"/world/wheel_{k}", wheel_meshes(float(r), float(thick)), cast_shadow=False)
+        self._body = None
+        if len(radius) > 1:
+            self._body = scene.add_frame("/world/body", show_axes=False)
+            length = float(np.hypot(*(poses[0, -1, :2] - poses[0, 0, :2])))
+            beam = Part("", "box", (length, body, 0.02), (0.0, 0.0, ahead), np.eye(3), AXLE_COLOUR)
+            add_meshes(scene, "/world/body", [surface_mesh(beam)], cast_shadow=False)
+
+    def show(self, frame: int) -> None:
+        """Moves wheels and body."""
+        poses = self._poses[frame]
+        for handle, (x, y, _), turn in zip(self._handles, poses, about_z(poses[:, 2]), strict=True):
+            handle.position, handle.wxyz = shortened(np.array([x, y, 0.0])), shortened(turn)
+        if self._body is not None:
+            (x, y), (dx, dy) = poses[:, :2].mean(axis=0), poses[-1, :2] - poses[0, :2]
+            self._body.position = shortened(np.array([x, y, 0.0]))
+            self._body.wxyz = shortened(about_z(np.array([np.arctan2(dy, dx)]))[0])
 
 
 class _Disks:
@@ -128,35 +177,6 @@ class _Disks:
                 self._shown[i] = places
                 handle.batched_positions = np.column_stack((places[:, :2], np.zeros(len(batch))))
                 handle.batched_wxyzs = shortened(about_z(places[:, 2]), 9)
-
-
-class _Wheels:
-    """The wheels and, between two wheels, the body."""
-
-    def __init__(self, run: SoilRun, scene: Any) -> None:
-        self._run, self._depth = run, _depth(run)
-        self._handles = []
-        for k, radius in enumerate(run.wheels[0, :, 2]):
-            name = f"/world/wheel_{k}"
-            self._handles.append(scene.add_frame(name, show_axes=False))
-            add_meshes(scene, name, wheel_meshes(float(radius), self._depth), cast_shadow=False)
-        self._body = None
-        if len(self._handles) == 2:
-            self._body = scene.add_frame("/world/body", show_axes=False)
-            length = float(np.hypot(*np.diff(run.wheels[0, :, :2], axis=0)[0]))
-            beam = Part("", "box", (length, 0.05, 0.02), (0.0, 0.0, 0.8 * self._depth), np.eye(3), AXLE_COLOUR)
-            add_meshes(scene, "/world/body", [surface_mesh(beam)], cast_shadow=False)
-
-    def show(self, frame: int) -> None:
-        """Moves wheels and body."""
-        wheels, angles = self._run.wheels[frame], self._run.wheel_angles[frame]
-        for handle, (x, y, _), turn in zip(self._handles, wheels, about_z(angles), strict=True):
-            handle.position = shortened(np.array([x, y, 0.0]))
-            handle.wxyz = shortened(turn)
-        if self._body is not None:
-            (x, y), (dx, dy) = wheels[:, :2].mean(axis=0), np.diff(wheels[:, :2], axis=0)[0]
-            self._body.position = shortened(np.array([x, y, 0.0]))
-            self._body.wxyz = shortened(about_z(np.array([np.arctan2(dy, dx)]))[0])
 
 
 class _Chains:
@@ -259,10 +279,10 @@ def _add_walls(run: SoilRun, scene: Any) -> None:
 def _seen(run: SoilRun) -> float:
     """Width of the picture, m: the bed, or the rover's surroundings on a longer one."""
     x = run.positions[0, :, 0]
-    return min(SEEN, SKIRT * float(x.max() - x.min() + 2.0 * run.radius.max()))
+    return min(SOIL_SEEN, SKIRT * float(x.max() - x.min() + 2.0 * run.radius.max()))
 
 
-def _eye(run: SoilRun, *, follow: bool) -> Array:
+def _soil_eye(run: SoilRun, *, follow: bool) -> Array:
     """(n, 2) centre of the picture: the rover's smoothed path, clamped so that soil fills the picture."""
     x = run.positions[0, :, 0]
     left, right = float(x.min()), float(x.max())
@@ -275,7 +295,7 @@ def _eye(run: SoilRun, *, follow: bool) -> Array:
     return np.column_stack((middle, np.full(run.n_frames, height)))
 
 
-def _curves(run: SoilRun) -> dict[str, Any]:
+def _soil_curves(run: SoilRun) -> dict[str, Any]:
     """Contents of the panel."""
     names = ("wheel",) if run.wheels.shape[1] == 1 else ("back wheel", "front wheel")
     wheels = list(zip(names, PLANAR_WHEEL_COLOURS[: len(names)], strict=True))
@@ -283,5 +303,65 @@ def _curves(run: SoilRun) -> dict[str, Any]:
         load_chart("wheel load", run.time, run.wheel_forces[..., 1], 1, wheels),
         Chart("sinkage", "mm", 1e3 * run.sinkage, 2, wheels),
         Chart("rim faster than rover", "mm/s", 1e3 * run.slip_speeds, 1, wheels),
+    ]
+    return panel_contents(run.title, run.time, charts)
+
+
+def _ground(run: PlanarRun) -> list[tuple[Colour, Array, npt.NDArray[np.int32]]]:
+    """The ground as a band in squares of two colours, and the cut through it that faces the eye."""
+    radius = float(run.radius.max())
+    land = LAND * SEEN * radius
+    x = run.discs[..., 0]
+    low, high = float(x.min()) - land, float(x.max()) + land
+    tile = TILE
+    while (high - low) / tile > 4000.0:
+        tile *= 2.0
+    places = (
+        np.arange(np.floor(low / tile), np.ceil(high / tile) + 1.0)[:, None] * tile + np.arange(0.0, 1.0, 0.125) * tile
+    )
+    corners = places.ravel()
+    if isinstance(run.ground, Polyline):
+        within = run.ground.x[(run.ground.x > low) & (run.ground.x < high)]
+        corners = np.sort(np.concatenate((corners, within - 1e-6, within)))
+    y = run.ground.height(corners)
+    front, back, deep = radius, -8.0 * radius, float(y.min()) - 2.0 * radius
+    n, k = len(corners), np.arange(len(corners) - 1)
+    vertices = np.vstack(
+        (
+            np.column_stack((corners, y, np.full(n, front))),
+            np.column_stack((corners, y, np.full(n, back))),
+            np.column_stack((corners, y, np.full(n, front))),
+            np.column_stack((corners, np.full(n, deep), np.full(n, front))),
+        )
+    )
+    top = np.stack((np.column_stack((k, k + 1, k + n)), np.column_stack((k + 1, k + n + 1, k + n))), axis=1)
+    cut = np.stack(
+        (
+            np.column_stack((k + 2 * n, k + 3 * n, k + 2 * n + 1)),
+            np.column_stack((k + 2 * n + 1, k + 3 * n, k + 3 * n + 1)),
+        ),
+        axis=1,
+    )
+    dark = np.floor(0.5 * (corners[1:] + corners[:-1]) / tile) % 2.0 == 1.0
+    light = np.concatenate((top[~dark].reshape(-1, 3),)).astype(np.int32)
+    shade = np.concatenate((top[dark].reshape(-1, 3), cut.reshape(-1, 3))).astype(np.int32)
+    return [(GROUND_COLOUR, vertices, light), (GROUND_COLOUR_2, vertices, shade)]
+
+
+def _planar_eye(run: PlanarRun, *, follow: bool) -> Array:
+    """(n, 2) centre of the picture: the machine's smoothed way, or the middle of all of it."""
+    middle = run.discs[..., :2].mean(axis=1)
+    if not follow:
+        return np.tile(0.5 * (middle.min(axis=0) + middle.max(axis=0)), (run.n_frames, 1))
+    return moving_mean(run.time, middle, FOLLOW_TIME)
+
+
+def _planar_curves(run: PlanarRun) -> dict[str, Any]:
+    """Contents of the panel."""
+    discs = list(zip(run.names, PLANAR_WHEEL_COLOURS[: len(run.names)], strict=True))
+    charts = [
+        load_chart("load", run.time, run.loads, 1, discs),
+        Chart("gap", "mm", 1e3 * run.trajectory["gaps"], 2, discs),
+        Chart("rim faster than machine", "mm/s", 1e3 * run.slip_speeds, 1, discs),
     ]
     return panel_contents(run.title, run.time, charts)
