@@ -42,7 +42,7 @@ EXTRAS = {
 NIGHTLY = {
     "docs/identification.md-1": pytest.mark.nightly("tests/api/test_identification.py::test_the_stated_noise_is_taken"),
     "docs/foresight.md-2": pytest.mark.nightly(
-        "tests/envs/test_foresight.py::test_rover_and_ground_choose_the_forecast"
+        "tests/envs/test_scan_policy.py::test_rover_and_ground_choose_the_forecast"
     ),
     "docs/vector.md-5": pytest.mark.nightly("tests/envs/test_vector.py"),
     "docs/tasks.md-5": pytest.mark.nightly("tests/envs/test_reward_terms.py"),

@@ -44,7 +44,7 @@ from torture.mutate import (
     mutate_value,
     mutate_xml,
 )
-from torture.regime import Bounds, Regime
+from torture.ledger import Bounds, Regime
 
 Random = np.random.Generator
 SECRET = 1234.5678

@@ -16,7 +16,7 @@ from torture.damage import INPUTS, _folder, attempt, use
 from torture.drives import log_uniform, variant
 from torture.ledger import Ledger
 from torture.mutate import mutate_array, mutate_bytes, mutate_value
-from torture.regime import Bounds, Regime
+from torture.ledger import Bounds, Regime
 
 Random = np.random.Generator
 

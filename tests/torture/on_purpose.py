@@ -9,7 +9,7 @@ import time
 import numpy as np
 
 from torture.ledger import Ledger
-from torture.regime import Regime
+from torture.ledger import Regime
 
 
 def _hang(_random: np.random.Generator, _ledger: Ledger) -> None:

@@ -14,7 +14,7 @@ from rover_gym import Plane, RoverEnv, RoverModel, Simulation, Snapshot, SphereF
 from torture.audit import Array
 from torture.drives import MODEL, log_uniform, pose, rocks, steer, tilted, variant
 from torture.ledger import Ledger
-from torture.regime import Bounds, Regime
+from torture.ledger import Bounds, Regime
 
 Random = np.random.Generator
 
