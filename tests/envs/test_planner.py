@@ -131,7 +131,6 @@ def test_the_planner_backs_out_of_a_dead_end() -> None:
         ({"horizon": 0.0}, "horizon"),
         ({"period": float("nan")}, "period"),
         ({"energy_price": -1.0}, "energy_price"),
-        ({"method": "newton"}, "method"),
         ({"spread": (0.4, 0.5)}, "spread"),
         ({"actions": "torques"}, "actions"),
         ({"raw_spread": (0.1, -0.1)}, "raw_spread"),
