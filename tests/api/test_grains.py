@@ -347,7 +347,7 @@ def test_a_sphere_that_falls_farther_goes_deeper(scene_bed: BallBed, tmp_path: P
         record_grains(sim, 0.12, tmp_path / "run.h5", 100.0)
         deepest.append(penetration_depths(open_run(tmp_path / "run.h5")).max())
     assert 0.004 < deepest[0] < 0.8 * deepest[1]
-    with pytest.raises(OptionError, match="half of the scene_bed"):
+    with pytest.raises(OptionError, match="half of the bed"):
         striking_sphere(scene_bed, 0.06, 7800.0, 0.1)
 
 

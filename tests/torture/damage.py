@@ -35,7 +35,7 @@ from rover_gym.record import Recorder, RecordingError, RoverSampler, describe, r
 from rover_gym.runs import open_run
 from rover_gym.soil import SoilSimulation, SoilSnapshot, soil_packing
 from torture.hostile import NUMBERS, TEXTS, THINGS
-from torture.ledger import Ledger
+from torture.ledger import Bounds, Ledger, Regime
 from torture.mutate import (
     mutate_bytes,
     mutate_hdf5,
@@ -44,7 +44,6 @@ from torture.mutate import (
     mutate_value,
     mutate_xml,
 )
-from torture.ledger import Bounds, Regime
 
 Random = np.random.Generator
 SECRET = 1234.5678

@@ -14,8 +14,7 @@ from rover_gym import Plane, RoverEnv, RoverModel, Simulation, SphereField, solv
 from rover_gym.planar import BallSimulation, Line, Polyline, Sine
 from rover_gym.soil import SoilSimulation, soil_packing
 from torture.damage import attempt, use
-from torture.ledger import Ledger
-from torture.ledger import Bounds, Regime
+from torture.ledger import Bounds, Ledger, Regime
 
 Random = np.random.Generator
 

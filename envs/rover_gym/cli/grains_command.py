@@ -6,7 +6,7 @@ import numpy as np
 import typer
 
 from rover_gym.cli.console import Results, plain_errors, row, status
-from rover_gym.cli.grains_options import Balls, Radius, Scene, radii, recorded, say
+from rover_gym.cli.grains_options import Balls, BallScene, Radius, radii, recorded, say
 from rover_gym.cli.shared_options import takes
 
 grains = typer.Typer(
@@ -17,9 +17,9 @@ grains = typer.Typer(
 
 @grains.command()
 @plain_errors
-@takes(Scene, fps=50.0)
+@takes(BallScene, fps=50.0)
 def collapse(
-    given: Scene,
+    given: BallScene,
     *,
     balls: Balls = 2000,
     radius: Radius = 0.005,
@@ -44,9 +44,9 @@ def collapse(
 
 @grains.command()
 @plain_errors
-@takes(Scene, duration=2.0, fps=50.0)
+@takes(BallScene, duration=2.0, fps=50.0)
 def silo(
-    given: Scene,
+    given: BallScene,
     *,
     balls: Balls = 2000,
     radius: Radius = 0.005,
@@ -76,9 +76,9 @@ def silo(
 
 @grains.command()
 @plain_errors
-@takes(Scene, duration=4.0)
+@takes(BallScene, duration=4.0)
 def drum(
-    given: Scene,
+    given: BallScene,
     *,
     balls: Balls = 700,
     radius: Radius = 0.005,
@@ -104,9 +104,9 @@ def drum(
 
 @grains.command()
 @plain_errors
-@takes(Scene, duration=0.5, fps=100.0)
+@takes(BallScene, duration=0.5, fps=100.0)
 def sphere(
-    given: Scene,
+    given: BallScene,
     *,
     balls: Balls = 3000,
     radius: Radius = 0.005,

@@ -27,7 +27,7 @@ Output = Annotated[Path, typer.Option(help="Folder to write into.", file_okay=Fa
 
 
 @dataclass(frozen=True)
-class Scene:
+class BallScene:
     """What a scene of balls is simulated and recorded with."""
 
     friction: Friction = 0.5
@@ -62,7 +62,7 @@ def radii(radius: float) -> dict[str, float]:
 
 def recorded(
     results: Results,
-    given: Scene,
+    given: BallScene,
     sim: "Recordable",
     name: str,
     title: str,

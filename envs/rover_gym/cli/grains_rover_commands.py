@@ -7,7 +7,7 @@ import numpy as np
 import typer
 
 from rover_gym.cli.console import Results, Row, plain_errors, row, status
-from rover_gym.cli.grains_options import MARS, Balls, Radius, Scene, radii, recorded, say
+from rover_gym.cli.grains_options import MARS, Balls, BallScene, Radius, radii, recorded, say
 from rover_gym.cli.options import ModelName, named_model
 from rover_gym.cli.shared_options import takes
 from rover_gym.mechanics import Motor, OptionError, RoverModel
@@ -30,9 +30,9 @@ WheelRadius = Annotated[float, typer.Option(help="Radius of the wheels, m.")]
 
 
 @plain_errors
-@takes(Scene, time_step=0.002, sleep=True, duration=4.0)
+@takes(BallScene, time_step=0.002, sleep=True, duration=4.0)
 def rover(
-    given: Scene,
+    given: BallScene,
     *,
     balls: Balls = 3000,
     radius: Radius = 0.025,
@@ -64,9 +64,9 @@ def rover(
 
 
 @plain_errors
-@takes(Scene, gravity=MARS, time_step=0.004, sleep=True, duration=10.0)
+@takes(BallScene, gravity=MARS, time_step=0.004, sleep=True, duration=10.0)
 def track(
-    given: Scene,
+    given: BallScene,
     *,
     length: Annotated[float, typer.Option(help="Length of the bed along x, m.")] = 6.0,
     depth: Annotated[float, typer.Option(help="Width of the bed across, m.")] = 2.0,
@@ -118,9 +118,9 @@ def track(
 
 
 @plain_errors
-@takes(Scene, gravity=MARS, time_step=0.005, sleep=True, duration=15.0)
+@takes(BallScene, gravity=MARS, time_step=0.005, sleep=True, duration=15.0)
 def pit(
-    given: Scene,
+    given: BallScene,
     *,
     radius: Radius = 0.027,
     length: Annotated[float, typer.Option(help="Length of the pit's rim along x, m.")] = 1.8,

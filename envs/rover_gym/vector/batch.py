@@ -25,6 +25,7 @@ from rover_gym.env.episode_scene import (
     origin_of,
     scene_of,
 )
+from rover_gym.env.episode_view import EpisodeView
 from rover_gym.env.generators import (
     Rows,
     check_seed,
@@ -35,11 +36,9 @@ from rover_gym.env.generators import (
     seeded_rows,
     set_row,
 )
-from rover_gym.env.observation import Array, Mask, ObservationLayout, Observations
+from rover_gym.env.observation import Array, Mask, Observations
 from rover_gym.env.reward_terms import earn, total
-from rover_gym.env.rocks import Rocks
 from rover_gym.env.rover_env import STEP_FAILED, RoverEnv
-from rover_gym.env.start import Domain, Start
 from rover_gym.env.task import Task, check_actions
 from rover_gym.mechanics import (
     DrawnEpisodes,
@@ -47,7 +46,6 @@ from rover_gym.mechanics import (
     EpisodeRun,
     OptionError,
     Plane,
-    RoverModel,
     Simulation,
     StateError,
 )
@@ -580,15 +578,14 @@ class Drawn(NamedTuple):
     seeded: set[int]
 
 
-class BatchRover:
+class BatchRover(EpisodeView):
     """A view of one rover of a batch, with the names of `RoverEnv`: read-only except for the difficulty."""
 
     #: None: Gymnasium has registered the vector environment, not its rovers.
     spec = None
 
     def __init__(self, batch: RoverBatch, i: int) -> None:
-        self._batch, self._i = batch, i
-        self._renderer: FrameRenderer | None = None
+        self._batch, self._i, self.task = batch, i, batch.task
 
     @property
     def render_mode(self) -> str | None:
@@ -599,17 +596,11 @@ class BatchRover:
         """Renders the present state as a frame, like `RoverEnv.render`; None without a render mode."""
         if self.render_mode is None:
             return None
-        scene, prototype = self._scene, self._batch.prototype
-        if self._renderer is None:
-            self._renderer = prototype.make_renderer(scene)
-        self._renderer.set_scene(scene.terrain, goal=self.goal, goal_tolerance=prototype.goal_tolerance)
-        return self._renderer.render(self.simulation)
+        return self.frame()
 
-    def close(self) -> None:
-        """Frees the renderer, if there is one."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+    def make_renderer(self, scene: EpisodeScene) -> "FrameRenderer":
+        """Creates a renderer, like `RoverEnv.make_renderer`."""
+        return self._batch.prototype.make_renderer(scene)
 
     @property
     def simulation(self) -> Simulation:
@@ -617,49 +608,9 @@ class BatchRover:
         return self._batch.episodes.simulation(self._i)
 
     @property
-    def start(self) -> Start:
-        """The episode's slope, pose and goal as they were drawn."""
-        return self._scene.start
-
-    @property
     def goal(self) -> tuple[float, float]:
         """The episode's present goal (x, z), m."""
         return self._batch.episodes.episode(self._i).goal
-
-    @property
-    def rocks(self) -> Rocks | None:
-        """The episode's difficulty and rocks as they were drawn; None on the plane."""
-        return self._scene.rocks
-
-    @property
-    def difficulty(self) -> float | None:
-        """The episode's difficulty; None on the plane."""
-        return None if self.rocks is None else self.rocks.difficulty
-
-    @property
-    def domain(self) -> Domain:
-        """The episode's properties of rover and world as they were drawn."""
-        return self._scene.domain
-
-    @property
-    def task(self) -> Task:
-        """The checked arguments."""
-        return self._batch.task
-
-    @property
-    def model(self) -> RoverModel:
-        """The rover, before its masses are scaled."""
-        return self._batch.task.model
-
-    @property
-    def observation_layout(self) -> ObservationLayout:
-        """The layout of the observation."""
-        return self._batch.task.layout
-
-    @property
-    def dt(self) -> float:
-        """Control period, s."""
-        return self._batch.task.dt
 
     @property
     def np_random(self) -> np.random.Generator:
@@ -679,6 +630,5 @@ class BatchRover:
         """
         self._batch.episodes.set_difficulty(self._i, check_difficulty(self._batch.task, difficulty))
 
-    @property
-    def _scene(self) -> EpisodeScene:
+    def _running(self) -> EpisodeScene:
         return self._batch.scene(self._i)
