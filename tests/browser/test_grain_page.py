@@ -18,7 +18,7 @@ from selenium.webdriver.common.by import By
 from rover_gym.grains import GrainRun, record_grains
 from rover_gym.rendering.appearance import SAND_COLOUR
 from rover_gym.replay import write_page
-from rover_gym.replay.panel import LOAD_TIME, moving_mean
+from rover_gym.replay.player import LOAD_TIME, moving_mean
 from rover_gym.runs import open_run
 
 # Time of the script for a new sample, on any thread: rebuilt from its differences, and given to the graphics card.

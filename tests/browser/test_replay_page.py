@@ -23,7 +23,7 @@ from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_ru
 from rover_gym.rendering.appearance import GROUND_COLOUR, TRUNK_COLOUR
 from rover_gym.replay import write_page
 from rover_gym.replay.page import WHEEL_NAMES
-from rover_gym.replay.panel import LOAD_TIME, moving_mean
+from rover_gym.replay.player import LOAD_TIME, moving_mean
 from rover_gym.runs import open_run
 from rover_gym.soil import SoilRun, record_soil, rover_on_soil, settled_bed
 

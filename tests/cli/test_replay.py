@@ -22,7 +22,7 @@ from rover_gym.record import RecordingError, RoverRun, Trajectory, read_run
 from rover_gym.rendering.appearance import rover_parts, sphere_mesh
 from rover_gym.replay import write_gltf, write_page, write_vrml
 from rover_gym.replay.page import WHEEL_NAMES, facts
-from rover_gym.replay.panel import axis_angles, continuous, moving_mean, quaternions
+from rover_gym.replay.player import axis_angles, continuous, moving_mean, quaternions
 from rover_gym.replay.scenery import ground_tiles, identifiers
 
 SLOPE = Plane((-0.1, 1.0, 0.05), 0.2)

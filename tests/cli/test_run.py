@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 from rover_gym import OptionError, Plane, RoverModel, Simulation, SphereField
 from rover_gym.cli import app
 from rover_gym.record import Recorder, RecordingError, RoverSampler, describe, read_run, read_trajectory
-from rover_gym.reproduction import inclined_plane, report_rover, sphere_rug
+from rover_gym.reproduction import inclined_plane, sphere_rug
+from rover_gym.reproduction.chapter_3_balls import WHEEL_RADIUS
 
 KILLED = """
 import os, signal, sys
@@ -202,9 +203,7 @@ def test_gaps_on_the_rug_are_those_of_points_on_the_rim() -> None:
         poses = sim.poses()
         for wheel, gap in zip(sim.model.to_dict()["wheels"], sim.wheel_gaps, strict=True):
             centre, rotation = poses[wheel["solid"]]
-            rim = (
-                centre + report_rover.WHEEL_RADIUS * np.stack((np.cos(turn), np.sin(turn)), axis=1) @ rotation[:, :2].T
-            )
+            rim = centre + WHEEL_RADIUS * np.stack((np.cos(turn), np.sin(turn)), axis=1) @ rotation[:, :2].T
             near = field.centres[np.linalg.norm(field.centres - centre, axis=1) < 1.5]
             distance = np.linalg.norm(rim[:, None] - near, axis=2).min() - 0.5
             assert gap == pytest.approx(distance, abs=1e-7)

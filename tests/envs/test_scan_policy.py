@@ -24,9 +24,9 @@ from rover_gym.policy import (
 from rover_gym.policy.evaluation import drive_all
 from rover_gym.policy.foresight_policy import OUTPUTS, ArcFeatures, ArcForecast, with_speed
 from rover_gym.policy.named_policy import named_policy
+from rover_gym.policy.policy_card import FOLDER
 from rover_gym.policy.rover_outline import RoverOutline
-from rover_gym.policy.scan_memory import TRAPS, ScanMemory
-from rover_gym.policy.shipped import FOLDER
+from rover_gym.policy.scan_policy import TRAPS, ScanMemory
 from rover_gym.policy.sweeps import Arcs
 
 ARGUMENTS = ScanPolicy.arguments()

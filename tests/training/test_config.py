@@ -1,21 +1,17 @@
 """A configuration is checked key by key."""
 
-import json
-import shutil
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from rover_gym import OptionError, RoverGymError
+
+pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
+
 from rover_gym.learning.build import build_env
 from rover_gym.learning.configurations import SHIPPED_CONFIGURATIONS, find_configuration
 from rover_gym.learning.training_config import parse_config, read_config
-from rover_gym.policy import policy_folder
-
-pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
 
 SMALLEST: dict[str, Any] = {"environment": {"terrain": "plane"}, "total_steps": 100}
 
@@ -88,48 +84,3 @@ def test_randomisation_reaches_the_environment() -> None:
     assert len({domain.friction for domain in domains}) == 4
     assert all(0.5 <= domain.friction <= 0.9 and 0.8 <= domain.mass_scale <= 1.2 for domain in domains)
     assert {domain.gravity_scale for domain in domains} == {0.38}
-
-
-@pytest.fixture
-def policy(tmp_path: Path) -> Path:
-    """A copy of a shipped policy."""
-    folder = tmp_path / "mine"
-    folder.mkdir()
-    for name in ("policy.npz", "policy.json"):
-        shutil.copy(policy_folder("plane") / name, folder)
-    return folder
-
-
-def test_episodes_are_reused_until_the_policy_or_the_arguments_change(
-    policy: Path, evaluate: Callable[..., Any], tmp_path: Path
-) -> None:
-    """A cached result was taken although the policy had been trained anew."""
-    output = tmp_path / "evaluation"
-
-    def evaluated(*arguments: Any) -> tuple[str, str]:
-        result = evaluate(policy, "--terrain", "plane", "--episodes", 1, "--output", output, *arguments)
-        assert result.exit_code == 0, result.output
-        mine, baseline = (output / f"episodes-{name}.json" for name in ("mine", "PD-baseline"))
-        found = mine.read_text(encoding="utf-8"), baseline.read_text(encoding="utf-8")
-        for path, text in zip((mine, baseline), found, strict=True):  # marks what is reused
-            path.write_text(text + " ", encoding="utf-8")
-        return found
-
-    def is_reused(text: str) -> bool:
-        return text.endswith(" ")
-
-    assert not any(map(is_reused, evaluated()))
-    assert all(map(is_reused, evaluated()))
-    # Other weights: this policy drives anew, the baseline does not.
-    with np.load(policy / "policy.npz") as arrays:
-        changed = {name: array * np.float32(0.5 if name == "bias_0" else 1.0) for name, array in arrays.items()}
-    np.savez_compressed(policy / "policy.npz", **changed)
-    mine, baseline = evaluated()
-    assert not is_reused(mine)
-    assert is_reused(baseline)
-    # Another card.
-    card = json.loads((policy / "policy.json").read_text(encoding="utf-8"))
-    card["command"]["speed"] = 0.9
-    (policy / "policy.json").write_text(json.dumps(card), encoding="utf-8")
-    assert [is_reused(text) for text in evaluated()] == [False, True]
-    assert not any(map(is_reused, evaluated("--slope", 2)))

@@ -10,10 +10,9 @@ from rover_gym.cli.dataset_command import dataset
 from rover_gym.cli.drive_command import drive
 from rover_gym.cli.evaluate_command import baseline, evaluate
 from rover_gym.cli.export_command import export
-from rover_gym.cli.grains_command import grains
+from rover_gym.cli.grains_command import grains, pit, track
+from rover_gym.cli.grains_command import rover as rover_on_bed
 from rover_gym.cli.grains_lab_commands import plate, shear, wheel
-from rover_gym.cli.grains_rover_commands import pit, track
-from rover_gym.cli.grains_rover_commands import rover as rover_on_bed
 from rover_gym.cli.live_command import live
 from rover_gym.cli.model_command import model
 from rover_gym.cli.planar_commands import planar

@@ -1,4 +1,4 @@
-"""`rover evaluate`: trained policies beside the PD baseline and the scan planner, on the same seeded episodes."""
+"""`rover evaluate` and `rover baseline`: policies beside each other on the same seeded episodes."""
 
 import json
 import math
@@ -34,7 +34,7 @@ from rover_gym.cli.options import (
 )
 from rover_gym.env.arguments import MAX_SLOPE_DEG, terrain_name
 from rover_gym.extras import MissingExtraError, require
-from rover_gym.figures.run_figures import draw_policies
+from rover_gym.figures.policy_figure import draw_policies
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.baseline import DIFFICULTIES, ENVIRONMENTS, BaselineInterrupt, BaselineRow, measure_baseline
 from rover_gym.policy.comparison import (

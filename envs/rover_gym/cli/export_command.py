@@ -21,7 +21,7 @@ from rover_gym.cli.options import (
     warn_of_slope,
 )
 from rover_gym.exports.fmu import fmu_library, write_fmu
-from rover_gym.exports.mcap_run import FPS, write_mcap
+from rover_gym.exports.mcap_writer import FPS, write_mcap
 from rover_gym.exports.onnx_policy import write_onnx
 from rover_gym.extras import require
 from rover_gym.mechanics import OptionError

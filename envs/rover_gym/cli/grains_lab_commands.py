@@ -17,7 +17,7 @@ from rover_gym.cli.console import (
     status,
 )
 from rover_gym.cli.grains_options import EARTH, FOLDER, Balls, Friction, Gravity, Output, Seed, TimeStep, Tolerance
-from rover_gym.cli.shared_options import takes
+from rover_gym.cli.options import takes
 from rover_gym.validation import number
 
 if TYPE_CHECKING:

@@ -1,18 +1,20 @@
-"""Options that name the rover and its ground, for all commands that take them."""
+"""Options that several commands share: rover, ground, policy and film, and their completion."""
 
+import functools
+import inspect
 import math
 import re
 from collections.abc import Callable, Iterable
+from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_type_hints
 
 import typer
 
 from rover_gym.env.arguments import ARGUMENTS, TERRAINS, terrain_name
-from rover_gym.maps.map_files import ENDINGS
+from rover_gym.maps.map_files import ENDINGS, is_terrain_file, open_terrain
 from rover_gym.maps.map_files import ENDINGS as MAPS
-from rover_gym.maps.mesh_files import ENDINGS as MESHES
-from rover_gym.maps.terrain_files import is_terrain_file, open_terrain
+from rover_gym.maps.map_files import ENDINGS as MESHES
 from rover_gym.mechanics import HeightField, OptionError, RoverModel, TriangleMesh
 from rover_gym.models import open_model
 from rover_gym.models.lookup import KINDS
@@ -203,3 +205,40 @@ def named_driver(name: str, terrain: str, model: RoverModel | None = None) -> Na
 def driver_title(name: str) -> str:
     """What a driver is, as a heading says it."""
     return "the planner with futures" if name == "planner" else policy_title(name)
+
+
+def takes(kind: type[Any], **defaults: Any) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Makes a command take the fields of a dataclass as options, and gives it an instance as its first argument.
+
+    Args:
+        kind: The dataclass, whose fields are annotated as options.
+        **defaults: Defaults of this command in the place of the dataclass's.
+    """
+    shared = get_type_hints(kind, include_extras=True)
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        own = list(inspect.signature(command).parameters.values())[1:]
+        given = {field.name: defaults.get(field.name, field.default) for field in fields(kind)}
+        unknown = defaults.keys() - given.keys()
+        assert not unknown, f"{kind.__name__} has no {sorted(unknown)}"  # noqa: S101 - a mistake in this package
+        added = [
+            inspect.Parameter(
+                name,
+                inspect.Parameter.KEYWORD_ONLY,
+                default=inspect.Parameter.empty if value is MISSING else value,
+                annotation=shared[name],
+            )
+            for name, value in given.items()
+        ]
+
+        @functools.wraps(command)
+        def called(**options: Any) -> None:
+            command(kind(**{name: options.pop(name) for name in given}), **options)
+
+        hints = get_type_hints(command, include_extras=True)
+        hints.pop(next(iter(inspect.signature(command).parameters)))
+        called.__annotations__ = hints | shared
+        called.__signature__ = inspect.Signature([*own, *added])  # type: ignore[attr-defined]
+        return called
+
+    return decorate

@@ -10,8 +10,7 @@ import numpy as np
 import typer
 
 from rover_gym.cli.console import AsJson, Results, check_folder, plain_errors, progress_bar, row
-from rover_gym.cli.options import warn_of_slope
-from rover_gym.cli.shared_options import takes
+from rover_gym.cli.options import takes, warn_of_slope
 from rover_gym.cli.soil_command import soil
 from rover_gym.mechanics import (
     BallSimulation,

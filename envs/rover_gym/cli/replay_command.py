@@ -1,4 +1,4 @@
-"""`rover replay`: a saved run as a page for the browser, as VRML97 or as glTF."""
+"""`rover replay` and `rover plot`: a saved run as a page, as VRML97, as glTF, as a film, and as figures."""
 
 from pathlib import Path
 from typing import Annotated

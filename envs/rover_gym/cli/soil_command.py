@@ -124,9 +124,11 @@ def _cross(
 ) -> None:
     from rover_gym.figures.grain_frames import draw_soil, film_soil  # noqa: PLC0415 - matplotlib is slow to load
     from rover_gym.runs import open_run  # noqa: PLC0415 - as above
-    from rover_gym.soil.bed import settled_bed  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.soil.bed import (  # noqa: PLC0415
+        rover_on_soil,
+        settled_bed,
+    )
     from rover_gym.soil.soil_recording import record_soil  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.soil.soil_rover import rover_on_soil  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.soil.soil_run import SoilRun  # noqa: PLC0415 - as above
 
     _check_width("disks", disks, layers, CROSSING)

@@ -1,4 +1,4 @@
-"""The plan of a scene, with a reason for every part, and the rover built from it."""
+"""A scene, its plan with a reason for every part, and the rover built from it."""
 
 import math
 from dataclasses import dataclass, field

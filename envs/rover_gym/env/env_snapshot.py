@@ -1,4 +1,4 @@
-"""Snapshots of a `RoverEnv`, and the checks made before one is restored."""
+"""Snapshots of a `RoverEnv`: the state of its episode, and the checks made before one is restored."""
 
 import copy
 from collections.abc import Mapping

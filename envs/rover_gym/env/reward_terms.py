@@ -1,4 +1,4 @@
-"""Terms of the reward that the user gives as functions.
+"""The terms of the reward: the weights of the environment's own, and terms that the user gives as functions.
 
 A term is a function of a control period,
 

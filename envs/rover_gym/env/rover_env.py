@@ -15,7 +15,8 @@ from rover_gym.env.beginning import draw_episodes
 from rover_gym.env.env_snapshot import EnvSnapshot, Progress, check_random_state, check_snapshot
 from rover_gym.env.episode_scene import EpisodeScene, check_difficulty, check_reset_options, scene_of
 from rover_gym.env.episode_view import EpisodeView
-from rover_gym.env.generators import check_seed, keys_to_action, pushed, row_of, seeded, set_row
+from rover_gym.env.generators import check_seed, row_of, seeded, set_row
+from rover_gym.env.play_keys import keys_to_action, pushed
 from rover_gym.env.reward_terms import earn, total
 from rover_gym.env.task import Task, make_task
 from rover_gym.mechanics import EpisodeRun, Plane, RoverGrainSimulation, Simulation, standard_normals

@@ -1,4 +1,4 @@
-"""The start of an episode: the ground's slope, the rover's pose and the goal.
+"""The start of an episode: the ground's slope, the rover's pose, the goal, and the properties that are drawn with them.
 
 A direction on the map, like the heading, is an angle about +y from +x, positive to the left (towards -z): the direction
 `a` points along `(cos a, -sin a)` in (x, z).

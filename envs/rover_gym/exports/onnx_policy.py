@@ -13,8 +13,7 @@ from rover_gym.exports.onnx_graph import Perceptron, onnx_model
 from rover_gym.extras import MissingExtraError, require
 from rover_gym.policy.features import LARGEST_FEATURE
 from rover_gym.policy.foresight_policy import FORECAST_FILE, OUTPUTS
-from rover_gym.policy.policy_card import Network, PolicyCard, PolicyError, is_there
-from rover_gym.policy.shipped import find_policy, forecast_folder
+from rover_gym.policy.policy_card import Network, PolicyCard, PolicyError, find_policy, forecast_folder, is_there
 from rover_gym.validation import checked, refuse
 
 if TYPE_CHECKING:

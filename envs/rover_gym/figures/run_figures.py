@@ -5,13 +5,11 @@ Signals that jump from step to step are drawn twice: every sample as a light lin
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rover_gym.extras import require
 from rover_gym.figures.derived_signals import (
     SMOOTHED,
     WINDOW,
@@ -35,8 +33,6 @@ from rover_gym.figures.style import (
     title,
 )
 from rover_gym.figures.wheel_paths import path_from_above
-from rover_gym.policy.comparison import BASELINE, GUIDE, PLANNER
-from rover_gym.policy.evaluation import IntervalEstimate, PolicySummary
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -267,36 +263,3 @@ DRAWINGS = {
     "energy": Drawing(energy, 5.5, _has("q", "kinetic_energy", "potential_energy", "motor_torques")),
     "contact-solver": Drawing(contact_solver, 5.0, _has("solver_residual", "solver_iterations")),
 }
-
-
-def draw_policies(rows: Sequence[PolicySummary], path: Path) -> None:
-    """Draws every figure of every policy with its interval.
-
-    Args:
-        rows: The policies' figures.
-        path: The file to write, PNG.
-
-    Raises:
-        MissingExtraError: matplotlib is not installed.
-    """
-    figure = require("matplotlib.figure", "demo").Figure(figsize=(10.0, 1.2 + 0.3 * len(rows)), layout="constrained")
-    quantities: tuple[tuple[str, Callable[[PolicySummary], IntervalEstimate], float], ...] = (
-        ("success, %", lambda row: row.success, 100.0),
-        ("time to goal, s", lambda row: row.time, 1.0),
-        ("energy, J/m", lambda row: row.energy_per_metre, 1.0),
-        ("slip ratio", lambda row: row.slip, 1.0),
-        ("tilt, °", lambda row: row.tilt, 1.0),
-    )
-    axes = figure.subplots(1, len(quantities), sharey=True)
-    places = list(range(len(rows)))[::-1]
-    for axis, (label, quantity, factor) in zip(axes, quantities, strict=True):
-        for place, row in zip(places, rows, strict=True):
-            estimate = quantity(row)
-            low, high = estimate.interval
-            colour = "tab:grey" if row.policy in (BASELINE, PLANNER, GUIDE) else "tab:blue"
-            axis.plot([factor * low, factor * high], [place, place], color=colour, linewidth=3, alpha=0.5)
-            axis.plot([factor * estimate.value], [place], "o", color=colour)
-        axis.set_xlabel(label)
-        axis.grid(axis="x", alpha=0.3)
-    axes[0].set_yticks(places, [row.policy for row in rows])
-    figure.savefig(path, dpi=110)

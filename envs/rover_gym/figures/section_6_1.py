@@ -1,4 +1,4 @@
-"""The report's figures 6.2 to 6.5, drawn from a recorded run.
+"""The figures of the report's sections 6.1 and 6.2, drawn from recorded runs.
 
 Our run is in colour, one colour per wheel, and a Siconos run of the same scene, if there is one, dotted in black. The
 report's curves are in grey or in a separate panel, because their parameters differ (listed in the data's `meta`).
@@ -28,8 +28,8 @@ from rover_gym.figures.style import (
 )
 from rover_gym.mechanics import SphereField
 from rover_gym.record.trajectory import Trajectory, read_trajectory
+from rover_gym.reproduction.chapter_3_balls import WHEEL_RADIUS, report_model
 from rover_gym.reproduction.inclined_plane import reference_data
-from rover_gym.reproduction.report_rover import WHEEL_RADIUS, report_model
 from rover_gym.validation import checked
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Scenes on a bed of balls in a box: a sphere that strikes it, and a rover that drives over it."""
+"""Scenes of balls: a sphere that strikes a bed, a rover that drives over it, and columns, silos and drums."""
 
 from __future__ import annotations
 

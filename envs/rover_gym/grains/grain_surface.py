@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import OptionError
-from rover_gym.models.file_axes import rotation_matrix
+from rover_gym.models.import_report import rotation_matrix
 from rover_gym.validation import array, number, refuse, vector
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Builds the vector environment of a training configuration."""
+"""The vector environment of a training: commands as actions, features as observations, and the clock around it."""
 
 import time
 from collections.abc import Mapping

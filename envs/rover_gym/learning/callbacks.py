@@ -1,4 +1,4 @@
-"""Callbacks of a training: curriculum and checkpoints."""
+"""Callbacks of a training: curriculum, checkpoints and the figures that it prints."""
 
 import json
 import time

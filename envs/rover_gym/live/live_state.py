@@ -1,4 +1,4 @@
-"""What a live drive shows of itself after each control period."""
+"""What a live drive shows of itself after each control period, and of what is past."""
 
 from __future__ import annotations
 

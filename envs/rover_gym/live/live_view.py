@@ -15,8 +15,7 @@ import numpy.typing as npt
 from rover_gym.mechanics import sin_cos
 from rover_gym.record.rover_run import RoverRun
 from rover_gym.record.trajectory import Trajectory
-from rover_gym.replay.panel import quaternions
-from rover_gym.replay.player import add_surroundings, shortened
+from rover_gym.replay.player import add_surroundings, quaternions, shortened
 from rover_gym.replay.scenery import first_view
 from rover_gym.replay.vrml import add_ground, add_rover
 

@@ -1,4 +1,4 @@
-"""What the writers of URDF and MJCF share: the solids of a model in z-up axes, and the text of numbers."""
+"""Models as URDF and MJCF files: the solids in z-up axes, and the text of numbers."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from rover_gym.mechanics import ModelError, RoverModel
-from rover_gym.models.file_axes import Z_UP_TO_Y_UP, Array, quaternion, roll_pitch_yaw, rotation_matrix, turn_z_to
+from rover_gym.models.import_report import Z_UP_TO_Y_UP, Array, quaternion, roll_pitch_yaw, rotation_matrix, turn_z_to
 from rover_gym.models.robot_tree import THIN_DISC, FileShape, check_kinds, checked_path
 from rover_gym.validation import refuse
 

@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from rover_gym.extras import require
-from rover_gym.models.file_axes import from_quaternion
+from rover_gym.models.import_report import from_quaternion
 from rover_gym.models.robot_tree import (
     MAX_LINKS,
     FileJoint,

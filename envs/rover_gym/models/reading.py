@@ -11,8 +11,7 @@ from typing import Any
 
 from rover_gym.mechanics import ModelError, RoverModel
 from rover_gym.models.description import WheelOptions, describe
-from rover_gym.models.file_axes import axes_of
-from rover_gym.models.import_report import ImportReport, RobotFileWarning, check_folders, solid_rows, together
+from rover_gym.models.import_report import ImportReport, RobotFileWarning, axes_of, check_folders, solid_rows, together
 from rover_gym.models.mjcf import read_mjcf_tree
 from rover_gym.models.robot_tree import (
     IGNORABLE,

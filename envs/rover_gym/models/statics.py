@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import ModelError, Plane, RoverModel, Simulation
-from rover_gym.models.file_axes import Array, rotation_matrix
+from rover_gym.models.import_report import Array, rotation_matrix
 from rover_gym.models.robot_tree import FileLink, RobotTree, round_radius
 from rover_gym.validation import number, refuse
 

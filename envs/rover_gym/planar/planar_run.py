@@ -1,4 +1,4 @@
-"""Saved planar runs, read back: a ball, a two-wheel rover or the straight-driving rover over its ground.
+"""Planar runs, recorded and read back: a ball, a two-wheel rover or the straight-driving rover over its ground.
 
 run = open_run("rover.h5").resample(25.0)
 run.discs[-1, 0, :2]

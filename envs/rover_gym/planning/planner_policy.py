@@ -22,7 +22,7 @@ from rover_gym.planning.scanned_ground import RawActions, ScannedGround
 from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimits
 from rover_gym.policy.features import check_observed
 from rover_gym.policy.pd_policy import find_rover_env
-from rover_gym.policy.scan_memory import scan_grid
+from rover_gym.policy.scan_policy import scan_grid
 from rover_gym.validation import array, number, refuse, vector, whole
 
 Array = npt.NDArray[np.float64]

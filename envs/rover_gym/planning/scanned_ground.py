@@ -1,4 +1,4 @@
-"""The ground as far as a rover has seen it, for a planner that does not know the rest."""
+"""What a planner may be given instead: the ground as far as it was seen, and raw actions in place of commands."""
 
 import math
 from typing import Any
@@ -11,7 +11,7 @@ from rover_gym.extras import require
 from rover_gym.mechanics import HeightField, OptionError
 from rover_gym.policy.command import N_COMMANDS, CommandController
 from rover_gym.policy.ground_map import MOST_CELLS, GroundMap, MapOptions
-from rover_gym.policy.scan_memory import scan_grid
+from rover_gym.policy.scan_policy import scan_grid
 from rover_gym.validation import refuse
 
 Array = npt.NDArray[np.float64]

@@ -21,9 +21,8 @@ from rover_gym.policy.goal_env import GoalObservation, RoverGoalEnv, RoverGoalVe
 from rover_gym.policy.ground_map import MapOptions
 from rover_gym.policy.named_policy import NamedPolicy, named_policy
 from rover_gym.policy.pd_policy import PDGains, PDPolicy
-from rover_gym.policy.policy_card import Network, PolicyCard, PolicyError
+from rover_gym.policy.policy_card import Network, PolicyCard, PolicyError, find_policy, policy_arguments, policy_folder
 from rover_gym.policy.scan_policy import ScanGains, ScanPolicy
-from rover_gym.policy.shipped import find_policy, policy_arguments, policy_folder
 from rover_gym.policy.trained_policy import TrainedPolicy
 from rover_gym.policy.trap_env import RoverTrapEnv
 

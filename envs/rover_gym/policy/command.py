@@ -24,7 +24,7 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.env.generators import keys_to_action
+from rover_gym.env.play_keys import keys_to_action
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import CommandError, OptionError, atan2, sin_cos
 from rover_gym.policy.features import LARGEST_FEATURE, Features

@@ -19,13 +19,12 @@ from rover_gym.env.task import MAX_EPISODE_STEPS
 from rover_gym.mechanics import RoverModel
 from rover_gym.policy.episodes import Episode, Policy, run_episode
 from rover_gym.policy.evaluation import EvaluatedEpisode, IntervalEstimate, PolicySummary, drive_all
-from rover_gym.policy.policy_card import PolicyCard, PolicyError
+from rover_gym.policy.policy_card import PolicyCard, PolicyError, find_policy, policy_arguments
 from rover_gym.policy.scan_policy import ScanPolicy
-from rover_gym.policy.shipped import find_policy, policy_arguments
 from rover_gym.policy.trained_policy import TrainedPolicy
 from rover_gym.record.channels import outcome_words
 from rover_gym.rendering.frames import captioned
-from rover_gym.rendering.video import VideoWriter
+from rover_gym.rendering.render_options import VideoWriter
 from rover_gym.validation import refuse
 
 COLUMNS = ("policy", "success", "95% interval", "time to goal, s", "energy, J/m", "slip", "tilt, °", "other ends")

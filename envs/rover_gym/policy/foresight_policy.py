@@ -23,9 +23,8 @@ from rover_gym.mechanics import OptionError
 from rover_gym.policy.arc_search import PathCosts
 from rover_gym.policy.ground_map import MapOptions
 from rover_gym.policy.pd_policy import find_rover_env
-from rover_gym.policy.policy_card import Network, PolicyError, is_there
+from rover_gym.policy.policy_card import Network, PolicyError, forecast_folder, is_there
 from rover_gym.policy.scan_policy import ScanGains, ScanPolicy
-from rover_gym.policy.shipped import forecast_folder
 from rover_gym.validation import number, refuse
 
 Array = npt.NDArray[np.float64]

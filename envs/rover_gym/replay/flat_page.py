@@ -21,8 +21,18 @@ from rover_gym.rendering.appearance import (
     Part,
     part_mesh,
 )
-from rover_gym.replay.panel import FOLLOW_TIME, Chart, load_chart, moving_mean, panel_contents, with_panel
-from rover_gym.replay.player import add_meshes, recorded_page, rgb, shortened
+from rover_gym.replay.player import (
+    FOLLOW_TIME,
+    Chart,
+    add_meshes,
+    load_chart,
+    moving_mean,
+    panel_contents,
+    recorded_page,
+    rgb,
+    shortened,
+    with_panel,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -32,8 +32,16 @@ from rover_gym.rendering.appearance import (
     sphere_mesh,
 )
 from rover_gym.replay.page import WHEEL_COLOURS
-from rover_gym.replay.panel import FOLLOW_TIME, Chart, continuous, load_chart, moving_mean, panel_contents, quaternions
-from rover_gym.replay.player import shortened
+from rover_gym.replay.player import (
+    FOLLOW_TIME,
+    Chart,
+    continuous,
+    load_chart,
+    moving_mean,
+    panel_contents,
+    quaternions,
+    shortened,
+)
 from rover_gym.replay.scenery import (
     MARGIN,
     MOST_HEIGHTS,

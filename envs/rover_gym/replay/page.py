@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.record.channels import outcome_words
-from rover_gym.replay.panel import (
+from rover_gym.replay.player import (
     FOLLOW_TIME,
     Chart,
     continuous,
@@ -17,9 +17,10 @@ from rover_gym.replay.panel import (
     moving_mean,
     panel_contents,
     quaternions,
+    recorded_page,
+    shortened,
     with_panel,
 )
-from rover_gym.replay.player import recorded_page, shortened
 from rover_gym.replay.scenery import first_view, trunk_path
 from rover_gym.replay.vrml import add_ground, add_rover
 

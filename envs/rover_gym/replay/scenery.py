@@ -22,7 +22,7 @@ from rover_gym.rendering.appearance import (
     part_mesh,
     rover_parts,
 )
-from rover_gym.replay.panel import quaternions
+from rover_gym.replay.player import quaternions
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

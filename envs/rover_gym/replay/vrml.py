@@ -23,8 +23,7 @@ from rover_gym.rendering.appearance import (
     Part,
     sphere_mesh,
 )
-from rover_gym.replay.panel import axis_angles, continuous, quaternions
-from rover_gym.replay.player import add_meshes, rgb
+from rover_gym.replay.player import add_meshes, axis_angles, continuous, quaternions, rgb
 from rover_gym.replay.scenery import (
     coloured_meshes,
     first_view,

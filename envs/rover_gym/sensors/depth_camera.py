@@ -1,4 +1,4 @@
-"""Depth camera."""
+"""What looks around: the depth camera and the laser scanner."""
 
 import math
 from dataclasses import dataclass, field

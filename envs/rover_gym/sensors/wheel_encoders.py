@@ -1,4 +1,4 @@
-"""Wheel encoders."""
+"""What the joints and the trunk give without looking around: wheel encoders, motor sensors and the heading."""
 
 import math
 from dataclasses import dataclass

@@ -25,8 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import OptionError, SoilSimulation
-from rover_gym.soil.bed import Bed, step_count
-from rover_gym.soil.soil_rover import WHEEL_RADIUS, rover_on_soil
+from rover_gym.soil.bed import WHEEL_RADIUS, Bed, rover_on_soil, step_count
 from rover_gym.validation import number, refuse
 
 __all__ = ["BedEstimate", "Pull", "SoilDrive", "Traction", "drawbar_pull", "drive_on_soil", "fit_traction", "over_beds"]

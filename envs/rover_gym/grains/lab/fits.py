@@ -17,8 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.grains.lab.plate import PlatePoint
-from rover_gym.grains.lab.shear import ShearPoint
+from rover_gym.grains.lab.plate_and_shear import PlatePoint, ShearPoint
 from rover_gym.grains.lab.wheel import WheelPoint
 from rover_gym.mechanics import OptionError
 from rover_gym.soil.soil_trials import Pull, Traction, fit_traction

@@ -1,4 +1,12 @@
-"""The shear test: shear stress under a loaded disc with vanes that is turned, against displacement.
+"""Two tests of a bed: a plate that is pushed into it, and a disc with vanes that is turned on it.
+
+The plate gives the mean pressure under it at a steady speed:
+
+>>> from rover_gym.grains.ball_bed import settled_balls
+>>> from rover_gym.grains.lab import plate_test
+>>> bed = settled_balls(300, 0.22, 0.22, radius_min=0.012, radius_max=0.016)
+>>> len(plate_test(bed, 0.04, depth=0.01, samples=5))
+5
 
 This is the rotary test of a bevameter. The vanes hold the grains between them, so the bed shears in grains and not
 along the disc. With a shear stress τ that is the same everywhere under a disc of radius R the moment is
@@ -23,10 +31,94 @@ from typing import Any
 import numpy as np
 
 from rover_gym.grains.ball_bed import BallBed
-from rover_gym.grains.lab.disc import check_room, describe_disc
-from rover_gym.grains.lab.rig import Rig, clear_height, fall, ground, larger_than_grains, step_count
+from rover_gym.grains.lab.rig import (
+    Rig,
+    check_room,
+    clear_height,
+    describe_disc,
+    fall,
+    ground,
+    larger_than_grains,
+    step_count,
+)
 from rover_gym.mechanics import OptionError
 from rover_gym.validation import checked, number, refuse, whole
+
+
+@dataclass(frozen=True)
+class PlatePoint:
+    """Means over a stretch of the way down.
+
+    Attributes:
+        depth: Middle of the stretch below the undisturbed mean surface, m; negative above it.
+        pressure: Force of the grains upwards over the plate's area, Pa.
+        pressure_error: Standard error of that mean, from the spread within the stretch, Pa.
+        torque: Moment of the grains about the plate's axis, N m, nothing but noise.
+    """
+
+    depth: float
+    pressure: float
+    pressure_error: float
+    torque: float
+
+
+@checked(bed="BallBed")
+def plate_test(
+    bed: BallBed,
+    radius: float,
+    *,
+    depth: float,
+    speed: float = 0.05,
+    samples: int = 25,
+    plate_friction: float = 0.5,
+    **options: Any,
+) -> list[PlatePoint]:
+    """Pushes a round plate into the middle of the bed, from just above the highest ball below it.
+
+    The plate is a piston as thick as the way is long: no ball comes to lie on it.
+
+    Args:
+        bed: Balls at rest.
+        radius: Of the plate, m.
+        depth: Of the end of the way below the mean surface, m.
+        speed: m/s. A slow one: the square of it is to be small beside gravity times a ball's radius.
+        samples: Points of the table, over equal stretches.
+        plate_friction: Coulomb's coefficient between plate and grains.
+        **options: Options of `GrainSimulation`, such as `friction`, `time_step` and `tolerance`.
+
+    Raises:
+        OptionError: A number is out of its range, the plate is smaller than the balls, or the bed is too small.
+            Nothing has run.
+        StepError: A step could not be taken.
+    """
+    radius = larger_than_grains("radius", radius, bed)
+    check_room(bed, radius)
+    depth, speed = number("depth", depth, above=0.0), number("speed", speed, above=0.0)
+    samples, friction = whole("samples", samples, at_least=1), number("plate_friction", plate_friction, at_least=0.0)
+    surface, largest = bed.surface, 2.0 * float(bed.radius.max())
+    if depth > surface - 2.0 * largest:
+        most = surface - 2.0 * largest
+        refuse(OptionError, "depth", depth, f"must be at most {most:.3g} m in this bed: two balls above its floor")
+    top = clear_height(bed, 0.5 * bed.width, 0.5 * bed.depth, radius)
+    way = top - surface + depth
+    grains = ground(bed, **options)
+    steps = step_count("depth", way / speed, grains.time_step)
+    if steps < samples:
+        refuse(OptionError, "samples", samples, f"must be at most the {steps} steps of the way")
+    mass = float(bed.mass.sum())  # any: the press is driven
+    machine = describe_disc(bed, radius, max(way, largest), mass)
+    rig = Rig(bed, machine, {"press": top}, tool_friction=friction, **options)
+    rows = np.zeros((steps, 3))
+    for k in range(steps):
+        place = top - speed * (k + 1) * rig.time_step
+        force, moment = rig.step({"press": place, "disc": 0.0})
+        rows[k] = surface - rig.place("press"), force[1] / (np.pi * radius**2), moment[1]
+    points = []
+    for stretch in np.array_split(rows, samples):
+        middle, pressure, torque = stretch.mean(axis=0)
+        error = float(stretch[:, 1].std() / np.sqrt(len(stretch)))
+        points.append(PlatePoint(float(middle), float(pressure), error, float(torque)))
+    return points
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,182 @@
+"""`Simulation.linearise`: against differences of real steps, modes that change, bad input."""
+
+import numpy as np
+import pytest
+
+from rover_gym import OptionError, Simulation, StateError
+from rover_gym.mechanics import Linearisation, SphereField
+
+NV = 21
+
+
+def on_wheels(**options) -> Simulation:
+    sim = Simulation(stabilisation="none", **options)
+    q = np.zeros(NV)
+    q[1] = 0.35
+    sim.set_state(q)
+    return sim
+
+
+def slope(degrees: float) -> np.ndarray:
+    angle = np.deg2rad(degrees)
+    return -9.81 * np.array([np.sin(angle), np.cos(angle), 0.0])
+
+
+def flying() -> Simulation:
+    sim = Simulation()
+    q = np.zeros(NV)
+    q[1], q[3:6] = 1.0, [0.1, 0.2, 0.3]
+    sim.set_state(q, 0.5 * np.random.default_rng(0).normal(size=NV))
+    return sim
+
+
+def rolling() -> Simulation:
+    sim = on_wheels()
+    sim.set_wheel_torques(np.full(6, 20.0))
+    sim.step(200)
+    return sim
+
+
+def held_on_a_slope() -> Simulation:
+    sim = on_wheels(gravity=slope(30.0), friction=0.9)
+    sim.brake()
+    sim.step(100)
+    return sim
+
+
+def sliding() -> Simulation:
+    sim = on_wheels(gravity=slope(30.0), friction=0.1)
+    sim.brake()
+    sim.step(100)
+    return sim
+
+
+def on_rocks(stabilisation: str = "none") -> Simulation:
+    rng = np.random.default_rng(3)
+    centres = np.column_stack([rng.uniform(-2, 4, 400), np.zeros(400), rng.uniform(-2, 2, 400)])
+    radii = rng.uniform(0.05, 0.25, 400)
+    centres[:, 1] = -0.6 * radii
+    sim = Simulation(terrain=SphereField(centres, radii), stabilisation=stabilisation)
+    q = np.zeros(NV)
+    q[1] = 0.55
+    sim.set_state(q)
+    sim.set_wheel_torques(np.full(6, 10.0))
+    sim.step(150)
+    return sim
+
+
+def differences(sim: Simulation, column: int, step: float) -> np.ndarray:
+    """Central difference of a real step, from the same state without memory."""
+    other = Simulation(sim.model, sim.terrain, **{**sim.settings, "tolerance": 1e-15})
+    other.restore(sim.snapshot())  # joints that are held stay so
+    ends = []
+    for sign in (1.0, -1.0):
+        point = np.concatenate([sim.q, sim.v, sim.wheel_torques, sim.steering])
+        point[column] += sign * step
+        other.set_state(point[:NV], point[NV : 2 * NV])
+        other.set_commands(point[2 * NV : -6], point[-6:])
+        other.step()
+        ends.append(np.concatenate([other.q, other.v]))
+    return (ends[0] - ends[1]) / (2.0 * step)
+
+
+def difference_error(sim: Simulation, linear: Linearisation) -> np.ndarray:
+    """Relative error of each column that holds, against the best of three steps of the differences."""
+    ab = np.column_stack([linear.a, linear.b])
+    errors = np.zeros(ab.shape[1])
+    for k in np.flatnonzero(linear.holds):
+        if not ab[:, k].any():
+            continue  # an axle that is not steered
+        scale = 1000.0 if 2 * NV <= k < 2 * NV + 6 else 1.0
+        tried = [np.abs(differences(sim, k, scale * h) - ab[:, k]).max() for h in (3e-7, 3e-6, 3e-5)]
+        errors[k] = min(tried) / np.abs(ab[:, k]).max()
+    return errors
+
+
+@pytest.mark.parametrize(
+    ("scene", "modes", "least"),
+    [
+        (flying, set(), 54),
+        (rolling, {"stick"}, 36),
+        (held_on_a_slope, {"stick"}, 36),
+        (sliding, {"slip"}, 45),
+        (on_rocks, {"stick", "slip"}, 45),
+    ],
+)
+def test_columns_that_hold_are_the_differences_of_real_steps(scene, modes, least):
+    sim = scene()
+    linear = sim.linearise()
+    assert set(linear.modes) == modes
+    assert linear.a.shape == (2 * NV, 2 * NV)
+    assert linear.b.shape == (2 * NV, 12)
+    assert linear.holds.sum() >= least
+    assert difference_error(sim, linear).max() < 1e-6
+
+
+def test_a_projection_is_differentiated():
+    sim = on_rocks("projection")
+    linear = sim.linearise()
+    assert linear.is_projected
+    assert linear.holds.sum() >= 40
+    assert difference_error(sim, linear).max() < 1e-6
+
+
+def test_it_says_where_modes_change():
+    sim = rolling()
+    linear = sim.linearise()
+    held = dict(zip(sim.model.dof_names, linear.holds[:NV], strict=True))
+    assert all(held[name] for name in ("x", "heading", "wheel_FL"))
+    assert not held["steering_FL"]  # a steered wheel cannot stick beside the others
+    assert not linear.is_smooth
+    # Over the ground by less than the tested change, a wheel touches on one side only.
+    falling = Simulation(stabilisation="none")
+    q = np.zeros(NV)
+    v = np.zeros(NV)
+    v[1] = -1.0
+    q[1] = 0.35 + 0.5 * falling.time_step + 1e-7
+    falling.set_state(q, v)
+    near = falling.linearise()
+    assert near.modes == []
+    assert not near.holds[1]
+    assert falling.linearise(perturbation=1e-8).holds[1]
+    assert flying().linearise().is_smooth
+
+
+def test_margins_say_how_far_the_next_mode_is():
+    linear = held_on_a_slope().linearise()
+    assert linear.bodies == [f"wheel_{name}" for name in Simulation().model.wheel_names]
+    assert (linear.margins > 0.0).all()
+    assert (on_rocks().linearise().margins >= -1e-12).all()
+
+
+def test_the_simulation_is_left_as_it_was():
+    sim = rolling()
+    before, contacts = sim.snapshot(), sim.contacts.impulses
+    linear = sim.linearise()
+    assert sim.snapshot() == before
+    np.testing.assert_array_equal(sim.contacts.impulses, contacts)
+    np.testing.assert_array_equal(linear.state[NV:], sim.v)
+    np.testing.assert_array_equal(linear.command, np.concatenate([sim.wheel_torques, sim.steering]))
+    other = Simulation(**sim.settings)
+    other.set_state(sim.q, sim.v)
+    other.set_wheel_torques(sim.wheel_torques)
+    other.step()
+    np.testing.assert_allclose(linear.next_state, np.concatenate([other.q, other.v]), atol=1e-11)
+
+
+@pytest.mark.parametrize("given", [0.0, 1.0, -1e-6, np.nan, "small", True, None])
+def test_a_bad_perturbation_is_refused_by_name(given):
+    with pytest.raises(OptionError, match="perturbation") as caught:
+        flying().linearise(given)
+    assert caught.value.field == "perturbation"
+
+
+def test_what_cannot_be_linearised_is_refused():
+    with pytest.raises(OptionError, match="variant"):
+        Simulation(variant="newton").linearise()
+    sim = Simulation()
+    q = np.zeros(NV)
+    q[1], q[5] = 5.0, np.pi / 2
+    sim.set_state(q)
+    with pytest.raises(StateError, match="singular"):
+        sim.linearise()

@@ -1,0 +1,52 @@
+"""`rover speed`: what it measures adds up."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from rover_gym.cli import app
+
+
+@pytest.mark.parametrize("terrain", ["plane", "rocks"])
+def test_json_adds_up(terrain: str) -> None:
+    options = ["--num-envs", "3", "--threads", "2", "--rounds", "2", "--terrain", terrain, "--json"]
+    result = CliRunner().invoke(app, ["speed", *options])
+    assert result.exit_code == 0, result.output
+    whole = json.loads(result.stdout)
+    assert whole["machine"]["cores"] > 0
+    assert whole["machine"]["instruction_set"] in ("AVX-512", "AVX2", "baseline")
+    assert list(whole["grounds"]) == [terrain]
+    told = whole["grounds"][terrain]["environment"]
+    assert (told["num_envs"], told["threads"]) == (3, 2)
+    assert 0.0 < told["physics"] <= told["step"]
+    assert told["physics_share"] == told["physics"] / told["step"]
+    assert told["speed_up"] == told["one_thread"] / told["all_threads"]
+    assert told["steps_per_second"] == pytest.approx(3 / told["step"])
+    assert told["gain"] == told["sync"] / told["step"]
+    exploring = whole["grounds"][terrain]["exploring"]
+    assert (exploring["num_envs"], exploring["threads"], exploring["torque"]) == (3, 2, 60.0)
+    assert exploring["rover_steps"]["rover-gym"] > 0.0
+    assert {name: rate * 0.005 for name, rate in exploring["rover_steps"].items()} == pytest.approx(
+        exploring["simulated"]
+    )
+    assert set(exploring["rover_steps"]) == {"rover-gym"}
+
+
+def test_the_text_names_what_it_tells() -> None:
+    result = CliRunner().invoke(app, ["speed", "--num-envs", "2", "--rounds", "1"])
+    assert result.exit_code == 0, result.output
+    for words in (
+        "rover-steps/s",
+        "simulated s/s",
+        "plane",
+        "rocks",
+        "inside the physics",
+        "over SyncVectorEnv",
+    ):
+        assert words in result.output
+
+
+def test_bad_numbers_are_refused() -> None:
+    assert CliRunner().invoke(app, ["speed", "--num-envs", "0"]).exit_code == 2
+    assert CliRunner().invoke(app, ["speed", "--torque", "-1"]).exit_code == 2

@@ -1,0 +1,57 @@
+"""An evaluation reuses its episodes only while everything that they depend on is the same."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rover_gym.policy import policy_folder
+
+
+@pytest.fixture
+def policy(tmp_path: Path) -> Path:
+    """A copy of a shipped policy."""
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    for name in ("policy.npz", "policy.json"):
+        shutil.copy(policy_folder("plane") / name, folder)
+    return folder
+
+
+def test_episodes_are_reused_until_the_policy_or_the_arguments_change(
+    policy: Path, evaluate: Callable[..., Any], tmp_path: Path
+) -> None:
+    """A cached result was taken although the policy had been trained anew."""
+    output = tmp_path / "evaluation"
+
+    def evaluated(*arguments: Any) -> tuple[str, str]:
+        result = evaluate(policy, "--terrain", "plane", "--episodes", 1, "--output", output, *arguments)
+        assert result.exit_code == 0, result.output
+        mine, baseline = (output / f"episodes-{name}.json" for name in ("mine", "PD-baseline"))
+        found = mine.read_text(encoding="utf-8"), baseline.read_text(encoding="utf-8")
+        for path, text in zip((mine, baseline), found, strict=True):  # marks what is reused
+            path.write_text(text + " ", encoding="utf-8")
+        return found
+
+    def is_reused(text: str) -> bool:
+        return text.endswith(" ")
+
+    assert not any(map(is_reused, evaluated()))
+    assert all(map(is_reused, evaluated()))
+    # Other weights: this policy drives anew, the baseline does not.
+    with np.load(policy / "policy.npz") as arrays:
+        changed = {name: array * np.float32(0.5 if name == "bias_0" else 1.0) for name, array in arrays.items()}
+    np.savez_compressed(policy / "policy.npz", **changed)
+    mine, baseline = evaluated()
+    assert not is_reused(mine)
+    assert is_reused(baseline)
+    # Another card.
+    card = json.loads((policy / "policy.json").read_text(encoding="utf-8"))
+    card["command"]["speed"] = 0.9
+    (policy / "policy.json").write_text(json.dumps(card), encoding="utf-8")
+    assert [is_reused(text) for text in evaluated()] == [False, True]
+    assert not any(map(is_reused, evaluated("--slope", 2)))
