@@ -118,9 +118,9 @@ train: $(STAMPS)/test $(STAMPS)/release ## train a policy for the rocks (about h
 	$(BIN)/python training/train_ppo.py --config rocks --seed 1
 	$(BIN)/python training/evaluate.py runs/train/rocks-seed1 --difficulty 1
 
-train-rllib: ## train Rover-v0 on a local Ray with 1 and with 2 workers; Ray wants a virtual environment of its own
+train-rllib: ## train Rover-v0 on a local Ray with 2 workers; Ray wants a virtual environment of its own
 	@$(MAKE) --no-print-directory VENV=$(VENV)-rllib $(VENV)-rllib/stamps/ray
-	$(VENV)-rllib/bin/python training/train_rllib.py --workers 1 --workers 2 --iterations 4
+	$(VENV)-rllib/bin/python training/examples/rllib.py --workers 2 --iterations 4
 
 # One thread for every engine, and the package of comparisons on the path.
 COMPARE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONPATH=tests $(BIN)/python -m comparison

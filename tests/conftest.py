@@ -21,15 +21,13 @@ TESTS = Path(__file__).parent
 #: Files of the quick tier.
 QUICK = (
     "house/test_circles.py",
-    "house/test_core_arrows.py",
     "house/test_package_arrows.py",
     "house/test_tiers.py",
     "api/test_friction_contact.py",
-    "api/test_mechanics.py",
     "api/test_model.py",
     "api/test_simulation.py",
     "envs/test_episode.py",
-    "envs/test_formulas.py",
+    "envs/test_reward_terms.py",
 )
 #: Processor time of one test and the processes that it waits for, s. It depends less on the machine's load than time.
 LIMIT = 5.0

@@ -14,7 +14,7 @@ import typer
 from gymnasium.wrappers import RecordVideo
 
 from rover_gym.cli.console import plain_errors, say_path
-from rover_gym.cli.scene_options import BUILT_IN, ModelName
+from rover_gym.cli.options import BUILT_IN, ModelName
 from rover_gym.policy import TrainedPolicy, policy_arguments, run_episode
 
 

@@ -17,10 +17,9 @@ import torch
 import typer
 
 from rover_gym.cli.console import plain_errors, progress_bar, say_path
-from rover_gym.cli.scene_options import BUILT_IN, ModelName, named_model
-from rover_gym.learning.arc_outcomes import try_arcs
-from rover_gym.learning.fit_forecast import fit_forecast
-from rover_gym.learning.provenance import provenance
+from rover_gym.cli.options import BUILT_IN, ModelName, named_model
+from rover_gym.learning.fit_forecast import fit_forecast, try_arcs
+from rover_gym.learning.ppo import provenance
 from rover_gym.policy import FORECAST_FILE, ScanPolicy
 
 #: What the forecast foretells.

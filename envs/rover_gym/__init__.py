@@ -17,8 +17,10 @@ The package consists of the subpackages below. Each one may import those above i
     vector         batches of rovers, for Gymnasium and for stable-baselines3
     sensors        encoders, inertial unit, cameras and scanners as observations
     policy         the baseline, trained policies and their evaluation
-    planning       the cheapest model that a scene permits
+    planning       driving by planning in the simulator
+    economy        the cheapest model that a scene permits
     planar         the planar systems: a ball, a two-wheel rover
+    runs           saved runs of every kind
     reproduction   the experiments of the 2010 report
     replay         saved runs for the browser, VRML and glTF
     figures        figures of saved runs

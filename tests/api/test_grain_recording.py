@@ -2,18 +2,31 @@
 
 import multiprocessing
 import os
+import pickle
 import time
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 import pytest
 from balls import MovingBalls, RoverOnMovingBalls
 
-from rover_gym import OptionError, RoverModel
-from rover_gym.grains import SurfaceMap, read_grain_run, record_grains, surface_map
-from rover_gym.mechanics import GrainSimulation, ball_packing
+from rover_gym import ModelError, OptionError, RoverModel, StateError
+from rover_gym.grains import (
+    BallBed,
+    MovingWindow,
+    SurfaceMap,
+    record_grains,
+    rover_on_bed,
+    settled_track,
+    surface_map,
+    with_wheel_width,
+)
+from rover_gym.grains.grain_surface import Footprint, Parts
+from rover_gym.mechanics import GrainSimulation, Plane, RoverGrainSimulation, Simulation, ball_packing
 from rover_gym.record import RecordingError, read_frames
+from rover_gym.runs import open_run
 
 FLOOR = [[0.0, 0.0, 0.0, 0.0, 1.0, 0.0]]
 
@@ -31,7 +44,7 @@ def test_places_are_stored_within_the_resolution_and_facts_beside_them(tmp_path:
     unconverged = record_grains(
         sim, 0.4, path, 50.0, title="a fall", seed=3, until=lambda now: places.append(now.position) or False
     )
-    run = read_grain_run(path)
+    run = open_run(path)
     resolution = run.trajectory.attributes["scene"]["resolution"]
     assert 0.0 < resolution <= 0.02 / 250.0
     assert run.n_frames == 21
@@ -67,7 +80,7 @@ def test_a_bed_at_rest_takes_little_room(tmp_path: Path) -> None:
 def test_a_resampled_run_reads_its_own_rows(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     record_grains(MovingBalls(), 2.0, path)
-    run = read_grain_run(path)
+    run = open_run(path)
     coarse = run.resample(5.0)
     assert coarse.n_frames == 11
     np.testing.assert_array_equal(coarse.positions, run.positions[coarse.rows])
@@ -82,7 +95,7 @@ def test_a_rover_among_balls_is_recorded_with_its_forces_and_sinkage(tmp_path: P
     sim = RoverOnMovingBalls((60, 2, 30), 0.03, 0.02)
     path = tmp_path / "rover.h5"
     record_grains(sim, 0.4, path)
-    run = read_grain_run(path)
+    run = open_run(path)
     assert run.model is not None
     assert run.model.to_dict() == RoverModel().to_dict()
     assert run.rover is not None
@@ -108,7 +121,7 @@ def test_a_killed_run_keeps_what_it_had(tmp_path: Path) -> None:
         time.sleep(0.01)
     os.kill(process.pid or 0, 9)
     process.join()
-    run = read_grain_run(path)
+    run = open_run(path)
     assert run.n_frames >= 16
     assert run.n_frames % 16 == 0
     assert not run.trajectory.attributes["complete"]
@@ -121,13 +134,13 @@ def test_a_run_of_something_else_is_refused(tmp_path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file["frames/position"][0, 3] = np.nan
     with pytest.raises(RecordingError, match="must be finite"):
-        _ = read_grain_run(path).positions
+        _ = open_run(path).positions
     with h5py.File(path, "r+") as file:
         radius = file.attrs["grain_radius"]
         del file.attrs["grain_radius"]
         file.attrs["grain_radius"] = -radius
     with pytest.raises(RecordingError, match="positive radius"):
-        read_grain_run(path)
+        open_run(path)
     with h5py.File(path, "r+") as file:
         del file.attrs["grain_radius"]
         file.attrs["grain_radius"] = radius[:-1]
@@ -137,7 +150,7 @@ def test_a_run_of_something_else_is_refused(tmp_path: Path) -> None:
         del file.attrs["grain_kinematic"]
         file.attrs["grain_kinematic"] = kinematic[:-1]
     with pytest.raises(RecordingError, match="frames/position"):
-        _ = read_grain_run(path).positions
+        _ = open_run(path).positions
 
 
 @pytest.mark.parametrize(("duration", "fps"), [(0.0, 25.0), (-1.0, 25.0), (1.0, 0.0), (np.nan, 25.0), (1.0, np.inf)])
@@ -170,3 +183,232 @@ def test_a_smoothed_surface_is_the_mean_over_squares() -> None:
     assert smooth[4, 5] == pytest.approx(np.nanmean(heights[3:6, 4:7]))
     assert smooth[6, 8] == pytest.approx(heights[5:8, 7:10].mean())
     assert np.isnan(smooth[1, 1])
+
+
+OPTIONS: dict[str, Any] = {"gravity": (0.0, -3.71, 0.0), "time_step": 0.004}
+
+MODEL = with_wheel_width(RoverModel().replace(wheel_radius=0.25), 0.2)
+
+
+def track(length: float) -> BallBed:
+    return settled_track(length, 1.6, 1.0, radius_min=0.036, radius_max=0.044, **OPTIONS)
+
+
+@pytest.fixture(scope="module")
+def bed() -> BallBed:
+    return track(4.0)
+
+
+def whole(bed: BallBed, torque: float = 60.0) -> RoverGrainSimulation:
+    return rover_on_bed(bed, MODEL, torque, **OPTIONS)
+
+
+def window(bed: BallBed, torque: float = 60.0, **options: Any) -> MovingWindow:
+    both = whole(bed, torque)
+    return MovingWindow(both.rover, both.grains, **{"reach": 0.2, "stride": 0.02, **options})
+
+
+def state(sim: MovingWindow | RoverGrainSimulation) -> list[Any]:
+    balls = sim if isinstance(sim, MovingWindow) else sim.grains
+    return [balls.position, balls.velocity, balls.spin, sim.rover.q, sim.rover.v]
+
+
+def push(sim: MovingWindow | RoverGrainSimulation, speed: float) -> None:
+    """Lets the rover roll forward."""
+    rover = sim.rover
+    v = rover.v
+    v[0] = speed
+    v[rover.model.wheel_joint_indices] = speed / 0.25
+    rover.set_state(rover.q, v)
+
+
+def test_a_window_over_the_whole_bed_is_the_whole_bed_to_the_bit(bed: BallBed) -> None:
+    all_of_it, part = whole(bed), window(bed, reach=10.0, stride=0.001)
+    for sim in (all_of_it, part):
+        push(sim, 1.0)
+    report = all_of_it.step(40)
+    assert part.moves == 0
+    followed = part.step(40)
+    assert part.moves > 5
+    assert (followed.steps, followed.iterations, followed.residual) == (40, report.iterations, report.residual)
+    for own, theirs in zip(state(part), state(all_of_it), strict=True):
+        np.testing.assert_array_equal(own, theirs)
+    assert part.time == all_of_it.time
+    np.testing.assert_array_equal(part.wheel_gaps, all_of_it.wheel_gaps)
+    assert part.energy().kinetic == all_of_it.grains.energy().kinetic
+    assert part.energy().potential == pytest.approx(all_of_it.grains.energy().potential, rel=1e-12)
+
+
+def test_the_window_follows_the_rover_and_leaves_the_rest_in_its_place(bed: BallBed) -> None:
+    sim = window(bed)
+    rover, grains, first = sim.rover, sim.grains, sim.inside
+    assert len(first) < 0.7 * len(bed.radius)
+    push(sim, 1.0)
+    speed = 0.0
+    for _ in range(60):
+        sim.step()
+        outside = np.setdiff1d(np.arange(len(bed.radius)), sim.inside)
+        assert not sim.velocity[outside].any()
+        assert sim.asleep[outside].all()
+        speed = max(speed, float(np.abs(sim.velocity).max()))
+        middles = np.array([sim.rover.poses()[wheel["solid"]][0] for wheel in MODEL.to_dict()["wheels"]])
+        apart = np.hypot(*(sim.position[:, None, ::2] - middles[None, :, ::2]).transpose(2, 0, 1)).min(axis=1)
+        still = grains.kinematic
+        assert apart[sim.inside[still]].min() > 0.2 - 0.02 - 0.01
+    assert speed > 0.1
+    assert sim.moves >= 3
+    assert sim.rover is rover
+    assert sim.grains is grains
+    np.testing.assert_array_equal(rover.wheel_torques, 60.0)
+    assert sim.time == pytest.approx(0.24)
+    assert rover.time == pytest.approx(0.24)
+    assert set(sim.inside) - set(first)
+    never = np.setdiff1d(np.arange(len(bed.radius)), np.union1d(first, sim.inside))
+    np.testing.assert_array_equal(sim.position[never], bed.position[never])
+    assert sim.penetration() < 0.05 * bed.radius.min()
+    assert 0.0 <= sim.frozen_momentum < 0.02 * bed.mass.sum()
+
+
+def test_what_is_simulated_does_not_depend_on_the_length_of_the_bed(bed: BallBed) -> None:
+    short, long = window(bed), window(track(9.0))
+    np.testing.assert_array_equal(short.inside, long.inside)
+    assert len(long.radius) > 2 * len(short.radius)
+
+
+def test_a_snapshot_continues_bit_for_bit_across_moves_of_the_window(bed: BallBed) -> None:
+    sim = window(bed)
+    push(sim, 1.0)
+    sim.step(15)
+    taken = pickle.loads(pickle.dumps(sim.snapshot()))  # noqa: S301 - our own
+    moves = sim.moves
+    sim.step(30)
+    end, momentum = state(sim), sim.frozen_momentum
+    assert sim.moves > moves
+    for other in (sim, window(bed)):
+        other.restore(taken)
+        assert other.moves == moves
+        other.step(30)
+        for own, theirs in zip(state(other), end, strict=True):
+            np.testing.assert_array_equal(own, theirs)
+        assert other.frozen_momentum == momentum
+
+
+def test_a_snapshot_of_something_else_is_refused_and_changes_nothing(bed: BallBed) -> None:
+    sim = window(bed)
+    sim.step(3)
+    before = state(sim)
+    other = BallBed(1.01 * bed.radius, bed.mass, 1.01 * bed.position, 1.02 * bed.walls, 1.02 * bed.width, bed.depth)
+    for wrong in (sim.rover.snapshot(), window(track(5.0)).snapshot(), window(other).snapshot()):
+        with pytest.raises(StateError, match="snapshot"):
+            sim.restore(wrong)  # type: ignore[arg-type]
+    for own, theirs in zip(state(sim), before, strict=True):
+        np.testing.assert_array_equal(own, theirs)
+    assert sim.step(3).steps == 3
+
+
+def test_a_ball_that_runs_away_stays_in_the_simulation_until_it_is_slow(bed: BallBed) -> None:
+    both = whole(bed, 0.0)
+    ahead = np.abs(bed.position[:, 0] - 3.2) < 0.3
+    ball = int(np.argmax(np.where(ahead, bed.position[:, 1], 0.0)))
+    velocity = np.zeros_like(bed.position)
+    velocity[ball] = [0.6, 1.2, 0.0]
+    both.grains.set_state(bed.position, velocity)
+    sim = MovingWindow(both.rover, both.grains, reach=0.2, stride=0.1, freeze_speed=0.1)
+    assert ball in sim.inside
+    farthest = 0.0
+    for _ in range(250):
+        sim.step()
+        farthest = max(farthest, float(sim.position[ball, 0] - bed.position[ball, 0]))
+    assert farthest > 0.25
+    assert sim.penetration() < 0.05 * bed.radius.min()
+    place = sim.position[ball]
+    apart = np.linalg.norm(sim.position - place, axis=1) - bed.radius - bed.radius[ball]
+    apart[ball] = np.inf
+    assert apart.min() > -0.05 * bed.radius.min()
+
+
+@pytest.mark.parametrize(
+    ("options", "field"),
+    [
+        ({"reach": 0.1}, "reach"),
+        ({"reach": np.nan}, "reach"),
+        ({"stride": 0.2}, "stride"),
+        ({"stride": 0.0}, "stride"),
+        ({"freeze_speed": 0.0}, "freeze_speed"),
+        ({"wheel_friction": -1.0}, "wheel_friction"),
+    ],
+)
+def test_bad_options_are_refused_before_balls_are_taken_out(
+    options: dict[str, float], field: str, bed: BallBed
+) -> None:
+    both = whole(bed)
+    with pytest.raises(OptionError, match=field) as caught:
+        MovingWindow(both.rover, both.grains, **options)
+    assert caught.value.field == field
+    assert len(both.grains.radius) == len(bed.radius)
+    with pytest.raises(OptionError, match="n:"):
+        window(bed).step(-1)
+
+
+def test_footprints_are_the_wheels_and_what_hangs_low() -> None:
+    rover = Simulation(MODEL, Plane())
+    rover.set_state(MODEL.resting_pose(Plane(), (1.0, 0.5), 0.0))
+    parts = Parts(MODEL)
+    high = parts.footprint(rover, 0.1)
+    assert len(high.names) == 6
+    x, z = rover.poses()["wheel_FR"][0][::2]
+    beside = [[x, z + 0.5], [x + 0.45, z], [x + 0.25 + 0.3, z + 0.4], [x, z]]
+    np.testing.assert_allclose(high.distance(np.array(beside)), [0.4, 0.1, 0.4, -0.1], atol=1e-9)
+    everything = parts.footprint(rover, 0.35)
+    assert "trunk/0" in everything.names
+    assert everything.distance(np.array([[1.0, 0.5]]))[0] < 0.0 < high.distance(np.array([[1.0, 0.5]]))[0]
+    assert everything.has_moved(high, 1.0)
+    assert not high.has_moved(everything, 1e-9)
+    ahead = Footprint(high.names, high.ends + 0.1, high.margin)
+    assert ahead.has_moved(high, 0.14)
+    assert not ahead.has_moved(high, 0.15)
+
+
+def test_a_drive_is_recorded_with_all_balls(bed: BallBed, tmp_path: Path) -> None:
+    sim = window(bed)
+    push(sim, 1.0)
+    path = tmp_path / "track.h5"
+    record_grains(sim, 0.12, path)
+    run = open_run(path)
+    assert run.positions.shape == (4, len(bed.radius), 3)
+    np.testing.assert_allclose(run.positions[-1], sim.position, atol=1e-3)
+    assert not run.kinematic.any()
+    assert run.time[-1] == pytest.approx(0.12)
+    assert run.trajectory["n_asleep"][0] > 0.3 * len(bed.radius)
+    assert run.model is not None
+    potential = run.trajectory["potential_energy"][0]
+    assert potential == pytest.approx(3.71 * float(bed.mass @ bed.position[:, 1]) + MODEL.mass * 3.71 * 0.58, rel=0.2)
+
+
+def test_balls_are_exchanged_in_order_and_bad_numbers_are_refused(bed: BallBed) -> None:
+    sim: GrainSimulation = bed.simulation(**OPTIONS)
+    sim.step(5)
+    time = sim.time
+    kept = np.arange(0, len(bed.radius), 2)
+    place = sim.position[kept]
+    arguments = (bed.radius[kept], bed.mass[kept], place)
+    n = len(bed.radius)
+    with pytest.raises(ModelError, match=r"before\[1\]"):
+        sim.exchange(*arguments, [*kept[:1], n, *kept[2:]])
+    with pytest.raises(ModelError, match=r"before\[2\]"):
+        sim.exchange(*arguments, [*kept[:2], kept[0], *kept[3:]])
+    with pytest.raises(ModelError, match=r"before\[0\]"):
+        sim.exchange(*arguments, [-2, *kept[1:]])
+    with pytest.raises(ModelError, match="before"):
+        sim.exchange(*arguments, kept[1:].tolist())
+    with pytest.raises(StateError, match="velocity"):
+        sim.exchange(*arguments, kept.tolist(), velocity=np.full_like(place, np.nan))
+    assert len(sim.radius) == n
+    sim.exchange(*arguments, kept.tolist(), kinematic=bed.radius[kept] > 0.04)
+    np.testing.assert_array_equal(sim.position, place)
+    assert sim.time == time
+    assert not sim.velocity.any()
+    sim.step(5)
+    still = sim.kinematic
+    np.testing.assert_array_equal(sim.position[still], place[still])
+    assert (sim.position[~still] != place[~still]).any()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import pickle
 from typing import Any
 
@@ -132,3 +133,280 @@ def test_bad_widths_are_refused_by_name(fields: dict[str, float], path: str) -> 
     with pytest.raises(ModelError) as caught:
         wide(**fields)
     assert caught.value.field == f"wheels[0].{path}"
+
+
+SLOPES = (0.13, 0.21)
+
+SLOPE = Plane((-SLOPES[0], 1.0, -SLOPES[1]))
+
+FOUR = ("four-steered", "skid-steered")
+
+
+def rigid(name: str) -> RoverModel:
+    return RoverModel.named(name).replace(wheel_stiffness=0.0)
+
+
+def yielding(name: str, width: float = 0.08) -> RoverModel:
+    description = RoverModel.named(name).to_dict()
+    for wheel in description["wheels"]:
+        wheel["width"] = width
+    return RoverModel.from_dict(description)
+
+
+def tilted_map() -> HeightField:
+    """The slope as a map, in single precision."""
+    place = np.linspace(-40.0, 40.0, 321)
+    x, z = np.meshgrid(place, place)
+    return HeightField(SLOPES[0] * x + SLOPES[1] * z, 0.25, (-40.0, -40.0))
+
+
+def driven(model: RoverModel, ground, time_step: float, seed: int = 1, duration: float = 3.0) -> Simulation:
+    """A drive with torques and steering that are drawn anew every half second."""
+    sim = Simulation(model, ground, time_step=time_step)
+    sim.set_state(model.resting_pose(SLOPE if ground is not None else Plane(), (0.0, 0.0), 0.3))
+    draw = np.random.default_rng(seed)
+    n, is_steered = len(model.wheel_names), max(model.steering_joint_indices) >= 0
+    for _ in range(round(duration / 0.5)):
+        sim.set_wheel_torques(np.array(model.wheel_torque_limits) * draw.uniform(0.2, 0.6) * np.ones(n))
+        angles = draw.uniform(-0.2, 0.2, n) * np.array([index >= 0 for index in model.steering_joint_indices])
+        if is_steered:
+            sim.set_steering(angles)
+        assert sim.step(round(0.5 / time_step)).is_converged
+    return sim
+
+
+def distance(a: Simulation, b: Simulation) -> float:
+    return float(np.linalg.norm(a.q[:3] - b.q[:3]))
+
+
+@pytest.mark.parametrize("name", RoverModel.names())
+def test_a_map_that_is_a_tilted_plane_is_the_plane(name: str) -> None:
+    """Rigid wheels end 0.1 to 0.6 m apart on four wheels: single precision errs by 0.2 um."""
+    model = RoverModel.named(name)
+    plane, field = (driven(model, ground, 0.005) for ground in (SLOPE, tilted_map()))
+    assert distance(plane, field) < 1e-3
+    np.testing.assert_allclose(plane.wheel_forces[:, 0], field.wheel_forces[:, 0], rtol=0.01, atol=1.0)
+
+
+def test_rigid_wheels_on_four_points_depend_on_micrometres() -> None:
+    """What the stiffness mends: if this fails, rigid wheels have learned the same."""
+    ends = [driven(rigid("four-steered"), ground, 0.005) for ground in (SLOPE, tilted_map())]
+    assert distance(*ends) > 0.1
+
+
+@pytest.mark.parametrize("name", FOUR)
+def test_two_wheels_turned_by_a_rounded_pi_change_nothing(name: str) -> None:
+    """3.14159 for pi in a robot's file left two of four wheels without load."""
+    description = RoverModel.named(name).to_dict()
+    for solid in description["solids"]:
+        if solid["name"] in ("wheel_FL", "wheel_BR"):
+            solid["rotation"] = [2.65e-6, 0.0, 0.0]
+    turned, plain = (driven(m, None, 0.005) for m in (RoverModel.from_dict(description), RoverModel.named(name)))
+    assert distance(turned, plain) < 1e-3
+
+
+@pytest.mark.parametrize("name", FOUR)
+def test_the_loads_do_not_depend_on_the_step(name: str) -> None:
+    """A rover on a rigid chassis parked itself on two wheels at 0.2 ms and on four at 20 ms."""
+    found = []
+    for step in (0.02, 0.005, 0.001):
+        sim = Simulation(RoverModel.named(name), SLOPE, time_step=step)
+        sim.set_state(sim.model.resting_pose(SLOPE, (0.0, 0.0), 0.3))
+        sim.brake()
+        sim.step(round(1.0 / step))
+        found.append(sim.wheel_forces[:, 0])
+    np.testing.assert_allclose(found, np.tile(found[-1], (3, 1)), rtol=1e-4)
+    assert np.min(found) > 20.0
+
+
+def test_wide_wheels_converge() -> None:
+    """Two contacts a wheel, as an import has them: 0.3 to 0.7 m between 5 and 1 ms with rigid wheels."""
+    for name in FOUR:
+        ends = [driven(yielding(name), SLOPE, step, seed=3) for step in (0.01, 0.005, 0.001)]
+        coarse, fine = distance(ends[0], ends[2]), distance(ends[1], ends[2])
+        assert fine < 0.01
+        assert fine < 0.7 * coarse
+
+
+def braced(stiffness: float) -> RoverModel:
+    """Six yielding wheels on a pitched body with two bogies: four supports of a rigid body."""
+    description = RoverModel.named("open-rover").to_dict()
+    for solid in description["solids"]:
+        if solid["name"].endswith("_rocker"):
+            solid["joint"] = "fixed"
+            for option in ("coupled", "limits", "axis"):
+                solid.pop(option, None)
+        if solid["name"].startswith("steering_F"):
+            solid["position"][1] -= 0.006
+    for wheel in description["wheels"]:
+        wheel |= {"width": 0.06, "stiffness": stiffness, "damping": 0.003 * stiffness}
+    return RoverModel.from_dict(description)
+
+
+def test_a_rigid_body_on_two_bogies_turns_alike_at_every_step() -> None:
+    """JPL's Open Source Rover: at 5 ms 15 mm from Drake's path, at 0.2 ms 0.45 m with a wheel at 0 N."""
+    ends, loads = [], []
+    for step in (0.02, 0.005, 0.001):
+        sim = Simulation(braced(1e7), time_step=step)
+        sim.set_state(sim.model.resting_pose(Plane(), (0.0, 0.0), 0.0))
+        for k in range(30):
+            share = min(1.0, (k + 1) / 10.0)
+            angles = [0.2 * share if name.endswith(("FL", "FR")) else 0.0 for name in sim.model.wheel_names]
+            sim.set_commands(0.1 * np.ones(6), angles)
+            assert sim.step(round(0.1 / step)).is_converged
+        ends.append(sim.q[:3])
+        loads.append(sim.wheel_forces[:, 0])
+    np.testing.assert_allclose(ends, np.tile(ends[-1], (3, 1)), atol=1e-3)
+    np.testing.assert_allclose(loads, np.tile(loads[-1], (3, 1)), atol=0.2)
+    assert np.linalg.norm(ends[-1][[0, 2]]) > 0.3
+
+
+@pytest.mark.parametrize("name", FOUR)
+def test_a_wheel_yields_by_its_load_over_its_stiffness(name: str) -> None:
+    model = RoverModel.named(name)
+    sim = Simulation(model)
+    sim.set_state(model.resting_pose(Plane(), (0.0, 0.0), 0.0))
+    sim.step(400)
+    stiffness = [wheel["stiffness"] for wheel in model.to_dict()["wheels"]]
+    np.testing.assert_allclose(-sim.wheel_gaps, sim.wheel_forces[:, 0] / stiffness, rtol=1e-4)
+    assert sim.wheel_forces[:, 0].sum() == pytest.approx(9.81 * model.mass, rel=1e-9)
+    assert ((sim.wheel_gaps < -1e-5) & (sim.wheel_gaps > -5e-5)).all()
+
+
+@pytest.mark.parametrize("step", [0.005, 0.02])
+@pytest.mark.parametrize("stiffness", [1e4, 1e6, 1e8, 1e10, 1e11])
+def test_every_stiffness_is_stable_at_every_step(stiffness: float, step: float) -> None:
+    """Dropped by 0.1 m: comes to rest, and never has more energy than at the start."""
+    model = RoverModel.named("four-steered").replace(wheel_stiffness=stiffness, wheel_damping=0.02 * stiffness)
+    sim = Simulation(model, time_step=step)
+    q = model.resting_pose(Plane(), (0.0, 0.0), 0.0)
+    q[1] += 0.1
+    sim.set_state(q)
+    sim.brake()
+    most = sim.energy().total
+    for _ in range(round(3.0 / step)):
+        report = sim.step()
+        assert report.is_converged
+        assert sim.energy().total <= most + 1e-6
+    assert float(np.abs(sim.v).max()) < 1e-3
+    np.testing.assert_allclose(sim.wheel_forces[:, 0].sum(), 9.81 * model.mass, rtol=1e-3)
+
+
+def test_a_stiff_contact_does_not_bounce_and_a_soft_one_swings_at_its_frequency() -> None:
+    def dropped(stiffness: float, step: float, n: int) -> np.ndarray:
+        model = RoverModel.named("four-steered").replace(wheel_stiffness=stiffness, wheel_damping=0.0)
+        sim = Simulation(model, time_step=step)
+        q = model.resting_pose(Plane(), (0.0, 0.0), 0.0)
+        q[1] += 0.01 if stiffness > 1e6 else 0.0
+        sim.set_state(q)
+        sim.brake()
+        heights = []
+        for _ in range(n):
+            sim.step()
+            heights.append(sim.q[1])
+        return np.array(heights)
+
+    stiff = dropped(1e9, 0.005, 60)
+    landed = int(np.argmin(stiff))
+    assert np.ptp(stiff[landed:]) < 1e-3
+    # Set down unloaded it swings about the depth of rest: the first minimum after half a period.
+    stiffness = 2e4
+    model = RoverModel.named("four-steered")
+    soft = dropped(stiffness, 1e-4, 2000)
+    omega = math.sqrt(4.0 * stiffness / model.mass)
+    assert 1e-4 * (1 + int(np.argmin(soft))) == pytest.approx(math.pi / omega, rel=0.02)
+    assert soft[0] - soft.min() == pytest.approx(2.0 * model.mass * 9.81 / (4.0 * stiffness), rel=0.02)
+
+
+def test_its_limit_is_the_rigid_wheel() -> None:
+    """Where equilibrium determines the loads, as on six wheels with rockers, a stiff wheel is a rigid one."""
+    stiff = RoverModel().replace(wheel_stiffness=1e11)
+    ends = [driven(model, SLOPE, 0.005, duration=2.0) for model in (RoverModel(), stiff)]
+    assert distance(*ends) < 1e-4
+    np.testing.assert_allclose(ends[0].wheel_forces[:, 0], ends[1].wheel_forces[:, 0], rtol=1e-3)
+
+
+def test_parked_on_a_slope_it_does_not_creep() -> None:
+    model = RoverModel.named("skid-steered")
+    sim = Simulation(model, SLOPE)
+    sim.set_state(model.resting_pose(SLOPE, (0.0, 0.0), 0.3))
+    sim.brake()
+    sim.step(400)
+    start = sim.q
+    sim.step(2000)
+    assert float(np.abs(sim.q - start).max()) < 1e-9
+
+
+@pytest.mark.parametrize("name", FOUR)
+@pytest.mark.parametrize("depth", [0.0, 0.02])
+def test_what_no_force_has_pressed_in_is_not_given_back(name: str, depth: float) -> None:
+    """A rover set 2 cm into the ground was shot up by 2 kJ; landings gave 100 J."""
+    model = RoverModel.named(name)
+    sim = Simulation(model, Plane(), stabilisation="none")
+    q = model.resting_pose(Plane(), (0.0, 0.0), 0.0)
+    q[1] += -depth if depth else 0.3
+    sim.set_state(q)
+    start, given = sim.energy().total, 0.0
+    for _ in range(300):
+        before = sim.energy().total
+        report = sim.step()
+        given += report.energy_released
+        change = report.energy_released - report.energy_dissipated - report.energy_lost - report.energy_removed
+        assert sim.energy().total - before == pytest.approx(change, abs=1e-9 * model.mass)
+        assert sim.energy().total < start + 1.0
+        # The weight's own deflection, no more.
+        assert given < 2.0
+    assert given != 0.0
+
+
+def test_the_report_says_when_loads_are_undetermined() -> None:
+    def count(model: RoverModel) -> int:
+        sim = Simulation(model)
+        sim.set_state(model.resting_pose(Plane(), (0.0, 0.0), 0.0))
+        return sim.step(50).undetermined_loads
+
+    assert count(RoverModel()) == 0
+    for name in FOUR:
+        assert count(rigid(name)) == 1
+        assert count(RoverModel.named(name)) == 0
+    assert count(yielding("four-steered").replace(wheel_stiffness=0.0)) >= 4
+    assert count(yielding("four-steered")) == 0
+
+
+def test_a_step_that_is_split_counts_the_loads_of_its_last_part() -> None:
+    """Its list of contacts is longer than its last problem where a part met another rock than the next."""
+    draw = np.random.default_rng(0)
+    n = 300
+    centres = np.column_stack((draw.uniform(-2.0, 6.0, n), np.full(n, -0.06), draw.uniform(-1.0, 1.0, n)))
+    sim = Simulation(RoverModel(), SphereField(centres, [0.1] * n, Plane()))
+    q = sim.q
+    q[1] = 0.3
+    sim.set_state(q)
+    sim.step(100)
+    longer = 0
+    for k in range(100):
+        v = sim.v
+        v[[0, 3, 5]] = 3.0, 130.0 * (-1) ** k, 100.0
+        sim.set_state(sim.q, v)
+        assert sim.step().undetermined_loads >= 0
+        longer += len(sim.contacts.impulses) > len(sim.last_problem()[2])
+    assert longer > 0
+
+
+def test_rovers_on_yielding_wheels_take_the_fast_step() -> None:
+    assert Simulation(RoverModel.named("four-steered")).fallback_reason is None
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"wheel_stiffness": -1.0}, r"wheels\[0\].stiffness"),
+        ({"wheel_stiffness": math.nan}, r"wheels\[0\].stiffness"),
+        ({"wheel_stiffness": 1e13}, r"wheels\[0\].stiffness"),
+        ({"wheel_damping": -1.0}, r"wheels\[0\].damping"),
+        ({"wheel_stiffness": 0.0, "wheel_damping": 1.0}, r"wheels\[0\].damping"),
+    ],
+)
+def test_a_wrong_stiffness_or_damping_is_refused(change: dict[str, float], field: str) -> None:
+    with pytest.raises(ModelError, match=field):
+        RoverModel.named("four-steered").replace(**change)

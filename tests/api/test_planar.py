@@ -2,12 +2,16 @@
 
 import math
 import pickle
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rover_gym import CommandError, ModelError, OptionError, StateError, TerrainError
+from rover_gym.figures import draw_run
+from rover_gym.figures.grain_frames import draw_soil
 from rover_gym.planar import (
     BallSimulation,
     Line,
@@ -18,7 +22,23 @@ from rover_gym.planar import (
     describe_planar,
     record_planar,
 )
-from rover_gym.record import read_trajectory
+from rover_gym.record import RecordingError, read_trajectory
+from rover_gym.runs import open_run
+from rover_gym.soil import (
+    Bed,
+    Pull,
+    SoilRun,
+    SoilSimulation,
+    SoilSnapshot,
+    drawbar_pull,
+    drive_on_soil,
+    fit_traction,
+    over_beds,
+    record_soil,
+    rover_on_soil,
+    settled_bed,
+    soil_packing,
+)
 
 G = 9.81
 
@@ -219,3 +239,315 @@ def test_runs_are_recorded_with_all_that_made_them(tmp_path: Path) -> None:
     }
     assert run.attributes["scene"]["machine"]["wheel_mass"] == [60.0, 60.0]
     assert run.attributes["solver"]["contact"] == "nearest"
+
+
+def pair(**options: object) -> SoilSimulation:
+    """Two disks side by side on a line, at rest."""
+    return SoilSimulation([0.1, 0.1], [1.0, 2.0], [[0.0, 0.1], [0.3, 0.1]], ground=Line(), **options)  # type: ignore[arg-type]
+
+
+def test_disks_at_rest_stay_and_press_on_the_ground() -> None:
+    sim = pair()
+    report = sim.step(50)
+    assert report.is_converged
+    assert report.steps == 50
+    np.testing.assert_allclose(sim.position, [[0.0, 0.1, 0.0], [0.3, 0.1, 0.0]], atol=1e-12)
+    contacts = sim.contacts
+    np.testing.assert_array_equal(contacts.bodies, [[0, -1], [1, -1]])
+    np.testing.assert_allclose(contacts.world_impulses, [[0.0, 9.81e-3], [0.0, 2 * 9.81e-3]], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(contacts.points, [[0.0, 0.0], [0.3, 0.0]], atol=1e-12)
+    assert sim.time == pytest.approx(0.05)
+    assert sim.energy().potential == pytest.approx(3.0 * 9.81 * 0.1)
+    assert sim.penetration() < 1e-12
+
+
+def test_two_disks_collide_as_the_closed_form_says() -> None:
+    # Head on, e = 0.5, no gravity: u+ = -e u-, momentum kept: v1 = 0, v2 = 0.5 for m = 1, 2 and v1- = 1.
+    sim = SoilSimulation(
+        [0.1, 0.1], [1.0, 2.0], [[0.0, 0.0], [0.3, 0.0]], gravity=(0.0, 0.0), restitution=0.5, tolerance=1e-12
+    )
+    sim.set_state(sim.position, [[1.0, 0.0], [0.0, 0.0]])
+    sim.step(200)
+    np.testing.assert_allclose(sim.velocity, [[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]], atol=1e-12)
+    np.testing.assert_allclose(sim.momentum()[:2], [1.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"radius": [0.1, -0.1]}, "radius[1]"),
+        ({"radius": [0.1, np.nan]}, "radius[1]"),
+        ({"mass": [1.0]}, "mass"),
+        ({"position": [[0.0, 0.1], [0.15, 0.1]]}, "position[1]"),
+        ({"position": [[0.0, 0.05], [0.3, 0.1]]}, "position[0]"),
+        ({"position": [[0.0, np.inf], [0.3, 0.1]]}, "position[0]"),
+        ({"position": [[0.0, 0.1]]}, "position"),
+        ({"friction": -1.0}, "friction"),
+        ({"time_step": 0.0}, "time_step"),
+        ({"tolerance": 0.0}, "tolerance"),
+        ({"walls": [[0.0, 0.0, 0.0, 0.0]]}, "normal"),
+        ({"sleep": True, "sleep_speed": -1.0}, "sleep_speed"),
+    ],
+)
+def test_what_cannot_be_is_refused_by_name(change: dict[str, object], field: str) -> None:
+    good: dict[str, object] = {"radius": [0.1, 0.1], "mass": [1.0, 2.0], "position": [[0.0, 0.1], [0.3, 0.1]]}
+    with pytest.raises(ValueError, match=r".+") as caught:
+        SoilSimulation(**{**good, "ground": Line(), **change})  # type: ignore[arg-type]
+    assert getattr(caught.value, "field", None) == field
+
+
+def test_a_refused_state_changes_nothing() -> None:
+    sim = pair()
+    before = sim.position
+    for state in ([[0.0, 0.1], [0.1, 0.1]], [[0.0, 0.1], [np.nan, 0.1]]):
+        with pytest.raises(ValueError, match="position"):
+            sim.set_state(state)
+    with pytest.raises(ValueError, match="machine"):
+        sim.set_pull([1.0, 0.0])
+    np.testing.assert_array_equal(sim.position, before)
+
+
+def test_packings_repeat_and_do_not_overlap() -> None:
+    radius, mass, centres = soil_packing(100, width=0.7, seed=3)
+    again = soil_packing(100, width=0.7, seed=3)
+    np.testing.assert_array_equal(centres, again[2])
+    assert not np.array_equal(centres, soil_packing(100, width=0.7, seed=4)[2])
+    apart = np.linalg.norm(centres[:, None] - centres[None], axis=2) - radius[:, None] - radius[None]
+    assert apart[np.triu_indices(100, 1)].min() >= 0.0
+    np.testing.assert_allclose(mass / radius**2, mass[0] / radius[0] ** 2)
+    with pytest.raises(ValueError, match="width"):
+        soil_packing(10, width=0.01)
+
+
+@pytest.fixture(scope="module")
+def bed() -> Bed:
+    """A hundred disks in two layers, 1.66 m wide."""
+    return settled_bed(100, 2, settle=0.1)
+
+
+def test_the_rover_drives_and_a_snapshot_continues_bit_for_bit(bed: Bed, tmp_path: Path) -> None:
+    sim = rover_on_soil(bed)
+    sim.set_torques([50.0, 50.0])
+    start = sim.machine
+    sim.step(40)
+    snapshot = SoilSnapshot.from_bytes(sim.snapshot().to_bytes())
+    assert snapshot == sim.snapshot()
+    pressed = sim.impulse_on_wheels()
+    path = tmp_path / "soil.h5"
+    record_soil(sim, path, "a test", duration=0.08, steps_per_row=20, walls=bed.walls)
+    end = sim.position
+    assert sim.machine[0] > start[0]
+    assert snapshot != sim.snapshot()
+    sim.restore(snapshot)
+    np.testing.assert_array_equal(sim.impulse_on_wheels(), pressed)
+    assert pressed[1] > 0.0
+    impulse = np.zeros(2)
+    for _ in range(80):
+        sim.step()
+        impulse += sim.impulse_on_wheels()
+    np.testing.assert_array_equal(sim.position, end)
+
+    run = open_run(path)
+    assert run.title == "a test"
+    assert run.n_frames == 5
+    np.testing.assert_allclose(run.time, [0.04, 0.06, 0.08, 0.1, 0.12])
+    np.testing.assert_array_equal(run.positions[-1], end)
+    np.testing.assert_array_equal(run.walls, bed.walls)
+    assert run.trajectory["penetration"].max() < 0.01 * sim.radius.min()
+    # The forces of a row are means over its steps, so over equal rows their mean is the whole impulse.
+    np.testing.assert_allclose(run.wheel_forces[1:].mean(axis=0).sum(axis=0), impulse / 0.08, rtol=1e-9)
+    strengths = run.force_chains[1:, :, 4]
+    assert (np.diff(strengths, axis=1) <= 0.0).all()  # the strongest first
+    assert (strengths[:, 0] > 0.0).all()
+    assert len(run.resample(25.0).time) == 3
+    assert draw_soil(run, tmp_path / "soil.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_soil_without_a_machine_is_recorded_and_drawn(bed: Bed, tmp_path: Path) -> None:
+    sim = SoilSimulation(bed.radius, bed.mass, bed.position, walls=bed.walls)
+    record_soil(sim, tmp_path / "soil.h5", "disks alone", duration=0.04, steps_per_row=20, walls=bed.walls)
+    run = open_run(tmp_path / "soil.h5")
+    assert run.wheels.shape == (3, 0, 3)
+    np.testing.assert_array_equal(run.positions[-1], sim.position)
+    assert draw_soil(run, tmp_path / "soil.png").exists()
+    paths = draw_run(run, tmp_path / "plots", with_overview=True)
+    assert [path.name for path in paths] == ["disks-and-contacts.png", "overview.png"]
+
+
+def test_a_file_without_a_soil_is_refused(tmp_path: Path) -> None:
+    sim = BallSimulation(Line())
+    record_planar(sim, tmp_path / "ball.h5", describe_planar(sim, "a ball"), duration=0.01)
+    with pytest.raises(RecordingError, match="holds a PlanarRun, no SoilRun"):
+        open_run(tmp_path / "ball.h5", SoilRun)
+
+
+def test_a_weaker_gravity_gives_the_same_motion_slower() -> None:
+    # Froude: with g/s^2 and torques/s^2 and the step s h everything goes s times slower, on the same paths. A power of
+    # two changes no digit, so the paths are equal to the last bit. The original run, at g/100, is such a run.
+    ends = []
+    for s in (1.0, 4.0):
+        options = {"gravity": (0.0, -9.81 / s**2), "time_step": 1e-3 * s}
+        sim = rover_on_soil(settled_bed(80, 2, settle=0.1 * s, **options), start=0.66, **options)
+        sim.set_torques([50.0 / s**2] * 2)
+        sim.step(400)
+        ends.append((sim.position, sim.machine, s * sim.velocity, s * sim.machine_rate, sim.time / s))
+    assert (ends[0][1][3:] < -0.01).all()  # its wheels turned
+    for one, other in zip(*ends, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_a_wheel_is_dragged_without_slip_and_pulls_with_half() -> None:
+    # A few slips on a short bed: the curve itself is `rover planar soil --sweep`.
+    bed = settled_bed(250, 4, radius_min=0.013, radius_max=0.0195, settle=0.2, time_step=2e-3)
+    trial = partial(drawbar_pull, rim_speed=0.2, run_in=0.2, distance=0.6, time_step=2e-3, tolerance=1e-3, sleep=True)
+    (braked,), (dragged,), (slipping,) = over_beds(trial, [-0.5, 0.0, 0.5], [bed])
+    assert [braked.slip, dragged.slip, slipping.slip] == [-0.5, 0.0, 0.5]
+    assert [braked.speed, dragged.speed, slipping.speed] == pytest.approx([0.3, 0.2, 0.1])
+    # In ratios of the load; the smallest rolling resistance seen on such beds is 0.1.
+    assert max(braked.pull, dragged.pull) < -0.1 * 98.1
+    assert slipping.pull > 0.0
+    for pull in (braked, dragged, slipping):
+        assert pull.weight == pytest.approx(10.0 * 9.81, rel=0.05)
+
+
+def test_a_curve_of_pull_against_slip_is_found_again() -> None:
+    slips = np.array([0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9])
+    offsets = np.array([-0.02, 0.0, 0.02])  # of three beds
+
+    def trials(ratios: np.ndarray) -> list[list[Pull]]:
+        return [
+            [Pull(s, 0.1, 50.0 * (ratio + offset), 50.0, 0.01) for offset in offsets]
+            for s, ratio in zip(slips, ratios, strict=True)
+        ]
+
+    fit = fit_traction(trials(0.25 * (1.0 - np.exp(-(slips - 0.1) / 0.15))))
+    for estimate, value in ((fit.limit, 0.25), (fit.free_slip, 0.1), (fit.scale, 0.15)):
+        assert estimate.value == pytest.approx(value, rel=0.01)
+    # Offsets of the whole curve move its limit as they do a mean, and its last slope not at all.
+    assert fit.limit.error == pytest.approx(offsets.std(ddof=1) / np.sqrt(3.0), rel=0.01)
+    assert fit.last_slope.error == pytest.approx(0.0, abs=1e-12)
+    assert fit.rms < 1e-3
+    assert fit.chi_square < 0.01 < 1.0 < fit.line_chi_square
+    np.testing.assert_allclose(fit([0.1, 9.0]), [0.0, 0.25], atol=2e-3)
+
+    straight = fit_traction(trials(0.3 * slips - 0.1), first=0.3)
+    assert straight.last_slope.value == pytest.approx(0.3)
+    assert straight.scale.value > 2.0  # no limit within the slips
+    with pytest.raises(ValueError, match="four slips") as caught:
+        fit_traction(trials(slips)[:3])
+    assert getattr(caught.value, "field", None) == "pulls"
+    with pytest.raises(ValueError, match="two slips") as caught:
+        fit_traction(trials(slips), first=0.8)
+    assert getattr(caught.value, "field", None) == "first"
+
+
+def test_a_drive_tells_way_slip_and_sinkage(bed: Bed) -> None:
+    drive = drive_on_soil(bed, 60.0, run_in=0.05, duration=0.2)
+    assert drive.torque == 60.0
+    assert drive.distance > 0.0
+    assert drive.speed == pytest.approx(drive.distance / 0.2)
+    assert 0.0 < drive.slip < 1.0
+    assert -0.01 < drive.sinkage < 0.05
+    assert np.isnan(drive_on_soil(bed, 0.0, run_in=0.02, duration=0.05).slip)  # it stands
+
+
+@pytest.mark.parametrize(
+    ("call", "field"),
+    [
+        (lambda _: settled_bed(0), "count"),
+        (lambda _: settled_bed(10, 2.5), "layers"),
+        (lambda _: settled_bed(10, settle=-1.0), "settle"),
+        (lambda bed: rover_on_soil(bed, start=0.5), "start"),
+        (lambda bed: rover_on_soil(bed, start=1.2), "start"),
+        (lambda bed: drawbar_pull(bed, 1.0), "slip"),
+        (lambda bed: drawbar_pull(bed, 0.1, rim_speed=0.0), "rim_speed"),
+        (lambda bed: drawbar_pull(bed, 0.1, distance=3.0), "distance"),
+        (lambda bed: drive_on_soil(bed, 50.0, duration=0.0), "duration"),
+        (lambda bed: drive_on_soil(bed, np.nan), "torques[0]"),
+    ],
+)
+def test_a_trial_that_cannot_be_is_refused_by_name(call: Callable[[Bed], object], field: str, bed: Bed) -> None:
+    with pytest.raises(ValueError, match=r".+") as caught:
+        call(bed)
+    assert getattr(caught.value, "field", None) == field
+
+
+def test_kinematic_disks_bear_and_move_as_they_are_told() -> None:
+    # A disk lies on two that are held, then on the same two as a piston goes down at 0.1 m/s.
+    options = {"kinematic": [True, True, False], "friction": 0.0, "tolerance": 1e-10}
+    sim = SoilSimulation([0.1, 0.1, 0.1], [1.0, 1.0, 2.0], [[-0.1, 0.0], [0.1, 0.0], [0.0, 0.18]], **options)
+    sim.step(400)
+    np.testing.assert_allclose(sim.position[2, :2], [0.0, 0.1 * np.sqrt(3.0)], atol=1e-8)
+    np.testing.assert_array_equal(sim.position[:2, :2], [[-0.1, 0.0], [0.1, 0.0]])
+    np.testing.assert_array_equal(sim.kinematic, [True, True, False])
+    weight = 2.0 * 9.81 * sim.time_step
+    np.testing.assert_allclose(np.abs(sim.contacts.world_impulses[:, 1]), 0.5 * weight, rtol=1e-6)
+    assert sim.energy().potential == pytest.approx(2.0 * 9.81 * 0.1 * np.sqrt(3.0), rel=1e-6)
+    sim.set_state(sim.position, [[0.0, -0.1, 0.0], [0.0, -0.1, 0.0], [0.0, 0.0, 0.0]])
+    sim.step(200)
+    np.testing.assert_allclose(sim.position[:2, 1], -0.02, rtol=1e-9)
+    np.testing.assert_allclose(sim.position[2, 1], 0.1 * np.sqrt(3.0) - 0.02, atol=1e-6)
+    np.testing.assert_allclose(sim.momentum(), [0.0, -0.2, 0.0], atol=1e-6)
+    with pytest.raises(ValueError, match="kinematic") as caught:
+        SoilSimulation([0.1], [1.0], [[0.0, 0.0]], kinematic=[True, False])
+    assert getattr(caught.value, "field", None) == "kinematic"
+
+
+def test_removed_disks_leave_the_others_as_they_are() -> None:
+    radius, mass, centres = soil_packing(40, width=0.4, seed=1)
+    walls = [[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0], [0.4, 0.0, -1.0, 0.0]]
+    # One more, held far off: with it or without it all go on bit for bit.
+    marks = np.arange(41) == 7
+    more = (np.insert(radius, 7, radius[0]), np.insert(mass, 7, 0.1), np.insert(centres, 7, [0.2, 9.0], axis=0))
+    far = SoilSimulation(*more, walls=walls, kinematic=marks)
+    alone = SoilSimulation(radius, mass, centres, walls=walls)
+    for sim in (far, alone):
+        sim.step(150)
+    far.remove(marks)
+    np.testing.assert_array_equal(far.radius, radius)
+    np.testing.assert_array_equal(far.position, alone.position)
+    for sim in (far, alone):
+        sim.step(100)
+    np.testing.assert_array_equal(far.position, alone.position)
+    for which, field in ((marks, "which"), (np.ones(40, dtype=bool), "radius")):
+        with pytest.raises(ValueError, match=field):
+            far.remove(which)
+    np.testing.assert_array_equal(far.radius, radius)
+
+
+@pytest.mark.parametrize(
+    ("call", "field"),
+    [
+        (lambda _: settled_bed(10**11), "count"),
+        (lambda _: settled_bed(30, 2.5), "layers"),
+        (lambda _: settled_bed(30, radius_min=0.0), "radius_min"),
+        (lambda _: settled_bed(30, radius_min=0.02, radius_max=0.01), "radius_max"),
+        (lambda _: settled_bed(30, settle=1e300), "settle"),
+        (lambda bed: rover_on_soil(bed, start=np.nan), "start"),
+        (lambda bed: rover_on_soil(bed, rover=[1]), "rover"),
+        (lambda bed: rover_on_soil(bed, rover={"wheel_radius": "big"}), "rover.wheel_radius[0]"),
+        (lambda bed: rover_on_soil(bed, rover={"axle_a": 3.0}), "rover.axle_a"),
+        (lambda bed: drive_on_soil(bed, 0.0, duration=1e300, start=0.61), "duration"),
+        (lambda bed: drawbar_pull(bed, 1.0 - 1e-12, run_in=0.1, distance=0.1, radius=0.1), "slip"),
+        (lambda bed: drawbar_pull(bed, 0.5, radius=-1.0), "radius"),
+        (lambda bed: over_beds(lambda *_: 0, [1.0], [bed], workers=-1), "workers"),
+        (lambda bed: record_soil(rover_on_soil(bed, start=0.61), "no.h5", "", duration=1e300), "duration"),
+        (
+            lambda bed: record_soil(rover_on_soil(bed, start=0.61), "no.h5", "", duration=1, steps_per_row=0.5),
+            "steps",
+        ),
+    ],
+)
+def test_soils_that_would_not_end_or_cannot_be_are_refused_by_name(
+    call: Callable[[Bed], object], field: str, narrow_bed: Bed
+) -> None:
+    with pytest.raises(OptionError) as caught:
+        call(narrow_bed)
+    assert str(caught.value.field).startswith(field)
+    assert "np.float64" not in str(caught.value)
+
+
+@pytest.fixture(scope="module")
+def narrow_bed() -> Bed:
+    """As wide as the rover."""
+    return settled_bed(90, 2, settle=0.02)

@@ -20,13 +20,14 @@ from torture.hostile import hostile_values
 
 from rover_gym import PDPolicy, Plane, RoverGymError, RoverModel, Simulation
 from rover_gym.extras import MissingExtraError
-from rover_gym.grains import read_grain_run, record_grains, settled_balls
+from rover_gym.grains import record_grains, settled_balls
 from rover_gym.grains.lab import PlatePoint, ShearLaw, ShearPoint, WheelPoint
 from rover_gym.live import LiveChoices, LiveLoop, LiveRover
 from rover_gym.mechanics import GrainSimulation, ball_packing
-from rover_gym.planar import BallSimulation, Line, describe_planar, read_planar_run, record_planar
+from rover_gym.planar import BallSimulation, Line, describe_planar, record_planar
 from rover_gym.record import Channel, Recorder, RoverSampler, describe, read_run
-from rover_gym.soil import SoilSimulation, read_soil_run, record_soil, soil_packing
+from rover_gym.runs import open_run
+from rover_gym.soil import SoilSimulation, record_soil, soil_packing
 
 pytest.importorskip("h5py")
 
@@ -58,13 +59,13 @@ class World:
                 self.sim.step(5)
         self.run = read_run(folder / "run.h5")
         record_grains(fall(), 0.05, folder / "grains.h5")
-        self.grains = read_grain_run(folder / "grains.h5")
+        self.grains = open_run(folder / "grains.h5")
         ball = BallSimulation(Line())
         record_planar(ball, folder / "planar.h5", describe_planar(ball, "a ball"), duration=0.1)
-        self.planar = read_planar_run(folder / "planar.h5")
+        self.planar = open_run(folder / "planar.h5")
         soil = SoilSimulation(*soil_packing(6, width=0.2), walls=[(0.0, 0.0, 0.0, 1.0)])
         record_soil(soil, folder / "soil.h5", "a soil", duration=0.02)
-        self.soil = read_soil_run(folder / "soil.h5")
+        self.soil = open_run(folder / "soil.h5")
         self.bed = settled_balls(20, 0.12, 0.12, radius_min=0.01, radius_max=0.012)
         self.rover = LiveRover()
         self.loop = LiveLoop(self.rover, folder)
@@ -92,11 +93,9 @@ def arguments(name: str, w: World) -> dict[str, Any]:
         "read_run": {"path": w.folder / "run.h5"},
         "read_trajectory": {"path": w.folder / "run.h5"},
         "row_count": {"duration": 1.0, "time_step": 0.005},
+        "draw_overview": {"run": w.run, "path": out / "overview.png"},
         "write_gltf": {"run": w.run, "path": out / "a.glb"},
-        "write_grain_page": {"run": w.grains, "path": out / "a.html"},
         "write_page": {"run": w.run, "path": out / "a.html"},
-        "write_planar_page": {"run": w.planar, "path": out / "a.html"},
-        "write_soil_page": {"run": w.soil, "path": out / "a.html"},
         "write_vrml": {"run": w.run, "path": out / "a.wrl"},
         "GrainSampler": {"sim": fall()},
         "MovingWindow": {"rover": w.sim, "grains": fall()},
@@ -108,7 +107,7 @@ def arguments(name: str, w: World) -> dict[str, Any]:
         "lognormal_radii": {"count": 5, "median": 0.01, "deviation": 0.1},
         "outflow": {"run": w.grains},
         "penetration_depths": {"run": w.grains},
-        "read_grain_run": {"path": w.folder / "grains.h5"},
+        "open_run": {"path": w.folder / "grains.h5"},
         "record_grains": {"sim": fall(), "duration": 0.01, "path": out / "g.h5"},
         "rover_on_bed": {"bed": w.bed, "model": RoverModel(), "torque": 1.0},
         "run_out": {"run": w.grains, "tube": 0.1},
@@ -211,7 +210,7 @@ DRAWS = pytest.mark.nightly("tests/cli/test_plot.py::test_an_unknown_format_is_r
 
 @pytest.mark.parametrize(
     ("room", "name", "argument"),
-    [pytest.param(*one, marks=DRAWS if one[1] == "draw_run" else ()) for one in public()],
+    [pytest.param(*one, marks=DRAWS if one[1] in ("draw_run", "draw_overview") else ()) for one in public()],
     ids=lambda part: part,
 )
 def test_a_value_of_the_wrong_kind_is_refused_by_name(

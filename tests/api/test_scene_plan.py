@@ -20,11 +20,11 @@ from rover_gym import (
     TerrainError,
     Union,
 )
+from rover_gym.economy import Scene, ScenePlan, measure_economies, plan
+from rover_gym.economy.planner import WELD_ERROR
 from rover_gym.env import resting_pose, tilted_plane
 from rover_gym.mechanics import SimulationBatch
 from rover_gym.planar import MirroredRoverSimulation
-from rover_gym.planning import Scene, ScenePlan, measure_economies, plan
-from rover_gym.planning.planner import WELD_ERROR
 
 PARTS = ["ground", "steering", "base", "scheme", "contact solver", "step", "steps", "in a batch"]
 

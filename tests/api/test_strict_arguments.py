@@ -6,6 +6,8 @@ object must not surface as a bare `TypeError` or `OverflowError` from the conver
 
 import datetime
 import fractions
+import pickle
+import pydoc
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +15,7 @@ import numpy as np
 import pytest
 from torture.hostile import NO_NUMBERS
 
+import rover_gym
 from rover_gym import (
     HeightField,
     Plane,
@@ -20,14 +23,18 @@ from rover_gym import (
     RoverModel,
     Simulation,
     SphereField,
+    _core,
     accuracy_options,
+    mechanics,
     solve_friction_contact,
 )
 from rover_gym.mechanics import SoilSimulation, soil_packing
 from rover_gym.planar import BallSimulation, Line, MirroredRoverSimulation, Polyline, Sine, TwoWheelRoverSimulation
 
 rocks = (0.1, (-5.0, -5.0, 5.0, 5.0), 0)
+
 one_contact = (np.eye(3), [-1.0, 0.0, 0.0], [0.5])
+
 one_disk = ([0.1], [1.0], [[0.0, 0.0]])
 
 NUMBERS: list[tuple[str, Callable[[Any], Any]]] = [
@@ -123,7 +130,6 @@ VECTORS: list[tuple[str, Callable[[Any], Any]]] = [
     ("x", lambda x: Polyline(x, [0.0, 1.0, 2.0])),
 ]
 
-
 #: What is no array of numbers.
 ARRAYS: tuple[Any, ...] = (
     np.ones(3, dtype="timedelta64[s]"),
@@ -138,7 +144,9 @@ ARRAYS: tuple[Any, ...] = (
     "text",
     object,
 )
+
 NO_COUNTS: tuple[Any, ...] = (*NO_NUMBERS, 1.0, 1.5, -1, np.float64(2.0), np.int64(-3), 2**64)
+
 #: Counts whose default is None.
 OPTIONAL = ("budget",)
 
@@ -275,3 +283,26 @@ def test_a_list_of_a_billion_entries_is_refused_before_they_are_read(field: str,
         call(endless)
     assert str(error.value).startswith(field)
     assert endless.reads <= 1
+
+
+def test_it_offers_all_that_is_compiled() -> None:
+    assert set(mechanics.__all__) == {name for name in vars(_core) if not name.startswith("_")} | {
+        "__version__",
+        "Terrain",
+    }
+
+
+@pytest.mark.parametrize("name", [name for name in mechanics.__all__ if isinstance(getattr(mechanics, name), type)])
+def test_a_class_says_where_it_is_found(name: str) -> None:
+    found = getattr(mechanics, name)
+    assert (found.__module__, found.__qualname__) == ("rover_gym.mechanics", name)
+    assert pickle.loads(pickle.dumps(found)) is found  # noqa: S301 - our own
+    title = pydoc.plain(pydoc.render_doc(found)).splitlines()[0]
+    assert title == f"Python Library Documentation: class {name} in module rover_gym.mechanics"
+
+
+def test_what_most_programs_need_is_in_the_package_itself() -> None:
+    shared = set(rover_gym.__all__) & set(mechanics.__all__)
+    assert {"Simulation", "RoverModel", "Plane", "SphereField", "RoverGymError", "solve_friction_contact"} <= shared
+    for name in shared:
+        assert getattr(rover_gym, name) is getattr(mechanics, name)

@@ -15,10 +15,11 @@ from browser.test_replay_page import await_that, coarse, go_to, messages, opened
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 
-from rover_gym.grains import GrainRun, read_grain_run, record_grains
+from rover_gym.grains import GrainRun, record_grains
 from rover_gym.rendering.appearance import SAND_COLOUR
-from rover_gym.replay import write_grain_page
-from rover_gym.replay.smoothing import LOAD_TIME, moving_mean
+from rover_gym.replay import write_page
+from rover_gym.replay.player import LOAD_TIME, moving_mean
+from rover_gym.runs import open_run
 
 # Time of the script for a new sample, on any thread: rebuilt from its differences, and given to the graphics card.
 SAMPLE_TIMES = """
@@ -56,8 +57,8 @@ class BallsShown(NamedTuple):
 def shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[BallsShown]:
     folder = tmp_path_factory.mktemp("grains")
     record_grains(RoverOnMovingBalls(), 1.2, folder / "run.h5", 10.0, title="a rover & <balls>")
-    run = read_grain_run(folder / "run.h5")
-    page = write_grain_page(run, folder / "replay.html")
+    run = open_run(folder / "run.h5")
+    page = write_page(run, folder / "replay.html")
     with opened(page, folder / "profile") as browser:
         yield BallsShown(browser, run, page)
 
@@ -181,7 +182,7 @@ def test_it_plays_and_the_wheel_of_the_mouse_zooms(shown: BallsShown) -> None:
 def test_twenty_thousand_balls_cost_the_script_little(tmp_path: Path) -> None:
     """60 pictures a second leave 17 ms for each; of 50 000 balls a new sample may take 3, and time goes with balls."""
     record_grains(MovingBalls((50, 10, 40), 0.01, 0.5), 0.4, tmp_path / "run.h5")
-    page = write_grain_page(read_grain_run(tmp_path / "run.h5"), tmp_path / "replay.html")
+    page = write_page(open_run(tmp_path / "run.h5"), tmp_path / "replay.html")
     with opened(page, tmp_path / "profile") as browser:
         took = browser.execute_async_script(SAMPLE_TIMES)
         severe = [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
@@ -202,8 +203,8 @@ def parts(page: Path) -> dict[str, Any]:
 def test_the_page_holds_the_places_of_every_sample(tmp_path: Path) -> None:
     """Rebuilt here as the page's script does."""
     record_grains(MovingBalls((12, 4, 8), moving=0.6), 2.4, tmp_path / "run.h5")
-    run = read_grain_run(tmp_path / "run.h5")
-    page = write_grain_page(run, tmp_path / "replay.html")
+    run = open_run(tmp_path / "run.h5")
+    page = write_page(run, tmp_path / "replay.html")
     held = parts(page)
     scene, n = held["scene"], len(run.radius)
     assert scene["pieces"] == 3

@@ -21,10 +21,11 @@ from selenium.webdriver.common.by import By
 from rover_gym import HeightField, Plane, RoverModel, Simulation, SphereField, Terrain, Union
 from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_run
 from rover_gym.rendering.appearance import GROUND_COLOUR, TRUNK_COLOUR
-from rover_gym.replay import write_page, write_soil_page
+from rover_gym.replay import write_page
 from rover_gym.replay.page import WHEEL_NAMES
-from rover_gym.replay.smoothing import LOAD_TIME, moving_mean
-from rover_gym.soil import SoilRun, read_soil_run, record_soil, rover_on_soil, settled_bed
+from rover_gym.replay.player import LOAD_TIME, moving_mean
+from rover_gym.runs import open_run
+from rover_gym.soil import SoilRun, record_soil, rover_on_soil, settled_bed
 
 ROCKS = SphereField([[1.6, 0.0, 0.6], [1.2, 0.05, -1.3], [-0.9, 0.0, 1.3]], [0.25, 0.2, 0.15], Plane())
 PEAK = 1e5  # N, of an impact
@@ -347,8 +348,8 @@ def soil_shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SoilShown]:
     sim = rover_on_soil(bed)
     sim.set_torques([50.0, 50.0])
     record_soil(sim, folder / "soil.h5", "the rover on 150 disks", duration=0.5, steps_per_row=50, walls=bed.walls)
-    run = read_soil_run(folder / "soil.h5")
-    page = write_soil_page(run, folder / "soil.html")
+    run = open_run(folder / "soil.h5")
+    page = write_page(run, folder / "soil.html")
     with opened(page, folder / "profile") as browser:
         yield SoilShown(browser, run, page)
 

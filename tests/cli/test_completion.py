@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rover_gym.cli.completion import (
+from rover_gym.cli.options import (
     Completer,
     complete_model,
     complete_policy,

@@ -1,5 +1,6 @@
 """`rover grains`, and what `rover replay` and `rover plot` make of its runs."""
 
+import csv
 import subprocess
 from pathlib import Path
 
@@ -13,8 +14,9 @@ from typer.testing import CliRunner
 from rover_gym.cli import app
 from rover_gym.figures.grain_frames import draw_grains
 from rover_gym.figures.grain_run_figures import GRAIN_DRAWINGS, slip_of_wheels
-from rover_gym.grains import read_grain_run, record_grains
+from rover_gym.grains import record_grains
 from rover_gym.rendering.appearance import SAND_COLOUR
+from rover_gym.runs import open_run
 
 
 def rover(*arguments: str) -> str:
@@ -39,7 +41,7 @@ def test_a_run_is_recorded_and_its_result_told(command: str, options: list[str],
     output = rover("grains", command, *options, "--time-step", "0.002", "--duration", "0.1", "--output", str(tmp_path))
     assert said in output
     assert "rows not converged" in output
-    run = read_grain_run(tmp_path / f"{command}.h5")
+    run = open_run(tmp_path / f"{command}.h5")
     assert run.trajectory.attributes["complete"]
     assert run.time[-1] == pytest.approx(0.1, abs=0.02)
     assert run.trajectory["penetration"].max() < 0.01 * run.radius.min()
@@ -92,7 +94,7 @@ def test_a_run_is_plotted(name: str, runs: dict[str, Path], tmp_path: Path) -> N
 
 def test_the_slip_of_rolling_wheels_is_small(runs: dict[str, Path]) -> None:
     """The rover of the fixture drives on a firm plane."""
-    slip = slip_of_wheels(read_grain_run(runs["rover"]))
+    slip = slip_of_wheels(open_run(runs["rover"]))
     assert slip.shape == (26, 6)
     assert np.nanmax(np.abs(slip[13:])) < 0.05
 
@@ -109,7 +111,7 @@ def test_a_run_is_filmed(name: str, runs: dict[str, Path], tmp_path: Path) -> No
 
 
 def test_a_frame_shows_sand(runs: dict[str, Path], tmp_path: Path) -> None:
-    image = imread(draw_grains(read_grain_run(runs["bed"]), tmp_path / "bed.png", row=3))[..., :3]
+    image = imread(draw_grains(open_run(runs["bed"]), tmp_path / "bed.png", row=3))[..., :3]
     ratio = image / np.maximum(image.max(axis=-1, keepdims=True), 1e-6)
     near = np.abs(ratio - np.array(SAND_COLOUR) / max(SAND_COLOUR)).max(axis=-1) < 0.06
     assert near.mean() > 0.05
@@ -122,3 +124,54 @@ def test_a_run_is_replayed_as_a_page_and_not_as_other_files(runs: dict[str, Path
     refused = CliRunner().invoke(app, ["replay", str(runs["bed"]), "--gltf", str(tmp_path / "run.glb")])
     assert refused.exit_code == 2
     assert "error: --gltf" in refused.output
+
+
+BED = ["--balls", "250", "--ball-radius", "0.013", "--width", "0.27", "--depth", "0.2", "--speed", "0.2"]
+
+STRESSES = ["--normal-stress", "1000", "--normal-stress", "3000"]
+
+
+@pytest.mark.parametrize(
+    ("command", "options", "tables", "rows", "said"),
+    [
+        ("plate", ["--radius", "0.04", "--sinkage", "0.01", "--samples", "6"], ["plate.csv"], 6, "N/m^(n+2)"),
+        (
+            "shear",
+            ["--radius", "0.04", "--displacement", "0.01", "--samples", "5", *STRESSES],
+            ["shear-1000Pa.csv", "shear-3000Pa.csv"],
+            5,
+            "friction angle",
+        ),
+        (
+            "wheel",
+            ["--slip", "0", "--slip", "0.3", "--run-in", "0.01", "--distance", "0.02"],
+            ["wheel.csv"],
+            2,
+            "slip 0.3",
+        ),
+    ],
+)
+def test_a_test_writes_its_tables(
+    command: str, options: list[str], tables: list[str], rows: int, said: str, tmp_path: Path
+) -> None:
+    result = CliRunner().invoke(app, ["grains", command, *BED, *options, "--output", str(tmp_path)])
+    assert result.exit_code == 0, result.output
+    assert said in result.output
+    for table in tables:
+        with (tmp_path / table).open(encoding="utf-8") as file:
+            assert len(list(csv.DictReader(file))) == rows
+
+
+@pytest.mark.parametrize(
+    ("command", "options", "said"),
+    [
+        ("plate", ["--radius", "0.001"], "radius"),
+        ("wheel", ["--slip", "1.5"], "slip"),
+        ("wheel", ["--load", "-1"], "load"),
+    ],
+)
+def test_bad_options_are_told_in_one_line(command: str, options: list[str], said: str, tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["grains", command, *BED, *options, "--output", str(tmp_path)])
+    assert result.exit_code == 2
+    assert said in result.output
+    assert not list(tmp_path.iterdir())

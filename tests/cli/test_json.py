@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rover_gym.cli import app
-from rover_gym.cli.results import plain
+from rover_gym.cli.console import plain
 
 BALLS = "--balls 60 --width 0.12 --time-step 0.004 --duration 0.05"
 LAB = "--balls 250 --ball-radius 0.008 --width 0.14 --depth 0.14 --samples 6 --speed 0.2 --time-step 0.004"

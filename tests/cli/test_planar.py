@@ -13,12 +13,14 @@ from typer.testing import CliRunner
 
 from rover_gym.cli import app
 from rover_gym.figures.chapter_3 import draw_chapter_3
+from rover_gym.figures.drawing import KINDS
 from rover_gym.figures.planar_drawing import PLANAR_DRAWINGS, path_over_ground
 from rover_gym.figures.soil_run_figures import SOIL_DRAWINGS
-from rover_gym.planar import BallSimulation, Sine, describe_planar, read_planar_run, record_planar
+from rover_gym.planar import BallSimulation, PlanarRun, Sine, describe_planar, record_planar
 from rover_gym.record import RecordingError, read_trajectory
 from rover_gym.reproduction.chapter_3_balls import ball_on_incline, published
-from rover_gym.soil import read_soil_run
+from rover_gym.runs import open_run
+from rover_gym.soil import SoilRun
 
 NIGHTLY_BALL = pytest.mark.nightly("tests/cli/test_planar.py::test_a_planar_run_is_plotted_and_replayed")
 
@@ -92,7 +94,7 @@ def test_a_crossing_is_recorded_drawn_filmed_and_replayed(tmp_path: Path) -> Non
     result = CliRunner().invoke(app, ["planar", "soil", *options])
     assert result.exit_code == 0, result.output
     assert "distance" in result.output
-    run = read_soil_run(tmp_path / "soil.h5")
+    run = open_run(tmp_path / "soil.h5")
     assert run.trajectory.attributes["complete"]
     assert run.n_frames == 11
     assert run.time[-1] == pytest.approx(0.2)
@@ -127,10 +129,10 @@ def test_a_crossing_is_recorded_drawn_filmed_and_replayed(tmp_path: Path) -> Non
 def test_a_run_on_a_soil_is_plotted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     options = [*SMALL, "--duration", "0.2", "--no-video", "--output", str(tmp_path)]
     assert CliRunner().invoke(app, ["planar", "soil", *options]).exit_code == 0
-    run = read_soil_run(tmp_path / "soil.h5")
+    run = open_run(tmp_path / "soil.h5")
     figures = {name: Figure() for name in SOIL_DRAWINGS}
-    for name, draw in SOIL_DRAWINGS.items():
-        draw(figures[name], run)
+    for name, drawing in SOIL_DRAWINGS.items():
+        drawing.draw(figures[name], run)
         assert run.title in figures[name].get_suptitle()
     labels = [[axes.get_ylabel().split("\n")[-1] for axes in figure.axes] for figure in figures.values()]
     assert labels == [
@@ -145,7 +147,7 @@ def test_a_run_on_a_soil_is_plotted(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert np.isfinite(ratios[:, 1:]).all()
     assert 0.0 < ratios.mean() < 100.0
 
-    monkeypatch.setattr("rover_gym.figures.soil_run_figures.SOIL_DRAWINGS", {"driving": SOIL_DRAWINGS["driving"]})
+    monkeypatch.setitem(KINDS, SoilRun, ({"driving": SOIL_DRAWINGS["driving"]}, 1))
     result = CliRunner().invoke(app, ["plot", str(tmp_path / "soil.h5"), "--overview"])
     assert result.exit_code == 0, result.output
     files = sorted((tmp_path / "soil-plots").iterdir())
@@ -160,7 +162,7 @@ def test_a_crossing_ends_where_the_soil_does(tmp_path: Path) -> None:
     options = ["--disks", "90", "--layers", "2", "--duration", "5", "--torque", "90", "--no-video"]
     result = CliRunner().invoke(app, ["planar", "soil", *options, "--gravity", "0.61", "--output", str(tmp_path)])
     assert result.exit_code == 0, result.output
-    assert read_soil_run(tmp_path / "soil.h5").time[-1] < 5.0
+    assert open_run(tmp_path / "soil.h5").time[-1] < 5.0
 
 
 @pytest.mark.nightly("tests/cli/test_planar.py::test_a_run_is_recorded_and_drawn")
@@ -231,7 +233,7 @@ def test_a_default_run_ends_where_its_subject_ends(tmp_path: Path) -> None:
     """A step of 5 cm was drawn on an axis of 70 m."""
     result = CliRunner().invoke(app, ["planar", "rover", "--ground", "step", "--output", str(tmp_path)])
     assert result.exit_code == 0, result.output
-    run = read_planar_run(tmp_path / "rover.h5")
+    run = open_run(tmp_path / "rover.h5")
     assert 6.0 <= run.discs[-1, :, 0].mean() < 6.1
     figure = Figure()
     axes = figure.subplots()
@@ -262,12 +264,12 @@ def test_a_planar_run_read_back_is_the_simulations(tmp_path: Path) -> None:
     sim = BallSimulation(Sine(0.1, 2.0), radius=0.3)
     sim.set_state([0.0, 0.5, 0.0], [1.0, 0.0, 0.0])
     record_planar(sim, tmp_path / "ball.h5", describe_planar(sim, "a ball"), duration=0.5)
-    run = read_planar_run(tmp_path / "ball.h5")
+    run = open_run(tmp_path / "ball.h5")
     assert run.radius == pytest.approx([sim.parameters["radius"]])
     assert run.discs[-1, 0] == pytest.approx(sim.q)
     assert run.ground.height(0.7) == sim.ground.height(0.7)
-    with pytest.raises(RecordingError, match="holds no planar machine"):
-        read_planar_run(write_episode(tmp_path))
+    with pytest.raises(RecordingError, match="holds a RoverRun, no PlanarRun"):
+        open_run(write_episode(tmp_path), PlanarRun)
 
 
 def write_episode(folder: Path) -> Path:

@@ -22,10 +22,11 @@ from rover_gym.cli import app
 from rover_gym.extras import MissingExtraError
 from rover_gym.figures import draw_run
 from rover_gym.figures.derived_signals import contact_velocities, motor_work, slip_ratios, smooth
-from rover_gym.figures.run_figures import DRAWINGS, drawable
-from rover_gym.figures.style import COLOURS, STYLE, WHEELS
+from rover_gym.figures.drawing import KINDS as FIGURES
+from rover_gym.figures.drawing import drawable
+from rover_gym.figures.run_figures import DRAWINGS
+from rover_gym.figures.style import COLOURS, STYLE, WHEELS, WheelStyle
 from rover_gym.figures.wheel_paths import footprints
-from rover_gym.figures.wheel_style import WheelStyle
 from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_run
 from rover_gym.reproduction import inclined_plane, sphere_rug
 
@@ -110,7 +111,7 @@ def test_without_a_folder_the_figures_lie_beside_the_run(
     recordings: dict[str, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     few = {name: DRAWINGS[name] for name in ("path", "wheel-loads", "energy")}  # drawing takes half a second each
-    monkeypatch.setattr("rover_gym.figures.run_figures.DRAWINGS", few)
+    monkeypatch.setitem(FIGURES, RoverRun, (few, 2))
     result = rover("plot", str(recordings["rug"]), "--format", "svg", "--overview")
     assert result.exit_code == 0, result.output
     files = sorted(recordings["rug"].with_name("rug-plots").iterdir())

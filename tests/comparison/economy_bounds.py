@@ -12,8 +12,8 @@ import numpy.typing as npt
 from rich.console import Console
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField
+from rover_gym.economy import Scene, measure_economies, plan
 from rover_gym.env import resting_pose, tilted_plane
-from rover_gym.planning import Scene, measure_economies, plan
 
 Array = npt.NDArray[np.float64]
 SLOPES = (0.0, 5.0, -10.0, -20.0)  # degrees, along the heading

@@ -42,7 +42,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from models.drives import FRICTION, SAMPLE, Part, commands, start
 
 from rover_gym import RoverModel, Simulation
-from rover_gym.models.right_angles import right_angle
+from rover_gym.models.robot_tree import right_angle
 
 GRAVITY = 9.81
 #: Of Drake's contacts: dissipation (Hunt and Crossley), s/m, and the speed below which its friction creeps, m/s. At

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from comparison.mujoco_rover import rover_xml
 from rover_gym import Plane, RoverModel, Simulation
-from rover_gym.vector.mujoco_rover import rover_xml
+from rover_gym.vector import measure_exploring
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed (make chart installs it)")
 
@@ -27,3 +28,11 @@ def test_mass_matrix_and_rest_are_ours() -> None:
     simulation.step(100)
     mujoco.mj_step(theirs, data, nstep=1000)
     np.testing.assert_allclose(data.qpos[:3], simulation.q[:3], atol=2e-3)
+
+
+def test_the_rollout_steps_the_rovers_that_are_measured() -> None:
+    from comparison.rollout import MUJOCO, players  # noqa: PLC0415 - needs MuJoCo
+
+    told = measure_exploring(2, 1, ground="rocks", rounds=1, beside=players)
+    assert set(told.rover_steps) == {"rover-gym", *MUJOCO}
+    assert min(told.rover_steps.values()) > 0.0

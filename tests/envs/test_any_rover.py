@@ -6,7 +6,7 @@ from machines import MACHINES, axle, machine
 
 from rover_gym import ModelError, PDPolicy, RoverEnv, RoverModel
 from rover_gym.policy import CommandController
-from rover_gym.policy.turning import Turning
+from rover_gym.policy.pd_policy import Turning
 from rover_gym.vector import RoverVectorEnv
 
 NAMES = sorted(MACHINES)

@@ -1,10 +1,16 @@
 """Bad input that depends on more than one value: which entry of it, or what it contradicts, is named.
 
 Values of a wrong kind or range are refused in `test_nonsense.py`, for every argument; ends of ranges in `test_card.py`.
+
+Each argument, option and method that takes a value gets every value of the table. If a field accepts one, a reset and
+some steps must give finite numbers. Any other exception, and any warning, fails the test.
 """
 
+import inspect
+import json
 import math
 import pickle
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import gymnasium as gym
@@ -12,6 +18,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from torture.hostile import NO_NUMBERS, hostile_values
 
 from rover_gym import (
     CommandError,
@@ -22,8 +29,25 @@ from rover_gym import (
     RoverGymError,
     RoverModel,
     StateError,
+    StepError,
+    TerrainError,
+)
+from rover_gym.economy import Scene, plan
+from rover_gym.env import ARGUMENTS as LIMITS
+from rover_gym.env.arguments import SOLVER_OPTIONS, Number, NumberOrRange
+from rover_gym.env.episode_scene import RESET_OPTIONS
+from rover_gym.env.reward_terms import WEIGHTS
+from rover_gym.policy import (
+    CommandController,
+    CommandLimits,
+    DriveByCommand,
+    Features,
+    PDGains,
+    RoverCommandEnv,
+    RoverCommandVectorEnv,
 )
 from rover_gym.validation import number, span
+from rover_gym.vector import RoverVectorEnv
 
 NAN, INF = float("nan"), float("inf")
 
@@ -112,7 +136,7 @@ def test_actions(env: RoverEnv, action: Any, field: str) -> None:
         ({"q": np.zeros(21), "heading_deg": 3.0}, OptionError, "options.heading_deg"),
     ],
 )
-def test_reset_options(env: RoverEnv, options: Any, error: type[RoverGymError], field: str) -> None:
+def test_reset_options_are_named(env: RoverEnv, options: Any, error: type[RoverGymError], field: str) -> None:
     before = env.snapshot()
     with pytest.raises(error) as caught:
         env.reset(seed=5, options=options)
@@ -158,3 +182,387 @@ def test_span_is_ordered_or_refused(value: Any) -> None:
     except OptionError:
         return
     assert -math.inf < low <= high < math.inf
+
+
+NAN, INF = float("nan"), float("inf")
+
+
+def throw(
+    use: Callable[[Any], object],
+    *fields: str,
+    error: type[RoverGymError] = RoverGymError,
+    never: Iterable[Any] = (),
+) -> int:
+    """Uses each hostile value, and those that are never accepted.
+
+    Returns how many were refused, each by one of these fields or an entry of it.
+    """
+    refused = 0
+    for value, may_pass in [*((value, True) for value in hostile_values()), *((value, False) for value in never)]:
+        caught = None
+        try:
+            use(value)
+        except RoverGymError as refusal:
+            caught = refusal
+        if caught is None:
+            assert may_pass, value
+            continue
+        assert isinstance(caught, error)
+        assert isinstance(caught, ValueError | StepError)
+        assert caught.field
+        assert not fields or any(f"{caught.field}[".startswith((f"{name}[", f"{name}.")) for name in fields), caught
+        assert caught.field.split("[", maxsplit=1)[0] in str(caught)
+        assert len(str(caught)) < 2000
+        refused += 1
+    return refused
+
+
+def drive(env: RoverEnv) -> None:
+    """What was accepted must work."""
+    observation, _ = env.reset(seed=0)
+    for _ in range(2):
+        assert np.isfinite(observation).all()
+        observation, reward, *_ = env.step(np.full(env.action_space.shape, 0.5, np.float32))
+        assert np.isfinite(reward)
+
+
+#: Other fields by which an argument is refused: a list of grounds is a union of parts, the course must fit into the
+#: field of rocks, a period must be a whole number of steps, and the batch has names of its own.
+OTHER_FIELDS = {
+    "terrain": ("parts",),
+    "goal_distance": ("waypoints",),
+    "time_step": ("control_frequency",),
+    "max_episode_steps": ("max_steps",),
+    "n_envs": ("num_envs",),
+}
+
+ARGUMENTS = list(inspect.signature(RoverEnv).parameters)
+
+#: What no number is, for arguments that are numbers.
+NUMERIC = (*NO_NUMBERS, NAN, INF, -INF, "nan")
+
+#: What each argument never accepts, beside `NUMERIC` where it is a number.
+NEVER: dict[str, tuple[Any, ...]] = {
+    "terrain": ("swamp", "sphere-field", None),
+    "model": ("lunokhod",),
+    "difficulty": (-0.1, 2.1, "hard"),
+    "rock_abundance": (-0.1, 0.6),
+    "max_rock_radius": (0.0, 11.0),
+    "height_scan": (3,),
+    "slope_deg": (-1.0, 61.0, "steep", (5.0, 1.0), (1.0, 2.0, 3.0)),
+    "goal_distance": (0.0,),
+    "goal_bearing_deg": (None,),
+    "goal_tolerance": (0.0,),
+    "battery": (0.0, -5.0, "full"),
+    "max_steering_deg": (0.0,),
+    "max_tilt_deg": (0.0, 181.0),
+    "stuck_time": (-1.0,),
+    "friction": (-0.1,),
+    "restitution": (1.5,),
+    "gravity": (9.81,),
+    "control_frequency": (0.0,),
+    "time_step": (0.0, -0.005),
+    "solver_options": (3,),
+    "reward_weights": ([1.0], {"slip": INF}),
+}
+
+
+@pytest.mark.parametrize("terrain", ["plane", "rocks"])
+@pytest.mark.parametrize("name", ARGUMENTS)
+def test_arguments_of_the_environment(name: str, terrain: str) -> None:
+    fields = OTHER_FIELDS.get(name, ())
+    error = {"terrain": TerrainError, "model": ModelError}.get(name, OptionError)
+    is_number = isinstance(LIMITS[name].check, Number | NumberOrRange)
+    never = (*NEVER.get(name, ()), *(NUMERIC if is_number else ()))
+
+    def use(value: Any) -> None:
+        drive(RoverEnv(**{"terrain": terrain, name: value}))
+
+    assert throw(use, name, *fields, error=error, never=never) > 50
+
+
+def test_pairs_of_arguments_that_divide_by_zero() -> None:
+    # `control_frequency=5e-324` was a ZeroDivisionError, alone too.
+    for arguments in (
+        {"time_step": 1e-300, "control_frequency": 1e300},
+        {"time_step": 5e-324, "control_frequency": 5e-324},
+    ):
+        with pytest.raises(RoverGymError) as caught:
+            RoverEnv(**arguments)  # type: ignore[arg-type]
+        assert caught.value.field in arguments
+
+
+@pytest.mark.parametrize("name", SOLVER_OPTIONS)
+def test_solver_options(name: str) -> None:
+    never = (-1.0,) if name == "tolerance" else ()
+    assert throw(lambda value: RoverEnv(solver_options={name: value}), name, error=OptionError, never=never) > 50
+
+
+@pytest.mark.parametrize("name", WEIGHTS)
+def test_reward_weights(name: str) -> None:
+    def use(value: Any) -> None:
+        drive(RoverEnv(reward_weights={name: value}))
+
+    assert throw(use, f"reward_weights.{name}", error=OptionError, never=NUMERIC) > 50
+
+
+@pytest.mark.parametrize("name", ["width", "height", "camera", "show_forces", "antialiasing"])
+def test_render_options(name: str) -> None:
+    assert throw(lambda value: RoverEnv(render_options={name: value})) > 50
+
+
+@pytest.mark.parametrize("name", ["solver_options", "reward_weights", "render_options"])
+def test_names_that_are_no_names(name: str) -> None:
+    def use(value: Any) -> None:
+        try:
+            given = {value: 1.0}
+        except TypeError:  # has no hash
+            return
+        RoverEnv(**{name: given})
+
+    assert throw(use) > 20
+
+
+@pytest.mark.parametrize("name", ["num_envs", "threads", "max_episode_steps", "autoreset_mode", "friction"])
+def test_arguments_of_the_vector_environment(name: str) -> None:
+    never = {
+        "num_envs": (0,),
+        "threads": (0, 1.5),
+        "max_episode_steps": (0,),
+        "autoreset_mode": ("sometimes",),
+        "friction": (-1.0,),
+    }[name]
+    arguments, fields = {"num_envs": 1, "threads": 1}, (name, *OTHER_FIELDS.get(name, ()))
+    assert (
+        throw(lambda value: RoverVectorEnv(**{**arguments, name: value}), *fields, error=OptionError, never=never) > 50
+    )
+
+
+@pytest.mark.parametrize("name", ["n_envs", "threads", "max_episode_steps", "friction"])
+def test_arguments_of_the_stable_baselines_environment(name: str) -> None:
+    sb3 = pytest.importorskip("rover_gym.vector.sb3")
+    arguments, fields = {"n_envs": 1, "threads": 1}, (name, *OTHER_FIELDS.get(name, ()))
+    assert throw(lambda value: sb3.RoverVecEnv(**{**arguments, name: value}), *fields, error=OptionError) > 50
+
+
+class Watched:
+    """An environment and its twin: whatever is refused by the one, the other has not heard of."""
+
+    def __init__(self, env: Any, twin: Any, state: Callable[[Any], Any]) -> None:
+        self.env, self.twin, self._state = env, twin, state
+        for one in (env, twin):
+            one.reset(seed=11)
+
+    def throw(
+        self,
+        use: Callable[[Any], object],
+        *fields: str,
+        error: type[RoverGymError] = RoverGymError,
+        never: Iterable[Any] = (),
+    ) -> int:
+        """As `throw`, and sees to it that what is refused changes nothing."""
+        before = self._state(self.env)
+
+        def watched(value: Any) -> None:
+            nonlocal before
+            try:
+                use(value)
+            except RoverGymError:
+                assert self._state(self.env) == before
+                raise
+            # Taken: both begin anew.
+            self.env.reset(seed=11)
+            self.twin.reset(seed=11)
+            before = self._state(self.env)
+
+        refused = throw(watched, *fields, error=error, never=never)
+        # The next draws are what they would have been, without a seed and with one.
+        for seed in (None, 4):
+            ours, theirs = self.env.reset(seed=seed)[0], self.twin.reset(seed=seed)[0]
+            assert ours.tobytes() == theirs.tobytes()
+        return refused
+
+
+def single_state(env: RoverEnv) -> Any:
+    snapshot = env.snapshot()
+    state = json.dumps(env.np_random.bit_generator.state, default=str)
+    return snapshot.simulation, env.start, env.domain, snapshot.difficulty, state, env.np_random_seed
+
+
+def vector_state(env: RoverVectorEnv) -> Any:
+    rovers = env.batch.rovers
+    states = [json.dumps(rover.np_random.bit_generator.state, default=str) for rover in rovers]
+    return [rover.simulation.snapshot() for rover in rovers], [rover.start for rover in rovers], states
+
+
+def single(**arguments: Any) -> Watched:
+    return Watched(RoverEnv(**arguments), RoverEnv(**arguments), single_state)
+
+
+def vector() -> Watched:
+    return Watched(RoverVectorEnv(2, threads=1), RoverVectorEnv(2, threads=1), vector_state)
+
+
+@pytest.mark.parametrize("terrain", ["plane", "rocks"])
+@pytest.mark.parametrize("name", RESET_OPTIONS)
+def test_reset_options(name: str, terrain: str) -> None:
+    watched = single(terrain=terrain)
+    extra = {"q": [0.0, 0.5, *[0.0] * 19]} if name == "v" else {}
+    error = StateError if name in ("q", "v") else OptionError
+
+    def use(value: Any) -> None:
+        watched.env.reset(seed=3, options={**extra, name: value})
+
+    never = {
+        "difficulty": (NAN,),
+        "uphill_deg": ("north",),
+        "heading_deg": (NAN,),
+        "position": ("here",),
+        "goal": (3.0, (1.0, 2.0, 3.0)),
+    }.get(name, ())
+    assert watched.throw(use, f"options.{name}", error=error, never=never) > 50
+    for entries in range(2, 22):
+        if name in ("q", "v", "position", "goal"):
+            bad = [0.0] * entries
+            bad[-1] = float("nan")
+            with pytest.raises(RoverGymError):
+                watched.env.reset(options={**extra, name: bad})
+
+
+@pytest.mark.parametrize("make", [single, vector])
+def test_seeds_options_and_actions(make: Callable[[], Watched]) -> None:
+    watched = make()
+    env = watched.env
+    assert watched.throw(lambda value: env.reset(seed=value), "seed", never=(-1, 1.5, True)) > 40
+    assert watched.throw(lambda value: env.reset(options=value), "options", never=(["goal"],)) > 40
+    assert watched.throw(lambda value: env.reset(options={"colour": value}), "options.colour") > 70
+    never = (0.0, None, ["a"] * 12, [[0.0], [0.0, 0.0]], np.zeros(12, complex))
+    assert watched.throw(env.step, "action", error=CommandError, never=never) > 70
+
+
+def test_masks_of_a_vector_reset() -> None:
+    watched = vector()
+    assert watched.throw(lambda value: watched.env.reset(options={"reset_mask": value}), "options.reset_mask") > 50
+
+
+def test_difficulties_and_snapshots() -> None:
+    watched = single(terrain="rocks")
+    assert watched.throw(watched.env.restore) > 70
+
+    def use(value: Any) -> None:
+        watched.env.set_difficulty(value)
+        watched.twin.set_difficulty(value)
+
+    assert watched.throw(use) > 50
+
+
+def test_stable_baselines_seeds_options_and_actions() -> None:
+    sb3 = pytest.importorskip("rover_gym.vector.sb3")
+    venv, twin = sb3.RoverVecEnv(2, threads=1), sb3.RoverVecEnv(2, threads=1)
+    for one in (venv, twin):
+        one.seed(2)
+        one.reset()
+    assert throw(venv.step) > 70
+    venv.seed(5)
+    assert throw(lambda value: venv.set_options([{"goal": value}] * 2)) > 50
+    assert throw(lambda value: venv.set_options({"colour": value})) > 70
+    venv.set_options()
+    twin.seed(5)
+    assert venv.reset().tobytes() == twin.reset().tobytes()
+
+    def seed(value: Any) -> None:
+        """A refused seed leaves the one that waits for the next reset."""
+        venv.seed(5)
+        try:
+            venv.seed(value)
+        except RoverGymError:
+            twin.seed(5)
+            assert venv.reset().tobytes() == twin.reset().tobytes()
+            raise
+
+    assert throw(seed, "seed", error=OptionError, never=(-1, "x", 1.5, True, [1, 2])) > 50
+
+
+def test_policies_and_what_they_see() -> None:
+    env = RoverEnv(height_scan=True)
+    seen, _ = env.reset(seed=0)
+    policy = PDPolicy(env)
+    assert throw(PDPolicy) > 70
+    assert throw(lambda value: PDPolicy(env, value)) > 70
+    assert throw(policy.predict) > 70
+    assert throw(env.observation_layout.split) > 70
+    assert throw(lambda value: Features(env, value)) > 70
+    assert throw(lambda value: CommandController(env, value)) > 70
+    assert throw(lambda value: CommandController(env, guided=value)) > 70
+
+    def gains(name: str, value: Any) -> None:
+        action, _ = PDPolicy(env, PDGains(**{name: value})).predict(seen)
+        assert np.isfinite(action).all()
+
+    def limits(name: str, value: Any) -> None:
+        controller = CommandController(env, CommandLimits(**{name: value}))
+        for command in (np.zeros((1, 3)), np.ones((1, 3))):
+            assert np.isfinite(controller.act(seen[None], command)).all()
+
+    for name in inspect.signature(PDGains).parameters:
+        assert throw(lambda value, name=name: gains(name, value)) > 50
+    for name in inspect.signature(CommandLimits).parameters:
+        assert throw(lambda value, name=name: limits(name, value)) > 50
+
+
+def one_commanded(**arguments: Any) -> RoverCommandVectorEnv:
+    return RoverCommandVectorEnv(1, threads=1, **arguments)
+
+
+def test_arguments_of_the_rover_under_commands() -> None:
+    for make in (RoverCommandEnv, one_commanded):
+        with pytest.raises(OptionError) as caught:
+            make(friction=-1.0)
+        assert caught.value.field == "friction"
+
+
+COMMAND = ("repeat", "guided", "pool", "speed", "curvature", "sideways_deg", "response")
+
+
+@pytest.mark.parametrize("make", [lambda **given: DriveByCommand(RoverEnv(), **given), RoverCommandEnv, one_commanded])
+def test_environments_of_commands(make: Any) -> None:
+    def use(value: Any, name: str) -> None:
+        env = make(**{name: value})
+        env.reset(seed=0)
+        env.step(np.zeros(env.action_space.shape, np.float32))
+
+    never: dict[str, tuple[Any, ...]] = {"repeat": (0, 2.5), "speed": (-1.0,), "guided": (3,)}
+    for name in COMMAND:
+        fields = (name, f"command.{name}")
+        assert (
+            throw(lambda value, name=name: use(value, name), *fields, error=OptionError, never=never.get(name, ())) > 50
+        )
+
+
+def test_the_command_wrapper() -> None:
+    assert throw(lambda value: DriveByCommand(RoverEnv(), colour=value)) > 50
+    assert throw(DriveByCommand) > 70
+    wrapped = DriveByCommand(RoverEnv(), repeat=1)
+    first, _ = wrapped.reset(seed=0)
+    assert throw(wrapped.step) > 60
+    assert wrapped.reset(seed=0)[0].tobytes() == first.tobytes()
+
+
+@pytest.mark.parametrize("name", inspect.signature(Scene).parameters)
+def test_scene_plans(name: str) -> None:
+    extra = {"steered": False, "equal_torques": True}
+
+    def use(value: Any) -> None:
+        rover = plan(Scene(**{**extra, name: value})).rover()
+        rover.step(1)
+
+    assert throw(use) > 50
+
+
+def test_arguments_of_a_plan() -> None:
+    assert throw(plan) > 70
+    assert throw(lambda value: plan(Scene(), value)) > 50
+    assert throw(lambda value: plan(Scene(), planar=value)) > 70
+    rover = plan(Scene(steered=False)).rover()
+    assert throw(rover.set_steering) > 60
+    assert throw(rover.set_wheel_torques) > 60

@@ -7,7 +7,8 @@ import numpy.typing as npt
 import pytest
 
 from rover_gym import RoverEnv, RoverModel
-from rover_gym.env import drive_signs, rewards
+from rover_gym.env import drive_signs
+from rover_gym.env.reward_terms import WEIGHTS
 from rover_gym.mechanics import EpisodeRun
 
 Array = npt.NDArray[np.float64]
@@ -78,4 +79,4 @@ def test_a_fast_step_is_far_from_the_bounds() -> None:
     distance = env.reset(seed=0)[1]["distance_to_goal"]
     _, _, _, _, info = env.step(FULL)
     assert info["reward_terms"]["progress"] == distance - info["distance_to_goal"]
-    assert info["reward_terms"]["energy"] == rewards.WEIGHTS["energy"] * info["energy"]
+    assert info["reward_terms"]["energy"] == WEIGHTS["energy"] * info["energy"]

@@ -6,14 +6,19 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rover_gym import PDPolicy, RoverEnv
 from rover_gym.env import wheel_centres
+from rover_gym.policy import CommandController, CommandLimits
+from rover_gym.policy.regulator import SLACK, WheelRegulator
+from rover_gym.vector.batch import RoverBatch
 
 POLICY = PDPolicy(RoverEnv())
+
 CENTRES = wheel_centres(RoverEnv().model)
 
 
@@ -108,3 +113,105 @@ def test_goal_is_reached(first_seed: int) -> None:
 @pytest.mark.parametrize("slope", [0.0, 10.0])
 def test_goal_is_reached_from_the_default_start(slope: float) -> None:
     assert drive(gym.make("Rover-v0", slope_deg=slope), 0)["success"]
+
+
+Array = npt.NDArray[np.float64]
+
+ROVER = RoverEnv()
+
+RADIUS, LIMIT = 0.1, 150.0
+
+#: m / n / response and I / (r^2 dt), N s/m, with a response of 0.2 s.
+ROLL, SPIN = 960.0 / 6.0 / 0.2, 0.15 / RADIUS**2 / ROVER.dt
+
+
+def force(missing: float, traction: float = 0.0, load: float = 1.0) -> float:
+    """Force at the rim of wheels that stand and pushed with the traction, N, under a load in units of the mean."""
+    layout = ROVER.observation_layout
+    seen = np.zeros((1, layout.size))
+    seen[:, layout["wheel_contact"]] = float(load > 0.0)
+    seen[:, layout["normal_force"]] = load
+    seen[:, layout["tangential_force"]][:, ::2] = traction / (960.0 * 9.81 / 6.0)
+    seen[:, layout["previous_action"]][:, :6] = traction * RADIUS / LIMIT
+    entries = WheelRegulator(ROVER, 0.2).entries(seen, np.full((1, 6), missing), np.zeros((1, 1)))
+    assert np.ptp(entries) < 1e-12
+    return float(entries[0, 0]) * LIMIT / RADIUS
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_force_is_that_of_the_formula(sign: float) -> None:
+    # Within the slack, the rover's share of mass; in the air, the wheel's own.
+    assert force(sign * 0.1) == pytest.approx(sign * ROLL * 0.1)
+    assert force(sign * 0.1, load=0.0) == pytest.approx(sign * SPIN * 0.1)
+    assert force(sign * 1.0, load=0.5) == pytest.approx(sign * SPIN * (1.0 + 0.5 * SLACK))
+    # Stopped: more than before. Beyond its speed under the same traction: not braked at once.
+    assert force(sign * 1.0, sign * 800.0) == pytest.approx(sign * (800.0 + SPIN * (1.0 - SLACK)))
+    assert force(-sign * 0.2, sign * 800.0) == pytest.approx(sign * (800.0 - SPIN * (0.2 + SLACK)))
+    # Close to its speed after a hard push: the push fades.
+    assert force(sign * 0.1, sign * 800.0) == pytest.approx(sign * 800.0 * 0.1 / SLACK)
+
+
+def test_wheels_in_the_air_turn_as_commanded_after_one_period() -> None:
+    env = RoverEnv()
+    env.reset(seed=0)
+    q = env.simulation.q
+    q[1] += 5.0
+    seen, _ = env.reset(seed=0, options={"q": q})
+    controller = CommandController(env, CommandLimits(speed=1.0), guided=False)
+    scale = env.observation_layout.scale
+    rates = env.observation_layout["velocity"].start + np.asarray(env.model.wheel_joint_indices)
+    for _ in range(5):
+        seen = env.step(controller.act(seen[None], np.array([[0.6, 0.0, 0.0]]))[0])[0]
+        assert not seen[env.observation_layout["wheel_contact"]].any()
+        # The joints turn about axes that point left: forward is negative.
+        np.testing.assert_allclose(-RADIUS * (seen * scale)[rates], 0.6, rtol=0.05)
+
+
+def regulated(policy: Any, seconds: float, **arguments: Any) -> tuple[float, float]:
+    """Share of the wheels' periods whose torque flips between 75 N m and its opposite, and energy over way, J/m."""
+    n = 8
+    batch = RoverBatch(n, threads=1, **arguments)
+    for i in range(n):
+        batch.reset(i, 3_200_000 + i)
+    act = policy(batch.prototype)
+    active, before = np.ones(n, np.bool_), np.zeros((n, 6))
+    place = batch.task.layout["q"].start
+    seen = batch.observation
+    flips = periods = way = 0.0
+    for _ in range(round(seconds / batch.task.dt)):
+        actions = act(seen)
+        torques = LIMIT * actions[:, :6]
+        swung = (torques * before < 0.0) & (np.minimum(abs(torques), abs(before)) > 75.0)
+        flips, periods = flips + swung[active].sum(), periods + 6 * active.sum()
+        before, last = torques, seen[:, [place, place + 2]]
+        seen, _, ended, _, _ = batch.step(actions, active)
+        way += np.linalg.norm(seen[:, [place, place + 2]] - last, axis=1).sum()
+        active &= ~ended
+    return flips / periods, batch.infos()["energy"].sum() / way
+
+
+def commanded(env: RoverEnv) -> Any:
+    controller = CommandController(env)
+    return lambda seen: controller.act(seen, np.zeros((len(seen), 3)))
+
+
+def baseline(env: RoverEnv) -> Any:
+    policy = PDPolicy(env)
+    return lambda seen: policy.predict(seen)[0]
+
+
+@pytest.mark.parametrize("policy", [commanded, baseline])
+@pytest.mark.parametrize("gravity", [1.0, 0.38])
+def test_torques_do_not_swing_among_rocks(policy: Any, gravity: float) -> None:
+    """Wheels in the air swung between full torques in half of their periods, and in a quarter at 0.38 of gravity."""
+    flips, _ = regulated(policy, 8.0, terrain="rocks", difficulty=1.0, gravity_scale=gravity)
+    assert flips < 0.001
+
+
+@pytest.mark.parametrize("policy", [commanded, baseline])
+@pytest.mark.parametrize("arguments", [{"gravity_scale": 0.38}, {"gravity": (0.0, -3.73, 0.0)}])
+def test_little_gravity_costs_no_energy_on_the_flat(policy: Any, arguments: dict[str, Any]) -> None:
+    """Wheels that slipped swung here too, and took 830 J/m on average."""
+    flips, energy = regulated(policy, 14.0, **arguments)
+    assert flips == 0.0
+    assert energy < 200.0

@@ -12,7 +12,7 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnvWrapper, VecMonitor, VecNormalize
 
 from rover_gym import CommandError, OptionError, PDPolicy, RoverEnv
-from rover_gym.learning.command_vec_env import CommandVecEnv
+from rover_gym.learning.build import CommandVecEnv
 from rover_gym.policy import CommandController, Features
 from rover_gym.vector.sb3 import RoverVecEnv
 

@@ -27,7 +27,7 @@ from rover_gym.sensors import (
     WheelEncoders,
 )
 from rover_gym.sensors.inertial_unit import rotation_matrix, rotation_vector
-from rover_gym.sensors.moment import Moment
+from rover_gym.sensors.sensor import Moment
 
 NOISY: list[Sensor] = [
     WheelEncoders(gain=(0.98, 1.02)),

@@ -15,7 +15,7 @@ from rover_gym import HeightField, OptionError, Plane, RoverModel, Simulation, S
 from rover_gym.cli import app
 from rover_gym.exports import fmu as units
 from rover_gym.exports import write_fmu
-from rover_gym.exports.fmu_variables import unit_variables
+from rover_gym.exports.fmu import unit_variables
 
 pytest.importorskip("fmpy", reason="the extra test is not installed")
 if not units.LIBRARIES.exists():

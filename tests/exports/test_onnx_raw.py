@@ -63,7 +63,7 @@ def test_the_file_gives_the_policys_actions(
 
 def test_a_damaged_run_leaves_no_file(tmp_path: Path) -> None:
     (tmp_path / "model.zip").write_bytes(b"no model")
-    with pytest.raises(OSError, match=r"config\.yaml"):
+    with pytest.raises(OSError, match=r"run\.json"):
         onnx_policy(tmp_path)
 
 

@@ -6,9 +6,9 @@ import pytest
 from rover_gym import HeightField
 from rover_gym.ground import spheres_of
 from rover_gym.live import LiveChoices, LiveRover, LiveScene
-from rover_gym.live.past import Past
+from rover_gym.live.live_state import Past
 from rover_gym.mechanics import OptionError, TerrainError
-from rover_gym.policy.policy_files import PolicyError
+from rover_gym.policy.policy_card import PolicyError
 
 
 def driven(rover: LiveRover, periods: int, forward: float = 1.0, turn: float = 0.0) -> LiveRover:

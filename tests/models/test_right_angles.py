@@ -7,7 +7,7 @@ import pytest
 from models.robot_files import body, joint, rover, write
 
 from rover_gym import RoverModel
-from rover_gym.models.right_angles import right_angle
+from rover_gym.models.robot_tree import right_angle
 
 pytest.importorskip("yourdfpy")
 

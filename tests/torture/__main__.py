@@ -13,7 +13,7 @@ from rich.console import Console
 from torture.ledger import Ledger
 from torture.pool import Task, play, side_by_side
 from torture.regimes import BY_NAME, REGIMES
-from torture.table import Row, console_table, write
+from torture.sizes import Row, console_table, write
 
 
 def _tasks(names: list[str], rounds: int, hours: float) -> Iterator[Task]:

@@ -30,11 +30,12 @@ from rover_gym import (
 from rover_gym.models import RobotFileWarning
 from rover_gym.planar import BallSimulation, Line, PlanarSnapshot, Polyline, Sine, Spline, TwoWheelRoverSimulation
 from rover_gym.policy import PolicyError, TrainedPolicy
-from rover_gym.policy.shipped import FOLDER
+from rover_gym.policy.policy_card import FOLDER
 from rover_gym.record import Recorder, RecordingError, RoverSampler, describe, read_run
-from rover_gym.soil import SoilSimulation, SoilSnapshot, read_soil_run, soil_packing
+from rover_gym.runs import open_run
+from rover_gym.soil import SoilRun, SoilSimulation, SoilSnapshot, soil_packing
 from torture.hostile import NUMBERS, TEXTS, THINGS
-from torture.ledger import Ledger
+from torture.ledger import Bounds, Ledger, Regime
 from torture.mutate import (
     mutate_bytes,
     mutate_hdf5,
@@ -43,7 +44,6 @@ from torture.mutate import (
     mutate_value,
     mutate_xml,
 )
-from torture.regime import Bounds, Regime
 
 Random = np.random.Generator
 SECRET = 1234.5678
@@ -138,7 +138,7 @@ def runs(random: Random, ledger: Ledger) -> None:
         mutate_hdf5(random, path, _elsewhere())
         run = attempt(ledger, "read_run", lambda: read_run(path), RecordingError, str(path))
         try:
-            read_soil_run(path)
+            open_run(path, SoilRun)
         except RecordingError:
             pass
         else:

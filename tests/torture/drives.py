@@ -9,8 +9,7 @@ import numpy as np
 from rover_gym import Plane, RoverModel, Simulation, SphereField
 from rover_gym.env import resting_pose, tilted_plane
 from torture.audit import Array, Audit
-from torture.ledger import Ledger
-from torture.regime import Bounds, Regime
+from torture.ledger import Bounds, Ledger, Regime
 
 Random = np.random.Generator
 VARIANTS = ("linearised", "newton")

@@ -21,8 +21,7 @@ from rover_gym.planar import (
 from rover_gym.soil import SoilSimulation, soil_packing
 from torture.audit import BLOWN_UP, GAIN, Array
 from torture.drives import log_uniform, variant
-from torture.ledger import Ledger
-from torture.regime import Bounds, Regime
+from torture.ledger import Bounds, Ledger, Regime
 
 Random = np.random.Generator
 

@@ -10,8 +10,7 @@ from rover_gym import OptionError, ProblemError
 from rover_gym import solve_friction_contact as solve
 from torture.audit import Array
 from torture.drives import log_uniform
-from torture.ledger import Ledger
-from torture.regime import Bounds, Regime
+from torture.ledger import Bounds, Ledger, Regime
 
 Random = np.random.Generator
 

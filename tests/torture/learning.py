@@ -12,8 +12,7 @@ from rover_gym.env import RoverEnv
 from rover_gym.vector import RoverVectorEnv
 from torture.audit import Audit
 from torture.drives import log_uniform
-from torture.ledger import Ledger
-from torture.regime import Bounds, Regime
+from torture.ledger import Bounds, Ledger, Regime
 
 Random = np.random.Generator
 Actions = npt.NDArray[np.float32]

@@ -14,9 +14,8 @@ from rover_gym import HeightField, RoverEnv, RoverModel, Simulation, SphereField
 from torture.audit import Audit
 from torture.damage import INPUTS, _folder, attempt, use
 from torture.drives import log_uniform, variant
-from torture.ledger import Ledger
+from torture.ledger import Bounds, Ledger, Regime
 from torture.mutate import mutate_array, mutate_bytes, mutate_value
-from torture.regime import Bounds, Regime
 
 Random = np.random.Generator
 

@@ -8,8 +8,7 @@ import time
 
 import numpy as np
 
-from torture.ledger import Ledger
-from torture.regime import Regime
+from torture.ledger import Ledger, Regime
 
 
 def _hang(_random: np.random.Generator, _ledger: Ledger) -> None:

@@ -13,8 +13,7 @@ import numpy as np
 from rover_gym import Plane, RoverEnv, RoverModel, Simulation, Snapshot, SphereField
 from torture.audit import Array
 from torture.drives import MODEL, log_uniform, pose, rocks, steer, tilted, variant
-from torture.ledger import Ledger
-from torture.regime import Bounds, Regime
+from torture.ledger import Bounds, Ledger, Regime
 
 Random = np.random.Generator
 

@@ -13,12 +13,10 @@ from torture import on_purpose
 from torture.audit import Audit
 from torture.drives import MODEL
 from torture.law import violation
-from torture.ledger import Ledger
+from torture.ledger import Bounds, Ledger, Regime
 from torture.pool import play, side_by_side
-from torture.regime import Bounds, Regime
 from torture.regimes import BY_NAME, REGIMES
-from torture.sizes import FINDS
-from torture.table import BEGIN, END, Row, write
+from torture.sizes import BEGIN, END, FINDS, Row, write
 
 
 def complaints(tasks: list[tuple[str, int]]) -> list[str]:

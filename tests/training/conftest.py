@@ -46,20 +46,6 @@ def enjoy() -> Script:
 
 @pytest.fixture(scope="session")
 def tune() -> Script:
-    """`tune.py`."""
+    """`examples/tune.py`."""
     pytest.importorskip("optuna", reason="the extra train is not installed")
-    return script("tune", "tune")
-
-
-@pytest.fixture(scope="session")
-def train_raw() -> Script:
-    """`train_raw.py`."""
-    pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
-    return script("train_raw", "train")
-
-
-@pytest.fixture(scope="session")
-def cleanrl() -> Script:
-    """`cleanrl_ppo.py`."""
-    pytest.importorskip("torch", reason="the extra train is not installed")
-    return script("cleanrl_ppo", "train")
+    return script("examples/tune", "tune")

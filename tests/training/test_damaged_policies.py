@@ -13,7 +13,7 @@ import pytest
 
 from rover_gym import RoverEnv
 from rover_gym.policy import Network, PolicyCard, PolicyError, TrainedPolicy, find_policy
-from rover_gym.policy.shipped import FOLDER
+from rover_gym.policy.policy_card import FOLDER
 
 
 @pytest.fixture

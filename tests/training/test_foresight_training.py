@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from rover_gym import OptionError, RoverEnv
-from rover_gym.learning.arc_outcomes import ArcOutcomes, try_arcs
-from rover_gym.learning.fit_forecast import fit_forecast
+from rover_gym.learning.fit_forecast import ArcOutcomes, fit_forecast, try_arcs
 from rover_gym.policy import ScanPolicy
-from rover_gym.policy.arc_forecast import ArcFeatures
+from rover_gym.policy.foresight_policy import ArcFeatures
 
 ARGUMENTS = {"terrain": "rocks", "difficulty": 1.0, **ScanPolicy.arguments()}
 

@@ -39,15 +39,15 @@ def test_train_ppo_trains_on_the_vector_of_the_core(name: str) -> None:
 
 def test_an_env_runner_of_rllib_has_one_vector_of_the_core(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("ray.rllib", reason="the extra rllib has an environment of its own")
-    monkeypatch.syspath_prepend(str(TRAINING))
+    monkeypatch.syspath_prepend(str(TRAINING / "examples"))
     from ray.rllib.env.single_agent_env_runner import SingleAgentEnvRunner  # noqa: PLC0415 - needs the extra
     from ray.tune.registry import register_env  # noqa: PLC0415
 
-    sys.modules.pop("train_rllib", None)
-    import train_rllib  # noqa: PLC0415
+    sys.modules.pop("rllib", None)
+    import rllib  # noqa: PLC0415
 
-    register_env("Rover", train_rllib.make_rovers)
-    config = train_rllib.configuration(workers=0, envs=4, batch=128, environment={"max_episode_steps": 20}, seed=1)
+    register_env("Rover", rllib.make_rovers)
+    config = rllib.configuration(workers=0, envs=4, batch=128, environment={"max_episode_steps": 20}, seed=1)
     runner = SingleAgentEnvRunner(config=config, worker_index=0)
     assert type(runner.env.unwrapped) is RoverVectorEnv
     assert runner.num_envs == 4

@@ -16,7 +16,6 @@ from validation import (
     balance,
     ball_balance,
     ball_collapse,
-    ball_drawing,
     ball_drum,
     ball_impact,
     ball_janssen,
@@ -28,7 +27,6 @@ from validation import (
     findings,
     hourglass,
     janssen,
-    lab_drawing,
     packing,
     plate_on_balls,
     repose,
@@ -57,7 +55,7 @@ PARTS: dict[str, ModuleType] = {
     "wheel_on_balls": wheel_on_balls,
     "plate_on_balls": plate_on_balls,
 }
-PICTURES = drawing.PICTURES | ball_drawing.PICTURES | lab_drawing.PICTURES
+PICTURES = drawing.PICTURES
 
 
 def _cpu_seconds() -> float:

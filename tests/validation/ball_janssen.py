@@ -12,7 +12,7 @@ from rover_gym.mechanics import Silo
 from validation.ball_silo import filled
 from validation.balls import DENSITY, DIAMETER, Array
 from validation.janssen import determination, law, saturation
-from validation.watch import GRAVITY, Ledger, Watched
+from validation.watch import GRAVITY, Ledger, Watched, means_by
 
 FRICTION = 0.5
 #: Packing fraction that turns a mass into a height.
@@ -113,13 +113,7 @@ def fitted(runs: list[dict[str, float]]) -> float:
 
 def means(runs: list[dict[str, float]]) -> list[dict[str, float]]:
     """Means of each number of balls over the seeds, with the standard error of the borne mass."""
-    rows = []
-    for count in COUNTS:
-        chosen = [run for run in runs if run["count"] == count]
-        borne = np.array([run["borne"] for run in chosen])
-        row = {name: float(np.mean([run[name] for run in chosen])) for name in ("filling", "borne", "wall_friction")}
-        rows.append({"count": count, **row, "error": float(borne.std(ddof=1) / np.sqrt(len(borne)))})
-    return rows
+    return means_by(runs, "count", COUNTS, {"borne": "error"}, ("filling", "wall_friction"))
 
 
 def farthest(rows: list[dict[str, float]], mass: float) -> float:

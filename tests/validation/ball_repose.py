@@ -8,15 +8,14 @@ import numpy as np
 
 from rover_gym.grains import surface_map
 from validation.balls import DIAMETER, RADIUS, Array, Balls, free, loose, settle, slow
-from validation.watch import Ledger
+from validation.repose import angle
+from validation.watch import Ledger, means_by
 
 FRICTIONS = (0.1, 0.2, 0.3, 0.5, 0.8)
 SEEDS = range(4)
 COUNT = 1100
 #: Length of the floor and distance of the smooth sides, diameters.
 LENGTH, WIDTH = 22.0, 6.0
-#: Shares of a heap's height between which its flank is taken.
-HIGH, LOW = 0.8, 0.2
 TIME_STEP = 2e-3  # s
 
 
@@ -35,14 +34,6 @@ def profile(position: Array, radius: Array, length: float) -> tuple[Array, Array
     known = np.isfinite(surface.heights).mean(axis=0) > 0.5
     heights = np.nanmean(surface.heights[:, known], axis=0)
     return columns, np.interp(columns, surface.x[known], heights, right=0.0)
-
-
-def flank(x: Array, y: Array) -> float:
-    """Degrees of a line through the surface between HIGH and LOW of its height."""
-    top = float(y.max())
-    begin = int(np.flatnonzero(y > HIGH * top)[-1])
-    used = (np.arange(len(x)) >= begin) & (y > LOW * top)
-    return float(np.degrees(np.arctan(-np.polyfit(x[used], y[used], 1)[0])))
 
 
 def slope(
@@ -86,7 +77,7 @@ def slope(
     return {
         "friction": friction,
         "seed": seed,
-        "angle": flank(x, y),
+        "angle": angle(x, y),
         "stays": float(kept.sum() / count),
         "seconds": float(sim.time),
         "surface": [(x / DIAMETER).round(3).tolist(), (y / DIAMETER).round(3).tolist()],
@@ -102,11 +93,4 @@ def measure(ledger: Ledger) -> dict[str, object]:
 
 def means(runs: list[dict[str, Any]]) -> list[dict[str, float]]:
     """Mean angle and share that stays for each friction, with their standard errors."""
-    rows = []
-    for mu in FRICTIONS:
-        row = {"friction": mu}
-        for name, error in (("angle", "error"), ("stays", "stays_error")):
-            values = np.array([run[name] for run in runs if run["friction"] == mu], dtype=float)
-            row |= {name: float(values.mean()), error: float(values.std(ddof=1) / np.sqrt(len(values)))}
-        rows.append(row)
-    return rows
+    return means_by(runs, "friction", FRICTIONS, {"angle": "error", "stays": "stays_error"})

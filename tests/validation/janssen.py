@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from validation.samples import DIAMETER, Array, glued_row, loose, settle, sides
-from validation.watch import GRAVITY, Ledger, Watched
+from validation.watch import GRAVITY, Ledger, Watched, means_by
 
 FRICTION = 0.5
 WALL_FRICTION = 0.5
@@ -95,13 +95,7 @@ def saturation(filling: Array, borne: Array) -> float:
 
 def means(runs: list[dict[str, float]]) -> list[dict[str, float]]:
     """Means of each height over the seeds, with the standard error of the borne mass."""
-    rows = []
-    for height in HEIGHTS:
-        chosen = [r for r in runs if r["height"] == height]
-        borne = np.array([r["borne"] for r in chosen])
-        row = {name: float(np.mean([r[name] for r in chosen])) for name in ("filling", "borne", "wall_friction")}
-        rows.append({"height": height, **row, "error": float(borne.std(ddof=1) / np.sqrt(len(borne)))})
-    return rows
+    return means_by(runs, "height", HEIGHTS, {"borne": "error"}, ("filling", "wall_friction"))
 
 
 def measure(ledger: Ledger) -> dict[str, object]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from validation.pool import Run, side_by_side
 from validation.samples import DIAMETER, Array, box, glued_row, loose, settle, slow
-from validation.watch import Ledger
+from validation.watch import Ledger, means_by
 
 FRICTIONS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7)
 LENGTH, COUNT = 60.0, 900
@@ -89,13 +89,7 @@ def measure(ledger: Ledger) -> dict[str, object]:
 
 def means(runs: list[Run]) -> list[dict[str, float]]:
     """Mean angle and share that stays for each friction, with their standard errors, and the range of the angles."""
-    rows = []
-    for mu in FRICTIONS:
-        row = {"friction": mu}
-        for name, error in (("angle", "error"), ("stays", "stays_error")):
-            values = np.array([r[name] for r in runs if r["friction"] == mu], dtype=float)
-            row |= {name: float(values.mean()), error: float(values.std(ddof=1) / np.sqrt(len(values)))}
-            if name == "angle":
-                row["spread"] = float(np.ptp(values))
-        rows.append(row)
+    rows = means_by(runs, "friction", FRICTIONS, {"angle": "error", "stays": "stays_error"})
+    for row in rows:
+        row["spread"] = float(np.ptp([run["angle"] for run in runs if run["friction"] == row["friction"]]))
     return rows

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
@@ -133,3 +135,25 @@ class Watched:
         scale = float(np.abs(impulse).sum() + np.abs(pull).sum() + self._mass @ speeds)
         if scale > 0.0:
             self.ledger.momentum = max(self.ledger.momentum, float(error) / scale)
+
+
+def means_by(
+    runs: list[dict[str, Any]], key: str, values: Iterable[float], errors: Mapping[str, str], others: Iterable[str] = ()
+) -> list[dict[str, float]]:
+    """A row for each value of a key: means over the runs that have it, some with their standard errors.
+
+    Args:
+        runs: The runs.
+        key: What is told apart.
+        values: Of the key.
+        errors: Names of the quantities, and of their standard errors.
+        others: Quantities of which the mean is enough.
+    """
+    rows = []
+    for value in values:
+        chosen = [run for run in runs if run[key] == value]
+        row = {key: value} | {name: float(np.mean([run[name] for run in chosen])) for name in (*errors, *others)}
+        for name, error in errors.items():
+            row[error] = float(np.std([run[name] for run in chosen], ddof=1) / np.sqrt(len(chosen)))
+        rows.append(row)
+    return rows

@@ -5,22 +5,18 @@ from typing import Annotated
 
 import typer
 
-from rover_gym.cli.baseline_command import baseline
-from rover_gym.cli.console import DEBUG, one_line
+from rover_gym.cli.console import DEBUG, one_line, say_first_steps
 from rover_gym.cli.dataset_command import dataset
 from rover_gym.cli.drive_command import drive
-from rover_gym.cli.evaluate_command import evaluate
+from rover_gym.cli.evaluate_command import baseline, evaluate
 from rover_gym.cli.export_command import export
-from rover_gym.cli.first_steps import say_first_steps
-from rover_gym.cli.grains_command import grains
+from rover_gym.cli.grains_command import grains, pit, track
+from rover_gym.cli.grains_command import rover as rover_on_bed
 from rover_gym.cli.grains_lab_commands import plate, shear, wheel
-from rover_gym.cli.grains_rover_commands import pit, track
-from rover_gym.cli.grains_rover_commands import rover as rover_on_bed
 from rover_gym.cli.live_command import live
 from rover_gym.cli.model_command import model
 from rover_gym.cli.planar_commands import planar
-from rover_gym.cli.plot_command import plot
-from rover_gym.cli.replay_command import replay
+from rover_gym.cli.replay_command import plot, replay
 from rover_gym.cli.report_command import report
 from rover_gym.cli.scene_command import scene
 from rover_gym.cli.speed_command import speed

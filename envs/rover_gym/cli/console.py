@@ -3,26 +3,31 @@
 import errno
 import functools
 import inspect
+import json
 import math
 import os
 import stat
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import asdict, dataclass, is_dataclass
 from pathlib import Path
-from typing import NoReturn, ParamSpec, TextIO, TypeVar
+from typing import Annotated, Any, NoReturn, ParamSpec, TextIO, TypeVar
 
+import numpy as np
 import typer
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
 from typer.models import ArgumentInfo
 
 from rover_gym.extras import MissingExtraError
-from rover_gym.mechanics import OptionError, RoverGymError
+from rover_gym.mechanics import OptionError, RoverGymError, __version__
 from rover_gym.models import RobotFileWarning
 from rover_gym.validation import refuse
 
 P = ParamSpec("P")
+
 R = TypeVar("R")
 
 #: Arguments that an option of another name sets: the command's parameter, and the option.
@@ -46,6 +51,7 @@ SET_BY = {
     "options.position": ("start", "--start"),
     "options.goal": ("goal", "--goal"),
 }
+
 #: The same of what a command takes by its place: the name in errors, and the command's parameters.
 PLACED = (
     ("path", "run"),
@@ -55,12 +61,16 @@ PLACED = (
     ("policy", "policies"),
     ("configuration", "config"),
 )
+
 #: If set to any value, the commands show the traceback of an error.
 DEBUG = "ROVER_DEBUG"
 
 MENDABLE, UNFORESEEN, INTERRUPTED = 2, 1, 130  # exit codes
+
 LONGEST_LINE = 600
+
 LARGEST_SEED = 2**63 - 1
+
 MOST_EPISODES = 1_000_000
 
 
@@ -243,3 +253,127 @@ def _check_finite(name: str, value: object) -> None:
     for entry in entries:
         if isinstance(entry, float) and not math.isfinite(entry):
             refuse(OptionError, name, entry, "must be finite")
+
+
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON on standard output, and nothing else.")]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of a table of results.
+
+    Attributes:
+        label: What it is.
+        text: Its value as a person reads it, with its unit.
+        values: The same as JSON says it, by names of their own; numbers in SI units.
+    """
+
+    label: str
+    text: str
+    values: Mapping[str, Any]
+
+
+def row(label: str, text: str, **values: Any) -> Row:
+    """One line of a table of results, with its values for JSON."""
+    return Row(label, text, values)
+
+
+class Results:
+    """Says results as they come, or, for programs, as one JSON object at the end of its block.
+
+    Args:
+        as_json: Whether standard output gets JSON and nothing else.
+    """
+
+    def __init__(self, *, as_json: bool) -> None:
+        self.as_json = as_json
+        self._values: dict[str, Any] = {}
+        self._written: list[Path] = []
+
+    def __enter__(self) -> "Results":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        """Prints the object, also where the command ends early by itself or by an interruption."""
+        if self.as_json and (kind is None or issubclass(kind, (typer.Exit, KeyboardInterrupt))):
+            written = {"written": self._written} if self._written else {}
+            typer.echo(json.dumps(plain(self._values | written), indent=2))
+
+    def add(self, **values: Any) -> None:
+        """Adds values to the JSON object."""
+        self._values |= values
+
+    def show(self, what: RenderableType) -> None:
+        """Prints a table or a line for people."""
+        if not self.as_json:
+            console().print(what, markup=False) if isinstance(what, str) else console().print(what)
+
+    def table(self, title: str, rows: Sequence[Row], part: str | None = None) -> None:
+        """Prints results line by line, or adds them to the JSON object, where `part` names an object within it."""
+        values: dict[str, Any] = {"title": title}
+        for line in rows:
+            values |= line.values
+        self.add(**(values if part is None else {part: values}))
+        table = Table(title=title, show_header=False, title_justify="left")
+        for line in rows:
+            table.add_row(line.label, line.text)
+        self.show(table)
+
+    def path(self, what: str, path: Path) -> None:
+        """Says where a file was written."""
+        self._written.append(path)
+        if not self.as_json:
+            say_path(what, path)
+
+    @contextmanager
+    def keeping(self, what: str, *paths: Path) -> Iterator[None]:
+        """If the user interrupts the block, says which files hold the results so far."""
+        try:
+            yield
+        except KeyboardInterrupt:
+            for path in paths:
+                if path.exists():
+                    self.path(f"{what}, incomplete", path)
+            raise
+
+
+@contextmanager
+def status(text: str) -> Iterator[None]:
+    """Shows a line on standard error while the block runs, if that is a terminal."""
+    with Console(stderr=True).status(text):
+        yield
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON can say it: NaN and infinity, which it lacks, are null."""
+    if is_dataclass(value) and not isinstance(value, type):
+        value = asdict(value)
+    if isinstance(value, Mapping):
+        return {str(name): plain(entry) for name, entry in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, (list, tuple, range)):
+        return [plain(entry) for entry in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return str(value) if isinstance(value, Path) else value
+
+
+#: Commands that a newcomer can type in this order, with what they do.
+FIRST_STEPS = (
+    ("rover drive", "drive to a goal on flat ground, and tell how it went"),
+    ("rover drive --difficulty 1 --policy scan --output runs/first", "find a way among rocks, and keep the run"),
+    ("rover replay runs/first/episode-0.h5 --html runs/first/replay.html", "watch that run in the browser"),
+    ("rover plot runs/first/episode-0.h5", "look at its path, wheel loads, slip and energy"),
+)
+
+
+def say_first_steps() -> None:
+    """Prints the first steps, and where to go on."""
+    typer.echo(f"rover-gym {__version__}: a six-wheel Mars rover in a nonsmooth simulator\n\nTry first:\n")
+    for command, meaning in FIRST_STEPS:
+        typer.echo(f"  {command}\n      {meaning}\n")
+    typer.echo("Recording, replay and plots need the extra demo: pip install 'rover-gym[demo]'.")
+    typer.echo("All commands: rover --help. Completion by the Tab key: rover --install-completion.")

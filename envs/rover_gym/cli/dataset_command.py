@@ -9,14 +9,13 @@ import gymnasium as gym
 import typer
 
 from rover_gym.cli.console import LARGEST_SEED, MOST_EPISODES, plain_errors, progress_bar, say_path
-from rover_gym.cli.drivers import DRIVERS_HELP, driver_title, named_driver
-from rover_gym.cli.scene_options import BUILT_IN, ModelName, named_model
+from rover_gym.cli.options import BUILT_IN, DRIVERS_HELP, ModelName, driver_title, named_driver, named_model
 from rover_gym.exports.minari_data import write_dataset
 from rover_gym.extras import require
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.episodes import Policy
 from rover_gym.policy.pd_policy import find_rover_env
-from rover_gym.policy.random_policy import RandomPolicy
+from rover_gym.policy.trained_policy import RandomPolicy
 from rover_gym.registration import ENVIRONMENTS
 from rover_gym.validation import refuse
 

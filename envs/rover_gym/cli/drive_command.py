@@ -14,41 +14,48 @@ import typer
 from rich.progress import Progress
 from rich.table import Table
 
-from rover_gym.cli.completion import complete_policy
 from rover_gym.cli.console import (
     INTERRUPTED,
     LARGEST_SEED,
     MOST_EPISODES,
+    AsJson,
+    Results,
     check_file,
     check_folder,
     plain_errors,
     progress_bar,
 )
-from rover_gym.cli.drivers import DRIVERS_HELP, driver_title, named_driver
-from rover_gym.cli.film_options import FilmAntialiasing, FilmCamera, FilmForces, FilmSize, film_options
-from rover_gym.cli.results import AsJson, Results
-from rover_gym.cli.scene_options import (
+from rover_gym.cli.options import (
     BUILT_IN,
+    DRIVERS_HELP,
+    FilmAntialiasing,
+    FilmCamera,
+    FilmForces,
+    FilmSize,
     HeightRange,
     ModelName,
     Spacing,
     Start,
     TerrainName,
     chosen_terrain,
+    complete_policy,
+    driver_title,
     environment_of,
     environment_title,
+    film_options,
+    named_driver,
     named_ground,
     named_model,
     warn_of_slope,
 )
-from rover_gym.env.rewards import WEIGHTS
+from rover_gym.env.reward_terms import WEIGHTS
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError
+from rover_gym.policy.comparison import EpisodeFilm
 from rover_gym.policy.episodes import Episode, Policy, run_episode
-from rover_gym.policy.films import EpisodeFilm
-from rover_gym.record.channels import Channel, RoverSampler
-from rover_gym.record.facts import describe
+from rover_gym.record.channels import Channel, RoverSampler, describe
 from rover_gym.record.recorder import Recorder
+from rover_gym.record.rover_run import OF_EPISODES
 from rover_gym.validation import number, refuse
 
 CONTROL_PERIOD = 0.05  # s, of Rover-v0
@@ -246,9 +253,7 @@ class _Tape:
         self._sampler = RoverSampler(rover.model)
         channels = (
             *self._sampler.channels,
-            Channel("distance_to_goal", "m", "horizontal distance from the trunk's origin to the goal"),
-            Channel("slip_ratio", "1", "mean over the wheels in contact of rim slip over the faster of rim and ground"),
-            Channel("motor_energy", "J", "work through the wheel motors since the start, driving or braking"),
+            *OF_EPISODES,
             Channel("reward_terms", "1", "terms of the step's reward", (len(WEIGHTS),), tuple(WEIGHTS)),
         )
         scene = {**arguments, **asdict(rover.start), **_rocks(rover), "control_period": rover.dt}

@@ -7,7 +7,7 @@ import gymnasium as gym
 import typer
 
 from rover_gym.cli.console import LARGEST_SEED, check_file, plain_errors, progress_bar, say_path
-from rover_gym.cli.scene_options import (
+from rover_gym.cli.options import (
     BUILT_IN,
     FRICTION,
     HeightRange,
@@ -21,7 +21,7 @@ from rover_gym.cli.scene_options import (
     warn_of_slope,
 )
 from rover_gym.exports.fmu import fmu_library, write_fmu
-from rover_gym.exports.mcap_run import FPS, write_mcap
+from rover_gym.exports.mcap_writer import FPS, write_mcap
 from rover_gym.exports.onnx_policy import write_onnx
 from rover_gym.extras import require
 from rover_gym.mechanics import OptionError

@@ -1,74 +1,107 @@
 """`rover grains plate|shear|wheel`: the virtual laboratory on a bed of balls, with tables and fitted laws."""
 
 import math
-from pathlib import Path
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rover_gym.cli.console import LARGEST_SEED, check_folder, plain_errors, progress_bar
-from rover_gym.cli.results import AsJson, Results, Row, row, status
+from rover_gym.cli.console import (
+    AsJson,
+    Results,
+    Row,
+    check_folder,
+    plain_errors,
+    progress_bar,
+    row,
+    status,
+)
+from rover_gym.cli.grains_options import EARTH, FOLDER, Balls, Friction, Gravity, Output, Seed, TimeStep, Tolerance
+from rover_gym.cli.options import takes
 from rover_gym.validation import number
 
 if TYPE_CHECKING:
     from rover_gym.grains.ball_bed import BallBed
     from rover_gym.grains.lab.fits import ShearLaw
 
-EARTH = 9.81  # m/s^2
 
-Balls = Annotated[int, typer.Option(min=1, max=1_000_000, help="Number of balls.")]
-BallRadius = Annotated[float, typer.Option(help="Mean radius of the balls, m; radii differ by a fifth.")]
-Width = Annotated[float, typer.Option(help="Length of the bed along x, m.")]
-Depth = Annotated[float, typer.Option(help="Width of the bed across, m.")]
-Friction = Annotated[float, typer.Option(help="Friction coefficient between balls.")]
-ToolFriction = Annotated[float, typer.Option(help="Friction coefficient between the tool and balls.")]
-Gravity = Annotated[float, typer.Option(min=1e-3, max=1e3, help="Gravity, m/s^2.")]
-Speed = Annotated[float, typer.Option(help="Speed of the tool, m/s.")]
 Samples = Annotated[int, typer.Option(min=4, max=10_000, help="Rows of the table.")]
-TimeStep = Annotated[float, typer.Option(help="Time step, s.")]
-Tolerance = Annotated[float, typer.Option(help="Largest relative residual of the contact solver.")]
-Seed = Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the balls' radii and places.")]
-Output = Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)]
-
-FOLDER = Path("runs/grains")
 SPREAD = 0.2  # of the radii about their mean
 
 
+@dataclass(frozen=True)
+class Bench:
+    """The bed of a test, and what it is measured with."""
+
+    balls: Balls = 1500
+    ball_radius: Annotated[float, typer.Option(help="Mean radius of the balls, m; radii differ by a fifth.")] = 0.007
+    width: Annotated[float, typer.Option(help="Length of the bed along x, m.")] = 0.2
+    depth: Annotated[float, typer.Option(help="Width of the bed across, m.")] = 0.2
+    friction: Friction = 0.5
+    tool_friction: Annotated[float, typer.Option(help="Friction coefficient between the tool and balls.")] = 0.5
+    gravity: Gravity = EARTH
+    speed: Annotated[float, typer.Option(help="Speed of the tool, m/s.")] = 0.05
+    time_step: TimeStep = 2e-3
+    tolerance: Tolerance = 3e-3
+    seed: Seed = 0
+    output: Output = FOLDER
+    as_json: AsJson = False
+
+    def __post_init__(self) -> None:
+        check_folder("output", self.output)
+        number("ball_radius", self.ball_radius, above=0.0)
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options of `GrainSimulation`."""
+        names = ("friction", "time_step", "tolerance")
+        return {name: getattr(self, name) for name in names} | {"gravity": (0.0, -self.gravity, 0.0)}
+
+    def bed(self) -> "BallBed":
+        """The settled bed."""
+        from rover_gym.grains.ball_bed import settled_balls  # noqa: PLC0415 - h5py is slow to load
+
+        with status("settling the bed"):
+            return settled_balls(
+                self.balls,
+                self.width,
+                self.depth,
+                radius_min=(1.0 - SPREAD) * self.ball_radius,
+                radius_max=(1.0 + SPREAD) * self.ball_radius,
+                seed=self.seed,
+                friction=self.friction,
+                gravity=(0.0, -self.gravity, 0.0),
+            )
+
+
 @plain_errors
+@takes(Bench)
 def plate(
+    given: Bench,
     *,
     radius: Annotated[float, typer.Option(help="Radius of the plate, m.")] = 0.04,
     sinkage: Annotated[float, typer.Option(help="Depth to which the plate is pushed, m.")] = 0.02,
-    balls: Balls = 1500,
-    ball_radius: BallRadius = 0.007,
-    width: Width = 0.2,
-    depth: Depth = 0.2,
-    friction: Friction = 0.5,
-    tool_friction: ToolFriction = 0.5,
-    gravity: Gravity = EARTH,
-    speed: Speed = 0.05,
     samples: Samples = 25,
-    time_step: TimeStep = 2e-3,
-    tolerance: Tolerance = 3e-3,
-    seed: Seed = 0,
-    output: Output = FOLDER,
-    as_json: AsJson = False,
 ) -> None:
     """Push a round plate into a bed of balls; write pressure against depth and fit k zⁿ."""
     from rover_gym.grains.lab import fit_pressure, plate_test, write_table  # noqa: PLC0415 - h5py is slow to load
 
-    check_folder("output", output)
-    options = _options(friction, gravity, time_step, tolerance)
-    number("ball_radius", ball_radius, above=0.0)
+    options = given.options
     number("sinkage", sinkage, above=0.0)
-    bed = _bed(balls, ball_radius, width, depth, seed, friction, gravity)
+    bed = given.bed()
     with status("pushing the plate"):
         points = plate_test(
-            bed, radius, depth=sinkage, speed=speed, samples=samples, plate_friction=tool_friction, **options
+            bed,
+            radius,
+            depth=sinkage,
+            speed=given.speed,
+            samples=samples,
+            plate_friction=given.tool_friction,
+            **options,
         )
-    output.mkdir(parents=True, exist_ok=True)
-    with Results(as_json=as_json) as results:
-        results.path("table", write_table(points, output / "plate.csv"))
+    given.output.mkdir(parents=True, exist_ok=True)
+    with Results(as_json=given.as_json) as results:
+        results.path("table", write_table(points, given.output / "plate.csv"))
         law = fit_pressure(points)
         rows = [
             row("k", f"{law.k:.3g} ± {law.k_error:.2g} N/m^(n+2)", k=law.k, k_error=law.k_error),
@@ -78,7 +111,9 @@ def plate(
 
 
 @plain_errors
+@takes(Bench)
 def shear(
+    given: Bench,
     *,
     normal_stress: Annotated[list[float], typer.Option(help="Normal stress, Pa; may be given several times.")] = [  # noqa: B006 - typer copies it
         2000.0,
@@ -86,29 +121,14 @@ def shear(
     ],
     radius: Annotated[float, typer.Option(help="Radius of the disc, m.")] = 0.05,
     displacement: Annotated[float, typer.Option(help="Mean displacement of the disc's area, m.")] = 0.02,
-    balls: Balls = 1500,
-    ball_radius: BallRadius = 0.007,
-    width: Width = 0.2,
-    depth: Depth = 0.2,
-    friction: Friction = 0.5,
-    tool_friction: ToolFriction = 0.5,
-    gravity: Gravity = EARTH,
-    speed: Speed = 0.05,
     samples: Samples = 25,
-    time_step: TimeStep = 2e-3,
-    tolerance: Tolerance = 3e-3,
-    seed: Seed = 0,
-    output: Output = FOLDER,
-    as_json: AsJson = False,
 ) -> None:
     """Turn a loaded disc with vanes on a bed of balls; write shear stress against displacement and fit its laws."""
     from rover_gym.grains.lab import fit_shear, fit_strength, shear_test, write_table  # noqa: PLC0415 - h5py is slow
 
-    check_folder("output", output)
-    options = _options(friction, gravity, time_step, tolerance)
-    number("ball_radius", ball_radius, above=0.0)
-    bed = _bed(balls, ball_radius, width, depth, seed, friction, gravity)
-    with Results(as_json=as_json) as results:
+    options = given.options
+    bed = given.bed()
+    with Results(as_json=given.as_json) as results:
         laws: list[ShearLaw] = []
         for stress in normal_stress:
             with status(f"shearing under {stress:g} Pa"):
@@ -117,13 +137,13 @@ def shear(
                     stress,
                     radius=radius,
                     displacement=displacement,
-                    speed=speed,
+                    speed=given.speed,
                     samples=samples,
-                    disc_friction=tool_friction,
+                    disc_friction=given.tool_friction,
                     **options,
                 )
-            output.mkdir(parents=True, exist_ok=True)
-            results.path("table", write_table(points, output / f"shear-{stress:g}Pa.csv"))
+            given.output.mkdir(parents=True, exist_ok=True)
+            results.path("table", write_table(points, given.output / f"shear-{stress:g}Pa.csv"))
             laws.append(fit_shear(points))
         rows = [_law(law) for law in laws]
         if len({law.normal_stress for law in laws}) > 1:
@@ -144,7 +164,9 @@ def _law(law: "ShearLaw") -> Row:
 
 
 @plain_errors
+@takes(Bench, ball_radius=0.008, width=0.33, depth=0.16)
 def wheel(
+    given: Bench,
     *,
     slip: Annotated[list[float], typer.Option(help="Slip, from -1 to below 1; may be given several times.")] = [  # noqa: B006 - typer copies it
         0.0,
@@ -158,28 +180,13 @@ def wheel(
     wheel_width: Annotated[float, typer.Option(help="Width of the wheel, m.")] = 0.05,
     run_in: Annotated[float, typer.Option(help="Travel that is not measured, m.")] = 0.05,
     distance: Annotated[float, typer.Option(help="Travel that is measured, m.")] = 0.1,
-    balls: Balls = 1500,
-    ball_radius: BallRadius = 0.008,
-    width: Width = 0.33,
-    depth: Depth = 0.16,
-    friction: Friction = 0.5,
-    tool_friction: ToolFriction = 0.5,
-    gravity: Gravity = EARTH,
-    speed: Speed = 0.05,
-    time_step: TimeStep = 2e-3,
-    tolerance: Tolerance = 3e-3,
-    seed: Seed = 0,
-    output: Output = FOLDER,
-    as_json: AsJson = False,
 ) -> None:
     """Drive a wheel over a bed of balls; write pull, lateral force, torque and sinkage against slip."""
     from rover_gym.grains.lab import fit_pull, wheel_test, write_table  # noqa: PLC0415 - h5py is slow to load
 
-    check_folder("output", output)
-    options = _options(friction, gravity, time_step, tolerance)
-    number("ball_radius", ball_radius, above=0.0)
+    options = given.options
     number("slip_angle", slip_angle, at_least=-90.0, at_most=90.0)
-    bed = _bed(balls, ball_radius, width, depth, seed, friction, gravity)
+    bed = given.bed()
     with progress_bar() as bar:
         task = bar.add_task("wheel", total=len(slip), state="")
         points = wheel_test(
@@ -189,16 +196,16 @@ def wheel(
             load=load,
             radius=radius,
             width=wheel_width,
-            speed=speed,
+            speed=given.speed,
             run_in=run_in,
             distance=distance,
-            wheel_friction=tool_friction,
+            wheel_friction=given.tool_friction,
             progress=lambda done: bar.update(task, completed=done, state=f"{done} of {len(slip)}"),
             **options,
         )
-    output.mkdir(parents=True, exist_ok=True)
-    with Results(as_json=as_json) as results:
-        results.path("table", write_table(points, output / "wheel.csv"))
+    given.output.mkdir(parents=True, exist_ok=True)
+    with Results(as_json=given.as_json) as results:
+        results.path("table", write_table(points, given.output / "wheel.csv"))
         results.add(points=points)
         rows = [
             row(
@@ -214,27 +221,4 @@ def wheel(
             fit = fit_pull(points)
             numbers = ", ".join(f"{e.value:.3f}" for e in (fit.limit, fit.free_slip, fit.scale))
             rows.append(row("A, s₀, K", numbers, fit=fit))
-        results.table(f"wheel on {balls} balls", rows)
-
-
-def _options(friction: float, gravity: float, time_step: float, tolerance: float) -> dict[str, Any]:
-    """The options of `GrainSimulation`."""
-    return {"friction": friction, "gravity": (0.0, -gravity, 0.0), "time_step": time_step, "tolerance": tolerance}
-
-
-def _bed(
-    balls: int, ball_radius: float, width: float, depth: float, seed: int, friction: float, gravity: float
-) -> "BallBed":
-    from rover_gym.grains.ball_bed import settled_balls  # noqa: PLC0415 - h5py is slow to load
-
-    with status("settling the bed"):
-        return settled_balls(
-            balls,
-            width,
-            depth,
-            radius_min=(1.0 - SPREAD) * ball_radius,
-            radius_max=(1.0 + SPREAD) * ball_radius,
-            seed=seed,
-            friction=friction,
-            gravity=(0.0, -gravity, 0.0),
-        )
+        results.table(f"wheel on {given.balls} balls", rows)

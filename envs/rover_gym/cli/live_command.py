@@ -6,17 +6,18 @@ from typing import Annotated
 
 import typer
 
-from rover_gym.cli.completion import complete_policy
 from rover_gym.cli.console import check_folder, plain_errors
-from rover_gym.cli.drivers import DRIVERS_HELP, named_driver
-from rover_gym.cli.scene_options import (
+from rover_gym.cli.options import (
     BUILT_IN,
+    DRIVERS_HELP,
     FRICTION,
     HeightRange,
     ModelName,
     Spacing,
     TerrainName,
     chosen_terrain,
+    complete_policy,
+    named_driver,
     named_ground,
     named_model,
 )

@@ -10,12 +10,11 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from rover_gym.cli.completion import complete_model
-from rover_gym.cli.console import check_file, plain_errors
-from rover_gym.cli.results import AsJson, Results
+from rover_gym.cli.console import AsJson, Results, check_file, plain_errors
+from rover_gym.cli.options import complete_model
 from rover_gym.extras import MissingExtraError, require
 from rover_gym.figures.model_drawing import write_model_picture
-from rover_gym.figures.saving import check_format
+from rover_gym.figures.style import check_format
 from rover_gym.mechanics import ModelError, OptionError, RoverModel
 from rover_gym.models import ImportReport, Statics, check_statics, open_model, read_robot, solid_rows
 from rover_gym.validation import refuse

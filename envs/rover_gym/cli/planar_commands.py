@@ -1,16 +1,16 @@
 """`rover planar ball|rover|soil`: the planar systems of the report's chapter 3."""
 
 import math
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 
-from rover_gym.cli.console import check_folder, plain_errors, progress_bar
-from rover_gym.cli.results import AsJson, Results, row
-from rover_gym.cli.scene_options import warn_of_slope
+from rover_gym.cli.console import AsJson, Results, check_folder, plain_errors, progress_bar, row
+from rover_gym.cli.options import takes, warn_of_slope
 from rover_gym.cli.soil_command import soil
 from rover_gym.mechanics import (
     BallSimulation,
@@ -22,8 +22,8 @@ from rover_gym.mechanics import (
     Spline,
     TwoWheelRoverSimulation,
 )
-from rover_gym.planar.planar_recording import PlanarGround, describe_planar, record_planar
-from rover_gym.planar.planar_run import read_planar_run
+from rover_gym.planar.planar_run import PlanarGround, PlanarRun, describe_planar, record_planar
+from rover_gym.runs import open_run
 from rover_gym.validation import number, refuse
 
 planar = typer.Typer(
@@ -45,103 +45,93 @@ class PlanarGroundKind(StrEnum):
     table = "table"
 
 
-GroundOption = Annotated[PlanarGroundKind, typer.Option("--ground", help="The ground.")]
-Slope = Annotated[float, typer.Option(help="Slope of the line, degrees, rising forward.")]
-Amplitude = Annotated[float, typer.Option(help="Amplitude of the sine, m.")]
-Wavelength = Annotated[float, typer.Option(help="Wavelength of the sine, m.")]
-Height = Annotated[float, typer.Option(help="Height of the step at x = 2 m.")]
-TableFile = Annotated[
-    Path | None, typer.Option(exists=True, dir_okay=False, help="Text file with columns x and y, m, for 'table'.")
-]
-Friction = Annotated[float, typer.Option(help="Friction coefficient.")]
-Restitution = Annotated[float, typer.Option(help="Coefficient of restitution.")]
-TimeStep = Annotated[float, typer.Option(help="Time step, s.")]
-Duration = Annotated[
-    float | None,
-    typer.Option(min=0.01, max=1000.0, help="Time to simulate, s. Default: until the distance is gone, at most 10 s."),
-]
-Distance = Annotated[
-    float | None,
-    typer.Option(min=0.01, max=1e6, help="Way along x at which the run ends, m. Default: 6 m; with a duration, none."),
-]
-Speed = Annotated[float, typer.Option(min=-1e4, max=1e4, help="Forward speed at the start, m/s.")]
-Output = Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)]
+@dataclass(frozen=True)
+class Course:
+    """The ground of a planar machine, and how it is simulated and recorded."""
+
+    ground: Annotated[PlanarGroundKind, typer.Option("--ground", help="The ground.")] = PlanarGroundKind.line
+    slope: Annotated[float, typer.Option(help="Slope of the line, degrees, rising forward.")] = -10.0
+    amplitude: Annotated[float, typer.Option(help="Amplitude of the sine, m.")] = 0.5
+    wavelength: Annotated[float, typer.Option(help="Wavelength of the sine, m.")] = 4.0
+    height: Annotated[float, typer.Option(help="Height of the step at x = 2 m.")] = 0.05
+    table: Annotated[
+        Path | None, typer.Option(exists=True, dir_okay=False, help="Text file with columns x and y, m, for 'table'.")
+    ] = None
+    speed: Annotated[float, typer.Option(min=-1e4, max=1e4, help="Forward speed at the start, m/s.")] = 0.0
+    friction: Annotated[float, typer.Option(help="Friction coefficient.")] = 0.7
+    restitution: Annotated[float, typer.Option(help="Coefficient of restitution.")] = 0.5
+    time_step: Annotated[float, typer.Option(help="Time step, s.")] = 0.002
+    duration: Annotated[
+        float | None,
+        typer.Option(
+            min=0.01, max=1000.0, help="Time to simulate, s. Default: until the distance is gone, at most 10 s."
+        ),
+    ] = None
+    distance: Annotated[
+        float | None,
+        typer.Option(
+            min=0.01, max=1e6, help="Way along x at which the run ends, m. Default: 6 m; with a duration, none."
+        ),
+    ] = None
+    output: Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)] = Path("runs/planar")
+    as_json: AsJson = False
+
+    def __post_init__(self) -> None:
+        check_folder("output", self.output)
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options of a planar simulation."""
+        return {name: getattr(self, name) for name in ("friction", "restitution", "time_step")}
+
+    @property
+    def line(self) -> PlanarGround:
+        """The ground."""
+        return _ground(self.ground, self.slope, self.amplitude, self.wavelength, self.height, self.table)
 
 
 @planar.command()
 @plain_errors
+@takes(Course)
 def ball(
+    given: Course,
     *,
-    ground: GroundOption = PlanarGroundKind.line,
-    slope: Slope = -10.0,
-    amplitude: Amplitude = 0.5,
-    wavelength: Wavelength = 4.0,
-    height: Height = 0.05,
-    table: TableFile = None,
     radius: Annotated[float, typer.Option(help="Radius, m.")] = 0.3,
     mass: Annotated[float, typer.Option(help="Mass, kg.")] = 3.0,
     drop: Annotated[float, typer.Option(min=0.0, help="Height of the start over the ground, m.")] = 1.0,
-    speed: Speed = 0.0,
-    friction: Friction = 0.7,
-    restitution: Restitution = 0.5,
-    time_step: TimeStep = 0.002,
-    duration: Duration = None,
-    distance: Distance = None,
-    output: Output = Path("runs/planar"),
-    as_json: AsJson = False,
 ) -> None:
     """Drop a ball on a line, a sine, a step or a table of points; record and draw its path."""
-    check_folder("output", output)
     sim = BallSimulation(
-        _ground(ground, slope, amplitude, wavelength, height, table),
+        given.line,
         mass=mass,
         radius=radius,
-        friction=friction,
-        restitution=restitution,
-        time_step=time_step,
+        **given.options,
     )
-    sim.set_state([0.0, sim.ground.height(0.0) + radius + drop, 0.0], [speed, 0.0, 0.0])
+    sim.set_state([0.0, sim.ground.height(0.0) + radius + drop, 0.0], [given.speed, 0.0, 0.0])
     _lift(sim, drop)
-    _run(sim, "a ball", duration, distance, output / "ball.h5", as_json=as_json)
+    _run(sim, "a ball", given, given.output / "ball.h5")
 
 
 @planar.command()
 @plain_errors
+@takes(Course, ground=PlanarGroundKind.sine, slope=10.0, amplitude=0.08, wavelength=1.5, friction=0.9, restitution=0.0)
 def rover(
+    given: Course,
     *,
-    ground: GroundOption = PlanarGroundKind.sine,
-    slope: Slope = 10.0,
-    amplitude: Amplitude = 0.08,
-    wavelength: Wavelength = 1.5,
-    height: Height = 0.05,
-    table: TableFile = None,
     torque: Annotated[float, typer.Option(help="Torque of each wheel, N m, positive forward.")] = 50.0,
-    speed: Speed = 0.0,
-    friction: Friction = 0.9,
-    restitution: Restitution = 0.0,
-    time_step: TimeStep = 0.002,
-    duration: Duration = None,
-    distance: Distance = None,
-    output: Output = Path("runs/planar"),
-    as_json: AsJson = False,
 ) -> None:
     """Drive the two-wheel rover over a line, a sine, a step or a table of points; record and draw its path."""
-    check_folder("output", output)
-    sim = TwoWheelRoverSimulation(
-        _ground(ground, slope, amplitude, wavelength, height, table),
-        friction=friction,
-        restitution=restitution,
-        time_step=time_step,
-    )
+    sim = TwoWheelRoverSimulation(given.line, **given.options)
     # Along the chord between the grounds under its two axles.
     low, high = (sim.ground.height(x) for x in (-0.4, 0.4))
     angle = float(np.arctan2(high - low, 0.8))
-    sim.set_state([0.0, sim.ground.height(0.0) + 0.2, angle, 0.0, 0.0], [speed, 0.0, 0.0, -speed / 0.2, -speed / 0.2])
+    rate = -given.speed / 0.2
+    sim.set_state([0.0, sim.ground.height(0.0) + 0.2, angle, 0.0, 0.0], [given.speed, 0.0, 0.0, rate, rate])
     _lift(sim, 0.0)
     sim.set_torques([torque, torque])
-    if ground is PlanarGroundKind.line:
-        warn_of_slope(slope, friction)
-    _run(sim, "the two-wheel rover", duration, distance, output / "rover.h5", as_json=as_json)
+    if given.ground is PlanarGroundKind.line:
+        warn_of_slope(given.slope, given.friction)
+    _run(sim, "the two-wheel rover", given, given.output / "rover.h5")
 
 
 planar.command()(soil)
@@ -187,14 +177,12 @@ def _words(ground: PlanarGround) -> str:
     return "a step" if isinstance(ground, Polyline) else "a table of points"
 
 
-def _run(
-    sim: PlanarSimulation, who: str, duration: float | None, distance: float | None, path: Path, *, as_json: bool
-) -> None:
-    longest = LONGEST if duration is None else duration
-    farthest = distance or (FARTHEST if duration is None else math.inf)
+def _run(sim: PlanarSimulation, who: str, given: Course, path: Path) -> None:
+    longest = LONGEST if given.duration is None else given.duration
+    farthest = given.distance or (FARTHEST if given.duration is None else math.inf)
     start = float(sim.q[0])
     title = f"{who} on {_words(sim.ground)}"
-    with Results(as_json=as_json) as results:
+    with Results(as_json=given.as_json) as results:
         with results.keeping("trajectory", path), progress_bar() as bar:
             task = bar.add_task(who, total=longest, state="")
             rows = record_planar(
@@ -206,7 +194,7 @@ def _run(
                 progress=lambda time: bar.update(task, completed=time, state=f"{time:.1f} s"),
             )
         x, y = sim.q[:2]
-        run = read_planar_run(path)
+        run = open_run(path, PlanarRun)
         speed, gap = float(np.hypot(*sim.v[:2])), float(run.trajectory["gaps"].min())
         results.table(
             title,
@@ -218,6 +206,6 @@ def _run(
             ],
         )
         results.path("trajectory", path)
-        from rover_gym.figures.planar_drawing import draw_planar_run  # noqa: PLC0415 - matplotlib is slow to load
+        from rover_gym.figures import draw_overview  # noqa: PLC0415 - matplotlib is slow to load
 
-        results.path("figure", draw_planar_run(run, path.with_suffix(".png")))
+        results.path("figure", draw_overview(run, path.with_suffix(".png")))

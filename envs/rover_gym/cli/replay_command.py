@@ -1,20 +1,20 @@
-"""`rover replay`: a saved run as a page for the browser, as VRML97 or as glTF."""
+"""`rover replay` and `rover plot`: a saved run as a page, as VRML97, as glTF, as a film, and as figures."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from rover_gym.cli.completion import complete_recording
-from rover_gym.cli.console import check_file, plain_errors, progress_bar, say_path
+from rover_gym.cli.console import check_file, check_folder, plain_errors, progress_bar, say_path
+from rover_gym.cli.options import complete_recording
 from rover_gym.extras import require
-from rover_gym.grains.grain_run import grain_run_of, is_grains
+from rover_gym.grains.grain_run import GrainRun
 from rover_gym.mechanics import OptionError
-from rover_gym.planar.planar_run import is_planar, planar_run_of
-from rover_gym.record.rover_run import run_of
-from rover_gym.record.trajectory import Trajectory, read_trajectory
-from rover_gym.replay import write_gltf, write_grain_page, write_page, write_planar_page, write_soil_page, write_vrml
-from rover_gym.soil.soil_run import is_soil, soil_run_of
+from rover_gym.planar.planar_run import PlanarRun
+from rover_gym.record.rover_run import RoverRun
+from rover_gym.replay import write_gltf, write_page, write_vrml
+from rover_gym.runs import open_run
+from rover_gym.soil.soil_run import SoilRun
 from rover_gym.validation import refuse
 
 
@@ -44,55 +44,71 @@ def replay(
     wanted = {"html": html, "vrml": vrml, "gltf": gltf, "film": film}
     if not any(wanted.values()):
         raise OptionError("say what to write: --html, --vrml, --gltf or --film, with a file's name")
-    trajectory = read_trajectory(run)
-    for package, path in (("viser", None if is_grains(trajectory) else html), ("pygltflib", gltf)):
+    saved = open_run(run)
+    kind, name = _KINDS[type(saved)], type(saved)
+    for package, path in (("viser", None if name is GrainRun else html), ("pygltflib", gltf)):
         if path is not None:
             require(package, "replay")  # before the first file is written
-    for name, path in wanted.items():
+    for option, path in wanted.items():
         if path is not None and path.exists() and path.samefile(run):
-            refuse(OptionError, name, str(path), "would replace the run itself")
-        check_file(name, path)
-    if is_soil(trajectory):
-        _refuse_others({"vrml": vrml, "gltf": gltf, "film": film}, "a run on a soil is replayed as a page, with --html")
-        if html is not None:
-            say_path("page", write_soil_page(soil_run_of(trajectory, run).resample(fps), html, follow=follow))
-        return
-    if is_planar(trajectory):
-        others = {"vrml": vrml, "gltf": gltf, "film": film}
-        _refuse_others(others, "a ball or a two-wheel rover is replayed as a page, with --html")
-        if html is not None:
-            say_path("page", write_planar_page(planar_run_of(trajectory, run).resample(fps), html, follow=follow))
-        return
-    if is_grains(trajectory):
-        reason = "a run of balls is replayed as a page or a film, with --html or --film"
-        _refuse_others({"vrml": vrml, "gltf": gltf}, reason)
-        _replay_grains(trajectory, run, html, film, fps, follow=follow)
-        return
-    _refuse_others({"film": film}, "only runs of `rover grains` are filmed here: `rover drive --video` films a drive")
-    frames = run_of(trajectory, run).resample(fps)
+            refuse(OptionError, option, str(path), "would replace the run itself")
+        check_file(option, path)
+        if path is not None and option not in kind[0]:
+            refuse(OptionError, option, str(path), kind[1])
+    frames = saved.resample(fps)
     if html is not None:
         say_path("page", write_page(frames, html, follow=follow))
-    if vrml is not None:
+    if vrml is not None and isinstance(frames, RoverRun):
         say_path("VRML", write_vrml(frames, vrml))
-    if gltf is not None:
+    if gltf is not None and isinstance(frames, RoverRun):
         say_path("glTF", write_gltf(frames, gltf))
-
-
-def _refuse_others(others: dict[str, Path | None], reason: str) -> None:
-    for name, path in others.items():
-        if path is not None:
-            refuse(OptionError, name, str(path), reason)
-
-
-def _replay_grains(
-    trajectory: Trajectory, run: Path, html: Path | None, film: Path | None, fps: float, *, follow: bool
-) -> None:
-    frames = grain_run_of(trajectory, run).resample(fps)
-    if html is not None:
-        say_path("page", write_grain_page(frames, html, follow=follow))
-    if film is not None:
+    if film is not None and isinstance(frames, GrainRun):
         from rover_gym.figures.grain_frames import film_grains  # noqa: PLC0415 - VTK is slow to load
 
         with progress_bar() as bar:
             task = bar.add_task("film", total=frames.n_frames, state="")
             say_path("film", film_grains(frames, film, fps, progress=lambda n: bar.update(task, completed=n)))
+
+
+#: As what each kind of run is replayed, and what is said of the rest.
+_KINDS: dict[type, tuple[tuple[str, ...], str]] = {
+    RoverRun: (
+        ("html", "vrml", "gltf"),
+        "only runs of `rover grains` are filmed here: `rover drive --video` films a drive",
+    ),
+    PlanarRun: (("html",), "a ball or a two-wheel rover is replayed as a page, with --html"),
+    SoilRun: (("html",), "a run on a soil is replayed as a page, with --html"),
+    GrainRun: (("html", "film"), "a run of balls is replayed as a page or a film, with --html or --film"),
+}
+
+
+@plain_errors
+def plot(
+    recording: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RUN",
+            autocompletion=complete_recording,
+            help="What `rover drive --output`, `rover report`, `rover planar` or `rover grains` saved.",
+        ),
+    ],
+    output: Annotated[
+        Path | None, typer.Option(file_okay=False, help="Folder to write into. Default: beside the run.")
+    ] = None,
+    file_format: Annotated[str, typer.Option("--format", help="'png', 'svg' or 'pdf'.")] = "png",
+    overview: Annotated[bool, typer.Option("--overview/--no-overview", help="Add one page with all figures.")] = False,
+) -> None:
+    """Draw a saved run over time: gaps, loads, slip, attitude, torques, energy and solver, and its path from above.
+
+    Of a ball or a two-wheel rover: the path over the ground, speed, loads, gaps, energy.
+
+    Of a run on a soil: speed, slip and sinkage; forces on the wheels; energy, contacts and overlap. Of balls in space
+    also the ruts: the surface before and after, with sections along and across a track.
+    """
+    folder = recording.with_name(f"{recording.stem}-plots") if output is None else output
+    run = open_run(recording)
+    check_folder("output", folder)
+    from rover_gym.figures import draw_run  # noqa: PLC0415 - slow to load, and a bad file is told at once
+
+    for path in draw_run(run, folder, file_format=file_format, with_overview=overview):
+        say_path("figure", path)

@@ -6,8 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rover_gym.cli.console import check_folder, plain_errors, progress_bar
-from rover_gym.cli.results import AsJson, Results, Row, row
+from rover_gym.cli.console import AsJson, Results, Row, check_folder, plain_errors, progress_bar, row
 from rover_gym.record.trajectory import Trajectory, read_trajectory
 from rover_gym.reproduction import SceneResult, inclined_plane, sphere_rug
 

@@ -11,25 +11,23 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from rover_gym.cli.completion import complete_terrain
-from rover_gym.cli.console import LARGEST_SEED, plain_errors, progress_bar
-from rover_gym.cli.results import AsJson, Results
-from rover_gym.cli.scene_options import (
+from rover_gym.cli.console import LARGEST_SEED, AsJson, Results, plain_errors, progress_bar
+from rover_gym.cli.options import (
     BUILT_IN,
     HeightRange,
     ModelName,
     Spacing,
     Start,
+    complete_terrain,
     named_ground,
     named_model,
     warn_of_slope,
 )
+from rover_gym.economy.economies import Economy, measure_economies
+from rover_gym.economy.planner import plan
+from rover_gym.economy.scene_plan import Accuracy, Scene, ScenePlan
 from rover_gym.env.start import tilted_plane
 from rover_gym.mechanics import OptionError, Plane, RoverModel, SphereField, Terrain
-from rover_gym.planning.economy import Economy, measure_economies
-from rover_gym.planning.planner import plan
-from rover_gym.planning.scene import Accuracy, Scene
-from rover_gym.planning.scene_plan import ScenePlan
 from rover_gym.reproduction.sphere_rug import START
 from rover_gym.validation import number, refuse
 

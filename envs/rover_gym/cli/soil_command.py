@@ -14,16 +14,19 @@ from rich.table import Table
 from rover_gym.cli.console import (
     INTERRUPTED,
     LARGEST_SEED,
+    AsJson,
+    Results,
     check_folder,
     plain_errors,
     progress_bar,
+    row,
+    status,
 )
-from rover_gym.cli.results import AsJson, Results, row, status
 from rover_gym.mechanics import OptionError
 from rover_gym.validation import refuse
 
 if TYPE_CHECKING:
-    from rover_gym.soil.traction import Traction
+    from rover_gym.soil.soil_trials import Traction
 
 EARTH = 9.81  # m/s^2
 FRAMES = 25.0  # of the video, a second at EARTH
@@ -119,11 +122,14 @@ def _cross(
     *,
     video: bool,
 ) -> None:
-    from rover_gym.figures.soil_frames import draw_soil, film_soil  # noqa: PLC0415 - matplotlib is slow to load
-    from rover_gym.soil.bed import settled_bed  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.figures.grain_frames import draw_soil, film_soil  # noqa: PLC0415 - matplotlib is slow to load
+    from rover_gym.runs import open_run  # noqa: PLC0415 - as above
+    from rover_gym.soil.bed import (  # noqa: PLC0415
+        rover_on_soil,
+        settled_bed,
+    )
     from rover_gym.soil.soil_recording import record_soil  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.soil.soil_rover import rover_on_soil  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.soil.soil_run import read_soil_run  # noqa: PLC0415 - as above
+    from rover_gym.soil.soil_run import SoilRun  # noqa: PLC0415 - as above
 
     _check_width("disks", disks, layers, CROSSING)
     bed = settled_bed(disks, layers, seed=seed, **options)
@@ -144,7 +150,7 @@ def _cross(
             until=lambda now: bool(now.wheels[-1, 0] + now.wheels[-1, 2] > bed.width - END),
             progress=lambda time: bar.update(task, completed=time, state=f"{time:.1f} s"),
         )
-    run = read_soil_run(path)
+    run = open_run(path, SoilRun)
     machine = run.trajectory["machine"]
     distance = float(machine[-1, 0] - machine[0, 0])
     rims = -float((run.wheels[0, :, 2] * (machine[-1] - machine[0])[3:]).mean())
@@ -193,10 +199,14 @@ def _sweep(
     options: dict[str, Any],
     output: Path,
 ) -> None:
-    from rover_gym.figures.trial_curves import draw_curves  # noqa: PLC0415 - matplotlib is slow to load
+    from rover_gym.figures.soil_run_figures import draw_curves  # noqa: PLC0415 - matplotlib is slow to load
     from rover_gym.soil.bed import settled_bed  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.soil.soil_trials import drawbar_pull, drive_on_soil, over_beds  # noqa: PLC0415 - as above
-    from rover_gym.soil.traction import fit_traction  # noqa: PLC0415 - as above
+    from rover_gym.soil.soil_trials import (  # noqa: PLC0415 - as above
+        drawbar_pull,
+        drive_on_soil,
+        fit_traction,
+        over_beds,
+    )
 
     _check_width("disks", disks, layers, CROSSING)
     _check_width("pull_disks", pull_disks, pull_layers, PULLING, UNEQUAL["radius_max"])

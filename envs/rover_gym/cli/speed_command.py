@@ -1,18 +1,16 @@
-"""`rover speed`: how fast a batch of rovers is here, beside MuJoCo, and where the time of its environment goes."""
+"""`rover speed`: how fast a batch of rovers is here, and where the time of its environment goes."""
 
 import datetime
 import os
 from dataclasses import asdict
 from enum import StrEnum
-from importlib import metadata
 from typing import Annotated, Any
 
 import typer
 
-from rover_gym.cli.console import plain_errors, progress_bar
-from rover_gym.cli.results import AsJson, Results
-from rover_gym.vector.exploring import ExploringSpeed, measure_exploring, processor
-from rover_gym.vector.throughput import VectorSpeed, measure_speed
+from rover_gym.cli.console import AsJson, Results, plain_errors, progress_bar
+from rover_gym.mechanics import __version__
+from rover_gym.vector.throughput import ExploringSpeed, VectorSpeed, measure_exploring, measure_speed, processor
 
 #: Steps of an environment for each round of the physics alone, which is as much work as ten.
 _STEPS_A_ROUND = 20
@@ -38,7 +36,7 @@ def speed(
     rounds: Annotated[int, typer.Option(min=1, max=1_000_000, help="Steps of each environment that are timed.")] = 200,
     as_json: AsJson = False,
 ) -> None:
-    """Step a batch of exploring rovers, and MuJoCo's rollout of the same where it is installed, and print how fast."""
+    """Step a batch of exploring rovers and its environment, and print how fast."""
     grounds = list(SpeedTerrain) if terrain is None else [terrain]
     exploring_rounds = -(-rounds // _STEPS_A_ROUND)
     told: dict[str, tuple[ExploringSpeed, VectorSpeed]] = {}
@@ -58,21 +56,19 @@ def speed(
                 measure_speed(num_envs, threads, rounds=rounds, progress=advance, **arguments),
             )
     first = next(iter(told.values()))[0]
-    versions = _versions()
     machine = {
         "processor": processor(),
         "cores": os.cpu_count(),
         "instruction_set": first.instruction_set,
         "date": datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
-        "packages": versions,
+        "packages": {"rover-gym": __version__},
     }
     with Results(as_json=as_json) as results:
         results.add(machine=machine, grounds={name: _fields(*two) for name, two in told.items()})
     if as_json:
         return
-    packages = ", ".join(f"{name} {version}" for name, version in versions.items())
     typer.echo(f"{machine['processor']}, {machine['cores']} cores, {machine['instruction_set']}; {machine['date']}")
-    typer.echo(f"{packages}; {num_envs} rovers, {first.threads} threads")
+    typer.echo(f"rover-gym {__version__}; {num_envs} rovers, {first.threads} threads")
     for name, (exploring, environment) in told.items():
         _print_exploring(name, exploring)
         _print_environment(environment)
@@ -104,14 +100,3 @@ def _print_environment(result: VectorSpeed) -> None:
         f"    over SyncVectorEnv    {result.gain:.1f} times\n"
         f"    reset of one rover    {result.reset * 1e6:.0f} us"
     )
-
-
-def _versions() -> dict[str, str]:
-    """Versions of the engines that are installed."""
-    found = {}
-    for name in ("rover-gym", "mujoco"):
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            continue
-    return found

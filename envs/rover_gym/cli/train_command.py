@@ -8,8 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from rover_gym.cli.console import check_folder, plain_errors
-from rover_gym.cli.results import AsJson, Results
+from rover_gym.cli.console import AsJson, Results, check_folder, plain_errors
 from rover_gym.extras import require
 
 LARGEST = 498  # the largest seed: the fields of all seeds stay below the evaluations'

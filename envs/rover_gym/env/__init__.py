@@ -4,13 +4,11 @@ from rover_gym.env.arguments import ARGUMENTS, Argument, RoverArguments
 from rover_gym.env.env_snapshot import EnvSnapshot
 from rover_gym.env.grains_env import BedDraw, GrainsEnvSnapshot, RoverGrainsEnv
 from rover_gym.env.observation import ObservationField, ObservationLayout
-from rover_gym.env.randomisation import Domain
 from rover_gym.env.reward_terms import RewardTerm
 from rover_gym.env.rocks import HeightScan, Rocks
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.env.start import Start, resting_pose, tilted_plane
+from rover_gym.env.start import Domain, Start, drive_signs, resting_pose, tilted_plane, wheel_centres
 from rover_gym.env.task import Task
-from rover_gym.env.wheels import drive_signs, wheel_centres
 
 __all__ = [
     "ARGUMENTS",

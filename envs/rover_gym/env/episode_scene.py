@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.env.argument_checks import MAX_SLOPE_DEG
-from rover_gym.env.quantities import Array
-from rover_gym.env.randomisation import Domain
+from rover_gym.env.arguments import MAX_SLOPE_DEG
+from rover_gym.env.observation import Array
 from rover_gym.env.rocks import MAX_DIFFICULTY, MAX_GOAL_DISTANCE, Rocks
-from rover_gym.env.start import Start
+from rover_gym.env.start import Domain, Start
 from rover_gym.env.task import Task
 from rover_gym.ground import plane_of
 from rover_gym.mechanics import OptionError, Plane, StateError, Terrain

@@ -1,9 +1,14 @@
 """Random generators: NumPy's `Generator` over `PCG64`, and the rows of numbers that the core draws from.
 
 A row is (4,) uint64: high and low half of the state, high and low half of the increment.
+
+Gymnasium looks an action up for the keys that are held together, so that each of the sixteen combinations has its own;
+the empty one is the action without a key.
 """
 
-from typing import Any, TypeAlias
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +16,10 @@ from gymnasium.utils import seeding
 
 from rover_gym.mechanics import OptionError, seed_generators
 from rover_gym.validation import refuse, whole
+
+if TYPE_CHECKING:
+    pass
+
 
 Rows: TypeAlias = npt.NDArray[np.uint64]
 

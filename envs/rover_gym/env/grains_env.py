@@ -233,7 +233,7 @@ class RoverGrainsEnv(RoverEnv):
 
     def make_renderer(self, scene: EpisodeScene) -> FrameRenderer:
         """Creates a renderer with this environment's `render_options`; the caller must close it."""
-        from rover_gym.rendering.ball_actors import BallsActor  # noqa: PLC0415 - only rendering needs it
+        from rover_gym.rendering.scenery_actors import BallsActor  # noqa: PLC0415 - only rendering needs it
 
         renderer = super().make_renderer(scene)
         self._balls = BallsActor(self.grains.radius)

@@ -8,6 +8,7 @@ and a non-finite entry ends the episode.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +18,9 @@ from rover_gym.validation import array, refuse
 
 # Scales in m, rad/s and m. Forces are scaled by the mean wheel load, m g / n.
 GAP_SCALE = 0.1
+
 WHEEL_RATE_SCALE = 10.0
+
 GOAL_SCALE = 10.0
 
 #: The largest finite entry.
@@ -170,3 +173,10 @@ def build_layout(
         fields.append(ObservationField(name, start, len(scale), unit, tuple(scale), low, high, meaning))
         start += len(scale)
     return ObservationLayout(tuple(fields))
+
+
+Array: TypeAlias = npt.NDArray[np.float64]
+
+Mask: TypeAlias = npt.NDArray[np.bool_]
+
+Observations: TypeAlias = npt.NDArray[np.float32]

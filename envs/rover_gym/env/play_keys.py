@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.env.wheels import wheel_centres
+from rover_gym.env.start import wheel_centres
 from rover_gym.mechanics import atan2
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Terms of the reward that the user gives as functions.
+"""The terms of the reward: the weights of the environment's own, and terms that the user gives as functions.
 
 A term is a function of a control period,
 
@@ -13,17 +13,19 @@ leading axis of n rovers, and the reward is `(n,)`. Written with `[..., i]`, one
 
 The value counts as it is, without a weight, and stands under the term's name in `info["reward_terms"]`. A period that
 ends with `"step_failed"` earns nothing from it.
+
+The reward of a step is the sum of the terms. Each term is its weight times a quantity of that step; a negative weight
+makes it a cost. The card of `RoverEnv` lists the quantities, and the core computes them.
 """
 
 from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
 from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.env import rewards
-from rover_gym.env.observation import ObservationLayout
-from rover_gym.env.quantities import Array, Mask, Observations
+from rover_gym.env.observation import Array, Mask, ObservationLayout, Observations
 from rover_gym.mechanics import OptionError
 from rover_gym.validation import refuse, shown
 
@@ -33,6 +35,21 @@ Fields: TypeAlias = dict[str, Array]
 RewardTerm: TypeAlias = Callable[[Fields, Array, Fields, Mapping[str, Any]], npt.ArrayLike]
 
 RewardTerms: TypeAlias = Mapping[str, RewardTerm]
+
+#: Default weights. A 7 m drive on flat ground earns about 15: 7 for progress and 10 at the goal, less the costs.
+WEIGHTS: Mapping[str, float] = MappingProxyType(
+    {
+        "progress": 1.0,
+        "time": -0.05,
+        "energy": -5e-5,
+        "slip": -0.1,
+        "tilt": -0.1,
+        "torque_change": -0.02,
+        "steering_change": -0.02,
+        "success": 10.0,
+        "failure": -10.0,
+    }
+)
 
 
 def check_reward_terms(field: str, value: object) -> dict[str, RewardTerm]:
@@ -47,7 +64,7 @@ def check_reward_terms(field: str, value: object) -> dict[str, RewardTerm]:
     for name, term in value.items():
         if not (isinstance(name, str) and name.isidentifier()):
             refuse(OptionError, f"{field}.{shown(name)}", name, "must be named by an identifier")
-        if name in rewards.WEIGHTS:
+        if name in WEIGHTS:
             refuse(
                 OptionError, f"{field}.{name}", term, "is a term of the environment; reward_weights changes its weight"
             )

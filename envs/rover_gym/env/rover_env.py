@@ -12,16 +12,12 @@ from gymnasium.error import ResetNeeded
 
 from rover_gym.env.arguments import RoverArguments, check_arguments, takes_arguments, with_argument_table
 from rover_gym.env.beginning import draw_episodes
-from rover_gym.env.env_snapshot import EnvSnapshot, check_random_state, check_snapshot
+from rover_gym.env.env_snapshot import EnvSnapshot, Progress, check_random_state, check_snapshot
 from rover_gym.env.episode_scene import EpisodeScene, check_difficulty, check_reset_options, scene_of
+from rover_gym.env.episode_view import EpisodeView
 from rover_gym.env.generators import check_seed, row_of, seeded, set_row
-from rover_gym.env.observation import ObservationLayout
 from rover_gym.env.play_keys import keys_to_action, pushed
-from rover_gym.env.progress import Progress
-from rover_gym.env.randomisation import Domain
 from rover_gym.env.reward_terms import earn, total
-from rover_gym.env.rocks import Rocks
-from rover_gym.env.start import Start
 from rover_gym.env.task import Task, make_task
 from rover_gym.mechanics import EpisodeRun, Plane, RoverGrainSimulation, Simulation, standard_normals
 from rover_gym.rendering.render_options import RENDER_MODES, RenderOptions
@@ -37,7 +33,7 @@ STEP_FAILED = "step_failed"
 
 
 @with_argument_table
-class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
+class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     """Drive a six-wheel, 21-dof rover with six motors and six steered wheels to a goal on the map.
 
     The world has x forward, y up and z to the right; heading is the angle about +y, positive to the
@@ -263,12 +259,6 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     def __init__(self, **arguments: Unpack[RoverArguments]) -> None:
         given = check_arguments(type(self).__name__, arguments)
         self.task: Task = make_task(given)
-        self.model = self.task.model
-        self.gravity = self.task.gravity
-        self.dt = self.task.dt
-        self.goal_tolerance = self.task.goal_tolerance
-        self.max_steering = self.task.max_steering
-        self.observation_layout: ObservationLayout = self.task.layout
         self.observation_space = gym.spaces.Box(
             self.observation_layout.low, self.observation_layout.high, dtype=np.float32
         )
@@ -285,7 +275,6 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         self.render_options: RenderOptions = given["render_options"] or RenderOptions()
         fps = round(1.0 / self.dt, 9)
         self.metadata = {**type(self).metadata, "render_fps": int(fps) if fps.is_integer() else fps}
-        self._renderer: FrameRenderer | None = None
 
     @property
     def simulation(self) -> Simulation:
@@ -297,27 +286,6 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         """The episode's present goal (x, z), m."""
         self._running()
         return self._episode.goal
-
-    @property
-    def start(self) -> Start:
-        """The episode's slope, pose and goal as they were drawn."""
-        return self._running().start
-
-    @property
-    def rocks(self) -> Rocks | None:
-        """The episode's difficulty and rocks as they were drawn; None on the plane."""
-        return self._running().rocks
-
-    @property
-    def domain(self) -> Domain:
-        """The episode's properties of rover and world as they were drawn."""
-        return self._running().domain
-
-    @property
-    def difficulty(self) -> float | None:
-        """The episode's difficulty; None on the plane."""
-        rocks = self.rocks
-        return None if rocks is None else rocks.difficulty
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -421,23 +389,13 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         if self.render_mode is None:
             gym.logger.warn('RoverEnv: render() needs render_mode="rgb_array" when the environment is made')
             return None
-        scene = self._running()
-        if self._renderer is None:
-            self._renderer = self.make_renderer(scene)
-        self._renderer.set_scene(scene.terrain, goal=self.goal, goal_tolerance=self.goal_tolerance)
-        return self._renderer.render(self._simulation)
+        return self.frame()
 
     def make_renderer(self, scene: EpisodeScene) -> "FrameRenderer":
         """Creates a renderer with this environment's `render_options`; the caller must close it."""
         from rover_gym.rendering import FrameRenderer  # noqa: PLC0415 - only rendering needs it
 
         return FrameRenderer(self.model, scene.terrain, **asdict(self.render_options))
-
-    def close(self) -> None:
-        """Frees the renderer, if there is one."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
 
     def snapshot(self) -> EnvSnapshot:
         """Returns the state of the environment and of its random generator, for `restore`."""

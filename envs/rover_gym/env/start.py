@@ -1,11 +1,14 @@
-"""The start of an episode: the ground's slope, the rover's pose and the goal.
+"""The start of an episode: the ground's slope, the rover's pose, the goal, and the properties that are drawn with them.
 
 A direction on the map, like the heading, is an angle about +y from +x, positive to the left (towards -z): the direction
 `a` points along `(cos a, -sin a)` in (x, z).
+
+A number fixes a property; a pair (low, high) is a range to draw from uniformly at each reset. A fixed property takes no
+random number, so it does not shift the other draws.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -87,3 +90,75 @@ def resting_pose(model: RoverModel, plane: Plane, position: Point, heading: floa
     The trunk is upright along the normal and joints are at zero, unless another pose puts more wheels on the ground.
     """
     return model.resting_pose(plane, position, heading)
+
+
+@dataclass(frozen=True)
+class Domain:
+    """The randomised properties of one episode.
+
+    Attributes:
+        mass_scale: Factor on the model's masses and inertias.
+        friction: Coulomb friction coefficient.
+        actuator_gain: Ratio of delivered to commanded wheel torque, up to the motor's limit.
+        gravity_scale: Factor on the argument `gravity`.
+    """
+
+    mass_scale: float
+    friction: float
+    actuator_gain: float
+    gravity_scale: float
+
+    def as_info(self) -> dict[str, float]:
+        """The values by name."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class DomainDistribution:
+    """Ranges that episodes draw from uniformly, and the standard deviation of the observation noise."""
+
+    mass_scale: Range
+    friction: Range
+    actuator_gain: Range
+    gravity_scale: Range
+    observation_noise: float
+
+
+#: The slip ratio is meaningless while both wheel and rim are slower than this, m/s; equals the core's `SLIP_SPEED`.
+SLIP_SPEED = 0.05
+
+
+@dataclass(frozen=True)
+class Steering:
+    """The steering entries of an action, one for each joint that steers, in the order of the wheels.
+
+    Attributes:
+        joints: Index in q of each entry's joint.
+        entries: The entry that each wheel follows, -1 where none does. Wheels that share a joint share its entry.
+    """
+
+    joints: tuple[int, ...]
+    entries: tuple[int, ...]
+
+    @classmethod
+    def of(cls, model: RoverModel) -> "Steering":
+        """The steering of a model; locked joints do not steer."""
+        of_wheels = model.steering_joint_indices
+        joints = tuple(dict.fromkeys(i for i in of_wheels if i >= 0))
+        return cls(joints, tuple(joints.index(i) if i >= 0 else -1 for i in of_wheels))
+
+    @property
+    def wheels(self) -> list[list[int]]:
+        """The wheels of each entry."""
+        return [[i for i, own in enumerate(self.entries) if own == entry] for entry in range(len(self.joints))]
+
+
+def drive_signs(model: RoverModel) -> npt.NDArray[np.float64]:
+    """`(n_wheels,)` sign of each wheel's joint rate when it rolls forward: 1, or -1 where the axis points right."""
+    return model.actuation_matrix()[model.wheel_joint_indices, range(len(model.wheel_names))]
+
+
+def wheel_centres(model: RoverModel) -> npt.NDArray[np.float64]:
+    """`(n_wheels, 2)` x and z of the wheel centres relative to the trunk's origin, joints at zero, m."""
+    points = model.wheel_contact_points(np.zeros(model.nq), Plane(), coordinates="state")
+    return np.asarray(points)[:, [0, 2]]

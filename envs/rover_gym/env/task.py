@@ -8,13 +8,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.env import rewards
 from rover_gym.env.observation import ObservationLayout, build_layout
-from rover_gym.env.randomisation import Domain, DomainDistribution
-from rover_gym.env.reward_terms import RewardTerms
+from rover_gym.env.reward_terms import WEIGHTS, RewardTerms
 from rover_gym.env.rocks import MAX_GOAL_DISTANCE, RockDistribution, rock_distribution
-from rover_gym.env.start import StartDistribution, slope_of
-from rover_gym.env.wheels import Steering
+from rover_gym.env.start import Domain, DomainDistribution, StartDistribution, Steering, slope_of
 from rover_gym.mechanics import (
     CommandError,
     EpisodeDistribution,
@@ -232,7 +229,7 @@ def _rules(
         goal_tolerance=given["goal_tolerance"],
         cos_max_tilt=float(sin_cos(math.radians(given["max_tilt_deg"]))[1]),
         stuck_time=given["stuck_time"],
-        weights=dict(rewards.WEIGHTS) if given["reward_weights"] is None else given["reward_weights"],
+        weights=dict(WEIGHTS) if given["reward_weights"] is None else given["reward_weights"],
         scale=layout.scale,
         noise=noise * layout.unbounded if noise > 0.0 else None,
         scan=scan,

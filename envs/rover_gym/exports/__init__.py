@@ -1,8 +1,7 @@
 """Runs, policies and simulations for other programs."""
 
 from rover_gym.exports.fmu import write_fmu
-from rover_gym.exports.mcap_run import write_mcap
-from rover_gym.exports.mcap_writer import McapWriter
+from rover_gym.exports.mcap_writer import McapWriter, write_mcap
 from rover_gym.exports.minari_data import write_dataset
 from rover_gym.exports.onnx_policy import onnx_policy, write_onnx
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -12,11 +13,11 @@ import numpy.typing as npt
 
 from rover_gym.exports import mcap_messages as messages
 from rover_gym.exports.axes import MAP_FROM_WORLD
-from rover_gym.exports.mcap_file import McapFile
-from rover_gym.mechanics import RoverModel, Terrain
-from rover_gym.record.channels import RoverSampler
-from rover_gym.record.facts import storable, versions
-from rover_gym.record.rover_run import RoverRun
+from rover_gym.exports.mcap_messages import McapFile
+from rover_gym.extras import require
+from rover_gym.mechanics import RoverModel, Simulation, Terrain
+from rover_gym.record.channels import RoverSampler, storable, versions
+from rover_gym.record.rover_run import RoverRun, film_rows
 from rover_gym.record.trajectory import Trajectory
 from rover_gym.record.trajectory_format import RecordingError
 from rover_gym.rendering.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR
@@ -26,10 +27,12 @@ from rover_gym.validation import TERRAINS, array, checked, number, refuse, vecto
 if TYPE_CHECKING:
     from types import TracebackType
 
+
 Array = npt.NDArray[np.float64]
 
 #: Half of the piece of ground that is shown about the first row of a run whose way is not known, m.
 REACH = 15.0
+
 #: Rows' channels that become columns of `/wheels`: the channel, and the names of its columns.
 WHEEL_CHANNELS = {
     "wheel_gaps": ("gap",),
@@ -38,7 +41,9 @@ WHEEL_CHANNELS = {
     "motor_torques": ("motor_torque",),
     "steering_set_points": ("steering_set_point",),
 }
+
 EARTH = (0.0, -9.81, 0.0)  # m/s², of runs whose attributes name none
+
 LATEST = 1.8e10  # s after 1970: what nanoseconds of 64 bits hold
 
 
@@ -378,3 +383,55 @@ def _schema_of(value: Any) -> dict[str, Any]:
 
 def _text(value: Any) -> str:
     return value if isinstance(value, str) else json.dumps(np.asarray(value).tolist())
+
+
+#: Images a second.
+FPS = 10.0
+
+
+@checked(run="RoverRun", path=Path, images=bool, fps=float, progress=callable)
+def write_mcap(
+    run: RoverRun,
+    path: str | Path,
+    *,
+    images: bool = False,
+    fps: float = FPS,
+    progress: Callable[[int], None] = lambda _rows: None,
+) -> Path:
+    """Writes a recorded run as MCAP, every sample of it.
+
+    Args:
+        run: The run.
+        path: The file to write, with its folder.
+        images: Whether to render it, as the environments render their frames (extra `render`).
+        fps: Images a second.
+        progress: Called with the number of rows that are written.
+
+    Raises:
+        RecordingError: The run lacks `q` or `v`, the file is in use, or it cannot be written.
+        OptionError: `fps` is not a positive number.
+        OSError: The file cannot be created, or no OpenGL library works.
+        MissingExtraError: An extra is not installed.
+    """
+    data = run.trajectory.data
+    if "v" not in data:
+        refuse(RecordingError, "run", sorted(data), "must hold v")
+    pictured = frozenset(film_rows(run.time, fps).tolist()) if images else frozenset()
+    simulation = Simulation(run.model, run.terrain)
+    with ExitStack() as stack:
+        renderer = None
+        if images:
+            require("vtkmodules", "render")
+            from rover_gym.rendering.frames import FrameRenderer  # noqa: PLC0415 - VTK is slow to load
+
+            renderer = stack.enter_context(FrameRenderer(run.model, run.terrain, goal=run.goal))
+        way, attributes = data["q"][:, [0, 2]], run.trajectory.attributes
+        writer = McapWriter(path, run.model, run.terrain, goal=run.goal, attributes=attributes, way=way)
+        stack.enter_context(writer)
+        for i in range(run.n_frames):
+            writer.append({name: values[i] for name, values in data.items()})
+            if renderer is not None and i in pictured:
+                simulation.set_state(data["q"][i])
+                writer.image(float(run.time[i]), renderer.render(simulation))
+            progress(i + 1)
+    return writer.path

@@ -11,19 +11,15 @@ import numpy as np
 
 from rover_gym.exports.onnx_graph import Perceptron, onnx_model
 from rover_gym.extras import MissingExtraError, require
-from rover_gym.policy.arc_forecast import OUTPUTS
 from rover_gym.policy.features import LARGEST_FEATURE
-from rover_gym.policy.foresight_policy import FORECAST_FILE
-from rover_gym.policy.network import Network
-from rover_gym.policy.policy_card import PolicyCard
-from rover_gym.policy.policy_files import PolicyError, is_there
-from rover_gym.policy.shipped import find_policy, forecast_folder
+from rover_gym.policy.foresight_policy import FORECAST_FILE, OUTPUTS
+from rover_gym.policy.policy_card import Network, PolicyCard, PolicyError, find_policy, forecast_folder, is_there
 from rover_gym.validation import checked, refuse
 
 if TYPE_CHECKING:
     from rover_gym.mechanics import RoverModel
 
-#: The file that tells a run of `training/train_raw.py`.
+#: The file that tells a run of `RawPolicy.save`.
 RAW_FILE = "model.zip"
 
 
@@ -35,7 +31,7 @@ def write_onnx(policy: str | Path, path: str | Path, terrain: str = "plane", mod
     |---|---|---|
     | "trained", or the folder of a trained policy | `features` | `command`: three entries in [-1, 1] |
     | "foresight", or the folder of a forecast | `features` | `outcomes`: way, stuck, failed |
-    | the folder of a run of `training/train_raw.py` | `observation` | `action` |
+    | the folder of a run of `RawPolicy.save` | `observation` | `action` |
 
     Args:
         policy: The policy.
@@ -69,7 +65,7 @@ def onnx_policy(policy: str | Path, terrain: str = "plane", model: RoverModel | 
     if is_there(folder / FORECAST_FILE):
         facts: Mapping[str, Any] = {
             "kind": "forecast",
-            "features": "rover_gym.policy.arc_forecast.ArcFeatures, and whether the arc is driven fast",
+            "features": "rover_gym.policy.foresight_policy.ArcFeatures, and whether the arc is driven fast",
             "outcomes": "way along the arc over the way at cruising speed; share of the time that ends an episode for"
             " which the trunk has been held; likelihood that the episode has failed",
         }

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.figures.planar_drawing import GROUND
-from rover_gym.figures.saving import save_figures
-from rover_gym.planar.planar_recording import describe_planar, record_planar
+from rover_gym.figures.style import save_figures
+from rover_gym.planar.planar_run import describe_planar, record_planar
 from rover_gym.record.trajectory import Trajectory, read_trajectory
 from rover_gym.rendering.appearance import PLANAR_WHEEL_COLOURS
 from rover_gym.reproduction.chapter_3_balls import ball_on_incline, ball_on_sine, published

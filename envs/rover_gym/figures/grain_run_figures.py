@@ -2,56 +2,133 @@
 
 from __future__ import annotations
 
-from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rover_gym.env.wheels import SLIP_SPEED
-from rover_gym.figures.derived_signals import Array, of_wheels, smooth
-from rover_gym.figures.ruts import rut_maps, rut_sections
-from rover_gym.figures.saving import check_format, save_figures
-from rover_gym.figures.signals import SMOOTHED, WINDOW, plot_raw_and_smooth
-from rover_gym.figures.style import DARK, QUANTITY_COLOURS, panel_legend, plain
-from rover_gym.figures.wheel_style import WheelStyle
+from rover_gym.env.start import SLIP_SPEED
+from rover_gym.figures.derived_signals import SMOOTHED, WINDOW, Array, of_wheels, plot_raw_and_smooth, smooth
+from rover_gym.figures.style import (
+    DARK,
+    QUANTITY_COLOURS,
+    Drawing,
+    WheelStyle,
+    panel_legend,
+    title,
+)
+from rover_gym.grains.grain_surface import SurfaceMap, surface_map
 from rover_gym.mechanics import RoverModel
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from matplotlib.axes import Axes
 
     from rover_gym.figures.style import Sheet
     from rover_gym.grains.grain_run import GrainRun
 
-__all__ = ["GRAIN_DRAWINGS", "draw_grain_run", "slip_of_wheels"]
+
+POINTS = 400  # of a section
+
+SMOOTHED_CELLS = 4.0  # edge of the square over which a section is smoothed: two balls
+
+MAP_CELLS = 5  # edge of the square over which a map is smoothed
+
+FINEST = 600  # cells along a map, at most
 
 
-def draw_grain_run(
-    run: GrainRun, folder: str | Path, *, file_format: str = "png", with_overview: bool = False
-) -> list[Path]:
-    """Draws the figures of a run of balls.
+def surfaces_of_run(run: GrainRun) -> tuple[SurfaceMap, SurfaceMap]:
+    """The surface of the balls at the first and the last sample, on the same cells."""
+    first, last = run.positions_of(run.rows[:1])[0], run.positions_of(run.rows[-1:])[0]
+    low, high = (
+        (first[:, [0, 2]].min(axis=0) - run.radius.max()).astype(float),
+        (first[:, [0, 2]].max(axis=0) + run.radius.max()).astype(float),
+    )
+    cell = max(float(run.radius.mean()), float((high - low).max()) / FINEST)
+    bounds = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+    return surface_map(first, run.radius, cell, bounds), surface_map(last, run.radius, cell, bounds)
 
-    Args:
-        run: From `read_grain_run`.
-        folder: Output folder; created if it does not exist. Without a rover its wheels are not drawn.
-        file_format: "png", "svg" or "pdf".
-        with_overview: Whether to add one page with all figures.
 
-    Returns:
-        Paths of the files.
+def rut_maps(figure: Sheet, run: GrainRun) -> None:
+    """Height before, height after, and the change, with the wheels' ways; means over squares of two balls."""
+    before, after = (surface.smoothed(MAP_CELLS) for surface in surfaces_of_run(run))
+    # Beds longer than wide one above the other, others side by side.
+    is_wide = np.ptp(before.z) > np.ptp(before.x)
+    panels = figure.subplots(*((1, 3) if is_wide else (3, 1)), sharex=True, sharey=True)
+    known = 1e3 * np.concatenate((before.heights.ravel(), after.heights.ravel()))
+    low, high = np.nanquantile(known, (0.01, 0.995))
+    change = 1e3 * (after.heights - before.heights)
+    finite = np.abs(change[np.isfinite(change)])
+    most = max(float(np.quantile(finite, 0.99)) if len(finite) else 0.0, 1e-3)
+    edges = before.x[0], before.x[-1], before.z[-1], before.z[0]
+    shown = (
+        (1e3 * before.heights, "before: height (mm)", "viridis", low, high),
+        (1e3 * after.heights, "after: height (mm)", "viridis", low, high),
+        (change, "change (mm)", "RdBu", -most, most),
+    )
+    for axes, (values, name, colours, least, largest) in zip(panels, shown, strict=True):
+        # z points to the right: seen from above with x to the right, it points down.
+        image = axes.imshow(values, extent=edges, cmap=colours, vmin=least, vmax=largest, aspect="equal")
+        axes.grid(visible=False)
+        if is_wide:
+            axes.set(xlabel="x (m)")
+        else:
+            axes.set(ylabel="z (m)")
+        figure.colorbar(image, ax=axes, label=name, shrink=0.9)
+    if run.model is not None:
+        style = WheelStyle.of(run.model)
+        for i, wheel in enumerate(style.names):
+            way = run.wheel_centres[:, i]
+            panels[2].plot(way[:, 0], way[:, 2], color=style.colours[wheel], linewidth=0.7, alpha=0.8)
+        panels[2].set(xlim=edges[:2], ylim=edges[2:])
+    panels[2].set(xlabel="x (m)")
+    panels[0].set(ylabel="z (m)")
 
-    Raises:
-        OptionError: The file format is unknown.
-        MissingExtraError: matplotlib is not installed.
-    """
-    check_format(file_format)
-    chosen = {name: draw for name, draw in GRAIN_DRAWINGS.items() if run.model is not None or name not in OF_WHEELS}
-    drawings = {name: partial(_fill, draw=draw, run=run) for name, draw in chosen.items()}
-    paths = save_figures(drawings, folder, height=6.5, file_format=file_format)
-    if with_overview:
-        page = {"overview": partial(_overview, draws=list(chosen.values()), run=run)}
-        paths += save_figures(page, folder, height=6.5 * len(chosen), file_format=file_format)
-    return paths
+
+def rut_sections(figure: Sheet, run: GrainRun) -> None:
+    """The surface before and after along a track and across it; through the middle of the bed without a rover."""
+    before, after = surfaces_of_run(run)
+    along, across = figure.subplots(2, 1)
+    track = _track(run, before)
+    middle = len(track) // 2
+    direction = track[min(middle + 1, len(track) - 1)] - track[max(middle - 1, 0)]
+    direction /= max(float(np.linalg.norm(direction)), 1e-12)
+    aside = np.array([-direction[1], direction[0]])
+    half = 0.5 * float(max(before.x[-1] - before.x[0], before.z[-1] - before.z[0]))
+    if run.model is not None:
+        half = min(half, 1.5 * run.model.clear_radius)
+    steps = np.linspace(-half, half, POINTS)
+    way = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(track, axis=0), axis=1))))
+    _section(along, before, after, track, way)
+    _section(across, before, after, track[middle] + steps[:, None] * aside, steps)
+    if run.model is None:
+        along.set(xlabel="x, along the middle of the bed (m)")
+        across.set(xlabel="z, across the bed, from the middle (m)")
+    else:
+        style = WheelStyle.of(run.model)
+        along.set(xlabel=f"along the track of the {style.labels[style.names[0]]} wheel (m)")
+        across.set(xlabel="across, from the middle of that track to the right (m)")
+    for axes in (along, across):
+        panel_legend(axes)
+
+
+def _track(run: GrainRun, surface: SurfaceMap) -> Array:
+    """(POINTS, 2) x and z, equally spaced: the first wheel's way over the bed, or the bed's middle along x."""
+    low, high = np.array([surface.x[0], surface.z[0]]), np.array([surface.x[-1], surface.z[-1]])
+    way = np.empty((0, 2)) if run.model is None else run.wheel_centres[:, 0][:, [0, 2]]
+    way = way[((low <= way) & (way <= high)).all(axis=1)]
+    if len(way) < 2:
+        x = np.linspace(low[0], high[0], POINTS)
+        return np.column_stack((x, np.full(POINTS, 0.5 * (low[1] + high[1]))))
+    travelled = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))))
+    places = np.linspace(0.0, max(float(travelled[-1]), 1e-9), POINTS)
+    return np.column_stack([np.interp(places, travelled, way[:, i]) for i in range(2)])
+
+
+def _section(axes: Axes, before: SurfaceMap, after: SurfaceMap, places: Array, way: Array) -> None:
+    old, new = (1e3 * surface.at(places, width=SMOOTHED_CELLS * surface.cell) for surface in (before, after))
+    axes.plot(way, old, color=DARK, linewidth=0.9, label="before")
+    axes.plot(way, new, color=QUANTITY_COLOURS[1], label="after")
+    axes.fill_between(way, old, new, where=np.isfinite(old) & np.isfinite(new), color=QUANTITY_COLOURS[1], alpha=0.15)
+    axes.set(ylabel="height (mm)")
 
 
 def wheel_forces(figure: Sheet, run: GrainRun) -> None:
@@ -74,7 +151,7 @@ def wheel_forces(figure: Sheet, run: GrainRun) -> None:
         axes.set(ylabel=f"{name} (N)")
     panels[-1].set(xlabel="time (s)")
     style.legend(figure, note=SMOOTHED)
-    _title(figure, "Force of balls and ground on the wheels, mean since the row before", run)
+    title(figure, "Force of balls and ground on the wheels, mean since the row before", run)
 
 
 def sinkage_and_slip(figure: Sheet, run: GrainRun) -> None:
@@ -91,7 +168,7 @@ def sinkage_and_slip(figure: Sheet, run: GrainRun) -> None:
     speed.plot(run.time, smooth(run.time, rate, WINDOW), color=DARK)
     speed.set(ylabel="speed of the trunk (m/s)", xlabel="time (s)")
     style.legend(figure, note=f"slip and speed: smoothed over {WINDOW:g} s")
-    _title(figure, "Sinkage and slip of the wheels, speed", run)
+    title(figure, "Sinkage and slip of the wheels, speed", run)
 
 
 def slip_of_wheels(run: GrainRun) -> Array:
@@ -139,48 +216,30 @@ def balls_and_contacts(figure: Sheet, run: GrainRun) -> None:
         residual.axhline(tolerance, color=DARK, linewidth=0.8, linestyle="--", label="tolerance")
     for axes in (energy, contacts, overlap, residual):
         panel_legend(axes)
-    _title(figure, "Balls and contacts", run)
+    title(figure, "Balls and contacts", run)
 
 
 def ruts(figure: Sheet, run: GrainRun) -> None:
     """The surface at the first and the last sample, and what changed."""
     rut_maps(figure, run)
-    _title(figure, "Surface of the balls", run)
+    title(figure, "Surface of the balls", run)
 
 
 def sections(figure: Sheet, run: GrainRun) -> None:
     """Sections along and across a track, or through the middle of the bed."""
     rut_sections(figure, run)
-    _title(figure, "Sections through the surface of the balls", run)
+    title(figure, "Sections through the surface of the balls", run)
 
 
 #: By file name.
-GRAIN_DRAWINGS: dict[str, Callable[[Sheet, GrainRun], None]] = {
-    "wheel-forces": wheel_forces,
-    "sinkage-and-slip": sinkage_and_slip,
-    "ruts": ruts,
-    "sections": sections,
-    "balls-and-contacts": balls_and_contacts,
+GRAIN_DRAWINGS = {
+    "wheel-forces": Drawing(wheel_forces, fits=lambda run: run.model is not None),
+    "sinkage-and-slip": Drawing(sinkage_and_slip, fits=lambda run: run.model is not None),
+    "ruts": Drawing(ruts),
+    "sections": Drawing(sections),
+    "balls-and-contacts": Drawing(balls_and_contacts),
 }
-#: Figures that need wheels.
-OF_WHEELS = frozenset({"wheel-forces", "sinkage-and-slip"})
 
 
 def _model(run: GrainRun) -> RoverModel:
     return RoverModel() if run.model is None else run.model
-
-
-def _fill(figure: Sheet, draw: Callable[[Sheet, GrainRun], None], run: GrainRun) -> None:
-    draw(figure, run)
-
-
-def _title(figure: Sheet, what: str, run: GrainRun) -> None:
-    broken_off = "" if run.trajectory.attributes.get("complete", True) else " (the recording was broken off)"
-    figure.suptitle(f"{what}\n{plain(run.title)}{broken_off}")
-
-
-def _overview(figure: Sheet, draws: list[Callable[[Sheet, GrainRun], None]], run: GrainRun) -> None:
-    """All figures stacked on one page."""
-    parts = figure.subfigures(len(draws), 1, squeeze=False).flat
-    for part, draw in zip(parts, draws, strict=True):
-        draw(part, run)

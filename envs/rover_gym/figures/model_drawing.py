@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.extras import require
-from rover_gym.figures.saving import check_format, save_figures
-from rover_gym.figures.style import DARK, QUANTITY_COLOURS, plain
+from rover_gym.figures.style import DARK, QUANTITY_COLOURS, check_format, plain, save_figures
 from rover_gym.mechanics import RoverModel
 from rover_gym.rendering.appearance import part_mesh, rover_parts
 

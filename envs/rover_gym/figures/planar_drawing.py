@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.figures.saving import check_format, save_figures
-from rover_gym.figures.style import DARK, QUANTITY_COLOURS, circle, panel_legend, plain
+from rover_gym.figures.style import (
+    DARK,
+    QUANTITY_COLOURS,
+    Drawing,
+    broken_off,
+    circle,
+    panel_legend,
+    plain,
+)
 from rover_gym.mechanics import Polyline
 from rover_gym.rendering.appearance import PLANAR_WHEEL_COLOURS
 
@@ -28,46 +33,6 @@ GROUND = "#8c6d46"
 #: Longest stretch of ground that is shown, in diameters of the largest disc: beyond it a step is a hair's breadth.
 STRETCH = 20.0
 STANCES = 6  # in which the machine is drawn along its way
-
-
-def draw_planar_run(run: PlanarRun, path: str | Path) -> Path:
-    """Draws a planar run on one page: the path over the ground, and speed, loads, gaps and energy against time.
-
-    Args:
-        run: From `read_planar_run`.
-        path: PNG file to write.
-
-    Raises:
-        MissingExtraError: matplotlib is not installed.
-    """
-    path = Path(path)
-    return save_figures({path.stem: partial(_page, run=run)}, path.parent, height=7.5)[0]
-
-
-def draw_planar_figures(
-    run: PlanarRun, folder: str | Path, *, file_format: str = "png", with_overview: bool = False
-) -> list[Path]:
-    """Draws each figure of a planar run to a file of its own.
-
-    Args:
-        run: From `read_planar_run`.
-        folder: Output folder; created if it does not exist.
-        file_format: "png", "svg" or "pdf".
-        with_overview: Whether to add one page with all figures.
-
-    Returns:
-        Paths of the files.
-
-    Raises:
-        OptionError: The file format is unknown.
-        MissingExtraError: matplotlib is not installed.
-    """
-    check_format(file_format)
-    drawings = {name: partial(_alone, run=run, draw=draw) for name, draw in PLANAR_DRAWINGS.items()}
-    paths = save_figures(drawings, folder, file_format=file_format)
-    if with_overview:
-        paths += save_figures({"overview": partial(_page, run=run)}, folder, height=7.5, file_format=file_format)
-    return paths
 
 
 def path_over_ground(axes: Axes, run: PlanarRun) -> None:
@@ -142,8 +107,7 @@ def mechanical_energy(axes: Axes, run: PlanarRun) -> None:
     axes.set(xlabel="time (s)", ylabel="energy (J)")
 
 
-#: By file name.
-PLANAR_DRAWINGS: dict[str, Callable[[Axes, PlanarRun], None]] = {
+_PANELS: dict[str, Callable[[Axes, PlanarRun], None]] = {
     "path": path_over_ground,
     "speed": speed_and_slip,
     "loads": disc_loads,
@@ -152,19 +116,27 @@ PLANAR_DRAWINGS: dict[str, Callable[[Axes, PlanarRun], None]] = {
 }
 
 
-def _alone(figure: Sheet, run: PlanarRun, draw: Callable[[Axes, PlanarRun], None]) -> None:
-    axes = figure.subplots()
-    draw(axes, run)
-    panel_legend(axes)
-    figure.suptitle(_title(run))
+def _alone(draw: Callable[[Axes, PlanarRun], None]) -> Drawing:
+    def fill(figure: Sheet, run: PlanarRun) -> None:
+        axes = figure.subplots()
+        draw(axes, run)
+        panel_legend(axes)
+        figure.suptitle(_title(run))
+
+    return Drawing(fill, 5.0)
 
 
-def _page(figure: Sheet, run: PlanarRun) -> None:
+#: By file name.
+PLANAR_DRAWINGS = {name: _alone(draw) for name, draw in _PANELS.items()}
+
+
+def planar_page(figure: Sheet, run: PlanarRun) -> None:
+    """The path over the ground, and speed, loads, gaps and energy against time."""
     grid = figure.add_gridspec(3, 2)
     places = {"path": grid[0, :], "speed": grid[1, 0], "loads": grid[1, 1], "gaps": grid[2, 0], "energy": grid[2, 1]}
     for name, place in places.items():
         axes = figure.add_subplot(place)
-        PLANAR_DRAWINGS[name](axes, run)
+        _PANELS[name](axes, run)
         panel_legend(axes, columns=4 if name == "path" else 3)
     figure.suptitle(_title(run))
 
@@ -173,8 +145,7 @@ def _title(run: PlanarRun) -> str:
     low, high = _stretch(run)
     x = run.discs[..., 0]
     part = f", shown from x = {low:.3g} to {high:.3g} m" if x.min() < low or x.max() > high else ""
-    broken_off = "" if run.trajectory.attributes.get("complete", True) else " (the recording was broken off)"
-    return f"{plain(run.title)}, {run.time[-1] - run.time[0]:.3g} s{part}{broken_off}"
+    return f"{plain(run.title)}, {run.time[-1] - run.time[0]:.3g} s{part}{broken_off(run)}"
 
 
 def _discs(run: PlanarRun) -> list[tuple[str, str]]:

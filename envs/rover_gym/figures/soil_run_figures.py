@@ -5,56 +5,32 @@ Signals that jump from row to row are drawn twice: every sample as a light line,
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Mapping, Sequence
+from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rover_gym.env.wheels import SLIP_SPEED
-from rover_gym.figures.derived_signals import Array, smooth
-from rover_gym.figures.saving import check_format, save_figures
-from rover_gym.figures.signals import WINDOW
-from rover_gym.figures.style import DARK, QUANTITY_COLOURS, panel_legend, plain
+from rover_gym.env.start import SLIP_SPEED
+from rover_gym.extras import MissingExtraError
+from rover_gym.figures.derived_signals import WINDOW, Array, smooth
+from rover_gym.figures.style import (
+    DARK,
+    QUANTITY_COLOURS,
+    Drawing,
+    panel_legend,
+    title,
+)
 from rover_gym.rendering.appearance import PLANAR_WHEEL_COLOURS
+from rover_gym.soil.soil_trials import Pull, SoilDrive
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from matplotlib.axes import Axes
 
     from rover_gym.figures.style import Sheet
     from rover_gym.soil.soil_run import SoilRun
-
-__all__ = ["SOIL_DRAWINGS", "draw_soil_run"]
-
-
-def draw_soil_run(
-    run: SoilRun, folder: str | Path, *, file_format: str = "png", with_overview: bool = False
-) -> list[Path]:
-    """Draws the curves of a run on a soil.
-
-    Args:
-        run: From `read_soil_run`.
-        folder: Output folder; created if it does not exist. For a soil without wheels only the disks are drawn.
-        file_format: "png", "svg" or "pdf".
-        with_overview: Whether to add one page with all figures.
-
-    Returns:
-        Paths of the files.
-
-    Raises:
-        OptionError: The file format is unknown.
-        MissingExtraError: matplotlib is not installed.
-    """
-    check_format(file_format)
-    chosen = {name: draw for name, draw in SOIL_DRAWINGS.items() if run.wheels.shape[1] or name not in OF_WHEELS}
-    drawings = {name: partial(_fill, draw=draw, run=run) for name, draw in chosen.items()}
-    paths = save_figures(drawings, folder, height=6.5, file_format=file_format)
-    if with_overview:
-        page = {"overview": partial(_overview, draws=list(chosen.values()), run=run)}
-        paths += save_figures(page, folder, height=6.5 * len(chosen), file_format=file_format)
-    return paths
+    from rover_gym.soil.soil_trials import Traction
 
 
 def driving(figure: Sheet, run: SoilRun) -> None:
@@ -112,17 +88,11 @@ def disks_and_contacts(figure: Sheet, run: SoilRun) -> None:
 
 
 #: By file name.
-SOIL_DRAWINGS: dict[str, Callable[[Sheet, SoilRun], None]] = {
-    "driving": driving,
-    "wheel-forces": wheel_forces,
-    "disks-and-contacts": disks_and_contacts,
+SOIL_DRAWINGS = {
+    "driving": Drawing(driving, fits=lambda run: run.wheels.shape[1] > 0),
+    "wheel-forces": Drawing(wheel_forces, fits=lambda run: run.wheels.shape[1] > 0),
+    "disks-and-contacts": Drawing(disks_and_contacts),
 }
-#: Figures that need wheels.
-OF_WHEELS = frozenset({"driving", "wheel-forces"})
-
-
-def _fill(figure: Sheet, draw: Callable[[Sheet, SoilRun], None], run: SoilRun) -> None:
-    draw(figure, run)
 
 
 def _wheels(run: SoilRun) -> list[tuple[str, str]]:
@@ -142,12 +112,87 @@ def _finish(figure: Sheet, panels: tuple[Axes, ...], what: str, run: SoilRun) ->
     """Adds legends, and a title naming the figure and the run."""
     for axes in panels:
         panel_legend(axes)
-    broken_off = "" if run.trajectory.attributes.get("complete", True) else " (the recording was broken off)"
-    figure.suptitle(f"{what}\n{plain(run.title)}{broken_off}")
+    title(figure, what, run)
 
 
-def _overview(figure: Sheet, draws: list[Callable[[Sheet, SoilRun], None]], run: SoilRun) -> None:
-    """All figures stacked on one page."""
-    parts = figure.subfigures(len(draws), 1, squeeze=False).flat
-    for part, draw in zip(parts, draws, strict=True):
-        draw(part, run)
+#: Load colours (Okabe and Ito's palette).
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
+
+
+def draw_curves(
+    drives: Sequence[Sequence[SoilDrive]],
+    pulls: Mapping[float, Sequence[Sequence[Pull]]],
+    fits: Mapping[float, Traction],
+    path: str | Path,
+) -> Path:
+    """Draws means over the beds, with one-standard-error bars if there are several beds, and the fitted pulls.
+
+    Args:
+        drives: Drives by torque, then by bed.
+        pulls: Pulls by load (kg), then by slip, then by bed.
+        fits: Fits by load.
+        path: PNG file to write.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+    """
+    try:
+        from matplotlib.figure import Figure  # noqa: PLC0415 - an extra
+    except ModuleNotFoundError as error:
+        raise MissingExtraError("matplotlib", "demo") from error
+    figure = Figure(figsize=(14.0, 7.4), layout="constrained")
+    (speed, slip, depth), (pull, sinkage, note) = figure.subplots(2, 3)
+    note.axis("off")
+    torques = [row[0].torque for row in drives]
+    for axes, name, unit in ((speed, "speed", 1.0), (slip, "slip", 1.0), (depth, "sinkage", 1e3)):
+        _curve(axes, torques, [[unit * getattr(drive, name) for drive in row] for row in drives], "rover")
+        axes.set_xlabel("torque of each wheel, N m")
+    speed.set_ylabel("mean speed, m/s")
+    slip.set_ylabel("slip")
+    depth.set_ylabel("sinkage, mm")
+    texts = []
+    for (load, rows), colour in zip(pulls.items(), cycle(COLOURS), strict=False):
+        slips, fit = [row[0].slip for row in rows], fits[load]
+        ratios = [[trial.pull / trial.weight for trial in row] for row in rows]
+        _curve(pull, slips, ratios, f"{load:g} kg", fmt="o", color=colour)
+        between = np.linspace(min(slips), max(slips), 200)
+        pull.plot(between, fit(between), color=colour)
+        _curve(sinkage, slips, [[1e3 * trial.sinkage for trial in row] for row in rows], f"{load:g} kg", color=colour)
+        texts.append(
+            f"{load:g} kg:\n  A = {fit.limit}\n  s₀ = {fit.free_slip}\n  K = {fit.scale}\n"
+            f"  slope from s = {fit.first:g} on: {fit.last_slope}"
+        )
+    pull.axhline(0.0, color="black", linewidth=0.8)
+    pull.set(xlabel="slip", ylabel="drawbar pull / load of one wheel")
+    sinkage.set(xlabel="slip", ylabel="sinkage of one wheel, mm")
+    for axes in (pull, sinkage):
+        axes.legend(title="load")
+    note.text(
+        0.0,
+        1.0,
+        "\n".join(("lines: pull / load = A (1 - exp(-(s - s₀) / K))\nof the slip s\n", *texts)),
+        transform=note.transAxes,
+        verticalalignment="top",
+        fontsize=11.0,
+    )
+    figure.savefig(path, dpi=100)
+    return Path(path)
+
+
+def _curve(
+    axes: Axes,
+    x: Sequence[float],
+    rows: Sequence[Sequence[float]],
+    label: str,
+    *,
+    fmt: str = "o-",
+    color: str = COLOURS[0],
+) -> None:
+    """Means of the rows over their finite values, with standard errors."""
+    means, errors = [], []
+    for row in rows:
+        known = np.array(row)[np.isfinite(row)]
+        means.append(known.mean() if len(known) else np.nan)
+        errors.append(known.std(ddof=1) / np.sqrt(len(known)) if len(known) > 1 else 0.0)
+    axes.errorbar(x, means, yerr=errors, fmt=fmt, color=color, markersize=4, capsize=3, label=label)
+    axes.grid(alpha=0.3)

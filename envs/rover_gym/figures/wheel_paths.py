@@ -8,8 +8,7 @@ import numpy as np
 
 from rover_gym.extras import require
 from rover_gym.figures.derived_signals import Array
-from rover_gym.figures.style import title
-from rover_gym.figures.wheel_style import WheelStyle
+from rover_gym.figures.style import WheelStyle, title
 from rover_gym.ground import parts_of, plane_of, spheres_of, surface_heights, surfaces_of
 from rover_gym.mechanics import SphereField, Terrain
 

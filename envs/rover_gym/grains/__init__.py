@@ -6,16 +6,34 @@
 True
 """
 
-from rover_gym.grains.ball_bed import BallBed, box_walls, settle, settled_balls
-from rover_gym.grains.bed_scenes import penetration_depths, rover_on_bed, striking_sphere, with_wheel_width
+from rover_gym.grains.ball_bed import (
+    BallBed,
+    box_walls,
+    even_radii,
+    lognormal_radii,
+    settle,
+    settled_balls,
+    settled_track,
+    sieved_radii,
+    tiled,
+)
+from rover_gym.grains.bed_scenes import (
+    column,
+    drum,
+    outflow,
+    penetration_depths,
+    rover_on_bed,
+    run_out,
+    silo,
+    slopes,
+    striking_sphere,
+    with_wheel_width,
+)
 from rover_gym.grains.grain_recording import GrainSampler, describe_grains, record_grains
-from rover_gym.grains.grain_run import GrainRun, read_grain_run
+from rover_gym.grains.grain_run import GrainRun
 from rover_gym.grains.grain_surface import SurfaceMap, surface_map
 from rover_gym.grains.moving_window import BedEnergy, MovingWindow, WindowSnapshot
 from rover_gym.grains.pit import Pit, PitFill
-from rover_gym.grains.sizes import even_radii, lognormal_radii, sieved_radii
-from rover_gym.grains.tiling import settled_track, tiled
-from rover_gym.grains.vessel_scenes import column, drum, outflow, run_out, silo, slopes
 
 __all__ = [
     "BallBed",
@@ -35,7 +53,6 @@ __all__ = [
     "lognormal_radii",
     "outflow",
     "penetration_depths",
-    "read_grain_run",
     "record_grains",
     "rover_on_bed",
     "run_out",

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -17,9 +19,19 @@ import numpy.typing as npt
 from rover_gym.grains.moving_window import MovingWindow
 from rover_gym.grains.stored_vessel import stored_vessel
 from rover_gym.mechanics import GrainSimulation, OptionError, RoverGrainSimulation, RoverModel, Simulation
-from rover_gym.record.channels import Channel, state_channels
-from rover_gym.record.facts import row_count
-from rover_gym.record.recorder import Recorder
+from rover_gym.record.channels import (
+    ITERATIONS,
+    RESIDUAL,
+    TIME,
+    Channel,
+    Sampler,
+    energy_channels,
+    origins,
+    rover_channels,
+    row_count,
+    wheel_solids,
+)
+from rover_gym.record.recorder import record_rows
 from rover_gym.validation import checked, number, refuse
 
 Array = npt.NDArray[np.float64]
@@ -63,7 +75,26 @@ class StoredPlaces:
         return rounded
 
 
-class GrainSampler:
+def grain_channels(balls: int, walls: int, model: RoverModel | None) -> tuple[Channel, ...]:
+    """The channels of so many balls and walls, with a rover among them or without."""
+    forces = "force of balls and ground on each wheel, world x, y, z, mean since the last row"
+    centres = "centre of each ball: x forward, y up, z right"
+    normals = "a point of each wall and the normal to its free side"
+    return (
+        replace(TIME, read="grains.time"),
+        Channel("position", "m", centres, (balls, 3), packed=True, read="places"),
+        Channel("walls", "m, 1", normals, (walls, 6), read="grains.walls"),
+        Channel("n_asleep", "1", "number of balls that sleep", read="n_asleep"),
+        *energy_channels(" of all", "all mass centres at height 0"),
+        Channel("n_contacts", "1", "most contacts of a step since the last row", read="n_contacts"),
+        Channel("penetration", "m", "deepest overlap", read="sim.penetration"),
+        RESIDUAL,
+        ITERATIONS,
+        *(() if model is None else rover_channels(model, "wheel_forces", forces)),
+    )
+
+
+class GrainSampler(Sampler):
     """Steps balls, alone or under a rover, from row to row and makes the rows for a `Recorder`.
 
     Args:
@@ -71,79 +102,49 @@ class GrainSampler:
     """
 
     def __init__(self, sim: Recordable) -> None:
-        self._sim = sim
-        self._grains, self._rover = _both(sim)
-        self._places = StoredPlaces(self._grains.radius)
-        n = len(self._grains.radius)
-        self.channels: tuple[Channel, ...] = (
-            Channel("time", "s", "time since the run's start"),
-            Channel("position", "m", "centre of each ball: x forward, y up, z right", (n, 3), packed=True),
-            Channel("walls", "m, 1", "a point of each wall and the normal to its free side", self._grains.walls.shape),
-            Channel("n_asleep", "1", "number of balls that sleep"),
-            Channel("kinetic_energy", "J", "kinetic energy of all"),
-            Channel("potential_energy", "J", "potential energy, zero with all mass centres at height 0"),
-            Channel("n_contacts", "1", "most contacts of a step since the last row"),
-            Channel("penetration", "m", "deepest overlap"),
-            Channel("solver_residual", "1", "largest residual of the contact solver since the last row"),
-            Channel("solver_iterations", "1", "iterations of the contact solver since the last row"),
-        )
-        self._wheel_solids: list[str] = []
-        if self._rover is not None:
-            self.channels += _rover_channels(self._rover.model)
-            self._wheel_solids = [wheel["solid"] for wheel in self._rover.model.to_dict()["wheels"]]
-        self._clear()
+        self.grains, self.rover = _both(sim)
+        model = None if self.rover is None else self.rover.model
+        self._stored = StoredPlaces(self.grains.radius)
+        self._solids = [] if model is None else wheel_solids(model)
+        super().__init__(sim)
+        self.channels = grain_channels(len(self.grains.radius), len(self.grains.walls), model)
 
-    def _clear(self) -> None:
+    def clear(self) -> None:
         """Resets what is gathered from row to row."""
-        self._residual, self._contacts, self._iterations, self._steps = 0.0, 0, 0, 0
-        self._impulses = np.zeros((len(self._wheel_solids), 3))
+        super().clear()
+        self.n_contacts, self._impulses = 0, np.zeros((len(self._solids), 3))
 
-    def step(self, n: int) -> bool:
-        """Takes the steps that the next row covers; returns whether all of them converged to the tolerance.
+    def gather(self, report: Any) -> None:
+        """Adds the contacts and the wheels' impulses of a step."""
+        self.n_contacts = max(self.n_contacts, report.n_contacts)
+        if self.rover is not None:
+            self._impulses += wheel_impulses(self.rover)
 
-        Raises:
-            StepError: A step failed.
-        """
-        converged = True
-        for _ in range(n):
-            report = self._sim.step()
-            self._steps += 1
-            self._residual = max(self._residual, report.residual)
-            self._contacts = max(self._contacts, report.n_contacts)
-            self._iterations += report.iterations
-            converged &= report.is_converged
-            if self._rover is not None:
-                self._impulses += wheel_impulses(self._rover)
-        return converged
+    def measure(self) -> None:
+        """Measures what several channels read."""
+        self.energy = self.grains.energy()
+        if self.rover is not None:
+            both = self.energy, self.rover.energy()
+            self.energy = SimpleNamespace(
+                kinetic=sum(energy.kinetic for energy in both), potential=sum(energy.potential for energy in both)
+            )
 
-    def row(self) -> dict[str, npt.ArrayLike]:
-        """One row of `channels`: the current state, and means since the previous row."""
-        grains, rover = self._grains, self._rover
-        energies = [grains.energy()] + ([] if rover is None else [rover.energy()])
-        row: dict[str, npt.ArrayLike] = {
-            "time": grains.time,
-            "position": self._places.of(grains.position),
-            "walls": grains.walls,
-            "n_asleep": int(np.count_nonzero(grains.asleep)),
-            "kinetic_energy": sum(energy.kinetic for energy in energies),
-            "potential_energy": sum(energy.potential for energy in energies),
-            "n_contacts": self._contacts,
-            "penetration": self._sim.penetration(),
-            "solver_residual": self._residual,
-            "solver_iterations": self._iterations,
-        }
-        if rover is not None:
-            poses = rover.poses()
-            row |= {
-                "q": rover.q,
-                "v": rover.v,
-                "wheel_forces": self._impulses / (max(self._steps, 1) * grains.time_step),
-                "wheel_centres": np.array([poses[solid][0] for solid in self._wheel_solids]),
-                "wheel_torques": rover.wheel_torques,
-                "steering_set_points": rover.steering,
-            }
-        self._clear()
-        return row
+    def places(self) -> Array:
+        """(n, 3) places as they are stored, m."""
+        return self._stored.of(self.grains.position)
+
+    def n_asleep(self) -> int:
+        """Number of balls that sleep."""
+        return int(np.count_nonzero(self.grains.asleep))
+
+    def wheel_forces(self) -> Array:
+        """(n_wheels, 3) mean force on each wheel since the last row, N."""
+        mean: Array = self._impulses / (max(self.steps, 1) * self.grains.time_step)
+        return mean
+
+    def wheel_centres(self) -> Array:
+        """(n_wheels, 3) m, world."""
+        return np.zeros((0, 3)) if self.rover is None else origins(self.rover, self._solids)
 
 
 def wheel_impulses(rover: Simulation) -> Array:
@@ -155,24 +156,6 @@ def wheel_impulses(rover: Simulation) -> Array:
     world = np.einsum("ci,cij->cj", contacts.impulses[touching], contacts.frames[touching])
     np.add.at(impulses, contacts.wheels[touching], world)
     return impulses
-
-
-def _rover_channels(model: RoverModel) -> tuple[Channel, ...]:
-    wheels = tuple(model.wheel_names)
-    n = len(wheels)
-    return (
-        *state_channels(model),
-        Channel(
-            "wheel_forces",
-            "N",
-            "force of balls and ground on each wheel, world x, y, z, mean since the last row",
-            (n, 3),
-            wheels,
-        ),
-        Channel("wheel_centres", "m", "world: x forward, y up, z to the right", (n, 3), wheels),
-        Channel("wheel_torques", "N m", "commanded driving torques, positive drives forward", (n,), wheels),
-        Channel("steering_set_points", "rad", "set-points of the steering controllers", (n,), wheels),
-    )
 
 
 @checked(scene=(Mapping, None))
@@ -252,22 +235,15 @@ def record_grains(
     grains, rover = _both(sim)
     steps_per_row = max(1, round(1.0 / (fps * grains.time_step)))
     rows = row_count(duration, grains.time_step, steps_per_row)
-    sampler = GrainSampler(sim)
-    unconverged = 0
-    with Recorder(
+    return record_rows(
+        GrainSampler(sim),
         path,
-        sampler.channels,
         describe_grains(sim, title, scene, seed=seed),
+        rows,
+        steps_per_row,
         terrain=grains.terrain if rover is None else rover.terrain,
         rows_per_flush=ROWS_PER_FLUSH,
-    ) as recorder:
-        recorder.append(sampler.row())
-        for _ in range(rows):
-            before_row(sim)
-            unconverged += not sampler.step(steps_per_row)
-            recorder.append(sampler.row())
-            progress(grains.time)
-            if until(sim):
-                break
-        recorder.note(unconverged_rows=unconverged)
-    return unconverged
+        before_row=before_row,
+        until=until,
+        progress=progress,
+    )

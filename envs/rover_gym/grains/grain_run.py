@@ -1,6 +1,6 @@
 """Saved runs of balls in space, read back: places of the balls, the rover among them, and its ruts.
 
-run = read_grain_run("grains.h5").resample(25.0)
+run = open_run("grains.h5").resample(25.0)
 run.positions[-1, :, 1].max()
 """
 
@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.grains.grain_recording import KIND
+from rover_gym.grains.grain_recording import KIND, grain_channels
 from rover_gym.grains.grain_surface import SurfaceMap, surface_map
 from rover_gym.grains.stored_vessel import checked_vessel
 from rover_gym.mechanics import Plane, RoverModel
-from rover_gym.record.rover_run import LARGEST, RoverRun, check_rows, check_time, film_rows, title_of
-from rover_gym.record.trajectory import Trajectory, read_frames, read_trajectory
+from rover_gym.record.rover_run import LARGEST, RoverRun, Run, check_rows, check_time, title_of
+from rover_gym.record.trajectory import Trajectory, read_frames
 from rover_gym.record.trajectory_format import RecordingError, sound
 from rover_gym.validation import refuse
 
@@ -31,7 +31,7 @@ Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class GrainRun:
+class GrainRun(Run):
     """A recorded run of balls, alone or under a rover.
 
     Attributes:
@@ -57,16 +57,6 @@ class GrainRun:
     model: RoverModel | None
     vessel: Mapping[str, Any] | None
     title: str
-
-    @property
-    def n_frames(self) -> int:
-        """Number of samples."""
-        return len(self.rows)
-
-    @property
-    def time(self) -> Array:
-        """(n,) times of the samples, s."""
-        return self.trajectory["time"]
 
     @cached_property
     def positions(self) -> npt.NDArray[np.float32]:
@@ -143,35 +133,15 @@ class GrainRun:
         result: Array = surface - (centres[..., 1] - radii)
         return result
 
-    def resample(self, fps: float) -> GrainRun:
-        """The run reduced to the samples nearest to the frame times of a video, each at most once.
-
-        Args:
-            fps: Frames per second; a run sampled more coarsely keeps all its samples.
-
-        Raises:
-            OptionError: `fps` is not a positive number.
-        """
-        chosen = film_rows(self.time, fps)
-        data = {name: values[chosen] for name, values in self.trajectory.data.items()}
-        return replace(self, trajectory=replace(self.trajectory, data=data), rows=self.rows[chosen])
+    def at(self, rows: npt.NDArray[np.int64]) -> GrainRun:
+        """Some samples of the run, by their indices `(n,)`."""
+        return replace(self, trajectory=self.trajectory.at(rows), rows=self.rows[rows])
 
 
 def is_grains(trajectory: Trajectory) -> bool:
     """Whether a trajectory is a run of balls in space."""
     scene = trajectory.attributes.get("scene")
     return isinstance(scene, dict) and scene.get("kind") == KIND
-
-
-def read_grain_run(path: str | Path) -> GrainRun:
-    """Reads a run that `record_grains` saved, complete or not.
-
-    Raises:
-        RecordingError: The file is not a trajectory, not a run of balls, or holds no samples.
-        OSError: The file does not exist or cannot be read.
-        MissingExtraError: h5py is not installed.
-    """
-    return grain_run_of(read_trajectory(path), path)
 
 
 def grain_run_of(trajectory: Trajectory, path: str | Path) -> GrainRun:
@@ -195,7 +165,9 @@ def grain_run_of(trajectory: Trajectory, path: str | Path) -> GrainRun:
             model = RoverModel.from_dict(scene["model"])
     with sound(path, "scene.vessel"):
         vessel = checked_vessel(scene.get("vessel"))
-    _check(trajectory, path, model)
+    walls = trajectory["walls"].shape[1] if trajectory["walls"].ndim == 3 else 0
+    channels = grain_channels(len(radius), walls, model)
+    check_rows(trajectory, path, channels, bounded=("walls", "q", "v", "wheel_centres"), needed=True)
     return GrainRun(
         path=Path(path),
         trajectory=trajectory,
@@ -216,27 +188,3 @@ def _of_balls(trajectory: Trajectory, path: str | Path, name: str) -> Array:
         refuse(RecordingError, f"{path}: grain_{name}", value, "must be an array with an entry for each of the balls")
     result: Array = value.astype(np.float64)
     return result
-
-
-def _check(trajectory: Trajectory, path: str | Path, model: RoverModel | None) -> None:
-    """Checks the shapes and ranges of the data sets."""
-    walls = trajectory["walls"].shape[1] if trajectory["walls"].ndim == 3 else 0
-    shapes: dict[str, tuple[int, ...]] = {"walls": (walls, 6)}
-    names = ("kinetic_energy", "potential_energy", "n_contacts", "n_asleep", "penetration", "solver_residual")
-    shapes |= dict.fromkeys(names, ())
-    for name in names:
-        trajectory[name]  # a missing one is named
-    if model is not None:
-        wheels = len(model.wheel_radii)
-        of_rover: dict[str, tuple[int, ...]] = {
-            "q": (model.nq,),
-            "v": (model.nv,),
-            "wheel_forces": (wheels, 3),
-            "wheel_centres": (wheels, 3),
-            "wheel_torques": (wheels,),
-            "steering_set_points": (wheels,),
-        }
-        for name in of_rover:
-            trajectory[name]
-        shapes |= of_rover
-    check_rows(trajectory, path, shapes, bounded=("walls", "q", "v", "wheel_centres"))

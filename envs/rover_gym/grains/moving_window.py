@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.grains.footprint import MAP, Footprint, Parts
+from rover_gym.grains.grain_surface import MAP, Footprint, Parts
 from rover_gym.mechanics import GrainSimulation, OptionError, RoverGrainSimulation, Simulation, StateError
 from rover_gym.validation import checked, number, refuse, whole
 

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.grains.ball_bed import DENSITY, settle
-from rover_gym.grains.sizes import MOST_BALLS
+from rover_gym.grains.ball_bed import DENSITY, MOST_BALLS, settle
 from rover_gym.mechanics import GrainSimulation, OptionError, TriangleMesh, ball_packing
 from rover_gym.validation import number, refuse
 

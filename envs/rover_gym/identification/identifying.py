@@ -10,12 +10,11 @@ import numpy.typing as npt
 
 from rover_gym.identification.estimates import Estimate, Identification, open_combinations
 from rover_gym.identification.fitting import SMALLEST_CHANGE, Solution, WindowFit
-from rover_gym.identification.misfit import FROM_MEDIAN, not_explained
 from rover_gym.identification.parameters import Parameter, Setup, chosen_parameters
-from rover_gym.identification.profiles import look_around, variance_of
+from rover_gym.identification.profiles import FROM_MEDIAN, look_around, not_explained, variance_of
 from rover_gym.identification.windows import Window, cut
 from rover_gym.mechanics import OptionError, RoverModel
-from rover_gym.record.channels import state_channels
+from rover_gym.record.channels import RoverSampler
 from rover_gym.record.rover_run import RoverRun, read_run
 from rover_gym.validation import number, refuse, whole
 
@@ -189,7 +188,7 @@ def _missed(windows: Sequence[Window], solution: Solution, model: RoverModel) ->
 
 def _columns(model: RoverModel) -> tuple[str, ...]:
     """Names of the (nq + nv) measured columns."""
-    coordinates, rates = state_channels(model)
+    coordinates, rates = RoverSampler(model).channels[1:3]
     return (*coordinates.columns, *rates.columns[:6], *(f"rate of {name}" for name in rates.columns[6:]))
 
 

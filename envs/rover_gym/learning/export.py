@@ -11,8 +11,7 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.vec_env import VecNormalize
 
 from rover_gym.learning.training_config import TrainingConfig, rover
-from rover_gym.policy.network import Network
-from rover_gym.policy.policy_card import PolicyCard
+from rover_gym.policy.policy_card import Network, PolicyCard
 
 
 def network_of(model: OnPolicyAlgorithm, normalisation: VecNormalize) -> Network:

@@ -6,9 +6,14 @@ The run's folder receives the configuration, seed, versions and revision (`run.j
 """
 
 import json
+import platform
+import re
+import subprocess
+import sys
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +23,125 @@ from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
-from rover_gym.learning.build import build_env, normalised
-from rover_gym.learning.callbacks import CheckpointCallback, CurriculumCallback
+from rover_gym.learning.build import Stopwatch, build_env, normalised
+from rover_gym.learning.callbacks import CheckpointCallback, CurriculumCallback, MetricsCallback, evaluation_line
 from rover_gym.learning.export import export
-from rover_gym.learning.metrics import MetricsCallback, evaluation_line
-from rover_gym.learning.provenance import provenance
-from rover_gym.learning.resuming import Checkpoint, check_resumable, latest_checkpoint
-from rover_gym.learning.stopwatch import Stopwatch
 from rover_gym.learning.training_config import PPOConfig, TrainingConfig, read_config
 from rover_gym.learning.training_evaluation import EvaluationCallback, TrainingEvaluation
+from rover_gym.mechanics import OptionError
+from rover_gym.validation import refuse
+
+#: What a checkpoint's network, its inputs and the meaning of its outputs depend on. All else is taken over.
+FIXED = (
+    "environment.model",
+    "environment.height_scan",
+    "pool",
+    "guided",
+    "command",
+    "ppo.net_arch",
+    "ppo.log_std_init",
+)
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """What `latest.json` says of a run's last checkpoint.
+
+    Attributes:
+        name: Name of its files, the number of decisions.
+        hardest: Hardest difficulty of the curriculum; None without one.
+    """
+
+    name: str
+    hardest: float | None
+
+    @property
+    def decisions(self) -> int:
+        """Decisions of all environments so far."""
+        return int(self.name)
+
+
+def latest_checkpoint(folder: Path) -> Checkpoint:
+    """The last checkpoint in a folder of checkpoints.
+
+    Raises:
+        OptionError: `latest.json` is damaged.
+        OSError: There is none.
+    """
+    path = folder / "latest.json"
+    text = path.read_bytes()
+    try:
+        latest: dict[str, Any] = json.loads(text)
+        hardest = None if latest["hardest"] is None else float(latest["hardest"])
+        is_named = re.fullmatch("[0-9]{9,15}", latest["name"]) is not None
+    except (ValueError, LookupError, TypeError, RecursionError):
+        is_named = False
+    if not is_named:
+        refuse(OptionError, "resume", str(path), "names no checkpoint")
+    return Checkpoint(latest["name"], hardest)
+
+
+def check_resumable(before: TrainingConfig, now: TrainingConfig) -> None:
+    """Refuses to go on with a configuration for which the checkpoint's network was not made.
+
+    Args:
+        before: The configuration that the checkpoint was trained with.
+        now: The one to go on with.
+
+    Raises:
+        OptionError: A value that the network depends on differs; `field` names it.
+    """
+    known, given = dict(_leaves(asdict(before))), dict(_leaves(asdict(now)))
+    for name in sorted(known.keys() | given.keys()):
+        is_fixed = any(name == fixed or name.startswith(f"{fixed}.") for fixed in FIXED)
+        if is_fixed and known.get(name) != given.get(name):
+            reason = f"was {known.get(name)!r} in the training that is to go on, whose network depends on it"
+            refuse(OptionError, name, given.get(name), reason)
+
+
+def _leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """The values of nested mappings, by their dotted names; lists and tuples are alike."""
+    for name, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", list(value) if isinstance(value, tuple) else value
+
+
+PACKAGES = ("rover-gym", "numpy", "gymnasium", "stable-baselines3", "torch", "ray")
+
+
+def provenance() -> dict[str, Any]:
+    """The command, machine type, versions of Python and the packages, and revision of the sources."""
+    return {
+        "command": [Path(sys.argv[0]).name, *sys.argv[1:]],
+        "python": platform.python_version(),
+        "machine": platform.machine(),
+        "versions": {name: found for name in PACKAGES if (found := _version(name)) is not None},
+        "revision": revision(),
+    }
+
+
+def revision() -> str | None:
+    """The git revision of the sources, with "-dirty" after uncommitted changes; None if no repository holds them."""
+    here = Path(__file__)
+    git = ["git", "-C", str(here.parent)]
+    try:
+        # An installed package may lie in the folder of another repository, which does not track it.
+        subprocess.run([*git, "ls-files", "--error-unmatch", here.name], check=True, capture_output=True)  # noqa: S603
+        head = subprocess.run([*git, "rev-parse", "HEAD"], check=True, capture_output=True, text=True)  # noqa: S603
+        changed = subprocess.run([*git, "status", "--porcelain"], check=True, capture_output=True, text=True)  # noqa: S603
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return head.stdout.strip() + ("-dirty" if changed.stdout.strip() else "")
+
+
+def _version(name: str) -> str | None:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
+
 
 # Different seeds and resumed runs get different fields; all seeds stay below the evaluations' million.
 SEED_STRIDE = 1000

@@ -1,18 +1,26 @@
 """A policy on the actions and observations of `RoverEnv` themselves, as stable-baselines3 trained it."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import yaml
+from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
 
-from rover_gym.learning.raw_config import ALGORITHMS, read_raw_config
+from rover_gym.learning.ppo import provenance
 from rover_gym.learning.training_config import environment_arguments
-from rover_gym.policy.observed import check_observed
+from rover_gym.mechanics import OptionError
+from rover_gym.policy.features import check_observed
+from rover_gym.validation import refuse
 from rover_gym.vector.sb3 import RoverVecEnv
+
+#: The algorithms of stable-baselines3, by name.
+ALGORITHMS: Mapping[str, type[BaseAlgorithm]] = {"PPO": PPO, "SAC": SAC}
 
 
 class RawPolicy:
@@ -41,21 +49,38 @@ class RawPolicy:
         """The statistics that it was trained with."""
         return self._normalisation
 
-    @classmethod
-    def load(cls, folder: str | Path) -> "RawPolicy":
-        """Loads the policy of a run of `training/train_raw.py`. The files are pickles: load only what you trust.
+    def save(self, folder: str | Path) -> None:
+        """Writes the model, its statistics and the environment's arguments, for `load`.
 
         Raises:
+            OSError: The folder cannot be written.
+        """
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        self.model.save(folder / "model.zip")
+        self.normalisation.save(str(folder / "normalisation.pkl"))
+        told = {"algorithm": type(self.model).__name__, "environment": self.environment, **provenance()}
+        (folder / "run.json").write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+
+    @classmethod
+    def load(cls, folder: str | Path) -> "RawPolicy":
+        """Loads a policy that `save` wrote. The files are pickles: load only what you trust.
+
+        Raises:
+            OptionError: The run is of an unknown algorithm.
             OSError: The folder lacks a file.
         """
         folder = Path(folder)
-        config = read_raw_config(folder / "config.yaml")
-        task = json.loads((folder / "run.json").read_text(encoding="utf-8"))["task"]
-        environment = environment_arguments(config.evaluated_environment_of(task))
+        told = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        algorithm = str(told["algorithm"]).split()[-1]
+        if algorithm not in ALGORITHMS:
+            refuse(OptionError, "algorithm", algorithm, f"must be one of {', '.join(ALGORITHMS)}")
+        environment = environment_arguments(
+            told["environment"] if "environment" in told else _earlier_environment(folder, told["task"])
+        )
         rovers = RoverVecEnv(1, threads=1, **environment)
         normalisation = VecNormalize.load(str(folder / "normalisation.pkl"), rovers)
-        model = ALGORITHMS[config.algorithm].load(folder / "model.zip", device="cpu")
-        return cls(model, normalisation, environment)
+        return cls(ALGORITHMS[algorithm].load(folder / "model.zip", device="cpu"), normalisation, environment)
 
     def predict(
         self,
@@ -72,3 +97,10 @@ class RawPolicy:
         seen = self._normalisation.normalize_obs(observation)
         actions, _ = self._model.predict(seen, deterministic=True)
         return actions.astype(np.float32), state
+
+
+def _earlier_environment(folder: Path, task: str) -> dict[str, Any]:
+    """The arguments of a run whose configuration is a file beside it, without its coarser physics."""
+    config = yaml.safe_load((folder / "config.yaml").read_text(encoding="utf-8"))
+    given = {**config["environment"], **config["tasks"][task].get("environment", {})}
+    return {name: value for name, value in given.items() if name not in ("time_step", "solver_options")}

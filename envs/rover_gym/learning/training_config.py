@@ -16,8 +16,7 @@ from typing import Any, TypeVar, get_args, get_type_hints
 
 import yaml
 
-from rover_gym.env.argument_checks import terrain_name
-from rover_gym.env.arguments import ARGUMENTS
+from rover_gym.env.arguments import ARGUMENTS, terrain_name
 from rover_gym.env.rocks import MAX_DIFFICULTY
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError

@@ -15,11 +15,9 @@ from stable_baselines3.common.vec_env import VecNormalize
 from rover_gym.learning.export import card_of, network_of
 from rover_gym.learning.training_config import TrainingConfig, environment_arguments
 from rover_gym.mechanics import OptionError
+from rover_gym.policy.comparison import film_episode
 from rover_gym.policy.evaluation import PolicySummary, drive_all, summarise
-from rover_gym.policy.films import film_episode
-from rover_gym.policy.network import Network
-from rover_gym.policy.policy_card import PolicyCard
-from rover_gym.policy.policy_files import PolicyError
+from rover_gym.policy.policy_card import Network, PolicyCard, PolicyError
 from rover_gym.policy.trained_policy import TrainedPolicy
 from rover_gym.validation import refuse
 

@@ -32,8 +32,7 @@ from rover_gym.live.live_commands import (
 )
 from rover_gym.live.live_recording import LiveRecording
 from rover_gym.live.live_scene import BY_HAND
-from rover_gym.live.live_state import LiveState, poses_of
-from rover_gym.live.past import Past
+from rover_gym.live.live_state import LiveState, Past, poses_of
 from rover_gym.mechanics import CommandError, RoverGymError
 from rover_gym.validation import checked, refuse
 

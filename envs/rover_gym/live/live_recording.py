@@ -11,9 +11,9 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from rover_gym.exports import McapWriter
-from rover_gym.record.channels import Channel, RoverSampler
-from rover_gym.record.facts import describe
+from rover_gym.record.channels import Channel, RoverSampler, describe
 from rover_gym.record.recorder import Recorder
+from rover_gym.record.rover_run import OF_EPISODES
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -52,9 +52,7 @@ class LiveRecording:
         self._sampler = RoverSampler(rover.env.model)
         channels = (
             *self._sampler.channels,
-            Channel("distance_to_goal", "m", "horizontal distance from the trunk's origin to the goal"),
-            Channel("slip_ratio", "1", "mean over the wheels in contact of rim slip over the faster of rim and ground"),
-            Channel("motor_energy", "J", "work through the wheel motors since the start, driving or braking"),
+            *OF_EPISODES,
             Channel("friction", "1", "friction coefficient"),
             Channel("gravity", "m/s2", "magnitude of gravity"),
         )

@@ -20,8 +20,8 @@ from rover_gym.policy.command import CommandController
 from rover_gym.validation import checked, number, refuse
 
 if TYPE_CHECKING:
+    from rover_gym.env.env_snapshot import Progress
     from rover_gym.env.episode_scene import EpisodeScene
-    from rover_gym.env.progress import Progress
     from rover_gym.policy.episodes import Policy
     from rover_gym.policy.named_policy import NamedPolicy
 

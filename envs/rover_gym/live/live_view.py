@@ -15,10 +15,9 @@ import numpy.typing as npt
 from rover_gym.mechanics import sin_cos
 from rover_gym.record.rover_run import RoverRun
 from rover_gym.record.trajectory import Trajectory
-from rover_gym.replay.player import add_surroundings, shortened
-from rover_gym.replay.rotation import quaternions
+from rover_gym.replay.player import add_surroundings, quaternions, shortened
 from rover_gym.replay.scenery import first_view
-from rover_gym.replay.world_nodes import add_ground, add_rover
+from rover_gym.replay.vrml import add_ground, add_rover
 
 if TYPE_CHECKING:
     from rover_gym.live.live_loop import LiveLoop

@@ -5,7 +5,6 @@ of them.
 """
 
 from rover_gym.maps.fractal import fractal_map
-from rover_gym.maps.map_files import read_map
-from rover_gym.maps.mesh_files import read_mesh
+from rover_gym.maps.map_files import read_map, read_mesh
 
 __all__ = ["fractal_map", "read_map", "read_mesh"]

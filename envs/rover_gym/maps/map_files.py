@@ -1,4 +1,4 @@
-"""Maps of heights from GeoTIFF, PNG and .npy files.
+"""Grounds from files: maps of heights (GeoTIFF, PNG, .npy) and meshes.
 
 A file's size is checked before it is read into memory, and every error names the file. Beside the numbers of the file
 there is never more than the map itself: they are converted some rows at a time, and in place where they are float32.
@@ -6,20 +6,62 @@ there is never more than the map itself: they are converted some rows at a time,
 
 from __future__ import annotations
 
+import json
+import os
+import struct
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from pathlib import Path
+from typing import Any, NoReturn, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.extras import require
-from rover_gym.maps.ground_file import GroundFile
-from rover_gym.mechanics import TerrainError
+from rover_gym.mechanics import HeightField, TerrainError, TriangleMesh
 from rover_gym.validation import number, refuse
 
+
+@dataclass(frozen=True)
+class GroundFile:
+    """A file that can be read.
+
+    Attributes:
+        path: Its path.
+        size: Its length, bytes.
+    """
+
+    path: Path
+    size: int
+
+    @classmethod
+    def at(cls, path: object) -> GroundFile:
+        """The file at a path.
+
+        Raises:
+            TerrainError: The path is none.
+            OSError: There is no file, or it may not be read.
+        """
+        try:
+            place = Path(path)  # type: ignore[arg-type]
+        except TypeError:
+            refuse(TerrainError, "path", path, "must be a path")
+        with place.open("rb") as file:
+            return cls(place, file.seek(0, 2))
+
+    @property
+    def ending(self) -> str:
+        """Its ending in lower case, with the dot."""
+        return self.path.suffix.lower()
+
+    def refuse(self, reason: str, value: object = None) -> NoReturn:
+        """Raises a `TerrainError` that names the file and what of it is wrong; the file itself if that is None."""
+        refuse(TerrainError, "path", str(self.path) if value is None else value, f"{self.path}: {reason}")
+
+
 Heights: TypeAlias = npt.NDArray[np.float32]
+
 Pair: TypeAlias = tuple[float, float]
 
 #: Endings of the formats.
@@ -302,3 +344,127 @@ def _spacing(file: GroundFile, transform: Any, crs: Any) -> Pair | None:
         if not SPACINGS[0] <= value <= SPACINGS[1]:
             file.refuse("the distance of its columns and rows must be from {:g} to {:g} m".format(*SPACINGS), value)
     return step
+
+
+#: Longest file, bytes: reading text takes some ten times as many.
+MOST_BYTES = 2**28
+
+#: Largest coordinate of a terrain, m.
+FARTHEST = 1e6
+
+#: Endings of the formats that hold a mesh and nothing that would be run or fetched.
+MESH_ENDINGS = (".obj", ".ply", ".stl", ".off", ".glb")
+
+
+def read_mesh(
+    path: object, *, scale: object = 1.0, position: object = (0.0, 0.0, 0.0), up: object = "y"
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+    """Reads a mesh; the arguments are those of `TriangleMesh.from_file`.
+
+    Returns:
+        Vertices `(n, 3)`, m, and triangles `(m, 3)`.
+
+    Raises:
+        TerrainError: The file holds no such mesh.
+        OSError: The file cannot be read.
+        MissingExtraError: The extra `maps` is not installed.
+    """
+    factor = number("scale", scale, above=0.0, error=TerrainError)
+    if up not in ("y", "z"):
+        refuse(TerrainError, "up", up, 'must be "y" or "z"')
+    places = list(position) if isinstance(position, Iterable) else []
+    shift = np.array([number(f"position[{k}]", x, error=TerrainError) for k, x in enumerate(places)])
+    if shift.shape != (3,):
+        refuse(TerrainError, "position", position, "must be three numbers")
+    file = GroundFile.at(path)
+    if file.ending not in MESH_ENDINGS:
+        file.refuse(f"a mesh's file ends in {', '.join(MESH_ENDINGS)}")
+    if file.size > MOST_BYTES:
+        file.refuse(f"at most {MOST_BYTES} bytes are read", file.size)
+    trimesh = require("trimesh", "maps")
+    try:
+        if file.ending == ".glb":
+            _check_counts(file)
+        with np.errstate(all="ignore"):
+            mesh: Any = trimesh.load_mesh(str(file.path), process=False, skip_materials=True)
+            vertices, triangles = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
+    except Exception as error:
+        file.refuse(f"is damaged or holds no mesh ({type(error).__name__}: {error})")
+    if vertices.ndim != 2 or vertices.shape[1:] != (3,) or triangles.ndim != 2 or triangles.shape[1:] != (3,):
+        file.refuse("holds no triangles")
+    bad = ~np.isfinite(vertices).all(axis=1)
+    if bad.any():
+        k = int(np.flatnonzero(bad)[0])
+        file.refuse(f"vertex {k} is not finite", vertices[k].tolist())
+    if triangles.size and (triangles.min() < 0 or triangles.max() >= len(vertices)):
+        file.refuse("a triangle names a vertex that is not there")
+    placed = _turned(vertices, str(up)) * factor + shift
+    far = (np.abs(placed) > FARTHEST).any(axis=1)
+    if far.any():
+        k = int(np.flatnonzero(far)[0])
+        file.refuse(f"vertex {k} must be within {FARTHEST:g} m", placed[k].tolist())
+    return _joined(file, placed, triangles)
+
+
+def _check_counts(file: GroundFile) -> None:
+    """Refuses a GLB that states more entries than it has bytes: those without data would be made, as zeros.
+
+    Raises:
+        ValueError: It does, or it is no GLB.
+    """
+    with file.path.open("rb") as opened:
+        _, _, _, length, _ = struct.unpack("<5I", opened.read(20))
+        described = json.loads(opened.read(min(length, file.size)))
+    stated = sum(accessor["count"] for accessor in described.get("accessors", ()))
+    if stated > file.size:
+        raise ValueError(f"its accessors state {stated} entries, more than the file's {file.size} bytes")
+
+
+def _turned(vertices: npt.NDArray[np.float64], up: str) -> npt.NDArray[np.float64]:
+    """Vertices with y up: of z up, x stays and y becomes -z."""
+    return vertices if up == "y" else np.stack([vertices[:, 0], vertices[:, 2], -vertices[:, 1]], axis=1)
+
+
+def _joined(
+    file: GroundFile, vertices: npt.NDArray[np.float64], triangles: npt.NDArray[np.int64]
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+    """The mesh with equal vertices joined, and without triangles that have no area."""
+    vertices, same = np.unique(vertices, axis=0, return_inverse=True)
+    triangles = same.reshape(-1)[triangles]
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    longest = np.max([((b - a) ** 2).sum(1), ((c - a) ** 2).sum(1), ((c - b) ** 2).sum(1)], axis=0)
+    triangles = triangles[area > 1e-8 * longest]
+    if not len(triangles):
+        file.refuse("holds no triangle that has an area")
+    return vertices, triangles
+
+
+MAPS = ENDINGS
+
+MESHES = ENDINGS
+
+
+def is_terrain_file(name: object) -> bool:
+    """Whether this is a path that ends like a map's or a mesh's."""
+    if not isinstance(name, (str, os.PathLike)):
+        return False
+    return Path(os.fsdecode(name)).suffix.lower() in (*MAPS, *MESHES)
+
+
+def open_terrain(path: str | os.PathLike[str], **options: Any) -> HeightField | TriangleMesh:
+    """The map or mesh in a file.
+
+    Args:
+        path: A path that ends in one of `MAPS` or `MESHES`.
+        **options: Those of `HeightField.from_file` or `TriangleMesh.from_file`.
+
+    Raises:
+        TerrainError: The file is of another kind, is damaged, or does not say enough.
+        OSError: The file cannot be read.
+    """
+    if not is_terrain_file(path):
+        refuse(TerrainError, "terrain", os.fsdecode(path), f"must end in {', '.join((*MAPS, *MESHES))}")
+    if Path(path).suffix.lower() in MAPS:
+        return HeightField.from_file(path, **options)
+    return TriangleMesh.from_file(path, **options)

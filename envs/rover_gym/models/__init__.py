@@ -3,12 +3,11 @@
 `RoverModel.from_urdf`, `from_mjcf`, `to_urdf` and `to_mjcf` call this room.
 """
 
+from rover_gym.models.file_writing import write_mjcf, write_urdf
 from rover_gym.models.import_report import ImportReport, RobotFileWarning, solid_rows
 from rover_gym.models.lookup import open_model, read_robot
-from rover_gym.models.mjcf_writer import write_mjcf
 from rover_gym.models.reading import read_mjcf, read_urdf
 from rover_gym.models.statics import Statics, check_statics
-from rover_gym.models.urdf_writer import write_urdf
 
 __all__ = [
     "ImportReport",

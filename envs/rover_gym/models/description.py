@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.models.file_axes import Z_UP_TO_Y_UP, Array, rotation_vector, turn_z_to
+from rover_gym.models.import_report import Z_UP_TO_Y_UP, Array, rotation_vector, turn_z_to
 from rover_gym.models.robot_tree import THIN_DISC, FileJoint, FileLink, FileShape, RobotTree
 from rover_gym.models.roles import WheelRole
 

@@ -1,16 +1,16 @@
-"""What the writers of URDF and MJCF share: the solids of a model in z-up axes, and the text of numbers."""
+"""Models as URDF and MJCF files: the solids in z-up axes, and the text of numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Any, NoReturn
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from rover_gym.mechanics import ModelError, RoverModel
-from rover_gym.models.file_axes import Z_UP_TO_Y_UP, Array, rotation_matrix, turn_z_to
-from rover_gym.models.robot_tree import THIN_DISC, FileShape, checked_path
+from rover_gym.models.import_report import Z_UP_TO_Y_UP, Array, quaternion, roll_pitch_yaw, rotation_matrix, turn_z_to
+from rover_gym.models.robot_tree import THIN_DISC, FileShape, check_kinds, checked_path
 from rover_gym.validation import refuse
 
 #: Width of the cylinder that stands for a thin disc, as a share of its radius.
@@ -173,3 +173,206 @@ def write_xml(root: ET.Element, path: object) -> None:
     ET.indent(root)
     text = '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
     checked_path(path).write_text(text, encoding="utf-8")
+
+
+JOINTS = {"revolute": "hinge", "prismatic": "slide", "spherical": "ball"}
+
+
+def write_mjcf(model: RoverModel, path: object) -> None:
+    """Writes an MJCF; the arguments are those of `RoverModel.to_mjcf`."""
+    description = model.to_dict()
+    wheels = {wheel["solid"]: wheel for wheel in description["wheels"]}
+    steering = {wheel["steering"]: wheel for wheel in description["wheels"] if wheel.get("steering")}
+    root = ET.Element("mujoco", model=description["name"] or "robot")
+    ET.SubElement(root, "compiler", angle="radian", autolimits="true", balanceinertia="false")
+    world = ET.SubElement(root, "worldbody")
+    equality, actuator = ET.SubElement(root, "equality"), ET.SubElement(root, "actuator")
+    bodies: dict[str, ET.Element] = {}
+    for solid in written_solids(model):
+        above = world if solid.parent is None else bodies[solid.parent]
+        bodies[solid.name] = _body(above, solid, wheels.get(solid.name))
+        _add_control(actuator, solid, wheels.get(solid.name), solid.name in steering)
+        coupled = solid.source.get("coupled")
+        if coupled is not None:
+            terms = text_of((coupled.get("offset", 0.0), coupled["ratio"], 0.0, 0.0, 0.0))
+            ET.SubElement(equality, "joint", joint1=solid.name, joint2=coupled["joint"], polycoef=terms)
+    for tag in description.get("tags") or ():
+        x, y, z = tag["position"]
+        ET.SubElement(bodies[tag["solid"]], "site", name=tag["name"], pos=text_of((x, -z, y)))
+    write_xml(root, path)
+
+
+def _body(above: ET.Element, solid: WrittenSolid, wheel: dict[str, Any] | None) -> ET.Element:
+    pose = {"pos": text_of(solid.position), "quat": _quaternion(solid.rotation)}
+    body = ET.SubElement(above, "body", {"name": solid.name, **pose})
+    source = solid.source
+    if solid.kind == "free":
+        ET.SubElement(body, "freejoint", name=solid.name)
+    elif solid.kind in JOINTS:
+        joint = {"name": solid.name, "type": JOINTS[solid.kind]}
+        if solid.kind != "spherical":
+            joint["axis"] = text_of(solid.axis)
+            for field in ("damping", "armature"):
+                if source.get(field):
+                    joint[field] = text_of(source[field])
+            if (spring := source.get("spring")) is not None:
+                joint |= {"stiffness": text_of(spring["stiffness"]), "springref": text_of(spring.get("rest", 0.0))}
+            if (limits := source.get("limits")) is not None:
+                joint["range"] = text_of((limits["lower"], limits["upper"]))
+        ET.SubElement(body, "joint", joint)
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = solid.inertia
+    inertia = text_of((xx, yy, zz, xy, xz, yz))
+    ET.SubElement(body, "inertial", pos=text_of(solid.centre), mass=text_of(solid.mass), fullinertia=inertia)
+    for shape in solid.shapes(wheel):
+        _add_geom(body, shape)
+    return body
+
+
+def _add_geom(body: ET.Element, shape: FileShape) -> None:
+    geom = {"name": shape.name} if shape.name else {}
+    geom |= {"type": shape.kind, "pos": text_of(shape.position), "quat": _quaternion(shape.rotation), "mass": "0"}
+    match shape.kind:
+        case "box":
+            x, y, z = shape.size
+            geom["size"] = text_of((x / 2.0, y / 2.0, z / 2.0))
+        case "cylinder":
+            radius, length = shape.size
+            geom["size"] = text_of((radius, length / 2.0))
+        case _:
+            geom["size"] = text_of(shape.size)
+    if not shape.collides:
+        geom |= {"contype": "0", "conaffinity": "0"}
+    if not shape.visible:
+        geom["rgba"] = "0 0 0 0"
+    ET.SubElement(body, "geom", geom)
+
+
+def _add_control(actuator: ET.Element, solid: WrittenSolid, wheel: dict[str, Any] | None, is_steering: bool) -> None:
+    """A motor for what is driven, a position servo for steering joints, which are held."""
+    drive = solid.source.get("drive") if solid.kind == "revolute" else None
+    limit = wheel["torque_limit"] if wheel is not None else (drive or {}).get("torque_limit")
+    if solid.kind == "revolute" and limit:
+        motor = {"name": f"drive_{solid.name}", "joint": solid.name, "ctrlrange": text_of((-limit, limit))}
+        if wheel is not None:
+            motor["gear"] = text_of(wheel["drive_sign"])  # a positive command drives forward, as here
+        ET.SubElement(actuator, "motor", motor)
+    hold = solid.source.get("hold")
+    if is_steering and hold is not None and solid.kind == "revolute":
+        gains = {"kp": text_of(hold["stiffness"]), "kv": text_of(hold["damping"])}
+        ET.SubElement(actuator, "position", {"name": f"hold_{solid.name}", "joint": solid.name, **gains})
+
+
+def _quaternion(R: Array) -> str:
+    w, v = quaternion(R)
+    return text_of((w, *v))
+
+
+#: What URDF cannot express and `ignore` may name.
+IGNORABLE = ("springs", "armature")
+
+FAST = 1e3  # rad/s, the velocity limit of a joint whose speed no motor limits: URDF wants one
+
+WORLD = "world"
+
+
+def write_urdf(model: RoverModel, path: object, *, ignore: Collection[str] = ()) -> None:
+    """Writes a URDF; the arguments are those of `RoverModel.to_urdf`."""
+    ignore = check_kinds(ignore, IGNORABLE)
+    description = model.to_dict()
+    wheels = {wheel["solid"]: wheel for wheel in description["wheels"]}
+    robot = ET.Element("robot", name=description["name"] or "robot")
+    solids = written_solids(model)
+    roots = [solid for solid in solids if solid.parent is None]
+    if len(roots) > 1:
+        roots[1].refuse("parent", None, "a URDF has one tree")
+    if roots[0].kind != "free":
+        if any(solid.name == WORLD for solid in solids):
+            roots[0].refuse("name", WORLD, "this name is the world's in a URDF")
+        ET.SubElement(robot, "link", name=WORLD)
+    drives = {solid["name"]: (solid.get("drive") or {}).get("torque_limit") for solid in description["solids"]}
+    for solid in solids:
+        _check(solid, ignore)
+        robot.append(_link(solid, wheels.get(solid.name)))
+        if solid.kind != "free":
+            robot.append(_joint(solid, wheels.get(solid.name), drives[solid.name]))
+    for tag in description.get("tags") or ():
+        ET.SubElement(robot, "link", name=tag["name"])
+        joint = ET.SubElement(robot, "joint", name=f"{tag['name']}_fixed", type="fixed")
+        x, y, z = tag["position"]
+        ET.SubElement(joint, "origin", xyz=text_of((x, -z, y)), rpy="0 0 0")
+        ET.SubElement(joint, "parent", link=tag["solid"])
+        ET.SubElement(joint, "child", link=tag["name"])
+    for name in [*wheels, *(name for name, limit in drives.items() if limit is not None)]:
+        transmission = ET.SubElement(robot, "transmission", name=f"drive_{name}")
+        ET.SubElement(transmission, "type").text = "transmission_interface/SimpleTransmission"
+        ET.SubElement(transmission, "joint", name=name)
+        ET.SubElement(transmission, "actuator", name=f"motor_{name}")
+    write_xml(robot, path)
+
+
+def _check(solid: WrittenSolid, ignore: Collection[str]) -> None:
+    if solid.kind == "spherical":
+        solid.refuse("joint", solid.kind, "URDF has no spherical joints")
+    for field, kind in (("spring", "springs"), ("armature", "armature")):
+        if solid.source.get(field) and kind not in ignore:
+            solid.refuse(field, solid.source[field], f'URDF has no {kind}; to_mjcf has, or ignore=["{kind}"]')
+
+
+def _link(solid: WrittenSolid, wheel: dict[str, Any] | None) -> ET.Element:
+    link = ET.Element("link", name=solid.name)
+    inertial = ET.SubElement(link, "inertial")
+    ET.SubElement(inertial, "origin", xyz=text_of(solid.centre), rpy="0 0 0")
+    ET.SubElement(inertial, "mass", value=text_of(solid.mass))
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = solid.inertia
+    entries = {"ixx": xx, "iyy": yy, "izz": zz, "ixy": xy, "ixz": xz, "iyz": yz}
+    ET.SubElement(inertial, "inertia", {name: text_of(float(value)) for name, value in entries.items()})
+    for shape in solid.shapes(wheel):
+        if shape.visible:
+            _add_shape(link, "visual", shape)
+        if shape.collides:
+            _add_shape(link, "collision", shape)
+    return link
+
+
+def _add_shape(link: ET.Element, role: str, shape: FileShape) -> None:
+    element = ET.SubElement(link, role, {"name": shape.name} if shape.name else {})
+    ET.SubElement(element, "origin", xyz=text_of(shape.position), rpy=text_of(roll_pitch_yaw(shape.rotation)))
+    geometry = ET.SubElement(element, "geometry")
+    match shape.kind:
+        case "box":
+            ET.SubElement(geometry, "box", size=text_of(shape.size))
+        case "sphere":
+            ET.SubElement(geometry, "sphere", radius=text_of(shape.size))
+        case _:
+            radius, length = shape.size
+            ET.SubElement(geometry, "cylinder", radius=text_of(radius), length=text_of(length))
+
+
+def _joint(solid: WrittenSolid, wheel: dict[str, Any] | None, drive: float | None) -> ET.Element:
+    source = solid.source
+    limits = source.get("limits") if solid.kind != "fixed" else None
+    coupled = source.get("coupled")
+    kind = solid.kind
+    if kind == "revolute" and limits is None:
+        kind = "continuous"
+    if kind == "prismatic" and limits is None:
+        limits = {"lower": -1e9, "upper": 1e9}
+    joint = ET.Element("joint", name=solid.name, type=kind)
+    ET.SubElement(joint, "origin", xyz=text_of(solid.position), rpy=text_of(roll_pitch_yaw(solid.rotation)))
+    ET.SubElement(joint, "parent", link=solid.parent or WORLD)
+    ET.SubElement(joint, "child", link=solid.name)
+    if kind == "fixed":
+        return joint
+    ET.SubElement(joint, "axis", xyz=text_of(solid.axis))
+    motor = (wheel or {}).get("motor") or {}
+    effort = wheel["torque_limit"] if wheel is not None else (drive or 0.0)
+    limit = {"effort": text_of(effort), "velocity": text_of(motor.get("no_load_speed") or FAST)}
+    if limits is not None:
+        limit |= {"lower": text_of(limits["lower"]), "upper": text_of(limits["upper"])}
+    ET.SubElement(joint, "limit", limit)
+    if source.get("damping"):
+        ET.SubElement(joint, "dynamics", damping=text_of(source["damping"]), friction="0")
+    if coupled is not None:
+        entries = {"multiplier": text_of(coupled["ratio"]), "offset": text_of(coupled.get("offset", 0.0))}
+        ET.SubElement(joint, "mimic", {"joint": coupled["joint"], **entries})
+    return joint

@@ -11,17 +11,18 @@ from typing import Any
 
 from rover_gym.mechanics import ModelError, RoverModel
 from rover_gym.models.description import WheelOptions, describe
-from rover_gym.models.file_axes import axes_of
-from rover_gym.models.import_report import ImportReport, RobotFileWarning, solid_rows, together
-from rover_gym.models.joint_conventions import (
+from rover_gym.models.import_report import ImportReport, RobotFileWarning, axes_of, check_folders, solid_rows, together
+from rover_gym.models.mjcf import read_mjcf_tree
+from rover_gym.models.robot_tree import (
+    IGNORABLE,
+    RobotTree,
+    check_kinds,
+    checked_path,
     drop_distant_limits,
+    join_rigid_groups,
     move_limits_to_followed_joints,
     turn_steering_axes_up,
 )
-from rover_gym.models.mjcf import read_mjcf_tree
-from rover_gym.models.packages import check_folders
-from rover_gym.models.rigid_groups import join_rigid_groups
-from rover_gym.models.robot_tree import IGNORABLE, RobotTree, check_kinds, checked_path
 from rover_gym.models.roles import Steering, Wheels, find_wheels
 from rover_gym.models.urdf import read_urdf_tree
 from rover_gym.validation import number, refuse

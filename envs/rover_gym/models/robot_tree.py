@@ -1,25 +1,44 @@
-"""What a robot file describes, in the file's own axes: links, joints and shapes, before any decision about wheels."""
+"""What a robot file describes, in the file's own axes: links, joints and shapes, before any decision about wheels.
+
+A file may give a link no mass, or an inertia that no body has, and state the rest with a link that is fixed to it. Only
+the links of a rigid group together must be a body.
+
+Two wheels of four that are turned by 3.14159 instead of pi stand micrometres apart, which decides how a rigid chassis
+on rigid ground shares its weight.
+
+Distant stops are none, steering turns to the left, and followed joints have the stops of those that follow.
+
+A link is a round solid if a cylinder, a sphere or a round mesh lies about its axis, and no other shape of it reaches
+much farther from the axis. A pole with a round hub at its hinge is none.
+"""
 
 from __future__ import annotations
 
+import itertools
+import math
 import os
 from collections.abc import Collection
 from dataclasses import dataclass, field
+from decimal import ROUND_DOWN, ROUND_HALF_EVEN, Decimal
 from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
 
+from rover_gym.extras import MissingExtraError, require
 from rover_gym.mechanics import ModelError
-from rover_gym.models.file_axes import Array
+from rover_gym.models.import_report import Array, turn_z_to
 from rover_gym.validation import refuse, shown
 
 #: Most links of a file: a model has at most 1000 solids, and links without mass are joined to others.
 MAX_LINKS = 2000
+
 #: Largest file, bytes.
 MAX_BYTES = 16 << 20
+
 #: What would change the motion if it were left out, and is therefore refused unless `ignore` names it.
 IGNORABLE = ("friction", "actuators", "closed loops", "tendons", "springs", "fluid")
+
 #: How the name of a cylinder ends that stands for a wheel without width.
 THIN_DISC = "thin_disc"
 
@@ -216,3 +235,342 @@ def is_urdf(path: Path) -> bool:
         start = file.read(1 << 16)
     place = start.find(b"<robot")
     return place >= 0 and b"<mujoco" not in start[:place]
+
+
+#: Smallest mass of a solid of a model, kg.
+LEAST_MASS = 1e-9
+
+
+def join_rigid_groups(tree: RobotTree, *, free_base: bool) -> None:
+    """Joins links that are no bodies to what they are fixed to. Their origins stay as named points.
+
+    A link that moves and is no body takes over the links that are fixed to it. If a root without mass has none and the
+    base is fixed to the world, its links hang on the world.
+
+    Raises:
+        ModelError: A link that moves has no mass, and nothing with a mass is fixed to it.
+    """
+    for name in reversed(list(tree.links)):
+        link = tree.links[name]
+        if link.parent is not None and link.joint.kind == "fixed" and not _is_body(link):
+            _join(tree, link, tree.links[link.parent])
+    for link in [one for one in tree.links.values() if one.parent is None or one.joint.kind != "fixed"]:
+        while not _is_body(link):
+            fixed = [child for child in tree.children(link.name) if child.joint.kind == "fixed"]
+            if not fixed:
+                break
+            for child in fixed:
+                _join(tree, child, link)
+    for root in [link for link in tree.links.values() if link.parent is None]:
+        if root.mass == 0.0 and root.joint.kind == "fixed":
+            children = tree.children(root.name)
+            is_carriage = [child.joint.kind for child in children] == ["free"]
+            if is_carriage or (not free_base and children):
+                _hang_on_world(tree, root, children)
+    for link in tree.links.values():
+        if link.mass == 0.0:
+            hint = ", or the base must be fixed: free_base=False" if link.parent is None else ""
+            reason = "a link that moves, or what is fixed to it, must have a mass"
+            tree.refuse(f"link[{link.name}].mass", link.mass, f"{reason}{hint}")
+
+
+def _is_body(link: FileLink) -> bool:
+    """Whether mass and inertia of a link are those of a body, by the rule of a model's solids."""
+    if not (link.mass >= LEAST_MASS and np.all(np.isfinite(link.inertia))):
+        return False
+    principal = np.linalg.eigvalsh((link.inertia + link.inertia.T) / 2.0)
+    return bool(principal[0] > 0.0 and principal[2] <= (principal[0] + principal[1]) * (1.0 + 1e-9))
+
+
+def _join(tree: RobotTree, link: FileLink, other: FileLink) -> None:
+    if link.mass > 0.0:
+        tree.assumed.append(f"link[{link.name}]: joined with {other.name}, since one of the two is no body by itself")
+    R, p = link.rotation, link.position
+    other.inertia = other.inertia + R @ link.inertia @ R.T  # a file may state an inertia without a mass
+    if link.mass > 0.0:
+        centre = p + R @ link.centre
+        mass = other.mass + link.mass
+        together = (other.mass * other.centre + link.mass * centre) / mass
+        for m, c in ((other.mass, other.centre), (link.mass, centre)):
+            other.inertia = other.inertia + m * _steiner(c - together)
+        other.mass, other.centre = mass, together
+    for shape in link.shapes:
+        shape.position, shape.rotation = p + R @ shape.position, R @ shape.rotation
+        other.shapes.append(shape)
+    other.points.append((link.name, p))
+    other.points += [(name, p + R @ point) for name, point in link.points]
+    for child in tree.children(link.name):
+        child.parent = other.name
+        child.position, child.rotation = p + R @ child.position, R @ child.rotation
+    del tree.links[link.name]
+
+
+def _hang_on_world(tree: RobotTree, root: FileLink, children: list[FileLink]) -> None:
+    for child in children:
+        child.parent = None
+        child.position = root.position + root.rotation @ child.position
+        child.rotation = root.rotation @ child.rotation
+    tree.left_out.append(f"link[{root.name}]: has no mass; what it carries hangs on the world")
+    del tree.links[root.name]
+
+
+def _steiner(r: Array) -> Array:
+    return np.asarray(float(r @ r) * np.eye(3) - np.outer(r, r))
+
+
+#: Largest multiple, of both signs: two turns.
+LARGEST = 8
+
+#: Fewest and most decimals: 1.57 means pi/2, and 1.6 means 1.6.
+DECIMALS = range(2, 13)
+
+#: An angle this close has all its digits, rad.
+EXACT = 1e-12
+
+
+def right_angle(word: str) -> tuple[float, str] | None:
+    """The multiple of pi/2 that a number means by its digits, rad, and its name.
+
+    Args:
+        word: A finite number as it was written.
+
+    Returns:
+        None if the number is none, rounded or cut to its own decimals, and if it has all digits already.
+    """
+    written = Decimal(word)
+    exponent = written.as_tuple().exponent
+    if not isinstance(exponent, int) or -exponent not in DECIMALS:
+        return None
+    count = round(float(written) / (math.pi / 2.0)) if abs(written) < 100 else 0
+    if count == 0 or abs(count) > LARGEST:
+        return None
+    angle = count * (math.pi / 2.0)
+    if abs(float(written) - angle) <= EXACT:
+        return None
+    roundings = (Decimal(angle).quantize(written, rounding) for rounding in (ROUND_DOWN, ROUND_HALF_EVEN))
+    return (angle, _name(count)) if written in roundings else None
+
+
+def _name(count: int) -> str:
+    """A multiple of pi/2 in words, such as -3 pi/2."""
+    whole = count // 2 if count % 2 == 0 else count
+    factor = {1: "", -1: "-"}.get(whole, f"{whole} ")
+    return f"{factor}pi{'' if count % 2 == 0 else '/2'}"
+
+
+#: Stops this far away mean none, rad or m.
+DISTANT = 1e6
+
+
+def drop_distant_limits(tree: RobotTree) -> None:
+    """Joints whose stops are both distant lose them; a single distant stop moves to `DISTANT`. Each is listed."""
+    for link in tree.links.values():
+        limits = link.joint.limits
+        if limits is None or max(abs(limit) for limit in limits) <= DISTANT:
+            continue
+        stated = f"joint[{link.joint.name}]: limits {limits[0]:g} and {limits[1]:g}"
+        if min(abs(limit) for limit in limits) > DISTANT and limits[0] < 0.0 < limits[1]:
+            link.joint.limits = None
+            tree.assumed.append(f"{stated} mean none")
+        else:
+            lower, upper = (max(min(limit, DISTANT), -DISTANT) for limit in limits)
+            if not lower < upper:
+                tree.refuse(f"joint[{link.joint.name}].limit", list(limits), f"must be within {DISTANT:g}")
+            link.joint.limits = (lower, upper)
+            tree.assumed.append(f"{stated} are {lower:g} and {upper:g}")
+
+
+def turn_steering_axes_up(tree: RobotTree, steering: set[str], P: Array) -> None:
+    """Reverses steering joints whose axis points down, so that a positive angle turns to the left everywhere.
+
+    Args:
+        tree: The robot.
+        steering: The links whose joints steer.
+        P: Rotation from the file's axes to those of this package, (3, 3).
+    """
+    poses, up = tree.poses(), P.T @ (0.0, 1.0, 0.0)
+    for name in sorted(steering):
+        link = tree.links[name]
+        if float(poses[name][0] @ link.joint.axis @ up) > 0.0:
+            continue
+        joint = link.joint
+        joint.axis, joint.rest = -joint.axis, -joint.rest
+        if joint.limits is not None:
+            joint.limits = (-joint.limits[1], -joint.limits[0])
+        if joint.follows is not None:
+            followed, ratio, offset = joint.follows
+            joint.follows = (followed, -ratio, -offset)
+        for other in tree.links.values():
+            if other.joint.follows is not None and other.joint.follows[0] == joint.name:
+                followed, ratio, offset = other.joint.follows
+                other.joint.follows = (followed, -ratio, offset)
+        tree.assumed.append(f"steering {name}: its axis points down and is reversed: positive turns to the left")
+
+
+def move_limits_to_followed_joints(tree: RobotTree) -> None:
+    """The stops of a joint that follows another become stops of the other.
+
+    Raises:
+        ModelError: The other joint does not move, or the stops of both exclude each other.
+    """
+    by_joint = {link.joint.name: link for link in tree.links.values()}
+    for link in tree.links.values():
+        if link.joint.follows is None:
+            continue
+        name, ratio, offset = link.joint.follows
+        at = f"joint[{link.joint.name}].mimic"
+        if name not in by_joint:
+            tree.refuse(f"{at}.joint", name, "this joint does not move")
+        if link.joint.limits is not None and ratio != 0.0:
+            lower, upper = sorted((limit - offset) / ratio for limit in link.joint.limits)
+            followed = by_joint[name].joint
+            own = followed.limits or (-np.inf, np.inf)
+            followed.limits = (max(own[0], lower), min(own[1], upper))
+            if not followed.limits[0] < followed.limits[1]:
+                tree.refuse(
+                    f"{at}", list(followed.limits), "its limits and those of the followed joint exclude each other"
+                )
+        link.joint.limits = None
+
+
+#: Largest distance of a wheel's shape from its axis, as a share of its radius.
+ECCENTRIC = 0.02
+
+#: A mesh is round if its convex outline, seen along the axis, reaches this share of its radius in every direction. A
+#: regular octagon reaches 0.92, a hexagon 0.87.
+ROUND = 0.9
+
+DIRECTIONS = 24
+
+#: Other shapes of a round solid reach at most this many of its radii from the axis: treads do, poles do not.
+OUTLINE = 1.5
+
+
+@dataclass(frozen=True)
+class Outline:
+    """What a mesh is about an axis.
+
+    Attributes:
+        radius: Largest distance of a vertex from the axis, m.
+        centre: Middle of the mesh along the axis, m.
+        is_round: Whether the outline is nearly a circle.
+    """
+
+    radius: float
+    centre: float
+    is_round: bool
+
+
+def round_shape(link: FileLink) -> FileShape | None:
+    """The largest cylinder or sphere about a link's axis, of those that touch if there are any."""
+    best: FileShape | None = None
+    for shape in sorted(link.shapes, key=lambda shape: not shape.collides):
+        if shape.kind not in ("cylinder", "sphere") or (best is not None and not shape.collides):
+            continue
+        off = shape.position - link.joint.anchor - along(link, shape) * link.joint.axis
+        is_coaxial = shape.kind == "sphere" or abs(float(shape.rotation[:, 2] @ link.joint.axis)) > 1.0 - 1e-6
+        is_centred = np.linalg.norm(off) <= ECCENTRIC * shape.size[0]
+        if is_coaxial and is_centred and (best is None or shape.size[0] > best.size[0]):
+            best = shape
+    return best
+
+
+def along(link: FileLink, shape: FileShape) -> float:
+    """Place of a shape along its link's axis, m."""
+    return float((shape.position - link.joint.anchor) @ link.joint.axis)
+
+
+def width(link: FileLink) -> float:
+    """Width of the cylinder that touches for a wheel, m; 0 where it stands for a thin disc or there is none."""
+    shape = round_shape(link)
+    if shape is None or shape.kind != "cylinder" or not shape.collides or shape.name.endswith(THIN_DISC):
+        return 0.0
+    return shape.size[1]
+
+
+def mesh_outline(link: FileLink) -> tuple[Outline | None, str]:
+    """Outline of a link's mesh, of one that touches if there is any; or None, and what the link is instead."""
+    meshes = [shape for shape in link.shapes if shape.mesh is not None]
+    if not meshes:
+        return None, "has no cylinder or sphere about its axis"
+    points, reason = _points(link, min(meshes, key=lambda shape: not shape.collides))
+    if points is None:
+        return None, reason
+    placed = points @ turn_z_to(link.joint.axis)  # the axis is z
+    across = placed[:, :2]
+    radius = float(np.linalg.norm(across, axis=1).max())
+    # The middle of the bounding box in the link's axes, as seen along the joint's axis.
+    sideways = points - np.outer(points @ link.joint.axis, link.joint.axis)
+    middle = (sideways.max(axis=0) + sideways.min(axis=0)) / 2.0
+    if np.linalg.norm(middle) > 5.0 * ECCENTRIC * radius:
+        return None, "is a mesh that is not round about its axis"
+    turns = np.arange(DIRECTIONS) * (2.0 * np.pi / DIRECTIONS)
+    reach = (across @ np.stack([np.cos(turns), np.sin(turns)])).max(axis=0)
+    centre = float(placed[:, 2].max() + placed[:, 2].min()) / 2.0
+    return Outline(radius, centre, bool(reach.min() >= ROUND * radius)), ""
+
+
+def round_radius(link: FileLink) -> tuple[float | None, str]:
+    """Radius of the round solid that a link is, m; or None, and why it is none."""
+    shape = round_shape(link)
+    if shape is not None:
+        radius = shape.size[0]
+    else:
+        outline, reason = mesh_outline(link)
+        if outline is None:
+            return None, reason if link.shapes else "has no shape"
+        if not outline.is_round:
+            return None, "is a mesh that is not round about its axis"
+        radius = outline.radius
+    farthest = max((_reach(link, shape) for shape in link.shapes), default=0.0)
+    if farthest > OUTLINE * radius:
+        return None, f"reaches {farthest:.3g} m from its axis, beyond its round shape of radius {radius:.3g} m"
+    return radius, ""
+
+
+def _reach(link: FileLink, shape: FileShape) -> float:
+    """Largest distance of a shape from its link's axis, m; 0 for meshes that are only drawn and for unknown shapes."""
+    margin = 0.0
+    match shape.kind:
+        case "box":
+            corners = np.array(list(itertools.product((-0.5, 0.5), repeat=3))) * shape.size
+        case "sphere":
+            corners, margin = np.zeros((1, 3)), shape.size[0]
+        case "capsule":
+            corners, margin = np.array([[0.0, 0.0, z * shape.size[1]] for z in (-0.5, 0.5)]), shape.size[0]
+        case "cylinder":
+            turns = np.arange(DIRECTIONS) * (2.0 * np.pi / DIRECTIONS)
+            rim = shape.size[0] * np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=1)
+            corners = np.concatenate([rim + np.array([0.0, 0.0, z * shape.size[1]]) for z in (-0.5, 0.5)])
+        case _:
+            points = _points(link, shape)[0] if shape.mesh is not None and shape.collides else None
+            return 0.0 if points is None else _farthest(link, points)
+    placed = corners @ shape.rotation.T + shape.position - link.joint.anchor
+    return _farthest(link, placed) + margin
+
+
+def _farthest(link: FileLink, points: Array) -> float:
+    """Largest distance of points (n, 3), m from the joint's anchor, from its axis."""
+    return float(np.linalg.norm(points - np.outer(points @ link.joint.axis, link.joint.axis), axis=1).max())
+
+
+def _points(link: FileLink, shape: FileShape) -> tuple[Array | None, str]:
+    """Vertices of a mesh (n, 3), m from the joint's anchor; or None, and why there are none."""
+    points: Array
+    if isinstance(shape.mesh, np.ndarray):
+        points = shape.mesh
+    elif shape.searched:
+        return None, f"is the mesh {shape.mesh}, which cannot be read: it is in none of {', '.join(shape.searched)}"
+    else:
+        try:
+            loader = require("trimesh", "models")
+        except MissingExtraError as error:
+            return None, f"is a mesh, and {error}"
+        try:
+            points = np.asarray(loader.load_mesh(shape.mesh).vertices, dtype=np.float64)
+        except Exception as error:  # whatever a parser of meshes makes of a damaged file
+            return None, f"is the mesh {shape.mesh}, which cannot be read ({type(error).__name__}: {error})"
+    if len(points) < 3:
+        return None, f"is the mesh {shape.mesh}, which has no surface"
+    scale = np.ones(3) if shape.scale is None else shape.scale
+    return (points * scale) @ shape.rotation.T + shape.position - link.joint.anchor, ""

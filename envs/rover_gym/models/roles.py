@@ -15,10 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rover_gym.mechanics import ModelError
-from rover_gym.models.file_axes import Array
-from rover_gym.models.robot_tree import FileLink, RobotTree
-from rover_gym.models.round_shapes import along, mesh_outline, round_shape, width
-from rover_gym.models.wheel_search import search_wheels
+from rover_gym.models.import_report import Array
+from rover_gym.models.robot_tree import FileLink, RobotTree, along, mesh_outline, round_shape, width
+from rover_gym.models.statics import search_wheels
 from rover_gym.validation import number, refuse
 
 STEERS = re.compile(r"steer|swerve|turn|rudder", re.IGNORECASE)

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from rover_gym.extras import require
-from rover_gym.models.file_axes import Array
-from rover_gym.models.packages import find_file
+from rover_gym.models.import_report import Array, find_file
 from rover_gym.models.robot_tree import FileJoint, FileLink, FileShape, RobotTree, refuse_in
 from rover_gym.models.urdf_schema import parse
 

@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from rover_gym.extras import require
-from rover_gym.models.right_angles import right_angle
-from rover_gym.models.robot_tree import MAX_LINKS, check_size, refuse_in
+from rover_gym.models.robot_tree import MAX_LINKS, check_size, refuse_in, right_angle
 
 #: Largest number of elements.
 MAX_ELEMENTS = 200_000

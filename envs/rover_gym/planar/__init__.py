@@ -22,8 +22,15 @@ from rover_gym.mechanics import (
     Spline,
     TwoWheelRoverSimulation,
 )
-from rover_gym.planar.planar_recording import PlanarGround, PlanarSampler, describe_planar, record_planar
-from rover_gym.planar.planar_run import PlanarRun, is_planar, planar_run_of, read_planar_run
+from rover_gym.planar.planar_run import (
+    PlanarGround,
+    PlanarRun,
+    PlanarSampler,
+    describe_planar,
+    is_planar,
+    planar_run_of,
+    record_planar,
+)
 
 __all__ = [
     "BallSimulation",
@@ -42,6 +49,5 @@ __all__ = [
     "describe_planar",
     "is_planar",
     "planar_run_of",
-    "read_planar_run",
     "record_planar",
 ]

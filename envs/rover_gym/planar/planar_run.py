@@ -1,34 +1,168 @@
-"""Saved planar runs, read back: a ball, a two-wheel rover or the straight-driving rover over its ground.
+"""Planar runs, recorded and read back: a ball, a two-wheel rover or the straight-driving rover over its ground.
 
-run = read_planar_run("rover.h5").resample(25.0)
+run = open_run("rover.h5").resample(25.0)
 run.discs[-1, 0, :2]
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import Line, Polyline, RoverModel, Sine, Spline
-from rover_gym.planar.planar_recording import COORDINATES, DISCS, PlanarGround
-from rover_gym.record.rover_run import LARGEST, check_rows, check_time, film_rows, title_of
-from rover_gym.record.trajectory import Trajectory, read_trajectory
+from rover_gym.mechanics import (
+    Line,
+    PlanarSimulation,
+    Polyline,
+    RoverModel,
+    Sine,
+    Spline,
+)
+from rover_gym.record.channels import RESIDUAL, TIME, Channel, Sampler, energy_channels, row_count
+from rover_gym.record.recorder import record_rows
+from rover_gym.record.rover_run import LARGEST, Run, check_rows, check_time, title_of
+from rover_gym.record.trajectory import Trajectory
 from rover_gym.record.trajectory_format import RecordingError, sound
 from rover_gym.validation import refuse
 
 Array = npt.NDArray[np.float64]
+PlanarGround = Line | Sine | Spline | Polyline
+
+COORDINATES = {
+    3: ("x", "y", "theta"),
+    5: ("x", "y", "theta", "theta_a", "theta_b"),
+    7: ("x", "y", "theta", "front_wheels", "bogies", "middle_wheels", "back_wheels"),
+}
+
+DISCS = {1: ("ball",), 2: ("wheel A", "wheel B"), 3: ("front wheels", "middle wheels", "back wheels")}
+
+
+def planar_channels(coordinates: int, discs: int) -> tuple[Channel, ...]:
+    """The channels of a machine with so many coordinates and discs."""
+    names, of_discs = COORDINATES[coordinates], DISCS[discs]
+    impulses = (
+        "impulses of the last step along the normal (out of the ground) and the tangent (forward), summed"
+        " over the contacts of a disc"
+    )
+    rates = tuple(f"{name}_rate" for name in names)
+    gaps = "distance from disc to ground, negative where they overlap"
+    return (
+        TIME,
+        Channel("q", "m, rad", "coordinates, angles turn to the left", (coordinates,), names, read="sim.q"),
+        Channel("v", "m/s, rad/s", "their rates", (coordinates,), rates, read="sim.v"),
+        Channel("centres", "m", "centres of the discs: x forward, y up", (discs, 2), of_discs, read="sim.centres"),
+        Channel("gaps", "m", gaps, (discs,), of_discs, read="sim.gaps"),
+        Channel("impulses", "N s", impulses, (discs, 2), of_discs, read="impulses"),
+        Channel("torques", "N m", "driving torques, positive drives forward", (discs,), of_discs, read="sim.torques"),
+        *energy_channels("", "the mass centre at height 0"),
+        RESIDUAL,
+    )
+
+
+class PlanarSampler(Sampler):
+    """Makes rows of a planar simulation for a `Recorder`.
+
+    Args:
+        sim: The simulation.
+    """
+
+    def __init__(self, sim: PlanarSimulation) -> None:
+        super().__init__(sim)
+        self.channels = planar_channels(len(sim.q), len(sim.centres))
+
+    @property
+    def impulses(self) -> Array:
+        """(n_discs, 2) impulses of the last step, N s."""
+        contacts, impulses = self.sim.contacts, np.zeros((len(self.sim.centres), 2))
+        np.add.at(impulses, contacts.discs, contacts.impulses)
+        return impulses
+
+    def step(self, n: int) -> bool:
+        """Takes the steps that the next row covers; returns whether all of them converged to the tolerance.
+
+        Raises:
+            StepError: A step failed.
+        """
+        report = self.sim.step(n)
+        self.residual = report.residual
+        return bool(report.is_converged)
+
+
+def describe_planar(sim: PlanarSimulation, title: str) -> dict[str, Any]:
+    """Attributes of a recording, from the simulation's initial state."""
+    ground = sim.ground
+    names = {
+        Line: ("slope", "offset"),
+        Sine: ("amplitude", "wavelength", "phase", "offset"),
+        Spline: ("x", "y"),
+        Polyline: ("x", "y"),
+    }[type(ground)]
+    shape = {name: getattr(ground, name) for name in names}
+    return {
+        "title": title,
+        "scene": {
+            "kind": type(sim).__name__,
+            "ground": {"kind": type(ground).__name__.lower(), **shape},
+            "machine": {
+                name: value.to_dict() if isinstance(value, RoverModel) else value
+                for name, value in sim.parameters.items()
+            },
+            "q": sim.q,
+            "v": sim.v,
+            "torques": sim.torques,
+        },
+        "seed": "none: the scene has no randomness",
+        "solver": sim.settings,
+    }
+
+
+def record_planar(
+    sim: PlanarSimulation,
+    path: str | Path,
+    attributes: Mapping[str, Any],
+    *,
+    duration: float,
+    steps_per_row: int = 1,
+    until: Callable[[PlanarSimulation], bool] = lambda _: False,
+    progress: Callable[[float], None] = lambda _: None,
+) -> int:
+    """Runs a simulation from its current state and records it.
+
+    Args:
+        sim: The simulation.
+        path: HDF5 file to write.
+        attributes: Attributes of the run, from `describe_planar`.
+        duration: Time to simulate, s.
+        steps_per_row: Steps from one row to the next.
+        until: Asked after each row whether the run ends before its time.
+        progress: Called with the simulated time after each row.
+
+    Returns:
+        Number of rows with steps that did not converge to the tolerance.
+
+    Raises:
+        OptionError: `duration` or `steps_per_row` is not positive, or the run has too many rows.
+        RecordingError: The file is in use, or the disk is full.
+        MissingExtraError: h5py is not installed.
+        StepError: A step failed; the rows before it are on disk.
+    """
+    rows = row_count(duration, sim.time_step, steps_per_row)
+    sampler = PlanarSampler(sim)
+    return record_rows(sampler, path, attributes, rows, steps_per_row, until=until, progress=progress)
+
 
 GROUNDS = {"line": Line, "sine": Sine, "spline": Spline, "polyline": Polyline}
+
 #: Coordinates that are the discs' angles, by the number of coordinates.
 ANGLES = {3: (2,), 5: (3, 4), 7: (3, 5, 6)}
 
 
 @dataclass(frozen=True)
-class PlanarRun:
+class PlanarRun(Run):
     """A recorded planar run.
 
     Attributes:
@@ -42,16 +176,6 @@ class PlanarRun:
     ground: PlanarGround
     radius: Array
     title: str
-
-    @property
-    def n_frames(self) -> int:
-        """Number of samples in the run."""
-        return len(self.time)
-
-    @property
-    def time(self) -> Array:
-        """(n,) sample times, s."""
-        return self.trajectory["time"]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -88,33 +212,11 @@ class PlanarRun:
         result: Array = rims - v[:, :1]
         return result
 
-    def resample(self, fps: float) -> PlanarRun:
-        """The run reduced to the samples nearest to the frame times of a video, each at most once.
-
-        Args:
-            fps: Frames per second; a run sampled more coarsely keeps all its samples.
-
-        Raises:
-            OptionError: `fps` is not a positive number.
-        """
-        return replace(self, trajectory=self.trajectory.at(film_rows(self.time, fps)))
-
 
 def is_planar(trajectory: Trajectory) -> bool:
     """Whether a trajectory is a planar run on a line."""
     scene = trajectory.attributes.get("scene")
     return isinstance(scene, dict) and isinstance(scene.get("ground"), dict) and isinstance(scene.get("machine"), dict)
-
-
-def read_planar_run(path: str | Path) -> PlanarRun:
-    """Reads a run that `record_planar` saved, complete or not.
-
-    Raises:
-        RecordingError: The file is not a trajectory, not a planar run, or holds no samples.
-        OSError: The file does not exist or cannot be read.
-        MissingExtraError: h5py is not installed.
-    """
-    return planar_run_of(read_trajectory(path), path)
 
 
 def planar_run_of(trajectory: Trajectory, path: str | Path) -> PlanarRun:
@@ -131,13 +233,8 @@ def planar_run_of(trajectory: Trajectory, path: str | Path) -> PlanarRun:
     coordinates = trajectory["q"].shape[1] if trajectory["q"].ndim == 2 else 0
     if discs not in DISCS or coordinates not in COORDINATES or len(ANGLES[coordinates]) != discs:
         refuse(RecordingError, f"{path}: centres", discs, "must be one, two or three discs with their coordinates")
-    shapes: dict[str, tuple[int, ...]] = {"q": (coordinates,), "v": (coordinates,), "centres": (discs, 2)}
-    shapes |= {"gaps": (discs,), "impulses": (discs, 2), "torques": (discs,)}
-    shapes |= dict.fromkeys(("kinetic_energy", "potential_energy", "solver_residual"), ())
-    for name in shapes:
-        if name not in trajectory.data:
-            refuse(RecordingError, f"{path}: {name}", None, "is missing")
-    check_rows(trajectory, path, shapes, bounded=("q", "v", "centres"))
+    channels = planar_channels(coordinates, discs)
+    check_rows(trajectory, path, channels, bounded=("q", "v", "centres"), needed=True)
     with sound(path, "scene"):
         ground = _ground(scene["ground"])
         radius = _radii(scene["machine"], discs)

@@ -1,9 +1,8 @@
 """A policy that plans with the simulator itself: sampling-based model-predictive control of commands.
 
 Every `period` seconds it draws sequences of commands, drives a copy of the rover by each through `horizon` seconds, and
-looks up in a `FieldPlan` what the place at which each future ends still costs. The update of the sequence is either the
-average with weights `exp(-cost / temperature)` (model-predictive path integral control, Williams et al. 2017) or the
-mean of the best tenth (cross-entropy method, Rubinstein 1999). The first command of the cheapest future is driven.
+looks up in a `FieldPlan` what the place at which each future ends still costs. The next round draws around the mean of
+the best tenth (cross-entropy method, Rubinstein 1999). The first command of the cheapest future is driven.
 """
 
 import math
@@ -19,12 +18,11 @@ from rover_gym.env.start import Point, Start
 from rover_gym.mechanics import OptionError, RoverModel, StateError, Terrain
 from rover_gym.planning.field_plan import FieldPlan
 from rover_gym.planning.futures import Ends, Futures
-from rover_gym.planning.raw_actions import RawActions
-from rover_gym.planning.scanned_ground import ScannedGround
+from rover_gym.planning.scanned_ground import RawActions, ScannedGround
 from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimits
-from rover_gym.policy.observed import check_observed
+from rover_gym.policy.features import check_observed
 from rover_gym.policy.pd_policy import find_rover_env
-from rover_gym.policy.scan_grid import scan_grid
+from rover_gym.policy.scan_policy import scan_grid
 from rover_gym.validation import array, number, refuse, vector, whole
 
 Array = npt.NDArray[np.float64]
@@ -41,8 +39,6 @@ class PlannerOptions:
         knot: How long a command of the sequence is held, s.
         period: Time from one planning to the next, s.
         actions: What is sampled: "commands", or "raw" actions, wheel torques and steering set-points.
-        method: "mppi" or "cem".
-        temperature: Of MPPI's weights, in metres of good ground.
         spread: Standard deviations of the samples of speed, curvature and sideways direction, each within [-1, 1].
         raw_spread: Those of wheel torques, over that at which a wheel pulls with its share of the weight, and of
             steering set-points, over the steering limit.
@@ -58,8 +54,6 @@ class PlannerOptions:
     knot: float = 0.6
     period: float = 0.3
     actions: Literal["commands", "raw"] = "commands"
-    method: Literal["mppi", "cem"] = "cem"
-    temperature: float = 0.1
     spread: tuple[float, float, float] = (0.4, 0.5, 0.4)
     raw_spread: tuple[float, float] = (0.2, 0.3)
     energy_price: float = 2e-4
@@ -70,7 +64,7 @@ class PlannerOptions:
     def __post_init__(self) -> None:
         whole("samples", self.samples, at_least=2, at_most=100_000)
         whole("iterations", self.iterations, at_least=1, at_most=100)
-        for name in ("horizon", "knot", "period", "temperature", "time_step"):
+        for name in ("horizon", "knot", "period", "time_step"):
             number(name, getattr(self, name), at_least=1e-3, at_most=1e3)
         for name in ("energy_price", "time_price", "failure_price"):
             number(name, getattr(self, name), at_least=0.0)
@@ -80,8 +74,6 @@ class PlannerOptions:
             number("raw_spread", value, at_least=0.0)
         if self.actions not in ("commands", "raw"):
             refuse(OptionError, "actions", self.actions, "must be 'commands' or 'raw'")
-        if self.method not in ("mppi", "cem"):
-            refuse(OptionError, "method", self.method, "must be 'mppi' or 'cem'")
 
 
 class PlannerPolicy:
@@ -225,11 +217,7 @@ class PlannerPolicy:
             plans = np.clip(np.concatenate((fixed, drawn)), -1.0, 1.0)
             costs = self._costs(futures.drive(self._controller, plans, self._hold, self._terrain), field)
             order = np.argsort(costs, kind="stable")
-            if options.method == "cem":
-                mean = plans[order[: max(1, options.samples // 10)]].mean(axis=0)
-            else:
-                weights = np.exp(-(costs - costs[order[0]]) / options.temperature)
-                mean = np.tensordot(weights / weights.sum(), plans, axes=1)
+            mean = plans[order[: max(1, options.samples // 10)]].mean(axis=0)
             fixed = np.stack((plans[order[0]], mean))
         self._sequence = plans[order[0]]
 

@@ -2,10 +2,9 @@
 
 from rover_gym.policy.arc_search import PathCosts
 from rover_gym.policy.baseline import ENDS, BaselineInterrupt, BaselineRow, measure_baseline, wilson_interval
-from rover_gym.policy.command import CommandController, CommandLimits
+from rover_gym.policy.command import CommandController, CommandLimits, DriveByCommand
 from rover_gym.policy.command_env import RoverCommandEnv, RoverCommandVectorEnv
 from rover_gym.policy.command_vector_env import CommandVectorEnv
-from rover_gym.policy.drive_by_command import DriveByCommand
 from rover_gym.policy.episodes import Episode, Policy, run_episode
 from rover_gym.policy.evaluation import (
     EvaluatedEpisode,
@@ -18,17 +17,12 @@ from rover_gym.policy.evaluation import (
 )
 from rover_gym.policy.features import Features
 from rover_gym.policy.foresight_policy import FORECAST_FILE, ForesightCosts, ForesightPolicy
-from rover_gym.policy.goal_env import RoverGoalEnv
-from rover_gym.policy.goal_observation import GoalObservation
-from rover_gym.policy.goal_vector_env import RoverGoalVectorEnv
+from rover_gym.policy.goal_env import GoalObservation, RoverGoalEnv, RoverGoalVectorEnv
 from rover_gym.policy.ground_map import MapOptions
 from rover_gym.policy.named_policy import NamedPolicy, named_policy
-from rover_gym.policy.network import Network
 from rover_gym.policy.pd_policy import PDGains, PDPolicy
-from rover_gym.policy.policy_card import PolicyCard
-from rover_gym.policy.policy_files import PolicyError
+from rover_gym.policy.policy_card import Network, PolicyCard, PolicyError, find_policy, policy_arguments, policy_folder
 from rover_gym.policy.scan_policy import ScanGains, ScanPolicy
-from rover_gym.policy.shipped import find_policy, policy_arguments, policy_folder
 from rover_gym.policy.trained_policy import TrainedPolicy
 from rover_gym.policy.trap_env import RoverTrapEnv
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import gymnasium as gym
 
-from rover_gym.env.argument_checks import terrain_name
+from rover_gym.env.arguments import terrain_name
 from rover_gym.env.rocks import MAX_DIFFICULTY
 from rover_gym.mechanics import OptionError
 from rover_gym.models.lookup import open_model

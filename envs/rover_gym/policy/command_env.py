@@ -7,9 +7,8 @@ from gymnasium.vector import AutoresetMode
 from rover_gym.env.arguments import RoverArguments, takes_arguments
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS
-from rover_gym.policy.command import CommandLimits
+from rover_gym.policy.command import CommandLimits, DriveByCommand, check_repeat
 from rover_gym.policy.command_vector_env import CommandVectorEnv
-from rover_gym.policy.drive_by_command import DriveByCommand, check_repeat
 from rover_gym.validation import whole
 from rover_gym.vector.vector_env import RoverVectorEnv
 

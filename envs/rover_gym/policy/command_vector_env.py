@@ -9,13 +9,12 @@ import numpy.typing as npt
 from gymnasium.vector import AutoresetMode, VectorWrapper
 from gymnasium.vector.utils import batch_space
 
-from rover_gym.env.quantities import Mask
+from rover_gym.env.observation import Mask
 from rover_gym.mechanics import CommandError, OptionError, TerrainError
-from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimits
-from rover_gym.policy.drive_by_command import check_repeat
+from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimits, check_repeat
 from rover_gym.policy.features import LARGEST_FEATURE, Features
 from rover_gym.validation import array, known_keys, refuse
-from rover_gym.vector.batch_snapshot import BatchSnapshot
+from rover_gym.vector.batch import BatchSnapshot
 from rover_gym.vector.vector_env import RoverVectorEnv
 
 Array = npt.NDArray[np.float32]

@@ -1,4 +1,15 @@
-"""`ScanPolicy` that foresees, by a learned forecast, what becomes of the rover on each arc."""
+"""`ScanPolicy` that foresees, by a learned forecast, what becomes of the rover on each arc.
+
+For each arc that `ScanPolicy` may drive next, at cruising speed or fast, a network foretells the rover after `HORIZON`
+seconds from
+
+- what lies under wheels and underside on the way, from the height scan;
+- the command;
+- the rover's state: attitude, joints, velocities, contacts, loads, how long its trunk has been held;
+- the slope of the ground plane.
+
+It is trained on what became of copies of the rover in the simulator (`rover_gym.learning.fit_forecast`).
+"""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,18 +18,117 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError
-from rover_gym.policy.arc_forecast import ArcFeatures, ArcForecast, Outcomes
 from rover_gym.policy.arc_search import PathCosts
 from rover_gym.policy.ground_map import MapOptions
-from rover_gym.policy.network import Network
 from rover_gym.policy.pd_policy import find_rover_env
-from rover_gym.policy.policy_files import PolicyError, is_there
+from rover_gym.policy.policy_card import Network, PolicyError, forecast_folder, is_there
 from rover_gym.policy.scan_policy import ScanGains, ScanPolicy
-from rover_gym.policy.shipped import forecast_folder
 from rover_gym.validation import number, refuse
 
 Array = npt.NDArray[np.float64]
+
+Features = npt.NDArray[np.float32]
+
+#: Time that the forecast looks ahead, s, and poses of an arc at which it looks at the ground.
+HORIZON, POSES = 1.0, 8
+
+#: Largest height in wheel radii, and largest entry of the state, that the network is given.
+LARGEST_HEIGHT, LARGEST_ENTRY = 4.0, 5.0
+
+#: What the network's outputs are multiplied by: way, stuck, failed.
+OUTPUTS = np.array([2.0, 1.0, 1.0], np.float32)
+
+
+@dataclass(frozen=True)
+class Outcomes:
+    """What becomes of the rover on each arc; arrays `(2, n_arcs)`, at cruising speed and fast.
+
+    Attributes:
+        way: Way along the arc's chord, over the way at cruising speed.
+        stuck: For how much of the time that ends an episode the trunk has been held at the end, 0 to 1.
+        failed: How likely the episode has ended without its goal, 0 to 1.
+    """
+
+    way: Array
+    stuck: Array
+    failed: Array
+
+
+class ArcFeatures:
+    """What the network is given of each arc of a policy.
+
+    Args:
+        rover: The environment, read once for the layout.
+        policy: The policy.
+
+    Attributes:
+        length: Way at cruising speed within the horizon, m.
+        poses: `(n_arcs, POSES, 3)` on the way, see `Arcs.poses`.
+        size: Number of features.
+    """
+
+    def __init__(self, rover: RoverEnv, policy: ScanPolicy) -> None:
+        self.length = HORIZON * policy.cruise_speed
+        self.poses = policy.arcs.poses(self.length, POSES)
+        self._commands, self._search = policy.commands, policy.search
+        self._looked_at = np.concatenate((np.zeros((1, 3)), self.poses.reshape(-1, 3)))
+        layout, model = rover.observation_layout, rover.model
+        q, velocity = layout["q"].start, layout["velocity"].start
+        wheels = set(model.wheel_joint_indices)
+        taken = [q + 3, q + 5, *(q + i for i in range(6, model.nq) if i not in wheels)]
+        taken += range(velocity, velocity + model.nv)
+        for name in ("wheel_contact", "normal_force", "stuck"):
+            taken += range(layout[name].start, layout[name].stop)
+        self._taken = np.array(taken)
+        n_wheels = len(model.wheel_radii)
+        self.size = POSES * (n_wheels + 3) + 3 + len(taken) + 2 + n_wheels + 1
+
+    def __call__(self, row: Array, slope: list[float], heights: Array) -> Features:
+        """`(n_arcs, size)` features, for an observation, the ground plane's slope, and heights over that plane."""
+        n = len(self._commands)
+        under = np.clip(self._search.under(heights, self._looked_at), -LARGEST_HEIGHT, LARGEST_HEIGHT)
+        state = np.concatenate((row[self._taken].clip(-LARGEST_ENTRY, LARGEST_ENTRY), 5.0 * np.array(slope)))
+        shared = np.concatenate((state, under[0, :-2]))
+        return np.concatenate(
+            (under[1:].reshape(n, -1), self._commands, np.broadcast_to(shared, (n, len(shared)))), axis=1
+        ).astype(np.float32)
+
+
+class ArcForecast:
+    """Foretells what becomes of a rover.
+
+    Args:
+        features: What the network is given, and after it whether the arc is driven fast.
+        network: The network; its outputs are way, stuck and failed over `OUTPUTS`.
+
+    Raises:
+        PolicyError: The network is for other features or outputs.
+    """
+
+    def __init__(self, features: ArcFeatures, network: Network) -> None:
+        inputs, outputs = network.weights[0].shape[1], network.weights[-1].shape[0]
+        if inputs != features.size + 1:
+            refuse(PolicyError, "forecast", features.size + 1, f"needs a rover with {inputs} features")
+        if outputs != len(OUTPUTS):
+            refuse(PolicyError, "forecast", outputs, f"must have {len(OUTPUTS)} outputs")
+        self._features, self._network = features, network
+
+    def __call__(self, row: Array, slope: list[float], heights: Array) -> Outcomes:
+        """The outcomes, for an observation, the ground plane's slope, and heights over that plane."""
+        seen = self._features(row, slope, heights)
+        n = len(seen)
+        both = np.concatenate((with_speed(seen, np.zeros(n)), with_speed(seen, np.ones(n))))
+        way, stuck, failed = np.moveaxis((self._network(both) * OUTPUTS).reshape(2, n, -1), -1, 0).astype(np.float64)
+        return Outcomes(way, stuck.clip(0.0, 1.0), failed.clip(0.0, 1.0))
+
+
+def with_speed(features: Features, is_fast: npt.ArrayLike) -> Features:
+    """`(n, size + 1)` features of arcs, each with whether it is driven fast, 0 or 1."""
+    column = np.asarray(is_fast, dtype=np.float32)[:, None]
+    return np.concatenate((features, column), axis=1)
+
 
 #: The file of a forecast's network in its folder.
 FORECAST_FILE = "forecast.npz"
@@ -57,7 +167,7 @@ class ForesightPolicy(ScanPolicy):
     """Drives as `ScanPolicy`, and foresees what becomes of the rover on each arc that it may drive next.
 
     A network that was trained in the simulator foretells for each arc, slow and fast, how far the rover comes within a
-    second and whether its trunk gets caught (`rover_gym.policy.arc_forecast`). The policy adds what that costs, and
+    second and whether its trunk gets caught (`rover_gym.policy.foresight_policy`). The policy adds what that costs, and
     drives an arc fast where it is cheaper so.
 
     Example:

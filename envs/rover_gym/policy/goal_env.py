@@ -1,10 +1,182 @@
-"""`RoverGoal-v0`: `Dict` observations for hindsight replay. The class docstring is the card."""
+"""`RoverGoal-v0`: `Dict` observations for hindsight replay (Andrychowicz et al. 2017). The class has the card."""
 
-from typing import Any, Literal
+from typing import Any, Literal, SupportsFloat
 
+import gymnasium as gym
+import numpy as np
+import numpy.typing as npt
+from gymnasium.vector.utils import batch_space
+
+from rover_gym.env.observation import LARGEST, Array, Mask, ObservationLayout
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.policy.command_env import RoverCommandEnv
-from rover_gym.policy.goal_observation import GoalObservation
+from rover_gym.mechanics import OptionError, StateError, sin_cos
+from rover_gym.policy.command import DriveByCommand
+from rover_gym.policy.command_env import RoverCommandEnv, RoverCommandVectorEnv
+from rover_gym.policy.pd_policy import find_rover_env
+from rover_gym.validation import array, refuse
+
+GoalDict = dict[str, npt.NDArray[Any]]
+
+REWARD_TYPES = ("sparse", "dense")
+
+#: Terminations that are no failure.
+_SOUND = ("", "goal")
+
+
+class GoalObservation(gym.Wrapper[GoalDict, Any, Any, Any]):
+    """Observations as Gymnasium-Robotics' `GoalEnv` has them, and rewards that follow from achieved and desired goal.
+
+    An observation is a dictionary:
+
+    - `observation`: `(size,) float32`, what the wrapped environment observes without what it says of the goal, and the
+      cosine and sine of the heading, which turn a place on the map into a direction;
+    - `achieved_goal`: `(2,) float64`, x and z of the trunk's origin on the map, m, without noise;
+    - `desired_goal`: `(2,) float64`, x and z of the goal, m.
+
+    The reward of a step is `compute_reward(achieved_goal, desired_goal, info)`, and nothing else:
+
+    - `"sparse"`: 1 within `goal_tolerance` of the goal, else 0;
+    - `"dense"`: `exp(-d)` with the distance d to the goal, m.
+
+    Neither is ever negative, so that an episode is not worth ending in failure. Both hold for relabelled goals too.
+    `info["reward_terms"]` is still the wrapped environment's.
+
+    Args:
+        env: A `Rover-v0` with one goal an episode, with or without a `DriveByCommand` around it.
+        reward_type: "sparse" or "dense".
+
+    Attributes:
+        kept: Entries of the wrapped environment's observation that say nothing of the goal.
+
+    Raises:
+        OptionError: `env` has a course of several goals or other wrappers of observations, or `reward_type` is unknown.
+    """
+
+    def __init__(self, env: gym.Env[Any, Any], reward_type: Literal["sparse", "dense"] = "sparse") -> None:
+        if reward_type not in REWARD_TYPES:
+            refuse(OptionError, "reward_type", reward_type, f"must be one of {', '.join(REWARD_TYPES)}")
+        rover = find_rover_env(env)
+        if rover.task.n_further:
+            refuse(
+                OptionError, "env.waypoints", 1 + rover.task.n_further, "must be 1: a goal that is relabelled is one"
+            )
+        super().__init__(env)
+        self.reward_type = reward_type
+        self.goal_tolerance = rover.goal_tolerance
+        self._rover = rover
+        self.kept = _kept(env, rover.observation_layout)
+        self._achieved: Array = np.zeros(2)
+        inner = env.observation_space
+        if not isinstance(inner, gym.spaces.Box):
+            refuse(OptionError, "env.observation_space", inner, "must be a Box")
+        goals = gym.spaces.Box(-LARGEST, LARGEST, (2,), np.float64)
+        self.observation_space = gym.spaces.Dict(  # type: ignore[assignment] # of the dictionaries
+            observation=gym.spaces.Box(
+                np.append(inner.low[self.kept], [-1.0, -1.0]).astype(np.float32),
+                np.append(inner.high[self.kept], [1.0, 1.0]).astype(np.float32),
+                dtype=np.float32,
+            ),
+            achieved_goal=goals,
+            desired_goal=goals,
+        )
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[GoalDict, dict[str, Any]]:
+        """Starts an episode."""
+        observation: Any
+        observation, info = self.env.reset(seed=seed, options=options)
+        return self._observed(observation), info
+
+    def step(self, action: npt.NDArray[np.float32]) -> tuple[GoalDict, SupportsFloat, bool, bool, dict[str, Any]]:
+        """Applies an action to the wrapped environment.
+
+        Raises:
+            CommandError: As the wrapped environment.
+            ResetNeeded: The environment has not been reset.
+        """
+        observation: Any
+        observation, _, terminated, truncated, info = self.env.step(action)
+        seen = self._observed(observation)
+        reward = float(self.compute_reward(seen["achieved_goal"], seen["desired_goal"], info))
+        return seen, reward, terminated, truncated, info
+
+    def compute_reward(
+        self,
+        achieved_goal: npt.ArrayLike,
+        desired_goal: npt.ArrayLike,
+        info: Any,  # noqa: ARG002 - GoalEnv's signature
+    ) -> Array:
+        """The rewards `(...)` of achieved and desired goals `(..., 2)`, m; `info` is not read.
+
+        Raises:
+            StateError: A goal has a wrong shape.
+        """
+        away = _distances(achieved_goal, desired_goal)
+        reward: Array = np.exp(-away) if self.reward_type == "dense" else (away <= self.goal_tolerance).astype(float)
+        return reward
+
+    def compute_terminated(self, achieved_goal: npt.ArrayLike, desired_goal: npt.ArrayLike, info: Any) -> Mask:
+        """Whether an episode ends `(...)` with achieved and desired goals `(..., 2)`: at the goal, or in failure.
+
+        `info` is that of the step, or a sequence of them.
+
+        Raises:
+            StateError: A goal has a wrong shape.
+        """
+        infos = [info] if isinstance(info, dict) else info
+        failed = np.array([one.get("termination", "") not in _SOUND for one in infos])
+        arrived = _distances(achieved_goal, desired_goal) <= self.goal_tolerance
+        return np.asarray(arrived | (failed[0] if isinstance(info, dict) else failed))
+
+    def compute_truncated(
+        self,
+        achieved_goal: npt.ArrayLike,
+        desired_goal: npt.ArrayLike,
+        info: Any,  # noqa: ARG002 - GoalEnv's signature
+    ) -> Mask:
+        """False `(...)`: a time limit is a wrapper's."""
+        return np.zeros_like(_distances(achieved_goal, desired_goal), np.bool_)
+
+    def _observed(self, observation: npt.NDArray[np.float32]) -> GoalDict:
+        q = self._rover.simulation.q
+        if np.isfinite(q).all():
+            self._achieved = q[[0, 2]]
+        layout = self._rover.observation_layout
+        seen = self._rover.complete_observation()
+        sine, cosine = sin_cos(float(seen[layout["q"].start + 4]))
+        return {
+            "observation": np.append(observation[self.kept], np.array([cosine, sine], np.float32)),
+            "achieved_goal": self._achieved.copy(),
+            "desired_goal": np.array(self._rover.goal),
+        }
+
+
+def _kept(env: gym.Env[Any, Any], layout: ObservationLayout) -> npt.NDArray[np.intp]:
+    """Entries of the observation that say nothing of the goal."""
+    size, goal = layout.size, [*range(*layout["goal"].indices(layout.size)), layout["goal_distance"].start]
+    layer: Any = env
+    while isinstance(layer, gym.Wrapper):
+        if isinstance(layer, DriveByCommand):
+            size, goal = layer.features.size, layer.features.goal_entries.tolist()
+        layer = layer.env
+    if env.observation_space.shape != (size,):
+        reason = "must be that of Rover-v0 or of a DriveByCommand"
+        refuse(OptionError, "env.observation_space", env.observation_space.shape, reason)
+    return np.setdiff1d(np.arange(size), goal)
+
+
+def _distances(achieved: npt.ArrayLike, desired: npt.ArrayLike) -> Array:
+    """Distances `(...)` of goals `(..., 2)`, m."""
+    places = []
+    for field, goal in (("achieved_goal", achieved), ("desired_goal", desired)):
+        place = array(field, goal, error=StateError)
+        if place.ndim == 0 or place.shape[-1] != 2:
+            refuse(StateError, field, place.shape, "must have x and z on its last axis")
+        places.append(place)
+    away = places[0] - places[1]
+    distance: Array = np.hypot(away[..., 0], away[..., 1])
+    return distance
 
 
 class RoverGoalEnv(GoalObservation):
@@ -47,3 +219,57 @@ class RoverGoalEnv(GoalObservation):
         rover = RoverCommandEnv(**arguments)
         super().__init__(rover, reward_type)
         self.metadata = rover.metadata
+
+
+class RoverGoalVectorEnv(RoverCommandVectorEnv):
+    """A vector of `RoverGoalEnv` environments that the compiled core steps on several threads.
+
+    Observations, rewards and ends equal, bit for bit, those of a `SyncVectorEnv` of them with a
+    `TimeLimit` and the same arguments and seeds.
+
+    Args:
+        num_envs: Number of rovers.
+        reward_type: "sparse" or "dense".
+        **arguments: Arguments of `RoverCommandVectorEnv`.
+
+    Raises:
+        OptionError: An argument is out of range.
+    """
+
+    def __init__(
+        self, num_envs: int = 1, *, reward_type: Literal["sparse", "dense"] = "sparse", **arguments: Any
+    ) -> None:
+        super().__init__(num_envs, **arguments)
+        own = {name: value for name, value in arguments.items() if name not in _OF_VECTORS}
+        self._single = RoverGoalEnv(reward_type=reward_type, **own)
+        self.compute_reward = self._single.compute_reward
+        self.compute_terminated = self._single.compute_terminated
+        self.compute_truncated = self._single.compute_truncated
+        self.single_observation_space = self._single.observation_space
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self._achieved: Array = np.zeros((self.num_envs, 2))
+        self._heading = self._rovers.prototype.observation_layout["q"].start + 4
+
+    def _observed(self) -> GoalDict:
+        rovers = self._rovers.batch.rovers
+        places = np.array([rover.simulation.q for rover in rovers])
+        known = np.isfinite(places).all(axis=1)
+        self._achieved[known] = places[known][:, [0, 2]]
+        sine, cosine = sin_cos(self._seen[:, self._heading].astype(np.float64))
+        features = self._features(self._seen)[:, self._single.kept]
+        return {
+            "observation": np.column_stack((features, cosine.astype(np.float32), sine.astype(np.float32))),
+            "achieved_goal": self._achieved.copy(),
+            "desired_goal": np.array([rover.goal for rover in rovers]),
+        }
+
+    def _of_rover(self, observations: Any, i: int) -> GoalDict:
+        return {name: values[i] for name, values in observations.items()}
+
+    def _earned(self, rewards: Array, observations: Any, moved: Mask) -> Array:
+        earned = self.compute_reward(observations["achieved_goal"], observations["desired_goal"], {})
+        return np.where(moved, earned, rewards)
+
+
+#: Arguments of the vector that one environment does not take.
+_OF_VECTORS = ("threads", "max_episode_steps", "autoreset_mode")

@@ -10,9 +10,8 @@ from rover_gym.mechanics import RoverModel
 from rover_gym.policy.episodes import Policy
 from rover_gym.policy.foresight_policy import FORECAST_FILE, ForesightPolicy
 from rover_gym.policy.pd_policy import PDPolicy
-from rover_gym.policy.policy_files import is_there
+from rover_gym.policy.policy_card import find_policy, is_there, policy_arguments
 from rover_gym.policy.scan_policy import ScanPolicy
-from rover_gym.policy.shipped import find_policy, policy_arguments
 from rover_gym.policy.trained_policy import TrainedPolicy
 
 #: What the command line says about the names.

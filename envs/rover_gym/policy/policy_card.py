@@ -1,17 +1,189 @@
-"""The card of a trained policy: its environment, the scale of its commands, and its provenance."""
+"""The files of a trained policy: its card, its network, and the policies that the package ships."""
 
+import io
 import json
-from collections.abc import Mapping
+import math
+import stat
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
-from rover_gym.env.arguments import ARGUMENTS
-from rover_gym.mechanics import RoverGymError
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.env.arguments import ARGUMENTS, terrain_name
+from rover_gym.mechanics import OptionError, RoverGymError, RoverModel
 from rover_gym.policy.command import CommandLimits
-from rover_gym.policy.network import LARGEST_CARD
-from rover_gym.policy.policy_files import FORMAT, PolicyError, intact, read_bytes, refuse_field
+from rover_gym.policy.features import LARGEST_FEATURE
 from rover_gym.validation import number, refuse
+
+# Format version of a policy's files; other versions are refused.
+FORMAT = 1
+
+
+class PolicyError(OptionError):
+    """A folder holds no valid policy, or a policy for another environment."""
+
+
+def refuse_field(path: Path, field: str, value: object, reason: str) -> NoReturn:
+    """Refuses a file with an error that names the file and the invalid field."""
+    refuse(PolicyError, f"{path}: {field}", value, reason)
+
+
+@contextmanager
+def intact(path: Path) -> Iterator[None]:
+    """Turns any exception that a damaged file causes into a `PolicyError` that names the file."""
+    try:
+        yield
+    except (RoverGymError, OSError):
+        raise
+    except Exception as error:
+        reason = f"is damaged ({type(error).__name__}: {' '.join(str(error).split())[:200]})"
+        refuse(PolicyError, "policy", str(path), reason)
+
+
+def read_bytes(path: Path, at_most: int) -> bytes:
+    """Reads a whole file.
+
+    Raises:
+        PolicyError: The file is no regular file, or larger than `at_most` bytes.
+        OSError: The file does not exist or may not be read.
+    """
+    status = path.stat()
+    if not stat.S_ISREG(status.st_mode):  # opening a pipe would wait for its writer
+        refuse(PolicyError, "policy", str(path), "must be a regular file")
+    if status.st_size > at_most:
+        refuse_field(path, "size", status.st_size, f"must be at most {at_most} bytes")
+    return path.read_bytes()
+
+
+def is_there(path: Path) -> bool:
+    """Whether the path exists; False for an impossible path."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):  # a name that is too long or impossible
+        return False
+
+
+#: Limits of a policy's files: bytes of the card, bytes of all arrays, and layers.
+LARGEST_CARD, LARGEST_NETWORK, MOST_LAYERS = 1 << 20, 1 << 26, 16
+
+#: Limits within which sums and quotients stay finite in single precision.
+LARGEST_WEIGHT, SMALLEST_DEVIATION = 1e6, 1e-6
+
+#: Compression types that NumPy writes.
+PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+
+Array = npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Network:
+    """A multilayer perceptron with tanh between its layers.
+
+    Attributes:
+        mean: `(features,)` mean of the features, which is subtracted.
+        deviation: `(features,)` divisor of the result, which is then clipped at `LARGEST_FEATURE`.
+        weights: Weight matrices, each `(outputs, inputs)`.
+        biases: Bias vectors, each `(outputs,)`.
+    """
+
+    mean: Array
+    deviation: Array
+    weights: tuple[Array, ...]
+    biases: tuple[Array, ...]
+
+    def __call__(self, features: Array) -> Array:
+        """The outputs `(n, outputs)` for features `(n, features)`, clipped to [-1, 1] as in stable-baselines3."""
+        x = np.clip((features - self.mean) / self.deviation, -LARGEST_FEATURE, LARGEST_FEATURE)
+        for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
+            x = np.tanh(x @ weight.T + bias)
+        outputs: Array = x @ self.weights[-1].T + self.biases[-1]
+        return outputs.clip(-1.0, 1.0)
+
+    def save(self, path: Path) -> None:
+        """Writes the arrays as a compressed `.npz` file."""
+        layers: dict[str, Any] = {f"weight_{i}": weight for i, weight in enumerate(self.weights)}
+        layers |= {f"bias_{i}": bias for i, bias in enumerate(self.biases)}
+        layers |= {"mean": self.mean, "deviation": self.deviation}
+        rows: dict[str, Any] = {name: np.ascontiguousarray(array, dtype=np.float32) for name, array in layers.items()}
+        np.savez_compressed(path, **rows)
+
+    @classmethod
+    def read(cls, path: Path) -> "Network":
+        """Reads what `save` wrote.
+
+        Raises:
+            PolicyError: The file holds arrays of other names, shapes or types, or numbers out of range.
+            OSError: The file does not exist or may not be read.
+        """
+        arrays = _read_arrays(path)
+        n = sum(name.startswith("weight_") for name in arrays)
+        expected = {"mean", "deviation", *(f"{kind}_{i}" for kind in ("weight", "bias") for i in range(n))}
+        if n == 0 or arrays.keys() != expected:
+            refuse_field(path, "arrays", sorted(arrays), "must be mean, deviation, and weight_0, bias_0 and so on")
+        features = arrays["mean"].size
+        shapes: dict[str, tuple[int, ...]] = {"mean": (features,), "deviation": (features,)}
+        size = features
+        for i in range(n):
+            outputs = arrays[f"weight_{i}"].shape[0] if arrays[f"weight_{i}"].ndim else 0
+            shapes |= {f"weight_{i}": (outputs, size), f"bias_{i}": (outputs,)}
+            size = outputs
+        for name, shape in shapes.items():
+            array = arrays[name]
+            if array.shape != shape or 0 in shape:
+                refuse_field(path, name, array.shape, f"must have the shape {shape}, none of it zero")
+            if not (np.abs(array) <= LARGEST_WEIGHT).all():
+                worst = float(array[~(np.abs(array) <= LARGEST_WEIGHT)].flat[0])
+                refuse_field(path, name, worst, f"must be finite and within {LARGEST_WEIGHT:g}")
+        if not (arrays["deviation"] >= SMALLEST_DEVIATION).all():
+            refuse_field(
+                path, "deviation", float(arrays["deviation"].min()), f"must be at least {SMALLEST_DEVIATION:g}"
+            )
+        return cls(
+            mean=arrays["mean"],
+            deviation=arrays["deviation"],
+            weights=tuple(arrays[f"weight_{i}"] for i in range(n)),
+            biases=tuple(arrays[f"bias_{i}"] for i in range(n)),
+        )
+
+
+def _read_arrays(path: Path) -> dict[str, Array]:
+    """Reads the float32 arrays of an archive, whose sizes are checked before decompression."""
+    data = read_bytes(path, LARGEST_NETWORK)
+    arrays: dict[str, Array] = {}
+    with intact(path), zipfile.ZipFile(io.BytesIO(data)) as archive:
+        members = archive.infolist()
+        if len(members) > 2 + 2 * MOST_LAYERS:
+            refuse_field(path, "arrays", len(members), f"must be at most {2 + 2 * MOST_LAYERS}")
+        if sum(member.file_size for member in members) > LARGEST_NETWORK:
+            refuse_field(
+                path, "arrays", sum(member.file_size for member in members), f"must be {LARGEST_NETWORK} bytes at most"
+            )
+        for member in members:
+            name = member.filename.removesuffix(".npy")
+            if name in arrays or name == member.filename or member.compress_type not in PACKINGS:
+                refuse_field(path, "arrays", member.filename, "must be arrays of their own names, as NumPy packs them")
+            arrays[name] = _read_array(path, name, archive.read(member))
+    return arrays
+
+
+def _read_array(path: Path, name: str, data: bytes) -> Array:
+    stream = io.BytesIO(data)
+    version = np.lib.format.read_magic(stream)
+    if version != (1, 0):
+        refuse_field(path, name, version, "must be an array of NumPy's format (1, 0)")
+    shape, fortran, kind = np.lib.format.read_array_header_1_0(stream)
+    if kind != np.float32 or fortran or len(shape) not in (1, 2):
+        refuse_field(path, name, f"{kind} {shape}", "must be float32, of one or two dimensions, row by row")
+    body = data[stream.tell() :]
+    if any(n < 0 for n in shape) or len(body) != 4 * math.prod(shape):
+        refuse_field(path, name, shape, f"must have the shape of its {len(body)} bytes")
+    return np.frombuffer(body, dtype=kind).astype(np.float32).reshape(shape)
+
 
 #: Arguments of the environment that the caller chooses, not the policy.
 NOT_A_POLICYS = ("model", "render_mode", "render_options")
@@ -96,3 +268,69 @@ def check_arguments(path: Path, arguments: Mapping[str, Any]) -> None:
     for name in arguments:
         if name not in known:
             refuse_field(path, f"environment.{name}", arguments[name], f"unknown; known are {', '.join(known)}")
+
+
+#: Folder names of the shipped policies, by terrain.
+SHIPPED: Mapping[str, str] = {"plane": "plane", "rocks": "rocks"}
+
+#: Folder names of the shipped forecasts: by the name of the rover's model, of the built-in one on hills, and of it
+#: on all other ground.
+FORECASTS: Mapping[str, str] = {"open-rover": "foresight-open-rover"}
+
+HILLS_FORECAST, ROCKS_FORECAST = "foresight-hills", "foresight"
+
+FOLDER = Path(__file__).parents[1] / "data" / "policies"
+
+
+def policy_folder(terrain: str) -> Path:
+    """The folder of the policy shipped for a terrain.
+
+    Raises:
+        PolicyError: No policy is shipped for this terrain.
+    """
+    terrain = terrain_name(terrain)
+    if terrain not in SHIPPED:
+        refuse(PolicyError, "policy", terrain, f"none was trained; there are some for {', '.join(SHIPPED)}")
+    return FOLDER / SHIPPED[terrain]
+
+
+def forecast_folder(model: RoverModel | None = None, *, hills: bool = False) -> Path:
+    """The folder of the forecast shipped for a rover, None for the built-in one, among rocks or on hills."""
+    of_terrain = HILLS_FORECAST if hills else ROCKS_FORECAST
+    return FOLDER / (of_terrain if model is None else FORECASTS.get(model.name, of_terrain))
+
+
+def find_policy(policy: str, terrain: str) -> Path | None:
+    """The folder of a policy: the shipped one for "trained", otherwise the given path; None for "pd" and "scan".
+
+    Of the folder of a run of `rover train` it is the policy at its end.
+
+    Raises:
+        PolicyError: There is no such policy.
+    """
+    if policy in ("pd", "scan"):
+        return None
+    folder = policy_folder(terrain) if policy == "trained" else Path(policy)
+    if is_there(folder / "policy" / "policy.json"):
+        folder = folder / "policy"
+    if not is_there(folder / "policy.json"):
+        refuse(
+            PolicyError,
+            "policy",
+            policy,
+            "must be 'pd', 'scan', 'foresight', 'trained' or the folder of a run, a trained policy or a forecast",
+        )
+    return folder
+
+
+def policy_arguments(folder: Path) -> dict[str, Any]:
+    """The arguments that a policy's environment must be made with.
+
+    Raises:
+        PolicyError: The folder holds no valid policy.
+        OSError: The file may not be read.
+    """
+    arguments = dict(PolicyCard.read(folder / "policy.json").environment)
+    if isinstance(arguments.get("height_scan"), list):
+        arguments["height_scan"] = tuple(arguments["height_scan"])
+    return arguments

@@ -34,7 +34,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.env.wheels import drive_signs
+from rover_gym.env.start import drive_signs
 
 Array = npt.NDArray[np.float64]
 

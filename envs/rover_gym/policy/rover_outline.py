@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.env.wheels import wheel_centres
+from rover_gym.env.start import wheel_centres
 from rover_gym.mechanics import Plane, RoverModel, sin_cos
 
 Array = npt.NDArray[np.float64]

@@ -11,17 +11,15 @@ A policy is a folder with
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.policy.command import N_COMMANDS, CommandController
-from rover_gym.policy.features import Features
-from rover_gym.policy.network import Network
-from rover_gym.policy.observed import check_observed
+from rover_gym.policy.features import Features, check_observed
 from rover_gym.policy.pd_policy import find_rover_env
-from rover_gym.policy.policy_card import PolicyCard
-from rover_gym.policy.policy_files import PolicyError, is_there
+from rover_gym.policy.policy_card import Network, PolicyCard, PolicyError, is_there
 from rover_gym.validation import refuse
 
 
@@ -110,3 +108,25 @@ class TrainedPolicy:
             commands[new] = self._network(self._features(rows[new]))
         actions = self._controller.act(rows, commands)
         return (actions[0] if given.ndim == 1 else actions), (commands, age + 1)
+
+
+class RandomPolicy:
+    """Draws every action from the environment's action space.
+
+    Args:
+        env: Any environment.
+        seed: Of the draws.
+    """
+
+    def __init__(self, env: gym.Env[Any, Any], seed: int = 0) -> None:
+        self._space = env.action_space
+        self._space.seed(seed)
+
+    def predict(
+        self,
+        observation: Any,  # noqa: ARG002 - the signature is stable-baselines3's
+        state: Any = None,
+        episode_start: Any = None,  # noqa: ARG002
+    ) -> tuple[Any, Any]:
+        """An action of the space, and the state as it was given."""
+        return self._space.sample(), state

@@ -12,7 +12,7 @@ from rover_gym.env.arguments import RoverArguments, takes_arguments
 from rover_gym.env.beginning import draw_episodes
 from rover_gym.env.episode_scene import EpisodeScene, check_reset_options, scene_of
 from rover_gym.env.generators import check_seed, row_of, seeded, set_row
-from rover_gym.env.rewards import WEIGHTS
+from rover_gym.env.reward_terms import WEIGHTS
 from rover_gym.env.rover_env import STEP_FAILED, RoverEnv
 from rover_gym.env.start import Start
 from rover_gym.env.task import TRUNK_LOAD

@@ -1,7 +1,6 @@
 """Trajectories in HDF5: recording, reading, and rover runs."""
 
-from rover_gym.record.channels import Channel, RoverSampler
-from rover_gym.record.facts import describe, row_count
+from rover_gym.record.channels import Channel, RoverSampler, describe, row_count
 from rover_gym.record.recorder import Recorder
 from rover_gym.record.rover_run import RoverRun, read_run
 from rover_gym.record.trajectory import Trajectory, read_frames, read_trajectory

@@ -2,13 +2,30 @@
 
 from __future__ import annotations
 
+import json
+import math
+import platform
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import RoverModel, Simulation
-from rover_gym.validation import checked
+from rover_gym.mechanics import OptionError, RoverModel, Simulation, __version__
+from rover_gym.record.trajectory_format import (
+    FORMAT,
+    FORMAT_VERSION,
+    RecordingError,
+    import_h5py,
+)
+from rover_gym.validation import checked, number, refuse
+
+if TYPE_CHECKING:
+    import h5py
 
 
 @dataclass(frozen=True)
@@ -23,6 +40,7 @@ class Channel:
         columns: Names along the first axis of a row, or empty.
         packed: Whether the data set is large: it is stored in single precision, compressed, in the group `frames`,
             and read by `read_frames`.
+        read: Attribute of the sampler that is or gives its row, with dots; empty where the rows are given.
     """
 
     name: str
@@ -31,30 +49,115 @@ class Channel:
     shape: tuple[int, ...] = ()
     columns: tuple[str, ...] = ()
     packed: bool = False
+    read: str = ""
 
 
-def state_channels(model: RoverModel) -> tuple[Channel, Channel]:
-    """The channels `q` and `v` of every recording of a rover."""
+class Sampler:
+    """Steps a simulation from row to row, and reads the rows of its channels.
+
+    Attributes:
+        sim: The simulation.
+        channels: What a row holds.
+        steps: Steps since the last row.
+        residual: Largest residual since the last row.
+        iterations: Iterations since the last row.
+        energy: Kinetic and potential energy in the row.
+    """
+
+    channels: tuple[Channel, ...]
+
+    def __init__(self, sim: Any) -> None:
+        self.sim = sim
+        self.energy: Any = None
+        self.clear()
+
+    def measure(self) -> None:
+        """Measures what several channels read."""
+        self.energy = self.sim.energy()
+
+    def clear(self) -> None:
+        """Resets what is gathered from row to row."""
+        self.steps, self.residual, self.iterations = 0, 0.0, 0
+
+    def step(self, n: int) -> bool:
+        """Takes the steps that the next row covers; returns whether all of them converged to the tolerance.
+
+        Raises:
+            StepError: A step failed.
+        """
+        converged = True
+        for _ in range(n):
+            report = self.sim.step()
+            self.steps += 1
+            self.residual = max(self.residual, report.residual)
+            self.iterations += report.iterations
+            converged &= report.is_converged
+            self.gather(report)
+        return converged
+
+    def gather(self, report: Any) -> None:
+        """Adds what else a row says of its steps, from the report of each."""
+
+    def read(self) -> dict[str, npt.ArrayLike]:
+        """One row of `channels`: the current state, and what happened since the previous row."""
+        self.measure()
+        row = {}
+        for channel in self.channels:
+            value = attrgetter(channel.read)(self)
+            row[channel.name] = value() if callable(value) else value
+        self.clear()
+        return row
+
+
+def rover_channels(model: RoverModel, forces: str, force_columns: str) -> tuple[Channel, ...]:
+    """What every recording of a rover holds; `forces` is the attribute with the forces on its wheels."""
+    wheels = tuple(model.wheel_names)
+    n = len(wheels)
+    positions = (
+        "public coordinates: trunk x, y (up), z (m); roll, heading, pitch, joint angles (rad);"
+        " trunk attitude R = Ry(heading) Rz(pitch) Rx(roll)"
+    )
+    rates = "trunk origin's velocity, world (m/s); trunk's angular velocity, world (rad/s); joint rates (rad/s)"
+    of_trunk = ("v_x", "v_y", "v_z", "omega_x", "omega_y", "omega_z")
+    torques = "commanded driving torques, positive drives forward"
     return (
+        Channel("q", "m, rad", positions, (model.nq,), tuple(model.dof_names), read="rover.q"),
+        Channel("v", "m/s, rad/s", rates, (model.nv,), (*of_trunk, *model.dof_names[6:]), read="rover.v"),
+        Channel("wheel_forces", "N", force_columns, (n, 3), wheels, read=forces),
+        Channel("wheel_centres", "m", "world: x forward, y up, z to the right", (n, 3), wheels, read="wheel_centres"),
+        Channel("wheel_torques", "N m", torques, (n,), wheels, read="rover.wheel_torques"),
         Channel(
-            "q",
-            "m, rad",
-            "public coordinates: trunk x, y (up), z (m); roll, heading, pitch, joint angles (rad);"
-            " trunk attitude R = Ry(heading) Rz(pitch) Rx(roll)",
-            (model.nq,),
-            tuple(model.dof_names),
-        ),
-        Channel(
-            "v",
-            "m/s, rad/s",
-            "trunk origin's velocity, world (m/s); trunk's angular velocity, world (rad/s); joint rates (rad/s)",
-            (model.nv,),
-            ("v_x", "v_y", "v_z", "omega_x", "omega_y", "omega_z", *model.dof_names[6:]),
+            "steering_set_points", "rad", "set-points of the steering controllers", (n,), wheels, read="rover.steering"
         ),
     )
 
 
-class RoverSampler:
+def wheel_solids(model: RoverModel) -> list[str]:
+    """Names of the solids that carry the wheels."""
+    return [wheel["solid"] for wheel in model.to_dict()["wheels"]]
+
+
+def origins(sim: Simulation, solids: Sequence[str]) -> npt.NDArray[np.float64]:
+    """(n, 3) origins of some solids, m, world."""
+    poses = sim.poses()
+    return np.array([poses[solid][0] for solid in solids]).reshape(-1, 3)
+
+
+#: What every recording says of time, energy and the contact solver; the energy's zero differs.
+TIME = Channel("time", "s", "time since the run's start", read="sim.time")
+RESIDUAL = Channel("solver_residual", "1", "largest residual of the contact solver since the last row", read="residual")
+ITERATIONS = Channel("solver_iterations", "1", "iterations of the contact solver since the last row", read="iterations")
+
+
+def energy_channels(whose: str, zero: str) -> tuple[Channel, Channel]:
+    """Kinetic energy, and potential energy with what its zero is."""
+    return (
+        Channel("kinetic_energy", "J", f"kinetic energy{whose}", read="energy.kinetic"),
+        Channel("potential_energy", "J", f"potential energy, zero with {zero}", read="energy.potential"),
+    )
+
+
+class RoverSampler(Sampler):
     """Samples rows from a simulation.
 
     Args:
@@ -63,35 +166,33 @@ class RoverSampler:
 
     @checked(model="RoverModel")
     def __init__(self, model: RoverModel) -> None:
+        super().__init__(None)
         wheels = tuple(model.wheel_names)
         n = len(wheels)
-        self._wheel_solids = [wheel["solid"] for wheel in model.to_dict()["wheels"]]
+        self._solids = wheel_solids(model)
+        gaps = "distance from wheel to ground, negative where they overlap"
+        forces = "mean contact force of the last step along n (ground to wheel), t (rolling direction), b = t x n"
+        torques = "mean torque that each drive gave in the last step, positive drives forward"
         self.channels = (
-            Channel("time", "s", "time since the run's start"),
-            *state_channels(model),
-            Channel("wheel_gaps", "m", "distance from wheel to ground, negative where they overlap", (n,), wheels),
-            Channel(
-                "wheel_forces",
-                "N",
-                "mean contact force of the last step along n (ground to wheel), t (rolling direction), b = t x n",
-                (n, 3),
-                wheels,
-            ),
-            Channel("wheel_centres", "m", "world: x forward, y up, z to the right", (n, 3), wheels),
-            Channel("wheel_torques", "N m", "commanded driving torques, positive drives forward", (n,), wheels),
-            Channel(
-                "motor_torques",
-                "N m",
-                "mean torque that each drive gave in the last step, positive drives forward",
-                (n,),
-                wheels,
-            ),
-            Channel("steering_set_points", "rad", "set-points of the steering controllers", (n,), wheels),
-            Channel("kinetic_energy", "J", "kinetic energy of the whole rover"),
-            Channel("potential_energy", "J", "potential energy, zero with all mass centres at the world's origin"),
-            Channel("solver_residual", "1", "largest residual of the contact solver since the last row"),
-            Channel("solver_iterations", "1", "iterations of the contact solver since the last row"),
+            TIME,
+            *rover_channels(model, "sim.wheel_forces", forces),
+            Channel("wheel_gaps", "m", gaps, (n,), wheels, read="sim.wheel_gaps"),
+            Channel("motor_torques", "N m", torques, (n,), wheels, read="sim.motor_torques"),
+            *energy_channels(" of the whole rover", "all mass centres at the world's origin"),
+            RESIDUAL,
+            ITERATIONS,
         )
+
+    @property
+    def rover(self) -> Simulation:
+        """The simulation that is sampled."""
+        sim: Simulation = self.sim
+        return sim
+
+    @property
+    def wheel_centres(self) -> npt.NDArray[np.float64]:
+        """(n_wheels, 3) m, world."""
+        return origins(self.rover, self._solids)
 
     def row(self, sim: Simulation, *, residual: float = 0.0, iterations: int = 0) -> dict[str, npt.ArrayLike]:
         """Samples one row of `channels`.
@@ -101,20 +202,137 @@ class RoverSampler:
             residual: Largest residual since the last row, from the step report.
             iterations: Iterations since the last row, from the step report.
         """
-        energy = sim.energy()
-        poses = sim.poses()
-        return {
-            "time": sim.time,
+        self.sim, self.residual, self.iterations = sim, residual, iterations
+        return self.read()
+
+
+#: Most rows of a run, which limits file size and run time.
+MOST_ROWS = 10_000_000
+
+
+def versions() -> dict[str, Any]:
+    """The file format, and the versions of the software that writes it."""
+    return {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "rover_gym_version": __version__,
+        "numpy_version": np.__version__,
+        "gymnasium_version": gymnasium.__version__,
+        "python_version": platform.python_version(),
+    }
+
+
+def storable(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Converts metadata to what HDF5 stores: strings, numbers and arrays of numbers as they are, the rest as JSON."""
+    result: dict[str, Any] = {}
+    for key, value in attributes.items():
+        plain = isinstance(value, (str, float, np.number)) or (
+            (isinstance(value, int) and -(2**63) <= value < 2**63)
+            or (isinstance(value, np.ndarray) and value.dtype.kind in "biuf")
+        )
+        try:
+            stored = value if plain else json.dumps(value, default=_to_plain)
+            if isinstance(stored, str):
+                stored.encode()
+        except (TypeError, ValueError, RecursionError) as error:
+            refuse(RecordingError, str(key), value, f"cannot be stored ({error})")
+        if isinstance(stored, str) and "\0" in stored:
+            refuse(RecordingError, str(key), value, "must not hold the character NUL")
+        result[key] = stored
+    return result
+
+
+@checked(time_step=float)
+def row_count(duration: float, time_step: float, steps_per_row: int = 1) -> int:
+    """The number of rows of a run after the first.
+
+    Args:
+        duration: Simulated time, s.
+        time_step: Step size, s.
+        steps_per_row: Steps between rows.
+
+    Raises:
+        OptionError: `duration` is no positive number, `steps_per_row` is no positive whole number, or there would be
+            more than `MOST_ROWS` rows.
+    """
+    seconds = number("duration", duration, above=0.0)
+    per_row = number("steps_per_row", steps_per_row, at_least=1.0)
+    if per_row != math.floor(per_row):
+        refuse(OptionError, "steps_per_row", steps_per_row, "must be a whole number")
+    rows = seconds / time_step / per_row
+    if not rows <= MOST_ROWS:
+        reason = f"at a step of {time_step:g} s makes more than {MOST_ROWS} rows"
+        refuse(OptionError, "duration", duration, reason)
+    return round(rows)
+
+
+@checked(sim="Simulation", scene=(Mapping, None))
+def describe(
+    sim: Simulation, title: str, scene: Mapping[str, Any] | None = None, *, seed: int | str = "none"
+) -> dict[str, Any]:
+    """The attributes of a recording, taken from the simulation at its start.
+
+    Args:
+        sim: The simulation, whose model, state, commands and settings are stored.
+        title: Title of the run.
+        scene: Further parameters of the scene.
+        seed: Seed of the run, or why there is none.
+    """
+    return {
+        "title": title,
+        "scene": {
+            **(scene or {}),
+            "model": sim.model.to_dict(),
             "q": sim.q,
-            "v": sim.v,
-            "wheel_gaps": sim.wheel_gaps,
-            "wheel_forces": sim.wheel_forces,
-            "wheel_centres": np.array([poses[solid][0] for solid in self._wheel_solids]),
+            "steering": sim.steering,
             "wheel_torques": sim.wheel_torques,
-            "motor_torques": sim.motor_torques,
-            "steering_set_points": sim.steering,
-            "kinetic_energy": energy.kinetic,
-            "potential_energy": energy.potential,
-            "solver_residual": residual,
-            "solver_iterations": iterations,
-        }
+        },
+        "seed": seed,
+        "solver": sim.settings,
+    }
+
+
+def write_attribute(item: Any, key: str, value: Any) -> None:
+    """Stores an attribute; text is stored as UTF-8 of fixed length."""
+    if isinstance(value, str):
+        text = value.encode()
+        item.attrs.create(key, text, dtype=import_h5py().string_dtype("utf-8", max(1, len(text))))
+    else:
+        item.attrs[key] = value
+
+
+def write_description(data: h5py.Dataset, unit: str, description: str, columns: Sequence[str]) -> None:
+    """Stores unit, description and column names in a data set's attributes."""
+    write_attribute(data, "unit", unit)
+    write_attribute(data, "description", description)
+    if columns:
+        write_texts(data, "columns", columns)
+
+
+def write_texts(item: Any, key: str, texts: Sequence[str]) -> None:
+    """Stores several texts in an attribute."""
+    encoded = [text.encode() for text in texts]
+    item.attrs.create(key, encoded, dtype=import_h5py().string_dtype("utf-8", max(1, *map(len, encoded))))
+
+
+def _to_plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, Path):
+        return str(value)
+    raise TypeError(f"{type(value).__name__} cannot be stored in a trajectory's attributes")
+
+
+WORDS = {
+    "goal": "reached the goal",
+    "time": "ran out of time",
+    "roll_over": "rolled over",
+    "high_centred": "got stuck on its belly",
+    "battery": "emptied its battery",
+    "step_failed": "could not be simulated further",
+}
+
+
+def outcome_words(end: str) -> str:
+    """The end of an episode, as `Episode.end` and a recording's `outcome` name it, in words."""
+    return WORDS.get(end, end.replace("_", " "))

@@ -8,29 +8,76 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import RoverModel, Terrain
-from rover_gym.record.channels import RoverSampler
+from rover_gym.record.channels import ITERATIONS, TIME, Channel, RoverSampler
 from rover_gym.record.trajectory import Trajectory, read_trajectory
 from rover_gym.record.trajectory_format import RecordingError, sound
 from rover_gym.validation import number, refuse, vector
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable
     from pathlib import Path
 
 LARGEST = 1e9  # m, rad or s: largest value that leaves enough digits in single precision
 LONGEST_TITLE = 200
-#: Channels that `rover drive` records besides the simulation's, with the shapes of their rows.
-OF_EPISODES: Mapping[str, tuple[int, ...]] = {"distance_to_goal": (), "slip_ratio": (), "motor_energy": ()}
+#: Channels that the recordings of episodes have besides the simulation's.
+OF_EPISODES = (
+    Channel("distance_to_goal", "m", "horizontal distance from the trunk's origin to the goal"),
+    Channel("slip_ratio", "1", "mean over the wheels in contact of rim slip over the faster of rim and ground"),
+    Channel("motor_energy", "J", "work through the wheel motors since the start, driving or braking"),
+)
+
+
+class Run:
+    """What all recorded runs have in common: a dataclass that adds what was simulated.
+
+    Attributes:
+        trajectory: The data sets and attributes of the file.
+        title: Title of the run.
+    """
+
+    trajectory: Trajectory
+    title: str
+
+    @property
+    def n_frames(self) -> int:
+        """Number of samples."""
+        return len(self.time)
+
+    @property
+    def time(self) -> npt.NDArray[np.float64]:
+        """(n,) times of the samples, s."""
+        return self.trajectory["time"]
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the recording came to its end."""
+        return bool(self.trajectory.attributes.get("complete", True))
+
+    def resample(self, fps: float) -> Self:
+        """The run reduced to the samples nearest to the frame times of a video, without duplicates.
+
+        Args:
+            fps: Frames per second; a run with fewer samples per second keeps them all.
+
+        Raises:
+            OptionError: `fps` is not a positive number.
+        """
+        return self.at(film_rows(self.time, fps))
+
+    def at(self, rows: npt.NDArray[np.int64]) -> Self:
+        """Some samples of the run, by their indices `(n,)`."""
+        changed: Any = replace(self, trajectory=self.trajectory.at(rows))  # type: ignore[type-var]
+        return changed  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True)
-class RoverRun:
+class RoverRun(Run):
     """A recorded run with its rover and its ground.
 
     Attributes:
@@ -48,16 +95,6 @@ class RoverRun:
     goal: tuple[float, float] | None
     title: str
     goal_tolerance: float | None = None
-
-    @property
-    def n_frames(self) -> int:
-        """Number of samples."""
-        return len(self.time)
-
-    @property
-    def time(self) -> npt.NDArray[np.float64]:
-        """(n,) time of the samples, s."""
-        return self.trajectory["time"]
 
     @property
     def positions(self) -> npt.NDArray[np.float64]:
@@ -79,17 +116,6 @@ class RoverRun:
             for i, name in enumerate(names):
                 positions[row, i], rotations[row, i] = poses[name]
         return positions, rotations
-
-    def resample(self, fps: float) -> RoverRun:
-        """The run reduced to the samples nearest to the frame times of a video, without duplicates.
-
-        Args:
-            fps: Frames per second; a run with fewer samples per second keeps them all.
-
-        Raises:
-            OptionError: `fps` is not a positive number.
-        """
-        return replace(self, trajectory=self.trajectory.at(film_rows(self.time, fps)))
 
 
 def film_rows(time: npt.NDArray[np.float64], fps: float) -> npt.NDArray[np.int64]:
@@ -137,8 +163,7 @@ def run_of(trajectory: Trajectory, path: str | Path) -> RoverRun:
     with sound(path, "scene.model"):
         model = RoverModel.from_dict(scene["model"])
     _check_solver(trajectory.attributes.get("solver", {}), path)
-    shapes = {channel.name: channel.shape for channel in RoverSampler(model).channels}
-    check_rows(trajectory, path, {**shapes, **OF_EPISODES}, bounded=("q", "wheel_centres"))
+    check_rows(trajectory, path, (*RoverSampler(model).channels, *OF_EPISODES), bounded=("q", "wheel_centres"))
     return RoverRun(
         trajectory=trajectory,
         model=model,
@@ -163,7 +188,7 @@ def check_time(trajectory: Trajectory, path: str | Path) -> None:
     """
     if "time" not in trajectory.data or len(trajectory["time"]) == 0:
         refuse(RecordingError, "path", str(path), "holds no samples: the run was killed before the first were written")
-    check_rows(trajectory, path, {"time": ()}, bounded=("time",))
+    check_rows(trajectory, path, (TIME,), bounded=("time",))
     backward = np.flatnonzero(np.diff(trajectory["time"]) < 0.0)
     if len(backward):
         row = int(backward[0]) + 1
@@ -171,22 +196,32 @@ def check_time(trajectory: Trajectory, path: str | Path) -> None:
 
 
 def check_rows(
-    trajectory: Trajectory, path: str | Path, shapes: Mapping[str, tuple[int, ...]], *, bounded: tuple[str, ...]
+    trajectory: Trajectory,
+    path: str | Path,
+    channels: Iterable[Channel],
+    *,
+    bounded: tuple[str, ...],
+    needed: bool = False,
 ) -> None:
     """Checks the row shapes and the value range of data sets.
 
     Args:
-        trajectory: The trajectory; data sets that it lacks are skipped.
+        trajectory: The trajectory.
         path: The file, for the message.
-        shapes: Shape of a row, by data set.
+        channels: What the data sets hold.
         bounded: Data sets whose values must be finite and within `LARGEST`.
+        needed: Whether all must be there, `solver_iterations` aside, which earlier files of balls lack; otherwise
+            those that are missing are skipped.
 
     Raises:
-        RecordingError: A data set has rows of another shape, or a value out of range.
+        RecordingError: A data set is missing, has rows of another shape, or a value out of range.
     """
-    for name, shape in shapes.items():
+    for channel in channels:
+        name, shape = channel.name, channel.shape
         values = trajectory.data.get(name)
         if values is None:
+            if needed and not channel.packed and channel is not ITERATIONS:
+                refuse(RecordingError, f"{path}: {name}", None, "is missing")
             continue
         if values.shape[1:] != shape:
             refuse(RecordingError, f"{path}: {name}", values.shape[1:], f"must have rows of shape {shape}")

@@ -9,17 +9,24 @@ from __future__ import annotations
 
 import errno
 import os
+import signal
 import stat
 import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
 from typing import TYPE_CHECKING
-
-if sys.platform != "win32":
-    import fcntl
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+
+if sys.platform != "win32":
+    import fcntl
+
 PAGE = 1 << 16  # bytes that are buffered and written as a unit
+
 NO_LOCKS = frozenset({errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS})  # file system without locks
 
 
@@ -174,3 +181,24 @@ def _write_all(descriptor: int, data: memoryview, place: int) -> None:
     os.lseek(descriptor, place, os.SEEK_SET)
     while data:
         data = data[os.write(descriptor, data) :]
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """A block after which an interrupt (SIGINT) that came within it is handled.
+
+    HDF5 crashes the process when a callback that writes for it ends with an exception. Blocks may be nested. Outside
+    the main thread, which alone handles signals, the block does nothing.
+    """
+    handler = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(handler):
+        yield
+        return
+    held: list[FrameType | None] = []
+    signal.signal(signal.SIGINT, lambda _, frame: held.append(frame))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        if held:
+            handler(signal.SIGINT, held[-1])

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from rover_gym.ground import parts_of, plane_of, spheres_of, surfaces_of
 from rover_gym.mechanics import HeightField, Plane, SphereField, Terrain, TriangleMesh
-from rover_gym.record.facts import write_attribute, write_description, write_texts
+from rover_gym.record.channels import write_attribute, write_description, write_texts
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

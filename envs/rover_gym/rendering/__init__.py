@@ -7,8 +7,7 @@ nothing else here needs it.
 from typing import TYPE_CHECKING, Any
 
 from rover_gym.extras import MissingExtraError
-from rover_gym.rendering.render_options import RenderOptions
-from rover_gym.rendering.video import VideoWriter
+from rover_gym.rendering.render_options import RenderOptions, VideoWriter
 
 if TYPE_CHECKING:
     from rover_gym.rendering.frames import FrameRenderer

@@ -10,8 +10,8 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
 from vtkmodules.vtkRenderingCore import vtkActor, vtkRenderer
 
+from rover_gym.rendering.appearance import Array, set_pose
 from rover_gym.rendering.frames import QuietLog, open_window
-from rover_gym.rendering.meshes import Array, set_pose
 from rover_gym.rendering.scenery_actors import headlight, sky, sun
 
 

@@ -3,15 +3,19 @@
 import math
 
 import numpy as np
-from vtkmodules.util.numpy_support import numpy_to_vtk
-from vtkmodules.vtkCommonDataModel import vtkPolyData
+import numpy.typing as npt
+from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
+from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 from vtkmodules.vtkFiltersSources import vtkSphereSource
 from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkLight, vtkPolyDataMapper
+from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLSphereMapper
 
 from rover_gym.ground import heights_of, plane_of, triangles_of
 from rover_gym.mechanics import HeightField, Plane, Terrain, TriangleMesh
 from rover_gym.rendering import appearance as look
-from rover_gym.rendering.meshes import (
+from rover_gym.rendering.appearance import (
+    FIXED_BALL_COLOUR,
+    SAND_COLOUR,
     Array,
     actor_of,
     actor_with,
@@ -25,11 +29,15 @@ from rover_gym.rendering.meshes import (
 
 # Direction to the sun, fixed: x forward, y up, z right.
 SUN = np.array([-0.35, 0.80, 0.50]) / math.sqrt(0.35**2 + 0.80**2 + 0.50**2)
+
 SHADOW = 0.55  # brightness of shadowed ground
+
 LIFT = 0.004  # m, offset of shadows above the ground and of the goal's ring above shadows, against flicker
 
 TILE = 0.5  # m, of the checkered ground
+
 NEAR, FAR = 20.0, 160.0  # m, half edges of the checkered ground and of the ground beyond
+
 HAZE = 12.0, 60.0  # m, where the haze begins and where the ground has the horizon's colour
 
 # The number of facets of a sphere depends on its size in the picture, since most of a frame's time goes into facets:
@@ -264,3 +272,42 @@ def _shadow(actor: vtkActor, ground: GroundActors) -> vtkActor:
     actor.GetProperty().SetColor(*colour)
     set_pose(actor, ground.flatten)
     return actor
+
+
+class BallsActor:
+    """Balls of sand, each with its own shade; those that no force moves are grey.
+
+    Args:
+        radius: (n,) m.
+        kinematic: (n,) whether no force moves the ball; none by default.
+
+    Attributes:
+        actor: What VTK draws.
+    """
+
+    def __init__(self, radius: npt.ArrayLike, kinematic: npt.ArrayLike | None = None) -> None:
+        radii = np.asarray(radius, dtype=np.float64)
+        fixed = np.zeros(len(radii), dtype=bool) if kinematic is None else np.asarray(kinematic, dtype=bool)
+        self._points = vtkPolyData()
+        cells = vtkCellArray()  # the mapper draws points that are cells
+        numbers = np.arange(len(radii) + 1, dtype=np.int64)
+        cells.SetData(numpy_to_vtkIdTypeArray(numbers, deep=True), numpy_to_vtkIdTypeArray(numbers[:-1], deep=True))
+        self._points.SetVerts(cells)
+        self._sizes = numpy_to_vtk(radii.astype(np.float32), deep=True)
+        self._sizes.SetName("radius")
+        # The golden ratio spreads the shades evenly.
+        shade = 0.84 + 0.3 * (np.arange(len(radii)) * 0.6180339887 % 1.0)
+        colours = np.where(fixed[:, None], np.array(FIXED_BALL_COLOUR), np.array(SAND_COLOUR))
+        self._colours = np.clip(shade[:, None] * colours, 0.0, 1.0)
+        mapper = vtkOpenGLSphereMapper()
+        mapper.SetInputData(self._points)
+        mapper.SetScaleArray("radius")
+        self.actor = actor_with(mapper)
+        self.place(np.zeros((len(radii), 3)))
+
+    def place(self, position: Array | npt.NDArray[np.float32]) -> None:
+        """Moves the balls to (n, 3), m."""
+        set_points(self._points, np.asarray(position, dtype=np.float64))
+        set_colours(self._points, self._colours)
+        self._points.GetPointData().AddArray(self._sizes)
+        self._points.Modified()

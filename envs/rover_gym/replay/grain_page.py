@@ -13,8 +13,8 @@ import html
 import json
 import zlib
 from importlib import resources
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from itertools import cycle
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -31,49 +31,119 @@ from rover_gym.rendering.appearance import (
     Colour,
     sphere_mesh,
 )
-from rover_gym.replay.grain_curves import grain_curves
-from rover_gym.replay.grain_eye import eye_path, start_view
-from rover_gym.replay.player import shortened
-from rover_gym.replay.rotation import continuous, quaternions
+from rover_gym.replay.page import WHEEL_COLOURS
+from rover_gym.replay.player import (
+    FOLLOW_TIME,
+    Chart,
+    continuous,
+    load_chart,
+    moving_mean,
+    panel_contents,
+    quaternions,
+    shortened,
+)
 from rover_gym.replay.scenery import (
     MARGIN,
     MOST_HEIGHTS,
     coloured_meshes,
+    first_view,
     ground_plane,
     ground_tiles,
     parts_by_solid,
     spheres,
     surfaces,
+    vessel_meshes,
+    vessel_poses,
+    wall_polygons,
+    wall_poses,
 )
-from rover_gym.replay.vessel_meshes import vessel_meshes, vessel_poses
-from rover_gym.replay.wall_polygons import wall_polygons, wall_poses
-from rover_gym.validation import checked
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from rover_gym.grains.grain_run import GrainRun
     from rover_gym.mechanics import Terrain
 
-SAMPLES = 25  # of a piece: each begins with whole places
-LEVELS = 65535  # of a place, along each axis
-MANY = 300  # spheres of the ground, above which each gets fewer triangles
+
+COLOURS = ("#332288", "#CC6677")
+
+
+def grain_curves(run: GrainRun) -> dict[str, Any]:
+    """Contents of the panel."""
+    data = run.trajectory
+    charts: list[Chart] = []
+    if run.model is not None:
+        wheels = list(zip(run.model.wheel_names, cycle(WHEEL_COLOURS), strict=False))
+        charts += [
+            load_chart("wheel load", run.time, run.wheel_forces[..., 1], 1, wheels),
+            Chart("sinkage", "mm", 1e3 * run.sinkage, 2, wheels),
+        ]
+    potential = data["potential_energy"] - data["potential_energy"][0]
+    energy = np.stack((data["kinetic_energy"], potential), axis=1)
+    overlap = 100.0 * data["penetration"] / float(run.radius.min())
+    parts = list(zip(("kinetic", "potential, from the start"), COLOURS, strict=True))
+    charts += [
+        Chart("energy", "J", energy, 4, parts),
+        Chart("contacts", "1", data["n_contacts"][:, None], 0, [("contacts", COLOURS[0])]),
+        Chart("deepest overlap", "% of a radius", overlap[:, None], 4, [("overlap", COLOURS[0])]),
+    ]
+    return panel_contents(run.title, run.time, charts)
+
+
+FIELD_OF_VIEW = 0.6  # rad, vertical, of a run without a rover
 
 Array = npt.NDArray[np.float64]
+
+
+class StartView(NamedTuple):
+    """A viewpoint: eye and target, m, and the vertical field of view, rad."""
+
+    eye: list[float]
+    target: list[float]
+    angle: float
+
+
+def start_view(run: GrainRun) -> StartView:
+    """The view at the start: beside the rover, or so that all balls are in it."""
+    if run.rover is not None:
+        view = first_view(run.rover)
+        return StartView(view.eye.tolist(), view.target.tolist(), view.field_of_view)
+    shown = run.positions_of(np.unique(run.rows[[0, run.n_frames // 2, -1]])).astype(np.float64)
+    ends = np.quantile(shown, 0.01, axis=1), np.quantile(shown, 0.99, axis=1)
+    low, high = ends[0].min(axis=0), ends[1].max(axis=0)
+    if run.vessel is not None and run.vessel["kind"] == "drum":
+        reach = np.array([run.vessel["radius"], run.vessel["radius"], 0.5 * run.vessel["length"]])
+        low, high = run.vessel["centre"] - reach, run.vessel["centre"] + reach
+    middle, size = 0.5 * (low + high), float(np.linalg.norm(high - low)) + 2.0 * float(run.radius.max())
+    eye = middle + 1.1 * size / np.tan(FIELD_OF_VIEW) * np.array([-0.42, 0.45, 0.79])
+    return StartView(eye.tolist(), middle.tolist(), FIELD_OF_VIEW)
+
+
+def eye_path(run: GrainRun, *, follow: bool = True) -> Array:
+    """(n, 3) what carries the eye along, relative to its start, m: the trunk's smoothed path."""
+    if run.rover is None or not follow:
+        return np.zeros((run.n_frames, 3))
+    smooth = moving_mean(run.time, run.trajectory["q"][:, :3], FOLLOW_TIME)
+    result: Array = smooth - smooth[0]
+    return result
+
+
+SAMPLES = 25  # of a piece: each begins with whole places
+
+LEVELS = 65535  # of a place, along each axis
+
+MANY = 300  # spheres of the ground, above which each gets fewer triangles
+
 Faces = npt.NDArray[np.int32]
+
 Mesh = tuple[Colour, Array, Faces]
 
 
-@checked(run="GrainRun", path=Path, follow=bool)
-def write_grain_page(run: GrainRun, path: str | Path, *, follow: bool = True) -> Path:
-    """Writes a run of balls as a single browser page.
-
-    Args:
-        run: The run; every sample becomes a frame of the replay, and the page goes smoothly from one to the next.
-        path: The file to write, usually `.html`. Its folder is created.
-        follow: Whether the eye follows the rover; otherwise the ground stays fixed.
+def grain_page(run: GrainRun, *, follow: bool) -> Iterator[str]:
+    """A run of balls as a page in pieces, which goes smoothly from one sample to the next.
 
     Raises:
         RecordingError: The recording is damaged.
-        OSError: The file cannot be written.
     """
     places, low, extent = _quantised(run)
     meshes, poses = _meshes(run)
@@ -102,14 +172,10 @@ def write_grain_page(run: GrainRun, path: str | Path, *, follow: bool = True) ->
         **_packed_meshes([mesh for _, mesh in meshes]),
         **{f"piece-{i}": _differences(piece) for i, piece in enumerate(pieces)},
     }
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", encoding="utf-8") as file:
-        file.writelines(_page(run.title, scene, blobs, grain_curves(run)))
-    return path
+    return _page(run.title, scene, blobs, grain_curves(run))
 
 
-def _page(title: str, scene: dict[str, Any], blobs: dict[str, bytes], curves: dict[str, Any]) -> Any:
+def _page(title: str, scene: dict[str, Any], blobs: dict[str, bytes], curves: dict[str, Any]) -> Iterator[str]:
     """The page in pieces."""
     files = resources.files("rover_gym.replay")
 

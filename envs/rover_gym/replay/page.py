@@ -1,24 +1,32 @@
-"""Export of a run as a browser page: 3D view, timeline and curves in one file that needs no network."""
+"""A rover's run as a browser page: 3D view, timeline and curves in one file that needs no network."""
 
 from __future__ import annotations
 
 from itertools import cycle
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.record.outcomes import outcome_words
-from rover_gym.replay.panel import Chart, load_chart, panel_contents, with_panel
-from rover_gym.replay.player import add_surroundings, hidden_server, shortened
-from rover_gym.replay.rotation import continuous, quaternions
+from rover_gym.record.channels import outcome_words
+from rover_gym.replay.player import (
+    FOLLOW_TIME,
+    Chart,
+    continuous,
+    load_chart,
+    moving_mean,
+    panel_contents,
+    quaternions,
+    recorded_page,
+    shortened,
+    with_panel,
+)
 from rover_gym.replay.scenery import first_view, trunk_path
-from rover_gym.replay.smoothing import FOLLOW_TIME, moving_mean
-from rover_gym.replay.world_nodes import add_ground, add_rover
-from rover_gym.validation import checked
+from rover_gym.replay.vrml import add_ground, add_rover
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rover_gym.record.rover_run import RoverRun
 
 WHEEL_NAMES = {
@@ -36,50 +44,26 @@ LONGEST_FACT = 100
 Array = npt.NDArray[np.float64]
 
 
-@checked(run="RoverRun", path=Path, follow=bool)
-def write_page(run: RoverRun, path: str | Path, *, follow: bool = True) -> Path:
-    """Writes a run as a single browser page.
+def rover_page(run: RoverRun, *, follow: bool) -> str:
+    """A rover's run as a page."""
+    view, centre = first_view(run), np.zeros((run.n_frames, 3))
+    if follow:
+        centre = moving_mean(run.time, trunk_path(run), FOLLOW_TIME)
+    turns = continuous(quaternions(run.rotations))
 
-    Args:
-        run: The run; every sample becomes a frame of the replay.
-        path: The file to write, usually `.html`. Its folder is created.
-        follow: Whether the eye follows the rover; otherwise the ground stays fixed.
+    def build(scene: Any) -> Callable[[int], None]:
+        solids = add_rover(scene, run)
+        add_ground(scene, run)
 
-    Raises:
-        MissingExtraError: viser is not installed.
-        OSError: The file cannot be written.
-    """
-    with hidden_server() as server:
-        world, solids = _build(run, server.scene)
-        view, centre = first_view(run), np.zeros((run.n_frames, 3))
-        if follow:
-            centre = moving_mean(run.time, trunk_path(run), FOLLOW_TIME)
-        server.initial_camera.position = view.eye - centre[0]
-        server.initial_camera.look_at = view.target - centre[0]
-        server.initial_camera.fov = view.field_of_view
-        recording = server.get_scene_serializer()
-        turns = continuous(quaternions(run.rotations))
-        with server.atomic():  # otherwise each of the thousands of updates would wake the server's thread
-            for frame, pause in enumerate(np.diff(run.time, append=run.time[-1])):
-                world.position = shortened(-centre[frame])
-                for i, solid in enumerate(solids):
-                    solid.position = shortened(run.positions[frame, i])
-                    solid.wxyz = shortened(turns[frame, i])
-                recording.insert_sleep(float(pause))
-        page = recording.as_html()
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(with_panel(page, _curves(run)), encoding="utf-8")
-    return path
+        def show(frame: int) -> None:
+            for i, solid in enumerate(solids):
+                solid.position = shortened(run.positions[frame, i])
+                solid.wxyz = shortened(turns[frame, i])
 
+        return show
 
-def _build(run: RoverRun, scene: Any) -> tuple[Any, list[Any]]:
-    """Builds the scene and returns the moving frames: the whole world's, and those of the solids."""
-    add_surroundings(scene)
-    world = scene.add_frame("/world", show_axes=False)
-    solids = add_rover(scene, run)
-    add_ground(scene, run)
-    return world, solids
+    page = recorded_page(run, centre, build, view.eye - centre[0], view.target - centre[0], view.field_of_view)
+    return with_panel(page, _curves(run))
 
 
 def facts(run: RoverRun) -> list[str]:

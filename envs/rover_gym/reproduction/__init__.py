@@ -1,6 +1,6 @@
 """Reproduction of the 2010 report: the rover of sections 6.1 and 6.2 and the balls of chapter 3."""
 
-from rover_gym.reproduction.report_rover import report_model
+from rover_gym.reproduction.chapter_3_balls import report_model
 from rover_gym.reproduction.scene_runs import SceneResult
 
 __all__ = [

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from rover_gym.mechanics import Plane, Simulation
-from rover_gym.record.facts import describe
+from rover_gym.record.channels import describe
 from rover_gym.record.trajectory import Trajectory
-from rover_gym.reproduction.report_rover import GRAVITY, put_at_start, report_model
+from rover_gym.reproduction.chapter_3_balls import GRAVITY, put_at_start, report_model
 from rover_gym.reproduction.scene_runs import SEED, SceneResult, record_scene
 
 FRICTION = 0.7

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rover_gym.mechanics import Simulation
-from rover_gym.record.channels import RoverSampler
-from rover_gym.record.facts import row_count
+from rover_gym.record.channels import RoverSampler, row_count
 from rover_gym.record.recorder import Recorder
 
 SEED = "none: the scene has no randomness"

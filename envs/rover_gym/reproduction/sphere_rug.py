@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from rover_gym.mechanics import Simulation, SphereField
-from rover_gym.record.facts import describe
-from rover_gym.reproduction.report_rover import GRAVITY, put_at_start, report_model
+from rover_gym.record.channels import describe
+from rover_gym.reproduction.chapter_3_balls import GRAVITY, put_at_start, report_model
 from rover_gym.reproduction.scene_runs import SEED, SceneResult, record_scene
 
 FRICTION = 0.8

@@ -1,17 +1,17 @@
 """What the rover's instruments measure, as observations for policies and other programs (`docs/sensors.md`)."""
 
-from rover_gym.sensors.depth_camera import DepthCamera
-from rover_gym.sensors.heading_sensor import HeadingSensor
+from rover_gym.sensors.depth_camera import DepthCamera, LaserScanner
 from rover_gym.sensors.inertial_unit import InertialUnit
-from rover_gym.sensors.laser_scanner import LaserScanner
-from rover_gym.sensors.motor_sensors import MotorSensors
-from rover_gym.sensors.mount import Mount
-from rover_gym.sensors.sensed import make_grains_rover, make_rover, make_rover_vector
-from rover_gym.sensors.sensor import Sensor
-from rover_gym.sensors.sensor_observation import SensorObservation
+from rover_gym.sensors.sensor import Mount, Sensor
+from rover_gym.sensors.sensor_observation import (
+    SensorObservation,
+    SensorVectorObservation,
+    make_grains_rover,
+    make_rover,
+    make_rover_vector,
+)
 from rover_gym.sensors.sensor_suite import SensorSuite
-from rover_gym.sensors.sensor_vector_observation import SensorVectorObservation
-from rover_gym.sensors.wheel_encoders import WheelEncoders
+from rover_gym.sensors.wheel_encoders import HeadingSensor, MotorSensors, WheelEncoders
 
 __all__ = [
     "DepthCamera",

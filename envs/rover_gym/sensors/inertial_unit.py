@@ -6,9 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rover_gym.mechanics import OptionError, RoverModel
-from rover_gym.sensors.moment import Moment
-from rover_gym.sensors.mount import Mount
-from rover_gym.sensors.sensor import LARGEST, Array, Sensor, Values, gaussian, uniform
+from rover_gym.sensors.sensor import LARGEST, Array, Moment, Mount, Sensor, Values, gaussian, uniform
 from rover_gym.validation import Range, refuse
 
 

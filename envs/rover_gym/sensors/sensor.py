@@ -1,19 +1,141 @@
 """What all sensors have in common: a name, a rate, a latency, and properties that are drawn for each episode."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import OptionError, RoverModel
-from rover_gym.sensors.moment import Moment
-from rover_gym.sensors.mount import Mount
-from rover_gym.validation import Range, number, refuse, span
+from rover_gym.mechanics import GrainSimulation, OptionError, RoverModel, Simulation, SphereField
+from rover_gym.validation import Range, number, refuse, span, vector
 
 Array = npt.NDArray[np.float64]
+
+#: Farthest place of a sensor from the origin of its solid, m.
+MAX_OFFSET = 1e3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mount:
+    """The pose of a sensor on a solid of the rover.
+
+    The sensor's frame is x forward, y up, z to the right, as the trunk's. It is turned by its heading, then by its
+    pitch, then by its roll.
+
+    Args:
+        solid: Name of the solid; None for the model's first, the trunk.
+        position: In the solid's frame, (3,), m.
+        heading_deg: Turn about the solid's y axis, positive to the left, deg.
+        pitch_deg: Turn about the sensor's z axis, positive looks up, deg.
+        roll_deg: Turn about the sensor's x axis, positive leans to the right, deg.
+
+    Raises:
+        OptionError: A number is not finite, or the position is beyond 1 km.
+    """
+
+    solid: str | None = None
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    heading_deg: float = 0.0
+    pitch_deg: float = 0.0
+    roll_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.solid is not None and not isinstance(self.solid, str):
+            refuse(OptionError, "solid", self.solid, "must be the name of a solid, or None")
+        for i, entry in enumerate(vector("position", self.position, 3)):
+            number(f"position[{i}]", entry, at_least=-MAX_OFFSET, at_most=MAX_OFFSET)
+        for name in ("heading_deg", "pitch_deg", "roll_deg"):
+            number(name, getattr(self, name))
+
+    def solid_of(self, model: RoverModel) -> str:
+        """The name of its solid of a model.
+
+        Raises:
+            OptionError: The model has no such solid.
+        """
+        names = model.solid_names
+        if self.solid is None:
+            return names[0]
+        if self.solid not in names:
+            refuse(OptionError, "mount.solid", self.solid, f"unknown; known are {', '.join(names)}")
+        return self.solid
+
+    @property
+    def rotation(self) -> Array:
+        """Rotation matrix, (3, 3), from coordinates of the sensor to those of the solid."""
+        angles = (self.heading_deg, self.pitch_deg, self.roll_deg)
+        (ch, sh), (cp, sp), (cr, sr) = ((math.cos(a), math.sin(a)) for a in map(math.radians, angles))
+        about_y = np.array([[ch, 0.0, sh], [0.0, 1.0, 0.0], [-sh, 0.0, ch]])
+        about_z = np.array([[cp, -sp, 0.0], [sp, cp, 0.0], [0.0, 0.0, 1.0]])
+        about_x = np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
+        turned: Array = about_y @ about_z @ about_x
+        return turned
+
+
+class Moment:
+    """The state of a simulation, computed where a sensor asks.
+
+    Args:
+        simulation: The rover, which must not move while the moment is looked at.
+        time: Of the episode, s.
+        grains: Balls around it, which rays meet too.
+    """
+
+    def __init__(self, simulation: Simulation, time: float, grains: GrainSimulation | None = None) -> None:
+        self.simulation, self.time, self._grains = simulation, time, grains
+
+    @property
+    def model(self) -> RoverModel:
+        """The rover's model."""
+        return self.simulation.model
+
+    @cached_property
+    def q(self) -> Array:
+        """Coordinates, (nq,), as `Simulation.q`."""
+        return self.simulation.q
+
+    @cached_property
+    def v(self) -> Array:
+        """Velocities, (nv,), as `Simulation.v`."""
+        return self.simulation.v
+
+    @cached_property
+    def poses(self) -> dict[str, tuple[Array, Array]]:
+        """Origin (3,), m, and rotation matrix (3, 3) of every solid, world frame."""
+        return self.simulation.poses()
+
+    @cached_property
+    def _balls(self) -> SphereField | None:
+        if self._grains is None or not len(self._grains.radius):
+            return None
+        return SphereField(self._grains.position, self._grains.radius)
+
+    def frame(self, mount: Mount) -> tuple[Array, Array]:
+        """Place (3,), m, and rotation matrix (3, 3) of a sensor, world frame."""
+        origin, rotation = self.poses[mount.solid_of(self.model)]
+        return origin + rotation @ np.asarray(mount.position), rotation @ mount.rotation
+
+    def distances(self, mount: Mount, directions: Array, max_range: float, *, sees_rover: bool) -> Array:
+        """Distances (n,), m, at which rays from a sensor meet something first; infinite where they meet nothing.
+
+        Args:
+            mount: The sensor, whose solid is not seen.
+            directions: In the sensor's frame, (n, 3).
+            max_range: Distance to which the rays are followed, m.
+            sees_rover: Whether they meet the rover's other solids.
+        """
+        place, rotation = self.frame(mount)
+        along = directions @ rotation.T
+        without = mount.solid_of(self.model)
+        found, _ = self.simulation.cast_rays(place, along, max_range, parts=sees_rover, without=without)
+        if self._balls is not None:
+            found = np.minimum(found, self._balls.cast_rays(place, along, max_range)[0])
+        return found
+
 
 #: What is drawn for an episode, or kept from one sample to the next, by name.
 Values: TypeAlias = Mapping[str, Array]

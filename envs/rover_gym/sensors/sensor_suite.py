@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import OptionError, RoverModel, StateError
-from rover_gym.sensors.moment import Moment
-from rover_gym.sensors.sensor import Array, Sensor, Values, uniform
+from rover_gym.sensors.sensor import Array, Moment, Sensor, Values, uniform
 from rover_gym.validation import refuse
 
 #: Key of the environment's own observation beside the sensors'.

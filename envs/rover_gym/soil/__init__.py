@@ -8,12 +8,19 @@
 """
 
 from rover_gym.mechanics import SoilContacts, SoilSimulation, SoilSnapshot, soil_packing
-from rover_gym.soil.bed import Bed, settled_bed
+from rover_gym.soil.bed import Bed, rover_on_soil, settled_bed
 from rover_gym.soil.soil_recording import SoilSampler, record_soil
-from rover_gym.soil.soil_rover import rover_on_soil
-from rover_gym.soil.soil_run import SoilRun, read_soil_run
-from rover_gym.soil.soil_trials import Pull, SoilDrive, drawbar_pull, drive_on_soil, over_beds
-from rover_gym.soil.traction import BedEstimate, Traction, fit_traction
+from rover_gym.soil.soil_run import SoilRun
+from rover_gym.soil.soil_trials import (
+    BedEstimate,
+    Pull,
+    SoilDrive,
+    Traction,
+    drawbar_pull,
+    drive_on_soil,
+    fit_traction,
+    over_beds,
+)
 
 __all__ = [
     "Bed",
@@ -30,7 +37,6 @@ __all__ = [
     "drive_on_soil",
     "fit_traction",
     "over_beds",
-    "read_soil_run",
     "record_soil",
     "rover_on_soil",
     "settled_bed",

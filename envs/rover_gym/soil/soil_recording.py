@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import SoilSimulation
-from rover_gym.record.channels import Channel
-from rover_gym.record.facts import row_count
-from rover_gym.record.recorder import Recorder
+from rover_gym.record.channels import RESIDUAL, TIME, Channel, Sampler, energy_channels, row_count
+from rover_gym.record.recorder import record_rows
 from rover_gym.soil.bed import Array
 
 MOST_CHAINS = 2000  # strongest contacts kept per row
@@ -67,7 +66,28 @@ class _MeanForces:
         return chains, on_wheels
 
 
-class SoilSampler:
+def soil_channels(disks: int, machine: int, wheels: int, chains: int) -> tuple[Channel, ...]:
+    """The channels of so many disks, coordinates of the machine, wheels and strongest contacts."""
+    strongest = "strongest contacts: from x, y to x, y (m), mean force since the last row (N); zeros where none are"
+    forces = "x and y of the soil on each wheel, mean since the last row"
+    return (
+        TIME,
+        Channel("position", "m, rad", "x forward, y up, angle of each disk", (disks, 3), read="sim.position"),
+        Channel("velocity", "m/s, rad/s", "their rates", (disks, 3), read="sim.velocity"),
+        Channel("asleep", "1", "1 where the disk sleeps", (disks,), read="sim.asleep"),
+        Channel("machine", "m, rad", "coordinates of the machine", (machine,), read="sim.machine"),
+        Channel("machine_rate", "m/s, rad/s", "their rates", (machine,), read="sim.machine_rate"),
+        Channel("wheels", "m", "centre x, y and radius of each wheel", (wheels, 3), read="sim.wheels"),
+        Channel("wheel_forces", "N", forces, (wheels, 2), read="wheel_forces"),
+        Channel("force_chains", "m, N", strongest, (chains, 5), read="force_chains"),
+        *energy_channels(" of all", "all mass centres at height 0"),
+        Channel("n_contacts", "1", "contacts of the last step", read="sim.contacts.__len__"),
+        Channel("penetration", "m", "deepest overlap", read="sim.penetration"),
+        RESIDUAL,
+    )
+
+
+class SoilSampler(Sampler):
     """Steps a soil from row to row and makes the rows for a `Recorder`.
 
     Args:
@@ -75,69 +95,25 @@ class SoilSampler:
     """
 
     def __init__(self, sim: SoilSimulation) -> None:
+        self._forces = _MeanForces(sim)
+        super().__init__(sim)
         n, wheels = len(sim.radius), len(sim.wheels)
-        self._sim, self._forces = sim, _MeanForces(sim)
         self._n_chains = min(n + wheels, MOST_CHAINS)
-        self._residual = 0.0
-        self.channels = (
-            Channel("time", "s", "time since the run's start"),
-            Channel("position", "m, rad", "x forward, y up, angle of each disk", (n, 3)),
-            Channel("velocity", "m/s, rad/s", "their rates", (n, 3)),
-            Channel("asleep", "1", "1 where the disk sleeps", (n,)),
-            Channel("machine", "m, rad", "coordinates of the machine", (len(sim.machine),)),
-            Channel("machine_rate", "m/s, rad/s", "their rates", (len(sim.machine),)),
-            Channel("wheels", "m", "centre x, y and radius of each wheel", (wheels, 3)),
-            Channel("wheel_forces", "N", "x and y of the soil on each wheel, mean since the last row", (wheels, 2)),
-            Channel(
-                "force_chains",
-                "m, N",
-                "strongest contacts: from x, y to x, y (m), mean force since the last row (N); zeros where none are",
-                (self._n_chains, 5),
-            ),
-            Channel("kinetic_energy", "J", "kinetic energy of all"),
-            Channel("potential_energy", "J", "potential energy, zero with all mass centres at height 0"),
-            Channel("n_contacts", "1", "contacts of the last step"),
-            Channel("penetration", "m", "deepest overlap"),
-            Channel("solver_residual", "1", "largest residual of the contact solver since the last row"),
-        )
+        self.channels = soil_channels(n, len(sim.machine), wheels, self._n_chains)
 
-    def step(self, n: int) -> bool:
-        """Takes the steps that the next row covers; returns whether all of them converged to the tolerance.
+    def gather(self, report: object) -> None:  # noqa: ARG002 - the forces are the simulation's
+        """Adds the contacts of the last step."""
+        self._forces.add(self.sim)
 
-        Raises:
-            StepError: A step failed.
-        """
-        converged = True
-        for _ in range(n):
-            report = self._sim.step()
-            self._forces.add(self._sim)
-            self._residual = max(self._residual, report.residual)
-            converged &= report.is_converged
-        return converged
-
-    def row(self) -> dict[str, npt.ArrayLike]:
-        """One row of `channels`: the current state, and means since the previous row."""
-        sim = self._sim
-        energy = sim.energy()
-        chains, on_wheels = self._forces.read(sim, self._n_chains)
-        residual, self._residual = self._residual, 0.0
+    def clear(self) -> None:
+        """Resets what is gathered from row to row."""
+        super().clear()
         self._forces.clear()
-        return {
-            "time": sim.time,
-            "position": sim.position,
-            "velocity": sim.velocity,
-            "asleep": sim.asleep.astype(np.float64),
-            "machine": sim.machine,
-            "machine_rate": sim.machine_rate,
-            "wheels": sim.wheels,
-            "wheel_forces": on_wheels,
-            "force_chains": chains,
-            "kinetic_energy": energy.kinetic,
-            "potential_energy": energy.potential,
-            "n_contacts": len(sim.contacts),
-            "penetration": sim.penetration(),
-            "solver_residual": residual,
-        }
+
+    def measure(self) -> None:
+        """Measures what several channels read."""
+        super().measure()
+        self.force_chains, self.wheel_forces = self._forces.read(self.sim, self._n_chains)
 
 
 def record_soil(
@@ -173,7 +149,6 @@ def record_soil(
         StepError: A step failed; the rows before it are on disk.
     """
     rows, steps_per_row = row_count(duration, sim.time_step, steps_per_row), int(steps_per_row)
-    sampler = SoilSampler(sim)
     scene = {
         "kind": "SoilSimulation",
         "radius": sim.radius,
@@ -187,14 +162,4 @@ def record_soil(
         "seed": "the start's positions are the first row",
         "solver": sim.settings,
     }
-    unconverged = 0
-    with Recorder(path, sampler.channels, attributes) as recorder:
-        recorder.append(sampler.row())
-        for _ in range(rows):
-            unconverged += not sampler.step(steps_per_row)
-            recorder.append(sampler.row())
-            progress(sim.time)
-            if until(sim):
-                break
-        recorder.note(unconverged_rows=unconverged)
-    return unconverged
+    return record_rows(SoilSampler(sim), path, attributes, rows, steps_per_row, until=until, progress=progress)

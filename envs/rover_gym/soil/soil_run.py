@@ -1,30 +1,31 @@
 """Saved runs on a soil, read back: disk and wheel poses, and the forces of the soil on the wheels.
 
-run = read_soil_run("soil.h5").resample(25.0)
+run = open_run("soil.h5").resample(25.0)
 run.wheels[-1, 0, :2]
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.record.rover_run import LARGEST, check_rows, check_time, film_rows, title_of
-from rover_gym.record.trajectory import Trajectory, read_trajectory
+from rover_gym.record.rover_run import LARGEST, Run, check_rows, check_time, title_of
+from rover_gym.record.trajectory import Trajectory
 from rover_gym.record.trajectory_format import RecordingError, sound
 from rover_gym.soil.bed import surface_height
+from rover_gym.soil.soil_recording import soil_channels
 from rover_gym.validation import refuse
 
-__all__ = ["SoilRun", "is_soil", "read_soil_run", "soil_run_of"]
+__all__ = ["SoilRun", "is_soil", "soil_run_of"]
 
 Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class SoilRun:
+class SoilRun(Run):
     """A recorded run on a soil of disks.
 
     Attributes:
@@ -40,16 +41,6 @@ class SoilRun:
     walls: Array
     surface: float
     title: str
-
-    @property
-    def n_frames(self) -> int:
-        """Number of samples in the run."""
-        return len(self.time)
-
-    @property
-    def time(self) -> Array:
-        """(n,) sample times, s."""
-        return self.trajectory["time"]
 
     @property
     def positions(self) -> Array:
@@ -95,33 +86,11 @@ class SoilRun:
         result: Array = rims - rates[:, :1]
         return result
 
-    def resample(self, fps: float) -> SoilRun:
-        """The run reduced to the samples nearest to the frame times of a video, each at most once.
-
-        Args:
-            fps: Frames per second; a run sampled more coarsely keeps all its samples.
-
-        Raises:
-            OptionError: `fps` is not a positive number.
-        """
-        return replace(self, trajectory=self.trajectory.at(film_rows(self.time, fps)))
-
 
 def is_soil(trajectory: Trajectory) -> bool:
     """Whether a trajectory is a soil run."""
     scene = trajectory.attributes.get("scene")
     return isinstance(scene, dict) and scene.get("kind") == "SoilSimulation"
-
-
-def read_soil_run(path: str | Path) -> SoilRun:
-    """Reads a run that `record_soil` saved, complete or not.
-
-    Raises:
-        RecordingError: The file is not a trajectory, not a soil run, or holds no samples.
-        OSError: The file does not exist or cannot be read.
-        MissingExtraError: h5py is not installed.
-    """
-    return soil_run_of(read_trajectory(path), path)
 
 
 def soil_run_of(trajectory: Trajectory, path: str | Path) -> SoilRun:
@@ -141,7 +110,12 @@ def soil_run_of(trajectory: Trajectory, path: str | Path) -> SoilRun:
         refuse(RecordingError, f"{path}: scene.radius", len(radius), "must be a positive radius for each of the disks")
     if not (np.abs(walls) <= LARGEST).all() or not np.hypot(*walls[:, 2:].T).all():
         refuse(RecordingError, f"{path}: scene.walls", len(walls), "must be points with normals, for each of the walls")
-    check_rows(trajectory, path, _shapes(trajectory, path, len(radius)), bounded=("position", "wheels", "machine"))
+    wheels, machine = (trajectory[name].shape[1] if trajectory[name].ndim > 1 else 0 for name in ("wheels", "machine"))
+    if wheels > 2 or machine < 3 * bool(wheels) + wheels:
+        refuse(RecordingError, f"{path}: wheels", wheels, "must be none, one or two, with their machine's coordinates")
+    chains = trajectory["force_chains"].shape[1] if trajectory["force_chains"].ndim == 3 else 0
+    channels = soil_channels(len(radius), machine, wheels, chains)
+    check_rows(trajectory, path, channels, bounded=("position", "wheels", "machine"), needed=True)
     return SoilRun(
         trajectory=trajectory,
         radius=radius,
@@ -149,22 +123,3 @@ def soil_run_of(trajectory: Trajectory, path: str | Path) -> SoilRun:
         surface=surface_height(radius, trajectory["position"][0]),
         title=title_of(trajectory),
     )
-
-
-def _shapes(trajectory: Trajectory, path: str | Path, disks: int) -> dict[str, tuple[int, ...]]:
-    """Required row shapes of a soil run's data sets."""
-    wheels, machine = (trajectory[name].shape[1] if trajectory[name].ndim > 1 else 0 for name in ("wheels", "machine"))
-    if wheels > 2 or machine < 3 * bool(wheels) + wheels:
-        refuse(RecordingError, f"{path}: wheels", wheels, "must be none, one or two, with their machine's coordinates")
-    chains = trajectory["force_chains"]
-    return {
-        "position": (disks, 3),
-        "velocity": (disks, 3),
-        "asleep": (disks,),
-        "machine": (machine,),
-        "machine_rate": (machine,),
-        "wheels": (wheels, 3),
-        "wheel_forces": (wheels, 2),
-        "force_chains": (chains.shape[1] if chains.ndim == 3 else 0, 5),
-        **dict.fromkeys(("kinetic_energy", "potential_energy", "n_contacts", "penetration", "solver_residual"), ()),
-    }

@@ -4,10 +4,8 @@
 library.
 """
 
-from rover_gym.vector.batch import BatchRover, RoverBatch
-from rover_gym.vector.batch_snapshot import BatchSnapshot
-from rover_gym.vector.exploring import ExploringSpeed, measure_exploring
-from rover_gym.vector.throughput import VectorSpeed, measure_speed
+from rover_gym.vector.batch import BatchRover, BatchSnapshot, RoverBatch
+from rover_gym.vector.throughput import ExploringSpeed, VectorSpeed, measure_exploring, measure_speed
 from rover_gym.vector.vector_env import RoverVectorEnv
 
 __all__ = [

@@ -7,6 +7,7 @@ its observation, reward and termination, as it does for `RoverEnv`.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 import numpy as np
@@ -15,7 +16,7 @@ from gymnasium.error import ResetNeeded
 
 from rover_gym.env import beginning
 from rover_gym.env.arguments import RoverArguments, takes_arguments
-from rover_gym.env.env_snapshot import EnvSnapshot
+from rover_gym.env.env_snapshot import EnvSnapshot, Progress, check_random_state, check_snapshot
 from rover_gym.env.episode_scene import (
     EpisodeScene,
     ResetOptions,
@@ -24,26 +25,211 @@ from rover_gym.env.episode_scene import (
     origin_of,
     scene_of,
 )
-from rover_gym.env.generators import Rows, check_seed, fresh_seed, generator_at, row_of, seeded_rows, set_row
-from rover_gym.env.observation import ObservationLayout
-from rover_gym.env.progress import Progress
-from rover_gym.env.quantities import Array, Mask, Observations
-from rover_gym.env.randomisation import Domain
-from rover_gym.env.rocks import Rocks
-from rover_gym.env.rover_env import RoverEnv
-from rover_gym.env.start import Start
+from rover_gym.env.episode_view import EpisodeView
+from rover_gym.env.generators import (
+    Rows,
+    check_seed,
+    fresh_generator,
+    fresh_seed,
+    generator_at,
+    row_of,
+    seeded_rows,
+    set_row,
+)
+from rover_gym.env.observation import Array, Mask, Observations
+from rover_gym.env.reward_terms import earn, total
+from rover_gym.env.rover_env import STEP_FAILED, RoverEnv
 from rover_gym.env.task import Task, check_actions
-from rover_gym.mechanics import DrawnEpisodes, EpisodeBatch, OptionError, Plane, RoverModel, Simulation
+from rover_gym.mechanics import (
+    DrawnEpisodes,
+    EpisodeBatch,
+    EpisodeRun,
+    OptionError,
+    Plane,
+    Simulation,
+    StateError,
+)
 from rover_gym.validation import Range, refuse, whole
-from rover_gym.vector.batch_snapshot import BatchSnapshot, check_batch_snapshot
-from rover_gym.vector.batch_terms import BatchTerms
 
 if TYPE_CHECKING:
     from rover_gym.rendering import FrameRenderer
 
 
+@dataclass(frozen=True)
+class BatchSnapshot:
+    """The state from which a batch of rovers continues bit for bit; picklable.
+
+    Attributes:
+        rovers: Each rover's state; `RoverEnv.restore` takes one, too.
+        steps: Control periods of each rover since its episode began.
+        seeds: Seed of each rover's random generator.
+        messages: Of the physics step that failed in a rover's last period, "" where none did.
+        terms: What the user's reward terms gave in the last period, `(n,)` each.
+    """
+
+    rovers: tuple[EnvSnapshot, ...]
+    steps: tuple[int, ...]
+    seeds: tuple[int, ...]
+    messages: tuple[str, ...]
+    terms: Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class RestoredRover:
+    """What a batch adopts of one rover, checked."""
+
+    simulation: Simulation
+    episode: EpisodeRun
+    generator: Rows
+    difficulty: Range | None
+    steps: int
+    seed: int
+    message: str
+
+
+def check_batch_snapshot(task: Task, n: int, snapshot: object) -> list[RestoredRover]:
+    """Checks that a snapshot comes from a batch of `n` rovers with this task, and returns what to restore.
+
+    Raises:
+        StateError: The value is no snapshot, is damaged, or comes from a batch of other size or arguments.
+    """
+    if not isinstance(snapshot, BatchSnapshot):
+        refuse(StateError, "snapshot", snapshot, "must come from snapshot() of a vector environment")
+    for name, kind in (("rovers", EnvSnapshot), ("steps", int), ("seeds", int), ("messages", str)):
+        part = getattr(snapshot, name)
+        if not isinstance(part, tuple) or len(part) != n or not all(isinstance(one, kind) for one in part):
+            refuse(StateError, f"snapshot.{name}", part, f"must be of {n} rovers")
+    terms = snapshot.terms
+    if terms.keys() != task.reward_terms.keys() or any(np.shape(term) != (n,) for term in terms.values()):
+        reason = f"must be of {n} rovers with the terms {', '.join(task.reward_terms) or 'of the environment alone'}"
+        refuse(StateError, "snapshot.terms", snapshot.terms, reason)
+    parts = zip(snapshot.rovers, snapshot.steps, snapshot.seeds, snapshot.messages, strict=True)
+    return [_check_rover(task, *part) for part in parts]
+
+
+def _check_rover(task: Task, rover: EnvSnapshot, steps: int, seed: int, message: str) -> RestoredRover:
+    episode = check_snapshot(task, rover)
+    generator = fresh_generator()
+    generator.bit_generator.state = check_random_state(generator, rover.random_state)
+    simulation = task.simulate(rover.scene.terrain, rover.scene.domain)
+    simulation.restore(rover.simulation)
+    return RestoredRover(
+        simulation=simulation,
+        episode=episode,
+        generator=row_of(generator)[None],
+        difficulty=None if rover.difficulty is None else check_difficulty(task, rover.difficulty),
+        steps=whole("snapshot.steps", steps, error=StateError),
+        seed=whole("snapshot.seeds", seed, error=StateError),
+        message=message,
+    )
+
+
+#: What the core returns: observations, rewards, which episodes ended or reached the time limit, and which are over.
+Stepped = tuple[Observations, Array, Mask, Mask, list[int]]
+
+Finals = dict[int, tuple[Observations, dict[str, Any]]]
+
+
+class BatchTerms:
+    """What the functions of `reward_terms` gave in the last control period of each rover; without functions, nothing.
+
+    Args:
+        task: The task, which has the functions.
+        episodes: The rovers' episodes.
+    """
+
+    def __init__(self, task: Task, episodes: EpisodeBatch) -> None:
+        self._task, self._episodes = task, episodes
+        self._now: dict[str, Array] = {name: np.zeros(len(episodes)) for name in task.reward_terms}
+        #: Those of the episodes that the last step has ended and followed by others.
+        self._finals: dict[int, dict[str, float]] = {}
+
+    def before(self) -> Observations | None:
+        """The observations that a period begins with; None without functions."""
+        return self._episodes.observations() if self._now else None
+
+    def earn(
+        self,
+        before: Observations,
+        actions: Any,
+        stepped: Stepped,
+        moved: Mask,
+        infos: dict[str, Any],
+        finals: Finals | None = None,
+    ) -> None:
+        """Calls the functions and adds what they give to the rewards.
+
+        Args:
+            before: Observations before the period.
+            actions: The actions.
+            stepped: What the core returned; its rewards are changed.
+            moved: Which rovers have moved; the others keep what they have.
+            infos: Infos of the period.
+            finals: Last observations and infos of the episodes that it has ended and followed by others.
+        """
+        observation, rewards = stepped[:2]
+        ended = finals or {}
+        after = observation.copy() if ended else observation
+        for i, (last, info) in ended.items():
+            after[i] = last
+            _put(infos, i, info)
+        counts = moved & (infos["termination"] != STEP_FAILED)
+        own = earn(self._task.reward_terms, self._task.layout, before, actions, after, infos, counts)
+        rewards += np.where(moved, total(own.values()), 0.0)
+        self._finals = {i: {name: float(term[i]) for name, term in own.items()} for i in ended}
+        begun = np.isin(np.arange(len(moved)), list(ended)) | (~moved & (self._zero_steps()))
+        for name, term in own.items():
+            self._now[name] = np.where(begun, 0.0, np.where(moved, term, self._now[name]))
+
+    def _zero_steps(self) -> Mask:
+        """Which episodes have only begun."""
+        return np.array([self._episodes.steps(i) == 0 for i in range(len(self._episodes))])
+
+    def clear(self, chosen: Sequence[int]) -> None:
+        """The rovers' episodes have begun and have earned nothing."""
+        for term in self._now.values():
+            term[list(chosen)] = 0.0
+
+    def add_to_info(self, i: int, info: dict[str, Any]) -> dict[str, Any]:
+        """Adds the terms to the info of a rover."""
+        info["reward_terms"] |= {name: float(term[i]) for name, term in self._now.items()}
+        return info
+
+    def add_to_infos(self, infos: dict[str, Any]) -> dict[str, Any]:
+        """Adds the terms to the infos of all rovers."""
+        terms = infos["reward_terms"]
+        for name, term in self._now.items():
+            terms[name], terms[f"_{name}"] = term.copy(), np.ones(len(term), np.bool_)
+        return infos
+
+    def add_to_finals(self, finals: Finals) -> Finals:
+        """Adds the terms to the infos of episodes that have ended."""
+        if self._now:
+            for i, (_, info) in finals.items():
+                info["reward_terms"] |= self._finals[i]
+        return finals
+
+    def state(self) -> dict[str, Array]:
+        """The terms of the last period, `(n,)` each."""
+        return {name: term.copy() for name, term in self._now.items()}
+
+    def set_state(self, state: Mapping[str, Array]) -> None:
+        """Sets the terms of the last period."""
+        self._now = {name: np.array(state[name], np.float64) for name in self._now}
+
+
+def _put(infos: dict[str, Any], i: int, info: Mapping[str, Any]) -> None:
+    """Puts the info of a rover into the infos of all."""
+    for key, value in info.items():
+        if isinstance(value, Mapping):
+            _put(infos[key], i, value)
+        else:
+            infos[key][i] = value
+
+
 #: Limits of a batch; `docs/vector.md` states the memory of a rover.
 MAX_ROVERS = 100_000
+
 MAX_THREADS = 4096
 
 
@@ -392,15 +578,14 @@ class Drawn(NamedTuple):
     seeded: set[int]
 
 
-class BatchRover:
+class BatchRover(EpisodeView):
     """A view of one rover of a batch, with the names of `RoverEnv`: read-only except for the difficulty."""
 
     #: None: Gymnasium has registered the vector environment, not its rovers.
     spec = None
 
     def __init__(self, batch: RoverBatch, i: int) -> None:
-        self._batch, self._i = batch, i
-        self._renderer: FrameRenderer | None = None
+        self._batch, self._i, self.task = batch, i, batch.task
 
     @property
     def render_mode(self) -> str | None:
@@ -411,17 +596,11 @@ class BatchRover:
         """Renders the present state as a frame, like `RoverEnv.render`; None without a render mode."""
         if self.render_mode is None:
             return None
-        scene, prototype = self._scene, self._batch.prototype
-        if self._renderer is None:
-            self._renderer = prototype.make_renderer(scene)
-        self._renderer.set_scene(scene.terrain, goal=self.goal, goal_tolerance=prototype.goal_tolerance)
-        return self._renderer.render(self.simulation)
+        return self.frame()
 
-    def close(self) -> None:
-        """Frees the renderer, if there is one."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+    def make_renderer(self, scene: EpisodeScene) -> "FrameRenderer":
+        """Creates a renderer, like `RoverEnv.make_renderer`."""
+        return self._batch.prototype.make_renderer(scene)
 
     @property
     def simulation(self) -> Simulation:
@@ -429,49 +608,9 @@ class BatchRover:
         return self._batch.episodes.simulation(self._i)
 
     @property
-    def start(self) -> Start:
-        """The episode's slope, pose and goal as they were drawn."""
-        return self._scene.start
-
-    @property
     def goal(self) -> tuple[float, float]:
         """The episode's present goal (x, z), m."""
         return self._batch.episodes.episode(self._i).goal
-
-    @property
-    def rocks(self) -> Rocks | None:
-        """The episode's difficulty and rocks as they were drawn; None on the plane."""
-        return self._scene.rocks
-
-    @property
-    def difficulty(self) -> float | None:
-        """The episode's difficulty; None on the plane."""
-        return None if self.rocks is None else self.rocks.difficulty
-
-    @property
-    def domain(self) -> Domain:
-        """The episode's properties of rover and world as they were drawn."""
-        return self._scene.domain
-
-    @property
-    def task(self) -> Task:
-        """The checked arguments."""
-        return self._batch.task
-
-    @property
-    def model(self) -> RoverModel:
-        """The rover, before its masses are scaled."""
-        return self._batch.task.model
-
-    @property
-    def observation_layout(self) -> ObservationLayout:
-        """The layout of the observation."""
-        return self._batch.task.layout
-
-    @property
-    def dt(self) -> float:
-        """Control period, s."""
-        return self._batch.task.dt
 
     @property
     def np_random(self) -> np.random.Generator:
@@ -491,6 +630,5 @@ class BatchRover:
         """
         self._batch.episodes.set_difficulty(self._i, check_difficulty(self._batch.task, difficulty))
 
-    @property
-    def _scene(self) -> EpisodeScene:
+    def _running(self) -> EpisodeScene:
         return self._batch.scene(self._i)

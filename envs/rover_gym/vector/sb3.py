@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
+from rover_gym.env.episode_view import EpisodeView
 from rover_gym.env.generators import check_seed
 from rover_gym.env.observation import LARGEST
 from rover_gym.env.rover_env import RoverEnv
@@ -22,8 +23,7 @@ from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
 from rover_gym.extras import MissingExtraError
 from rover_gym.mechanics import OptionError, StateError
 from rover_gym.validation import Range, refuse
-from rover_gym.vector.batch import BatchRover, Drawn, RoverBatch
-from rover_gym.vector.batch_snapshot import BatchSnapshot
+from rover_gym.vector.batch import BatchRover, BatchSnapshot, Drawn, RoverBatch
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
@@ -230,5 +230,6 @@ class RoverVecEnv(VecEnv):
 
     def _find(self, rover: BatchRover, name: str) -> Any:
         # hasattr would evaluate properties.
-        owner = rover if name in vars(rover) or name in vars(BatchRover) else self.prototype
+        known = name in vars(rover) or any(name in vars(kind) for kind in (BatchRover, EpisodeView))
+        owner = rover if known else self.prototype
         return getattr(owner, name)

@@ -1,21 +1,38 @@
-"""Measures the throughput of a batch of rovers and where its time goes.
+"""Measures the throughput of a batch of rovers: its environment, and its physics where a policy explores.
 
 Other processes disturb timings, so the variants are measured in turn in many short rounds, and the fastest round of
 each counts.
 """
 
+import platform
+import statistics
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Unpack
+from pathlib import Path
+from typing import Any, Literal, TypeAlias, Unpack
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
+from rover_gym.env.observation import Array
+from rover_gym.env.rover_env import RoverEnv
+from rover_gym.env.start import tilted_plane
+from rover_gym.mechanics import Simulation, SimulationBatch
 from rover_gym.vector.batch import RoverBatch
 from rover_gym.vector.vector_env import RoverVectorEnv
+
+Ground = Literal["plane", "rocks"]
+#: Lets an engine drive by commands `(n_commands, n_rovers, 12)`, N m and rad.
+Player: TypeAlias = Callable[[Array], None]
+
+TIME_STEP = 0.005  # s
+#: Steps from one command to the next, commands of a round, and rounds that are not measured.
+STEPS_A_COMMAND, COMMANDS, WARM_UP = 10, 10, 1
+#: Height by which a rover is raised until nothing overlaps, m, and steps that it has to come to rest, braked.
+LIFT, LANDING = 0.005, 200
 
 #: Largest action: torques within a fifth of the limit, so that the rovers drive about and few roll over.
 _EFFORT = 0.2
@@ -145,3 +162,114 @@ def _mean_step(env: gym.vector.VectorEnv[Any, Any, Any], actions: npt.NDArray[np
     for action in actions:
         env.step(action)
     return (time.perf_counter() - start) / len(actions)
+
+
+@dataclass(frozen=True)
+class ExploringSpeed:
+    """How fast rovers explore on one ground.
+
+    Attributes:
+        ground: "plane" or "rocks".
+        num_envs: Number of rovers.
+        threads: Threads that step them.
+        instruction_set: Of the processor, as far as the core uses it.
+        torque: Largest torque, N m.
+        rover_steps: Rover-steps per second, steps of `TIME_STEP` of one rover, by engine.
+    """
+
+    ground: Ground
+    num_envs: int
+    threads: int
+    instruction_set: str
+    torque: float
+    rover_steps: dict[str, float]
+
+    @property
+    def simulated(self) -> dict[str, float]:
+        """Simulated seconds per second, all rovers together, by engine."""
+        return {engine: TIME_STEP * rate for engine, rate in self.rover_steps.items()}
+
+
+def measure_exploring(
+    num_envs: int = 64,
+    threads: int | None = None,
+    *,
+    ground: Ground = "plane",
+    torque: float = 60.0,
+    rounds: int = 10,
+    beside: Callable[[list[Simulation], int], dict[str, Player]] = lambda _simulations, _threads: {},
+    progress: Callable[[], object] = lambda: None,
+) -> ExploringSpeed:
+    """Times a batch of exploring rovers: torques and set-points of the steering are redrawn every ten steps of 5 ms.
+
+    Among rocks each rover has its own field of difficulty 0.5, as `Rover-v0` draws it, and starts halfway to its goal:
+    the clearing at the environment's start has no rocks.
+
+    Args:
+        num_envs: Number of rovers.
+        threads: Threads; None for one per core.
+        ground: What they drive on.
+        torque: Largest torque, N m.
+        rounds: Measured rounds, of 100 steps each.
+        beside: Makes other engines' players from the rovers and the number of threads, by name; the median round of
+            each counts.
+        progress: Called after each round.
+    """
+    env = RoverEnv(terrain=ground)
+    simulations = [_rover(env, seed) for seed in range(num_envs)]
+    batch = SimulationBatch(simulations, threads=threads)
+    engines: dict[str, Player] = {"rover-gym": _ours(batch)} | beside(simulations, batch.threads)
+    limit = simulations[0].model.steering_limit
+    rng = np.random.default_rng(0)
+    seconds: dict[str, list[float]] = {name: [] for name in engines}
+    for _ in range(rounds + WARM_UP):
+        commands = rng.uniform(-1.0, 1.0, (COMMANDS, num_envs, 12)) * np.repeat([torque, limit], 6)
+        for name, play in engines.items():
+            start = time.perf_counter()
+            play(commands)
+            seconds[name].append(time.perf_counter() - start)
+        progress()
+    steps = num_envs * COMMANDS * STEPS_A_COMMAND
+    return ExploringSpeed(
+        ground=ground,
+        num_envs=num_envs,
+        threads=batch.threads,
+        instruction_set=batch.instruction_set,
+        torque=torque,
+        rover_steps={name: steps / statistics.median(times[WARM_UP:]) for name, times in seconds.items()},
+    )
+
+
+def processor() -> str:
+    """What the machine calls its processor."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor() or platform.machine()
+
+
+def _rover(env: RoverEnv, seed: int) -> Simulation:
+    """A rover at rest on the ground of an episode, its wheels braked until the first command."""
+    env.reset(seed=seed)
+    terrain, start = env.simulation.terrain, env.start
+    place, plane = start.position, tilted_plane(start.slope, start.uphill)
+    if env.rocks is not None:
+        place = (0.5 * (place[0] + env.goal[0]), 0.5 * (place[1] + env.goal[1]))
+    q = env.model.resting_pose(plane, place, start.heading)
+    simulation = Simulation(env.model, terrain, time_step=TIME_STEP)
+    simulation.set_state(q)
+    while simulation.deepest_overlap < -LIFT:
+        q[1] += LIFT
+        simulation.set_state(q)
+    simulation.brake()
+    simulation.step(LANDING)
+    return simulation
+
+
+def _ours(batch: SimulationBatch) -> Player:
+    def play(commands: Array) -> None:
+        for command in commands:
+            batch.step(command[:, :6], command[:, 6:], STEPS_A_COMMAND)
+
+    return play

@@ -12,12 +12,11 @@ from gymnasium.vector.utils import batch_space
 from rover_gym.env.arguments import RoverArguments, takes_arguments
 from rover_gym.env.episode_scene import ResetOptions
 from rover_gym.env.generators import spread_seeds
-from rover_gym.env.quantities import Array, Mask, Observations
+from rover_gym.env.observation import Array, Mask, Observations
 from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
 from rover_gym.mechanics import OptionError
 from rover_gym.validation import Range, mapping, refuse
-from rover_gym.vector.batch import RoverBatch
-from rover_gym.vector.batch_snapshot import BatchSnapshot
+from rover_gym.vector.batch import BatchSnapshot, RoverBatch
 
 _Info = dict[str, Any]
 

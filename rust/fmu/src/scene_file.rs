@@ -1,4 +1,4 @@
-//! `resources/scene.json`: what the unit simulates, as `rover_gym.exports.fmu_scene` writes it.
+//! `resources/scene.json`: what the unit simulates, as `rover_gym.exports.fmu` writes it.
 
 use std::collections::HashMap;
 use std::path::Path;

@@ -6,8 +6,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from comparison.mujoco_rover import contact_radius, principal_inertia
 from comparison.scene import Array, Phase, RoverScene
-from rover_gym.vector.mujoco_rover import contact_radius, principal_inertia
 
 
 class LeftOut(Exception):  # noqa: N818 - no error: the chart has a gap there

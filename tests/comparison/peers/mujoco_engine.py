@@ -10,11 +10,11 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 
+from comparison.mujoco_rover import rover_xml
 from comparison.peers.base import Variant, bodies, held, quaternion_of, rotation_of
 from comparison.peers.grid import middle
 from comparison.scene import Array, Phase, RoverScene
 from rover_gym import HeightField
-from rover_gym.vector.mujoco_rover import rover_xml
 
 
 def model_on(text: str, field: HeightField | None, solref: float | None = None) -> mujoco.MjModel:

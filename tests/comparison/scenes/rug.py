@@ -9,7 +9,7 @@ import numpy as np
 
 from comparison.scene import Array, Phase, RoverScene, Trace
 from rover_gym import SphereField
-from rover_gym.reproduction.report_rover import FRONT_STEERING, GRAVITY, report_model
+from rover_gym.reproduction.chapter_3_balls import FRONT_STEERING, GRAVITY, report_model
 from rover_gym.reproduction.sphere_rug import FRICTION, START, WHEEL_TORQUE
 
 

@@ -17,12 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.grains.lab.plate import PlatePoint
-from rover_gym.grains.lab.shear import ShearPoint
+from rover_gym.grains.lab.plate_and_shear import PlatePoint, ShearPoint
 from rover_gym.grains.lab.wheel import WheelPoint
 from rover_gym.mechanics import OptionError
-from rover_gym.soil.soil_trials import Pull
-from rover_gym.soil.traction import Traction, fit_traction
+from rover_gym.soil.soil_trials import Pull, Traction, fit_traction
 from rover_gym.validation import checked, number, refuse
 
 Array = npt.NDArray[np.float64]

@@ -1,0 +1,244 @@
+"""Options that several commands share: rover, ground, policy and film, and their completion."""
+
+import functools
+import inspect
+import math
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import MISSING, fields
+from pathlib import Path
+from typing import Annotated, Any, get_type_hints
+
+import typer
+
+from rover_gym.env.arguments import ARGUMENTS, TERRAINS, terrain_name
+from rover_gym.maps.map_files import ENDINGS, is_terrain_file, open_terrain
+from rover_gym.maps.map_files import ENDINGS as MAPS
+from rover_gym.maps.map_files import ENDINGS as MESHES
+from rover_gym.mechanics import HeightField, OptionError, RoverModel, TriangleMesh
+from rover_gym.models import open_model
+from rover_gym.models.lookup import KINDS
+from rover_gym.planning.planner_policy import PlannerPolicy
+from rover_gym.policy.named_policy import NAMES_HELP, NamedPolicy, named_policy, policy_title
+from rover_gym.rendering.render_options import CAMERAS, check_render_options
+from rover_gym.validation import refuse
+
+FilmSize = Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Size of the film, pixels, even numbers.")]
+
+FilmCamera = Annotated[
+    str, typer.Option(help="Camera of the film: 'follow', 'side' or 'top'.", autocompletion=lambda: list(CAMERAS))
+]
+
+FilmForces = Annotated[bool, typer.Option("--forces/--no-forces", help="Draw contact forces in the film.")]
+
+FilmAntialiasing = Annotated[
+    bool, typer.Option("--antialiasing/--no-antialiasing", help="Smooth the film's edges; takes twice the time.")
+]
+
+
+def film_options(size: str, camera: str, *, forces: bool, antialiasing: bool) -> dict[str, Any]:
+    """The render options of a film.
+
+    Raises:
+        OptionError: The size is not two even numbers within the renderer's limits, or the camera is unknown.
+    """
+    found = re.fullmatch(r"(\d{1,6})x(\d{1,6})", size)
+    if found is None:
+        refuse(OptionError, "size", size, "must be WIDTHxHEIGHT, such as 1280x720")
+    if camera not in CAMERAS:
+        refuse(OptionError, "camera", camera, f"must be one of {', '.join(CAMERAS)}")
+    width, height = (int(side) for side in found.groups())
+    options = {"width": width, "height": height, "camera": camera}
+    options |= {"show_forces": forces, "antialiasing": antialiasing}
+    check_render_options("", options)
+    return options
+
+
+Completer = Callable[[str], list[str]]
+
+DRIVERS = ("pd", "scan", "foresight", "trained", "planner")
+
+
+def complete_terrain(incomplete: str) -> list[str]:
+    """Names of grounds, and files of maps and meshes."""
+    return _named(incomplete, TERRAINS) + _files(incomplete, (*MAPS, *MESHES))
+
+
+def complete_model(incomplete: str) -> list[str]:
+    """Names of the gallery, and files of models."""
+    return _named(incomplete, RoverModel.names()) + _files(incomplete, tuple(KINDS))
+
+
+def complete_policy(incomplete: str) -> list[str]:
+    """Names of policies, and folders."""
+    return _named(incomplete, DRIVERS) + _files(incomplete, ())
+
+
+def complete_recording(incomplete: str) -> list[str]:
+    """Recorded runs."""
+    return _files(incomplete, (".h5",))
+
+
+def _named(incomplete: str, names: Iterable[str]) -> list[str]:
+    return [name for name in names if name.startswith(incomplete)]
+
+
+def _files(incomplete: str, endings: tuple[str, ...]) -> list[str]:
+    """Files with one of these endings, and folders, which end in a slash, as far as they are typed."""
+    folder, slash, begun = incomplete.rpartition("/")
+    try:
+        places = sorted(Path(folder + slash or ".").iterdir())
+    except OSError:
+        return []
+    fitting = [place for place in places if place.name.startswith(begun) and not place.name.startswith(".")]
+    return [
+        f"{folder}{slash}{place.name}{'/' if place.is_dir() else ''}"
+        for place in fitting
+        if place.is_dir() or place.name.lower().endswith(endings)
+    ]
+
+
+ModelName = Annotated[
+    str,
+    typer.Option(
+        help="The rover: a name of the gallery, or a model's file (TOML, URDF, MJCF).", autocompletion=complete_model
+    ),
+]
+
+TerrainName = Annotated[
+    str | None,
+    typer.Option(
+        help="The ground: 'plane', 'rocks', 'hills', or the file of a map or a mesh. "
+        "Default: the plane; with a difficulty, rocks.",
+        autocompletion=complete_terrain,
+    ),
+]
+
+Spacing = Annotated[
+    float | None, typer.Option(help="Distance of a map's columns and rows, m, where its file does not give it.")
+]
+
+HeightRange = Annotated[
+    tuple[float, float] | None, typer.Option(metavar="LOW HIGH", help="Heights of black and white in a PNG, m.")
+]
+
+Start = Annotated[tuple[float, float] | None, typer.Option(metavar="X Z", help="Start on the map, m. Default: 0 0.")]
+
+BUILT_IN = "rover"
+
+#: Friction coefficient of wheel and ground where no option sets it.
+FRICTION: float = ARGUMENTS["friction"].default
+
+#: Environments by the names of their grounds.
+ENVIRONMENTS = dict(zip(TERRAINS, ("Rover-v0", "RoverRocks-v0", "RoverHills-v0"), strict=True))
+
+
+def chosen_terrain(terrain: str | None, difficulty: float | None) -> str:
+    """The ground of an option `--terrain`; where none is given, rocks with a difficulty and the plane without."""
+    if terrain is None:
+        return "plane" if difficulty is None else "rocks"
+    return terrain_name(terrain)
+
+
+def environment_of(terrain: str) -> str:
+    """The environment that has this ground; of a file `Rover-v0`."""
+    return ENVIRONMENTS.get(terrain, "Rover-v0")
+
+
+def environment_title(terrain: str) -> str:
+    """The environment that has this ground, as a heading says it."""
+    return environment_of(terrain) if terrain in ENVIRONMENTS else f"{environment_of(terrain)} on {terrain}"
+
+
+def warn_of_slope(slope_deg: float | None, friction: float = FRICTION) -> None:
+    """Says on standard error that a slope, degrees, is beyond the friction angle, where rovers slide."""
+    angle = math.degrees(math.atan(friction))
+    if slope_deg is not None and abs(slope_deg) > angle:
+        typer.echo(
+            f"warning: --slope {slope_deg:g} is steeper than the friction angle of {angle:.1f} degrees "
+            f"(friction {friction:g}): a rover slides down",
+            err=True,
+        )
+
+
+def named_model(name: str) -> RoverModel | None:
+    """The model of an option `--model`; None for the built-in one.
+
+    Raises:
+        ModelError: There is no such model.
+        OSError: Its file cannot be read.
+    """
+    return None if name == BUILT_IN else open_model(name)
+
+
+def named_ground(
+    terrain: str, spacing: float | None, height_range: tuple[float, float] | None
+) -> HeightField | TriangleMesh | None:
+    """The map or mesh of an option `--terrain`; None if it does not name a file.
+
+    Raises:
+        OptionError: An option is given that only a map's file takes.
+        TerrainError: The file is damaged or does not say enough.
+        OSError: It cannot be read.
+    """
+    given: dict[str, Any] = {"spacing": spacing, "height_range": height_range}
+    given = {name: value for name, value in given.items() if value is not None}
+    if not terrain.lower().endswith(ENDINGS):
+        for name, value in given.items():
+            refuse(OptionError, name, value, "needs a map's file as terrain")
+    return open_terrain(terrain, **given) if is_terrain_file(terrain) else None
+
+
+DRIVERS_HELP = f"{NAMES_HELP[:-1]}; 'planner' tries out futures in the simulator, see the manual's page on policies."
+
+
+def named_driver(name: str, terrain: str, model: RoverModel | None = None) -> NamedPolicy:
+    """The policy of a name, as `named_policy` takes it, or "planner".
+
+    Raises:
+        PolicyError: There is no such policy.
+        OSError: A file may not be read.
+    """
+    return NamedPolicy({}, PlannerPolicy) if name == "planner" else named_policy(name, terrain, model)
+
+
+def driver_title(name: str) -> str:
+    """What a driver is, as a heading says it."""
+    return "the planner with futures" if name == "planner" else policy_title(name)
+
+
+def takes(kind: type[Any], **defaults: Any) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Makes a command take the fields of a dataclass as options, and gives it an instance as its first argument.
+
+    Args:
+        kind: The dataclass, whose fields are annotated as options.
+        **defaults: Defaults of this command in the place of the dataclass's.
+    """
+    shared = get_type_hints(kind, include_extras=True)
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        own = list(inspect.signature(command).parameters.values())[1:]
+        given = {field.name: defaults.get(field.name, field.default) for field in fields(kind)}
+        unknown = defaults.keys() - given.keys()
+        assert not unknown, f"{kind.__name__} has no {sorted(unknown)}"  # noqa: S101 - a mistake in this package
+        added = [
+            inspect.Parameter(
+                name,
+                inspect.Parameter.KEYWORD_ONLY,
+                default=inspect.Parameter.empty if value is MISSING else value,
+                annotation=shared[name],
+            )
+            for name, value in given.items()
+        ]
+
+        @functools.wraps(command)
+        def called(**options: Any) -> None:
+            command(kind(**{name: options.pop(name) for name in given}), **options)
+
+        hints = get_type_hints(command, include_extras=True)
+        hints.pop(next(iter(inspect.signature(command).parameters)))
+        called.__annotations__ = hints | shared
+        called.__signature__ = inspect.Signature([*own, *added])  # type: ignore[attr-defined]
+        return called
+
+    return decorate

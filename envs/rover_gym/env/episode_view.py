@@ -1,0 +1,114 @@
+"""What an environment shows of its episode, alone or as a row of a batch."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.env.episode_scene import EpisodeScene
+from rover_gym.env.observation import ObservationLayout
+from rover_gym.env.rocks import Rocks
+from rover_gym.env.start import Domain, Start
+from rover_gym.env.task import Task
+from rover_gym.mechanics import RoverModel, Simulation
+
+if TYPE_CHECKING:
+    from rover_gym.rendering import FrameRenderer
+
+
+class EpisodeView:
+    """What the task gives and what an episode drew, and frames of it.
+
+    Attributes:
+        task: The checked arguments.
+    """
+
+    task: Task
+    _renderer: "FrameRenderer | None" = None
+
+    def _running(self) -> EpisodeScene:
+        """The scene of the episode.
+
+        Raises:
+            ResetNeeded: There is none yet.
+        """
+        raise NotImplementedError
+
+    @property
+    def simulation(self) -> Simulation:
+        """The simulation of the episode, to be read."""
+        raise NotImplementedError
+
+    @property
+    def goal(self) -> tuple[float, float]:
+        """The episode's present goal (x, z), m."""
+        raise NotImplementedError
+
+    def make_renderer(self, scene: EpisodeScene) -> "FrameRenderer":
+        """Creates a renderer of a scene; the caller must close it."""
+        raise NotImplementedError
+
+    @property
+    def model(self) -> RoverModel:
+        """The rover, before its masses are scaled."""
+        return self.task.model
+
+    @property
+    def gravity(self) -> tuple[float, ...]:
+        """Gravity before it is scaled, m/s2."""
+        return self.task.gravity
+
+    @property
+    def dt(self) -> float:
+        """Control period, s."""
+        return self.task.dt
+
+    @property
+    def goal_tolerance(self) -> float:
+        """Distance from a goal at which it is reached, m."""
+        return self.task.goal_tolerance
+
+    @property
+    def max_steering(self) -> float:
+        """Set-point of a steering action of 1, rad."""
+        return self.task.max_steering
+
+    @property
+    def observation_layout(self) -> ObservationLayout:
+        """The layout of the observation."""
+        return self.task.layout
+
+    @property
+    def start(self) -> Start:
+        """The episode's slope, pose and goal as they were drawn."""
+        return self._running().start
+
+    @property
+    def rocks(self) -> Rocks | None:
+        """The episode's difficulty and rocks as they were drawn; None on the plane."""
+        return self._running().rocks
+
+    @property
+    def domain(self) -> Domain:
+        """The episode's properties of rover and world as they were drawn."""
+        return self._running().domain
+
+    @property
+    def difficulty(self) -> float | None:
+        """The episode's difficulty; None on the plane."""
+        rocks = self.rocks
+        return None if rocks is None else rocks.difficulty
+
+    def frame(self) -> npt.NDArray[np.uint8]:
+        """Renders the present state, (height, width, 3)."""
+        scene = self._running()
+        if self._renderer is None:
+            self._renderer = self.make_renderer(scene)
+        self._renderer.set_scene(scene.terrain, goal=self.goal, goal_tolerance=self.goal_tolerance)
+        return self._renderer.render(self.simulation)
+
+    def close(self) -> None:
+        """Frees the renderer, if there is one."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
