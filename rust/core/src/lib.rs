@@ -47,6 +47,7 @@ pub mod planar;
 mod pool;
 pub mod problem;
 pub mod quantity;
+pub mod sand;
 pub mod scalar;
 pub mod simulation;
 pub mod solver;
