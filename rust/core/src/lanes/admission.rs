@@ -18,6 +18,9 @@ pub enum NeverOrdinary {
     /// The ground is a surface and wheels have a width.
     #[error("wheels with a width are on a surface")]
     WideWheelsOnSurface,
+    /// Wheels sink into the ground.
+    #[error("the ground is soft")]
+    SoftGround,
     /// Contacts bounce.
     #[error("the restitution is {0}, not 0")]
     Restitution(f64),

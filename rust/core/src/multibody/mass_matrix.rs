@@ -181,6 +181,24 @@ impl MassMatrix {
         self.rows[k * self.stride + last(model, k)] += value;
     }
 
+    /// Adds a symmetric matrix over the velocities of a body's path: `entry` gives that of two places
+    /// on the path. Entries between velocities of which none moves the other's body are left out.
+    pub(crate) fn add_quadratic(
+        &mut self,
+        model: &Model,
+        path: &[usize],
+        entry: impl Fn(usize, usize) -> f64,
+    ) {
+        for (p, &k) in path.iter().enumerate() {
+            let own = model.velocity_path(k);
+            for (q, &i) in path.iter().enumerate().filter(|(_, i)| **i <= k) {
+                if let Some(at) = own.iter().position(|&j| j == i) {
+                    self.rows[k * self.stride + at] += entry(p, q);
+                }
+            }
+        }
+    }
+
     /// `M v` (nv).
     pub fn times(&self, model: &Model, v: &[f64], out: &mut [f64]) {
         out.fill(0.0);

@@ -12,7 +12,9 @@ pub mod bekker;
 pub mod memory;
 pub mod patch;
 pub mod resistive_force;
+pub mod ruts;
 pub mod soil;
+pub mod state;
 pub mod test_bed;
 pub mod wheel;
 
@@ -20,6 +22,8 @@ pub use bekker::Bekker;
 pub use memory::{Memory, Twist};
 pub use patch::{Bed, Reaction, Want, WheelPose, react};
 pub use resistive_force::{Flow, Interface};
+pub use ruts::RutMap;
 pub use soil::{Law, Resistive, Soil};
+pub use state::{SandState, WheelInSand};
 pub use test_bed::{Drive, Measured, Sunk, TestBed};
 pub use wheel::{Rules, SandWheel};

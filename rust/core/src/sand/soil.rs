@@ -176,7 +176,7 @@ impl Resistive {
 }
 
 /// Checks a number against a closed range.
-pub(super) fn in_range(
+pub(crate) fn in_range(
     field: &str,
     value: f64,
     [low, high]: [f64; 2],

@@ -11,6 +11,7 @@ pub mod mesh;
 mod neighbourhood;
 pub mod plane;
 pub mod rocks;
+pub mod soft_ground;
 pub mod sphere_field;
 pub mod surface;
 mod tiles;
@@ -24,6 +25,7 @@ pub use mesh::TriangleMesh;
 pub use neighbourhood::Neighbourhood;
 pub use plane::Plane;
 pub use rocks::{Clearing, Rocks};
+pub use soft_ground::{SoftGround, Tangent};
 pub use sphere_field::SphereField;
 pub use surface::{Edge, Face, Vertex};
 pub use union::Union;
@@ -148,4 +150,9 @@ pub trait Terrain: Send + Sync {
 
     /// The base plane, if there is one; its number is 0.
     fn ground(&self) -> Option<&Plane>;
+
+    /// The sand that wheels sink into, if there is any.
+    fn soft(&self) -> Option<&SoftGround> {
+        None
+    }
 }
