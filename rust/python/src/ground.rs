@@ -15,6 +15,7 @@ use crate::height_field::HeightField;
 use crate::heights::heights;
 use crate::plane::Plane;
 use crate::rays::{Met, cast_rays};
+use crate::soft_ground::SoftGround;
 use crate::triangle_mesh::TriangleMesh;
 
 /// Any terrain.
@@ -28,6 +29,8 @@ pub enum Ground {
     Map(HeightField),
     /// A mesh of triangles.
     Mesh(TriangleMesh),
+    /// Sand.
+    Soft(SoftGround),
     /// Several at once.
     Union(Union),
 }
@@ -40,6 +43,7 @@ impl Ground {
             Self::Field(field) => field.inner.clone(),
             Self::Map(map) => map.inner.clone(),
             Self::Mesh(mesh) => mesh.inner.clone(),
+            Self::Soft(soft) => soft.inner.clone(),
             Self::Union(union) => union.inner.clone(),
         }
     }
@@ -51,6 +55,7 @@ impl Ground {
             Self::Field(field) => DrawnGround::Field(field.inner.clone()),
             Self::Map(map) => DrawnGround::Map(map.inner.clone()),
             Self::Mesh(mesh) => DrawnGround::Mesh(mesh.inner.clone()),
+            Self::Soft(soft) => soft.drawn(),
             Self::Union(union) => {
                 let parts = union.parts.iter().map(Self::drawn).collect();
                 DrawnGround::Union(union.inner.clone(), parts)
@@ -69,6 +74,7 @@ impl Ground {
             DrawnGround::Mesh(mesh) => Self::Mesh(TriangleMesh {
                 inner: mesh.clone(),
             }),
+            DrawnGround::Soft(soft, surface) => Self::Soft(SoftGround::of(soft, surface)),
             DrawnGround::Union(union, parts) => Self::Union(Union {
                 inner: union.clone(),
                 parts: parts.iter().map(Self::of).collect(),
@@ -84,8 +90,8 @@ impl Ground {
         given.extract::<Self>().map_err(|_| {
             let shown = shown(given);
             let message = format!(
-                "terrain: must be a Plane, SphereField, HeightField, TriangleMesh or Union, or a \
-                 list of them, is {shown}"
+                "terrain: must be a Plane, SphereField, HeightField, TriangleMesh, SoftGround or \
+                 Union, or a list of them, is {shown}"
             );
             let (field, value) = (Some("terrain".to_owned()), Value::Text(shown));
             BorderError {
@@ -105,6 +111,7 @@ impl Ground {
             Self::Field(field) => field.clone().into_pyobject(py)?.into_any(),
             Self::Map(map) => map.clone().into_pyobject(py)?.into_any(),
             Self::Mesh(mesh) => mesh.clone().into_pyobject(py)?.into_any(),
+            Self::Soft(soft) => soft.clone().into_pyobject(py)?.into_any(),
             Self::Union(union) => union.clone().into_pyobject(py)?.into_any(),
         })
     }

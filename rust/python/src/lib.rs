@@ -42,6 +42,7 @@ mod rover_grains;
 mod shared;
 mod simulation;
 mod snapshot;
+mod soft_ground;
 mod sphere_field;
 mod stepping;
 mod triangle_mesh;
@@ -62,6 +63,8 @@ pub fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<ground::SphereField>()?;
     module.add_class::<height_field::HeightField>()?;
     module.add_class::<triangle_mesh::TriangleMesh>()?;
+    module.add_class::<soft_ground::SoftGround>()?;
+    module.add_class::<soft_ground::WheelBed>()?;
     module.add_class::<ground::Union>()?;
     module.add_class::<contacts::Contacts>()?;
     module.add_class::<simulation::Simulation>()?;

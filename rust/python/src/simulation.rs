@@ -28,6 +28,7 @@ use crate::reading::{place, scan_points, slices};
 use crate::report::{Energy, StepReport};
 use crate::shared::{Shared, Watch};
 use crate::snapshot::{Snapshot, belonging};
+use crate::soft_ground::sand_to_dict;
 use crate::stepping::{Problem, problem, step};
 
 /// A rover on a terrain, stepped through time.
@@ -208,6 +209,26 @@ impl Simulation {
     #[getter]
     fn terrain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.origin.terrain.to_object(py)
+    }
+
+    /// The sand under the wheels; None on firm ground.
+    ///
+    /// Returns:
+    ///     Arrays by name. `force` (N) and `moment` about the wheel's centre (N m) of the sand on
+    ///     each wheel in the last step, (n_wheels, 3), world frame; `sinkage` of each wheel's
+    ///     lowest point under the undisturbed surface, (n_wheels,), m, negative where it is clear;
+    ///     `absorbed`, energy that the sand has taken from each wheel, (n_wheels,), J; `ruts`,
+    ///     place x and z and depth of each cell that a wheel has pressed down, (n, 3), m.
+    ///
+    /// Raises:
+    ///     BusyError: Another thread is stepping this simulation.
+    fn sand<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let open = self.open()?;
+        let Some(sand) = open.sand() else {
+            return Ok(None);
+        };
+        let cell = open.terrain().soft().map_or(1.0, |soft| soft.cell());
+        Ok(Some(sand_to_dict(py, sand, cell)?))
     }
 
     /// Time since the last call of `set_state`, s.

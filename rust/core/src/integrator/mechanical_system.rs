@@ -22,6 +22,7 @@
 
 use nalgebra::Vector3;
 
+use super::moreau_jean::MOST_REVISIONS;
 use super::options::StepOptions;
 use crate::contact::Activation;
 use crate::law::compliance::Compliance;
@@ -199,6 +200,11 @@ pub trait MechanicalSystem {
     /// has changed and the step must be repeated. By default there is none.
     fn revise(&mut self, _start: Start<'_, Self::Configuration>, _v_end: &[f64]) -> bool {
         false
+    }
+
+    /// Most repetitions of a step that [`Self::revise`] asks for.
+    fn most_revisions(&self) -> usize {
+        MOST_REVISIONS
     }
 
     /// Kinetic and potential energy of a state, J, and its overall momentum; none if the system is

@@ -132,7 +132,7 @@ impl Part<'_> {
             };
             report.retaken += retaken;
             retaken += 1;
-            if retaken <= MOST_REVISIONS && system.revise(start, &ws.v) {
+            if retaken <= system.most_revisions() && system.revise(start, &ws.v) {
                 continue;
             }
             let is_solved = report.is_converged();

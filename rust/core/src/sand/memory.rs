@@ -61,6 +61,9 @@ pub struct Recalled {
     pub memory: Memory,
     /// Derivative of the six numbers, shift first, by linear and angular velocity.
     pub slope: Matrix6<f64>,
+    /// The same without the change of the rate at which memory fades: a multiple of the identity,
+    /// s/m.
+    pub fresh: f64,
 }
 
 impl Memory {
@@ -108,6 +111,7 @@ impl Memory {
         Recalled {
             memory: Self::of(&end),
             slope,
+            fresh: h / length * kept,
         }
     }
 

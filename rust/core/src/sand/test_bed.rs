@@ -166,6 +166,14 @@ impl TestBed {
         }
     }
 
+    /// The forces of steady motion at a sinkage, m.
+    #[must_use]
+    pub fn at(&self, sinkage: f64, drive: &Drive) -> Measured {
+        let memory = Memory::steady(&drive.twist(), self.wheel.drum());
+        let force = self.force(sinkage, &memory, drive, Want::Wrench);
+        Self::measured(sinkage, &force.wrench)
+    }
+
     /// Steady motion: the sinkage at which the sand bears the load, and the forces there. None if
     /// the sand does not bear it within one and a half diameters.
     #[must_use]

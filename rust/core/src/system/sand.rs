@@ -10,7 +10,8 @@
 //! at the velocity before the step, and then at the last solution
 //! ([`crate::integrator::MechanicalSystem::revise`]). C is the symmetric part of the derivative by
 //! the twist, over memory and pose, without its negative pivots: M̂ stays symmetric and positive,
-//! and has the sparsity of M. What C leaves out is found by the repetitions.
+//! and has the sparsity of M. What C leaves out is found by the repetitions; where they converge
+//! slowly, a multiple of the chord `|F| / |V|` is added to C.
 //!
 //! The sand gives back no more energy than it has taken: [`SandContact::work`] counts what it gives
 //! only up to what is stored, and the energy audit removes the rest from the motion.
@@ -33,6 +34,12 @@ use crate::sand::{
 /// linearisation has settled.
 const SETTLED: f64 = 1e-3;
 
+/// Part of its error that a repetition must leave at most; otherwise the tangent is stiffened.
+const SLOW: f64 = 0.5;
+
+/// By how much the tangent is stiffened again.
+const BOOST: f64 = 3.0;
+
 /// Accuracy of the forces on a wheel for which the number of its points is chosen.
 const ACCURACY: f64 = 0.01;
 
@@ -50,6 +57,10 @@ struct Patch {
     at: Vector6<f64>,
     force: Vector6<f64>,
     tangent: Matrix6<f64>,
+    /// Multiple of the chord that is added to the tangent.
+    boost: f64,
+    /// By how much the force of the last linearisation was wrong, N.
+    last_change: f64,
     is_touching: bool,
     begin: WheelInSand,
     tried: WheelInSand,
@@ -108,6 +119,8 @@ impl SandContact {
                 at: Vector6::zeros(),
                 force: Vector6::zeros(),
                 tangent: Matrix6::zeros(),
+                boost: 0.0,
+                last_change: f64::INFINITY,
                 is_touching: false,
                 begin: WheelInSand::default(),
                 tried: WheelInSand::default(),
@@ -173,6 +186,9 @@ impl SandContact {
     /// The next solution starts from the velocity before the step.
     pub(crate) fn start_from(&mut self, v: &[f64]) {
         self.guess.copy_from_slice(v);
+        for patch in &mut self.patches {
+            (patch.boost, patch.last_change) = (0.0, f64::INFINITY);
+        }
     }
 
     /// Evaluates the forces and their tangents at the guess.
@@ -194,6 +210,8 @@ impl SandContact {
             let end = moved(&patch.pose, &twist, theta * h);
             let times = (h, place.ground.soil().memory);
             let recalled = patch.begin.memory.after(&twist, patch.wheel.drum(), times);
+            // A memory that fades as a whole hardly changes the force.
+            let fresh = Matrix6::from_diagonal_element(recalled.fresh);
             let found = patch.react(
                 (place, &gravity),
                 ruts,
@@ -203,9 +221,10 @@ impl SandContact {
             );
             patch.is_touching = found.is_some_and(|found| found.area > 0.0);
             if let Some(found) = found.filter(|_| patch.is_touching) {
-                let slope = found.by_memory * recalled.slope + found.by_pose * (theta * h);
+                let slope = found.by_memory * fresh + found.by_pose * (theta * h);
                 patch.force = found.wrench;
                 patch.tangent = dissipative(&-slope, patch.wheel.radius);
+                patch.add_chord(&twist, place.ground.soil().memory / h);
             }
         }
     }
@@ -258,6 +277,10 @@ impl SandContact {
             };
             let arm = patch.wheel.radius;
             let change = size(&(exact - applied), arm);
+            if change > SLOW * patch.last_change {
+                patch.boost = (BOOST * patch.boost).max(1.0);
+            }
+            patch.last_change = change;
             is_new |= change > SETTLED * size(&exact, arm).max(size(&applied, arm));
         }
         self.guess.copy_from_slice(v_end);
@@ -340,6 +363,22 @@ impl Patch {
             twist += column * v[k];
         }
         twist
+    }
+
+    /// Adds a multiple of the chord of the force to its tangent: where the sand yields the tangent
+    /// is nearly zero, and a step that reverses would leave the point where it stops far behind.
+    fn add_chord(&mut self, twist: &Twist, slowest: f64) {
+        let radius = self.wheel.drum();
+        let rim = radius * radius * twist.angular.norm_squared();
+        let speed = (twist.linear.norm_squared() + rim).sqrt();
+        let chord = self.boost * size(&self.force, radius) / (speed + slowest);
+        for k in 0..6 {
+            self.tangent[(k, k)] += if k < 3 {
+                chord
+            } else {
+                chord * radius * radius
+            };
+        }
     }
 
     /// The linearised force at a twist.

@@ -16,6 +16,7 @@ use crate::contact::{
     detect_pairs, generalized_impulse, relocate, relocate_limit,
 };
 use crate::geometry::{SoftGround, Terrain};
+use crate::integrator::moreau_jean::MOST_REVISIONS;
 use crate::integrator::{
     MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact,
 };
@@ -593,6 +594,14 @@ impl MechanicalSystem for TreeSystem<'_> {
         }
     }
 
+    fn most_revisions(&self) -> usize {
+        if self.parts.sand.is_some() {
+            MOST_REVISIONS_IN_SAND
+        } else {
+            MOST_REVISIONS
+        }
+    }
+
     fn revise(&mut self, start: Start<'_, Configuration>, v_end: &[f64]) -> bool {
         let drives = self.parts.motors.iter_mut().zip(&self.command.drives);
         let mut is_new = false;
@@ -815,6 +824,9 @@ fn keep(kept: &mut [f64], joints: &[f64]) {
         *kept = *q;
     }
 }
+
+/// Most repetitions of a step in sand. Wheels that fall and come to rest in a long step need them.
+const MOST_REVISIONS_IN_SAND: usize = 24;
 
 /// Arm that converts a joint rotation to a length, m. A freely steered wheel that is moved out of a
 /// penetration of 2 cm rotates by 0.4 rad.

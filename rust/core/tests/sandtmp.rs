@@ -1,0 +1,2 @@
+#[path = "../../../tests/physics/sand.rs"]
+mod sand;

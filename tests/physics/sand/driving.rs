@@ -1,0 +1,1 @@
+//! Driving on sand.
