@@ -15,13 +15,17 @@ from typing_extensions import disjoint_base
 _Array: TypeAlias = npt.NDArray[np.float64]
 _Rows: TypeAlias = npt.NDArray[np.uint64]
 _Observation: TypeAlias = npt.NDArray[np.float32]
-_Terrain: TypeAlias = "Plane | SphereField | HeightField | TriangleMesh | Union"
+_Terrain: TypeAlias = "Plane | SphereField | HeightField | TriangleMesh | SoftGround | Union"
 _Terrains: TypeAlias = Sequence[_Terrain]
 _Coordinates: TypeAlias = Literal["report", "state"]
 _Range: TypeAlias = tuple[float, float]
 _Outcome: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike, str]
 _MaterialRow: TypeAlias = tuple[str, str, float, float]
 _Materials: TypeAlias = Mapping[tuple[str, str], tuple[float, float]] | Sequence[_MaterialRow]
+
+class _Soil(Protocol):
+    @property
+    def numbers(self) -> Mapping[str, float]: ...
 
 class _SparseArray(Protocol):
     @property
@@ -67,6 +71,7 @@ __all__ = [
     "SimulationBatch",
     "Sine",
     "Snapshot",
+    "SoftGround",
     "SoilContacts",
     "SoilSimulation",
     "SoilSnapshot",
@@ -80,6 +85,7 @@ __all__ = [
     "TriangleMesh",
     "TwoWheelRoverSimulation",
     "Union",
+    "WheelBed",
     "__version__",
     "accuracy_options",
     "arrange_balls",
@@ -767,6 +773,38 @@ class Plane:
                 zero, an origin is beyond 1e6 m, or `max_range` is not positive.
         """
     def __reduce__(self) -> Any: ...
+
+@final
+class SoftGround:
+    def __new__(cls, surface: _Terrain, soil: _Soil | Mapping[str, float], rut_cell: float = 0.02) -> SoftGround: ...
+    @property
+    def surface(self) -> _Terrain: ...
+    @property
+    def soil(self) -> dict[str, float]: ...
+    @property
+    def rut_cell(self) -> float: ...
+    def heights(self, points: npt.ArrayLike) -> _Array: ...
+    def __reduce__(self) -> Any: ...
+
+@final
+class WheelBed:
+    def __new__(
+        cls,
+        soil: _Soil | Mapping[str, float],
+        radius: float,
+        width: float,
+        rounding: float = 0.0,
+        grouser_height: float = 0.0,
+        grousers: int = 0,
+        accuracy: float = 0.01,
+    ) -> WheelBed: ...
+    @property
+    def n_points(self) -> int: ...
+    @property
+    def drum(self) -> float: ...
+    def steady(self, drives: npt.ArrayLike) -> _Array: ...
+    def forces(self, sinkage: float, drives: npt.ArrayLike) -> _Array: ...
+    def run(self, drives: npt.ArrayLike, mass: float, time_step: float) -> _Array: ...
 
 @final
 class SphereField:
@@ -1631,6 +1669,7 @@ class Simulation:
     @property
     def terrain(self) -> _Terrain:
         """The ground."""
+    def sand(self) -> dict[str, _Array] | None: ...
     @property
     def time(self) -> float:
         """Time since the last call of `set_state`, s."""

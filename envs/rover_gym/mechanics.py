@@ -46,6 +46,7 @@ from rover_gym._core import (
     SimulationBatch,
     Sine,
     Snapshot,
+    SoftGround,
     SoilContacts,
     SoilSimulation,
     SoilSnapshot,
@@ -73,7 +74,7 @@ from rover_gym._core import (
 )
 
 #: Any ground; wherever one is taken, so is a list of several.
-Terrain: TypeAlias = Plane | SphereField | HeightField | TriangleMesh | Union
+Terrain: TypeAlias = Plane | SphereField | HeightField | TriangleMesh | SoftGround | Union
 
 __all__ = [
     "BallSimulation",
@@ -114,6 +115,7 @@ __all__ = [
     "SimulationBatch",
     "Sine",
     "Snapshot",
+    "SoftGround",
     "SoilContacts",
     "SoilSimulation",
     "SoilSnapshot",

@@ -31,7 +31,7 @@ pub fn dry_sand() -> Soil {
                 grip: 0.19,
                 width: 0.05,
                 fluidity: 0.71,
-                mobilisation: 0.15,
+                mobilisation: 0.05,
             },
         }),
         memory: 0.001,

@@ -115,6 +115,12 @@ impl Memory {
         }
     }
 
+    /// Multiplied by a factor.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self::of(&(self.six() * factor))
+    }
+
     /// Displacement of a piece at `r` (m from the wheel's centre) in units of K.
     #[inline]
     #[must_use]
