@@ -29,7 +29,7 @@ from rover_gym.sand import (
 )
 
 mpl.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402 - after the choice of the backend
+import matplotlib.pyplot as plt
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "validation"
 VARIABLE = "ROVER_GYM_SOIL_DATA"
@@ -48,7 +48,7 @@ SIDEWAYS = math.radians(89.0)
 
 
 def weights(runs: Sequence[Runs]) -> list[npt.NDArray[np.float64]]:
-    """1, but 0 for the pull at 90 degrees: a locked wheel drawn sideways has none by symmetry, and 7 N were measured."""
+    """1, but 0 for the pull at 90 degrees: by symmetry a locked wheel has none there, and 7 N were measured."""
     found = []
     for own in runs:
         weight = np.ones((len(own), 3))
@@ -69,8 +69,7 @@ def table(soil: Soil, runs: Sequence[Runs]) -> list[str]:
     for own in runs:
         errors = errors_of(soil, [own], WHEELS)
         degrees = np.degrees(own.slip_angle).round()
-        for angle in np.unique(degrees):
-            lines.append(f"| {own.wheel} | {angle:.0f}° | {rms(errors[degrees == angle])} |")
+        lines += [f"| {own.wheel} | {angle:.0f}° | {rms(errors[degrees == angle])} |" for angle in np.unique(degrees)]
         lines.append(f"| {own.wheel} | below 90° | {rms(errors[own.slip_angle < SIDEWAYS])} |")
         lines.append(f"| {own.wheel} | all | {rms(errors)} |")
         published = " | ".join(f"{value:.1f}" for value in PUBLISHED[own.wheel])

@@ -16,21 +16,13 @@ fn a_rover_rests_without_creep() {
                 for soil in [dry_sand(), bekker_sand()] {
                     let mut sim = placed(&model, soil, angle, h);
                     sim.brake();
-                    let settle = (3.0 / h) as usize;
+                    let settle = (2.0 / h) as usize;
                     let report = sim.step(settle).unwrap();
                     assert!(report.is_converged());
                     let before = sim.q().position;
                     sim.step(settle).unwrap();
-                    let creep = (sim.q().position - before).norm() / 3.0;
+                    let creep = (sim.q().position - before).norm() / 2.0;
                     let force = total_force(&sim);
-                    println!(
-                        "{name} h {h} angle {angle:.2}: creep {creep:.2e} force {force} of {weight:.1} sinkage {:.4} retaken {}",
-                        sim.sand().unwrap().wheels[0].sinkage,
-                        report.retaken
-                    );
-                    if std::env::var("GO").is_ok() {
-                        continue;
-                    }
                     assert!(creep < 1e-6, "{name} {h} {angle}: {creep} m/s");
                     let error = (force - Vector3::new(0.0, weight, 0.0)).norm();
                     assert!(

@@ -69,6 +69,8 @@ struct Patch {
     /// Twist and force of the last linearisation in this step.
     last: Option<(Vector6<f64>, Vector6<f64>)>,
     is_touching: bool,
+    /// Whether the sand should have given more than it has stored in this step.
+    is_empty: bool,
     begin: WheelInSand,
     tried: WheelInSand,
 }
@@ -128,6 +130,7 @@ impl SandContact {
                 tangent: Matrix6::zeros(),
                 last: None,
                 is_touching: false,
+                is_empty: false,
                 begin: WheelInSand::default(),
                 tried: WheelInSand::default(),
             }
@@ -200,6 +203,7 @@ impl SandContact {
         self.guess.copy_from_slice(v);
         for patch in &mut self.patches {
             patch.last = None;
+            patch.is_empty = false;
         }
     }
 
@@ -329,7 +333,8 @@ impl SandContact {
             let given = wanted.min(patch.begin.stored);
             let most = length * force.fixed_rows::<3>(0).norm();
             total += given;
-            let memory = if wanted > given {
+            patch.is_empty |= wanted > given;
+            let memory = if patch.is_empty {
                 after.memory.scaled(GIVES_WAY)
             } else {
                 after.memory

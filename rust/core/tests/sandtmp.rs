@@ -1,2 +1,0 @@
-#[path = "../../../tests/physics/sand.rs"]
-mod sand;
