@@ -16,6 +16,7 @@ CHAPTERS = [
     "problem",
     "solver",
     "multibody",
+    "sand",
     "geometry",
     "contact",
     "integrator",

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from rover_gym._core import OptionError
+from rover_gym.mechanics import OptionError
 from rover_gym.cli.console import plain_errors
 from rover_gym.cli.results import AsJson, Results
 from rover_gym.validation import number

@@ -1,6 +1,6 @@
 """Wheels on sand: soils, a virtual test bed for one wheel, and fits to measurements."""
 
-from rover_gym._core import SoftGround, WheelBed
+from rover_gym.mechanics import SoftGround, WheelBed
 from rover_gym.sand.fit import FittedSoil, errors_of, fit_soil
 from rover_gym.sand.measurements import Runs, SingleWheel, read_runs
 from rover_gym.sand.slopes import climbed_slope

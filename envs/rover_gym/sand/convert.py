@@ -4,7 +4,7 @@ import csv
 from collections.abc import Sequence
 from pathlib import Path
 
-from rover_gym._core import OptionError
+from rover_gym.mechanics import OptionError
 from rover_gym.sand.measurements import COLUMNS
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
 
-from rover_gym._core import OptionError
+from rover_gym.mechanics import OptionError
 from rover_gym.sand.measurements import Runs, SingleWheel
 from rover_gym.sand.soils import Soil
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym._core import OptionError, WheelBed
+from rover_gym.mechanics import OptionError, WheelBed
 from rover_gym.sand.soils import Soil
 
 Array = npt.NDArray[np.float64]

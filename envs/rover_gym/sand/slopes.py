@@ -2,7 +2,7 @@
 
 import math
 
-from rover_gym._core import OptionError
+from rover_gym.mechanics import OptionError
 from rover_gym.sand.measurements import GRAVITY, SingleWheel
 from rover_gym.sand.soils import Soil
 

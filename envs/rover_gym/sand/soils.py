@@ -7,7 +7,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from rover_gym._core import OptionError
+from rover_gym.mechanics import OptionError
 
 #: Numbers that both laws take.
 SHARED = ("memory", "reload")

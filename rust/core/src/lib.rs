@@ -15,6 +15,7 @@
 //! - [`quantity`]: admissible numbers of a description; [`scalar`]: one rover or several to a
 //!   register; [`spatial`]: rotations and inertias;
 //! - [`multibody`]: model, state, kinematics, mass matrix, bias, energy, momentum;
+//! - [`sand`]: the force of sand on a wheel;
 //! - [`geometry`]: shapes, the ground, distances between them; [`contact`]: points, frames, gaps,
 //!   the Delassus operator;
 //! - [`cone`], [`law`], [`problem`], [`solver`]: the friction-contact

@@ -5,17 +5,20 @@ use std::sync::Arc;
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use pyo3::types::{PyList, PyTuple};
+use pyo3::types::{PyDict, PyList, PyTuple};
 use rover_core::draw::DrawnGround;
-use rover_core::geometry::{SphereField as CoreField, Terrain, Union as CoreUnion};
+use rover_core::geometry::{
+    SoftGround as CoreGround, SphereField as CoreField, Terrain, Union as CoreUnion,
+};
 
 use crate::arguments::{Given, refused, shown};
 use crate::errors::{BorderError, Kind, Value};
 use crate::height_field::HeightField;
 use crate::heights::heights;
+use crate::planar_ground::quantity;
 use crate::plane::Plane;
 use crate::rays::{Met, cast_rays};
-use crate::soft_ground::SoftGround;
+use crate::sand::{numbers_of, soil_of};
 use crate::triangle_mesh::TriangleMesh;
 
 /// Any terrain.
@@ -133,6 +136,103 @@ impl Ground {
 #[derive(Clone)]
 pub struct SphereField {
     pub inner: Arc<CoreField>,
+}
+
+/// Ground of sand, into which wheels sink. To every other part of a machine its surface is rigid.
+///
+/// The ruts belong to a simulation and are part of its snapshots. Rocks on sand are a `Union` of
+/// both. Steps on soft ground take the general path, not the batch's.
+///
+/// Args:
+///     surface: The undisturbed surface: a `Plane`, `HeightField` or `TriangleMesh`.
+///     soil: A `rover_gym.sand.Soil`, or a mapping of its numbers.
+///     rut_cell: Size of a cell of the map of ruts, from 0.001 to 1 m.
+///
+/// Raises:
+///     TerrainError: The surface is no terrain, or a number of the soil is missing or out of its
+///         range.
+#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
+#[derive(Clone)]
+pub struct SoftGround {
+    pub inner: Arc<CoreGround>,
+    surface: Arc<Ground>,
+}
+
+impl SoftGround {
+    pub fn drawn(&self) -> DrawnGround {
+        DrawnGround::Soft(self.inner.clone(), Arc::new(self.surface.drawn()))
+    }
+
+    pub fn of(inner: &Arc<CoreGround>, surface: &DrawnGround) -> Self {
+        Self {
+            inner: inner.clone(),
+            surface: Arc::new(Ground::of(surface)),
+        }
+    }
+}
+
+#[pymethods]
+impl SoftGround {
+    #[new]
+    #[pyo3(signature = (surface, soil, rut_cell = Given::MISSING),
+        text_signature = "(surface, soil, rut_cell=0.02)")]
+    fn new(
+        surface: &Bound<'_, PyAny>,
+        soil: &Bound<'_, PyAny>,
+        rut_cell: Given<'_>,
+    ) -> PyResult<Self> {
+        let ground = Ground::parse(surface)?;
+        let cell = rut_cell.number(0.02, Kind::Terrain, "rut_cell")?;
+        let made = CoreGround::new(ground.terrain(), Arc::new(soil_of(soil)?), cell);
+        Ok(Self {
+            inner: Arc::new(made.map_err(|e| quantity(Kind::Terrain, &e))?),
+            surface: Arc::new(ground),
+        })
+    }
+
+    /// The undisturbed surface.
+    #[getter]
+    fn surface<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.surface.to_object(py)
+    }
+
+    /// Numbers of the soil by their names.
+    #[getter]
+    fn soil<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        numbers_of(py, self.inner.soil())
+    }
+
+    /// Size of a cell of the map of ruts, m.
+    #[getter]
+    fn rut_cell(&self) -> f64 {
+        self.inner.cell()
+    }
+
+    /// The height of the undisturbed surface at places of the map.
+    ///
+    /// Args:
+    ///     points: Places (x, z), (m, 2), m.
+    ///
+    /// Returns:
+    ///     Heights y, (m,), m; nan where there is no ground.
+    ///
+    /// Raises:
+    ///     TerrainError: `points` has a wrong shape.
+    fn heights<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'_, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        heights(&*self.inner, py, points)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let py = slf.py();
+        let own = slf.get();
+        let arguments = (own.surface(py)?, own.soil(py)?, own.rut_cell());
+        let arguments = arguments.into_pyobject(py)?.into_any();
+        Ok((slf.get_type().into_any(), arguments))
+    }
 }
 
 /// Several terrains as one ground: a map with rocks on it, say. Immutable.

@@ -26,9 +26,9 @@ use crate::plane::Plane;
 use crate::rays::{Met, met, rays};
 use crate::reading::{place, scan_points, slices};
 use crate::report::{Energy, StepReport};
+use crate::sand::sand_to_dict;
 use crate::shared::{Shared, Watch};
 use crate::snapshot::{Snapshot, belonging};
-use crate::soft_ground::sand_to_dict;
 use crate::stepping::{Problem, problem, step};
 
 /// A rover on a terrain, stepped through time.
@@ -227,7 +227,7 @@ impl Simulation {
         let Some(sand) = open.sand() else {
             return Ok(None);
         };
-        let cell = open.terrain().soft().map_or(1.0, |soft| soft.cell());
+        let cell = open.terrain().soft().map_or(1.0, |soft| soft.cell);
         Ok(Some(sand_to_dict(py, sand, cell)?))
     }
 

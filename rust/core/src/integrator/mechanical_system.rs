@@ -22,13 +22,16 @@
 
 use nalgebra::Vector3;
 
-use super::moreau_jean::MOST_REVISIONS;
 use super::options::StepOptions;
 use crate::contact::Activation;
 use crate::law::compliance::Compliance;
 use crate::law::newton_impact::rebound;
 use crate::problem::{Dimension, FrictionContactProblem};
 use crate::solver::{SolveReport, SolverOptions, SolverWorkspace, solve};
+
+/// Most repetitions of a step because a piecewise force changed its branch. A motor that reaches
+/// its torque–speed line needs one, a single wheel at most four.
+pub(crate) const MOST_REVISIONS: usize = 6;
 
 /// A contact as time stepping sees it: a key and a gap.
 pub trait UnilateralContact {

@@ -219,10 +219,6 @@ impl Part<'_> {
     }
 }
 
-/// Most repetitions of a step because a piecewise force changed its branch. A motor that reaches
-/// its torque–speed line needs one, a single wheel at most four.
-pub(crate) const MOST_REVISIONS: usize = 6;
-
 /// Passes over the mean velocity at which implicit gyroscopic terms are frozen: the second makes
 /// the step second order.
 const GYROSCOPIC_PASSES: usize = 2;

@@ -181,8 +181,9 @@ impl MassMatrix {
         self.rows[k * self.stride + last(model, k)] += value;
     }
 
-    /// Adds a symmetric matrix over the velocities of a body's path: `entry` gives that of two places
-    /// on the path. Entries between velocities of which none moves the other's body are left out.
+    /// Adds a symmetric matrix over the velocities of a body's path: `entry` gives that of two
+    /// places on the path. Entries between velocities of which none moves the other's body are left
+    /// out.
     pub(crate) fn add_quadratic(
         &mut self,
         model: &Model,

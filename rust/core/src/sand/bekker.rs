@@ -10,12 +10,12 @@
 //! entered has `j = |x_t| l`, with x at the middle of that arc. Side walls bear nothing.
 //!
 //! Source: Bekker 1969, *Introduction to Terrain–Vehicle Systems*; Janosi and Hanamoto 1961,
-//! *Analytical determination of drawbar pull as a function of slip*; Wong and Reece 1967, *Prediction
-//! of rigid wheel performance based on the analysis of soil-wheel stresses*, J. Terramechanics 4.
+//! *Analytical determination of drawbar pull as a function of slip*; Wong and Reece 1967.
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::soil::{Piece, Stress, in_range, not_negative};
+use super::checks::{in_range, not_negative};
+use super::piece::{Piece, Stress};
 use super::wheel::Skin;
 use crate::quantity::{QuantityError, positive};
 use crate::scalar::elementary::{exp, ln};

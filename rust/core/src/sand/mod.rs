@@ -9,8 +9,10 @@
 //! coupling to a machine is in [`crate::system`].
 
 pub mod bekker;
+pub(crate) mod checks;
 pub mod memory;
 pub mod patch;
+pub mod piece;
 pub mod resistive_force;
 pub mod ruts;
 pub mod soil;

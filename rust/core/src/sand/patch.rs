@@ -3,7 +3,8 @@
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 use super::memory::Memory;
-use super::soil::{Piece, Soil};
+use super::piece::Piece;
+use super::soil::Soil;
 use super::wheel::{Ring, Rules, SandWheel, visit_rings};
 use crate::scalar::elementary::{acos, sin_cos};
 

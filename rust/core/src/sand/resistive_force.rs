@@ -28,9 +28,7 @@
 //! the same direction. A small displacement mobilises only the part `|x| / √(|x|² + s²)` of the
 //! stress, so the force is continuous where the velocity is zero.
 //!
-//! Source: Agarwal, Goldman and Kamrin 2023, *Mechanistic framework for reduced-order models in
-//! soft materials: Application to three-dimensional granular intrusion*, PNAS 120(4), e2214017120,
-//! with the coefficients of table S3.
+//! Source: Agarwal, Goldman and Kamrin 2023, with the coefficients of table S3.
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -1,11 +1,11 @@
 //! A soil: its law of stress, its memory, and how it bears a second pass.
 
-use nalgebra::{Matrix3, Vector3};
-
 use super::bekker::Bekker;
+use super::checks::{in_range, not_negative};
+use super::piece::{Piece, Stress};
 use super::resistive_force::{Flow, Interface, traction};
 use super::wheel::Skin;
-use crate::quantity::{QuantityError, finite, positive};
+use crate::quantity::{QuantityError, positive};
 
 /// A soil.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,49 +55,6 @@ impl Resistive {
         let cubic = mu * (89.0 + mu * (894.0 * mu - 386.0));
         self.stiffness_factor * self.density * gravity * cubic
     }
-}
-
-/// A piece of a wheel in the sand.
-#[derive(Clone, Copy, Debug)]
-pub struct Piece<'a> {
-    /// Outward unit normal.
-    pub normal: &'a Vector3<f64>,
-    /// Displacement relative to the sand, in units of its memory.
-    pub x: &'a Vector3<f64>,
-    /// Into the sand, against the normal of its surface.
-    pub down: &'a Vector3<f64>,
-    /// Under the surface, m.
-    pub depth: f64,
-    /// Along the rim from where it enters the sand, m.
-    pub arc: f64,
-    /// What it is part of.
-    pub skin: Skin,
-    /// Part of the rim at which grousers hold sand.
-    pub held: f64,
-    /// Width of the wheel, m.
-    pub width: f64,
-    /// m/s², along `down`.
-    pub gravity: f64,
-}
-
-/// Stress of the sand on a piece, N/m², and its derivatives.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stress {
-    /// N/m².
-    pub value: Vector3<f64>,
-    /// By the displacement.
-    pub by_x: Matrix3<f64>,
-    /// By the depth, N/m³.
-    pub by_depth: Vector3<f64>,
-}
-
-impl Stress {
-    /// None.
-    pub const NONE: Self = Self {
-        value: Vector3::new(0.0, 0.0, 0.0),
-        by_x: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-        by_depth: Vector3::new(0.0, 0.0, 0.0),
-    };
 }
 
 impl Soil {
@@ -173,34 +130,4 @@ impl Resistive {
         let range = "from 0.001 to 1";
         in_range("mobilisation", flow.mobilisation, [1e-3, 1.0], range)
     }
-}
-
-/// Checks a number against a closed range.
-pub(crate) fn in_range(
-    field: &str,
-    value: f64,
-    [low, high]: [f64; 2],
-    range: &'static str,
-) -> Result<(), QuantityError> {
-    finite(field, value)?;
-    if (low..=high).contains(&value) {
-        Ok(())
-    } else {
-        Err(QuantityError::OutOfRange {
-            field: field.to_owned(),
-            range,
-            value,
-        })
-    }
-}
-
-/// Checks that a number is finite and not negative.
-pub(super) fn not_negative(field: &str, value: f64) -> Result<(), QuantityError> {
-    if finite(field, value)? < 0.0 {
-        return Err(QuantityError::Negative {
-            field: field.to_owned(),
-            value,
-        });
-    }
-    Ok(())
 }

@@ -10,18 +10,18 @@
 //! at the velocity before the step, and then at the last solution
 //! ([`crate::integrator::MechanicalSystem::revise`]). C is the symmetric part of the derivative by
 //! the twist, over memory and pose, without its negative pivots: M̂ stays symmetric and positive,
-//! and has the sparsity of M. What C leaves out is found by the repetitions; from the second one on, C
-//! is at least the secant of the last two points.
+//! and has the sparsity of M. What C leaves out is found by the repetitions; from the second one
+//! on, C is at least the secant of the last two points.
 //!
 //! The sand gives back no more energy than it has taken: [`SandContact::work`] counts what it gives
-//! only up to what is stored, and the energy audit removes the rest from the motion.
-//! Sand that has nothing left to give gives way: its memory, and with it its force, becomes smaller.
+//! only up to what is stored, and the energy audit removes the rest from the motion. Sand that has
+//! nothing left to give gives way: its memory, and with it its force, becomes smaller.
 
 use std::sync::Arc;
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 
-use crate::geometry::{SoftGround, Tangent};
+use crate::geometry::{SoftLayer, Tangent};
 use crate::integrator::StepOptions;
 use crate::multibody::{Kinematics, MassMatrix, Model};
 use crate::sand::patch::Relief;
@@ -94,20 +94,20 @@ pub(crate) struct Place<'a> {
     /// The machine.
     pub model: &'a Model,
     /// The ground.
-    pub ground: &'a SoftGround,
+    pub ground: SoftLayer<'a>,
     /// Poses at which the step evaluates its forces.
     pub kinematics: &'a Kinematics,
 }
 
 impl SandContact {
     /// Of a machine on soft ground.
-    pub(crate) fn new(model: &Model, ground: &SoftGround) -> Self {
+    pub(crate) fn new(model: &Model, ground: SoftLayer<'_>) -> Self {
         let mut known: Vec<(SandWheel, Rules)> = Vec::new();
         let mut rules_of = |wheel: &SandWheel| {
             if let Some((_, rules)) = known.iter().find(|(same, _)| same == wheel) {
                 return rules.clone();
             }
-            let rules = rules_within(wheel, ground.soil(), ACCURACY);
+            let rules = rules_within(wheel, ground.soil, ACCURACY);
             known.push((*wheel, rules.clone()));
             rules
         };
@@ -139,7 +139,7 @@ impl SandContact {
             patches: patches.collect(),
             guess: vec![0.0; model.nv()],
             ruts: RutMap::default(),
-            soil: ground.soil().clone(),
+            soil: ground.soil.clone(),
             step: (0.0, 0.5),
             gravity: Vector3::zeros(),
         }
@@ -156,22 +156,22 @@ impl SandContact {
     }
 
     /// Whether it was made for the soil of a ground.
-    pub(crate) fn is_of(&self, ground: &SoftGround) -> bool {
-        Arc::ptr_eq(&self.soil, ground.soil())
+    pub(crate) fn is_of(&self, ground: SoftLayer<'_>) -> bool {
+        Arc::ptr_eq(&self.soil, ground.soil)
     }
 
     /// Writes the state at the end of a step; the wheels' poses are those of `kinematics`.
     pub(crate) fn end(
         &self,
         model: &Model,
-        ground: &SoftGround,
+        ground: SoftLayer<'_>,
         kinematics: &Kinematics,
         state: &mut SandState,
     ) {
         for (w, patch) in self.patches.iter().enumerate() {
             state.wheels[w] = patch.begin;
             let pose = pose(model, kinematics, w);
-            let cell = ground.cell();
+            let cell = ground.cell;
             let (c, axle) = (pose.centre, pose.axle);
             let radius = patch.wheel.drum();
             let reach = radius + 0.5 * patch.wheel.width;
@@ -186,7 +186,7 @@ impl SandContact {
                 let (s, t) = (r.dot(&flat), (r.z * flat.x - r.x * flat.z));
                 let inside = radius * radius - t * t;
                 let is_over = s.abs() <= 0.5 * patch.wheel.width.max(cell) && inside > 0.0;
-                let surface = ground.surface();
+                let surface = ground.surface;
                 is_over.then(|| surface.height(x, z).unwrap_or(c.y) - (c.y - inside.sqrt()))
             });
         }
@@ -423,7 +423,7 @@ impl Patch {
         let ground = place.ground;
         let radius = self.wheel.drum();
         let tangent = ground.tangent(&pose.centre, 0.5 * radius)?;
-        let (cell, n) = (ground.cell(), tangent.normal);
+        let (cell, n) = (ground.cell, tangent.normal);
         let at = [pose.centre.x, pose.centre.z];
         let is_rutted = ruts.is_near(at, radius + 0.5 * self.wheel.width, cell);
         let heights = |x: &Vector3<f64>| {
@@ -431,7 +431,7 @@ impl Patch {
             let over = if tangent.is_exact {
                 0.0
             } else {
-                let height = ground.surface().height(x.x, x.z);
+                let height = ground.surface.height(x.x, x.z);
                 height.map_or(0.0, |y| plane + n.y * (y - x.y))
             };
             let rut = if is_rutted {
@@ -455,7 +455,7 @@ impl Patch {
         };
         let found = react(
             (&self.wheel, &self.rules),
-            ground.soil(),
+            ground.soil,
             &bed,
             pose,
             memory,

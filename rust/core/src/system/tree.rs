@@ -15,8 +15,8 @@ use crate::contact::{
     Activation, Contact, ContactKey, ContactSystem, Opposite, PairSearch, detect, detect_limits,
     detect_pairs, generalized_impulse, relocate, relocate_limit,
 };
-use crate::geometry::{SoftGround, Terrain};
-use crate::integrator::moreau_jean::MOST_REVISIONS;
+use crate::geometry::{SoftLayer, Terrain};
+use crate::integrator::mechanical_system::MOST_REVISIONS;
 use crate::integrator::{
     MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact,
 };
@@ -132,7 +132,7 @@ impl TreeScratch {
     pub(crate) fn begin_sand(
         &mut self,
         model: &Model,
-        ground: Option<&SoftGround>,
+        ground: Option<SoftLayer<'_>>,
         state: Option<&SandState>,
     ) {
         let (Some(ground), Some(state)) = (ground, state) else {
@@ -156,7 +156,7 @@ impl TreeScratch {
     pub(crate) fn end_sand(
         &mut self,
         model: &Model,
-        ground: Option<&SoftGround>,
+        ground: Option<SoftLayer<'_>>,
         q: &Configuration,
         state: Option<&mut SandState>,
     ) {

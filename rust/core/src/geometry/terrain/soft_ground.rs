@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::{Coverage, Neighbourhood, Plane, Primitive, Terrain};
+use super::{Coverage, Neighbourhood, Plane, Primitive, SoftLayer, Terrain};
 use crate::geometry::ray::{Hit, Ray};
 use crate::geometry::shape::{PlacedShape, Sphere};
 use crate::quantity::QuantityError;
 use crate::sand::Soil;
-use crate::sand::soil::in_range;
+use crate::sand::checks::in_range;
 
 /// A layer of sand under a surface. Wheels sink into it; to every other part of a machine the
 /// surface is rigid. Immutable: the ruts belong to a simulation.
@@ -27,19 +27,6 @@ impl fmt::Debug for SoftGround {
             .field("soil", &self.soil)
             .finish_non_exhaustive()
     }
-}
-
-/// The plane that touches a surface at a place.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tangent {
-    /// World, m.
-    pub place: Vector3<f64>,
-    /// Unit normal, out of the ground.
-    pub normal: Vector3<f64>,
-    /// Whether the surface is this plane.
-    pub is_exact: bool,
-    /// Largest height of the surface over the plane among the places that were looked at, m.
-    pub highest: f64,
 }
 
 impl SoftGround {
@@ -77,38 +64,6 @@ impl SoftGround {
     #[must_use]
     pub fn cell(&self) -> f64 {
         self.cell
-    }
-
-    /// The tangent plane under a place (world, m), from the heights within `radius`, m. None where
-    /// there is no ground.
-    #[must_use]
-    pub fn tangent(&self, at: &Vector3<f64>, radius: f64) -> Option<Tangent> {
-        if let Some(plane) = self.surface.ground().filter(|_| self.surface.is_plane()) {
-            let normal = *plane.normal();
-            let height = normal.dot(at) + plane.offset();
-            return Some(Tangent {
-                place: at - normal * height,
-                normal,
-                is_exact: true,
-                highest: 0.0,
-            });
-        }
-        let height = |x: f64, z: f64| self.surface.height(at.x + x * radius, at.z + z * radius);
-        let middle = height(0.0, 0.0)?;
-        let around = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
-        let around = around.map(|[x, z]| height(x, z).unwrap_or(middle));
-        let slope_x = (around[0] - around[1]) / (2.0 * radius);
-        let slope_z = (around[2] - around[3]) / (2.0 * radius);
-        let normal = Vector3::new(-slope_x, 1.0, -slope_z).normalize();
-        // Of opposite places the mean is over or under the plane.
-        let bend = [around[0] + around[1], around[2] + around[3]];
-        let over = bend.map(|sum| 0.5 * sum - middle);
-        Some(Tangent {
-            place: Vector3::new(at.x, middle, at.z),
-            normal,
-            is_exact: false,
-            highest: normal.y * over[0].max(over[1]).max(0.0),
-        })
     }
 }
 
@@ -182,7 +137,11 @@ impl Terrain for SoftGround {
         self.surface.ground()
     }
 
-    fn soft(&self) -> Option<&SoftGround> {
-        Some(self)
+    fn soft(&self) -> Option<SoftLayer<'_>> {
+        Some(SoftLayer {
+            surface: &*self.surface,
+            soil: &self.soil,
+            cell: self.cell,
+        })
     }
 }

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 use super::error::TerrainError;
 use super::plane::Plane;
-use super::{Coverage, Neighbourhood, Primitive, SoftGround, Terrain};
+use super::{Coverage, Neighbourhood, Primitive, SoftLayer, Terrain};
 use crate::geometry::ray::{Hit, Ray};
 use crate::geometry::shape::Sphere;
 
@@ -175,7 +175,7 @@ impl Terrain for Union {
         self.parts[0].ground()
     }
 
-    fn soft(&self) -> Option<&SoftGround> {
+    fn soft(&self) -> Option<SoftLayer<'_>> {
         self.parts.iter().find_map(|part| part.soft())
     }
 }

@@ -1,12 +1,8 @@
-//! `SoftGround`, and one wheel on a virtual test bed.
+//! Soils, the sand of a simulation, and one wheel on a virtual test bed.
 
-use std::sync::Arc;
-
-use numpy::{PyArray1, PyArray2};
+use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
-use rover_core::draw::DrawnGround;
-use rover_core::geometry::SoftGround as CoreGround;
 use rover_core::sand::{
     Bekker, Drive, Flow, Interface, Law, Measured, Resistive, SandState, SandWheel, Soil, Sunk,
     TestBed,
@@ -15,8 +11,6 @@ use rover_core::sand::{
 use crate::arguments::{Given, number, refused, whole};
 use crate::arrays::{fresh, fresh_table, rows};
 use crate::errors::{BorderError, Kind};
-use crate::ground::Ground;
-use crate::heights::heights;
 use crate::planar_ground::quantity;
 
 /// Numbers of a soil by their names.
@@ -58,7 +52,8 @@ impl<'py> Numbers<'py> {
     }
 }
 
-fn soil_of(given: &Bound<'_, PyAny>) -> PyResult<Soil> {
+/// A soil from Python.
+pub fn soil_of(given: &Bound<'_, PyAny>) -> PyResult<Soil> {
     let numbers = Numbers::of(given)?;
     let law = if numbers.0.contains("frictional_modulus")? {
         Law::Bekker(Bekker {
@@ -95,7 +90,8 @@ fn soil_of(given: &Bound<'_, PyAny>) -> PyResult<Soil> {
     Ok(soil)
 }
 
-fn numbers_of<'py>(py: Python<'py>, soil: &Soil) -> PyResult<Bound<'py, PyDict>> {
+/// Numbers of a soil by their names.
+pub fn numbers_of<'py>(py: Python<'py>, soil: &Soil) -> PyResult<Bound<'py, PyDict>> {
     let numbers = PyDict::new(py);
     let set = |name: &str, value: f64| numbers.set_item(name, value);
     match &soil.law {
@@ -129,103 +125,6 @@ fn numbers_of<'py>(py: Python<'py>, soil: &Soil) -> PyResult<Bound<'py, PyDict>>
     set("memory", soil.memory)?;
     set("reload", soil.reload)?;
     Ok(numbers)
-}
-
-/// Ground of sand, into which wheels sink. To every other part of a machine its surface is rigid.
-///
-/// The ruts belong to a simulation and are part of its snapshots. Rocks on sand are a `Union` of
-/// both. Steps on soft ground take the general path, not the batch's.
-///
-/// Args:
-///     surface: The undisturbed surface: a `Plane`, `HeightField` or `TriangleMesh`.
-///     soil: A `rover_gym.sand.Soil`, or a mapping of its numbers.
-///     rut_cell: Size of a cell of the map of ruts, from 0.001 to 1 m.
-///
-/// Raises:
-///     TerrainError: The surface is no terrain, or a number of the soil is missing or out of its
-///         range.
-#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
-#[derive(Clone)]
-pub struct SoftGround {
-    pub inner: Arc<CoreGround>,
-    surface: Arc<Ground>,
-}
-
-impl SoftGround {
-    pub fn drawn(&self) -> DrawnGround {
-        DrawnGround::Soft(self.inner.clone(), Arc::new(self.surface.drawn()))
-    }
-
-    pub fn of(inner: &Arc<CoreGround>, surface: &DrawnGround) -> Self {
-        Self {
-            inner: inner.clone(),
-            surface: Arc::new(Ground::of(surface)),
-        }
-    }
-}
-
-#[pymethods]
-impl SoftGround {
-    #[new]
-    #[pyo3(signature = (surface, soil, rut_cell = Given::MISSING),
-        text_signature = "(surface, soil, rut_cell=0.02)")]
-    fn new(
-        surface: &Bound<'_, PyAny>,
-        soil: &Bound<'_, PyAny>,
-        rut_cell: Given<'_>,
-    ) -> PyResult<Self> {
-        let ground = Ground::parse(surface)?;
-        let cell = rut_cell.number(0.02, Kind::Terrain, "rut_cell")?;
-        let made = CoreGround::new(ground.terrain(), Arc::new(soil_of(soil)?), cell);
-        Ok(Self {
-            inner: Arc::new(made.map_err(|e| quantity(Kind::Terrain, &e))?),
-            surface: Arc::new(ground),
-        })
-    }
-
-    /// The undisturbed surface.
-    #[getter]
-    fn surface<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.surface.to_object(py)
-    }
-
-    /// Numbers of the soil by their names.
-    #[getter]
-    fn soil<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        numbers_of(py, self.inner.soil())
-    }
-
-    /// Size of a cell of the map of ruts, m.
-    #[getter]
-    fn rut_cell(&self) -> f64 {
-        self.inner.cell()
-    }
-
-    /// The height of the undisturbed surface at places of the map.
-    ///
-    /// Args:
-    ///     points: Places (x, z), (m, 2), m.
-    ///
-    /// Returns:
-    ///     Heights y, (m,), m; nan where there is no ground.
-    ///
-    /// Raises:
-    ///     TerrainError: `points` has a wrong shape.
-    fn heights<'py>(
-        &self,
-        py: Python<'py>,
-        points: &Bound<'_, PyAny>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        heights(&*self.inner, py, points)
-    }
-
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-        let py = slf.py();
-        let own = slf.get();
-        let arguments = (own.surface(py)?, own.soil(py)?, own.rut_cell());
-        let arguments = arguments.into_pyobject(py)?.into_any();
-        Ok((slf.get_type().into_any(), arguments))
-    }
 }
 
 /// The sand of a simulation as arrays.
@@ -269,7 +168,7 @@ pub fn sand_to_dict<'py>(
 /// Raises:
 ///     TerrainError: A number of the soil is missing or out of its range.
 ///     OptionError: A number of the wheel is out of its range.
-#[pyclass(module = "rover_gym.sand", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct WheelBed {
     bed: TestBed,
 }
