@@ -162,7 +162,7 @@ def test_a_rover_sinks_and_says_how_deep() -> None:
     soft = SoftGround(Plane(), named_soil("cmu-sand"))
     sim = Simulation(wide_rover(), terrain=soft, time_step=0.005)
     q = np.zeros(len(sim.q))
-    q[1] = 0.19
+    q[1] = 0.245
     sim.set_state(q, np.zeros(len(sim.v)))
     sim.step(300)
     sand = sim.sand()
@@ -181,7 +181,7 @@ def test_ruts_follow_the_wheels_and_snapshots_keep_them() -> None:
     rocks = SphereField(np.array([[5.0, 0.0, 5.0]]), np.array([0.2]))
     sim = Simulation(wide_rover(), terrain=[SoftGround(Plane(), named_soil("cmu-sand")), rocks], time_step=0.005)
     q = np.zeros(len(sim.q))
-    q[1] = 0.19
+    q[1] = 0.245
     sim.set_state(q, np.zeros(len(sim.v)))
     sim.set_wheel_torques(np.full(6, 1.0))
     sim.step(300)
@@ -198,3 +198,23 @@ def test_ruts_follow_the_wheels_and_snapshots_keep_them() -> None:
     assert len(first["ruts"]) > 10
     assert np.all(first["ruts"][:, 2] > 0.0)
     assert np.unique(np.sign(first["ruts"][:, 1])).tolist() == [-1.0, 1.0]
+
+
+def test_a_level_map_is_the_plane_and_a_tilted_one_a_slope() -> None:
+    soil = named_soil("cmu-sand")
+    x = np.linspace(-2.0, 2.0, 21)
+    for slope in (0.0, 0.1):
+        heights = np.tile(slope * x, (21, 1))
+        grounds = (Plane.tilted(math.atan(slope), 0.0), HeightField(heights, 0.2, origin=(-2.0, -2.0)))
+        found = []
+        for ground in grounds:
+            sim = Simulation(wide_rover(), terrain=SoftGround(ground, soil), time_step=0.005)
+            q = np.zeros(len(sim.q))
+            q[1] = 0.25
+            sim.set_state(q, np.zeros(len(sim.v)))
+            sim.brake()
+            sim.step(300)
+            sand = sim.sand()
+            assert sand is not None
+            found.append(sand["sinkage"])
+        assert found[0] == pytest.approx(found[1], abs=3e-4)

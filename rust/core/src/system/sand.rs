@@ -49,8 +49,9 @@ const GIVES_WAY: f64 = 0.5;
 /// Twist, m/s, below which two points are the same.
 const TINY: f64 = 1e-12;
 
-/// Accuracy of the forces on a wheel for which the number of its points is chosen.
-const ACCURACY: f64 = 0.01;
+/// Accuracy of the forces on a wheel, in the worst of several motions, for which the number of its
+/// points is chosen: a few hundred points at 1%, 168 at 5%. Soils are not known better.
+const ACCURACY: f64 = 0.05;
 
 /// A wheel of a machine in sand: geometry, linearised force and trial.
 #[derive(Clone, Debug)]
