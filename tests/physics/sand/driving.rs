@@ -11,7 +11,7 @@ use super::sand_scenes::{dry_sand, placed, wide};
 fn driven(h: f64) -> RoverSimulation {
     let model = wide("open-rover", 0.08, 1.0);
     let mut sim = placed(&model, dry_sand(), 0.0, h);
-    sim.set_wheel_torques(&vec![1.0; 6]).unwrap();
+    sim.set_wheel_torques(&[1.0; 6]).unwrap();
     sim
 }
 
@@ -94,7 +94,7 @@ fn wheels_touch_rocks_that_lie_on_sand() {
     };
     let mut sim = RoverSimulation::new(model.clone(), union, options).unwrap();
     sim.set_state(start, vec![0.0; model.nv()]);
-    sim.set_wheel_torques(&vec![1.5; 6]).unwrap();
+    sim.set_wheel_torques(&[1.5; 6]).unwrap();
     let mut touched = false;
     for _ in 0..400 {
         let report = sim.step(1).unwrap();

@@ -3,8 +3,8 @@
 use rover_core::nalgebra::Vector3;
 use rover_core::sand::test_bed::rules_within;
 use rover_core::sand::{
-    Bed, Drive, Law, Memory, Resistive, Rules, SandWheel, Soil, Sunk, TestBed, Twist, Want,
-    WheelPose, react,
+    Bed, Drive, Law, Measured, Memory, Resistive, Rules, SandWheel, Soil, Sunk, TestBed, Twist,
+    Want, WheelPose, react,
 };
 
 use super::sand_scenes::{bekker_sand, dry_sand};
@@ -204,7 +204,7 @@ fn a_run_ends_in_steady_motion() {
         let drive = drive(1.25, 0.2, 20.0);
         let steady = bed.steady(&drive).unwrap();
         let mut state = Sunk::default();
-        let mut last = Default::default();
+        let mut last = Measured::default();
         for _ in 0..2000 {
             last = bed.advance(&mut state, &drive, 20.0 / 9.81, 0.005);
         }
