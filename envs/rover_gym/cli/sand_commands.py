@@ -8,9 +8,11 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from rover_gym.mechanics import OptionError
 from rover_gym.cli.console import plain_errors
 from rover_gym.cli.results import AsJson, Results
+from rover_gym.mechanics import OptionError
+from rover_gym.sand import SingleWheel, climbed_slope, named_soil, soil_names
+from rover_gym.sand.convert import convert_runs
 from rover_gym.validation import number
 
 sand = typer.Typer(help="Wheels on sand: soils by name, and a virtual test bed for one wheel.", no_args_is_help=True)
@@ -43,8 +45,6 @@ def _say(name: str, rows: Sequence[Mapping[str, Any]], *, as_json: bool) -> None
 @plain_errors
 def soils(*, as_json: AsJson = False) -> None:
     """List the soils, with their law and source."""
-    from rover_gym.sand import named_soil, soil_names  # noqa: PLC0415 - SciPy is slow to load
-
     listed = [named_soil(name) for name in soil_names()]
     _say("soils", [{"name": soil.name, "law": soil.law, "source": soil.source} for soil in listed], as_json=as_json)
 
@@ -73,8 +73,6 @@ def bed(
     as_json: AsJson = False,
 ) -> None:
     """Drive one wheel over a bed at given slips: sinkage, drawbar pull, side force and torque in steady motion."""
-    from rover_gym.sand import SingleWheel, named_soil  # noqa: PLC0415 - SciPy is slow to load
-
     mass = number("mass", mass, above=0.0)
     wheel = SingleWheel(radius, width, grouser_height, grousers).on(named_soil(soil))
     slips = list(slip or SLIPS)
@@ -101,8 +99,6 @@ def slope(
     as_json: AsJson = False,
 ) -> None:
     """Find the slope that a wheel with its load climbs at given slips."""
-    from rover_gym.sand import SingleWheel, climbed_slope, named_soil  # noqa: PLC0415 - SciPy is slow to load
-
     mass = number("mass", mass, above=0.0)
     wheel = SingleWheel(radius, width, grouser_height, grousers)
     chosen = named_soil(soil)
@@ -126,7 +122,5 @@ def convert(
     wheel: Annotated[str, typer.Option(help="Name of the wheel, for all rows.")] = "wheel",
 ) -> None:
     """Rewrite a table of runs in the columns, units and signs that `read_runs` takes."""
-    from rover_gym.sand.convert import convert_runs  # noqa: PLC0415 - SciPy is slow to load
-
     n = convert_runs(source, target, column, wheel)
     typer.echo(f"{target}: {n} runs")

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import least_squares
 
+from rover_gym.extras import require
 from rover_gym.mechanics import OptionError
 from rover_gym.sand.measurements import Runs, SingleWheel
 from rover_gym.sand.soils import Soil
@@ -96,7 +96,9 @@ def fit_soil(
 
     Raises:
         OptionError: There are no runs, or a name is no number of the soil or not positive.
+        MissingExtraError: SciPy is not installed.
     """
+    least_squares = require("scipy.optimize", "planning").least_squares
     ties = TIED if tied is None else tied
     if not runs or sum(len(own) for own in runs) == 0:
         raise OptionError("runs: needs at least one")

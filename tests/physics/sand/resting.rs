@@ -8,13 +8,17 @@ use super::sand_scenes::{bekker_sand, dry_sand, placed, total_force, wide};
 /// degrees, light or heavy, at every step; the sand bears its weight.
 #[test]
 fn a_rover_rests_without_creep() {
-    for (name, width, factor) in [("mars-rover", 0.4, 1.0), ("open-rover", 0.08, 3.0 / 12.7)] {
+    let (sand, bekker) = (dry_sand(), bekker_sand());
+    for (name, width, factor, soils) in [
+        ("mars-rover", 0.4, 1.0, vec![&sand]),
+        ("open-rover", 0.08, 3.0 / 12.7, vec![&sand, &bekker]),
+    ] {
         let model = wide(name, width, factor);
         let weight = 9.81 * model.mass();
         for h in [0.005, 0.02] {
             for angle in [0.0, 10.0_f64.to_radians()] {
-                for soil in [dry_sand(), bekker_sand()] {
-                    let mut sim = placed(&model, soil, angle, h);
+                for soil in &soils {
+                    let mut sim = placed(&model, (*soil).clone(), angle, h);
                     sim.brake();
                     let settle = (2.0 / h) as usize;
                     let report = sim.step(settle).unwrap();
