@@ -123,7 +123,6 @@ pub struct RoverMemory {
     /// Mean torque of each wheel's drive in the last step, positive forward, N m.
     pub wheel_torque: Vec<f64>,
     /// The sand under its wheels; none on firm ground.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sand: Option<SandState>,
 }
 
