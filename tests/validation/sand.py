@@ -178,9 +178,7 @@ def main() -> None:
         "Other wheels, nothing fitted": single_wheels(Path(data) / "single_wheels.csv"),
     }
     text = "\n\n".join(f"## {title}\n\n" + "\n".join(lines) for title, lines in parts.items())
-    head = (
-        "---\norphan: true\n---\n\n# Sand: tables\n\nBy `make validate-sand`; [sand](../sand.md) explains them."
-    )
+    head = "---\norphan: true\n---\n\n# Sand: tables\n\nBy `make validate-sand`; [sand](../sand.md) explains them."
     (DOCS / "sand.md").write_text(f"{head}\n\n{text}\n", encoding="utf-8")
     draw(start, runs, DOCS / "sand.png")
     sys.stdout.write(text + "\n")
