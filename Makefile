@@ -20,7 +20,7 @@ TIER   ?= test# of the tests: quick, test or all
 SIDE_BY_SIDE = $(MAKE) --no-print-directory --jobs=2 --output-sync
 MODULE := $(or $(wildcard $(STAMPS)/release),$(STAMPS)/core)# as it is installed, or for development
 
-.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras docs bench chart stability torture validate orders bits profiles train train-rllib pins clean
+.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras docs bench chart stability torture validate validate-sand orders bits profiles train train-rllib pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -146,6 +146,9 @@ profiles: $(STAMPS)/test $(STAMPS)/release ## performance profiles of the contac
 
 validate: $(STAMPS)/release ## the soil beside papers and closed forms: docs/tables/validation.md (an hour and a half on two cores; VALIDATE="packing repose" measures some)
 	PYTHONPATH=tests $(BIN)/python -m validation $(VALIDATE)
+
+validate-sand: $(STAMPS)/test $(STAMPS)/core ## sand beside measurements: docs/validation/sand.md (a minute; the folder of the data in DATA or ROVER_GYM_SOIL_DATA)
+	PYTHONPATH=tests $(BIN)/python -m validation.sand $(if $(DATA),--data $(DATA))
 
 orders: $(STAMPS)/demo ## measure every time-stepping scheme: order, drift, energy, cost; redraw docs/comparison/orders.png
 	cargo run --release --locked --quiet -p rover-comparison --bin orders -- runs/orders.json

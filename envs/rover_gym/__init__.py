@@ -13,6 +13,7 @@ The package consists of the subpackages below. Each one may import those above i
     identification  parameters of a recorded run, with their uncertainty
     soil           granular soil of disks, in the plane
     grains         granular ground of balls, in space
+    sand           wheels on sand: soils, a test bed for one wheel, fits
     env            `Rover-v0`: its card, arguments and control period
     vector         batches of rovers, for Gymnasium and for stable-baselines3
     sensors        encoders, inertial unit, cameras and scanners as observations

@@ -22,6 +22,10 @@ _Outcome: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike, str]
 _MaterialRow: TypeAlias = tuple[str, str, float, float]
 _Materials: TypeAlias = Mapping[tuple[str, str], tuple[float, float]] | Sequence[_MaterialRow]
 
+class _Soil(Protocol):
+    @property
+    def numbers(self) -> Mapping[str, float]: ...
+
 class _SparseArray(Protocol):
     @property
     def shape(self) -> tuple[int, ...]: ...
@@ -66,6 +70,7 @@ __all__ = [
     "SimulationBatch",
     "Sine",
     "Snapshot",
+    "SoftGround",
     "SoilContacts",
     "SoilSimulation",
     "SoilSnapshot",
@@ -80,6 +85,7 @@ __all__ = [
     "TriangleMesh",
     "TwoWheelRoverSimulation",
     "Union",
+    "WheelBed",
     "__version__",
     "accuracy_options",
     "arrange_balls",
@@ -785,6 +791,111 @@ class Plane(Terrain):
             TerrainError: The plane is vertical, or an argument is not a number.
         """
     def __reduce__(self) -> Any: ...
+
+@final
+class SoftGround(Terrain):
+    """Ground of sand, into which wheels sink. To every other part of a machine its surface is rigid.
+
+    The ruts belong to a simulation and are part of its snapshots. Rocks on sand are a `Union` of
+    both. Steps on soft ground take the general path, not the batch's.
+
+    Args:
+        surface: The undisturbed surface: a `Plane`, `HeightField` or `TriangleMesh`.
+        soil: A `rover_gym.sand.Soil`, or a mapping of its numbers.
+        rut_cell: Size of a cell of the map of ruts, from 0.001 to 1 m.
+
+    Raises:
+        TerrainError: The surface is no terrain, or a number of the soil is missing or out of its
+            range.
+    """
+
+    def __new__(cls, surface: Terrain, soil: _Soil | Mapping[str, float], rut_cell: float = 0.02) -> SoftGround: ...
+    @property
+    def surface(self) -> Terrain:
+        """The undisturbed surface."""
+    @property
+    def soil(self) -> dict[str, float]:
+        """Numbers of the soil by their names."""
+    @property
+    def rut_cell(self) -> float:
+        """Size of a cell of the map of ruts, m."""
+    def __reduce__(self) -> Any: ...
+
+@final
+class WheelBed:
+    """One wheel on a bed of soil, driven at prescribed speeds and free to sink under its load.
+
+    Args:
+        soil: A `rover_gym.sand.Soil`, or a mapping of its numbers.
+        radius: Radius of the wheel without grousers, m.
+        width: Its width, m.
+        rounding: Radius of its edges, m.
+        grouser_height: Height of its grousers, m.
+        grousers: Number of its grousers.
+        accuracy: Largest error of the forces by the number of points on the wheel.
+
+    Raises:
+        TerrainError: A number of the soil is missing or out of its range.
+        OptionError: A number of the wheel is out of its range.
+    """
+
+    def __new__(
+        cls,
+        soil: _Soil | Mapping[str, float],
+        radius: float,
+        width: float,
+        rounding: float = 0.0,
+        grouser_height: float = 0.0,
+        grousers: int = 0,
+        accuracy: float = 0.01,
+    ) -> WheelBed: ...
+    @property
+    def n_points(self) -> int:
+        """Points at which the stress is evaluated."""
+    @property
+    def drum(self) -> float:
+        """Radius of the drum with the sand that its grousers hold, m."""
+    def steady(self, drives: npt.ArrayLike) -> _Array:
+        """Steady motion.
+
+        Args:
+            drives: Speed of travel (m/s), rate of the wheel (rad/s, positive forward), slip angle
+                (rad, to the right), load (N) and gravity (m/s²) of each run, (n, 5).
+
+        Returns:
+            Sinkage (m), drawbar pull, force to the right and lift (N), and driving torque (N m) of
+            each run, (n, 5); nan where the soil does not bear the load.
+
+        Raises:
+            OptionError: `drives` has a wrong shape or an entry that is not finite.
+        """
+    def forces(self, sinkage: float, drives: npt.ArrayLike) -> _Array:
+        """Forces in steady motion at a given sinkage.
+
+        Args:
+            sinkage: Depth of the lowest point under the surface, m.
+            drives: As for `steady`; the load does not matter.
+
+        Returns:
+            As `steady`, (n, 5).
+
+        Raises:
+            OptionError: An argument has a wrong shape or is not finite.
+        """
+    def run(self, drives: npt.ArrayLike, mass: float, time_step: float) -> _Array:
+        """A run from rest on the surface: the wheel is let down and driven.
+
+        Args:
+            drives: As for `steady`, one row for each step, (n, 5).
+            mass: Mass that sinks with the wheel, kg.
+            time_step: Length of a step, s.
+
+        Returns:
+            As `steady`, at the end of each step, (n, 5).
+
+        Raises:
+            OptionError: An argument has a wrong shape, is not finite, or is not positive.
+        """
 
 @final
 class SphereField(Terrain):
@@ -1528,6 +1639,19 @@ class Simulation:
     @property
     def terrain(self) -> Terrain:
         """The ground."""
+    def sand(self) -> dict[str, _Array] | None:
+        """The sand under the wheels; None on firm ground.
+
+        Returns:
+            Arrays by name. `force` (N) and `moment` about the wheel's centre (N m) of the sand on
+            each wheel in the last step, (n_wheels, 3), world frame; `sinkage` of each wheel's
+            lowest point under the undisturbed surface, (n_wheels,), m, negative where it is clear;
+            `absorbed`, energy that the sand has taken from each wheel, (n_wheels,), J; `ruts`,
+            place x and z and depth of each cell that a wheel has pressed down, (n, 3), m.
+
+        Raises:
+            BusyError: Another thread is stepping this simulation.
+        """
     @property
     def time(self) -> float:
         """Time since the last call of `set_state`, s."""

@@ -24,7 +24,7 @@ R = TypeVar("R")
 
 Range: TypeAlias = tuple[float, float]
 #: Names of the classes of grounds, for `checked`.
-TERRAINS = ("Plane", "SphereField", "HeightField", "TriangleMesh", "Union")
+TERRAINS = ("Plane", "SphereField", "HeightField", "TriangleMesh", "SoftGround", "Union")
 #: What an argument may be: see `checked`.
 Kind: TypeAlias = Any
 

@@ -136,6 +136,7 @@ CHAPTERS = [
     "problem",
     "solver",
     "multibody",
+    "sand",
     "geometry",
     "contact",
     "integrator",

@@ -11,6 +11,7 @@ mod lanes;
 mod materials;
 mod planar;
 mod rover;
+mod sand;
 mod shapes;
 mod solver;
 mod solver_methods;

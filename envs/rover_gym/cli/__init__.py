@@ -18,6 +18,7 @@ from rover_gym.cli.model_command import model
 from rover_gym.cli.planar_commands import planar
 from rover_gym.cli.replay_command import plot, replay
 from rover_gym.cli.report_command import report
+from rover_gym.cli.sand_commands import sand
 from rover_gym.cli.scene_command import scene
 from rover_gym.cli.speed_command import speed
 from rover_gym.cli.train_command import ManySeeds, train
@@ -43,6 +44,7 @@ app.add_typer(planar, name="planar")
 for _command in (rover_on_bed, track, pit, plate, shear, wheel):
     grains.command()(_command)
 app.add_typer(grains, name="grains")
+app.add_typer(sand, name="sand")
 app.add_typer(export, name="export")
 app.command()(dataset)
 app.command()(speed)

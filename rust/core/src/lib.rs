@@ -15,6 +15,7 @@
 //! - [`quantity`]: admissible numbers of a description; [`scalar`]: one rover or several to a
 //!   register; [`spatial`]: rotations and inertias;
 //! - [`multibody`]: model, state, kinematics, mass matrix, bias, energy, momentum;
+//! - [`sand`]: the force of sand on a wheel;
 //! - [`geometry`]: shapes, the ground, distances between them; [`contact`]: points, frames, gaps,
 //!   the Delassus operator;
 //! - [`cone`], [`law`], [`problem`], [`solver`]: the friction-contact
@@ -47,6 +48,7 @@ pub mod planar;
 mod pool;
 pub mod problem;
 pub mod quantity;
+pub mod sand;
 pub mod scalar;
 pub mod simulation;
 pub mod solver;

@@ -297,7 +297,8 @@ impl From<TerrainError> for BorderError {
             }
             TerrainError::FlatTriangle { index }
             | TerrainError::NotASurface { index, .. }
-            | TerrainError::SecondPlane { index } => (Some(index), Value::Count(*index)),
+            | TerrainError::SecondPlane { index }
+            | TerrainError::SecondSand { index } => (Some(index), Value::Count(*index)),
             TerrainError::MapSize { .. } | TerrainError::NoData | TerrainError::TooManyPieces => {
                 (None, Value::Nothing)
             }

@@ -26,6 +26,7 @@ use crate::options::{Options, SolverWords, settings};
 use crate::rays::{Met, met, rays};
 use crate::reading::{place, scan_points, slices};
 use crate::report::{Energy, StepReport};
+use crate::sand::sand_to_dict;
 use crate::shared::{Shared, Watch};
 use crate::snapshot::{Snapshot, belonging};
 use crate::stepping::{Problem, problem, step};
@@ -207,6 +208,26 @@ impl Simulation {
     #[getter]
     fn terrain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         union::object(py, &self.origin.terrain)
+    }
+
+    /// The sand under the wheels; None on firm ground.
+    ///
+    /// Returns:
+    ///     Arrays by name. `force` (N) and `moment` about the wheel's centre (N m) of the sand on
+    ///     each wheel in the last step, (n_wheels, 3), world frame; `sinkage` of each wheel's
+    ///     lowest point under the undisturbed surface, (n_wheels,), m, negative where it is clear;
+    ///     `absorbed`, energy that the sand has taken from each wheel, (n_wheels,), J; `ruts`,
+    ///     place x and z and depth of each cell that a wheel has pressed down, (n, 3), m.
+    ///
+    /// Raises:
+    ///     BusyError: Another thread is stepping this simulation.
+    fn sand<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let open = self.open()?;
+        let Some(sand) = open.sand() else {
+            return Ok(None);
+        };
+        let cell = open.terrain().soft().map_or(1.0, |soft| soft.cell);
+        Ok(Some(sand_to_dict(py, sand, cell)?))
     }
 
     /// Time since the last call of `set_state`, s.

@@ -40,8 +40,8 @@ pub fn parse(given: &Bound<'_, PyAny>) -> PyResult<DrawnGround> {
     Err(BorderError {
         kind: Kind::Terrain,
         message: format!(
-            "terrain: must be a Plane, SphereField, HeightField, TriangleMesh or Union, or a list \
-             of them, is {shown}"
+            "terrain: must be a Plane, SphereField, HeightField, TriangleMesh, SoftGround or \
+             Union, or a list of them, is {shown}"
         ),
         field: Some("terrain".to_owned()),
         value: Value::Text(shown),

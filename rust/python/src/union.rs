@@ -5,6 +5,7 @@ use rover_core::draw::DrawnGround;
 
 use crate::height_field::HeightField;
 use crate::plane::Plane;
+use crate::soft_ground::SoftGround;
 use crate::sphere_field::SphereField;
 use crate::terrain::{Terrain, union};
 use crate::triangle_mesh::TriangleMesh;
@@ -16,6 +17,9 @@ pub fn object<'py>(py: Python<'py>, ground: &DrawnGround) -> PyResult<Bound<'py,
         DrawnGround::Field(field) => Bound::new(py, SphereField::of(field.clone()))?.into_any(),
         DrawnGround::Map(map) => Bound::new(py, HeightField::of(map.clone()))?.into_any(),
         DrawnGround::Mesh(mesh) => Bound::new(py, TriangleMesh::of(mesh.clone()))?.into_any(),
+        DrawnGround::Soft(soft, surface) => {
+            Bound::new(py, SoftGround::of(soft.clone(), surface.clone()))?.into_any()
+        }
         DrawnGround::Union(..) => {
             Bound::new(py, Terrain::base(ground.clone()).add_subclass(Union))?.into_any()
         }

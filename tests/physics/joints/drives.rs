@@ -111,6 +111,8 @@ fn drives_survive_both_formats_and_bad_ones_are_refused_by_field() {
             contact_radius: None,
             width: None,
             rounding: None,
+            grouser_height: None,
+            grousers: None,
             stiffness: None,
             damping: None,
             material: None,

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::hills::HillDistribution;
 use crate::geometry::{
-    HeightField, Plane, SphereField, Terrain, TerrainError, TriangleMesh, Union,
+    HeightField, Plane, SoftGround, SphereField, Terrain, TerrainError, TriangleMesh, Union,
 };
 
 /// What the ground of episodes is.
@@ -29,6 +29,8 @@ pub enum DrawnGround {
     Map(Arc<HeightField>),
     /// A mesh.
     Mesh(Arc<TriangleMesh>),
+    /// Sand under a surface, and what that is.
+    Soft(Arc<SoftGround>, Arc<DrawnGround>),
     /// Several as one, and what they are.
     Union(Arc<Union>, Arc<[DrawnGround]>),
 }
@@ -52,6 +54,7 @@ impl DrawnGround {
             Self::Field(field) => field.clone(),
             Self::Map(map) => map.clone(),
             Self::Mesh(mesh) => mesh.clone(),
+            Self::Soft(soft, _) => soft.clone(),
             Self::Union(union, _) => union.clone(),
         }
     }
@@ -64,6 +67,7 @@ impl DrawnGround {
             Self::Field(field) => field.ground().and_then(|plane| plane.height(x, z)),
             Self::Map(map) => map.height(x, z),
             Self::Mesh(mesh) => mesh.height(x, z),
+            Self::Soft(soft, _) => soft.height(x, z),
             Self::Union(_, parts) => {
                 let heights = parts.iter().filter_map(|part| part.height(x, z));
                 heights.reduce(f64::max)

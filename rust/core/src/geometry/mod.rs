@@ -17,6 +17,6 @@ pub use ray::{Hit, Ray, RayError};
 pub use shape::{Disc, OrientedBox, PlacedShape, Roller, Sphere, SupportMap};
 pub use support::{Drum, Facing, Floor, Silo, Support, TerrainSupport};
 pub use terrain::{
-    Clearing, Coverage, HeightField, Neighbourhood, Plane, Primitive, Rocks, SphereField, Terrain,
-    TerrainError, TriangleMesh, Union,
+    Clearing, Coverage, HeightField, Neighbourhood, Plane, Primitive, Rocks, SoftGround, SoftLayer,
+    SphereField, Tangent, Terrain, TerrainError, TriangleMesh, Union,
 };

@@ -17,8 +17,8 @@
 use nalgebra::{DMatrix, DVectorView};
 
 use super::contact_modes::{HeldLaw, product};
-use super::mechanical_system::{MechanicalSystem, Start, UnilateralContact};
-use super::moreau_jean::{MOST_REVISIONS, load_explicitly, load_implicitly};
+use super::mechanical_system::{MOST_REVISIONS, MechanicalSystem, Start, UnilateralContact};
+use super::moreau_jean::{load_explicitly, load_implicitly};
 use super::options::{Stabilisation, StepOptions};
 use super::scratch::ScratchOf;
 use super::step_contacts::{assemble_contacts, shift, yielded};

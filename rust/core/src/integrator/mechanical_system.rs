@@ -29,6 +29,10 @@ use crate::law::newton_impact::rebound;
 use crate::problem::{Dimension, FrictionContactProblem};
 use crate::solver::{SolveReport, SolverOptions, SolverWorkspace, solve};
 
+/// Most repetitions of a step because a piecewise force changed its branch. A motor that reaches
+/// its torque–speed line needs one, a single wheel at most four.
+pub(crate) const MOST_REVISIONS: usize = 6;
+
 /// A contact as time stepping sees it: a key and a gap.
 pub trait UnilateralContact {
     /// Identifies a contact from one step to the next.
@@ -199,6 +203,11 @@ pub trait MechanicalSystem {
     /// has changed and the step must be repeated. By default there is none.
     fn revise(&mut self, _start: Start<'_, Self::Configuration>, _v_end: &[f64]) -> bool {
         false
+    }
+
+    /// Most repetitions of a step that [`Self::revise`] asks for.
+    fn most_revisions(&self) -> usize {
+        MOST_REVISIONS
     }
 
     /// Kinetic and potential energy of a state, J, and its overall momentum; none if the system is

@@ -132,7 +132,7 @@ impl Part<'_> {
             };
             report.retaken += retaken;
             retaken += 1;
-            if retaken <= MOST_REVISIONS && system.revise(start, &ws.v) {
+            if retaken <= system.most_revisions() && system.revise(start, &ws.v) {
                 continue;
             }
             let is_solved = report.is_converged();
@@ -218,10 +218,6 @@ impl Part<'_> {
         Ok(total)
     }
 }
-
-/// Most repetitions of a step because a piecewise force changed its branch. A motor that reaches
-/// its torque–speed line needs one, a single wheel at most four.
-pub(crate) const MOST_REVISIONS: usize = 6;
 
 /// Passes over the mean velocity at which implicit gyroscopic terms are frozen: the second makes
 /// the step second order.

@@ -21,8 +21,8 @@
 
 use super::energy_audit::{Audit, GAIN, Verdict, energy_before};
 use super::error::StepError;
-use super::mechanical_system::{KeyOf, MechanicalSystem, Start, UnilateralContact};
-use super::moreau_jean::{MOST_REVISIONS, MoreauJean, finish};
+use super::mechanical_system::{KeyOf, MOST_REVISIONS, MechanicalSystem, Start, UnilateralContact};
+use super::moreau_jean::{MoreauJean, finish};
 use super::options::StepOptions;
 use super::probe::{Phase, Probe};
 use super::report::{StepReport, StepStatus};

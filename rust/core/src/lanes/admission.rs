@@ -15,6 +15,9 @@ pub enum FallbackReason {
     /// The variant is not [`Variant::Linearised`].
     #[error("the variant is Newton's")]
     Variant,
+    /// Wheels sink into the ground.
+    #[error("the ground is soft")]
+    SoftGround,
     /// Contacts bounce.
     #[error("the restitution is {0}, not 0")]
     Restitution(f64),

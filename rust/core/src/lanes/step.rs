@@ -28,7 +28,7 @@ use super::sweeps::write_start;
 use super::yielding::Yields;
 use crate::contact::Contact;
 use crate::integrator::energy_audit::{COARSE, GAIN, RAISE, ROUNDINGS};
-use crate::integrator::moreau_jean::MOST_REVISIONS;
+use crate::integrator::mechanical_system::MOST_REVISIONS;
 use crate::integrator::position_projection::FARTHEST;
 use crate::integrator::step_contacts::STEADY;
 use crate::integrator::{Phase, Probe, Stabilisation, StepOptions, StepReport, WarmStart};

@@ -31,6 +31,44 @@ pub struct MassMatrix<T: Lane> {
     coupled: Vec<Momentum<T>>,
 }
 
+impl MassMatrix<f64> {
+    /// Adds a symmetric matrix over the velocities of a body's path: `entry` gives that of two
+    /// places on the path. Entries between velocities of which none moves the other's body are left
+    /// out.
+    pub(crate) fn add_quadratic(
+        &mut self,
+        mechanism: &Mechanism,
+        path: &[usize],
+        entry: impl Fn(usize, usize) -> f64,
+    ) {
+        let Some(&first) = path.first() else { return };
+        let t = mechanism.tree_of[first];
+        let base = mechanism.trees[t].velocities.start;
+        let joints = base + mechanism.trees[t].lead();
+        for (p, &k) in path.iter().enumerate() {
+            if k < joints {
+                let i = k - base;
+                for (q, &j) in path.iter().enumerate().filter(|(_, j)| **j <= k) {
+                    self.rows.blocks[t][i * (i + 1) / 2 + (j - base)] += entry(p, q);
+                }
+                continue;
+            }
+            let row = mechanism.row_of(k);
+            let own = mechanism.rows[row].clone();
+            for (q, &j) in path.iter().enumerate() {
+                if j < joints {
+                    self.rows.base[row][j - base] += entry(p, q);
+                    continue;
+                }
+                let mut columns = mechanism.columns[own.clone()].iter();
+                if let Some(at) = columns.position(|&column| joints + column == j) {
+                    self.rows.joints[own.start + at] += entry(p, q);
+                }
+            }
+        }
+    }
+}
+
 impl<T: Lane> MassMatrix<T> {
     /// Room for a mechanism.
     #[must_use]

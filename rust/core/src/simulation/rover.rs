@@ -4,6 +4,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use super::active_contact::LocatedContact;
 use super::quick::Quick;
@@ -16,6 +17,7 @@ use crate::geometry::Terrain;
 use crate::integrator::{OptionsError, Probe, StepOptions, StepReport};
 use crate::lanes::machine::{Machine, Unsupported};
 use crate::multibody::{Configuration, Energy, Kinematics, Model, Momentum, momentum};
+use crate::sand::SandState;
 use crate::system::{TreeScratch, TreeSystem};
 
 /// A machine on a terrain, both shared.
@@ -39,6 +41,15 @@ impl RoverScene {
             terrain,
             machine,
         }
+    }
+
+    fn admits_memory(&self, memory: &RoverMemory) -> bool {
+        let n = self.model.wheels().len();
+        let is_of_sand = memory.sand.as_ref().is_none_or(|sand| sand.is_of(n));
+        memory.wheel_torque.len() == n
+            && memory.wheel_torque.iter().all(|x| x.is_finite())
+            && memory.sand.is_some() == self.terrain.soft().is_some()
+            && is_of_sand
     }
 
     /// The same machine on another terrain.
@@ -106,12 +117,20 @@ impl LocatedContact for Contact {
     }
 }
 
+/// What a rover remembers between steps.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RoverMemory {
+    /// Mean torque of each wheel's drive in the last step, positive forward, N m.
+    pub wheel_torque: Vec<f64>,
+    /// The sand under its wheels; none on firm ground.
+    pub sand: Option<SandState>,
+}
+
 impl Scene for RoverScene {
     type Configuration = Configuration;
     type Contact = Contact;
     type Command = RoverCommand;
-    /// Mean torque of each wheel's drive in the last step, positive forward, N m.
-    type Memory = Vec<f64>;
+    type Memory = RoverMemory;
     type Parts = RoverParts;
     type System<'a> = TreeSystem<'a>;
 
@@ -125,8 +144,12 @@ impl Scene for RoverScene {
         RoverCommand::idle(&self.model)
     }
 
-    fn memory(&self) -> Vec<f64> {
-        vec![0.0; self.model.wheels().len()]
+    fn memory(&self) -> RoverMemory {
+        let n = self.model.wheels().len();
+        RoverMemory {
+            wheel_torque: vec![0.0; n],
+            sand: self.terrain.soft().map(|_| SandState::new(n)),
+        }
     }
 
     fn parts(&self) -> RoverParts {
@@ -151,11 +174,13 @@ impl Scene for RoverScene {
     fn system<'a>(
         &'a self,
         command: &'a RoverCommand,
-        _memory: &'a Vec<f64>,
+        memory: &'a RoverMemory,
         parts: &'a mut RoverParts,
     ) -> TreeSystem<'a> {
         parts.quick.set_last(false);
         parts.tree.begin_step();
+        let (ground, sand) = (self.terrain.soft(), memory.sand.as_ref());
+        parts.tree.begin_sand(&self.model, ground, sand);
         TreeSystem {
             model: &self.model,
             terrain: &*self.terrain,
@@ -180,10 +205,14 @@ impl Scene for RoverScene {
         for (work, drive) in taken.parts.drive_work.iter_mut().zip(drives) {
             *work += drive.work;
         }
-        for (torque, wheel) in taken.memory.iter_mut().zip(self.model.wheels()) {
+        let RoverMemory { wheel_torque, sand } = taken.memory;
+        for (torque, wheel) in wheel_torque.iter_mut().zip(self.model.wheels()) {
             let impulse = wheel.joint.map_or(0.0, |j| drives[j].impulse);
             *torque = wheel.drive_sign * impulse / taken.options.time_step;
         }
+        let (ground, q) = (self.terrain.soft(), &taken.state.configuration);
+        let tree = &mut taken.parts.tree;
+        tree.end_sand(&self.model, ground, q, sand.as_mut());
     }
 
     fn quick_step(
@@ -234,8 +263,7 @@ impl Scene for RoverScene {
         configuration.is_finite()
             && configuration.is_of(model)
             && snapshot.command.is_of(model)
-            && snapshot.memory.len() == model.wheels().len()
-            && snapshot.memory.iter().all(|x| x.is_finite())
+            && self.admits_memory(&snapshot.memory)
             && (snapshot.active.iter()).all(|a| is_sound(&a.contact))
     }
 }
@@ -360,7 +388,13 @@ impl RoverSimulation {
     /// Zero before any step and where the wheel is locked.
     #[must_use]
     pub fn motor_torques(&self) -> &[f64] {
-        &self.memory
+        &self.memory.wheel_torque
+    }
+
+    /// The sand under the wheels; none on firm ground.
+    #[must_use]
+    pub fn sand(&self) -> Option<&SandState> {
+        self.memory.sand.as_ref()
     }
 
     /// Current poses of the bodies.

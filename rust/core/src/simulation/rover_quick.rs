@@ -26,6 +26,9 @@ impl RoverScene {
     /// Why with these options it has no fast steps.
     #[inline]
     pub(super) fn fallback_reason(&self, options: &StepOptions) -> Option<FallbackReason> {
+        if self.terrain.soft().is_some() {
+            return Some(FallbackReason::SoftGround);
+        }
         match (admit(options), &self.machine) {
             (Err(why), _) => Some(why),
             (Ok(()), Err(why)) => Some(why.clone().into()),
@@ -59,7 +62,7 @@ impl RoverScene {
             time: &mut step.state.time,
             warm_start: step.warm_start,
             drive_work: &mut step.parts.drive_work,
-            wheel_torque: step.memory,
+            wheel_torque: &mut step.memory.wheel_torque,
         };
         block.board(0, &passenger);
         block.begin();
@@ -152,7 +155,7 @@ impl RoverSimulation {
             time: &mut self.state.time,
             warm_start: &mut self.warm_start,
             drive_work: &mut self.parts.drive_work,
-            wheel_torque: &mut self.memory,
+            wheel_torque: &mut self.memory.wheel_torque,
         }
     }
 }

@@ -17,6 +17,7 @@ pub mod grains;
 pub mod gyroscopic;
 pub(crate) mod motor_branch;
 pub mod planar;
+mod sand;
 pub mod soil;
 pub mod tree;
 

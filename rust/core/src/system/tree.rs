@@ -10,11 +10,13 @@ use nalgebra::Vector3;
 use super::command::{Command, HeldJoint};
 use super::gyroscopic::GyroscopicScratch;
 use super::motor_branch::{MotorBranch, line_slope};
+use super::sand::{SandContact, SandScene};
 use crate::contact::{
     Activation, Contact, ContactKey, ContactSystem, Opposite, PairSearch, detect, detect_limits,
     detect_pairs, generalized_impulse, relocate, relocate_limit,
 };
-use crate::geometry::Terrain;
+use crate::geometry::{SoftLayer, Terrain};
+use crate::integrator::mechanical_system::MOST_REVISIONS;
 use crate::integrator::{
     MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact,
 };
@@ -28,6 +30,7 @@ use crate::multibody::{
     Momentum, Passive, Place, Tree,
 };
 use crate::problem::{Dimension, FrictionContactProblem};
+use crate::sand::SandState;
 use crate::scalar::Single;
 
 impl UnilateralContact for Contact {
@@ -84,6 +87,8 @@ pub struct TreeScratch {
     joints_middle: Vec<f64>,
     joints_end: Vec<f64>,
     pub(super) system: ContactSystem,
+    /// Of a machine on soft ground.
+    sand: Option<Box<SandContact>>,
 }
 
 impl TreeScratch {
@@ -119,12 +124,51 @@ impl TreeScratch {
             joints_middle: limited.clone(),
             joints_end: limited,
             system: ContactSystem::with_capacity(model, n),
+            sand: None,
         }
     }
 
     /// Resets the impulse and work of the drives at the start of a step.
     pub fn begin_step(&mut self) {
         self.drives.fill(DriveAction::default());
+    }
+
+    /// Takes over the sand at the start of a step; none on firm ground.
+    pub(crate) fn begin_sand(
+        &mut self,
+        model: &Model,
+        ground: Option<SoftLayer<'_>>,
+        state: Option<&SandState>,
+    ) {
+        let (Some(ground), Some(state)) = (ground, state) else {
+            self.sand = None;
+            return;
+        };
+        let known = self.sand.take().filter(|sand| sand.is_of(ground));
+        let mut sand = known.unwrap_or_else(|| Box::new(SandContact::new(model, ground)));
+        sand.begin(state);
+        self.sand = Some(sand);
+    }
+
+    /// Adds the impulse of the sand over a step of h that ends with the velocity `v`.
+    fn add_sand(&self, h: f64, v: &[f64], y: &mut [f64]) {
+        if let Some(sand) = &self.sand {
+            sand.add_impulse(h, v, y);
+        }
+    }
+
+    /// Writes the sand at the end of a step that led to a configuration.
+    pub(crate) fn end_sand(
+        &mut self,
+        model: &Model,
+        ground: Option<SoftLayer<'_>>,
+        q: &Configuration,
+        state: Option<&mut SandState>,
+    ) {
+        if let (Some(sand), Some(ground), Some(state)) = (&self.sand, ground, state) {
+            self.kinematics.update_for_step(model, q);
+            sand.end(model, ground, &self.kinematics, state);
+        }
     }
 
     /// Impulse and work of each joint's drive since [`Self::begin_step`] (n_joints), summed over
@@ -194,6 +238,57 @@ impl TreeSystem<'_> {
     fn turning_of_joints(&self, v: &[f64]) -> f64 {
         let turning = self.model.mechanism().turning.iter();
         turning.fold(0.0, |most, &(k, ratio)| most.max(v[k].abs() * ratio))
+    }
+}
+
+impl TreeSystem<'_> {
+    /// Forces and tangents of the sand at the last guess of the velocity.
+    fn linearise_sand(&mut self, options: &StepOptions) {
+        let TreeScratch {
+            sand, kinematics, ..
+        } = &mut *self.parts;
+        if let (Some(sand), Some(ground)) = (sand, self.terrain.soft()) {
+            sand.linearise(
+                SandScene {
+                    model: self.model,
+                    ground,
+                    kinematics,
+                },
+                options,
+            );
+        }
+    }
+
+    /// Whether the sand asks for another solution.
+    fn revise_sand(&mut self, v_end: &[f64]) -> bool {
+        let TreeScratch {
+            sand, kinematics, ..
+        } = &mut *self.parts;
+        let (Some(sand), Some(ground)) = (sand, self.terrain.soft()) else {
+            return false;
+        };
+        let place = SandScene {
+            model: self.model,
+            ground,
+            kinematics,
+        };
+        sand.revise(place, v_end)
+    }
+
+    /// Work of the sand over a step between two velocities, J.
+    fn work_of_sand(&mut self, v: &[f64], v_end: &[f64]) -> f64 {
+        let TreeScratch {
+            sand, kinematics, ..
+        } = &mut *self.parts;
+        let (Some(sand), Some(ground)) = (sand, self.terrain.soft()) else {
+            return 0.0;
+        };
+        let place = SandScene {
+            model: self.model,
+            ground,
+            kinematics,
+        };
+        sand.work(place, v, v_end)
     }
 }
 
@@ -327,6 +422,7 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn update_mass_matrix(&mut self, options: &StepOptions) {
+        self.linearise_sand(options);
         self.parts.mass_matrix.update(
             self.model.mechanism(),
             self.model.inertias(),
@@ -347,6 +443,9 @@ impl MechanicalSystem for TreeSystem<'_> {
                 let k = joint.velocity;
                 (parts.mass_matrix).add_to_diagonal(self.model.mechanism(), k, implicit);
             }
+        }
+        if let Some(sand) = &parts.sand {
+            sand.add_to_mass(self.model, h, &mut parts.mass_matrix);
         }
         (parts.mass_matrix).factorise(self.model.mechanism(), &mut parts.factor)
     }
@@ -385,6 +484,7 @@ impl MechanicalSystem for TreeSystem<'_> {
             &parts.motors,
             y,
         );
+        self.parts.add_sand(options.time_step, start.v, y);
     }
 
     #[inline]
@@ -448,6 +548,7 @@ impl MechanicalSystem for TreeSystem<'_> {
             &parts.motors,
             y,
         );
+        parts.add_sand(options.time_step, start.v, y);
         parts.gyroscopic.solve(
             model,
             &parts.kinematics,
@@ -466,6 +567,17 @@ impl MechanicalSystem for TreeSystem<'_> {
         for ((motor, drive), &k) in drives.zip(self.model.joint_velocities()) {
             motor.choose(drive.as_ref(), start.v[k]);
         }
+        if let Some(sand) = &mut self.parts.sand {
+            sand.start_from(start.v);
+        }
+    }
+
+    fn most_revisions(&self) -> usize {
+        if self.parts.sand.is_some() {
+            MOST_REVISIONS_IN_SAND
+        } else {
+            MOST_REVISIONS
+        }
     }
 
     fn revise(&mut self, start: Start<'_, Configuration>, v_end: &[f64]) -> bool {
@@ -474,7 +586,7 @@ impl MechanicalSystem for TreeSystem<'_> {
         for ((motor, drive), &k) in drives.zip(self.model.joint_velocities()) {
             is_new |= motor.revise(drive.as_ref(), start.v[k], v_end[k]);
         }
-        is_new
+        is_new | self.revise_sand(v_end)
     }
 
     fn energy(
@@ -512,6 +624,7 @@ impl MechanicalSystem for TreeSystem<'_> {
         v_end: &[f64],
     ) -> f64 {
         let h = options.time_step;
+        let of_sand = self.work_of_sand(start.v, v_end);
         let TreeScratch {
             motors,
             drives_tried,
@@ -524,7 +637,7 @@ impl MechanicalSystem for TreeSystem<'_> {
             v_end,
             motors,
         };
-        let mut total = 0.0;
+        let mut total = of_sand;
         let mut drives = self.command.drives.iter().zip(drives_tried);
         trial.for_each(self.model, |joint, torque| {
             let turned = h * trial.mean_rate(joint.velocity);
@@ -569,6 +682,9 @@ impl MechanicalSystem for TreeSystem<'_> {
         for (done, tried) in parts.drives.iter_mut().zip(&parts.drives_tried) {
             done.impulse += tried.impulse;
             done.work += tried.work;
+        }
+        if let Some(sand) = &mut parts.sand {
+            sand.accept();
         }
     }
 
@@ -617,6 +733,7 @@ impl MechanicalSystem for TreeSystem<'_> {
             &self.parts.motors,
             y,
         );
+        self.parts.add_sand(options.time_step, v_end, y);
     }
 
     #[inline]
@@ -694,6 +811,9 @@ fn keep(kept: &mut [f64], joints: &[f64]) {
         *kept = *q;
     }
 }
+
+/// Most repetitions of a step in sand. Wheels that fall and come to rest in a long step need them.
+const MOST_REVISIONS_IN_SAND: usize = 24;
 
 /// Arm that converts a joint rotation to a length, m. A freely steered wheel that is moved out of a
 /// penetration of 2 cm rotates by 0.4 rad.

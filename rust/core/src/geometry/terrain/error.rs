@@ -146,6 +146,12 @@ pub enum TerrainError {
         /// Number of the part.
         index: usize,
     },
+    /// More soft grounds than one in a union.
+    #[error("parts[{index}]: a second soft ground; a union takes one at most")]
+    SecondSand {
+        /// Number of the part.
+        index: usize,
+    },
     /// More primitives than can be numbered.
     #[error("parts: their pieces are more than can be numbered, 2^32")]
     TooManyPieces,
@@ -181,7 +187,10 @@ impl TerrainError {
             | Self::NoSuchVertex { .. }
             | Self::FlatTriangle { .. }
             | Self::NotASurface { .. } => "triangles",
-            Self::NoParts | Self::SecondPlane { .. } | Self::TooManyPieces => "parts",
+            Self::NoParts
+            | Self::SecondPlane { .. }
+            | Self::SecondSand { .. }
+            | Self::TooManyPieces => "parts",
         }
     }
 }

@@ -11,10 +11,13 @@ pub mod mesh;
 mod neighbourhood;
 pub mod plane;
 pub mod rocks;
+pub mod soft_ground;
 pub mod sphere_field;
 pub mod surface;
 mod tiles;
 pub mod union;
+
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 
@@ -24,12 +27,14 @@ pub use mesh::TriangleMesh;
 pub use neighbourhood::Neighbourhood;
 pub use plane::Plane;
 pub use rocks::{Clearing, Rocks};
+pub use soft_ground::SoftGround;
 pub use sphere_field::SphereField;
 pub use surface::{Edge, Face, Vertex};
 pub use union::Union;
 
 use super::ray::{Hit, Ray};
 use super::shape::Sphere;
+use crate::sand::Soil;
 
 /// A convex piece of ground whose distance to every shape has a closed form.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -148,4 +153,67 @@ pub trait Terrain: Send + Sync {
 
     /// The base plane, if there is one; its number is 0.
     fn ground(&self) -> Option<&Plane>;
+
+    /// The sand that wheels sink into, if there is any.
+    fn soft(&self) -> Option<SoftLayer<'_>> {
+        None
+    }
+}
+
+/// Sand under a surface, into which wheels sink.
+#[derive(Clone, Copy)]
+pub struct SoftLayer<'a> {
+    /// The undisturbed surface.
+    pub surface: &'a dyn Terrain,
+    /// The sand.
+    pub soil: &'a Arc<Soil>,
+    /// Size of a cell of the ruts, m.
+    pub cell: f64,
+}
+
+/// The plane that touches a surface at a place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tangent {
+    /// World, m.
+    pub place: Vector3<f64>,
+    /// Unit normal, out of the ground.
+    pub normal: Vector3<f64>,
+    /// Whether the surface is this plane.
+    pub is_exact: bool,
+    /// Largest height of the surface over the plane among the places that were looked at, m.
+    pub highest: f64,
+}
+
+impl SoftLayer<'_> {
+    /// The tangent plane under a place (world, m), from the heights within `radius`, m. None where
+    /// there is no ground.
+    #[must_use]
+    pub fn tangent(&self, at: &Vector3<f64>, radius: f64) -> Option<Tangent> {
+        if let Some(plane) = self.surface.ground().filter(|_| self.surface.is_plane()) {
+            let normal = *plane.normal();
+            let height = normal.dot(at) + plane.offset();
+            return Some(Tangent {
+                place: at - normal * height,
+                normal,
+                is_exact: true,
+                highest: 0.0,
+            });
+        }
+        let height = |x: f64, z: f64| self.surface.height(at.x + x * radius, at.z + z * radius);
+        let middle = height(0.0, 0.0)?;
+        let around = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
+        let around = around.map(|[x, z]| height(x, z).unwrap_or(middle));
+        let slope_x = (around[0] - around[1]) / (2.0 * radius);
+        let slope_z = (around[2] - around[3]) / (2.0 * radius);
+        let normal = Vector3::new(-slope_x, 1.0, -slope_z).normalize();
+        // Of opposite places the mean is over or under the plane.
+        let bend = [around[0] + around[1], around[2] + around[3]];
+        let over = bend.map(|sum| 0.5 * sum - middle);
+        Some(Tangent {
+            place: Vector3::new(at.x, middle, at.z),
+            normal,
+            is_exact: false,
+            highest: normal.y * over[0].max(over[1]).max(0.0),
+        })
+    }
 }

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 use super::error::TerrainError;
 use super::plane::Plane;
-use super::{Coverage, Neighbourhood, Primitive, Terrain};
+use super::{Coverage, Neighbourhood, Primitive, SoftLayer, Terrain};
 use crate::geometry::ray::{Hit, Ray};
 use crate::geometry::shape::Sphere;
 
@@ -34,7 +34,7 @@ impl Union {
     /// Of its parts.
     ///
     /// # Errors
-    /// `NoParts`, `SecondPlane`, `TooManyPieces`.
+    /// `NoParts`, `SecondPlane`, `SecondSand`, `TooManyPieces`.
     pub fn new(mut parts: Vec<Arc<dyn Terrain>>) -> Result<Self, TerrainError> {
         if parts.is_empty() {
             return Err(TerrainError::NoParts);
@@ -45,6 +45,10 @@ impl Union {
                 return Err(TerrainError::SecondPlane { index });
             }
             parts[..=plane].rotate_right(1);
+        }
+        let mut soft = (0..parts.len()).filter(|&k| parts[k].soft().is_some());
+        if let (Some(_), Some(index)) = (soft.next(), soft.next()) {
+            return Err(TerrainError::SecondSand { index });
         }
         let mut first = Vec::with_capacity(parts.len());
         let mut sum = 0_u32;
@@ -169,5 +173,9 @@ impl Terrain for Union {
 
     fn ground(&self) -> Option<&Plane> {
         self.parts[0].ground()
+    }
+
+    fn soft(&self) -> Option<SoftLayer<'_>> {
+        self.parts.iter().find_map(|part| part.soft())
     }
 }

@@ -301,6 +301,15 @@ fn check_width(at: &impl Fn(&str) -> String, wheel: &WheelDescription) -> Result
             value: rounding,
         });
     }
+    let height = wheel.grouser_height.unwrap_or(0.0);
+    not_negative(&at("grouser_height"), height)?;
+    if height > radius {
+        return Err(ModelError::OutOfRange {
+            field: at("grouser_height"),
+            range: "at most the wheel's radius",
+            value: height,
+        });
+    }
     Ok(())
 }
 

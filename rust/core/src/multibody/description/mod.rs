@@ -162,6 +162,12 @@ pub struct WheelDescription {
     /// width for a torus.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rounding: Option<f64>,
+    /// Height of the grousers over the rim, m, which sand feels; 0, a smooth wheel, by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grouser_height: Option<f64>,
+    /// Number of grousers around the rim; 0 by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grousers: Option<u32>,
     /// Normal stiffness where it touches, N/m; rigid by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<f64>,

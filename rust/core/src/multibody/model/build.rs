@@ -421,6 +421,8 @@ fn wheels(
             radius: wheel.contact_radius.unwrap_or(wheel.radius),
             width: wheel.width.unwrap_or(0.0),
             rounding: wheel.rounding.unwrap_or(0.0),
+            grouser_height: wheel.grouser_height.unwrap_or(0.0),
+            grousers: wheel.grousers.unwrap_or(0),
             compliance: wheel.stiffness.map(|stiffness| Compliance {
                 stiffness,
                 damping: wheel.damping.unwrap_or(0.0),

@@ -39,6 +39,10 @@ pub struct Wheel {
     pub width: f64,
     /// Radius of its edges, m: at most half the width.
     pub rounding: f64,
+    /// Height of the grousers over the rim, m. Only sand feels them.
+    pub grouser_height: f64,
+    /// Number of grousers around the rim.
+    pub grousers: u32,
     /// Spring and damper where it touches; `None` if it is rigid.
     pub compliance: Option<Compliance>,
     /// Name of its material.

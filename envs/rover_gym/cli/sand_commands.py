@@ -1,0 +1,126 @@
+"""`rover sand soils|bed|slope|convert`: soils by name, and one wheel on a virtual test bed."""
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from rover_gym.cli.console import plain_errors
+from rover_gym.cli.results import AsJson, Results
+from rover_gym.mechanics import OptionError
+from rover_gym.sand import SingleWheel, climbed_slope, named_soil, soil_names
+from rover_gym.sand.convert import convert_runs
+from rover_gym.validation import number
+
+sand = typer.Typer(help="Wheels on sand: soils by name, and a virtual test bed for one wheel.", no_args_is_help=True)
+
+EARTH = 9.81  # m/s^2
+
+SoilName = Annotated[str, typer.Option("--soil", help="Name of the soil; `rover sand soils` lists them.")]
+Radius = Annotated[float, typer.Option(help="Radius of the wheel without grousers, m.")]
+Width = Annotated[float, typer.Option(help="Width of the wheel, m.")]
+GrouserHeight = Annotated[float, typer.Option(help="Height of its grousers, m.")]
+Grousers = Annotated[int, typer.Option(min=0, help="Number of its grousers.")]
+Mass = Annotated[float, typer.Option(help="Mass that the wheel carries, kg.")]
+Gravity = Annotated[float, typer.Option(help="Gravity, m/s^2.")]
+Slip = Annotated[list[float] | None, typer.Option(help="Slip, from -1 (locked) to below 1; repeat it for several.")]
+
+SLIPS = (-0.5, -0.2, 0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9)
+
+
+def _say(name: str, rows: Sequence[Mapping[str, Any]], *, as_json: bool) -> None:
+    """Prints rows with the same columns as a table, or as a list of JSON objects."""
+    with Results(as_json=as_json) as results:
+        results.add(**{name: list(rows)})
+        table = Table(*rows[0])
+        for line in rows:
+            table.add_row(*(f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in line.values()))
+        results.show(table)
+
+
+@sand.command()
+@plain_errors
+def soils(*, as_json: AsJson = False) -> None:
+    """List the soils, with their law and source."""
+    listed = [named_soil(name) for name in soil_names()]
+    _say("soils", [{"name": soil.name, "law": soil.law, "source": soil.source} for soil in listed], as_json=as_json)
+
+
+def _drive(slip: float, radius: float, angle: float, load: float, gravity: float) -> list[float]:
+    """Speed, rate, slip angle, load and gravity of a run with a slip; the faster of speed and rim has 0.1 m/s."""
+    if not -1.0 <= slip < 1.0:
+        raise OptionError(f"slip: must be from -1 to below 1, is {slip}")
+    speed, rim = (0.1 * (1.0 - slip), 0.1) if slip >= 0.0 else (0.1, 0.1 * (1.0 + slip))
+    return [speed, rim / radius, math.radians(angle), load, gravity]
+
+
+@sand.command()
+@plain_errors
+def bed(
+    *,
+    soil: SoilName = "cmu-sand",
+    radius: Radius = 0.1,
+    width: Width = 0.08,
+    grouser_height: GrouserHeight = 0.0,
+    grousers: Grousers = 0,
+    mass: Mass = 2.0,
+    gravity: Gravity = EARTH,
+    slip: Slip = None,
+    slip_angle: Annotated[float, typer.Option(help="Angle from the wheel's plane to its travel, degrees.")] = 0.0,
+    as_json: AsJson = False,
+) -> None:
+    """Drive one wheel over a bed at given slips: sinkage, drawbar pull, side force and torque in steady motion."""
+    mass = number("mass", mass, above=0.0)
+    wheel = SingleWheel(radius, width, grouser_height, grousers).on(named_soil(soil))
+    slips = list(slip or SLIPS)
+    found = wheel.steady([_drive(s, radius, slip_angle, mass * gravity, gravity) for s in slips])
+    runs = [
+        {"slip": s, "sinkage_mm": 1e3 * z, "drawbar_N": pull, "across_N": -side, "torque_Nm": torque}
+        for s, (z, pull, side, _, torque) in zip(slips, found.tolist(), strict=True)
+    ]
+    _say("runs", runs, as_json=as_json)
+
+
+@sand.command()
+@plain_errors
+def slope(
+    *,
+    soil: SoilName = "cmu-sand",
+    radius: Radius = 0.1,
+    width: Width = 0.08,
+    grouser_height: GrouserHeight = 0.0,
+    grousers: Grousers = 0,
+    mass: Mass = 2.0,
+    gravity: Gravity = EARTH,
+    slip: Slip = None,
+    as_json: AsJson = False,
+) -> None:
+    """Find the slope that a wheel with its load climbs at given slips."""
+    mass = number("mass", mass, above=0.0)
+    wheel = SingleWheel(radius, width, grouser_height, grousers)
+    chosen = named_soil(soil)
+    slips = list(slip or [s for s in SLIPS if s > 0.0])
+    slopes = []
+    for s in slips:
+        angle, sinkage = climbed_slope(wheel, chosen, mass, s, gravity)
+        slopes.append({"slip": s, "slope_deg": math.degrees(angle), "sinkage_mm": 1e3 * sinkage})
+    _say("slopes", slopes, as_json=as_json)
+
+
+@sand.command()
+@plain_errors
+def convert(
+    source: Annotated[Path, typer.Argument(help="A CSV file of runs in other columns.", exists=True, dir_okay=False)],
+    target: Annotated[Path, typer.Argument(help="The table to write.", dir_okay=False)],
+    *,
+    column: Annotated[
+        list[str], typer.Option(help="One column of the table, as NAME=COLUMN or NAME=COLUMN*FACTOR; repeat it.")
+    ],
+    wheel: Annotated[str, typer.Option(help="Name of the wheel, for all rows.")] = "wheel",
+) -> None:
+    """Rewrite a table of runs in the columns, units and signs that `read_runs` takes."""
+    n = convert_runs(source, target, column, wheel)
+    typer.echo(f"{target}: {n} runs")

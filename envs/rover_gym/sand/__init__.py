@@ -1,0 +1,22 @@
+"""Wheels on sand: soils, a virtual test bed for one wheel, and fits to measurements."""
+
+from rover_gym.mechanics import SoftGround, WheelBed
+from rover_gym.sand.fit import FittedSoil, errors_of, fit_soil
+from rover_gym.sand.measurements import Runs, SingleWheel, read_runs
+from rover_gym.sand.slopes import climbed_slope
+from rover_gym.sand.soils import Soil, named_soil, soil_names
+
+__all__ = [
+    "FittedSoil",
+    "Runs",
+    "SingleWheel",
+    "SoftGround",
+    "Soil",
+    "WheelBed",
+    "climbed_slope",
+    "errors_of",
+    "fit_soil",
+    "named_soil",
+    "read_runs",
+    "soil_names",
+]

@@ -1,0 +1,31 @@
+//! Sand under wheels: sinkage, slip, traction and ruts.
+//!
+//! A wheel in sand feels a stress on every piece of it that is under the surface
+//! ([`resistive_force`], or [`bekker`] as the baseline of the field), which [`patch`] sums to a
+//! force, a moment and their derivatives. [`memory`] is the state of the sand at a wheel, which
+//! makes rest and small motions regular. [`test_bed`] is a virtual test bed for one wheel.
+//!
+//! The chapter sees a wheel, a plane with a relief and six numbers of memory, and no machine: the
+//! coupling to a machine is in [`crate::system`].
+
+pub mod bekker;
+pub(crate) mod checks;
+pub mod memory;
+pub mod patch;
+pub mod piece;
+pub mod resistive_force;
+pub mod ruts;
+pub mod soil;
+pub mod state;
+pub mod test_bed;
+pub mod wheel;
+
+pub use bekker::Bekker;
+pub use memory::{Memory, Twist};
+pub use patch::{Bed, Reaction, Want, WheelPose, react};
+pub use resistive_force::{Flow, Interface};
+pub use ruts::RutMap;
+pub use soil::{Law, Resistive, Soil};
+pub use state::{SandState, WheelInSand};
+pub use test_bed::{Drive, Measured, Sunk, TestBed};
+pub use wheel::{Rules, SandWheel};

@@ -1,0 +1,353 @@
+//! Soils, the sand of a simulation, and one wheel on a virtual test bed.
+
+use numpy::PyArray2;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyMapping};
+use rover_core::sand::{
+    Bekker, Drive, Flow, Interface, Law, Measured, Resistive, SandState, SandWheel, Soil, Sunk,
+    TestBed,
+};
+
+use crate::arguments::{Given, number, refused, whole};
+use crate::arrays::{fresh, fresh_table, rows};
+use crate::errors::{BorderError, Kind};
+use crate::planar_ground::quantity;
+
+/// Numbers of a soil by their names.
+struct Numbers<'py>(Bound<'py, PyMapping>);
+
+impl<'py> Numbers<'py> {
+    /// Of a mapping, or of an object whose attribute `numbers` is one.
+    fn of(soil: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let numbers = match soil.getattr("numbers") {
+            Ok(numbers) => numbers,
+            Err(_) => soil.clone(),
+        };
+        let mapping = numbers.cast_into::<PyMapping>().map_err(|_| {
+            refused(
+                soil,
+                Kind::Terrain,
+                "soil",
+                "a Soil or a mapping of its numbers",
+            )
+        })?;
+        Ok(Self(mapping))
+    }
+
+    fn get(&self, name: &str) -> PyResult<f64> {
+        let value = self.0.get_item(name).map_err(|_| BorderError {
+            kind: Kind::Terrain,
+            message: format!("soil: has no {name}"),
+            field: Some("soil".to_owned()),
+            value: crate::errors::Value::Text(name.to_owned()),
+        })?;
+        number(&value, Kind::Terrain, name)
+    }
+
+    fn interface(&self, name: &str) -> PyResult<Interface> {
+        Ok(Interface {
+            friction: self.get(&format!("{name}_friction"))?,
+            follow: self.get(&format!("{name}_follow"))?,
+        })
+    }
+}
+
+/// A soil from Python.
+pub fn soil_of(given: &Bound<'_, PyAny>) -> PyResult<Soil> {
+    let numbers = Numbers::of(given)?;
+    let law = if numbers.0.contains("frictional_modulus")? {
+        Law::Bekker(Bekker {
+            cohesive_modulus: numbers.get("cohesive_modulus")?,
+            frictional_modulus: numbers.get("frictional_modulus")?,
+            exponent: numbers.get("exponent")?,
+            cohesion: numbers.get("cohesion")?,
+            internal_friction: numbers.get("internal_friction")?,
+            shear_modulus: numbers.get("shear_modulus")?,
+        })
+    } else {
+        Law::Resistive(Resistive {
+            density: numbers.get("density")?,
+            internal_friction: numbers.get("internal_friction")?,
+            stiffness_factor: numbers.get("stiffness_factor")?,
+            tread: numbers.interface("tread")?,
+            wall: numbers.interface("wall")?,
+            grousers: numbers.interface("grouser")?,
+            flow: Flow {
+                dilatancy: numbers.get("dilatancy")?,
+                grip: numbers.get("grip")?,
+                width: numbers.get("grip_width")?,
+                fluidity: numbers.get("fluidity")?,
+                mobilisation: numbers.get("mobilisation")?,
+            },
+        })
+    };
+    let soil = Soil {
+        law,
+        memory: numbers.get("memory")?,
+        reload: numbers.get("reload")?,
+    };
+    soil.check().map_err(|e| quantity(Kind::Terrain, &e))?;
+    Ok(soil)
+}
+
+/// Numbers of a soil by their names.
+pub fn numbers_of<'py>(py: Python<'py>, soil: &Soil) -> PyResult<Bound<'py, PyDict>> {
+    let numbers = PyDict::new(py);
+    let set = |name: &str, value: f64| numbers.set_item(name, value);
+    match &soil.law {
+        Law::Resistive(sand) => {
+            set("density", sand.density)?;
+            set("internal_friction", sand.internal_friction)?;
+            set("stiffness_factor", sand.stiffness_factor)?;
+            for (name, surface) in [
+                ("tread", sand.tread),
+                ("wall", sand.wall),
+                ("grouser", sand.grousers),
+            ] {
+                set(&format!("{name}_friction"), surface.friction)?;
+                set(&format!("{name}_follow"), surface.follow)?;
+            }
+            set("dilatancy", sand.flow.dilatancy)?;
+            set("grip", sand.flow.grip)?;
+            set("grip_width", sand.flow.width)?;
+            set("fluidity", sand.flow.fluidity)?;
+            set("mobilisation", sand.flow.mobilisation)?;
+        }
+        Law::Bekker(soil) => {
+            set("cohesive_modulus", soil.cohesive_modulus)?;
+            set("frictional_modulus", soil.frictional_modulus)?;
+            set("exponent", soil.exponent)?;
+            set("cohesion", soil.cohesion)?;
+            set("internal_friction", soil.internal_friction)?;
+            set("shear_modulus", soil.shear_modulus)?;
+        }
+    }
+    set("memory", soil.memory)?;
+    set("reload", soil.reload)?;
+    Ok(numbers)
+}
+
+/// The sand of a simulation as arrays.
+pub fn sand_to_dict<'py>(
+    py: Python<'py>,
+    sand: &SandState,
+    cell: f64,
+) -> PyResult<Bound<'py, PyDict>> {
+    let found = PyDict::new(py);
+    let of = |value: fn(&rover_core::sand::WheelInSand) -> f64| -> Vec<f64> {
+        sand.wheels.iter().map(value).collect()
+    };
+    let forces: Vec<[f64; 3]> = sand.wheels.iter().map(|wheel| wheel.force).collect();
+    let moments: Vec<[f64; 3]> = sand.wheels.iter().map(|wheel| wheel.moment).collect();
+    found.set_item("force", fresh_table(py, forces.into_iter())?)?;
+    found.set_item("moment", fresh_table(py, moments.into_iter())?)?;
+    found.set_item("sinkage", fresh(py, &of(|wheel| wheel.sinkage)))?;
+    found.set_item("absorbed", fresh(py, &of(|wheel| wheel.absorbed)))?;
+    let ruts = sand.ruts.cells().into_iter();
+    let ruts: Vec<[f64; 3]> = ruts
+        .map(|(i, k, depth)| {
+            let place = |index| (f64::from(index) + 0.5) * cell;
+            [place(i), place(k), depth]
+        })
+        .collect();
+    found.set_item("ruts", fresh_table(py, ruts.into_iter())?)?;
+    Ok(found)
+}
+
+/// One wheel on a bed of soil, driven at prescribed speeds and free to sink under its load.
+///
+/// Args:
+///     soil: A `rover_gym.sand.Soil`, or a mapping of its numbers.
+///     radius: Radius of the wheel without grousers, m.
+///     width: Its width, m.
+///     rounding: Radius of its edges, m.
+///     grouser_height: Height of its grousers, m.
+///     grousers: Number of its grousers.
+///     accuracy: Largest error of the forces by the number of points on the wheel.
+///
+/// Raises:
+///     TerrainError: A number of the soil is missing or out of its range.
+///     OptionError: A number of the wheel is out of its range.
+#[pyclass(module = "rover_gym.mechanics", frozen)]
+pub struct WheelBed {
+    bed: TestBed,
+}
+
+fn drive_of([speed, rate, slip_angle, load, gravity]: [f64; 5]) -> Drive {
+    Drive {
+        speed,
+        rate,
+        slip_angle,
+        load,
+        gravity,
+    }
+}
+
+fn listed(found: Measured) -> [f64; 5] {
+    let Measured {
+        sinkage,
+        drawbar,
+        lateral,
+        lift,
+        torque,
+    } = found;
+    [sinkage, drawbar, lateral, lift, torque]
+}
+
+#[pymethods]
+impl WheelBed {
+    #[new]
+    #[pyo3(signature = (soil, radius, width, rounding = Given::MISSING,
+        grouser_height = Given::MISSING, grousers = Given::MISSING, accuracy = Given::MISSING),
+        text_signature = "(soil, radius, width, rounding=0.0, grouser_height=0.0, grousers=0, \
+                          accuracy=0.01)")]
+    fn new(
+        soil: &Bound<'_, PyAny>,
+        radius: &Bound<'_, PyAny>,
+        width: &Bound<'_, PyAny>,
+        rounding: Given<'_>,
+        grouser_height: Given<'_>,
+        grousers: Given<'_>,
+        accuracy: Given<'_>,
+    ) -> PyResult<Self> {
+        let soil = soil_of(soil)?;
+        let positive = |value: f64, field: &str| {
+            let checked = rover_core::quantity::positive(field, value);
+            checked.map_err(|e| quantity(Kind::Option, &e))
+        };
+        let grousers = match grousers.given() {
+            Some(n) => whole(&n, Kind::Option, "grousers")?,
+            None => 0,
+        };
+        let wheel = SandWheel {
+            radius: positive(number(radius, Kind::Option, "radius")?, "radius")?,
+            width: positive(number(width, Kind::Option, "width")?, "width")?,
+            rounding: rounding.number(0.0, Kind::Option, "rounding")?,
+            grouser_height: grouser_height.number(0.0, Kind::Option, "grouser_height")?,
+            grousers: u32::try_from(grousers).unwrap_or(u32::MAX),
+        };
+        let most = 0.5 * wheel.width;
+        for (field, value, range, high) in [
+            ("rounding", wheel.rounding, "from 0 to half the width", most),
+            (
+                "grouser_height",
+                wheel.grouser_height,
+                "from 0 to the radius",
+                wheel.radius,
+            ),
+        ] {
+            if !(0.0..=high).contains(&value) {
+                let error = rover_core::quantity::QuantityError::OutOfRange {
+                    field: field.to_owned(),
+                    range,
+                    value,
+                };
+                return Err(quantity(Kind::Option, &error).into());
+            }
+        }
+        let accuracy = accuracy.number(0.01, Kind::Option, "accuracy")?;
+        let rules = rover_core::sand::test_bed::rules_within(&wheel, &soil, accuracy);
+        Ok(Self {
+            bed: TestBed { wheel, soil, rules },
+        })
+    }
+
+    /// Points at which the stress is evaluated.
+    #[getter]
+    fn n_points(&self) -> usize {
+        self.bed.rules.n_points()
+    }
+
+    /// Radius of the drum with the sand that its grousers hold, m.
+    #[getter]
+    fn drum(&self) -> f64 {
+        self.bed.wheel.drum()
+    }
+
+    /// Steady motion.
+    ///
+    /// Args:
+    ///     drives: Speed of travel (m/s), rate of the wheel (rad/s, positive forward), slip angle
+    ///         (rad, to the right), load (N) and gravity (m/s²) of each run, (n, 5).
+    ///
+    /// Returns:
+    ///     Sinkage (m), drawbar pull, force to the right and lift (N), and driving torque (N m) of
+    ///     each run, (n, 5); nan where the soil does not bear the load.
+    ///
+    /// Raises:
+    ///     OptionError: `drives` has a wrong shape or an entry that is not finite.
+    fn steady<'py>(
+        &self,
+        py: Python<'py>,
+        drives: &Bound<'_, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let drives = rows::<5>(drives, "drives")?;
+        let found = py.detach(|| {
+            let runs = drives
+                .iter()
+                .map(|drive| self.bed.steady(&drive_of(*drive)));
+            let runs = runs.map(|run| run.map_or([f64::NAN; 5], listed));
+            runs.collect::<Vec<_>>()
+        });
+        fresh_table(py, found.into_iter())
+    }
+
+    /// Forces in steady motion at a given sinkage.
+    ///
+    /// Args:
+    ///     sinkage: Depth of the lowest point under the surface, m.
+    ///     drives: As for `steady`; the load does not matter.
+    ///
+    /// Returns:
+    ///     As `steady`, (n, 5).
+    ///
+    /// Raises:
+    ///     OptionError: An argument has a wrong shape or is not finite.
+    fn forces<'py>(
+        &self,
+        py: Python<'py>,
+        sinkage: &Bound<'_, PyAny>,
+        drives: &Bound<'_, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let sinkage = number(sinkage, Kind::Option, "sinkage")?;
+        let drives = rows::<5>(drives, "drives")?;
+        let found = drives
+            .iter()
+            .map(|drive| listed(self.bed.at(sinkage, &drive_of(*drive))));
+        fresh_table(py, found.collect::<Vec<_>>().into_iter())
+    }
+
+    /// A run from rest on the surface: the wheel is let down and driven.
+    ///
+    /// Args:
+    ///     drives: As for `steady`, one row for each step, (n, 5).
+    ///     mass: Mass that sinks with the wheel, kg.
+    ///     time_step: Length of a step, s.
+    ///
+    /// Returns:
+    ///     As `steady`, at the end of each step, (n, 5).
+    ///
+    /// Raises:
+    ///     OptionError: An argument has a wrong shape, is not finite, or is not positive.
+    fn run<'py>(
+        &self,
+        py: Python<'py>,
+        drives: &Bound<'_, PyAny>,
+        mass: &Bound<'_, PyAny>,
+        time_step: &Bound<'_, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let drives = rows::<5>(drives, "drives")?;
+        let positive = |given: &Bound<'_, PyAny>, field: &str| {
+            let value = number(given, Kind::Option, field)?;
+            let checked = rover_core::quantity::positive(field, value);
+            checked.map_err(|e| PyErr::from(quantity(Kind::Option, &e)))
+        };
+        let (mass, h) = (positive(mass, "mass")?, positive(time_step, "time_step")?);
+        let mut state = Sunk::default();
+        let found = drives.iter().map(|drive| {
+            let drive = drive_of(*drive);
+            listed(self.bed.advance(&mut state, &drive, mass, h))
+        });
+        fresh_table(py, found.collect::<Vec<_>>().into_iter())
+    }
+}

@@ -1,0 +1,86 @@
+//! `SoftGround`.
+
+use std::sync::Arc;
+
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rover_core::draw::DrawnGround;
+use rover_core::geometry::SoftGround as CoreGround;
+
+use crate::arguments::Given;
+use crate::errors::Kind;
+use crate::planar_ground::quantity;
+use crate::sand::{numbers_of, soil_of};
+use crate::terrain::{Terrain, parse};
+use crate::union;
+
+/// Ground of sand, into which wheels sink. To every other part of a machine its surface is rigid.
+///
+/// The ruts belong to a simulation and are part of its snapshots. Rocks on sand are a `Union` of
+/// both. Steps on soft ground are general: `Simulation.fallback_reason` says so.
+///
+/// Args:
+///     surface: The undisturbed surface: a `Plane`, `HeightField` or `TriangleMesh`.
+///     soil: A `rover_gym.sand.Soil`, or a mapping of its numbers.
+///     rut_cell: Size of a cell of the map of ruts, from 0.001 to 1 m.
+///
+/// Raises:
+///     TerrainError: The surface is no terrain, or a number of the soil is missing or out of its
+///         range.
+#[pyclass(module = "rover_gym.mechanics", frozen, extends = Terrain)]
+pub struct SoftGround {
+    inner: Arc<CoreGround>,
+    surface: Arc<DrawnGround>,
+}
+
+impl SoftGround {
+    /// Sand of the core, for Python.
+    pub fn of(inner: Arc<CoreGround>, surface: Arc<DrawnGround>) -> PyClassInitializer<Self> {
+        let ground = DrawnGround::Soft(inner.clone(), surface.clone());
+        Terrain::base(ground).add_subclass(Self { inner, surface })
+    }
+}
+
+#[pymethods]
+impl SoftGround {
+    #[new]
+    #[pyo3(signature = (surface, soil, rut_cell = Given::MISSING),
+        text_signature = "(surface, soil, rut_cell=0.02)")]
+    fn new(
+        surface: &Bound<'_, PyAny>,
+        soil: &Bound<'_, PyAny>,
+        rut_cell: Given<'_>,
+    ) -> PyResult<PyClassInitializer<Self>> {
+        let surface = parse(surface)?;
+        let cell = rut_cell.number(0.02, Kind::Terrain, "rut_cell")?;
+        let made = CoreGround::new(surface.terrain(), Arc::new(soil_of(soil)?), cell);
+        let made = made.map_err(|e| quantity(Kind::Terrain, &e))?;
+        Ok(Self::of(Arc::new(made), Arc::new(surface)))
+    }
+
+    /// The undisturbed surface.
+    #[getter]
+    fn surface<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        union::object(py, &self.surface)
+    }
+
+    /// Numbers of the soil by their names.
+    #[getter]
+    fn soil<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        numbers_of(py, self.inner.soil())
+    }
+
+    /// Size of a cell of the map of ruts, m.
+    #[getter]
+    fn rut_cell(&self) -> f64 {
+        self.inner.cell()
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let py = slf.py();
+        let own = slf.get();
+        let arguments = (own.surface(py)?, own.soil(py)?, own.rut_cell());
+        let arguments = arguments.into_pyobject(py)?.into_any();
+        Ok((slf.get_type().into_any(), arguments))
+    }
+}

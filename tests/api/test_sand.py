@@ -1,0 +1,220 @@
+"""Sand from Python: soils, the test bed for one wheel, fits, and rovers on soft ground."""
+
+import math
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rover_gym.mechanics import (
+    HeightField,
+    OptionError,
+    Plane,
+    RoverModel,
+    Simulation,
+    SphereField,
+    TerrainError,
+    Union,
+)
+from rover_gym.sand import (
+    Runs,
+    SingleWheel,
+    SoftGround,
+    Soil,
+    climbed_slope,
+    errors_of,
+    fit_soil,
+    named_soil,
+    read_runs,
+    soil_names,
+)
+from rover_gym.sand.convert import convert_runs
+
+WHEEL = SingleWheel(0.058, 0.05)
+
+
+def drives(slips: list[float], angles: list[float]) -> list[list[float]]:
+    return [[0.01, 0.01 / (1.0 - s) / WHEEL.radius, a, 20.0, 9.81] for s in slips for a in angles]
+
+
+@pytest.mark.parametrize("name", soil_names())
+def test_every_soil_bears_a_wheel_and_says_where_it_is_from(name: str) -> None:
+    soil = named_soil(name)
+    assert len(soil.source) > 20
+    sinkage, _, across, lift, torque = SingleWheel(0.1, 0.1).on(soil).steady([[0.1, 1.2, 0.0, 30.0, 9.81]])[0]
+    assert 1e-4 < sinkage < 0.1
+    assert lift == pytest.approx(30.0, rel=1e-3)
+    assert abs(across) < 1e-9
+    assert torque > 0.0
+
+
+def test_the_points_follow_the_accuracy() -> None:
+    from rover_gym.sand import WheelBed  # noqa: PLC0415 - beside its use
+
+    coarse, fine = (WheelBed(named_soil("cmu-sand"), 0.058, 0.05, accuracy=a) for a in (0.05, 0.002))
+    assert coarse.n_points < fine.n_points
+    runs = drives([0.2, 0.5], [0.0, 0.5])
+    assert coarse.steady(runs) == pytest.approx(fine.steady(runs), rel=0.1, abs=0.5)
+
+
+def test_unknown_and_wrong_numbers_are_named() -> None:
+    soil = named_soil("cmu-sand")
+    with pytest.raises(OptionError, match="no soil 'mud'; they are cmu-sand"):
+        named_soil("mud")
+    with pytest.raises(OptionError, match="cohesion: no number of the law resistive"):
+        soil.having(cohesion=3.0)
+    with pytest.raises(OptionError, match="law: must be resistive or bekker, is 'magic'"):
+        Soil("x", "magic", {})
+    with pytest.raises(TerrainError, match="density: must be from 1 to 10 000 kg/m³, is -5"):
+        SoftGround(Plane(), soil.having(density=-5.0))
+    with pytest.raises(TerrainError, match="soil: has no memory"):
+        SoftGround(Plane(), {k: v for k, v in soil.numbers.items() if k != "memory"})
+    with pytest.raises(TerrainError, match=r"soil: .*a Soil or a mapping"):
+        SoftGround(Plane(), 3)  # type: ignore[arg-type]
+    with pytest.raises(TerrainError, match=r"rut_cell: must be from 0.001 to 1 m, is 2"):
+        SoftGround(Plane(), soil, rut_cell=2.0)
+    with pytest.raises(OptionError, match="radius: must be positive, is 0"):
+        SingleWheel(0.0, 0.1).on(soil)
+    with pytest.raises(TerrainError, match="a second soft ground"):
+        Union([SoftGround(Plane(), soil), SoftGround(HeightField(np.zeros((3, 3)), 1.0), soil)])
+
+
+def test_a_run_settles_at_steady_motion() -> None:
+    bed = WHEEL.on(named_soil("cmu-sand"))
+    drive = drives([0.2], [0.3])[0]
+    steady = bed.steady([drive])[0]
+    run = bed.run(np.tile(drive, (6000, 1)), 20.0 / 9.81, 0.01)
+    assert run[-1] == pytest.approx(steady, rel=1e-3, abs=1e-3)
+    assert bed.forces(steady[0], [drive])[0] == pytest.approx(steady, rel=1e-9, abs=1e-9)
+
+
+def test_more_slip_climbs_more_until_the_sand_gives_way() -> None:
+    soil = named_soil("grc-1")
+    found = [climbed_slope(SingleWheel(0.225, 0.2), soil, 17.5, slip)[0] for slip in (0.05, 0.2, 0.5)]
+    assert 0.0 < found[0] < found[1] < found[2] < math.radians(30.0)
+    with pytest.raises(OptionError, match="slip: must be from 0 to below 1, is 1"):
+        climbed_slope(WHEEL, soil, 1.0, 1.0)
+
+
+def synthetic(soil: Soil, noise: float = 0.0) -> Runs:
+    table = np.array(drives([-0.5, 0.0, 0.3, 0.6], [0.0, 0.3, 0.8]))
+    empty = Runs("w", table[:, 2], table[:, 0], table[:, 1], table[:, 3], np.zeros((len(table), 3)))
+    measured = empty.predicted(WHEEL.on(soil))
+    measured += noise * np.random.default_rng(1).normal(size=measured.shape) * (1.0, 1.0, 1e-3)
+    return Runs("w", empty.slip_angle, empty.speed, empty.rate, empty.load, measured)
+
+
+def test_a_fit_finds_the_soil_behind_synthetic_runs() -> None:
+    start = named_soil("cmu-sand")
+    truth = start.having(
+        wall_friction=0.25, tread_follow=6.0, wall_follow=6.0, fluidity=0.6, tread_friction=0.6, grouser_friction=0.6
+    )
+    free = ("tread_friction", "wall_friction", "tread_follow", "fluidity")
+    runs = [synthetic(truth)]
+    fit = fit_soil(start, runs, {"w": WHEEL}, free=free)
+    assert fit.is_converged
+    for name in free:
+        assert fit.soil.numbers[name] == pytest.approx(truth.numbers[name], rel=0.02), name
+    assert np.abs(errors_of(fit.soil, runs, {"w": WHEEL})).max() < 0.1
+    noisy = fit_soil(start, [synthetic(truth, 0.3)], {"w": WHEEL}, free=free)
+    for name, deviation in zip(free, noisy.deviations, strict=True):
+        assert abs(noisy.soil.numbers[name] - truth.numbers[name]) < 4.0 * deviation, name
+    with pytest.raises(OptionError, match="free: 'colour' must be a positive number"):
+        fit_soil(start, runs, {"w": WHEEL}, free=("colour",))
+    with pytest.raises(OptionError, match="runs: needs at least one"):
+        fit_soil(start, [], {"w": WHEEL})
+
+
+def test_tables_are_converted_read_and_refused_by_line(tmp_path: Path) -> None:
+    (tmp_path / "raw.csv").write_text("beta,vrim,v,Fx,Fy,Fz,z\n0,8,10,-1,0,20,0.01\n15,10,10,-2,7,20,0.012\n")
+    columns = [
+        "slip_angle_deg=beta",
+        "rim_speed_mm_s=vrim",
+        "speed_mm_s=v",
+        "drawbar_N=Fx",
+        "lateral_N=Fy*-1",
+        "load_N=Fz",
+        "sinkage_mm=z*1000",
+    ]
+    assert convert_runs(tmp_path / "raw.csv", tmp_path / "runs.csv", columns, "mine") == 2
+    runs = read_runs(tmp_path / "runs.csv", {"mine": WHEEL})[0]
+    assert runs.measured[1] == pytest.approx([-2.0, -7.0, 0.012])
+    assert runs.rate[0] == pytest.approx(0.008 / 0.058)
+    with pytest.raises(OptionError, match="load_N is missing"):
+        convert_runs(tmp_path / "raw.csv", tmp_path / "x.csv", columns[:5], "mine")
+    with pytest.raises(OptionError, match="unknown wheel 'mine'"):
+        read_runs(tmp_path / "runs.csv", {"other": WHEEL})
+    broken = (tmp_path / "runs.csv").read_text().replace("12.0", "deep")
+    (tmp_path / "broken.csv").write_text(broken)
+    with pytest.raises(OptionError, match="line 3: sinkage_mm must be a number, is 'deep'"):
+        read_runs(tmp_path / "broken.csv", {"mine": WHEEL})
+
+
+def wide_rover() -> RoverModel:
+    description = RoverModel.named("open-rover").to_dict()
+    for wheel in description["wheels"]:
+        wheel |= {"width": 0.08, "grouser_height": 0.005, "grousers": 24}
+    return RoverModel.from_dict(description)
+
+
+def test_a_rover_sinks_and_says_how_deep() -> None:
+    soft = SoftGround(Plane(), named_soil("cmu-sand"))
+    sim = Simulation(wide_rover(), terrain=soft, time_step=0.005)
+    q = np.zeros(len(sim.q))
+    q[1] = 0.245
+    sim.set_state(q, np.zeros(len(sim.v)))
+    sim.step(300)
+    sand = sim.sand()
+    assert sand is not None
+    assert sand["force"].shape == (6, 3)
+    assert np.all(sand["sinkage"] > 5e-4)
+    assert sand["force"][:, 1].sum() == pytest.approx(12.7 * 9.81, rel=0.02)
+    assert np.all(sand["absorbed"] >= 0.0)
+    again = pickle.loads(pickle.dumps(soft))  # noqa: S301 - made here
+    assert again.soil == soft.soil
+    assert again.rut_cell == soft.rut_cell
+    assert Simulation(wide_rover(), terrain=Plane()).sand() is None
+
+
+def test_ruts_follow_the_wheels_and_snapshots_keep_them() -> None:
+    rocks = SphereField(np.array([[5.0, 0.0, 5.0]]), np.array([0.2]))
+    sim = Simulation(wide_rover(), terrain=[SoftGround(Plane(), named_soil("cmu-sand")), rocks], time_step=0.005)
+    q = np.zeros(len(sim.q))
+    q[1] = 0.245
+    sim.set_state(q, np.zeros(len(sim.v)))
+    sim.set_wheel_torques(np.full(6, 1.0))
+    sim.step(300)
+    snapshot = sim.snapshot()
+    sim.step(50)
+    first = sim.sand()
+    sim.restore(snapshot)
+    sim.step(50)
+    second = sim.sand()
+    assert first is not None
+    assert second is not None
+    for name in first:
+        assert np.array_equal(first[name], second[name]), name
+    assert len(first["ruts"]) > 10
+    assert np.all(first["ruts"][:, 2] > 0.0)
+    assert np.unique(np.sign(first["ruts"][:, 1])).tolist() == [-1.0, 1.0]
+
+
+def test_a_level_map_is_the_plane_and_a_tilted_one_a_slope() -> None:
+    soil = named_soil("cmu-sand")
+    x = np.linspace(-2.0, 2.0, 21)
+    for slope in (0.0, 0.1):
+        heights = np.tile(slope * x, (21, 1))
+        grounds = (Plane.tilted(math.atan(slope), 0.0), HeightField(heights, 0.2, origin=(-2.0, -2.0)))
+        found = []
+        for ground in grounds:
+            sim = Simulation(wide_rover(), terrain=SoftGround(ground, soil), time_step=0.005)
+            q = np.zeros(len(sim.q))
+            q[1] = 0.25
+            sim.set_state(q, np.zeros(len(sim.v)))
+            sim.brake()
+            sim.step(300)
+            sand = sim.sand()
+            assert sand is not None
+            found.append(sand["sinkage"])
+        assert found[0] == pytest.approx(found[1], abs=3e-4)

@@ -1,0 +1,9 @@
+//! Machines whose wheels sink into sand.
+#![allow(clippy::unwrap_used)]
+#![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // numbers of steps
+
+mod sand_scenes;
+
+mod driving;
+mod forces;
+mod resting;

@@ -1,0 +1,40 @@
+//! Rest on sand: sinkage under the weight, no creep, every step and mass.
+
+use rover_core::nalgebra::Vector3;
+
+use super::sand_scenes::{bekker_sand, dry_sand, placed, total_force, wide};
+
+/// After it has settled, a rover that is left alone stays where it is, on level sand and on ten
+/// degrees, light or heavy, at every step; the sand bears its weight.
+#[test]
+fn a_rover_rests_without_creep() {
+    let (sand, bekker) = (dry_sand(), bekker_sand());
+    for (name, width, factor, soils) in [
+        ("mars-rover", 0.4, 1.0, vec![&sand]),
+        ("open-rover", 0.08, 3.0 / 12.7, vec![&sand, &bekker]),
+    ] {
+        let model = wide(name, width, factor);
+        let weight = 9.81 * model.mass();
+        for h in [0.005, 0.02] {
+            for angle in [0.0, 10.0_f64.to_radians()] {
+                for soil in &soils {
+                    let mut sim = placed(&model, (*soil).clone(), angle, h);
+                    sim.brake();
+                    let settle = (2.0 / h) as usize;
+                    let report = sim.step(settle).unwrap();
+                    assert!(report.is_converged());
+                    let before = sim.q().position;
+                    sim.step(settle).unwrap();
+                    let creep = (sim.q().position - before).norm() / 2.0;
+                    let force = total_force(&sim);
+                    assert!(creep < 1e-6, "{name} {h} {angle}: {creep} m/s");
+                    let error = (force - Vector3::new(0.0, weight, 0.0)).norm();
+                    assert!(
+                        error < 0.01 * weight,
+                        "{name} {h} {angle}: {force}, {weight}"
+                    );
+                }
+            }
+        }
+    }
+}

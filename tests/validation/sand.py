@@ -1,0 +1,188 @@
+"""Sand beside measurements: `python -m validation.sand --data FOLDER` writes tables and a figure.
+
+The folder has `wheel_on_sand.csv` and `single_wheels.csv`, which are not in the repository; `docs/sand.md` says where
+the public data are. Without a folder the command says so and ends.
+"""
+
+import argparse
+import csv
+import math
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.sand import (
+    FittedSoil,
+    Runs,
+    SingleWheel,
+    Soil,
+    climbed_slope,
+    errors_of,
+    fit_soil,
+    named_soil,
+    read_runs,
+)
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+
+DOCS = Path(__file__).resolve().parents[2] / "docs" / "validation"
+VARIABLE = "ROVER_GYM_SOIL_DATA"
+
+#: The wheel of the data set. The number of grousers is not stated there; 30 hold sand all around the rim.
+WHEELS = {"smooth": SingleWheel(0.058, 0.05), "grousered": SingleWheel(0.058, 0.05, 0.005, 30)}
+
+#: Errors of the model published with the data, which has coefficients for each slip angle: N, N, mm.
+PUBLISHED = {"smooth": (6.8, 7.3, 7.5), "grousered": (5.1, 6.9, 9.0)}
+
+#: NASA's MGRU3 wheel on GRC-1: slope, degrees, and slip, as Project Chrono's scripts quote the measurement.
+MGRU3 = ((0.3, 0.032), (5.2, 0.052), (10.0, 0.135), (15.0, 0.434), (20.2, 0.756), (25.1, 0.885))
+MGRU3_MASS = 17.5
+
+SIDEWAYS = math.radians(89.0)
+
+
+def weights(runs: Sequence[Runs]) -> list[npt.NDArray[np.float64]]:
+    """1, but 0 for the pull at 90 degrees: by symmetry a locked wheel has none there, and 7 N were measured."""
+    found = []
+    for own in runs:
+        weight = np.ones((len(own), 3))
+        weight[own.slip_angle > SIDEWAYS, 0] = 0.0
+        found.append(weight)
+    return found
+
+
+def rms(errors: npt.NDArray[np.float64]) -> str:
+    """Root mean squares of errors (n, 3) in N, N and mm, as cells of a table."""
+    values = np.sqrt((errors**2).mean(axis=0)) * (1.0, 1.0, 1e3)
+    return " | ".join(f"{value:.1f}" for value in values)
+
+
+def table(soil: Soil, runs: Sequence[Runs]) -> list[str]:
+    """Errors by wheel and slip angle."""
+    lines = ["| wheel | slip angles | pull, N | across, N | sinkage, mm |", "|---|---|---|---|---|"]
+    for own in runs:
+        errors = errors_of(soil, [own], WHEELS)
+        degrees = np.degrees(own.slip_angle).round()
+        lines += [f"| {own.wheel} | {angle:.0f}° | {rms(errors[degrees == angle])} |" for angle in np.unique(degrees)]
+        lines.append(f"| {own.wheel} | below 90° | {rms(errors[own.slip_angle < SIDEWAYS])} |")
+        lines.append(f"| {own.wheel} | all | {rms(errors)} |")
+        published = " | ".join(f"{value:.1f}" for value in PUBLISHED[own.wheel])
+        lines.append(f"| {own.wheel} | all, published model | {published} |")
+    return lines
+
+
+def fitted(fit: FittedSoil) -> str:
+    """The fitted numbers with their standard deviations."""
+    pairs = zip(fit.free, fit.deviations.tolist(), strict=True)
+    return ", ".join(f"`{name}` {fit.soil.numbers[name]:.3f} ± {deviation:.3f}" for name, deviation in pairs)
+
+
+def predictions(start: Soil, runs: Sequence[Runs]) -> list[str]:
+    """Fits on some of the runs, and the errors of the others."""
+    lines = ["| fitted on | predicted | pull, N | across, N | sinkage, mm |", "|---|---|---|---|---|"]
+    for wheel, other in (("grousered", "smooth"), ("smooth", "grousered")):
+        chosen = [own for own in runs if own.wheel == wheel]
+        fit = fit_soil(start, chosen, WHEELS, weights=weights(chosen))
+        rest = [own for own in runs if own.wheel == other]
+        below = [own.where(own.slip_angle < SIDEWAYS) for own in rest]
+        lines.append(f"| the {wheel} wheel | the {other} wheel | {rms(errors_of(fit.soil, rest, WHEELS))} |")
+        lines.append(f"| | the same below 90° | {rms(errors_of(fit.soil, below, WHEELS))} |")
+    degrees = [np.degrees(own.slip_angle).round() for own in runs]
+    chosen = [own.where(np.isin(angle, (0, 45))) for own, angle in zip(runs, degrees, strict=True)]
+    fit = fit_soil(start, chosen, WHEELS, weights=weights(chosen))
+    for angle in (15, 60, 90):
+        rest = [own.where(of == angle) for own, of in zip(runs, degrees, strict=True)]
+        lines.append(f"| 0° and 45°, both wheels | {angle}° | {rms(errors_of(fit.soil, rest, WHEELS))} |")
+    return lines
+
+
+def mgru3() -> list[str]:
+    """Slope at equal slip of the MGRU3 wheel, nothing fitted."""
+    lines = ["| slip | slope measured | without grousers | 24 grousers of 10 mm |", "|---|---|---|---|"]
+    soil = named_soil("grc-1")
+    wheels = (SingleWheel(0.225, 0.2), SingleWheel(0.225, 0.2, 0.01, 24))
+    for slope, slip in MGRU3:
+        found = [math.degrees(climbed_slope(wheel, soil, MGRU3_MASS, slip)[0]) for wheel in wheels]
+        lines.append(f"| {slip:.3f} | {slope}° | {found[0]:.1f}° | {found[1]:.1f}° |")
+    return lines
+
+
+def single_wheels(path: Path) -> list[str]:
+    """Drawbar pull of other wheels from density and friction angle, nothing fitted."""
+    lines = ["| wheel | slip | pull measured, N | predicted, N | error |", "|---|---|---|---|---|"]
+    groups: dict[str, list[float]] = {}
+    with path.open(newline="", encoding="utf-8") as file:
+        for cells in csv.DictReader(file):
+            soil = named_soil("hit-simulant").having(
+                density=float(cells["density_kg_m3"]),
+                internal_friction=math.tan(math.radians(float(cells["friction_angle_deg"]))),
+            )
+            radius, height = float(cells["wheel_radius_m"]), float(cells["grouser_height_m"])
+            wheel = SingleWheel(radius, float(cells["wheel_width_m"]), height, int(cells["grouser_count"]))
+            slip, pull = float(cells["slip"]), float(cells["drawbar_N"])
+            drive = [0.1 * (1.0 - slip), 0.1 / radius, 0.0, float(cells["load_N"]), 9.81]
+            predicted = float(wheel.on(soil).steady([drive])[0, 1])
+            error = abs(predicted - pull) / abs(pull)
+            name = f"{cells['source']}, grousers {1e3 * height:.0f} mm"
+            groups.setdefault(name, []).append(error)
+            lines.append(f"| {name} | {slip} | {pull} | {predicted:.1f} | {100 * error:.0f}% |")
+    for name, errors in groups.items():
+        lines.append(f"| {name} | median | | | {100 * float(np.median(errors)):.0f}% |")
+    return lines
+
+
+def draw(soil: Soil, runs: Sequence[Runs], path: Path) -> None:
+    """Measured and predicted forces and sinkage over slip, by slip angle."""
+    names = ("drawbar pull, N", "force across, N", "sinkage, mm")
+    figure, axes = plt.subplots(len(runs), 3, figsize=(11, 3.2 * len(runs)), squeeze=False)
+    for line, own in zip(axes, runs, strict=True):
+        rim = own.rate * WHEELS[own.wheel].radius
+        slip = (rim - own.speed) / np.maximum(rim, own.speed)
+        predicted = own.predicted(WHEELS[own.wheel].on(soil))
+        degrees = np.degrees(own.slip_angle).round()
+        for k, (axis, name) in enumerate(zip(line, names, strict=True)):
+            scale = 1e3 if k == 2 else 1.0
+            for n, angle in enumerate(np.unique(degrees)):
+                of = np.flatnonzero(degrees == angle)
+                of = of[np.argsort(slip[of])]
+                axis.plot(slip[of], scale * predicted[of, k], color=f"C{n}", label=f"{angle:.0f}°")
+                axis.plot(slip[of], scale * own.measured[of, k], "o", color=f"C{n}", markersize=3)
+            axis.set(title=f"{own.wheel}: {name}", xlabel="slip")
+    axes[0, 0].legend(title="slip angle", fontsize="small")
+    figure.tight_layout()
+    figure.savefig(path, dpi=90)
+
+
+def main() -> None:
+    """Writes `docs/validation/sand.md` and `sand.png`."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--data", type=Path, default=os.environ.get(VARIABLE))
+    data = parser.parse_args().data
+    if data is None:
+        sys.stdout.write(f"validate-sand: skipped, no data: give --data FOLDER or set {VARIABLE}\n")
+        return
+    runs = read_runs(Path(data) / "wheel_on_sand.csv", WHEELS)
+    start = named_soil("cmu-sand")
+    fit = fit_soil(start, runs, WHEELS, weights=weights(runs))
+    parts = {
+        "Fitted numbers": [fitted(fit)],
+        "Errors of the soil `cmu-sand`, root mean squares": table(start, runs),
+        "Errors of predictions, root mean squares": predictions(start, runs),
+        "MGRU3 wheel on GRC-1, nothing fitted": mgru3(),
+        "Other wheels, nothing fitted": single_wheels(Path(data) / "single_wheels.csv"),
+    }
+    text = "\n\n".join(f"## {title}\n\n" + "\n".join(lines) for title, lines in parts.items())
+    head = "---\norphan: true\n---\n\n# Sand: tables\n\nBy `make validate-sand`; [sand](../sand.md) explains them."
+    (DOCS / "sand.md").write_text(f"{head}\n\n{text}\n", encoding="utf-8")
+    draw(start, runs, DOCS / "sand.png")
+    sys.stdout.write(text + "\n")
+
+
+if __name__ == "__main__":
+    main()
