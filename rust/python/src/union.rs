@@ -58,11 +58,13 @@ impl Union {
 
     /// The terrains, in the order they were given.
     #[getter]
-    fn parts<'py>(slf: PyRef<'py, Self>) -> PyResult<Vec<Bound<'py, PyAny>>> {
+    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
+    fn parts(slf: PyRef<'_, Self>) -> PyResult<Vec<Bound<'_, PyAny>>> {
         let grounds = Self::grounds(&slf).iter();
         grounds.map(|ground| object(slf.py(), ground)).collect()
     }
 
+    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn __len__(slf: PyRef<'_, Self>) -> usize {
         Self::grounds(&slf).len()
     }

@@ -160,7 +160,7 @@ fn the_quick_step_obeys_the_law_of_the_general_one() {
 
 fn obeys_the_law_of_the_general_step(model: &Arc<Model>) {
     let mut numbers = Random(11);
-    let mut worst = Vec::new();
+    let (mut worst, mut unsolved) = (Vec::new(), 0);
     for i in 0..6 {
         let mut own = rover(i, model, &mut numbers);
         own.step(100).unwrap();
@@ -169,21 +169,18 @@ fn obeys_the_law_of_the_general_step(model: &Arc<Model>) {
             for _ in 0..10 {
                 let mut general = own.clone();
                 general.step_with(&MoreauJean, 1).unwrap();
-                own.step(1).unwrap();
+                unsolved += usize::from(!own.step(1).unwrap().is_converged());
                 let difference = own.v().iter().zip(general.v()).map(|(a, b)| (a - b).abs());
                 worst.push(difference.fold(0.0, f64::max));
             }
         }
     }
     worst.sort_by(f64::total_cmp);
-    // A few friction problems have several answers, most of them those of rigid cylinders, which
-    // touch at twelve points.
-    let is_rigid = (model.wheels().iter())
-        .any(|wheel| wheel.width > 2.0 * wheel.rounding && wheel.compliance.is_none());
-    let share = if is_rigid { 90 } else { 97 };
-    assert!(
-        worst[worst.len() * share / 100] < 1e-9,
-        "{:?}",
-        &worst[worst.len() - 20..]
-    );
+    let n_other = worst.iter().filter(|x| **x >= 1e-9).count();
+    // Of rigid cylinders some problems have several answers, or none that is found: 21 and 7.
+    let wheel = &model.description().wheels[0];
+    let is_hard = wheel.stiffness.is_none() && wheel.width.is_some() && wheel.rounding == Some(0.0);
+    let (most_other, most_unsolved) = if is_hard { (24, 10) } else { (6, 0) };
+    assert!(n_other <= most_other, "{:?}", &worst[worst.len() - 30..]);
+    assert!(unsolved <= most_unsolved, "{unsolved}");
 }

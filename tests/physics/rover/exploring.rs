@@ -1,7 +1,12 @@
 //! Rovers whose policy explores: every step is solved, and a probe sees all parts of it.
 
-use rover_core::integrator::{Phase, Probe, StepOptions};
+use std::sync::Arc;
 
+use rover_core::integrator::{Phase, Probe, StepOptions};
+use rover_core::multibody::Model;
+use rover_core::simulation::RoverSimulation;
+
+use crate::exploring_scenes::STEPS_A_COMMAND;
 use crate::exploring_scenes::{Drive, Ground, TORQUES, drives};
 
 const PHASES: [Phase; 9] = [
@@ -71,4 +76,45 @@ fn a_probe_sees_the_parts_of_a_step_in_their_order_and_changes_no_bit() {
     // A step that is taken once more begins anew.
     assert!(parts.0.len() >= 10 * PHASES.len());
     assert_eq!(parts.0, PHASES.repeat(parts.0.len() / PHASES.len()));
+}
+
+/// The first drive among rocks on cylinders 0.15 m wide that yield by 0.03 mm, critically damped.
+fn on_yielding_cylinders() -> Drive {
+    let mut drive = first_drive(Ground::Rocks, 60.0);
+    let old = &drive.simulation;
+    let mut description = old.model().description().clone();
+    for wheel in &mut description.wheels {
+        (wheel.width, wheel.rounding) = (Some(0.15), Some(0.0));
+        (wheel.stiffness, wheel.damping) = (Some(5.3e7), Some(1.9e5));
+    }
+    let model = Arc::new(Model::from_description(description).unwrap());
+    let mut new =
+        RoverSimulation::new(model, old.terrain().clone(), old.options().clone()).unwrap();
+    new.set_state(old.q().clone(), old.v().to_vec());
+    new.step(100).unwrap();
+    drive.simulation = new;
+    drive
+}
+
+#[test]
+fn cylinders_that_yield_need_few_systems_among_rocks_and_never_the_general_step() {
+    let mut drive = on_yielding_cylinders();
+    let (mut iterations, mut steps) = (0, 0);
+    for command in 0..drive.n_commands() {
+        drive.give(command);
+        for _ in 0..STEPS_A_COMMAND {
+            let mut parts = Recorder(Vec::new());
+            let report = drive.simulation.step_probed(1, &mut parts).unwrap();
+            assert!(report.is_converged());
+            let begun = parts.0.iter().filter(|p| **p == Phase::Kinematics).count();
+            assert_eq!(begun, 1, "step {steps}");
+            iterations += report.iterations;
+            steps += 1;
+        }
+    }
+    // Rigid cylinders take some 130.
+    assert!(
+        iterations < 9 * steps,
+        "{iterations} systems in {steps} steps"
+    );
 }

@@ -311,6 +311,7 @@ impl<T: Lane, const C: usize> System<T, C> for DenseSystem<T, C> {
     const ALPHA: f64 = 1e-8;
     const PARKED_ALPHA: f64 = 1e-6;
     const SMALLEST_ALPHA: f64 = 1e-14;
+    const SMALLEST_ALPHA_AGAIN: f64 = Self::SMALLEST_ALPHA;
     const RETURNS: bool = false;
     // A rover that sticks is solved then.
     const NEAR: f64 = 1e-6;

@@ -205,6 +205,10 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
         let centre = if S::RETURNS { &self.centre } else { &self.p };
         self.system
             .newton_point(&self.q, centre, self.alpha, &self.modes, &mut self.trial);
+        let fine = active & self.alpha.lt(one.like(S::SMALLEST_ALPHA) * self.mean);
+        if S::SMALLEST_ALPHA_AGAIN < S::SMALLEST_ALPHA && fine.any() {
+            self.improve_trial(fine);
+        }
         let mut first = one;
         let mut limits = [Limit {
             t: one,
@@ -235,6 +239,43 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
         }
         (self.system).velocities(&self.q, &self.p, &mut self.u);
         self.judge();
+    }
+
+    /// Removes the rounding of the Newton point in the lanes of a mask, with the factors that found
+    /// it.
+    #[inline(always)]
+    fn improve_trial(&mut self, lanes: T::Mask) {
+        let left = self.left_by_trial();
+        let mut change = left;
+        (self.system).correction(&left, &self.modes, &mut change);
+        for i in self.system.places() {
+            for k in 0..3 {
+                let improved = self.trial[i][k] + change[i][k];
+                self.trial[i][k] = T::select(lanes, improved, self.trial[i][k]);
+            }
+        }
+    }
+
+    /// What the Newton point leaves of its equations, which are these velocities
+    /// [across](super::equations) the modes.
+    #[inline(always)]
+    fn left_by_trial(&mut self) -> [Triple<T>; C] {
+        let centre = if S::RETURNS { &self.centre } else { &self.p };
+        let mut left = self.u;
+        (self.system).velocities(&self.q, &self.trial, &mut left);
+        for i in self.system.places() {
+            let (left, trial, centre, mode) =
+                (&mut left[i], &self.trial[i], &centre[i], &self.modes[i]);
+            for k in 0..3 {
+                left[k] += self.alpha * (trial[k] - centre[k]);
+            }
+            // The turn of a slide.
+            let [b0, b1] = mode.b;
+            let turn = mode.gamma * (b0 * trial[1] + b1 * trial[2]);
+            left[1] += turn * b0;
+            left[2] += turn * b1;
+        }
+        left
     }
 
     /// Violations by the present impulses.
@@ -330,7 +371,8 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
         let (found, worst) = self.worst_contradiction(looks);
         // With the right modes nothing but α is left in the way.
         let is_settled = gains_nothing & looks & !zero.lt(worst);
-        let least = like.like(S::SMALLEST_ALPHA) * self.mean;
+        let (least, again) = (S::SMALLEST_ALPHA, S::SMALLEST_ALPHA_AGAIN);
+        let least = T::select(zero.lt(self.asked), like.like(again), like.like(least)) * self.mean;
         let smaller = (like.like(SHRINK) * self.alpha).max(least);
         self.alpha = T::select(is_settled, smaller, self.alpha);
         let circles = looks & like.like(PATIENCE).lt(self.visits.idle);
@@ -505,5 +547,54 @@ fn return_to_cone<T: Lane>(lanes: T::Mask, mu: T, p: &mut Triple<T>) {
     let scale = T::select(zero.lt(norm), mu * p[0].max(zero) / norm, zero);
     for p in &mut p[1..] {
         *p = T::select(lanes, *p * scale, *p);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::equations::across;
+    use crate::lanes::problem::MAX_DENSE;
+    use crate::lanes::velocity_equations::VelocitySystem;
+    use crate::lanes::velocity_equations::tests::{pattern, problem};
+    use crate::scalar::Single;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn the_newton_point_of_a_small_alpha_is_as_accurate_as_that_of_a_large_one(
+            numbers in prop::collection::vec(-1.0..1.0_f64, 600), modes in prop::collection::vec(0..3, MAX_DENSE),
+        ) {
+            let pattern = pattern();
+            let problem = problem(&pattern, &mut numbers.iter().copied());
+            let mut own =
+                Pivoting::<f64, MAX_CONTACTS, VelocitySystem<f64, MAX_CONTACTS>>::new(Single::best());
+            prop_assert_eq!(own.system.load(0, &problem).count(), MAX_DENSE);
+            let mut more = numbers.iter().rev().copied();
+            for i in 0..MAX_DENSE {
+                for x in own.q[i].iter_mut().chain(&mut own.centre[i]) {
+                    *x = more.next().unwrap();
+                }
+                // Friction that opposes the slip, so that its direction turns.
+                let p = own.centre[i];
+                let u = [0.0, -p[1], -p[2]];
+                own.modes[i] = Mode::of(0.3, modes[i] > 0, modes[i] == 1, &p, &u);
+            }
+            own.alpha = 1e-8;
+            own.system.factorise(own.alpha, &own.modes);
+            own.system.newton_point(&own.q, &own.centre, own.alpha, &own.modes, &mut own.trial);
+            let largest = |own: &mut Pivoting<f64, MAX_CONTACTS, _>| {
+                let left = own.left_by_trial();
+                let left = left[..MAX_DENSE].iter().zip(&own.modes).flat_map(|(u, mode)| across(mode, *u));
+                left.fold(0.0, |most: f64, x| most.max(x.abs()))
+            };
+            prop_assume!(own.trial.iter().flatten().all(|x| x.abs() < 1e2));
+            let before = largest(&mut own);
+            own.improve_trial(true);
+            let after = largest(&mut own);
+            prop_assert!(before < 1e-4, "{before:e}");
+            prop_assert!(after < 1e-12, "{before:e} {after:e}");
+        }
     }
 }

@@ -22,6 +22,10 @@ pub(super) trait System<T: Lane, const C: usize>: Sized {
     /// Smallest `α`, relative to the mean diagonal of `W`, for which the systems are accurate.
     const SMALLEST_ALPHA: f64;
 
+    /// Smallest `α` of further attempts. Below [`Self::SMALLEST_ALPHA`] a Newton point is corrected
+    /// once with the factors of its system.
+    const SMALLEST_ALPHA_AGAIN: f64;
+
     /// Whether a solve's first full step stays near the impulses of the last step, rather than near
     /// those from which it starts.
     const RETURNS: bool;

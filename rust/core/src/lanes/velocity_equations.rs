@@ -210,6 +210,9 @@ impl<T: Lane, const C: usize> System<T, C> for VelocitySystem<T, C> {
     const ALPHA: f64 = 1e-4;
     const PARKED_ALPHA: f64 = 1e-4;
     const SMALLEST_ALPHA: f64 = 1e-6;
+    // Of 531 problems among rocks, where axles tilt by 1e-5, 117 resist with 1e-6, 70 with 1e-8, 63
+    // with 1e-9 and 73 with 1e-11.
+    const SMALLEST_ALPHA_AGAIN: f64 = 1e-9;
     const RETURNS: bool = true;
     // Six cylinders with torques of up to 60 N m: three corrections from 1e-6 on save a twentieth
     // of the systems and cost a sixth more instructions.
@@ -383,7 +386,7 @@ impl<T: Lane, const C: usize> System<T, C> for VelocitySystem<T, C> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::lanes::equations::DenseSystem;
     use crate::lanes::machine::Machine;
@@ -392,7 +395,7 @@ mod tests {
     use crate::scalar::Single;
     use proptest::prelude::*;
 
-    fn pattern() -> Arc<Pattern> {
+    pub(in crate::lanes) fn pattern() -> Arc<Pattern> {
         let mut description = ModelDescription::rover();
         for wheel in &mut description.wheels {
             wheel.width = Some(0.1);
@@ -402,7 +405,10 @@ mod tests {
     }
 
     /// A problem of the first slots of the rover with both forms of its operator.
-    fn problem(pattern: &Arc<Pattern>, numbers: &mut impl Iterator<Item = f64>) -> ContactProblem {
+    pub(in crate::lanes) fn problem(
+        pattern: &Arc<Pattern>,
+        numbers: &mut impl Iterator<Item = f64>,
+    ) -> ContactProblem {
         let mut problem = ContactProblem {
             n_contacts: MAX_DENSE,
             ..ContactProblem::default()
