@@ -141,10 +141,13 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
         relative.le(tolerances[0]) & largest.le(tolerances[1])
     }
 
-    /// Forgets the mode of a place where a lane has no contact. It may be in use in other lanes,
-    /// where the mode would count among this one's.
+    /// Forgets mode and velocity of a place where a lane has no contact. When another lane begins to
+    /// use the place they would count among this one's modes and violations.
     #[inline(always)]
     pub(super) fn vacate(&mut self, place: usize, lane: usize) {
+        for u in &mut self.u[place] {
+            u.set(lane, 0.0);
+        }
         let others = !T::mask(self.mean.token(), 1 << lane);
         for modes in [
             &mut self.closed,
