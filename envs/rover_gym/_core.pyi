@@ -797,7 +797,7 @@ class SoftGround(Terrain):
     """Ground of sand, into which wheels sink. To every other part of a machine its surface is rigid.
 
     The ruts belong to a simulation and are part of its snapshots. Rocks on sand are a `Union` of
-    both. Steps on soft ground take the general path, not the batch's.
+    both. Steps on soft ground are general: `Simulation.fallback_reason` says so.
 
     Args:
         surface: The undisturbed surface: a `Plane`, `HeightField` or `TriangleMesh`.

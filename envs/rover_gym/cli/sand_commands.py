@@ -8,8 +8,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from rover_gym.cli.console import plain_errors
-from rover_gym.cli.results import AsJson, Results
+from rover_gym.cli.console import AsJson, Results, plain_errors
 from rover_gym.mechanics import OptionError
 from rover_gym.sand import SingleWheel, climbed_slope, named_soil, soil_names
 from rover_gym.sand.convert import convert_runs

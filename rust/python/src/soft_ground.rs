@@ -7,12 +7,11 @@ use pyo3::types::PyDict;
 use rover_core::draw::DrawnGround;
 use rover_core::geometry::SoftGround as CoreGround;
 
-use crate::arguments::Given;
+use crate::arguments::{Given, refused};
 use crate::errors::Kind;
 use crate::planar_ground::quantity;
 use crate::sand::{numbers_of, soil_of};
-use crate::terrain::{Terrain, parse};
-use crate::union;
+use crate::terrain::Terrain;
 
 /// Ground of sand, into which wheels sink. To every other part of a machine its surface is rigid.
 ///
@@ -30,13 +29,16 @@ use crate::union;
 #[pyclass(module = "rover_gym.mechanics", frozen, extends = Terrain)]
 pub struct SoftGround {
     inner: Arc<CoreGround>,
-    surface: Arc<DrawnGround>,
+    surface: Py<PyAny>,
 }
 
 impl SoftGround {
-    /// Sand of the core, for Python.
-    pub fn of(inner: Arc<CoreGround>, surface: Arc<DrawnGround>) -> PyClassInitializer<Self> {
-        let ground = DrawnGround::Soft(inner.clone(), surface.clone());
+    /// Sand of the core, for Python; `surface`: its surface for the core and for Python.
+    pub fn of(
+        inner: Arc<CoreGround>,
+        (drawn, surface): (Arc<DrawnGround>, Py<PyAny>),
+    ) -> PyClassInitializer<Self> {
+        let ground = DrawnGround::Soft(inner.clone(), drawn);
         Terrain::base(ground).add_subclass(Self { inner, surface })
     }
 }
@@ -51,17 +53,25 @@ impl SoftGround {
         soil: &Bound<'_, PyAny>,
         rut_cell: Given<'_>,
     ) -> PyResult<PyClassInitializer<Self>> {
-        let surface = parse(surface)?;
+        let what = "a Plane, HeightField or TriangleMesh";
+        let refuse = |_| refused(surface, Kind::Terrain, "surface", what);
+        let drawn = surface
+            .cast::<Terrain>()
+            .map_err(refuse)?
+            .get()
+            .ground
+            .clone();
         let cell = rut_cell.number(0.02, Kind::Terrain, "rut_cell")?;
-        let made = CoreGround::new(surface.terrain(), Arc::new(soil_of(soil)?), cell);
+        let made = CoreGround::new(drawn.terrain(), Arc::new(soil_of(soil)?), cell);
         let made = made.map_err(|e| quantity(Kind::Terrain, &e))?;
-        Ok(Self::of(Arc::new(made), Arc::new(surface)))
+        let surface = (Arc::new(drawn), surface.clone().unbind());
+        Ok(Self::of(Arc::new(made), surface))
     }
 
     /// The undisturbed surface.
     #[getter]
-    fn surface<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        union::object(py, &self.surface)
+    fn surface(&self, py: Python<'_>) -> Py<PyAny> {
+        self.surface.clone_ref(py)
     }
 
     /// Numbers of the soil by their names.
@@ -79,7 +89,7 @@ impl SoftGround {
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let py = slf.py();
         let own = slf.get();
-        let arguments = (own.surface(py)?, own.soil(py)?, own.rut_cell());
+        let arguments = (own.surface(py), own.soil(py)?, own.rut_cell());
         let arguments = arguments.into_pyobject(py)?.into_any();
         Ok((slf.get_type().into_any(), arguments))
     }

@@ -18,7 +18,8 @@ pub fn object<'py>(py: Python<'py>, ground: &DrawnGround) -> PyResult<Bound<'py,
         DrawnGround::Map(map) => Bound::new(py, HeightField::of(map.clone()))?.into_any(),
         DrawnGround::Mesh(mesh) => Bound::new(py, TriangleMesh::of(mesh.clone()))?.into_any(),
         DrawnGround::Soft(soft, surface) => {
-            Bound::new(py, SoftGround::of(soft.clone(), surface.clone()))?.into_any()
+            let own = object(py, surface)?.unbind();
+            Bound::new(py, SoftGround::of(soft.clone(), (surface.clone(), own)))?.into_any()
         }
         DrawnGround::Union(..) => {
             Bound::new(py, Terrain::base(ground.clone()).add_subclass(Union))?.into_any()

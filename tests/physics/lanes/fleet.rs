@@ -149,7 +149,7 @@ fn narrower_lanes_give_the_same_bits() {
         }
         drive(instructions, 9, 60.0, 7);
         // A lane ends its problem while another one begins to use a place that it has vacated.
-        drive(instructions, 13, 0.0, 2654566666266279419);
+        drive(instructions, 13, 0.0, 2_654_566_666_266_279_419);
     }
 }
 

@@ -141,8 +141,8 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
         relative.le(tolerances[0]) & largest.le(tolerances[1])
     }
 
-    /// Forgets mode and velocity of a place where a lane has no contact. When another lane begins to
-    /// use the place they would count among this one's modes and violations.
+    /// Forgets mode and velocity of a place where a lane has no contact. When another lane begins
+    /// to use the place they would count among this one's modes and violations.
     #[inline(always)]
     pub(super) fn vacate(&mut self, place: usize, lane: usize) {
         for u in &mut self.u[place] {
