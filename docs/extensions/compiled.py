@@ -2,11 +2,9 @@
 
 import __future__
 
-import operator
 import re
 import sys
 from collections.abc import Callable
-from functools import reduce
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -28,7 +26,6 @@ def in_print(text: str) -> str:
         text = re.sub(pattern, name, text)
     aliases = dict(re.findall(r"^(_\w+): TypeAlias = (.*)$", text, flags=re.MULTILINE))
     text = re.sub(r"^_\w+: TypeAlias = .*\n", "", text, flags=re.MULTILINE)
-    aliases["_Terrain"] = "Terrain"
     for _ in aliases:  # one may stand in another
         for alias, meaning in aliases.items():
             text = re.sub(rf"\b{alias}\b", meaning, text)
@@ -47,8 +44,6 @@ def use_stub() -> None:
     # A stub may name a class before it is there, so its annotations stay unevaluated.
     code = compile(run, source, "exec", __future__.annotations.compiler_flag)
     exec(code, stub.__dict__)  # noqa: S102 - our own stub
-    kinds = (stub.Plane, stub.SphereField, stub.HeightField, stub.TriangleMesh, stub.Union)  # type: ignore[attr-defined]
-    stub.Terrain = reduce(operator.or_, kinds)  # type: ignore[attr-defined]
     sys.modules[name] = rover_gym.mechanics = stub
     ModuleAnalyzer.cache["module", name] = ModuleAnalyzer.for_string(text, name, str(source))
 
