@@ -1,5 +1,6 @@
 """What an environment shows of its episode, alone or as a row of a batch."""
 
+from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from rover_gym.rendering import FrameRenderer
 
 
-class EpisodeView:
+class EpisodeView(ABC):
     """What the task gives and what an episode drew, and frames of it.
 
     Attributes:
@@ -26,27 +27,27 @@ class EpisodeView:
     task: Task
     _renderer: "FrameRenderer | None" = None
 
+    @abstractmethod
     def _running(self) -> EpisodeScene:
         """The scene of the episode.
 
         Raises:
             ResetNeeded: There is none yet.
         """
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def simulation(self) -> Simulation:
         """The simulation of the episode, to be read."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def goal(self) -> tuple[float, float]:
         """The episode's present goal (x, z), m."""
-        raise NotImplementedError
 
+    @abstractmethod
     def make_renderer(self, scene: EpisodeScene) -> "FrameRenderer":
         """Creates a renderer of a scene; the caller must close it."""
-        raise NotImplementedError
 
     @property
     def model(self) -> RoverModel:

@@ -1,4 +1,7 @@
 //! Heaps of loose boxes, in which many contacts share few loads: every step is solved.
+//!
+//! The ignored tests take longer and run in the nightly tier; each names the test of every run that
+//! fails for the same defect.
 
 use super::heap_scenes::heap;
 
