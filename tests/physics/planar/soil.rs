@@ -8,7 +8,7 @@ use rover_core::planar::{Line, PlanarWheel, TwoWheelRover};
 use rover_core::simulation::{SoilSetupError, SoilSimulation, soil_options};
 use rover_core::solver::Method;
 use rover_core::system::soil::{
-    Disks, Packing, SleepOptions, SoilError, SoilFriction, SoilScene, Wall, on_soil,
+    Disks, Packing, SleepOptions, SoilError, SoilFriction, SoilScene, Wall,
 };
 
 fn box_of(width: f64) -> Vec<Wall> {
@@ -429,7 +429,7 @@ fn the_rover_drives_over_the_original_soil() {
     let mut q = bed.q().clone();
     q.extend([0.7, 0.31, 0.0, 0.0, 0.0]);
     let scene = SoilScene {
-        machine: Some(on_soil(rover())),
+        machine: Some(Arc::new(rover().into())),
         ..(**bed.soil()).clone()
     };
     let mut soil = SoilSimulation::new(Arc::new(scene), options, None, q).expect("a soil");

@@ -1,7 +1,7 @@
 //! Mechanical systems, advanced by the time-stepping schemes of [`crate::integrator`].
 //!
 //! - [`tree`]: a multibody tree on a terrain, under a [`command`];
-//! - [`planar`]: a planar machine on a ground;
+//! - [`planar`]: a planar machine on a ground, with its matrices;
 //! - [`composite`]: two systems as one, with contacts between them;
 //!   [`among_grains`]: those of a tree and balls;
 //! - [`gyroscopic`]: implicit gyroscopic terms of the tree; `motor_branch`: the branch of a motor's
@@ -17,6 +17,7 @@ pub mod grains;
 pub mod gyroscopic;
 pub(crate) mod motor_branch;
 pub mod planar;
+mod planar_matrices;
 mod sand;
 pub mod soil;
 pub mod tree;
@@ -24,5 +25,5 @@ pub mod tree;
 pub use among_grains::{AmongGrains, AmongParts, GrainTouch};
 pub use command::{Command, Drive, HeldJoint};
 pub use composite::{Apart, Composite, CompositeParts, Coupling, Of, PartsOf};
-pub use planar::{PlanarContact, PlanarKey, PlanarScratch, PlanarSystem, contact_rows};
+pub use planar::{PlanarContact, PlanarKey, PlanarScratch, PlanarSystem};
 pub use tree::{DriveAction, TreeScratch, TreeSystem};
