@@ -2,8 +2,7 @@
 //!
 //! - [`tree`]: a multibody tree on a terrain, under a [`command`];
 //! - [`planar`]: a planar machine on a ground, with its matrices;
-//! - [`composite`]: two systems as one, with contacts between them;
-//!   [`among_grains`]: those of a tree and balls;
+//! - [`among_grains`]: a tree among balls;
 //! - [`gyroscopic`]: implicit gyroscopic terms of the tree; `motor_branch`: the branch of a motor's
 //!   torque–speed line in a step, implicit with [`fitted_theta`];
 //! - [`grains`]: thousands of free disks or balls, and a machine among
@@ -11,7 +10,6 @@
 
 pub mod among_grains;
 pub mod command;
-pub mod composite;
 pub mod fitted_theta;
 pub mod grains;
 pub mod gyroscopic;
@@ -22,8 +20,7 @@ mod sand;
 pub mod soil;
 pub mod tree;
 
-pub use among_grains::{AmongGrains, AmongParts, GrainTouch};
+pub use among_grains::{AmongContact, AmongGrains, AmongKey, AmongParts, GrainTouch};
 pub use command::{Command, Drive, HeldJoint};
-pub use composite::{Apart, Composite, CompositeParts, Coupling, Of, PartsOf};
 pub use planar::{PlanarContact, PlanarKey, PlanarScratch, PlanarSystem};
 pub use tree::{DriveAction, TreeScratch, TreeSystem};
