@@ -12,7 +12,7 @@ use std::sync::Arc;
 use rover_core::nalgebra::{Vector2, Vector3};
 use rover_core::planar::{PlanarWheel, TwoWheelRover};
 use rover_core::simulation::{SoilSimulation, soil_options};
-use rover_core::system::soil::{Packing, SleepOptions, SoilFriction, SoilScene, Wall};
+use rover_core::system::grains::{GrainFriction, GrainScene, Packing, SleepOptions, Wall};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().collect();
@@ -24,12 +24,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     if !drives {
         options.gravity = Vector3::new(4.0, -9.0, 0.0);
     }
-    let mut scene = SoilScene {
+    let mut scene = GrainScene {
         grains: disks,
         walls: vec![Wall::floor(0.0), Wall::left(0.0), Wall::right(2.4494)],
         ground: None,
         machine: None,
-        friction: SoilFriction::default(),
+        friction: GrainFriction::default(),
     };
     if drives {
         let wheel = |x: f64| PlanarWheel {

@@ -6,7 +6,7 @@ use pyo3::types::PyDict;
 use rover_core::geometry::Support;
 use rover_core::planar::{Ground, PlanarTree, WheelRig};
 use rover_core::simulation::SoilSimulation as Core;
-use rover_core::system::soil::{Packing, SoilScene};
+use rover_core::system::grains::{GrainScene, Packing};
 use std::sync::{Arc, MutexGuard};
 
 use crate::arguments::{Given, flags};
@@ -193,7 +193,7 @@ impl SoilSimulation {
         if let Some(machine) = machine {
             q.extend(vector(machine, Kind::State, "machine")?);
         }
-        let scene = SoilScene {
+        let scene = GrainScene {
             grains: disks,
             walls: lines,
             ground: ground.map(|ground| ground as Arc<dyn Support<2>>),

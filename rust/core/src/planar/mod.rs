@@ -5,7 +5,7 @@
 //! - [`tree`]: kinematics and dynamics of a machine, a tree of bodies with wheels;
 //! - [`ball`], [`two_wheel_rover`]: the numbers of two such trees; [`mirrored_rover`]: that of the
 //!   six-wheel rover driven straight; [`rig`]: one wheel at a given slip, for the drawbar pull on a
-//!   [soil](crate::system::soil).
+//!   [bed of disks](crate::system::grains).
 //!
 //! Time stepping, contact law and solver live elsewhere: [`crate::system::planar`] turns a machine
 //! on a ground into a mechanical system, and [`crate::simulation`] steps it like the rover. x

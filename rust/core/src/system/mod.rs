@@ -5,8 +5,7 @@
 //! - [`among_grains`]: a tree among balls;
 //! - [`gyroscopic`]: implicit gyroscopic terms of the tree; `motor_branch`: the branch of a motor's
 //!   torque–speed line in a step, implicit with [`fitted_theta`];
-//! - [`grains`]: thousands of free disks or balls, and a machine among
-//!   them; [`soil`]: disks under a planar machine.
+//! - [`grains`]: thousands of free disks or balls, and a planar machine among them.
 
 pub mod among_grains;
 pub mod command;
@@ -17,7 +16,6 @@ pub(crate) mod motor_branch;
 pub mod planar;
 mod planar_matrices;
 mod sand;
-pub mod soil;
 pub mod tree;
 
 pub use among_grains::{AmongContact, AmongGrains, AmongKey, AmongParts, GrainTouch};

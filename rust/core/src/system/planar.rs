@@ -186,12 +186,6 @@ impl MechanicalSystem for PlanarSystem<'_> {
         self.machine.nv()
     }
 
-    fn set_moved(&self, from: &Vec<f64>, v: &[f64], h: f64, to: &mut Vec<f64>) {
-        for ((to, from), v) in to.iter_mut().zip(from).zip(v) {
-            *to = from + h * v;
-        }
-    }
-
     fn advance(&self, q: &mut Vec<f64>, v: &[f64], h: f64) {
         for (q, v) in q.iter_mut().zip(v) {
             *q += h * v;

@@ -276,11 +276,6 @@ where
         self.scene.nv()
     }
 
-    fn set_moved(&self, from: &Vec<f64>, v: &[f64], h: f64, to: &mut Vec<f64>) {
-        to.clone_from(from);
-        self.advance(to, v, h);
-    }
-
     fn advance(&self, q: &mut Vec<f64>, v: &[f64], h: f64) {
         let (n, V) = (self.n(), body_velocities(D));
         let (grains, machine) = q.split_at_mut(COORDINATES * n);
