@@ -35,7 +35,7 @@ use crate::geometry::query::dispatch;
 use crate::geometry::{PlacedShape, Sphere, SupportMap};
 use crate::integrator::{MechanicalSystem, Start, StepOptions, UnilateralContact};
 use crate::multibody::{Configuration, Kinematics, Model};
-use crate::problem::{Dimension, FrictionContactProblem};
+use crate::problem::{BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem};
 use crate::solver::{ManyBodies, SolveReport, SolverOptions, SolverWorkspace, solve_many_bodies};
 
 /// A contact of a part of the tree with a grain. Its normal points from the grain to the part.
@@ -111,8 +111,8 @@ pub struct AmongParts {
     rows: ContactSystem,
     /// Grains near a part: number, centre in the world (m), radius (m).
     near: Vec<(u32, Vector3<f64>, f64)>,
-    /// W, dense, assembled on request.
-    W: OnceLock<Vec<f64>>,
+    /// W of a step without touches, assembled on request.
+    operator: OnceLock<BlockSparseDelassus>,
 }
 
 impl AmongParts {
@@ -126,7 +126,7 @@ impl AmongParts {
             contacts: Vec::new(),
             rows: ContactSystem::with_capacity(model, 0),
             near: Vec::new(),
-            W: OnceLock::new(),
+            operator: OnceLock::new(),
         }
     }
 
@@ -372,7 +372,6 @@ impl AmongGrains<'_> {
     /// Rows of the touches, and all contacts of the tree among the grains' pairs of bodies.
     fn assemble_touches(&mut self, v: (&[f64], &[f64]), u: &mut [f64]) {
         let AmongParts {
-            of_tree,
             touches,
             contacts,
             rows,
@@ -383,53 +382,46 @@ impl AmongGrains<'_> {
         if touches.is_empty() {
             return;
         }
-        let model = self.tree.model;
         let TreeScratch {
-            kinematics,
-            factor,
-            system,
-            ..
+            kinematics, factor, ..
         } = &*self.tree.parts;
-        rows.assemble_rows(model, kinematics, factor, contacts, v.1);
+        rows.assemble_rows(self.tree.model, kinematics, factor, contacts, v.1);
         u.copy_from_slice(&rows.u);
-        let bed = &self.bed;
-        let own = of_tree.iter().map(|c| bed.pair_with(None, &c.frame.rows()));
-        let with_grains = touches
-            .iter()
-            .map(|t| bed.pair_with(Some(t.grain()), &t.contact.frame.rows()));
-        let all: Vec<_> = own.chain(with_grains).collect();
-        let pairs = &mut self.bed.parts.pairs;
+        self.subtract_rims(&self.parts.touches, v.0, u);
+        let mut pairs = std::mem::take(&mut self.bed.parts.pairs);
+        self.push_tree(&mut pairs);
+        self.bed.parts.pairs = pairs;
+    }
+
+    /// Adds the tree as the machine of the grains' pairs, with its own contacts and the touches.
+    fn push_tree(&self, pairs: &mut BodyPairs<3>) {
+        let (bed, parts, model) = (&self.bed, &*self.parts, self.tree.model);
+        let own = parts.of_tree.iter().map(|c| (None, c));
+        let touches = parts.touches.iter();
+        let touches = touches.map(|touch| (Some(touch.grain()), &touch.contact));
+        let pair = |(grain, c): (_, &Contact)| bed.pair_with(grain, &c.frame.rows());
         pairs.machine.clear();
-        pairs.machine.extend(all);
+        pairs.machine.extend(own.chain(touches).map(pair));
         pairs.rows.clear();
         pairs.width = model.nv();
         pairs.n_coordinates = pairs.machine_at + pairs.width;
-        for c in 0..of_tree.len() {
-            system.push_dense_rows(model, c, &mut pairs.rows);
+        for c in 0..parts.of_tree.len() {
+            (self.tree.parts.system).push_dense_rows(model, c, &mut pairs.rows);
         }
-        for c in 0..touches.len() {
-            rows.push_dense_rows(model, c, &mut pairs.rows);
+        for c in 0..parts.touches.len() {
+            parts.rows.push_dense_rows(model, c, &mut pairs.rows);
         }
-        self.subtract_rims(&self.parts.touches, v.0, u);
     }
 
-    /// W (row-major): column j is the response to a unit impulse at j.
-    fn operator(&self) -> &[f64] {
-        self.parts.W.get_or_init(|| {
-            let n = self.parts.ends()[1] + 3 * self.parts.touches.len();
-            let (mut W, mut p) = (vec![0.0; n * n], vec![0.0; n]);
-            let (mut y, mut column) = (vec![0.0; self.nv()], vec![0.0; n]);
-            for j in 0..n {
-                p[j] = 1.0;
-                y.fill(0.0);
-                self.add_impulses(&p, &mut y);
-                self.local(&y, &mut column);
-                p[j] = 0.0;
-                for (i, entry) in column.iter().enumerate() {
-                    W[i * n + j] = *entry;
-                }
-            }
-            W
+    fn operator(&self) -> &BlockSparseDelassus {
+        let pairs = &self.bed.parts.pairs;
+        if !self.parts.touches.is_empty() {
+            return self.bed.parts.operator();
+        }
+        self.parts.operator.get_or_init(|| {
+            let mut pairs = pairs.clone();
+            self.push_tree(&mut pairs);
+            pairs.operator()
         })
     }
 }
@@ -624,7 +616,7 @@ impl MechanicalSystem for AmongGrains<'_> {
         let v = self.halves(v);
         let parts = &mut *self.parts;
         parts.sort(contacts);
-        parts.W.take();
+        parts.operator.take();
         let [u_a, u_b, u] = parts.split_mut(u);
         self.bed.assemble(&parts.of_grains, v.0, u_a);
         self.tree.assemble(&parts.of_tree, v.1, u_b);
@@ -688,7 +680,7 @@ impl MechanicalSystem for AmongGrains<'_> {
     }
 
     fn problem<'a>(&'a self, q: &'a [f64], mu: &'a [f64]) -> FrictionContactProblem<'a> {
-        FrictionContactProblem::from_assembled(Self::DIMENSION, self.operator(), q, mu)
+        FrictionContactProblem::from_assembled_sparse(self.operator(), q, mu)
     }
 
     fn normal_shift(&self, options: &StepOptions, contact: &AmongContact, u_N_before: f64) -> f64 {
