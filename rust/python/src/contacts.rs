@@ -8,7 +8,6 @@ use rover_core::multibody::Model;
 use rover_core::simulation::{ActiveContact, Components, LocatedContact};
 use rover_core::system::PlanarContact;
 use rover_core::system::grains::GrainContact;
-use rover_core::system::soil::SoilContact;
 
 use crate::arrays::fresh_blocks;
 
@@ -232,13 +231,13 @@ impl PlanarContacts {
 /// Contacts between sleeping disks are left out.
 #[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct SoilContacts {
-    active: Columns<SoilContact>,
+    active: Columns<GrainContact<2>>,
     n_moving: usize,
 }
 
 impl SoilContacts {
     /// `n_moving`: number of disks and wheels.
-    pub fn new(active: &[ActiveContact<SoilContact>], n_moving: usize) -> Self {
+    pub fn new(active: &[ActiveContact<GrainContact<2>>], n_moving: usize) -> Self {
         Self {
             active: Columns(active.to_vec()),
             n_moving,

@@ -5,11 +5,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use rover_core::integrator::StepOptions;
 use rover_core::nalgebra::{DMatrix, Vector2};
-use rover_core::planar::{ContactRule, Ground, PlanarMachine};
-use rover_core::simulation::{
-    BallSimulation as BallCore, MirroredRoverSimulation as MirroredRoverCore,
-    PlanarSimulation as Core, SnapshotError, TwoWheelRoverSimulation as TwoWheelRoverCore,
-};
+use rover_core::planar::{ContactRule, Ground, PlanarTree};
+use rover_core::simulation::PlanarSimulation as Core;
 use std::sync::{Arc, MutexGuard};
 
 use crate::arguments::{Given, text};
@@ -20,7 +17,7 @@ use crate::options::{Options, SolverWords, choice, name_of, settings};
 use crate::planar_ground::parse;
 use crate::report::{Energy, StepReport};
 use crate::shared::Shared;
-use crate::snapshot::{OfPlanar, PlanarSnapshot, belonging};
+use crate::snapshot::{PlanarSnapshot, belonging};
 use crate::stepping::{Problem, problem, step};
 
 const RULES: [(&str, ContactRule); 2] = [
@@ -28,32 +25,13 @@ const RULES: [(&str, ContactRule); 2] = [
     ("centre_height", ContactRule::CentreHeight),
 ];
 
-/// A simulation, by its machine.
-#[allow(clippy::large_enum_variant)] // there is one for each Python object
-pub enum Machine {
-    Ball(BallCore),
-    TwoWheelRover(TwoWheelRoverCore),
-    MirroredRover(MirroredRoverCore),
-}
-
-/// The same words for a simulation of any machine.
-macro_rules! each {
-    ($machine:expr, $simulation:ident => $body:expr) => {
-        match $machine {
-            Machine::Ball($simulation) => $body,
-            Machine::TwoWheelRover($simulation) => $body,
-            Machine::MirroredRover($simulation) => $body,
-        }
-    };
-}
-
 /// A planar machine on a ground: what the machines share. Made by the classes derived from it.
 ///
 /// One call at a time: a call during another one, from another thread or a signal handler, raises
 /// BusyError.
 #[pyclass(module = "rover_gym.mechanics", subclass, frozen)]
 pub struct PlanarSimulation {
-    inner: Shared<Machine>,
+    inner: Shared<Core>,
     ground: Py<PyAny>,
     parameters: Py<PyDict>,
     words: SolverWords,
@@ -96,14 +74,13 @@ fn options(given: Option<&Bound<'_, PyDict>>) -> PyResult<(StepOptions, SolverWo
 }
 
 impl PlanarSimulation {
-    fn open(&self) -> Result<MutexGuard<'_, Machine>, BorderError> {
+    fn open(&self) -> Result<MutexGuard<'_, Core>, BorderError> {
         self.inner.open()
     }
 
-    /// `kind`: the machine's place among all.
-    pub fn build<const NV: usize, M: PlanarMachine<NV> + Clone>(
-        kind: fn(Core<NV, M>) -> Machine,
-        machine: M,
+    /// A machine on a ground. `parameters`: the arguments that describe it; `given`: the options.
+    pub fn build(
+        machine: impl Into<PlanarTree>,
         ground: &Bound<'_, PyAny>,
         parameters: Bound<'_, PyDict>,
         given: Option<&Bound<'_, PyDict>>,
@@ -112,7 +89,7 @@ impl PlanarSimulation {
         let (step, words, rule) = options(given)?;
         let inner = Core::new(machine, terrain, rule, step).map_err(BorderError::from)?;
         Ok(Self {
-            inner: Shared::new(kind(inner)),
+            inner: Shared::new(inner),
             ground: ground.clone().unbind(),
             parameters: parameters.unbind(),
             words,
@@ -131,47 +108,45 @@ impl PlanarSimulation {
     /// Time since the last call of `set_state`, s.
     #[getter]
     fn time(&self) -> PyResult<f64> {
-        Ok(each!(&*self.open()?, s => s.time()))
+        Ok(self.open()?.time())
     }
 
     /// Time step, s.
     #[getter]
     fn time_step(&self) -> PyResult<f64> {
-        Ok(each!(&*self.open()?, s => s.options().time_step))
+        Ok(self.open()?.options().time_step)
     }
 
     /// Coordinates, (nv,), x and y, m, then angles, rad, which turn to the left.
     #[getter]
     fn q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(each!(&*self.open()?, s => fresh(py, s.q().as_slice())))
+        Ok(fresh(py, self.open()?.q()))
     }
 
     /// Rates of the coordinates, (nv,), m/s and rad/s.
     #[getter]
     fn v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(each!(&*self.open()?, s => fresh(py, s.v())))
+        Ok(fresh(py, self.open()?.v()))
     }
 
     /// Centres of the discs, world frame, (n_discs, 2), m.
     #[getter]
     fn centres<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        each!(&*self.open()?, s => {
-            let discs = (0..s.machine().n_discs()).map(|i| s.machine().disc(i, s.q()));
-            let centres: Vec<[f64; 2]> = discs.map(|disc| disc.centre.into()).collect();
-            fresh_rows(py, &centres)
-        })
+        let discs = self.open()?.discs();
+        let centres: Vec<[f64; 2]> = discs.iter().map(|disc| disc.centre.into()).collect();
+        fresh_rows(py, &centres)
     }
 
     /// Gap of each disc now, (n_discs,), m; negative where it overlaps the ground.
     #[getter]
     fn gaps<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(each!(&*self.open()?, s => fresh(py, &s.gaps())))
+        Ok(fresh(py, &self.open()?.gaps()))
     }
 
     /// Commanded torques, (n_discs,), N m, positive forward.
     #[getter]
     fn torques<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(each!(&*self.open()?, s => fresh(py, s.command())))
+        Ok(fresh(py, self.open()?.command()))
     }
 
     /// The keyword arguments that describe the machine.
@@ -183,12 +158,12 @@ impl PlanarSimulation {
     /// The keyword arguments that make a simulation with the same options.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        each!(&*self.open()?, s => {
-            let gravity = (s.options().gravity.x, s.options().gravity.y).into_pyobject(py)?;
-            let settings = settings(&gravity, s.options(), &self.words)?;
-            settings.set_item("contact", name_of(s.scene().rule, &RULES))?;
-            Ok(settings)
-        })
+        let inner = self.open()?;
+        let options = inner.options();
+        let gravity = (options.gravity.x, options.gravity.y).into_pyobject(py)?;
+        let settings = settings(&gravity, options, &self.words)?;
+        settings.set_item("contact", name_of(inner.scene().rule, &RULES))?;
+        Ok(settings)
     }
 
     /// Sets coordinates and rates; torques stay.
@@ -206,9 +181,9 @@ impl PlanarSimulation {
     fn set_state(&self, q: &Bound<'_, PyAny>, v: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
         let mut inner = self.open()?;
         let q = vector(q, Kind::State, "q")?;
-        let rest = || Ok(vec![0.0; each!(&*inner, s => s.v().len())]);
+        let rest = || Ok(vec![0.0; inner.v().len()]);
         let v = v.map_or_else(rest, |v| vector(v, Kind::State, "v"))?;
-        Ok(each!(&mut *inner, s => s.set_state(&q, &v)).map_err(BorderError::from)?)
+        Ok(inner.set_state(&q, &v).map_err(BorderError::from)?)
     }
 
     /// Sets the driving torques; each saturates at its limit, where the machine has one.
@@ -221,7 +196,7 @@ impl PlanarSimulation {
     fn set_torques(&self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
         let mut inner = self.open()?;
         let torques = vector(torques, Kind::Command, "torques")?;
-        Ok(each!(&mut *inner, s => s.set_inputs(&torques)).map_err(BorderError::from)?)
+        Ok(inner.set_inputs(&torques).map_err(BorderError::from)?)
     }
 
     /// Takes n steps, as `Simulation.step` does.
@@ -238,26 +213,25 @@ impl PlanarSimulation {
     #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
     fn step(&self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
         let steps = n.count(1, Kind::Option, "n")?;
-        each!(&mut *self.open()?, s => step(py, s, steps))
+        step(py, &mut *self.open()?, steps)
     }
 
     /// The contacts of the last step.
     #[getter]
     fn contacts(&self) -> PyResult<PlanarContacts> {
-        Ok(each!(&*self.open()?, s => PlanarContacts::new(s.contacts())))
+        Ok(PlanarContacts::new(self.open()?.contacts()))
     }
 
     /// Kinetic and potential energy now.
     fn energy(&self) -> PyResult<Energy> {
-        Ok(each!(&*self.open()?, s => s.energy()).into())
+        Ok(self.open()?.energy().into())
     }
 
     /// Mass matrix now, (nv, nv), in kg, kg m and kg m².
     fn mass_matrix<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        each!(&*self.open()?, s => {
-            let (M, nv) = (s.mass_matrix(), s.v().len());
-            fresh_matrix(py, &DMatrix::from_column_slice(nv, nv, M.as_slice()))
-        })
+        let inner = self.open()?;
+        let nv = inner.v().len();
+        fresh_matrix(py, &DMatrix::from_row_slice(nv, nv, &inner.mass_matrix()))
     }
 
     /// The friction-contact problem of the last step, of the last part of a split one.
@@ -266,16 +240,12 @@ impl PlanarSimulation {
     ///     Delassus operator W, (2 n_c, 2 n_c), 1/kg; free velocity, (2 n_c,), m/s; friction
     ///     coefficients, (n_c,).
     fn last_problem<'py>(&self, py: Python<'py>) -> PyResult<Problem<'py>> {
-        each!(&*self.open()?, s => problem(py, s))
+        problem(py, &*self.open()?)
     }
 
     /// Everything that is needed to continue bit for bit.
     fn snapshot(&self) -> PyResult<PlanarSnapshot> {
-        let inner = match &*self.open()? {
-            Machine::Ball(s) => OfPlanar::Ball(s.snapshot()),
-            Machine::TwoWheelRover(s) => OfPlanar::TwoWheelRover(s.snapshot()),
-            Machine::MirroredRover(s) => OfPlanar::MirroredRover(s.snapshot()),
-        };
+        let inner = self.open()?.snapshot();
         Ok(PlanarSnapshot { inner })
     }
 
@@ -289,12 +259,7 @@ impl PlanarSimulation {
     fn restore(&self, snapshot: &Bound<'_, PyAny>) -> PyResult<()> {
         let mut inner = self.open()?;
         let snapshot = belonging::<PlanarSnapshot>(snapshot, "a PlanarSnapshot")?;
-        let restored = match (&mut *inner, &snapshot.get().inner) {
-            (Machine::Ball(s), OfPlanar::Ball(own)) => s.restore(own),
-            (Machine::TwoWheelRover(s), OfPlanar::TwoWheelRover(own)) => s.restore(own),
-            (Machine::MirroredRover(s), OfPlanar::MirroredRover(own)) => s.restore(own),
-            _ => Err(SnapshotError::OtherModel),
-        };
+        let restored = inner.restore(&snapshot.get().inner);
         Ok(restored.map_err(BorderError::from)?)
     }
 

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use crate::arguments::{Given, number};
 use crate::errors::Kind;
 use crate::model::RoverModel;
-use crate::planar::{Machine, PlanarSimulation, pair};
+use crate::planar::{PlanarSimulation, pair};
 use crate::planar_ground::border;
 
 /// A disc on a ground: coordinates x, y of its centre, m, and its angle theta, rad.
@@ -53,7 +53,7 @@ impl BallSimulation {
         parameters.set_item("mass", mass)?;
         parameters.set_item("radius", radius)?;
         parameters.set_item("inertia", inertia)?;
-        let base = PlanarSimulation::build(Machine::Ball, ball, ground, parameters, options)?;
+        let base = PlanarSimulation::build(ball, ground, parameters, options)?;
         Ok(PyClassInitializer::from(base).add_subclass(Self))
     }
 }
@@ -121,8 +121,7 @@ impl TwoWheelRoverSimulation {
             }
         }
         let rover = two_wheel_rover(&parameters)?;
-        let base =
-            PlanarSimulation::build(Machine::TwoWheelRover, rover, ground, parameters, options)?;
+        let base = PlanarSimulation::build(rover, ground, parameters, options)?;
         Ok(PyClassInitializer::from(base).add_subclass(Self))
     }
 }
@@ -193,8 +192,7 @@ pub fn two_wheel_rover(parameters: &Bound<'_, PyDict>) -> PyResult<TwoWheelRover
 ///     **options: Options as of `BallSimulation`.
 ///
 /// Raises:
-///     ModelError: The model is not its own mirror image, or its planar image has not 7
-///         coordinates.
+///     ModelError: The model is not its own mirror image.
 ///     TerrainError: `ground` is not a ground.
 ///     OptionError: An option is out of its range.
 ///     TypeError: An option is unknown.
@@ -215,15 +213,14 @@ impl MirroredRoverSimulation {
     ) -> PyResult<PyClassInitializer<Self>> {
         let model = model.object::<RoverModel>(Kind::Model, "model", "a RoverModel")?;
         let inner = model.map_or_else(|| Arc::new(Model::rover()), |m| m.inner);
-        let rover = MirroredRover::<7>::new(&inner).map_err(|e| border(Kind::Model, &e))?;
+        let rover = MirroredRover::new(&inner).map_err(|e| border(Kind::Model, &e))?;
         let own = Self {
             joints: rover.joints(),
-            wheels: rover.wheel_names(),
+            wheels: rover.wheel_names().to_vec(),
         };
         let parameters = PyDict::new(ground.py());
         parameters.set_item("model", RoverModel::from(inner))?;
-        let base =
-            PlanarSimulation::build(Machine::MirroredRover, rover, ground, parameters, options)?;
+        let base = PlanarSimulation::build(rover, ground, parameters, options)?;
         Ok(PyClassInitializer::from(base).add_subclass(own))
     }
 

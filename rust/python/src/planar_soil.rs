@@ -4,9 +4,9 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::geometry::Support;
-use rover_core::planar::{Ground, WheelRig};
+use rover_core::planar::{Ground, PlanarTree, WheelRig};
 use rover_core::simulation::SoilSimulation as Core;
-use rover_core::system::soil::{Machine, Packing, SoilScene, on_soil};
+use rover_core::system::grains::{GrainScene, Packing};
 use std::sync::{Arc, MutexGuard};
 
 use crate::arguments::{Given, flags};
@@ -177,12 +177,12 @@ impl SoilSimulation {
         let lines = bed_arguments::walls(walls)?;
         let ground: Option<Arc<dyn Ground>> = ground.map(parse).transpose()?;
         let rover = rover.object::<Bound<'_, PyDict>>(Kind::Model, "rover", "a dict")?;
-        let who: Option<Arc<Machine>> = match (&rover, rig) {
-            (Some(given), None) => Some(on_soil(two_wheel_rover(&given.copy()?)?)),
+        let who: Option<PlanarTree> = match (&rover, rig) {
+            (Some(given), None) => Some(two_wheel_rover(&given.copy()?)?.into()),
             (None, Some(given)) => {
                 let given = pair(given, Kind::Model, "rig")?;
                 let rig = WheelRig::new(given.x, given.y);
-                Some(on_soil(rig.map_err(|e| border(Kind::Model, &e))?))
+                Some(rig.map_err(|e| border(Kind::Model, &e))?.into())
             }
             (None, None) => None,
             _ => {
@@ -193,11 +193,11 @@ impl SoilSimulation {
         if let Some(machine) = machine {
             q.extend(vector(machine, Kind::State, "machine")?);
         }
-        let scene = SoilScene {
+        let scene = GrainScene {
             grains: disks,
             walls: lines,
             ground: ground.map(|ground| ground as Arc<dyn Support<2>>),
-            machine: who,
+            machine: who.map(Arc::new),
             friction: bed_arguments::friction(friction, wall_friction, wheel_friction)?,
         };
         let sleep = bed_arguments::sleep(sleep, sleep_speed, sleep_distance)?;
@@ -278,15 +278,11 @@ impl SoilSimulation {
     #[getter]
     fn wheels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let inner = self.open()?;
-        let Some(machine) = &inner.soil().machine else {
-            return fresh_rows::<3>(py, &[]);
-        };
-        let own = inner.soil().machine_coordinates(inner.q());
-        let row = |k| {
-            let wheel = machine.wheel(k, own);
-            [wheel.centre.x, wheel.centre.y, wheel.radius]
-        };
-        fresh_rows(py, &(0..machine.n_wheels()).map(row).collect::<Vec<_>>())
+        let wheels = inner.soil().wheels(inner.q());
+        let rows = wheels
+            .iter()
+            .map(|(centre, radius)| [centre.x, centre.y, *radius]);
+        fresh_rows(py, &rows.collect::<Vec<_>>())
     }
 
     /// Commanded torques of the rover's wheels, (2,), N m, positive forward; empty without a rover.

@@ -3,10 +3,8 @@
 use pyo3::PyTypeInfo;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use rover_core::planar::{Ball, MirroredRover, TwoWheelRover};
 use rover_core::simulation::{GrainBed, PlanarScene, RoverScene, Snapshot as SnapshotOf};
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
 
 use crate::arguments;
 use crate::errors::{BorderError, Kind, Value};
@@ -45,14 +43,6 @@ fn refused(reason: &str) -> BorderError {
         field: Some("snapshot".to_owned()),
         value: Value::Nothing,
     }
-}
-
-/// A snapshot of a planar simulation, by its machine.
-#[derive(PartialEq, Serialize, Deserialize)]
-pub enum OfPlanar {
-    Ball(SnapshotOf<PlanarScene<3, Ball>>),
-    TwoWheelRover(SnapshotOf<PlanarScene<5, TwoWheelRover>>),
-    MirroredRover(SnapshotOf<PlanarScene<7, MirroredRover<7>>>),
 }
 
 /// A class of snapshots: all of them are read, written, compared and pickled alike.
@@ -116,7 +106,7 @@ snapshot_class! {
 
 snapshot_class! {
     /// Everything that a planar simulation needs to continue bit for bit. Picklable.
-    PlanarSnapshot, OfPlanar
+    PlanarSnapshot, SnapshotOf<PlanarScene>
 }
 
 snapshot_class! {

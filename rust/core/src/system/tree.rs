@@ -304,11 +304,6 @@ impl MechanicalSystem for TreeSystem<'_> {
     }
 
     #[inline]
-    fn set_moved(&self, from: &Configuration, v: &[f64], h: f64, to: &mut Configuration) {
-        to.set_moved(self.model, from, v, h);
-    }
-
-    #[inline]
     fn advance(&self, q: &mut Configuration, v: &[f64], h: f64) {
         q.advance(self.model, v, h);
     }
