@@ -229,19 +229,15 @@ impl SandContact {
             let times = (h, length);
             let recalled = patch.begin.memory.after(&twist, patch.wheel.drum(), times);
             // A memory that fades as a whole hardly changes the force.
-            let fresh = Matrix6::from_diagonal_element(recalled.fresh);
-            let found = patch.react(
-                (place, &gravity),
-                ruts,
-                &end,
-                &recalled.memory,
-                Want::Slopes,
-            );
-            patch.is_touching = found.is_some_and(|found| found.area > 0.0);
+            let want = Want::Slopes {
+                by_memory: recalled.fresh,
+                by_pose: theta * h,
+            };
+            let found = patch.react((place, &gravity), ruts, &end, &recalled.memory, want);
+            patch.is_touching = found.is_some_and(|found| found.is_touching);
             if let Some(found) = found.filter(|_| patch.is_touching) {
-                let slope = found.by_memory * fresh + found.by_pose * (theta * h);
                 patch.force = found.wrench;
-                patch.tangent = dissipative(&-slope, patch.wheel.radius);
+                patch.tangent = dissipative(&-found.slope, patch.wheel.radius);
                 patch.add_secant();
             }
         }
