@@ -25,7 +25,7 @@ pub use bekker::Bekker;
 pub use memory::{Memory, Twist};
 pub use patch::{Bed, Reaction, Want, WheelPose, react, react_with};
 pub use resistive_force::{Flow, Interface};
-pub use ruts::RutMap;
+pub use ruts::{RutMap, Window};
 pub use soil::{Law, Resistive, Soil};
 pub use state::{SandState, WheelInSand};
 pub use test_bed::{Drive, Measured, Sunk, TestBed};

@@ -28,7 +28,7 @@ use crate::sand::patch::Relief;
 use crate::sand::test_bed::rules_within;
 use crate::sand::{
     Bed, Memory, Reaction, Rules, RutMap, SandState, SandWheel, Soil, Twist, Want, WheelInSand,
-    WheelPose, react,
+    WheelPose, Window, react,
 };
 
 /// Change of the force of a wheel by the last repetition, relative to the force, at which the
@@ -45,6 +45,9 @@ const RESOLVED: f64 = 2.0;
 /// Part of its memory that sand keeps in a step in which it should give more energy than it has
 /// stored.
 const GIVES_WAY: f64 = 0.5;
+
+/// Cells around what of a wheel is in the sand in which ruts are looked for: it moves in a step.
+const MARGIN: f64 = 2.0;
 
 /// Twist, m/s, below which two points are the same.
 const TINY: f64 = 1e-12;
@@ -70,6 +73,9 @@ struct Patch {
     /// Twist and force of the last linearisation in this step.
     last: Option<(Vector6<f64>, Vector6<f64>)>,
     is_touching: bool,
+    /// Ruts near the wheel; meaningless where there are none.
+    window: Window,
+    is_rutted: bool,
     /// Whether the sand should have given more than it has stored in this step.
     is_empty: bool,
     begin: WheelInSand,
@@ -82,7 +88,6 @@ pub(crate) struct SandContact {
     patches: Vec<Patch>,
     /// Velocity at which the forces are taken (nv).
     guess: Vec<f64>,
-    ruts: RutMap,
     soil: Arc<Soil>,
     /// Step, its weight on its end, and gravity of the last linearisation.
     step: (f64, f64),
@@ -96,6 +101,8 @@ pub(crate) struct SandScene<'a> {
     pub model: &'a Model,
     /// The ground.
     pub ground: SoftLayer<'a>,
+    /// Where wheels have been.
+    pub ruts: &'a RutMap,
     /// Poses at which the step evaluates its forces.
     pub kinematics: &'a Kinematics,
 }
@@ -131,6 +138,8 @@ impl SandContact {
                 tangent: Matrix6::zeros(),
                 last: None,
                 is_touching: false,
+                window: Window::default(),
+                is_rutted: false,
                 is_empty: false,
                 begin: WheelInSand::default(),
                 tried: WheelInSand::default(),
@@ -139,7 +148,6 @@ impl SandContact {
         Self {
             patches: patches.collect(),
             guess: vec![0.0; model.nv()],
-            ruts: RutMap::default(),
             soil: ground.soil.clone(),
             step: (0.0, 0.5),
             gravity: Vector3::zeros(),
@@ -152,7 +160,6 @@ impl SandContact {
             patch.begin = *wheel;
             patch.tried = *wheel;
         }
-        self.ruts.clone_from(&state.ruts);
         self.guess.fill(0.0);
     }
 
@@ -175,13 +182,13 @@ impl SandContact {
             let cell = ground.cell;
             let (c, axle) = (pose.centre, pose.axle);
             let radius = patch.wheel.drum();
-            let reach = radius + 0.5 * patch.wheel.width;
             if patch.begin.sinkage < -cell {
-                state.ruts.pass(w, [c.x, c.z], (0.0, cell), |_| None);
+                state.ruts.pass(w, [c.x, c.z], ([0.0; 2], cell), |_| None);
                 continue;
             }
             let flat = Vector3::new(axle.x, 0.0, axle.z);
             let flat = flat / flat.norm().max(f64::MIN_POSITIVE);
+            let reach = patch.reach(ground, &pose);
             state.ruts.pass(w, [c.x, c.z], (reach, cell), |[x, z]| {
                 let r = Vector3::new(x - c.x, 0.0, z - c.z);
                 let (s, t) = (r.dot(&flat), (r.z * flat.x - r.x * flat.z));
@@ -214,15 +221,11 @@ impl SandContact {
         (self.step, self.gravity) = ((h, theta), options.gravity);
         let gravity = self.gravity;
         let length = self.memory_length();
-        let Self {
-            patches,
-            guess,
-            ruts,
-            ..
-        } = self;
+        let Self { patches, guess, .. } = self;
         for (w, patch) in patches.iter_mut().enumerate() {
             patch.pose = pose(place.model, place.kinematics, w);
             patch.set_columns(place.model, place.kinematics);
+            patch.read_ruts(place);
             patch.at = patch.twist(guess);
             let twist = Twist::of(&patch.at);
             let end = moved(&patch.pose, &twist, theta * h);
@@ -233,7 +236,7 @@ impl SandContact {
                 by_memory: recalled.fresh,
                 by_pose: theta * h,
             };
-            let found = patch.react((place, &gravity), ruts, &end, &recalled.memory, want);
+            let found = patch.react((place, &gravity), &end, &recalled.memory, want);
             patch.is_touching = found.is_some_and(|found| found.is_touching);
             if let Some(found) = found.filter(|_| patch.is_touching) {
                 patch.force = found.wrench;
@@ -279,7 +282,6 @@ impl SandContact {
                 .memory;
             let found = patch.react(
                 (place, &self.gravity),
-                &self.ruts,
                 &end,
                 &memory,
                 Want::Wrench,
@@ -409,10 +411,35 @@ impl Patch {
         self.force - self.tangent * (twist - self.at)
     }
 
+    /// How far from its centre the wheel may be in the sand, m, along x and z.
+    fn reach(&self, ground: SoftLayer<'_>, pose: &WheelPose) -> [f64; 2] {
+        let radius = self.wheel.drum();
+        let Some(tangent) = ground.tangent(&pose.centre, 0.5 * radius) else {
+            return [0.0; 2];
+        };
+        let above = radius - depth(&self.wheel, pose, &tangent) - tangent.highest;
+        let chord = (radius * radius - above.max(0.0) * above.max(0.0)).max(0.0);
+        let n = tangent.normal;
+        let tilt = (n.x * n.x + n.z * n.z).sqrt();
+        let along = (chord.sqrt() + radius * tilt).min(radius);
+        let across = 0.5 * self.wheel.width.max(ground.cell);
+        let a = pose.axle;
+        let level = (a.x * a.x + a.z * a.z).sqrt().max(f64::MIN_POSITIVE);
+        let (x, z) = (a.x.abs() / level, a.z.abs() / level);
+        [along * z + across * x, along * x + across * z]
+    }
+
+    /// Reads the ruts near the wheel.
+    fn read_ruts(&mut self, place: SandScene<'_>) {
+        let reach = self.reach(place.ground, &self.pose);
+        let (cell, c) = (place.ground.cell, self.pose.centre);
+        let reach = reach.map(|reach| reach + MARGIN * cell);
+        self.is_rutted = (place.ruts).read([c.x, c.z], reach, cell, &mut self.window);
+    }
+
     fn react(
         &self,
         (place, gravity): (SandScene<'_>, &Vector3<f64>),
-        ruts: &RutMap,
         pose: &WheelPose,
         memory: &Memory,
         want: Want,
@@ -421,8 +448,7 @@ impl Patch {
         let radius = self.wheel.drum();
         let tangent = ground.tangent(&pose.centre, 0.5 * radius)?;
         let (cell, n) = (ground.cell, tangent.normal);
-        let at = [pose.centre.x, pose.centre.z];
-        let is_rutted = ruts.is_near(at, radius + 0.5 * self.wheel.width, cell);
+        let is_rutted = self.is_rutted;
         let heights = |x: &Vector3<f64>| {
             let plane = n.dot(&(x - tangent.place));
             let over = if tangent.is_exact {
@@ -432,7 +458,7 @@ impl Patch {
                 height.map_or(0.0, |y| plane + n.y * (y - x.y))
             };
             let rut = if is_rutted {
-                ruts.depth([x.x, x.z], cell)
+                place.ruts.depth_in(&self.window, [x.x, x.z], cell)
             } else {
                 0.0
             };
