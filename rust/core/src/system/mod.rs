@@ -18,6 +18,7 @@ pub mod gyroscopic;
 pub(crate) mod motor_branch;
 pub mod planar;
 mod sand;
+mod sand_patch;
 pub mod soil;
 pub mod tree;
 

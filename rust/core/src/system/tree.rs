@@ -246,15 +246,18 @@ impl TreeSystem<'_> {
 impl TreeSystem<'_> {
     /// Forces and tangents of the sand at the last guess of the velocity.
     fn linearise_sand(&mut self, options: &StepOptions) {
-        if let Some((sand, place)) = self.sand() {
+        if let Some((sand, place, _)) = self.sand() {
             sand.linearise(place, options);
         }
     }
 
-    /// The sand with its ground and poses.
-    fn sand(&mut self) -> Option<(&mut SandContact, SandScene<'_>)> {
+    /// The sand with its ground and poses, and the factor of M̂.
+    fn sand(&mut self) -> Option<(&mut SandContact, SandScene<'_>, &Factor<f64>)> {
         let TreeScratch {
-            sand, kinematics, ..
+            sand,
+            kinematics,
+            factor,
+            ..
         } = &mut *self.parts;
         let place = SandScene {
             model: self.model,
@@ -262,17 +265,17 @@ impl TreeSystem<'_> {
             ruts: self.ruts?,
             kinematics,
         };
-        Some((sand.as_mut()?, place))
+        Some((sand.as_mut()?, place, factor))
     }
 
     /// Whether the sand asks for another solution.
     fn revise_sand(&mut self, v_end: &[f64]) -> bool {
-        (self.sand()).is_some_and(|(sand, place)| sand.revise(place, v_end))
+        (self.sand()).is_some_and(|(sand, place, factor)| sand.revise(place, factor, v_end))
     }
 
     /// Work of the sand over a step between two velocities, J.
     fn work_of_sand(&mut self, v: &[f64], v_end: &[f64]) -> f64 {
-        (self.sand()).map_or(0.0, |(sand, place)| sand.work(place, v, v_end))
+        (self.sand()).map_or(0.0, |(sand, place, _)| sand.work(place, v, v_end))
     }
 }
 
