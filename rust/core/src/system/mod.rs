@@ -16,6 +16,7 @@ pub(crate) mod motor_branch;
 pub mod planar;
 mod planar_matrices;
 mod sand;
+mod sand_patch;
 pub mod tree;
 
 pub use among_grains::{AmongContact, AmongGrains, AmongKey, AmongParts, GrainTouch};
