@@ -438,11 +438,11 @@ def check_arguments(caller: str, given: Mapping[str, object]) -> dict[str, Any]:
     return checked
 
 
-def takes_arguments(function: F) -> F:
-    """Replaces `**arguments` in a function's signature by the list."""
+def takes_arguments(function: F, before: Sequence[inspect.Parameter] = ()) -> F:
+    """Replaces `**arguments` in a function's signature by further parameters, if there are any, and the list."""
     own = inspect.signature(function)
     kept = [entry for entry in own.parameters.values() if entry.kind is not inspect.Parameter.VAR_KEYWORD]
-    function.__signature__ = own.replace(parameters=[*kept, *PARAMETERS])  # type: ignore[attr-defined]
+    function.__signature__ = own.replace(parameters=[*kept, *before, *PARAMETERS])  # type: ignore[attr-defined]
     return function
 
 

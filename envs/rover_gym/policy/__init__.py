@@ -2,9 +2,8 @@
 
 from rover_gym.policy.arc_search import PathCosts
 from rover_gym.policy.baseline import ENDS, BaselineInterrupt, BaselineRow, measure_baseline, wilson_interval
-from rover_gym.policy.command import CommandController, CommandLimits, DriveByCommand
-from rover_gym.policy.command_env import RoverCommandEnv, RoverCommandVectorEnv
-from rover_gym.policy.command_vector_env import CommandVectorEnv
+from rover_gym.policy.command import CommandController, CommandLimits
+from rover_gym.policy.command_env import CommandVectorEnv, DriveByCommand, RoverCommandEnv, RoverCommandVectorEnv
 from rover_gym.policy.episodes import Episode, Policy, run_episode
 from rover_gym.policy.evaluation import (
     EvaluatedEpisode,

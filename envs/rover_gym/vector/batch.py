@@ -23,7 +23,7 @@ from rover_gym.env.episode_scene import (
     check_difficulty,
     check_reset_options,
     origin_of,
-    scene_of,
+    scene_of_rows,
 )
 from rover_gym.env.episode_view import EpisodeView
 from rover_gym.env.generators import (
@@ -520,7 +520,7 @@ class RoverBatch:
             raise ResetNeeded("a batch of rovers: call reset() first")
         ground = self.task.ground  # one object for all, so that snapshots hold it once
         terrain = self.episodes.terrain(i) if ground is None else ground
-        return scene_of(self.task, *self.episodes.origin(i), terrain)
+        return scene_of_rows(self.task, *self.episodes.origin(i), terrain)
 
     def _check_begun(self, actions: object) -> None:
         """Refuses a step before all rovers have been reset; once they have been, all have an episode for good."""
@@ -630,5 +630,7 @@ class BatchRover(EpisodeView):
         """
         self._batch.episodes.set_difficulty(self._i, check_difficulty(self._batch.task, difficulty))
 
-    def _running(self) -> EpisodeScene:
+    @property
+    def scene(self) -> EpisodeScene:
+        """The scene of the rover's episode."""
         return self._batch.scene(self._i)
