@@ -1,5 +1,6 @@
 """Policies: the PD baseline, the scan planner, trained policies, their commands and features, and their evaluation."""
 
+from rover_gym.policy.arc_forecast import FORECAST_FILE, ForesightCosts
 from rover_gym.policy.arc_search import PathCosts
 from rover_gym.policy.baseline import ENDS, BaselineInterrupt, BaselineRow, measure_baseline, wilson_interval
 from rover_gym.policy.command import CommandController, CommandLimits
@@ -15,7 +16,6 @@ from rover_gym.policy.evaluation import (
     summarise,
 )
 from rover_gym.policy.features import Features
-from rover_gym.policy.foresight_policy import FORECAST_FILE, ForesightCosts, ForesightPolicy
 from rover_gym.policy.goal_env import GoalObservation, RoverGoalEnv, RoverGoalVectorEnv
 from rover_gym.policy.ground_map import MapOptions
 from rover_gym.policy.named_policy import NamedPolicy, named_policy
@@ -38,7 +38,6 @@ __all__ = [
     "EvaluatedEpisode",
     "Features",
     "ForesightCosts",
-    "ForesightPolicy",
     "GoalObservation",
     "IntervalEstimate",
     "MapOptions",

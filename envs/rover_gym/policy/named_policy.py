@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from rover_gym.mechanics import RoverModel
+from rover_gym.policy.arc_forecast import FORECAST_FILE
 from rover_gym.policy.episodes import Policy
-from rover_gym.policy.foresight_policy import FORECAST_FILE, ForesightPolicy
 from rover_gym.policy.pd_policy import PDPolicy
 from rover_gym.policy.policy_card import find_policy, is_there, policy_arguments
 from rover_gym.policy.scan_policy import ScanPolicy
@@ -54,10 +54,9 @@ def named_policy(policy: str, terrain: str, model: RoverModel | None = None) -> 
         PolicyError: There is no such policy.
         OSError: A file may not be read.
     """
-    if policy == "foresight":
-        return NamedPolicy(ForesightPolicy.arguments(model), ForesightPolicy)
-    if is_there(Path(policy) / FORECAST_FILE):
-        return NamedPolicy(ForesightPolicy.arguments(model), partial(ForesightPolicy, forecast=policy))
+    if policy == "foresight" or is_there(Path(policy) / FORECAST_FILE):
+        forecast = True if policy == "foresight" else policy
+        return NamedPolicy(ScanPolicy.arguments(model), partial(ScanPolicy, forecast=forecast))
     folder = find_policy(policy, terrain)
     if folder is not None:
         return NamedPolicy(policy_arguments(folder), partial(_load, folder))
