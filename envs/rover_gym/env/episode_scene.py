@@ -1,19 +1,23 @@
-"""The scene of an episode: ground, rocks, start, goal and properties, drawn at random or fixed by reset options."""
+"""The scene of an episode: ground, rocks, start, goal and properties, drawn at random or fixed by reset options.
+
+A draw checks everything before the caller adopts it: episodes are complete, or none begins.
+"""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from rover_gym.env.arguments import MAX_SLOPE_DEG
+from rover_gym.env.generators import Rows
 from rover_gym.env.observation import Array
 from rover_gym.env.rocks import MAX_DIFFICULTY, MAX_GOAL_DISTANCE, Rocks
 from rover_gym.env.start import Domain, Start
 from rover_gym.env.task import Task
 from rover_gym.ground import plane_of
-from rover_gym.mechanics import DrawnEpisodes, OptionError, Plane, StateError, Terrain
+from rover_gym.mechanics import DrawnEpisodes, EpisodeBatch, OptionError, Plane, StateError, Terrain
 from rover_gym.validation import Range, known_keys, mapping, number, refuse, span, vector, whole
 
 RESET_OPTIONS = (
@@ -169,3 +173,34 @@ def _course(task: Task, field: str, value: object) -> list[tuple[float, ...]]:
     if not isinstance(value, (list, tuple)) or len(value) != n:
         refuse(OptionError, field, value, f"must be a list of {n} places (x, z), as many as waypoints")
     return [_place(f"{field}[{i}]", place) for i, place in enumerate(value)]
+
+
+#: Most scenes drawn for one reset until the rover penetrates neither the ground nor a sphere.
+PLACING_ATTEMPTS = 100
+
+
+def draw_episodes(
+    task: Task,
+    generators: Rows,
+    difficulties: Sequence[Range | None],
+    options: ResetOptions | Sequence[ResetOptions],
+    batch: EpisodeBatch | None = None,
+) -> DrawnEpisodes:
+    """Draws the next episode of each generator, which keeps its state, and repeats each draw until the rover has room.
+
+    Args:
+        task: The task.
+        generators: `(m, 4)` random generators; the result's `generators` holds their states after the draws.
+        difficulties: Range of each rover's rocks' difficulty; None for the task's own.
+        options: The values that reset options fix, for all rovers or one per rover.
+        batch: The batch whose threads draw; None for the caller's alone.
+
+    Raises:
+        TerrainError: A rover would penetrate the ground or a sphere in each of `PLACING_ATTEMPTS` scenes.
+        StateError: The observation of a given state overflows float32.
+    """
+    fixed = options.fixed if isinstance(options, ResetOptions) else [one.fixed for one in options]
+    given = list(difficulties) if any(difficulties) else None
+    if batch is None:
+        return task.episodes.draw(generators, attempts=PLACING_ATTEMPTS, difficulties=given, fixed=fixed)
+    return batch.draw(task.episodes, generators, attempts=PLACING_ATTEMPTS, difficulties=given, fixed=fixed)

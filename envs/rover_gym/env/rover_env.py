@@ -11,9 +11,15 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from rover_gym.env.arguments import RoverArguments, check_arguments, takes_arguments, with_argument_table
-from rover_gym.env.beginning import draw_episodes
 from rover_gym.env.env_snapshot import EnvSnapshot, Progress, check_random_state, check_snapshot
-from rover_gym.env.episode_scene import EpisodeScene, ResetOptions, check_difficulty, check_reset_options, scene_of
+from rover_gym.env.episode_scene import (
+    EpisodeScene,
+    ResetOptions,
+    check_difficulty,
+    check_reset_options,
+    draw_episodes,
+    scene_of,
+)
 from rover_gym.env.episode_view import EpisodeView
 from rover_gym.env.generators import check_seed, row_of, seeded, set_row
 from rover_gym.env.play_keys import keys_to_action, pushed

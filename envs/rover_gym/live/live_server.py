@@ -18,7 +18,7 @@ from rover_gym.live.live_rover import ROCK_RADII
 from rover_gym.live.live_scene import GOAL_DISTANCES, GRAVITY
 from rover_gym.live.live_view import LiveView
 from rover_gym.mechanics import CommandError, RoverGymError
-from rover_gym.replay.page import WHEEL_COLOURS
+from rover_gym.rendering.appearance import WHEEL_COLOURS
 from rover_gym.replay.player import with_parts
 from rover_gym.validation import checked, number, refuse
 

@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.arguments import RoverArguments, check_reward_weights, takes_arguments
-from rover_gym.env.beginning import draw_episodes
-from rover_gym.env.episode_scene import EpisodeScene, ResetOptions, scene_of
+from rover_gym.env.episode_scene import EpisodeScene, ResetOptions, draw_episodes, scene_of
 from rover_gym.env.generators import row_of, set_row
 from rover_gym.env.rover_env import STEP_FAILED, RoverEnv, RunningEpisode
 from rover_gym.env.start import Start

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
-from rover_gym.env import beginning
+from rover_gym.env import episode_scene
 from rover_gym.env.arguments import RoverArguments, takes_arguments
 from rover_gym.env.env_snapshot import EnvSnapshot, Progress, check_random_state, check_snapshot
 from rover_gym.env.episode_scene import (
@@ -324,7 +324,7 @@ class RoverBatch:
         used = [self._seeds[i] if seed is None else seed for i, seed in zip(chosen, given, strict=True)]
         difficulties = [self.episodes.difficulty(i) for i in chosen]
         fixed = ResetOptions() if options is None else options
-        episodes = beginning.draw_episodes(self.task, rows, difficulties, fixed, self.episodes)
+        episodes = episode_scene.draw_episodes(self.task, rows, difficulties, fixed, self.episodes)
         return Drawn(episodes, chosen, used, {chosen[k] for k in anew})
 
     def begin(self, drawn: "Drawn") -> None:
@@ -400,7 +400,7 @@ class RoverBatch:
                 actions,
                 self.task.episodes,
                 same_step=same_step,
-                attempts=beginning.PLACING_ATTEMPTS,
+                attempts=episode_scene.PLACING_ATTEMPTS,
                 has_scan=has_scan,
             )
         if before is not None and moved is not None:
