@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
-from rover_gym.env.arguments import RoverArguments, check_arguments, takes_arguments, with_argument_table
+from rover_gym.env.arguments import RoverArguments, check_arguments, takes_arguments, with_tables
 from rover_gym.env.env_snapshot import EnvSnapshot, Progress, check_random_state, check_snapshot
 from rover_gym.env.episode_scene import (
     EpisodeScene,
@@ -55,7 +55,7 @@ class RunningEpisode:
     mover: RoverGrainSimulation | None = None
 
 
-@with_argument_table
+@with_tables
 class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     """Drive a six-wheel, 21-dof rover with six motors and six steered wheels to a goal on the map.
 
@@ -117,19 +117,7 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
     the slices and converts the values back to SI units. Observations are never clipped. The bounds of
     unbounded entries are float32's largest numbers: the space holds every finite observation and nothing else.
 
-    | index | field            | meaning                                                   | unit       | scale        |
-    |-------|------------------|-----------------------------------------------------------|------------|--------------|
-    | 0-20  | q                | trunk x, y, z, roll, heading, pitch; joint angles         | m, rad     | 1            |
-    | 21-41 | velocity         | trunk linear and angular in the trunk frame; joint rates  | m/s, rad/s | 1, wheels 10 |
-    | 42-47 | wheel_gap        | distance of each wheel to ground and rocks                | m          | 0.1          |
-    | 48-53 | wheel_contact    | 1 where the gap is at most 1 mm, else 0                   |            | 1            |
-    | 54-59 | normal_force     | ground or rock on wheel, along the contact's normal       | N          | m g / 6      |
-    | 60-71 | tangential_force | the same, rolling then lateral, wheel by wheel            | N          | m g / 6      |
-    | 72-74 | ground_normal    | the normal of the ground, over 1 m, in the trunk frame    |            | 1            |
-    | 75-76 | goal             | goal ahead and to the right of the trunk, horizontal      | m          | 10           |
-    | 77    | goal_distance    | horizontal distance from the trunk's origin to the goal   | m          | 10           |
-    | 78-89 | previous_action  | the action before this observation, 0 at reset            |            | 1            |
-    | 90    | stuck            | fraction of the time to high-centring that has passed     |            | 1            |
+    {observation}
 
     The trunk frame is x forward, y up, z to the right of the trunk. `q` is the simulation's, with the
     wheels' angles wrapped to one turn. Forces are those of the last physics step, zero at reset.
@@ -250,12 +238,7 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
 
     ## Info
 
-    `time` (s), `success` and `is_success` (the name stable-baselines3 looks for), `termination` ("" while
-    the episode runs), `distance_to_goal` (m), `energy` (J, wheel motors, braking counted) and
-    `energy_positive` (J, driving only) since reset, `slip_ratio` (mean over wheels in contact of
-    rim slip over the faster of rim and ground, 0 to 2), `tilt` (rad), `difficulty` (of the rocks, 0 where none
-    are drawn), `domain` (the randomised properties, by argument), `reward_terms`, and `solver` (`status`,
-    `iterations`, `residual`, `n_contacts`, `message`): the worst of the physics steps.
+    {info}
 
     ## Arguments
 
