@@ -14,8 +14,7 @@ from rover_gym import OptionError, Plane, RoverModel, Simulation, SphereField
 from rover_gym.cli import app
 from rover_gym.record import Recorder, RecordingError, RoverSampler, describe, read_run, read_trajectory
 from rover_gym.reproduction import inclined_plane, sphere_rug
-from rover_gym.reproduction.chapter_3_balls import GRAVITY, WHEEL_RADIUS
-from rover_gym.reproduction.scene_runs import distance_to_siconos, reference_data
+from rover_gym.reproduction.scene_runs import GRAVITY, WHEEL_RADIUS, distance_to_siconos, reference_data
 
 KILLED = """
 import os, signal, sys

@@ -11,7 +11,7 @@ import pytest
 
 from rover_gym import Plane, SphereField, StateError
 from rover_gym.env import RoverEnv
-from rover_gym.env.rocks import HeightScan, scan_points
+from rover_gym.env.start import HeightScan, scan_points
 from rover_gym.mechanics import OptionError, PathSearch, atan2, exp, sin_cos
 from rover_gym.policy import MapOptions, PathCosts, ScanPolicy
 from rover_gym.policy.arc_search import STEPS, Arcs, ArcSearch, RoverOutline, SearchTask

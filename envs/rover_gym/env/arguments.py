@@ -18,7 +18,7 @@ from typing import Annotated, Any, TypedDict, TypeVar, get_args, get_type_hints
 
 from rover_gym.env.observation import info_table, observation_table
 from rover_gym.env.reward_terms import WEIGHTS, RewardTerm, RewardTerms, check_reward_terms
-from rover_gym.env.rocks import MAX_ABUNDANCE, MAX_DIFFICULTY, ROCK_RADII, check_scan
+from rover_gym.env.start import MAX_ABUNDANCE, MAX_DIFFICULTY, ROCK_RADII, check_scan
 from rover_gym.maps.map_files import is_terrain_file, open_terrain
 from rover_gym.mechanics import ModelError, OptionError, RoverModel, Terrain, TerrainError, Union
 from rover_gym.models.lookup import open_model

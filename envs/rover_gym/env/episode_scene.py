@@ -13,8 +13,7 @@ import numpy as np
 from rover_gym.env.arguments import MAX_SLOPE_DEG
 from rover_gym.env.generators import Rows
 from rover_gym.env.observation import Array
-from rover_gym.env.rocks import MAX_DIFFICULTY, MAX_GOAL_DISTANCE, Rocks
-from rover_gym.env.start import Domain, Start
+from rover_gym.env.start import MAX_DIFFICULTY, MAX_GOAL_DISTANCE, Domain, Rocks, Start
 from rover_gym.env.task import Task
 from rover_gym.ground import plane_of
 from rover_gym.mechanics import DrawnEpisodes, EpisodeBatch, OptionError, Plane, StateError, Terrain

@@ -20,9 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.identification.fitting import EXACT, Solution, WindowFit, is_told
+from rover_gym.identification.fitting import EXACT, Solution, Window, WindowFit, is_told
 from rover_gym.identification.parameters import Parameter
-from rover_gym.identification.windows import Window
 from rover_gym.mechanics import OptionError
 from rover_gym.validation import refuse
 

@@ -17,9 +17,8 @@ from rover_gym.identification.estimates import (
     open_combinations,
     variance_of,
 )
-from rover_gym.identification.fitting import SMALLEST_CHANGE, Solution, WindowFit
+from rover_gym.identification.fitting import SMALLEST_CHANGE, Solution, Window, WindowFit, cut
 from rover_gym.identification.parameters import Parameter, Setup, chosen_parameters
-from rover_gym.identification.windows import Window, cut
 from rover_gym.mechanics import OptionError, RoverModel
 from rover_gym.record.channels import RoverSampler
 from rover_gym.record.rover_run import RoverRun, read_run

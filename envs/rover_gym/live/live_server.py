@@ -10,7 +10,7 @@ from itertools import cycle, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rover_gym.env.rocks import MAX_DIFFICULTY
+from rover_gym.env.start import MAX_DIFFICULTY
 from rover_gym.extras import require
 from rover_gym.live.guarded_server import GuardedServer, start_guarded
 from rover_gym.live.live_commands import command_of, read_message

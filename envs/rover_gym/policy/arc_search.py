@@ -20,8 +20,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.env.rocks import HeightScan
-from rover_gym.env.start import wheel_centres
+from rover_gym.env.start import HeightScan, wheel_centres
 from rover_gym.mechanics import OptionError, PathSearch, Plane, RoverModel, atan2, sin_cos
 from rover_gym.validation import number, refuse
 

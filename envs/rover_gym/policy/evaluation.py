@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.arguments import terrain_name
-from rover_gym.env.rocks import MAX_DIFFICULTY
 from rover_gym.env.rover_env import RoverEnv
+from rover_gym.env.start import MAX_DIFFICULTY
 from rover_gym.env.task import MAX_EPISODE_STEPS
 from rover_gym.mechanics import OptionError
 from rover_gym.models.lookup import open_model

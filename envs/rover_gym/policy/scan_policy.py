@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.env.rocks import HeightScan
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.env.start import wheel_centres
+from rover_gym.env.start import HeightScan, wheel_centres
 from rover_gym.mechanics import OptionError, RoverModel, StateError, exp, sin_cos
 from rover_gym.policy.arc_forecast import FORECAST_FILE, USUAL_WAY, ArcFeatures, ArcForecast, ForesightCosts
 from rover_gym.policy.arc_search import Arcs, ArcSearch, PathCosts, RoverOutline, SearchTask

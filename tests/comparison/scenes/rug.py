@@ -10,7 +10,7 @@ import numpy as np
 from comparison.scene import Array, Phase, RoverScene, Trace
 from rover_gym import SphereField
 from rover_gym.reproduction import sphere_rug
-from rover_gym.reproduction.chapter_3_balls import FRONT_STEERING, GRAVITY, report_model
+from rover_gym.reproduction.scene_runs import FRONT_STEERING, GRAVITY, report_model
 
 
 def scene() -> RoverScene:
