@@ -258,13 +258,12 @@ impl PlanarTree {
         std::iter::from_fn(move || {
             let (i, x, turns) = next?;
             let (part, origin) = (&self.parts[i], poses.origin[i]);
-            next = (i > 0).then(|| {
-                if part.is_absolute {
-                    (part.parent, origin, false)
-                } else {
-                    (part.parent, x, turns)
-                }
-            });
+            let above = if part.is_absolute {
+                (part.parent, origin, false)
+            } else {
+                (part.parent, x, turns)
+            };
+            next = (i > 0).then_some(above);
             Some((i, left(&(x - origin)), turns))
         })
     }
