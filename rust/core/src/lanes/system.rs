@@ -27,7 +27,7 @@ pub(super) trait Loaded<T: Lane, const C: usize>: System<T, Few<C>> + Sized {
     fn block_of(problem: &ContactProblem, contact: usize) -> &[f64; 9];
 
     /// Free velocity of a place, m/s.
-    fn free_velocity(&mut self, place: usize) -> &mut Triple<T>;
+    fn free_velocity_mut(&mut self, place: usize) -> &mut Triple<T>;
 }
 
 /// Mode and impulse of a lane's contact with the diagonal block `W`, see [`System::solve_one`].

@@ -276,7 +276,7 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
             return;
         }
         let centre = if S::RETURNS { &self.centre } else { &self.p };
-        system.newton_point(&self.u, centre, self.alpha, &self.modes, &mut self.trial);
+        newton_point::<T, B, S>(system, centre, self.alpha, &self.modes, &mut self.trial);
         let fine = active & self.alpha.lt(one.like(S::SMALLEST_ALPHA) * self.mean);
         if S::SMALLEST_ALPHA_AGAIN < S::SMALLEST_ALPHA && fine.any() {
             self.improve_trial(system, fine);
@@ -315,8 +315,8 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
     #[inline(always)]
     fn improve_trial<S: System<T, B>>(&mut self, system: &mut S, lanes: T::Mask) {
         let left = self.left_by_trial(system);
-        let mut change = left.clone();
-        system.correction(&left, &self.modes, &mut change);
+        let mut change = left;
+        correction::<T, B, S>(system, &self.modes, &mut change);
         for i in system.places() {
             for k in 0..3 {
                 let improved = self.trial[i][k] + change[i][k];
@@ -375,7 +375,10 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
     fn refine<S: System<T, B>>(&mut self, system: &mut S, lanes: T::Mask) {
         let zero = self.mean.like(0.0);
         self.find_modes(system.places());
-        system.correction(&self.u, &self.modes, &mut self.trial);
+        for i in system.places() {
+            self.trial[i] = self.u[i];
+        }
+        correction::<T, B, S>(system, &self.modes, &mut self.trial);
         for i in system.places() {
             let trial = &mut self.trial[i];
             for (trial, p) in trial.iter_mut().zip(self.p[i]) {
@@ -425,6 +428,40 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
     }
 }
 
+/// The impulses of the Newton step about the impulses `centre`, into `y`.
+#[inline(always)]
+fn newton_point<T: Lane, B: Store, S: System<T, B>>(
+    system: &mut S,
+    centre: &B::Of<Triple<T>>,
+    alpha: T,
+    modes: &B::Of<Mode<T>>,
+    y: &mut B::Of<Triple<T>>,
+) {
+    for i in system.places() {
+        let (c, q) = (&centre[i], system.free_velocity(i));
+        for k in 0..3 {
+            y[i][k] = alpha * c[k] - q[k];
+        }
+    }
+    system.solve(modes, y);
+}
+
+/// The change of the impulses that removes the velocities `u` as far as the modes allow, in their
+/// place.
+#[inline(always)]
+fn correction<T: Lane, B: Store, S: System<T, B>>(
+    system: &mut S,
+    modes: &B::Of<Mode<T>>,
+    u: &mut B::Of<Triple<T>>,
+) {
+    for i in system.places() {
+        for u in &mut u[i] {
+            *u = -*u;
+        }
+    }
+    system.solve(modes, u);
+}
+
 /// `new` in the lanes of a mask, `old` elsewhere.
 #[inline(always)]
 fn replaced<T: Lane>(lanes: T::Mask, new: T::Mask, old: T::Mask) -> T::Mask {
@@ -461,7 +498,7 @@ pub(crate) mod tests {
         let mut own = Pivoting::<f64, B>::new(Single::Baseline);
         (own.alpha, own.modes, own.centre) = (alpha, modes, centre);
         assert!(S::RETURNS && system.factorise(alpha, &own.modes));
-        system.newton_point(&own.u, &own.centre, alpha, &own.modes, &mut own.trial);
+        newton_point::<f64, B, S>(system, &own.centre, alpha, &own.modes, &mut own.trial);
         let entries = |x: Triple<f64>| x.into_iter().map(f64::abs);
         let is_small = |x: f64| x < 1e2;
         if !(system.places()).all(|i| entries(own.trial[i]).all(is_small)) {

@@ -44,31 +44,18 @@ pub(crate) trait System<T: Lane, B: Store> {
     /// Places of contacts of any lane.
     fn places(&self) -> Self::Places;
 
+    /// Free velocity `q` of a place, m/s.
+    fn free_velocity(&self, place: usize) -> Triple<T>;
+
     /// `u = W p + q`.
     fn velocities(&mut self, p: &B::Of<Triple<T>>, u: &mut B::Of<Triple<T>>);
 
     /// Factors the systems of the modes; false if one is singular or costs too much.
     fn factorise(&mut self, alpha: T, modes: &B::Of<Mode<T>>) -> bool;
 
-    /// The impulses of the Newton step about the impulses `centre`, into `y`. `u`: the velocities
-    /// of the present impulses.
-    fn newton_point(
-        &mut self,
-        u: &B::Of<Triple<T>>,
-        centre: &B::Of<Triple<T>>,
-        alpha: T,
-        modes: &B::Of<Mode<T>>,
-        y: &mut B::Of<Triple<T>>,
-    );
-
-    /// The change of the impulses, into `y`, that removes the velocities `u` as far as the modes
-    /// allow; the factors may be those of modes at nearby impulses.
-    fn correction(
-        &mut self,
-        u: &B::Of<Triple<T>>,
-        modes: &B::Of<Mode<T>>,
-        y: &mut B::Of<Triple<T>>,
-    );
+    /// Solves `Bᵀ (W + α I) C y + γ y = Bᵀ r` with the last factors, which may be those of modes at
+    /// nearby impulses. The velocities `r` become the impulses `C y`.
+    fn solve(&mut self, modes: &B::Of<Mode<T>>, r: &mut B::Of<Triple<T>>);
 
     /// Mode and impulse of the contact at a place of a lane, all others fixed, from its velocity
     /// `free` without this impulse.
