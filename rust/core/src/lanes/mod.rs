@@ -10,7 +10,7 @@
 //! The dynamics of the tree are those of [`crate::multibody`].
 //!
 //! - [`admission`]: which options have a fast step; [`machine`]: what the rovers share;
-//! - `parts`, [`ground`], `footing`, [`forecast`], [`contacts`], `by_lane`, `rare`, `spares`,
+//! - `parts`, [`ground`], `footing`, `pieces`, `rolling`, [`forecast`], [`contacts`], `by_lane`, `rare`, `spares`,
 //!   `stops`: what touches what;
 //!   [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield;
 //! - [`problem`], [`modes`], [`equations`], [`pattern`], `tree_matrix`, `velocity_equations`,
@@ -32,10 +32,12 @@ pub mod modes;
 mod parts;
 pub mod passenger;
 pub mod pattern;
+mod pieces;
 mod pivoting;
 pub mod problem;
 pub mod queue;
 mod rare;
+mod rolling;
 pub mod rows;
 mod spares;
 pub mod step;
