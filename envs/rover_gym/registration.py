@@ -35,6 +35,9 @@ ENVIRONMENTS: Mapping[str, Registration] = {
     "RoverHills-v0": Registration(
         "rover_gym.sensors:make_rover", "rover_gym.sensors:make_rover_vector", arguments={"terrain": "hills"}
     ),
+    "RoverSand-v0": Registration(
+        "rover_gym.sensors:make_rover", "rover_gym.sensors:make_rover_vector", arguments={"terrain": "sand"}
+    ),
     "RoverWaypoints-v0": Registration(
         "rover_gym.sensors:make_rover",
         "rover_gym.sensors:make_rover_vector",
