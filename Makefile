@@ -108,6 +108,7 @@ docs: $(STAMPS)/test $(STAMPS)/core ## build the documentation, Rust and Python,
 bench: $(STAMPS)/release ## time a step and tell where the time goes, MuJoCo's beside it where it is installed (informs, does not gate)
 	$(COMPARE).exploring_bench
 	cargo bench --locked $(addprefix --bench ,step accuracy spheres rays solver soil)
+	cargo run --locked --quiet --profile bench -p rover-core --example sand_steps
 	@if command -v valgrind > /dev/null; then cargo build --release --locked --quiet --example drive_steps; \
 	  count() { valgrind --tool=callgrind --callgrind-out-file=/dev/null target/release/examples/drive_steps $$1 2>&1 \
 	    | awk '/Collected/ { print $$NF }'; }; \

@@ -1,6 +1,6 @@
 """The sand of episodes: soils to draw from, and a rover that they carry."""
 
-from rover_gym.mechanics import ModelError, OptionError, RoverModel
+from rover_gym.mechanics import ModelError, OptionError, RoverModel, SoftGround, Terrain, Union
 from rover_gym.sand.soils import Soil, named_soil
 from rover_gym.validation import refuse
 
@@ -37,7 +37,7 @@ def check_wheels_for_sand(rover: RoverModel) -> None:
     for i, wheel in enumerate(rover.to_dict()["wheels"]):
         width = wheel.get("width") or 0.0
         if not width > 0.0:
-            refuse(ModelError, f"model.wheels[{i}].width", width, "must be above 0: sand does not bear wheels without width")
+            refuse(ModelError, f"model.wheels[{i}].width", width, "must be above 0 on sand")
 
 
 def soils_of(terrain: object, given: tuple[Soil, ...] | None) -> tuple[Soil, ...]:
@@ -52,3 +52,14 @@ def soils_of(terrain: object, given: tuple[Soil, ...] | None) -> tuple[Soil, ...
         names = ", ".join(soil.name for soil in given)
         refuse(OptionError, "soil", names, "needs terrain 'sand'")
     return ()
+
+
+def soil_of(soils: tuple[Soil, ...], terrain: Terrain) -> Soil | None:
+    """Which of some soils lies under a terrain; None on firm ground."""
+    if isinstance(terrain, SoftGround):
+        numbers = terrain.soil
+        alike = (soil for soil in soils if all(numbers.get(name) == own for name, own in soil.numbers.items()))
+        return next(alike, None)
+    parts = terrain.parts if isinstance(terrain, Union) else ()
+    found = (soil_of(soils, part) for part in parts)
+    return next((soil for soil in found if soil is not None), None)

@@ -182,7 +182,7 @@ def make_task(given: Mapping[str, Any]) -> Task:
 
 
 def _rocks(given: Mapping[str, Any]) -> RockDistribution | None:
-    """Distribution of the rock fields on rocks, hills and sand, whose course must lie within the field; None elsewhere."""
+    """Distribution of the rock fields where there are any, whose course must lie within the field; None elsewhere."""
     if given["terrain"] not in ("rocks", "hills", "sand"):
         for name in ("difficulty", "rock_abundance", "max_rock_radius"):
             if given[name] is not None:

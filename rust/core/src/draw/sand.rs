@@ -55,8 +55,8 @@ impl SandDistribution {
     pub fn draw(&self, random: &mut Pcg64, difficulty: f64, seed: Option<u64>) -> SandDraw {
         let drawn = random.below(1 << 63);
         let n = self.soils.len();
-        let index = if n > 1 { random.below(n as u64) } else { 0 };
-        let index = usize::try_from(index).unwrap_or(0);
+        let place = if n > 1 { random.below(1 << 63) } else { 0 };
+        let index = usize::try_from(place % n as u64).unwrap_or(0);
         SandDraw {
             soil: self.soils[index].clone(),
             amplitude: AMPLITUDE * difficulty,
