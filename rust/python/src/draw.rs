@@ -4,8 +4,9 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
 use rover_core::draw::{
-    Domain, DomainDistribution, Fixed, FixedStart, GroundDistribution, HillDistribution, Order,
-    Pcg64, Range, RockDistribution, RockDraw, SceneDistribution, Start, StartDistribution,
+    Domain, DomainDistribution, DrawnGround, Fixed, FixedStart, GroundDistribution,
+    HillDistribution, Order, Pcg64, Range, RockDistribution, RockDraw, SandDistribution,
+    SceneDistribution, Start, StartDistribution,
 };
 use rover_core::episode::{Beginning, EpisodeBatch, EpisodeDistribution as CoreDistribution};
 use rover_core::geometry::Plane as CorePlane;
@@ -48,6 +49,9 @@ type NewArguments<'py> = ((Bound<'py, PyAny>, Bound<'py, PyAny>), Bound<'py, PyD
 ///     ground: The ground of every episode, a terrain of any kind; None for a tilted plane.
 ///     hills: Fractal ground: root mean square of its slope, rise over run, or nan for one that
 ///         follows from the difficulty of the rocks; None for none. Not together with `ground`.
+///     sand: Soft grounds, one of which is drawn, on a tilted plane with ripples by the difficulty
+///         of the rocks; their surfaces do not count; None for none. Not together with the two
+///         others.
 ///
 /// Raises:
 ///     OptionError: An argument is missing, no number, or out of its range.
@@ -250,8 +254,8 @@ impl EpisodeDistribution {
     #[new]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
     #[pyo3(signature = (rules, simulation, *, start, domain, trunk_load_limit, rocks = None, slope_by_difficulty = Given::MISSING,
-        ground = None, hills = None),
-        text_signature = "(rules, simulation, *, start, domain, trunk_load_limit, rocks=None, slope_by_difficulty=False, ground=None, hills=None)")]
+        ground = None, hills = None, sand = None),
+        text_signature = "(rules, simulation, *, start, domain, trunk_load_limit, rocks=None, slope_by_difficulty=False, ground=None, hills=None, sand=None)")]
     fn new(
         rules: &Bound<'_, PyAny>,
         simulation: &Bound<'_, PyAny>,
@@ -262,6 +266,7 @@ impl EpisodeDistribution {
         slope_by_difficulty: Given<'_>,
         ground: Option<&Bound<'_, PyAny>>,
         hills: Option<&Bound<'_, PyAny>>,
+        sand: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let slope_by_difficulty =
             slope_by_difficulty.flag(false, Kind::Option, "slope_by_difficulty")?;
@@ -273,6 +278,7 @@ impl EpisodeDistribution {
             ("rocks", rocks),
             ("ground", ground),
             ("hills", hills),
+            ("sand", sand),
         ] {
             given.set_item(name, value)?;
         }
@@ -286,7 +292,10 @@ impl EpisodeDistribution {
         let rules = episode::rules(rules)?;
         let made = episode::simulation(simulation, "simulation")?.get();
         let rover = made.open()?;
-        let ground = ground_distribution(ground, hills)?;
+        let ground = match sand {
+            Some(sand) => sand_distribution(sand, &[("ground", ground), ("hills", hills)])?,
+            None => ground_distribution(ground, hills)?,
+        };
         let (start, domain) = (Named::of(start, "start")?, Named::of(domain, "domain")?);
         let scenes = SceneDistribution {
             rover: rover.scene().clone(),
@@ -390,6 +399,30 @@ fn ground_distribution(
             Err(refused(hills, Kind::Option, "hills", "None beside a ground").into())
         }
     }
+}
+
+/// Sand of episodes: a list of soft grounds, whose surfaces do not count.
+fn sand_distribution(
+    sand: &Bound<'_, PyAny>,
+    others: &[(&str, Option<&Bound<'_, PyAny>>)],
+) -> PyResult<GroundDistribution> {
+    for (name, other) in others {
+        if let Some(other) = other {
+            return Err(refused(other, Kind::Option, name, "None beside sand").into());
+        }
+    }
+    let wrong = || refused(sand, Kind::Option, "sand", "a list of one or more SoftGround");
+    let mut soils = Vec::new();
+    for one in sand.try_iter().map_err(|_| wrong())? {
+        match terrain::parse(&one?)? {
+            DrawnGround::Soft(soft, _) => soils.push(soft),
+            _ => return Err(wrong().into()),
+        }
+    }
+    if soils.is_empty() {
+        return Err(wrong().into());
+    }
+    Ok(GroundDistribution::Sand(SandDistribution { soils }))
 }
 
 fn rock_distribution(given: &Bound<'_, PyAny>) -> PyResult<RockDistribution> {
