@@ -154,10 +154,12 @@ fn the_force_has_the_same_bits_with_any_number_of_lanes() {
     };
     for soil in [dry_sand(), bekker_sand()] {
         let rules = rules_within(&wheel, &soil, 0.01);
-        let found = Instructions::all_of_this_machine().into_iter().map(|instructions| {
-            let parts = (&wheel, &rules);
-            react_with(instructions, parts, &soil, &LEVEL, (&pose, &memory), want)
-        });
+        let found = Instructions::all_of_this_machine()
+            .into_iter()
+            .map(|instructions| {
+                let parts = (&wheel, &rules);
+                react_with(instructions, parts, &soil, &LEVEL, (&pose, &memory), want)
+            });
         let found: Vec<_> = found.collect();
         assert!(found[0].wrench.norm() > 1.0, "{:?}", found[0]);
         assert!(found.iter().all(|other| other == &found[0]), "{found:?}");

@@ -25,7 +25,6 @@ use super::machine::{Machine, Stop};
 use super::parts::{Parts, Twist};
 use super::pieces::LanePlane;
 use super::problem::{MAX_CONTACTS, MAX_DENSE};
-use super::stops::side;
 use crate::contact::detection::{touch_of_disc, touch_of_roller};
 use crate::contact::{Contact, ContactFrame, ContactKey, Opposite, Part};
 use crate::geometry::query::sweep::DEEP;
@@ -937,6 +936,16 @@ impl<T: Lane> Contacts<T> {
             own.active = own.active & !T::mask(self.token, too_many);
         }
         T::mask(self.token, too_many)
+    }
+}
+
+/// The end of its range that a joint is at, in a lane.
+#[inline(always)]
+fn side<T: Lane>(end: T, lane: usize) -> Side {
+    if end.get(lane) > 0.0 {
+        Side::Lower
+    } else {
+        Side::Upper
     }
 }
 

@@ -80,13 +80,3 @@ impl<T: Lane> Contacts<T> {
         )
     }
 }
-
-/// The end of its range that a joint is at, in a lane.
-#[inline(always)]
-pub(super) fn side<T: Lane>(end: T, lane: usize) -> Side {
-    if end.get(lane) > 0.0 {
-        Side::Lower
-    } else {
-        Side::Upper
-    }
-}
