@@ -26,7 +26,7 @@ impl PlanarMatrices {
     fn resize(&mut self, nv: usize) {
         if self.nv != nv {
             self.nv = nv;
-            let entry = |k: usize| if k % (nv + 1) == 0 { 1.0 } else { 0.0 };
+            let entry = |k: usize| if k.is_multiple_of(nv + 1) { 1.0 } else { 0.0 };
             self.mass = (0..nv * nv).map(entry).collect();
             self.L.clone_from(&self.mass);
         }
