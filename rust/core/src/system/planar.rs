@@ -386,7 +386,7 @@ impl MechanicalSystem for PlanarSystem<'_> {
             W,
             ..
         } = &mut *self.parts;
-        matrices.clear_rows();
+        matrices.clear_rows(v.len());
         Z.clear();
         for contact in contacts {
             let (wheel, frame) = (contact.key.disc as usize, [contact.n, contact.t()]);

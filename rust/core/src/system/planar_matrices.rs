@@ -22,10 +22,19 @@ pub(super) struct PlanarMatrices {
 }
 
 impl PlanarMatrices {
+    /// Matrices of that many coordinates: identities if there were others.
+    fn resize(&mut self, nv: usize) {
+        if self.nv != nv {
+            self.nv = nv;
+            let entry = |k: usize| if k.is_multiple_of(nv + 1) { 1.0 } else { 0.0 };
+            self.mass = (0..nv * nv).map(entry).collect();
+            self.L.clone_from(&self.mass);
+        }
+    }
+
     /// M at a configuration.
     pub fn set_mass(&mut self, machine: &PlanarTree, poses: &PlanarPoses) {
-        self.nv = machine.nv();
-        self.mass.resize(self.nv * self.nv, 0.0);
+        self.resize(machine.nv());
         machine.mass_matrix(poses, &mut self.mass);
     }
 
@@ -84,8 +93,9 @@ impl PlanarMatrices {
         }
     }
 
-    /// No contact yet.
-    pub fn clear_rows(&mut self) {
+    /// No contact yet, of a machine of so many coordinates.
+    pub fn clear_rows(&mut self, nv: usize) {
+        self.resize(nv);
         self.rows.clear();
     }
 

@@ -413,12 +413,13 @@ where
             search,
             ..
         } = &mut *self.parts;
-        pairs.clear(machine.map_or(0, PlanarTree::nv), V * n, scene.nv());
+        let width = machine.map_or(0, PlanarTree::nv);
+        pairs.clear(width, V * n, scene.nv());
         if D == 3 {
             let width = 2.0 * scene.grains.largest() + search.reach;
             slabs.assign(middle, n, width, &mut pairs.slabs);
         }
-        own.clear_rows();
+        own.clear_rows(width);
         operator.take();
         let asleep = self.asleep;
         let side = |body: u32| side(scene, asleep, body);
