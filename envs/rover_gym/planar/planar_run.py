@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from rover_gym.mechanics import (
     Line,
+    PlanarGround,
     PlanarSimulation,
     Polyline,
     RoverModel,
@@ -30,7 +31,6 @@ from rover_gym.record.trajectory_format import RecordingError, sound
 from rover_gym.validation import refuse
 
 Array = npt.NDArray[np.float64]
-PlanarGround = Line | Sine | Spline | Polyline
 
 COORDINATES = {
     3: ("x", "y", "theta"),
