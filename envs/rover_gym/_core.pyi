@@ -718,9 +718,6 @@ class Plane(Terrain):
             slope: Slope, rad.
             uphill: Direction of steepest ascent, rad: an angle about +y from +x.
 
-        Returns:
-            The plane.
-
         Raises:
             TerrainError: An angle is no finite number.
         """
@@ -915,9 +912,6 @@ class SphereField(Terrain):
                 not part of the field: combine them as `Union([terrain, rocks])`.
             clear: Circles x, z, radius that no rock reaches into, (n, 3), m; none by default.
             material: Name of the rocks' material.
-
-        Returns:
-            The field.
 
         Raises:
             TerrainError: An argument is out of its range.
@@ -1497,9 +1491,6 @@ class Snapshot:
         Args:
             data: What `to_bytes` returned.
 
-        Returns:
-            The snapshot.
-
         Raises:
             StateError: The bytes are not those of a snapshot.
         """
@@ -1758,9 +1749,6 @@ class Simulation:
 
         Args:
             n: Number of steps.
-
-        Returns:
-            How the steps went.
 
         Raises:
             StepError: A step could not be taken; the state before it stays.
@@ -2054,9 +2042,6 @@ class Polyline(PlanarGround):
             x: Place of the step, m.
             height: Height of the ground beyond it, m; negative for a step down.
 
-        Returns:
-            The ground.
-
         Raises:
             TerrainError: A number is not finite or beyond 1e6 m, or the step has no height.
         """
@@ -2105,9 +2090,6 @@ class PlanarSnapshot:
 
         Args:
             data: What `to_bytes` returned.
-
-        Returns:
-            The snapshot.
 
         Raises:
             StateError: The bytes are not those of a snapshot.
@@ -2396,9 +2378,6 @@ class SimulationBatch:
         Args:
             index: Index of the rover.
 
-        Returns:
-            The copy; stepping it does not move the rover.
-
         Raises:
             OptionError: There is no such rover.
         """
@@ -2677,9 +2656,6 @@ class EpisodeDistribution:
                 after it, `difficulty`, `field_seed`, `q`, `v`; one mapping for all or a list of one
                 for each generator; none by default.
 
-        Returns:
-            The episodes.
-
         Raises:
             TerrainError: A rover has no room in `attempts` scenes, or the ground refuses a number.
             StateError: `q` or `v` has a wrong length or an entry that is not finite, or float32
@@ -2862,9 +2838,6 @@ class EpisodeBatch:
         Returns:
             For each entry an array (n_rovers,), and under its name after an underscore the mask of
             the rovers that have it: all.
-
-        Raises:
-            OptionError: An episode has not begun.
         """
     def info(self, index: int) -> dict[str, Any]:
         """The info of one rover, of its last period or beginning.
@@ -2888,9 +2861,9 @@ class EpisodeBatch:
         Args:
             distribution: What the episodes are drawn from.
             generators: Generators, (m, 4) uint64.
-            attempts: As of `EpisodeDistribution.draw`.
-            difficulties: As of `EpisodeDistribution.draw`.
-            fixed: As of `EpisodeDistribution.draw`.
+            attempts: As of `EpisodeDistribution.draw`, as the next two.
+            difficulties: See there.
+            fixed: See there.
 
         Returns:
             The episodes, the same for any number of threads.
@@ -2956,9 +2929,6 @@ class EpisodeBatch:
 
         Returns:
             (m, 4) uint64: high and low half of each state, high and low half of each increment.
-
-        Raises:
-            OptionError: There is no such rover, or its episode has not begun.
         """
     def set_generators(self, indices: Sequence[int], generators: _Rows) -> None:
         """Sets the generators of rovers.
@@ -3053,9 +3023,6 @@ class SoilSnapshot:
 
         Args:
             data: What `to_bytes` returned.
-
-        Returns:
-            The snapshot.
 
         Raises:
             StateError: The bytes are not those of a snapshot.
@@ -3387,9 +3354,6 @@ class GrainSnapshot:
         Args:
             data: What `to_bytes` returned.
 
-        Returns:
-            The snapshot.
-
         Raises:
             StateError: The bytes are not those of a snapshot.
         """
@@ -3625,9 +3589,6 @@ class RoverGrainSnapshot:
 
         Args:
             data: What `to_bytes` returned.
-
-        Returns:
-            The snapshot.
 
         Raises:
             StateError: The bytes are not those of a snapshot.

@@ -199,9 +199,6 @@ impl SimulationBatch {
     /// Args:
     ///     index: Index of the rover.
     ///
-    /// Returns:
-    ///     The copy; stepping it does not move the rover.
-    ///
     /// Raises:
     ///     OptionError: There is no such rover.
     fn simulation(&self, index: &Bound<'_, PyAny>) -> Result<Simulation> {

@@ -4,16 +4,16 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
 use rover_core::draw::{
     DomainDistribution, Fixed, FixedStart, GroundDistribution, HillDistribution, Order, Pcg64,
-    Range, RockDistribution, RockDraw, SceneDistribution, Start, StartDistribution,
+    Range, RockDistribution, RockDraw, SceneDistribution, StartDistribution,
 };
 use rover_core::episode::{Beginning, EpisodeBatch, EpisodeDistribution as CoreDistribution};
 use rover_core::simulation::RoverSimulation;
 
 use crate::arguments::{Named, below, number, refused, whole};
 use crate::arrays::{Array, fresh_rows, two, vector};
-use crate::episode::{EpisodeRun, GivenRules, GivenSimulation, domain_row};
+use crate::episode::{EpisodeRun, GivenRules, GivenSimulation};
 use crate::errors::{Kind, Result};
-use crate::generators::{generators, halves};
+use crate::generators::generators;
 use crate::options::SolverWords;
 use crate::plane::Plane;
 use crate::reading::points;
@@ -265,9 +265,6 @@ impl EpisodeDistribution {
     ///         after it, `difficulty`, `field_seed`, `q`, `v`; one mapping for all or a list of one
     ///         for each generator; none by default.
     ///
-    /// Returns:
-    ///     The episodes.
-    ///
     /// Raises:
     ///     TerrainError: A rover has no room in `attempts` scenes, or the ground refuses a number.
     ///     StateError: `q` or `v` has a wrong length or an entry that is not finite, or float32
@@ -332,50 +329,12 @@ impl DrawnEpisodes {
     }
 }
 
-/// A row of `DrawnEpisodes.starts`.
-pub fn start_row(start: &Start) -> Vec<f64> {
-    let [x, z] = start.position;
-    let pose = [start.slope, start.uphill, x, z, start.heading];
-    pose.into_iter().chain(start.goals().flatten()).collect()
-}
-
-/// What a row of `DrawnEpisodes.starts` tells; None if it has another length.
-pub fn start_of(row: &[f64]) -> Option<Start> {
-    let (&[slope, uphill, x, z, heading, goal_x, goal_z], rest) = row.split_first_chunk()?;
-    let (further, []) = rest.as_chunks() else {
-        return None;
-    };
-    Some(Start {
-        slope,
-        uphill,
-        position: [x, z],
-        heading,
-        goal: [goal_x, goal_z],
-        further: further.to_vec(),
-    })
-}
-
-/// A row of `DrawnEpisodes.rocks`.
-pub fn rocks_row(rocks: Option<RockDraw>) -> [f64; 3] {
-    rocks.map_or([0.0; 3], |r| [r.difficulty, r.abundance, r.max_radius])
-}
-
-/// What a row of `DrawnEpisodes.rocks` tells; None for that of no rocks.
-pub fn rocks_of([difficulty, abundance, max_radius]: [f64; 3], seed: u64) -> Option<RockDraw> {
-    (max_radius > 0.0).then_some(RockDraw {
-        difficulty,
-        abundance,
-        max_radius,
-        seed,
-    })
-}
-
 #[pymethods]
 impl DrawnEpisodes {
     /// The generators after the draws, (m, 4) uint64.
     #[getter]
     fn generators(&self) -> Array<u64> {
-        fresh_rows(self.drawn.iter().map(|one| halves(&one.random)))
+        fresh_rows(self.drawn.iter().map(|one| one.random.state().halves()))
     }
 
     /// First observations, (m, size) float32.
@@ -389,7 +348,7 @@ impl DrawnEpisodes {
     /// Slope, direction of steepest ascent, x and z of the start, heading, x and z of each goal.
     #[getter]
     fn starts(&self) -> Array {
-        self.table(|one| start_row(&one.scene.start))
+        self.table(|one| one.scene.start.row())
     }
 
     /// Properties of rover and world, (m, 4).
@@ -397,7 +356,7 @@ impl DrawnEpisodes {
     /// Factor of the masses, friction, gain of the motors, factor of gravity.
     #[getter]
     fn domains(&self) -> Array {
-        fresh_rows(self.drawn.iter().map(|one| domain_row(&one.scene.domain)))
+        fresh_rows(self.drawn.iter().map(|one| one.scene.domain.row()))
     }
 
     /// Rocks, (m, 3); zeros where there are none.
@@ -405,7 +364,7 @@ impl DrawnEpisodes {
     /// Difficulty, abundance, radius of the largest in wheel radii.
     #[getter]
     fn rocks(&self) -> Array {
-        fresh_rows(self.drawn.iter().map(|one| rocks_row(one.scene.rocks)))
+        fresh_rows(self.drawn.iter().map(|one| RockDraw::row(one.scene.rocks)))
     }
 
     /// Seeds of the rocks, (m,) uint64; zeros where there are none.

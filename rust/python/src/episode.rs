@@ -5,7 +5,6 @@ use std::sync::Arc;
 use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyRange};
-use rover_core::draw::Domain;
 use rover_core::episode::running::{Period, check_normals};
 use rover_core::episode::{
     Ending, Episode as CoreEpisode, Last, N_QUANTITIES, N_TERMS, Progress, Quantities, Rules,
@@ -129,29 +128,17 @@ impl<'py> IntoPyObject<'py> for GivenRules {
     }
 }
 
-/// A row of `DrawnEpisodes.domains`.
-pub fn domain_row(domain: &Domain) -> [f64; 4] {
-    let (mass, gravity) = (domain.mass_scale, domain.gravity_scale);
-    [mass, domain.friction, domain.actuator_gain, gravity]
-}
-
 /// What is set when an episode begins.
 fn setting(given: &Named<'_>) -> Result<Setting> {
     let domain = given.need("domain", |value, kind, field| {
         let numbers = <[f64; 4]>::try_from(vector(value, kind, field)?);
         numbers.map_err(|_| refused(value, kind, field, "four numbers"))
     })?;
-    let [mass_scale, friction, actuator_gain, gravity_scale] = domain;
     let further = |value: &Bound<'_, PyAny>, _, field: &str| points(value, field);
     Ok(Setting {
         goal: given.need("goal", |value, _, _| place(Some(value)))?,
         further: given.read("further", further)?.unwrap_or_default(),
-        domain: Domain {
-            mass_scale,
-            friction,
-            actuator_gain,
-            gravity_scale,
-        },
+        domain: domain.into(),
         trunk_load_limit: given.need("trunk_load_limit", number)?,
         difficulty: given.need("difficulty", number)?,
     })
@@ -469,7 +456,7 @@ impl EpisodeRun {
         let (setting, progress) = (held.episode.setting(), held.episode.progress());
         let state = PyDict::new(py);
         state.set_item("goal", (setting.goal[0], setting.goal[1]))?;
-        state.set_item("domain", fresh(&domain_row(&setting.domain)))?;
+        state.set_item("domain", fresh(&setting.domain.row()))?;
         state.set_item("trunk_load_limit", setting.trunk_load_limit)?;
         state.set_item("difficulty", setting.difficulty)?;
         state.set_item("distance", progress.distance)?;

@@ -2,7 +2,7 @@
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rover_core::draw::{DrawnGround, Pcg64};
+use rover_core::draw::{DrawnGround, Pcg64, RockDraw, Start};
 use rover_core::episode::{
     Autoreset, EpisodeBatch as CoreBatch, EpisodeError, Origin as Began, Stepped, Succession,
 };
@@ -10,12 +10,10 @@ use rover_core::episode::{
 use crate::arguments::{Given, Named, at_least_one, below, refused, text, whole};
 use crate::arrays::{Array, fresh, fresh_rows};
 use crate::batch::mask;
-use crate::draw::{
-    DrawnEpisodes, EpisodeDistribution, Request, range, rocks_of, rocks_row, start_of, start_row,
-};
-use crate::episode::{EpisodeRun, GivenRules, GivenSimulation, actions, domain_row};
+use crate::draw::{DrawnEpisodes, EpisodeDistribution, Request, range};
+use crate::episode::{EpisodeRun, GivenRules, GivenSimulation, actions};
 use crate::errors::{Kind, Result};
-use crate::generators::{generators, halves};
+use crate::generators::generators;
 use crate::infos::{Told, info, infos};
 use crate::options::SolverWords;
 use crate::shared::{Shared, Watch};
@@ -155,10 +153,10 @@ fn origin(given: &Bound<'_, PyAny>, ground: DrawnGround) -> Result<Began> {
     if !start.iter().chain(&rocks).all(|x| x.is_finite()) {
         return Err(refuse());
     }
-    let start = start_of(&start).ok_or_else(refuse)?;
+    let start = Start::from_row(&start).ok_or_else(refuse)?;
     Ok(Began {
         start,
-        rocks: rocks_of(rocks, seed),
+        rocks: RockDraw::from_row(rocks, seed),
         ground,
     })
 }
@@ -313,9 +311,6 @@ impl EpisodeBatch {
     /// Returns:
     ///     For each entry an array (n_rovers,), and under its name after an underscore the mask of
     ///     the rovers that have it: all.
-    ///
-    /// Raises:
-    ///     OptionError: An episode has not begun.
     fn infos<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let held = self.0.open()?;
         let told = (0..held.batch.rovers().len()).map(|i| held.told(i));
@@ -349,9 +344,9 @@ impl EpisodeBatch {
     /// Args:
     ///     distribution: What the episodes are drawn from.
     ///     generators: Generators, (m, 4) uint64.
-    ///     attempts: As of `EpisodeDistribution.draw`.
-    ///     difficulties: As of `EpisodeDistribution.draw`.
-    ///     fixed: As of `EpisodeDistribution.draw`.
+    ///     attempts: As of `EpisodeDistribution.draw`, as the next two.
+    ///     difficulties: See there.
+    ///     fixed: See there.
     ///
     /// Returns:
     ///     The episodes, the same for any number of threads.
@@ -473,15 +468,14 @@ impl EpisodeBatch {
     ///
     /// Returns:
     ///     (m, 4) uint64: high and low half of each state, high and low half of each increment.
-    ///
-    /// Raises:
-    ///     OptionError: There is no such rover, or its episode has not begun.
     fn generators(&self, indices: &Bound<'_, PyAny>) -> Result<Array<u64>> {
         let held = self.0.open()?;
         let places = held.indices(indices, None)?;
         let found = places.iter().map(|&index| held.batch.generator(index));
         let found: Vec<Pcg64> = found.collect::<Result<_, _>>()?;
-        Ok(fresh_rows(found.iter().map(halves)))
+        Ok(fresh_rows(
+            found.iter().map(|random| random.state().halves()),
+        ))
     }
 
     /// Sets the generators of rovers.
@@ -521,10 +515,10 @@ impl EpisodeBatch {
         self.one(index, |held, i| {
             let (origin, episode) = (held.batch.origin(i)?, held.batch.episode(i)?);
             Ok((
-                start_row(&origin.start).into(),
-                fresh(&rocks_row(origin.rocks)),
+                origin.start.row().into(),
+                fresh(&RockDraw::row(origin.rocks)),
                 origin.rocks.map_or(0, |rocks| rocks.seed),
-                fresh(&domain_row(&episode.setting().domain)),
+                fresh(&episode.setting().domain.row()),
             ))
         })
     }

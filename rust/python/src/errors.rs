@@ -45,37 +45,15 @@ pub enum Kind {
 }
 
 /// Name and docstring of each exception, in the order of [`Kind`].
-const CLASSES: [(&str, &str); 8] = [
-    (
-        "ModelError",
-        "A model's description is unreadable or not physical.",
-    ),
-    (
-        "StateError",
-        "A state or a snapshot has a wrong shape or an entry that is not finite.",
-    ),
-    ("TerrainError", "A terrain's description is invalid."),
-    (
-        "OptionError",
-        "An option or another argument is out of its range.",
-    ),
-    (
-        "CommandError",
-        "A torque, a set-point or an action is invalid.",
-    ),
-    (
-        "ProblemError",
-        "A friction-contact problem has a wrong shape or an invalid entry.",
-    ),
-    (
-        "StepError",
-        "A time step could not be taken; the state is as it was before that step.",
-    ),
-    (
-        "BusyError",
-        "An object was used while another call on it was still going on. Nothing has changed.",
-    ),
-];
+const CLASSES: &str = "\
+ModelError: A model's description is unreadable or not physical.
+StateError: A state or a snapshot has a wrong shape or an entry that is not finite.
+TerrainError: A terrain's description is invalid.
+OptionError: An option or another argument is out of its range.
+CommandError: A torque, a set-point or an action is invalid.
+ProblemError: A friction-contact problem has a wrong shape or an invalid entry.
+StepError: A time step could not be taken; the state is as it was before that step.
+BusyError: An object was used while another call on it was still going on. Nothing has changed.";
 
 /// What was given where something else was needed.
 #[derive(Debug)]
@@ -121,7 +99,8 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let exception = PyTuple::new(py, [py.get_type::<PyException>()])?;
     let root = make("RoverGymError", exception, ROOT)?;
     let root = root.bind(py);
-    let one = |(name, doc): (&str, &str)| {
+    let one = |line: &str| {
+        let (name, doc) = line.split_once(": ").unwrap_or_default();
         let is_event = matches!(name, "StepError" | "BusyError");
         let builtin = if is_event {
             py.get_type::<PyRuntimeError>()
@@ -130,7 +109,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
         };
         make(name, PyTuple::new(py, [root.clone(), builtin])?, doc)
     };
-    let _ = MADE.set(py, CLASSES.into_iter().map(one).collect::<PyResult<_>>()?);
+    let _ = MADE.set(py, CLASSES.lines().map(one).collect::<PyResult<_>>()?);
     Ok(())
 }
 

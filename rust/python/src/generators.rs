@@ -19,25 +19,10 @@ pub fn generators(value: &Bound<'_, PyAny>) -> Result<Vec<Pcg64>> {
     if view.shape()[1] != 4 {
         return Err(refused(value, Kind::Option, "generators", what));
     }
-    let join = |high: u64, low: u64| (u128::from(high) << 64) | u128::from(low);
     let generator = |row: numpy::ndarray::ArrayView1<'_, u64>| {
-        Pcg64::from_state(Pcg64State {
-            state: join(row[0], row[1]),
-            increment: join(row[2], row[3]),
-        })
+        Pcg64::from_state(Pcg64State::from_halves([row[0], row[1], row[2], row[3]]))
     };
     Ok(view.rows().into_iter().map(generator).collect())
-}
-
-#[allow(clippy::cast_possible_truncation)] // the halves are meant
-pub fn halves(random: &Pcg64) -> [u64; 4] {
-    let Pcg64State { state, increment } = random.state();
-    [
-        (state >> 64) as u64,
-        state as u64,
-        (increment >> 64) as u64,
-        increment as u64,
-    ]
 }
 
 /// Seeds generators as `numpy.random.PCG64` does.
@@ -71,7 +56,7 @@ pub fn seed_generators(seeds: &Bound<'_, PyAny>) -> Result<Array<u64>> {
         let words: Vec<u32> = words
             .map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]]))
             .collect();
-        Ok(halves(&Pcg64::seeded(&words)))
+        Ok(Pcg64::seeded(&words).state().halves())
     };
     let rows: Vec<[u64; 4]> = entries.enumerate().map(seeded).collect::<Result<_>>()?;
     Ok(fresh_rows(rows))
@@ -98,5 +83,8 @@ pub fn standard_normals(
     let numbers = (randoms.iter_mut()).flat_map(|random| (0..size).map(|_| random.normal()));
     let numbers = numbers.collect();
     let numbers = Array::shaped(numbers, &[randoms.len(), size]);
-    Ok((numbers, fresh_rows(randoms.iter().map(halves))))
+    Ok((
+        numbers,
+        fresh_rows(randoms.iter().map(|random| random.state().halves())),
+    ))
 }

@@ -68,37 +68,9 @@ impl Delassus {
         };
         let (starts, columns) = (index("indptr")?, index("indices")?);
         let blocks = flat(&rows.getattr("data")?, "W")?;
-        let (starts, columns, blocks) = with_diagonal(d * d, &starts, &columns, &blocks);
-        let sparse = BlockSparseDelassus::from_rows(dimension, starts, columns, blocks);
+        let sparse = BlockSparseDelassus::from_partial_rows(dimension, &starts, &columns, &blocks);
         Ok(Self::BlockSparse(sparse?))
     }
-}
-
-/// Block rows in which every row has its diagonal block, zero where it was not stored.
-fn with_diagonal(
-    size: usize,
-    starts: &[usize],
-    columns: &[usize],
-    blocks: &[f64],
-) -> (Vec<usize>, Vec<usize>, Vec<f64>) {
-    let (mut all_starts, mut all_columns, mut all_blocks) = (vec![0], Vec::new(), Vec::new());
-    for (row, ends) in starts.windows(2).enumerate() {
-        let own = &columns[ends[0]..ends[1]];
-        let before = own.partition_point(|&column| column < row);
-        let middle = ends[0] + before;
-        let stored = usize::from(own.get(before) == Some(&row));
-        all_columns.extend_from_slice(&columns[ends[0]..middle]);
-        all_columns.push(row);
-        all_columns.extend_from_slice(&columns[middle + stored..ends[1]]);
-        all_blocks.extend_from_slice(&blocks[size * ends[0]..size * (middle + stored)]);
-        all_blocks.resize(
-            size * all_columns.len() - size * (ends[1] - middle - stored),
-            0.0,
-        );
-        all_blocks.extend_from_slice(&blocks[size * (middle + stored)..size * ends[1]]);
-        all_starts.push(all_columns.len());
-    }
-    (all_starts, all_columns, all_blocks)
 }
 
 /// Friction coefficients, one for each contact or one for all.

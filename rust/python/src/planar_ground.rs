@@ -275,9 +275,6 @@ impl Polyline {
     ///     x: Place of the step, m.
     ///     height: Height of the ground beyond it, m; negative for a step down.
     ///
-    /// Returns:
-    ///     The ground.
-    ///
     /// Raises:
     ///     TerrainError: A number is not finite or beyond 1e6 m, or the step has no height.
     #[staticmethod]

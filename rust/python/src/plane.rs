@@ -54,9 +54,6 @@ impl Plane {
     ///     slope: Slope, rad.
     ///     uphill: Direction of steepest ascent, rad: an angle about +y from +x.
     ///
-    /// Returns:
-    ///     The plane.
-    ///
     /// Raises:
     ///     TerrainError: An angle is no finite number.
     #[staticmethod]

@@ -460,9 +460,6 @@ impl Simulation {
     /// Args:
     ///     n: Number of steps.
     ///
-    /// Returns:
-    ///     How the steps went.
-    ///
     /// Raises:
     ///     StepError: A step could not be taken; the state before it stays.
     ///     OptionError: `n` is not a count.
@@ -745,7 +742,7 @@ impl Simulation {
         let stopwatch = watch.result(stopwatch)?;
         let parts = PyDict::new(py);
         for (phase, microseconds) in stopwatch.microseconds() {
-            parts.set_item(snake_case(&format!("{phase:?}")), microseconds)?;
+            parts.set_item(phase.name(), microseconds)?;
         }
         Ok(parts)
     }
@@ -782,15 +779,4 @@ impl Simulation {
         made.get().restore(snapshot)?;
         Ok(made)
     }
-}
-
-fn snake_case(camel: &str) -> String {
-    let mut out = String::new();
-    for c in camel.chars() {
-        if c.is_uppercase() && !out.is_empty() {
-            out.push('_');
-        }
-        out.extend(c.to_lowercase());
-    }
-    out
 }

@@ -66,9 +66,6 @@ macro_rules! snapshot_class {
             /// Args:
             ///     data: What `to_bytes` returned.
             ///
-            /// Returns:
-            ///     The snapshot.
-            ///
             /// Raises:
             ///     StateError: The bytes are not those of a snapshot.
             #[staticmethod]

@@ -106,9 +106,6 @@ impl SphereField {
     ///     clear: Circles x, z, radius that no rock reaches into, (n, 3), m; none by default.
     ///     material: Name of the rocks' material.
     ///
-    /// Returns:
-    ///     The field.
-    ///
     /// Raises:
     ///     TerrainError: An argument is out of its range.
     ///

@@ -88,8 +88,8 @@ impl Chart {
     }
 }
 
-/// Maps torques to generalized forces (nv, 2 `n_wheels`): a column for each wheel's torque, positive
-/// forward, then one for each steering torque.
+/// Maps torques to generalized forces (nv, 2 `n_wheels`): a column for each wheel's torque,
+/// positive forward, then one for each steering torque.
 #[must_use]
 pub fn actuation_matrix(model: &Model) -> DMatrix<f64> {
     let wheels = model.wheels();
@@ -109,7 +109,7 @@ pub fn actuation_matrix(model: &Model) -> DMatrix<f64> {
 mod tests {
     use super::*;
 
-    /// The power of a force is the same in both charts: `f · v = (Bᵀ f) · q̇`, and so is the energy.
+    /// The power of a force, `f · v = (Bᵀ f) · q̇`, and the energy are the same in both charts.
     #[test]
     fn power_and_energy_are_the_same_in_both_charts() {
         let model = Model::rover();
