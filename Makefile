@@ -106,6 +106,7 @@ docs: $(STAMPS)/test $(STAMPS)/core ## build the documentation, Rust and Python,
 	@echo "target/doc/rover_core/index.html"
 
 bench: $(STAMPS)/release ## time a step and tell where the time goes, MuJoCo's beside it where it is installed (informs, does not gate)
+	$(COMPARE).rollout
 	$(COMPARE).exploring_bench
 	cargo bench --locked $(addprefix --bench ,step accuracy spheres rays solver soil)
 	@if command -v valgrind > /dev/null; then cargo build --release --locked --quiet --example drive_steps; \

@@ -1,4 +1,4 @@
-"""Trains the forecast of `ForesightPolicy`: what becomes of the rover on the arcs that it may drive next.
+"""Trains a forecast for `ScanPolicy`: a one-second prediction of the rover on each arc that it may drive next.
 
     python training/train_foresight.py --seed 1      # runs/train/foresight-seed1, 12 minutes of one core
 

@@ -2284,8 +2284,7 @@ class MirroredRoverSimulation(PlanarSimulation):
         **options: Options as of `BallSimulation`.
 
     Raises:
-        ModelError: The model is not its own mirror image, or its planar image has not 7
-            coordinates.
+        ModelError: The model is not its own mirror image.
         TerrainError: `ground` is not a ground.
         OptionError: An option is out of its range.
         TypeError: An option is unknown.

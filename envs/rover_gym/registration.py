@@ -27,25 +27,18 @@ class Registration:
     arguments: Mapping[str, Any] = field(default_factory=dict)
 
 
+def _rover(arguments: Mapping[str, Any], max_episode_steps: int = MAX_EPISODE_STEPS) -> Registration:
+    """The registration of `Rover-v0` with other arguments."""
+    makers = "rover_gym.sensors:make_rover", "rover_gym.sensors:make_rover_vector"
+    return Registration(*makers, max_episode_steps, arguments)
+
+
 ENVIRONMENTS: Mapping[str, Registration] = {
-    "Rover-v0": Registration("rover_gym.sensors:make_rover", "rover_gym.sensors:make_rover_vector"),
-    "RoverRocks-v0": Registration(
-        "rover_gym.sensors:make_rover", "rover_gym.sensors:make_rover_vector", arguments={"terrain": "rocks"}
-    ),
-    "RoverHills-v0": Registration(
-        "rover_gym.sensors:make_rover", "rover_gym.sensors:make_rover_vector", arguments={"terrain": "hills"}
-    ),
-    "RoverWaypoints-v0": Registration(
-        "rover_gym.sensors:make_rover",
-        "rover_gym.sensors:make_rover_vector",
-        2 * MAX_EPISODE_STEPS,
-        {"waypoints": 5, "goal_distance": (4.0, 8.0)},
-    ),
-    "RoverBattery-v0": Registration(
-        "rover_gym.sensors:make_rover",
-        "rover_gym.sensors:make_rover_vector",
-        arguments={"terrain": "rocks", "goal_distance": (10.0, 14.0), "battery": 7000.0},
-    ),
+    "Rover-v0": _rover({}),
+    "RoverRocks-v0": _rover({"terrain": "rocks"}),
+    "RoverHills-v0": _rover({"terrain": "hills"}),
+    "RoverWaypoints-v0": _rover({"waypoints": 5, "goal_distance": (4.0, 8.0)}, 2 * MAX_EPISODE_STEPS),
+    "RoverBattery-v0": _rover({"terrain": "rocks", "goal_distance": (10.0, 14.0), "battery": 7000.0}),
     "RoverCommand-v0": Registration(
         "rover_gym.policy:RoverCommandEnv", "rover_gym.policy:RoverCommandVectorEnv", MAX_COMMANDS
     ),

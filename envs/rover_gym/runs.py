@@ -8,9 +8,9 @@ from typing import Any, TypeAlias, TypeVar, overload
 
 from rover_gym.grains.grain_run import GrainRun, grain_run_of, is_grains
 from rover_gym.planar.planar_run import PlanarRun, is_planar, planar_run_of
+from rover_gym.record.channels import RecordingError
 from rover_gym.record.rover_run import RoverRun, Run, run_of
 from rover_gym.record.trajectory import Trajectory, read_trajectory
-from rover_gym.record.trajectory_format import RecordingError
 from rover_gym.soil.soil_run import SoilRun, is_soil, soil_run_of
 from rover_gym.validation import refuse
 

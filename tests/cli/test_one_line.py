@@ -17,7 +17,7 @@ import pytest
 from typer.main import get_command
 from typer.testing import CliRunner, Result
 
-import rover_gym.policy.baseline
+import rover_gym.policy.evaluation
 from rover_gym import OptionError
 from rover_gym.cli import app, drive_command
 from rover_gym.cli.console import FIRST_STEPS
@@ -176,7 +176,7 @@ def test_an_interrupted_drive_keeps_and_prints_what_is_done(tmp_path: Path, monk
 
 
 def test_an_interrupted_baseline_prints_what_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
-    drive, driven = rover_gym.policy.baseline.run_episode, []
+    drive, driven = rover_gym.policy.evaluation.run_episode, []
 
     def interrupted(*args: Any, **kwargs: Any) -> Any:
         if len(driven) == 3:
@@ -184,7 +184,7 @@ def test_an_interrupted_baseline_prints_what_is_done(monkeypatch: pytest.MonkeyP
         driven.append(1)
         return drive(*args, **kwargs)
 
-    monkeypatch.setattr(rover_gym.policy.baseline, "run_episode", interrupted)
+    monkeypatch.setattr(rover_gym.policy.evaluation, "run_episode", interrupted)
     options = ["--episodes", "2", "--difficulty", "0", "--difficulty", "0.25", "--difficulty", "0.5"]
     result = rover("baseline", *options, "--json")
     assert one_line(result, 130) == "interrupted: 3 of 6 episodes are done\n"

@@ -18,7 +18,7 @@ from rover_gym.figures.planar_drawing import PLANAR_DRAWINGS, path_over_ground
 from rover_gym.figures.soil_run_figures import SOIL_DRAWINGS
 from rover_gym.planar import BallSimulation, PlanarRun, Sine, describe_planar, record_planar
 from rover_gym.record import RecordingError, read_trajectory
-from rover_gym.reproduction.chapter_3_balls import ball_on_incline, published
+from rover_gym.reproduction.scene_runs import ball_on_incline, published
 from rover_gym.runs import open_run
 from rover_gym.soil import SoilRun
 

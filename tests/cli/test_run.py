@@ -14,7 +14,7 @@ from rover_gym import OptionError, Plane, RoverModel, Simulation, SphereField
 from rover_gym.cli import app
 from rover_gym.record import Recorder, RecordingError, RoverSampler, describe, read_run, read_trajectory
 from rover_gym.reproduction import inclined_plane, sphere_rug
-from rover_gym.reproduction.chapter_3_balls import WHEEL_RADIUS
+from rover_gym.reproduction.scene_runs import GRAVITY, WHEEL_RADIUS, distance_to_siconos, reference_data
 
 KILLED = """
 import os, signal, sys
@@ -156,7 +156,7 @@ def test_the_scene_is_recorded_and_drawn(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     trajectory = read_trajectory(tmp_path / "trajectory.h5")
     assert trajectory.attributes["complete"]
-    assert trajectory.attributes["solver"]["gravity"] == list(inclined_plane.GRAVITY)
+    assert trajectory.attributes["solver"]["gravity"] == list(GRAVITY)
     assert trajectory["time"][-1] == pytest.approx(12.0)
     for name in FIGURES:
         head = (tmp_path / name).read_bytes()[:24]
@@ -171,7 +171,7 @@ def test_the_scene_is_recorded_and_drawn(tmp_path: Path) -> None:
 def test_the_run_lands_where_siconos_does(tmp_path: Path) -> None:
     # Without stabilisation the scheme is Siconos' own, so at its step the two differ by impact times alone.
     inclined_plane.run(tmp_path / "run.h5", duration=10.0, time_step=0.005, variant="newton", stabilisation="none")
-    rows = inclined_plane.distance_to_siconos(read_trajectory(tmp_path / "run.h5"))
+    rows = distance_to_siconos(read_trajectory(tmp_path / "run.h5"))
     assert [step for step, _, _ in rows] == [0.005, 0.0002]
     assert rows[0][2] < 0.001  # m; 0.2 mm when written
     assert rows[1][2] < 0.01  # m, the tolerance at 5 ms
@@ -179,7 +179,7 @@ def test_the_run_lands_where_siconos_does(tmp_path: Path) -> None:
 
 def test_the_scene_starts_as_the_reference_does() -> None:
     # The gaps at the start, from the Siconos run: they fix plane, wheel radius, geometry and attitude.
-    reference = inclined_plane.reference_data()["siconos"][0]
+    reference = reference_data()["siconos"][0]
     assert inclined_plane.simulation().wheel_gaps == pytest.approx(np.array(reference["gap"][0]), abs=1e-6)
 
 
@@ -187,7 +187,7 @@ def test_the_rover_drives_over_the_rug(tmp_path: Path) -> None:
     result = sphere_rug.run(tmp_path / "rug.h5", duration=20.0)
     trajectory = read_trajectory(result.path)
     assert trajectory.attributes["scene"]["terrain"]["kind"] == "sphere_field"
-    assert trajectory["q"][0, :3] == pytest.approx(sphere_rug.START)
+    assert trajectory["q"][0, :3] == pytest.approx(sphere_rug.start)
     assert np.isfinite(trajectory["q"]).all()
     assert result.first_contact is not None
     assert result.unconverged_steps == 0

@@ -1,9 +1,8 @@
-"""What a step costs where a policy explores: `python -m comparison.exploring_bench`, the first table of `make bench`.
+"""Where a step's time goes while a policy explores: `python -m comparison.exploring_bench`, after `comparison.rollout`.
 
-Every scene of `comparison.exploring` is measured by Rust (`cargo bench --bench exploring`), and right after by MuJoCo
-where it is installed, so that a busy machine is busy for all. The instructions of each part of a step are callgrind's,
-where valgrind is installed, over every seventh step of the first drives; a processor under valgrind may lack AVX-512.
-It only reports.
+Every scene of `comparison.exploring` is measured by Rust (`cargo bench --bench exploring`). The instructions of each
+part of a step are callgrind's, where valgrind is installed, over every seventh step of the first drives; a processor
+under valgrind may lack AVX-512. It only reports.
 """
 
 import argparse
@@ -11,7 +10,6 @@ import json
 import os
 import re
 import shutil
-import statistics
 import subprocess
 import tempfile
 import time
@@ -21,14 +19,10 @@ from typing import Any
 
 from rich.console import Console
 
-from comparison.exploring import GROUNDS, REST, TORQUES, drives, scene
+from comparison.exploring import GROUNDS, TORQUES
 from comparison.machine import processor, versions
 from comparison.output import ROOT
-from comparison.peers import Variant
-from comparison.scene import steps_in
 
-STEP = 0.005  # s
-ROUNDS = 5
 #: Drives whose steps callgrind counts.
 COUNTED_DRIVES = 2
 #: Parts of a step in the order in which it takes them, by their names in Rust.
@@ -56,40 +50,6 @@ def ours(ground: str, torque: float) -> dict[str, Any]:
     )
     figures: dict[str, Any] = json.loads(done.stdout)
     return figures
-
-
-def peers(console: Console) -> list[Variant]:
-    """MuJoCo at its defaults and at its best; none where it is not installed."""
-    try:
-        from comparison.peers import mujoco_engine  # noqa: PLC0415 - the peer may be missing
-    except ImportError as error:
-        console.print(f"left out, not installed: MuJoCo ({error})")
-        return []
-    best, defaults = mujoco_engine.VARIANTS
-    return [defaults, best]
-
-
-def peer_microseconds(variant: Variant, ground: str, torque: float) -> float | None:
-    """Median over the rounds of the mean time of a step, us; None if the engine cannot go on."""
-    times = []
-    for _ in range(ROUNDS):
-        seconds, steps = 0.0, 0
-        for drive in drives():
-            played = scene(drive, ground, torque)
-            runner = variant.build(played, STEP)
-            runner.advance(steps_in(REST, STEP))
-            try:
-                for phase in played.phases[1:]:
-                    runner.command(phase)
-                    count = steps_in(phase.duration, STEP)
-                    begin = time.perf_counter()
-                    runner.advance(count)
-                    seconds += time.perf_counter() - begin
-                    steps += count
-            except (RuntimeError, ArithmeticError):
-                return None
-        times.append(1e6 * seconds / steps)
-    return statistics.median(times)
 
 
 def instructions(ground: str, torque: float) -> dict[str, float]:
@@ -147,15 +107,15 @@ def titles() -> list[str]:
     return [str(a) if a == b else f"{a}-{b}" for a, b in zip(lows, BINS, strict=True)] + [f"{BINS[-1] + 1}+"]
 
 
-def print_times(rows: dict[tuple[str, float], dict[str, Any]], variants: list[Variant], console: Console) -> None:
-    """Microseconds a step, beside the peers."""
-    names = ["1e-12", "1e-6", *(f"{v.engine}, {v.name}" for v in variants), "iterations", "not converged"]
+def print_times(rows: dict[tuple[str, float], dict[str, Any]], console: Console) -> None:
+    """Microseconds a step."""
+    names = ["1e-12", "1e-6", "batch", "iterations", "general", "not converged"]
     console.print(f"\n{'us a step of 5 ms, one thread':<30}" + "".join(f"{name:>{len(name) + 3}}" for name in names))
     for (ground, torque), row in rows.items():
         total = sum(size * count for size, count in row["iterations"])
-        values = [*row["microseconds"], *row["peers"], total / row["steps"]]
-        cells = ["-" if value is None else f"{value:.1f}" for value in values]
-        cells.append(f"{row['not_converged']} of {row['steps']}")
+        values = [*row["microseconds"], row["batch_microseconds"], total / row["steps"]]
+        cells = [f"{value:.1f}" for value in values]
+        cells += [f"{row[what]} of {row['steps']}" for what in ("general", "not_converged")]
         widths = (len(name) + 3 for name in names)
         line = "".join(f"{cell:>{width}}" for cell, width in zip(cells, widths, strict=True))
         console.print(f"{ground + f', {torque:g} N m':<30}{line}")
@@ -185,7 +145,6 @@ def main() -> None:
     parser.add_argument("--no-instructions", action="store_true", help="leave callgrind out")
     arguments = parser.parse_args()
     console = Console(width=180, highlight=False)
-    variants = peers(console)
     packages = ", ".join(f"{name} {version}" for name, version in versions().items())
     console.print(f"{processor()}; {packages}; {time.strftime('%Y-%m-%d')}")
     counts = not arguments.no_instructions and shutil.which("valgrind") is not None
@@ -196,11 +155,10 @@ def main() -> None:
     for ground in GROUNDS:
         for torque in TORQUES:
             row = ours(ground, torque)
-            row["peers"] = [peer_microseconds(variant, ground, torque) for variant in variants]
             if counts:
                 row["instructions"] = instructions(ground, torque)
             rows[ground, torque] = row
-    print_times(rows, variants, console)
+    print_times(rows, console)
     if counts:
         print_instructions(rows, console)
     else:

@@ -1,110 +1,341 @@
-"""Exploring rovers beside MuJoCo's rollout of the same: `python -m comparison.rollout [--rovers N] [--threads N]`."""
+"""Any rover on any ground beside MuJoCo: `python -m comparison.rollout [--row TEXT] [--robot FILE] [--seed N]`.
+
+The first table of `make bench`: microseconds of a step of 5 ms, of one rover alone, of one rover of a batch, and of
+MuJoCo's `rollout` of the same rovers, with the same commands, in the same round. Torques and set-points are drawn anew
+in every run, from a seed that is printed. Every rover of a batch has its own rocks, or its own place on a map. MuJoCo
+gets the model as `RoverModel.to_mjcf` writes it, with position servos on the steered joints; the times that it needs
+are those of its C code, as ours are those of the core.
+"""
 
 import argparse
+import math
+import statistics
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from importlib import metadata
+from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
 from mujoco import rollout
+from rich.console import Console
 
-from comparison.mujoco_rover import rover_xml
+from comparison.machine import processor
 from comparison.scene import Array
-from rover_gym import Simulation
-from rover_gym.vector.throughput import STEPS_A_COMMAND, TIME_STEP, Player, measure_exploring, processor
+from rover_gym import HeightField, Plane, RoverModel, Simulation, SphereField
+from rover_gym.mechanics import SimulationBatch
 
+TIME_STEP = 0.005  # s
+#: Steps from one command to the next, commands of a round, rounds, and the first rounds, which are not counted.
+STEPS_A_COMMAND, COMMANDS, ROUNDS, WARM_UP = 10, 10, 10, 1
+#: Height by which a rover is raised until nothing overlaps, m, and steps that it has to come to rest, braked.
+LIFT, LANDING = 0.005, 200
+#: Largest torque of a wheel, as a share of that which its part of the weight resists at the rim.
+EFFORT = 0.2
+#: Rovers that are measured alone.
+ALONE = 8
 #: Names of MuJoCo's settings, with integrator, cone and impratio. The second has the friction of rigid contacts,
-#: nearly; with it the integrator `discrete` is both the most accurate and the fastest.
+#: nearly; with it the integrator `discrete` is both the most accurate and the fastest. The default integrator, `Euler`,
+#: is unstable with the gains of the steering.
 MUJOCO = {
-    "MuJoCo, defaults": ("mjINT_IMPLICITFAST", "mjCONE_PYRAMIDAL", 1.0),
-    "MuJoCo, elliptic cone, impratio 100": ("mjINT_DISCRETE", "mjCONE_ELLIPTIC", 100.0),
+    "MuJoCo": ("mjINT_IMPLICITFAST", "mjCONE_PYRAMIDAL", 1.0),
+    "elliptic": ("mjINT_DISCRETE", "mjCONE_ELLIPTIC", 100.0),
 }
+#: Drives by commands `(n_commands, n_rovers, 2 n_wheels)`, N m and rad.
+Player = Callable[[Array], None]
 
 
-def players(simulations: list[Simulation], threads: int) -> dict[str, Player]:
-    """MuJoCo's rollout of the same rovers, by setting."""
-    models = [mujoco.MjModel.from_xml_string(text) for text in _descriptions(simulations)]
+@dataclass(frozen=True)
+class Row:
+    """A rover on a ground.
+
+    Attributes:
+        name: In the table.
+        model: The rover.
+        ground: Makes the ground of a rover from a generator.
+    """
+
+    name: str
+    model: RoverModel
+    ground: Callable[[np.random.Generator], Any]
+
+
+def wide(width: float, rounding: float, stiffness: float = 0.0) -> RoverModel:
+    """The built-in rover on wheels of 0.20 m with a width and a rounding, m (0: thin discs), and a stiffness, N/m."""
+    model = RoverModel().replace(contact_radius=0.20, motor=None)
+    if width == 0.0:
+        return model
+    machine = model.to_dict()
+    tread = {"width": width, "rounding": rounding}
+    if stiffness > 0.0:
+        tread |= {"stiffness": stiffness, "damping": stiffness * 3.5e-3}
+    machine["wheels"] = [wheel | tread for wheel in machine["wheels"]]
+    return RoverModel.from_dict(machine)
+
+
+def plane(_: np.random.Generator) -> Plane:
+    """Level ground."""
+    return Plane()
+
+
+def rocks(rng: np.random.Generator) -> SphereField:
+    """600 half-buried rocks of up to 15 cm on 12 m by 12 m."""
+    n = 600
+    radii = rng.uniform(0.04, 0.15, n)
+    places = rng.uniform(-6.0, 6.0, (n, 2))
+    depth = rng.uniform(0.3, 0.7, n) * radii
+    return SphereField(np.column_stack([places[:, 0], -depth, places[:, 1]]), radii, Plane())
+
+
+def hills(spacing: float) -> Callable[[np.random.Generator], HeightField]:
+    """Self-affine hills with cells of a size, m, one map for all rovers of a row."""
+    made: list[HeightField] = []
+
+    def ground(rng: np.random.Generator) -> HeightField:
+        if not made:
+            made.append(HeightField.fractal(24.0, spacing, 0.15, longest_wave=12.0, seed=int(rng.integers(1 << 31))))
+        return made[0]
+
+    return ground
+
+
+def rows(robots: list[Path]) -> Iterator[Row]:
+    """All rows of the table: the built-in rover by its wheels, the gallery, and files of robots."""
+    grounds = {"plane": plane, "rocks": rocks, "hills 0.25 m": hills(0.25), "hills 0.05 m": hills(0.05)}
+    wheels = {
+        "thin discs": wide(0.0, 0.0),
+        "cylinders": wide(0.15, 0.0),
+        "yielding": wide(0.15, 0.0, 5.2e7),
+        "tori": wide(0.15, 0.075),
+    }
+    for ground, make in grounds.items():
+        for name, model in wheels.items():
+            yield Row(f"rover, {name}, {ground}", model, make)
+    for name in ("mars-rover", "open-rover", "four-steered", "skid-steered"):
+        for ground, make in grounds.items():
+            yield Row(f"{name}, {ground}", RoverModel.named(name).replace(motor=None), make)
+    for file in robots:
+        read = RoverModel.from_urdf if file.suffix == ".urdf" else RoverModel.from_mjcf
+        for ground, make in grounds.items():
+            yield Row(f"{file.stem}, {ground}", read(file), make)
+
+
+def rover_at_rest(row: Row, rng: np.random.Generator) -> Simulation:
+    """A rover somewhere on its ground, at rest, its wheels braked until the first command."""
+    terrain = row.ground(rng)
+    simulation = Simulation(row.model, terrain, time_step=TIME_STEP)
+    x, z = rng.uniform(-3.0, 3.0, 2)
+    q = row.model.resting_pose(Plane(), (x, z), rng.uniform(-math.pi, math.pi))
+    simulation.set_state(q)
+    while simulation.deepest_overlap < -LIFT:
+        q[1] += LIFT
+        simulation.set_state(q)
+    simulation.brake()
+    simulation.step(LANDING)
+    return simulation
+
+
+def together(batch: SimulationBatch, n_wheels: int) -> Player:
+    """Plays commands of all rovers in a batch."""
+
+    def play(commands: Array) -> None:
+        for command in commands:
+            batch.step(command[:, :n_wheels], command[:, n_wheels:], STEPS_A_COMMAND)
+
+    return play
+
+
+def one_by_one(simulations: list[Simulation], reports: list[Any]) -> Player:
+    """Plays commands rover by rover."""
+    n_wheels = len(simulations[0].model.to_dict()["wheels"])
+
+    def play(commands: Array) -> None:
+        for i, simulation in enumerate(simulations):
+            for command in commands[:, i]:
+                simulation.set_commands(command[:n_wheels], command[n_wheels:])
+                reports.append(simulation.step(STEPS_A_COMMAND))
+
+    return play
+
+
+def in_mujoco(simulations: list[Simulation], threads: int, states: dict[str, Array] | None = None) -> dict[str, Player]:
+    """MuJoCo's rollout of the same rovers, by setting; with their states, which a dictionary receives."""
+    states = {} if states is None else states
+    models = [mujoco.MjModel.from_xml_string(text) for text in descriptions(simulations)]
+    for model, one in zip(models, simulations, strict=True):
+        terrain: Any = one.terrain
+        if isinstance(terrain, HeightField):
+            heights = terrain.grid.astype(float)[::-1]  # our z is to the right, the file's y to the left
+            low, high = heights.min(), heights.max()
+            model.hfield_data[:] = ((heights - low) / (high - low)).ravel()
     datas = [mujoco.MjData(models[0]) for _ in range(threads)]
     whole = mujoco.mjtState.mjSTATE_FULLPHYSICS.value
     start = np.stack([_state(model, one, whole) for model, one in zip(models, simulations, strict=True)])
-    drives, holds, signs = _actuators(models[0], simulations[0])
+    wheels = simulations[0].model.to_dict()["wheels"]
+    drives = [models[0].actuator(f"drive_{wheel['solid']}").id for wheel in wheels]
+    steered = [i for i, wheel in enumerate(wheels) if wheel.get("steering")]
+    holds = [models[0].actuator(f"hold_{wheels[i]['steering']}").id for i in steered]
     pool = rollout.Rollout(nthread=threads)
 
-    def player(integrator: str, cone: str, impratio: float) -> Player:
-        states = start.copy()
+    def player(name: str, integrator: str, cone: str, impratio: float) -> Player:
+        own = states[name] = start.copy()
 
         def play(commands: Array) -> None:
             for model in models:
                 model.opt.integrator = getattr(mujoco.mjtIntegrator, integrator)
                 model.opt.cone, model.opt.impratio = getattr(mujoco.mjtCone, cone), impratio
             control = np.empty((len(models), len(commands), models[0].nu))
-            control[:, :, drives] = signs * commands[:, :, :6].transpose(1, 0, 2)
-            control[:, :, holds] = commands[:, :, 6:].transpose(1, 0, 2)
+            control[:, :, drives] = commands[:, :, : len(wheels)].transpose(1, 0, 2)
+            control[:, :, holds] = commands[:, :, [len(wheels) + i for i in steered]].transpose(1, 0, 2)
             control = np.repeat(control, STEPS_A_COMMAND, axis=1)
-            after, _ = pool.rollout(models, datas, states, control)
-            states[:] = after[:, -1]
+            after, _ = pool.rollout(models, datas, own, control)
+            own[:] = after[:, -1]
 
         return play
 
-    return {name: player(*setting) for name, setting in MUJOCO.items()}
+    return {name: player(name, *setting) for name, setting in MUJOCO.items()}
 
 
-def _descriptions(simulations: list[Simulation]) -> list[str]:
-    """The rovers in MuJoCo's XML. A rollout wants equally large models: fields of fewer rocks get some far below."""
-    machine = simulations[0].model.to_dict()
-    grounds = []
-    for simulation in simulations:
-        terrain: Any = simulation.terrain
-        has_rocks = hasattr(terrain, "centres")
-        spheres = np.column_stack([terrain.centres, terrain.radii]) if has_rocks else np.zeros((0, 4))
-        grounds.append((tuple((terrain.ground if has_rocks else terrain).normal), spheres))
-    most = max(len(spheres) for _, spheres in grounds)
+def descriptions(simulations: list[Simulation]) -> list[str]:
+    """The rovers and their grounds as MJCF, z up. Only wheels touch the ground, thin discs as cylinders 4 mm wide.
+
+    A rollout wants equally large models: fields of fewer rocks get some far below.
+    """
+    machine = simulations[0].model
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "rover.xml"
+        machine.to_mjcf(file)
+        text = file.read_text(encoding="utf-8")
+    wheels = {wheel["solid"]: wheel for wheel in machine.to_dict()["wheels"]}
+    limits = {solid["name"]: solid for solid in machine.to_dict()["solids"]}
     texts = []
-    for normal, spheres in grounds:
-        below = np.tile([0.0, -100.0, 0.0, 0.1], (most - len(spheres), 1))
-        texts.append(
-            rover_xml(
-                machine,
-                time_step=TIME_STEP,
-                normal=normal,
-                spheres=np.concatenate([spheres, below]),
-                thin_wheels=most > 0,
-            )
-        )
+    for simulation in simulations:
+        root = ElementTree.fromstring(text)  # noqa: S314 - our own text
+        ElementTree.SubElement(root, "option", timestep=repr(TIME_STEP), gravity="0 0 -9.81")
+        for body in root.iter("body"):
+            for geom in body.findall("geom"):
+                is_rim = body.get("name") in wheels and geom.get("type") == "cylinder" and "contype" not in geom.keys()  # noqa: SIM118
+                if not is_rim:
+                    body.remove(geom)
+                    continue
+                wheel = wheels[str(body.get("name"))]
+                radius, half = float(str(geom.get("size")).split()[0]), 0.5 * (wheel.get("width") or 0.004)
+                geom.set("size", f"{radius!r} {half!r}")
+                if (wheel.get("rounding") or 0.0) >= half:
+                    geom.set("type", "ellipsoid")
+                    geom.set("size", f"{radius!r} {radius!r} {half!r}")
+                geom.attrib |= {"contype": "2", "conaffinity": "1", "friction": "0.7 0 0", "condim": "3"}
+        for motor in root.iter("motor"):
+            motor.attrib.pop("ctrlrange", None)
+        for name, solid in limits.items():
+            if (
+                solid.get("hold")
+                and name not in wheels
+                and not any(a.get("name") == f"hold_{name}" for a in root.iter("position"))
+            ):
+                # A joint held by its model, and not steered, is a spring and a damper.
+                for joint in root.iter("joint"):
+                    if joint.get("name") == name and joint.get("type"):
+                        joint.set("stiffness", repr(solid["hold"]["stiffness"]))
+                        joint.set("damping", repr(solid["hold"]["damping"]))
+        _add_ground(root, simulation.terrain)
+        texts.append(ElementTree.tostring(root, encoding="unicode"))
     return texts
+
+
+def _add_ground(root: ElementTree.Element, terrain: Any) -> None:
+    """Adds a ground of ours to MJCF: x forward, y left, z up."""
+    world = root.find("worldbody")
+    assert world is not None
+    masks = {"contype": "1", "conaffinity": "2", "friction": "0.7 0 0", "condim": "3"}
+    if isinstance(terrain, HeightField):
+        x_min, z_min, x_max, z_max = terrain.bounds
+        low, high = float(terrain.grid.min()), float(terrain.grid.max())
+        rows, columns = terrain.grid.shape
+        size = f"{(x_max - x_min) / 2!r} {(z_max - z_min) / 2!r} {high - low!r} 1"
+        asset = ElementTree.SubElement(root, "asset")
+        ElementTree.SubElement(asset, "hfield", name="map", nrow=str(rows), ncol=str(columns), size=size)
+        pos = f"{(x_min + x_max) / 2!r} {-(z_min + z_max) / 2!r} {low!r}"
+        ElementTree.SubElement(world, "geom", masks, type="hfield", hfield="map", pos=pos)
+        return
+    ElementTree.SubElement(world, "geom", masks, type="plane", size="0 0 1")
+    if isinstance(terrain, SphereField):
+        for (x, y, z), r in zip(terrain.centres, terrain.radii, strict=True):
+            pos = f"{float(x)!r} {-float(z)!r} {float(y)!r}"
+            ElementTree.SubElement(world, "geom", masks, type="sphere", size=repr(float(r)), pos=pos)
 
 
 def _state(model: Any, simulation: Simulation, whole: int) -> Array:
     """The rover's start as MuJoCo's state."""
     data = mujoco.MjData(model)
-    data.qpos[:3] = simulation.q[:3]
-    mujoco.mju_mat2Quat(data.qpos[3:7], simulation.rotation.ravel())
-    for i, solid in enumerate(simulation.model.to_dict()["solids"][1:]):
-        data.qpos[model.joint(solid["name"]).qposadr[0]] = simulation.q[6 + i]
+    x, y, z = simulation.q[:3]
+    data.qpos[:3] = x, -z, y
+    turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # from y up to z up
+    mujoco.mju_mat2Quat(data.qpos[3:7], (turn @ simulation.rotation @ turn.T).ravel())
+    for name, angle in zip(simulation.model.dof_names[6:], simulation.q[6:], strict=True):
+        data.qpos[model.joint(name).qposadr[0]] = angle
     state = np.empty(mujoco.mj_stateSize(model, whole))
     mujoco.mj_getState(model, data, state, whole)
     return state
 
 
-def _actuators(model: Any, simulation: Simulation) -> tuple[list[int], list[int], Array]:
-    """Places of the drives and of the steering in the control, and the signs of the drives, by wheel."""
-    wheels = simulation.model.to_dict()["wheels"]
-    drives = [model.actuator(f"drive{i}").id for i in range(len(wheels))]
-    holds = [model.actuator(f"hold_{wheel['steering']}").id for wheel in wheels]
-    return drives, holds, np.array([wheel["drive_sign"] for wheel in wheels])
+def measure(row: Row, rovers: int, threads: int, seed: int, rounds: int = ROUNDS) -> dict[str, float]:
+    """Microseconds of a step by engine, and the shares of general steps and of commands with an unsolved one."""
+    rng = np.random.default_rng(seed)
+    simulations = [rover_at_rest(row, rng) for _ in range(rovers)]
+    description = row.model.to_dict()
+    n = len(description["wheels"])
+    masses = sum(solid["mass"] for solid in description["solids"])
+    radius = statistics.mean(w.get("contact_radius") or w["radius"] for w in description["wheels"])
+    torque = EFFORT * masses * 9.81 * radius / n
+    turns = [min(w.get("steering_limit") or 0.0, 0.7) if w.get("steering") else 0.0 for w in description["wheels"]]
+    limits = np.array([torque] * n + turns)
+    reports: list[Any] = []
+    alone = simulations[: min(ALONE, rovers)]
+    beside = in_mujoco(simulations, threads)
+    engines: dict[str, tuple[int, Player]] = {
+        "batch": (rovers, together(SimulationBatch(simulations, threads=threads), n)),
+        "alone": (len(alone), one_by_one(alone, reports)),
+    } | {name: (rovers, play) for name, play in beside.items()}
+    seconds: dict[str, list[float]] = {name: [] for name in engines}
+    for _ in range(rounds + WARM_UP):
+        commands = rng.uniform(-1.0, 1.0, (COMMANDS, rovers, 2 * n)) * limits
+        for name, (count, play) in engines.items():
+            start = time.perf_counter()
+            play(commands)
+            seconds[name].append((time.perf_counter() - start) / (count * COMMANDS * STEPS_A_COMMAND))
+    general = sum(report.fallbacks for report in reports) / (STEPS_A_COMMAND * len(reports))
+    return {name: 1e6 * statistics.median(times[WARM_UP:]) for name, times in seconds.items()} | {
+        "general": 1.0 if alone[0].fallback_reason else general,
+        "unsolved": sum(not report.is_converged for report in reports) / len(reports),
+    }
 
 
 def main() -> None:
     """Measures and prints."""
-    parser = argparse.ArgumentParser(description="Exploring rovers beside MuJoCo's rollout.")
+    parser = argparse.ArgumentParser(description="Cost of a step of any rover on any ground, beside MuJoCo.")
     parser.add_argument("--rovers", type=int, default=64)
-    parser.add_argument("--threads", type=int)
+    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--seed", type=int, help="of commands and grounds; drawn, where not given")
+    parser.add_argument("--row", default="", help="only rows with this text in their name")
+    parser.add_argument("--robot", type=Path, action="append", default=[], help="a URDF or MJCF, in rows of its own")
     given = parser.parse_args()
-    print(f"{processor()}; rover-gym {metadata.version('rover-gym')}, MuJoCo {metadata.version('mujoco')}")  # noqa: T201
-    for ground in ("plane", "rocks"):
-        told = measure_exploring(given.rovers, given.threads, ground=ground, beside=players)
-        for engine, rate in told.rover_steps.items():
-            print(f"{ground:<6} {engine:<38}{rate:>12.0f} rover-steps/s")  # noqa: T201
+    seed = int(np.random.SeedSequence().entropy % (1 << 32)) if given.seed is None else given.seed
+    console = Console(width=160, highlight=False)
+    packages = f"rover-gym {metadata.version('rover-gym')}, MuJoCo {metadata.version('mujoco')}"
+    console.print(f"{processor()}; {packages}; seed {seed}; {given.rovers} rovers, {given.threads} thread(s)")
+    console.print(
+        f"{'us a step of 5 ms':<32}{'alone':>8}{'batch':>8}{'MuJoCo':>9}{'elliptic':>9}{'general':>9}{'unsolved':>9}"
+    )
+    for row in rows(given.robot):
+        if given.row in row.name:
+            found = measure(row, given.rovers, given.threads, seed)
+            times = f"{found['alone']:9.1f}{found['batch']:9.1f}{found['MuJoCo']:9.1f}{found['elliptic']:9.1f}"
+            console.print(f"{row.name:<32}{times}{found['general']:9.2%}{found['unsolved']:9.2%}")
 
 
 if __name__ == "__main__":

@@ -5,7 +5,6 @@ import pytest
 
 from comparison.mujoco_rover import rover_xml
 from rover_gym import Plane, RoverModel, Simulation
-from rover_gym.vector import measure_exploring
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed (make chart installs it)")
 
@@ -30,9 +29,20 @@ def test_mass_matrix_and_rest_are_ours() -> None:
     np.testing.assert_allclose(data.qpos[:3], simulation.q[:3], atol=2e-3)
 
 
-def test_the_rollout_steps_the_rovers_that_are_measured() -> None:
-    from comparison.rollout import MUJOCO, players  # noqa: PLC0415 - needs MuJoCo
+@pytest.mark.parametrize("name", ["rover, cylinders, rocks", "mars-rover, hills 0.25 m", "skid-steered, plane"])
+def test_every_row_of_the_bench_has_its_rover_in_both_engines(name: str) -> None:
+    from comparison import rollout  # noqa: PLC0415 - needs MuJoCo
 
-    told = measure_exploring(2, 1, ground="rocks", rounds=1, beside=players)
-    assert set(told.rover_steps) == {"rover-gym", *MUJOCO}
-    assert min(told.rover_steps.values()) > 0.0
+    (row,) = (row for row in rollout.rows([]) if row.name == name)
+    found = rollout.measure(row, 2, 1, seed=3, rounds=1)
+    assert min(found[engine] for engine in ("alone", "batch", *rollout.MUJOCO)) > 0.0
+    rng = np.random.default_rng(3)
+    simulations = [rollout.rover_at_rest(row, rng) for _ in range(2)]
+    n = len(row.model.to_dict()["wheels"])
+    theirs = rollout.in_mujoco(simulations, 1, states := {})
+    commands = np.zeros((4, 2, 2 * n))
+    theirs["elliptic"](commands)
+    rollout.one_by_one(simulations, [])(commands)
+    for one, state in zip(simulations, states["elliptic"], strict=True):
+        # Of MuJoCo's full physics: time, then qpos, z up. Its contacts are soft.
+        np.testing.assert_allclose([state[1], state[3], -state[2]], one.q[:3], atol=0.05)

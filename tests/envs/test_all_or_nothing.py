@@ -21,7 +21,7 @@ from rover_gym import (
     StateError,
     TerrainError,
 )
-from rover_gym.env import beginning
+from rover_gym.env import episode_scene
 from rover_gym.vector import RoverVectorEnv
 from rover_gym.vector.sb3 import RoverVecEnv
 
@@ -118,7 +118,7 @@ def test_a_scene_without_room_is_drawn_again() -> None:
 def test_a_scene_without_room_is_refused_after_a_stated_number_of_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(TerrainError) as caught:
         RoverEnv(terrain=BLOCKED).reset(seed=0)
-    assert beginning.PLACING_ATTEMPTS == 100
+    assert episode_scene.PLACING_ATTEMPTS == 100
     assert "100 scenes" in str(caught.value)
     assert caught.value.field == "terrain"
     assert caught.value.value > 0.01
@@ -127,7 +127,7 @@ def test_a_scene_without_room_is_refused_after_a_stated_number_of_draws(monkeypa
     env = RoverEnv(terrain=NARROW)
     seed = next(seed for seed in range(60) if draws_of(env, seed) == 15)
     for attempts in (3, 2):
-        monkeypatch.setattr(beginning, "PLACING_ATTEMPTS", attempts)
+        monkeypatch.setattr(episode_scene, "PLACING_ATTEMPTS", attempts)
         if attempts == 3:
             env.reset(seed=seed)
         else:
@@ -188,7 +188,7 @@ def test_half_a_vector_was_reset_before_a_bad_seed(arguments: dict[str, Any], fi
 
 
 def test_half_a_vector_was_reset_before_a_rover_without_room(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(beginning, "PLACING_ATTEMPTS", 1)
+    monkeypatch.setattr(episode_scene, "PLACING_ATTEMPTS", 1)
     env, alone = vector(terrain=NARROW), RoverEnv(terrain=NARROW)
 
     def has_room(seed: int) -> bool:

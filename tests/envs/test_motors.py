@@ -61,7 +61,7 @@ def test_no_step_is_worth_more_than_a_hundred_whatever_the_physics_did(control_f
     env = RoverEnv(control_frequency=control_frequency)
     env.reset(seed=0)
     rng = np.random.default_rng(1)
-    state = env._episode.state()
+    state = env.episode.progress.state()
     rewards = []
     for row in readings(env, rng, 300):
         one = EpisodeRun(env.task.rules, **{**state, "distance": 10.0 ** rng.uniform(-3.0, 36.0)})

@@ -11,13 +11,11 @@ import pytest
 
 from rover_gym import Plane, SphereField, StateError
 from rover_gym.env import RoverEnv
-from rover_gym.env.rocks import HeightScan, scan_points
+from rover_gym.env.start import HeightScan, scan_points
 from rover_gym.mechanics import OptionError, PathSearch, atan2, exp, sin_cos
 from rover_gym.policy import MapOptions, PathCosts, ScanPolicy
-from rover_gym.policy.arc_search import STEPS, ArcSearch, SearchTask
+from rover_gym.policy.arc_search import STEPS, Arcs, ArcSearch, RoverOutline, SearchTask
 from rover_gym.policy.ground_map import GroundMap
-from rover_gym.policy.rover_outline import RoverOutline
-from rover_gym.policy.sweeps import Arcs
 
 Array = npt.NDArray[np.float64]
 

@@ -7,7 +7,7 @@ import pytest
 from rover_gym import HeightField, OptionError, Plane, RoverModel, SphereField, StateError
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.planning import FieldPlan, Futures, PlannerOptions, PlannerPolicy
-from rover_gym.planning.scanned_ground import ScannedGround
+from rover_gym.planning.planner_policy import ScannedGround
 from rover_gym.policy import CommandController, ScanPolicy
 
 ROVER = RoverModel()

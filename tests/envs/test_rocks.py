@@ -25,10 +25,10 @@ from rover_gym import (
     Union,
 )
 from rover_gym.env import HeightScan
-from rover_gym.env.rocks import scan_points
+from rover_gym.env.start import scan_points
 from rover_gym.ground import heights_of, plane_of, surfaces_of
 from rover_gym.policy import measure_baseline, wilson_interval
-from rover_gym.policy.baseline import ENDS
+from rover_gym.policy.evaluation import ENDS
 from rover_gym.vector import RoverVectorEnv
 
 NAN, INF = float("nan"), float("inf")

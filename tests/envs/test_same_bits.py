@@ -19,7 +19,7 @@ import pytest
 
 from rover_gym.env.start import tilted_plane
 from rover_gym.mechanics import SphereField
-from rover_gym.policy.command import DriveByCommand
+from rover_gym.policy.command_env import DriveByCommand
 from rover_gym.policy.pd_policy import PDPolicy, find_rover_env
 
 SEEDS = (3, 4)

@@ -2,6 +2,7 @@
 
 import inspect
 import math
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,20 +15,18 @@ from rover_gym.models import open_model
 from rover_gym.policy import (
     FORECAST_FILE,
     ForesightCosts,
-    ForesightPolicy,
     Network,
     PathCosts,
     PolicyError,
     ScanGains,
     ScanPolicy,
 )
+from rover_gym.policy.arc_forecast import OUTPUTS, ArcFeatures, ArcForecast, Outcomes, with_speed
+from rover_gym.policy.arc_search import Arcs, RoverOutline
 from rover_gym.policy.evaluation import drive_all
-from rover_gym.policy.foresight_policy import OUTPUTS, ArcFeatures, ArcForecast, with_speed
 from rover_gym.policy.named_policy import named_policy
 from rover_gym.policy.policy_card import FOLDER
-from rover_gym.policy.rover_outline import RoverOutline
 from rover_gym.policy.scan_policy import TRAPS, ScanMemory
-from rover_gym.policy.sweeps import Arcs
 
 ARGUMENTS = ScanPolicy.arguments()
 
@@ -267,13 +266,18 @@ def test_the_features_see_the_rock_on_the_arcs_that_lead_over_it() -> None:
     assert gap[ahead] < 0.1 < 0.5 < gap[back]
 
 
+def foreseen_by(policy: ScanPolicy, row: Any) -> Outcomes:
+    assert policy.forecast is not None
+    return policy.forecast(row, *policy.ground(row))
+
+
 def test_the_shipped_forecast_knows_what_holds_the_trunk() -> None:
     """It foretells less way and a held trunk over a rock that is higher than the clearance, not over a low one."""
     foreseen = []
     for radius in (0.1, 0.26):
         env, row = in_front_of_a_rock(radius)
-        policy = ForesightPolicy(env)
-        outcomes = policy.foresee(row)
+        policy = ScanPolicy(env, forecast=True)
+        outcomes = foreseen_by(policy, row)
         ahead = int(np.argmin(np.abs(policy.commands - [1.0, 0.0, 0.0]).sum(axis=1)))
         foreseen.append((outcomes.way[0, ahead], outcomes.stuck[0, ahead]))
     assert foreseen[0][0] > foreseen[1][0] + 0.2
@@ -284,8 +288,8 @@ def test_the_shipped_forecast_knows_what_holds_the_trunk() -> None:
 def test_the_small_rover_has_a_forecast_of_its_own() -> None:
     """Of difficulty 2, where `ScanPolicy` reaches six goals of ten in the same time, it reaches nearly all."""
     model = open_model("open-rover")
-    arguments = {"terrain": "rocks", "difficulty": 2.0, "model": model, **ForesightPolicy.arguments(model)}
-    drives = drive_all(ForesightPolicy, range(1_000_000, 1_000_008), arguments=arguments, num_envs=8)
+    arguments = {"terrain": "rocks", "difficulty": 2.0, "model": model, **ScanPolicy.arguments(model)}
+    drives = drive_all(partial(ScanPolicy, forecast=True), range(1_000_000, 1_000_008), arguments=arguments, num_envs=8)
     assert sum(drive.success for drive in drives) >= 6
 
 
@@ -301,23 +305,23 @@ def test_the_small_rover_has_a_forecast_of_its_own() -> None:
 def test_rover_and_ground_choose_the_forecast(terrain: str, rover: str, folder: str) -> None:
     """By itself the policy foresees what it does with that forecast by name, and not what it does with another."""
     model = open_model(rover)
-    env = RoverEnv(terrain=terrain, model=model, **ForesightPolicy.arguments(model))
+    env = RoverEnv(terrain=terrain, model=model, **ScanPolicy.arguments(model))
     row = env.reset(seed=2)[0].astype(np.float64)
-    way = ForesightPolicy(env).foresee(row).way
+    way = foreseen_by(ScanPolicy(env, forecast=True), row).way
     for other in ("foresight", "foresight-hills", "foresight-open-rover"):
         if (other == "foresight-open-rover") == (rover == "open-rover"):
-            same = (way == ForesightPolicy(env, FOLDER / other).foresee(row).way).all()
+            same = (way == foreseen_by(ScanPolicy(env, forecast=FOLDER / other), row).way).all()
             assert same == (other == folder)
 
 
 def test_what_is_foreseen_costs_in_proportion_to_the_way(tmp_path: Path) -> None:
     """A slower rover's costs are smaller, as the ways that it compares are shorter."""
     for model in (RoverModel(), open_model("open-rover")):
-        env = RoverEnv(terrain="plane", model=model, **ForesightPolicy.arguments(model))
+        env = RoverEnv(terrain="plane", model=model, **ScanPolicy.arguments(model))
         row = env.reset(seed=1)[0].astype(np.float64)
         size = ArcFeatures(env, ScanPolicy(env)).size + 1
         constant(size, [0.0, 0.5, 0.0]).save(tmp_path / FORECAST_FILE)
-        policy = ForesightPolicy(env, tmp_path)
+        policy = ScanPolicy(env, forecast=tmp_path)
         costs, fast = policy._outlook(row, *policy.ground(row), 1.0)
         assert costs == pytest.approx(policy.cruise_speed / 1.2 * (2.0 * 0.85 * 1.2 + 10.0 * 0.5))
         assert not fast.any()
@@ -329,15 +333,15 @@ def test_costs_of_what_is_foreseen_choose_arc_and_speed(tmp_path: Path) -> None:
     size = ArcFeatures(env, ScanPolicy(env)).size + 1
     calm = constant(size, [1.0, 0.0, 0.0])
     calm.save(tmp_path / FORECAST_FILE)
-    alike = ForesightPolicy(env, tmp_path, foresight=ForesightCosts(caution=1.0))
+    alike = ScanPolicy(env, forecast=tmp_path, foresight=ForesightCosts(caution=1.0))
     observation = row.astype(np.float32)
     np.testing.assert_array_equal(alike.predict(observation)[0], ScanPolicy(env).predict(observation)[0])
     held = constant(size, [-0.5, 0.0, 0.0])
     held.weights[0][0, -1] = 1.0  # fast arcs get on
     held.save(tmp_path / FORECAST_FILE)
-    command = ForesightPolicy(env, tmp_path).predict(observation)[1][0][0]
+    command = ScanPolicy(env, forecast=tmp_path).predict(observation)[1][0][0]
     assert command[0] == pytest.approx(1.0)
-    slow = ForesightPolicy(env, tmp_path, foresight=ForesightCosts(push=100.0)).predict(observation)[1][0][0]
+    slow = ScanPolicy(env, forecast=tmp_path, foresight=ForesightCosts(push=100.0)).predict(observation)[1][0][0]
     assert slow[0] < 0.6
 
 
@@ -356,28 +360,28 @@ def test_the_forecast_scales_and_limits_its_outputs() -> None:
 def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
     env, _ = in_front_of_a_rock(0.1)
     with pytest.raises(PolicyError, match="is not there"):
-        ForesightPolicy(env, tmp_path)
+        ScanPolicy(env, forecast=tmp_path)
     with pytest.raises(OptionError) as caught:
-        ForesightPolicy(env, foresight=1.0)  # type: ignore[arg-type]
+        ScanPolicy(env, foresight=1.0)  # type: ignore[arg-type]
     assert caught.value.field == "foresight"
     with pytest.raises(OptionError) as caught:
         ForesightCosts(stuck=-1.0)
     assert caught.value.field == "foresight.stuck"
     constant(5, [0.0, 0.0, 0.0]).save(tmp_path / FORECAST_FILE)
     with pytest.raises(PolicyError, match="5 features"):
-        ForesightPolicy(env, tmp_path)
+        ScanPolicy(env, forecast=tmp_path)
     size = ArcFeatures(env, ScanPolicy(env)).size + 1
     constant(size, [0.0, 0.0]).save(tmp_path / FORECAST_FILE)
     with pytest.raises(PolicyError, match="3 outputs"):
-        ForesightPolicy(env, tmp_path)
+        ScanPolicy(env, forecast=tmp_path)
 
 
 def test_a_name_and_a_folder_lead_to_it(tmp_path: Path) -> None:
     env, _ = in_front_of_a_rock(0.1)
     named = named_policy("foresight", "rocks")
-    assert isinstance(named.make(env), ForesightPolicy)
+    assert getattr(named.make(env), "forecast", None) is not None
     size = ArcFeatures(env, ScanPolicy(env)).size + 1
     constant(size, [0.0, 0.0, 0.0]).save(tmp_path / FORECAST_FILE)
     own = named_policy(str(tmp_path), "rocks")
     assert own.arguments == ARGUMENTS
-    assert isinstance(own.make(env), ForesightPolicy)
+    assert getattr(own.make(env), "forecast", None) is not None

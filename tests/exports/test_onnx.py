@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from rover_gym.cli import app
 from rover_gym.models import open_model
 from rover_gym.policy import Network, PolicyError, TrainedPolicy, policy_arguments, policy_folder
-from rover_gym.policy.foresight_policy import OUTPUTS
+from rover_gym.policy.arc_forecast import OUTPUTS
 from rover_gym.policy.policy_card import forecast_folder
 
 pytest.importorskip("onnx")

@@ -3,17 +3,19 @@
 
 use std::sync::Arc;
 
+use rover_core::contact::Activation;
 use rover_core::geometry::{Plane, SphereField, Terrain};
-use rover_core::integrator::{Stabilisation, StepOptions, StepReport};
+use rover_core::integrator::{MechanicalSystem, Stabilisation, StepOptions, StepReport};
 use rover_core::multibody::{Model, coordinates};
 use rover_core::nalgebra::Vector3;
 use rover_core::simulation::{
-    GrainSimulation, RoverInGrains, RoverSimulation, TogetherError, soil_options,
+    GrainSimulation, RoverInGrains, RoverSimulation, Scene as _, TogetherError, soil_options,
 };
 use rover_core::solver::SolverOptions;
 use rover_core::system::grains::{
     COORDINATES, GrainFriction, GrainScene, Grains, Packing, SleepOptions, Wall,
 };
+use rover_core::system::{AmongContact, AmongGrains, AmongParts};
 
 /// θ = γ = 1, solved to `tolerance`.
 fn options(gravity: f64, time_step: f64, tolerance: f64) -> StepOptions {
@@ -271,4 +273,64 @@ fn what_does_not_belong_together_is_refused() {
         matches!(refused, TogetherError::Overlap { grain: 0, .. }),
         "{refused}"
     );
+}
+
+/// The step applies Z and Zᵀ contact by contact; W is assembled from the pairs of bodies.
+#[test]
+fn the_assembled_operator_is_that_of_the_impulses() {
+    let options = options(9.81, 1e-3, 1e-9);
+    let ground = || -> Arc<dyn Terrain> { Arc::new(Plane::new([0.0, 1.0, 0.0], 0.0).unwrap()) };
+    // Its wheels rest on the ground, and one of them by a ball, which another one lies on.
+    let centre = |rover: &RoverSimulation| {
+        let (model, kinematics) = (rover.model(), rover.kinematics());
+        let wheel = &model.wheels()[0];
+        kinematics.origin(wheel.body) + kinematics.point(wheel.body, &wheel.centre)
+    };
+    let low = centre(&rover(ground(), [0.0; 3], &options));
+    let radius = Model::rover().wheels()[0].radius;
+    let rover = rover(ground(), [0.0, radius - low.y, 0.0], &options);
+    let wheel = centre(&rover);
+    for (away, touch_it) in [(0.0, true), (10.0, false)] {
+        let side = wheel.x.signum() * (radius + 0.1 + away);
+        let place = [wheel.x + side, wheel.y, wheel.z];
+        let above = [place[0], place[1] + 0.2, place[2]];
+        let bed = balls(&[place, above], 0.1, 4.0, false, &options);
+        let mut parts = AmongParts::new(rover.model());
+        let (mut bed_parts, mut rover_parts) = (bed.scene().parts(), rover.scene().parts());
+        let (bed_memory, rover_memory) = (bed.scene().memory(), rover.scene().memory());
+        let mut system = AmongGrains {
+            bed: (bed.scene()).system(bed.command(), &bed_memory, &mut bed_parts),
+            tree: (rover.scene()).system(rover.command(), &rover_memory, &mut rover_parts),
+            friction: 0.7,
+            parts: &mut parts,
+        };
+        let q = (bed.q().clone(), rover.q().clone());
+        system.place_middle(&q);
+        system.place_end(&q);
+        let (v, mut contacts) = (vec![0.0; system.nv()], Vec::new());
+        let activation = Activation {
+            lead: options.time_step,
+            ..Activation::default()
+        };
+        system.detect(&v, activation, &mut contacts);
+        system.relocate(&mut contacts);
+        system.update_mass_matrix(&options);
+        assert!(system.factorise(&options));
+        let n = 3 * contacts.len();
+        system.assemble(&contacts, &v, &mut vec![0.0; n]);
+        let count = |is: fn(&AmongContact) -> bool| contacts.iter().filter(|c| is(c)).count();
+        assert!(count(|c| matches!(c, AmongContact::Grains(_))) > 0);
+        assert!(count(|c| matches!(c, AmongContact::Tree(_))) > 0);
+        assert_eq!(count(|c| matches!(c, AmongContact::Touch(_))) > 0, touch_it);
+        let p: Vec<f64> = (0..n).map(|i| (1.7 * i as f64).sin()).collect();
+        let (mut y, mut expected) = (vec![0.0; system.nv()], vec![0.0; n]);
+        system.add_impulses(&p, &mut y);
+        system.local(&y, &mut expected);
+        let (zero, mu, mut found) = (vec![0.0; n], vec![0.5; contacts.len()], vec![0.0; n]);
+        let problem = system.problem(&zero, &mu);
+        problem.operator().multiply_add(&p, &zero, &mut found);
+        for (a, b) in expected.iter().zip(&found) {
+            assert!((a - b).abs() < 1e-12, "{a} {b}");
+        }
+    }
 }

@@ -1,5 +1,5 @@
 //! Grains in the plane and in space: closed forms for both, heaps, energy
-//! and momentum balance, machines of any number of coordinates.
+//! and momentum balance, a machine among them.
 
 use std::sync::Arc;
 
@@ -8,13 +8,14 @@ use rover_core::integrator::{
     StepReport, WarmStart,
 };
 use rover_core::nalgebra::{SVector, Vector3};
+use rover_core::planar::Ball;
 use rover_core::problem::FrictionContactProblem;
 use rover_core::simulation::GrainSimulation;
 use rover_core::solver::SolverOptions;
 use rover_core::spatial::space::{axis, body_velocities};
 use rover_core::system::grains::{
     COORDINATES, GrainContact, GrainFriction, GrainKey, GrainParts, GrainScene, GrainSystem,
-    Grains, Machine, Packing, Sleep, SleepOptions, StepTaken, Wall, Wheel,
+    Grains, Packing, Sleep, SleepOptions, StepTaken, Wall,
 };
 
 const G: f64 = 9.81;
@@ -595,114 +596,35 @@ fn balls_that_rest_fall_asleep_and_wake_when_one_is_struck() {
     assert!(report.n_contacts >= 3, "{report:?}");
 }
 
-/// A ball or disk in the role of a machine.
-#[derive(Debug)]
-struct RoundMachine {
-    mass: f64,
-    radius: f64,
-}
-
-impl<const D: usize> Machine<D> for RoundMachine {
-    fn nv(&self) -> usize {
-        body_velocities(D)
-    }
-
-    fn mass_matrix(&self, _q: &[f64], out: &mut [f64]) {
-        let n = body_velocities(D);
-        out.fill(0.0);
-        for k in 0..n {
-            let arm = kappa::<D>() * self.radius * self.radius;
-            out[k * (n + 1)] = self.mass * if k < D { 1.0 } else { arm };
-        }
-    }
-
-    fn force(
-        &self,
-        _q: &[f64],
-        _v: &[f64],
-        gravity: &Vector3<f64>,
-        _inputs: &[f64],
-        out: &mut [f64],
-    ) {
-        out.fill(0.0);
-        for k in 0..D {
-            out[k] = self.mass * gravity[k];
-        }
-    }
-
-    fn potential(&self, q: &[f64], gravity: &Vector3<f64>) -> f64 {
-        -self.mass * (0..D).map(|k| gravity[k] * q[k]).sum::<f64>()
-    }
-
-    fn n_inputs(&self) -> usize {
-        0
-    }
-
-    fn n_wheels(&self) -> usize {
-        1
-    }
-
-    fn wheel(&self, _i: usize, q: &[f64]) -> Wheel<D> {
-        Wheel {
-            centre: SVector::from_column_slice(&q[..D]),
-            radius: self.radius,
-        }
-    }
-
-    /// `v + ω × r`.
-    fn point_jacobian(&self, _i: usize, q: &[f64], point: &SVector<f64, D>, out: &mut [f64]) {
-        let n = body_velocities(D);
-        let arm = |k: usize| point[k] - q[k];
-        out.fill(0.0);
-        for k in 0..D {
-            out[k * n + k] = 1.0;
-        }
-        if D == 2 {
-            (out[2], out[n + 2]) = (-arm(1), arm(0));
-        } else {
-            for k in 0..3 {
-                let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-                out[k * n + D + i] = arm(j);
-                out[k * n + D + j] = -arm(i);
-            }
-        }
-    }
-
-    fn displacement(&self, y: &[f64]) -> f64 {
-        y[..D].iter().fold(0.0, |most, y| most.max(y.abs()))
-    }
-
-    fn fingerprint(&self) -> u64 {
-        0
-    }
-}
-
-/// The impact of one body on D others on the floor is the same whether the one is a grain or a
-/// machine.
+/// The impact of one body on two others on the floor, in the plane z = 0, is the same whether the
+/// one is a grain or a machine.
 fn machine_moves_as_a_grain<const D: usize>()
 where
     for<'a> GrainSystem<'a, D>:
         MechanicalSystem<Configuration = Vec<f64>, Contact = GrainContact<D>>,
 {
-    let (mut centres, _) = small_pyramid::<D>(1.1);
-    centres[D][1] += 0.05;
-    let as_grain = |mut heap: Heap<D>| {
-        let at = body_velocities(D) * D;
+    let (mut flat, _) = small_pyramid::<2>(1.1);
+    flat[2].y += 0.05;
+    let centres: Vec<SVector<f64, D>> = flat
+        .iter()
+        .map(|x| SVector::from_fn(|k, _| if k < 2 { x[k] } else { 0.0 }))
+        .collect();
+    // The velocity of the one at `at`, whose last entry is its turn.
+    let struck = |mut heap: Heap<D>, at: usize| {
         heap.v[at] = 0.3;
-        heap.v[at + D] = 2.0;
+        *heap.v.last_mut().unwrap() = 2.0;
         assert!(heap.step(300).is_converged());
-        heap.v
+        let turn = heap.v.len() - 1;
+        [0, 1, D, at, at + 1, turn].map(|k| heap.v[k])
     };
-    let grain = as_grain(on_a_floor(&centres, 0.4));
-    let mut scene = on_a_floor(&centres[..D], 0.4).scene;
-    scene.machine = Some(Arc::new(RoundMachine {
-        mass: 2.0,
-        radius: 0.1,
-    }));
-    let mut q = coordinates(&centres);
-    // A machine has as many coordinates as velocities.
-    q.resize(COORDINATES * D + body_velocities(D), 0.0);
-    let machine = as_grain(Heap::new(scene, options(), q));
+    let at = 2 * body_velocities(D);
+    let grain = struck(on_a_floor(&centres, 0.4), at);
+    let mut scene = on_a_floor(&centres[..2], 0.4).scene;
+    let ball = Ball::new(2.0, 0.1, kappa::<D>() * 2.0 * 0.01).unwrap();
+    scene.machine = Some(Arc::new(ball.into()));
+    let mut q = coordinates(&centres[..2]);
+    q.extend([flat[2].x, flat[2].y, 0.0]);
+    let machine = struck(Heap::new(scene, options(), q), at);
     let off = grain.iter().zip(&machine);
     let off = off.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
     assert!(grain.iter().any(|v| v.abs() > 0.05), "it moves");

@@ -4,7 +4,6 @@
 mod scenes;
 
 mod ball;
-mod composite;
 mod mirrored_rover;
 mod siconos;
 mod soil;

@@ -10,8 +10,7 @@ from rover_gym import OptionError, RoverGymError
 pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
 
 from rover_gym.learning.build import build_env
-from rover_gym.learning.configurations import SHIPPED_CONFIGURATIONS, find_configuration
-from rover_gym.learning.training_config import parse_config, read_config
+from rover_gym.learning.training_config import SHIPPED_CONFIGURATIONS, find_configuration, parse_config, read_config
 
 SMALLEST: dict[str, Any] = {"environment": {"terrain": "plane"}, "total_steps": 100}
 

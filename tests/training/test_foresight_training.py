@@ -6,7 +6,7 @@ import pytest
 from rover_gym import OptionError, RoverEnv
 from rover_gym.learning.fit_forecast import ArcOutcomes, fit_forecast, try_arcs
 from rover_gym.policy import ScanPolicy
-from rover_gym.policy.foresight_policy import ArcFeatures
+from rover_gym.policy.arc_forecast import ArcFeatures
 
 ARGUMENTS = {"terrain": "rocks", "difficulty": 1.0, **ScanPolicy.arguments()}
 

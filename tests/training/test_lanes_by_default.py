@@ -26,8 +26,7 @@ def test_make_vec_makes_the_vector_of_the_core(name: str) -> None:
 def test_train_ppo_trains_on_the_vector_of_the_core(name: str) -> None:
     pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
     from rover_gym.learning.build import build_env  # noqa: PLC0415 - needs the extra
-    from rover_gym.learning.configurations import find_configuration  # noqa: PLC0415
-    from rover_gym.learning.training_config import read_config  # noqa: PLC0415
+    from rover_gym.learning.training_config import find_configuration, read_config  # noqa: PLC0415
     from rover_gym.vector.sb3 import RoverVecEnv  # noqa: PLC0415
 
     config = read_config(find_configuration(name))

@@ -17,9 +17,8 @@ pytest.importorskip("stable_baselines3", reason="the extra train is not installe
 
 import yaml
 
-from rover_gym.learning.configurations import FOLDER, SHIPPED_CONFIGURATIONS
 from rover_gym.learning.several_seeds import seed_estimate, student_quantile
-from rover_gym.learning.training_config import parse_config, read_config
+from rover_gym.learning.training_config import FOLDER, SHIPPED_CONFIGURATIONS, parse_config, read_config
 from rover_gym.learning.training_evaluation import TrainingEvaluation, read_evaluations
 from rover_gym.policy import PolicyCard, TrainedPolicy, drive_all
 from rover_gym.policy.comparison import ENDING, film_episode

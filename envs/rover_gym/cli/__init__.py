@@ -6,10 +6,9 @@ from typing import Annotated
 import typer
 
 from rover_gym.cli.console import DEBUG, one_line, say_first_steps
-from rover_gym.cli.dataset_command import dataset
 from rover_gym.cli.drive_command import drive
 from rover_gym.cli.evaluate_command import baseline, evaluate
-from rover_gym.cli.export_command import export
+from rover_gym.cli.export_command import dataset, export
 from rover_gym.cli.grains_command import grains, pit, track
 from rover_gym.cli.grains_command import rover as rover_on_bed
 from rover_gym.cli.grains_lab_commands import plate, shear, wheel

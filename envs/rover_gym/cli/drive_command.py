@@ -52,7 +52,8 @@ from rover_gym.env.reward_terms import WEIGHTS
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.comparison import EpisodeFilm
-from rover_gym.policy.episodes import Episode, Policy, run_episode
+from rover_gym.policy.evaluation import Episode, run_episode
+from rover_gym.policy.named_policy import Policy
 from rover_gym.record.channels import Channel, RoverSampler, describe
 from rover_gym.record.recorder import Recorder
 from rover_gym.record.rover_run import OF_EPISODES

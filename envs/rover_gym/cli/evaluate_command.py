@@ -36,7 +36,6 @@ from rover_gym.env.arguments import MAX_SLOPE_DEG, terrain_name
 from rover_gym.extras import MissingExtraError, require
 from rover_gym.figures.policy_figure import draw_policies
 from rover_gym.mechanics import OptionError
-from rover_gym.policy.baseline import DIFFICULTIES, ENVIRONMENTS, BaselineInterrupt, BaselineRow, measure_baseline
 from rover_gym.policy.comparison import (
     BASELINE,
     Contender,
@@ -48,7 +47,16 @@ from rover_gym.policy.comparison import (
     planner_contender,
     trained_contender,
 )
-from rover_gym.policy.evaluation import EvaluatedEpisode, PolicySummary, summarise
+from rover_gym.policy.evaluation import (
+    DIFFICULTIES,
+    ENVIRONMENTS,
+    BaselineInterrupt,
+    BaselineRow,
+    EvaluatedEpisode,
+    PolicySummary,
+    measure_baseline,
+    summarise,
+)
 from rover_gym.policy.named_policy import NAMES_HELP, policy_title
 from rover_gym.policy.pd_policy import PDPolicy
 from rover_gym.validation import number, refuse

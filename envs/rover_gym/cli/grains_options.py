@@ -10,8 +10,7 @@ import typer
 from rover_gym.cli.console import LARGEST_SEED, AsJson, Results, Row, check_folder, progress_bar, row, status
 
 if TYPE_CHECKING:
-    from rover_gym.grains.grain_recording import Recordable
-    from rover_gym.grains.grain_run import GrainRun
+    from rover_gym.grains.grain_run import GrainRun, Recordable
 
 EARTH, MARS = 9.81, 3.71  # m/s^2
 FOLDER = Path("runs/grains")
@@ -71,8 +70,7 @@ def recorded(
     until: Callable[[Any], bool] = lambda _: False,
 ) -> "GrainRun":
     """Records a run, films it if wanted, says where both are, and reads it back."""
-    from rover_gym.grains.grain_recording import record_grains  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.grains.grain_run import GrainRun  # noqa: PLC0415 - as above
+    from rover_gym.grains.grain_run import GrainRun, record_grains  # noqa: PLC0415 - as above
     from rover_gym.runs import open_run  # noqa: PLC0415 - as above
 
     path = given.output / f"{name}.h5"

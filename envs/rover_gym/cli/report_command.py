@@ -9,6 +9,7 @@ import typer
 from rover_gym.cli.console import AsJson, Results, Row, check_folder, plain_errors, progress_bar, row
 from rover_gym.record.trajectory import Trajectory, read_trajectory
 from rover_gym.reproduction import SceneResult, inclined_plane, sphere_rug
+from rover_gym.reproduction.scene_runs import distance_to_siconos
 
 
 @plain_errors
@@ -46,7 +47,7 @@ def report(
 
         trajectory = read_trajectory(result.path)
         rows = _rows(result, trajectory, settings)
-        for step, time, distance in inclined_plane.distance_to_siconos(trajectory):
+        for step, time, distance in distance_to_siconos(trajectory):
             values = {f"from_siconos_at_{1e6 * step:.0f}_us": {"time": time, "distance": distance}}
             rows.append(row(f"from Siconos at {1e3 * step:g} ms", f"{1e3 * distance:.2f} mm at {time:g} s", **values))
         results.table("Section 6.1: the rover on the inclined plane", rows, part="section_6_1")

@@ -28,7 +28,7 @@ from rover_gym.economy.planner import plan
 from rover_gym.economy.scene_plan import Accuracy, Scene, ScenePlan
 from rover_gym.env.start import tilted_plane
 from rover_gym.mechanics import OptionError, Plane, RoverModel, SphereField, Terrain
-from rover_gym.reproduction.sphere_rug import START
+from rover_gym.reproduction import sphere_rug
 from rover_gym.validation import number, refuse
 
 #: Radius of the ground without rocks around the start, beyond the rover itself, m.
@@ -158,7 +158,7 @@ def _start(
         if place is not None:
             refuse(OptionError, "start", place, "is above the middle of the rug's edge")
         start = np.zeros(model.nq)
-        start[:3] = START
+        start[:3] = sphere_rug.start
         start[4] = turned
         return start
     return None if place is None else model.resting_pose(ground, place, turned)

@@ -128,8 +128,7 @@ def _cross(
         rover_on_soil,
         settled_bed,
     )
-    from rover_gym.soil.soil_recording import record_soil  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.soil.soil_run import SoilRun  # noqa: PLC0415 - as above
+    from rover_gym.soil.soil_run import SoilRun, record_soil  # noqa: PLC0415 - as above
 
     _check_width("disks", disks, layers, CROSSING)
     bed = settled_bed(disks, layers, seed=seed, **options)

@@ -85,10 +85,8 @@ def _fields(exploring: ExploringSpeed, environment: VectorSpeed) -> dict[str, An
 def _print_exploring(name: str, result: ExploringSpeed) -> None:
     typer.echo(
         f"\n{name}: torques of up to {result.torque:g} N m and set-points redrawn every 10 steps of 5 ms\n"
-        f"  {'':<38}{'rover-steps/s':>14}{'simulated s/s':>16}"
+        f"  {result.rover_steps:.0f} rover-steps/s, {result.simulated:.0f} simulated s/s"
     )
-    for engine, rate in result.rover_steps.items():
-        typer.echo(f"  {engine:<38}{rate:>14.0f}{result.simulated[engine]:>16.0f}")
 
 
 def _print_environment(result: VectorSpeed) -> None:

@@ -77,10 +77,9 @@ def train(
     if films:
         for package in ("imageio_ffmpeg", "vtkmodules"):
             require(package, "render")
-    from rover_gym.learning.configurations import find_configuration  # noqa: PLC0415 - as below
     from rover_gym.learning.ppo import Reporting, train_ppo  # noqa: PLC0415 - needs the extra, and slow to load
     from rover_gym.learning.several_seeds import read_seed, write_seeds  # noqa: PLC0415
-    from rover_gym.learning.training_config import read_config  # noqa: PLC0415
+    from rover_gym.learning.training_config import find_configuration, read_config  # noqa: PLC0415
 
     path = find_configuration(config)
     settings = read_config(path)

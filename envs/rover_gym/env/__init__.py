@@ -5,9 +5,8 @@ from rover_gym.env.env_snapshot import EnvSnapshot
 from rover_gym.env.grains_env import BedDraw, GrainsEnvSnapshot, RoverGrainsEnv
 from rover_gym.env.observation import ObservationField, ObservationLayout
 from rover_gym.env.reward_terms import RewardTerm
-from rover_gym.env.rocks import HeightScan, Rocks
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.env.start import Domain, Start, drive_signs, resting_pose, tilted_plane, wheel_centres
+from rover_gym.env.start import Domain, HeightScan, Rocks, Start, drive_signs, resting_pose, tilted_plane, wheel_centres
 from rover_gym.env.task import Task
 
 __all__ = [

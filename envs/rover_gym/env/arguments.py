@@ -16,8 +16,9 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Annotated, Any, TypedDict, TypeVar, get_args, get_type_hints
 
+from rover_gym.env.observation import info_table, observation_table
 from rover_gym.env.reward_terms import WEIGHTS, RewardTerm, RewardTerms, check_reward_terms
-from rover_gym.env.rocks import MAX_ABUNDANCE, MAX_DIFFICULTY, ROCK_RADII, check_scan
+from rover_gym.env.start import MAX_ABUNDANCE, MAX_DIFFICULTY, ROCK_RADII, check_scan
 from rover_gym.maps.map_files import is_terrain_file, open_terrain
 from rover_gym.mechanics import ModelError, OptionError, RoverModel, Terrain, TerrainError, Union
 from rover_gym.models.lookup import open_model
@@ -438,28 +439,33 @@ def check_arguments(caller: str, given: Mapping[str, object]) -> dict[str, Any]:
     return checked
 
 
-def takes_arguments(function: F) -> F:
-    """Replaces `**arguments` in a function's signature by the list."""
+def takes_arguments(function: F, before: Sequence[inspect.Parameter] = ()) -> F:
+    """Replaces `**arguments` in a function's signature by further parameters, if there are any, and the list."""
     own = inspect.signature(function)
     kept = [entry for entry in own.parameters.values() if entry.kind is not inspect.Parameter.VAR_KEYWORD]
-    function.__signature__ = own.replace(parameters=[*kept, *PARAMETERS])  # type: ignore[attr-defined]
+    function.__signature__ = own.replace(parameters=[*kept, *before, *PARAMETERS])  # type: ignore[attr-defined]
     return function
 
 
-def with_argument_table(cls: C) -> C:
-    """Replaces {arguments} in a class's docstring by the list as a table."""
+def with_tables(cls: C) -> C:
+    """Replaces {arguments}, {observation} and {info} in a class's docstring by tables."""
+    tables = {"arguments": argument_table, "observation": observation_table, "info": info_table}
     if cls.__doc__ is not None:  # `python -OO` strips docstrings
-        before, place, after = cls.__doc__.partition("{arguments}")
-        if place:
-            margin = before.rpartition("\n")[2]
-            cls.__doc__ = before + argument_table(margin) + after
+        for name, rows in tables.items():
+            before, place, after = cls.__doc__.partition(f"{{{name}}}")
+            if place:
+                cls.__doc__ = before + markdown_table(rows(), before.rpartition("\n")[2]) + after
     return cls
 
 
-def argument_table(indent: str = "") -> str:
-    """The list as a Markdown table: name, default, unit, allowed values, meaning."""
-    rows = [("name", "default", "unit", "may be", "meaning")]
-    rows += [(name, _plain(a.default), a.unit, str(a.check), a.meaning) for name, a in ARGUMENTS.items()]
+def argument_table() -> list[tuple[str, ...]]:
+    """The rows of the card's table of arguments: name, default, unit, allowed values, meaning."""
+    rows = ((name, _plain(a.default), a.unit, str(a.check), a.meaning) for name, a in ARGUMENTS.items())
+    return [("name", "default", "unit", "may be", "meaning"), *rows]
+
+
+def markdown_table(rows: Sequence[tuple[str, ...]], indent: str = "") -> str:
+    """Rows as a table in Markdown; the first one is its header."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [" | ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
     lines.insert(1, "-|-".join("-" * width for width in widths))

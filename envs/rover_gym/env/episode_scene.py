@@ -1,19 +1,22 @@
-"""The scene of an episode: ground, rocks, start, goal and properties, drawn at random or fixed by reset options."""
+"""The scene of an episode: ground, rocks, start, goal and properties, drawn at random or fixed by reset options.
+
+A draw checks everything before the caller adopts it: episodes are complete, or none begins.
+"""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from rover_gym.env.arguments import MAX_SLOPE_DEG
+from rover_gym.env.generators import Rows
 from rover_gym.env.observation import Array
-from rover_gym.env.rocks import MAX_DIFFICULTY, MAX_GOAL_DISTANCE, Rocks
-from rover_gym.env.start import Domain, Start
+from rover_gym.env.start import MAX_DIFFICULTY, MAX_GOAL_DISTANCE, Domain, Rocks, Start
 from rover_gym.env.task import Task
 from rover_gym.ground import plane_of
-from rover_gym.mechanics import OptionError, Plane, StateError, Terrain
+from rover_gym.mechanics import DrawnEpisodes, EpisodeBatch, OptionError, Plane, StateError, Terrain
 from rover_gym.validation import Range, known_keys, mapping, number, refuse, span, vector, whole
 
 RESET_OPTIONS = (
@@ -63,8 +66,16 @@ class ResetOptions:
     fixed: Mapping[str, Any] = field(default_factory=dict)
 
 
-def scene_of(task: Task, start: Array, rocks: Array, rock_seed: int, domain: Array, terrain: Terrain) -> EpisodeScene:
-    """The scene of one episode from rows of `DrawnEpisodes`: `starts`, `rocks`, `rock_seeds`, `domains`."""
+def scene_of(task: Task, drawn: DrawnEpisodes, i: int) -> EpisodeScene:
+    """The scene of drawn episode i."""
+    rows = drawn.starts[i], drawn.rocks[i], drawn.rock_seeds[i], drawn.domains[i]
+    return scene_of_rows(task, *rows, drawn.terrain(i))
+
+
+def scene_of_rows(
+    task: Task, start: Array, rocks: Array, rock_seed: int, domain: Array, terrain: Terrain
+) -> EpisodeScene:
+    """The scene of an episode from rows of `DrawnEpisodes`: `starts`, `rocks`, `rock_seeds`, `domains`."""
     slope, uphill, x, z, heading, *places = start.tolist()
     goal, *further = zip(places[::2], places[1::2], strict=True)
     difficulty, abundance, max_radius = rocks.tolist()
@@ -77,7 +88,7 @@ def scene_of(task: Task, start: Array, rocks: Array, rock_seed: int, domain: Arr
 
 
 def origin_of(scene: EpisodeScene) -> tuple[list[float], list[float], int, list[float]]:
-    """The rows of `DrawnEpisodes` that `scene_of` makes a scene from: start, rocks, seed of the rocks, domain."""
+    """The rows of `DrawnEpisodes` that `scene_of_rows` makes a scene from: start, rocks, seed of the rocks, domain."""
     start, rocks = scene.start, scene.rocks
     places = [x for goal in start.goals for x in goal]
     row = [start.slope, start.uphill, *start.position, start.heading, *places]
@@ -161,3 +172,34 @@ def _course(task: Task, field: str, value: object) -> list[tuple[float, ...]]:
     if not isinstance(value, (list, tuple)) or len(value) != n:
         refuse(OptionError, field, value, f"must be a list of {n} places (x, z), as many as waypoints")
     return [_place(f"{field}[{i}]", place) for i, place in enumerate(value)]
+
+
+#: Most scenes drawn for one reset until the rover penetrates neither the ground nor a sphere.
+PLACING_ATTEMPTS = 100
+
+
+def draw_episodes(
+    task: Task,
+    generators: Rows,
+    difficulties: Sequence[Range | None],
+    options: ResetOptions | Sequence[ResetOptions],
+    batch: EpisodeBatch | None = None,
+) -> DrawnEpisodes:
+    """Draws the next episode of each generator, which keeps its state, and repeats each draw until the rover has room.
+
+    Args:
+        task: The task.
+        generators: `(m, 4)` random generators; the result's `generators` holds their states after the draws.
+        difficulties: Range of each rover's rocks' difficulty; None for the task's own.
+        options: The values that reset options fix, for all rovers or one per rover.
+        batch: The batch whose threads draw; None for the caller's alone.
+
+    Raises:
+        TerrainError: A rover would penetrate the ground or a sphere in each of `PLACING_ATTEMPTS` scenes.
+        StateError: The observation of a given state overflows float32.
+    """
+    fixed = options.fixed if isinstance(options, ResetOptions) else [one.fixed for one in options]
+    given = list(difficulties) if any(difficulties) else None
+    if batch is None:
+        return task.episodes.draw(generators, attempts=PLACING_ATTEMPTS, difficulties=given, fixed=fixed)
+    return batch.draw(task.episodes, generators, attempts=PLACING_ATTEMPTS, difficulties=given, fixed=fixed)

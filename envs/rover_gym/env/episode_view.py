@@ -8,8 +8,7 @@ import numpy.typing as npt
 
 from rover_gym.env.episode_scene import EpisodeScene
 from rover_gym.env.observation import ObservationLayout
-from rover_gym.env.rocks import Rocks
-from rover_gym.env.start import Domain, Start
+from rover_gym.env.start import Domain, Rocks, Start
 from rover_gym.env.task import Task
 from rover_gym.mechanics import RoverModel, Simulation
 
@@ -27,8 +26,9 @@ class EpisodeView(ABC):
     task: Task
     _renderer: "FrameRenderer | None" = None
 
+    @property
     @abstractmethod
-    def _running(self) -> EpisodeScene:
+    def scene(self) -> EpisodeScene:
         """The scene of the episode.
 
         Raises:
@@ -82,17 +82,17 @@ class EpisodeView(ABC):
     @property
     def start(self) -> Start:
         """The episode's slope, pose and goal as they were drawn."""
-        return self._running().start
+        return self.scene.start
 
     @property
     def rocks(self) -> Rocks | None:
         """The episode's difficulty and rocks as they were drawn; None on the plane."""
-        return self._running().rocks
+        return self.scene.rocks
 
     @property
     def domain(self) -> Domain:
         """The episode's properties of rover and world as they were drawn."""
-        return self._running().domain
+        return self.scene.domain
 
     @property
     def difficulty(self) -> float | None:
@@ -102,7 +102,7 @@ class EpisodeView(ABC):
 
     def frame(self) -> npt.NDArray[np.uint8]:
         """Renders the present state, (height, width, 3)."""
-        scene = self._running()
+        scene = self.scene
         if self._renderer is None:
             self._renderer = self.make_renderer(scene)
         self._renderer.set_scene(scene.terrain, goal=self.goal, goal_tolerance=self.goal_tolerance)

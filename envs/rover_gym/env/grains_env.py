@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import copy
 import functools
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 import numpy.typing as npt
-from gymnasium.error import ResetNeeded
 
 from rover_gym.env.arguments import RoverArguments
-from rover_gym.env.env_snapshot import EnvSnapshot, check_snapshot
-from rover_gym.env.episode_scene import EpisodeScene
-from rover_gym.env.rover_env import NOT_RUNNING, RoverEnv
+from rover_gym.env.env_snapshot import EnvSnapshot
+from rover_gym.env.episode_scene import EpisodeScene, ResetOptions
+from rover_gym.env.rover_env import RoverEnv, RunningEpisode
 from rover_gym.mechanics import (
     GrainSimulation,
     GrainSnapshot,
@@ -63,18 +61,35 @@ class BedDraw:
 
 
 @dataclass(frozen=True)
-class GrainsEnvSnapshot:
+class GrainsEnvSnapshot(EnvSnapshot):
     """The state from which a `RoverGrainsEnv` continues bit for bit; picklable.
 
     Attributes:
-        rover: Rover and episode.
         bed: The bed that was drawn.
         grains: Rover and balls in the core.
     """
 
-    rover: EnvSnapshot
     bed: BedDraw
     grains: GrainSnapshot
+
+
+@dataclass(frozen=True, kw_only=True)
+class EpisodeAmongGrains(RunningEpisode):
+    """The running episode of a rover among grains.
+
+    Attributes:
+        mover: The rover among the grains.
+        bed: The bed of the episode.
+    """
+
+    mover: RoverGrainSimulation
+    bed: BedDraw
+
+    @classmethod
+    def put(cls, rover: RunningEpisode, bed: BedDraw, grains: GrainSimulation) -> EpisodeAmongGrains:
+        """A rover's episode among the grains of a bed."""
+        mover = RoverGrainSimulation(rover.simulation, grains, wheel_friction=rover.simulation.friction)
+        return cls(scene=rover.scene, simulation=rover.simulation, progress=rover.progress, mover=mover, bed=bed)
 
 
 class RoverGrainsEnv(RoverEnv):
@@ -164,51 +179,39 @@ class RoverGrainsEnv(RoverEnv):
             arguments.setdefault(name, value)  # type: ignore[misc] # names of arguments
         arguments["terrain"] = pit.terrain
         super().__init__(**arguments)
-        self._among: RoverGrainSimulation | None = None
-        self._bed: BedDraw
+
+    @property
+    def episode(self) -> EpisodeAmongGrains:
+        """The running episode.
+
+        Raises:
+            ResetNeeded: The environment has not been reset.
+        """
+        episode = super().episode
+        assert isinstance(episode, EpisodeAmongGrains)  # noqa: S101 - `draw_episode` and `resume_episode` make no other
+        return episode
 
     @property
     def grains(self) -> GrainSimulation:
         """The grains of the episode; read them, but do not step them."""
-        self._running()
-        return self._link().grains
+        return self.episode.mover.grains
 
     @property
     def bed(self) -> BedDraw:
         """The bed of the episode as it was drawn."""
-        self._running()
-        return self._bed
+        return self.episode.bed
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
-        """Starts an episode, as `RoverEnv.reset` does.
+    def draw_episode(self, generator: np.random.Generator, options: ResetOptions) -> EpisodeAmongGrains:
+        """Draws an episode and its bed.
 
         Raises:
-            OptionError: As `RoverEnv.reset`.
             StateError: As `RoverEnv.reset`, or a part of the rover is in a grain.
             TerrainError: As `RoverEnv.reset`.
         """
-        names = ("_simulation", "_episode", "_scene", "_np_random", "_np_random_seed", "_bed", "_among")
-        before = {name: getattr(self, name) for name in names if hasattr(self, name)}
-        generator = self._np_random
-        state = {} if generator is None else copy.deepcopy(generator.bit_generator.state)
-        try:
-            observation, info = super().reset(seed=seed, options=options)
-            number, along_x, along_z = self.np_random.integers(0, (self.n_beds, 2, 2)).tolist()
-            self._bed = BedDraw(number, bool(along_x), bool(along_z))
-            self._among = self._put(self._simulation, self._bed)
-        except Exception:
-            for name, value in before.items():
-                setattr(self, name, value)
-            if generator is not None:
-                generator.bit_generator.state = state
-            raise
-        return observation, info
-
-    def _put(self, rover: Simulation, bed: BedDraw) -> RoverGrainSimulation:
-        """The rover among the grains of a bed."""
-        return RoverGrainSimulation(rover, self._grains(rover, bed), wheel_friction=rover.friction)
+        drawn = super().draw_episode(generator, options)
+        number, along_x, along_z = generator.integers(0, (self.n_beds, 2, 2)).tolist()
+        bed = BedDraw(number, bool(along_x), bool(along_z))
+        return EpisodeAmongGrains.put(drawn, bed, self._grains(drawn.simulation, bed))
 
     def _grains(self, rover: Simulation, bed: BedDraw) -> GrainSimulation:
         """The grains of a bed, in the steps of a rover."""
@@ -223,14 +226,6 @@ class RoverGrainsEnv(RoverEnv):
             sleep_speed=SLEEP_SPEED,
         )
 
-    def _link(self) -> RoverGrainSimulation:
-        if self._among is None:
-            raise ResetNeeded(NOT_RUNNING)
-        return self._among
-
-    def _moving(self) -> RoverGrainSimulation:
-        return self._link()
-
     def make_renderer(self, scene: EpisodeScene) -> FrameRenderer:
         """Creates a renderer with this environment's `render_options`; the caller must close it."""
         from rover_gym.rendering.scenery_actors import BallsActor  # noqa: PLC0415 - only rendering needs it
@@ -238,7 +233,7 @@ class RoverGrainsEnv(RoverEnv):
         renderer = super().make_renderer(scene)
         self._balls = BallsActor(self.grains.radius)
         renderer.add(self._balls.actor)
-        self._drawn = self._bed.number
+        self._drawn = self.bed.number
         return renderer
 
     def render(self) -> npt.NDArray[np.uint8] | None:
@@ -247,39 +242,36 @@ class RoverGrainsEnv(RoverEnv):
             self._renderer.close()
             self._renderer = None
         if self.render_mode is not None:
-            scene = self._running()
+            scene = self.scene
             if self._renderer is None:
                 self._renderer = self.make_renderer(scene)
             self._balls.place(self.grains.position)
         return super().render()
 
-    def snapshot(self) -> GrainsEnvSnapshot:  # type: ignore[override]
+    def snapshot(self) -> GrainsEnvSnapshot:
         """Returns the state of the environment and of its random generator, for `restore`."""
-        return GrainsEnvSnapshot(rover=super().snapshot(), bed=self._bed, grains=self._link().grains.snapshot())
+        return GrainsEnvSnapshot(**vars(super().snapshot()), bed=self.bed, grains=self.grains.snapshot())
 
-    def restore(self, snapshot: GrainsEnvSnapshot) -> None:  # type: ignore[override]
-        """Restores a snapshot of an environment with the same arguments, which then continues bit for bit.
+    def resume_episode(self, episode: RunningEpisode, snapshot: EnvSnapshot) -> EpisodeAmongGrains:
+        """The episode of a snapshot, with its grains.
 
         Raises:
-            StateError: The value is no snapshot, is damaged, or comes from an environment with other arguments; nothing
-                has changed.
+            StateError: The snapshot is of an environment without grains or with other beds.
         """
         if not isinstance(snapshot, GrainsEnvSnapshot):
             refuse(StateError, "snapshot", snapshot, "must come from RoverGrainsEnv.snapshot()")
         if not snapshot.bed.number < self.n_beds:
             refuse(StateError, "snapshot.bed", snapshot.bed, f"must be one of this environment's {self.n_beds} beds")
-        check_snapshot(self.task, snapshot.rover)
-        scene = snapshot.rover.scene
-        grains = self._grains(self.task.simulate(scene.terrain, scene.domain), snapshot.bed)
+        rover = episode.simulation
+        grains = self._grains(rover, snapshot.bed)
         grains.restore(snapshot.grains)
-        super().restore(snapshot.rover)
         # Together while the rover is far away: what runs may overlap more than what starts.
-        rover = self._simulation
         at, away = rover.snapshot(), np.zeros(self.model.nq)
         away[1] = FAR
         rover.set_state(away)
-        self._bed, self._among = snapshot.bed, RoverGrainSimulation(rover, grains, wheel_friction=rover.friction)
+        among = EpisodeAmongGrains.put(episode, snapshot.bed, grains)
         rover.restore(at)
+        return among
 
 
 @functools.lru_cache(maxsize=8)

@@ -6,9 +6,9 @@ with a fixed scale per entry, chosen so that the entries of a driving rover are 
 and a non-finite entry ends the episode.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,12 @@ GAP_SCALE = 0.1
 WHEEL_RATE_SCALE = 10.0
 
 GOAL_SCALE = 10.0
+
+Array: TypeAlias = npt.NDArray[np.float64]
+
+Mask: TypeAlias = npt.NDArray[np.bool_]
+
+Observations: TypeAlias = npt.NDArray[np.float32]
 
 #: The largest finite entry.
 LARGEST = float(np.finfo(np.float32).max)
@@ -123,6 +129,162 @@ class ObservationLayout(Mapping[str, slice]):
         return {field.name: values[..., field.slice].copy() for field in self.fields}
 
 
+@dataclass(frozen=True)
+class LayoutInputs:
+    """What the sizes and scales of an observation follow from; by default the built-in rover.
+
+    Attributes:
+        nq: Coordinates of the model.
+        nv: Velocities of the model.
+        wheels: Number of wheels.
+        actions: Entries of an action.
+        goals: Goals of a course.
+        batteries: 1 with a battery, else 0.
+        points: Points of the height scan.
+        wheel_joints: Places of the wheels' rates in the velocity.
+        wheel_load: Mean weight on a wheel, N.
+    """
+
+    nq: int = 21
+    nv: int = 21
+    wheels: int = 6
+    actions: int = 12
+    goals: int = 1
+    batteries: int = 0
+    points: int = 0
+    wheel_joints: tuple[int, ...] = ()
+    wheel_load: float = 1.0
+
+    @property
+    def courses(self) -> int:
+        """1 with several goals, else 0."""
+        return int(self.goals > 1)
+
+    def rate_scales(self) -> list[float]:
+        """The scales of the velocities: those of wheels are larger."""
+        return [WHEEL_RATE_SCALE if i in self.wheel_joints else 1.0 for i in range(self.nv)]
+
+
+@dataclass(frozen=True)
+class Declared:
+    """One field of every observation.
+
+    Attributes:
+        name: Its name.
+        size: Its number of entries; without any, an observation lacks it.
+        unit: Unit before scaling.
+        meaning: Meaning, in a few words.
+        scale: By what entries are divided: a number for all, or one for each.
+        words: The scale, as the card prints it.
+        bounds: Least and largest scaled entry.
+    """
+
+    name: str
+    size: Callable[[LayoutInputs], int]
+    unit: str
+    meaning: str
+    scale: Callable[[LayoutInputs], float | list[float]] = lambda _: 1.0
+    words: str = "1"
+    bounds: tuple[float, float] = (-LARGEST, LARGEST)
+
+    def scales(self, inputs: LayoutInputs) -> tuple[float, ...]:
+        """The scale of each entry."""
+        scale = self.scale(inputs)
+        return tuple(scale) if isinstance(scale, list) else (scale,) * self.size(inputs)
+
+
+def _scaled(scale: float) -> dict[str, Any]:
+    """The keyword arguments of a fixed scale."""
+    return {"scale": lambda _: scale, "words": f"{scale:g}"}
+
+
+_LOAD: dict[str, Any] = {"scale": lambda n: n.wheel_load, "words": "m g / 6"}
+
+_FLAG: dict[str, Any] = {"bounds": (0.0, 1.0)}
+
+_UNIT: dict[str, Any] = {"bounds": (-1.0, 1.0)}
+
+#: The fields of an observation, in order. Spaces, layout and card follow from this table; the core writes the entries.
+OBSERVATION = (
+    Declared("q", lambda n: n.nq, "m, rad", "trunk x, y, z, roll, heading, pitch; joint angles"),
+    Declared(
+        "velocity",
+        lambda n: n.nv,
+        "m/s, rad/s",
+        "trunk linear and angular in the trunk frame; joint rates",
+        LayoutInputs.rate_scales,
+        f"1, wheels {WHEEL_RATE_SCALE:g}",
+    ),
+    Declared("wheel_gap", lambda n: n.wheels, "m", "distance of each wheel to ground and rocks", **_scaled(GAP_SCALE)),
+    Declared("wheel_contact", lambda n: n.wheels, "", "1 where the gap is at most 1 mm, else 0", **_FLAG),
+    Declared("normal_force", lambda n: n.wheels, "N", "ground or rock on wheel, along the contact's normal", **_LOAD),
+    Declared(
+        "tangential_force", lambda n: 2 * n.wheels, "N", "the same, rolling then lateral, wheel by wheel", **_LOAD
+    ),
+    Declared("ground_normal", lambda _: 3, "", "the normal of the ground, over 1 m, in the trunk frame", **_UNIT),
+    Declared("goal", lambda _: 2, "m", "goal ahead and to the right of the trunk, horizontal", **_scaled(GOAL_SCALE)),
+    Declared(
+        "goal_distance",
+        lambda _: 1,
+        "m",
+        "horizontal distance from the trunk's origin to the goal",
+        **_scaled(GOAL_SCALE),
+        bounds=(0.0, LARGEST),
+    ),
+    Declared("previous_action", lambda n: n.actions, "", "the action before this observation, 0 at reset", **_UNIT),
+    Declared("stuck", lambda _: 1, "", "fraction of the time to high-centring that has passed", **_FLAG),
+    Declared("charge", lambda n: n.batteries, "", "fraction of the battery's charge", **_FLAG),
+    Declared(
+        "next_goal",
+        lambda n: 2 * n.courses,
+        "m",
+        "the goal after the present one, ahead and to the right of the trunk, horizontal",
+        **_scaled(GOAL_SCALE),
+    ),
+    Declared(
+        "waypoints_remaining",
+        lambda n: n.courses,
+        "",
+        "goals still to reach",
+        lambda n: float(n.goals),
+        "goals",
+        **_FLAG,
+    ),
+    Declared(
+        "height_scan",
+        lambda n: n.points,
+        "m",
+        "heights of ground and rocks over the trunk's origin, from the front, each row from the left",
+    ),
+)
+
+#: The entries of an info, in order: name, unit and meaning. The core fills them in.
+INFO = (
+    ("time", "s", "since the reset"),
+    ("success", "", "whether the goal is reached"),
+    ("is_success", "", "the same, by the name that stable-baselines3 looks for"),
+    ("termination", "", 'how the episode has ended; "" while it runs'),
+    ("distance_to_goal", "m", "horizontal"),
+    ("energy", "J", "work of the wheel motors since the reset, braking counted"),
+    ("energy_positive", "J", "the same, driving only"),
+    ("slip_ratio", "", "mean over wheels in contact of rim slip over the faster of rim and ground, 0 to 2"),
+    ("tilt", "rad", "angle between the trunk and the vertical"),
+    ("difficulty", "", "of the rocks; 0 where none are drawn"),
+    ("domain", "", "the randomised properties, by argument"),
+    ("reward_terms", "", "the terms of the step's reward, by name"),
+    ("solver", "", "`status`, `iterations`, `residual`, `n_contacts`, `message`: the worst of the physics steps"),
+)
+
+
+def _placed(inputs: LayoutInputs) -> Iterator[tuple[int, int, Declared]]:
+    """First entry and size of the fields that an observation has."""
+    start = 0
+    for field in OBSERVATION:
+        if size := field.size(inputs):
+            yield start, size, field
+            start += size
+
+
 def build_layout(
     model: RoverModel,
     gravity_magnitude: float,
@@ -136,47 +298,35 @@ def build_layout(
 
     A battery and a course of several goals add fields before the scan.
     """
-    nq, nv, n = model.nq, model.nv, len(model.wheel_names)
-    wheel_load = model.mass * gravity_magnitude / n
-
-    # The trunk's six velocities come first, then the joints in the order of q.
-    velocity_scale = [1.0] * nv
-    for index in model.wheel_joint_indices:
-        velocity_scale[index] = WHEEL_RATE_SCALE
-
-    any_number, no_less = (-LARGEST, LARGEST), (0.0, LARGEST)
-    rows: list[tuple[str, str, list[float], tuple[float, float], str]] = [
-        ("q", "m, rad", [1.0] * nq, any_number, "trunk x, y, z, roll, heading, pitch; joint angles"),
-        ("velocity", "m/s, rad/s", velocity_scale, any_number, "trunk linear, angular in its frame; joint rates"),
-        ("wheel_gap", "m", [GAP_SCALE] * n, any_number, "distance of each wheel to ground and rocks"),
-        ("wheel_contact", "", [1.0] * n, (0.0, 1.0), "1 where the gap is at most 1 mm, else 0"),
-        ("normal_force", "N", [wheel_load] * n, any_number, "ground or rock on wheel, along the contact's normal"),
-        ("tangential_force", "N", [wheel_load] * 2 * n, any_number, "the same, rolling then lateral"),
-        ("ground_normal", "", [1.0] * 3, (-1.0, 1.0), "the normal of the ground, over 1 m, in the trunk frame"),
-        ("goal", "m", [GOAL_SCALE] * 2, any_number, "goal ahead and to the right of the trunk, horizontal"),
-        ("goal_distance", "m", [GOAL_SCALE], no_less, "horizontal distance to the goal"),
-        ("previous_action", "", [1.0] * n_actions, (-1.0, 1.0), "the action before this observation"),
-        ("stuck", "", [1.0], (0.0, 1.0), "fraction of the time to high-centring"),
-    ]
-    if has_battery:
-        rows.append(("charge", "", [1.0], (0.0, 1.0), "fraction of the battery's charge"))
-    if n_goals > 1:
-        meaning = "the goal after the present one, ahead and to the right of the trunk, horizontal"
-        rows.append(("next_goal", "m", [GOAL_SCALE] * 2, any_number, meaning))
-        rows.append(("waypoints_remaining", "", [float(n_goals)], (0.0, 1.0), "goals still to reach"))
-    if n_scan:
-        meaning = "heights of ground and rocks over the trunk's origin, from the front, each row from the left"
-        rows.append(("height_scan", "m", [1.0] * n_scan, any_number, meaning))
-    fields: list[ObservationField] = []
-    start = 0
-    for name, unit, scale, (low, high), meaning in rows:
-        fields.append(ObservationField(name, start, len(scale), unit, tuple(scale), low, high, meaning))
-        start += len(scale)
-    return ObservationLayout(tuple(fields))
+    n = len(model.wheel_names)
+    inputs = LayoutInputs(
+        nq=model.nq,
+        nv=model.nv,
+        wheels=n,
+        actions=n_actions,
+        goals=n_goals,
+        batteries=int(has_battery),
+        points=n_scan,
+        wheel_joints=tuple(model.wheel_joint_indices),
+        wheel_load=model.mass * gravity_magnitude / n,
+    )
+    return ObservationLayout(
+        tuple(
+            ObservationField(own.name, start, size, own.unit, own.scales(inputs), *own.bounds, own.meaning)
+            for start, size, own in _placed(inputs)
+        )
+    )
 
 
-Array: TypeAlias = npt.NDArray[np.float64]
+def observation_table() -> list[tuple[str, ...]]:
+    """The rows of the card's table of observations, for the built-in rover."""
+    rows: list[tuple[str, ...]] = [("index", "field", "meaning", "unit", "scale")]
+    for start, size, own in _placed(LayoutInputs()):
+        index = str(start) if size == 1 else f"{start}-{start + size - 1}"
+        rows.append((index, own.name, own.meaning, own.unit, own.words))
+    return rows
 
-Mask: TypeAlias = npt.NDArray[np.bool_]
 
-Observations: TypeAlias = npt.NDArray[np.float32]
+def info_table() -> list[tuple[str, ...]]:
+    """The rows of the card's table of infos."""
+    return [("key", "unit", "meaning"), *((f"`{name}`", unit, meaning) for name, unit, meaning in INFO)]

@@ -1,7 +1,7 @@
 """`Rover-v0`: drive a rover to a goal. The class docstring is the environment's card."""
 
 import copy
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -10,10 +10,16 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
-from rover_gym.env.arguments import RoverArguments, check_arguments, takes_arguments, with_argument_table
-from rover_gym.env.beginning import draw_episodes
+from rover_gym.env.arguments import RoverArguments, check_arguments, takes_arguments, with_tables
 from rover_gym.env.env_snapshot import EnvSnapshot, Progress, check_random_state, check_snapshot
-from rover_gym.env.episode_scene import EpisodeScene, check_difficulty, check_reset_options, scene_of
+from rover_gym.env.episode_scene import (
+    EpisodeScene,
+    ResetOptions,
+    check_difficulty,
+    check_reset_options,
+    draw_episodes,
+    scene_of,
+)
 from rover_gym.env.episode_view import EpisodeView
 from rover_gym.env.generators import check_seed, row_of, seeded, set_row
 from rover_gym.env.play_keys import keys_to_action, pushed
@@ -32,7 +38,24 @@ NOT_RUNNING = "RoverEnv: call reset() first"
 STEP_FAILED = "step_failed"
 
 
-@with_argument_table
+@dataclass(frozen=True)
+class RunningEpisode:
+    """The running episode of an environment.
+
+    Attributes:
+        scene: What it was drawn as: ground, start, goals.
+        simulation: The rover.
+        progress: How far it has come.
+        mover: What a control period moves, where the rover is not alone; None for `simulation`.
+    """
+
+    scene: EpisodeScene
+    simulation: Simulation
+    progress: EpisodeRun
+    mover: RoverGrainSimulation | None = None
+
+
+@with_tables
 class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     """Drive a six-wheel, 21-dof rover with six motors and six steered wheels to a goal on the map.
 
@@ -94,19 +117,7 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
     the slices and converts the values back to SI units. Observations are never clipped. The bounds of
     unbounded entries are float32's largest numbers: the space holds every finite observation and nothing else.
 
-    | index | field            | meaning                                                   | unit       | scale        |
-    |-------|------------------|-----------------------------------------------------------|------------|--------------|
-    | 0-20  | q                | trunk x, y, z, roll, heading, pitch; joint angles         | m, rad     | 1            |
-    | 21-41 | velocity         | trunk linear and angular in the trunk frame; joint rates  | m/s, rad/s | 1, wheels 10 |
-    | 42-47 | wheel_gap        | distance of each wheel to ground and rocks                | m          | 0.1          |
-    | 48-53 | wheel_contact    | 1 where the gap is at most 1 mm, else 0                   |            | 1            |
-    | 54-59 | normal_force     | ground or rock on wheel, along the contact's normal       | N          | m g / 6      |
-    | 60-71 | tangential_force | the same, rolling then lateral, wheel by wheel            | N          | m g / 6      |
-    | 72-74 | ground_normal    | the normal of the ground, over 1 m, in the trunk frame    |            | 1            |
-    | 75-76 | goal             | goal ahead and to the right of the trunk, horizontal      | m          | 10           |
-    | 77    | goal_distance    | horizontal distance from the trunk's origin to the goal   | m          | 10           |
-    | 78-89 | previous_action  | the action before this observation, 0 at reset            |            | 1            |
-    | 90    | stuck            | fraction of the time to high-centring that has passed     |            | 1            |
+    {observation}
 
     The trunk frame is x forward, y up, z to the right of the trunk. `q` is the simulation's, with the
     wheels' angles wrapped to one turn. Forces are those of the last physics step, zero at reset.
@@ -227,12 +238,7 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
 
     ## Info
 
-    `time` (s), `success` and `is_success` (the name stable-baselines3 looks for), `termination` ("" while
-    the episode runs), `distance_to_goal` (m), `energy` (J, wheel motors, braking counted) and
-    `energy_positive` (J, driving only) since reset, `slip_ratio` (mean over wheels in contact of
-    rim slip over the faster of rim and ground, 0 to 2), `tilt` (rad), `difficulty` (of the rocks, 0 where none
-    are drawn), `domain` (the randomised properties, by argument), `reward_terms`, and `solver` (`status`,
-    `iterations`, `residual`, `n_contacts`, `message`): the worst of the physics steps.
+    {info}
 
     ## Arguments
 
@@ -263,9 +269,8 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
             self.observation_layout.low, self.observation_layout.high, dtype=np.float32
         )
         self.action_space = gym.spaces.Box(-1.0, 1.0, (self.task.n_actions,), np.float32)
-        self._simulation = Simulation(self.model, Plane(), **self.task.simulation_options)
-        self._scene: EpisodeScene | None = None
-        self._episode: EpisodeRun
+        self._idle = Simulation(self.model, Plane(), **self.task.simulation_options)
+        self._episode: RunningEpisode | None = None
         self._difficulty: Range | None = None
         #: Whether a step takes the height scan. Without, observations keep the last heights until
         #: `complete_observation`, or until the episode ends by itself.
@@ -279,13 +284,32 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
     @property
     def simulation(self) -> Simulation:
         """The environment's simulation, replaced at each reset; read it, but do not step it."""
-        return self._simulation
+        return self._idle if self._episode is None else self._episode.simulation
 
     @property
     def goal(self) -> tuple[float, float]:
         """The episode's present goal (x, z), m."""
-        self._running()
-        return self._episode.goal
+        return self.episode.progress.goal
+
+    @property
+    def episode(self) -> RunningEpisode:
+        """The running episode.
+
+        Raises:
+            ResetNeeded: The environment has not been reset.
+        """
+        if self._episode is None:
+            raise ResetNeeded(NOT_RUNNING)
+        return self._episode
+
+    @property
+    def scene(self) -> EpisodeScene:
+        """The scene of the episode.
+
+        Raises:
+            ResetNeeded: The environment has not been reset.
+        """
+        return self.episode.scene
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -302,16 +326,28 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
         checked = check_reset_options(self.task, options)
         chosen = check_seed(seed)
         generator, used = (self.np_random, self._np_random_seed) if chosen is None else seeded(chosen)
-        drawn = draw_episodes(self.task, row_of(generator)[None], [self._difficulty], checked)
-        set_row(generator, drawn.generators[0])
-        self._np_random, self._np_random_seed = generator, used
-        self._simulation, self._episode = drawn.simulation(0), drawn.episode(0)
-        self._scene = scene_of(
-            self.task, drawn.starts[0], drawn.rocks[0], drawn.rock_seeds[0], drawn.domains[0], drawn.terrain(0)
-        )
-        info = self._episode.info()
+        trial = copy.deepcopy(generator)
+        episode = self.draw_episode(trial, checked)
+        generator.bit_generator.state = trial.bit_generator.state
+        self._np_random, self._np_random_seed, self._episode = generator, used, episode
+        info = episode.progress.info()
         info["reward_terms"] |= dict.fromkeys(self.task.reward_terms, 0.0)
-        return self._episode.observation, info
+        return episode.progress.observation, info
+
+    def draw_episode(self, generator: np.random.Generator, options: ResetOptions) -> RunningEpisode:
+        """Draws an episode for `reset`, which starts it. A task that begins in another way overrides this method.
+
+        Args:
+            generator: A copy of the environment's random generator, which the environment then continues from.
+            options: The checked options of the reset.
+
+        Raises:
+            StateError: As `reset`.
+            TerrainError: As `reset`.
+        """
+        drawn = draw_episodes(self.task, row_of(generator)[None], [self._difficulty], options)
+        set_row(generator, drawn.generators[0])
+        return RunningEpisode(scene_of(self.task, drawn, 0), drawn.simulation(0), drawn.episode(0))
 
     def step(
         self, action: npt.NDArray[np.float32]
@@ -324,15 +360,14 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
             OptionError: A function of `reward_terms` fails; the period has been taken.
             ResetNeeded: The environment has not been reset.
         """
-        if self._scene is None:
-            raise ResetNeeded(NOT_RUNNING)
-        before = self._episode.observation if self.task.reward_terms else None
+        progress, mover = self.episode.progress, self.episode.mover or self.episode.simulation
+        before = progress.observation if self.task.reward_terms else None
         if self.task.is_noisy:
             normals, after = standard_normals(row_of(self.np_random)[None], self.task.layout.size)
-            result = self._episode.step(self._moving(), action, normals[0], has_scan=self.has_scan)
+            result = progress.step(mover, action, normals[0], has_scan=self.has_scan)
             set_row(self.np_random, after[0])
         else:
-            result = self._episode.step(self._moving(), action, has_scan=self.has_scan)
+            result = progress.step(mover, action, has_scan=self.has_scan)
         observation, reward, terminated, info = result
         if before is not None:
             reward += self._earn(before, action, observation, info)
@@ -351,18 +386,13 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
         info["reward_terms"] |= {name: float(term) for name, term in own.items()}
         return float(total(own.values()))
 
-    def _moving(self) -> Simulation | RoverGrainSimulation:
-        """What a control period moves."""
-        return self._simulation
-
     def complete_observation(self) -> npt.NDArray[np.float32]:
         """The last observation, with the heights that it lacks where `has_scan` was off; takes the scan if it must.
 
         Raises:
             ResetNeeded: The environment has not been reset.
         """
-        self._running()
-        return self._episode.complete(self._simulation)
+        return self.episode.progress.complete(self.simulation)
 
     def get_keys_to_action(self) -> dict[str, npt.NDArray[np.float32]]:
         """Actions by keys held together, for `gymnasium.utils.play`: w and s push, a and d steer; "" is no key.
@@ -400,9 +430,9 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
     def snapshot(self) -> EnvSnapshot:
         """Returns the state of the environment and of its random generator, for `restore`."""
         return EnvSnapshot(
-            scene=self._running(),
-            simulation=self._simulation.snapshot(),
-            progress=Progress.of(self._episode),
+            scene=self.scene,
+            simulation=self.simulation.snapshot(),
+            progress=Progress.of(self.episode.progress),
             difficulty=self._difficulty,
             random_state=copy.deepcopy(self.np_random.bit_generator.state),
         )
@@ -414,16 +444,15 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
             StateError: The value is no snapshot, is damaged, or comes from an environment with other arguments; nothing
                 has changed.
         """
-        episode = check_snapshot(self.task, snapshot)
+        progress = check_snapshot(self.task, snapshot)
         state = check_random_state(self.np_random, snapshot.random_state)
         difficulty = None if snapshot.difficulty is None else check_difficulty(self.task, snapshot.difficulty)
         simulation = self.task.simulate(snapshot.scene.terrain, snapshot.scene.domain)
         simulation.restore(snapshot.simulation)
+        episode = self.resume_episode(RunningEpisode(snapshot.scene, simulation, progress), snapshot)
         self.np_random.bit_generator.state = state
-        self._simulation, self._scene = simulation, snapshot.scene
         self._episode, self._difficulty = episode, difficulty
 
-    def _running(self) -> EpisodeScene:
-        if self._scene is None:
-            raise ResetNeeded(NOT_RUNNING)
-        return self._scene
+    def resume_episode(self, episode: RunningEpisode, snapshot: EnvSnapshot) -> RunningEpisode:  # noqa: ARG002
+        """The episode of a snapshot for `restore`. A task whose snapshots hold more overrides this method."""
+        return episode

@@ -10,8 +10,16 @@ import numpy.typing as npt
 
 from rover_gym.env.observation import ObservationLayout, build_layout
 from rover_gym.env.reward_terms import WEIGHTS, RewardTerms
-from rover_gym.env.rocks import MAX_GOAL_DISTANCE, RockDistribution, rock_distribution
-from rover_gym.env.start import Domain, DomainDistribution, StartDistribution, Steering, slope_of
+from rover_gym.env.start import (
+    MAX_GOAL_DISTANCE,
+    Domain,
+    DomainDistribution,
+    RockDistribution,
+    StartDistribution,
+    Steering,
+    rock_distribution,
+    slope_of,
+)
 from rover_gym.mechanics import (
     CommandError,
     EpisodeDistribution,

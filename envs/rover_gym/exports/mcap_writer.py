@@ -16,10 +16,9 @@ from rover_gym.exports.axes import MAP_FROM_WORLD
 from rover_gym.exports.mcap_messages import McapFile
 from rover_gym.extras import require
 from rover_gym.mechanics import RoverModel, Simulation, Terrain
-from rover_gym.record.channels import RoverSampler, storable, versions
+from rover_gym.record.channels import RecordingError, RoverSampler, storable, versions
 from rover_gym.record.rover_run import RoverRun, film_rows
 from rover_gym.record.trajectory import Trajectory
-from rover_gym.record.trajectory_format import RecordingError
 from rover_gym.rendering.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR
 from rover_gym.replay import scenery
 from rover_gym.validation import TERRAINS, array, checked, number, refuse, vector

@@ -19,7 +19,7 @@ from rover_gym.registration import ENVIRONMENTS
 from rover_gym.validation import checked, refuse, whole
 
 if TYPE_CHECKING:
-    from rover_gym.policy.episodes import Policy
+    from rover_gym.policy.named_policy import Policy
 
 #: What a data set may be called.
 NAME = re.compile(r"(?:[A-Za-z][A-Za-z0-9_-]*/)*[A-Za-z][A-Za-z0-9_-]*-v\d+")

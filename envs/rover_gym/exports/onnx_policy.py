@@ -11,8 +11,8 @@ import numpy as np
 
 from rover_gym.exports.onnx_graph import Perceptron, onnx_model
 from rover_gym.extras import MissingExtraError, require
+from rover_gym.policy.arc_forecast import FORECAST_FILE, OUTPUTS
 from rover_gym.policy.features import LARGEST_FEATURE
-from rover_gym.policy.foresight_policy import FORECAST_FILE, OUTPUTS
 from rover_gym.policy.policy_card import Network, PolicyCard, PolicyError, find_policy, forecast_folder, is_there
 from rover_gym.validation import checked, refuse
 
@@ -65,7 +65,7 @@ def onnx_policy(policy: str | Path, terrain: str = "plane", model: RoverModel | 
     if is_there(folder / FORECAST_FILE):
         facts: Mapping[str, Any] = {
             "kind": "forecast",
-            "features": "rover_gym.policy.foresight_policy.ArcFeatures, and whether the arc is driven fast",
+            "features": "rover_gym.policy.arc_forecast.ArcFeatures, and whether the arc is driven fast",
             "outcomes": "way along the arc over the way at cruising speed; share of the time that ends an episode for"
             " which the trunk has been held; likelihood that the episode has failed",
         }

@@ -16,7 +16,7 @@ from rover_gym.figures.style import save_figures
 from rover_gym.planar.planar_run import describe_planar, record_planar
 from rover_gym.record.trajectory import Trajectory, read_trajectory
 from rover_gym.rendering.appearance import PLANAR_WHEEL_COLOURS
-from rover_gym.reproduction.chapter_3_balls import ball_on_incline, ball_on_sine, published
+from rover_gym.reproduction.scene_runs import ball_on_incline, ball_on_sine, published
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

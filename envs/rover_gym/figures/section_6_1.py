@@ -28,8 +28,7 @@ from rover_gym.figures.style import (
 )
 from rover_gym.mechanics import SphereField
 from rover_gym.record.trajectory import Trajectory, read_trajectory
-from rover_gym.reproduction.chapter_3_balls import WHEEL_RADIUS, report_model
-from rover_gym.reproduction.inclined_plane import reference_data
+from rover_gym.reproduction.scene_runs import WHEEL_RADIUS, reference_data, report_model
 from rover_gym.validation import checked
 
 if TYPE_CHECKING:

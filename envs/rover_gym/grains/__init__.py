@@ -29,8 +29,7 @@ from rover_gym.grains.bed_scenes import (
     striking_sphere,
     with_wheel_width,
 )
-from rover_gym.grains.grain_recording import GrainSampler, describe_grains, record_grains
-from rover_gym.grains.grain_run import GrainRun
+from rover_gym.grains.grain_run import GrainRun, GrainSampler, describe_grains, record_grains
 from rover_gym.grains.grain_surface import SurfaceMap, surface_map
 from rover_gym.grains.moving_window import BedEnergy, MovingWindow, WindowSnapshot
 from rover_gym.grains.pit import Pit, PitFill

@@ -1,4 +1,7 @@
-"""Saved runs of balls in space, read back: places of the balls, the rover among them, and its ruts.
+"""Recordings of balls in space, alone or under a rover, and the saved runs read back.
+
+Positions are stored in single precision. A grain keeps its stored place until it has moved by the resolution, so that
+a bed at rest repeats its rows and compresses to almost nothing.
 
 run = open_run("grains.h5").resample(25.0)
 run.positions[-1, :, 1].max()
@@ -6,28 +9,302 @@ run.positions[-1, :, 1].max()
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.grains.grain_recording import KIND, grain_channels
 from rover_gym.grains.grain_surface import SurfaceMap, surface_map
-from rover_gym.grains.stored_vessel import checked_vessel
-from rover_gym.mechanics import Plane, RoverModel
+from rover_gym.grains.moving_window import MovingWindow
+from rover_gym.mechanics import (
+    Drum,
+    GrainSimulation,
+    OptionError,
+    Plane,
+    RoverGrainSimulation,
+    RoverModel,
+    Silo,
+    Simulation,
+)
+from rover_gym.record.channels import (
+    ITERATIONS,
+    RESIDUAL,
+    TIME,
+    Channel,
+    RecordingError,
+    Sampler,
+    energy_channels,
+    origins,
+    rover_channels,
+    row_count,
+    sound,
+    wheel_solids,
+)
+from rover_gym.record.recorder import record_rows
 from rover_gym.record.rover_run import LARGEST, RoverRun, Run, check_rows, check_time, title_of
 from rover_gym.record.trajectory import Trajectory, read_frames
-from rover_gym.record.trajectory_format import RecordingError, sound
-from rover_gym.validation import refuse
+from rover_gym.validation import checked, number, refuse
 
 if TYPE_CHECKING:
     from rover_gym.mechanics import Terrain
 
+
+def stored_vessel(vessel: Drum | Silo | None) -> dict[str, Any] | None:
+    """A vessel as JSON holds it; None for none."""
+    if vessel is None:
+        return None
+    if isinstance(vessel, Drum):
+        sizes = {"radius": vessel.radius, "length": vessel.length, "rate": vessel.rate}
+        return {"kind": "drum", **sizes, "centre": list(vessel.centre)}
+    return {
+        "kind": "silo",
+        "radius": vessel.radius,
+        "floor": vessel.floor,
+        "hole": vessel.hole,
+        "axis": list(vessel.axis),
+    }
+
+
+def checked_vessel(vessel: Any) -> dict[str, Any] | None:
+    """A vessel as a recording stores it; None for none.
+
+    Raises:
+        ValueError: It is no vessel; so do TypeError and KeyError.
+    """
+    if vessel is None:
+        return None
+    numbers = {"drum": ("radius", "length", "rate"), "silo": ("radius", "hole")}[vessel["kind"]]
+    result: dict[str, Any] = {"kind": str(vessel["kind"]), **{name: float(vessel[name]) for name in numbers}}
+    if result["kind"] == "drum":
+        result["centre"] = [float(value) for value in vessel["centre"]]
+    else:
+        result["axis"] = [float(value) for value in vessel["axis"]]
+        result["floor"] = None if vessel["floor"] is None else float(vessel["floor"])
+    sizes = [value for value in result.values() if isinstance(value, float)]
+    if not all(abs(value) <= LARGEST for value in sizes):
+        raise ValueError("a number is not finite or too large")
+    return result
+
+
 Array = npt.NDArray[np.float64]
+#: Balls in space, alone or under a rover.
+Recordable: TypeAlias = GrainSimulation | RoverGrainSimulation | MovingWindow
+
+KIND = "GrainSimulation"
+#: Share of the smallest radius by which a stored position may be off.
+RESOLUTION = 1.0 / 250.0
+#: Rows of a flush and of a chunk: a kill loses at most these, 0.6 s at 25 frames a second.
+ROWS_PER_FLUSH = 16
+
+
+def _both(sim: Recordable) -> tuple[GrainSimulation | MovingWindow, Simulation | None]:
+    """All the balls, and the rover among them."""
+    if isinstance(sim, GrainSimulation):
+        return sim, None
+    if not hasattr(sim, "grains") or not hasattr(sim, "rover"):
+        refuse(OptionError, "sim", sim, "must be a GrainSimulation, a RoverGrainSimulation or a MovingWindow")
+    return (sim if isinstance(sim, MovingWindow) else sim.grains), sim.rover
+
+
+class StoredPlaces:
+    """Positions as they are stored: a grain keeps its place until it has moved by the resolution.
+
+    Args:
+        radius: (n,) m.
+    """
+
+    def __init__(self, radius: Array) -> None:
+        self.resolution = 2.0 ** math.floor(math.log2(RESOLUTION * float(radius.min())))
+        self._stored: Array | None = None
+
+    def of(self, position: Array) -> Array:
+        """(n, 3) multiples of the resolution, m."""
+        rounded = np.round(position / self.resolution) * self.resolution
+        if self._stored is not None:
+            still = (np.abs(position - self._stored) < self.resolution).all(axis=1)
+            rounded[still] = self._stored[still]
+        self._stored = rounded
+        return rounded
+
+
+def grain_channels(balls: int, walls: int, model: RoverModel | None) -> tuple[Channel, ...]:
+    """The channels of so many balls and walls, with a rover among them or without."""
+    forces = "force of balls and ground on each wheel, world x, y, z, mean since the last row"
+    centres = "centre of each ball: x forward, y up, z right"
+    normals = "a point of each wall and the normal to its free side"
+    return (
+        replace(TIME, read="grains.time"),
+        Channel("position", "m", centres, (balls, 3), packed=True, read="places"),
+        Channel("walls", "m, 1", normals, (walls, 6), read="grains.walls"),
+        Channel("n_asleep", "1", "number of balls that sleep", read="n_asleep"),
+        *energy_channels(" of all", "all mass centres at height 0"),
+        Channel("n_contacts", "1", "most contacts of a step since the last row", read="n_contacts"),
+        Channel("penetration", "m", "deepest overlap", read="sim.penetration"),
+        RESIDUAL,
+        ITERATIONS,
+        *(() if model is None else rover_channels(model, "wheel_forces", forces)),
+    )
+
+
+class GrainSampler(Sampler):
+    """Steps balls, alone or under a rover, from row to row and makes the rows for a `Recorder`.
+
+    Args:
+        sim: A `GrainSimulation`, a `RoverGrainSimulation` or a `MovingWindow`.
+    """
+
+    def __init__(self, sim: Recordable) -> None:
+        self.grains, self.rover = _both(sim)
+        model = None if self.rover is None else self.rover.model
+        self._stored = StoredPlaces(self.grains.radius)
+        self._solids = [] if model is None else wheel_solids(model)
+        super().__init__(sim)
+        self.channels = grain_channels(len(self.grains.radius), len(self.grains.walls), model)
+
+    def clear(self) -> None:
+        """Resets what is gathered from row to row."""
+        super().clear()
+        self.n_contacts, self._impulses = 0, np.zeros((len(self._solids), 3))
+
+    def gather(self, report: Any) -> None:
+        """Adds the contacts and the wheels' impulses of a step."""
+        self.n_contacts = max(self.n_contacts, report.n_contacts)
+        if self.rover is not None:
+            self._impulses += wheel_impulses(self.rover)
+
+    def measure(self) -> None:
+        """Measures what several channels read."""
+        self.energy = self.grains.energy()
+        if self.rover is not None:
+            both = self.energy, self.rover.energy()
+            self.energy = SimpleNamespace(
+                kinetic=sum(energy.kinetic for energy in both), potential=sum(energy.potential for energy in both)
+            )
+
+    def places(self) -> Array:
+        """(n, 3) places as they are stored, m."""
+        return self._stored.of(self.grains.position)
+
+    def n_asleep(self) -> int:
+        """Number of balls that sleep."""
+        return int(np.count_nonzero(self.grains.asleep))
+
+    def wheel_forces(self) -> Array:
+        """(n_wheels, 3) mean force on each wheel since the last row, N."""
+        mean: Array = self._impulses / (max(self.steps, 1) * self.grains.time_step)
+        return mean
+
+    def wheel_centres(self) -> Array:
+        """(n_wheels, 3) m, world."""
+        return np.zeros((0, 3)) if self.rover is None else origins(self.rover, self._solids)
+
+
+def wheel_impulses(rover: Simulation) -> Array:
+    """(n_wheels, 3) impulse of balls and ground on each wheel in the last step, world, N s."""
+    contacts = rover.contacts
+    impulses = np.zeros((len(rover.model.wheel_radii), 3))
+    touching = contacts.wheels >= 0
+    # The rows of a contact frame are n, t, b: a world impulse is the sum of its components times the rows.
+    world = np.einsum("ci,cij->cj", contacts.impulses[touching], contacts.frames[touching])
+    np.add.at(impulses, contacts.wheels[touching], world)
+    return impulses
+
+
+@checked(scene=(Mapping, None))
+def describe_grains(
+    sim: Recordable,
+    title: str,
+    scene: Mapping[str, Any] | None = None,
+    *,
+    seed: int | str = "none",
+) -> dict[str, Any]:
+    """The attributes of a recording, taken from the simulation at its start.
+
+    Args:
+        sim: The simulation.
+        title: Title of the run.
+        scene: Further parameters of the scene.
+        seed: Seed of the packing, or why there is none.
+    """
+    grains, rover = _both(sim)
+    return {
+        "title": title,
+        "scene": {
+            **(scene or {}),
+            "kind": KIND,
+            "resolution": StoredPlaces(grains.radius).resolution,
+            "vessel": stored_vessel(grains.vessel),
+            **({} if rover is None else {"model": rover.model.to_dict()}),
+        },
+        "grain_radius": np.asarray(grains.radius, dtype=np.float64),
+        "grain_mass": np.asarray(grains.mass, dtype=np.float64),
+        "grain_kinematic": np.asarray(grains.kinematic, dtype=np.uint8),
+        "seed": seed,
+        "solver": grains.settings,
+    }
+
+
+@checked(scene=(Mapping, None), title=str, seed=(int, str), before_row=callable, until=callable, progress=callable)
+def record_grains(
+    sim: Recordable,
+    duration: float,
+    path: str | Path,
+    fps: float = 25.0,
+    *,
+    title: str = "balls in space",
+    scene: Mapping[str, Any] | None = None,
+    seed: int | str = "none",
+    before_row: Callable[[Any], None] = lambda _: None,
+    until: Callable[[Any], bool] = lambda _: False,
+    progress: Callable[[float], None] = lambda _: None,
+) -> int:
+    """Runs balls, alone or under a rover, from their current state and records them.
+
+    Rows are written 16 at a time: a run that is killed keeps all but its last 15 rows at most.
+
+    Args:
+        sim: A `GrainSimulation`, a `RoverGrainSimulation` or a `MovingWindow`.
+        duration: Time to simulate, s.
+        path: HDF5 file to write.
+        fps: Rows per second of simulated time, rounded to a whole number of steps from row to row.
+        title: Title of the recording.
+        scene: Further parameters of the scene, stored with it.
+        seed: Seed of the packing, or why there is none.
+        before_row: Called with the simulation before the steps of each row, to command a rover or move walls.
+        until: Called with the simulation after each row; the run stops when it returns true.
+        progress: Called with the simulated time after each row.
+
+    Returns:
+        Number of rows with steps that did not converge to the tolerance.
+
+    Raises:
+        OptionError: `duration` or `fps` is not positive, or the run has too many rows.
+        RecordingError: The file is in use, or the disk is full.
+        MissingExtraError: h5py is not installed.
+        StepError: A step failed; the rows before it are on disk.
+    """
+    fps = number("fps", fps, above=0.0)
+    grains, rover = _both(sim)
+    steps_per_row = max(1, round(1.0 / (fps * grains.time_step)))
+    rows = row_count(duration, grains.time_step, steps_per_row)
+    return record_rows(
+        GrainSampler(sim),
+        path,
+        describe_grains(sim, title, scene, seed=seed),
+        rows,
+        steps_per_row,
+        terrain=grains.terrain if rover is None else rover.terrain,
+        rows_per_flush=ROWS_PER_FLUSH,
+        before_row=before_row,
+        until=until,
+        progress=progress,
+    )
 
 
 @dataclass(frozen=True)

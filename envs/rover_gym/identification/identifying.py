@@ -8,11 +8,17 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.identification.estimates import Estimate, Identification, open_combinations
-from rover_gym.identification.fitting import SMALLEST_CHANGE, Solution, WindowFit
+from rover_gym.identification.estimates import (
+    FROM_MEDIAN,
+    Estimate,
+    Identification,
+    look_around,
+    not_explained,
+    open_combinations,
+    variance_of,
+)
+from rover_gym.identification.fitting import SMALLEST_CHANGE, Solution, Window, WindowFit, cut
 from rover_gym.identification.parameters import Parameter, Setup, chosen_parameters
-from rover_gym.identification.profiles import FROM_MEDIAN, look_around, not_explained, variance_of
-from rover_gym.identification.windows import Window, cut
 from rover_gym.mechanics import OptionError, RoverModel
 from rover_gym.record.channels import RoverSampler
 from rover_gym.record.rover_run import RoverRun, read_run

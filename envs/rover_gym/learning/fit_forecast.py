@@ -17,8 +17,8 @@ from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS
 from rover_gym.mechanics import OptionError, sin_cos
 from rover_gym.planning.futures import Futures
+from rover_gym.policy.arc_forecast import HORIZON, OUTPUTS, ArcFeatures, with_speed
 from rover_gym.policy.features import LARGEST_FEATURE
-from rover_gym.policy.foresight_policy import HORIZON, OUTPUTS, ArcFeatures, with_speed
 from rover_gym.policy.policy_card import Network
 from rover_gym.policy.scan_policy import ScanPolicy
 from rover_gym.validation import refuse, whole

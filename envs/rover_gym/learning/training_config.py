@@ -17,8 +17,8 @@ from typing import Any, TypeVar, get_args, get_type_hints
 import yaml
 
 from rover_gym.env.arguments import ARGUMENTS, terrain_name
-from rover_gym.env.rocks import MAX_DIFFICULTY
 from rover_gym.env.rover_env import RoverEnv
+from rover_gym.env.start import MAX_DIFFICULTY
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.command import CommandLimits
 from rover_gym.policy.features import Features
@@ -260,3 +260,31 @@ def _plain(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [_plain(entry) for entry in value]
     return value
+
+
+FOLDER = Path(__file__).parents[1] / "data" / "configs"
+
+#: Their names.
+SHIPPED_CONFIGURATIONS = tuple(sorted(path.stem for path in FOLDER.glob("*.yaml")))
+
+
+def find_configuration(config: str) -> Path:
+    """The file of a configuration.
+
+    Args:
+        config: A name among `SHIPPED_CONFIGURATIONS`, or the path of a YAML file. A file wins over a name.
+
+    Raises:
+        OptionError: There is neither.
+    """
+    path = Path(config)
+    try:
+        if path.is_file():
+            return path
+    except (OSError, ValueError):  # a path that cannot be
+        pass
+    if config not in SHIPPED_CONFIGURATIONS:
+        refuse(
+            OptionError, "configuration", config, f"must be a YAML file or one of {', '.join(SHIPPED_CONFIGURATIONS)}"
+        )
+    return FOLDER / f"{config}.yaml"

@@ -22,8 +22,7 @@ from rover_gym.validation import checked, number, refuse
 if TYPE_CHECKING:
     from rover_gym.env.env_snapshot import Progress
     from rover_gym.env.episode_scene import EpisodeScene
-    from rover_gym.policy.episodes import Policy
-    from rover_gym.policy.named_policy import NamedPolicy
+    from rover_gym.policy.named_policy import NamedPolicy, Policy
 
 #: Radii of rocks that may be thrown, m, and how many lie at most.
 ROCK_RADII = (0.03, 0.6)

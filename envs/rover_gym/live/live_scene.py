@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 from rover_gym.env.arguments import TERRAINS
-from rover_gym.env.rocks import MAX_DIFFICULTY
+from rover_gym.env.start import MAX_DIFFICULTY
 from rover_gym.mechanics import OptionError, RoverModel, Terrain
 from rover_gym.policy.named_policy import NamedPolicy, named_policy
 from rover_gym.validation import number, refuse, whole

@@ -10,7 +10,7 @@ from itertools import cycle, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rover_gym.env.rocks import MAX_DIFFICULTY
+from rover_gym.env.start import MAX_DIFFICULTY
 from rover_gym.extras import require
 from rover_gym.live.guarded_server import GuardedServer, start_guarded
 from rover_gym.live.live_commands import command_of, read_message
@@ -18,7 +18,7 @@ from rover_gym.live.live_rover import ROCK_RADII
 from rover_gym.live.live_scene import GOAL_DISTANCES, GRAVITY
 from rover_gym.live.live_view import LiveView
 from rover_gym.mechanics import CommandError, RoverGymError
-from rover_gym.replay.page import WHEEL_COLOURS
+from rover_gym.rendering.appearance import WHEEL_COLOURS
 from rover_gym.replay.player import with_parts
 from rover_gym.validation import checked, number, refuse
 

@@ -23,11 +23,19 @@ from rover_gym.mechanics import (
     Sine,
     Spline,
 )
-from rover_gym.record.channels import RESIDUAL, TIME, Channel, Sampler, energy_channels, row_count
+from rover_gym.record.channels import (
+    RESIDUAL,
+    TIME,
+    Channel,
+    RecordingError,
+    Sampler,
+    energy_channels,
+    row_count,
+    sound,
+)
 from rover_gym.record.recorder import record_rows
 from rover_gym.record.rover_run import LARGEST, Run, check_rows, check_time, title_of
 from rover_gym.record.trajectory import Trajectory
-from rover_gym.record.trajectory_format import RecordingError, sound
 from rover_gym.validation import refuse
 
 Array = npt.NDArray[np.float64]

@@ -1,6 +1,7 @@
 """The way over a whole field: what it costs to reach the goal from anywhere.
 
-The costs are those of Dijkstra's algorithm (Dijkstra 1959) on a grid.
+The costs are those of Dijkstra's algorithm (Dijkstra 1959) on a grid, as `rover_gym.mechanics.PathSearch` computes
+them.
 
 The price of a place tells how badly the rover fits there: how high the ground stands under its trunk, over the mean of
 the ground about it, compared with the trunk's clearance. `PlannerPolicy` looks the end of each future up in it.
@@ -16,6 +17,7 @@ from rover_gym.extras import require
 from rover_gym.ground import heights_of
 from rover_gym.mechanics import OptionError, RoverModel, Terrain
 from rover_gym.models.statics import Statics, check_statics
+from rover_gym.policy.arc_search import ways_by_price
 from rover_gym.validation import number, refuse, vector
 
 Array = npt.NDArray[np.float64]
@@ -24,6 +26,8 @@ Array = npt.NDArray[np.float64]
 MAX_CELLS = 1_000_000
 #: Price of a metre where the ground stands as high as the trunk's clearance, beside 1 for the metre itself.
 STEEP = 3.0
+#: Rows and columns from a cell to its neighbours.
+NEIGHBOURS = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j])
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,9 +38,8 @@ class FieldPlan:
         goal: The goal (x, z), m.
         corner: Least x and z of the grid, m.
         resolution: Side of a cell, m.
-        price: (rows along x, columns along z) cost of a metre through a cell, at least 1.
+        price: (rows along x, columns along z) cost of a metre into a cell, at least 1.
         cost: (rows, columns) cost from a cell to the goal, in metres of good ground.
-        towards: (rows, columns) the next cell on the way, as an index into the flat grid; negative at the goal.
     """
 
     goal: tuple[float, float]
@@ -44,7 +47,6 @@ class FieldPlan:
     resolution: float
     price: Array
     cost: Array
-    towards: npt.NDArray[np.int64]
 
     @classmethod
     def over(
@@ -96,8 +98,9 @@ class FieldPlan:
         lowest = min(stance.clearance, float(model.wheel_radii.max()) * 2.0)
         price = 1.0 + STEEP * np.clip(stands / lowest, 0.0, 3.0) ** 2
         price[unknown] = np.inf
-        cost, towards = _dijkstra(price, resolution, tuple(np.rint((end - low) / resolution).astype(int)))
-        return cls((float(end[0]), float(end[1])), (float(low[0]), float(low[1])), resolution, price, cost, towards)
+        row, column = np.rint((end - low) / resolution).astype(int).tolist()
+        cost = ways_by_price(price, resolution, (row, column))
+        return cls((float(end[0]), float(end[1])), (float(low[0]), float(low[1])), resolution, price, cost)
 
     def cost_to_go(self, points: npt.ArrayLike) -> Array:
         """(n,) cost from places to the goal, in metres of good ground; beyond the grid by the straight way to its edge.
@@ -124,37 +127,19 @@ class FieldPlan:
         """
         begin = np.array(vector("start", start, 2))
         cell = np.clip(np.rint((begin - self.corner) / self.resolution), 0, np.array(self.cost.shape) - 1).astype(int)
-        at = int(np.ravel_multi_index(tuple(cell), self.cost.shape))
-        if not np.isfinite(self.cost.flat[at]):
+        if not np.isfinite(self.cost[tuple(cell)]):
             refuse(OptionError, "start", begin.tolist(), "has no way to the goal")
-        cells = [at]
-        while (at := int(self.towards.flat[at])) >= 0:
-            cells.append(at)
-        rows, columns = np.unravel_index(cells, self.cost.shape)
-        return np.asarray(self.corner + self.resolution * np.stack((rows, columns), axis=1))
+        cells = [cell]
+        while self.cost[tuple(cell)] > 0.0:
+            beside = np.clip(cell + NEIGHBOURS, 0, np.array(self.cost.shape) - 1)
+            i, j = beside.T
+            onward = self.cost[i, j] + self.resolution * np.hypot(*NEIGHBOURS.T) * self.price[i, j]
+            cell = beside[np.argmin(onward)]
+            cells.append(cell)
+        return np.asarray(self.corner + self.resolution * np.array(cells))
 
 
 @lru_cache(maxsize=8)
 def _stance(model: RoverModel) -> Statics:
     """The rover on level ground, for which it must settle once."""
     return check_statics(model)
-
-
-def _dijkstra(price: Array, resolution: float, goal: tuple[int, ...]) -> tuple[Array, npt.NDArray[np.int64]]:
-    """Costs to the goal and next cells, over the eight neighbours of each cell."""
-    sparse, graph = require("scipy.sparse", "planning"), require("scipy.sparse.csgraph", "planning")
-    cells = np.arange(price.size).reshape(price.shape)
-    heads, tails, weights = [], [], []
-    for di, dj in ((0, 1), (1, 0), (1, 1), (1, -1)):
-        a = (slice(0, price.shape[0] - di), slice(max(0, -dj), price.shape[1] - max(0, dj)))
-        b = (slice(di, None), slice(max(0, dj), price.shape[1] - max(0, -dj)))
-        weight = 0.5 * (price[a] + price[b]) * resolution * np.hypot(di, dj)
-        open_ = np.isfinite(weight)
-        heads.append(cells[a][open_])
-        tails.append(cells[b][open_])
-        weights.append(weight[open_])
-    size = price.size
-    edges = sparse.coo_array((np.concatenate(weights), (np.concatenate(heads), np.concatenate(tails))), (size, size))
-    place = int(np.ravel_multi_index(goal, price.shape))
-    cost, before = graph.dijkstra(edges.tocsr(), directed=False, indices=place, return_predecessors=True)
-    return cost.reshape(price.shape), before.astype(np.int64).reshape(price.shape)

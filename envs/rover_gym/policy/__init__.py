@@ -1,25 +1,29 @@
 """Policies: the PD baseline, the scan planner, trained policies, their commands and features, and their evaluation."""
 
+from rover_gym.policy.arc_forecast import FORECAST_FILE, ForesightCosts
 from rover_gym.policy.arc_search import PathCosts
-from rover_gym.policy.baseline import ENDS, BaselineInterrupt, BaselineRow, measure_baseline, wilson_interval
-from rover_gym.policy.command import CommandController, CommandLimits, DriveByCommand
-from rover_gym.policy.command_env import RoverCommandEnv, RoverCommandVectorEnv
-from rover_gym.policy.command_vector_env import CommandVectorEnv
-from rover_gym.policy.episodes import Episode, Policy, run_episode
+from rover_gym.policy.command import CommandController, CommandLimits
+from rover_gym.policy.command_env import CommandVectorEnv, DriveByCommand, RoverCommandEnv, RoverCommandVectorEnv
 from rover_gym.policy.evaluation import (
+    ENDS,
+    BaselineInterrupt,
+    BaselineRow,
+    Episode,
     EvaluatedEpisode,
     IntervalEstimate,
     PolicySummary,
     drive_all,
     mean_estimate,
+    measure_baseline,
     ratio_estimate,
+    run_episode,
     summarise,
+    wilson_interval,
 )
 from rover_gym.policy.features import Features
-from rover_gym.policy.foresight_policy import FORECAST_FILE, ForesightCosts, ForesightPolicy
 from rover_gym.policy.goal_env import GoalObservation, RoverGoalEnv, RoverGoalVectorEnv
 from rover_gym.policy.ground_map import MapOptions
-from rover_gym.policy.named_policy import NamedPolicy, named_policy
+from rover_gym.policy.named_policy import NamedPolicy, Policy, named_policy
 from rover_gym.policy.pd_policy import PDGains, PDPolicy
 from rover_gym.policy.policy_card import Network, PolicyCard, PolicyError, find_policy, policy_arguments, policy_folder
 from rover_gym.policy.scan_policy import ScanGains, ScanPolicy
@@ -39,7 +43,6 @@ __all__ = [
     "EvaluatedEpisode",
     "Features",
     "ForesightCosts",
-    "ForesightPolicy",
     "GoalObservation",
     "IntervalEstimate",
     "MapOptions",

@@ -11,18 +11,169 @@ costs, in metres of way,
     memory  how close it comes to places where the rover got stuck
 """
 
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.env.rocks import HeightScan
-from rover_gym.mechanics import OptionError, PathSearch
-from rover_gym.policy.rover_outline import RoverOutline
-from rover_gym.policy.sweeps import Arcs
+from rover_gym.env.start import HeightScan, wheel_centres
+from rover_gym.mechanics import OptionError, PathSearch, Plane, RoverModel, atan2, sin_cos
 from rover_gym.validation import number, refuse
 
 Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RoverOutline:
+    """A rover from above, in the trunk's frame with its joints at zero.
+
+    Attributes:
+        wheels: `(n_wheels, 2)` x and z of the wheels' centres, m.
+        underside: `(n, 2)` x and z of the cells over which a box or a sphere of the rover reaches, m. What carries a
+            wheel rises with it over a rock, and does not count within the wheel's radius.
+        clearance: `(n,)` height of its lowest point in each cell over the ground that the wheels stand on, m.
+    """
+
+    wheels: Array
+    underside: Array
+    clearance: Array
+
+    @classmethod
+    def of(cls, model: RoverModel, cell: float) -> "RoverOutline":
+        """That of a model, in square cells of a width, m."""
+        zero, wheels, radii = np.zeros(model.nq), wheel_centres(model), model.wheel_radii
+        ground = float(np.mean(np.asarray(model.wheel_contact_points(zero, Plane(), coordinates="state"))[:, 1]))
+        poses = model.poses(zero)
+        lowest: dict[tuple[int, int], float] = {}
+        for solid in model.to_dict()["solids"]:
+            origin, rotation = poses[solid["name"]]
+            for points in _colliding(solid, 0.5 * cell):
+                placed = points @ np.asarray(rotation).T + np.asarray(origin)
+                if "parent" in solid:
+                    apart = np.linalg.norm(placed[:, None, [0, 2]] - wheels, axis=2)
+                    placed = placed[(apart > radii).all(axis=1)]
+                cells = np.rint(placed[:, [0, 2]] / cell).astype(int).tolist()
+                for (i, k), y in zip(cells, placed[:, 1].tolist(), strict=True):
+                    lowest[i, k] = min(y, lowest.get((i, k), math.inf))
+        places = sorted(lowest)
+        return cls(
+            wheels=wheels,
+            underside=cell * np.array(places, dtype=np.float64).reshape(-1, 2),
+            clearance=np.array([lowest[place] for place in places]) - ground,
+        )
+
+
+def _colliding(solid: Mapping[str, Any], spacing: float) -> Iterator[Array]:
+    """Points `(m, 3)` on each box and sphere of a solid that collides, in the solid's frame, m."""
+    alone = {"shape", "collides"} <= solid.keys()
+    shapes = [solid["shape"] | {"collides": solid["collides"]}] if alone else solid.get("shapes", ())
+    for shape in shapes:
+        if not shape.get("collides"):
+            continue
+        centre = np.array(solid.get("centre_of_mass", (0.0,) * 3) if alone else shape.get("position", (0.0,) * 3))
+        turn = np.eye(3) if alone else _rotation(shape.get("rotation", (0.0,) * 3))
+        if shape["kind"] == "box":
+            yield _box(shape["size"], spacing) @ turn.T + centre
+        elif shape["kind"] == "sphere":
+            yield _sphere(shape["radius"], spacing) + centre
+
+
+def _box(size: Any, spacing: float) -> Array:
+    """Points on the surface of a box."""
+    axes = [np.linspace(-0.5 * side, 0.5 * side, max(2, math.ceil(side / spacing) + 1)) for side in size]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    on_a_face = np.isclose(np.abs(grid), 0.5 * np.array(size)).any(axis=1)
+    surface: Array = grid[on_a_face]
+    return surface
+
+
+def _sphere(radius: float, spacing: float) -> Array:
+    """Points on a sphere: those of the cube around it, drawn in."""
+    cube = _box((2.0 * radius,) * 3, spacing)
+    drawn_in: Array = radius * cube / np.linalg.norm(cube, axis=1, keepdims=True)
+    return drawn_in
+
+
+def _rotation(vector: Any) -> Array:
+    """The rotation matrix of a rotation vector, axis times angle (Rodrigues)."""
+    given = np.array(vector, dtype=np.float64)
+    angle = float(np.linalg.norm(given))
+    if angle == 0.0:
+        return np.eye(3)
+    x, y, z = given / angle
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    sine, cosine = sin_cos(angle)
+    turn: Array = np.eye(3) + sine * cross + (1.0 - cosine) * cross @ cross
+    return turn
+
+
+@dataclass(frozen=True)
+class Arcs:
+    """Arcs of constant command, one per row.
+
+    The middle of the wheelbase moves off the trunk's x axis by a constant angle `beta`, while the trunk turns by
+    `kappa` per metre. After the way t, negative on an arc driven backward,
+
+        heading      theta = kappa t
+        ahead        integral of  cos(theta + beta) dt
+        to the left  integral of  sin(theta + beta) dt
+
+    Attributes:
+        curvature: `(n,)` 1/m, positive to the left.
+        sideways: `(n,)` direction of travel off the trunk's x axis, rad, positive to the left.
+        direction: `(n,)` 1 forward, -1 backward.
+    """
+
+    curvature: Array
+    sideways: Array
+    direction: Array
+
+    def __len__(self) -> int:
+        return len(self.curvature)
+
+    @classmethod
+    def grid(cls, curvatures: npt.ArrayLike, sideways: npt.ArrayLike, direction: float) -> "Arcs":
+        """Each curvature with each sideways direction."""
+        kappa, beta = (grid.ravel() for grid in np.meshgrid(curvatures, sideways, indexing="ij"))
+        return cls(kappa, beta, np.full(len(kappa), direction))
+
+    def joined(self, other: "Arcs") -> "Arcs":
+        """These and others."""
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        return Arcs(*(np.concatenate(pair) for pair in pairs))
+
+    def kept(self, which: npt.NDArray[np.bool_]) -> "Arcs":
+        """Those marked in `which` `(n,)`."""
+        return Arcs(*(values[which] for values in vars(self).values()))
+
+    def steering(self, wheels: Array) -> Array:
+        """`(n, n_wheels)` angles of wheels at x and z `(n_wheels, 2)` from the point that follows the path, rad."""
+        sine, cosine = sin_cos(self.sideways)
+        left = sine[:, None] + self.curvature[:, None] * wheels[:, 0]
+        return atan2(left, cosine[:, None] + self.curvature[:, None] * wheels[:, 1])
+
+    def within(self, max_steering: float, wheels: Array) -> "Arcs":
+        """Those on which no wheel at x and z `(n_wheels, 2)` is steered beyond a limit, rad, by more than a degree."""
+        if not len(wheels):
+            return self
+        largest: Array = np.abs(self.steering(wheels)).max(axis=1)
+        return self.kept(largest <= max_steering + math.radians(1.0))
+
+    def poses(self, length: float, steps: int) -> Array:
+        """`(n, steps, 3)` way ahead, way to the right and heading after equal parts of a length, m and rad."""
+        way = self.direction[:, None] * length * np.arange(1, steps + 1) / steps
+        theta = self.curvature[:, None] * way
+        # The chord of an arc leads in its mean direction, and is shorter by sin(theta / 2) / (theta / 2).
+        half = 0.5 * theta
+        turned = np.abs(half) > 1e-6
+        chord = way * np.where(turned, sin_cos(half)[0] / np.where(turned, half, 1.0), 1.0)
+        sine, cosine = sin_cos(half + self.sideways[:, None])
+        return np.stack((chord * cosine, -chord * sine, theta), axis=-1)
+
 
 #: Poses on an arc.
 STEPS = 4
@@ -156,6 +307,47 @@ class ArcSearch:
     def under(self, heights: Array, poses: Array) -> npt.NDArray[np.float32]:
         """`(n, n_wheels + 3)` what lies under the rover in poses `(..., 3)`; see `PathSearch.under`."""
         return self._search.under(heights, poses)
+
+
+#: Price of a metre where a rover cannot go, and way beyond which it has crossed such ground, in cells.
+CLOSED = 1e9
+
+
+def ways_by_price(price: Array, spacing: float, goal: tuple[int, int]) -> Array:
+    """`(rows, columns)` the cheapest way to a cell of a map from every cell, by prices alone.
+
+    Args:
+        price: `(rows, columns)` price of a metre into a cell, at least 1; infinite where nothing leads.
+        spacing: Distance of rows and columns, m.
+        goal: Row and column of the goal.
+    """
+    closed = ~np.isfinite(price)
+    unknown = np.full(price.shape, np.nan)
+    ways = _search_by_price().ways(unknown, spacing, goal, 0.0, np.where(closed, CLOSED, price - 1.0))
+    ways[closed | (ways >= CLOSED * spacing)] = np.inf
+    return ways
+
+
+@lru_cache(maxsize=1)
+def _search_by_price() -> PathSearch:
+    """A search for a rover of a point's size, for ground that costs what it is said to."""
+    wheels, arc = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), {"poses": np.zeros((1, STEPS, 3)), "direction": [1.0]}
+    return PathSearch(
+        scan=(2, 2, 1.0),
+        outline={
+            "wheels": wheels,
+            "underside": wheels,
+            "clearance": np.ones(3),
+            "plane_fit": _plane_fit(*wheels.T),
+            "x_c": 0.0,
+            "radius": 1.0,
+        },
+        costs=vars(PathCosts()),
+        first={**arc, "commands": np.zeros((1, 3))},
+        further=arc,
+        reach=1.0,
+        arrival=1.0,
+    )
 
 
 def _plane_fit(x: Array, z: Array) -> Array:

@@ -1,22 +1,341 @@
-"""`RoverCommand-v0`: drive a rover to a goal by commands, alone or as a vector. The class docstring is the card."""
+"""Drives one rover or many by commands: wrappers, and `RoverCommand-v0`, whose class docstring is the card."""
 
-from typing import Any, Unpack
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from functools import partial
+from typing import Any, SupportsFloat, Unpack
 
-from gymnasium.vector import AutoresetMode
+import gymnasium as gym
+import numpy as np
+import numpy.typing as npt
+from gymnasium.vector import AutoresetMode, VectorWrapper
+from gymnasium.vector.utils import batch_space
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
+from rover_gym.env.observation import Array, Mask, Observations
+from rover_gym.env.play_keys import keys_to_action
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS
-from rover_gym.policy.command import CommandLimits, DriveByCommand, check_repeat
-from rover_gym.policy.command_vector_env import CommandVectorEnv
-from rover_gym.validation import whole
+from rover_gym.mechanics import CommandError, OptionError, TerrainError
+from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimits
+from rover_gym.policy.features import LARGEST_FEATURE, Features
+from rover_gym.policy.pd_policy import find_rover_env
+from rover_gym.validation import array, known_keys, refuse, whole
+from rover_gym.vector.batch import BatchSnapshot
 from rover_gym.vector.vector_env import RoverVectorEnv
+
+#: Most steps that a command may be held; a few minutes.
+MAX_REPEAT = 10_000
+
+#: Applies actions to rovers `(n,)`, of which some are active, with or without the height scan. Returns observations,
+#: rewards, and which episodes have ended or reached their time limit.
+Step = Callable[[Observations, Mask, bool], tuple[Observations, Array, Mask, Mask]]
+
+
+def check_repeat(repeat: object) -> int:
+    """Checks for how many steps a command is held."""
+    return whole("repeat", repeat, at_least=1, at_most=MAX_REPEAT)
+
+
+class HeldCommands:
+    """Commands that n rovers hold, and what they have observed.
+
+    Args:
+        rover: The environment, read once for the layout and the rover's constants.
+        n: Number of rovers.
+        repeat: Steps that a command is held.
+        guided: Whether actions are offsets from the guide's command.
+        pool: Height-scan points per pooling cell, lengthwise and crosswise.
+        limits: Fields of `CommandLimits`.
+
+    Attributes:
+        seen: `(n, size)` the last observations of the environment.
+        observation_space: The features of one rover.
+        action_space: The commands of one rover.
+
+    Raises:
+        OptionError: An argument is out of range.
+    """
+
+    def __init__(
+        self, rover: RoverEnv, n: int, *, repeat: int, guided: bool, pool: int, limits: Mapping[str, float]
+    ) -> None:
+        self.repeat = check_repeat(repeat)
+        known_keys("limits", limits, [field.name for field in fields(CommandLimits)])
+        self.features = Features(rover, pool)
+        self._controller = CommandController(rover, CommandLimits(**limits), guided=guided)
+        self.seen: Observations = np.zeros((n, rover.observation_layout.size), np.float32)
+        self.observation_space = gym.spaces.Box(-LARGEST_FEATURE, LARGEST_FEATURE, (self.features.size,), np.float32)
+        self.action_space = gym.spaces.Box(-1.0, 1.0, (N_COMMANDS,), np.float32)
+
+    def hold(self, commands: Array, moved: Mask, step: Step) -> tuple[Array, Mask, Mask]:
+        """Holds commands `(n, 3)`, clipped to [-1, 1], for `repeat` steps or until a rover's episode ends.
+
+        The height scan is taken once a command, in the last of its steps, and where an episode ends.
+
+        Returns:
+            Sums of the rewards `(n,)`, which episodes have ended, and which have reached their time limit.
+        """
+        active, rewards = moved.copy(), np.zeros(len(moved))
+        terminated, truncated = np.zeros_like(moved), np.zeros_like(moved)
+        for left in reversed(range(self.repeat)):
+            if not active.any():
+                break
+            actions = self._controller.act(self.seen, commands)
+            self.seen, earned, ended, timed_out = step(actions, active, left == 0)
+            rewards[active] += earned[active]
+            terminated |= ended & active
+            truncated |= timed_out & active
+            active &= ~(terminated | truncated)
+        return rewards, terminated, truncated
+
+    def observe(self) -> Observations:
+        """`(n, size)` the features of the last observations."""
+        return self.features(self.seen)
+
+
+def check_commands(actions: object, shape: tuple[int, ...]) -> Array:
+    """Checks that commands have a shape and are finite."""
+    commands = array("action", actions, error=CommandError)
+    if commands.shape != shape:
+        refuse(CommandError, "action", commands.shape, f"must have shape {shape}")
+    if not np.isfinite(commands).all():
+        refuse(CommandError, "action", actions, "must be finite")
+    return commands
+
+
+class DriveByCommand(gym.Wrapper[Observations, Observations, Observations, Observations]):
+    """Holds each command for several steps of the rover and sums the rewards.
+
+    Actions and observations are those that `rover_gym.learning` trains with, for libraries that take single
+    environments. The height scan is taken once a command, in the last of its steps, and where an episode ends.
+
+    Args:
+        env: A `Rover-v0`, wrapped or not.
+        repeat: Steps that a command is held.
+        guided: Whether actions are offsets from the guide's command.
+        pool: Height-scan points per pooling cell, lengthwise and crosswise.
+        **limits: Fields of `CommandLimits`.
+
+    Raises:
+        OptionError: An argument is out of range.
+    """
+
+    def __init__(
+        self,
+        env: gym.Env[Observations, Observations],
+        repeat: int = 4,
+        guided: bool = False,
+        pool: int = 1,
+        **limits: float,
+    ) -> None:
+        self._rover = find_rover_env(env)
+        self._held = HeldCommands(self._rover, 1, repeat=repeat, guided=guided, pool=pool, limits=limits)
+        super().__init__(env)
+        self.features = self._held.features
+        self.observation_space, self.action_space = self._held.observation_space, self._held.action_space
+        self._info: dict[str, Any] = {}
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observations, dict[str, Any]]:
+        """Starts an episode."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        self._held.seen = observation[None]
+        return self._held.observe()[0], info
+
+    def step(self, action: Observations) -> tuple[Observations, SupportsFloat, bool, bool, dict[str, Any]]:
+        """Holds a command, clipped to [-1, 1], for `repeat` steps or until the episode ends.
+
+        Raises:
+            CommandError: The command is not three finite numbers; nothing has changed.
+            ResetNeeded: The environment has not been reset.
+        """
+        command = check_commands(action, (N_COMMANDS,))[None]
+        (reward,), (terminated,), (truncated,) = self._held.hold(command, np.ones(1, np.bool_), self._step)
+        return self._held.observe()[0], float(reward), bool(terminated), bool(truncated), self._info
+
+    def _step(self, actions: Observations, _: Mask, has_scan: bool) -> tuple[Observations, Array, Mask, Mask]:
+        """A step of the environment as one of a batch of one."""
+        self._rover.has_scan = has_scan
+        try:
+            observation, reward, terminated, truncated, self._info = self.env.step(actions[0])
+        finally:
+            self._rover.has_scan = True
+        heights = self._rover.observation_layout.get("height_scan")
+        if heights is not None and (terminated or truncated):
+            observation[heights] = self._rover.complete_observation()[heights]
+        return observation[None], np.array([float(reward)]), np.array([terminated]), np.array([truncated])
+
+    def get_keys_to_action(self) -> dict[str, Observations]:
+        """Commands by keys held together, for `gymnasium.utils.play`: w and s drive, a and d turn; "" is no key."""
+        return keys_to_action(lambda forward, left: np.array([forward, left, 0.0], np.float32))
+
+
+class CommandVectorEnv(VectorWrapper):
+    """Holds each rover's command for several steps and sums the rewards, as `DriveByCommand` does for one rover.
+
+    Observations, rewards and ends equal, bit for bit, those of a `SyncVectorEnv` of such environments; the rovers are
+    stepped together. A rover whose episode ends while its command is held stands still until the others' commands are
+    over. Its next episode starts with the next command or, with autoreset in the same step, then and there.
+
+    Example:
+        >>> envs = CommandVectorEnv(gym.make_vec("Rover-v0", 64), repeat=6)
+
+    Args:
+        env: A `RoverVectorEnv` with autoreset in the next or in the same step; wrappers go around this one.
+        repeat: Steps that a command is held.
+        guided: Whether actions are offsets from the guide's command.
+        pool: Height-scan points per pooling cell, lengthwise and crosswise.
+        **limits: Fields of `CommandLimits`.
+
+    Raises:
+        OptionError: An argument is out of range, or `env` is another environment.
+    """
+
+    def __init__(
+        self, env: RoverVectorEnv, repeat: int = 4, *, guided: bool = False, pool: int = 1, **limits: float
+    ) -> None:
+        if not isinstance(env, RoverVectorEnv):
+            refuse(OptionError, "env", env, "must be a RoverVectorEnv, as gymnasium.make_vec makes it")
+        if env.autoreset_mode == AutoresetMode.DISABLED:
+            refuse(OptionError, "env.autoreset_mode", env.autoreset_mode.value, "must be NextStep or SameStep")
+        super().__init__(env)
+        self.rovers = env
+        self.held = HeldCommands(env.prototype, env.num_envs, repeat=repeat, guided=guided, pool=pool, limits=limits)
+        self.repeat = self.held.repeat
+        self._over: Mask = np.zeros(self.num_envs, np.bool_)
+        self.single_action_space = self.held.action_space
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.show(self.held.observation_space)
+
+    def show(self, space: gym.Space[Any]) -> None:
+        """Sets the space of one rover's observations."""
+        self.single_observation_space = space
+        self.observation_space = batch_space(space, self.num_envs)
+
+    def observe(self) -> Any:
+        """The present observations of all rovers. A task that shows something else overrides this method."""
+        return self.held.observe()
+
+    def reward(
+        self,
+        rewards: Array,
+        observations: Any,  # noqa: ARG002 - for rewards that follow from them
+        moved: Mask,  # noqa: ARG002
+    ) -> Array:
+        """`(num_envs,)` rewards of a command, from the sums of its steps'. A task with other rewards overrides this."""
+        return rewards
+
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Starts episodes, as `RoverVectorEnv.reset`."""
+        self.held.seen, infos = self.rovers.reset(seed=seed, options=options)
+        self._over &= ~(options or {}).get("reset_mask", np.True_)
+        return self.observe(), infos
+
+    def snapshot(self) -> BatchSnapshot:
+        """Returns the state of the rovers, as `RoverVectorEnv.snapshot`."""
+        return self.rovers.snapshot()
+
+    def restore(self, snapshot: BatchSnapshot) -> None:
+        """Restores a snapshot, as `RoverVectorEnv.restore`.
+
+        Raises:
+            StateError: As `RoverVectorEnv.restore`; nothing has changed.
+        """
+        self.rovers.restore(snapshot)
+        self.held.seen = self.rovers.batch.observation
+        self._over = np.isin(np.arange(self.num_envs), self.rovers.batch.over)
+
+    def step(self, actions: npt.ArrayLike) -> tuple[Any, Array, Mask, Mask, dict[str, Any]]:
+        """Holds commands `(num_envs, 3)`, clipped to [-1, 1], for `repeat` steps or until a rover's episode ends.
+
+        Raises:
+            CommandError: The commands have a wrong shape or an entry that is not finite; nothing has changed.
+            TerrainError: A rover's next episode cannot begin; nothing has changed.
+            ResetNeeded: A rover has not been reset.
+        """
+        commands = check_commands(actions, (self.num_envs, N_COMMANDS))
+        if self._over.any():
+            self.held.seen, _ = self.rovers.reset(options={"reset_mask": self._over})
+        moved, self._over = ~self._over, np.zeros(self.num_envs, np.bool_)
+        batch = self.rovers.batch
+        rewards, terminated, truncated = self.held.hold(
+            commands, moved, lambda actions, active, has_scan: batch.step(actions, active, has_scan=has_scan)[:4]
+        )
+        self._over = terminated | truncated
+        last = self.observe()
+        rewards = self.reward(rewards, last, moved)
+        finals = self._begin_next(last) if self.rovers.autoreset_mode == AutoresetMode.SAME_STEP else {}
+        infos = batch.infos()
+        for i, final in finals.items():
+            infos = self._add_info(infos, final, i)
+        return (self.observe() if finals else last), rewards, terminated, truncated, infos
+
+    def _begin_next(self, last: Any) -> dict[int, dict[str, Any]]:
+        """Starts the next episodes of the rovers whose episode is over; returns what the last ones ended with.
+
+        If one cannot begin, none does, and the next command refuses it.
+        """
+        finals = {
+            i: {"final_obs": _row(last, i), "final_info": self.rovers.batch.info(i)}
+            for i in np.flatnonzero(self._over).tolist()
+        }
+        if not finals:
+            return {}
+        try:
+            self.held.seen, _ = self.rovers.reset(options={"reset_mask": self._over})
+        except TerrainError:
+            return finals
+        self._over = np.zeros(self.num_envs, np.bool_)
+        return finals
+
+
+def _row(observations: Any, i: int) -> Any:
+    """Rover i's part of the observations of all."""
+    if isinstance(observations, dict):
+        return {name: values[i] for name, values in observations.items()}
+    return observations[i]
+
 
 #: Control periods that a command is held: 0.3 s at the default control frequency.
 REPEAT = 6
 
 #: Commands until truncation: as long as `Rover-v0`.
 MAX_COMMANDS = MAX_EPISODE_STEPS // REPEAT
+
+#: Arguments of `RoverCommand-v0` beside those of `Rover-v0`, with their defaults.
+COMMAND_ARGUMENTS: Mapping[str, Any] = {"repeat": REPEAT, "guided": False, "pool": 1, **vars(CommandLimits())}
+
+
+class CommandArguments(RoverArguments, total=False):
+    """The keyword arguments of `RoverCommandEnv`."""
+
+    repeat: int
+    guided: bool
+    pool: int
+    speed: float
+    curvature: float
+    sideways_deg: float
+    response: float
+
+
+takes_command_arguments = partial(
+    takes_arguments,
+    before=[
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=value, annotation=type(value))
+        for name, value in COMMAND_ARGUMENTS.items()
+    ],
+)
+
+
+def _split(arguments: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The arguments that concern the commands, with their defaults, and those of the rover."""
+    own = {name: arguments.get(name, default) for name, default in COMMAND_ARGUMENTS.items()}
+    return own, {name: value for name, value in arguments.items() if name not in own}
 
 
 class RoverCommandEnv(DriveByCommand):
@@ -75,22 +394,11 @@ class RoverCommandEnv(DriveByCommand):
     #: As of the rover's environment.
     metadata = RoverEnv.metadata
 
-    @takes_arguments
-    def __init__(
-        self,
-        *,
-        repeat: int = REPEAT,
-        guided: bool = False,
-        pool: int = 1,
-        speed: float = CommandLimits.speed,
-        curvature: float = CommandLimits.curvature,
-        sideways_deg: float = CommandLimits.sideways_deg,
-        response: float = CommandLimits.response,
-        **arguments: Unpack[RoverArguments],
-    ) -> None:
-        limits = {"speed": speed, "curvature": curvature, "sideways_deg": sideways_deg, "response": response}
-        rover = RoverEnv(**arguments)
-        super().__init__(rover, repeat, guided, pool, **limits)
+    @takes_command_arguments
+    def __init__(self, **arguments: Unpack[CommandArguments]) -> None:
+        own, rovers = _split(arguments)
+        rover = RoverEnv(**rovers)
+        super().__init__(rover, **own)
         self.metadata = rover.metadata
 
 
@@ -105,20 +413,13 @@ class RoverCommandVectorEnv(CommandVectorEnv):
         threads: Threads that step the rovers; None for one per core.
         max_episode_steps: Commands until truncation; None for no limit.
         autoreset_mode: `"NextStep"` or `"SameStep"`, as Gymnasium defines them.
-        repeat: Control periods that a command is held.
-        guided: Whether actions are offsets from the guide's command.
-        pool: Height-scan points per pooling cell, lengthwise and crosswise.
-        speed: Speed of an action of 1, m/s.
-        curvature: Curvature of an action of 1, 1/m.
-        sideways_deg: Direction of an action of 1, degrees.
-        response: Time constant of the rover's speed, s.
-        **arguments: Arguments of `RoverEnv`.
+        **arguments: Arguments of `RoverCommandEnv`.
 
     Raises:
         OptionError: An argument is out of range.
     """
 
-    @takes_arguments
+    @takes_command_arguments
     def __init__(
         self,
         num_envs: int = 1,
@@ -126,25 +427,13 @@ class RoverCommandVectorEnv(CommandVectorEnv):
         threads: int | None = None,
         max_episode_steps: int | None = MAX_COMMANDS,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-        repeat: int = REPEAT,
-        guided: bool = False,
-        pool: int = 1,
-        speed: float = CommandLimits.speed,
-        curvature: float = CommandLimits.curvature,
-        sideways_deg: float = CommandLimits.sideways_deg,
-        response: float = CommandLimits.response,
-        **arguments: Unpack[RoverArguments],
+        **arguments: Unpack[CommandArguments],
     ) -> None:
-        limits: dict[str, Any] = {
-            "speed": speed,
-            "curvature": curvature,
-            "sideways_deg": sideways_deg,
-            "response": response,
-        }
+        own, rovers = _split(arguments)
         periods = None
         if max_episode_steps is not None:
-            periods = check_repeat(repeat) * whole("max_episode_steps", max_episode_steps, at_least=1)
-        rovers = RoverVectorEnv(
-            num_envs, threads=threads, max_episode_steps=periods, autoreset_mode=autoreset_mode, **arguments
+            periods = check_repeat(own["repeat"]) * whole("max_episode_steps", max_episode_steps, at_least=1)
+        vector = RoverVectorEnv(
+            num_envs, threads=threads, max_episode_steps=periods, autoreset_mode=autoreset_mode, **rovers
         )
-        super().__init__(rovers, repeat, guided=guided, pool=pool, **limits)
+        super().__init__(vector, **own)

@@ -17,8 +17,15 @@ import numpy.typing as npt
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS
 from rover_gym.mechanics import RoverModel
-from rover_gym.policy.episodes import Episode, Policy, run_episode
-from rover_gym.policy.evaluation import EvaluatedEpisode, IntervalEstimate, PolicySummary, drive_all
+from rover_gym.policy.evaluation import (
+    Episode,
+    EvaluatedEpisode,
+    IntervalEstimate,
+    PolicySummary,
+    drive_all,
+    run_episode,
+)
+from rover_gym.policy.named_policy import Policy
 from rover_gym.policy.policy_card import PolicyCard, PolicyError, find_policy, policy_arguments
 from rover_gym.policy.scan_policy import ScanPolicy
 from rover_gym.policy.trained_policy import TrainedPolicy

@@ -1,21 +1,27 @@
 """`RoverGoal-v0`: `Dict` observations for hindsight replay (Andrychowicz et al. 2017). The class has the card."""
 
-from typing import Any, Literal, SupportsFloat
+from typing import Any, Literal, SupportsFloat, Unpack
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
-from gymnasium.vector.utils import batch_space
 
-from rover_gym.env.observation import LARGEST, Array, Mask, ObservationLayout
+from rover_gym.env.observation import LARGEST, Array, Mask, Observations
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError, StateError, sin_cos
-from rover_gym.policy.command import DriveByCommand
-from rover_gym.policy.command_env import RoverCommandEnv, RoverCommandVectorEnv
+from rover_gym.policy.command_env import (
+    CommandArguments,
+    DriveByCommand,
+    RoverCommandEnv,
+    RoverCommandVectorEnv,
+    takes_command_arguments,
+)
 from rover_gym.policy.pd_policy import find_rover_env
 from rover_gym.validation import array, refuse
 
 GoalDict = dict[str, npt.NDArray[Any]]
+
+RewardType = Literal["sparse", "dense"]
 
 REWARD_TYPES = ("sparse", "dense")
 
@@ -23,83 +29,68 @@ REWARD_TYPES = ("sparse", "dense")
 _SOUND = ("", "goal")
 
 
-class GoalObservation(gym.Wrapper[GoalDict, Any, Any, Any]):
-    """Observations as Gymnasium-Robotics' `GoalEnv` has them, and rewards that follow from achieved and desired goal.
-
-    An observation is a dictionary:
-
-    - `observation`: `(size,) float32`, what the wrapped environment observes without what it says of the goal, and the
-      cosine and sine of the heading, which turn a place on the map into a direction;
-    - `achieved_goal`: `(2,) float64`, x and z of the trunk's origin on the map, m, without noise;
-    - `desired_goal`: `(2,) float64`, x and z of the goal, m.
-
-    The reward of a step is `compute_reward(achieved_goal, desired_goal, info)`, and nothing else:
-
-    - `"sparse"`: 1 within `goal_tolerance` of the goal, else 0;
-    - `"dense"`: `exp(-d)` with the distance d to the goal, m.
-
-    Neither is ever negative, so that an episode is not worth ending in failure. Both hold for relabelled goals too.
-    `info["reward_terms"]` is still the wrapped environment's.
-
-    Args:
-        env: A `Rover-v0` with one goal an episode, with or without a `DriveByCommand` around it.
-        reward_type: "sparse" or "dense".
+class GoalRewards:
+    """Goals that can be replaced, of n rovers: what is observed of them, and the rewards that follow.
 
     Attributes:
+        reward_type: "sparse" or "dense".
+        goal_tolerance: Distance within which a goal is reached, m.
         kept: Entries of the wrapped environment's observation that say nothing of the goal.
-
-    Raises:
-        OptionError: `env` has a course of several goals or other wrappers of observations, or `reward_type` is unknown.
+        goal_space: The space of one rover's dictionaries.
     """
 
-    def __init__(self, env: gym.Env[Any, Any], reward_type: Literal["sparse", "dense"] = "sparse") -> None:
+    def set_goals(
+        self, rover: RoverEnv, n: int, reward_type: RewardType, shown: gym.spaces.Box, goal_entries: npt.ArrayLike
+    ) -> None:
+        """Sets what goals are for.
+
+        Args:
+            rover: The environment, read once for the layout and the tolerance of goals.
+            n: Number of rovers.
+            reward_type: "sparse" or "dense".
+            shown: The space of what a rover observes otherwise.
+            goal_entries: Entries of it that say where the goal is.
+
+        Raises:
+            OptionError: The environment has a course of several goals, or `reward_type` is unknown.
+        """
         if reward_type not in REWARD_TYPES:
             refuse(OptionError, "reward_type", reward_type, f"must be one of {', '.join(REWARD_TYPES)}")
-        rover = find_rover_env(env)
         if rover.task.n_further:
-            refuse(
-                OptionError, "env.waypoints", 1 + rover.task.n_further, "must be 1: a goal that is relabelled is one"
-            )
-        super().__init__(env)
-        self.reward_type = reward_type
-        self.goal_tolerance = rover.goal_tolerance
-        self._rover = rover
-        self.kept = _kept(env, rover.observation_layout)
-        self._achieved: Array = np.zeros(2)
-        inner = env.observation_space
-        if not isinstance(inner, gym.spaces.Box):
-            refuse(OptionError, "env.observation_space", inner, "must be a Box")
+            reason = "must be 1: a goal that is relabelled is one"
+            refuse(OptionError, "env.waypoints", 1 + rover.task.n_further, reason)
+        self.reward_type, self.goal_tolerance = reward_type, rover.goal_tolerance
+        self.kept = np.setdiff1d(np.arange(*shown.shape), goal_entries)
+        self._achieved: Array = np.zeros((n, 2))
+        self._heading = rover.observation_layout["q"].start + 4
         goals = gym.spaces.Box(-LARGEST, LARGEST, (2,), np.float64)
-        self.observation_space = gym.spaces.Dict(  # type: ignore[assignment] # of the dictionaries
+        self.goal_space = gym.spaces.Dict(
             observation=gym.spaces.Box(
-                np.append(inner.low[self.kept], [-1.0, -1.0]).astype(np.float32),
-                np.append(inner.high[self.kept], [1.0, 1.0]).astype(np.float32),
+                np.append(shown.low[self.kept], [-1.0, -1.0]).astype(np.float32),
+                np.append(shown.high[self.kept], [1.0, 1.0]).astype(np.float32),
                 dtype=np.float32,
             ),
             achieved_goal=goals,
             desired_goal=goals,
         )
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[GoalDict, dict[str, Any]]:
-        """Starts an episode."""
-        observation: Any
-        observation, info = self.env.reset(seed=seed, options=options)
-        return self._observed(observation), info
+    def observe_goals(self, shown: Observations, seen: Observations, places: Array, goals: Array) -> GoalDict:
+        """The dictionary of n rovers.
 
-    def step(self, action: npt.NDArray[np.float32]) -> tuple[GoalDict, SupportsFloat, bool, bool, dict[str, Any]]:
-        """Applies an action to the wrapped environment.
-
-        Raises:
-            CommandError: As the wrapped environment.
-            ResetNeeded: The environment has not been reset.
+        Args:
+            shown: `(n, ...)` what is observed otherwise.
+            seen: `(n, size)` the environment's observations.
+            places: `(n, nq)` coordinates of the rovers.
+            goals: `(n, 2)` x and z of the goals, m.
         """
-        observation: Any
-        observation, _, terminated, truncated, info = self.env.step(action)
-        seen = self._observed(observation)
-        reward = float(self.compute_reward(seen["achieved_goal"], seen["desired_goal"], info))
-        return seen, reward, terminated, truncated, info
+        known = np.isfinite(places).all(axis=1)
+        self._achieved[known] = places[known][:, [0, 2]]
+        sine, cosine = sin_cos(seen[:, self._heading].astype(np.float64))
+        return {
+            "observation": np.column_stack((shown[:, self.kept], cosine.astype(np.float32), sine.astype(np.float32))),
+            "achieved_goal": self._achieved.copy(),
+            "desired_goal": goals,
+        }
 
     def compute_reward(
         self,
@@ -138,32 +129,78 @@ class GoalObservation(gym.Wrapper[GoalDict, Any, Any, Any]):
         """False `(...)`: a time limit is a wrapper's."""
         return np.zeros_like(_distances(achieved_goal, desired_goal), np.bool_)
 
-    def _observed(self, observation: npt.NDArray[np.float32]) -> GoalDict:
-        q = self._rover.simulation.q
-        if np.isfinite(q).all():
-            self._achieved = q[[0, 2]]
-        layout = self._rover.observation_layout
-        seen = self._rover.complete_observation()
-        sine, cosine = sin_cos(float(seen[layout["q"].start + 4]))
-        return {
-            "observation": np.append(observation[self.kept], np.array([cosine, sine], np.float32)),
-            "achieved_goal": self._achieved.copy(),
-            "desired_goal": np.array(self._rover.goal),
-        }
 
+class GoalObservation(GoalRewards, gym.Wrapper[GoalDict, Any, Any, Any]):
+    """Observations as Gymnasium-Robotics' `GoalEnv` has them, and rewards that follow from achieved and desired goal.
 
-def _kept(env: gym.Env[Any, Any], layout: ObservationLayout) -> npt.NDArray[np.intp]:
-    """Entries of the observation that say nothing of the goal."""
-    size, goal = layout.size, [*range(*layout["goal"].indices(layout.size)), layout["goal_distance"].start]
-    layer: Any = env
-    while isinstance(layer, gym.Wrapper):
-        if isinstance(layer, DriveByCommand):
-            size, goal = layer.features.size, layer.features.goal_entries.tolist()
-        layer = layer.env
-    if env.observation_space.shape != (size,):
-        reason = "must be that of Rover-v0 or of a DriveByCommand"
-        refuse(OptionError, "env.observation_space", env.observation_space.shape, reason)
-    return np.setdiff1d(np.arange(size), goal)
+    An observation is a dictionary:
+
+    - `observation`: `(size,) float32`, what the wrapped environment observes without what it says of the goal, and the
+      cosine and sine of the heading, which turn a place on the map into a direction;
+    - `achieved_goal`: `(2,) float64`, x and z of the trunk's origin on the map, m, without noise;
+    - `desired_goal`: `(2,) float64`, x and z of the goal, m.
+
+    The reward of a step is `compute_reward(achieved_goal, desired_goal, info)`, and nothing else:
+
+    - `"sparse"`: 1 within `goal_tolerance` of the goal, else 0;
+    - `"dense"`: `exp(-d)` with the distance d to the goal, m.
+
+    Neither is ever negative, so that an episode is not worth ending in failure. Both hold for relabelled goals too.
+    `info["reward_terms"]` is still the wrapped environment's.
+
+    Args:
+        env: A `Rover-v0` with one goal an episode, with or without a `DriveByCommand` around it.
+        reward_type: "sparse" or "dense".
+
+    Raises:
+        OptionError: `env` has a course of several goals or other wrappers of observations, or `reward_type` is unknown.
+    """
+
+    def __init__(self, env: gym.Env[Any, Any], reward_type: RewardType = "sparse") -> None:
+        rover = find_rover_env(env)
+        layout = rover.observation_layout
+        size, goal = layout.size, [*range(*layout["goal"].indices(layout.size)), layout["goal_distance"].start]
+        layer: Any = env
+        while isinstance(layer, gym.Wrapper):
+            if isinstance(layer, DriveByCommand):
+                size, goal = layer.features.size, layer.features.goal_entries.tolist()
+            layer = layer.env
+        inner = env.observation_space
+        if not isinstance(inner, gym.spaces.Box) or inner.shape != (size,):
+            reason = "must be that of Rover-v0 or of a DriveByCommand"
+            refuse(OptionError, "env.observation_space", inner.shape, reason)
+        self.set_goals(rover, 1, reward_type, inner, goal)
+        super().__init__(env)
+        self._rover = rover
+        self.observation_space = self.goal_space  # type: ignore[assignment] # of the dictionaries
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[GoalDict, dict[str, Any]]:
+        """Starts an episode."""
+        observation: Any
+        observation, info = self.env.reset(seed=seed, options=options)
+        return self._observed(observation), info
+
+    def step(self, action: npt.NDArray[np.float32]) -> tuple[GoalDict, SupportsFloat, bool, bool, dict[str, Any]]:
+        """Applies an action to the wrapped environment.
+
+        Raises:
+            CommandError: As the wrapped environment.
+            ResetNeeded: The environment has not been reset.
+        """
+        observation: Any
+        observation, _, terminated, truncated, info = self.env.step(action)
+        seen = self._observed(observation)
+        reward = float(self.compute_reward(seen["achieved_goal"], seen["desired_goal"], info))
+        return seen, reward, terminated, truncated, info
+
+    def _observed(self, observation: Observations) -> GoalDict:
+        """The row of one rover."""
+        rover = self._rover
+        places, goals = rover.simulation.q[None], np.array([rover.goal])
+        seen = self.observe_goals(observation[None], rover.complete_observation()[None], places, goals)
+        return {name: values[0] for name, values in seen.items()}
 
 
 def _distances(achieved: npt.ArrayLike, desired: npt.ArrayLike) -> Array:
@@ -215,13 +252,14 @@ class RoverGoalEnv(GoalObservation):
     #: As of the rover's environment.
     metadata = RoverEnv.metadata
 
-    def __init__(self, *, reward_type: Literal["sparse", "dense"] = "sparse", **arguments: Any) -> None:
+    @takes_command_arguments
+    def __init__(self, *, reward_type: RewardType = "sparse", **arguments: Unpack[CommandArguments]) -> None:
         rover = RoverCommandEnv(**arguments)
         super().__init__(rover, reward_type)
         self.metadata = rover.metadata
 
 
-class RoverGoalVectorEnv(RoverCommandVectorEnv):
+class RoverGoalVectorEnv(GoalRewards, RoverCommandVectorEnv):
     """A vector of `RoverGoalEnv` environments that the compiled core steps on several threads.
 
     Observations, rewards and ends equal, bit for bit, those of a `SyncVectorEnv` of them with a
@@ -236,40 +274,19 @@ class RoverGoalVectorEnv(RoverCommandVectorEnv):
         OptionError: An argument is out of range.
     """
 
-    def __init__(
-        self, num_envs: int = 1, *, reward_type: Literal["sparse", "dense"] = "sparse", **arguments: Any
-    ) -> None:
-        super().__init__(num_envs, **arguments)
-        own = {name: value for name, value in arguments.items() if name not in _OF_VECTORS}
-        self._single = RoverGoalEnv(reward_type=reward_type, **own)
-        self.compute_reward = self._single.compute_reward
-        self.compute_terminated = self._single.compute_terminated
-        self.compute_truncated = self._single.compute_truncated
-        self.single_observation_space = self._single.observation_space
-        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self._achieved: Array = np.zeros((self.num_envs, 2))
-        self._heading = self._rovers.prototype.observation_layout["q"].start + 4
+    def __init__(self, num_envs: int = 1, *, reward_type: RewardType = "sparse", **arguments: Any) -> None:
+        RoverCommandVectorEnv.__init__(self, num_envs, **arguments)
+        held, features = self.held, self.held.features
+        self.set_goals(self.rovers.prototype, self.num_envs, reward_type, held.observation_space, features.goal_entries)
+        self.show(self.goal_space)
 
-    def _observed(self) -> GoalDict:
-        rovers = self._rovers.batch.rovers
-        places = np.array([rover.simulation.q for rover in rovers])
-        known = np.isfinite(places).all(axis=1)
-        self._achieved[known] = places[known][:, [0, 2]]
-        sine, cosine = sin_cos(self._seen[:, self._heading].astype(np.float64))
-        features = self._features(self._seen)[:, self._single.kept]
-        return {
-            "observation": np.column_stack((features, cosine.astype(np.float32), sine.astype(np.float32))),
-            "achieved_goal": self._achieved.copy(),
-            "desired_goal": np.array([rover.goal for rover in rovers]),
-        }
+    def observe(self) -> GoalDict:
+        """The dictionaries of all rovers."""
+        rovers = self.rovers.batch.rovers
+        places, goals = np.array([rover.simulation.q for rover in rovers]), np.array([rover.goal for rover in rovers])
+        return self.observe_goals(self.held.observe(), self.held.seen, places, goals)
 
-    def _of_rover(self, observations: Any, i: int) -> GoalDict:
-        return {name: values[i] for name, values in observations.items()}
-
-    def _earned(self, rewards: Array, observations: Any, moved: Mask) -> Array:
+    def reward(self, rewards: Array, observations: GoalDict, moved: Mask) -> Array:
+        """The rewards of the goals; 0 where a rover's next episode has only begun."""
         earned = self.compute_reward(observations["achieved_goal"], observations["desired_goal"], {})
         return np.where(moved, earned, rewards)
-
-
-#: Arguments of the vector that one environment does not take.
-_OF_VECTORS = ("threads", "max_episode_steps", "autoreset_mode")

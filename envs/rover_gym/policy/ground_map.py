@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.env.rocks import HeightScan, scan_points
-from rover_gym.env.start import Point
+from rover_gym.env.start import HeightScan, Point, scan_points
 from rover_gym.mechanics import exp, sin_cos
 from rover_gym.policy.arc_search import ArcSearch
 from rover_gym.validation import number, whole

@@ -4,11 +4,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
 
 from rover_gym.mechanics import RoverModel
-from rover_gym.policy.episodes import Policy
-from rover_gym.policy.foresight_policy import FORECAST_FILE, ForesightPolicy
+from rover_gym.policy.arc_forecast import FORECAST_FILE
 from rover_gym.policy.pd_policy import PDPolicy
 from rover_gym.policy.policy_card import find_policy, is_there, policy_arguments
 from rover_gym.policy.scan_policy import ScanPolicy
@@ -26,6 +28,15 @@ _TITLES = {"pd": "the PD baseline", "scan": "the scan planner", "foresight": "th
 def policy_title(policy: str) -> str:
     """What a policy is, as a heading says it, by its name or folder."""
     return _TITLES.get(policy, "a trained policy")
+
+
+class Policy(Protocol):
+    """Any object with stable-baselines3's `predict`."""
+
+    def predict(
+        self, observation: npt.NDArray[np.float32], state: Any = None, episode_start: Any = None
+    ) -> tuple[npt.NDArray[np.float32], Any]:
+        """Returns the action for an observation, and the state for the next call."""
 
 
 @dataclass(frozen=True)
@@ -54,10 +65,9 @@ def named_policy(policy: str, terrain: str, model: RoverModel | None = None) -> 
         PolicyError: There is no such policy.
         OSError: A file may not be read.
     """
-    if policy == "foresight":
-        return NamedPolicy(ForesightPolicy.arguments(model), ForesightPolicy)
-    if is_there(Path(policy) / FORECAST_FILE):
-        return NamedPolicy(ForesightPolicy.arguments(model), partial(ForesightPolicy, forecast=policy))
+    if policy == "foresight" or is_there(Path(policy) / FORECAST_FILE):
+        forecast = True if policy == "foresight" else policy
+        return NamedPolicy(ScanPolicy.arguments(model), partial(ScanPolicy, forecast=forecast))
     folder = find_policy(policy, terrain)
     if folder is not None:
         return NamedPolicy(policy_arguments(folder), partial(_load, folder))

@@ -1,23 +1,23 @@
-"""The planner by hand: it takes the cheapest of many paths over the height scan, and backs off where it gets stuck."""
+"""`ScanPolicy`: it takes the cheapest of many paths over the height scan, and backs off where it gets stuck."""
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.env.rocks import HeightScan
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.env.start import wheel_centres
+from rover_gym.env.start import HeightScan, wheel_centres
 from rover_gym.mechanics import OptionError, RoverModel, StateError, exp, sin_cos
-from rover_gym.policy.arc_search import ArcSearch, PathCosts, SearchTask
+from rover_gym.policy.arc_forecast import FORECAST_FILE, USUAL_WAY, ArcFeatures, ArcForecast, ForesightCosts
+from rover_gym.policy.arc_search import Arcs, ArcSearch, PathCosts, RoverOutline, SearchTask
 from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimits
 from rover_gym.policy.features import check_observed, ground_slope
 from rover_gym.policy.ground_map import GroundMap, MapOptions
 from rover_gym.policy.pd_policy import Turning, find_rover_env
-from rover_gym.policy.rover_outline import RoverOutline
-from rover_gym.policy.sweeps import Arcs
+from rover_gym.policy.policy_card import Network, PolicyError, forecast_folder, is_there
 from rover_gym.validation import array, number, refuse
 
 Array = npt.NDArray[np.float64]
@@ -233,6 +233,10 @@ class ScanPolicy:
         gains: Speed and times.
         costs: What a path costs.
         map: A map of what the scans have shown, which tells the way to the goal; None for the straight way.
+        forecast: A learned one-second prediction of each arc (`rover_gym.policy.arc_forecast`): the folder of a trained
+            one, or True for the package's: one for the built-in rover on hills, one for it on other ground, one for
+            `open-rover`. The policy adds the costs of what is predicted, and drives an arc fast where that is cheaper.
+        foresight: What predicted outcomes cost.
 
     Attributes:
         gains: Speed and times.
@@ -242,9 +246,11 @@ class ScanPolicy:
         push: The same where the policy pushes.
         search: Finds the cheapest path.
         controller: Turns commands into actions.
+        forecast: The prediction; None without one.
 
     Raises:
         OptionError: The environment has no height scan, or the rover's wheels stand in a line.
+        PolicyError: The folder holds no forecast, or one for another rover.
     """
 
     def __init__(
@@ -254,9 +260,12 @@ class ScanPolicy:
         costs: PathCosts | None = None,
         *,
         map: MapOptions | None = None,  # noqa: A002 - what it is
+        forecast: str | Path | bool | None = None,
+        foresight: ForesightCosts | None = None,
     ) -> None:
         rover = find_rover_env(env)
-        for name, given, kind in (("gains", gains, ScanGains), ("costs", costs, PathCosts), ("map", map, MapOptions)):
+        options = (("gains", gains, ScanGains), ("costs", costs, PathCosts), ("map", map, MapOptions))
+        for name, given, kind in (*options, ("foresight", foresight, ForesightCosts)):
             if given is not None and not isinstance(given, kind):
                 refuse(OptionError, name, given, f"must be {kind.__name__}")
         scan = scan_grid(rover)
@@ -293,8 +302,16 @@ class ScanPolicy:
         )
         self._map = None if map is None else GroundMap(scan, map, TRAP_AHEAD * self._reach)
         self._cells = 0 if map is None else map.cells
-        self._slow = np.zeros(len(first), np.bool_)
-        self._caution = 1.0
+        self._caution, self.foresight = 1.0, ForesightCosts() if foresight is None else foresight
+        self.forecast: ArcForecast | None = None
+        if forecast is not None and forecast is not False:
+            folder = forecast_folder(model, hills=rover.task.on_hills) if forecast is True else Path(forecast)
+            if not is_there(folder / FORECAST_FILE):
+                refuse(PolicyError, "forecast", str(folder / FORECAST_FILE), "is not there")
+            features = ArcFeatures(rover, self)
+            self._length = features.length
+            self.forecast = ArcForecast(features, Network.read(folder / FORECAST_FILE))
+            self._caution = self.foresight.caution
         self.controller = CommandController(rover, limits, guided=False)
         self._repeat = max(1, round(self.gains.period / rover.dt))
         self._period = self._repeat * rover.dt
@@ -415,14 +432,13 @@ class ScanPolicy:
         return max(self.gains.least, float(exp(-math.log(2.0) * halvings)))
 
     def _outlook(
-        self,
-        row: Array,  # noqa: ARG002 - for policies that know more
-        slope: list[float],  # noqa: ARG002
-        heights: Array,  # noqa: ARG002
-        boldness: float,  # noqa: ARG002
+        self, row: Array, slope: list[float], heights: Array, boldness: float
     ) -> tuple[Array | None, npt.NDArray[np.bool_]]:
         """`(n_arcs,)` further costs of the first arcs, m, and whether they are driven fast."""
-        return None, self._slow
+        if self.forecast is None:
+            return None, np.zeros(len(self.arcs), np.bool_)
+        costs, fast = self.foresight.price(self.forecast(row, slope, heights), boldness)
+        return self._length / USUAL_WAY * costs, fast
 
     def _back_off(self, memory: ScanMemory, i: int, x: float, z: float, heading: float) -> None:
         """Remembers a trap where the rover was about to go, and that it shall drive the other way for a while."""

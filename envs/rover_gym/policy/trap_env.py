@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.env.arguments import RoverArguments, takes_arguments
-from rover_gym.env.beginning import draw_episodes
-from rover_gym.env.episode_scene import EpisodeScene, check_reset_options, scene_of
-from rover_gym.env.generators import check_seed, row_of, seeded, set_row
-from rover_gym.env.reward_terms import WEIGHTS
-from rover_gym.env.rover_env import STEP_FAILED, RoverEnv
+from rover_gym.env.arguments import RoverArguments, check_reward_weights, takes_arguments
+from rover_gym.env.episode_scene import EpisodeScene, ResetOptions, draw_episodes, scene_of
+from rover_gym.env.generators import row_of, set_row
+from rover_gym.env.rover_env import STEP_FAILED, RoverEnv, RunningEpisode
 from rover_gym.env.start import Start
 from rover_gym.env.task import TRUNK_LOAD
 from rover_gym.mechanics import EpisodeRun, OptionError, Simulation, StateError, TerrainError, standard_normals
@@ -89,12 +88,10 @@ class RoverTrapEnv(RoverEnv):
             refuse(OptionError, "terrain", given["terrain"], "has nothing to be stuck on")
         if given.get("waypoints", 1) != 1:
             refuse(OptionError, "waypoints", given["waypoints"], "must be 1: the goal is to come free")
-        weights: Any = given.get("reward_weights") or {}
-        super().__init__(**given)
-        self._weights = {name: float(weights.get(name, WEIGHTS[name])) for name in ("progress", "success")}
+        weights = check_reward_weights("reward_weights", given.pop("reward_weights", None) or {})
+        self._weights = {name: weights[name] for name in ("progress", "success")}
         # The terms of this task take the place of those two, and the baseline drives without noise.
-        silent = {"reward_weights": {**weights, "progress": 0.0, "success": 0.0}}
-        self.task = RoverEnv(**(given | silent)).task
+        super().__init__(**given, reward_weights={**weights, "progress": 0.0, "success": 0.0})
         quiet = {"stuck_time": HELD, "observation_noise": 0.0, "height_scan": False}
         driven = RoverEnv(**(given | quiet | dict.fromkeys(("battery", "reward_terms", "render_mode"))))
         self._driven, self._driver = driven.task, PDPolicy(driven)
@@ -109,29 +106,31 @@ class RoverTrapEnv(RoverEnv):
             StateError: As `RoverEnv.reset`.
             TerrainError: As `RoverEnv.reset`, or no drive ended in a trap.
         """
-        checked = check_reset_options(self.task, options)
-        chosen = check_seed(seed)
-        generator, used = (self.np_random, self._np_random_seed) if chosen is None else seeded(chosen)
+        observation, info = super().reset(seed=seed, options=options)
+        return observation, info | {"distance_from_trap": 0.0}
+
+    def draw_episode(self, generator: np.random.Generator, options: ResetOptions) -> RunningEpisode:
+        """Draws scenes until the baseline's drive in one ends in a trap.
+
+        Raises:
+            StateError: As `RoverEnv.reset`.
+            TerrainError: As `RoverEnv.reset`, or no drive ended in a trap.
+        """
         row = row_of(generator)
         for _ in range(DRIVES):
-            drawn = draw_episodes(self._driven, row[None], [self._difficulty], checked)
+            drawn = draw_episodes(self._driven, row[None], [self._difficulty], options)
             row = drawn.generators[0]
             simulation = drawn.simulation(0)
-            if "q" in checked.fixed or self._drive(simulation, drawn.episode(0)):
+            if "q" in options.fixed or self._drive(simulation, drawn.episode(0)):
                 break
         else:
             refuse(TerrainError, "terrain", self.task.ground or DRIVES, f"none of {DRIVES} drives ended in a trap")
-        scene = scene_of(
-            self.task, drawn.starts[0], drawn.rocks[0], drawn.rock_seeds[0], drawn.domains[0], drawn.terrain(0)
-        )
-        v = simulation.v if "q" in checked.fixed else None
-        begun = self._begin(scene, simulation.q, v, row)
-        set_row(generator, begun[3])
-        self._np_random, self._np_random_seed = generator, used
-        self._scene, self._simulation, self._episode = begun[:3]
-        info = self._episode.info()
-        info["reward_terms"] |= dict.fromkeys(self.task.reward_terms, 0.0)
-        return self._episode.observation, info | {"distance_from_trap": 0.0}
+        normals = None
+        if self.task.is_noisy:
+            (normals,), (row,) = standard_normals(row[None], self.task.layout.size)
+        set_row(generator, row)
+        v = simulation.v if "q" in options.fixed else None
+        return self._trapped(scene_of(self.task, drawn, 0), simulation.q, v, normals)
 
     def step(
         self, action: npt.NDArray[np.float32]
@@ -159,7 +158,7 @@ class RoverTrapEnv(RoverEnv):
     def distance_from_trap(self) -> float:
         """Horizontal distance from where the episode started, m."""
         x, z = self.start.position
-        q = self._simulation.q
+        q = self.simulation.q
         return math.hypot(q[0] - x, q[2] - z)
 
     def _drive(self, simulation: Simulation, episode: EpisodeRun) -> bool:
@@ -171,30 +170,28 @@ class RoverTrapEnv(RoverEnv):
                 return bool(info["termination"] == "high_centred")
         return False
 
-    def _begin(
-        self, drawn: EpisodeScene, q: npt.NDArray[np.float64], v: npt.NDArray[np.float64] | None, row: Any
-    ) -> tuple[EpisodeScene, Simulation, EpisodeRun, Any]:
-        """The scene, simulation and episode in a trap, and the generator's row after the noise."""
-        task, old = self.task, drawn.start
+    def _trapped(
+        self,
+        drawn: EpisodeScene,
+        q: npt.NDArray[np.float64],
+        v: npt.NDArray[np.float64] | None,
+        normals: npt.NDArray[np.float64] | None,
+    ) -> RunningEpisode:
+        """The episode that begins in a trap."""
+        task, domain, old = self.task, drawn.domain, drawn.start
         start = Start(old.slope, old.uphill, (float(q[0]), float(q[2])), float(q[4]), old.goal)
-        scene = EpisodeScene(start, drawn.terrain, drawn.rocks, drawn.domain)
-        simulation = task.simulate(scene.terrain, scene.domain)
+        simulation = task.simulate(drawn.terrain, domain)
         simulation.set_state(q, v)
-        normals = None
-        if task.is_noisy:
-            noise, after = standard_normals(row[None], task.layout.size)
-            normals, row = noise[0], after[0]
         load = TRUNK_LOAD * task.model.mass * math.hypot(*task.gravity)
-        domain = scene.domain
-        episode = EpisodeRun.begin(
+        progress = EpisodeRun.begin(
             task.rules,
             simulation,
             goal=start.goal,
             domain=list(domain.as_info().values()),
             trunk_load_limit=load * domain.mass_scale * domain.gravity_scale,
-            difficulty=scene.difficulty,
+            difficulty=drawn.difficulty,
             normals=normals,
         )
-        if episode is None:
+        if progress is None:
             refuse(StateError, "q", q, "must be observable in float32")
-        return scene, simulation, episode, row
+        return RunningEpisode(replace(drawn, start=start), simulation, progress)

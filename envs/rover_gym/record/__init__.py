@@ -1,10 +1,9 @@
 """Trajectories in HDF5: recording, reading, and rover runs."""
 
-from rover_gym.record.channels import Channel, RoverSampler, describe, row_count
+from rover_gym.record.channels import Channel, RecordingError, RoverSampler, describe, row_count
 from rover_gym.record.recorder import Recorder
 from rover_gym.record.rover_run import RoverRun, read_run
 from rover_gym.record.trajectory import Trajectory, read_frames, read_trajectory
-from rover_gym.record.trajectory_format import RecordingError
 
 __all__ = [
     "Channel",

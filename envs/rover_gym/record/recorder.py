@@ -19,18 +19,23 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import Terrain
-from rover_gym.record.channels import Channel, Sampler, storable, versions, write_attribute, write_description
-from rover_gym.record.steady_file import FileInUseError, SteadyFile, uninterrupted
-from rover_gym.record.stored_terrain import write_terrain
-from rover_gym.record.trajectory import read_trajectory
-from rover_gym.record.trajectory_format import (
+from rover_gym.record.channels import (
     FRAMES,
     LIBRARY,
     TERRAIN,
+    Channel,
     RecordingError,
+    Sampler,
     file_path,
     import_h5py,
+    storable,
+    versions,
+    write_attribute,
+    write_description,
 )
+from rover_gym.record.steady_file import FileInUseError, SteadyFile, uninterrupted
+from rover_gym.record.stored_terrain import write_terrain
+from rover_gym.record.trajectory import read_trajectory
 from rover_gym.validation import TERRAINS, checked, refuse, whole
 
 if TYPE_CHECKING:

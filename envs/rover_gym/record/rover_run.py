@@ -14,9 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import RoverModel, Terrain
-from rover_gym.record.channels import ITERATIONS, TIME, Channel, RoverSampler
+from rover_gym.record.channels import ITERATIONS, TIME, Channel, RecordingError, RoverSampler, sound
 from rover_gym.record.trajectory import Trajectory, read_trajectory
-from rover_gym.record.trajectory_format import RecordingError, sound
 from rover_gym.validation import number, refuse, vector
 
 if TYPE_CHECKING:

@@ -14,9 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import RoverGymError, Terrain, Union
-from rover_gym.record.steady_file import FileInUseError, lock
-from rover_gym.record.stored_terrain import MATERIALS, Stored, is_stored, stored_parts
-from rover_gym.record.trajectory_format import (
+from rover_gym.record.channels import (
     FORMAT,
     FORMAT_VERSION,
     FRAMES,
@@ -29,6 +27,8 @@ from rover_gym.record.trajectory_format import (
     refuse_field,
     sound,
 )
+from rover_gym.record.steady_file import FileInUseError, lock
+from rover_gym.record.stored_terrain import MATERIALS, Stored, is_stored, stored_parts
 from rover_gym.validation import refuse
 
 if TYPE_CHECKING:

@@ -59,6 +59,8 @@ BOGIE_COLOUR: Colour = (0.22, 0.56, 0.55)  # a beam that turns about another axi
 
 COLUMN_COLOUR: Colour = (0.55, 0.57, 0.60)
 
+#: One colour per wheel: Okabe and Ito's palette, safe for colour-blind readers.
+WHEEL_COLOURS = ("#0072B2", "#56B4E9", "#009E73", "#D55E00", "#CC79A7", "#E69F00")
 #: Curves of one, two or three wheels in the plane, back to front (Okabe and Ito's palette).
 PLANAR_WHEEL_COLOURS = ("#D55E00", "#0072B2", "#009E73")
 

@@ -1,13 +1,12 @@
-"""Frames of a simulation: the rover, its surroundings, contact forces and the camera."""
+"""Frames of a simulation: a rover with its surroundings, contact forces and camera, or balls between walls."""
 
 import contextlib
 import ctypes
 import importlib.util
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -54,7 +53,44 @@ FOLLOW_TIME = 0.25, 0.8  # s, time constants of the view's centre and heading
 EYE_HEIGHT = 0.4  # m, minimum height above the ground
 
 
-class FrameRenderer:
+class Picture:
+    """A window that is never shown, and its first scene; a context manager.
+
+    Args:
+        width: Pixels, even.
+        height: Pixels, even.
+
+    Raises:
+        OSError: No OpenGL library works on this machine; the message names the packages that provide one.
+    """
+
+    def __init__(self, width: int, height: int) -> None:
+        self._size = width, height
+        self._window = open_window(width, height)
+        self._scene = vtkRenderer()
+        self._pixels = vtkUnsignedCharArray()
+
+    def _shot(self) -> npt.NDArray[np.uint8]:
+        """The window as an image (height, width, 3) uint8, top row first."""
+        with QuietLog():
+            self._window.Render()
+        width, height = self._size
+        self._window.GetPixelData(0, 0, width - 1, height - 1, 0, self._pixels, 0)
+        pixels: npt.NDArray[np.uint8] = vtk_to_numpy(self._pixels)
+        return pixels.reshape(height, width, 3)[::-1].copy()  # VTK's first row is the bottom one
+
+    def close(self) -> None:
+        """Frees the window and its memory; the renderer is unusable afterwards."""
+        self._window.Finalize()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class FrameRenderer(Picture):
     """Draws frames of a rover on its terrain; a context manager.
 
     Equal sequences of simulated states give equal frames. A renderer must not be shared between threads.
@@ -97,8 +133,7 @@ class FrameRenderer:
         }
         self.options = check_render_options("", options)
         self._wheel_mass = model.mass / len(model.wheel_radii)
-        self._window = open_window(self.options.width, self.options.height)
-        self._scene = vtkRenderer()
+        super().__init__(self.options.width, self.options.height)
         self._scene.SetUseFXAA(self.options.antialiasing)
         # Arrows begin inside wheels: a second layer draws them in front of everything.
         self._overlay = vtkRenderer()
@@ -118,7 +153,6 @@ class FrameRenderer:
         self._arrows = vtkPolyData()
         set_points(self._arrows, np.zeros((0, 3)))
         self._overlay.AddActor(_arrow_actor(self._arrows))
-        self._pixels = vtkUnsignedCharArray()
         self._terrain: Terrain | None = None
         self._goal: tuple[Goal | None, float] = (None, 0.0)
         self._stage: list[vtkActor] = []
@@ -165,24 +199,7 @@ class FrameRenderer:
         if self.options.show_forces:
             self._place_arrows(simulation)
         self._place_camera(simulation, position)
-        with QuietLog():
-            self._window.Render()
-        width, height = self.options.width, self.options.height
-        self._window.GetPixelData(0, 0, width - 1, height - 1, 0, self._pixels, 0)
-        pixels: npt.NDArray[np.uint8] = vtk_to_numpy(self._pixels)
-        return pixels.reshape(height, width, 3)[::-1].copy()  # VTK's first row is the bottom one
-
-    def close(self) -> None:
-        """Frees the window and its memory; the renderer is unusable afterwards."""
-        self._window.Finalize()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
+        return self._shot()
 
     def _place_rover(self, simulation: Simulation) -> None:
         pose = np.eye(4)
@@ -379,3 +396,47 @@ def captioned(frame: Frame, lines: Sequence[str]) -> Frame:
 @lru_cache(maxsize=4)
 def _font(size: int) -> Any:
     return require("PIL.ImageFont", "render").load_default(size)
+
+
+class BedRenderer(Picture):
+    """Draws frames of actors that stand still or are moved by their owner; a context manager.
+
+    Args:
+        actors: What to draw, besides sun and sky.
+        width: Pixels, even.
+        height: Pixels, even.
+
+    Raises:
+        OSError: No OpenGL library works on this machine; the message names the packages that provide one.
+    """
+
+    def __init__(self, actors: Iterable[vtkActor], *, width: int = 960, height: int = 540) -> None:
+        super().__init__(width, height)
+        self._scene.AutomaticLightCreationOff()
+        self._scene.AddLight(sun(0.85))
+        self._scene.AddLight(headlight(0.25))
+        self._window.AddRenderer(self._scene)
+        self._sky = sky()
+        for actor in (self._sky, *actors):
+            self._scene.AddActor(actor)
+
+    def render(self, eye: npt.ArrayLike, target: npt.ArrayLike, angle: float) -> npt.NDArray[np.uint8]:
+        """An image (height, width, 3) uint8, top row first.
+
+        Args:
+            eye: (3,) m.
+            target: (3,) what the eye looks at, m.
+            angle: Vertical field of view, rad.
+        """
+        at: Array = np.asarray(eye, dtype=np.float64)
+        distance = float(np.linalg.norm(np.asarray(target, dtype=np.float64) - at))
+        camera = self._scene.GetActiveCamera()
+        camera.SetPosition(*at)
+        camera.SetFocalPoint(*np.asarray(target, dtype=np.float64))
+        camera.SetViewUp(0.0, 1.0, 0.0)
+        camera.SetViewAngle(float(np.degrees(angle)))
+        camera.SetClippingRange(0.02 * distance, 500.0)
+        dome = np.eye(4)
+        dome[:3, 3] = at
+        set_pose(self._sky, dome)
+        return self._shot()

@@ -1,7 +1,7 @@
 """Exports saved runs for other programs: a browser page, VRML97, glTF."""
 
 from rover_gym.replay.gltf import write_gltf
-from rover_gym.replay.pages import write_page
+from rover_gym.replay.page import write_page
 from rover_gym.replay.vrml import write_vrml
 
 __all__ = ["write_gltf", "write_page", "write_vrml"]

@@ -28,10 +28,10 @@ from rover_gym.rendering.appearance import (
     SAND_COLOUR,
     SKY_COLOUR,
     SKY_COLOUR_2,
+    WHEEL_COLOURS,
     Colour,
     sphere_mesh,
 )
-from rover_gym.replay.page import WHEEL_COLOURS
 from rover_gym.replay.player import (
     FOLLOW_TIME,
     Chart,

@@ -1,14 +1,21 @@
-"""A rover's run as a browser page: 3D view, timeline and curves in one file that needs no network."""
+"""A saved run as a browser page, one file that needs no network; a rover's has 3D view, timeline and curves."""
 
 from __future__ import annotations
 
 from itertools import cycle
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.grains.grain_run import GrainRun
+from rover_gym.planar.planar_run import PlanarRun
 from rover_gym.record.channels import outcome_words
+from rover_gym.record.rover_run import RoverRun
+from rover_gym.rendering.appearance import WHEEL_COLOURS
+from rover_gym.replay.flat_page import planar_page, soil_page
+from rover_gym.replay.grain_page import grain_page
 from rover_gym.replay.player import (
     FOLLOW_TIME,
     Chart,
@@ -23,11 +30,15 @@ from rover_gym.replay.player import (
 )
 from rover_gym.replay.scenery import first_view, trunk_path
 from rover_gym.replay.vrml import add_ground, add_rover
+from rover_gym.soil.soil_run import SoilRun
+from rover_gym.validation import checked
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rover_gym.record.rover_run import RoverRun
+    from rover_gym.runs import SavedRun
+
 
 WHEEL_NAMES = {
     "FL": "front left",
@@ -37,8 +48,6 @@ WHEEL_NAMES = {
     "BL": "back left",
     "BR": "back right",
 }
-#: One colour per wheel: Okabe and Ito's palette, safe for colour-blind readers.
-WHEEL_COLOURS = ("#0072B2", "#56B4E9", "#009E73", "#D55E00", "#CC79A7", "#E69F00")
 LONGEST_FACT = 100
 
 Array = npt.NDArray[np.float64]
@@ -96,3 +105,30 @@ def _curves(run: RoverRun) -> dict[str, Any]:
         Chart("wheel gap", "mm", 1e3 * data["wheel_gaps"], 2, wheels),
     ]
     return panel_contents(run.title, run.time, charts, facts(run))
+
+
+#: What makes the page, whole or in pieces, of each kind of run.
+VIEWS: dict[type, Any] = {RoverRun: rover_page, PlanarRun: planar_page, SoilRun: soil_page, GrainRun: grain_page}
+
+
+@checked(run=("RoverRun", "PlanarRun", "SoilRun", "GrainRun"), path=Path, follow=bool)
+def write_page(run: SavedRun, path: str | Path, *, follow: bool = True) -> Path:
+    """Writes a run as a single browser page: the scene with a timeline and, beside it, curves.
+
+    Args:
+        run: The run; every sample becomes a frame of the replay.
+        path: The file to write, usually `.html`. Its folder is created.
+        follow: Whether the eye follows what moves; otherwise the ground stays fixed. A soil is followed where it is
+            wider than the picture.
+
+    Raises:
+        RecordingError: The recording is damaged.
+        MissingExtraError: viser is not installed, which pages of balls do not need.
+        OSError: The file cannot be written.
+    """
+    page = VIEWS[type(run)](run, follow=follow)
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", encoding="utf-8") as file:
+        file.writelines([page] if isinstance(page, str) else page)
+    return path

@@ -3,14 +3,14 @@
 from rover_gym.sensors.depth_camera import DepthCamera, LaserScanner
 from rover_gym.sensors.inertial_unit import InertialUnit
 from rover_gym.sensors.sensor import Mount, Sensor
-from rover_gym.sensors.sensor_observation import (
+from rover_gym.sensors.sensor_suite import (
     SensorObservation,
+    SensorSuite,
     SensorVectorObservation,
     make_grains_rover,
     make_rover,
     make_rover_vector,
 )
-from rover_gym.sensors.sensor_suite import SensorSuite
 from rover_gym.sensors.wheel_encoders import HeadingSensor, MotorSensors, WheelEncoders
 
 __all__ = [

@@ -9,8 +9,7 @@
 
 from rover_gym.mechanics import SoilContacts, SoilSimulation, SoilSnapshot, soil_packing
 from rover_gym.soil.bed import Bed, rover_on_soil, settled_bed
-from rover_gym.soil.soil_recording import SoilSampler, record_soil
-from rover_gym.soil.soil_run import SoilRun
+from rover_gym.soil.soil_run import SoilRun, SoilSampler, record_soil
 from rover_gym.soil.soil_trials import (
     BedEstimate,
     Pull,

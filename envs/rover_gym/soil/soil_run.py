@@ -1,4 +1,4 @@
-"""Saved runs on a soil, read back: disk and wheel poses, and the forces of the soil on the wheels.
+"""Recordings of a soil and the saved runs read back: disk poses, wheel forces and the strongest contacts.
 
 run = open_run("soil.h5").resample(25.0)
 run.wheels[-1, 0, :2]
@@ -6,22 +6,180 @@ run.wheels[-1, 0, :2]
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.mechanics import SoilSimulation
+from rover_gym.record.channels import (
+    RESIDUAL,
+    TIME,
+    Channel,
+    RecordingError,
+    Sampler,
+    energy_channels,
+    row_count,
+    sound,
+)
+from rover_gym.record.recorder import record_rows
 from rover_gym.record.rover_run import LARGEST, Run, check_rows, check_time, title_of
 from rover_gym.record.trajectory import Trajectory
-from rover_gym.record.trajectory_format import RecordingError, sound
-from rover_gym.soil.bed import surface_height
-from rover_gym.soil.soil_recording import soil_channels
+from rover_gym.soil.bed import Array, surface_height
 from rover_gym.validation import refuse
 
-__all__ = ["SoilRun", "is_soil", "soil_run_of"]
+MOST_CHAINS = 2000  # strongest contacts kept per row
 
-Array = npt.NDArray[np.float64]
+
+class _MeanForces:
+    """Contact forces of a soil averaged over several steps, since single steps carry impacts."""
+
+    def __init__(self, sim: SoilSimulation) -> None:
+        self._n, self._wheels = len(sim.radius), len(sim.wheels)
+        self.clear()
+
+    def clear(self) -> None:
+        """Resets the sums."""
+        self._steps = 0
+        self._pairs: list[npt.NDArray[np.int64]] = []
+        self._points: list[Array] = []
+        self._impulses: list[Array] = []
+
+    def add(self, sim: SoilSimulation) -> None:
+        """Adds the contacts of the last step."""
+        contacts = sim.contacts
+        pairs, normals = contacts.bodies, contacts.normals
+        steep = np.abs(normals[:, 0]) > np.abs(normals[:, 1])
+        pairs[:, 1] -= (pairs[:, 1] < 0) & steep  # floor and walls are two things
+        self._steps += 1
+        self._pairs.append(pairs)
+        self._points.append(contacts.points)
+        self._impulses.append(contacts.world_impulses)
+
+    def read(self, sim: SoilSimulation, n_chains: int) -> tuple[Array, Array]:
+        """Strongest contacts (n_chains, 5): x, y to x, y and a force, zero-padded; and wheel forces (n_wheels, 2)."""
+        chains, on_wheels = np.zeros((n_chains, 5)), np.zeros((self._wheels, 2))
+        if not self._pairs or sum(map(len, self._pairs)) == 0:
+            return chains, on_wheels
+        duration = self._steps * sim.time_step
+        points, impulses = np.concatenate(self._points), np.concatenate(self._impulses)
+        # Later entries overwrite earlier ones: a pair keeps its latest position.
+        _, last, which = np.unique(np.concatenate(self._pairs)[::-1], axis=0, return_index=True, return_inverse=True)
+        which, last = which.ravel()[::-1], len(which) - 1 - last
+        pairs = np.concatenate(self._pairs)[last]
+        forces = np.stack([np.bincount(which, impulses[:, k]) for k in range(2)], axis=1) / duration
+        for wheel in range(self._wheels):
+            on_wheels[wheel] = forces[pairs[:, 0] == self._n + wheel].sum(axis=0)
+        strengths = np.linalg.norm(forces, axis=1)
+        kept = np.argsort(-strengths, kind="stable")[:n_chains]
+        kept = kept[strengths[kept] > 0.0]
+        centres = np.concatenate((sim.position[:, :2], sim.wheels[:, :2]))
+        (a, b), places = pairs[kept].T, points[last[kept]]
+        chains[: len(kept), :2] = np.where(a[:, None] >= self._n, places, centres[a])
+        chains[: len(kept), 2:4] = np.where(b[:, None] < 0, places, centres[b])
+        chains[: len(kept), 4] = strengths[kept]
+        return chains, on_wheels
+
+
+def soil_channels(disks: int, machine: int, wheels: int, chains: int) -> tuple[Channel, ...]:
+    """The channels of so many disks, coordinates of the machine, wheels and strongest contacts."""
+    strongest = "strongest contacts: from x, y to x, y (m), mean force since the last row (N); zeros where none are"
+    forces = "x and y of the soil on each wheel, mean since the last row"
+    return (
+        TIME,
+        Channel("position", "m, rad", "x forward, y up, angle of each disk", (disks, 3), read="sim.position"),
+        Channel("velocity", "m/s, rad/s", "their rates", (disks, 3), read="sim.velocity"),
+        Channel("asleep", "1", "1 where the disk sleeps", (disks,), read="sim.asleep"),
+        Channel("machine", "m, rad", "coordinates of the machine", (machine,), read="sim.machine"),
+        Channel("machine_rate", "m/s, rad/s", "their rates", (machine,), read="sim.machine_rate"),
+        Channel("wheels", "m", "centre x, y and radius of each wheel", (wheels, 3), read="sim.wheels"),
+        Channel("wheel_forces", "N", forces, (wheels, 2), read="wheel_forces"),
+        Channel("force_chains", "m, N", strongest, (chains, 5), read="force_chains"),
+        *energy_channels(" of all", "all mass centres at height 0"),
+        Channel("n_contacts", "1", "contacts of the last step", read="sim.contacts.__len__"),
+        Channel("penetration", "m", "deepest overlap", read="sim.penetration"),
+        RESIDUAL,
+    )
+
+
+class SoilSampler(Sampler):
+    """Steps a soil from row to row and makes the rows for a `Recorder`.
+
+    Args:
+        sim: The soil.
+    """
+
+    def __init__(self, sim: SoilSimulation) -> None:
+        self._forces = _MeanForces(sim)
+        super().__init__(sim)
+        n, wheels = len(sim.radius), len(sim.wheels)
+        self._n_chains = min(n + wheels, MOST_CHAINS)
+        self.channels = soil_channels(n, len(sim.machine), wheels, self._n_chains)
+
+    def gather(self, report: object) -> None:  # noqa: ARG002 - the forces are the simulation's
+        """Adds the contacts of the last step."""
+        self._forces.add(self.sim)
+
+    def clear(self) -> None:
+        """Resets what is gathered from row to row."""
+        super().clear()
+        self._forces.clear()
+
+    def measure(self) -> None:
+        """Measures what several channels read."""
+        super().measure()
+        self.force_chains, self.wheel_forces = self._forces.read(self.sim, self._n_chains)
+
+
+def record_soil(
+    sim: SoilSimulation,
+    path: str | Path,
+    title: str,
+    *,
+    duration: float,
+    steps_per_row: int = 20,
+    walls: npt.ArrayLike | None = None,
+    until: Callable[[SoilSimulation], bool] = lambda _: False,
+    progress: Callable[[float], None] = lambda _: None,
+) -> int:
+    """Runs a soil from its current state and records it.
+
+    Args:
+        sim: The soil.
+        path: HDF5 file to write.
+        title: Title of the recording.
+        duration: Time to simulate, s.
+        steps_per_row: Steps from one row to the next.
+        walls: (n, 4) walls of the soil, for drawing.
+        until: Called after each row; the run stops when it returns true.
+        progress: Called with the simulated time after each row.
+
+    Returns:
+        Number of rows with steps that did not converge to the tolerance.
+
+    Raises:
+        OptionError: `duration` or `steps_per_row` is not positive, or the run has too many rows.
+        RecordingError: The file is in use, or the disk is full.
+        MissingExtraError: h5py is not installed.
+        StepError: A step failed; the rows before it are on disk.
+    """
+    rows, steps_per_row = row_count(duration, sim.time_step, steps_per_row), int(steps_per_row)
+    scene = {
+        "kind": "SoilSimulation",
+        "radius": sim.radius,
+        "mass": sim.mass,
+        "walls": np.empty((0, 4)) if walls is None else np.asarray(walls, dtype=np.float64),
+        "torques": sim.torques,
+    }
+    attributes = {
+        "title": title,
+        "scene": scene,
+        "seed": "the start's positions are the first row",
+        "solver": sim.settings,
+    }
+    return record_rows(SoilSampler(sim), path, attributes, rows, steps_per_row, until=until, progress=progress)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
-from rover_gym.env import beginning
+from rover_gym.env import episode_scene
 from rover_gym.env.arguments import RoverArguments, takes_arguments
 from rover_gym.env.env_snapshot import EnvSnapshot, Progress, check_random_state, check_snapshot
 from rover_gym.env.episode_scene import (
@@ -23,7 +23,7 @@ from rover_gym.env.episode_scene import (
     check_difficulty,
     check_reset_options,
     origin_of,
-    scene_of,
+    scene_of_rows,
 )
 from rover_gym.env.episode_view import EpisodeView
 from rover_gym.env.generators import (
@@ -324,7 +324,7 @@ class RoverBatch:
         used = [self._seeds[i] if seed is None else seed for i, seed in zip(chosen, given, strict=True)]
         difficulties = [self.episodes.difficulty(i) for i in chosen]
         fixed = ResetOptions() if options is None else options
-        episodes = beginning.draw_episodes(self.task, rows, difficulties, fixed, self.episodes)
+        episodes = episode_scene.draw_episodes(self.task, rows, difficulties, fixed, self.episodes)
         return Drawn(episodes, chosen, used, {chosen[k] for k in anew})
 
     def begin(self, drawn: "Drawn") -> None:
@@ -400,7 +400,7 @@ class RoverBatch:
                 actions,
                 self.task.episodes,
                 same_step=same_step,
-                attempts=beginning.PLACING_ATTEMPTS,
+                attempts=episode_scene.PLACING_ATTEMPTS,
                 has_scan=has_scan,
             )
         if before is not None and moved is not None:
@@ -520,7 +520,7 @@ class RoverBatch:
             raise ResetNeeded("a batch of rovers: call reset() first")
         ground = self.task.ground  # one object for all, so that snapshots hold it once
         terrain = self.episodes.terrain(i) if ground is None else ground
-        return scene_of(self.task, *self.episodes.origin(i), terrain)
+        return scene_of_rows(self.task, *self.episodes.origin(i), terrain)
 
     def _check_begun(self, actions: object) -> None:
         """Refuses a step before all rovers have been reset; once they have been, all have an episode for good."""
@@ -630,5 +630,7 @@ class BatchRover(EpisodeView):
         """
         self._batch.episodes.set_difficulty(self._i, check_difficulty(self._batch.task, difficulty))
 
-    def _running(self) -> EpisodeScene:
+    @property
+    def scene(self) -> EpisodeScene:
+        """The scene of the rover's episode."""
         return self._batch.scene(self._i)

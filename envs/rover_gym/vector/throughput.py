@@ -10,14 +10,13 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, TypeAlias, Unpack
+from typing import Any, Literal, Unpack
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
-from rover_gym.env.observation import Array
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.start import tilted_plane
 from rover_gym.mechanics import Simulation, SimulationBatch
@@ -25,8 +24,6 @@ from rover_gym.vector.batch import RoverBatch
 from rover_gym.vector.vector_env import RoverVectorEnv
 
 Ground = Literal["plane", "rocks"]
-#: Lets an engine drive by commands `(n_commands, n_rovers, 12)`, N m and rad.
-Player: TypeAlias = Callable[[Array], None]
 
 TIME_STEP = 0.005  # s
 #: Steps from one command to the next, commands of a round, and rounds that are not measured.
@@ -174,7 +171,7 @@ class ExploringSpeed:
         threads: Threads that step them.
         instruction_set: Of the processor, as far as the core uses it.
         torque: Largest torque, N m.
-        rover_steps: Rover-steps per second, steps of `TIME_STEP` of one rover, by engine.
+        rover_steps: Rover-steps per second, steps of `TIME_STEP` of one rover.
     """
 
     ground: Ground
@@ -182,12 +179,12 @@ class ExploringSpeed:
     threads: int
     instruction_set: str
     torque: float
-    rover_steps: dict[str, float]
+    rover_steps: float
 
     @property
-    def simulated(self) -> dict[str, float]:
-        """Simulated seconds per second, all rovers together, by engine."""
-        return {engine: TIME_STEP * rate for engine, rate in self.rover_steps.items()}
+    def simulated(self) -> float:
+        """Simulated seconds per second, all rovers together."""
+        return TIME_STEP * self.rover_steps
 
 
 def measure_exploring(
@@ -197,7 +194,6 @@ def measure_exploring(
     ground: Ground = "plane",
     torque: float = 60.0,
     rounds: int = 10,
-    beside: Callable[[list[Simulation], int], dict[str, Player]] = lambda _simulations, _threads: {},
     progress: Callable[[], object] = lambda: None,
 ) -> ExploringSpeed:
     """Times a batch of exploring rovers: torques and set-points of the steering are redrawn every ten steps of 5 ms.
@@ -211,23 +207,20 @@ def measure_exploring(
         ground: What they drive on.
         torque: Largest torque, N m.
         rounds: Measured rounds, of 100 steps each.
-        beside: Makes other engines' players from the rovers and the number of threads, by name; the median round of
-            each counts.
         progress: Called after each round.
     """
     env = RoverEnv(terrain=ground)
     simulations = [_rover(env, seed) for seed in range(num_envs)]
     batch = SimulationBatch(simulations, threads=threads)
-    engines: dict[str, Player] = {"rover-gym": _ours(batch)} | beside(simulations, batch.threads)
     limit = simulations[0].model.steering_limit
     rng = np.random.default_rng(0)
-    seconds: dict[str, list[float]] = {name: [] for name in engines}
+    seconds = []
     for _ in range(rounds + WARM_UP):
         commands = rng.uniform(-1.0, 1.0, (COMMANDS, num_envs, 12)) * np.repeat([torque, limit], 6)
-        for name, play in engines.items():
-            start = time.perf_counter()
-            play(commands)
-            seconds[name].append(time.perf_counter() - start)
+        start = time.perf_counter()
+        for command in commands:
+            batch.step(command[:, :6], command[:, 6:], STEPS_A_COMMAND)
+        seconds.append(time.perf_counter() - start)
         progress()
     steps = num_envs * COMMANDS * STEPS_A_COMMAND
     return ExploringSpeed(
@@ -236,7 +229,7 @@ def measure_exploring(
         threads=batch.threads,
         instruction_set=batch.instruction_set,
         torque=torque,
-        rover_steps={name: steps / statistics.median(times[WARM_UP:]) for name, times in seconds.items()},
+        rover_steps=steps / statistics.median(seconds[WARM_UP:]),
     )
 
 
@@ -265,11 +258,3 @@ def _rover(env: RoverEnv, seed: int) -> Simulation:
     simulation.brake()
     simulation.step(LANDING)
     return simulation
-
-
-def _ours(batch: SimulationBatch) -> Player:
-    def play(commands: Array) -> None:
-        for command in commands:
-            batch.step(command[:, :6], command[:, 6:], STEPS_A_COMMAND)
-
-    return play

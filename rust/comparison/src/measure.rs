@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use rover_core::integrator::StepError;
-use rover_core::planar::{Ball, ContactRule, Line, PlanarMachine};
-use rover_core::simulation::{BallSimulation, PlanarSimulation};
+use rover_core::planar::{Ball, ContactRule, Line};
+use rover_core::simulation::PlanarSimulation;
 
 use serde::Serialize;
 
@@ -92,13 +92,13 @@ pub const DURATION: f64 = 0.64;
 /// Steps of the reference over the duration.
 const REFERENCE: usize = 4096;
 
-fn run<const NV: usize, M: PlanarMachine<NV> + Clone + 'static>(
-    mut simulation: PlanarSimulation<NV, M>,
+fn run(
+    mut simulation: PlanarSimulation,
     stepper: &Stepper,
     n: usize,
 ) -> Result<Vec<f64>, MeasureError> {
     simulation.step_with(stepper, n)?;
-    Ok(simulation.q().as_slice().to_vec())
+    Ok(simulation.q().clone())
 }
 
 /// Coordinates at the end of a motion in n steps, m and rad.
@@ -307,7 +307,7 @@ pub fn creep(scheme: &Scheme) -> Result<f64, MeasureError> {
     let block = Ball::new(MASS, 0.3, 1e12)?;
     let options = scheme.options(&options(mu, 0.0, 1e-3));
     let mut simulation =
-        BallSimulation::new(block, Arc::new(ground), ContactRule::Nearest, options)?;
+        PlanarSimulation::new(block, Arc::new(ground), ContactRule::Nearest, options)?;
     simulation.set_state(&[0.0, 0.3 / alpha.cos(), 0.0], &[0.0; 3])?;
     simulation.step_with(&scheme.stepper(MASS, 0.0), 2000)?;
     Ok(simulation.v()[0].hypot(simulation.v()[1]))

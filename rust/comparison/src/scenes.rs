@@ -7,7 +7,7 @@ use rover_core::nalgebra::{SVector, Vector2, Vector3};
 use rover_core::planar::{
     Ball, ContactRule, Curve, Ground, Line, PlanarError, PlanarWheel, Sine, TwoWheelRover,
 };
-use rover_core::simulation::{BallSimulation, TwoWheelRoverSimulation};
+use rover_core::simulation::PlanarSimulation;
 
 use crate::Scheme;
 use crate::error::MeasureError;
@@ -61,7 +61,7 @@ pub fn ball_above(
     scheme: &Scheme,
     options: &StepOptions,
     gap: f64,
-) -> Result<BallSimulation, MeasureError> {
+) -> Result<PlanarSimulation, MeasureError> {
     ball_on(
         scheme,
         options,
@@ -81,10 +81,10 @@ pub fn ball_on(
     ground: impl Ground + 'static,
     centre: [f64; 2],
     v: [f64; 3],
-) -> Result<BallSimulation, MeasureError> {
+) -> Result<PlanarSimulation, MeasureError> {
     let ground = Arc::new(ground);
     let options = scheme.options(options);
-    let mut simulation = BallSimulation::new(disc()?, ground, ContactRule::Nearest, options)?;
+    let mut simulation = PlanarSimulation::new(disc()?, ground, ContactRule::Nearest, options)?;
     simulation.set_state(&[centre[0], centre[1], 0.0], &v)?;
     Ok(simulation)
 }
@@ -98,7 +98,7 @@ pub fn ball_on_sine(
     options: &StepOptions,
     x: f64,
     speed: f64,
-) -> Result<BallSimulation, MeasureError> {
+) -> Result<PlanarSimulation, MeasureError> {
     let sine = Sine::new(0.3, 6.0, 0.0, 0.0)?;
     let [y, slope, ..] = sine.jet(x);
     let n = Vector2::new(-slope, 1.0).normalize();
@@ -111,7 +111,7 @@ pub fn ball_on_sine(
 ///
 /// # Errors
 /// Options out of their range.
-pub fn rolling(scheme: &Scheme, h: f64) -> Result<BallSimulation, MeasureError> {
+pub fn rolling(scheme: &Scheme, h: f64) -> Result<PlanarSimulation, MeasureError> {
     ball_on_sine(scheme, &options(0.9, 0.0, h), -0.3, 0.0)
 }
 
@@ -119,7 +119,7 @@ pub fn rolling(scheme: &Scheme, h: f64) -> Result<BallSimulation, MeasureError> 
 ///
 /// # Errors
 /// Options out of their range.
-pub fn sliding(scheme: &Scheme, h: f64) -> Result<BallSimulation, MeasureError> {
+pub fn sliding(scheme: &Scheme, h: f64) -> Result<PlanarSimulation, MeasureError> {
     ball_on_sine(scheme, &options(0.05, 0.0, h), -2.8, 3.0)
 }
 
@@ -127,11 +127,10 @@ pub fn sliding(scheme: &Scheme, h: f64) -> Result<BallSimulation, MeasureError> 
 ///
 /// # Errors
 /// Options out of their range.
-pub fn driving(scheme: &Scheme, h: f64) -> Result<TwoWheelRoverSimulation, MeasureError> {
+pub fn driving(scheme: &Scheme, h: f64) -> Result<PlanarSimulation, MeasureError> {
     let ground = Arc::new(Sine::new(0.1, 3.0, 0.4, 0.0)?);
     let options = scheme.options(&options(0.9, 0.0, h));
-    let mut simulation =
-        TwoWheelRoverSimulation::new(rover()?, ground, ContactRule::Nearest, options)?;
+    let mut simulation = PlanarSimulation::new(rover()?, ground, ContactRule::Nearest, options)?;
     // Newton's iteration on (y, θ) until both wheels touch.
     let mut q = [0.0, 0.5, 0.0, 0.0, 0.0];
     for _ in 0..30 {
@@ -168,11 +167,10 @@ const FLIGHT: ([f64; 5], [f64; 5], [f64; 2]) = (
 ///
 /// # Errors
 /// Options out of their range.
-pub fn flight(scheme: &Scheme, h: f64) -> Result<TwoWheelRoverSimulation, MeasureError> {
+pub fn flight(scheme: &Scheme, h: f64) -> Result<PlanarSimulation, MeasureError> {
     let ground = Arc::new(Line::new(0.0, 0.0)?);
     let options = scheme.options(&options(0.9, 0.0, h));
-    let mut simulation =
-        TwoWheelRoverSimulation::new(rover()?, ground, ContactRule::Nearest, options)?;
+    let mut simulation = PlanarSimulation::new(rover()?, ground, ContactRule::Nearest, options)?;
     simulation.set_state(&FLIGHT.0, &FLIGHT.1)?;
     simulation.set_inputs(&FLIGHT.2)?;
     Ok(simulation)

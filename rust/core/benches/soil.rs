@@ -12,7 +12,7 @@ use std::time::Instant;
 use rover_core::integrator::StepOptions;
 use rover_core::nalgebra::Vector3;
 use rover_core::simulation::{SoilSimulation, soil_options};
-use rover_core::system::soil::{Packing, SoilFriction, SoilScene, Wall};
+use rover_core::system::grains::{GrainFriction, GrainScene, Packing, Wall};
 
 /// CPU seconds of this thread, or wall seconds without /proc.
 fn cpu_seconds(start: Instant) -> f64 {
@@ -35,11 +35,11 @@ fn bed(count: usize) -> SoilSimulation {
     let (disks, q) = packing.build().expect("a packing");
     let mut options: StepOptions = soil_options(&disks);
     options.solver.tolerance = 1e-3;
-    let scene = SoilScene {
+    let scene = GrainScene {
         walls: vec![Wall::floor(0.0), Wall::left(0.0), Wall::right(width)],
         ground: None,
         machine: None,
-        friction: SoilFriction::default(),
+        friction: GrainFriction::default(),
         grains: disks,
     };
     let mut soil = SoilSimulation::new(Arc::new(scene), options, None, q).expect("a soil");

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use rover_core::nalgebra::{Vector2, Vector3};
 use rover_core::planar::{PlanarWheel, TwoWheelRover};
 use rover_core::simulation::{SoilSimulation, soil_options};
-use rover_core::system::soil::{Packing, SleepOptions, SoilFriction, SoilScene, Wall, on_soil};
+use rover_core::system::grains::{GrainFriction, GrainScene, Packing, SleepOptions, Wall};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().collect();
@@ -24,12 +24,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     if !drives {
         options.gravity = Vector3::new(4.0, -9.0, 0.0);
     }
-    let mut scene = SoilScene {
+    let mut scene = GrainScene {
         grains: disks,
         walls: vec![Wall::floor(0.0), Wall::left(0.0), Wall::right(2.4494)],
         ground: None,
         machine: None,
-        friction: SoilFriction::default(),
+        friction: GrainFriction::default(),
     };
     if drives {
         let wheel = |x: f64| PlanarWheel {
@@ -39,7 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             axle: Vector2::new(x, 0.0),
         };
         let rover = TwoWheelRover::new(130.0, 130.0 * 0.64 / 12.0, wheel(-0.4), wheel(0.4))?;
-        scene.machine = Some(on_soil(rover));
+        scene.machine = Some(Arc::new(rover.into()));
         q.extend([0.7, 0.32, 0.0, 0.0, 0.0]);
     }
     let sleep = drives.then(SleepOptions::default);

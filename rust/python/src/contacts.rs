@@ -7,7 +7,6 @@ use rover_core::multibody::Model;
 use rover_core::simulation::{ActiveContact, Components, LocatedContact};
 use rover_core::system::PlanarContact;
 use rover_core::system::grains::GrainContact;
-use rover_core::system::soil::SoilContact;
 
 use crate::arrays::{Array, fresh_rows};
 
@@ -211,7 +210,7 @@ pub struct SoilContacts {
 
 impl SoilContacts {
     /// `n_moving`: number of disks and wheels.
-    pub fn new(active: &[ActiveContact<SoilContact>], n_moving: usize) -> Self {
+    pub fn new(active: &[ActiveContact<GrainContact<2>>], n_moving: usize) -> Self {
         let Columns {
             points,
             normals,
@@ -219,7 +218,7 @@ impl SoilContacts {
             velocities,
             ..
         } = Columns::of(active);
-        let on_first = |a: &ActiveContact<SoilContact>| {
+        let on_first = |a: &ActiveContact<GrainContact<2>>| {
             (a.contact.n * a.impulse[0] + a.contact.t() * a.impulse[1]).into()
         };
         Self {

@@ -4,11 +4,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use rover_core::integrator::StepOptions;
 use rover_core::nalgebra::{DMatrix, Vector2};
-use rover_core::planar::{ContactRule, Ground, PlanarMachine};
-use rover_core::simulation::{
-    BallSimulation as BallCore, MirroredRoverSimulation as MirroredRoverCore,
-    PlanarSimulation as Core, SnapshotError, TwoWheelRoverSimulation as TwoWheelRoverCore,
-};
+use rover_core::planar::{ContactRule, Ground, PlanarTree};
+use rover_core::simulation::PlanarSimulation as Core;
 use std::sync::{Arc, MutexGuard};
 
 use crate::arguments::{Named, text};
@@ -19,7 +16,7 @@ use crate::options::{Options, SolverWords, choice, name_of, settings};
 use crate::planar_ground::parse;
 use crate::report::{Energy, StepReport};
 use crate::shared::Shared;
-use crate::snapshot::{OfPlanar, PlanarSnapshot, belonging};
+use crate::snapshot::{PlanarSnapshot, belonging};
 use crate::stepping::{Problem, Steps, problem, step};
 
 const RULES: [(&str, ContactRule); 2] = [
@@ -27,31 +24,12 @@ const RULES: [(&str, ContactRule); 2] = [
     ("centre_height", ContactRule::CentreHeight),
 ];
 
-/// A simulation, by its machine.
-#[allow(clippy::large_enum_variant)] // there is one for each Python object
-pub enum Machine {
-    Ball(BallCore),
-    TwoWheelRover(TwoWheelRoverCore),
-    MirroredRover(MirroredRoverCore),
-}
-
-/// The same words for a simulation of any machine.
-macro_rules! each {
-    ($machine:expr, $simulation:ident => $body:expr) => {
-        match $machine {
-            Machine::Ball($simulation) => $body,
-            Machine::TwoWheelRover($simulation) => $body,
-            Machine::MirroredRover($simulation) => $body,
-        }
-    };
-}
-
 /// A planar machine on a ground: what the machines share. Made by the classes derived from it.
 ///
 /// One call at a time, as of `Simulation`.
 #[pyclass(module = "rover_gym.mechanics", subclass, frozen)]
 pub struct PlanarSimulation {
-    inner: Shared<Machine>,
+    inner: Shared<Core>,
     ground: Py<PyAny>,
     parameters: Py<PyDict>,
     words: SolverWords,
@@ -82,14 +60,13 @@ fn options(given: &Named<'_>) -> Result<(StepOptions, SolverWords, ContactRule)>
 }
 
 impl PlanarSimulation {
-    fn open(&self) -> Result<MutexGuard<'_, Machine>, BorderError> {
+    fn open(&self) -> Result<MutexGuard<'_, Core>, BorderError> {
         self.inner.open()
     }
 
-    /// `kind`: the machine's place among all. `given`: the options beside those of the machine.
-    pub fn build<const NV: usize, M: PlanarMachine<NV> + Clone>(
-        kind: fn(Core<NV, M>) -> Machine,
-        machine: M,
+    /// A machine on a ground. `parameters`: the arguments that describe it; `given`: the options.
+    pub fn build(
+        machine: impl Into<PlanarTree>,
         ground: &Bound<'_, PyAny>,
         parameters: Bound<'_, PyDict>,
         given: Named<'_>,
@@ -99,7 +76,7 @@ impl PlanarSimulation {
         given.finish()?;
         let inner = Core::new(machine, terrain, rule, step)?;
         Ok(PyClassInitializer::from(Self {
-            inner: Shared::new(kind(inner)),
+            inner: Shared::new(inner),
             ground: ground.clone().unbind(),
             parameters: parameters.unbind(),
             words,
@@ -118,46 +95,45 @@ impl PlanarSimulation {
     /// Time since the last call of `set_state`, s.
     #[getter]
     fn time(&self) -> Result<f64> {
-        Ok(each!(&*self.open()?, s => s.time()))
+        Ok(self.open()?.time())
     }
 
     /// Time step, s.
     #[getter]
     fn time_step(&self) -> Result<f64> {
-        Ok(each!(&*self.open()?, s => s.options().time_step))
+        Ok(self.open()?.options().time_step)
     }
 
     /// Coordinates, (nv,), x and y, m, then angles, rad, which turn to the left.
     #[getter]
     fn q(&self) -> Result<Array> {
-        Ok(each!(&*self.open()?, s => fresh(s.q().as_slice())))
+        Ok(fresh(self.open()?.q()))
     }
 
     /// Rates of the coordinates, (nv,), m/s and rad/s.
     #[getter]
     fn v(&self) -> Result<Array> {
-        Ok(each!(&*self.open()?, s => fresh(s.v())))
+        Ok(fresh(self.open()?.v()))
     }
 
     /// Centres of the discs, world frame, (n_discs, 2), m.
     #[getter]
     fn centres(&self) -> Result<Array> {
-        each!(&*self.open()?, s => {
-            let discs = (0..s.machine().n_discs()).map(|i| s.machine().disc(i, s.q()));
-            Ok(fresh_rows(discs.map(|disc| disc.centre.into())))
-        })
+        Ok(fresh_rows(
+            self.open()?.discs().iter().map(|disc| disc.centre.into()),
+        ))
     }
 
     /// Gap of each disc now, (n_discs,), m; negative where it overlaps the ground.
     #[getter]
     fn gaps(&self) -> Result<Array> {
-        Ok(each!(&*self.open()?, s => fresh(&s.gaps())))
+        Ok(fresh(&self.open()?.gaps()))
     }
 
     /// Commanded torques, (n_discs,), N m, positive forward.
     #[getter]
     fn torques(&self) -> Result<Array> {
-        Ok(each!(&*self.open()?, s => fresh(s.command())))
+        Ok(fresh(self.open()?.command()))
     }
 
     /// The keyword arguments that describe the machine.
@@ -169,12 +145,12 @@ impl PlanarSimulation {
     /// The keyword arguments that make a simulation with the same options.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
-        each!(&*self.open()?, s => {
-            let gravity = (s.options().gravity.x, s.options().gravity.y).into_pyobject(py)?;
-            let settings = settings(&gravity, s.options(), &self.words)?;
-            settings.set_item("contact", name_of(s.scene().rule, &RULES))?;
-            Ok(settings)
-        })
+        let inner = self.open()?;
+        let options = inner.options();
+        let gravity = (options.gravity.x, options.gravity.y).into_pyobject(py)?;
+        let settings = settings(&gravity, options, &self.words)?;
+        settings.set_item("contact", name_of(inner.scene().rule, &RULES))?;
+        Ok(settings)
     }
 
     /// Sets coordinates and rates; torques stay.
@@ -192,9 +168,9 @@ impl PlanarSimulation {
     fn set_state(&self, q: &Bound<'_, PyAny>, v: Option<&Bound<'_, PyAny>>) -> Result<()> {
         let mut inner = self.open()?;
         let q = vector(q, Kind::State, "q")?;
-        let rest = || Ok(vec![0.0; each!(&*inner, s => s.v().len())]);
+        let rest = || Ok(vec![0.0; inner.v().len()]);
         let v = v.map_or_else(rest, |v| vector(v, Kind::State, "v"))?;
-        Ok(each!(&mut *inner, s => s.set_state(&q, &v))?)
+        Ok(inner.set_state(&q, &v)?)
     }
 
     /// Sets the driving torques; each saturates at its limit, where the machine has one.
@@ -207,7 +183,7 @@ impl PlanarSimulation {
     fn set_torques(&self, torques: &Bound<'_, PyAny>) -> Result<()> {
         let mut inner = self.open()?;
         let torques = vector(torques, Kind::Command, "torques")?;
-        Ok(each!(&mut *inner, s => s.set_inputs(&torques))?)
+        Ok(inner.set_inputs(&torques)?)
     }
 
     /// Takes n steps, as `Simulation.step` does.
@@ -219,26 +195,29 @@ impl PlanarSimulation {
     ///     StepError: A step could not be taken; the state before it stays.
     #[pyo3(signature = (n = Steps(1)), text_signature = "($self, n=1)")]
     fn step(&self, py: Python<'_>, n: Steps) -> Result<StepReport> {
-        each!(&mut *self.open()?, s => step(py, s, n))
+        step(py, &mut *self.open()?, n)
     }
 
     /// The contacts of the last step.
     #[getter]
     fn contacts(&self) -> Result<PlanarContacts> {
-        Ok(each!(&*self.open()?, s => PlanarContacts::new(s.contacts())))
+        Ok(PlanarContacts::new(self.open()?.contacts()))
     }
 
     /// Kinetic and potential energy now.
     fn energy(&self) -> Result<Energy> {
-        Ok(each!(&*self.open()?, s => s.energy()).into())
+        Ok(self.open()?.energy().into())
     }
 
     /// Mass matrix now, (nv, nv), in kg, kg m and kg m².
     fn mass_matrix(&self) -> Result<Array> {
-        each!(&*self.open()?, s => {
-            let (M, nv) = (s.mass_matrix(), s.v().len());
-            Ok(fresh_matrix(&DMatrix::from_column_slice(nv, nv, M.as_slice())))
-        })
+        let inner = self.open()?;
+        let nv = inner.v().len();
+        Ok(fresh_matrix(&DMatrix::from_row_slice(
+            nv,
+            nv,
+            &inner.mass_matrix(),
+        )))
     }
 
     /// The friction-contact problem of the last step, of the last part of a split one.
@@ -247,16 +226,12 @@ impl PlanarSimulation {
     ///     Delassus operator W, (2 n_c, 2 n_c), 1/kg; free velocity, (2 n_c,), m/s; friction
     ///     coefficients, (n_c,).
     fn last_problem(&self) -> Result<Problem> {
-        Ok(each!(&*self.open()?, s => problem(s)))
+        Ok(problem(&*self.open()?))
     }
 
     /// Everything that is needed to continue bit for bit.
     fn snapshot(&self) -> Result<PlanarSnapshot> {
-        let inner = match &*self.open()? {
-            Machine::Ball(s) => OfPlanar::Ball(s.snapshot()),
-            Machine::TwoWheelRover(s) => OfPlanar::TwoWheelRover(s.snapshot()),
-            Machine::MirroredRover(s) => OfPlanar::MirroredRover(s.snapshot()),
-        };
+        let inner = self.open()?.snapshot();
         Ok(PlanarSnapshot { inner })
     }
 
@@ -270,13 +245,7 @@ impl PlanarSimulation {
     fn restore(&self, snapshot: &Bound<'_, PyAny>) -> Result<()> {
         let mut inner = self.open()?;
         let snapshot = belonging::<PlanarSnapshot>(snapshot, "a PlanarSnapshot")?;
-        match (&mut *inner, &snapshot.get().inner) {
-            (Machine::Ball(s), OfPlanar::Ball(own)) => s.restore(own),
-            (Machine::TwoWheelRover(s), OfPlanar::TwoWheelRover(own)) => s.restore(own),
-            (Machine::MirroredRover(s), OfPlanar::MirroredRover(own)) => s.restore(own),
-            _ => Err(SnapshotError::OtherModel),
-        }?;
-        Ok(())
+        Ok(inner.restore(&snapshot.get().inner)?)
     }
 
     fn __repr__(slf: &Bound<'_, Self>) -> Result<String> {

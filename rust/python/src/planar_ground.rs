@@ -21,8 +21,7 @@ pub fn border(kind: Kind, e: &PlanarError) -> BorderError {
         | PlanarError::RepeatedPoint { value, .. } => Value::Number(*value),
         PlanarError::TooFewPoints { count, .. }
         | PlanarError::TooManyPoints { count, .. }
-        | PlanarError::MismatchedLengths { count, .. }
-        | PlanarError::CoordinateCount { count, .. } => Value::Count(*count),
+        | PlanarError::MismatchedLengths { count, .. } => Value::Count(*count),
         PlanarError::NotMirrored { body } => Value::Text(body.clone()),
         _ => Value::Nothing,
     };

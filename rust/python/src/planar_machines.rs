@@ -10,7 +10,7 @@ use std::sync::Arc;
 use crate::arguments::{Named, number, refused};
 use crate::errors::{Kind, Result};
 use crate::model::RoverModel;
-use crate::planar::{Machine, PlanarSimulation, pair};
+use crate::planar::{PlanarSimulation, pair};
 use crate::planar_ground::border;
 
 /// A disc on a ground: coordinates x, y of its centre, m, and its angle theta, rad.
@@ -51,7 +51,7 @@ impl BallSimulation {
         for (name, value) in [("mass", mass), ("radius", radius), ("inertia", inertia)] {
             parameters.set_item(name, value)?;
         }
-        let base = PlanarSimulation::build(Machine::Ball, ball, ground, parameters, given)?;
+        let base = PlanarSimulation::build(ball, ground, parameters, given)?;
         Ok(base.add_subclass(Self))
     }
 }
@@ -97,8 +97,7 @@ impl TwoWheelRoverSimulation {
         let given = Named::keywords(ground.py(), options)?;
         let parameters = PyDict::new(ground.py());
         let rover = two_wheel_rover(&given, &parameters)?;
-        let kind = Machine::TwoWheelRover;
-        let base = PlanarSimulation::build(kind, rover, ground, parameters, given)?;
+        let base = PlanarSimulation::build(rover, ground, parameters, given)?;
         Ok(base.add_subclass(Self))
     }
 }
@@ -164,8 +163,7 @@ pub fn two_wheel_rover(given: &Named<'_>, parameters: &Bound<'_, PyDict>) -> Res
 ///     **options: Options as of `BallSimulation`.
 ///
 /// Raises:
-///     ModelError: The model is not its own mirror image, or its planar image has not 7
-///         coordinates.
+///     ModelError: The model is not its own mirror image.
 ///     TerrainError: `ground` is not a ground.
 ///     OptionError: An option is out of its range.
 ///     TypeError: An option is unknown.
@@ -193,15 +191,14 @@ impl MirroredRoverSimulation {
         let inner = model
             .transpose()?
             .map_or_else(|| Arc::new(Model::rover()), |m| m.inner);
-        let rover = MirroredRover::<7>::new(&inner).map_err(|e| border(Kind::Model, &e))?;
+        let rover = MirroredRover::new(&inner).map_err(|e| border(Kind::Model, &e))?;
         let own = Self {
             joints: rover.joints(),
-            wheels: rover.wheel_names(),
+            wheels: rover.wheel_names().to_vec(),
         };
         let parameters = PyDict::new(ground.py());
         parameters.set_item("model", RoverModel::from(inner))?;
-        let kind = Machine::MirroredRover;
-        let base = PlanarSimulation::build(kind, rover, ground, parameters, given)?;
+        let base = PlanarSimulation::build(rover, ground, parameters, given)?;
         Ok(base.add_subclass(own))
     }
 }

@@ -3,9 +3,9 @@
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::geometry::Support;
-use rover_core::planar::{Ground, WheelRig};
+use rover_core::planar::{Ground, PlanarTree, WheelRig};
 use rover_core::simulation::SoilSimulation as Core;
-use rover_core::system::soil::{Machine, Packing, SoilScene, on_soil};
+use rover_core::system::grains::{GrainScene, Packing};
 use std::sync::{Arc, MutexGuard};
 
 use crate::arguments::{Given, Named, flags, refused};
@@ -109,19 +109,19 @@ fn with_angles(value: &Bound<'_, PyAny>, field: &str) -> Result<Vec<f64>> {
 }
 
 /// The machine on the soil, if there is one.
-fn machine(given: &Named<'_>) -> Result<Option<Arc<Machine>>> {
+fn machine(given: &Named<'_>) -> Result<Option<PlanarTree>> {
     let rover = given.of(Kind::Model).read("rover", |rover, kind, field| {
         let wrong = |_| refused(rover, kind, field, "a dict");
         let described = Named::keywords(rover.py(), Some(rover.cast().map_err(wrong)?))?;
         let made = two_wheel_rover(&described, &PyDict::new(rover.py()))?;
         described.finish()?;
-        Ok(on_soil(made))
+        Ok(made.into())
     })?;
     let rig = given.of(Kind::Model).read("rig", |rig, kind, field| {
         let rig = pair(rig, kind, field)?;
-        Ok(on_soil(
-            WheelRig::new(rig.x, rig.y).map_err(|e| border(kind, &e))?,
-        ))
+        Ok(WheelRig::new(rig.x, rig.y)
+            .map_err(|e| border(kind, &e))?
+            .into())
     })?;
     if rover.is_some() && rig.is_some() {
         let message = "rig: a soil has a rover or a rig, not both".to_owned();
@@ -154,11 +154,11 @@ impl SoilSimulation {
         if let Some(machine) = given.of(Kind::State).read("machine", vector)? {
             q.extend(machine);
         }
-        let scene = SoilScene {
+        let scene = GrainScene {
             grains: disks,
             walls,
             ground: ground.map(|ground| ground as Arc<dyn Support<2>>),
-            machine,
+            machine: machine.map(Arc::new),
             friction: bed_arguments::friction(
                 given.get("friction")?,
                 given.get("wall_friction")?,
@@ -241,14 +241,10 @@ impl SoilSimulation {
     #[getter]
     fn wheels(&self, _py: Python<'_>) -> Result<Array> {
         let inner = self.open()?;
-        let own = inner.soil().machine_coordinates(inner.q());
-        let machine = inner.soil().machine.as_ref();
-        let wheels = machine
-            .iter()
-            .flat_map(|m| (0..m.n_wheels()).map(|k| m.wheel(k, own)));
-        Ok(fresh_rows(wheels.map(|wheel| {
-            [wheel.centre.x, wheel.centre.y, wheel.radius]
-        })))
+        let wheels = inner.soil().wheels(inner.q()).into_iter();
+        Ok(fresh_rows(
+            wheels.map(|(centre, radius)| [centre.x, centre.y, radius]),
+        ))
     }
 
     /// Commanded torques of the rover's wheels, (2,), N m, positive forward; empty without a rover.

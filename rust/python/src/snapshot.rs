@@ -3,10 +3,8 @@
 use pyo3::PyTypeInfo;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use rover_core::planar::{Ball, MirroredRover, TwoWheelRover};
 use rover_core::simulation::{GrainBed, PlanarScene, RoverScene, Snapshot as SnapshotOf};
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
 
 use crate::arguments;
 use crate::errors::{BorderError, Kind, Result, Value};
@@ -40,14 +38,6 @@ fn damaged(e: &postcard::Error) -> BorderError {
 fn refused(reason: &str) -> BorderError {
     let message = format!("snapshot: its bytes are damaged ({reason})");
     Kind::State.error("snapshot", message, Value::Nothing)
-}
-
-/// A snapshot of a planar simulation, by its machine.
-#[derive(PartialEq, Serialize, Deserialize)]
-pub enum OfPlanar {
-    Ball(SnapshotOf<PlanarScene<3, Ball>>),
-    TwoWheelRover(SnapshotOf<PlanarScene<5, TwoWheelRover>>),
-    MirroredRover(SnapshotOf<PlanarScene<7, MirroredRover<7>>>),
 }
 
 /// A class of snapshots: all of them are read, written, compared and pickled alike.
@@ -108,7 +98,7 @@ snapshot_class! {
 
 snapshot_class! {
     /// Everything that a planar simulation needs to continue bit for bit. Picklable.
-    PlanarSnapshot, OfPlanar
+    PlanarSnapshot, SnapshotOf<PlanarScene>
 }
 
 snapshot_class! {

@@ -9,15 +9,15 @@ import numpy as np
 
 from comparison.scene import Array, Phase, RoverScene, Trace
 from rover_gym import SphereField
-from rover_gym.reproduction.chapter_3_balls import FRONT_STEERING, GRAVITY, report_model
-from rover_gym.reproduction.sphere_rug import FRICTION, START, WHEEL_TORQUE
+from rover_gym.reproduction import sphere_rug
+from rover_gym.reproduction.scene_runs import FRONT_STEERING, GRAVITY, report_model
 
 
 def scene() -> RoverScene:
     """The rug."""
     model = report_model()
     q = np.zeros(model.nq)
-    q[:3] = START
+    q[:3] = sphere_rug.start
     q[model.steering_joint_indices[:2]] = FRONT_STEERING
     field = SphereField.rug()
     steering = (FRONT_STEERING, FRONT_STEERING, 0.0, 0.0, 0.0, 0.0)
@@ -26,10 +26,10 @@ def scene() -> RoverScene:
         title="10 s on the report's rug of 1250 spheres",
         machine=model.to_dict(),
         q=q,
-        phases=(Phase(10.0, steering, (WHEEL_TORQUE,) * 6),),
+        phases=(Phase(10.0, steering, (sphere_rug.wheel_torque,) * 6),),
         normal=None,
         spheres=np.column_stack([field.centres, field.radii]),
-        friction=FRICTION,
+        friction=sphere_rug.friction,
         gravity=GRAVITY,
         thin_wheels=True,
     )

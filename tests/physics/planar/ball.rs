@@ -2,9 +2,10 @@
 
 use std::f64::consts::{PI, TAU};
 
+use nalgebra::SVector;
 use rover_core::integrator::{StepOptions, Variant};
 use rover_core::planar::{Ball, Line, Polyline, Sine, Spline};
-use rover_core::simulation::BallSimulation;
+use rover_core::simulation::PlanarSimulation;
 
 use super::scenes::{G, VARIANTS, ball_on, count, level, options, speed};
 
@@ -303,10 +304,10 @@ fn a_spline_through_a_line_is_the_line() {
     let x: Vec<f64> = (0..8).map(|i| -1.0 + 0.7 * f64::from(i)).collect();
     let y: Vec<f64> = x.iter().map(|x| -alpha.tan() * x).collect();
     let start = [0.0, 0.3 / alpha.cos() + 0.2, 0.0];
-    let run = |mut simulation: BallSimulation| {
+    let run = |mut simulation: PlanarSimulation| {
         simulation.set_state(&start, &[0.0; 3]).unwrap();
         simulation.step(1000).unwrap();
-        *simulation.q()
+        SVector::<f64, 3>::from_column_slice(simulation.q())
     };
     let o = options(G, 0.4, 0.3, 2e-3);
     let line = run(ball_on(
@@ -372,12 +373,12 @@ fn a_snapshot_continues_bit_for_bit() {
     simulation.step(700).unwrap();
     let snapshot = simulation.snapshot();
     simulation.step(700).unwrap();
-    let (q, v) = (*simulation.q(), simulation.v().to_vec());
+    let (q, v) = (simulation.q().clone(), simulation.v().to_vec());
     let mut other = ball_on(sine, disc(), options(G, 0.6, 0.4, 2e-3));
     other.restore(&snapshot).unwrap();
     assert_eq!(other.snapshot(), snapshot);
     other.step(700).unwrap();
-    assert_eq!((q, v), (*other.q(), other.v().to_vec()));
+    assert_eq!((q, v), (other.q().clone(), other.v().to_vec()));
 }
 
 #[test]

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use nalgebra::Vector3;
+use nalgebra::{SMatrix, SVector, Vector2, Vector3};
 use rover_core::integrator::{Stabilisation, StepOptions, Variant};
-use rover_core::planar::{Ball, ContactRule, Ground, Line};
-use rover_core::simulation::BallSimulation;
+use rover_core::planar::{Ball, ContactRule, Ground, Line, PlanarTree};
+use rover_core::simulation::PlanarSimulation;
 
 pub const VARIANTS: [Variant; 2] = [Variant::Linearised, Variant::Newton];
 pub const G: f64 = 9.81;
@@ -30,8 +30,12 @@ pub fn unprojected(options: &StepOptions) -> StepOptions {
 }
 
 /// A ball on a ground with true contact.
-pub fn ball_on(ground: impl Ground + 'static, ball: Ball, options: StepOptions) -> BallSimulation {
-    BallSimulation::new(ball, Arc::new(ground), ContactRule::Nearest, options).unwrap()
+pub fn ball_on(
+    ground: impl Ground + 'static,
+    ball: Ball,
+    options: StepOptions,
+) -> PlanarSimulation {
+    PlanarSimulation::new(ball, Arc::new(ground), ContactRule::Nearest, options).unwrap()
 }
 
 /// Level ground at height 0.
@@ -49,4 +53,28 @@ pub fn count(duration: f64, time_step: f64) -> usize {
 /// Length of a velocity.
 pub fn speed(v: &[f64]) -> f64 {
     v.iter().map(|v| v * v).sum::<f64>().sqrt()
+}
+
+/// `M(q)` of a machine.
+pub fn mass_matrix<const NV: usize>(
+    machine: &PlanarTree,
+    q: &SVector<f64, NV>,
+) -> SMatrix<f64, NV, NV> {
+    let mut M = vec![0.0; NV * NV];
+    machine.mass_matrix(&machine.poses(q.as_slice()), &mut M);
+    SMatrix::from_row_slice(&M)
+}
+
+/// `F(q, v)` of a machine.
+pub fn force<const NV: usize>(
+    machine: &PlanarTree,
+    q: &SVector<f64, NV>,
+    v: &SVector<f64, NV>,
+    gravity: &Vector2<f64>,
+    torques: &[f64],
+) -> SVector<f64, NV> {
+    let mut F = SVector::<f64, NV>::zeros();
+    let mut poses = machine.poses(q.as_slice());
+    machine.force(&mut poses, v.as_slice(), gravity, torques, F.as_mut_slice());
+    F
 }

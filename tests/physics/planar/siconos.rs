@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use rover_core::integrator::{StepOptions, Variant};
 use rover_core::planar::{Ball, ContactRule, Ground, Line, Sine};
-use rover_core::simulation::BallSimulation;
+use rover_core::simulation::PlanarSimulation;
 
 use super::scenes::{count, options, unprojected};
 
@@ -26,20 +26,20 @@ fn report_ball(
     friction: f64,
     time_step: f64,
     variant: Variant,
-) -> BallSimulation {
+) -> PlanarSimulation {
     let options = StepOptions {
         variant,
         ..unprojected(&options(9.8, friction, 0.7, time_step))
     };
     let ball = Ball::new(3.0, 1.5, 4.05).unwrap();
     let mut simulation =
-        BallSimulation::new(ball, Arc::new(ground), ContactRule::CentreHeight, options).unwrap();
+        PlanarSimulation::new(ball, Arc::new(ground), ContactRule::CentreHeight, options).unwrap();
     simulation.set_state(&[5.0, 10.0, 0.0], &[0.0; 3]).unwrap();
     simulation
 }
 
 /// Largest distance (m) of the centre from a reference's up to a time.
-fn distance(simulation: &mut BallSimulation, reference: &[Vec<f64>], until: f64) -> f64 {
+fn distance(simulation: &mut PlanarSimulation, reference: &[Vec<f64>], until: f64) -> f64 {
     let h = simulation.options().time_step;
     let mut worst = 0.0_f64;
     let mut done = 0;

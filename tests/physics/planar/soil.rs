@@ -7,15 +7,15 @@ use rover_core::nalgebra::{Vector2, Vector3};
 use rover_core::planar::{Line, PlanarWheel, TwoWheelRover};
 use rover_core::simulation::{SoilSetupError, SoilSimulation, soil_options};
 use rover_core::solver::Method;
-use rover_core::system::soil::{
-    Disks, Packing, SleepOptions, SoilError, SoilFriction, SoilScene, Wall, on_soil,
+use rover_core::system::grains::{
+    GrainError, GrainFriction, GrainScene, Grains, Packing, SleepOptions, Wall,
 };
 
-fn box_of(width: f64) -> Vec<Wall> {
+fn box_of(width: f64) -> Vec<Wall<2>> {
     vec![Wall::floor(0.0), Wall::left(0.0), Wall::right(width)]
 }
 
-fn packing(count: usize, columns: usize, seed: u64) -> Packing {
+fn packing(count: usize, columns: usize, seed: u64) -> Packing<2> {
     Packing {
         count,
         sides: [0.0335 * columns as f64, f64::INFINITY],
@@ -27,17 +27,17 @@ fn packing(count: usize, columns: usize, seed: u64) -> Packing {
 
 /// Disks in a box, not yet settled.
 fn soil(
-    packing: &Packing,
-    change: impl FnOnce(&mut StepOptions, &mut SoilScene),
+    packing: &Packing<2>,
+    change: impl FnOnce(&mut StepOptions, &mut GrainScene<2>),
 ) -> SoilSimulation {
     let (disks, q) = packing.build().expect("a packing");
     let mut options = soil_options(&disks);
-    let mut scene = SoilScene {
+    let mut scene = GrainScene {
         grains: disks,
         walls: box_of(packing.sides[0]),
         ground: None,
         machine: None,
-        friction: SoilFriction::default(),
+        friction: GrainFriction::default(),
     };
     change(&mut options, &mut scene);
     SoilSimulation::new(Arc::new(scene), options, None, q).expect("a soil")
@@ -167,7 +167,7 @@ fn energy_never_grows_with_restitution_without_friction() {
             scene
                 .walls
                 .push(Wall::new(Vector2::new(0.0, 0.6), -Vector2::y()).expect("a wall"));
-            scene.friction = SoilFriction {
+            scene.friction = GrainFriction {
                 grains: 0.0,
                 walls: 0.0,
                 wheels: 0.0,
@@ -192,14 +192,14 @@ fn energy_never_grows_with_restitution_without_friction() {
 
 #[test]
 fn a_disk_falls_and_rests_within_a_rounding_of_the_floor() {
-    let disks = Disks::new(vec![0.02], vec![0.5]).expect("a disk");
+    let disks = Grains::new(vec![0.02], vec![0.5]).expect("a disk");
     let options = soil_options(&disks);
-    let scene = SoilScene {
+    let scene = GrainScene {
         grains: disks,
         walls: vec![],
         ground: Some(Arc::new(Line::new(0.0, 0.1).expect("a line"))),
         machine: None,
-        friction: SoilFriction::default(),
+        friction: GrainFriction::default(),
     };
     let q = vec![0.0, 0.5, 0.0];
     let mut soil = SoilSimulation::new(Arc::new(scene), options, None, q).expect("a soil");
@@ -216,17 +216,17 @@ fn a_disk_on_a_slope_rolls_below_and_slides_above_three_times_the_friction() {
     // Solid disk on a slope α: rolls with 2/3 g sin α iff tan α ≤ 3 μ, else
     // slides with g (sin α − μ cos α).
     for (mu, slope) in [(0.3, 0.5_f64), (0.1, 0.5)] {
-        let disks = Disks::new(vec![0.02], vec![0.5]).expect("a disk");
+        let disks = Grains::new(vec![0.02], vec![0.5]).expect("a disk");
         let options = soil_options(&disks);
         let alpha = slope.atan();
-        let scene = SoilScene {
+        let scene = GrainScene {
             grains: disks,
             walls: vec![],
             ground: Some(Arc::new(Line::new(-slope, 0.0).expect("a line"))),
             machine: None,
-            friction: SoilFriction {
+            friction: GrainFriction {
                 walls: mu,
-                ..SoilFriction::default()
+                ..GrainFriction::default()
             },
         };
         let q = vec![0.02 * alpha.sin(), 0.02 * alpha.cos(), 0.0];
@@ -296,8 +296,8 @@ fn dropped(sleep: Option<SleepOptions>) -> (SoilSimulation, usize) {
     mass.push(3.0);
     let mut q = bed.q().clone();
     q.extend([0.2, 0.6, 0.0]);
-    let scene = SoilScene {
-        grains: Disks::new(radius, mass).expect("disks"),
+    let scene = GrainScene {
+        grains: Grains::new(radius, mass).expect("disks"),
         ..(**bed.soil()).clone()
     };
     let options = bed.options().clone();
@@ -417,19 +417,19 @@ fn rover() -> TwoWheelRover {
 fn the_rover_drives_over_the_original_soil() {
     let (disks, q) = Packing::default().build().expect("a packing");
     let options = soil_options(&disks);
-    let scene = SoilScene {
+    let scene = GrainScene {
         grains: disks,
         walls: box_of(Packing::default().sides[0]),
         ground: None,
         machine: None,
-        friction: SoilFriction::default(),
+        friction: GrainFriction::default(),
     };
     let mut bed = SoilSimulation::new(Arc::new(scene), options.clone(), None, q).expect("a soil");
     bed.step(300).expect("finite");
     let mut q = bed.q().clone();
     q.extend([0.7, 0.31, 0.0, 0.0, 0.0]);
-    let scene = SoilScene {
-        machine: Some(on_soil(rover())),
+    let scene = GrainScene {
+        machine: Some(Arc::new(rover().into())),
         ..(**bed.soil()).clone()
     };
     let mut soil = SoilSimulation::new(Arc::new(scene), options, None, q).expect("a soil");
@@ -463,8 +463,8 @@ fn the_rover_drives_over_the_original_soil() {
 
 #[test]
 fn what_cannot_be_is_refused() {
-    let made = |radius: &[f64], mass: &[f64]| Disks::new(radius.to_vec(), mass.to_vec());
-    assert_eq!(made(&[], &[]), Err(SoilError::Empty));
+    let made = |radius: &[f64], mass: &[f64]| Grains::new(radius.to_vec(), mass.to_vec());
+    assert_eq!(made(&[], &[]), Err(GrainError::Empty));
     assert_eq!(
         made(&[1.0, -1.0], &[1.0, 1.0])
             .expect_err("negative")
@@ -479,12 +479,12 @@ fn what_cannot_be_is_refused() {
         made(&[1.0], &[1.0, 2.0]).expect_err("length").field(),
         "mass"
     );
-    let scene = Arc::new(SoilScene {
+    let scene = Arc::new(GrainScene {
         grains: made(&[0.1, 0.1], &[1.0, 1.0]).expect("disks"),
         walls: vec![Wall::floor(0.0)],
         ground: None,
         machine: None,
-        friction: SoilFriction::default(),
+        friction: GrainFriction::default(),
     });
     let build = |q: &[f64]| {
         SoilSimulation::new(scene.clone(), soil_options(&scene.grains), None, q.to_vec())
@@ -502,5 +502,5 @@ fn what_cannot_be_is_refused() {
     let mut soil = build(&[0.0, 0.1, 0.0, 0.5, 0.1, 0.0]).expect("a soil");
     assert!(soil.set_state(&[0.0; 6], &[0.0; 6]).is_err());
     assert!((soil.q()[3] - 0.5).abs() < 1e-15, "nothing has changed");
-    assert_eq!(soil.set_pull([1.0, 0.0]), Err(SoilError::NoMachine));
+    assert_eq!(soil.set_pull([1.0, 0.0]), Err(GrainError::NoMachine));
 }

@@ -6,12 +6,11 @@ use nalgebra::{SMatrix, SVector, Vector2};
 use rover_core::geometry::Support;
 use rover_core::integrator::StepOptions;
 use rover_core::planar::{
-    ContactRule, Ground, Line, PlanarMachine, PlanarWheel, Polyline, Sine, TwoWheelRover,
+    ContactRule, Ground, Line, PlanarTree, PlanarWheel, Polyline, Sine, TwoWheelRover,
 };
-use rover_core::simulation::TwoWheelRoverSimulation;
-use rover_core::system::contact_rows;
+use rover_core::simulation::PlanarSimulation;
 
-use super::scenes::{G, VARIANTS, count, level, options, speed};
+use super::scenes::{G, VARIANTS, count, force, level, mass_matrix, options, speed};
 
 type Q = SVector<f64, 5>;
 
@@ -52,8 +51,8 @@ fn on(
     ground: impl Ground + 'static,
     rover: TwoWheelRover,
     options: StepOptions,
-) -> TwoWheelRoverSimulation {
-    TwoWheelRoverSimulation::new(rover, Arc::new(ground), ContactRule::Nearest, options).unwrap()
+) -> PlanarSimulation {
+    PlanarSimulation::new(rover, Arc::new(ground), ContactRule::Nearest, options).unwrap()
 }
 
 /// Standing on a slope (rise positive forward) with both wheels of `r` touching.
@@ -75,12 +74,60 @@ fn states() -> impl Iterator<Item = (Q, Q)> {
     })
 }
 
+/// Centre of a wheel.
+fn centre(tree: &PlanarTree, wheel: usize, q: &Q) -> Vector2<f64> {
+    tree.disc(wheel, &tree.poses(q.as_slice())).centre
+}
+
+/// M and F of [`TwoWheelRover`]'s page.
+fn closed_forms(
+    rover: &TwoWheelRover,
+    (q, v): (&Q, &Q),
+    g: &Vector2<f64>,
+    [tau_a, tau_b]: [f64; 2],
+) -> (SMatrix<f64, 5, 5>, Q) {
+    let [a, b] = rover.wheels();
+    let turned = |x: Vector2<f64>| nalgebra::Rotation2::new(q[2]) * x;
+    // `Σ m_i r_i`.
+    let s = turned(a.axle) * a.mass + turned(b.axle) * b.mass;
+    let around = a.mass * a.axle.norm_squared() + b.mass * b.axle.norm_squared();
+    let m = rover.total_mass();
+    let mut M = SMatrix::from_diagonal(&Q::from([
+        m,
+        m,
+        rover.inertia() + around,
+        a.inertia,
+        b.inertia,
+    ]));
+    (M[(0, 2)], M[(2, 0)]) = (-s.y, -s.y);
+    (M[(1, 2)], M[(2, 1)]) = (s.x, s.x);
+    let linear = g * m + s * (v[2] * v[2]);
+    let turning = s.perp(g) + tau_a + tau_b;
+    (M, Q::from([linear.x, linear.y, turning, -tau_a, -tau_b]))
+}
+
+#[test]
+fn the_tree_has_the_closed_forms() {
+    let (g, torques) = (Vector2::new(0.7, -G), [3.0, -5.0]);
+    for rover in [report_rover(), lopsided()] {
+        let tree = PlanarTree::from(rover);
+        for (q, v) in states() {
+            let (M, F) = closed_forms(&rover, (&q, &v), &g, torques);
+            let difference = (mass_matrix(&tree, &q) - M).norm();
+            assert!(difference < 1e-13 * M.norm(), "{difference}");
+            let difference = (force(&tree, &q, &v, &g, &torques) - F).norm();
+            assert!(difference < 1e-13 * F.norm(), "{difference}");
+        }
+    }
+}
+
 /// Kinetic energy from the bodies' velocities, without M.
 fn kinetic(rover: &TwoWheelRover, q: &Q, v: &Q) -> f64 {
+    let tree = PlanarTree::from(*rover);
     let mut sum = 0.5 * rover.mass() * v.xy().norm_squared() + 0.5 * rover.inertia() * v[2] * v[2];
     let step = 1e-6;
     for (i, wheel) in rover.wheels().iter().enumerate() {
-        let place = |s: f64| rover.disc(i, &(q + v * s)).centre;
+        let place = |s: f64| centre(&tree, i, &(q + v * s));
         let velocity = (place(step) - place(-step)) / (2.0 * step);
         sum += 0.5 * wheel.mass * velocity.norm_squared();
         sum += 0.5 * wheel.inertia * v[3 + i] * v[3 + i];
@@ -91,9 +138,10 @@ fn kinetic(rover: &TwoWheelRover, q: &Q, v: &Q) -> f64 {
 #[test]
 fn the_mass_matrix_is_that_of_the_bodies_velocities() {
     for rover in [report_rover(), lopsided()] {
+        let tree = PlanarTree::from(rover);
         for (q, v) in states() {
             let expected = kinetic(&rover, &q, &v);
-            let energy = 0.5 * v.dot(&(rover.mass_matrix(&q) * v));
+            let energy = 0.5 * v.dot(&(mass_matrix(&tree, &q) * v));
             assert!(
                 (energy - expected).abs() < 1e-8 * expected,
                 "{energy} {expected}"
@@ -106,21 +154,23 @@ fn the_mass_matrix_is_that_of_the_bodies_velocities() {
 fn quadratic_terms_and_gravity_are_lagranges() {
     // F = ∂K/∂q − Ṁ v − ∂V/∂q.
     let gravity = Vector2::new(0.7, -9.81);
-    let rover = lopsided();
+    let tree = PlanarTree::from(lopsided());
     let step = 1e-5;
     for (q, v) in states() {
-        let M_rate: SMatrix<f64, 5, 5> = (rover.mass_matrix(&(q + v * step))
-            - rover.mass_matrix(&(q - v * step)))
+        let M_rate: SMatrix<f64, 5, 5> = (mass_matrix(&tree, &(q + v * step))
+            - mass_matrix(&tree, &(q - v * step)))
             / (2.0 * step);
         let mut expected = -(M_rate * v);
         for k in 0..5 {
             let mut shift = Q::zeros();
             shift[k] = step;
-            let lagrangian =
-                |q: &Q| 0.5 * v.dot(&(rover.mass_matrix(q) * v)) - rover.potential(q, &gravity);
+            let lagrangian = |q: &Q| {
+                let potential = tree.potential(&tree.poses(q.as_slice()), &gravity);
+                0.5 * v.dot(&(mass_matrix(&tree, q) * v)) - potential
+            };
             expected[k] += (lagrangian(&(q + shift)) - lagrangian(&(q - shift))) / (2.0 * step);
         }
-        let force = rover.force(&q, &v, &gravity, &[0.0, 0.0]);
+        let force = force(&tree, &q, &v, &gravity, &[0.0, 0.0]);
         assert!(
             (force - expected).norm() < 1e-6 * (1.0 + expected.norm()),
             "{force} {expected}"
@@ -130,11 +180,11 @@ fn quadratic_terms_and_gravity_are_lagranges() {
 
 #[test]
 fn motors_do_work_between_body_and_wheel() {
-    let rover = lopsided();
+    let tree = PlanarTree::from(lopsided());
     for (q, v) in states() {
         let (on, off) = (
-            rover.force(&q, &v, &Vector2::zeros(), &[3.0, -5.0]),
-            rover.force(&q, &v, &Vector2::zeros(), &[0.0, 0.0]),
+            force(&tree, &q, &v, &Vector2::zeros(), &[3.0, -5.0]),
+            force(&tree, &q, &v, &Vector2::zeros(), &[0.0, 0.0]),
         );
         let power = v.dot(&(on - off));
         // A positive torque drives forward, that is to negative angles relative to the body.
@@ -147,6 +197,7 @@ fn motors_do_work_between_body_and_wheel() {
 fn the_normal_row_is_the_gaps_gradient_and_the_tangential_one_the_rims_velocity() {
     let sine = Sine::new(0.3, 3.0, 0.2, 0.0).unwrap();
     let rover = lopsided();
+    let tree = PlanarTree::from(rover);
     for (mut q, v) in states() {
         q[1] = 0.9 + 0.05 * q[1];
         q[2] *= 0.1;
@@ -162,24 +213,21 @@ fn the_normal_row_is_the_gaps_gradient_and_the_tangential_one_the_rims_velocity(
         let step = 1e-6;
         let (before, after) = (gaps(&(q - v * step)), gaps(&(q + v * step)));
         for i in 0..2 {
-            let disc = rover.disc(i, &q);
+            let poses = tree.poses(q.as_slice());
+            let disc = tree.disc(i, &poses);
             let mut facing = Vec::new();
             sine.facing(&disc.centre, 5.0, &mut facing);
             let near = facing
                 .iter()
                 .min_by(|a, b| a.distance.total_cmp(&b.distance))
                 .unwrap();
-            let contact = rover_core::system::PlanarContact {
-                key: rover_core::system::PlanarKey {
-                    disc: u32::try_from(i).unwrap(),
-                    feature: 0,
-                },
-                point: disc.centre - near.n * disc.radius,
-                foot: near.foot,
-                n: near.n,
-                gap: near.distance - disc.radius,
-            };
-            let [normal, tangential] = contact_rows(&rover, &q, &[contact])[0];
+            let (point, t) = (
+                disc.centre - near.n * disc.radius,
+                Vector2::new(near.n.y, -near.n.x),
+            );
+            let mut rows = Vec::new();
+            tree.push_rows(i, &poses, &point, &[near.n, t], &mut rows);
+            let [normal, tangential] = [0, 5].map(|k| Q::from_column_slice(&rows[k..k + 5]));
             let rate = (after[i] - before[i]) / (2.0 * step);
             assert!(
                 (normal.dot(&v) - rate).abs() < 1e-6,
@@ -187,9 +235,13 @@ fn the_normal_row_is_the_gaps_gradient_and_the_tangential_one_the_rims_velocity(
                 normal.dot(&v)
             );
             // The rim's material point: the centre's velocity and the wheel's own turn.
-            let place = |s: f64| rover.disc(i, &(q + v * s)).centre;
-            let centre = (place(step) - place(-step)) / (2.0 * step);
-            let rim = centre.dot(&contact.t()) + disc.radius * v[3 + i];
+            let place = |s: f64| centre(&tree, i, &(q + v * s));
+            let velocity = (place(step) - place(-step)) / (2.0 * step);
+            assert!(
+                (tree.point_velocity(i, &poses, &disc.centre, v.as_slice()) - velocity).norm()
+                    < 1e-6
+            );
+            let rim = velocity.dot(&t) + disc.radius * v[3 + i];
             assert!((tangential.dot(&v) - rim).abs() < 1e-6);
         }
     }
@@ -410,7 +462,7 @@ fn it_drives_over_waves_and_up_a_step() {
         (Arc::new(waves) as Arc<dyn Ground>, 45.0, 3.0),
         (Arc::new(step), 90.0, 3.0),
     ] {
-        let mut simulation = TwoWheelRoverSimulation::new(
+        let mut simulation = PlanarSimulation::new(
             report_rover(),
             ground,
             ContactRule::Nearest,
@@ -430,7 +482,7 @@ fn it_drives_over_waves_and_up_a_step() {
                 break;
             }
         }
-        assert!(simulation.q()[0] > way, "{}", simulation.q());
+        assert!(simulation.q()[0] > way, "{:?}", simulation.q());
         assert!(
             simulation.q()[2].abs() < 1.0,
             "upright: {}",
@@ -442,7 +494,7 @@ fn it_drives_over_waves_and_up_a_step() {
 
 #[test]
 fn without_friction_the_wheels_spin_on_the_spot() {
-    let mut simulation = TwoWheelRoverSimulation::new(
+    let mut simulation = PlanarSimulation::new(
         report_rover(),
         Arc::new(Polyline::step(1.0, 0.05).unwrap()),
         ContactRule::Nearest,
@@ -456,7 +508,7 @@ fn without_friction_the_wheels_spin_on_the_spot() {
     simulation.step(500).unwrap();
     assert!(
         simulation.q()[0].abs() < 1e-9,
-        "wheels spin: {}",
+        "wheels spin: {:?}",
         simulation.q()
     );
     assert!(simulation.v()[3] < -10.0);

@@ -10,7 +10,7 @@ from rover_gym.grains.lab.fits import (
     fit_strength,
 )
 from rover_gym.grains.lab.plate_and_shear import PlatePoint, ShearPoint, plate_test, shear_test
-from rover_gym.grains.lab.table import write_table
+from rover_gym.grains.lab.rig import write_table
 from rover_gym.grains.lab.wheel import WheelPoint, wheel_test
 
 __all__ = [

@@ -6,16 +6,23 @@ stiffness goes with mass over the step squared, so a rig keeps its motion exactl
 
 from __future__ import annotations
 
+import csv
 import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, fields, is_dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.grains.ball_bed import BallBed
 from rover_gym.mechanics import GrainSimulation, OptionError, Plane, RoverGrainSimulation, RoverModel, Simulation
-from rover_gym.validation import number, refuse
+from rover_gym.validation import checked, number, refuse
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
 
 Array = npt.NDArray[np.float64]
 
@@ -246,3 +253,26 @@ def check_room(bed: BallBed, radius: float) -> None:
             f"must be at most {most:.3g} m on a bed {bed.width:.3g} m long and "
             f"{bed.depth:.3g} m wide, to leave a ball to the walls",
         )
+
+
+@checked(points=Sequence, path=Path)
+def write_table(points: Sequence[DataclassInstance], path: str | Path) -> Path:
+    """Writes points of one test, a line each under the names of their fields; numbers keep all their digits.
+
+    Args:
+        points: Points of one kind, at least one.
+        path: File to write.
+
+    Raises:
+        OptionError: There is no point.
+        OSError: The file cannot be written.
+    """
+    rows: list[Any] = list(points)
+    if not rows or not all(is_dataclass(point) and not isinstance(point, type) for point in rows):
+        refuse(OptionError, "points", points, "must be points of one test, one or more")
+    path = Path(path)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, [field.name for field in fields(rows[0])], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(asdict(point) for point in rows)
+    return path

@@ -107,7 +107,10 @@ pub trait MechanicalSystem {
         v: &[f64],
         h: f64,
         to: &mut Self::Configuration,
-    );
+    ) {
+        to.clone_from(from);
+        self.advance(to, v, h);
+    }
 
     /// `q ⊕= h v`.
     fn advance(&self, q: &mut Self::Configuration, v: &[f64], h: f64);

@@ -4,20 +4,16 @@
 //! steps and not the largest. No lane's bits depend on its neighbours.
 
 use super::equations::DenseSystem;
-use super::pivoting::Pivoting;
 use super::problem::{ContactProblem, MAX_CONTACTS, MAX_DENSE};
-use super::system::System;
+use super::system::Loaded;
 use super::velocity_equations::VelocitySystem;
-use crate::problem::{ContactScales, Magnitudes, Residual};
+use crate::problem::{ContactScales, Magnitudes};
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
-use crate::solver::FURTHER_ALPHAS;
-
-/// Share of the squared residual that a correction leaves if another one follows.
-const GAIN: f64 = 0.1;
+use crate::solver::pivoting::{FURTHER_ALPHAS, Few, Pivoting};
 
 /// Most steps of a solve: those of the first attempt and of all further ones.
 pub const MAX_ITERATIONS: usize =
-    <DenseSystem<f64, MAX_DENSE> as System<f64, MAX_DENSE>>::MAX_STEPS * (1 + FURTHER_ALPHAS.len());
+    <DenseSystem<f64, MAX_DENSE> as Loaded<f64, MAX_DENSE>>::MAX_STEPS * (1 + FURTHER_ALPHAS.len());
 
 /// Where a bench gets its problems and leaves their answers.
 pub(super) trait Line {
@@ -38,8 +34,9 @@ pub(super) type DenseBench<T, const C: usize> = Bench<T, C, DenseSystem<T, C>>;
 pub(super) type FactoredBench<T> = Bench<T, MAX_CONTACTS, VelocitySystem<T, MAX_CONTACTS>>;
 
 /// Lanes with their problems of at most `C` contacts.
-pub(super) struct Bench<T: Lane, const C: usize, S: System<T, C>> {
-    pivoting: Pivoting<T, C, S>,
+pub(super) struct Bench<T: Lane, const C: usize, S: Loaded<T, C>> {
+    system: S,
+    pivoting: Pivoting<T, Few<C>>,
     /// Lanes with a problem, those that have taken all steps of an attempt, and those that begin
     /// another one.
     active: u32,
@@ -53,10 +50,11 @@ pub(super) struct Bench<T: Lane, const C: usize, S: System<T, C>> {
     before: [usize; MAX_LANES],
 }
 
-impl<T: Lane, const C: usize, S: System<T, C>> Bench<T, C, S> {
+impl<T: Lane, const C: usize, S: Loaded<T, C>> Bench<T, C, S> {
     #[inline(always)]
     pub(super) fn new(token: T::Token) -> Self {
         Self {
+            system: S::new(token),
             pivoting: Pivoting::new(token),
             active: 0,
             late: 0,
@@ -76,7 +74,7 @@ impl<T: Lane, const C: usize, S: System<T, C>> Bench<T, C, S> {
         let mut data = Magnitudes::default();
         let own = &mut self.pivoting;
         assert!(lane < T::LANES, "a lane");
-        for i in own.system.load(lane, problem) {
+        for i in self.system.load(lane, problem) {
             let contact = S::contact_at(problem, i);
             let is_used = contact.is_some();
             let contact = contact.unwrap_or(0);
@@ -90,15 +88,8 @@ impl<T: Lane, const C: usize, S: System<T, C>> Bench<T, C, S> {
                 (1.0, 2.0)
             };
             let scales = ContactScales::new::<3>(normal, tangential);
-            let [rho_N, rho_T] = scales.modes;
-            let law = &mut own.laws[i];
-            law.mu
-                .set(lane, if is_used { problem.mu[contact] } else { 0.0 });
-            law.rho[0].set(lane, rho_N);
-            law.rho[1].set(lane, rho_T);
-            law.inverse[0].set(lane, 1.0 / rho_N);
-            law.inverse[1].set(lane, 1.0 / rho_T);
-            law.mass_squared.set(lane, scales.mass * scales.mass);
+            let mu = if is_used { problem.mu[contact] } else { 0.0 };
+            own.laws[i].set(lane, mu, scales);
             if S::RETURNS {
                 let last = S::last_of(problem, contact);
                 for k in 0..3 {
@@ -113,7 +104,7 @@ impl<T: Lane, const C: usize, S: System<T, C>> Bench<T, C, S> {
                     (0.0, 0.0)
                 };
                 own.p[i][k].set(lane, p);
-                own.q[i][k].set(lane, q);
+                self.system.free_velocity(i)[k].set(lane, q);
             }
             if is_used {
                 trace += normal + tangential;
@@ -133,7 +124,7 @@ impl<T: Lane, const C: usize, S: System<T, C>> Bench<T, C, S> {
     }
 
     /// Lets a lane try its problem again from the start, or from the last step's impulses where the
-    /// system [returns](System::RETURNS) to them, with another `α`, if there is one left.
+    /// system [returns](crate::solver::pivoting::System::RETURNS) to them, with another `α`, if there is one left.
     /// [`Pivoting::begin`] follows.
     #[inline(always)]
     fn retry(&mut self, lane: usize, problem: &ContactProblem) -> bool {
@@ -145,7 +136,7 @@ impl<T: Lane, const C: usize, S: System<T, C>> Bench<T, C, S> {
         self.steps[lane] = 0;
         let own = &mut self.pivoting;
         own.asked.set(lane, *alpha);
-        for i in own.system.places() {
+        for i in self.system.places() {
             if let Some(contact) = S::contact_at(problem, i) {
                 for k in 0..3 {
                     let start = if S::RETURNS {
@@ -171,12 +162,8 @@ impl<T: Lane, const C: usize, S: System<T, C>> Bench<T, C, S> {
             return;
         }
         let own = &self.pivoting;
-        let [relative, largest] = own.residual();
-        problem.residual = Residual {
-            relative: relative.get(lane).sqrt(),
-            velocity: largest.get(lane).sqrt(),
-        };
-        for i in own.system.places() {
+        problem.residual = own.residual_of(lane);
+        for i in self.system.places() {
             if let Some(contact) = S::contact_at(problem, i) {
                 for k in 0..3 {
                     problem.p[3 * contact + k] = own.p[i][k].get(lane);
@@ -189,21 +176,8 @@ impl<T: Lane, const C: usize, S: System<T, C>> Bench<T, C, S> {
     /// A step of all lanes that have a problem.
     #[inline(always)]
     fn step(&mut self, token: T::Token, tolerances: [T; 2]) {
-        let own = &mut self.pivoting;
         let active = T::mask(token, self.active);
-        own.correct(active);
-        own.step(active);
-        let mut nearly = active & own.is_near() & !own.is_solved(tolerances);
-        for _ in 0..S::CORRECTIONS {
-            if !nearly.any() {
-                break;
-            }
-            let [before, _] = own.residual();
-            own.refine(nearly);
-            let [after, _] = own.residual();
-            let gains = after.lt(before.like(GAIN) * before);
-            nearly = nearly & gains & !own.is_solved(tolerances);
-        }
+        self.pivoting.advance(&mut self.system, active, tolerances);
         self.late = 0;
         for lane in 0..T::LANES {
             self.steps[lane] += 1;
@@ -247,7 +221,7 @@ impl<T: Lane, const C: usize, S: System<T, C>> Bench<T, C, S> {
             self.active |= new;
             self.late &= !new;
             if new != 0 {
-                self.pivoting.begin(T::mask(token, new));
+                self.pivoting.begin(&mut self.system, T::mask(token, new));
             }
             let n_active = self.n_active();
             if n_active == 0 || (has_gone_on && n_active < T::LANES && line.may_leave(n_active)) {
@@ -256,7 +230,7 @@ impl<T: Lane, const C: usize, S: System<T, C>> Bench<T, C, S> {
             has_gone_on = true;
             let own = &mut self.pivoting;
             let solved = own.is_solved(tolerances);
-            let ends = (solved | own.lost | !own.sums.is_finite()).bits() | self.late;
+            let ends = (solved | own.lost | !own.is_finite()).bits() | self.late;
             let ended = self.active & ends;
             if ended == 0 {
                 self.step(token, tolerances);

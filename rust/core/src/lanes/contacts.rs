@@ -21,9 +21,10 @@ use nalgebra::Vector3;
 use super::by_lane::ByLane;
 use super::forecast::Forecast;
 use super::ground::{Ground, GroundSphere, turning};
-use super::machine::{Machine, SIDES, Stop};
+use super::machine::{Machine, Stop};
 use super::parts::{Parts, Twist};
 use super::problem::{MAX_CONTACTS, MAX_DENSE};
+use super::stops::side;
 use crate::contact::detection::{touch_of_disc, touch_of_roller};
 use crate::contact::{Contact, ContactFrame, ContactKey, Opposite, Part};
 use crate::geometry::query::sweep::DEEP;
@@ -79,6 +80,8 @@ pub struct Contacts<T: Lane> {
     pub(super) parts: Parts,
     pub(super) by_lane: ByLane<T>,
     pub(super) stops: Vec<Stop>,
+    /// Of each stop, 1 where the joint is at its lower end, −1 at its upper one, 0 at none.
+    pub(super) ends: Vec<T>,
     /// The first spare slot, and the first slot of a stop.
     first_spare: usize,
     pub(super) first_stop: usize,
@@ -140,7 +143,7 @@ impl<T: Lane> Contacts<T> {
         let first_stop = part_of.len();
         let n_shapes = n_wheels + machine.spares.len();
         let stops = n_shapes..n_shapes + machine.stops.len();
-        part_of.extend(stops.flat_map(|part| [part; SIDES]));
+        part_of.extend(stops);
         let n_slots = part_of.len();
         assert!(n_slots <= 256, "invariant: slots are numbered by 8 bits");
         let zero = T::splat(token, 0.0);
@@ -170,6 +173,7 @@ impl<T: Lane> Contacts<T> {
             first_stop,
             parts,
             stops: machine.stops.clone(),
+            ends: vec![zero; machine.stops.len()],
             slots: vec![slot; n_slots],
             by_lane: ByLane::new(machine, first_spare),
             part_of,
@@ -267,8 +271,8 @@ impl<T: Lane> Contacts<T> {
         }
         let (own, part) = (&self.slots[slot], self.part(slot));
         let n = Vector3::from(own.n.get(lane));
-        let (part, body, frame) = if let Some((stop, side)) = self.stop(slot) {
-            let part = Part::Limit(stop.joint, side);
+        let (part, body, frame) = if let Some((stop, end)) = self.stop(slot) {
+            let part = Part::Limit(stop.joint, side(end, lane));
             (
                 part,
                 machine.joints[stop.joint].body,
@@ -846,8 +850,9 @@ impl<T: Lane> Contacts<T> {
     /// it. Returns the lanes that have too many.
     #[inline(always)]
     pub(super) fn list_slot(&mut self, slot: usize, ground: Option<&Ground<T>>) -> T::Mask {
-        let shown = match self.stop(slot) {
-            Some((stop, side)) => ContactKey::at_limit(stop.joint, side),
+        let stop = self.stop(slot).map(|(stop, end)| (stop.joint, end));
+        let shown = match stop {
+            Some(_) => NO_KEY,
             None => match self.parts.wheels.get(self.part_of[slot]) {
                 Some(wheel) => {
                     let is_second = wheel.n_circles() > 1 && slot > wheel.slots.start;
@@ -887,6 +892,8 @@ impl<T: Lane> Contacts<T> {
             } else if on_sphere >> lane & 1 == 1 {
                 key.feature = 0;
                 key.opposite = Opposite::Ground(whole(numbers[lane]));
+            } else if let Some((joint, end)) = stop {
+                key = ContactKey::at_limit(joint, side(end, lane));
             } else if ground.is_some_and(|ground| ground.is_surface(lane)) {
                 // Which piece was found depends on when a search was made.
                 key = key.on_surface().lasting();

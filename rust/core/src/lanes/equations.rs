@@ -2,7 +2,7 @@
 //!
 //! Each contact has three unknowns whatever its mode; those that a mode eliminates have a row of
 //! the unit matrix and the answer zero. With the columns `C_i` and rows `B_i` of the
-//! [modes](super::modes) the system is
+//! [modes](Mode) the system is
 //!
 //! ```text
 //! Bᵀ (W + α I) C y + γ y = −Bᵀ (q − α c),    p = C y
@@ -12,13 +12,14 @@
 //! equations, whatever the condition of `W + α I`. Rows are not exchanged; that leaves the number
 //! of steps as it is.
 
-use super::modes::Mode;
-use super::problem::{ContactProblem, MAX_BLOCKS, Triple, block};
-use super::system::System;
+use super::problem::{ContactProblem, MAX_BLOCKS, block};
+use super::system::{Loaded, solve_one};
+use crate::law::coulomb::ContactMode;
 use crate::scalar::Lane;
+use crate::solver::pivoting::{Few, Mode, System, Triple};
 
 /// A 3 x 3 block, row-major.
-pub type Block<T> = [T; 9];
+pub(super) type Block<T> = [T; 9];
 
 /// Block (i, j) of a symmetric `W`.
 #[inline(always)]
@@ -33,7 +34,7 @@ fn block_of<T: Lane>(W: &[Block<T>; MAX_BLOCKS], i: usize, j: usize) -> Block<T>
 
 /// `u = W p + q`.
 #[inline(always)]
-pub fn velocities<T: Lane, const C: usize>(
+fn velocities<T: Lane, const C: usize>(
     W: &[Block<T>; MAX_BLOCKS],
     q: &[Triple<T>; C],
     p: &[Triple<T>; C],
@@ -106,7 +107,7 @@ fn assemble<T: Lane>(
 }
 
 /// Factors of the system, `L` with ones on its diagonal and `U` with the inverse of its own.
-pub type Factors<T, const C: usize> = [[Block<T>; C]; C];
+type Factors<T, const C: usize> = [[Block<T>; C]; C];
 
 /// `x − L U`.
 #[inline(always)]
@@ -166,7 +167,7 @@ fn under_lower<T: Lane>(x: &Block<T>, f: &Block<T>) -> Block<T> {
 
 /// Factors the system of the modes.
 #[inline(always)]
-pub fn factorise<T: Lane, const C: usize>(
+fn factorise<T: Lane, const C: usize>(
     W: &[Block<T>; MAX_BLOCKS],
     alpha: T,
     modes: &[Mode<T>; C],
@@ -233,30 +234,9 @@ fn subtract<T: Lane>(own: &mut Triple<T>, x: &Block<T>, y: &Triple<T>) {
     }
 }
 
-/// `Bᵀ x` of a contact.
-#[inline(always)]
-pub(super) fn across<T: Lane>(mode: &Mode<T>, x: [T; 3]) -> Triple<T> {
-    let Mode {
-        closed, b, stick, ..
-    } = mode;
-    let zero = x[0].like(0.0);
-    [
-        T::select(*closed, x[0], zero),
-        b[0] * x[1] + b[1] * x[2],
-        T::select(*stick, x[2], zero),
-    ]
-}
-
-/// `C y` of a contact.
-#[inline(always)]
-pub(super) fn impulse<T: Lane>(mode: &Mode<T>, [y0, y1, y2]: Triple<T>) -> Triple<T> {
-    let Mode { a, b, .. } = mode;
-    [y0, a[0] * y0 + b[0] * y1, a[1] * y0 + b[1] * y1 + y2]
-}
-
 /// The impulses `C y` of the Newton step about the impulses `centre`, into `y`.
 #[inline(always)]
-pub fn newton_point<T: Lane, const C: usize>(
+fn newton_point<T: Lane, const C: usize>(
     factors: &Factors<T, C>,
     q: &[Triple<T>; C],
     centre: &[Triple<T>; C],
@@ -271,18 +251,18 @@ pub fn newton_point<T: Lane, const C: usize>(
             alpha * c[1] - q[1],
             alpha * c[2] - q[2],
         ];
-        y[k] = across(&modes[k], rest);
+        y[k] = modes[k].across(rest);
     }
     solve(factors, y);
     for k in 0..C {
-        y[k] = impulse(&modes[k], y[k]);
+        y[k] = modes[k].impulse(y[k]);
     }
 }
 
 /// The change `C y` of the impulses, into `y`, that removes the velocities `u` as far as the modes
 /// allow; the factors may be those of modes at nearby impulses.
 #[inline(always)]
-pub fn correction<T: Lane, const C: usize>(
+fn correction<T: Lane, const C: usize>(
     factors: &Factors<T, C>,
     u: &[Triple<T>; C],
     modes: &[Mode<T>; C],
@@ -290,11 +270,11 @@ pub fn correction<T: Lane, const C: usize>(
 ) {
     for k in 0..C {
         let [u0, u1, u2] = u[k];
-        y[k] = across(&modes[k], [-u0, -u1, -u2]);
+        y[k] = modes[k].across([-u0, -u1, -u2]);
     }
     solve(factors, y);
     for k in 0..C {
-        y[k] = impulse(&modes[k], y[k]);
+        y[k] = modes[k].impulse(y[k]);
     }
 }
 
@@ -302,20 +282,59 @@ pub fn correction<T: Lane, const C: usize>(
 #[derive(Clone, Debug)]
 pub(super) struct DenseSystem<T: Lane, const C: usize> {
     W: [Block<T>; MAX_BLOCKS],
+    pub(super) q: [Triple<T>; C],
     factors: Factors<T, C>,
 }
 
-impl<T: Lane, const C: usize> System<T, C> for DenseSystem<T, C> {
+impl<T: Lane, const C: usize> System<T, Few<C>> for DenseSystem<T, C> {
     type Places = std::ops::Range<usize>;
 
-    const ALPHA: f64 = 1e-8;
-    const PARKED_ALPHA: f64 = 1e-6;
-    const SMALLEST_ALPHA: f64 = 1e-14;
-    const SMALLEST_ALPHA_AGAIN: f64 = Self::SMALLEST_ALPHA;
-    const RETURNS: bool = false;
-    // A rover that sticks is solved then.
-    const NEAR: f64 = 1e-6;
-    const CORRECTIONS: usize = 1;
+    #[inline(always)]
+    fn places(&self) -> Self::Places {
+        0..C
+    }
+
+    #[inline(always)]
+    fn velocities(&mut self, p: &[Triple<T>; C], u: &mut [Triple<T>; C]) {
+        velocities(&self.W, &self.q, p, u);
+    }
+
+    #[inline(always)]
+    fn factorise(&mut self, alpha: T, modes: &[Mode<T>; C]) -> bool {
+        factorise(&self.W, alpha, modes, &mut self.factors);
+        true
+    }
+
+    #[inline(always)]
+    fn newton_point(
+        &mut self,
+        _: &[Triple<T>; C],
+        centre: &[Triple<T>; C],
+        alpha: T,
+        modes: &[Mode<T>; C],
+        y: &mut [Triple<T>; C],
+    ) {
+        newton_point(&self.factors, &self.q, centre, alpha, modes, y);
+    }
+
+    #[inline(always)]
+    fn correction(&mut self, u: &[Triple<T>; C], modes: &[Mode<T>; C], y: &mut [Triple<T>; C]) {
+        correction(&self.factors, u, modes, y);
+    }
+
+    #[inline(always)]
+    fn solve_one(
+        &self,
+        place: usize,
+        lane: usize,
+        free: &Triple<f64>,
+        mu: f64,
+    ) -> (ContactMode, Triple<f64>) {
+        solve_one(&self.W[block(place, place)], lane, free, mu)
+    }
+}
+
+impl<T: Lane, const C: usize> Loaded<T, C> for DenseSystem<T, C> {
     const MAX_STEPS: usize = 80;
 
     #[inline(always)]
@@ -323,6 +342,7 @@ impl<T: Lane, const C: usize> System<T, C> for DenseSystem<T, C> {
         let zero = T::splat(token, 0.0);
         Self {
             W: [[zero; 9]; MAX_BLOCKS],
+            q: [[zero; 3]; C],
             factors: [[[zero; 9]; C]; C],
         }
     }
@@ -356,39 +376,7 @@ impl<T: Lane, const C: usize> System<T, C> for DenseSystem<T, C> {
     }
 
     #[inline(always)]
-    fn places(&self) -> Self::Places {
-        0..C
-    }
-
-    #[inline(always)]
-    fn diagonal(&self, place: usize) -> &Block<T> {
-        &self.W[block(place, place)]
-    }
-
-    #[inline(always)]
-    fn velocities(&mut self, q: &[Triple<T>; C], p: &[Triple<T>; C], u: &mut [Triple<T>; C]) {
-        velocities(&self.W, q, p, u);
-    }
-
-    #[inline(always)]
-    fn factorise(&mut self, alpha: T, modes: &[Mode<T>; C]) {
-        factorise(&self.W, alpha, modes, &mut self.factors);
-    }
-
-    #[inline(always)]
-    fn newton_point(
-        &mut self,
-        q: &[Triple<T>; C],
-        centre: &[Triple<T>; C],
-        alpha: T,
-        modes: &[Mode<T>; C],
-        y: &mut [Triple<T>; C],
-    ) {
-        newton_point(&self.factors, q, centre, alpha, modes, y);
-    }
-
-    #[inline(always)]
-    fn correction(&mut self, u: &[Triple<T>; C], modes: &[Mode<T>; C], y: &mut [Triple<T>; C]) {
-        correction(&self.factors, u, modes, y);
+    fn free_velocity(&mut self, place: usize) -> &mut Triple<T> {
+        &mut self.q[place]
     }
 }

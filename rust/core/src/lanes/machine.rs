@@ -22,9 +22,6 @@ use crate::scalar::elementary::hypot;
 /// Most wheels and joints with stops: the operator of a block has room for contacts of all of them.
 pub const MOST_PARTS: usize = 32;
 
-/// Slots of a joint with stops.
-pub const SIDES: usize = 2;
-
 /// Why a machine has no fast step.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum Unsupported {
@@ -239,7 +236,7 @@ fn check(model: &Model) -> Result<(), Unsupported> {
     let wheels: Vec<WheelDisc> = model.wheels().iter().map(WheelDisc::of).collect();
     let has_lines = wheels.iter().any(|wheel| wheel.n_circles() > 1);
     let n_slots = wheels.iter().map(WheelDisc::n_slots).sum::<usize>();
-    let n_slots = n_slots + SIDES * model.limited_joints().len();
+    let n_slots = n_slots + model.limited_joints().len();
     if has_lines && n_slots > MAX_CONTACTS {
         return Err(Unsupported::TooManyContacts(n_slots));
     }

@@ -13,8 +13,9 @@
 //! - `parts`, [`ground`], `footing`, [`forecast`], [`contacts`], `by_lane`, `rare`, `spares`,
 //!   `stops`: what touches what;
 //!   [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield;
-//! - [`problem`], [`modes`], [`equations`], [`pattern`], `tree_matrix`, `velocity_equations`,
-//!   `sweeps`, `pivoting`, `visits`, `bench`, [`queue`]: the friction-contact problems;
+//! - [`problem`], `system`, `equations`, [`pattern`], `tree_matrix`, `velocity_equations`,
+//!   `sweeps`, `bench`, [`queue`]: the friction-contact problems, which
+//!   [`crate::solver`]'s pivoting solves;
 //! - [`step`]: the step.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
@@ -23,16 +24,14 @@ mod bench;
 mod by_lane;
 pub mod contacts;
 pub mod drives;
-pub mod equations;
+mod equations;
 mod footing;
 pub mod forecast;
 pub mod ground;
 pub mod machine;
-pub mod modes;
 mod parts;
 pub mod passenger;
 pub mod pattern;
-mod pivoting;
 pub mod problem;
 pub mod queue;
 mod rare;
@@ -45,5 +44,4 @@ mod system;
 mod tread;
 mod tree_matrix;
 mod velocity_equations;
-mod visits;
 pub mod yielding;

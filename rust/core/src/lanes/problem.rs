@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::pattern::Pattern;
 use crate::problem::Residual;
+pub(crate) use crate::solver::pivoting::Triple;
 
 /// Most contacts of a problem.
 pub const MAX_CONTACTS: usize = 32;
@@ -16,9 +17,6 @@ pub const MAX_UNKNOWNS: usize = 3 * MAX_CONTACTS;
 
 /// Blocks of the lower triangle of `W`.
 pub const MAX_BLOCKS: usize = MAX_DENSE * (MAX_DENSE + 1) / 2;
-
-/// Entries of a contact along n, t, b.
-pub type Triple<T> = [T; 3];
 
 /// Index of block (i, j), `j <= i`, in [`ContactProblem::W`].
 #[inline(always)]

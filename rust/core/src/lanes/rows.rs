@@ -211,11 +211,10 @@ impl<T: Lane> Rows<T> {
         slot: usize,
     ) {
         let part = contacts.part(slot);
-        let (Some((_, side)), Some(mover)) = (contacts.stop(slot), self.movers[part].last()) else {
+        let (Some((_, sign)), Some(mover)) = (contacts.stop(slot), self.movers[part].last()) else {
             return;
         };
         let zero = T::splat(self.token, 0.0);
-        let sign = zero.like(side.sign());
         let rows = &mut self.Z[slot * self.stride..][..BASE + self.movers[part].len()];
         rows.fill([zero; 3]);
         let last = rows.len() - 1;
@@ -378,12 +377,8 @@ impl<T: Lane> Rows<T> {
         for &slot in contacts.used_by_stops() {
             let here = contacts.slot(slot).active & lanes;
             let mover = self.movers[contacts.part(slot)].last();
-            if let (Some((_, side)), Some(mover)) = (contacts.stop(slot), mover) {
-                add(
-                    here,
-                    &mut out[mover.velocity],
-                    zero.like(side.sign()) * p[slot][0],
-                );
+            if let (Some((_, sign)), Some(mover)) = (contacts.stop(slot), mover) {
+                add(here, &mut out[mover.velocity], sign * p[slot][0]);
             }
         }
         out[..BASE].copy_from_slice(&[total.x, total.y, total.z, couple.x, couple.y, couple.z]);

@@ -7,7 +7,7 @@
 
 use std::sync::Arc;
 
-use super::machine::{Machine, SIDES, WheelDisc};
+use super::machine::{Machine, WheelDisc};
 use super::pattern::Pattern;
 use super::problem::MAX_CONTACTS;
 
@@ -41,15 +41,14 @@ impl Machine {
     /// Number of slots of the wheels and stops.
     fn n_own_slots(&self) -> usize {
         let of_wheels = self.wheels.iter().map(WheelDisc::n_slots).sum::<usize>();
-        of_wheels + SIDES * self.stops.len()
+        of_wheels + self.stops.len()
     }
 
     /// Bodies whose path each slot has, in order; `None`: all velocities.
     pub(super) fn slot_bodies(&self) -> Vec<Option<usize>> {
         let wheels = (self.wheels.iter())
             .flat_map(|wheel| std::iter::repeat_n(Some(wheel.body), wheel.n_slots()));
-        let stops =
-            (self.stops.iter()).flat_map(|stop| [Some(self.joints[stop.joint].body); SIDES]);
+        let stops = (self.stops.iter()).map(|stop| Some(self.joints[stop.joint].body));
         wheels
             .chain(self.spares.iter().copied())
             .chain(stops)

@@ -1,40 +1,14 @@
-//! What pivoting needs of the operator of its problems.
+//! How the problems of several rovers become the [systems](System) of their lanes.
 
-use super::modes::Mode;
-use super::problem::{ContactProblem, Triple};
+use super::equations::Block;
+use super::problem::ContactProblem;
+use crate::law::coulomb::ContactMode;
 use crate::scalar::Lane;
+use crate::solver::pivoting::{Few, System, Triple};
+use crate::solver::solve_one_contact;
 
-/// Operators `W` of several problems side by side, of at most `C` contacts each, and the linear
-/// systems of their modes.
-pub(super) trait System<T: Lane, const C: usize>: Sized {
-    /// Places of contacts, ascending.
-    type Places: Iterator<Item = usize>;
-
-    /// First `α` of the proximal term `α (p − c)`, relative to the mean diagonal of `W`. A step's
-    /// error is `α` times the change of the impulse, and the rounding of `W p + q`, divided by `α`,
-    /// drifts into the null space of `W`. The ratio test bounds that where wheels slide. A parked
-    /// rover, whose impulses hardly change, collects it step by step: its `α` may be larger.
-    const ALPHA: f64;
-
-    /// The same for a parked rover.
-    const PARKED_ALPHA: f64;
-
-    /// Smallest `α`, relative to the mean diagonal of `W`, for which the systems are accurate.
-    const SMALLEST_ALPHA: f64;
-
-    /// Smallest `α` of further attempts. Below [`Self::SMALLEST_ALPHA`] a Newton point is corrected
-    /// once with the factors of its system.
-    const SMALLEST_ALPHA_AGAIN: f64;
-
-    /// Whether a solve's first full step stays near the impulses of the last step, rather than near
-    /// those from which it starts.
-    const RETURNS: bool;
-
-    /// Squared relative residual after a full step below which the same factors may correct the
-    /// rest, and most such corrections. Where the slides still turn, a fresh step gains more.
-    const NEAR: f64;
-    const CORRECTIONS: usize;
-
+/// Systems of at most `C` contacts, each of a lane's own problem.
+pub(super) trait Loaded<T: Lane, const C: usize>: System<T, Few<C>> + Sized {
     /// Most steps of an attempt. What is unsolved then goes in circles, mostly.
     const MAX_STEPS: usize;
 
@@ -53,29 +27,19 @@ pub(super) trait System<T: Lane, const C: usize>: Sized {
     /// Diagonal block of a problem's contact.
     fn block_of(problem: &ContactProblem, contact: usize) -> &[f64; 9];
 
-    /// Places of contacts of any lane.
-    fn places(&self) -> Self::Places;
+    /// Free velocity of a place, m/s.
+    fn free_velocity(&mut self, place: usize) -> &mut Triple<T>;
+}
 
-    /// Diagonal block of a place.
-    fn diagonal(&self, place: usize) -> &[T; 9];
-
-    /// `u = W p + q`.
-    fn velocities(&mut self, q: &[Triple<T>; C], p: &[Triple<T>; C], u: &mut [Triple<T>; C]);
-
-    /// Factors the system of the modes.
-    fn factorise(&mut self, alpha: T, modes: &[Mode<T>; C]);
-
-    /// The impulses of the Newton step about the impulses `centre`, into `y`.
-    fn newton_point(
-        &mut self,
-        q: &[Triple<T>; C],
-        centre: &[Triple<T>; C],
-        alpha: T,
-        modes: &[Mode<T>; C],
-        y: &mut [Triple<T>; C],
-    );
-
-    /// The change of the impulses, into `y`, that removes the velocities `u` as far as the modes
-    /// allow; the factors may be those of modes at nearby impulses.
-    fn correction(&mut self, u: &[Triple<T>; C], modes: &[Mode<T>; C], y: &mut [Triple<T>; C]);
+/// Mode and impulse of a lane's contact with the diagonal block `W`, see [`System::solve_one`].
+#[inline(always)]
+pub(super) fn solve_one<T: Lane>(
+    W: &Block<T>,
+    lane: usize,
+    free: &Triple<f64>,
+    mu: f64,
+) -> (ContactMode, Triple<f64>) {
+    let [a, b, c, d, e, f, g, h, k] = W.map(|w| w.get(lane));
+    let own = solve_one_contact(&[[a, b, c], [d, e, f], [g, h, k]], free, mu);
+    (own.mode, own.impulse)
 }

@@ -2,7 +2,7 @@
 //!
 //! Where a machine has more contacts than its velocities can tell apart, `W = Zᵀ Z + D` is a large
 //! matrix of small rank: six cylinders on a plane have twelve contacts, 36 impulses and 21
-//! velocities. With the modes' columns `C_i` and rows `B_i` ([`super::modes`]) the equations
+//! velocities. With the modes' columns `C_i` and rows `B_i` ([`Mode`]) the equations
 //!
 //! ```text
 //! Bᵀ (Zᵀ Z + D + α I) C y + γ y = r
@@ -22,14 +22,15 @@
 
 use std::sync::Arc;
 
-use super::equations::{Block, across, impulse};
-use super::modes::Mode;
+use super::equations::Block;
 use super::pattern::Pattern;
-use super::problem::{ContactProblem, Triple};
-use super::system::System;
+use super::problem::ContactProblem;
+use super::system::{Loaded, solve_one};
 use super::tree_matrix::{Base, Columns, TreeMatrix, product};
+use crate::law::coulomb::ContactMode;
 use crate::multibody::model::BASE;
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
+use crate::solver::pivoting::{Few, Mode, System, Triple};
 
 /// Factored operators of several problems of one machine; a contact's place is its slot.
 #[derive(Clone, Debug)]
@@ -41,6 +42,7 @@ pub(super) struct VelocitySystem<T: Lane, const C: usize> {
     used: u32,
     /// `Z` by slot; zero in lanes without a contact there.
     Z: Vec<Columns<T>>,
+    q: [Triple<T>; C],
     /// Diagonal blocks of W, and the diagonal of D, 1/kg.
     diagonal: [Block<T>; C],
     softness: [T; C],
@@ -179,16 +181,16 @@ impl<T: Lane, const C: usize> VelocitySystem<T, C> {
     fn solve(&mut self, modes: &[Mode<T>; C], r: &mut [Triple<T>; C]) {
         self.rest();
         for i in Bits(self.used) {
-            let p = impulse(&modes[i], scaled(&self.inverse[i], &r[i]));
+            let p = modes[i].impulse(scaled(&self.inverse[i], &r[i]));
             self.push(i, &p);
         }
         let pattern = Self::pattern(self.pattern.as_ref());
         self.matrix.solve(pattern, &mut self.base, &mut self.joints);
         for i in Bits(self.used) {
-            let taken = across(&modes[i], self.local(i));
+            let taken = modes[i].across(self.local(i));
             let [r0, r1, r2] = r[i];
             let rest = [r0 - taken[0], r1 - taken[1], r2 - taken[2]];
-            r[i] = impulse(&modes[i], scaled(&self.inverse[i], &rest));
+            r[i] = modes[i].impulse(scaled(&self.inverse[i], &rest));
         }
     }
 }
@@ -204,7 +206,7 @@ fn scaled<T: Lane>(g: &Triple<T>, y: &Triple<T>) -> Triple<T> {
     [g[0] * y[0], g[1] * y[1], g[2] * y[2]]
 }
 
-impl<T: Lane, const C: usize> System<T, C> for VelocitySystem<T, C> {
+impl<T: Lane, const C: usize> System<T, Few<C>> for VelocitySystem<T, C> {
     type Places = Bits;
 
     const ALPHA: f64 = 1e-4;
@@ -218,6 +220,96 @@ impl<T: Lane, const C: usize> System<T, C> for VelocitySystem<T, C> {
     // of the systems and cost a sixth more instructions.
     const NEAR: f64 = 1e-14;
     const CORRECTIONS: usize = 2;
+
+    #[inline(always)]
+    fn places(&self) -> Bits {
+        Bits(self.used)
+    }
+
+    #[inline(always)]
+    fn velocities(&mut self, p: &[Triple<T>; C], u: &mut [Triple<T>; C]) {
+        self.rest();
+        for i in Bits(self.used) {
+            self.push(i, &p[i]);
+        }
+        for i in Bits(self.used) {
+            let local = self.local(i);
+            for k in 0..3 {
+                u[i][k] = local[k] + self.softness[i] * p[i][k] + self.q[i][k];
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn factorise(&mut self, alpha: T, modes: &[Mode<T>; C]) -> bool {
+        let zero = self.zero;
+        let one = zero.like(1.0);
+        self.matrix.clear(zero);
+        for i in Bits(self.used) {
+            let Mode {
+                b,
+                closed,
+                stick,
+                gamma,
+                ..
+            } = &modes[i];
+            let own = alpha + self.softness[i];
+            let inverse = one / own;
+            self.inverse[i] = [
+                T::select(*closed, inverse, zero),
+                one / ((b[0] * b[0] + b[1] * b[1]) * own + *gamma),
+                T::select(*stick, inverse, zero),
+            ];
+            self.add(i, &modes[i]);
+        }
+        let pattern = Self::pattern(self.pattern.as_ref());
+        self.matrix.factorise(pattern);
+        true
+    }
+
+    #[inline(always)]
+    fn newton_point(
+        &mut self,
+        _: &[Triple<T>; C],
+        centre: &[Triple<T>; C],
+        alpha: T,
+        modes: &[Mode<T>; C],
+        y: &mut [Triple<T>; C],
+    ) {
+        for i in Bits(self.used) {
+            let (c, q) = (&centre[i], &self.q[i]);
+            let rest = [
+                alpha * c[0] - q[0],
+                alpha * c[1] - q[1],
+                alpha * c[2] - q[2],
+            ];
+            y[i] = modes[i].across(rest);
+        }
+        self.solve(modes, y);
+    }
+
+    #[inline(always)]
+    fn correction(&mut self, u: &[Triple<T>; C], modes: &[Mode<T>; C], y: &mut [Triple<T>; C]) {
+        for i in Bits(self.used) {
+            let [u0, u1, u2] = u[i];
+            y[i] = modes[i].across([-u0, -u1, -u2]);
+        }
+        self.solve(modes, y);
+    }
+
+    #[inline(always)]
+    fn solve_one(
+        &self,
+        place: usize,
+        lane: usize,
+        free: &Triple<f64>,
+        mu: f64,
+    ) -> (ContactMode, Triple<f64>) {
+        solve_one(&self.diagonal[place], lane, free, mu)
+    }
+}
+
+impl<T: Lane, const C: usize> Loaded<T, C> for VelocitySystem<T, C> {
     const MAX_STEPS: usize = 40;
 
     fn new(token: T::Token) -> Self {
@@ -228,6 +320,7 @@ impl<T: Lane, const C: usize> System<T, C> for VelocitySystem<T, C> {
             slots: [0; MAX_LANES],
             used: 0,
             Z: Vec::new(),
+            q: [[zero; 3]; C],
             diagonal: [[zero; 9]; C],
             softness: [zero; C],
             inverse: [[zero; 3]; C],
@@ -305,83 +398,8 @@ impl<T: Lane, const C: usize> System<T, C> for VelocitySystem<T, C> {
     }
 
     #[inline(always)]
-    fn places(&self) -> Bits {
-        Bits(self.used)
-    }
-
-    #[inline(always)]
-    fn diagonal(&self, place: usize) -> &Block<T> {
-        &self.diagonal[place]
-    }
-
-    #[inline(always)]
-    fn velocities(&mut self, q: &[Triple<T>; C], p: &[Triple<T>; C], u: &mut [Triple<T>; C]) {
-        self.rest();
-        for i in Bits(self.used) {
-            self.push(i, &p[i]);
-        }
-        for i in Bits(self.used) {
-            let local = self.local(i);
-            for k in 0..3 {
-                u[i][k] = local[k] + self.softness[i] * p[i][k] + q[i][k];
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn factorise(&mut self, alpha: T, modes: &[Mode<T>; C]) {
-        let zero = self.zero;
-        let one = zero.like(1.0);
-        self.matrix.clear(zero);
-        for i in Bits(self.used) {
-            let Mode {
-                b,
-                closed,
-                stick,
-                gamma,
-                ..
-            } = &modes[i];
-            let own = alpha + self.softness[i];
-            let inverse = one / own;
-            self.inverse[i] = [
-                T::select(*closed, inverse, zero),
-                one / ((b[0] * b[0] + b[1] * b[1]) * own + *gamma),
-                T::select(*stick, inverse, zero),
-            ];
-            self.add(i, &modes[i]);
-        }
-        let pattern = Self::pattern(self.pattern.as_ref());
-        self.matrix.factorise(pattern);
-    }
-
-    #[inline(always)]
-    fn newton_point(
-        &mut self,
-        q: &[Triple<T>; C],
-        centre: &[Triple<T>; C],
-        alpha: T,
-        modes: &[Mode<T>; C],
-        y: &mut [Triple<T>; C],
-    ) {
-        for i in Bits(self.used) {
-            let (c, q) = (&centre[i], &q[i]);
-            let rest = [
-                alpha * c[0] - q[0],
-                alpha * c[1] - q[1],
-                alpha * c[2] - q[2],
-            ];
-            y[i] = across(&modes[i], rest);
-        }
-        self.solve(modes, y);
-    }
-
-    #[inline(always)]
-    fn correction(&mut self, u: &[Triple<T>; C], modes: &[Mode<T>; C], y: &mut [Triple<T>; C]) {
-        for i in Bits(self.used) {
-            let [u0, u1, u2] = u[i];
-            y[i] = across(&modes[i], [-u0, -u1, -u2]);
-        }
-        self.solve(modes, y);
+    fn free_velocity(&mut self, place: usize) -> &mut Triple<T> {
+        &mut self.q[place]
     }
 }
 
@@ -393,6 +411,7 @@ pub(super) mod tests {
     use crate::lanes::problem::{MAX_CONTACTS, MAX_DENSE, block};
     use crate::multibody::{Model, ModelDescription};
     use crate::scalar::Single;
+    use crate::solver::pivoting::rests;
     use proptest::prelude::*;
 
     pub(in crate::lanes) fn pattern() -> Arc<Pattern> {
@@ -478,8 +497,9 @@ pub(super) mod tests {
             };
             let [p, q, centre, _] = few;
             let [p_many, q_many, centre_many, _] = many;
-            dense.velocities(&q, &p, &mut few[3]);
-            own.velocities(&q_many, &p_many, &mut many[3]);
+            (dense.q, own.q) = (q, q_many);
+            dense.velocities(&p, &mut few[3]);
+            own.velocities(&p_many, &mut many[3]);
             prop_assert!(close(&few[3], &many[3]));
             dense.factorise(0.1, &of_few);
             own.factorise(0.1, &of_many);
@@ -491,6 +511,32 @@ pub(super) mod tests {
             own.correction(&q_many, &of_many, &mut many[3]);
             prop_assume!(few[3].iter().flatten().all(|x| x.abs() < 1e3));
             prop_assert!(close(&few[3], &many[3]));
+        }
+
+        #[test]
+        fn the_newton_point_of_a_small_alpha_is_as_accurate_as_that_of_a_large_one(
+            numbers in prop::collection::vec(-1.0..1.0_f64, 600), modes in prop::collection::vec(0..3, MAX_DENSE),
+        ) {
+            let pattern = pattern();
+            let problem = problem(&pattern, &mut numbers.iter().copied());
+            let mut own = VelocitySystem::<f64, MAX_CONTACTS>::new(Single::best());
+            prop_assert_eq!(own.load(0, &problem).count(), MAX_DENSE);
+            let mut centre = [[0.0; 3]; MAX_CONTACTS];
+            let mut of_many = [Mode::open(0.0); MAX_CONTACTS];
+            let mut more = numbers.iter().rev().copied();
+            for i in 0..MAX_DENSE {
+                for x in own.q[i].iter_mut().chain(&mut centre[i]) {
+                    *x = more.next().unwrap();
+                }
+                // Friction that opposes the slip, so that its direction turns.
+                let p = centre[i];
+                of_many[i] = Mode::of(0.3, modes[i] > 0, modes[i] == 1, &p, &[0.0, -p[1], -p[2]]);
+            }
+            let rests = rests(&mut own, 1e-8, of_many, centre);
+            prop_assume!(rests.is_some());
+            let [before, after] = rests.unwrap();
+            prop_assert!(before < 1e-4, "{before:e}");
+            prop_assert!(after < 1e-12, "{before:e} {after:e}");
         }
     }
 }

@@ -84,20 +84,8 @@ impl Configuration {
     /// `self = from ⊕ h v`: moves with the velocity `v` (nv) for `h` seconds along the exponential
     /// maps of the joints.
     pub fn set_moved(&mut self, model: &Model, from: &Self, v: &[f64], h: f64) {
-        let joints = self.joints.iter_mut().zip(&from.joints);
-        for ((q, q0), &k) in joints.zip(model.joint_velocities()) {
-            *q = q0 + h * v[k];
-        }
-        for (joint, k) in model.rotating_joints() {
-            match joint {
-                Joint::Free(free) => self.set_pose(*free, from.pose(*free).moved(&v[*k..], h)),
-                Joint::Spherical(Spherical { rotation }) => {
-                    let before = &from.rotations[*rotation];
-                    self.rotations[*rotation] = Spherical::moved(before, &v[*k..], h);
-                }
-                Joint::Fixed | Joint::Revolute(_) | Joint::Prismatic(_) => {}
-            }
-        }
+        self.clone_from(from);
+        self.advance(model, v, h);
     }
 
     /// `self ⊕= h v`, in place.

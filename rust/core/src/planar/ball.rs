@@ -9,10 +9,10 @@
 //! gradient, and turning does not change the gap. The report's (3.8) has the
 //! opposite sign, and its (3.17) turns the contact point with the ball.
 
-use nalgebra::{SMatrix, SVector, Vector2};
+use nalgebra::Vector2;
 
 use super::error::PlanarError;
-use super::machine::{Disc, PlanarMachine, fingerprint};
+use super::tree::{Part, PlanarTree, Wheel, fingerprint};
 use crate::quantity::{INERTIAS, LENGTHS, MASSES, within};
 
 /// A disc.
@@ -35,85 +35,19 @@ impl Ball {
             inertia: within(|| "inertia".to_owned(), inertia, INERTIAS)?,
         })
     }
-
-    /// kg.
-    #[must_use]
-    pub fn mass(&self) -> f64 {
-        self.mass
-    }
-
-    /// m.
-    #[must_use]
-    pub fn radius(&self) -> f64 {
-        self.radius
-    }
-
-    /// kg m².
-    #[must_use]
-    pub fn inertia(&self) -> f64 {
-        self.inertia
-    }
 }
 
-impl PlanarMachine<3> for Ball {
-    fn mass_matrix(&self, _q: &SVector<f64, 3>) -> SMatrix<f64, 3, 3> {
-        SMatrix::from_diagonal(&SVector::from([self.mass, self.mass, self.inertia]))
-    }
-
-    fn force(
-        &self,
-        _q: &SVector<f64, 3>,
-        _v: &SVector<f64, 3>,
-        gravity: &Vector2<f64>,
-        torques: &[f64],
-    ) -> SVector<f64, 3> {
-        SVector::from([
-            self.mass * gravity.x,
-            self.mass * gravity.y,
-            // A positive torque drives forward.
-            -torques[0],
-        ])
-    }
-
-    fn potential(&self, q: &SVector<f64, 3>, gravity: &Vector2<f64>) -> f64 {
-        -self.mass * gravity.dot(&q.xy())
-    }
-
-    fn n_inputs(&self) -> usize {
-        1
-    }
-
-    /// It looks the same from all sides.
-    fn turning(&self, _v: &SVector<f64, 3>) -> f64 {
-        0.0
-    }
-
-    fn n_discs(&self) -> usize {
-        1
-    }
-
-    fn disc(&self, _i: usize, q: &SVector<f64, 3>) -> Disc {
-        Disc {
-            centre: q.xy(),
-            radius: self.radius,
-        }
-    }
-
-    fn point_jacobian(
-        &self,
-        _i: usize,
-        q: &SVector<f64, 3>,
-        point: &Vector2<f64>,
-    ) -> SMatrix<f64, 2, 3> {
-        let r = point - q.xy();
-        SMatrix::<f64, 2, 3>::new(1.0, 0.0, -r.y, 0.0, 1.0, r.x)
-    }
-
-    fn arms(&self) -> SVector<f64, 3> {
-        SVector::from([1.0, 1.0, self.radius])
-    }
-
-    fn fingerprint(&self) -> u64 {
-        fingerprint("ball", [self.mass, self.radius, self.inertia])
+impl From<Ball> for PlanarTree {
+    fn from(ball: Ball) -> Self {
+        let Ball {
+            mass,
+            radius,
+            inertia,
+        } = ball;
+        Self::new(
+            vec![Part::centred(Vector2::zeros(), mass, inertia)],
+            vec![Wheel::driven(0, radius)],
+            fingerprint("ball", [mass, radius, inertia]),
+        )
     }
 }

@@ -71,14 +71,6 @@ pub enum PlanarError {
         /// Its name.
         body: String,
     },
-    /// A rover with another number of planar coordinates than there is a simulation for.
-    #[error("model: needs {expected} coordinates in the plane, has {count}")]
-    CoordinateCount {
-        /// How many are needed.
-        expected: usize,
-        /// How many there are.
-        count: usize,
-    },
 }
 
 impl PlanarError {
@@ -88,7 +80,7 @@ impl PlanarError {
         match self {
             Self::Number(number) => number.field().to_owned(),
             Self::WheelsOverlap { .. } => "axle_b".to_owned(),
-            Self::NotMirrored { .. } | Self::CoordinateCount { .. } => "model".to_owned(),
+            Self::NotMirrored { .. } => "model".to_owned(),
             Self::TooFewPoints { .. } | Self::TooManyPoints { .. } => "x".to_owned(),
             Self::MismatchedLengths { .. } => "y".to_owned(),
             Self::NotAFunction { index, .. } => format!("x[{index}]"),

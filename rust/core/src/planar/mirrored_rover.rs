@@ -16,78 +16,29 @@
 //! Coordinates: x, y of the base's origin, its angle, then the angle of each pair's joint relative
 //! to its carrier. Only wheels touch the ground; boxes do not.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 use super::error::PlanarError;
-use super::machine::{Disc, PlanarMachine, PlanarMotor};
-use crate::multibody::{Body, Joint, JointAxis, JointProperties, Model, Motor, Passive};
-use crate::scalar::elementary::sin_cos;
+use super::tree::{Part, PlanarTree, Wheel};
+use crate::multibody::{Body, Joint, JointAxis, JointProperties, Model, Passive};
 
 /// Relative difference up to which two sides count as mirror images.
 const ALIKE: f64 = 1e-9;
 
-/// A pair of mirrored bodies, or one body in the plane of symmetry.
+/// The planar image of a mirrored rover: 3 coordinates of the base, one for each pair of joints.
 #[derive(Clone, Debug)]
-struct Part {
-    /// Bodies of the model.
-    bodies: Vec<usize>,
-    /// Part that carries it (0 for the base itself).
-    parent: usize,
-    /// Joint in the parent's axes, m.
-    joint: Vector2<f64>,
-    /// kg, of all its bodies.
-    mass: f64,
-    /// Mass centre in its own axes, m.
-    centre: Vector2<f64>,
-    /// About the mass centre, kg m².
-    inertia: f64,
-    /// Its rotation does not change the mass distribution.
-    is_spinner: bool,
-}
-
-/// A pair of mirrored wheels.
-#[derive(Clone, Debug)]
-struct WheelPair {
-    names: Vec<String>,
-    part: usize,
-    /// In its part's axes, m.
-    centre: Vector2<f64>,
-    /// m.
-    radius: f64,
-    /// Largest torque of each wheel, N m.
-    torque_limit: f64,
-    /// Joint torque of a unit of command: the number of wheels and their
-    /// sign; 0 where the joint is locked.
-    gain: f64,
-    /// Torque–speed line of each wheel's motor.
-    motor: Option<Motor>,
-}
-
-/// The planar image of a mirrored rover, with `NV` coordinates: 3 of the
-/// base, one for each pair of joints.
-#[derive(Clone, Debug)]
-pub struct MirroredRover<const NV: usize> {
+pub struct MirroredRover {
     model: Model,
-    parts: Vec<Part>,
-    wheels: Vec<WheelPair>,
+    tree: PlanarTree,
+    /// Bodies of the model that are each part of the tree.
+    bodies: Vec<Vec<usize>>,
+    wheel_names: Vec<Vec<String>>,
 }
 
-/// Origin and direction of its x axis of every part.
-struct Placed<const NV: usize> {
-    origin: [Vector2<f64>; NV],
-    x_axis: [Vector2<f64>; NV],
-}
-
-impl<const NV: usize> Placed<NV> {
-    fn point(&self, part: usize, p: &Vector2<f64>) -> Vector2<f64> {
-        let x_axis = &self.x_axis[part];
-        self.origin[part] + x_axis * p.x + left(x_axis) * p.y
+impl From<MirroredRover> for PlanarTree {
+    fn from(rover: MirroredRover) -> Self {
+        rover.tree
     }
-}
-
-/// Rotation by a quarter turn to the left: the velocity at `r` for a unit rate.
-fn left(r: &Vector2<f64>) -> Vector2<f64> {
-    Vector2::new(-r.y, r.x)
 }
 
 fn inertia_of(body: &Body) -> Matrix3<f64> {
@@ -95,12 +46,11 @@ fn inertia_of(body: &Body) -> Matrix3<f64> {
     body.principal_axes.map_or(I, |P| P * I * P.transpose())
 }
 
-impl<const NV: usize> MirroredRover<NV> {
+impl MirroredRover {
     /// The planar image of a model, all joints that do not turn about z locked at zero.
     ///
     /// # Errors
-    /// A joint that a lock has turned out of the plane, a body without its
-    /// mirror image, another number of coordinates.
+    /// A joint that a lock has turned out of the plane, a body without its mirror image.
     pub fn new(model: &Model) -> Result<Self, PlanarError> {
         let across: Vec<(String, f64)> = model.bodies()[1..]
             .iter()
@@ -112,18 +62,13 @@ impl<const NV: usize> MirroredRover<NV> {
             .map_err(|_| PlanarError::NotMirrored {
                 body: model.bodies()[0].name.clone(),
             })?;
-        let parts = pair_bodies(&model)?;
-        if parts.len() + 2 != NV {
-            return Err(PlanarError::CoordinateCount {
-                expected: NV,
-                count: parts.len() + 2,
-            });
-        }
-        let wheels = pair_wheels(&model, &parts)?;
+        let (parts, bodies) = pair_bodies(&model)?;
+        let (wheels, wheel_names) = pair_wheels(&model, &bodies)?;
         Ok(Self {
+            tree: PlanarTree::new(parts, wheels, model.fingerprint()),
             model,
-            parts,
-            wheels,
+            bodies,
+            wheel_names,
         })
     }
 
@@ -133,18 +78,24 @@ impl<const NV: usize> MirroredRover<NV> {
         &self.model
     }
 
+    /// The image.
+    #[must_use]
+    pub fn tree(&self) -> &PlanarTree {
+        &self.tree
+    }
+
     /// Names of the joints that share each coordinate from the fourth on.
     #[must_use]
     pub fn joints(&self) -> Vec<Vec<String>> {
         let name = |&b: &usize| self.model.bodies()[b].name.clone();
-        let names = |part: &Part| part.bodies.iter().map(name).collect();
-        self.parts[1..].iter().map(names).collect()
+        let names = |bodies: &Vec<usize>| bodies.iter().map(name).collect();
+        self.bodies[1..].iter().map(names).collect()
     }
 
     /// Names of the wheels of each disc.
     #[must_use]
-    pub fn wheel_names(&self) -> Vec<Vec<String>> {
-        self.wheels.iter().map(|w| w.names.clone()).collect()
+    pub fn wheel_names(&self) -> &[Vec<String>] {
+        &self.wheel_names
     }
 
     /// Velocity indices of [`Self::model`] that follow planar coordinate
@@ -155,49 +106,15 @@ impl<const NV: usize> MirroredRover<NV> {
             0 | 1 => vec![k],
             2 => vec![5],
             _ => {
-                let bodies = self.parts[k - 2].bodies.iter();
+                let bodies = self.bodies[k - 2].iter();
                 bodies.map(|&b| self.model.bodies()[b].velocity).collect()
             }
         }
     }
-
-    fn place(&self, q: &SVector<f64, NV>) -> Placed<NV> {
-        let mut placed = Placed {
-            origin: [Vector2::zeros(); NV],
-            x_axis: [Vector2::x(); NV],
-        };
-        for (b, part) in self.parts.iter().enumerate() {
-            if b == 0 {
-                placed.origin[0] = Vector2::new(q[0], q[1]);
-            } else {
-                placed.origin[b] = placed.point(part.parent, &part.joint);
-            }
-            let carrier = placed.x_axis[part.parent];
-            placed.x_axis[b] = if part.is_spinner {
-                carrier
-            } else {
-                let (s, c) = sin_cos(q[2 + b]);
-                carrier * c + left(&carrier) * s
-            };
-        }
-        placed
-    }
-
-    /// Calls `visit` with the part itself and all that carry it, up to the base.
-    fn for_path(&self, part: usize, mut visit: impl FnMut(usize)) {
-        let mut a = part;
-        loop {
-            visit(a);
-            if a == 0 {
-                return;
-            }
-            a = self.parts[a].parent;
-        }
-    }
 }
 
-/// Groups the bodies of a planar tree by mirror images.
-fn pair_bodies(model: &Model) -> Result<Vec<Part>, PlanarError> {
+/// Groups the bodies of a planar tree by mirror images: the parts, and the bodies of each.
+fn pair_bodies(model: &Model) -> Result<(Vec<Part>, Vec<Vec<usize>>), PlanarError> {
     let bodies = model.bodies();
     // Nothing rotates out of the plane, so z adds up along the tree.
     let mut z = vec![0.0; bodies.len()];
@@ -240,7 +157,7 @@ fn pair_bodies(model: &Model) -> Result<Vec<Part>, PlanarError> {
             && (I - J).norm() <= ALIKE * I.norm()
     };
     let mut part_of: Vec<Option<usize>> = vec![None; bodies.len()];
-    let mut parts: Vec<Part> = Vec::new();
+    let (mut parts, mut groups) = (Vec::new(), Vec::new());
     for (a, body) in bodies.iter().enumerate() {
         if part_of[a].is_some() {
             continue;
@@ -270,31 +187,36 @@ fn pair_bodies(model: &Model) -> Result<Vec<Part>, PlanarError> {
             mass: group.iter().map(|&b| bodies[b].mass).sum(),
             centre: body.centre_of_mass.xy(),
             inertia: group.iter().map(|&b| inertia_of(&bodies[b])[(2, 2)]).sum(),
+            is_absolute: false,
             is_spinner: group.iter().all(|&b| bodies[b].is_spinner),
-            bodies: group,
         });
+        groups.push(group);
     }
-    Ok(parts)
+    Ok((parts, groups))
 }
 
-/// Groups the wheels by the parts that carry them.
-fn pair_wheels(model: &Model, parts: &[Part]) -> Result<Vec<WheelPair>, PlanarError> {
-    let mut pairs: Vec<(WheelPair, f64)> = Vec::new();
+/// Groups the wheels by the parts that carry them: the pairs, and the names of each.
+#[allow(clippy::type_complexity)] // two lists
+fn pair_wheels(
+    model: &Model,
+    bodies: &[Vec<usize>],
+) -> Result<(Vec<Wheel>, Vec<Vec<String>>), PlanarError> {
+    let mut pairs: Vec<(Wheel, f64, Vec<String>)> = Vec::new();
     for wheel in model.wheels() {
         let refused = || PlanarError::NotMirrored {
             body: wheel.name.clone(),
         };
-        let part = parts.iter().position(|p| p.bodies.contains(&wheel.body));
+        let part = bodies.iter().position(|b| b.contains(&wheel.body));
         let part = part.ok_or_else(refused)?;
         if wheel.axle.xy().norm() > ALIKE {
             return Err(refused());
         }
         let gain = wheel.joint.map_or(0.0, |_| wheel.drive_sign);
-        let known = pairs.iter_mut().find(|(pair, _)| {
+        let known = pairs.iter_mut().find(|(pair, ..)| {
             pair.part == part
                 && (pair.centre - wheel.centre.xy()).norm() <= ALIKE * (1.0 + pair.centre.norm())
         });
-        if let Some((pair, sign)) = known {
+        if let Some((pair, sign, names)) = known {
             let differs = |a: f64, b: f64| (a - b).abs() > ALIKE * a.abs();
             if differs(pair.radius, wheel.radius)
                 || differs(pair.torque_limit, wheel.torque_limit)
@@ -304,10 +226,9 @@ fn pair_wheels(model: &Model, parts: &[Part]) -> Result<Vec<WheelPair>, PlanarEr
                 return Err(refused());
             }
             pair.gain += gain;
-            pair.names.push(wheel.name.clone());
+            names.push(wheel.name.clone());
         } else {
-            let pair = WheelPair {
-                names: vec![wheel.name.clone()],
+            let pair = Wheel {
                 part,
                 centre: wheel.centre.xy(),
                 radius: wheel.radius,
@@ -315,151 +236,16 @@ fn pair_wheels(model: &Model, parts: &[Part]) -> Result<Vec<WheelPair>, PlanarEr
                 gain,
                 motor: wheel.motor,
             };
-            pairs.push((pair, gain));
+            pairs.push((pair, gain, vec![wheel.name.clone()]));
         }
     }
-    for (pair, _) in &pairs {
-        if pair.names.len() != parts[pair.part].bodies.len() {
+    for (pair, _, names) in &pairs {
+        if names.len() != bodies[pair.part].len() {
             return Err(PlanarError::NotMirrored {
-                body: pair.names[0].clone(),
+                body: names[0].clone(),
             });
         }
     }
-    Ok(pairs.into_iter().map(|(pair, _)| pair).collect())
-}
-
-impl<const NV: usize> PlanarMachine<NV> for MirroredRover<NV> {
-    fn mass_matrix(&self, q: &SVector<f64, NV>) -> SMatrix<f64, NV, NV> {
-        let placed = self.place(q);
-        let mut M = SMatrix::<f64, NV, NV>::zeros();
-        for (b, part) in self.parts.iter().enumerate() {
-            let (m, c) = (part.mass, placed.point(b, &part.centre));
-            M[(0, 0)] += m;
-            M[(1, 1)] += m;
-            self.for_path(b, |i| {
-                let turn = left(&(c - placed.origin[i]));
-                M[(0, 2 + i)] += m * turn.x;
-                M[(1, 2 + i)] += m * turn.y;
-                self.for_path(i, |j| {
-                    let other = left(&(c - placed.origin[j]));
-                    M[(2 + j, 2 + i)] += m * turn.dot(&other) + part.inertia;
-                });
-            });
-        }
-        M.fill_lower_triangle_with_upper_triangle();
-        M
-    }
-
-    fn force(
-        &self,
-        q: &SVector<f64, NV>,
-        v: &SVector<f64, NV>,
-        gravity: &Vector2<f64>,
-        torques: &[f64],
-    ) -> SVector<f64, NV> {
-        let placed = self.place(q);
-        let mut omega = [0.0; NV];
-        // Acceleration of each part's origin while no rate changes.
-        let mut a = [Vector2::zeros(); NV];
-        let mut F = SVector::<f64, NV>::zeros();
-        for (b, part) in self.parts.iter().enumerate() {
-            let p = part.parent;
-            if b > 0 {
-                a[b] = a[p] - (placed.origin[b] - placed.origin[p]) * (omega[p] * omega[p]);
-            }
-            omega[b] = v[2 + b] + if b > 0 { omega[p] } else { 0.0 };
-            let c = placed.point(b, &part.centre);
-            let centripetal = (c - placed.origin[b]) * (omega[b] * omega[b]);
-            let f = (gravity - a[b] + centripetal) * part.mass;
-            F[0] += f.x;
-            F[1] += f.y;
-            self.for_path(b, |i| F[2 + i] += left(&(c - placed.origin[i])).dot(&f));
-        }
-        for (wheel, torque) in self.wheels.iter().zip(torques) {
-            F[2 + wheel.part] += wheel.gain * torque;
-        }
-        F
-    }
-
-    fn potential(&self, q: &SVector<f64, NV>, gravity: &Vector2<f64>) -> f64 {
-        let placed = self.place(q);
-        let of =
-            |(b, part): (usize, &Part)| part.mass * gravity.dot(&placed.point(b, &part.centre));
-        -self.parts.iter().enumerate().map(of).sum::<f64>()
-    }
-
-    fn n_inputs(&self) -> usize {
-        self.wheels.len()
-    }
-
-    fn torque_limit(&self, i: usize) -> f64 {
-        self.wheels[i].torque_limit
-    }
-
-    fn motor(&self, i: usize) -> Option<PlanarMotor> {
-        let wheel = &self.wheels[i];
-        let motor = wheel.motor.filter(|_| wheel.gain != 0.0)?;
-        Some(PlanarMotor {
-            motor,
-            coordinate: 2 + wheel.part,
-            gain: wheel.gain,
-        })
-    }
-
-    fn turning(&self, v: &SVector<f64, NV>) -> f64 {
-        let turns = self.parts.iter().enumerate().skip(1);
-        let joints = turns.filter(|(_, part)| !part.is_spinner);
-        v[2].abs() + joints.fold(0.0_f64, |most, (b, _)| most.max(v[2 + b].abs()))
-    }
-
-    fn n_discs(&self) -> usize {
-        self.wheels.len()
-    }
-
-    fn disc(&self, i: usize, q: &SVector<f64, NV>) -> Disc {
-        let wheel = &self.wheels[i];
-        Disc {
-            centre: self.place(q).point(wheel.part, &wheel.centre),
-            radius: wheel.radius,
-        }
-    }
-
-    fn point_jacobian(
-        &self,
-        i: usize,
-        q: &SVector<f64, NV>,
-        point: &Vector2<f64>,
-    ) -> SMatrix<f64, 2, NV> {
-        let placed = self.place(q);
-        let mut J = SMatrix::<f64, 2, NV>::zeros();
-        J[(0, 0)] = 1.0;
-        J[(1, 1)] = 1.0;
-        self.for_path(self.wheels[i].part, |a| {
-            J.set_column(2 + a, &left(&(point - placed.origin[a])));
-        });
-        J
-    }
-
-    fn arms(&self) -> SVector<f64, NV> {
-        let mut arms = SVector::<f64, NV>::zeros();
-        arms[0] = 1.0;
-        arms[1] = 1.0;
-        for wheel in &self.wheels {
-            let mut reach = wheel.centre.norm() + wheel.radius;
-            let mut b = wheel.part;
-            loop {
-                arms[2 + b] = arms[2 + b].max(reach);
-                if b == 0 {
-                    break;
-                }
-                reach += self.parts[b].joint.norm();
-                b = self.parts[b].parent;
-            }
-        }
-        arms
-    }
-
-    fn fingerprint(&self) -> u64 {
-        self.model.fingerprint()
-    }
+    let split = pairs.into_iter().map(|(pair, _, names)| (pair, names));
+    Ok(split.unzip())
 }

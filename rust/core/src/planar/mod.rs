@@ -2,10 +2,10 @@
 //! and the ground they run on.
 //!
 //! - [`ground`], [`curve`], [`polyline`]: the ground below a curve, and where a disc touches it;
-//! - [`machine`]: the interface of a machine with few coordinates;
-//! - [`ball`], [`two_wheel_rover`]: two such machines; [`mirrored_rover`]: the six-wheel rover
-//!   driven straight;
-//! - [`rig`]: one wheel at a given slip, for the drawbar pull on a [soil](crate::system::soil).
+//! - [`tree`]: kinematics and dynamics of a machine, a tree of bodies with wheels;
+//! - [`ball`], [`two_wheel_rover`]: the numbers of two such trees; [`mirrored_rover`]: that of the
+//!   six-wheel rover driven straight; [`rig`]: one wheel at a given slip, for the drawbar pull on a
+//!   [bed of disks](crate::system::grains).
 //!
 //! Time stepping, contact law and solver live elsewhere: [`crate::system::planar`] turns a machine
 //! on a ground into a mechanical system, and [`crate::simulation`] steps it like the rover. x
@@ -15,18 +15,18 @@ pub mod ball;
 pub mod curve;
 pub mod error;
 pub mod ground;
-pub mod machine;
 pub mod mirrored_rover;
 pub mod polyline;
 pub mod rig;
+pub mod tree;
 pub mod two_wheel_rover;
 
 pub use ball::Ball;
 pub use curve::{Curve, Line, Sine, Spline};
 pub use error::PlanarError;
 pub use ground::{ContactRule, Facing, Ground, MAX_FACING};
-pub use machine::{Disc, PlanarMachine, PlanarMotor};
 pub use mirrored_rover::MirroredRover;
 pub use polyline::Polyline;
 pub use rig::WheelRig;
+pub use tree::{Disc, PlanarMotor, PlanarPoses, PlanarTree};
 pub use two_wheel_rover::{PlanarWheel, TwoWheelRover};

@@ -22,12 +22,11 @@
 //! columns `(n, r_i × n, 0…)` and `(t, r_i × t, r)` with r in the wheel's own row: the body's turn
 //! moves the axle and never the rim.
 
-use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
+use nalgebra::Vector2;
 
 use super::error::PlanarError;
-use super::machine::{Disc, PlanarMachine, fingerprint};
+use super::tree::{Part, PlanarTree, Wheel, fingerprint};
 use crate::quantity::{INERTIAS, LENGTHS, MASSES, PLACES, within};
-use crate::scalar::elementary::sin_cos;
 
 /// A wheel and where its axle sits.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -110,115 +109,27 @@ impl TwoWheelRover {
     pub fn total_mass(&self) -> f64 {
         self.mass + self.wheels[0].mass + self.wheels[1].mass
     }
-
-    /// `r_A`, `r_B`: the axles relative to the body's mass centre, world axes, m.
-    fn arms_of(&self, q: &SVector<f64, 5>) -> [Vector2<f64>; 2] {
-        let (sin, cos) = sin_cos(q[2]);
-        let R = Matrix2::new(cos, -sin, sin, cos);
-        [R * self.wheels[0].axle, R * self.wheels[1].axle]
-    }
-
-    /// `Σ m_i r_i`, kg m.
-    fn moment(&self, q: &SVector<f64, 5>) -> Vector2<f64> {
-        let [a, b] = self.arms_of(q);
-        a * self.wheels[0].mass + b * self.wheels[1].mass
-    }
-
-    /// Mass centre of all, world, m.
-    #[must_use]
-    pub fn centre_of_mass(&self, q: &SVector<f64, 5>) -> Vector2<f64> {
-        q.xy() + self.moment(q) / self.total_mass()
-    }
 }
 
-impl PlanarMachine<5> for TwoWheelRover {
-    fn mass_matrix(&self, q: &SVector<f64, 5>) -> SMatrix<f64, 5, 5> {
-        let s = self.moment(q);
-        let around: f64 = self
-            .wheels
-            .iter()
-            .map(|w| w.mass * w.axle.norm_squared())
-            .sum();
-        let mut M = SMatrix::<f64, 5, 5>::zeros();
-        M[(0, 0)] = self.total_mass();
-        M[(1, 1)] = self.total_mass();
-        M[(2, 2)] = self.inertia + around;
-        M[(3, 3)] = self.wheels[0].inertia;
-        M[(4, 4)] = self.wheels[1].inertia;
-        (M[(0, 2)], M[(2, 0)]) = (-s.y, -s.y);
-        (M[(1, 2)], M[(2, 1)]) = (s.x, s.x);
-        M
-    }
-
-    fn force(
-        &self,
-        q: &SVector<f64, 5>,
-        v: &SVector<f64, 5>,
-        gravity: &Vector2<f64>,
-        torques: &[f64],
-    ) -> SVector<f64, 5> {
-        let s = self.moment(q);
-        let linear = gravity * self.total_mass() + s * (v[2] * v[2]);
-        SVector::from([
-            linear.x,
-            linear.y,
-            s.perp(gravity) + torques[0] + torques[1],
-            -torques[0],
-            -torques[1],
-        ])
-    }
-
-    fn potential(&self, q: &SVector<f64, 5>, gravity: &Vector2<f64>) -> f64 {
-        -self.total_mass() * gravity.dot(&self.centre_of_mass(q))
-    }
-
-    fn n_inputs(&self) -> usize {
-        2
-    }
-
-    fn turning(&self, v: &SVector<f64, 5>) -> f64 {
-        v[2].abs()
-    }
-
-    fn n_discs(&self) -> usize {
-        2
-    }
-
-    fn disc(&self, i: usize, q: &SVector<f64, 5>) -> Disc {
-        Disc {
-            centre: q.xy() + self.arms_of(q)[i],
-            radius: self.wheels[i].radius,
-        }
-    }
-
-    fn point_jacobian(
-        &self,
-        i: usize,
-        q: &SVector<f64, 5>,
-        point: &Vector2<f64>,
-    ) -> SMatrix<f64, 2, 5> {
-        let arm = self.arms_of(q)[i];
-        let rim = point - (q.xy() + arm);
-        let mut J = SMatrix::<f64, 2, 5>::zeros();
-        J[(0, 0)] = 1.0;
-        J[(1, 1)] = 1.0;
-        (J[(0, 2)], J[(1, 2)]) = (-arm.y, arm.x);
-        (J[(0, 3 + i)], J[(1, 3 + i)]) = (-rim.y, rim.x);
-        J
-    }
-
-    fn arms(&self) -> SVector<f64, 5> {
-        let [a, b] = &self.wheels;
-        let arm = a.axle.norm().max(b.axle.norm());
-        SVector::from([1.0, 1.0, arm, a.radius, b.radius])
-    }
-
-    fn fingerprint(&self) -> u64 {
+impl From<TwoWheelRover> for PlanarTree {
+    fn from(rover: TwoWheelRover) -> Self {
+        let TwoWheelRover {
+            mass,
+            inertia,
+            wheels,
+        } = rover;
+        let body = Part {
+            is_spinner: false,
+            ..Part::centred(Vector2::zeros(), mass, inertia)
+        };
+        let part = |w: PlanarWheel| Part::centred(w.axle, w.mass, w.inertia);
+        let [a, b] = wheels;
         let of_wheel = |w: &PlanarWheel| [w.mass, w.radius, w.inertia, w.axle.x, w.axle.y];
-        let wheels = self.wheels.iter().flat_map(of_wheel);
-        fingerprint(
-            "two wheels",
-            [self.mass, self.inertia].into_iter().chain(wheels),
+        let numbers = wheels.iter().flat_map(of_wheel);
+        Self::new(
+            vec![body, part(a), part(b)],
+            vec![Wheel::driven(1, a.radius), Wheel::driven(2, b.radius)],
+            fingerprint("two wheels", [mass, inertia].into_iter().chain(numbers)),
         )
     }
 }

@@ -12,13 +12,12 @@
 //! Source: Bekker 1969, *Introduction to Terrain–Vehicle Systems*; Janosi and Hanamoto 1961,
 //! *Analytical determination of drawbar pull as a function of slip*; Wong and Reece 1967.
 
-use nalgebra::{Matrix3, Vector3};
-
 use super::checks::{in_range, not_negative};
-use super::piece::{Piece, Stress};
+use super::piece::{Piece, Setting, Stress};
 use super::wheel::Skin;
 use crate::quantity::{QuantityError, positive};
-use crate::scalar::elementary::{exp, ln};
+use crate::scalar::elementary::{exp_m1, ln};
+use crate::scalar::{Lane, LaneMask, Vec3};
 
 /// A soil in the model of Bekker, Janosi and Hanamoto.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,55 +44,70 @@ const FADE: f64 = 0.05;
 const TINY: f64 = 1e-12;
 
 impl Bekker {
-    /// Stress on a piece.
+    /// Stress on pieces; its derivatives if they are wanted.
+    #[inline(always)]
     #[must_use]
-    pub fn stress(&self, piece: &Piece<'_>) -> Stress {
+    pub fn stress<T: Lane>(
+        &self,
+        piece: &Piece<T>,
+        setting: &Setting,
+        wants_slopes: bool,
+    ) -> Stress<T> {
         let (n, x) = (piece.normal, piece.x);
-        let size = x.norm();
-        if piece.skin == Skin::Wall || piece.depth <= 0.0 || size < TINY {
-            return Stress::NONE;
-        }
+        let number = |value: f64| n.x.like(value);
+        let (zero, one, tiny) = (number(0.0), number(1.0), number(TINY));
+        let mut found = Stress::none(n.x.token());
+        let length = x.norm();
+        let size = length.max(tiny);
         let x_n = x.dot(n);
-        let gate = 0.5 + x_n / (size * FADE);
-        if gate <= 0.0 {
-            return Stress::NONE;
+        let per_size = one / size;
+        let gate = number(0.5) + x_n * per_size * number(1.0 / FADE);
+        let is_felt = piece.depth.gt(zero) & length.ge(tiny) & gate.gt(zero);
+        if piece.skin == Skin::Wall || !is_felt.any() {
+            return found;
         }
-        let root = (size * size + FADE * FADE).sqrt();
-        let along = x / size;
-        let (mut share, mut by_x) = (size / root, along * (FADE * FADE / (root * root * root)));
-        if gate < 1.0 {
-            by_x = by_x * gate + (n - along * (x_n / size)) * (share / (size * FADE));
-            share *= gate;
-        }
-        let modulus = self.cohesive_modulus / piece.width.max(TINY) + self.frictional_modulus;
-        let sigma = modulus * exp(self.exponent * ln(piece.depth));
-        let by_depth = self.exponent * sigma / piece.depth;
+        let per_root = one / (size * size + number(FADE * FADE)).sqrt();
+        let along = x * per_size;
+        let mobilised = size * per_root;
+        let is_partial = gate.lt(one);
+        let limited = T::select(is_partial, gate, one);
+        let share = T::select(is_felt, mobilised * limited, zero);
+        let modulus = self.cohesive_modulus / setting.width.max(TINY) + self.frictional_modulus;
+        let depth = T::select(is_felt, piece.depth, one);
+        let sigma = number(modulus) * power(depth, self.exponent);
         let x_t = x - n * x_n;
         let t = x_t.norm();
-        let (slide, spread) = if t > TINY {
-            let slide = x_t / t;
-            (
-                slide,
-                Matrix3::identity() - n * n.transpose() - slide * slide.transpose(),
-            )
-        } else {
-            (Vector3::zeros(), Matrix3::zeros())
-        };
-        let rate = piece.arc / self.shear_modulus;
-        let kept = exp(-t * rate);
-        let limit = self.cohesion + sigma * self.internal_friction;
-        let shear = limit * (1.0 - kept);
-        let value = -n * sigma - slide * shear;
-        let mut slope = slide * slide.transpose() * (-limit * rate * kept);
-        if t > TINY {
-            slope -= spread * (shear / t);
+        let per_t = one / t.max(tiny);
+        let slide = x_t * per_t;
+        let rate = piece.arc * number(1.0 / self.shear_modulus);
+        let risen = -exp_m1(-(t * rate));
+        let tan = number(self.internal_friction);
+        let limit = number(self.cohesion) + sigma * tan;
+        let shear = limit * risen;
+        let value = -(n * sigma) - slide * shear;
+        found.value = value * share;
+        if !wants_slopes {
+            return found;
         }
-        let tan = self.internal_friction * (1.0 - kept);
-        Stress {
-            value: value * share,
-            by_x: slope * share + value * by_x.transpose(),
-            by_depth: (-n - slide * tan) * (by_depth * share),
+        let by_depth = number(self.exponent) * sigma / depth * share;
+        found.by_depth = -(n + slide * (tan * risen)) * by_depth;
+        let by_size = number(FADE * FADE) * per_root * per_root * per_root * limited;
+        let by_gate = mobilised * per_size * number(1.0 / FADE);
+        let by_gate = T::select(is_partial, by_gate, zero);
+        let share_by_x = along * by_size + (n - along * (x_n * per_size)) * by_gate;
+        let by_t = -(limit * rate * (one - risen));
+        let turning = shear * per_t;
+        let parts = [share_by_x.x, share_by_x.y, share_by_x.z];
+        let units = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        for ((column, unit), part) in found.by_x.iter_mut().zip(units).zip(parts) {
+            let e = Vec3::splat(n.x.token(), unit);
+            let along_slide = slide.dot(e);
+            let across = e - n * n.dot(e) - slide * along_slide;
+            let slope = slide * (by_t * along_slide) - across * turning;
+            let slope = slope * share + value * part;
+            *column = Vec3::select(is_felt, slope, *column);
         }
+        found
     }
 
     pub(super) fn check(&self) -> Result<(), QuantityError> {
@@ -117,8 +131,20 @@ impl Bekker {
     }
 }
 
+/// `xⁿ` of a positive x.
+#[inline(always)]
+fn power<T: Lane>(x: T, n: f64) -> T {
+    let mut logarithm = x;
+    for lane in 0..T::LANES {
+        logarithm.set(lane, ln(x.get(lane)));
+    }
+    exp_m1(logarithm * x.like(n)) + x.like(1.0)
+}
+
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use super::*;
 
     const SOIL: Bekker = Bekker {
@@ -130,47 +156,51 @@ mod tests {
         shear_modulus: 0.02,
     };
 
-    fn piece<'a>(n: &'a Vector3<f64>, x: &'a Vector3<f64>, down: &'a Vector3<f64>) -> Piece<'a> {
-        Piece {
-            normal: n,
-            x,
-            down,
+    const SETTING: Setting = Setting {
+        held: 0.0,
+        width: 0.1,
+        gravity: 9.81,
+    };
+
+    /// Stress on a piece of a plate that faces down, and its derivative by the displacement.
+    fn stress(x: Vector3<f64>) -> [Vector3<f64>; 4] {
+        let down = Vector3::new(0.0, -1.0, 0.0);
+        let piece = Piece::<f64> {
+            normal: down.into(),
+            x: x.into(),
+            down: down.into(),
             depth: 0.03,
             arc: 0.05,
             skin: Skin::Rim,
-            held: 0.0,
-            width: 0.1,
-            gravity: 9.81,
-        }
+        };
+        let found = SOIL.stress(&piece, &SETTING, true);
+        let [a, b, c] = found.by_x.map(Vector3::from);
+        [found.value.into(), a, b, c]
     }
 
     #[test]
     fn a_plate_bears_bekkers_pressure() {
-        let down = Vector3::new(0.0, -1.0, 0.0);
-        let stress = SOIL.stress(&piece(&down, &(down * 1e3), &down));
+        let [stress, ..] = stress(Vector3::new(0.0, -1e3, 0.0));
         let exact = (1370.0 / 0.1 + 814_000.0) * 0.03;
-        assert!((stress.value.y - exact).abs() < 1e-5 * exact);
+        assert!((stress.y - exact).abs() < 1e-5 * exact);
     }
 
     #[test]
     fn a_long_slide_reaches_coulombs_limit() {
-        let down = Vector3::new(0.0, -1.0, 0.0);
-        let stress = SOIL.stress(&piece(&down, &Vector3::new(1e3, -1e3, 0.0), &down));
-        let limit = 800.0 + stress.value.y * 0.65;
-        assert!((stress.value.x + limit).abs() < 1e-3 * limit);
+        let [stress, ..] = stress(Vector3::new(1e3, -1e3, 0.0));
+        let limit = 800.0 + stress.y * 0.65;
+        assert!((stress.x + limit).abs() < 1e-3 * limit);
     }
 
     #[test]
     fn the_slopes_are_derivatives() {
-        let down = Vector3::new(0.0, -1.0, 0.0);
         for x in [Vector3::new(0.4, -0.3, 0.2), Vector3::new(0.5, 0.005, 0.1)] {
-            let found = SOIL.stress(&piece(&down, &x, &down));
+            let found = stress(x);
             for k in 0..3 {
                 let mut step = Vector3::zeros();
                 step[k] = 1e-7;
-                let at = |x: Vector3<f64>| SOIL.stress(&piece(&down, &x, &down)).value;
-                let change = (at(x + step) - at(x - step)) / 2e-7;
-                assert!((found.by_x.column(k) - change).norm() < 1e-5 * (1.0 + change.norm()));
+                let change = (stress(x + step)[0] - stress(x - step)[0]) / 2e-7;
+                assert!((found[1 + k] - change).norm() < 1e-5 * (1.0 + change.norm()));
             }
         }
     }

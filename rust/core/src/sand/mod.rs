@@ -7,6 +7,7 @@
 //!
 //! The chapter sees a wheel, a plane with a relief and six numbers of memory, and no machine: the
 //! coupling to a machine is in [`crate::system`].
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 pub mod bekker;
 pub(crate) mod checks;
@@ -22,9 +23,9 @@ pub mod wheel;
 
 pub use bekker::Bekker;
 pub use memory::{Memory, Twist};
-pub use patch::{Bed, Reaction, Want, WheelPose, react};
+pub use patch::{Bed, Reaction, Want, WheelPose, react, react_with};
 pub use resistive_force::{Flow, Interface};
-pub use ruts::RutMap;
+pub use ruts::{RutMap, Window};
 pub use soil::{Law, Resistive, Soil};
 pub use state::{SandState, WheelInSand};
 pub use test_bed::{Drive, Measured, Sunk, TestBed};

@@ -1,12 +1,20 @@
 //! Force of sand on a wheel: the stress over what is under the surface, with its derivatives.
+//!
+//! The points of an arc lie side by side in lanes, eight at a time. A machine with fewer lanes takes
+//! them in turns and keeps a sum for each of the eight, so that the bits do not depend on the lanes.
+//!
+//! A surface that recedes feels nothing. Of a ring, only the part of the arc under the surface that
+//! may push is integrated. Angles on it are `θ = 4 atan u`, so that sine and cosine are rational.
 
+use fearless_simd::{f64x4, f64x8};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 use super::memory::Memory;
-use super::piece::Piece;
-use super::soil::Soil;
-use super::wheel::{Ring, Rules, SandWheel, visit_rings};
-use crate::scalar::elementary::{acos, sin_cos};
+use super::piece::{Piece, Setting};
+use super::soil::{Law, Soil};
+use super::wheel::{Ring, Rules, SandWheel};
+use crate::scalar::elementary::{acos, atan2};
+use crate::scalar::{Instructions, Lane, LaneMask, MAX_LANES, Single, Vec3};
 
 /// Pose of a wheel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,24 +49,27 @@ pub struct Bed<'a> {
 pub struct Reaction {
     /// Force, N, and moment about the centre, N m, in world axes.
     pub wrench: Vector6<f64>,
-    /// Its derivative by the six numbers of the memory.
-    pub by_memory: Matrix6<f64>,
-    /// Its derivative by a translation and a rotation of the wheel, m and rad. The normals of the
-    /// pieces are kept.
-    pub by_pose: Matrix6<f64>,
-    /// Area under the surface, m².
-    pub area: f64,
+    /// Its derivatives, as they are wanted.
+    pub slope: Matrix6<f64>,
+    /// Whether a part that pushes, or may, is under the surface.
+    pub is_touching: bool,
     /// Depth of the lowest point under the surface, m; negative where the wheel is clear of it.
     pub sinkage: f64,
 }
 
 /// Derivatives are not computed where they are not asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Want {
     /// The wrench alone.
     Wrench,
-    /// The wrench and its derivatives.
-    Slopes,
+    /// The wrench and a sum of its derivatives.
+    Slopes {
+        /// Factor of the derivative by the six numbers of the memory.
+        by_memory: f64,
+        /// Factor of the derivative by a translation and a rotation of the wheel, m and rad. The
+        /// normals of the pieces are kept.
+        by_pose: f64,
+    },
 }
 
 /// Sine between axle and normal below which the wheel lies flat.
@@ -67,79 +78,99 @@ const FLAT: f64 = 1e-9;
 /// How fast the side at which the rim enters changes with the direction of travel.
 const ENTRY: f64 = 0.1;
 
-/// Frame of a wheel relative to the bed.
+/// A wheel relative to the bed, in its own axes: down and forward in its plane, and its axle.
 struct Frame<'a> {
     wheel: &'a SandWheel,
     rules: &'a Rules,
     soil: &'a Soil,
     bed: &'a Bed<'a>,
     pose: &'a WheelPose,
-    memory: &'a Memory,
     want: Want,
-    /// In the wheel's plane, downwards and along.
-    down: Vector3<f64>,
-    along: Vector3<f64>,
-    /// Sine of the angle between axle and normal.
-    sine: f64,
+    setting: Setting,
+    /// Columns: down, along and axle in world axes.
+    axes: Matrix3<f64>,
+    /// Into the sand.
+    g: Vector3<f64>,
+    shift: Vector3<f64>,
+    turn: Vector3<f64>,
     /// Height of the wheel's centre over the plane, m.
     height: f64,
-    /// Along the axle per unit of normal.
-    lean: f64,
-    held: f64,
+    /// Radius from which on the side walls may be under the surface, m.
+    dry: f64,
     /// From −1 to 1: which end of an arc enters the sand.
     entry: f64,
+}
+
+/// Sums of a reaction in the wheel's axes: wrench, and its derivative column by column.
+#[derive(Clone, Copy)]
+struct Sums {
+    wrench: [[f64; MAX_LANES]; 6],
+    slope: [[f64; MAX_LANES]; 36],
+    is_touching: bool,
 }
 
 /// The force of a soil on a wheel in a pose, with what the sand remembers.
 #[must_use]
 pub fn react(
-    (wheel, rules): (&SandWheel, &Rules),
+    wheel: (&SandWheel, &Rules),
     soil: &Soil,
     bed: &Bed<'_>,
     pose: &WheelPose,
     memory: &Memory,
     want: Want,
 ) -> Reaction {
+    let instructions = Instructions::of_this_machine();
+    react_with(instructions, wheel, soil, bed, (pose, memory), want)
+}
+
+/// [`react`] with a set of instructions; the bits are the same.
+#[must_use]
+pub fn react_with(
+    instructions: Instructions,
+    (wheel, rules): (&SandWheel, &Rules),
+    soil: &Soil,
+    bed: &Bed<'_>,
+    (pose, memory): (&WheelPose, &Memory),
+    want: Want,
+) -> Reaction {
+    let frame = Frame::new((wheel, rules), soil, bed, (pose, memory), want);
     let lean = pose.axle.dot(&bed.normal);
-    let flat = pose.axle * lean - bed.normal;
-    let sine = flat.norm();
-    let down = if sine > FLAT {
-        flat / sine
-    } else {
-        perpendicular(&pose.axle)
-    };
-    let along = pose.axle.cross(&down);
-    let travel = Vector3::from(memory.shift).dot(&along);
-    let height = (pose.centre - bed.place).dot(&bed.normal);
-    let frame = Frame {
-        wheel,
-        rules,
-        soil,
-        bed,
-        pose,
-        memory,
-        want,
-        down,
-        along,
-        sine,
-        height,
-        lean,
-        held: wheel.held(),
-        entry: travel / (travel * travel + ENTRY * ENTRY).sqrt(),
-    };
-    let radius = wheel.drum();
-    let half = 0.5 * wheel.width;
+    let sinkage = 0.5 * wheel.width * lean.abs() + wheel.drum() * frame.g.x - frame.height;
     let mut reaction = Reaction {
         wrench: Vector6::zeros(),
-        by_memory: Matrix6::zeros(),
-        by_pose: Matrix6::zeros(),
-        area: 0.0,
-        sinkage: half * lean.abs() + radius * sine - height,
+        slope: Matrix6::zeros(),
+        is_touching: false,
+        sinkage,
     };
-    if reaction.sinkage + bed.highest > 0.0 {
-        // The inner radius of what is wet of the side wall that is deeper.
-        let dry = (height - half * lean.abs() - bed.highest) / sine.max(FLAT);
-        visit_rings(wheel, rules, dry, |ring| frame.add(ring, &mut reaction));
+    if sinkage + bed.highest <= 0.0 {
+        return reaction;
+    }
+    let mut sums = Sums {
+        wrench: [[0.0; MAX_LANES]; 6],
+        slope: [[0.0; MAX_LANES]; 36],
+        is_touching: false,
+    };
+    match instructions {
+        Instructions::Baseline => frame.sum::<f64>(Single::Baseline, &mut sums),
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx2(token) => frame.sum::<f64x4<_>>(token, &mut sums),
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx512(token) => frame.sum::<f64x8<_>>(token, &mut sums),
+    }
+    reaction.is_touching = sums.is_touching;
+    let total = |lanes: &[f64; MAX_LANES]| lanes.iter().sum::<f64>();
+    let of = |k: usize| Vector3::from_fn(|i, _| total(&sums.wrench[3 * k + i]));
+    for k in 0..2 {
+        let part = frame.axes * of(k);
+        reaction.wrench.fixed_rows_mut::<3>(3 * k).copy_from(&part);
+    }
+    if want != Want::Wrench {
+        for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            let part = Matrix3::from_fn(|a, b| total(&sums.slope[6 * (3 * j + b) + 3 * i + a]));
+            let turned = frame.axes * part * frame.axes.transpose();
+            let mut place = reaction.slope.fixed_view_mut::<3, 3>(3 * i, 3 * j);
+            place.copy_from(&turned);
+        }
     }
     reaction
 }
@@ -154,112 +185,305 @@ fn perpendicular(axle: &Vector3<f64>) -> Vector3<f64> {
     (e - axle * axle.dot(&e)).normalize()
 }
 
-impl Frame<'_> {
-    /// Adds the stress over the arc of a ring that is under the surface.
-    fn add(&self, ring: &Ring, sum: &mut Reaction) {
-        let raised = self.bed.highest - self.height - ring.offset * self.lean;
-        let swing = ring.radius * self.sine;
+/// `tan(θ/4)` of the angle of a unit vector, −π < θ <= π.
+fn quarter(cos: f64, sin: f64) -> f64 {
+    let half_cos = (0.5 * (1.0 + cos)).max(0.0).sqrt();
+    let half_sin = (0.5 * (1.0 - cos)).max(0.0).sqrt();
+    half_sin.copysign(sin) / (1.0 + half_cos)
+}
+
+impl<'a> Frame<'a> {
+    fn new(
+        (wheel, rules): (&'a SandWheel, &'a Rules),
+        soil: &'a Soil,
+        bed: &'a Bed<'a>,
+        (pose, memory): (&'a WheelPose, &Memory),
+        want: Want,
+    ) -> Self {
+        let lean = pose.axle.dot(&bed.normal);
+        let flat = pose.axle * lean - bed.normal;
+        let sine = flat.norm();
+        let down = if sine > FLAT {
+            flat / sine
+        } else {
+            perpendicular(&pose.axle)
+        };
+        let axes = Matrix3::from_columns(&[down, pose.axle.cross(&down), pose.axle]);
+        let shift = axes.tr_mul(&Vector3::from(memory.shift));
+        let height = (pose.centre - bed.place).dot(&bed.normal);
+        let beyond = height - 0.5 * wheel.width * lean.abs() - bed.highest;
+        Self {
+            wheel,
+            rules,
+            soil,
+            bed,
+            pose,
+            want,
+            setting: Setting {
+                held: wheel.held(),
+                width: wheel.width,
+                gravity: bed.gravity,
+            },
+            axes,
+            g: Vector3::new(sine, 0.0, -lean),
+            shift,
+            turn: axes.tr_mul(&Vector3::from(memory.turn)),
+            height,
+            dry: beyond / sine.max(FLAT),
+            entry: shift.y / (shift.y * shift.y + ENTRY * ENTRY).sqrt(),
+        }
+    }
+
+    /// Adds the stresses over all rings.
+    #[inline(always)]
+    fn sum<T: Lane>(&self, token: T::Token, sums: &mut Sums) {
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || {
+                for lanes in 0..MAX_LANES / T::LANES {
+                    let at = lanes * T::LANES..(lanes + 1) * T::LANES;
+                    let zero = T::splat(token, 0.0);
+                    let mut own = Own {
+                        wrench: [zero; 6],
+                        slope: [zero; 36],
+                        is_touching: false,
+                    };
+                    for index in 0..self.rules.n_rings() {
+                        let ring = self.rules.ring(self.wheel, self.dry, index);
+                        if let Some((ring, arc)) = ring.and_then(|ring| self.arc(ring)) {
+                            self.add(&ring, &arc, (token, at.start), &mut own);
+                        }
+                    }
+                    sums.is_touching |= own.is_touching;
+                    for (out, own) in sums.wrench.iter_mut().zip(own.wrench) {
+                        own.store(&mut out[at.clone()]);
+                    }
+                    for (out, own) in sums.slope.iter_mut().zip(own.slope) {
+                        own.store(&mut out[at.clone()]);
+                    }
+                }
+            },
+        );
+    }
+
+    /// The part of a ring that may feel the sand; none if there is none.
+    #[inline]
+    fn arc(&self, ring: Ring) -> Option<(Ring, Arc)> {
+        let raised = self.bed.highest - self.height + ring.offset * self.g.z;
+        let swing = ring.radius * self.g.x;
         if raised <= -swing {
-            return;
+            return None;
         }
-        let arc = if raised >= swing {
-            std::f64::consts::PI
+        let cos = if raised >= swing {
+            -1.0
         } else {
-            acos(-raised / swing)
+            -raised / swing
         };
-        for (x, weight) in &self.rules.arc.points {
-            let theta = arc * x;
-            let area = arc * weight * ring.radius * ring.width;
-            let (sin, cos) = sin_cos(theta);
-            let radial = self.down * cos + self.along * sin;
-            let r = radial * ring.radius + self.pose.axle * ring.offset;
-            let depth = self.depth(&r);
-            if depth[0] > 0.0 {
-                let way = ring.radius * (arc - self.entry * theta);
-                let normal = radial * ring.normal[0] + self.pose.axle * ring.normal[1];
-                self.add_piece(ring, &r, &normal, (depth, way, area), sum);
-            }
+        let end = quarter(cos, 1.0);
+        let [from, to] = self.pushing(&ring, end);
+        (from < to).then_some((ring, Arc { from, to, cos }))
+    }
+
+    /// The part of an arc up to `tan(θ/4) = end` on both sides of its lowest point on which the
+    /// surface may push: `x·n > −B`, where B is the most that leaves a stress.
+    #[inline]
+    fn pushing(&self, ring: &Ring, end: f64) -> [f64; 2] {
+        let whole = [-end, end];
+        let Law::Resistive(sand) = &self.soil.law else {
+            return whole;
+        };
+        let (x, w) = (&self.shift, &self.turn);
+        let (speed, tilt) = (
+            (x.x * x.x + x.y * x.y).sqrt(),
+            (w.x * w.x + w.y * w.y).sqrt(),
+        );
+        let [n_r, n_a] = ring.normal;
+        let largest = x.norm() + w.norm() * (ring.radius + ring.offset.abs());
+        let sideways = x.z.abs() + tilt * ring.radius;
+        let bound = sand.flow.grip * sand.flow.width * largest
+            + n_a.abs() * sideways
+            + n_r * tilt * ring.offset.abs();
+        if bound >= n_r * speed {
+            return whole;
+        }
+        // The directions at which it ends, on both sides of that of the motion.
+        let (cos, sin) = (x.x / speed, x.y / speed);
+        let far = -bound / (n_r * speed);
+        let across = (1.0 - far * far).max(0.0).sqrt();
+        let [low, high] = [-across, across].map(|s| [cos * far - sin * s, sin * far + cos * s]);
+        let [from, to] = [low, high].map(|[c, s]| quarter(c, s));
+        // An end beyond θ = ±π lies on the other side of the circle.
+        let is_over = [sin < 0.0 && low[1] > 0.0, sin > 0.0 && high[1] < 0.0];
+        match is_over {
+            [false, false] => [from.max(-end), to.min(end)],
+            [true, _] if from >= end => [-end, to.min(end)],
+            [_, true] if to <= -end => [from.max(-end), end],
+            _ => whole,
         }
     }
 
-    /// Depth that counts of a piece at `r` from the centre, m, and its derivative by the depth.
-    fn depth(&self, r: &Vector3<f64>) -> [f64; 2] {
-        let below = -self.height - r.dot(&self.bed.normal);
-        let Some(relief) = self.bed.relief else {
-            return [below, 1.0];
-        };
-        let [virgin, left] = relief(&(self.pose.centre + r));
-        let (virgin, left) = (below + virgin, (below + left) * self.soil.reload);
-        if left < virgin {
-            [left, self.soil.reload]
-        } else {
-            [virgin, 1.0]
-        }
-    }
-
-    fn add_piece(
+    /// Adds the stress over an arc of a ring: the lanes of each group from `first` on.
+    #[inline(always)]
+    fn add<T: Lane>(
         &self,
         ring: &Ring,
-        r: &Vector3<f64>,
-        normal: &Vector3<f64>,
-        ([depth, by_depth], arc, area): ([f64; 2], f64, f64),
-        sum: &mut Reaction,
+        arc: &Arc,
+        (token, first): (T::Token, usize),
+        own: &mut Own<T>,
     ) {
-        let down = -self.bed.normal;
-        let x = self.memory.at(r);
-        let stress = self.soil.stress(&Piece {
-            normal,
-            x: &x,
-            down: &down,
+        let number = |value: f64| T::splat(token, value);
+        let (zero, one, two) = (number(0.0), number(1.0), number(2.0));
+        let (middle, half) = (0.5 * (arc.from + arc.to), 0.5 * (arc.to - arc.from));
+        let rule = &self.rules.arc;
+        for group in (0..rule.places.len()).step_by(MAX_LANES) {
+            let at = group + first..group + first + T::LANES;
+            let u = number(middle) + number(half) * T::load(token, &rule.places[at.clone()]);
+            let per = one / (one + u * u);
+            let (p, q) = ((one - u * u) * per, two * u * per);
+            let (cos, sin) = (p * p - q * q, two * p * q);
+            let scale = 4.0 * half * ring.radius * ring.width;
+            let area = T::load(token, &rule.weights[at]) * number(scale) * per;
+            let [n_r, n_a] = ring.normal;
+            let radial = number(n_r);
+            let place = Place {
+                r: Vec3::new(
+                    cos * number(ring.radius),
+                    sin * number(ring.radius),
+                    number(ring.offset),
+                ),
+                normal: Vec3::new(cos * radial, sin * radial, number(n_a)),
+                area,
+            };
+            let (depth, by_depth) = self.depth(place.r);
+            let is_under = depth.gt(zero);
+            if !is_under.any() {
+                continue;
+            }
+            own.is_touching = true;
+            let depth = T::select(is_under, depth, zero);
+            let way = self.way(ring, arc, (cos, sin));
+            self.add_pieces(ring.skin, &place, (depth, by_depth, way), own);
+        }
+    }
+
+    /// Way from where pieces entered, m. Only Bekker's law needs it.
+    #[inline(always)]
+    fn way<T: Lane>(&self, ring: &Ring, arc: &Arc, (cos, sin): (T, T)) -> T {
+        let mut way = cos;
+        if matches!(self.soil.law, Law::Bekker(_)) {
+            let end = acos(arc.cos);
+            for lane in 0..T::LANES {
+                let theta = atan2(sin.get(lane), cos.get(lane));
+                way.set(lane, ring.radius * (end - self.entry * theta));
+            }
+        }
+        way
+    }
+
+    /// Depth that counts of pieces at `r` from the centre, m, and its derivative by the depth.
+    #[inline(always)]
+    fn depth<T: Lane>(&self, r: Vec3<T>) -> (T, T) {
+        let number = |value: f64| r.x.like(value);
+        let g = Vec3::splat(r.x.token(), self.g.into());
+        let mut below = r.dot(g) - number(self.height);
+        let mut slope = number(1.0);
+        let Some(relief) = self.bed.relief else {
+            return (below, slope);
+        };
+        for lane in 0..T::LANES {
+            let place = self.pose.centre + self.axes * Vector3::from(r.get(lane));
+            let [virgin, left] = relief(&place);
+            let depth = below.get(lane);
+            let (virgin, left) = (depth + virgin, (depth + left) * self.soil.reload);
+            if left < virgin {
+                below.set(lane, left);
+                slope.set(lane, self.soil.reload);
+            } else {
+                below.set(lane, virgin);
+            }
+        }
+        (below, slope)
+    }
+
+    #[inline(always)]
+    fn add_pieces<T: Lane>(
+        &self,
+        skin: super::wheel::Skin,
+        place: &Place<T>,
+        (depth, by_depth, arc): (T, T, T),
+        own: &mut Own<T>,
+    ) {
+        let (r, area, token) = (place.r, place.area, depth.token());
+        let shared = |v: Vector3<f64>| Vec3::<T>::splat(token, v.into());
+        let g = shared(self.g);
+        let piece = Piece {
+            normal: place.normal,
+            x: shared(self.shift) + shared(self.turn).cross(r),
+            down: g,
             depth,
             arc,
-            skin: ring.skin,
-            held: self.held,
-            width: self.wheel.width,
-            gravity: self.bed.gravity,
-        });
+            skin,
+        };
+        let wants_slopes = self.want != Want::Wrench;
+        let stress = self.soil.stress(&piece, &self.setting, wants_slopes);
         let force = stress.value * area;
-        sum.area += area;
-        add_wrench(&mut sum.wrench, r, &force);
-        if self.want == Want::Wrench {
+        add_wrench(&mut own.wrench, r, force);
+        let Want::Slopes { by_memory, by_pose } = self.want else {
             return;
+        };
+        let fresh = area * depth.like(by_memory);
+        let memory = stress.by_x.map(|column| column * fresh);
+        let sunk = stress.by_depth * (area * by_depth * depth.like(by_pose));
+        let [a, b, c] = [
+            memory[0] + sunk * g.x,
+            memory[1] + sunk * g.y,
+            memory[2] + sunk * g.z,
+        ];
+        // Displacements by a rotation: e × r. The wheel may turn about its axle without a change
+        // of depth.
+        let columns = [
+            a,
+            b,
+            c,
+            c * r.y - b * r.z,
+            a * r.z - c * r.x,
+            memory[1] * r.x - memory[0] * r.y,
+        ];
+        for (slope, column) in own.slope.chunks_exact_mut(6).zip(columns) {
+            add_wrench(slope, r, column);
         }
-        add_slope(&mut sum.by_memory, r, &(stress.by_x * area));
-        // The wheel may turn about its axle without a change of depth.
-        let by_depth = stress.by_depth * (by_depth * area);
-        let axle = &self.pose.axle;
-        let turn = r.cross(&down);
-        let turn = turn - axle * axle.dot(&turn);
-        let lever = Vector6::new(down.x, down.y, down.z, turn.x, turn.y, turn.z);
-        let mut wrench = Vector6::zeros();
-        add_wrench(&mut wrench, r, &by_depth);
-        sum.by_pose += wrench * lever.transpose();
     }
 }
 
-fn add_wrench(sum: &mut Vector6<f64>, r: &Vector3<f64>, force: &Vector3<f64>) {
+/// Part of a ring, by the tangents of a quarter of the angles at its ends.
+struct Arc {
+    from: f64,
+    to: f64,
+    /// Of the angle at which the ring leaves the sand.
+    cos: f64,
+}
+
+/// Where pieces are, in the wheel's axes, and how large, m².
+struct Place<T> {
+    r: Vec3<T>,
+    normal: Vec3<T>,
+    area: T,
+}
+
+/// Sums of some lanes.
+struct Own<T> {
+    wrench: [T; 6],
+    slope: [T; 36],
+    is_touching: bool,
+}
+
+/// Adds a force at r and its moment.
+#[inline(always)]
+fn add_wrench<T: Lane>(sum: &mut [T], r: Vec3<T>, force: Vec3<T>) {
     let moment = r.cross(force);
-    for k in 0..3 {
-        sum[k] += force[k];
-        sum[3 + k] += moment[k];
-    }
-}
-
-/// Adds `Jᵀ S J` with `J = [1, −r×]`, the displacement of a piece at r by those of the wheel.
-fn add_slope(sum: &mut Matrix6<f64>, r: &Vector3<f64>, slope: &Matrix3<f64>) {
-    let cross = r.cross_matrix();
-    let turned = slope * -cross;
-    for i in 0..3 {
-        for j in 0..3 {
-            sum[(i, j)] += slope[(i, j)];
-            sum[(i, 3 + j)] += turned[(i, j)];
-        }
-    }
-    let (moment, turned) = (cross * slope, cross * turned);
-    for i in 0..3 {
-        for j in 0..3 {
-            sum[(3 + i, j)] += moment[(i, j)];
-            sum[(3 + i, 3 + j)] += turned[(i, j)];
-        }
+    let parts = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
+    for (sum, part) in sum.iter_mut().zip(parts) {
+        *sum += part;
     }
 }

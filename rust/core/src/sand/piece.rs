@@ -1,48 +1,58 @@
-//! A piece of a wheel in a soil, and the stress on it.
+//! Pieces of a wheel in a soil, side by side in lanes, and the stress on each.
 
-use nalgebra::{Matrix3, Vector3};
+use crate::scalar::{Lane, Vec3};
 
 use super::wheel::Skin;
 
-/// A piece of a wheel in the sand.
+/// A piece of a wheel in the sand. All vectors have the same axes.
 #[derive(Clone, Copy, Debug)]
-pub struct Piece<'a> {
+pub struct Piece<T: Lane> {
     /// Outward unit normal.
-    pub normal: &'a Vector3<f64>,
+    pub normal: Vec3<T>,
     /// Displacement relative to the sand, in units of its memory.
-    pub x: &'a Vector3<f64>,
+    pub x: Vec3<T>,
     /// Into the sand, against the normal of its surface.
-    pub down: &'a Vector3<f64>,
+    pub down: Vec3<T>,
     /// Under the surface, m.
-    pub depth: f64,
+    pub depth: T,
     /// Along the rim from where it enters the sand, m.
-    pub arc: f64,
+    pub arc: T,
     /// What it is part of.
     pub skin: Skin,
+}
+
+/// What all pieces of a wheel share.
+#[derive(Clone, Copy, Debug)]
+pub struct Setting {
     /// Part of the rim at which grousers hold sand.
     pub held: f64,
     /// Width of the wheel, m.
     pub width: f64,
-    /// m/s², along `down`.
+    /// m/s², into the sand.
     pub gravity: f64,
 }
 
 /// Stress of the sand on a piece, N/m², and its derivatives.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stress {
+#[derive(Clone, Copy, Debug)]
+pub struct Stress<T> {
     /// N/m².
-    pub value: Vector3<f64>,
-    /// By the displacement.
-    pub by_x: Matrix3<f64>,
+    pub value: Vec3<T>,
+    /// By each component of the displacement; what it was before if it was not wanted.
+    pub by_x: [Vec3<T>; 3],
     /// By the depth, N/m³.
-    pub by_depth: Vector3<f64>,
+    pub by_depth: Vec3<T>,
 }
 
-impl Stress {
+impl<T: Lane> Stress<T> {
     /// None.
-    pub const NONE: Self = Self {
-        value: Vector3::new(0.0, 0.0, 0.0),
-        by_x: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-        by_depth: Vector3::new(0.0, 0.0, 0.0),
-    };
+    #[inline(always)]
+    #[must_use]
+    pub fn none(token: T::Token) -> Self {
+        let zero = Vec3::splat(token, [0.0; 3]);
+        Self {
+            value: zero,
+            by_x: [zero; 3],
+            by_depth: zero,
+        }
+    }
 }

@@ -4,21 +4,43 @@
 //! greatest depth of its rim there is noted; when it has left, the depth becomes the rut. A wheel
 //! therefore never loses the support of its own sinkage. Between the centres of cells the depth is
 //! interpolated.
+//!
+//! Depths are kept in tiles of [`SIDE`] by [`SIDE`] cells. A step reads those near a wheel once, into
+//! a [`Window`].
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 
-type Cells = BTreeMap<(i32, i32), f64>;
+/// Cells along the side of a tile.
+const SIDE: usize = 16;
+
+/// Depths of a tile's cells, m, row by row.
+type Tile = Box<[f64]>;
 
 /// Depths of ruts under the undisturbed surface, m.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Listed", into = "Listed")]
 pub struct RutMap {
-    depths: Cells,
+    tiles: BTreeMap<(i32, i32), Tile>,
     /// Cells under each wheel, with the depth that they will keep.
-    under: Vec<Cells>,
+    under: Vec<Window>,
 }
+
+/// Depths on a rectangle of cells, m.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Window {
+    /// First column and row.
+    first: [i32; 2],
+    /// Columns and rows.
+    size: [usize; 2],
+    /// Row by row.
+    depths: Vec<f64>,
+}
+
+/// Rectangle of cells: columns along x and rows along z.
+type Rectangle = [RangeInclusive<i32>; 2];
 
 /// The map as lists: column, row, depth.
 #[derive(Serialize, Deserialize)]
@@ -27,30 +49,120 @@ struct Listed {
     under: Vec<Vec<(i32, i32, f64)>>,
 }
 
-fn list(cells: &Cells) -> Vec<(i32, i32, f64)> {
-    cells.iter().map(|(&(i, k), &d)| (i, k, d)).collect()
-}
-
-fn map(list: Vec<(i32, i32, f64)>) -> Cells {
-    list.into_iter().map(|(i, k, d)| ((i, k), d)).collect()
-}
-
 impl From<RutMap> for Listed {
     fn from(ruts: RutMap) -> Self {
         Self {
-            depths: list(&ruts.depths),
-            under: ruts.under.iter().map(list).collect(),
+            depths: ruts.cells(),
+            under: ruts.under.iter().map(Window::cells).collect(),
         }
     }
 }
 
 impl From<Listed> for RutMap {
     fn from(listed: Listed) -> Self {
-        Self {
-            depths: map(listed.depths),
-            under: listed.under.into_iter().map(map).collect(),
+        let mut ruts = Self::new(0);
+        for (i, k, depth) in listed.depths {
+            ruts.deepen([i, k], depth);
         }
+        ruts.under = listed.under.iter().map(|cells| Window::of(cells)).collect();
+        ruts
     }
+}
+
+impl Window {
+    /// The smallest that has all cells of a list: column, row, depth.
+    fn of(cells: &[(i32, i32, f64)]) -> Self {
+        let span = |of: fn(&(i32, i32, f64)) -> i32| {
+            let (least, most) = (cells.iter().map(of).min(), cells.iter().map(of).max());
+            least.unwrap_or(0)..=most.unwrap_or(-1)
+        };
+        let mut window = Self::default();
+        window.clear([span(|cell| cell.0), span(|cell| cell.1)]);
+        for &(i, k, depth) in cells {
+            if let Some(at) = window.index(i, k) {
+                window.depths[at] = depth;
+            }
+        }
+        window
+    }
+
+    /// Cells that are deeper than the surface.
+    fn cells(&self) -> Vec<(i32, i32, f64)> {
+        self.visit().filter(|(.., depth)| *depth > 0.0).collect()
+    }
+
+    /// Column, row and depth of all cells.
+    fn visit(&self) -> impl Iterator<Item = (i32, i32, f64)> {
+        let ([i, k], columns) = (self.first, self.size[0].max(1));
+        let cells = self.depths.iter().enumerate();
+        cells.map(move |(at, depth)| {
+            let [column, row] = [at % columns, at / columns].map(|n| i32::try_from(n).unwrap_or(0));
+            (i + column, k + row, *depth)
+        })
+    }
+
+    /// Becomes an empty rectangle.
+    fn clear(&mut self, [columns, rows]: Rectangle) {
+        let length = |range: &RangeInclusive<i32>| {
+            usize::try_from(range.end().saturating_sub(*range.start()).saturating_add(1))
+                .unwrap_or(0)
+        };
+        self.first = [*columns.start(), *rows.start()];
+        self.size = [length(&columns), length(&rows)];
+        self.depths.clear();
+        self.depths.resize(self.size[0] * self.size[1], 0.0);
+    }
+
+    #[inline]
+    fn index(&self, i: i32, k: i32) -> Option<usize> {
+        let column = usize::try_from(i.wrapping_sub(self.first[0])).ok()?;
+        let row = usize::try_from(k.wrapping_sub(self.first[1])).ok()?;
+        (column < self.size[0] && row < self.size[1]).then(|| row * self.size[0] + column)
+    }
+
+    /// The rectangle that it covers.
+    fn covered(&self) -> Rectangle {
+        std::array::from_fn(|d| {
+            let size = i32::try_from(self.size[d]).unwrap_or(0);
+            self.first[d]..=self.first[d] + size - 1
+        })
+    }
+
+    /// Depth at a place between the centres of its cells, m; none where it does not reach.
+    #[inline]
+    fn depth(&self, (i, k): (i32, i32), (a, b): (f64, f64)) -> Option<f64> {
+        let (near, last) = (self.index(i, k)?, self.index(i + 1, k + 1)?);
+        let z = &self.depths;
+        let near = z[near] * (1.0 - a) + z[near + 1] * a;
+        let far = z[last - 1] * (1.0 - a) + z[last] * a;
+        Some(near * (1.0 - b) + far * b)
+    }
+}
+
+/// Indices of a cell's tile, and of the cell in it.
+fn tile_of([i, k]: [i32; 2]) -> ((i32, i32), usize) {
+    let side = i32::try_from(SIDE).unwrap_or(i32::MAX);
+    let place = |n: i32| usize::try_from(n.rem_euclid(side)).unwrap_or(0);
+    (
+        (i.div_euclid(side), k.div_euclid(side)),
+        place(k) * SIDE + place(i),
+    )
+}
+
+/// Cell and parts of a cell of a place, relative to the centres of cells.
+#[inline]
+fn between([x, z]: [f64; 2], cell: f64) -> ((i32, i32), (f64, f64)) {
+    let (x, z) = (x / cell - 0.5, z / cell - 0.5);
+    let (i, k) = (index(x), index(z));
+    ((i, k), (x - f64::from(i), z - f64::from(k)))
+}
+
+/// Cells of which a centre is within a rectangle around a place, with a margin.
+fn around([x, z]: [f64; 2], [dx, dz]: [f64; 2], cell: f64) -> Rectangle {
+    [
+        index((x - dx) / cell - 0.5)..=index((x + dx) / cell + 0.5),
+        index((z - dz) / cell - 0.5)..=index((z + dz) / cell + 0.5),
+    ]
 }
 
 impl RutMap {
@@ -58,15 +170,15 @@ impl RutMap {
     #[must_use]
     pub fn new(wheels: usize) -> Self {
         Self {
-            depths: Cells::new(),
-            under: vec![Cells::new(); wheels],
+            tiles: BTreeMap::new(),
+            under: vec![Window::default(); wheels],
         }
     }
 
     /// Whether nothing was driven on.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.depths.is_empty()
+        self.tiles.is_empty()
     }
 
     /// Number of wheels.
@@ -78,85 +190,135 @@ impl RutMap {
     /// Cells with a rut: column along x, row along z, and depth, m.
     #[must_use]
     pub fn cells(&self) -> Vec<(i32, i32, f64)> {
-        list(&self.depths)
+        let side = i32::try_from(SIDE).unwrap_or(i32::MAX);
+        let cells = self.tiles.iter().flat_map(|(&(column, row), tile)| {
+            let cells = tile.iter().enumerate();
+            cells.map(move |(at, depth)| {
+                let [i, k] = [at % SIDE, at / SIDE].map(|n| i32::try_from(n).unwrap_or(0));
+                (column * side + i, row * side + k, *depth)
+            })
+        });
+        let mut cells: Vec<_> = cells.filter(|(.., depth)| *depth > 0.0).collect();
+        cells.sort_by_key(|&(i, k, _)| (i, k));
+        cells
     }
 
     /// Whether all depths are finite and not negative.
     #[must_use]
     pub fn is_sound(&self) -> bool {
-        let maps = std::iter::once(&self.depths).chain(&self.under);
-        let mut depths = maps.flat_map(BTreeMap::values);
+        let ruts = self.tiles.values().flat_map(|tile| tile.iter());
+        let under = self.under.iter().flat_map(|window| window.depths.iter());
+        let mut depths = ruts.chain(under);
         depths.all(|depth| depth.is_finite() && *depth >= 0.0)
+    }
+
+    fn at(&self, cell: [i32; 2]) -> f64 {
+        let (tile, place) = tile_of(cell);
+        self.tiles.get(&tile).map_or(0.0, |tile| tile[place])
+    }
+
+    fn deepen(&mut self, cell: [i32; 2], depth: f64) {
+        let (tile, place) = tile_of(cell);
+        let tile = self.tiles.entry(tile);
+        let tile = tile.or_insert_with(|| vec![0.0; SIDE * SIDE].into_boxed_slice());
+        tile[place] = tile[place].max(depth);
     }
 
     /// Depth at a place, m, on a grid with cells of this size, m.
     #[must_use]
-    pub fn depth(&self, [x, z]: [f64; 2], cell: f64) -> f64 {
-        if self.depths.is_empty() {
+    pub fn depth(&self, place: [f64; 2], cell: f64) -> f64 {
+        if self.tiles.is_empty() {
             return 0.0;
         }
-        let (x, z) = (x / cell - 0.5, z / cell - 0.5);
-        let (i, k) = (x.floor(), z.floor());
-        let (a, b) = (x - i, z - k);
-        let (i, k) = (index(i), index(k));
-        let at = |i, k| self.depths.get(&(i, k)).copied().unwrap_or(0.0);
-        let near = at(i, k) * (1.0 - a) + at(i + 1, k) * a;
-        let far = at(i, k + 1) * (1.0 - a) + at(i + 1, k + 1) * a;
+        let ((i, k), (a, b)) = between(place, cell);
+        let near = self.at([i, k]) * (1.0 - a) + self.at([i + 1, k]) * a;
+        let far = self.at([i, k + 1]) * (1.0 - a) + self.at([i + 1, k + 1]) * a;
         near * (1.0 - b) + far * b
     }
 
-    /// Whether there is a rut within `radius` (m) of a place.
+    /// [`Self::depth`] with a window read before.
+    #[inline]
     #[must_use]
-    pub fn is_near(&self, [x, z]: [f64; 2], radius: f64, cell: f64) -> bool {
-        let columns = index((x - radius) / cell - 1.0)..=index((x + radius) / cell + 1.0);
-        let rows = [
-            index((z - radius) / cell - 1.0),
-            index((z + radius) / cell + 1.0),
-        ];
-        !self.depths.is_empty()
-            && columns.into_iter().any(|i| {
-                self.depths
-                    .range((i, rows[0])..=(i, rows[1]))
-                    .next()
-                    .is_some()
-            })
+    pub fn depth_in(&self, window: &Window, place: [f64; 2], cell: f64) -> f64 {
+        let (at, part) = between(place, cell);
+        let depth = window.depth(at, part);
+        depth.unwrap_or_else(|| self.depth(place, cell))
+    }
+
+    /// Reads the depths within `reach` (m, along x and z) of a place into a window; whether there
+    /// is a rut.
+    pub fn read(&self, place: [f64; 2], reach: [f64; 2], cell: f64, window: &mut Window) -> bool {
+        if self.tiles.is_empty() {
+            return false;
+        }
+        let [columns, rows] = around(place, reach, cell);
+        window.clear([columns.clone(), rows.clone()]);
+        let mut known: Option<((i32, i32), Option<&Tile>)> = None;
+        let (mut is_rutted, mut next) = (false, 0);
+        for k in rows {
+            for i in columns.clone() {
+                let (key, at) = tile_of([i, k]);
+                let tile = match known {
+                    Some((same, tile)) if same == key => tile,
+                    _ => self.tiles.get(&key),
+                };
+                known = Some((key, tile));
+                let depth = tile.map_or(0.0, |tile| tile[at]);
+                is_rutted |= depth > 0.0;
+                window.depths[next] = depth;
+                next += 1;
+            }
+        }
+        is_rutted
     }
 
     /// Notes where a wheel is: `depth_at` gives the depth of its rim under the undisturbed surface
     /// at a place, m; none where the wheel is not over the place. Cells that it has left become
-    /// ruts. `reach`: how far from its centre the wheel may be, m.
+    /// ruts. `reach`: how far from its centre the wheel may be in the sand, m, along x and z.
     pub fn pass(
         &mut self,
         wheel: usize,
-        [x, z]: [f64; 2],
-        (reach, cell): (f64, f64),
+        place: [f64; 2],
+        (reach, cell): ([f64; 2], f64),
         depth_at: impl Fn([f64; 2]) -> Option<f64>,
     ) {
-        let mut now = Cells::new();
-        for i in index((x - reach) / cell)..=index((x + reach) / cell) {
-            for k in index((z - reach) / cell)..=index((z + reach) / cell) {
+        let before = std::mem::take(&mut self.under[wheel]);
+        let known = before.covered();
+        let wanted = around(place, reach, cell);
+        let all = std::array::from_fn(|d| {
+            let is_new = known[d].is_empty();
+            if is_new {
+                return wanted[d].clone();
+            }
+            let (a, b) = (&known[d], &wanted[d]);
+            *a.start().min(b.start())..=*a.end().max(b.end())
+        });
+        let mut now: Vec<(i32, i32, f64)> = Vec::new();
+        let [columns, rows] = all;
+        for k in rows {
+            for i in columns.clone() {
                 let centre = [(f64::from(i) + 0.5) * cell, (f64::from(k) + 0.5) * cell];
-                if let Some(depth) = depth_at(centre) {
-                    let before = self.under[wheel].get(&(i, k)).copied();
-                    let depth = depth.max(before.unwrap_or(0.0));
-                    if depth > 0.0 {
-                        now.insert((i, k), depth);
-                    }
+                let kept = before.index(i, k).map_or(0.0, |at| before.depths[at]);
+                match depth_at(centre) {
+                    Some(depth) if depth.max(kept) > 0.0 => now.push((i, k, depth.max(kept))),
+                    None if kept > 0.0 => self.deepen([i, k], kept),
+                    _ => {}
                 }
             }
         }
-        for (at, depth) in std::mem::replace(&mut self.under[wheel], now) {
-            if !self.under[wheel].contains_key(&at) {
-                let rut = self.depths.entry(at).or_insert(0.0);
-                *rut = rut.max(depth);
-            }
-        }
+        self.under[wheel] = Window::of(&now);
     }
 }
 
+#[inline]
 #[allow(clippy::cast_possible_truncation)] // saturates far beyond any terrain
 fn index(x: f64) -> i32 {
-    x.floor() as i32
+    let whole = x as i32;
+    if f64::from(whole) > x {
+        whole.saturating_sub(1)
+    } else {
+        whole
+    }
 }
 
 #[cfg(test)]
@@ -174,13 +336,39 @@ mod tests {
         };
         let mut x = 0.0;
         while x < 1.0 {
-            ruts.pass(0, [x, 0.0], (0.1, 0.01), disc(x));
+            ruts.pass(0, [x, 0.0], ([0.1; 2], 0.01), disc(x));
             x += 0.005;
         }
         assert!((ruts.depth([0.5, 0.0], 0.01) - 0.02).abs() < 1e-3);
         assert!(ruts.depth([x - 0.02, 0.0], 0.01) < 1e-12);
         assert!(ruts.depth([0.5, 0.1], 0.01) < 1e-12);
-        assert!(ruts.is_near([0.5, 0.05], 0.03, 0.01));
-        assert!(!ruts.is_near([0.5, 0.2], 0.03, 0.01));
+        let mut window = Window::default();
+        assert!(ruts.read([0.5, 0.05], [0.03; 2], 0.01, &mut window));
+        for place in [
+            [0.5, 0.05],
+            [0.48, 0.031],
+            [0.519, 0.07],
+            [0.5, 0.0],
+            [0.7, 0.01],
+        ] {
+            let found = ruts.depth_in(&window, place, 0.01);
+            assert!((found - ruts.depth(place, 0.01)).abs() < 1e-15);
+        }
+        assert!(!ruts.read([0.5, 0.2], [0.03; 2], 0.01, &mut window));
+    }
+
+    #[test]
+    fn a_map_is_the_same_after_it_was_written_and_read() {
+        let mut ruts = RutMap::new(2);
+        for x in [-0.33, -0.1, 0.0, 0.2] {
+            ruts.pass(1, [x, -x], ([0.05; 2], 0.01), |[a, b]| {
+                let t = (a - x).hypot(b + x);
+                (t < 0.04).then_some(0.01 - t)
+            });
+        }
+        let text = serde_json::to_string(&ruts).unwrap();
+        let read: RutMap = serde_json::from_str(&text).unwrap();
+        assert_eq!(read, ruts);
+        assert!(ruts.cells().len() > 20);
     }
 }

@@ -2,10 +2,11 @@
 
 use super::bekker::Bekker;
 use super::checks::{in_range, not_negative};
-use super::piece::{Piece, Stress};
+use super::piece::{Piece, Setting, Stress};
 use super::resistive_force::{Flow, Interface, traction};
 use super::wheel::Skin;
 use crate::quantity::{QuantityError, positive};
+use crate::scalar::Lane;
 
 /// A soil.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,24 +59,33 @@ impl Resistive {
 }
 
 impl Soil {
-    /// Stress on a piece.
+    /// Stress on pieces; its derivatives if they are wanted.
+    #[inline(always)]
     #[must_use]
-    pub fn stress(&self, piece: &Piece<'_>) -> Stress {
+    pub fn stress<T: Lane>(
+        &self,
+        piece: &Piece<T>,
+        setting: &Setting,
+        wants_slopes: bool,
+    ) -> Stress<T> {
         match &self.law {
             Law::Resistive(sand) => {
                 let surface = match piece.skin {
-                    Skin::Rim => sand.tread.mixed(&sand.grousers, piece.held),
+                    Skin::Rim => sand.tread.mixed(&sand.grousers, setting.held),
                     Skin::Wall => sand.wall,
                 };
-                let found = traction(piece.normal, piece.x, piece.down, &surface, &sand.flow);
-                let xi = sand.stiffness(piece.gravity);
+                let properties = (&surface, &sand.flow);
+                let (n, x, g) = (piece.normal, piece.x, piece.down);
+                let found = traction(n, x, g, properties, wants_slopes);
+                let xi = n.x.like(sand.stiffness(setting.gravity));
+                let pressure = xi * piece.depth;
                 Stress {
-                    value: found.alpha * (xi * piece.depth),
-                    by_x: found.slope * (xi * piece.depth),
+                    value: found.alpha * pressure,
+                    by_x: found.slope.map(|column| column * pressure),
                     by_depth: found.alpha * xi,
                 }
             }
-            Law::Bekker(soil) => soil.stress(piece),
+            Law::Bekker(soil) => soil.stress(piece, setting, wants_slopes),
         }
     }
 

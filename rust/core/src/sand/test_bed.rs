@@ -65,12 +65,14 @@ pub struct Sunk {
 }
 
 /// Points of the coarsest rules, and by how much each next trial has more.
-const TRIALS: [[usize; 3]; 6] = [
-    [6, 1, 2],
-    [8, 1, 3],
-    [10, 2, 4],
-    [14, 2, 5],
-    [18, 3, 6],
+const TRIALS: [[usize; 3]; 8] = [
+    [8, 1, 1],
+    [8, 1, 2],
+    [8, 2, 2],
+    [8, 2, 3],
+    [16, 2, 3],
+    [16, 2, 4],
+    [16, 3, 6],
     [24, 4, 8],
 ];
 
@@ -215,11 +217,14 @@ impl TestBed {
             twist.linear.y = -rate;
             let recalled = state.memory.after(&twist, radius, times);
             let sinkage = state.sinkage + h * rate;
-            let force = self.force(sinkage, &recalled.memory, drive, Want::Slopes);
+            let want = Want::Slopes {
+                by_memory: recalled.fresh,
+                by_pose: h,
+            };
+            let force = self.force(sinkage, &recalled.memory, drive, want);
             found = (recalled.memory, sinkage, force.wrench);
             let residual = mass * (rate - state.rate) - h * (drive.load - force.wrench[1]);
-            let by_rate = -(force.by_memory * recalled.slope)[(1, 1)] - h * force.by_pose[(1, 1)];
-            let change = residual / (mass + h * by_rate.max(0.0));
+            let change = residual / (mass - h * force.slope[(1, 1)].min(0.0));
             rate -= change;
             if change.abs() < 1e-12 + 1e-9 * rate.abs() {
                 break;

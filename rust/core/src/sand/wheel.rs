@@ -9,6 +9,7 @@
 //! works as a drum of the radius of their tips, with the friction of sand on sand.
 
 use crate::multibody::Wheel;
+use crate::scalar::MAX_LANES;
 use crate::scalar::elementary::sin_cos;
 
 /// Length of rim over which a grouser holds sand, in heights of the grouser. Estimated from the
@@ -87,8 +88,10 @@ pub const MOST_POINTS: usize = 24;
 /// Gauss–Legendre rule on (−1, 1).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gauss {
-    /// Place and weight of each point.
-    pub points: Vec<(f64, f64)>,
+    /// Of its points.
+    pub places: Vec<f64>,
+    /// Of its points.
+    pub weights: Vec<f64>,
 }
 
 impl Gauss {
@@ -111,9 +114,8 @@ impl Gauss {
             }
             (x, 2.0 / ((1.0 - x * x) * slope * slope))
         });
-        Self {
-            points: points.collect(),
-        }
+        let (places, weights) = points.unzip();
+        Self { places, weights }
     }
 }
 
@@ -129,11 +131,12 @@ pub struct Rules {
 }
 
 impl Rules {
-    /// With these numbers of points.
+    /// With these numbers of points. Those of an arc lie side by side in lanes: their number is
+    /// rounded up to whole groups of [`MAX_LANES`].
     #[must_use]
     pub fn new([arc, across, radial]: [usize; 3]) -> Self {
         Self {
-            arc: Gauss::new(arc),
+            arc: Gauss::new(arc.max(1).next_multiple_of(MAX_LANES)),
             across: Gauss::new(across),
             radial: Gauss::new(radial),
         }
@@ -142,18 +145,29 @@ impl Rules {
     /// Points of a wheel.
     #[must_use]
     pub fn n_points(&self) -> usize {
-        self.arc.points.len() * (self.across.points.len() + 2 * self.radial.points.len())
+        let [arc, across, radial] =
+            [&self.arc, &self.across, &self.radial].map(|rule| rule.places.len());
+        arc * (across + 2 * radial)
     }
-}
 
-/// Visits the rings of a wheel of which a part may be under the surface: the side walls from the
-/// radius `dry` (m) outwards.
-pub fn visit_rings(wheel: &SandWheel, rules: &Rules, dry: f64, mut visit: impl FnMut(&Ring)) {
-    let (radius, half, edge) = (wheel.drum(), 0.5 * wheel.width, wheel.rounding);
-    let flat = half - edge;
-    if flat > 0.0 {
-        for (x, weight) in &rules.across.points {
-            visit(&Ring {
+    /// Rings of a wheel, with those that are empty.
+    #[must_use]
+    pub fn n_rings(&self) -> usize {
+        self.across.places.len() + 2 + 2 * self.radial.places.len()
+    }
+
+    /// A ring of a wheel, of which a part may be under the surface: `dry` is the radius (m) from
+    /// which on its side walls may be. None if the ring is empty.
+    #[inline]
+    #[must_use]
+    pub fn ring(&self, wheel: &SandWheel, dry: f64, index: usize) -> Option<Ring> {
+        let (radius, half, edge) = (wheel.drum(), 0.5 * wheel.width, wheel.rounding);
+        let flat = half - edge;
+        if let (Some(x), Some(weight)) = (
+            self.across.places.get(index),
+            self.across.weights.get(index),
+        ) {
+            return (flat > 0.0).then(|| Ring {
                 offset: x * flat,
                 radius,
                 normal: [1.0, 0.0],
@@ -161,12 +175,12 @@ pub fn visit_rings(wheel: &SandWheel, rules: &Rules, dry: f64, mut visit: impl F
                 skin: Skin::Rim,
             });
         }
-    }
-    let diagonal = std::f64::consts::FRAC_1_SQRT_2;
-    let inner = radius - edge;
-    for side in [-1.0, 1.0] {
-        if edge > 0.0 {
-            visit(&Ring {
+        let index = index - self.across.places.len();
+        let side = if index.is_multiple_of(2) { -1.0 } else { 1.0 };
+        let inner = radius - edge;
+        if index < 2 {
+            let diagonal = std::f64::consts::FRAC_1_SQRT_2;
+            return (edge > 0.0).then(|| Ring {
                 offset: side * (flat + diagonal * edge),
                 radius: inner + diagonal * edge,
                 normal: [diagonal, side * diagonal],
@@ -175,18 +189,14 @@ pub fn visit_rings(wheel: &SandWheel, rules: &Rules, dry: f64, mut visit: impl F
             });
         }
         let depth = 0.5 * (inner - dry.max(0.0));
-        if depth <= 0.0 {
-            continue;
-        }
-        for (x, weight) in &rules.radial.points {
-            visit(&Ring {
-                offset: side * half,
-                radius: inner - depth * (1.0 - x),
-                normal: [0.0, side],
-                width: weight * depth,
-                skin: Skin::Wall,
-            });
-        }
+        let point = index / 2 - 1;
+        (depth > 0.0).then(|| Ring {
+            offset: side * half,
+            radius: inner - depth * (1.0 - self.radial.places[point]),
+            normal: [0.0, side],
+            width: self.radial.weights[point] * depth,
+            skin: Skin::Wall,
+        })
     }
 }
 
@@ -201,7 +211,9 @@ mod tests {
             let rule = Gauss::new(n);
             for degree in 0..2 * n {
                 let power = i32::try_from(degree).unwrap();
-                let sum: f64 = rule.points.iter().map(|(x, w)| w * x.powi(power)).sum();
+                let sum: f64 = (rule.places.iter().zip(&rule.weights))
+                    .map(|(x, w)| w * x.powi(power))
+                    .sum();
                 let exact = if degree % 2 == 0 {
                     2.0 / (f64::from(power) + 1.0)
                 } else {
@@ -222,10 +234,11 @@ mod tests {
             grousers: 0,
         };
         let mut area = [0.0; 2];
-        visit_rings(&wheel, &Rules::new([4, 2, 3]), 0.0, |ring| {
+        let rules = Rules::new([4, 2, 3]);
+        for ring in (0..rules.n_rings()).filter_map(|k| rules.ring(&wheel, 0.0, k)) {
             let of_ring = std::f64::consts::TAU * ring.radius * ring.width;
             area[usize::from(ring.skin == Skin::Wall)] += of_ring;
-        });
+        }
         let exact = std::f64::consts::TAU * 0.1 * 0.06;
         assert!((area[0] - exact).abs() < 1e-12);
         assert!((area[1] - std::f64::consts::TAU * 0.1 * 0.1).abs() < 1e-12);

@@ -63,7 +63,7 @@ pub struct GrainBed<const D: usize> {
 pub struct BedCommand<const D: usize> {
     /// Torques, N m, positive forward.
     pub torques: Vec<f64>,
-    /// Force at the machine's first D coordinates, N: a drawbar.
+    /// Force at the machine's origin, N: a drawbar.
     pub pull: SVector<f64, D>,
 }
 
@@ -173,6 +173,7 @@ where
         let Some(options) = &self.sleep else {
             return;
         };
+        let movers = (self.soil).movers(&taken.state.configuration, &taken.state.v);
         let step = grains::StepTaken {
             scene: &self.soil,
             weight_impulse: taken.options.gravity.norm() * taken.options.time_step,
@@ -181,7 +182,7 @@ where
             contacts: taken.scratch.contacts(),
             impulses: taken.scratch.impulses(),
             count: taken.memory.count,
-            movers: &[],
+            movers: &movers,
         };
         taken.memory.sleep.update(options, step, taken.warm_start);
     }
@@ -409,7 +410,7 @@ where
         Ok(())
     }
 
-    /// Sets a force at the machine's first D coordinates, N: a drawbar.
+    /// Sets a force at the machine's origin, N: a drawbar.
     ///
     /// # Errors
     /// No machine, or an entry that is not finite; nothing is changed then.

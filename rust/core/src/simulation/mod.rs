@@ -41,9 +41,7 @@ pub use grains::{
     BedCommand, BedMemory, GrainBed, GrainSimulation, SoilSetupError, SoilSimulation, soil_options,
 };
 pub use linearisation::{Linearisation, LinearisationError};
-pub use planar::{
-    BallSimulation, MirroredRoverSimulation, PlanarScene, PlanarSimulation, TwoWheelRoverSimulation,
-};
+pub use planar::{PlanarScene, PlanarSimulation};
 pub use reading::{Look, ReadingLayout, ReadingScratch, seen_from};
 pub use rover::{LastCall, Placement, RoverScene, RoverSimulation};
 pub use rover_command::RoverCommand;

@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use nalgebra::{SMatrix, SVector, Vector2};
-
 use super::active_contact::LocatedContact;
 use super::error::CommandError;
 use super::rover_command::check;
@@ -12,16 +10,14 @@ use super::state::State;
 use super::stepping::Simulation;
 use crate::integrator::{OptionsError, StepOptions};
 use crate::multibody::{Energy, StateError};
-use crate::planar::{
-    Ball, ContactRule, Facing, Ground, MirroredRover, PlanarMachine, TwoWheelRover,
-};
+use crate::planar::{ContactRule, Disc, Facing, Ground, PlanarTree};
 use crate::system::{PlanarContact, PlanarScratch, PlanarSystem};
 
-/// A machine on a ground. The ground is shared.
+/// A machine on a ground. Both are shared.
 #[derive(Clone, Debug)]
-pub struct PlanarScene<const NV: usize, M> {
+pub struct PlanarScene {
     /// The machine.
-    pub machine: M,
+    pub machine: Arc<PlanarTree>,
     /// The ground.
     pub ground: Arc<dyn Ground>,
     /// Contact rule of discs on the ground.
@@ -29,18 +25,9 @@ pub struct PlanarScene<const NV: usize, M> {
 }
 
 /// A planar machine on a ground, stepped through time.
-pub type PlanarSimulation<const NV: usize, M> = Simulation<PlanarScene<NV, M>>;
+pub type PlanarSimulation = Simulation<PlanarScene>;
 
-/// The ball on a ground.
-pub type BallSimulation = PlanarSimulation<3, Ball>;
-
-/// The two-wheel rover on a ground.
-pub type TwoWheelRoverSimulation = PlanarSimulation<5, TwoWheelRover>;
-
-/// The six-wheel rover, driven straight on a ground.
-pub type MirroredRoverSimulation = PlanarSimulation<7, MirroredRover<7>>;
-
-impl<const NV: usize> DenseOperator for PlanarScratch<NV> {
+impl DenseOperator for PlanarScratch {
     fn operator(&self) -> &[f64] {
         PlanarScratch::operator(self)
     }
@@ -59,20 +46,17 @@ impl LocatedContact for PlanarContact {
     }
 }
 
-impl<const NV: usize, M: PlanarMachine<NV> + Clone> Scene for PlanarScene<NV, M> {
-    type Configuration = SVector<f64, NV>;
+impl Scene for PlanarScene {
+    type Configuration = Vec<f64>;
     type Contact = PlanarContact;
     /// Torques, N m, positive forward.
     type Command = Vec<f64>;
     type Memory = ();
-    type Parts = PlanarScratch<NV>;
-    type System<'a>
-        = PlanarSystem<'a, NV, M>
-    where
-        Self: 'a;
+    type Parts = PlanarScratch;
+    type System<'a> = PlanarSystem<'a>;
 
     fn nv(&self) -> usize {
-        NV
+        self.machine.nv()
     }
 
     fn command(&self) -> Vec<f64> {
@@ -81,20 +65,20 @@ impl<const NV: usize, M: PlanarMachine<NV> + Clone> Scene for PlanarScene<NV, M>
 
     fn memory(&self) {}
 
-    fn parts(&self) -> PlanarScratch<NV> {
+    fn parts(&self) -> PlanarScratch {
         PlanarScratch::default()
     }
 
     fn contact_capacity(&self) -> usize {
-        2 * self.machine.n_discs()
+        2 * self.machine.n_wheels()
     }
 
     fn system<'a>(
         &'a self,
         command: &'a Vec<f64>,
         (): &'a (),
-        parts: &'a mut PlanarScratch<NV>,
-    ) -> PlanarSystem<'a, NV, M> {
+        parts: &'a mut PlanarScratch,
+    ) -> PlanarSystem<'a> {
         PlanarSystem {
             machine: &self.machine,
             ground: &*self.ground,
@@ -104,17 +88,16 @@ impl<const NV: usize, M: PlanarMachine<NV> + Clone> Scene for PlanarScene<NV, M>
         }
     }
 
-    fn position(&self, _parts: &PlanarScratch<NV>, contact: &PlanarContact) -> [f64; 2] {
+    fn position(&self, _parts: &PlanarScratch, contact: &PlanarContact) -> [f64; 2] {
         contact.foot.into()
     }
 
-    fn energy(&self, options: &StepOptions, state: &State<SVector<f64, NV>>) -> Energy {
-        let v = SVector::<f64, NV>::from_column_slice(&state.v);
-        let momentum = self.machine.mass_matrix(&state.configuration) * v;
-        let gravity: Vector2<f64> = options.gravity.xy();
+    fn energy(&self, options: &StepOptions, state: &State<Vec<f64>>) -> Energy {
+        let gravity = options.gravity.xy();
+        let energy = (self.machine).energy(&state.configuration, &state.v, &gravity);
         Energy {
-            kinetic: 0.5 * v.dot(&momentum),
-            potential: self.machine.potential(&state.configuration, &gravity),
+            kinetic: energy.kinetic,
+            potential: energy.potential,
         }
     }
 
@@ -123,36 +106,40 @@ impl<const NV: usize, M: PlanarMachine<NV> + Clone> Scene for PlanarScene<NV, M>
     }
 
     fn admits(&self, snapshot: &Snapshot<Self>) -> bool {
-        let n_discs = self.machine.n_discs();
+        let n_discs = self.machine.n_wheels();
         let discs = snapshot.active.iter().map(|a| a.contact.key.disc as usize);
         let mut numbers = snapshot.state.configuration.iter().chain(&snapshot.command);
-        snapshot.command.len() == self.machine.n_inputs()
+        snapshot.state.configuration.len() == self.machine.nv()
+            && snapshot.command.len() == self.machine.n_inputs()
             && numbers.all(|x| x.is_finite())
             && discs.into_iter().all(|disc| disc < n_discs)
     }
 }
 
-impl<const NV: usize, M: PlanarMachine<NV> + Clone> PlanarSimulation<NV, M> {
+impl PlanarSimulation {
     /// At rest with all coordinates 0, no torque.
     ///
     /// # Errors
     /// An option out of its range.
     pub fn new(
-        machine: M,
+        machine: impl Into<PlanarTree>,
         ground: Arc<dyn Ground>,
         rule: ContactRule,
         options: StepOptions,
     ) -> Result<Self, OptionsError> {
+        let machine = Arc::new(machine.into());
+        let q = vec![0.0; machine.nv()];
         let scene = PlanarScene {
             machine,
             ground,
             rule,
         };
-        Self::of(scene, SVector::zeros(), options)
+        Self::of(scene, q, options)
     }
 
     /// The machine.
-    pub fn machine(&self) -> &M {
+    #[must_use]
+    pub fn machine(&self) -> &PlanarTree {
         &self.scene.machine
     }
 
@@ -162,10 +149,11 @@ impl<const NV: usize, M: PlanarMachine<NV> + Clone> PlanarSimulation<NV, M> {
     /// Wrong length or an entry that is not finite; nothing is changed then.
     pub fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), StateError> {
         for (field, values) in [("q", q), ("v", v)] {
-            if values.len() != NV {
+            let expected = self.machine().nv();
+            if values.len() != expected {
                 return Err(StateError::Length {
                     field,
-                    expected: NV,
+                    expected,
                     actual: values.len(),
                 });
             }
@@ -177,12 +165,12 @@ impl<const NV: usize, M: PlanarMachine<NV> + Clone> PlanarSimulation<NV, M> {
                 });
             }
         }
-        self.place(SVector::from_column_slice(q), v.to_vec());
+        self.place(q.to_vec(), v.to_vec());
         Ok(())
     }
 
     /// Sets the torques, N m, positive forward; each saturates at its limit
-    /// ([`PlanarMachine::torque_limit`]).
+    /// ([`PlanarTree::torque_limit`]).
     ///
     /// # Errors
     /// Wrong length or an entry that is not finite; nothing is changed then.
@@ -196,33 +184,39 @@ impl<const NV: usize, M: PlanarMachine<NV> + Clone> PlanarSimulation<NV, M> {
         Ok(())
     }
 
-    /// `M(q)` at the current q.
-    pub fn mass_matrix(&self) -> SMatrix<f64, NV, NV> {
-        self.machine().mass_matrix(self.q())
+    /// `M(q)` (nv × nv, row-major) at the current q.
+    #[must_use]
+    pub fn mass_matrix(&self) -> Vec<f64> {
+        let machine = self.machine();
+        let mut M = vec![0.0; machine.nv() * machine.nv()];
+        machine.mass_matrix(&machine.poses(self.q()), &mut M);
+        M
+    }
+
+    /// Discs of the wheels now.
+    #[must_use]
+    pub fn discs(&self) -> Vec<Disc> {
+        let poses = self.machine().poses(self.q());
+        let discs = 0..self.machine().n_wheels();
+        discs.map(|i| self.machine().disc(i, &poses)).collect()
     }
 
     /// Current smallest gap of every disc, m; negative if it overlaps the ground.
+    #[must_use]
     pub fn gaps(&self) -> Vec<f64> {
-        let PlanarScene {
-            machine,
-            ground,
-            rule,
-        } = &self.scene;
+        let PlanarScene { ground, rule, .. } = &self.scene;
         let mut facing: Vec<Facing> = Vec::new();
-        let gap = |i: usize| {
-            let disc = machine.disc(i, self.q());
-            match rule {
-                ContactRule::CentreHeight => ground.below(&disc.centre).distance,
-                ContactRule::Nearest => {
-                    // The nearest point is no farther than the one straight below.
-                    let height = disc.centre.y - ground.height(disc.centre.x);
-                    facing.clear();
-                    ground.facing(&disc.centre, height.abs() * (1.0 + 1e-9), &mut facing);
-                    let nearest = facing.iter().map(|f| f.distance);
-                    nearest.fold(height, f64::min) - disc.radius
-                }
+        let gap = |disc: &Disc| match rule {
+            ContactRule::CentreHeight => ground.below(&disc.centre).distance,
+            ContactRule::Nearest => {
+                // The nearest point is no farther than the one straight below.
+                let height = disc.centre.y - ground.height(disc.centre.x);
+                facing.clear();
+                ground.facing(&disc.centre, height.abs() * (1.0 + 1e-9), &mut facing);
+                let nearest = facing.iter().map(|f| f.distance);
+                nearest.fold(height, f64::min) - disc.radius
             }
         };
-        (0..machine.n_discs()).map(gap).collect()
+        self.discs().iter().map(gap).collect()
     }
 }

@@ -185,6 +185,7 @@ impl Scene for RoverScene {
             model: &self.model,
             terrain: &*self.terrain,
             command: &command.actuators,
+            ruts: memory.sand.as_ref().map(|sand| &sand.ruts),
             parts: &mut parts.tree,
         }
     }

@@ -9,23 +9,18 @@ use super::active_contact::ActiveContact;
 use super::grains::GrainSimulation;
 use super::rover::RoverSimulation;
 use super::scene::{Scene, StepTaken};
-use crate::contact::{Contact, Part};
-use crate::geometry::SupportMap;
+use crate::contact::Part;
+use crate::geometry::query::dispatch;
+use crate::geometry::{PlacedShape, Sphere, SupportMap};
 use crate::integrator::{
     Integrator, NoProbe, Scratch, StateMut, StepError, StepOptions, StepReport, WarmStart,
 };
 use crate::multibody::{Configuration, Kinematics};
-use crate::system::grains::{self, GrainContact, GrainError, GrainKey, Grid, Mover, OVERLAP};
-use crate::system::{AmongGrains, AmongParts, Composite, CompositeParts, GrainTouch, Of};
+use crate::system::grains::{self, GrainContact, GrainError, Grid, Mover, OVERLAP};
+use crate::system::{AmongContact, AmongGrains, AmongKey, AmongParts, GrainTouch};
 use nalgebra::Vector3;
 
-use crate::contact::ContactKey;
-use crate::geometry::query::dispatch;
-use crate::geometry::{PlacedShape, Sphere};
-
 type Both = (Vec<f64>, Configuration);
-type BothContact = Of<GrainContact<3>, Contact, GrainTouch>;
-type BothKey = Of<GrainKey, ContactKey, GrainKey>;
 
 /// A rover and a bed that cannot be stepped together.
 #[derive(Clone, Debug, thiserror::Error, PartialEq)]
@@ -59,10 +54,9 @@ pub enum TogetherError {
 #[derive(Clone, Debug)]
 pub struct RoverInGrains {
     friction: f64,
-    warm_start: WarmStart<BothKey>,
-    scratch: Scratch<Both, BothContact>,
-    among: AmongParts,
-    parts: CompositeParts<GrainContact<3>, Contact, GrainTouch>,
+    warm_start: WarmStart<AmongKey>,
+    scratch: Scratch<Both, AmongContact>,
+    parts: AmongParts,
 }
 
 impl RoverInGrains {
@@ -104,8 +98,7 @@ impl RoverInGrains {
             friction,
             warm_start: WarmStart::with_capacity(room, 0),
             scratch: Scratch::new(&q, nv, room, 3),
-            among: AmongParts::new(rover.model()),
-            parts: CompositeParts::default(),
+            parts: AmongParts::new(rover.model()),
         })
     }
 
@@ -194,13 +187,10 @@ impl RoverInGrains {
         let mut v = [&bed.state.v[..], &rover.state.v[..]].concat();
         let mut time = bed.state.time;
         self.join_warm_starts(rover, bed);
-        let mut system = Composite {
-            first: (bed.scene).system(&bed.command, &bed.memory, &mut bed.parts),
-            second: (rover.scene).system(&rover.command, &rover.memory, &mut rover.parts),
-            coupling: AmongGrains {
-                friction: self.friction,
-                parts: &mut self.among,
-            },
+        let mut system = AmongGrains {
+            bed: (bed.scene).system(&bed.command, &bed.memory, &mut bed.parts),
+            tree: (rover.scene).system(&rover.command, &rover.memory, &mut rover.parts),
+            friction: self.friction,
             parts: &mut self.parts,
         };
         let taken = options.variant.step(
@@ -241,11 +231,13 @@ impl RoverInGrains {
         let all = &mut self.warm_start.impulses;
         all.clear();
         let of_bed = &bed.warm_start.impulses;
-        all.extend((of_bed.iter().filter(|(key, _)| key.a < n)).map(|(k, p)| (Of::First(*k), *p)));
-        let own = &rover.warm_start.impulses;
-        all.extend(own.iter().map(|(k, p)| (Of::Second(*k), *p)));
         all.extend(
-            (of_bed.iter().filter(|(key, _)| key.a >= n)).map(|(k, p)| (Of::Between(*k), *p)),
+            (of_bed.iter().filter(|(key, _)| key.a < n)).map(|(k, p)| (AmongKey::Grains(*k), *p)),
+        );
+        let own = &rover.warm_start.impulses;
+        all.extend(own.iter().map(|(k, p)| (AmongKey::Tree(*k), *p)));
+        all.extend(
+            (of_bed.iter().filter(|(key, _)| key.a >= n)).map(|(k, p)| (AmongKey::Touch(*k), *p)),
         );
         self.warm_start.persistent.clear();
     }
@@ -255,8 +247,10 @@ impl RoverInGrains {
         bed.warm_start.clear();
         for (key, p) in &self.warm_start.impulses {
             match key {
-                Of::First(key) | Of::Between(key) => bed.warm_start.impulses.push((*key, *p)),
-                Of::Second(key) => rover.warm_start.impulses.push((*key, *p)),
+                AmongKey::Grains(key) | AmongKey::Touch(key) => {
+                    bed.warm_start.impulses.push((*key, *p))
+                }
+                AmongKey::Tree(key) => rover.warm_start.impulses.push((*key, *p)),
             }
         }
     }
@@ -271,15 +265,15 @@ impl RoverInGrains {
         let local = self.scratch.impulses().as_chunks::<3>().0;
         for (contact, p) in self.scratch.contacts().iter().zip(local) {
             let contact = match contact {
-                Of::First(contact) => *contact,
-                Of::Between(touch) => GrainContact {
+                AmongContact::Grains(contact) => *contact,
+                AmongContact::Touch(touch) => GrainContact {
                     key: touch.key,
                     n: touch.contact.frame.n,
                     point: touch.contact.point,
                     gap: touch.contact.gap,
                     gap_start: touch.gap_start,
                 },
-                Of::Second(_) => continue,
+                AmongContact::Tree(_) => continue,
             };
             contacts.push(contact);
             impulses.extend_from_slice(p);
@@ -325,13 +319,13 @@ impl RoverInGrains {
         for (contact, (impulse, velocity)) in self.scratch.contacts().iter().zip(local) {
             let (impulse, velocity) = (*impulse, *velocity);
             match contact {
-                Of::First(contact) => bed.active.push(ActiveContact {
+                AmongContact::Grains(contact) => bed.active.push(ActiveContact {
                     contact: *contact,
                     position: contact.point.into(),
                     impulse,
                     velocity,
                 }),
-                Of::Second(contact) | Of::Between(GrainTouch { contact, .. }) => {
+                AmongContact::Tree(contact) | AmongContact::Touch(GrainTouch { contact, .. }) => {
                     rover.active.push(ActiveContact {
                         contact: *contact,
                         position: rover.scene.position(&rover.parts, contact),

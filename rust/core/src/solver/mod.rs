@@ -8,6 +8,7 @@
 //! - `local`: one contact with all others fixed: its exact [solution](solve_one_contact) and its
 //!   mode;
 //! - `linear`: the linear system of a Newton step and its factors, dense or block-sparse;
+//! - `pivoting`: pivoting on the contact modes, over any scalar, storage and linear system;
 //! - `scratch`: memory that the stages share;
 //! - `stage`: the iterative methods, one per file;
 //! - `strategy`: the order of the stages; `reference`: methods for comparison;
@@ -29,6 +30,7 @@ mod history;
 mod linear;
 mod local;
 mod options;
+pub(crate) mod pivoting;
 mod reference;
 mod report;
 mod scratch;
@@ -43,6 +45,5 @@ pub use local::one_contact::{OneContactSolution, solve_one_contact};
 pub use options::{ContactLaw, Method, SolverOptions};
 pub use report::{Rung, Rungs, SolveReport, SolveStatus, Stage};
 pub use stage::body_sweeps::{BodySweeps, Swept, solve_body_pairs};
-pub(crate) use stage::pivoting::FURTHER_ALPHAS;
 pub use strategy::many_bodies::ManyBodies;
 pub use workspace::SolverWorkspace;

@@ -2,6 +2,7 @@
 
 use super::history::History;
 use super::linear::reduced_system::ReducedSystem;
+use super::pivoting::{Many, Pivoting};
 use super::report::{Rung, Rungs, SolveStatus, Stage};
 use super::work::{Work, sweep};
 use crate::problem::Operator;
@@ -12,6 +13,8 @@ use crate::problem::Operator;
 pub(super) struct Scratch {
     /// The linear system of a Newton step with its linearisation.
     pub system: ReducedSystem,
+    /// Pivoting's impulses, velocities and modes.
+    pub pivoting: Pivoting<f64, Many>,
     /// Inverse masses of the contacts, 1/kg: ADMM's penalty at `σ = 1`.
     pub weights: Vec<f64>,
     /// Impulse at the start of the solve, N s.
@@ -46,6 +49,7 @@ impl Scratch {
     pub fn resize(&mut self, n_contacts: usize, n: usize) {
         self.weights.resize(n_contacts, 0.0);
         self.system.resize(n_contacts, n);
+        self.pivoting.resize(n_contacts);
         for buffer in [
             &mut self.start,
             &mut self.best,

@@ -1,16 +1,17 @@
 //! A planar machine on a ground as a mechanical system: contacts with one
 //! tangent, `M = L Lᵀ`, `Z = L⁻¹ H`.
 
-use nalgebra::{Cholesky, SMatrix, SVector, Vector2, Vector3};
+use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
 use super::command::Drive;
 use super::motor_branch::{MotorBranch, line_slope};
+use super::planar_matrices::{PlanarMatrices, sum_of_products};
 use crate::contact::Activation;
 use crate::integrator::{
     MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact,
 };
-use crate::planar::{ContactRule, Disc, Facing, Ground, PlanarMachine, PlanarMotor};
+use crate::planar::{ContactRule, Disc, Facing, Ground, PlanarMotor, PlanarPoses, PlanarTree};
 use crate::problem::{Dimension, FrictionContactProblem};
 
 /// Key of a contact between a disc and the ground.
@@ -68,41 +69,23 @@ impl UnilateralContact for PlanarContact {
 }
 
 /// Matrices of a step: scratch.
-#[derive(Clone, Debug)]
-pub struct PlanarScratch<const NV: usize> {
-    middle: SVector<f64, NV>,
-    end: SVector<f64, NV>,
-    mass: SMatrix<f64, NV, NV>,
-    /// Lower factor, `M = L Lᵀ`.
-    L: SMatrix<f64, NV, NV>,
-    /// Columns n, t of each contact.
-    H: Vec<SMatrix<f64, NV, 2>>,
-    Z: Vec<SMatrix<f64, NV, 2>>,
+#[derive(Clone, Debug, Default)]
+pub struct PlanarScratch {
+    middle: PlanarPoses,
+    end: PlanarPoses,
+    matrices: PlanarMatrices,
+    /// Rows n, t of Zᵀ of each contact (nv each).
+    Z: Vec<f64>,
     W: Vec<f64>,
     facing: Vec<Facing>,
     /// Of each input.
     motors: Vec<MotorBranch>,
     torques: Vec<f64>,
+    /// Their generalized force (nv).
+    driving: Vec<f64>,
 }
 
-impl<const NV: usize> Default for PlanarScratch<NV> {
-    fn default() -> Self {
-        Self {
-            middle: SVector::zeros(),
-            end: SVector::zeros(),
-            mass: SMatrix::identity(),
-            L: SMatrix::identity(),
-            H: Vec::new(),
-            Z: Vec::new(),
-            W: Vec::new(),
-            facing: Vec::new(),
-            motors: Vec::new(),
-            torques: Vec::new(),
-        }
-    }
-}
-
-impl<const NV: usize> PlanarScratch<NV> {
+impl PlanarScratch {
     /// Delassus operator of the last step, row-major, 1/kg.
     #[must_use]
     pub fn operator(&self) -> &[f64] {
@@ -113,9 +96,9 @@ impl<const NV: usize> PlanarScratch<NV> {
 /// A machine on a ground, driven by torques. Motors on their torque–speed line are implicit, as in
 /// the rover's tree.
 #[derive(Debug)]
-pub struct PlanarSystem<'a, const NV: usize, M> {
+pub struct PlanarSystem<'a> {
     /// The machine.
-    pub machine: &'a M,
+    pub machine: &'a PlanarTree,
     /// The ground.
     pub ground: &'a dyn Ground,
     /// How discs meet it.
@@ -123,7 +106,7 @@ pub struct PlanarSystem<'a, const NV: usize, M> {
     /// Commanded torques, N m, positive forward.
     pub inputs: &'a [f64],
     /// Its scratch.
-    pub parts: &'a mut PlanarScratch<NV>,
+    pub parts: &'a mut PlanarScratch,
 }
 
 /// The points of the ground that face a disc, with their contact's number.
@@ -149,7 +132,7 @@ fn motor_rates(motor: &PlanarMotor, begin: &[f64], end: &[f64]) -> (f64, f64) {
     (sign * begin[k], sign * end[k])
 }
 
-impl<const NV: usize, M: PlanarMachine<NV>> PlanarSystem<'_, NV, M> {
+impl PlanarSystem<'_> {
     /// Mean torques of a step that ends with the iterate `v_end`, into `parts.torques`.
     fn set_torques(&mut self, start: &[f64], v_end: &[f64]) {
         let parts = &mut *self.parts;
@@ -171,67 +154,69 @@ impl<const NV: usize, M: PlanarMachine<NV>> PlanarSystem<'_, NV, M> {
         y: &mut [f64],
     ) {
         self.set_torques(start, v_end);
-        let parts = &*self.parts;
-        let v = SVector::<f64, NV>::from_column_slice(v_mean);
+        let PlanarScratch {
+            middle, torques, ..
+        } = &mut *self.parts;
         let gravity = options.gravity.xy();
-        let force = self
-            .machine
-            .force(&parts.middle, &v, &gravity, &parts.torques);
-        y.copy_from_slice((force * options.time_step).as_slice());
+        self.machine.force(middle, v_mean, &gravity, torques, y);
+        for y in y {
+            *y *= options.time_step;
+        }
+    }
+
+    /// Generalized force of the torques of a step that ends with `v_end`, into `parts.driving`.
+    fn set_driving(&mut self, start: &[f64], v_end: &[f64]) {
+        self.set_torques(start, v_end);
+        let PlanarScratch {
+            torques, driving, ..
+        } = &mut *self.parts;
+        driving.clear();
+        driving.resize(self.machine.nv(), 0.0);
+        self.machine.add_torques(torques, driving);
     }
 }
 
-impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_, NV, M> {
-    type Configuration = SVector<f64, NV>;
+impl MechanicalSystem for PlanarSystem<'_> {
+    type Configuration = Vec<f64>;
     type Contact = PlanarContact;
 
     const DIMENSION: Dimension = Dimension::Two;
 
     fn nv(&self) -> usize {
-        NV
+        self.machine.nv()
     }
 
-    fn set_moved(&self, from: &SVector<f64, NV>, v: &[f64], h: f64, to: &mut SVector<f64, NV>) {
-        for ((to, from), v) in to.iter_mut().zip(from).zip(v) {
-            *to = from + h * v;
-        }
-    }
-
-    fn advance(&self, q: &mut SVector<f64, NV>, v: &[f64], h: f64) {
+    fn advance(&self, q: &mut Vec<f64>, v: &[f64], h: f64) {
         for (q, v) in q.iter_mut().zip(v) {
             *q += h * v;
         }
     }
 
-    fn is_finite(&self, q: &SVector<f64, NV>) -> bool {
+    fn is_finite(&self, q: &Vec<f64>) -> bool {
         q.iter().all(|x| x.is_finite())
     }
 
-    fn place_middle(&mut self, q: &SVector<f64, NV>) {
-        self.parts.middle = *q;
+    fn place_middle(&mut self, q: &Vec<f64>) {
+        self.machine.place(q, &mut self.parts.middle);
     }
 
-    fn place_end(&mut self, q: &SVector<f64, NV>) {
-        self.parts.end = *q;
+    fn place_end(&mut self, q: &Vec<f64>) {
+        self.machine.place(q, &mut self.parts.end);
     }
 
     fn detect(&mut self, v: &[f64], mut activation: Activation, out: &mut Vec<PlanarContact>) {
         out.clear();
-        let v = SVector::<f64, NV>::from_column_slice(v);
-        let q = self.parts.middle;
-        for i in 0..self.machine.n_discs() {
-            let disc = self.machine.disc(i, &q);
-            let J = self.machine.point_jacobian(i, &q, &disc.centre);
-            let velocity = J * v;
+        let PlanarScratch {
+            middle,
+            facing: found,
+            ..
+        } = &mut *self.parts;
+        for i in 0..self.machine.n_wheels() {
+            let disc = self.machine.disc(i, middle);
+            let velocity = self.machine.point_velocity(i, middle, &disc.centre, v);
             activation.margin = activation.lead.abs() * velocity.norm();
-            facing(
-                self.ground,
-                self.rule,
-                &disc,
-                activation.reach(),
-                &mut self.parts.facing,
-            );
-            for (feature, facing) in (0..).zip(&self.parts.facing) {
+            facing(self.ground, self.rule, &disc, activation.reach(), found);
+            for (feature, facing) in (0..).zip(&*found) {
                 let mut contact = PlanarContact {
                     key: PlanarKey {
                         disc: u32::try_from(i).unwrap_or(u32::MAX),
@@ -251,10 +236,9 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
     }
 
     fn relocate(&mut self, contacts: &mut [PlanarContact]) {
-        let q = self.parts.end;
         for contact in contacts {
             let i = contact.key.disc as usize;
-            let disc = self.machine.disc(i, &q);
+            let disc = self.machine.disc(i, &self.parts.end);
             let moved = (disc.centre - contact.foot).norm();
             // The same minimum of the distance is the one whose foot is next to the old foot.
             facing(self.ground, self.rule, &disc, moved, &mut self.parts.facing);
@@ -274,12 +258,11 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
 
     fn update_mass_matrix(&mut self, options: &StepOptions) {
         let parts = &mut *self.parts;
-        parts.mass = self.machine.mass_matrix(&parts.middle);
+        parts.matrices.set_mass(self.machine, &parts.middle);
         let step = (options.time_step, options.theta);
         for (i, branch) in parts.motors.iter_mut().enumerate() {
             if let Some(motor) = self.machine.motor(i) {
-                let k = motor.coordinate;
-                let inertia = parts.mass[(k, k)] / motor.gain.abs();
+                let inertia = *parts.matrices.inertia(motor.coordinate) / motor.gain.abs();
                 let command = drive(&motor, 0.0);
                 branch.set_theta(step, (line_slope(Some(&command)), 0.0), inertia);
             }
@@ -291,35 +274,28 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
         for (i, branch) in parts.motors.iter().enumerate() {
             if let Some(motor) = self.machine.motor(i) {
                 let damping = motor.gain.abs() * branch.damping();
-                let k = motor.coordinate;
-                parts.mass[(k, k)] += options.time_step * branch.theta() * damping;
+                let inertia = parts.matrices.inertia(motor.coordinate);
+                *inertia += options.time_step * branch.theta() * damping;
             }
         }
-        match Cholesky::new(self.parts.mass) {
-            Some(factor) => {
-                self.parts.L = factor.l();
-                true
-            }
-            None => false,
-        }
+        parts.matrices.factorise()
     }
 
     fn multiply_mass(&self, v: &[f64], out: &mut [f64]) {
-        let momentum = self.parts.mass * SVector::<f64, NV>::from_column_slice(v);
-        out.copy_from_slice(momentum.as_slice());
+        self.parts.matrices.multiply_mass(v, out);
     }
 
     fn load(
         &mut self,
         options: &StepOptions,
-        start: Start<'_, SVector<f64, NV>>,
+        start: Start<'_, Vec<f64>>,
         v_mean: &[f64],
         y: &mut [f64],
     ) {
         self.impulse(options, (start.v, start.v), v_mean, y);
     }
 
-    fn choose_branches(&mut self, start: Start<'_, SVector<f64, NV>>) {
+    fn choose_branches(&mut self, start: Start<'_, Vec<f64>>) {
         let parts = &mut *self.parts;
         parts
             .motors
@@ -332,7 +308,7 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
         }
     }
 
-    fn revise(&mut self, start: Start<'_, SVector<f64, NV>>, v_end: &[f64]) -> bool {
+    fn revise(&mut self, start: Start<'_, Vec<f64>>, v_end: &[f64]) -> bool {
         let parts = &mut *self.parts;
         let mut is_new = false;
         for (i, (branch, torque)) in parts.motors.iter_mut().zip(self.inputs).enumerate() {
@@ -346,13 +322,13 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
     }
 
     fn turning(&self, v: &[f64]) -> f64 {
-        self.machine.turning(&SVector::from_column_slice(v))
+        self.machine.turning(v)
     }
 
     fn load_at_end(
         &mut self,
         options: &StepOptions,
-        start: Start<'_, SVector<f64, NV>>,
+        start: Start<'_, Vec<f64>>,
         v_end: &[f64],
         v_mean: &[f64],
         y: &mut [f64],
@@ -363,52 +339,31 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
     fn energy(
         &mut self,
         options: &StepOptions,
-        q: &SVector<f64, NV>,
+        q: &Vec<f64>,
         v: &[f64],
     ) -> Option<MechanicalEnergy> {
-        let v = SVector::<f64, NV>::from_column_slice(v);
-        let momentum = self.machine.mass_matrix(q) * v;
-        // A force along x or y acts on the whole mass.
-        let mass = self.machine.mass_matrix(q)[(0, 0)];
-        Some(MechanicalEnergy {
-            kinetic: 0.5 * momentum.dot(&v),
-            potential: self.machine.potential(q, &options.gravity.xy()),
-            momentum: Vector3::new(momentum[0], momentum[1], 0.0),
-            mass,
-        })
+        let energy = self.machine.energy(q, v, &options.gravity.xy());
+        Some(energy)
     }
 
     fn work_of_displacement(
         &mut self,
         _options: &StepOptions,
-        start: Start<'_, SVector<f64, NV>>,
+        start: Start<'_, Vec<f64>>,
         v_end: &[f64],
         displacement: &[f64],
     ) -> f64 {
-        let (still, none) = (SVector::zeros(), Vector2::zeros());
-        self.set_torques(start.v, v_end);
-        let parts = &*self.parts;
-        let torques = self
-            .machine
-            .force(&parts.middle, &still, &none, &parts.torques);
-        torques.iter().zip(displacement).map(|(f, d)| f * d).sum()
+        self.set_driving(start.v, v_end);
+        sum_of_products(&self.parts.driving, displacement)
     }
 
-    fn work(
-        &mut self,
-        options: &StepOptions,
-        start: Start<'_, SVector<f64, NV>>,
-        v_end: &[f64],
-    ) -> f64 {
-        let (still, none) = (SVector::zeros(), Vector2::zeros());
-        self.set_torques(start.v, v_end);
+    fn work(&mut self, options: &StepOptions, start: Start<'_, Vec<f64>>, v_end: &[f64]) -> f64 {
+        self.set_driving(start.v, v_end);
         let parts = &*self.parts;
-        let torques = self
-            .machine
-            .force(&parts.middle, &still, &none, &parts.torques);
         let (h, theta) = (options.time_step, options.theta);
         let mean = |k: usize| theta * v_end[k] + (1.0 - theta) * start.v[k];
-        let power: f64 = torques.iter().enumerate().map(|(k, f)| f * mean(k)).sum();
+        let driving = parts.driving.iter().enumerate();
+        let power: f64 = driving.map(|(k, f)| f * mean(k)).sum();
         let mut work = h * power;
         for (i, &torque) in parts.torques.iter().enumerate() {
             if let Some(motor) = self.machine.motor(i) {
@@ -422,87 +377,64 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
     }
 
     fn half_solve(&self, y: &mut [f64]) {
-        let L = &self.parts.L;
-        for i in 0..NV {
-            let known: f64 = (0..i).map(|k| L[(i, k)] * y[k]).sum();
-            y[i] = (y[i] - known) / L[(i, i)];
-        }
+        self.parts.matrices.forward(y);
     }
 
     fn half_solve_back(&self, y: &mut [f64]) {
-        let L = &self.parts.L;
-        for i in (0..NV).rev() {
-            let known: f64 = (i + 1..NV).map(|k| L[(k, i)] * y[k]).sum();
-            y[i] = (y[i] - known) / L[(i, i)];
-        }
+        self.parts.matrices.backward(y);
     }
 
     fn assemble(&mut self, contacts: &[PlanarContact], v: &[f64], u: &mut [f64]) {
         let n = 2 * contacts.len();
-        let q = self.parts.end;
-        let velocity = SVector::<f64, NV>::from_column_slice(v);
-        self.parts.H.clear();
-        self.parts.Z.clear();
-        for (contact, u) in contacts.iter().zip(u.chunks_exact_mut(2)) {
-            let J = self
-                .machine
-                .point_jacobian(contact.key.disc as usize, &q, &contact.point);
-            let mut H = SMatrix::<f64, NV, 2>::zeros();
-            H.set_column(0, &J.tr_mul(&contact.n));
-            H.set_column(1, &J.tr_mul(&contact.t()));
-            u.copy_from_slice(H.tr_mul(&velocity).as_slice());
-            let mut Z = H;
-            for column in Z.as_mut_slice().chunks_exact_mut(NV) {
-                self.half_solve(column);
-            }
-            self.parts.H.push(H);
-            self.parts.Z.push(Z);
+        let PlanarScratch {
+            end,
+            matrices,
+            Z,
+            W,
+            ..
+        } = &mut *self.parts;
+        matrices.clear_rows();
+        Z.clear();
+        for contact in contacts {
+            let (wheel, frame) = (contact.key.disc as usize, [contact.n, contact.t()]);
+            matrices.push_contact((self.machine, end), wheel, &contact.point, &frame, Z);
         }
-        let parts = &mut *self.parts;
-        parts.W.resize(n * n, 0.0);
-        for (i, a) in parts.Z.iter().enumerate() {
-            for (j, b) in parts.Z[..=i].iter().enumerate() {
-                let block = a.tr_mul(b);
-                for r in 0..2 {
-                    for s in 0..2 {
-                        parts.W[(2 * i + r) * n + 2 * j + s] = block[(r, s)];
-                        parts.W[(2 * j + s) * n + 2 * i + r] = block[(r, s)];
-                    }
-                }
+        W.resize(n * n, 0.0);
+        let row = |i: usize| &Z[i * v.len()..(i + 1) * v.len()];
+        for i in 0..n {
+            for j in 0..=i {
+                W[i * n + j] = sum_of_products(row(i), row(j));
+                W[j * n + i] = W[i * n + j];
             }
         }
+        u.fill(0.0);
+        self.add_local_of_velocity(contacts, v, u);
     }
 
     fn local(&self, y: &[f64], out: &mut [f64]) {
-        let y = SVector::<f64, NV>::from_column_slice(y);
-        for (Z, out) in self.parts.Z.iter().zip(out.chunks_exact_mut(2)) {
-            out.copy_from_slice(Z.tr_mul(&y).as_slice());
+        for (row, out) in self.parts.Z.chunks_exact(y.len()).zip(out) {
+            *out = sum_of_products(row, y);
         }
     }
 
     fn add_local_of_velocity(&self, _contacts: &[PlanarContact], v: &[f64], out: &mut [f64]) {
-        let v = SVector::<f64, NV>::from_column_slice(v);
-        for (H, out) in self.parts.H.iter().zip(out.chunks_exact_mut(2)) {
-            let u = H.tr_mul(&v);
-            out[0] += u[0];
-            out[1] += u[1];
+        for (i, out) in out.chunks_exact_mut(2).enumerate() {
+            self.parts.matrices.add_local(i, v, out);
         }
     }
 
     fn add_impulses(&self, p: &[f64], y: &mut [f64]) {
-        for (Z, p) in self.parts.Z.iter().zip(p.chunks_exact(2)) {
-            for (y, row) in y.iter_mut().zip(Z.row_iter()) {
-                *y += row[0] * p[0] + row[1] * p[1];
+        for (row, p) in self.parts.Z.chunks_exact(y.len()).zip(p) {
+            for (y, z) in y.iter_mut().zip(row) {
+                *y += z * p;
             }
         }
     }
 
     fn generalized_impulse(&self, _contacts: &[PlanarContact], p: &[f64], out: &mut [f64]) {
         out.fill(0.0);
-        for (H, p) in self.parts.H.iter().zip(p.chunks_exact(2)) {
-            for (out, row) in out.iter_mut().zip(H.row_iter()) {
-                *out += row[0] * p[0] + row[1] * p[1];
-            }
+        for (i, p) in p.as_chunks::<2>().0.iter().enumerate() {
+            self.parts.matrices.add_impulse(i, p, out);
         }
     }
 
@@ -511,23 +443,6 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
     }
 
     fn displacement(&self, y: &[f64]) -> f64 {
-        let arms = self.machine.arms();
-        y.iter()
-            .zip(&arms)
-            .fold(0.0_f64, |m, (y, arm)| m.max((y * arm).abs()))
+        self.machine.displacement(y)
     }
-}
-
-/// `Hᵀ` of contacts at a configuration, rows n and t of each: for checks and for other schemes.
-#[must_use]
-pub fn contact_rows<const NV: usize, M: PlanarMachine<NV>>(
-    machine: &M,
-    q: &SVector<f64, NV>,
-    contacts: &[PlanarContact],
-) -> Vec<[SVector<f64, NV>; 2]> {
-    let rows = |contact: &PlanarContact| {
-        let J = machine.point_jacobian(contact.key.disc as usize, q, &contact.point);
-        [J.tr_mul(&contact.n), J.tr_mul(&contact.t())]
-    };
-    contacts.iter().map(rows).collect()
 }

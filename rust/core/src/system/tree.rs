@@ -30,7 +30,7 @@ use crate::multibody::{
     Momentum, Passive, Place, Tree,
 };
 use crate::problem::{Dimension, FrictionContactProblem};
-use crate::sand::SandState;
+use crate::sand::{RutMap, SandState};
 use crate::scalar::Single;
 
 impl UnilateralContact for Contact {
@@ -205,6 +205,8 @@ pub struct TreeSystem<'a> {
     pub terrain: &'a dyn Terrain,
     /// Actuator torques and held joints.
     pub command: &'a Command,
+    /// Where wheels have been in soft ground.
+    pub ruts: Option<&'a RutMap>,
     /// Scratch of the system.
     pub parts: &'a mut TreeScratch,
 }
@@ -244,51 +246,36 @@ impl TreeSystem<'_> {
 impl TreeSystem<'_> {
     /// Forces and tangents of the sand at the last guess of the velocity.
     fn linearise_sand(&mut self, options: &StepOptions) {
-        let TreeScratch {
-            sand, kinematics, ..
-        } = &mut *self.parts;
-        if let (Some(sand), Some(ground)) = (sand, self.terrain.soft()) {
-            sand.linearise(
-                SandScene {
-                    model: self.model,
-                    ground,
-                    kinematics,
-                },
-                options,
-            );
+        if let Some((sand, place, _)) = self.sand() {
+            sand.linearise(place, options);
         }
+    }
+
+    /// The sand with its ground and poses, and the factor of M̂.
+    fn sand(&mut self) -> Option<(&mut SandContact, SandScene<'_>, &Factor<f64>)> {
+        let TreeScratch {
+            sand,
+            kinematics,
+            factor,
+            ..
+        } = &mut *self.parts;
+        let place = SandScene {
+            model: self.model,
+            ground: self.terrain.soft()?,
+            ruts: self.ruts?,
+            kinematics,
+        };
+        Some((sand.as_mut()?, place, factor))
     }
 
     /// Whether the sand asks for another solution.
     fn revise_sand(&mut self, v_end: &[f64]) -> bool {
-        let TreeScratch {
-            sand, kinematics, ..
-        } = &mut *self.parts;
-        let (Some(sand), Some(ground)) = (sand, self.terrain.soft()) else {
-            return false;
-        };
-        let place = SandScene {
-            model: self.model,
-            ground,
-            kinematics,
-        };
-        sand.revise(place, v_end)
+        (self.sand()).is_some_and(|(sand, place, factor)| sand.revise(place, factor, v_end))
     }
 
     /// Work of the sand over a step between two velocities, J.
     fn work_of_sand(&mut self, v: &[f64], v_end: &[f64]) -> f64 {
-        let TreeScratch {
-            sand, kinematics, ..
-        } = &mut *self.parts;
-        let (Some(sand), Some(ground)) = (sand, self.terrain.soft()) else {
-            return 0.0;
-        };
-        let place = SandScene {
-            model: self.model,
-            ground,
-            kinematics,
-        };
-        sand.work(place, v, v_end)
+        (self.sand()).map_or(0.0, |(sand, place, _)| sand.work(place, v, v_end))
     }
 }
 
@@ -301,11 +288,6 @@ impl MechanicalSystem for TreeSystem<'_> {
     #[inline]
     fn nv(&self) -> usize {
         self.model.nv()
-    }
-
-    #[inline]
-    fn set_moved(&self, from: &Configuration, v: &[f64], h: f64, to: &mut Configuration) {
-        to.set_moved(self.model, from, v, h);
     }
 
     #[inline]

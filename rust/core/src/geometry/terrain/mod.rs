@@ -17,7 +17,7 @@ pub mod surface;
 mod tiles;
 pub mod union;
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::Vector3;
 
@@ -34,7 +34,8 @@ pub use union::Union;
 
 use super::ray::{Hit, Ray};
 use super::shape::Sphere;
-use crate::sand::Soil;
+use crate::sand::test_bed::rules_within;
+use crate::sand::{Rules, SandWheel, Soil};
 
 /// A convex piece of ground whose distance to every shape has a closed form.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -169,7 +170,17 @@ pub struct SoftLayer<'a> {
     pub soil: &'a Arc<Soil>,
     /// Size of a cell of the ruts, m.
     pub cell: f64,
+    /// Where points lie on wheels.
+    pub known: &'a KnownRules,
 }
+
+/// Gauss rules of wheels in a soil, found once for all rovers on a ground.
+#[derive(Debug, Default)]
+pub struct KnownRules(Mutex<Vec<(SandWheel, Arc<Rules>)>>);
+
+/// Accuracy of the forces on a wheel, in the worst of several motions, for which the number of its
+/// points is chosen. Soils are not known better.
+const ACCURACY: f64 = 0.05;
 
 /// The plane that touches a surface at a place.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -185,6 +196,18 @@ pub struct Tangent {
 }
 
 impl SoftLayer<'_> {
+    /// Where the points lie on a wheel whose forces are within 5%.
+    #[must_use]
+    pub fn rules(&self, wheel: &SandWheel) -> Arc<Rules> {
+        let mut known = self.known.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, rules)) = known.iter().find(|(same, _)| same == wheel) {
+            return rules.clone();
+        }
+        let rules = Arc::new(rules_within(wheel, self.soil, ACCURACY));
+        known.push((*wheel, rules.clone()));
+        rules
+    }
+
     /// The tangent plane under a place (world, m), from the heights within `radius`, m. None where
     /// there is no ground.
     #[must_use]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::{Coverage, Neighbourhood, Plane, Primitive, SoftLayer, Terrain};
+use super::{Coverage, KnownRules, Neighbourhood, Plane, Primitive, SoftLayer, Terrain};
 use crate::geometry::ray::{Hit, Ray};
 use crate::geometry::shape::{PlacedShape, Sphere};
 use crate::quantity::QuantityError;
@@ -19,6 +19,7 @@ pub struct SoftGround {
     surface: Arc<dyn Terrain>,
     soil: Arc<Soil>,
     cell: f64,
+    known: Arc<KnownRules>,
 }
 
 impl fmt::Debug for SoftGround {
@@ -45,6 +46,7 @@ impl SoftGround {
             surface,
             soil,
             cell,
+            known: Arc::default(),
         })
     }
 
@@ -142,6 +144,7 @@ impl Terrain for SoftGround {
             surface: &*self.surface,
             soil: &self.soil,
             cell: self.cell,
+            known: &self.known,
         })
     }
 }

@@ -21,12 +21,10 @@ pub(in crate::solver) struct Linearised {
     pub gamma: f64,
     /// First unknown of this contact in the reduced system.
     pub start: usize,
-    /// Whether pivoting keeps the mode, which it left and returned to at once.
-    pub is_barred: bool,
 }
 
 /// Result of a prediction of the modes.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(in crate::solver) struct Prediction {
     /// Whether any mode differs from the previous prediction.
     pub changed: bool,
@@ -84,11 +82,7 @@ pub(in crate::solver) fn recall<const D: usize>(
     u: &[f64],
     contacts: &mut [Linearised],
 ) -> Prediction {
-    let mut prediction = Prediction {
-        changed: false,
-        m: 0,
-        slides: false,
-    };
+    let mut prediction = Prediction::default();
     for ((contact, &mu), (p, u)) in contacts
         .iter_mut()
         .zip(mu)
@@ -130,11 +124,7 @@ pub(in crate::solver) fn predict<const D: usize>(
     u: &[f64],
     contacts: &mut [Linearised],
 ) -> Prediction {
-    let mut prediction = Prediction {
-        changed: false,
-        m: 0,
-        slides: false,
-    };
+    let mut prediction = Prediction::default();
     let alpha = prox.alpha;
     for (i, ((((contact, &mu), &rho), (p, u)), c)) in contacts
         .iter_mut()

@@ -17,7 +17,6 @@ pub(super) mod guided;
 mod helpers;
 pub(super) mod interior_point;
 pub(super) mod newton;
-mod pivot_rules;
-pub(crate) mod pivoting;
+pub(super) mod pivoting;
 pub(super) mod proximal;
 pub(super) mod restarts;

@@ -4,7 +4,7 @@ use nalgebra::SVector;
 
 use super::bodies::COORDINATES;
 use super::contact::{GROUND, GrainContact, WALL};
-use super::machine::point_velocity;
+use super::scene::embedded;
 use super::search::{Neighbour, Search, Seeker, gather};
 use super::system::{GrainParts, GrainSystem};
 use crate::contact::Activation;
@@ -55,18 +55,17 @@ where
             .fold(0.0, f64::max);
         let mut wheels = Vec::new();
         if let Some(machine) = scene.machine.as_deref() {
-            let own = (scene.machine_coordinates(&q), scene.machine_velocities(v));
+            let (own, poses) = (scene.machine_velocities(v), &self.parts.machine_poses[0]);
             #[allow(clippy::cast_possible_truncation)] // grains are numbered by u32
             for (k, a) in (0..machine.n_wheels()).zip(n as u32..) {
-                let wheel = machine.wheel(k, own.0);
-                let jacobian = &mut self.parts.machine.jacobian;
-                let velocity = point_velocity(machine, k, own, &wheel.centre, jacobian);
+                let disc = machine.disc(k, poses);
+                let velocity = machine.point_velocity(k, poses, &disc.centre, own);
                 fastest = fastest.max(velocity.norm());
                 wheels.push(Seeker {
                     a,
-                    centre: wheel.centre,
-                    radius: wheel.radius,
-                    velocity,
+                    centre: embedded(&disc.centre),
+                    radius: disc.radius,
+                    velocity: embedded(&velocity),
                 });
             }
         }
@@ -147,16 +146,18 @@ where
     pub(super) fn forecast_gaps(&self, contacts: &mut [GrainContact<D>]) {
         let n = self.n();
         let (middle, end) = (&self.parts.middle, &self.parts.end);
-        let scene = self.scene;
         let wheels: Vec<SVector<f64, D>> =
-            scene.machine.as_ref().map_or_else(Vec::new, |machine| {
-                let (from, to) = (
-                    scene.machine_coordinates(middle),
-                    scene.machine_coordinates(end),
-                );
-                let moved = |k| machine.wheel(k, to).centre - machine.wheel(k, from).centre;
-                (0..machine.n_wheels()).map(moved).collect()
-            });
+            self.scene
+                .machine
+                .as_ref()
+                .map_or_else(Vec::new, |machine| {
+                    let poses = &self.parts.machine_poses;
+                    let moved = |k| {
+                        let [from, to] = poses.each_ref().map(|at| machine.disc(k, at).centre);
+                        embedded(&(to - from))
+                    };
+                    (0..machine.n_wheels()).map(moved).collect()
+                });
         let moved = |body: u32| {
             let body = body as usize;
             if body < n {

@@ -42,13 +42,9 @@ impl<const D: usize> GrainScene<D> {
         }
         if let Some(machine) = &self.machine {
             let (pose, rate) = (self.machine_coordinates(q), self.machine_velocities(v));
-            let nv = machine.nv();
-            let mut mass = vec![0.0; nv * nv];
-            machine.mass_matrix(pose, &mut mass);
-            let product = |row: &[f64]| row.iter().zip(rate).map(|(a, b)| a * b).sum::<f64>();
-            let rows = mass.chunks_exact(nv.max(1)).zip(rate);
-            energy.kinetic += 0.5 * rows.map(|(row, v)| v * product(row)).sum::<f64>();
-            energy.potential += machine.potential(pose, gravity);
+            let own = machine.energy(pose, rate, &gravity.xy());
+            energy.kinetic += own.kinetic;
+            energy.potential += own.potential;
         }
         energy
     }
@@ -114,12 +110,8 @@ impl<const D: usize> GrainScene<D> {
         for (i, (r, q)) in radius.iter().zip(q.chunks_exact(COORDINATES)).enumerate() {
             meet(i, &SVector::from_fn(|k, _| q[k]), *r);
         }
-        if let Some(machine) = &self.machine {
-            let own = self.machine_coordinates(q);
-            for k in 0..machine.n_wheels() {
-                let wheel = machine.wheel(k, own);
-                meet(n + k, &wheel.centre, wheel.radius);
-            }
+        for (k, (centre, radius)) in self.wheels(q).iter().enumerate() {
+            meet(n + k, centre, *radius);
         }
         -least
     }

@@ -1,11 +1,11 @@
 //! Grains: free disks in the plane, free balls in space, with friction,
-//! walls, a ground, and a machine that drives over them.
+//! walls, a ground, and a planar machine that drives over them.
 //!
 //! One code serves D = 2 and D = 3. Only the number of angular rates of a body and the construction
 //! of a frame from a normal differ ([`crate::spatial::space`], [`GrainContact::frame`]).
 //!
-//! - [`bodies`], [`wall`], [`machine`], [`scene`]: the description; [`packing`]: initial positions
-//!   without overlap, from a seed;
+//! - [`bodies`], [`wall`], [`scene`]: the description; [`packing`]: initial positions without
+//!   overlap, from a seed;
 //! - [`cohesion`]: an attraction of contacts;
 //! - [`grid`]: the search for neighbours; [`contact`]: a contact and its key;
 //! - [`system`]: grains as a mechanical system for [`crate::integrator`]; `search` and `detection`:
@@ -28,7 +28,6 @@ pub mod contact;
 mod detection;
 pub mod error;
 pub mod grid;
-pub mod machine;
 mod measures;
 pub mod packing;
 pub mod removal;
@@ -44,7 +43,6 @@ pub use cohesion::Cohesion;
 pub use contact::{GrainContact, GrainKey};
 pub use error::GrainError;
 pub use grid::Grid;
-pub use machine::{Machine, Wheel};
 pub use packing::{Packing, arranged};
 pub use removal::Renumbering;
 pub use scene::{GrainFriction, GrainScene, OVERLAP};

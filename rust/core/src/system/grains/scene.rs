@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
-use nalgebra::SVector;
+use nalgebra::{SVector, Vector2};
 
 use super::bodies::{COORDINATES, Grains, noun};
 use super::contact::GrainContact;
 use super::error::GrainError;
 use super::grid::Grid;
-use super::machine::Machine;
 use super::wall::Wall;
 use crate::geometry::{Facing, Support};
 use crate::multibody::fingerprint;
+use crate::planar::PlanarTree;
 use crate::quantity::{QuantityError, finite};
 use crate::spatial::space::{body_velocities, length};
 
@@ -65,8 +65,8 @@ pub struct GrainScene<const D: usize> {
     pub walls: Vec<Wall<D>>,
     /// A ground of any shape.
     pub ground: Option<Arc<dyn Support<D>>>,
-    /// The machine.
-    pub machine: Option<Arc<dyn Machine<D>>>,
+    /// A planar machine. Among balls it keeps to the plane z = 0, and its discs are balls.
+    pub machine: Option<Arc<PlanarTree>>,
     /// μ.
     pub friction: GrainFriction,
 }
@@ -98,6 +98,19 @@ impl<const D: usize> GrainScene<D> {
     #[must_use]
     pub fn machine_velocities<'v>(&self, v: &'v [f64]) -> &'v [f64] {
         &v[body_velocities(D) * self.grains.len()..]
+    }
+
+    /// Centre (world, m) and radius (m) of each of the machine's wheels at a configuration (nq).
+    #[must_use]
+    pub fn wheels(&self, q: &[f64]) -> Vec<(SVector<f64, D>, f64)> {
+        let Some(machine) = &self.machine else {
+            return Vec::new();
+        };
+        let poses = machine.poses(self.machine_coordinates(q));
+        let discs = (0..machine.n_wheels()).map(|k| machine.disc(k, &poses));
+        discs
+            .map(|disc| (embedded(&disc.centre), disc.radius))
+            .collect()
     }
 
     /// No wall and no point of the ground is faster, m/s.
@@ -192,16 +205,11 @@ impl<const D: usize> GrainScene<D> {
                 });
             }
         }
-        let Some(machine) = &self.machine else {
-            return Ok(());
-        };
-        let own = self.machine_coordinates(q);
-        for wheel in 0..machine.n_wheels() {
-            let disc = machine.wheel(wheel, own);
-            let mut found = self.deepest_fixed(&disc.centre, disc.radius, &mut facing);
-            let reach = disc.radius + self.grains.largest();
-            grid.near(&disc.centre.into(), reach, |item| {
-                let gap = apart(&item.centre, &disc.centre) - disc.radius - item.radius;
+        for (wheel, (centre, radius)) in self.wheels(q).iter().enumerate() {
+            let mut found = self.deepest_fixed(centre, *radius, &mut facing);
+            let reach = radius + self.grains.largest();
+            grid.near(&(*centre).into(), reach, |item| {
+                let gap = apart(&item.centre, centre) - radius - item.radius;
                 if gap < found.as_ref().map_or(0.0, |f| f.1) {
                     found = Some((format!("{} {}", noun(D), item.index), gap));
                 }
@@ -257,6 +265,16 @@ impl<const D: usize> GrainScene<D> {
             .map(|f| ("the ground".to_owned(), f.distance - radius));
         walls.chain(ground).min_by(|(_, a), (_, b)| a.total_cmp(b))
     }
+}
+
+/// A vector of the plane among those of D dimensions.
+pub(super) fn embedded<const D: usize>(x: &Vector2<f64>) -> SVector<f64, D> {
+    SVector::from_fn(|k, _| if k < 2 { x[k] } else { 0.0 })
+}
+
+/// Its part in the plane.
+pub(super) fn flat<const D: usize>(x: &SVector<f64, D>) -> Vector2<f64> {
+    Vector2::new(x[0], x[1])
 }
 
 /// Distance of two centres, m.

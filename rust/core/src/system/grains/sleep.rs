@@ -12,12 +12,12 @@ use serde::{Deserialize, Serialize};
 
 use super::bodies::COORDINATES;
 use super::contact::{GrainContact, GrainKey};
-use super::machine::point_velocity;
 use super::removal::Renumbering;
-use super::scene::GrainScene;
+use super::scene::{GrainScene, embedded};
 use crate::integrator::{OptionsError, WarmStart};
-use crate::spatial::space::{axis, body_velocities, length};
-use nalgebra::SVector;
+use crate::planar::Disc;
+use crate::spatial::space::{body_velocities, length};
+use nalgebra::{SVector, Vector2};
 
 /// When grains sleep.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -126,6 +126,29 @@ pub struct Mover<const D: usize> {
     pub radius: f64,
     /// Speed of its fastest point, m/s.
     pub speed: f64,
+}
+
+impl<const D: usize> GrainScene<D> {
+    /// The machine's wheels as bodies that keep grains awake. q (nq), v (nv).
+    #[must_use]
+    pub fn movers(&self, q: &[f64], v: &[f64]) -> Vec<Mover<D>> {
+        let Some(machine) = &self.machine else {
+            return Vec::new();
+        };
+        let poses = machine.poses(self.machine_coordinates(q));
+        let rate = self.machine_velocities(v);
+        let mover = |k: usize| {
+            let Disc { centre, radius } = machine.disc(k, &poses);
+            let below = centre - Vector2::y() * radius;
+            let speed = |x: &Vector2<f64>| machine.point_velocity(k, &poses, x, rate).norm();
+            Mover {
+                centre: embedded(&centre),
+                radius,
+                speed: speed(&centre).max(speed(&below)),
+            }
+        };
+        (0..machine.n_wheels()).map(mover).collect()
+    }
 }
 
 impl Sleep {
@@ -271,7 +294,7 @@ impl Sleep {
             self.still[grain] = 0;
         }
         if looks {
-            let near = self.near_movers(options, scene, (q, v), movers);
+            let near = self.near_movers(options, scene, q, movers);
             for i in (0..n).filter(|i| !kinematic[*i]) {
                 if near[i] {
                     if self.asleep[i] {
@@ -294,7 +317,7 @@ impl Sleep {
         &self,
         options: &SleepOptions,
         scene: &GrainScene<D>,
-        (q, v): (&[f64], &[f64]),
+        q: &[f64],
         movers: &[Mover<D>],
     ) -> Vec<bool> {
         let n = scene.grains.len();
@@ -306,27 +329,9 @@ impl Sleep {
         for i in (0..n).filter(|i| self.still[*i] == 0) {
             marks.mark(&centre(i), 1);
         }
-        let mut mark = |centre: &SVector<f64, D>, radius: f64| {
-            let cells = 1 + marks.cell(radius + options.distance);
-            marks.mark(centre, cells.min(MOST_CELLS));
-        };
         for mover in movers.iter().filter(|m| m.speed >= options.speed) {
-            mark(&mover.centre, mover.radius);
-        }
-        if let Some(machine) = scene.machine.as_deref() {
-            let own = (&q[COORDINATES * n..], &v[body_velocities(D) * n..]);
-            let mut jacobian = Vec::new();
-            for k in 0..machine.n_wheels() {
-                let wheel = machine.wheel(k, own.0);
-                let below = wheel.centre - axis(1) * wheel.radius;
-                let mut speed = |point| {
-                    let velocity = point_velocity(machine, k, own, point, &mut jacobian);
-                    velocity.norm()
-                };
-                if speed(&wheel.centre).max(speed(&below)) >= options.speed {
-                    mark(&wheel.centre, wheel.radius);
-                }
-            }
+            let cells = 1 + marks.cell(mover.radius + options.distance);
+            marks.mark(&mover.centre, cells.min(MOST_CELLS));
         }
         (0..n).map(|i| marks.is_marked(&centre(i))).collect()
     }

@@ -8,13 +8,13 @@ use nalgebra::SVector;
 use super::bodies::COORDINATES;
 use super::contact::{GrainContact, GrainKey, WALL};
 use super::grid::Grid;
-use super::machine::{Machine, MachineParts};
-use super::scene::GrainScene;
+use super::scene::{GrainScene, flat};
 use super::search::{Neighbour, Search};
 use super::slabs::Slabs;
 use crate::contact::Activation;
 use crate::geometry::Facing;
 use crate::integrator::{MechanicalSystem, Stabilisation, Start, StepOptions};
+use crate::planar::{PlanarPoses, PlanarTree};
 use crate::problem::{
     BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem, RoundPair,
 };
@@ -22,6 +22,7 @@ use crate::solver::{
     ManyBodies, SolveReport, SolverOptions, SolverWorkspace, Swept, solve_many_bodies,
 };
 use crate::spatial::space::body_velocities;
+use crate::system::planar_matrices::PlanarMatrices;
 
 /// The place of fixed bodies, with c = s = 0.
 const NOWHERE: u32 = 0;
@@ -43,7 +44,9 @@ pub struct GrainParts<const D: usize> {
     /// Force of the cohesion on every grain's coordinates, N and N m.
     attraction: Vec<f64>,
     pub(in crate::system) pairs: BodyPairs<D>,
-    pub(super) machine: MachineParts,
+    /// The machine at the middle and at the end of the step.
+    pub(super) machine_poses: [PlanarPoses; 2],
+    machine: PlanarMatrices,
     slabs: Slabs,
     /// W, assembled on request.
     operator: OnceLock<BlockSparseDelassus>,
@@ -88,7 +91,7 @@ pub struct GrainSystem<'a, const D: usize> {
     pub asleep: &'a [bool],
     /// Torques of the machine, N m.
     pub inputs: &'a [f64],
-    /// A force at the machine's first D coordinates, N.
+    /// A force at the machine's origin, N.
     pub pull: SVector<f64, D>,
     /// Its scratch.
     pub parts: &'a mut GrainParts<D>,
@@ -121,6 +124,14 @@ fn add_rim_velocity<const D: usize>(
 }
 
 impl<const D: usize> GrainSystem<'_, D> {
+    /// The machine's poses at a configuration of the step.
+    fn place_machine(&mut self, q: &[f64], which: usize) {
+        if let Some(machine) = &self.scene.machine {
+            let own = self.scene.machine_coordinates(q);
+            machine.place(own, &mut self.parts.machine_poses[which]);
+        }
+    }
+
     /// How many grains.
     pub(super) fn n(&self) -> usize {
         self.scene.grains.len()
@@ -265,11 +276,6 @@ where
         self.scene.nv()
     }
 
-    fn set_moved(&self, from: &Vec<f64>, v: &[f64], h: f64, to: &mut Vec<f64>) {
-        to.clone_from(from);
-        self.advance(to, v, h);
-    }
-
     fn advance(&self, q: &mut Vec<f64>, v: &[f64], h: f64) {
         let (n, V) = (self.n(), body_velocities(D));
         let (grains, machine) = q.split_at_mut(COORDINATES * n);
@@ -291,10 +297,12 @@ where
 
     fn place_middle(&mut self, q: &Vec<f64>) {
         self.parts.middle.clone_from(q);
+        self.place_machine(q, 0);
     }
 
     fn place_end(&mut self, q: &Vec<f64>) {
         self.parts.end.clone_from(q);
+        self.place_machine(q, 1);
     }
 
     fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<GrainContact<D>>) {
@@ -312,11 +320,11 @@ where
     fn update_mass_matrix(&mut self, _options: &StepOptions) {
         if let Some(machine) = self.scene.machine.as_deref() {
             let GrainParts {
-                middle,
+                machine_poses: [middle, _],
                 machine: own,
                 ..
             } = &mut *self.parts;
-            own.set_mass(machine, self.scene.machine_coordinates(middle));
+            own.set_mass(machine, middle);
         }
     }
 
@@ -362,11 +370,11 @@ where
             *y += h * force;
         }
         if let Some(machine) = &self.scene.machine {
-            let pose = self.scene.machine_coordinates(&self.parts.middle);
             let rate = self.scene.machine_velocities(v_mean);
             let force = &mut y[V * self.n()..];
-            machine.force(pose, rate, gravity, self.inputs, force);
-            for (force, pull) in force.iter_mut().zip(&self.pull) {
+            let middle = &mut self.parts.machine_poses[0];
+            machine.force(middle, rate, &gravity.xy(), self.inputs, force);
+            for (force, pull) in force.iter_mut().zip(&flat(&self.pull)) {
                 *force += pull;
             }
             for force in force {
@@ -398,14 +406,14 @@ where
         let GrainParts {
             middle,
             pairs,
+            machine_poses: [poses, _],
             machine: own,
             operator,
             slabs,
             search,
             ..
         } = &mut *self.parts;
-        let pose = scene.machine_coordinates(middle);
-        pairs.clear(machine.map_or(0, Machine::nv), V * n, scene.nv());
+        pairs.clear(machine.map_or(0, PlanarTree::nv), V * n, scene.nv());
         if D == 3 {
             let width = 2.0 * scene.grains.largest() + search.reach;
             slabs.assign(middle, n, width, &mut pairs.slabs);
@@ -429,8 +437,9 @@ where
             if (a as usize) < n {
                 pairs.round.push(pair);
             } else if let Some(machine) = machine {
-                let wheel = (a as usize - n, pose);
-                own.push_contact(machine, wheel, &contact.point, &frame, &mut pairs.rows);
+                let (wheel, point) = (a as usize - n, flat(&contact.point));
+                let frame = frame.each_ref().map(flat);
+                own.push_contact((machine, poses), wheel, &point, &frame, &mut pairs.rows);
                 pairs.machine.push(pair);
             }
         }

@@ -1,8 +1,12 @@
 //! Modes of the contacts side by side, and their violation of the law, which is measured by the
 //! projection of `z = p − ρ u` (Alart and Curnier 1991).
 
-use super::problem::Triple;
+use super::system::Store;
+use crate::problem::ContactScales;
 use crate::scalar::{Lane, LaneMask};
+
+/// Entries of a contact along n, t, b.
+pub(crate) type Triple<T> = [T; 3];
 
 /// The linearised equations of one contact.
 ///
@@ -19,9 +23,10 @@ use crate::scalar::{Lane, LaneMask};
 ///          μ e2 e1   -            0 e1   0
 /// ```
 ///
-/// A column marked `-` may be anything, since its unknown is zero.
+/// A column marked `-` may be anything, since its unknown is zero. In the plane the entries of
+/// tangent t2 are zero.
 #[derive(Clone, Copy, Debug)]
-pub struct Mode<T: Lane> {
+pub(crate) struct Mode<T: Lane> {
     /// `μ e`, zero unless sliding.
     pub a: [T; 2],
     /// `(−e2, e1)`; (1, 0) if sticking, zero if open or without friction.
@@ -36,7 +41,7 @@ pub struct Mode<T: Lane> {
 
 /// What a contact's law needs to know of its problem.
 #[derive(Clone, Copy, Debug)]
-pub struct Law<T> {
+pub(crate) struct Law<T> {
     /// Friction coefficient.
     pub mu: T,
     /// `ρ_N` and `ρ_T`, kg.
@@ -49,7 +54,7 @@ pub struct Law<T> {
 
 /// Sums over the contacts' violations.
 #[derive(Clone, Copy, Debug)]
-pub struct Violations<T> {
+pub(crate) struct Violations<T> {
     /// `Σ |v_i|²`, (m/s)².
     pub squares: T,
     /// `Σ |ρ_i v_i|²`, (N s)².
@@ -62,9 +67,21 @@ pub struct Violations<T> {
 const AT_THE_LIMIT: f64 = 1e-9;
 
 impl<T: Lane> Law<T> {
+    /// Sets that of a lane.
+    #[inline(always)]
+    pub(crate) fn set(&mut self, lane: usize, mu: f64, scales: ContactScales) {
+        let [rho_N, rho_T] = scales.modes;
+        self.mu.set(lane, mu);
+        self.rho[0].set(lane, rho_N);
+        self.rho[1].set(lane, rho_T);
+        self.inverse[0].set(lane, 1.0 / rho_N);
+        self.inverse[1].set(lane, 1.0 / rho_T);
+        self.mass_squared.set(lane, scales.mass * scales.mass);
+    }
+
     /// That of a contact without data.
     #[inline(always)]
-    pub fn new(zero: T) -> Self {
+    pub(crate) fn new(zero: T) -> Self {
         let one = zero.like(1.0);
         Self {
             mu: zero,
@@ -78,7 +95,7 @@ impl<T: Lane> Law<T> {
 impl<T: Lane> Mode<T> {
     /// Open.
     #[inline(always)]
-    pub fn open(like: T) -> Self {
+    pub(crate) fn open(like: T) -> Self {
         let (zero, one) = (like.like(0.0), like.like(1.0));
         Self {
             a: [zero; 2],
@@ -91,7 +108,13 @@ impl<T: Lane> Mode<T> {
 
     /// Open, sticking or sliding along the present impulse `p` with the velocity `u`.
     #[inline(always)]
-    pub fn of(mu: T, closed: T::Mask, sticks: T::Mask, p: &Triple<T>, u: &Triple<T>) -> Self {
+    pub(crate) fn of(
+        mu: T,
+        closed: T::Mask,
+        sticks: T::Mask,
+        p: &Triple<T>,
+        u: &Triple<T>,
+    ) -> Self {
         let (zero, one) = (mu.like(0.0), mu.like(1.0));
         let (e, gamma, norm) = slide_along(p, u);
         let slides = closed & !sticks & zero.lt(mu) & zero.lt(norm);
@@ -105,11 +128,29 @@ impl<T: Lane> Mode<T> {
             gamma: T::select(slides, gamma, T::select(sticks, zero, one)),
         }
     }
+
+    /// `Bᵀ x` of a contact.
+    #[inline(always)]
+    pub(crate) fn across(&self, x: Triple<T>) -> Triple<T> {
+        let zero = x[0].like(0.0);
+        [
+            T::select(self.closed, x[0], zero),
+            self.b[0] * x[1] + self.b[1] * x[2],
+            T::select(self.stick, x[2], zero),
+        ]
+    }
+
+    /// `C y` of a contact.
+    #[inline(always)]
+    pub(crate) fn impulse(&self, [y0, y1, y2]: Triple<T>) -> Triple<T> {
+        let Self { a, b, .. } = self;
+        [y0, a[0] * y0 + b[0] * y1, a[1] * y0 + b[1] * y1 + y2]
+    }
 }
 
 /// Whether the contact is closed and its impulse at the limit of friction or beyond.
 #[inline(always)]
-pub fn is_pressed_to_slide<T: Lane>(mu: T, p: &Triple<T>) -> T::Mask {
+pub(super) fn is_pressed_to_slide<T: Lane>(mu: T, p: &Triple<T>) -> T::Mask {
     let zero = mu.like(0.0);
     let norm = (p[1] * p[1] + p[2] * p[2]).sqrt();
     let below = zero.lt(mu) & norm.lt(mu * p[0] * zero.like(1.0 - AT_THE_LIMIT));
@@ -130,13 +171,13 @@ fn slide_along<T: Lane>(p: &Triple<T>, u: &Triple<T>) -> ([T; 2], T, T) {
 
 /// Violations of the law at impulses `p` and velocities `u` of the contacts at some places.
 #[inline(always)]
-pub fn judge<T: Lane, const C: usize>(
+pub(super) fn judge<T: Lane, B: Store>(
     places: impl Iterator<Item = usize>,
-    laws: &[Law<T>; C],
-    p: &[Triple<T>; C],
-    u: &[Triple<T>; C],
+    laws: &B::Of<Law<T>>,
+    p: &B::Of<Triple<T>>,
+    u: &B::Of<Triple<T>>,
+    zero: T,
 ) -> Violations<T> {
-    let zero = p[0][0].like(0.0);
     let one = zero.like(1.0);
     let mut sums = Violations::none(zero);
     for i in places {
@@ -165,7 +206,7 @@ pub fn judge<T: Lane, const C: usize>(
 impl<T: Lane> Violations<T> {
     /// No violation.
     #[inline(always)]
-    pub fn none(like: T) -> Self {
+    pub(crate) fn none(like: T) -> Self {
         let zero = like.like(0.0);
         Self {
             squares: zero,
@@ -176,7 +217,7 @@ impl<T: Lane> Violations<T> {
 
     /// `yes` where the mask is true, `no` elsewhere.
     #[inline(always)]
-    pub fn select(mask: T::Mask, yes: &Self, no: &Self) -> Self {
+    pub(crate) fn select(mask: T::Mask, yes: &Self, no: &Self) -> Self {
         Self {
             squares: T::select(mask, yes.squares, no.squares),
             weighted: T::select(mask, yes.weighted, no.weighted),
@@ -186,18 +227,9 @@ impl<T: Lane> Violations<T> {
 
     /// Whether the sums are finite, and with them all impulses and velocities.
     #[inline(always)]
-    pub fn is_finite(&self) -> T::Mask {
+    pub(crate) fn is_finite(&self) -> T::Mask {
         self.squares.is_finite() & self.weighted.is_finite()
     }
-}
-
-/// Where a contact limits a step, as a fraction of it: 1 where it does not.
-#[derive(Clone, Copy, Debug)]
-pub struct Limit<T: Lane> {
-    /// Fraction of the step.
-    pub t: T,
-    /// Whether the contact slides from there on; else it opens.
-    pub slides: T::Mask,
 }
 
 /// `x_T y_T − μ² x_N y_N`; for x = y positive outside the cone of friction.
@@ -207,14 +239,14 @@ fn outside<T: Lane>(mu: T, x: &Triple<T>, y: &Triple<T>) -> T {
 }
 
 /// Smallest fraction of the step from `p` to `trial` at which a sticking contact reaches the limit
-/// of friction, or a sliding one opens. `closed`, `sticks`: its mode.
+/// of friction, or a sliding one opens; 1 where neither does. `closed`, `sticks`: its mode.
 #[inline(always)]
-pub fn limit<T: Lane>(
+pub(super) fn limit<T: Lane>(
     (closed, sticks): (T::Mask, T::Mask),
     mu: T,
     p: &Triple<T>,
     trial: &Triple<T>,
-) -> Limit<T> {
+) -> T {
     let (zero, one) = (mu.like(0.0), mu.like(1.0));
     let sticks = closed & sticks;
     let pressed = zero.lt(p[0]);
@@ -228,7 +260,7 @@ pub fn limit<T: Lane>(
     if opens.any() {
         t = T::select(opens, p[0] / (p[0] - trial[0]), t);
     }
-    Limit { t, slides: sticks }
+    t
 }
 
 /// Fraction of the way from `p` to `trial` at which an impulse reaches the limit of friction.

@@ -5,24 +5,49 @@ use crate::scalar::{Lane, LaneMask};
 /// Modes remembered.
 const MEMORY: usize = 8;
 
+/// Contacts whose modes have a number of their own.
+const NUMBERED: usize = 32;
+
+/// Their weights in it.
+const POWERS_OF_3: [f64; NUMBERED] = {
+    let mut powers = [3.0; NUMBERED];
+    let mut i = 1;
+    while i < NUMBERED {
+        powers[i] = 3.0 * powers[i - 1];
+        i += 1;
+    }
+    powers
+};
+
+/// Weight of a contact's mode in the number of all modes. Numbers of 32 contacts are distinct; with
+/// more, two that are equal end a solve early.
+#[inline(always)]
+pub(super) fn weight(contact: usize) -> f64 {
+    if contact < NUMBERED {
+        return POWERS_OF_3[contact];
+    }
+    // Multiplicative hashing (Knuth), 44 bits of it: the sum over many contacts is nearly exact.
+    ((contact as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 20) as f64
+}
+
 /// Share of a squared residual that counts as a smaller one.
 const LEAST_GAIN: f64 = 0.25;
 
 /// The modes of past full steps and the smallest squared residual with each, lane by lane.
 #[derive(Clone, Debug)]
-pub struct Visits<T> {
+pub(super) struct Visits<T> {
     modes: [T; MEMORY],
     least: [T; MEMORY],
     /// Place of the next modes.
     next: T,
     /// Full steps since the last with new modes or a smaller residual.
-    pub idle: T,
+    pub(super) idle: T,
 }
 
 impl<T: Lane> Visits<T> {
     /// Nothing visited.
     #[inline(always)]
-    pub fn new(zero: T) -> Self {
+    pub(super) fn new(zero: T) -> Self {
         Self {
             modes: [zero; MEMORY],
             least: [zero; MEMORY],
@@ -33,7 +58,7 @@ impl<T: Lane> Visits<T> {
 
     /// Forgets the visits of the lanes of a mask.
     #[inline(always)]
-    pub fn forget(&mut self, lanes: T::Mask) {
+    pub(super) fn forget(&mut self, lanes: T::Mask) {
         let zero = self.idle.like(0.0);
         for modes in &mut self.modes {
             *modes = T::select(lanes, zero, *modes);
@@ -45,7 +70,7 @@ impl<T: Lane> Visits<T> {
     /// Enters the modes of a full step in the lanes of a mask, as a number that is not zero, and
     /// the squared residual after it.
     #[inline(always)]
-    pub fn enter(&mut self, lanes: T::Mask, modes: T, residual: T) {
+    pub(super) fn enter(&mut self, lanes: T::Mask, modes: T, residual: T) {
         let (zero, one) = (modes.like(0.0), modes.like(1.0));
         let mut known = !lanes & lanes;
         let mut better = known;

@@ -1,30 +1,24 @@
-"""`ScanPolicy` that foresees, by a learned forecast, what becomes of the rover on each arc.
+"""A learned one-second prediction of the rover on each arc that `ScanPolicy` may drive next.
 
-For each arc that `ScanPolicy` may drive next, at cruising speed or fast, a network foretells the rover after `HORIZON`
-seconds from
+For each arc, at cruising speed and fast, a network predicts the rover's state after `HORIZON` seconds from
 
 - what lies under wheels and underside on the way, from the height scan;
 - the command;
 - the rover's state: attitude, joints, velocities, contacts, loads, how long its trunk has been held;
 - the slope of the ground plane.
 
-It is trained on what became of copies of the rover in the simulator (`rover_gym.learning.fit_forecast`).
+`rover_gym.learning.fit_forecast` trains it on copies of the rover in the simulator.
 """
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.mechanics import OptionError
-from rover_gym.policy.arc_search import PathCosts
-from rover_gym.policy.ground_map import MapOptions
-from rover_gym.policy.pd_policy import find_rover_env
-from rover_gym.policy.policy_card import Network, PolicyError, forecast_folder, is_there
-from rover_gym.policy.scan_policy import ScanGains, ScanPolicy
+from rover_gym.policy.arc_search import Arcs, ArcSearch
+from rover_gym.policy.policy_card import Network, PolicyError
 from rover_gym.validation import number, refuse
 
 Array = npt.NDArray[np.float64]
@@ -56,12 +50,21 @@ class Outcomes:
     failed: Array
 
 
+class ArcPolicy(Protocol):
+    """A policy that chooses among arcs: `ScanPolicy`, whose attributes these are."""
+
+    arcs: Arcs
+    commands: Array
+    search: ArcSearch
+    cruise_speed: float
+
+
 class ArcFeatures:
-    """What the network is given of each arc of a policy.
+    """The network's inputs for each arc of a policy.
 
     Args:
         rover: The environment, read once for the layout.
-        policy: The policy.
+        policy: The policy, a `ScanPolicy`.
 
     Attributes:
         length: Way at cruising speed within the horizon, m.
@@ -69,7 +72,7 @@ class ArcFeatures:
         size: Number of features.
     """
 
-    def __init__(self, rover: RoverEnv, policy: ScanPolicy) -> None:
+    def __init__(self, rover: RoverEnv, policy: ArcPolicy) -> None:
         self.length = HORIZON * policy.cruise_speed
         self.poses = policy.arcs.poses(self.length, POSES)
         self._commands, self._search = policy.commands, policy.search
@@ -97,7 +100,7 @@ class ArcFeatures:
 
 
 class ArcForecast:
-    """Foretells what becomes of a rover.
+    """Predicts the outcome of each arc.
 
     Args:
         features: What the network is given, and after it whether the arc is driven fast.
@@ -142,7 +145,7 @@ USUAL_WAY = 1.2
 
 @dataclass(frozen=True)
 class ForesightCosts:
-    """What foreseen outcomes cost, in metres of way at 1.2 m/s; less in proportion for a slower rover.
+    """What predicted outcomes cost, in metres of way at 1.2 m/s; less in proportion for a slower rover.
 
     Attributes:
         lost: Of a metre that is not made.
@@ -162,65 +165,9 @@ class ForesightCosts:
         for name, value in vars(self).items():
             number(f"foresight.{name}", value, at_least=0.0, at_most=1e3)
 
-
-class ForesightPolicy(ScanPolicy):
-    """Drives as `ScanPolicy`, and foresees what becomes of the rover on each arc that it may drive next.
-
-    A network that was trained in the simulator foretells for each arc, slow and fast, how far the rover comes within a
-    second and whether its trunk gets caught (`rover_gym.policy.foresight_policy`). The policy adds what that costs, and
-    drives an arc fast where it is cheaper so.
-
-    Example:
-        >>> env = gym.make("RoverRocks-v0", difficulty=2.0, **ForesightPolicy.arguments())
-        >>> policy = ForesightPolicy(env)
-
-    Args:
-        env: A rover environment with a height scan, wrapped or not, or a vector of them. It is read once, for layout
-            and rover constants.
-        forecast: Folder of a trained forecast; None for the package's: one for the built-in rover on hills, one for it
-            on other ground, one for `open-rover`.
-        gains: Speed and times.
-        costs: What a path costs.
-        foresight: What foreseen outcomes cost.
-        map: A map of what the scans have shown; see `ScanPolicy`.
-
-    Raises:
-        OptionError: The environment has no height scan, or the rover's wheels stand in a line.
-        PolicyError: The folder holds no forecast, or one for another rover.
-    """
-
-    def __init__(
-        self,
-        env: Any,
-        forecast: str | Path | None = None,
-        *,
-        gains: ScanGains | None = None,
-        costs: PathCosts | None = None,
-        foresight: ForesightCosts | None = None,
-        map: MapOptions | None = None,  # noqa: A002 - what it is
-    ) -> None:
-        if foresight is not None and not isinstance(foresight, ForesightCosts):
-            refuse(OptionError, "foresight", foresight, "must be ForesightCosts")
-        super().__init__(env, gains, costs, map=map)
-        self.foresight = ForesightCosts() if foresight is None else foresight
-        rover = find_rover_env(env)
-        folder = forecast_folder(rover.model, hills=rover.task.on_hills) if forecast is None else Path(forecast)
-        path = folder / FORECAST_FILE
-        if not is_there(path):
-            refuse(PolicyError, "forecast", str(path), "is not there")
-        features = ArcFeatures(rover, self)
-        self._length, self._forecast = features.length, ArcForecast(features, Network.read(path))
-        self._caution = self.foresight.caution
-
-    def foresee(self, row: Array) -> Outcomes:
-        """What becomes of the rover on each arc, for an observation `(size,)`, scaled as the environment returns it."""
-        return self._forecast(row, *self.ground(row))
-
-    def _outlook(
-        self, row: Array, slope: list[float], heights: Array, boldness: float
-    ) -> tuple[Array | None, npt.NDArray[np.bool_]]:
-        costs, outcomes = self.foresight, self._forecast(row, slope, heights)
+    def price(self, outcomes: Outcomes, boldness: float) -> tuple[Array, npt.NDArray[np.bool_]]:
+        """`(n_arcs,)` costs of the arcs, in metres at 1.2 m/s, and whether each is cheaper if driven fast."""
         lost = USUAL_WAY * np.maximum(0.0, OPEN_WAY - outcomes.way)
-        by_speed = costs.lost * lost + costs.stuck * outcomes.stuck + costs.failed * outcomes.failed
-        slow, fast = by_speed[0], by_speed[1] + boldness * costs.push
-        return self._length / USUAL_WAY * np.minimum(slow, fast), fast < slow
+        by_speed = self.lost * lost + self.stuck * outcomes.stuck + self.failed * outcomes.failed
+        slow, fast = by_speed[0], by_speed[1] + boldness * self.push
+        return np.minimum(slow, fast), fast < slow

@@ -1,21 +1,21 @@
-//! Pivoting on the contact modes of several problems side by side: the rules of
-//! [`crate::solver`]'s pivoting, in lanes.
+//! The steps of pivoting on the contact modes of several problems side by side.
 //!
-//! From a warm start a step goes to the [answer of the present modes](super::equations) as far as
-//! all cones allow. The contact that blocks then slides or opens. After a full step the contact
-//! whose velocity contradicts its mode most is corrected, with those that do so as much, unless the
+//! From a warm start a step goes to the answer of the present [modes](super::modes) as far as all
+//! cones allow. The contact that blocks then slides or opens. After a full step the contact whose
+//! velocity contradicts its mode most is corrected, with those that do so as much, unless the
 //! residual falls fast: then the modes are right, and the next step removes the curvature of the
-//! slides. A contact whose friction pushes along its slip, but which would leave its cone at once
-//! if it stuck, is barred, so that another one changes its mode. If none is left, its friction is
-//! reversed.
+//! slides. With right modes two or three systems solve a step, as with Newton's method.
+//!
+//! Two modes may contradict each other at one contact: its friction pushes along its slip, and if
+//! it sticks, it leaves the cone at once. Such a contact is barred, so that another one changes its
+//! mode. If none is left, its slip has changed its sign, and its friction is reversed.
 
-use super::modes::{Law, Limit, Mode, Violations, is_pressed_to_slide, judge, limit};
-use super::problem::{MAX_CONTACTS, Triple};
-use super::system::System;
-use super::visits::Visits;
+use super::modes::{Law, Mode, Triple, Violations, is_pressed_to_slide, judge, limit};
+use super::system::{Many, Store, System};
+use super::visits::{Visits, weight};
 use crate::law::coulomb::ContactMode;
-use crate::scalar::{Lane, LaneMask};
-use crate::solver::solve_one_contact;
+use crate::problem::Residual;
+use crate::scalar::{Lane, LaneMask, Single};
 
 /// Squared relative residual below which a rover without a slide counts as parked.
 const PARKED: f64 = 1e-12;
@@ -25,7 +25,7 @@ const SHRINK: f64 = 1e-3;
 
 /// Share of the squared residual that a full step must leave, if it gains nothing, and if it gains
 /// so much that the modes stay.
-const NO_GAIN: f64 = 0.25;
+pub(crate) const NO_GAIN: f64 = 0.25;
 const HOLD: f64 = 1e-4;
 
 /// Fraction of a step below which the impulse stays where it was.
@@ -44,81 +44,112 @@ const REVERSALS: f64 = 2.0;
 /// Impulses that stick may leave the cone by this share, which is rounding.
 const BEYOND: f64 = 1.0 + 1e-12;
 
-/// The weights of the modes in their number: exact for as many contacts as a problem can have.
-const POWERS_OF_3: [f64; MAX_CONTACTS + 1] = {
-    let mut powers = [1.0; MAX_CONTACTS + 1];
-    let mut i = 1;
-    while i <= MAX_CONTACTS {
-        powers[i] = 3.0 * powers[i - 1];
-        i += 1;
-    }
-    powers
-};
+/// Share of the squared residual that a correction leaves if another one follows.
+const GAIN: f64 = 0.1;
 
-/// Problems of at most `C` contacts that are being solved, one a lane.
+/// Problems that are being solved, one a lane. Each method is given their systems.
 #[derive(Clone, Debug)]
-pub(super) struct Pivoting<T: Lane, const C: usize, S: System<T, C>> {
-    pub(super) system: S,
-    pub(super) q: [Triple<T>; C],
-    pub(super) laws: [Law<T>; C],
+pub(crate) struct Pivoting<T: Lane, B: Store> {
+    pub(crate) laws: B::Of<Law<T>>,
     /// Mean diagonal of `W`, 1/kg.
-    pub(super) mean: T,
+    pub(crate) mean: T,
     /// Impulses and their velocities.
-    pub(super) p: [Triple<T>; C],
-    pub(super) u: [Triple<T>; C],
+    pub(crate) p: B::Of<Triple<T>>,
+    pub(crate) u: B::Of<Triple<T>>,
     /// Violations of the law by them.
-    pub(super) sums: Violations<T>,
-    /// Lanes whose modes go in circles.
-    pub(super) lost: T::Mask,
+    sums: Violations<T>,
+    /// Lanes whose modes go in circles, or whose system has no factors.
+    pub(crate) lost: T::Mask,
     /// Squares of `1/|q|` and `1/|(ρ_i q_i)|`.
-    pub(super) inverses: [T; 2],
+    pub(crate) inverses: [T; 2],
     /// `α` that an attempt asks for, relative to the mean diagonal of `W`; 0 for that which suits
     /// the start.
-    pub(super) asked: T,
+    pub(crate) asked: T,
     /// Impulses that a step stays near, where the system [returns](System::RETURNS) to them.
-    pub(super) centre: [Triple<T>; C],
+    pub(crate) centre: B::Of<Triple<T>>,
     alpha: T,
     first_alpha: T,
-    trial: [Triple<T>; C],
-    modes: [Mode<T>; C],
-    closed: [T::Mask; C],
-    sticks: [T::Mask; C],
-    barred: [T::Mask; C],
-    /// The contact that has just been let stick.
-    freed: [T::Mask; C],
+    trial: B::Of<Triple<T>>,
+    /// Velocities of the trial.
+    renewed: B::Of<Triple<T>>,
+    modes: B::Of<Mode<T>>,
+    closed: B::Of<T::Mask>,
+    sticks: B::Of<T::Mask>,
+    barred: B::Of<T::Mask>,
+    /// The contacts that have just been let stick.
+    freed: B::Of<T::Mask>,
+    /// Fraction of the step at which each contact blocks; how much it contradicts its mode.
+    fractions: B::Of<T>,
+    contradictions: B::Of<T>,
     /// Lanes whose last step was a full one.
     full: T::Mask,
-    /// Squared relative residual after the last full step.
+    /// Squared relative residual after the full step before the last.
     last: T,
     visits: Visits<T>,
     reversals: T,
 }
 
-impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
+impl<T: Lane> Pivoting<T, Many> {
+    /// Makes room for `n` contacts.
+    pub(crate) fn resize(&mut self, n: usize) {
+        let zero = self.mean.like(0.0);
+        let none = zero.lt(zero);
+        self.laws.resize(n, Law::new(zero));
+        self.modes.resize(n, Mode::open(zero));
+        for triples in [
+            &mut self.p,
+            &mut self.u,
+            &mut self.centre,
+            &mut self.trial,
+            &mut self.renewed,
+        ] {
+            triples.resize(n, [zero; 3]);
+        }
+        for masks in [
+            &mut self.closed,
+            &mut self.sticks,
+            &mut self.barred,
+            &mut self.freed,
+        ] {
+            masks.resize(n, none);
+        }
+        self.fractions.resize(n, zero);
+        self.contradictions.resize(n, zero);
+    }
+}
+
+impl Default for Pivoting<f64, Many> {
+    fn default() -> Self {
+        Self::new(Single::Baseline)
+    }
+}
+
+impl<T: Lane, B: Store> Pivoting<T, B> {
     #[inline(always)]
-    pub(super) fn new(token: T::Token) -> Self {
+    pub(crate) fn new(token: T::Token) -> Self {
         let (zero, one) = (T::splat(token, 0.0), T::splat(token, 1.0));
         let none = T::mask(token, 0);
         Self {
-            system: S::new(token),
-            q: [[zero; 3]; C],
-            laws: [Law::new(zero); C],
+            laws: B::filled(Law::new(zero)),
             mean: one,
-            p: [[zero; 3]; C],
-            u: [[zero; 3]; C],
+            p: B::filled([zero; 3]),
+            u: B::filled([zero; 3]),
             sums: Violations::none(zero),
             lost: none,
             inverses: [zero, one],
             asked: zero,
             alpha: one,
             first_alpha: one,
-            centre: [[zero; 3]; C],
-            trial: [[zero; 3]; C],
-            modes: [Mode::open(zero); C],
-            closed: [none; C],
-            sticks: [none; C],
-            barred: [none; C],
-            freed: [none; C],
+            centre: B::filled([zero; 3]),
+            trial: B::filled([zero; 3]),
+            renewed: B::filled([zero; 3]),
+            modes: B::filled(Mode::open(zero)),
+            closed: B::filled(none),
+            sticks: B::filled(none),
+            barred: B::filled(none),
+            freed: B::filled(none),
+            fractions: B::filled(one),
+            contradictions: B::filled(zero),
             full: none,
             last: zero,
             visits: Visits::new(zero),
@@ -128,23 +159,70 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
 
     /// Squares of the two numbers of the residual.
     #[inline(always)]
-    pub(super) fn residual(&self) -> [T; 2] {
+    fn residual(&self) -> [T; 2] {
         let speed = self.sums.squares * self.inverses[0];
         let impulse = self.sums.weighted * self.inverses[1];
         [speed.max(impulse), self.sums.largest]
     }
 
+    /// The residual of a lane.
+    #[inline(always)]
+    pub(crate) fn residual_of(&self, lane: usize) -> Residual {
+        if !self.is_finite().get(lane) {
+            return Residual::UNSOLVED;
+        }
+        let [relative, velocity] = self.residual().map(|square| square.get(lane).sqrt());
+        Residual { relative, velocity }
+    }
+
     /// Where squares of the residual are within tolerances.
     #[inline(always)]
-    pub(super) fn is_solved(&self, tolerances: [T; 2]) -> T::Mask {
+    pub(crate) fn is_solved(&self, tolerances: [T; 2]) -> T::Mask {
         let [relative, largest] = self.residual();
         relative.le(tolerances[0]) & largest.le(tolerances[1])
+    }
+
+    /// Whether impulses and velocities are finite.
+    #[inline(always)]
+    pub(crate) fn is_finite(&self) -> T::Mask {
+        self.sums.is_finite()
+    }
+
+    /// Where the last step was a full one that left more than a share of the squared residual.
+    #[inline(always)]
+    pub(crate) fn leaves(&self, share: f64) -> T::Mask {
+        let [relative, _] = self.residual();
+        self.full & relative.like(share).lt(relative / self.last)
+    }
+
+    /// Corrects modes and takes a step, in the lanes of a mask. Near the answer the factors serve
+    /// again.
+    #[inline(always)]
+    pub(crate) fn advance<S: System<T, B>>(
+        &mut self,
+        system: &mut S,
+        active: T::Mask,
+        tolerances: [T; 2],
+    ) {
+        self.correct(system, active);
+        self.step(system, active);
+        let mut nearly = active & self.is_near(S::NEAR) & !self.is_solved(tolerances);
+        for _ in 0..S::CORRECTIONS {
+            if !nearly.any() {
+                break;
+            }
+            let [before, _] = self.residual();
+            self.refine(system, nearly);
+            let [after, _] = self.residual();
+            let gains = after.lt(before.like(GAIN) * before);
+            nearly = nearly & gains & !self.is_solved(tolerances);
+        }
     }
 
     /// Forgets mode and velocity of a place where a lane has no contact. When another lane begins
     /// to use the place they would count among this one's modes and violations.
     #[inline(always)]
-    pub(super) fn vacate(&mut self, place: usize, lane: usize) {
+    pub(crate) fn vacate(&mut self, place: usize, lane: usize) {
         for u in &mut self.u[place] {
             u.set(lane, 0.0);
         }
@@ -161,12 +239,12 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
 
     /// Begins the lanes of a mask: velocities, violations and modes of their impulses.
     #[inline(always)]
-    pub(super) fn begin(&mut self, lanes: T::Mask) {
+    pub(crate) fn begin<S: System<T, B>>(&mut self, system: &mut S, lanes: T::Mask) {
         let zero = self.mean.like(0.0);
-        self.renew_velocities(lanes);
-        self.judge();
+        self.renew_velocities(system, lanes);
+        self.judge(system.places());
         let mut slides = !lanes & lanes;
-        for i in self.system.places() {
+        for i in system.places() {
             let (p, mu) = (&self.p[i], self.laws[i].mu);
             let pressed = zero.lt(p[0]);
             let approaches = self.u[i][0].lt(zero);
@@ -193,65 +271,65 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
 
     /// `u = W p + q` in the lanes of a mask.
     #[inline(always)]
-    fn renew_velocities(&mut self, lanes: T::Mask) {
-        (self.system).velocities(&self.q, &self.p, &mut self.trial);
-        select(self.system.places(), lanes, &self.trial, &mut self.u);
+    fn renew_velocities<S: System<T, B>>(&mut self, system: &mut S, lanes: T::Mask) {
+        system.velocities(&self.p, &mut self.trial);
+        select::<T, B>(system.places(), lanes, &self.trial, &mut self.u);
     }
 
     /// A step of the lanes of a mask, as far as the cones allow; a blocking contact changes its
     /// mode.
     #[inline(always)]
-    pub(super) fn step(&mut self, active: T::Mask) {
+    fn step<S: System<T, B>>(&mut self, system: &mut S, active: T::Mask) {
         let (zero, one) = (self.mean.like(0.0), self.mean.like(1.0));
-        self.find_modes();
-        self.system.factorise(self.alpha, &self.modes);
+        self.find_modes(system.places());
+        if !system.factorise(self.alpha, &self.modes) {
+            self.lost = self.lost | active;
+            self.full = self.full & !active;
+            return;
+        }
         let centre = if S::RETURNS { &self.centre } else { &self.p };
-        self.system
-            .newton_point(&self.q, centre, self.alpha, &self.modes, &mut self.trial);
+        system.newton_point(&self.u, centre, self.alpha, &self.modes, &mut self.trial);
         let fine = active & self.alpha.lt(one.like(S::SMALLEST_ALPHA) * self.mean);
         if S::SMALLEST_ALPHA_AGAIN < S::SMALLEST_ALPHA && fine.any() {
-            self.improve_trial(fine);
+            self.improve_trial(system, fine);
         }
         let mut first = one;
-        let mut limits = [Limit {
-            t: one,
-            slides: active,
-        }; C];
-        for i in self.system.places() {
+        for i in system.places() {
             let trial = &mut self.trial[i];
             let slides = self.closed[i] & !self.sticks[i] & zero.lt(trial[0]);
             return_to_cone::<T>(slides, self.laws[i].mu, trial);
             let (closed, sticks) = (self.closed[i], self.sticks[i]);
-            limits[i] = limit((closed, sticks), self.laws[i].mu, &self.p[i], trial);
-            first = limits[i].t.min(first);
+            let t = limit((closed, sticks), self.laws[i].mu, &self.p[i], trial);
+            self.fractions[i] = t;
+            first = t.min(first);
         }
         let blocked = active & first.lt(one);
         if blocked.any() {
-            self.stop_at(blocked, first, &limits);
+            self.stop_at(system.places(), blocked, first);
         } else {
-            for i in self.system.places() {
+            for i in system.places() {
                 self.p[i] = self.trial[i];
             }
         }
-        for i in self.system.places() {
+        for i in system.places() {
             self.freed[i] = self.freed[i] & !active;
         }
         self.full = active & !blocked;
         if S::RETURNS {
-            select(self.system.places(), self.full, &self.p, &mut self.centre);
+            select::<T, B>(system.places(), self.full, &self.p, &mut self.centre);
         }
-        (self.system).velocities(&self.q, &self.p, &mut self.u);
-        self.judge();
+        system.velocities(&self.p, &mut self.u);
+        self.judge(system.places());
     }
 
     /// Removes the rounding of the Newton point in the lanes of a mask, with the factors that found
     /// it.
     #[inline(always)]
-    fn improve_trial(&mut self, lanes: T::Mask) {
-        let left = self.left_by_trial();
-        let mut change = left;
-        (self.system).correction(&left, &self.modes, &mut change);
-        for i in self.system.places() {
+    fn improve_trial<S: System<T, B>>(&mut self, system: &mut S, lanes: T::Mask) {
+        let left = self.left_by_trial(system);
+        let mut change = left.clone();
+        system.correction(&left, &self.modes, &mut change);
+        for i in system.places() {
             for k in 0..3 {
                 let improved = self.trial[i][k] + change[i][k];
                 self.trial[i][k] = T::select(lanes, improved, self.trial[i][k]);
@@ -260,13 +338,13 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
     }
 
     /// What the Newton point leaves of its equations, which are these velocities
-    /// [across](super::equations) the modes.
+    /// [across](Mode::across) the modes.
     #[inline(always)]
-    fn left_by_trial(&mut self) -> [Triple<T>; C] {
+    fn left_by_trial<S: System<T, B>>(&mut self, system: &mut S) -> B::Of<Triple<T>> {
         let centre = if S::RETURNS { &self.centre } else { &self.p };
-        let mut left = self.u;
-        (self.system).velocities(&self.q, &self.trial, &mut left);
-        for i in self.system.places() {
+        let mut left = self.u.clone();
+        system.velocities(&self.trial, &mut left);
+        for i in system.places() {
             let (left, trial, centre, mode) =
                 (&mut left[i], &self.trial[i], &centre[i], &self.modes[i]);
             for k in 0..3 {
@@ -283,14 +361,14 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
 
     /// Violations by the present impulses.
     #[inline(always)]
-    fn judge(&mut self) {
-        self.sums = judge(self.system.places(), &self.laws, &self.p, &self.u);
+    fn judge(&mut self, places: impl Iterator<Item = usize>) {
+        self.sums = judge::<T, B>(places, &self.laws, &self.p, &self.u, self.mean.like(0.0));
     }
 
     /// Modes at the present impulses.
     #[inline(always)]
-    fn find_modes(&mut self) {
-        for i in self.system.places() {
+    fn find_modes(&mut self, places: impl Iterator<Item = usize>) {
+        for i in places {
             let (mu, p, u) = (self.laws[i].mu, &self.p[i], &self.u[i]);
             self.modes[i] = Mode::of(mu, self.closed[i], self.sticks[i], p, u);
         }
@@ -298,20 +376,19 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
 
     /// Where the last step was a full one and came near the answer.
     #[inline(always)]
-    pub(super) fn is_near(&self) -> T::Mask {
+    fn is_near(&self, near: f64) -> T::Mask {
         let [relative, _] = self.residual();
-        self.full & relative.lt(relative.like(S::NEAR))
+        self.full & relative.lt(relative.like(near))
     }
 
     /// Corrects the impulses of the lanes of a mask with the factors of their last step, where that
     /// makes the violations smaller.
     #[inline(always)]
-    pub(super) fn refine(&mut self, lanes: T::Mask) {
+    fn refine<S: System<T, B>>(&mut self, system: &mut S, lanes: T::Mask) {
         let zero = self.mean.like(0.0);
-        self.find_modes();
-        (self.system).correction(&self.u, &self.modes, &mut self.trial);
-        let mut u = self.u;
-        for i in self.system.places() {
+        self.find_modes(system.places());
+        system.correction(&self.u, &self.modes, &mut self.trial);
+        for i in system.places() {
             let trial = &mut self.trial[i];
             for (trial, p) in trial.iter_mut().zip(self.p[i]) {
                 *trial += p;
@@ -319,29 +396,35 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
             let slides = self.closed[i] & !self.sticks[i] & zero.lt(trial[0]);
             return_to_cone::<T>(slides, self.laws[i].mu, trial);
         }
-        (self.system).velocities(&self.q, &self.trial, &mut u);
-        let sums = judge(self.system.places(), &self.laws, &self.trial, &u);
+        system.velocities(&self.trial, &mut self.renewed);
+        let sums = judge::<T, B>(
+            system.places(),
+            &self.laws,
+            &self.trial,
+            &self.renewed,
+            zero,
+        );
         let better = lanes & sums.weighted.lt(self.sums.weighted);
-        select(self.system.places(), better, &self.trial, &mut self.p);
-        select(self.system.places(), better, &u, &mut self.u);
+        select::<T, B>(system.places(), better, &self.trial, &mut self.p);
+        select::<T, B>(system.places(), better, &self.renewed, &mut self.u);
         self.sums = Violations::select(better, &sums, &self.sums);
     }
 
     /// Moves the impulses of blocked lanes to where the first contacts block, which change their
     /// modes; those of the others to the trial.
     #[inline(always)]
-    fn stop_at(&mut self, blocked: T::Mask, first: T, limits: &[Limit<T>; C]) {
+    fn stop_at(&mut self, places: impl Iterator<Item = usize>, blocked: T::Mask, first: T) {
         let (zero, one) = (first.like(0.0), first.like(1.0));
         let moves = zero.like(NO_MOVE).lt(first);
-        for i in self.system.places() {
+        for i in places {
             let (p, trial) = (&mut self.p[i], &self.trial[i]);
             for k in 0..3 {
                 let between = p[k] + first * (trial[k] - p[k]);
                 p[k] = T::select(blocked, between, trial[k]);
             }
-            let t = limits[i].t;
+            let t = self.fractions[i];
             let hit = blocked & t.lt(one) & (t * zero.like(ALIKE)).le(first);
-            let opens = hit & !limits[i].slides;
+            let opens = hit & !(self.closed[i] & self.sticks[i]);
             self.barred[i] = (self.barred[i] & !(blocked & moves)) | (hit & !moves & self.freed[i]);
             self.sticks[i] = self.sticks[i] & !hit;
             self.closed[i] = self.closed[i] & !opens;
@@ -355,7 +438,7 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
 
     /// The next modes of the lanes of a mask, where the last step was a full one and did not solve.
     #[inline(always)]
-    pub(super) fn correct(&mut self, active: T::Mask) {
+    fn correct<S: System<T, B>>(&mut self, system: &mut S, active: T::Mask) {
         let full = self.full & active;
         if !full.any() {
             return;
@@ -366,12 +449,13 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
         let gain = relative / self.last;
         self.last = T::select(full, relative, self.last);
         let gains_nothing = full & like.like(NO_GAIN).lt(gain);
-        self.visits.enter(full, self.number(), relative);
+        let number = self.number(system.places());
+        self.visits.enter(full, number, relative);
         let looks = full & !gain.lt(like.like(HOLD));
         if !looks.any() {
             return;
         }
-        let (found, worst) = self.worst_contradiction(looks);
+        let worst = self.worst_contradiction(system.places(), looks);
         // With the right modes nothing but α is left in the way.
         let is_settled = gains_nothing & looks & !zero.lt(worst);
         let (least, again) = (S::SMALLEST_ALPHA, S::SMALLEST_ALPHA_AGAIN);
@@ -381,24 +465,26 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
         let circles = looks & like.like(PATIENCE).lt(self.visits.idle);
         let stuck = circles | is_settled;
         let reversed = if stuck.any() {
-            self.reverse(stuck)
+            self.reverse(system.places(), stuck)
         } else {
             stuck
         };
         self.lost = self.lost | (circles & !reversed);
         let mut moved = reversed;
-        for i in self.system.places() {
-            let here = found[i] & !reversed;
+        let found = zero.lt(worst) & !reversed;
+        let least = worst * zero.like(ALIKE);
+        for i in system.places() {
+            let here = found & least.le(self.contradictions[i]);
             self.freed[i] = here;
             if here.any() {
-                moved = moved | self.change_mode(i, here);
+                moved = moved | self.change_mode(system, i, here);
             }
         }
         if moved.any() {
-            self.renew_velocities(moved);
+            self.renew_velocities(system, moved);
         }
         if reversed.any() {
-            self.judge();
+            self.judge(system.places());
             let [relative, _] = self.residual();
             self.last = T::select(reversed, relative, self.last);
         }
@@ -406,26 +492,24 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
 
     /// The modes as a number that is not zero.
     #[inline(always)]
-    fn number(&self) -> T {
+    fn number(&self, places: impl Iterator<Item = usize>) -> T {
         let one = self.mean.like(1.0);
         let (zero, two) = (one.like(0.0), one.like(2.0));
         let mut number = one;
-        for i in self.system.places() {
+        for i in places {
             let digit = T::select(self.closed[i], T::select(self.sticks[i], one, two), zero);
-            number += digit * one.like(POWERS_OF_3[i + 1]);
+            number += digit * one.like(weight(i));
         }
         number
     }
 
-    /// The contacts that contradict their modes most, unless they are barred, in the lanes of a
-    /// mask, and by how much; zero where none does.
+    /// How much the contacts contradict their modes, unless they are barred, in the lanes of a
+    /// mask; returns the largest amount, zero where none does.
     #[inline(always)]
-    fn worst_contradiction(&self, lanes: T::Mask) -> ([T::Mask; C], T) {
+    fn worst_contradiction(&mut self, places: impl Iterator<Item = usize>, lanes: T::Mask) -> T {
         let zero = self.mean.like(0.0);
         let mut worst = zero;
-        let mut found = [!lanes & lanes; C];
-        let mut amounts = [zero; C];
-        for i in self.system.places() {
+        for i in places {
             let (p, u, mu) = (&self.p[i], &self.u[i], self.laws[i].mu);
             let norm = (p[1] * p[1] + p[2] * p[2]).sqrt();
             let beyond = zero.lt(p[0]) & (mu * p[0] * zero.like(BEYOND)).lt(norm);
@@ -436,25 +520,20 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
             let amount = T::select(self.sticks[i], of_stick, of_slide);
             let amount = T::select(self.closed[i], amount, -u[0]);
             let amount = T::select(lanes & !self.barred[i], amount, zero);
-            amounts[i] = amount;
+            self.contradictions[i] = amount;
             worst = amount.max(worst);
         }
-        let least = worst * zero.like(ALIKE);
-        let is_any = zero.lt(worst);
-        for i in self.system.places() {
-            found[i] = is_any & least.le(amounts[i]);
-        }
-        (found, worst)
+        worst
     }
 
     /// Turns the friction of barred contacts against their slip and frees them, in the lanes of a
     /// mask. Returns where there was one.
     #[inline(always)]
-    fn reverse(&mut self, stuck: T::Mask) -> T::Mask {
+    fn reverse(&mut self, places: impl Iterator<Item = usize>, stuck: T::Mask) -> T::Mask {
         let zero = self.mean.like(0.0);
         let may = stuck & zero.lt(self.reversals);
         let mut reversed = !stuck & stuck;
-        for i in self.system.places() {
+        for i in places {
             let (p, u, mu) = (&mut self.p[i], &self.u[i], self.laws[i].mu);
             let slip = (u[1] * u[1] + u[2] * u[2]).sqrt();
             let here = may & self.barred[i] & zero.lt(slip);
@@ -474,7 +553,7 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
     /// Gives contact `i` the mode that its contradiction asks for, in the lanes of a mask. Returns
     /// where its impulse moved.
     #[inline(always)]
-    fn change_mode(&mut self, i: usize, lanes: T::Mask) -> T::Mask {
+    fn change_mode<S: System<T, B>>(&mut self, system: &S, i: usize, lanes: T::Mask) -> T::Mask {
         let zero = self.mean.like(0.0);
         let p = &mut self.p[i];
         let (closed, stuck) = (
@@ -492,7 +571,7 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
         self.sticks[i] = (self.sticks[i] & !stuck) | (closed & !stuck);
         let mut bits = closes.bits();
         while bits != 0 {
-            self.close(i, bits.trailing_zeros() as usize);
+            self.close(system, i, bits.trailing_zeros() as usize);
             bits &= bits - 1;
         }
         opens | slides | closes
@@ -501,18 +580,17 @@ impl<T: Lane, const C: usize, S: System<T, C>> Pivoting<T, C, S> {
     /// Closes contact `i` of a lane with its own solution, all others fixed, since it may slide at
     /// once.
     #[inline(always)]
-    fn close(&mut self, i: usize, lane: usize) {
-        let [a, b, c, d, e, f, g, h, k] = self.system.diagonal(i).map(|w| w.get(lane));
+    fn close<S: System<T, B>>(&mut self, system: &S, i: usize, lane: usize) {
         // Its impulse is zero, so that u is its free velocity.
         let free = self.u[i].map(|u| u.get(lane));
         let mu = self.laws[i].mu.get(lane);
-        let own = solve_one_contact(&[[a, b, c], [d, e, f], [g, h, k]], &free, mu);
-        for (p, own) in self.p[i].iter_mut().zip(own.impulse) {
+        let (mode, impulse) = system.solve_one(i, lane, &free, mu);
+        for (p, own) in self.p[i].iter_mut().zip(impulse) {
             p.set(lane, own);
         }
         let here = T::mask(self.mean.token(), 1 << lane);
         self.sticks[i] = self.sticks[i] & !here;
-        if own.mode == ContactMode::Stick {
+        if mode == ContactMode::Stick {
             self.sticks[i] = self.sticks[i] | here;
         }
     }
@@ -526,11 +604,11 @@ fn replaced<T: Lane>(lanes: T::Mask, new: T::Mask, old: T::Mask) -> T::Mask {
 
 /// `out = new` in the lanes of a mask.
 #[inline(always)]
-fn select<T: Lane, const C: usize>(
+fn select<T: Lane, B: Store>(
     places: impl Iterator<Item = usize>,
     lanes: T::Mask,
-    new: &[Triple<T>; C],
-    out: &mut [Triple<T>; C],
+    new: &B::Of<Triple<T>>,
+    out: &mut B::Of<Triple<T>>,
 ) {
     for i in places {
         for k in 0..3 {
@@ -554,50 +632,33 @@ fn return_to_cone<T: Lane>(lanes: T::Mask, mu: T, p: &mut Triple<T>) {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
-    use crate::lanes::equations::across;
-    use crate::lanes::problem::MAX_DENSE;
-    use crate::lanes::velocity_equations::VelocitySystem;
-    use crate::lanes::velocity_equations::tests::{pattern, problem};
-    use crate::scalar::Single;
-    use proptest::prelude::*;
 
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(64))]
-        #[test]
-        fn the_newton_point_of_a_small_alpha_is_as_accurate_as_that_of_a_large_one(
-            numbers in prop::collection::vec(-1.0..1.0_f64, 600), modes in prop::collection::vec(0..3, MAX_DENSE),
-        ) {
-            let pattern = pattern();
-            let problem = problem(&pattern, &mut numbers.iter().copied());
-            let mut own =
-                Pivoting::<f64, MAX_CONTACTS, VelocitySystem<f64, MAX_CONTACTS>>::new(Single::best());
-            prop_assert_eq!(own.system.load(0, &problem).count(), MAX_DENSE);
-            let mut more = numbers.iter().rev().copied();
-            for i in 0..MAX_DENSE {
-                for x in own.q[i].iter_mut().chain(&mut own.centre[i]) {
-                    *x = more.next().unwrap();
-                }
-                // Friction that opposes the slip, so that its direction turns.
-                let p = own.centre[i];
-                let u = [0.0, -p[1], -p[2]];
-                own.modes[i] = Mode::of(0.3, modes[i] > 0, modes[i] == 1, &p, &u);
-            }
-            own.alpha = 1e-8;
-            own.system.factorise(own.alpha, &own.modes);
-            own.system.newton_point(&own.q, &own.centre, own.alpha, &own.modes, &mut own.trial);
-            let largest = |own: &mut Pivoting<f64, MAX_CONTACTS, _>| {
-                let left = own.left_by_trial();
-                let left = left[..MAX_DENSE].iter().zip(&own.modes).flat_map(|(u, mode)| across(mode, *u));
-                left.fold(0.0, |most: f64, x| most.max(x.abs()))
-            };
-            prop_assume!(own.trial.iter().flatten().all(|x| x.abs() < 1e2));
-            let before = largest(&mut own);
-            own.improve_trial(true);
-            let after = largest(&mut own);
-            prop_assert!(before < 1e-4, "{before:e}");
-            prop_assert!(after < 1e-12, "{before:e} {after:e}");
+    /// The largest rest that a Newton point leaves of its equations, before and after its
+    /// improvement; none where the impulses are large.
+    pub(crate) fn rests<B: Store, S: System<f64, B>>(
+        system: &mut S,
+        alpha: f64,
+        modes: B::Of<Mode<f64>>,
+        centre: B::Of<Triple<f64>>,
+    ) -> Option<[f64; 2]> {
+        let mut own = Pivoting::<f64, B>::new(Single::Baseline);
+        (own.alpha, own.modes, own.centre) = (alpha, modes, centre);
+        assert!(S::RETURNS && system.factorise(alpha, &own.modes));
+        system.newton_point(&own.u, &own.centre, alpha, &own.modes, &mut own.trial);
+        let entries = |x: Triple<f64>| x.into_iter().map(f64::abs);
+        let is_small = |x: f64| x < 1e2;
+        if !(system.places()).all(|i| entries(own.trial[i]).all(is_small)) {
+            return None;
         }
+        let largest = |own: &mut Pivoting<f64, B>, system: &mut S| {
+            let left = own.left_by_trial(system);
+            let left = system.places().map(|i| own.modes[i].across(left[i]));
+            left.flat_map(entries).fold(0.0, f64::max)
+        };
+        let before = largest(&mut own, system);
+        own.improve_trial(system, true);
+        Some([before, largest(&mut own, system)])
     }
 }

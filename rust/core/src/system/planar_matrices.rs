@@ -1,97 +1,37 @@
-//! A machine among grains: a few coordinates, a dense mass matrix, and wheels that touch grains.
+//! The matrices of a planar machine in a step: `M = L Lᵀ` and the rows of its contacts.
 
-use std::fmt::Debug;
+use nalgebra::Vector2;
 
-use nalgebra::{SVector, Vector3};
-
-/// A wheel's disc or ball in the world.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wheel<const D: usize> {
-    /// m.
-    pub centre: SVector<f64, D>,
-    /// m.
-    pub radius: f64,
-}
-
-/// A machine of [`Self::nv`] coordinates whose velocities are their rates.
-///
-/// The first D coordinates are a place in the world, m; the others angles,
-/// rad. Matrices are row-major.
-pub trait Machine<const D: usize>: Debug + Send + Sync {
-    /// Number of coordinates.
-    fn nv(&self) -> usize;
-
-    /// `M(q)` (nv × nv), kg, kg m, kg m².
-    fn mass_matrix(&self, q: &[f64], out: &mut [f64]);
-
-    /// `F(q, v)` (nv), N and N m: gravity (m/s²), torques (`inputs`, N m, positive forward) and
-    /// terms quadratic in v, so that `M v̇ = F` without contacts.
-    fn force(&self, q: &[f64], v: &[f64], gravity: &Vector3<f64>, inputs: &[f64], out: &mut [f64]);
-
-    /// Potential energy `−Σ m g · x`, J.
-    fn potential(&self, q: &[f64], gravity: &Vector3<f64>) -> f64;
-
-    /// Number of torques that can be set.
-    fn n_inputs(&self) -> usize;
-
-    /// Number of wheels.
-    fn n_wheels(&self) -> usize;
-
-    /// Wheel i.
-    fn wheel(&self, i: usize, q: &[f64]) -> Wheel<D>;
-
-    /// Velocity of the material point of wheel i at `point` (world, m) per
-    /// unit of each coordinate's rate (D × nv).
-    fn point_jacobian(&self, i: usize, q: &[f64], point: &SVector<f64, D>, out: &mut [f64]);
-
-    /// Largest displacement, m, that a change (nv) causes away from the contact points.
-    fn displacement(&self, y: &[f64]) -> f64;
-
-    /// A number that is equal for two machines only if they are of the same kind, with the same
-    /// masses, inertias and lengths.
-    fn fingerprint(&self) -> u64;
-}
-
-/// Velocity (m/s) of the material point of wheel i at `point`. `jacobian`: scratch.
-pub(super) fn point_velocity<const D: usize>(
-    machine: &dyn Machine<D>,
-    i: usize,
-    (q, v): (&[f64], &[f64]),
-    point: &SVector<f64, D>,
-    jacobian: &mut Vec<f64>,
-) -> SVector<f64, D> {
-    jacobian.resize(D * v.len(), 0.0);
-    machine.point_jacobian(i, q, point, jacobian);
-    SVector::from_fn(|d, _| {
-        let row = &jacobian[d * v.len()..(d + 1) * v.len()];
-        sum_of_products(row, v)
-    })
-}
+use crate::planar::{PlanarPoses, PlanarTree};
 
 /// `a · b`, from the first entry to the last.
-fn sum_of_products(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn sum_of_products(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// The machine's matrices in a step: scratch.
+/// A machine's matrices in a step: scratch.
 #[derive(Clone, Debug, Default)]
-pub(super) struct MachineParts {
+pub(super) struct PlanarMatrices {
     nv: usize,
     /// M, row-major.
     mass: Vec<f64>,
     /// Lower factor, `M = L Lᵀ`, row-major.
     L: Vec<f64>,
-    /// Rows n, t, (b) of Hᵀ of its contacts (D × nv each).
+    /// Rows of Hᵀ of its contacts (d × nv each).
     rows: Vec<f64>,
-    pub jacobian: Vec<f64>,
 }
 
-impl MachineParts {
+impl PlanarMatrices {
     /// M at a configuration.
-    pub fn set_mass<const D: usize>(&mut self, machine: &dyn Machine<D>, q: &[f64]) {
+    pub fn set_mass(&mut self, machine: &PlanarTree, poses: &PlanarPoses) {
         self.nv = machine.nv();
         self.mass.resize(self.nv * self.nv, 0.0);
-        machine.mass_matrix(q, &mut self.mass);
+        machine.mass_matrix(poses, &mut self.mass);
+    }
+
+    /// Entry k of M's diagonal.
+    pub fn inertia(&mut self, k: usize) -> &mut f64 {
+        &mut self.mass[k * self.nv + k]
     }
 
     /// `M = L Lᵀ`; false if it is not positive definite.
@@ -149,25 +89,21 @@ impl MachineParts {
         self.rows.clear();
     }
 
-    /// Adds a contact of wheel i: stores its rows of Hᵀ and appends those of Zᵀ to `scaled`.
-    pub fn push_contact<const D: usize>(
+    /// Adds a contact of a wheel along some directions: stores its rows of Hᵀ and appends those of
+    /// Zᵀ to `scaled`.
+    pub fn push_contact(
         &mut self,
-        machine: &dyn Machine<D>,
-        (i, q): (usize, &[f64]),
-        point: &SVector<f64, D>,
-        frame: &[SVector<f64, D>; D],
+        (machine, poses): (&PlanarTree, &PlanarPoses),
+        wheel: usize,
+        point: &Vector2<f64>,
+        directions: &[Vector2<f64>],
         scaled: &mut Vec<f64>,
     ) {
-        let n = self.nv;
-        self.jacobian.resize(D * n, 0.0);
-        machine.point_jacobian(i, q, point, &mut self.jacobian);
-        for direction in frame {
+        let begin = self.rows.len();
+        machine.push_rows(wheel, poses, point, directions, &mut self.rows);
+        for row in self.rows[begin..].chunks_exact(self.nv) {
             let begin = scaled.len();
-            for k in 0..n {
-                let column = SVector::<f64, D>::from_fn(|d, _| self.jacobian[d * n + k]);
-                scaled.push(column.dot(direction));
-            }
-            self.rows.extend_from_slice(&scaled[begin..]);
+            scaled.extend_from_slice(row);
             self.forward(&mut scaled[begin..]);
         }
     }
@@ -197,10 +133,10 @@ mod tests {
 
     #[test]
     fn the_factor_solves_with_the_mass_matrix() {
-        let mut parts = MachineParts {
+        let mut parts = PlanarMatrices {
             nv: 3,
             mass: vec![4.0, 2.0, 0.4, 2.0, 5.0, 1.0, 0.4, 1.0, 3.0],
-            ..MachineParts::default()
+            ..PlanarMatrices::default()
         };
         assert!(parts.factorise());
         let v = [0.3, -0.7, 1.1];

@@ -1,0 +1,126 @@
+//! What a step in sand costs: `sand_steps [STEPS] [rest|drive|explore]` prints microseconds a step
+//! of a rover alone and of each of 8 in a batch on one thread. With a scene it steps that alone,
+//! for counting instructions: `valgrind --tool=callgrind --toggle-collect='*counted*'`.
+//!
+//! The rover is `open-rover` on wheels 0.08 m wide with grousers, in dry sand, at 5 ms: parked,
+//! driven by a constant torque, or by torques and steering that change every ten steps.
+
+#![allow(clippy::print_stdout, clippy::unwrap_used)] // prints; stops at an impossible scene
+
+#[path = "../../../tests/physics/sand/sand_scenes.rs"]
+#[allow(missing_docs, dead_code)]
+mod sand_scenes;
+
+use std::time::Instant;
+
+use rover_core::integrator::StepReport;
+use rover_core::multibody::Model;
+use rover_core::simulation::{Batch, RoverSimulation};
+use sand_scenes::{dry_sand, placed, wide};
+
+/// Steps between two commands, and before the first.
+const STEPS_A_COMMAND: usize = 10;
+const STEPS_AT_REST: usize = 200;
+
+/// Rovers of the batch.
+const ROVERS: usize = 8;
+
+/// Rounds of a measurement; the fastest counts.
+const ROUNDS: usize = 3;
+
+/// Largest torque, N m, and steering angle, rad, of a policy that explores.
+const TORQUE: f64 = 2.0;
+const STEERING: f64 = 0.5;
+
+/// Between −1 and 1, spread evenly.
+fn drawn(seed: usize) -> f64 {
+    let x = (seed as f64 + 1.0) * 0.618_033_988_749_894_9 * 7.31;
+    2.0 * (x * x - (x * x).floor()) - 1.0
+}
+
+/// Torques and steering, the latter of the wheels that can steer.
+fn command(model: &Model, scene: &str, k: usize) -> ([f64; 6], [f64; 6]) {
+    let at = |i: usize, size: f64| size * drawn(17 * k + i);
+    let steering = |i: usize| {
+        model.wheels()[i]
+            .steering
+            .map_or(0.0, |_| at(6 + i, STEERING))
+    };
+    match scene {
+        "rest" => ([0.0; 6], [0.0; 6]),
+        "drive" => ([1.0; 6], [0.0; 6]),
+        _ => (
+            std::array::from_fn(|i| at(i, TORQUE)),
+            std::array::from_fn(steering),
+        ),
+    }
+}
+
+fn start() -> RoverSimulation {
+    let mut sim = placed(&wide("open-rover", 0.08, 1.0), dry_sand(), 0.0, 0.005);
+    sim.step(STEPS_AT_REST).unwrap();
+    sim
+}
+
+#[inline(never)]
+fn counted(sim: &mut RoverSimulation, scene: &str, steps: usize) -> StepReport {
+    let mut report = StepReport::default();
+    for k in 0..steps / STEPS_A_COMMAND {
+        let (torques, angles) = command(sim.model(), scene, k);
+        sim.set_wheel_torques(&torques).unwrap();
+        sim.set_steering(&angles).unwrap();
+        report.merge(&sim.step(STEPS_A_COMMAND).unwrap());
+    }
+    report
+}
+
+/// Microseconds a step and rover of a batch.
+fn in_batch(scene: &str, steps: usize) -> f64 {
+    let start = start();
+    let model = start.model().clone();
+    let mut batch = Batch::new(vec![start; ROVERS], Vec::new(), Some(1)).unwrap();
+    let mut rows = vec![0.0; ROVERS * batch.layout().size()];
+    let begin = Instant::now();
+    for k in 0..steps / STEPS_A_COMMAND {
+        let (mut torques, mut angles) = (Vec::new(), Vec::new());
+        for i in 0..ROVERS {
+            let (own_torques, own_angles) = command(&model, scene, k + 100 * i);
+            torques.extend(own_torques);
+            angles.extend(own_angles);
+        }
+        batch
+            .step(&torques, &angles, STEPS_A_COMMAND, None, &mut rows)
+            .unwrap();
+    }
+    1e6 * begin.elapsed().as_secs_f64() / (ROVERS * steps) as f64
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().collect();
+    let steps = arguments.get(1).and_then(|n| n.parse().ok()).unwrap_or(500);
+    if let Some(scene) = arguments.get(2) {
+        counted(&mut start(), scene, steps);
+        return;
+    }
+    println!(
+        "{:<8} {:>10} {:>10}  us a step {:>10} {:>14}",
+        "scene", "alone", "in batch", "repeated", "status"
+    );
+    for scene in ["rest", "drive", "explore"] {
+        let (mut alone, mut batch) = (f64::INFINITY, f64::INFINITY);
+        let mut report = StepReport::default();
+        for _ in 0..ROUNDS {
+            let mut sim = start();
+            let begin = Instant::now();
+            report = counted(&mut sim, scene, steps);
+            alone = alone.min(1e6 * begin.elapsed().as_secs_f64() / steps as f64);
+            batch = batch.min(in_batch(scene, steps));
+        }
+        let repeated = report.retaken as f64 / steps as f64;
+        let state = format!("{:?}", report.status);
+        println!(
+            "{scene:<8} {alone:>10.1} {batch:>10.1} {:>10} {repeated:>10.2} {state:>14}",
+            ""
+        );
+    }
+}

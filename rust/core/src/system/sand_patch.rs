@@ -1,0 +1,454 @@
+//! A wheel of a tree in sand: its force along a tangent, and where that is taken.
+
+use std::sync::Arc;
+
+use nalgebra::{Matrix6, Vector3, Vector6};
+
+use super::sand::SandScene;
+use crate::geometry::{SoftLayer, Tangent};
+use crate::multibody::{Factor, Kinematics, Model};
+use crate::sand::patch::Relief;
+use crate::sand::{
+    Bed, Memory, Reaction, Rules, SandWheel, Twist, Want, WheelInSand, WheelPose, Window, react,
+};
+
+/// Error of the linearised force of a wheel, relative to the force, at which it has settled.
+const SETTLED: f64 = 1e-2;
+
+/// Displacement in units of the sand's memory, and change of the force relative to it, by which a
+/// solution may differ from where its force was linearised without a check.
+const UNTURNED: f64 = 2e-3;
+const UNCHANGED: f64 = 1e-2;
+
+/// Residual of a wheel's own problem, relative to the way from the last point, at which it is
+/// solved.
+const LOCALLY_SETTLED: f64 = 2e-3;
+
+/// Most evaluations of the force in a wheel's own problem.
+const MOST_EVALUATIONS: usize = 12;
+
+/// Factor by which a step that does not bring it nearer is shortened.
+const SHORTER: f64 = 0.4;
+
+/// Cells around what of a wheel is in the sand in which ruts are looked for: it moves in a step.
+const MARGIN: f64 = 2.0;
+
+/// Twist, m/s, below which two points are the same.
+const TINY: f64 = 1e-12;
+
+/// What the wheels of a step share.
+#[derive(Clone, Debug)]
+pub(super) struct SandStep {
+    /// Step, s, and its weight on its end.
+    pub(super) h: f64,
+    pub(super) theta: f64,
+    pub(super) gravity: Vector3<f64>,
+    /// Length over which the sand forgets, m.
+    pub(super) length: f64,
+}
+
+/// The force at a twist and its derivative by the twist.
+#[derive(Clone, Copy)]
+struct Evaluated {
+    at: Vector6<f64>,
+    force: Vector6<f64>,
+    slope: Matrix6<f64>,
+    is_touching: bool,
+}
+
+/// A wheel of a machine in sand: geometry, linearised force and trial.
+#[derive(Clone, Debug)]
+pub(super) struct Patch {
+    pub(super) wheel: SandWheel,
+    pub(super) rules: Arc<Rules>,
+    pub(super) body: usize,
+    /// Velocities that move it, and the twist that each gives it.
+    pub(super) path: Vec<usize>,
+    pub(super) columns: Vec<Vector6<f64>>,
+    pub(super) pose: WheelPose,
+    /// Twist at which the force was evaluated.
+    pub(super) at: Vector6<f64>,
+    pub(super) force: Vector6<f64>,
+    pub(super) tangent: Matrix6<f64>,
+    /// Columns along the path, for its compliance.
+    rows: Vec<[f64; 6]>,
+    /// Whether the force is to be evaluated at the velocity before the step.
+    pub(super) is_stale: bool,
+    /// Twist and force of the last linearisation in this step.
+    pub(super) last: Option<(Vector6<f64>, Vector6<f64>)>,
+    pub(super) is_touching: bool,
+    /// Ruts near the wheel; meaningless where there are none.
+    pub(super) window: Window,
+    pub(super) is_rutted: bool,
+    /// Whether the sand should have given more than it has stored in this step.
+    pub(super) is_empty: bool,
+    pub(super) begin: WheelInSand,
+    pub(super) tried: WheelInSand,
+}
+
+impl Patch {
+    /// Of a wheel of a model, clear of the ground.
+    pub(super) fn new(model: &Model, body: usize, wheel: SandWheel, rules: Arc<Rules>) -> Self {
+        let path = model.mechanism().path(body).to_vec();
+        Self {
+            rules,
+            wheel,
+            body,
+            columns: vec![Vector6::zeros(); path.len()],
+            rows: vec![[0.0; 6]; path.len()],
+            path,
+            pose: WheelPose {
+                centre: Vector3::zeros(),
+                axle: Vector3::z(),
+            },
+            at: Vector6::zeros(),
+            force: Vector6::zeros(),
+            tangent: Matrix6::zeros(),
+            is_stale: true,
+            last: None,
+            is_touching: false,
+            window: Window::default(),
+            is_rutted: false,
+            is_empty: false,
+            begin: WheelInSand::default(),
+            tried: WheelInSand::default(),
+        }
+    }
+
+    fn set_columns(&mut self, model: &Model, kinematics: &Kinematics) {
+        let x = self.pose.centre - kinematics.origin(self.body);
+        let lead = model.lead(self.body);
+        let (base, rest) = self.columns.split_at_mut(lead);
+        for (k, column) in base.iter_mut().enumerate() {
+            let mut unit = Vector3::zeros();
+            unit[k % 3] = 1.0;
+            *column = if k < 3 {
+                six(&unit, &Vector3::zeros())
+            } else {
+                six(&unit.cross(&x), &unit)
+            };
+        }
+        for (column, mover) in rest.iter_mut().zip(model.movers(self.body)) {
+            let axis = kinematics.motions()[mover.motion].axis.into();
+            *column = six(&kinematics.velocity_at(mover.motion, &x), &axis);
+        }
+    }
+
+    pub(super) fn twist(&self, v: &[f64]) -> Vector6<f64> {
+        let mut twist = Vector6::zeros();
+        for (&k, column) in self.path.iter().zip(&self.columns) {
+            twist += column * v[k];
+        }
+        twist
+    }
+
+    /// Puts the wheel where the step evaluates its forces.
+    pub(super) fn place(&mut self, place: SandScene<'_>, w: usize) {
+        self.pose = pose(place.model, place.kinematics, w);
+        self.set_columns(place.model, place.kinematics);
+        self.read_ruts(place);
+    }
+
+    /// The force at a twist and its derivative by the twist.
+    fn evaluate(&self, step: &SandStep, place: SandScene<'_>, at: &Vector6<f64>) -> Evaluated {
+        let twist = Twist::of(at);
+        let lag = step.theta * step.h;
+        let end = moved(&self.pose, &twist, lag);
+        let times = (step.h, step.length);
+        let recalled = self.begin.memory.after(&twist, self.wheel.drum(), times);
+        // A memory that fades as a whole hardly changes the force.
+        let want = Want::Slopes {
+            by_memory: recalled.fresh,
+            by_pose: lag,
+        };
+        let found = self.react((place, &step.gravity), &end, &recalled.memory, want);
+        let found = found.filter(|found| found.is_touching);
+        Evaluated {
+            at: *at,
+            is_touching: found.is_some(),
+            force: found.map_or_else(Vector6::zeros, |found| found.wrench),
+            slope: found.map_or_else(Matrix6::zeros, |found| found.slope),
+        }
+    }
+
+    /// Evaluates force and tangent at a twist.
+    pub(super) fn linearise(&mut self, step: &SandStep, place: SandScene<'_>, at: &Vector6<f64>) {
+        let found = self.evaluate(step, place, at);
+        self.take(&found);
+    }
+
+    fn take(&mut self, found: &Evaluated) {
+        (self.at, self.is_touching) = (found.at, found.is_touching);
+        (self.force, self.tangent) = (found.force, Matrix6::zeros());
+        if found.is_touching {
+            self.tangent = dissipative(&-found.slope, self.wheel.radius);
+            self.add_secant();
+        }
+    }
+
+    /// Compares the linearised force at a solution with the force there. If they differ, the force
+    /// is linearised anew, where the wheel would go if the rest of the machine answered it
+    /// linearly.
+    pub(super) fn revise(
+        &mut self,
+        step: &SandStep,
+        place: SandScene<'_>,
+        factor: &Factor<f64>,
+        six: &Vector6<f64>,
+    ) -> bool {
+        let arm = self.wheel.radius;
+        let applied = self.applied(six);
+        let way = scaled(&(six - self.at), self.wheel.drum()).norm();
+        let turned = way * step.h / step.length;
+        let changed = size(&(applied - self.force), arm);
+        if turned < UNTURNED && changed <= UNCHANGED * size(&applied, arm) {
+            return false;
+        }
+        let found = self.evaluate(step, place, six);
+        let error = size(&(found.force - applied), arm);
+        if error <= SETTLED * size(&found.force, arm).max(size(&applied, arm)) {
+            return false;
+        }
+        let compliance = self.compliance(place.model, factor) * step.h;
+        let found = self.settle(step, place, &compliance, found);
+        self.take(&found);
+        true
+    }
+
+    /// `J M̂⁻¹ Jᵀ`: the twist per impulse on the wheel.
+    fn compliance(&mut self, model: &Model, factor: &Factor<f64>) -> Matrix6<f64> {
+        for (row, column) in self.rows.iter_mut().zip(&self.columns) {
+            *row = (*column).into();
+        }
+        factor.half_solve_path(model.mechanism(), self.body, &mut self.rows);
+        let mut sum = Matrix6::zeros();
+        for row in &self.rows {
+            let row = Vector6::from(*row);
+            sum += row * row.transpose();
+        }
+        sum
+    }
+
+    /// Newton's method for `x − u = A (F(x) − F_lin(x))`, from the solution u of the linearised
+    /// problem; A: what a force does to the twist in a step. A step that does not bring x nearer is
+    /// shortened.
+    fn settle(
+        &self,
+        step: &SandStep,
+        place: SandScene<'_>,
+        A: &Matrix6<f64>,
+        start: Evaluated,
+    ) -> Evaluated {
+        let arm = self.wheel.drum();
+        let u = start.at;
+        let residual =
+            |x: &Evaluated| x.at - u - A * (x.force - self.force + self.tangent * (x.at - self.at));
+        let length = |g: &Vector6<f64>| scaled(g, arm).norm();
+        let near = LOCALLY_SETTLED * length(&(u - self.at));
+        let mut best = start;
+        let mut rest = residual(&best);
+        let mut evaluations = 1;
+        while length(&rest) > near {
+            let slope = Matrix6::identity() - A * (best.slope + self.tangent);
+            let Some(way) = slope.lu().solve(&rest) else {
+                break;
+            };
+            let mut share = 1.0;
+            loop {
+                let found = self.evaluate(step, place, &(best.at - way * share));
+                let left = residual(&found);
+                evaluations += 1;
+                if length(&left) < (1.0 - 0.1 * share) * length(&rest) {
+                    (best, rest) = (found, left);
+                    break;
+                }
+                if evaluations >= MOST_EVALUATIONS {
+                    return best;
+                }
+                share *= SHORTER;
+            }
+        }
+        best
+    }
+
+    /// Stiffens the tangent along the way from the last point, so that it is at least the secant
+    /// between both: where the sand yields its own tangent is nearly zero, and a step that reverses
+    /// would leave the point where it stops far behind.
+    fn add_secant(&mut self) {
+        if let Some((twist, force)) = &self.last {
+            let arm = self.wheel.drum();
+            let lengths = |x: &Vector6<f64>| scaled(x, arm);
+            let way = lengths(&(self.at - twist));
+            let square = way.norm_squared();
+            if square > TINY * TINY {
+                let secant = -scaled(&(self.force - force), 1.0 / arm).dot(&way) / square;
+                let weights = scaled(&way, arm);
+                let own = (self.at - twist).dot(&(self.tangent * (self.at - twist))) / square;
+                let more = (secant - own).max(0.0) / square;
+                self.tangent += weights * weights.transpose() * more;
+            }
+        }
+        self.last = Some((self.at, self.force));
+    }
+
+    /// The linearised force at a twist.
+    pub(super) fn applied(&self, twist: &Vector6<f64>) -> Vector6<f64> {
+        self.force - self.tangent * (twist - self.at)
+    }
+
+    /// How far from its centre the wheel may be in the sand, m, along x and z.
+    pub(super) fn reach(&self, ground: SoftLayer<'_>, pose: &WheelPose) -> [f64; 2] {
+        let radius = self.wheel.drum();
+        let Some(tangent) = ground.tangent(&pose.centre, 0.5 * radius) else {
+            return [0.0; 2];
+        };
+        let above = radius - depth(&self.wheel, pose, &tangent) - tangent.highest;
+        let chord = (radius * radius - above.max(0.0) * above.max(0.0)).max(0.0);
+        let n = tangent.normal;
+        let tilt = (n.x * n.x + n.z * n.z).sqrt();
+        let along = (chord.sqrt() + radius * tilt).min(radius);
+        let across = 0.5 * self.wheel.width.max(ground.cell);
+        let a = pose.axle;
+        let level = (a.x * a.x + a.z * a.z).sqrt().max(f64::MIN_POSITIVE);
+        let (x, z) = (a.x.abs() / level, a.z.abs() / level);
+        [along * z + across * x, along * x + across * z]
+    }
+
+    /// Reads the ruts near the wheel.
+    fn read_ruts(&mut self, place: SandScene<'_>) {
+        let reach = self.reach(place.ground, &self.pose);
+        let (cell, c) = (place.ground.cell, self.pose.centre);
+        let reach = reach.map(|reach| reach + MARGIN * cell);
+        self.is_rutted = (place.ruts).read([c.x, c.z], reach, cell, &mut self.window);
+    }
+
+    fn react(
+        &self,
+        (place, gravity): (SandScene<'_>, &Vector3<f64>),
+        pose: &WheelPose,
+        memory: &Memory,
+        want: Want,
+    ) -> Option<Reaction> {
+        let ground = place.ground;
+        let radius = self.wheel.drum();
+        let tangent = ground.tangent(&pose.centre, 0.5 * radius)?;
+        let (cell, n) = (ground.cell, tangent.normal);
+        let is_rutted = self.is_rutted;
+        let heights = |x: &Vector3<f64>| {
+            let plane = n.dot(&(x - tangent.place));
+            let over = if tangent.is_exact {
+                0.0
+            } else {
+                let height = ground.surface.height(x.x, x.z);
+                height.map_or(0.0, |y| plane + n.y * (y - x.y))
+            };
+            let rut = if is_rutted {
+                place.ruts.depth_in(&self.window, [x.x, x.z], cell)
+            } else {
+                0.0
+            };
+            [over, over - n.y * rut]
+        };
+        let relief: Option<Relief<'_>> = if tangent.is_exact && !is_rutted {
+            None
+        } else {
+            Some(&heights)
+        };
+        let bed = Bed {
+            place: tangent.place,
+            normal: n,
+            relief,
+            highest: tangent.highest,
+            gravity: -gravity.dot(&n),
+        };
+        let found = react(
+            (&self.wheel, &self.rules),
+            ground.soil,
+            &bed,
+            pose,
+            memory,
+            want,
+        );
+        Some(found)
+    }
+}
+
+/// The same with its angular part multiplied by `arm`.
+fn scaled(x: &Vector6<f64>, arm: f64) -> Vector6<f64> {
+    Vector6::new(x[0], x[1], x[2], arm * x[3], arm * x[4], arm * x[5])
+}
+
+fn six(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
+    Vector6::new(
+        linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
+    )
+}
+
+/// Size of a wrench, N, with moments at an arm, m.
+fn size(wrench: &Vector6<f64>, arm: f64) -> f64 {
+    let moment = wrench.fixed_rows::<3>(3).norm_squared() / (arm * arm);
+    (wrench.fixed_rows::<3>(0).norm_squared() + moment).sqrt()
+}
+
+/// Pose of a wheel, world.
+pub(super) fn pose(model: &Model, kinematics: &Kinematics, wheel: usize) -> WheelPose {
+    let wheel = &model.wheels()[wheel];
+    WheelPose {
+        centre: kinematics.origin(wheel.body) + kinematics.point(wheel.body, &wheel.centre),
+        axle: kinematics.R(wheel.body) * wheel.axle,
+    }
+}
+
+/// The pose after a time with a twist, to first order.
+pub(super) fn moved(pose: &WheelPose, twist: &Twist, time: f64) -> WheelPose {
+    let axle = pose.axle + twist.angular.cross(&pose.axle) * time;
+    WheelPose {
+        centre: pose.centre + twist.linear * time,
+        axle: axle / axle.norm(),
+    }
+}
+
+/// Depth of the lowest point of a wheel under a tangent plane, m.
+pub(super) fn depth(wheel: &SandWheel, pose: &WheelPose, tangent: &Tangent) -> f64 {
+    let lean = pose.axle.dot(&tangent.normal);
+    let upright = (1.0 - lean * lean).max(0.0).sqrt();
+    let height = (pose.centre - tangent.place).dot(&tangent.normal);
+    0.5 * wheel.width * lean.abs() + wheel.drum() * upright - height
+}
+
+/// Pivot, relative to the largest, below which it is dropped.
+const DROPPED: f64 = 1e-9;
+
+/// The symmetric part of a matrix without its negative pivots: `Σ d_k l_k l_kᵀ` over the positive
+/// pivots d_k of its factor `L D Lᵀ`. Rotations are scaled to lengths by `arm`, m.
+fn dissipative(matrix: &Matrix6<f64>, arm: f64) -> Matrix6<f64> {
+    let scale = |i: usize| if i < 3 { 1.0 } else { arm };
+    let mut rest =
+        Matrix6::from_fn(|i, j| 0.5 * (matrix[(i, j)] + matrix[(j, i)]) / (scale(i) * scale(j)));
+    let largest = (0..6).fold(0.0_f64, |m, i| m.max(rest[(i, i)]));
+    let mut sum = Matrix6::zeros();
+    for k in 0..6 {
+        let pivot = rest[(k, k)];
+        if pivot <= DROPPED * largest {
+            continue;
+        }
+        let column = rest.column(k) / pivot;
+        let part = column * column.transpose() * pivot;
+        sum += part;
+        rest -= part;
+    }
+    Matrix6::from_fn(|i, j| sum[(i, j)] * scale(i) * scale(j))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dissipative_matrix_is_kept_and_a_negative_one_dropped() {
+        let a = Matrix6::from_fn(|i, j| ((i * 7 + j * 3) % 5) as f64 * 0.2);
+        let positive = a * a.transpose() + Matrix6::identity();
+        assert!((dissipative(&positive, 0.1) - positive).norm() < 1e-9);
+        assert_eq!(dissipative(&-positive, 0.1), Matrix6::zeros());
+    }
+}
