@@ -109,6 +109,7 @@ bench: $(STAMPS)/release ## time a step and tell where the time goes, MuJoCo's b
 	$(COMPARE).rollout
 	$(COMPARE).exploring_bench
 	cargo bench --locked $(addprefix --bench ,step accuracy spheres rays solver soil)
+	cargo run --locked --quiet --profile bench -p rover-core --example sand_steps
 	@if command -v valgrind > /dev/null; then cargo build --release --locked --quiet --example drive_steps; \
 	  count() { valgrind --tool=callgrind --callgrind-out-file=/dev/null target/release/examples/drive_steps $$1 2>&1 \
 	    | awk '/Collected/ { print $$NF }'; }; \

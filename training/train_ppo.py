@@ -11,9 +11,8 @@ from typing import Annotated
 import typer
 
 from rover_gym.cli.console import plain_errors, say_path
-from rover_gym.learning.configurations import find_configuration
 from rover_gym.learning.ppo import LARGEST_TRAINING_SEED, Reporting, train_ppo
-from rover_gym.learning.training_config import read_config
+from rover_gym.learning.training_config import find_configuration, read_config
 
 
 @plain_errors

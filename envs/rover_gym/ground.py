@@ -5,16 +5,18 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import HeightField, Plane, SphereField, Terrain, TriangleMesh, Union
+from rover_gym.mechanics import HeightField, Plane, SoftGround, SphereField, Terrain, TriangleMesh, Union
 
 Array = npt.NDArray[np.float64]
 
 
 def parts_of(terrain: Terrain) -> Iterator[Terrain]:
-    """The terrains of a union, and of unions in it; the terrain itself if it is none."""
+    """The terrains of a union, and of unions in it, and the surface of sand; the terrain itself if it is none."""
     if isinstance(terrain, Union):
         for part in terrain.parts:
             yield from parts_of(part)
+    elif isinstance(terrain, SoftGround):
+        yield from parts_of(terrain.surface)
     else:
         yield terrain
 

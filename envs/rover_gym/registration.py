@@ -37,6 +37,7 @@ ENVIRONMENTS: Mapping[str, Registration] = {
     "Rover-v0": _rover({}),
     "RoverRocks-v0": _rover({"terrain": "rocks"}),
     "RoverHills-v0": _rover({"terrain": "hills"}),
+    "RoverSand-v0": _rover({"terrain": "sand"}),
     "RoverWaypoints-v0": _rover({"waypoints": 5, "goal_distance": (4.0, 8.0)}, 2 * MAX_EPISODE_STEPS),
     "RoverBattery-v0": _rover({"terrain": "rocks", "goal_distance": (10.0, 14.0), "battery": 7000.0}),
     "RoverCommand-v0": Registration(

@@ -6,12 +6,24 @@ import re
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
 from balls import MovingBalls, RoverOnMovingBalls
-from browser.test_replay_page import await_that, coarse, go_to, messages, opened, picture, readings, shown_load, slider
+from browser.test_replay_page import (
+    Shown,
+    assert_alone,
+    await_that,
+    click_halfway,
+    coarse,
+    go_to,
+    opened,
+    picture,
+    readings,
+    shown_load,
+    slider,
+)
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 
@@ -45,34 +57,22 @@ const done = arguments[arguments.length - 1];
 """
 
 
-class BallsShown(NamedTuple):
-    """A page that is open, and the run that it should show."""
-
-    browser: webdriver.Chrome
-    run: GrainRun
-    page: Path
-
-
 @pytest.fixture(scope="module")
-def shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[BallsShown]:
+def shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown[GrainRun]]:
     folder = tmp_path_factory.mktemp("grains")
     record_grains(RoverOnMovingBalls(), 1.2, folder / "run.h5", 10.0, title="a rover & <balls>")
     run = open_run(folder / "run.h5")
     page = write_page(run, folder / "replay.html")
     with opened(page, folder / "profile") as browser:
-        yield BallsShown(browser, run, page)
+        yield Shown(browser, run, page)
 
 
-def test_the_page_loads_without_errors_and_without_the_network(shown: BallsShown) -> None:
-    asked = [params["request"]["url"] for params in messages(shown.browser, "Network.requestWillBeSent")]
-    assert shown.page.as_uri() in asked
-    inside = ("data:", "blob:", "chrome:", shown.page.as_uri())
-    assert [url[:100] for url in asked if not url.startswith(inside)] == []
-    assert [entry for entry in shown.browser.get_log("browser") if entry["level"] == "SEVERE"] == []
+def test_the_page_loads_without_errors_and_without_the_network(shown: Shown[GrainRun]) -> None:
+    assert_alone(shown)
     assert shown.browser.title == "a rover & <balls>"
 
 
-def test_balls_rover_and_sky_are_where_they_belong(shown: BallsShown) -> None:
+def test_balls_rover_and_sky_are_where_they_belong(shown: Shown[GrainRun]) -> None:
     go_to(shown.browser, 0.2)
     image = picture(shown.browser)
     height, width, _ = image.shape
@@ -90,7 +90,7 @@ def test_balls_rover_and_sky_are_where_they_belong(shown: BallsShown) -> None:
     assert 0.25 < rows.mean() / height < 0.7
 
 
-def test_the_timeline_moves_balls_and_rover_and_comes_back(shown: BallsShown) -> None:
+def test_the_timeline_moves_balls_and_rover_and_comes_back(shown: Shown[GrainRun]) -> None:
     paint(shown.browser, 2)  # balls that move have another colour than balls at rest
     go_to(shown.browser, 0.25)
     first = still(shown.browser)
@@ -125,7 +125,7 @@ def paint(browser: webdriver.Chrome, number: int) -> None:
     )
 
 
-def test_layers_show_the_height_at_the_start(shown: BallsShown) -> None:
+def test_layers_show_the_height_at_the_start(shown: Shown[GrainRun]) -> None:
     go_to(shown.browser, 0.2)
     plain = still(shown.browser)
     paint(shown.browser, 1)
@@ -135,7 +135,7 @@ def test_layers_show_the_height_at_the_start(shown: BallsShown) -> None:
     assert (np.abs(layered - plain).max(axis=-1) > 15.0).mean() > 0.03
 
 
-def test_the_curves_follow_the_timeline(shown: BallsShown) -> None:
+def test_the_curves_follow_the_timeline(shown: Shown[GrainRun]) -> None:
     browser, run = shown.browser, shown.run
     assert run.model is not None
     assert [node.text for node in browser.find_elements(By.CSS_SELECTOR, "#panel h2")] == [
@@ -150,19 +150,11 @@ def test_the_curves_follow_the_timeline(shown: BallsShown) -> None:
     pairs = zip(run.model.wheel_names, loads, strict=True)
     expected = [word for name, load in pairs for word in (name, shown_load(load))]
     await_that(lambda: readings(browser)[0] == expected, "the loads at that time")
-    chart = browser.find_element(By.CSS_SELECTOR, "#panel svg")
-    browser.execute_script(
-        "const box = arguments[0].getBoundingClientRect();"
-        "const at = {bubbles: true, clientX: box.x + box.width / 2, clientY: box.y + box.height / 2};"
-        "arguments[0].dispatchEvent(new MouseEvent('click', at));",
-        chart,
-    )
-    middle = (165 - 42) / (330 - 42 - 6) * float(run.time[-1])
-    await_that(lambda: slider(browser) == pytest.approx(middle, abs=0.02), "the time that was clicked on")
+    click_halfway(browser, run)
 
 
 @pytest.mark.nightly("tests/browser/test_grain_page.py::test_the_timeline_moves_balls_and_rover_and_comes_back")
-def test_it_plays_and_the_wheel_of_the_mouse_zooms(shown: BallsShown) -> None:
+def test_it_plays_and_the_wheel_of_the_mouse_zooms(shown: Shown[GrainRun]) -> None:
     browser = shown.browser
     go_to(browser, 0.1)
     browser.find_element(By.CSS_SELECTOR, "#root button").click()

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 import pytest
@@ -27,24 +27,18 @@ from rover_gym.replay.player import LOAD_TIME, moving_mean
 from rover_gym.runs import open_run
 from rover_gym.soil import SoilRun, record_soil, rover_on_soil, settled_bed
 
+R = TypeVar("R")
+
 ROCKS = SphereField([[1.6, 0.0, 0.6], [1.2, 0.05, -1.3], [-0.9, 0.0, 1.3]], [0.25, 0.2, 0.15], Plane())
 PEAK = 1e5  # N, of an impact
 PATIENCE = 120.0  # s: without a GPU, on a busy machine, a frame takes seconds
 
 
-class Shown(NamedTuple):
+class Shown(NamedTuple, Generic[R]):
     """A page that is open, and the run that it should show."""
 
     browser: webdriver.Chrome
-    run: RoverRun
-    page: Path
-
-
-class SoilShown(NamedTuple):
-    """A page of a run on a soil that is open."""
-
-    browser: webdriver.Chrome
-    run: SoilRun
+    run: R
     page: Path
 
 
@@ -104,7 +98,7 @@ def drive(path: Path, terrain: Terrain = ROCKS) -> RoverRun:
 
 
 @pytest.fixture(scope="module")
-def shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown]:
+def shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown[RoverRun]]:
     folder = tmp_path_factory.mktemp("page")
     run = drive(folder / "run.h5")
     page = write_page(run, folder / "replay.html")
@@ -185,12 +179,12 @@ def messages(browser: webdriver.Chrome, method: str) -> list[dict[str, Any]]:
     return [message["params"] for message in found if message["method"] == method]
 
 
-def test_the_page_loads_without_errors_and_without_the_network(shown: Shown) -> None:
+def test_the_page_loads_without_errors_and_without_the_network(shown: Shown[RoverRun]) -> None:
     assert_alone(shown)
     assert shown.browser.title == "a drive over rocks"
 
 
-def assert_alone(shown: Shown | SoilShown) -> None:
+def assert_alone(shown: Shown[Any]) -> None:
     """The page makes no external request, and the browser reports no error."""
     asked = [params["request"]["url"] for params in messages(shown.browser, "Network.requestWillBeSent")]
     assert shown.page.as_uri() in asked
@@ -201,7 +195,7 @@ def assert_alone(shown: Shown | SoilShown) -> None:
     assert severe == []
 
 
-def test_the_scene_shows_rover_rocks_and_ground_the_right_way_up(shown: Shown) -> None:
+def test_the_scene_shows_rover_rocks_and_ground_the_right_way_up(shown: Shown[RoverRun]) -> None:
     go_to(shown.browser, 0.0)
     image = picture(shown.browser)
     height, width, _ = image.shape
@@ -239,7 +233,7 @@ def test_a_map_lies_under_the_rover_and_no_rock_floats_in_the_sky(tmp_path: Path
     assert (red > blue)[: height // 8].mean() < 0.02  # the sky; a fifth of it was rocks
 
 
-def test_the_timeline_moves_the_rover(shown: Shown) -> None:
+def test_the_timeline_moves_the_rover(shown: Shown[RoverRun]) -> None:
     go_to(shown.browser, 0.3)
     first = picture(shown.browser)
     again = picture(shown.browser)
@@ -269,7 +263,7 @@ def readings(browser: webdriver.Chrome) -> list[list[str]]:
     return [legend.text.split() for legend in found]
 
 
-def test_the_curves_stand_beside_the_scene_and_follow_the_timeline(shown: Shown) -> None:
+def test_the_curves_stand_beside_the_scene_and_follow_the_timeline(shown: Shown[RoverRun]) -> None:
     browser, run = shown.browser, shown.run
     assert [node.text for node in browser.find_elements(By.CSS_SELECTOR, "#panel h2")] == [
         f"wheel load, mean over {LOAD_TIME:g} s (N)",
@@ -303,21 +297,26 @@ def test_the_curves_stand_beside_the_scene_and_follow_the_timeline(shown: Shown)
     assert positions[1][0] - positions[0][0] == pytest.approx(0.5 * (330 - 42 - 6), abs=2.0)  # half of the axis
 
 
-def test_a_click_on_a_curve_goes_to_that_time(shown: Shown) -> None:
-    go_to(shown.browser, 0.2)
-    chart = shown.browser.find_element(By.CSS_SELECTOR, "#panel svg")
-    shown.browser.execute_script(
+def click_halfway(browser: webdriver.Chrome, run: Any) -> None:
+    """Clicks on the middle of a chart, which goes to the time there."""
+    chart = browser.find_element(By.CSS_SELECTOR, "#panel svg")
+    browser.execute_script(
         "const box = arguments[0].getBoundingClientRect();"
         "const at = {bubbles: true, clientX: box.x + box.width / 2, clientY: box.y + box.height / 2};"
         "arguments[0].dispatchEvent(new MouseEvent('click', at));",
         chart,
     )
-    middle = (165 - 42) / (330 - 42 - 6) * float(shown.run.time[-1] - shown.run.time[0])
-    await_that(lambda: slider(shown.browser) == pytest.approx(middle, abs=0.02), "the time that was clicked on")
+    middle = (165 - 42) / (330 - 42 - 6) * float(run.time[-1] - run.time[0])
+    await_that(lambda: slider(browser) == pytest.approx(middle, abs=0.02), "the time that was clicked on")
+
+
+def test_a_click_on_a_curve_goes_to_that_time(shown: Shown[RoverRun]) -> None:
+    go_to(shown.browser, 0.2)
+    click_halfway(shown.browser, shown.run)
 
 
 @pytest.mark.nightly("tests/browser/test_replay_page.py::test_the_timeline_moves_the_rover")
-def test_it_plays(shown: Shown) -> None:
+def test_it_plays(shown: Shown[RoverRun]) -> None:
     go_to(shown.browser, 0.2)
     # One button starts and stops, and a slow browser may not have stopped yet.
     shown.browser.find_element(By.CSS_SELECTOR, "#root button").click()
@@ -341,7 +340,7 @@ def moves(browser: webdriver.Chrome, patience: float) -> bool:
 
 
 @pytest.fixture(scope="module")
-def soil_shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SoilShown]:
+def soil_shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown[SoilRun]]:
     """Half a second on 150 disks."""
     folder = tmp_path_factory.mktemp("soil")
     bed = settled_bed(150, 2, settle=0.1)
@@ -351,11 +350,11 @@ def soil_shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SoilShown]:
     run = open_run(folder / "soil.h5")
     page = write_page(run, folder / "soil.html")
     with opened(page, folder / "profile") as browser:
-        yield SoilShown(browser, run, page)
+        yield Shown(browser, run, page)
 
 
 @pytest.mark.nightly("tests/browser/test_grain_page.py::test_the_page_loads_without_errors_and_without_the_network")
-def test_a_soils_page_loads_alone_and_shows_rover_and_disks(soil_shown: SoilShown) -> None:
+def test_a_soils_page_loads_alone_and_shows_rover_and_disks(soil_shown: Shown[SoilRun]) -> None:
     assert_alone(soil_shown)
     browser = soil_shown.browser
     assert browser.title == "the rover on 150 disks"
@@ -373,7 +372,7 @@ def test_a_soils_page_loads_alone_and_shows_rover_and_disks(soil_shown: SoilShow
 
 
 @pytest.mark.nightly("tests/browser/test_grain_page.py::test_the_timeline_moves_balls_and_rover_and_comes_back")
-def test_a_soils_timeline_moves_disks_chains_and_wheels_and_comes_back(soil_shown: SoilShown) -> None:
+def test_a_soils_timeline_moves_disks_chains_and_wheels_and_comes_back(soil_shown: Shown[SoilRun]) -> None:
     browser, run = soil_shown.browser, soil_shown.run
     go_to(browser, 0.0)
     first = picture(browser)

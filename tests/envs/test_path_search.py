@@ -14,7 +14,7 @@ from rover_gym.env import RoverEnv
 from rover_gym.env.start import HeightScan, scan_points
 from rover_gym.mechanics import OptionError, PathSearch, atan2, exp, sin_cos
 from rover_gym.policy import MapOptions, PathCosts, ScanPolicy
-from rover_gym.policy.arc_search import STEPS, Arcs, ArcSearch, RoverOutline, SearchTask
+from rover_gym.policy.arc_search import STEPS, Arcs, ArcSearch, RoverOutline, SearchTask, ways_by_price
 from rover_gym.policy.ground_map import GroundMap
 
 Array = npt.NDArray[np.float64]
@@ -344,6 +344,27 @@ def test_the_way_over_a_map_is_the_distance_where_nothing_is_in_it() -> None:
     for field, given in bad:
         with pytest.raises(OptionError, match=field):
             search.ways(*given)
+
+
+def test_ways_by_price_alone_are_the_cheapest_of_all() -> None:
+    """Bellman and Ford's relaxation of every cell finds the same, and nothing leads through what is closed."""
+    rng = np.random.default_rng(3)
+    price = 1.0 + rng.exponential(size=(12, 9))
+    price[rng.random(price.shape) < 0.25] = np.inf
+    price[:, 6], price[4, 2] = np.inf, 1.0  # a wall, and the goal before it
+    expected = np.full(price.shape, np.inf)
+    expected[4, 2] = 0.0
+    for _ in range(price.size):
+        onward = np.pad(expected, 1, constant_values=np.inf)
+        into = np.pad(price, 1, constant_values=np.inf)
+        for i, j in ((i, j) for i in range(3) for j in range(3) if (i, j) != (1, 1)):
+            beside = (slice(i, i + price.shape[0]), slice(j, j + price.shape[1]))
+            expected = np.minimum(expected, onward[beside] + 0.5 * math.hypot(i - 1, j - 1) * into[beside])
+        expected[np.isinf(price)] = np.inf
+    ways = ways_by_price(price, 0.5, (4, 2))
+    assert np.isinf(ways[:, 6:]).all()
+    assert 20 < np.isfinite(ways).sum() < 60
+    np.testing.assert_allclose(ways, expected, rtol=1e-12)
 
 
 def test_what_is_wrong_is_named() -> None:

@@ -11,6 +11,7 @@ FLOORS = [
     {"options", "report", "history", "work"},
     {"local"},
     {"linear"},
+    {"pivoting"},
     {"scratch"},
     {"stage"},
     {"reference", "strategy"},

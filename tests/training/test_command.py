@@ -212,27 +212,6 @@ def test_a_scan_once_a_command_is_the_scan_where_it_counts(limit: int) -> None:
     assert truncated
 
 
-@pytest.mark.parametrize("arguments", [{}, SCANNED])
-def test_a_vector_of_commanded_rovers_is_that_of_single_ones(arguments: dict[str, Any]) -> None:
-    # The limit of 10 steps cuts the fourth command short.
-    arguments = {**arguments, "max_episode_steps": 10}
-    ours = CommandVectorEnv(gym.make_vec("Rover-v0", 3, threads=2, **arguments), repeat=3, guided=True)
-    single = gym.vector.SyncVectorEnv(
-        [lambda: DriveByCommand(gym.make("Rover-v0", **arguments), repeat=3, guided=True)] * 3
-    )
-    assert ours.single_observation_space == single.single_observation_space
-    assert ours.action_space == single.action_space
-    np.testing.assert_array_equal(ours.reset(seed=2)[0], single.reset(seed=2)[0])
-    ended = 0
-    for commands in RNG.uniform(-1.2, 1.2, (20, 3, 3)).astype(np.float32):
-        mine, theirs = ours.step(commands), single.step(commands)
-        for one, other in zip(mine[:-1], theirs[:-1], strict=True):
-            np.testing.assert_array_equal(one, other)
-        assert mine[-1].keys() == theirs[-1].keys()
-        ended += int((mine[2] | mine[3]).sum())
-    assert ended >= 9
-
-
 def test_a_vector_of_commanded_rovers_refuses_what_it_cannot_do() -> None:
     for env, field in (
         (gym.make_vec("Rover-v0", 2, "sync"), "env"),

@@ -13,9 +13,8 @@ import optuna
 import typer
 from optuna.storages.journal import JournalFileBackend
 
-from rover_gym.learning.configurations import find_configuration
 from rover_gym.learning.ppo import Reporting, train_ppo
-from rover_gym.learning.training_config import TrainingConfig, read_config
+from rover_gym.learning.training_config import TrainingConfig, find_configuration, read_config
 from rover_gym.learning.training_evaluation import TrainingEvaluation
 
 

@@ -130,7 +130,7 @@ BUILT_IN = "rover"
 FRICTION: float = ARGUMENTS["friction"].default
 
 #: Environments by the names of their grounds.
-ENVIRONMENTS = dict(zip(TERRAINS, ("Rover-v0", "RoverRocks-v0", "RoverHills-v0"), strict=True))
+ENVIRONMENTS = dict(zip(TERRAINS, ("Rover-v0", "RoverRocks-v0", "RoverHills-v0", "RoverSand-v0"), strict=True))
 
 
 def chosen_terrain(terrain: str | None, difficulty: float | None) -> str:

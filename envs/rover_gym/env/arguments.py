@@ -23,9 +23,10 @@ from rover_gym.maps.map_files import is_terrain_file, open_terrain
 from rover_gym.mechanics import ModelError, OptionError, RoverModel, Terrain, TerrainError, Union
 from rover_gym.models.lookup import open_model
 from rover_gym.rendering.render_options import check_render_mode, check_render_options
+from rover_gym.sand.soils import Soil, named_soil
 from rover_gym.validation import Range, flag, known_keys, mapping, number, refuse, span, vector, whole
 
-TERRAINS = ("plane", "rocks", "hills")
+TERRAINS = ("plane", "rocks", "hills", "sand")
 
 #: Another name of a terrain, which files of trainings hold.
 SYNONYMS = {"sphere_field": "rocks"}
@@ -145,6 +146,22 @@ def check_terrain(field: str, value: object) -> str | Terrain:
     return terrain
 
 
+def check_soils(field: str, value: object) -> tuple[Soil, ...]:
+    """Checks a soil, its name, or a list of both, to draw from."""
+    given = value if isinstance(value, (list, tuple)) else (value,)
+    if not given:
+        refuse(OptionError, field, value, "must have at least one soil")
+    soils = []
+    for one in given:
+        if isinstance(one, str):
+            soils.append(named_soil(one))
+        elif isinstance(one, Soil):
+            soils.append(one)
+        else:
+            refuse(OptionError, field, one, "must be a rover_gym.sand.Soil or the name of one")
+    return tuple(soils)
+
+
 def check_waypoints(field: str, value: object) -> int:
     """Checks the number of goals of a course."""
     return whole(field, value, at_least=1, at_most=MAX_WAYPOINTS)
@@ -220,7 +237,7 @@ class RoverArguments(TypedDict, total=False):
         str | PathLike[str] | Terrain | Sequence[Terrain],
         Argument(
             "plane",
-            Special('"plane", "rocks", "hills", a terrain, its file or a list of terrains', check_terrain),
+            Special('"plane", "rocks", "hills", "sand", a terrain, its file or a list of terrains', check_terrain),
             "the ground",
         ),
     ]
@@ -252,6 +269,14 @@ class RoverArguments(TypedDict, total=False):
             Number(at_least=0.0, at_most=MAX_HILL_SLOPE_DEG),
             "root mean square of the hills' slope; None: by the difficulty",
             "deg",
+        ),
+    ]
+    soil: Annotated[
+        str | Soil | Sequence[str | Soil] | None,
+        Argument(
+            None,
+            Special("a `Soil`, a name of one, or a list to draw from", check_soils),
+            'of the sand; None: one of the named dry sands, drawn at each reset; see "Sand"',
         ),
     ]
     height_scan: Annotated[

@@ -102,7 +102,7 @@ def check_difficulty(task: Task, difficulty: object, field: str = "difficulty") 
     """Checks a difficulty or a range of difficulties; the task must have rocks."""
     checked = span(field, difficulty, at_least=0.0, at_most=MAX_DIFFICULTY)
     if task.rocks is None:
-        refuse(OptionError, field, difficulty, "needs terrain 'rocks' or 'hills'")
+        refuse(OptionError, field, difficulty, "needs terrain 'rocks', 'hills' or 'sand'")
     return checked
 
 
@@ -116,11 +116,11 @@ def check_reset_options(task: Task, options: Mapping[str, Any] | None, field: st
             f"{field}.difficulty", given["difficulty"], at_least=0.0, at_most=MAX_DIFFICULTY
         )
         if task.rocks is None:
-            refuse(OptionError, f"{field}.difficulty", difficulty, "needs terrain 'rocks' or 'hills'")
+            refuse(OptionError, f"{field}.difficulty", difficulty, "needs terrain 'rocks', 'hills' or 'sand'")
     if "field_seed" in given:
         seed = fixed["field_seed"] = whole(f"{field}.field_seed", given["field_seed"], at_most=FIELD_SEEDS - 1)
         if task.rocks is None:
-            refuse(OptionError, f"{field}.field_seed", seed, "needs terrain 'rocks' or 'hills'")
+            refuse(OptionError, f"{field}.field_seed", seed, "needs terrain 'rocks', 'hills' or 'sand'")
     if "slope_deg" in given:
         fixed["slope"] = math.radians(
             number(f"{field}.slope_deg", given["slope_deg"], at_least=0.0, at_most=MAX_SLOPE_DEG)

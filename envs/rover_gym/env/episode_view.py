@@ -8,9 +8,11 @@ import numpy.typing as npt
 
 from rover_gym.env.episode_scene import EpisodeScene
 from rover_gym.env.observation import ObservationLayout
+from rover_gym.env.sand import soil_of
 from rover_gym.env.start import Domain, Rocks, Start
 from rover_gym.env.task import Task
 from rover_gym.mechanics import RoverModel, Simulation
+from rover_gym.sand.soils import Soil
 
 if TYPE_CHECKING:
     from rover_gym.rendering import FrameRenderer
@@ -88,6 +90,11 @@ class EpisodeView(ABC):
     def rocks(self) -> Rocks | None:
         """The episode's difficulty and rocks as they were drawn; None on the plane."""
         return self.scene.rocks
+
+    @property
+    def soil(self) -> Soil | None:
+        """The soil of the episode's sand as it was drawn; None on firm ground."""
+        return soil_of(self.task.soils, self.simulation.terrain)
 
     @property
     def domain(self) -> Domain:

@@ -218,6 +218,27 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
     allow. A scene is drawn again where the ground under start or goal is not known, or no way leads from one to the other
     on ground that rises by at most 30 degrees. A rover that leaves the map ends its episode: `"step_failed"`.
 
+    ## Sand
+
+    With `terrain="sand"`, as in `RoverSand-v0`, wheels sink into a plane of dry sand with ripples and rocks of difficulty d
+    on it, and leave ruts (`docs/sand.md`). `soil` names the soil, or several to draw from at each reset; by default one of
+    cmu-sand, grc-1-loose, grc-1, grc-1-dense and hit-simulant. `soil` of the environment is the one drawn.
+
+    | quantity  | value              | meaning                                                              |
+    |-----------|--------------------|----------------------------------------------------------------------|
+    | slope_deg | uniform, 0 to 10 d | slope of the plane, unless it is given                               |
+    | ripples   | 0.02 d m           | amplitude of waves 1.6 m long, with half as high ones 1.0 m long     |
+    | rocks     | as above           | half below the surface, rigid                                        |
+
+    The rover of the other environments, 960 kg on discs of radius 0.10 m, cannot drive there: sand does not bear a wheel
+    without width, and on wheels 0.10 m wide each would carry its 1570 N only at a depth of 154 mm, below its axle.
+    Without `model` the rover is therefore the gallery's `open-rover`, 12.7 kg, on wheels 0.08 m wide with 24 grousers of
+    5 mm; a `model` of your own must have wheels with a width.
+
+    A wheel in sand counts as in contact: its `wheel_gap` is minus its sinkage, `normal_force` and `tangential_force` are
+    those of the sand, and `slip_ratio` in `info` counts it. `simulation.sand()` has the sinkage, slip and force of each wheel,
+    and the ruts. Frames show the undisturbed surface.
+
     ## End
 
     `terminated`, with `info["termination"]`:
@@ -255,7 +276,7 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
 
     ## Version history
 
-    - v0: plane ground and rocks. Numbers may change until the first release.
+    - v0: plane ground, rocks, hills and sand. Numbers may change until the first release.
     """
 
     #: Render modes, and the frames of a second of film: the control frequency.

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from rover_gym.env.observation import ObservationLayout, build_layout
 from rover_gym.env.reward_terms import WEIGHTS, RewardTerms
+from rover_gym.env.sand import check_wheels_for_sand, sand_rover, soils_of
 from rover_gym.env.start import (
     MAX_GOAL_DISTANCE,
     Domain,
@@ -28,9 +29,11 @@ from rover_gym.mechanics import (
     Plane,
     RoverModel,
     Simulation,
+    SoftGround,
     Terrain,
     sin_cos,
 )
+from rover_gym.sand.soils import Soil
 from rover_gym.validation import Range, array, number, refuse, span
 
 #: Steps until truncation: 60 s at the default control frequency of 20 Hz.
@@ -54,6 +57,7 @@ class Task:
         ground: The given terrain, which is the ground of every episode; None without one.
         rocks: Distribution of the rock fields; None without rocks.
         on_hills: Whether the ground is hills.
+        soils: Soils that the sand is drawn from; none on firm ground.
         slope_by_difficulty: Whether the rocks' difficulty sets the slope of the ground.
         scan: `(n, 2)` points of the height scan in the heading frame, m; None without one.
         start: Distribution of the starts.
@@ -77,6 +81,7 @@ class Task:
     ground: Terrain | None
     rocks: RockDistribution | None
     on_hills: bool
+    soils: tuple[Soil, ...]
     slope_by_difficulty: bool
     scan: npt.NDArray[np.float64] | None
     start: StartDistribution
@@ -117,11 +122,13 @@ def make_task(given: Mapping[str, Any]) -> Task:
     terrain, gravity, step = given["terrain"], given["gravity"], given["time_step"]
     ground = None if isinstance(terrain, str) else terrain
     rocks, hills = _rocks(given), _hills(terrain, given["hill_slope_deg"])
+    soils = soils_of(terrain, given["soil"])
+    sand = [SoftGround(Plane(), soil) for soil in soils] or None
     start = _start(given, ground)
     properties = ("mass_scale", "friction", "actuator_gain", "gravity_scale", "observation_noise")
     domain = DomainDistribution(**{name: given[name] for name in properties})
     substeps = _substeps(given["control_frequency"], step)
-    rover = _rover(given["model"], steered=given["steered"])
+    rover = _rover(given["model"], steered=given["steered"], on_sand=sand is not None)
     steering = Steering.of(rover)
     options = {
         "gravity": gravity,
@@ -143,7 +150,7 @@ def make_task(given: Mapping[str, Any]) -> Task:
     )
     max_steering = _steering_limit(rover, steering, given["max_steering_deg"])
     rules = _rules(given, rover, layout, substeps=substeps, max_steering=max_steering, scan=points)
-    slope_by_difficulty = given["slope_deg"] is None and terrain == "rocks"
+    slope_by_difficulty = given["slope_deg"] is None and terrain in ("rocks", "sand")
     episodes = EpisodeDistribution(
         rules,
         simulation,
@@ -154,6 +161,7 @@ def make_task(given: Mapping[str, Any]) -> Task:
         slope_by_difficulty=slope_by_difficulty,
         ground=ground,
         hills=hills,
+        sand=sand,
     )
     return Task(
         model=rover,
@@ -162,6 +170,7 @@ def make_task(given: Mapping[str, Any]) -> Task:
         ground=ground,
         rocks=rocks,
         on_hills=hills is not None,
+        soils=soils,
         slope_by_difficulty=slope_by_difficulty,
         scan=points,
         start=start,
@@ -181,11 +190,11 @@ def make_task(given: Mapping[str, Any]) -> Task:
 
 
 def _rocks(given: Mapping[str, Any]) -> RockDistribution | None:
-    """Distribution of the rock fields on rocks and hills, whose course must lie within the field; None elsewhere."""
-    if given["terrain"] not in ("rocks", "hills"):
+    """Distribution of the rock fields where there are any, whose course must lie within the field; None elsewhere."""
+    if given["terrain"] not in ("rocks", "hills", "sand"):
         for name in ("difficulty", "rock_abundance", "max_rock_radius"):
             if given[name] is not None:
-                refuse(OptionError, name, _as_given(given[name]), "needs terrain 'rocks' or 'hills'")
+                refuse(OptionError, name, _as_given(given[name]), "needs terrain 'rocks', 'hills' or 'sand'")
         return None
     rocks = rock_distribution(given["difficulty"], given["rock_abundance"], given["max_rock_radius"])
     nearest, farthest = given["goal_distance"]
@@ -209,7 +218,7 @@ def _start(given: Mapping[str, Any], ground: Terrain | None) -> StartDistributio
         goal_bearing=_radians(given["goal_bearing_deg"]),
         turn=_radians(given["waypoint_turn_deg"]),
     )
-    if given["terrain"] in ("plane", "rocks"):
+    if given["terrain"] in ("plane", "rocks", "sand"):
         return start
     if slope_deg is not None:
         refuse(OptionError, "slope_deg", _as_given(slope_deg), "is the ground's own")
@@ -275,9 +284,14 @@ def _substeps(frequency: float, step: float) -> int:
     return substeps
 
 
-def _rover(model: RoverModel | None, *, steered: bool) -> RoverModel:
+def _rover(model: RoverModel | None, *, steered: bool, on_sand: bool) -> RoverModel:
     """The rover to simulate, with its steering joints welded where it is not steered."""
-    rover = RoverModel() if model is None else model
+    if model is None:
+        rover = sand_rover() if on_sand else RoverModel()
+    else:
+        rover = model
+        if on_sand:
+            check_wheels_for_sand(rover)
     if steered:
         return rover
     return rover.weld([rover.dof_names[i] for i in rover.steering_joint_indices if i >= 0])

@@ -32,6 +32,8 @@ from rover_gym.reproduction.scene_runs import WHEEL_RADIUS, reference_data, repo
 from rover_gym.validation import checked
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -46,7 +48,6 @@ def draw_section_6_1(recording: str | Path, folder: str | Path) -> list[Path]:
     Raises:
         MissingExtraError: matplotlib or h5py is not installed.
     """
-    trajectory = read_trajectory(recording)
     drawings = {
         "figure-6.2-wheel-traces": _traces,
         "figure-6.3-contact-distances": _distances,
@@ -54,6 +55,26 @@ def draw_section_6_1(recording: str | Path, folder: str | Path) -> list[Path]:
         "figure-6.5-steering-angles": steering_angles,
         "section-6.1-beside-siconos": beside_siconos,
     }
+    return _draw(recording, folder, drawings)
+
+
+@checked(recording=Path, folder=Path)
+def draw_section_6_2(recording: str | Path, folder: str | Path) -> list[Path]:
+    """Draws the figures of the run over the rug as PNG files into the folder and returns their paths.
+
+    Raises:
+        MissingExtraError: matplotlib or h5py is not installed.
+    """
+    drawings = {
+        "section-6.2-wheel-traces": wheel_traces,
+        "section-6.2-contact-distances": contact_distances,
+        "section-6.2-reaction-forces": reaction_forces,
+    }
+    return _draw(recording, folder, drawings)
+
+
+def _draw(recording: str | Path, folder: str | Path, drawings: Mapping[str, Callable[..., None]]) -> list[Path]:
+    trajectory = read_trajectory(recording)
     return save_figures({name: partial(draw, trajectory=trajectory) for name, draw in drawings.items()}, folder)
 
 
@@ -192,22 +213,6 @@ def _on_the_page(centres: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float
     px = 2625.0 + 2.51143 * (x + 1200.0) - 2.61 * (z + 500.0)
     py = 1234.0 + 0.447143 * (x + 1200.0) + 2.34333 * (z + 500.0) + 8.5125 * (y + 80.0)
     return px, py
-
-
-@checked(recording=Path, folder=Path)
-def draw_section_6_2(recording: str | Path, folder: str | Path) -> list[Path]:
-    """Draws the figures of the run over the rug as PNG files into the folder and returns their paths.
-
-    Raises:
-        MissingExtraError: matplotlib or h5py is not installed.
-    """
-    trajectory = read_trajectory(recording)
-    drawings = {
-        "section-6.2-wheel-traces": wheel_traces,
-        "section-6.2-contact-distances": contact_distances,
-        "section-6.2-reaction-forces": reaction_forces,
-    }
-    return save_figures({name: partial(draw, trajectory=trajectory) for name, draw in drawings.items()}, folder)
 
 
 def wheel_traces(figure: Figure, trajectory: Trajectory) -> None:

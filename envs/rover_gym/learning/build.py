@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from gymnasium import spaces
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor, VecNormalize
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
 from rover_gym.learning.training_config import TrainingConfig, environment_arguments
 from rover_gym.mechanics import StateError
-from rover_gym.policy.command import N_COMMANDS, CommandController
-from rover_gym.policy.features import LARGEST_FEATURE, Features
+from rover_gym.policy.command import N_COMMANDS, CommandController, command_space
+from rover_gym.policy.features import Features
 from rover_gym.validation import refuse
 from rover_gym.vector.sb3 import RoverVecEnv, VecEnvSnapshot
 
@@ -35,11 +34,7 @@ class CommandVecEnv(VecEnvWrapper):
     """
 
     def __init__(self, venv: VecEnv, features: Features, controller: CommandController, repeat: int = 4) -> None:
-        super().__init__(
-            venv,
-            spaces.Box(-LARGEST_FEATURE, LARGEST_FEATURE, (features.size,), np.float32),
-            spaces.Box(-1.0, 1.0, (N_COMMANDS,), np.float32),
-        )
+        super().__init__(venv, features.space, command_space())
         self.features = features
         self.controller = controller
         self.repeat = repeat

@@ -20,6 +20,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
@@ -33,6 +34,12 @@ Array = npt.NDArray[np.float64]
 
 #: Entries of a command: speed, curvature, sideways.
 N_COMMANDS = 3
+
+
+def command_space() -> "gym.spaces.Box[np.float32]":
+    """The space of the commands of one rover."""
+    return gym.spaces.Box(-1.0, 1.0, (N_COMMANDS,), np.float32)
+
 
 #: Offset from the guide's command that an action of 1 adds.
 OFFSET = np.array([2.0, 2.0, 1.0])

@@ -18,8 +18,8 @@ from rover_gym.env.play_keys import keys_to_action
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS
 from rover_gym.mechanics import CommandError, OptionError, TerrainError
-from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimits
-from rover_gym.policy.features import LARGEST_FEATURE, Features
+from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimits, command_space
+from rover_gym.policy.features import Features
 from rover_gym.policy.pd_policy import find_rover_env
 from rover_gym.validation import array, known_keys, refuse, whole
 from rover_gym.vector.batch import BatchSnapshot
@@ -66,8 +66,8 @@ class HeldCommands:
         self.features = Features(rover, pool)
         self._controller = CommandController(rover, CommandLimits(**limits), guided=guided)
         self.seen: Observations = np.zeros((n, rover.observation_layout.size), np.float32)
-        self.observation_space = gym.spaces.Box(-LARGEST_FEATURE, LARGEST_FEATURE, (self.features.size,), np.float32)
-        self.action_space = gym.spaces.Box(-1.0, 1.0, (N_COMMANDS,), np.float32)
+        self.observation_space = self.features.space
+        self.action_space = command_space()
 
     def hold(self, commands: Array, moved: Mask, step: Step) -> tuple[Array, Mask, Mask]:
         """Holds commands `(n, 3)`, clipped to [-1, 1], for `repeat` steps or until a rover's episode ends.

@@ -392,7 +392,7 @@ class BaselineInterrupt(KeyboardInterrupt):
 
 
 #: Environments with a difficulty, by their ground.
-ENVIRONMENTS = {"rocks": "RoverRocks-v0", "hills": "RoverHills-v0"}
+ENVIRONMENTS = {"rocks": "RoverRocks-v0", "hills": "RoverHills-v0", "sand": "RoverSand-v0"}
 
 
 def measure_baseline(
@@ -405,14 +405,14 @@ def measure_baseline(
     model: str | None = None,
     progress: Callable[[float, int], None] = lambda _difficulty, _done: None,
 ) -> list[BaselineRow]:
-    """Drives `RoverRocks-v0` or `RoverHills-v0` with a policy, with the same seeds at every difficulty.
+    """Drives `RoverRocks-v0`, `RoverHills-v0` or `RoverSand-v0` with a policy, with the same seeds at every difficulty.
 
     Args:
         difficulties: The difficulties, each in [0, 2].
         episodes: Episodes per difficulty.
         seed: Seed of the first episode; the seed increases by one per episode.
         policy: A name or folder, as `named_policy` takes it.
-        terrain: "rocks" or "hills".
+        terrain: "rocks", "hills" or "sand".
         model: The rover: a name of the gallery or a file; None for the built-in one.
         progress: Called after each episode with the difficulty and the number of episodes done.
 

@@ -8,6 +8,7 @@ hits its flank would miss.
 
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
@@ -51,6 +52,11 @@ class Features:
         self._offsets = np.zeros((0, 2)) if offsets is None else offsets
         self._cells = _cells(self._offsets, pool)
         self.size = len(self._taken) + 7 + (0 if self._scan is None else 1 + len(self._cells))
+
+    @property
+    def space(self) -> "gym.spaces.Box[np.float32]":
+        """The space of one rover's features."""
+        return gym.spaces.Box(-LARGEST_FEATURE, LARGEST_FEATURE, (self.size,), np.float32)
 
     @property
     def goal_entries(self) -> npt.NDArray[np.intp]:

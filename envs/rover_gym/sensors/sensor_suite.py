@@ -161,13 +161,68 @@ class SensorSuite:
 
 @dataclass(frozen=True)
 class SensedSnapshot:
-    """The state from which an environment with sensors continues bit for bit; picklable."""
+    """The state from which an environment or a vector with sensors continues bit for bit; picklable."""
 
-    env: EnvSnapshot
-    sensors: SuiteState
+    env: EnvSnapshot | BatchSnapshot
+    sensors: tuple[SuiteState, ...]
 
 
-class SensorObservation(gym.Wrapper, RecordConstructorArgs):
+class SensedRovers:
+    """What the wrappers of one rover and of a vector share: the sensors of n rovers, and their episodes' states.
+
+    Attributes:
+        suite: The sensors.
+    """
+
+    def set_sensors(self, inner: RoverEnv | RoverVectorEnv, rover: RoverEnv, n: int, sensors: Sequence[Sensor]) -> None:
+        """Sets the sensors.
+
+        Args:
+            inner: The environment whose snapshots are kept.
+            rover: The environment of one rover, read once.
+            n: Number of rovers.
+            sensors: The sensors that each rover has, with different names.
+
+        Raises:
+            OptionError: A sensor does not fit the rover.
+        """
+        self._inner: Any = inner
+        self.suite = SensorSuite(sensors, rover.model, rover.dt)
+        self._states: list[SuiteState | None] = [None] * n
+
+    def _state(self, i: int) -> SuiteState:
+        state = self._states[i]
+        if state is None:
+            raise ResetNeeded(f"{type(self).__name__}: call reset() first")
+        return state
+
+    def snapshot(self) -> SensedSnapshot:
+        """Returns the state of the environment and of its sensors, for `restore`; picklable.
+
+        Raises:
+            ResetNeeded: A rover has not been reset.
+        """
+        states = tuple(copy.deepcopy(self._state(i)) for i in range(len(self._states)))
+        return SensedSnapshot(self._inner.snapshot(), states)
+
+    def restore(self, snapshot: SensedSnapshot) -> None:
+        """Restores a snapshot of as many rovers with the same arguments and sensors, which continue bit for bit.
+
+        Raises:
+            StateError: The value is no snapshot, is damaged, or comes from other arguments or sensors; nothing has
+                changed.
+        """
+        if not isinstance(snapshot, SensedSnapshot):
+            refuse(StateError, "snapshot", snapshot, f"must come from {type(self).__name__}.snapshot()")
+        kept: object = snapshot.sensors
+        if not isinstance(kept, tuple) or len(kept) != len(self._states):
+            refuse(StateError, "snapshot.sensors", kept, f"must be of {len(self._states)} rovers")
+        states = [self.suite.check_state(state) for state in kept]
+        self._inner.restore(snapshot.env)
+        self._states[:] = states
+
+
+class SensorObservation(SensedRovers, gym.Wrapper, RecordConstructorArgs):
     """Observations of a `Dict` space: the environment's own as `state`, and each sensor's reading by its name.
 
     Readings are float32 in SI units, not scaled. They are those at the end of a step; their random numbers follow from
@@ -191,9 +246,8 @@ class SensorObservation(gym.Wrapper, RecordConstructorArgs):
         RecordConstructorArgs.__init__(self, sensors=sensors)
         gym.Wrapper.__init__(self, env)
         self._rover: RoverEnv = given.unwrapped
-        self.suite = SensorSuite(sensors, self._rover.model, self._rover.dt)
+        self.set_sensors(self._rover, self._rover, 1, sensors)
         self.observation_space = self.suite.space(env.observation_space)
-        self._state: SuiteState | None = None
 
     @property
     def sensor_state(self) -> SuiteState:
@@ -202,9 +256,7 @@ class SensorObservation(gym.Wrapper, RecordConstructorArgs):
         Raises:
             ResetNeeded: The environment has not been reset.
         """
-        if self._state is None:
-            raise ResetNeeded("SensorObservation: call reset() first")
-        return self._state
+        return self._state(0)
 
     def readings(self) -> Readings:
         """What is read now, by sensor.
@@ -219,54 +271,22 @@ class SensorObservation(gym.Wrapper, RecordConstructorArgs):
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Starts an episode, as the environment does, with the sensors' properties drawn anew."""
         observation, info = self.env.reset(seed=seed, options=options)
-        self._state = self.suite.begin(self._moment(), row_of(self._rover.np_random))
-        return self._with_readings(observation), info
+        self._states[0] = self.suite.begin(self._moment(), row_of(self._rover.np_random))
+        return {STATE: observation, **self.readings()}, info
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Applies an action, as the environment does, then takes the samples that are due."""
         state = self.sensor_state
         observation, reward, terminated, truncated, info = self.env.step(action)
         self.suite.advance(state, self._moment())
-        return self._with_readings(observation), float(reward), terminated, truncated, info
-
-    def snapshot(self) -> SensedSnapshot:
-        """Returns the state of the environment and of its sensors, for `restore`.
-
-        Raises:
-            ResetNeeded: The environment has not been reset.
-        """
-        return SensedSnapshot(self._rover.snapshot(), copy.deepcopy(self.sensor_state))
-
-    def restore(self, snapshot: SensedSnapshot) -> None:
-        """Restores a snapshot of an environment with the same arguments and sensors, which continues bit for bit.
-
-        Raises:
-            StateError: The value is no snapshot, is damaged, or comes from other arguments or sensors; nothing has
-                changed.
-        """
-        if not isinstance(snapshot, SensedSnapshot):
-            refuse(StateError, "snapshot", snapshot, "must come from SensorObservation.snapshot()")
-        state = self.suite.check_state(snapshot.sensors)
-        self._rover.restore(snapshot.env)
-        self._state = state
+        return {STATE: observation, **self.readings()}, float(reward), terminated, truncated, info
 
     def _moment(self) -> Moment:
-        grains = self._rover.grains if isinstance(self._rover, RoverGrainsEnv) else None
-        return Moment(self._rover.simulation, self._rover.simulation.time, grains)
-
-    def _with_readings(self, observation: Any) -> dict[str, Any]:
-        return {STATE: observation, **self.readings()}
+        simulation, mover = self._rover.simulation, self._rover.episode.mover
+        return Moment(simulation, simulation.time, None if mover is None else mover.grains)
 
 
-@dataclass(frozen=True)
-class SensedBatchSnapshot:
-    """The state from which a vector of rovers with sensors continues bit for bit; picklable."""
-
-    rovers: BatchSnapshot
-    sensors: tuple[SuiteState, ...]
-
-
-class SensorVectorObservation(VectorWrapper):
+class SensorVectorObservation(SensedRovers, VectorWrapper):
     """Adds each rover's sensors to its observation, as `SensorObservation` does for one rover, and bit for bit alike.
 
     Args:
@@ -283,12 +303,11 @@ class SensorVectorObservation(VectorWrapper):
             refuse(OptionError, "env", env, "must be a RoverVectorEnv, as gymnasium.make_vec makes it")
         if env.autoreset_mode == AutoresetMode.SAME_STEP:
             refuse(OptionError, "autoreset_mode", env.autoreset_mode.value, "must be NextStep or Disabled with sensors")
-        super().__init__(env)
+        VectorWrapper.__init__(self, env)
         self._rovers = env
-        self.suite = SensorSuite(sensors, env.prototype.model, env.prototype.dt)
+        self.set_sensors(env, env.prototype, env.num_envs, sensors)
         self.single_observation_space = self.suite.space(env.single_observation_space)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self._states: list[SuiteState | None] = [None] * self.num_envs
 
     def sensor_state(self, i: int) -> SuiteState:
         """The sensors of rover i's episode, with the properties that were drawn.
@@ -296,10 +315,7 @@ class SensorVectorObservation(VectorWrapper):
         Raises:
             ResetNeeded: The rover has not been reset.
         """
-        state = self._states[i]
-        if state is None:
-            raise ResetNeeded("SensorVectorObservation: call reset() first")
-        return state
+        return self._state(i)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -312,7 +328,7 @@ class SensorVectorObservation(VectorWrapper):
 
     def step(self, actions: npt.NDArray[np.float32]) -> tuple[dict[str, Any], Array, Mask, Mask, dict[str, Any]]:
         """Applies actions, as `RoverVectorEnv.step`, then takes the samples that are due."""
-        states = [self.sensor_state(i) for i in range(self.num_envs)]
+        states = [self._state(i) for i in range(self.num_envs)]
         begun = set(self._rovers.batch.over)
         observation, reward, terminated, truncated, infos = self._rovers.step(actions)
         for i, state in enumerate(states):
@@ -321,30 +337,10 @@ class SensorVectorObservation(VectorWrapper):
         self._begin(sorted(begun))
         return self._with_readings(observation), reward, terminated, truncated, infos
 
-    def snapshot(self) -> SensedBatchSnapshot:
-        """Returns the state of all rovers and of their sensors, for `restore`; picklable.
-
-        Raises:
-            ResetNeeded: A rover has not been reset.
-        """
-        states = tuple(copy.deepcopy(self.sensor_state(i)) for i in range(self.num_envs))
-        return SensedBatchSnapshot(self._rovers.snapshot(), states)
-
-    def restore(self, snapshot: SensedBatchSnapshot) -> None:
-        """Restores a snapshot of as many rovers with the same arguments and sensors, which continue bit for bit.
-
-        Raises:
-            StateError: The value is no snapshot, is damaged, or comes from other arguments or sensors; nothing has
-                changed.
-        """
-        if not isinstance(snapshot, SensedBatchSnapshot):
-            refuse(StateError, "snapshot", snapshot, "must come from SensorVectorObservation.snapshot()")
-        kept: object = snapshot.sensors
-        if not isinstance(kept, tuple) or len(kept) != self.num_envs:
-            refuse(StateError, "snapshot.sensors", kept, f"must be of {self.num_envs} rovers")
-        states = [self.suite.check_state(state) for state in kept]
-        self._rovers.restore(snapshot.rovers)
-        self._states[:] = states
+    def _with_readings(self, observations: Any) -> dict[str, Any]:
+        """The observations `(n, ...)` and the readings of all rovers."""
+        each = [self.suite.readings(self._state(i)) for i in range(len(self._states))]
+        return {STATE: observations, **{name: np.stack([one[name] for one in each]) for name in self.suite.spaces}}
 
     def _begin(self, chosen: Iterable[int]) -> None:
         chosen = list(chosen)
@@ -355,10 +351,6 @@ class SensorVectorObservation(VectorWrapper):
     def _moment(self, i: int) -> Moment:
         simulation = self._rovers.batch.rovers[i].simulation
         return Moment(simulation, simulation.time)
-
-    def _with_readings(self, observation: npt.NDArray[np.float32]) -> dict[str, Any]:
-        each = [self.suite.readings(self.sensor_state(i)) for i in range(self.num_envs)]
-        return {STATE: observation, **{name: np.stack([one[name] for one in each]) for name in self.suite.spaces}}
 
 
 def make_rover(

@@ -318,7 +318,7 @@ class RoverBatch:
         given = [None] * len(chosen) if seeds is None else seeds
         rows = np.zeros((len(chosen), 4), np.uint64)
         kept = [k for k, seed in enumerate(given) if seed is None]
-        rows[kept] = self._rows([chosen[k] for k in kept])
+        rows[kept] = self.generator_rows([chosen[k] for k in kept])
         anew = [k for k, seed in enumerate(given) if seed is not None]
         rows[anew] = seeded_rows([seed for seed in given if seed is not None])
         used = [self._seeds[i] if seed is None else seed for i, seed in zip(chosen, given, strict=True)]
@@ -432,7 +432,7 @@ class RoverBatch:
         """
         if not self._begun.all():
             raise ResetNeeded("a batch of rovers: call reset() first")
-        rows = self._rows(range(self.n))
+        rows = self.generator_rows(range(self.n))
         rovers = tuple(
             EnvSnapshot(
                 simulation=self.episodes.simulation(i).snapshot(),
@@ -498,12 +498,8 @@ class RoverBatch:
         The rover continues to draw from it: numbers that the caller draws are not drawn again.
         """
         if i not in self._lent:
-            self._lent[i] = generator_at(self._rows([i])[0])
+            self._lent[i] = generator_at(self.generator_rows([i])[0])
         return self._lent[i]
-
-    def generator_rows(self, chosen: Sequence[int]) -> Rows:
-        """The states of some rovers' random generators, `(m, 4)`; none is moved."""
-        return self._rows(chosen)
 
     def seed_of(self, i: int) -> int:
         """The seed of rover i's random generator."""
@@ -544,8 +540,8 @@ class RoverBatch:
         finally:
             self._hand_back(lent)
 
-    def _rows(self, chosen: Sequence[int]) -> Rows:
-        """The present generators of some rovers, `(m, 4)`."""
+    def generator_rows(self, chosen: Sequence[int]) -> Rows:
+        """The states of some rovers' random generators, `(m, 4)`; none is moved."""
         self._seed_at_random(chosen)
         rows = self._generators[chosen]
         begun = [k for k, i in enumerate(chosen) if self._begun[i]]

@@ -123,7 +123,6 @@ impl SimulationBatch {
     ///     CommandError: An array has a wrong shape or an entry that a rover refuses. No rover has
     ///         moved.
     ///     OptionError: `n` or `active` is invalid.
-    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     #[pyo3(signature = (torques, set_points, n = Given::MISSING, *, active = None),
         text_signature = "($self, torques, set_points, n=1, *, active=None)")]
     fn step<'py>(

@@ -3,8 +3,9 @@
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
 use rover_core::draw::{
-    DomainDistribution, Fixed, FixedStart, GroundDistribution, HillDistribution, Order, Pcg64,
-    Range, RockDistribution, RockDraw, SceneDistribution, StartDistribution,
+    DomainDistribution, DrawnGround, Fixed, FixedStart, GroundDistribution, HillDistribution,
+    Order, Pcg64, Range, RockDistribution, RockDraw, SandDistribution, SceneDistribution,
+    StartDistribution,
 };
 use rover_core::episode::{Beginning, EpisodeBatch, EpisodeDistribution as CoreDistribution};
 use rover_core::simulation::RoverSimulation;
@@ -43,6 +44,9 @@ use crate::{terrain, union};
 ///     ground: The ground of every episode, a terrain of any kind; None for a tilted plane.
 ///     hills: Fractal ground: root mean square of its slope, rise over run, or nan for one that
 ///         follows from the difficulty of the rocks; None for none. Not together with `ground`.
+///     sand: Soft grounds, one of which is drawn, on a tilted plane with ripples by the difficulty
+///         of the rocks; their surfaces do not count; None for none. Not together with the two
+///         others.
 ///
 /// Raises:
 ///     OptionError: An argument is missing, no number, or out of its range.
@@ -193,7 +197,7 @@ impl EpisodeDistribution {
 impl EpisodeDistribution {
     #[new]
     #[pyo3(signature = (rules, simulation, **options),
-        text_signature = "(rules, simulation, *, start, domain, trunk_load_limit, rocks=None, slope_by_difficulty=False, ground=None, hills=None)")]
+        text_signature = "(rules, simulation, *, start, domain, trunk_load_limit, rocks=None, slope_by_difficulty=False, ground=None, hills=None, sand=None)")]
     fn new(
         rules: GivenRules,
         simulation: GivenSimulation<'_>,
@@ -291,9 +295,34 @@ impl EpisodeDistribution {
     }
 }
 
+/// Sand of episodes: a list of soft grounds, whose surfaces do not count.
+fn sand_distribution(sand: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<SandDistribution> {
+    let wrong = || refused(sand, kind, field, "a list of one or more SoftGround");
+    let mut soils = Vec::new();
+    for one in sand.try_iter().map_err(|_| wrong())? {
+        match terrain::parse(&one?)? {
+            DrawnGround::Soft(soft, _) => soils.push(soft),
+            _ => return Err(wrong()),
+        }
+    }
+    if soils.is_empty() {
+        return Err(wrong());
+    }
+    Ok(SandDistribution { soils })
+}
+
 /// The ground of episodes.
 fn ground_distribution(given: &Named<'_>) -> Result<GroundDistribution> {
-    match (given.some("ground")?, given.some("hills")?) {
+    let (ground, hills) = (given.some("ground")?, given.some("hills")?);
+    if let Some(sand) = given.read("sand", sand_distribution)? {
+        for (name, other) in [("ground", &ground), ("hills", &hills)] {
+            if let Some(other) = other {
+                return Err(given.refused(other, name, "None beside sand"));
+            }
+        }
+        return Ok(GroundDistribution::Sand(sand));
+    }
+    match (ground, hills) {
         (None, None) => Ok(GroundDistribution::Tilted),
         (Some(ground), None) => Ok(GroundDistribution::Given(terrain::parse(&ground)?)),
         (None, Some(hills)) => match hills.extract::<f64>() {

@@ -1,5 +1,6 @@
 //! The border between `rover-core` and Python: conversions, exceptions, array views. No mechanics.
 #![forbid(unsafe_code)]
+#![allow(clippy::needless_pass_by_value)] // what pyo3 hands over
 
 mod accuracy;
 mod arguments;

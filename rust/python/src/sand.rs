@@ -130,6 +130,7 @@ pub fn numbers_of<'py>(py: Python<'py>, soil: &Soil) -> PyResult<Bound<'py, PyDi
 pub fn sand_to_dict<'py>(
     py: Python<'py>,
     sand: &SandState,
+    slip: &[f64],
     cell: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
     let found = PyDict::new(py);
@@ -142,6 +143,7 @@ pub fn sand_to_dict<'py>(
     found.set_item("moment", fresh_rows(moments))?;
     found.set_item("sinkage", fresh(&of(|wheel| wheel.sinkage)))?;
     found.set_item("absorbed", fresh(&of(|wheel| wheel.absorbed)))?;
+    found.set_item("slip", fresh(slip))?;
     let ruts = sand.ruts.cells().into_iter();
     let ruts: Vec<[f64; 3]> = ruts
         .map(|(i, k, depth)| {
@@ -199,7 +201,7 @@ impl WheelBed {
     #[pyo3(signature = (soil, radius, width, rounding = Given::MISSING,
         grouser_height = Given::MISSING, grousers = Given::MISSING, accuracy = Given::MISSING),
         text_signature = "(soil, radius, width, rounding=0.0, grouser_height=0.0, grousers=0, \
-                          accuracy=0.01)")]
+                          accuracy=0.002)")]
     fn new(
         soil: &Bound<'_, PyAny>,
         radius: &Bound<'_, PyAny>,
@@ -244,7 +246,7 @@ impl WheelBed {
                 return Err(quantity(Kind::Option, &error).into());
             }
         }
-        let accuracy = accuracy.number(0.01, Kind::Option, "accuracy")?;
+        let accuracy = accuracy.number(0.002, Kind::Option, "accuracy")?;
         let rules = rover_core::sand::test_bed::rules_within(&wheel, &soil, accuracy);
         Ok(Self {
             bed: TestBed { wheel, soil, rules },

@@ -168,8 +168,9 @@ impl Simulation {
     ///     Arrays by name. `force` (N) and `moment` about the wheel's centre (N m) of the sand on
     ///     each wheel in the last step, (n_wheels, 3), world frame; `sinkage` of each wheel's
     ///     lowest point under the undisturbed surface, (n_wheels,), m, negative where it is clear;
-    ///     `absorbed`, energy that the sand has taken from each wheel, (n_wheels,), J; `ruts`,
-    ///     place x and z and depth of each cell that a wheel has pressed down, (n, 3), m.
+    ///     `absorbed`, energy that the sand has taken from each wheel, (n_wheels,), J; `slip`, rim
+    ///     slip of each wheel over the faster of rim and ground, (n_wheels,), 0 where it is clear;
+    ///     `ruts`, place x and z and depth of each cell that a wheel has pressed down, (n, 3), m.
     ///
     /// Raises:
     ///     BusyError: Another thread is stepping this simulation.
@@ -179,7 +180,11 @@ impl Simulation {
             return Ok(None);
         };
         let cell = open.terrain().soft().map_or(1.0, |soft| soft.cell);
-        Ok(Some(sand_to_dict(py, sand, cell)?))
+        let mut slip = vec![0.0; sand.wheels.len()];
+        for contact in open.wheels_in_sand() {
+            slip[contact.wheel] = contact.slip;
+        }
+        Ok(Some(sand_to_dict(py, sand, &slip, cell)?))
     }
 
     /// Time since the last call of `set_state`, s.
@@ -315,7 +320,7 @@ impl Simulation {
     ///
     /// Raises:
     ///     StateError: The heading is ±90 degrees, where these coordinates are singular.
-    fn report_state<'py>(&self) -> Result<Pair> {
+    fn report_state(&self) -> Result<Pair> {
         let held = self.open()?;
         let state = held.state();
         let (q, qdot) = coordinates::to_report(&self.model, &state.configuration, &state.v)?;
@@ -572,7 +577,6 @@ impl Simulation {
     /// Raises:
     ///     OptionError: `n_scan` is not a count.
     #[pyo3(signature = (n_scan = Given::MISSING), text_signature = "($self, n_scan=0)")]
-    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn reading_layout<'py>(
         &self,
         py: Python<'py>,

@@ -52,7 +52,6 @@ impl Union {
 }
 
 #[pymethods]
-#[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
 impl Union {
     #[new]
     fn new(parts: &Bound<'_, PyAny>) -> Result<PyClassInitializer<Self>> {

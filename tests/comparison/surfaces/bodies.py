@@ -1,7 +1,7 @@
 """The scenes of a single body: a ball that rolls over a flat map and over a sine, a box that lies on a flat map."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -89,33 +89,40 @@ def inner_edges(spacing: float, duration: float) -> int:
     return round((x + z + abs(x - z)) / spacing)
 
 
+def row_each(spacings: Iterable[float | None], measure: Callable[[Any], dict[str, Any]]) -> list[dict[str, Any]]:
+    """A row a spacing: what is measured, or why an engine has failed."""
+    rows = []
+    for spacing in spacings:
+        try:
+            found = measure(spacing)
+        except (LeftOut, RuntimeError, ArithmeticError) as error:
+            found = {"failure": str(error).splitlines()[0][:120]}
+        rows.append({"spacing": spacing, **found})
+    return rows
+
+
 def measure_edges(make: Builder, step: float, duration: float, cap: float) -> list[dict[str, Any]]:
     """A row a spacing: error of the path, m, distance from the same engine's on its plane, false impulse, cost."""
-    rows: list[dict[str, Any]] = []
-    on_plane: Array | None = None
-    for spacing in EDGE_SPACINGS:
-        row: dict[str, Any] = {"spacing": spacing}
-        rows.append(row)
+    on_plane: list[Array] = []
+
+    def measure(spacing: float | None) -> dict[str, Any]:
         scene = over_edges(spacing, duration)
-        try:
-            run = roll(make, scene, step, cap)
-        except (LeftOut, RuntimeError, ArithmeticError) as error:
-            row["failure"] = str(error).splitlines()[0][:120]
-            continue
+        run = roll(make, scene, step, cap)
         travelled = run.path - run.path[0]
         times = step * np.arange(len(travelled))
-        on_plane = travelled if spacing is None else on_plane
-        if on_plane is None:
-            row["failure"] = "not run on the plane"
-            continue
-        row |= {
+        if spacing is None:
+            on_plane.append(travelled)
+        if not on_plane:
+            raise LeftOut("not run on the plane")
+        return {
             "error": distance(travelled, times[:, None] * scene.velocity),
-            "from_plane": distance(travelled, on_plane),
+            "from_plane": distance(travelled, on_plane[0]),
             "impulse": largest_false_impulse(run.velocities[steps_in(SETTLED, step) :], step),
             "lowest": float(travelled[:, 1].min()),
             "cpu_ms_per_s": run.cpu_ms_per_s,
         }
-    return rows
+
+    return row_each(EDGE_SPACINGS, measure)
 
 
 def at_rest(spacing: float | None, duration: float) -> BodyScene:
@@ -149,22 +156,17 @@ def measure_rest(make: Builder, step: float, duration: float, cap: float) -> lis
 
     The false impulse counts after `SETTLED`, as springs sink at first.
     """
-    rows: list[dict[str, Any]] = []
-    for spacing in EDGE_SPACINGS:
-        row: dict[str, Any] = {"spacing": spacing}
-        rows.append(row)
-        try:
-            run, contacts = lie(make, at_rest(spacing, duration), step, cap)
-        except (LeftOut, RuntimeError, ArithmeticError) as error:
-            row["failure"] = str(error).splitlines()[0][:120]
-            continue
-        row |= {
+
+    def measure(spacing: float | None) -> dict[str, Any]:
+        run, contacts = lie(make, at_rest(spacing, duration), step, cap)
+        return {
             "error": float(np.linalg.norm(run.path - run.path[0], axis=1).max()),
             "impulse": largest_false_impulse(run.velocities[steps_in(SETTLED, step) :], step),
             "contacts": contacts,
             "cpu_ms_per_s": run.cpu_ms_per_s,
         }
-    return rows
+
+    return row_each(EDGE_SPACINGS, measure)
 
 
 def wave(spacing: float) -> HeightField:
@@ -195,22 +197,17 @@ def faceted_path(field: HeightField, times: Array) -> Array:
 
 def measure_wave(make: Builder, step: float, duration: float, cap: float) -> list[dict[str, Any]]:
     """A row a spacing: distance from the path on the facets and on the sine, m, and cost."""
-    rows: list[dict[str, Any]] = []
     times = SAMPLE * np.arange(steps_in(duration, SAMPLE) + 1)
-    for spacing in SINE_SPACINGS:
-        row: dict[str, Any] = {"spacing": spacing}
-        rows.append(row)
+
+    def measure(spacing: float) -> dict[str, Any]:
         scene = over_wave(spacing, duration)
-        try:
-            run = roll(make, scene, step, cap)
-        except (LeftOut, RuntimeError, ArithmeticError) as error:
-            row["failure"] = str(error).splitlines()[0][:120]
-            continue
+        run = roll(make, scene, step, cap)
         sampled = run.path[:: steps_in(SAMPLE, step), :2]
         assert scene.field is not None
-        row |= {
+        return {
             "error": distance(sampled, faceted_path(scene.field, times)),
             "from_sine": distance(sampled, smooth_path(times)),
             "cpu_ms_per_s": run.cpu_ms_per_s,
         }
-    return rows
+
+    return row_each(SINE_SPACINGS, measure)

@@ -4,8 +4,9 @@ use rover_core::nalgebra::Vector3;
 use rover_core::sand::test_bed::rules_within;
 use rover_core::sand::{
     Bed, Drive, Law, Measured, Memory, Resistive, Rules, SandWheel, Soil, Sunk, TestBed, Twist,
-    Want, WheelPose, react,
+    Want, WheelPose, react, react_with,
 };
+use rover_core::scalar::Instructions;
 
 use super::sand_scenes::{bekker_sand, dry_sand};
 
@@ -113,6 +114,95 @@ fn the_force_is_continuous_along_random_paths() {
             };
             let fine = largest(2000);
             assert!(fine < 0.05 * size, "{fine} of {size}");
+        }
+    }
+}
+
+/// A tilted wheel that slips and slides, with grousers and rounded edges.
+fn askew() -> (SandWheel, WheelPose, Memory) {
+    let wheel = SandWheel {
+        grouser_height: 0.004,
+        grousers: 20,
+        ..WHEEL
+    };
+    let pose = WheelPose {
+        centre: Vector3::new(0.3, 0.075, -0.2),
+        axle: Vector3::new(0.2, 0.15, 1.0).normalize(),
+    };
+    let memory = Memory {
+        shift: [0.5, -0.05, 0.2],
+        turn: [0.4, -0.6, -7.0],
+    };
+    (wheel, pose, memory)
+}
+
+const LEVEL: Bed<'static> = Bed {
+    place: Vector3::new(0.0, 0.0, 0.0),
+    normal: Vector3::new(0.0, 1.0, 0.0),
+    relief: None,
+    highest: 0.0,
+    gravity: 9.81,
+};
+
+/// The points of a wheel lie side by side in lanes. How many lanes a machine has does not matter.
+#[test]
+fn the_force_has_the_same_bits_with_any_number_of_lanes() {
+    let (wheel, pose, memory) = askew();
+    let want = Want::Slopes {
+        by_memory: 0.7,
+        by_pose: 0.002,
+    };
+    for soil in [dry_sand(), bekker_sand()] {
+        let rules = rules_within(&wheel, &soil, 0.01);
+        let found = Instructions::all_of_this_machine()
+            .into_iter()
+            .map(|instructions| {
+                let parts = (&wheel, &rules);
+                react_with(instructions, parts, &soil, &LEVEL, (&pose, &memory), want)
+            });
+        let found: Vec<_> = found.collect();
+        assert!(found[0].wrench.norm() > 1.0, "{:?}", found[0]);
+        assert!(found.iter().all(|other| other == &found[0]), "{found:?}");
+    }
+}
+
+/// The derivatives by memory and by pose, which keep where the points lie and their normals, are
+/// near those of finite differences.
+#[test]
+fn the_slopes_of_a_wheel_are_its_derivatives() {
+    let (wheel, pose, memory) = askew();
+    for soil in [dry_sand(), bekker_sand()] {
+        let rules = Rules::new([24, 4, 8]);
+        let force = |pose: &WheelPose, memory: &Memory, by_memory: f64, by_pose: f64| {
+            let want = Want::Slopes { by_memory, by_pose };
+            react((&wheel, &rules), &soil, &LEVEL, pose, memory, want)
+        };
+        let by_memory = force(&pose, &memory, 1.0, 0.0).slope;
+        let by_pose = force(&pose, &memory, 0.0, 1.0).slope;
+        let step = 1e-5;
+        for k in 0..6 {
+            let shifted = |sign: f64| {
+                let mut six = memory.six();
+                six[k] += sign * step;
+                let moved = Memory {
+                    shift: [six[0], six[1], six[2]],
+                    turn: [six[3], six[4], six[5]],
+                };
+                force(&pose, &moved, 0.0, 0.0).wrench
+            };
+            let change = (shifted(1.0) - shifted(-1.0)) / (2.0 * step);
+            let error = (by_memory.column(k) - change).norm();
+            assert!(error < 0.03 * by_memory.norm(), "memory {k}: {error}");
+        }
+        for k in 0..3 {
+            let sunk = |sign: f64| {
+                let mut moved = pose;
+                moved.centre[k] += sign * step;
+                force(&moved, &memory, 0.0, 0.0).wrench
+            };
+            let change = (sunk(1.0) - sunk(-1.0)) / (2.0 * step);
+            let error = (by_pose.column(k) - change).norm();
+            assert!(error < 0.03 * by_pose.norm(), "pose {k}: {error}");
         }
     }
 }

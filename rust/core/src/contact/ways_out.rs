@@ -24,7 +24,7 @@ use crate::geometry::{PlacedShape, Primitive, Terrain};
 const MOST: usize = 24;
 
 /// Depth, in bounding radii of the shape, up to which every point counts.
-const SHALLOW: f64 = 1e-3;
+pub(crate) const SHALLOW: f64 = 1e-3;
 
 /// How far a part is moved out, in depths: where the other point is much deeper, so far that what
 /// the part overlaps beside the first point is left behind too.

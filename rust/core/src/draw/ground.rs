@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::hills::HillDistribution;
+use super::sand::SandDistribution;
 use crate::geometry::{
     HeightField, Plane, SoftGround, SphereField, Terrain, TerrainError, TriangleMesh, Union,
 };
@@ -16,6 +17,8 @@ pub enum GroundDistribution {
     Given(DrawnGround),
     /// Hills, whose slope follows from the difficulty of the rocks.
     Hills(HillDistribution),
+    /// Sand with ripples, on a plane with the slope of the start.
+    Sand(SandDistribution),
 }
 
 /// The ground of an episode, by its kind.
@@ -44,6 +47,21 @@ impl DrawnGround {
         let parts = [self, other];
         let union = Union::new(parts.iter().map(Self::terrain).collect())?;
         Ok(Self::Union(Arc::new(union), parts.into()))
+    }
+
+    /// What a machine that does not sink stands on, as a simulation takes it.
+    ///
+    /// # Errors
+    /// As [`Union::new`].
+    pub fn firm(&self) -> Result<Arc<dyn Terrain>, TerrainError> {
+        Ok(match self {
+            Self::Soft(_, surface) => surface.terrain(),
+            Self::Union(_, parts) => {
+                let parts: Result<_, _> = parts.iter().map(Self::firm).collect();
+                Arc::new(Union::new(parts?)?)
+            }
+            _ => self.terrain(),
+        })
     }
 
     /// As a simulation takes it.

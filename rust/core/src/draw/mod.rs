@@ -3,7 +3,7 @@
 //! - [`pcg64`]: the generator of NumPy's `default_rng`, number for number; [`seed_sequence`]: its
 //!   state for a seed; [`normal`]: standard normal numbers;
 //! - [`start`]: slope, pose and goal; [`rocks`]: rocks by difficulty; [`hills`]: fractal ground;
-//!   [`ground`]: the ground of all of them; [`way`]: whether a way leads to the goal; [`domain`]:
+//!   [`sand`]: soils and ripples; [`ground`]: the ground of all of them; [`way`]: whether a way leads to the goal; [`domain`]:
 //!   properties of rover and world;
 //! - [`scene`]: all of these, and the rover in them; [`many`]: the next scenes of many rovers, on
 //!   several threads.
@@ -17,6 +17,7 @@ pub mod normal;
 mod normal_layers;
 pub mod pcg64;
 pub mod rocks;
+pub mod sand;
 pub mod scene;
 pub mod seed_sequence;
 pub mod start;
@@ -29,6 +30,7 @@ pub use hills::{HillDistribution, HillDraw};
 pub use many::{Drawn, Order, draw_many};
 pub use pcg64::{Pcg64, Pcg64State};
 pub use rocks::{RockDistribution, RockDraw};
+pub use sand::{SandDistribution, SandDraw};
 pub use scene::{DrawnScene, Fixed, SceneDistribution};
 pub use start::{
     FixedStart, PlacementError, Range, Start, StartDistribution, resting_on, resting_pose,

@@ -13,6 +13,7 @@ use super::start::{
 };
 use super::way;
 use crate::contact::detection::deepest_overlap;
+use crate::geometry::Terrain;
 use crate::integrator::StepOptions;
 use crate::multibody::{Kinematics, coordinates};
 use crate::simulation::{Placement, RoverScene};
@@ -127,7 +128,9 @@ impl SceneDistribution {
         };
         let options = domain.options(&self.options);
         options.check()?;
-        let (model, terrain) = (&*scene.model, &*scene.terrain);
+        // Wheels sink into sand once they have stood on it.
+        let firm = ground.firm()?;
+        let (model, terrain) = (&*scene.model, &*firm);
         // Over a plane every place is known, and every way leads uphill alike.
         let plane = terrain.ground().filter(|_| !terrain.has_surface());
         let (q, v) = if let Some((q, v)) = &fixed.state {
@@ -195,17 +198,44 @@ impl SceneDistribution {
             GroundDistribution::Hills(hills) => {
                 let difficulty = rocks.map_or(0.0, |rocks| rocks.difficulty);
                 let map = hills.draw(random, difficulty, field_seed).lay_out(start)?;
-                let field = match rocks {
-                    Some(rocks) => rocks.lay_on(model, start, &map, radius, tolerance)?,
-                    None => None,
-                };
                 let map = DrawnGround::Map(Arc::new(map));
-                Ok(match field {
-                    Some(field) => map.with(DrawnGround::Field(Arc::new(field)))?,
-                    None => map,
-                })
+                let surface = map.terrain();
+                self.with_rocks(map, &*surface, start, rocks)
+            }
+            GroundDistribution::Sand(sand) => {
+                let difficulty = rocks.map_or(0.0, |rocks| rocks.difficulty);
+                let plane = tilted_plane(start.slope, start.uphill)?;
+                let drawn = sand.draw(random, difficulty, field_seed);
+                let surface = match drawn.lay_out(start, &plane)? {
+                    Some(map) => DrawnGround::Map(Arc::new(map)),
+                    None => DrawnGround::Plane(plane),
+                };
+                let firm = surface.terrain();
+                let soft = Arc::new(drawn.soil.under(firm.clone()));
+                let soft = DrawnGround::Soft(soft, Arc::new(surface));
+                self.with_rocks(soft, &*firm, start, rocks)
             }
         }
+    }
+
+    /// A ground with rocks on its surface.
+    fn with_rocks(
+        &self,
+        ground: DrawnGround,
+        surface: &dyn Terrain,
+        start: &Start,
+        rocks: Option<RockDraw>,
+    ) -> Result<DrawnGround, DrawError> {
+        let model = &self.rover.model;
+        let (radius, tolerance) = (clear_radius(model), self.goal_tolerance);
+        let field = match rocks {
+            Some(rocks) => rocks.lay_on(model, start, surface, radius, tolerance)?,
+            None => None,
+        };
+        Ok(match field {
+            Some(field) => ground.with(DrawnGround::Field(Arc::new(field)))?,
+            None => ground,
+        })
     }
 }
 

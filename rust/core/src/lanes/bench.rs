@@ -104,7 +104,7 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> Bench<T, C, S> {
                     (0.0, 0.0)
                 };
                 own.p[i][k].set(lane, p);
-                self.system.free_velocity(i)[k].set(lane, q);
+                self.system.free_velocity_mut(i)[k].set(lane, q);
             }
             if is_used {
                 trace += normal + tangential;

@@ -10,7 +10,7 @@
 //! along `t × s` from its centre.
 //!
 //! What is rare is found lane by lane (`rare`): a wheel that nearly lies flat, passes a sphere
-//! within the step, touches more things than it has slots or stands on rough ground, and a body
+//! within the step, touches more things than it has slots, or an edge of a surface, and a body
 //! near the ground or another one. A lane with more contacts than a problem has is declined.
 
 use std::ops::Range;
@@ -23,6 +23,7 @@ use super::forecast::Forecast;
 use super::ground::{Ground, GroundSphere, turning};
 use super::machine::{Machine, Stop};
 use super::parts::{Parts, Twist};
+use super::pieces::LanePlane;
 use super::problem::{MAX_CONTACTS, MAX_DENSE};
 use super::stops::side;
 use crate::contact::detection::{touch_of_disc, touch_of_roller};
@@ -60,6 +61,19 @@ pub struct Slot<T: Lane> {
     pub gap: T,
     on_sphere: T::Mask,
     sphere: GroundSphere<T>,
+    /// The plane that it stands on where the ground is a surface.
+    pub(super) plane: LanePlane<T>,
+}
+
+/// A circle of a wheel over a plane.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stand<T: Lane> {
+    /// m.
+    pub gap: T,
+    /// Where it is a contact.
+    pub admitted: T::Mask,
+    /// Where it lies so flat that more than one point may touch.
+    pub lies: T::Mask,
 }
 
 /// The contacts of one rover in the order of detection.
@@ -160,6 +174,10 @@ impl<T: Lane> Contacts<T> {
                 centre: nowhere,
                 radius: zero,
                 number: zero,
+            },
+            plane: LanePlane {
+                normal: nowhere,
+                offset: zero,
             },
         };
         let twist = Twist {
@@ -367,13 +385,14 @@ impl<T: Lane> Contacts<T> {
                     self.parts.wheels[w].axle(pose),
                     self.parts.wheels[w].centre(pose),
                 );
-                let plane = if ground.has_surfaces() {
-                    ground.under_wheel(w, end.origin)
-                } else {
-                    (ground.normal, height_at_end)
-                };
                 for slot in slots.clone() {
                     if self.slots[slot].active.any() {
+                        let own = &self.slots[slot].plane;
+                        let plane = if ground.has_surfaces() {
+                            (own.normal, own.height(end.origin))
+                        } else {
+                            (ground.normal, height_at_end)
+                        };
                         self.used.push(slot);
                         let place = slot - slots.start;
                         let flat = if self.parts.wheels[w].is_wide() {
@@ -472,25 +491,35 @@ impl<T: Lane> Contacts<T> {
             || wheel.speed(&self.twists[wheel.carrier], centre, sight.v),
         );
         let none = T::mask(self.token, 0);
-        let mut rest = none;
+        let (mut rest, mut on_pieces) = (none, none);
         let (first, n_circles) = (wheel.slots.start, wheel.n_circles());
         let mut plane = (ground.normal, height);
         if ground.has_surfaces() {
             let origin = sight.middle.origin;
             rest = ground.find_footing(w, origin + centre, wheel.bound, reach);
-            plane = ground.under_wheel(w, origin);
+            let own = ground.under_wheel(w);
+            plane = (own.normal, own.height(origin));
+            for slot in &mut self.slots[wheel.slots.clone()] {
+                slot.plane = own;
+            }
             // Where a wheel sinks in, a piece counts by how deep each circle is.
             if sight.needs_pieces || (wheel.n_circles() > 1 && wheel.is_soft) {
                 rest = rest | ground.on_surface();
+            } else if !wheel.is_wide() {
+                on_pieces = rest & T::mask(self.token, sight.going);
+                rest = rest & !on_pieces;
             }
         }
         for slot in &mut self.slots[wheel.slots.clone()] {
             (slot.active, slot.on_sphere) = (none, none);
         }
         for circle in 0..n_circles {
-            let (admitted, lies) = self.stands((w, circle), plane, sight, (s, centre), reach);
-            self.slots[first + circle].active = admitted;
-            rest = rest | lies;
+            let stand = self.stands((w, circle), plane, sight, (s, centre), reach);
+            self.slots[first + circle].active = stand.admitted;
+            rest = rest | stand.lies;
+        }
+        if on_pieces.any() {
+            rest = rest | self.look_at_pieces((w, on_pieces), ground, sight, (s, centre), reach);
         }
         if ground.has_spheres() {
             rest = rest | self.look_at_spheres(w, ground, sight, s, centre, reach);
@@ -499,17 +528,16 @@ impl<T: Lane> Contacts<T> {
     }
 
     /// Where a circle of a wheel with the axle `s` and the centre `centre` touches a plane of the
-    /// normal n at the midpoint, the trunk's origin being at the given height (m) over it, and
-    /// where it lies so flat that more than one point does.
+    /// normal n at the midpoint, the trunk's origin being at the given height (m) over it.
     #[inline(always)]
-    fn stands(
+    pub(super) fn stands(
         &self,
         (w, circle): (usize, usize),
         (n, base): (Vec3<T>, T),
         sight: &Sight<'_, T>,
         (s, centre): (Vec3<T>, Vec3<T>),
         reach: T,
-    ) -> (T::Mask, T::Mask) {
+    ) -> Stand<T> {
         let wheel = &self.parts.wheels[w];
         let radius = T::splat(self.token, wheel.radius);
         let (across, along) = (n.cross(s), n.dot(s));
@@ -531,8 +559,11 @@ impl<T: Lane> Contacts<T> {
             radius
         };
         let half = radius.like(0.5);
-        let lies = (height + half * radius * length).le(reach);
-        (sight.forecast.admits(gap, u_N), lies)
+        Stand {
+            gap,
+            admitted: sight.forecast.admits(gap, u_N),
+            lies: (height + half * radius * length).le(reach),
+        }
     }
 
     /// Adds the contacts of a wheel with spheres at the midpoint; it has the axle `s` and the

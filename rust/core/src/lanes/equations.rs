@@ -234,50 +234,6 @@ fn subtract<T: Lane>(own: &mut Triple<T>, x: &Block<T>, y: &Triple<T>) {
     }
 }
 
-/// The impulses `C y` of the Newton step about the impulses `centre`, into `y`.
-#[inline(always)]
-fn newton_point<T: Lane, const C: usize>(
-    factors: &Factors<T, C>,
-    q: &[Triple<T>; C],
-    centre: &[Triple<T>; C],
-    alpha: T,
-    modes: &[Mode<T>; C],
-    y: &mut [Triple<T>; C],
-) {
-    for k in 0..C {
-        let (c, q) = (&centre[k], &q[k]);
-        let rest = [
-            alpha * c[0] - q[0],
-            alpha * c[1] - q[1],
-            alpha * c[2] - q[2],
-        ];
-        y[k] = modes[k].across(rest);
-    }
-    solve(factors, y);
-    for k in 0..C {
-        y[k] = modes[k].impulse(y[k]);
-    }
-}
-
-/// The change `C y` of the impulses, into `y`, that removes the velocities `u` as far as the modes
-/// allow; the factors may be those of modes at nearby impulses.
-#[inline(always)]
-fn correction<T: Lane, const C: usize>(
-    factors: &Factors<T, C>,
-    u: &[Triple<T>; C],
-    modes: &[Mode<T>; C],
-    y: &mut [Triple<T>; C],
-) {
-    for k in 0..C {
-        let [u0, u1, u2] = u[k];
-        y[k] = modes[k].across([-u0, -u1, -u2]);
-    }
-    solve(factors, y);
-    for k in 0..C {
-        y[k] = modes[k].impulse(y[k]);
-    }
-}
-
 /// Operators with all their blocks; a contact's place is its number.
 #[derive(Clone, Debug)]
 pub(super) struct DenseSystem<T: Lane, const C: usize> {
@@ -295,6 +251,11 @@ impl<T: Lane, const C: usize> System<T, Few<C>> for DenseSystem<T, C> {
     }
 
     #[inline(always)]
+    fn free_velocity(&self, place: usize) -> Triple<T> {
+        self.q[place]
+    }
+
+    #[inline(always)]
     fn velocities(&mut self, p: &[Triple<T>; C], u: &mut [Triple<T>; C]) {
         velocities(&self.W, &self.q, p, u);
     }
@@ -306,20 +267,14 @@ impl<T: Lane, const C: usize> System<T, Few<C>> for DenseSystem<T, C> {
     }
 
     #[inline(always)]
-    fn newton_point(
-        &mut self,
-        _: &[Triple<T>; C],
-        centre: &[Triple<T>; C],
-        alpha: T,
-        modes: &[Mode<T>; C],
-        y: &mut [Triple<T>; C],
-    ) {
-        newton_point(&self.factors, &self.q, centre, alpha, modes, y);
-    }
-
-    #[inline(always)]
-    fn correction(&mut self, u: &[Triple<T>; C], modes: &[Mode<T>; C], y: &mut [Triple<T>; C]) {
-        correction(&self.factors, u, modes, y);
+    fn solve(&mut self, modes: &[Mode<T>; C], r: &mut [Triple<T>; C]) {
+        for k in 0..C {
+            r[k] = modes[k].across(r[k]);
+        }
+        solve(&self.factors, r);
+        for k in 0..C {
+            r[k] = modes[k].impulse(r[k]);
+        }
     }
 
     #[inline(always)]
@@ -376,7 +331,7 @@ impl<T: Lane, const C: usize> Loaded<T, C> for DenseSystem<T, C> {
     }
 
     #[inline(always)]
-    fn free_velocity(&mut self, place: usize) -> &mut Triple<T> {
+    fn free_velocity_mut(&mut self, place: usize) -> &mut Triple<T> {
         &mut self.q[place]
     }
 }

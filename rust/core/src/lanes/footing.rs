@@ -15,6 +15,10 @@ use crate::scalar::{Lane, MAX_LANES, Vec3};
 /// searches half as often.
 const AHEAD: f64 = 0.1;
 
+/// Share of a wheel's bound within which ground that is not flat is looked for: such ground stays
+/// near while the wheel moves by the rest of it.
+const NEARBY: f64 = 0.5;
+
 /// Covers the rounding of distances, m.
 const ROUNDING: f64 = 1e-6;
 
@@ -31,6 +35,9 @@ pub struct Footing<T> {
     within: [f64; MAX_LANES],
     /// Lanes where it found a plane.
     flat: u32,
+    /// A place with ground that is not flat as near as this, m.
+    rough_from: [Vector3<f64>; MAX_LANES],
+    rough: [f64; MAX_LANES],
 }
 
 impl<T: Lane> Footing<T> {
@@ -42,6 +49,8 @@ impl<T: Lane> Footing<T> {
             from: [Vector3::zeros(); MAX_LANES],
             within: [f64::NEG_INFINITY; MAX_LANES],
             flat: 0,
+            rough_from: [Vector3::zeros(); MAX_LANES],
+            rough: [f64::INFINITY; MAX_LANES],
         }
     }
 
@@ -50,6 +59,7 @@ impl<T: Lane> Footing<T> {
         self.normal.set(lane, normal);
         self.offset.set(lane, offset);
         self.within[lane] = f64::NEG_INFINITY;
+        self.rough[lane] = f64::INFINITY;
         self.flat &= !(1 << lane);
     }
 
@@ -74,9 +84,16 @@ impl<T: Lane> Footing<T> {
             if is_known && self.flat >> lane & 1 == 1 {
                 continue;
             }
-            let is_flat = !is_known && self.search(lane, &**terrain, centre, bound, reach + AHEAD);
+            let is_rough =
+                (centre - self.rough_from[lane]).norm() + self.rough[lane] <= bound + reach;
+            let is_flat = !is_rough
+                && !is_known
+                && self.search(lane, &**terrain, centre, bound, reach + AHEAD);
             // A step does not depend on when a search was made.
-            if !(is_flat || self.stand(lane, &**terrain, centre, bound + reach)) {
+            if is_rough || !(is_flat || self.stand(lane, &**terrain, centre, bound + reach)) {
+                if !is_rough && terrain.level_near(&centre, NEARBY * bound).is_none() {
+                    (self.rough_from[lane], self.rough[lane]) = (centre, NEARBY * bound);
+                }
                 self.offset.set(lane, f64::INFINITY);
                 others |= 1 << lane;
             }

@@ -10,6 +10,7 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Vector3};
 
 use super::footing::Footing;
+use super::pieces::{LanePlane, Pieces, Rim};
 use crate::contact::box_clearance::over_surfaces;
 use crate::geometry::query::sweep::DEEP;
 use crate::geometry::{Coverage, OrientedBox, Sphere, Terrain};
@@ -115,6 +116,8 @@ pub struct Ground<T: Lane> {
     /// Rovers on a surface and a plane.
     mixed: T::Mask,
     footings: Vec<Footing<T>>,
+    /// Near each wheel.
+    pieces: Vec<Pieces<T>>,
     wheels: Vec<Near<T>>,
     boxes: Vec<Around<T>>,
 }
@@ -156,6 +159,7 @@ impl<T: Lane> Ground<T> {
             has_surfaces: false,
             mixed: T::mask(token, 0),
             footings: vec![Footing::new(token); n_wheels],
+            pieces: vec![Pieces::new(token); n_wheels],
             wheels: vec![near; n_wheels],
             boxes: vec![around; n_boxes],
         }
@@ -188,6 +192,9 @@ impl<T: Lane> Ground<T> {
         }
         for footing in &mut self.footings {
             footing.set_lane(lane, normal, offset);
+        }
+        for pieces in &mut self.pieces {
+            pieces.forget(lane);
         }
         // Without spheres there is nothing to search, and the first step on spheres makes one.
         let has_spheres = !is_plane && terrain.can_be_passed();
@@ -235,11 +242,25 @@ impl<T: Lane> Ground<T> {
         self.footings[wheel].find(&self.surfaces, centre, bound, reach) | self.mixed
     }
 
-    /// Normal of the plane under a wheel and the height of a point over it, m.
+    /// The plane under a wheel.
     #[inline(always)]
-    pub(super) fn under_wheel(&self, wheel: usize, x: Vec3<T>) -> (Vec3<T>, T) {
-        let Footing { normal, offset, .. } = &self.footings[wheel];
-        (*normal, normal.dot(x) + *offset)
+    pub(super) fn under_wheel(&self, wheel: usize) -> LanePlane<T> {
+        let Footing { normal, offset, .. } = self.footings[wheel];
+        LanePlane { normal, offset }
+    }
+
+    /// The pieces that the rovers' wheel may touch, of the given lanes, and the lanes where they
+    /// are known; none if they are in no lane.
+    #[inline(always)]
+    pub(super) fn find_pieces(
+        &mut self,
+        wheel: usize,
+        lanes: T::Mask,
+        rim: &Rim<T>,
+    ) -> Option<(&Pieces<T>, T::Mask)> {
+        let pieces = &mut self.pieces[wheel];
+        let known = pieces.find(&self.surfaces, lanes & !self.mixed, rim);
+        known.any().then_some((pieces, known))
     }
 
     /// The ground of a lane.

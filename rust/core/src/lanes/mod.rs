@@ -10,8 +10,8 @@
 //! The dynamics of the tree are those of [`crate::multibody`].
 //!
 //! - [`admission`]: which options have a fast step; [`machine`]: what the rovers share;
-//! - `parts`, [`ground`], `footing`, [`forecast`], [`contacts`], `by_lane`, `rare`, `spares`,
-//!   `stops`: what touches what;
+//! - `parts`, [`ground`], `footing`, `pieces`, `rolling`, [`forecast`], [`contacts`], `by_lane`,
+//!   `rare`, `spares`, `stops`: what touches what;
 //!   [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield;
 //! - [`problem`], `system`, `equations`, [`pattern`], `tree_matrix`, `velocity_equations`,
 //!   `sweeps`, `bench`, [`queue`]: the friction-contact problems, which
@@ -32,9 +32,11 @@ pub mod machine;
 mod parts;
 pub mod passenger;
 pub mod pattern;
+mod pieces;
 pub mod problem;
 pub mod queue;
 mod rare;
+mod rolling;
 pub mod rows;
 mod spares;
 pub mod step;

@@ -1,6 +1,5 @@
 //! How the problems of several rovers become the [systems](System) of their lanes.
 
-use super::equations::Block;
 use super::problem::ContactProblem;
 use crate::law::coulomb::ContactMode;
 use crate::scalar::Lane;
@@ -28,13 +27,13 @@ pub(super) trait Loaded<T: Lane, const C: usize>: System<T, Few<C>> + Sized {
     fn block_of(problem: &ContactProblem, contact: usize) -> &[f64; 9];
 
     /// Free velocity of a place, m/s.
-    fn free_velocity(&mut self, place: usize) -> &mut Triple<T>;
+    fn free_velocity_mut(&mut self, place: usize) -> &mut Triple<T>;
 }
 
 /// Mode and impulse of a lane's contact with the diagonal block `W`, see [`System::solve_one`].
 #[inline(always)]
 pub(super) fn solve_one<T: Lane>(
-    W: &Block<T>,
+    W: &[T; 9],
     lane: usize,
     free: &Triple<f64>,
     mu: f64,

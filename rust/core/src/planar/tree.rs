@@ -108,6 +108,9 @@ pub struct PlanarMotor {
 /// Origin and x axis of every part at a configuration, and scratch for their motion.
 #[derive(Clone, Debug, Default)]
 pub struct PlanarPoses {
+    /// Origin of the base in the world, m. All other places are relative to it, so a machine far
+    /// away loses no precision.
+    base: Vector2<f64>,
     origin: Vec<Vector2<f64>>,
     x_axis: Vec<Vector2<f64>>,
     /// Angular rate, rad/s.
@@ -117,6 +120,7 @@ pub struct PlanarPoses {
 }
 
 impl PlanarPoses {
+    /// A point of a part, relative to the base's origin.
     fn point(&self, part: usize, p: &Vector2<f64>) -> Vector2<f64> {
         let x_axis = &self.x_axis[part];
         self.origin[part] + x_axis * p.x + left(x_axis) * p.y
@@ -217,12 +221,13 @@ impl PlanarTree {
 
     /// [`Self::poses`] without a new allocation.
     pub fn place(&self, q: &[f64], poses: &mut PlanarPoses) {
+        poses.base = Vector2::new(q[0], q[1]);
         let PlanarPoses { origin, x_axis, .. } = poses;
         origin.clear();
         x_axis.clear();
         for (b, part) in self.parts.iter().enumerate() {
             let (at, carrier) = if b == 0 {
-                (Vector2::new(q[0], q[1]), Vector2::x())
+                (Vector2::zeros(), Vector2::x())
             } else {
                 let (p, joint) = (part.parent, &part.joint);
                 let carrier = x_axis[p];
@@ -246,8 +251,8 @@ impl PlanarTree {
         }
     }
 
-    /// The parts that move a point x of part b, from b itself to the base: each with the velocity
-    /// of x for a unit of its rate, and whether it turns b.
+    /// The parts that move a point x of part b (relative to the base's origin), from b itself to
+    /// the base: each with the velocity of x for a unit of its rate, and whether it turns b.
     fn movers<'a>(
         &'a self,
         poses: &'a PlanarPoses,
@@ -258,13 +263,12 @@ impl PlanarTree {
         std::iter::from_fn(move || {
             let (i, x, turns) = next?;
             let (part, origin) = (&self.parts[i], poses.origin[i]);
-            next = (i > 0).then(|| {
-                if part.is_absolute {
-                    (part.parent, origin, false)
-                } else {
-                    (part.parent, x, turns)
-                }
-            });
+            let above = if part.is_absolute {
+                (part.parent, origin, false)
+            } else {
+                (part.parent, x, turns)
+            };
+            next = (i > 0).then_some(above);
             Some((i, left(&(x - origin)), turns))
         })
     }
@@ -352,7 +356,10 @@ impl PlanarTree {
     /// Potential energy `−Σ m g · x`, J.
     #[must_use]
     pub fn potential(&self, poses: &PlanarPoses, gravity: &Vector2<f64>) -> f64 {
-        let of = |(b, part): (usize, &Part)| part.mass * gravity.dot(&poses.point(b, &part.centre));
+        let of = |(b, part): (usize, &Part)| {
+            let centre = poses.base + poses.point(b, &part.centre);
+            part.mass * gravity.dot(&centre)
+        };
         -self.parts.iter().enumerate().map(of).sum::<f64>()
     }
 
@@ -391,7 +398,7 @@ impl PlanarTree {
     pub fn disc(&self, wheel: usize, poses: &PlanarPoses) -> Disc {
         let wheel = &self.wheels[wheel];
         Disc {
-            centre: poses.point(wheel.part, &wheel.centre),
+            centre: poses.base + poses.point(wheel.part, &wheel.centre),
             radius: wheel.radius,
         }
     }
@@ -410,7 +417,8 @@ impl PlanarTree {
         out.resize(begin + n * directions.len(), 0.0);
         for (row, d) in out[begin..].chunks_exact_mut(n).zip(directions) {
             (row[0], row[1]) = (d.x, d.y);
-            for (i, turn, _) in self.movers(poses, self.wheels[wheel].part, *point) {
+            let x = point - poses.base;
+            for (i, turn, _) in self.movers(poses, self.wheels[wheel].part, x) {
                 row[2 + i] = turn.dot(d);
             }
         }
@@ -425,7 +433,7 @@ impl PlanarTree {
         point: &Vector2<f64>,
         v: &[f64],
     ) -> Vector2<f64> {
-        let movers = self.movers(poses, self.wheels[wheel].part, *point);
+        let movers = self.movers(poses, self.wheels[wheel].part, point - poses.base);
         movers.fold(Vector2::new(v[0], v[1]), |sum, (i, turn, _)| {
             sum + turn * v[2 + i]
         })

@@ -1,6 +1,6 @@
 //! Force of sand on a wheel: the stress over what is under the surface, with its derivatives.
 //!
-//! The points of an arc lie side by side in lanes, eight at a time. A machine with fewer lanes takes
+//! The points of arcs lie side by side in lanes, eight at a time. A machine with fewer lanes takes
 //! them in turns and keeps a sum for each of the eight, so that the bits do not depend on the lanes.
 //!
 //! A surface that recedes feels nothing. Of a ring, only the part of the arc under the surface that
@@ -12,7 +12,7 @@ use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use super::memory::Memory;
 use super::piece::{Piece, Setting};
 use super::soil::{Law, Soil};
-use super::wheel::{Ring, Rules, SandWheel};
+use super::wheel::{Gauss, Ring, Rules, SandWheel, Skin};
 use crate::scalar::elementary::{acos, atan2};
 use crate::scalar::{Instructions, Lane, LaneMask, MAX_LANES, Single, Vec3};
 
@@ -249,12 +249,10 @@ impl<'a> Frame<'a> {
                         slope: [zero; 36],
                         is_touching: false,
                     };
-                    for index in 0..self.rules.n_rings() {
-                        let ring = self.rules.ring(self.wheel, self.dry, index);
-                        if let Some((ring, arc)) = ring.and_then(|ring| self.arc(ring)) {
-                            self.add(&ring, &arc, (token, at.start), &mut own);
-                        }
-                    }
+                    self.visit_groups(
+                        #[inline(always)]
+                        |group| self.add(group, (token, at.start), &mut own),
+                    );
                     sums.is_touching |= own.is_touching;
                     for (out, own) in sums.wrench.iter_mut().zip(own.wrench) {
                         own.store(&mut out[at.clone()]);
@@ -265,6 +263,39 @@ impl<'a> Frame<'a> {
                 }
             },
         );
+    }
+
+    /// Visits the points of the wheel that may be in the sand, [`MAX_LANES`] at a time.
+    #[inline(always)]
+    fn visit_groups(&self, mut visit: impl FnMut(&Group)) {
+        let (strips, sides) = (self.rules.n_strips(), self.rules.n_of_a_side());
+        for index in 0..strips + sides {
+            let (pair, rule) = if index < strips {
+                let ring = self.rules.strip(self.wheel, index);
+                ([ring, None], &self.rules.arc)
+            } else {
+                let ring = self.rules.side(self.wheel, self.dry, index - strips);
+                (
+                    [ring, ring.map(|ring| ring.mirrored())],
+                    &self.rules.side_arc,
+                )
+            };
+            let pair = pair.map(|ring| ring.and_then(|ring| self.arc(ring)));
+            let n = rule.places.len();
+            let groups = if n < MAX_LANES { 1 } else { 2 * n / MAX_LANES };
+            for k in 0..groups {
+                let group = if n < MAX_LANES {
+                    Group::of_two(&pair, rule)
+                } else {
+                    let part = k % (n / MAX_LANES) * MAX_LANES;
+                    let one = &pair[usize::from(k >= n / MAX_LANES)];
+                    Group::of_one(one.as_ref(), rule, part)
+                };
+                if let Some(group) = group {
+                    visit(&group);
+                }
+            }
+        }
     }
 
     /// The part of a ring that may feel the sand; none if there is none.
@@ -323,59 +354,41 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// Adds the stress over an arc of a ring: the lanes of each group from `first` on.
+    /// Adds the stress on a group of points: its lanes from `first` on.
     #[inline(always)]
-    fn add<T: Lane>(
-        &self,
-        ring: &Ring,
-        arc: &Arc,
-        (token, first): (T::Token, usize),
-        own: &mut Own<T>,
-    ) {
+    fn add<T: Lane>(&self, group: &Group, (token, first): (T::Token, usize), own: &mut Own<T>) {
         let number = |value: f64| T::splat(token, value);
+        let lanes = |values: &[f64; MAX_LANES]| T::load(token, &values[first..first + T::LANES]);
         let (zero, one, two) = (number(0.0), number(1.0), number(2.0));
-        let (middle, half) = (0.5 * (arc.from + arc.to), 0.5 * (arc.to - arc.from));
-        let rule = &self.rules.arc;
-        for group in (0..rule.places.len()).step_by(MAX_LANES) {
-            let at = group + first..group + first + T::LANES;
-            let u = number(middle) + number(half) * T::load(token, &rule.places[at.clone()]);
-            let per = one / (one + u * u);
-            let (p, q) = ((one - u * u) * per, two * u * per);
-            let (cos, sin) = (p * p - q * q, two * p * q);
-            let scale = 4.0 * half * ring.radius * ring.width;
-            let area = T::load(token, &rule.weights[at]) * number(scale) * per;
-            let [n_r, n_a] = ring.normal;
-            let radial = number(n_r);
-            let place = Place {
-                r: Vec3::new(
-                    cos * number(ring.radius),
-                    sin * number(ring.radius),
-                    number(ring.offset),
-                ),
-                normal: Vec3::new(cos * radial, sin * radial, number(n_a)),
-                area,
-            };
-            let (depth, by_depth) = self.depth(place.r);
-            let is_under = depth.gt(zero);
-            if !is_under.any() {
-                continue;
-            }
+        let u = lanes(&group.u);
+        let per = one / (one + u * u);
+        let (p, q) = ((one - u * u) * per, two * u * per);
+        let (cos, sin) = (p * p - q * q, two * p * q);
+        let (radius, radial) = (number(group.radius), number(group.radial));
+        let place = Place {
+            r: Vec3::new(cos * radius, sin * radius, lanes(&group.offset)),
+            normal: Vec3::new(cos * radial, sin * radial, lanes(&group.axial)),
+            area: lanes(&group.area) * per,
+        };
+        let (depth, by_depth) = self.depth(place.r);
+        let is_under = depth.gt(zero) & place.area.gt(zero);
+        if is_under.any() {
             own.is_touching = true;
             let depth = T::select(is_under, depth, zero);
-            let way = self.way(ring, arc, (cos, sin));
-            self.add_pieces(ring.skin, &place, (depth, by_depth, way), own);
+            let ends = lanes(&group.end);
+            let way = self.way(group.radius, ends, (cos, sin));
+            self.add_pieces(group.skin, &place, (depth, by_depth, way), own);
         }
     }
 
     /// Way from where pieces entered, m. Only Bekker's law needs it.
     #[inline(always)]
-    fn way<T: Lane>(&self, ring: &Ring, arc: &Arc, (cos, sin): (T, T)) -> T {
+    fn way<T: Lane>(&self, radius: f64, end: T, (cos, sin): (T, T)) -> T {
         let mut way = cos;
         if matches!(self.soil.law, Law::Bekker(_)) {
-            let end = acos(arc.cos);
             for lane in 0..T::LANES {
                 let theta = atan2(sin.get(lane), cos.get(lane));
-                way.set(lane, ring.radius * (end - self.entry * theta));
+                way.set(lane, radius * (acos(end.get(lane)) - self.entry * theta));
             }
         }
         way
@@ -409,7 +422,7 @@ impl<'a> Frame<'a> {
     #[inline(always)]
     fn add_pieces<T: Lane>(
         &self,
-        skin: super::wheel::Skin,
+        skin: Skin,
         place: &Place<T>,
         (depth, by_depth, arc): (T, T, T),
         own: &mut Own<T>,
@@ -462,6 +475,75 @@ struct Arc {
     to: f64,
     /// Of the angle at which the ring leaves the sand.
     cos: f64,
+}
+
+/// Points of one ring, or of two on both sides of a wheel.
+struct Group {
+    radius: f64,
+    /// Component of the normal along the radius, and of each point along the axle.
+    radial: f64,
+    axial: [f64; MAX_LANES],
+    skin: Skin,
+    /// Along the axle, m.
+    offset: [f64; MAX_LANES],
+    /// `tan(θ/4)`, and area per 1/(1 + u²), m².
+    u: [f64; MAX_LANES],
+    area: [f64; MAX_LANES],
+    /// Cosines of the angles at which the rings leave the sand.
+    end: [f64; MAX_LANES],
+}
+
+impl Group {
+    fn new(ring: &Ring) -> Self {
+        Self {
+            radius: ring.radius,
+            radial: ring.normal[0],
+            axial: [0.0; MAX_LANES],
+            skin: ring.skin,
+            offset: [0.0; MAX_LANES],
+            u: [0.0; MAX_LANES],
+            area: [0.0; MAX_LANES],
+            end: [1.0; MAX_LANES],
+        }
+    }
+
+    /// Writes points of an arc, from a lane on.
+    #[inline]
+    fn put(&mut self, (ring, arc): &(Ring, Arc), lane: usize, places: &[f64], weights: &[f64]) {
+        let (middle, half) = (0.5 * (arc.from + arc.to), 0.5 * (arc.to - arc.from));
+        let scale = 4.0 * half * ring.radius * ring.width;
+        for (k, (x, weight)) in places.iter().zip(weights).enumerate() {
+            let k = lane + k;
+            self.u[k] = middle + half * x;
+            self.area[k] = scale * weight;
+            self.offset[k] = ring.offset;
+            self.axial[k] = ring.normal[1];
+            self.end[k] = arc.cos;
+        }
+    }
+
+    /// Points of an arc from one of a rule on.
+    #[inline]
+    fn of_one(arc: Option<&(Ring, Arc)>, rule: &Gauss, first: usize) -> Option<Self> {
+        let arc = arc?;
+        let mut group = Self::new(&arc.0);
+        let at = first..first + MAX_LANES;
+        group.put(arc, 0, &rule.places[at.clone()], &rule.weights[at]);
+        Some(group)
+    }
+
+    /// All points of two arcs; one that there is none of has no area.
+    #[inline]
+    fn of_two(pair: &[Option<(Ring, Arc)>; 2], rule: &Gauss) -> Option<Self> {
+        let (first, _) = pair[0].as_ref().or(pair[1].as_ref())?;
+        let mut group = Self::new(first);
+        for (k, arc) in pair.iter().enumerate() {
+            if let Some(arc) = arc {
+                group.put(arc, k * MAX_LANES / 2, &rule.places, &rule.weights);
+            }
+        }
+        Some(group)
+    }
 }
 
 /// Where pieces are, in the wheel's axes, and how large, m².

@@ -18,6 +18,9 @@ pub struct WheelInSand {
     pub force: [f64; 3],
     /// Moment about its centre, world, N m.
     pub moment: [f64; 3],
+    /// Velocity of its centre, world, m/s.
+    #[serde(default)]
+    pub velocity: [f64; 3],
     /// Depth of its lowest point under the undisturbed surface, m; negative where it is clear.
     pub sinkage: f64,
 }
@@ -54,7 +57,7 @@ impl SandState {
 impl WheelInSand {
     fn is_finite(&self) -> bool {
         let numbers = [self.stored, self.absorbed, self.sinkage];
-        let forces = self.force.iter().chain(&self.moment);
+        let forces = self.force.iter().chain(&self.moment).chain(&self.velocity);
         self.memory.is_finite() && numbers.iter().chain(forces).all(|x| x.is_finite())
     }
 }

@@ -65,8 +65,9 @@ pub struct Sunk {
 }
 
 /// Points of the coarsest rules, and by how much each next trial has more.
-const TRIALS: [[usize; 3]; 8] = [
-    [8, 1, 1],
+const TRIALS: [[usize; 3]; 9] = [
+    [4, 1, 1],
+    [4, 1, 2],
     [8, 1, 2],
     [8, 2, 2],
     [8, 2, 3],

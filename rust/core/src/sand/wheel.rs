@@ -122,8 +122,10 @@ impl Gauss {
 /// Gauss rules of a wheel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rules {
-    /// Along an arc.
+    /// Along an arc of the drum.
     pub arc: Gauss,
+    /// Along an arc of an edge or of a side wall.
+    pub side_arc: Gauss,
     /// Across the drum.
     pub across: Gauss,
     /// Along the radius of a side wall.
@@ -131,12 +133,19 @@ pub struct Rules {
 }
 
 impl Rules {
-    /// With these numbers of points. Those of an arc lie side by side in lanes: their number is
-    /// rounded up to whole groups of [`MAX_LANES`].
+    /// With these numbers of points. Those of arcs lie side by side in lanes, [`MAX_LANES`] at a
+    /// time: of one arc, or half of them of each of the two sides. Their number is rounded up.
     #[must_use]
     pub fn new([arc, across, radial]: [usize; 3]) -> Self {
+        let whole = arc.max(1).next_multiple_of(MAX_LANES);
+        let side = if arc <= MAX_LANES / 2 {
+            MAX_LANES / 2
+        } else {
+            whole
+        };
         Self {
-            arc: Gauss::new(arc.max(1).next_multiple_of(MAX_LANES)),
+            arc: Gauss::new(whole),
+            side_arc: Gauss::new(side),
             across: Gauss::new(across),
             radial: Gauss::new(radial),
         }
@@ -145,58 +154,75 @@ impl Rules {
     /// Points of a wheel.
     #[must_use]
     pub fn n_points(&self) -> usize {
-        let [arc, across, radial] =
-            [&self.arc, &self.across, &self.radial].map(|rule| rule.places.len());
-        arc * (across + 2 * radial)
+        let [arc, side, across, radial] =
+            [&self.arc, &self.side_arc, &self.across, &self.radial].map(|rule| rule.places.len());
+        arc * across + 2 * side * radial
     }
 
-    /// Rings of a wheel, with those that are empty.
+    /// Rings of the drum.
     #[must_use]
-    pub fn n_rings(&self) -> usize {
-        self.across.places.len() + 2 + 2 * self.radial.places.len()
+    pub fn n_strips(&self) -> usize {
+        self.across.places.len()
     }
 
-    /// A ring of a wheel, of which a part may be under the surface: `dry` is the radius (m) from
-    /// which on its side walls may be. None if the ring is empty.
+    /// Rings of a side, with those that are empty: the edge, and then the wall.
+    #[must_use]
+    pub fn n_of_a_side(&self) -> usize {
+        1 + self.radial.places.len()
+    }
+
+    /// A ring of the drum; none if it is empty.
     #[inline]
     #[must_use]
-    pub fn ring(&self, wheel: &SandWheel, dry: f64, index: usize) -> Option<Ring> {
-        let (radius, half, edge) = (wheel.drum(), 0.5 * wheel.width, wheel.rounding);
-        let flat = half - edge;
-        if let (Some(x), Some(weight)) = (
-            self.across.places.get(index),
-            self.across.weights.get(index),
-        ) {
-            return (flat > 0.0).then(|| Ring {
-                offset: x * flat,
-                radius,
-                normal: [1.0, 0.0],
-                width: weight * flat,
-                skin: Skin::Rim,
-            });
-        }
-        let index = index - self.across.places.len();
-        let side = if index.is_multiple_of(2) { -1.0 } else { 1.0 };
-        let inner = radius - edge;
-        if index < 2 {
-            let diagonal = std::f64::consts::FRAC_1_SQRT_2;
+    pub fn strip(&self, wheel: &SandWheel, index: usize) -> Option<Ring> {
+        let flat = 0.5 * wheel.width - wheel.rounding;
+        (flat > 0.0).then(|| Ring {
+            offset: self.across.places[index] * flat,
+            radius: wheel.drum(),
+            normal: [1.0, 0.0],
+            width: self.across.weights[index] * flat,
+            skin: Skin::Rim,
+        })
+    }
+
+    /// A ring of the right side, of which a part may be under the surface: `dry` is the radius (m)
+    /// from which on the wall may be. None if the ring is empty.
+    #[inline]
+    #[must_use]
+    pub fn side(&self, wheel: &SandWheel, dry: f64, index: usize) -> Option<Ring> {
+        let (half, edge) = (0.5 * wheel.width, wheel.rounding);
+        let inner = wheel.drum() - edge;
+        let diagonal = std::f64::consts::FRAC_1_SQRT_2;
+        if index == 0 {
             return (edge > 0.0).then(|| Ring {
-                offset: side * (flat + diagonal * edge),
+                offset: half - edge + diagonal * edge,
                 radius: inner + diagonal * edge,
-                normal: [diagonal, side * diagonal],
+                normal: [diagonal, diagonal],
                 width: std::f64::consts::FRAC_PI_2 * edge,
                 skin: Skin::Rim,
             });
         }
         let depth = 0.5 * (inner - dry.max(0.0));
-        let point = index / 2 - 1;
+        let point = index - 1;
         (depth > 0.0).then(|| Ring {
-            offset: side * half,
+            offset: half,
             radius: inner - depth * (1.0 - self.radial.places[point]),
-            normal: [0.0, side],
+            normal: [0.0, 1.0],
             width: self.radial.weights[point] * depth,
             skin: Skin::Wall,
         })
+    }
+}
+
+impl Ring {
+    /// The ring on the other side.
+    #[must_use]
+    pub fn mirrored(&self) -> Self {
+        Self {
+            offset: -self.offset,
+            normal: [self.normal[0], -self.normal[1]],
+            ..*self
+        }
     }
 }
 
@@ -235,7 +261,9 @@ mod tests {
         };
         let mut area = [0.0; 2];
         let rules = Rules::new([4, 2, 3]);
-        for ring in (0..rules.n_rings()).filter_map(|k| rules.ring(&wheel, 0.0, k)) {
+        let strips = (0..rules.n_strips()).filter_map(|k| rules.strip(&wheel, k));
+        let sides = (0..rules.n_of_a_side()).filter_map(|k| rules.side(&wheel, 0.0, k));
+        for ring in strips.chain(sides.flat_map(|ring| [ring, ring.mirrored()])) {
             let of_ring = std::f64::consts::TAU * ring.radius * ring.width;
             area[usize::from(ring.skin == Skin::Wall)] += of_ring;
         }

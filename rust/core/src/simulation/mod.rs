@@ -29,6 +29,7 @@ pub mod rover_controls;
 pub mod rover_in_grains;
 mod rover_quick;
 pub mod rover_rays;
+mod rover_sand;
 pub mod scene;
 pub mod state;
 pub mod stepping;

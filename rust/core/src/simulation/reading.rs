@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 
 use super::rover::RoverSimulation;
 use super::rover_contacts::WheelForces;
+use super::rover_sand::WheelContactInSand;
 use crate::contact::{Part, WheelGaps};
 use crate::geometry::Terrain;
 use crate::integrator::StepStatus;
@@ -55,7 +56,7 @@ pub struct Look<'a> {
 /// | `pose` | nq | public q with the wheels' angles wrapped to one turn |
 /// | `body_velocity` | 6 | trunk, linear then angular, in the trunk's frame |
 /// | `joint_rates` | nv − 6 | |
-/// | `wheel_gaps` | n | distance to the ground or the nearest grain, one a wheel |
+/// | `wheel_gaps` | n | distance to the ground or the nearest grain, one a wheel; minus the sinkage of a wheel in sand |
 /// | `wheel_contacts` | n | 1 where the gap is at most [`CONTACT_GAP`], else 0 |
 /// | `normal_forces` | n | mean of the last step, N |
 /// | `tangential_forces` | 2 n | rolling, lateral, wheel by wheel, N |
@@ -219,10 +220,15 @@ impl RoverSimulation {
         for (gap, to_grain) in gaps.iter_mut().zip(&self.parts.gaps_to_grains) {
             *gap = gap.min(*to_grain);
         }
+        let in_sand = self.wheels_in_sand();
+        for contact in &in_sand {
+            gaps[contact.wheel] = gaps[contact.wheel].min(-contact.sinkage);
+        }
         for (touch, gap) in touch.iter_mut().zip(gaps) {
             *touch = f64::from(u8::from(*gap <= CONTACT_GAP));
         }
         scratch.forces.sum(self);
+        scratch.forces.add_sand(&in_sand);
         let forces = &scratch.forces.along;
         row.put(forces.iter().map(|force| force[0]));
         row.put(forces.iter().flat_map(|force| [force[1], force[2]]));
@@ -238,7 +244,7 @@ impl RoverSimulation {
             up.dot(&R_WB.matrix().column(1)),
             hypot(base[0], base[2]),
             self.body_force(),
-            self.slip_ratio(),
+            self.mean_slip(&in_sand),
         ]);
 
         let last = self.last_call();
@@ -281,11 +287,16 @@ impl RoverSimulation {
         }
     }
 
-    /// Mean over the wheels' contacts of the last step of |u_T| / max(|rim
+    /// Mean over the wheels' contacts of the last step, and the wheels in sand, of |u_T| / max(|rim
     /// speed|, |ground speed|); 0 without contacts.
     #[must_use]
     pub fn slip_ratio(&self) -> f64 {
-        let (mut total, mut n) = (0.0, 0_u32);
+        self.mean_slip(&self.wheels_in_sand())
+    }
+
+    fn mean_slip(&self, in_sand: &[WheelContactInSand]) -> f64 {
+        let mut total: f64 = in_sand.iter().map(|contact| contact.slip).sum();
+        let mut n = in_sand.len();
         for active in self.contacts() {
             if let Part::Wheel(i) = active.contact.part {
                 let wheel = &self.model().wheels()[i];
@@ -298,6 +309,6 @@ impl RoverSimulation {
                 n += 1;
             }
         }
-        if n == 0 { 0.0 } else { total / f64::from(n) }
+        if n == 0 { 0.0 } else { total / n as f64 }
     }
 }

@@ -5,6 +5,7 @@ use crate::contact::detection::{deepest_overlap, wheel_contacts};
 use nalgebra::Vector3;
 
 use super::active_contact::ActiveContact;
+use super::rover_sand::WheelContactInSand;
 use crate::contact::part::place_wheel;
 use crate::contact::{Contact, ContactFrame, Opposite, Part};
 
@@ -23,7 +24,8 @@ impl RoverSimulation {
         deepest_overlap(self.model(), &self.kinematics(), &**self.terrain())
     }
 
-    /// Mean contact force of the last step on every wheel along its frame's n, t, b, N.
+    /// Mean contact force of the last step on every wheel along its frame's n, t, b, N, that of sand
+    /// included.
     ///
     /// Several contacts of one wheel are summed in the frame of its first; where grains are among
     /// them, in that of their mean normal, weighted by the normal impulses.
@@ -31,6 +33,7 @@ impl RoverSimulation {
     pub fn wheel_forces(&self) -> Vec<[f64; 3]> {
         let mut forces = WheelForces::default();
         forces.sum(self);
+        forces.add_sand(&self.wheels_in_sand());
         forces.along
     }
 
@@ -75,6 +78,20 @@ impl WheelForces {
         let is_grain = |a: &RoverContact| matches!(a.contact.key.opposite, Opposite::Grain(_));
         if rover.active.iter().any(is_grain) {
             self.turn_to_mean_normals(rover);
+        }
+    }
+
+    /// Adds the forces of sand, in the frame of a wheel's contact where it has one.
+    pub(super) fn add_sand(&mut self, in_sand: &[WheelContactInSand]) {
+        for contact in in_sand {
+            let i = contact.wheel;
+            let own = contact.frame.rows();
+            let force = (0..3).map(|k| own[k] * contact.force[k]);
+            let force = force.fold(Vector3::zeros(), |sum, part| sum + part);
+            let frame = self.frames[i].get_or_insert(contact.frame);
+            for (along, d) in self.along[i].iter_mut().zip(frame.rows()) {
+                *along += force.dot(&d);
+            }
         }
     }
 

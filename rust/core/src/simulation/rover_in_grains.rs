@@ -248,7 +248,7 @@ impl RoverInGrains {
         for (key, p) in &self.warm_start.impulses {
             match key {
                 AmongKey::Grains(key) | AmongKey::Touch(key) => {
-                    bed.warm_start.impulses.push((*key, *p))
+                    bed.warm_start.impulses.push((*key, *p));
                 }
                 AmongKey::Tree(key) => rover.warm_start.impulses.push((*key, *p)),
             }

@@ -78,8 +78,7 @@ pub struct PlanarScratch {
     Z: Vec<f64>,
     W: Vec<f64>,
     facing: Vec<Facing>,
-    /// Of each input.
-    motors: Vec<MotorBranch>,
+    motors: Vec<Driven>,
     torques: Vec<f64>,
     /// Their generalized force (nv).
     driving: Vec<f64>,
@@ -118,49 +117,33 @@ fn facing(ground: &dyn Ground, rule: ContactRule, disc: &Disc, reach: f64, out: 
     }
 }
 
-/// One of the motors of a torque, with its command, N m.
-fn drive(motor: &PlanarMotor, torque: f64) -> Drive {
-    Drive {
-        torque,
-        motor: Some(motor.motor),
-    }
+/// The motors of an input that have a torque–speed line, in a step.
+#[derive(Clone, Debug)]
+struct Driven {
+    input: usize,
+    motor: PlanarMotor,
+    /// One of them, with its command.
+    drive: Drive,
+    branch: MotorBranch,
 }
 
-/// Rates before and after a step with which the motors of input i turn, forward, rad/s.
-fn motor_rates(motor: &PlanarMotor, begin: &[f64], end: &[f64]) -> (f64, f64) {
-    let (k, sign) = (motor.coordinate, motor.gain.signum());
-    (sign * begin[k], sign * end[k])
+impl Driven {
+    /// Rate with which they turn forward, rad/s.
+    fn rate(&self, v: &[f64]) -> f64 {
+        self.motor.gain.signum() * v[self.motor.coordinate]
+    }
 }
 
 impl PlanarSystem<'_> {
     /// Mean torques of a step that ends with the iterate `v_end`, into `parts.torques`.
     fn set_torques(&mut self, start: &[f64], v_end: &[f64]) {
-        let parts = &mut *self.parts;
-        parts.torques.clear();
-        parts.torques.extend_from_slice(self.inputs);
-        for (i, (torque, branch)) in parts.torques.iter_mut().zip(&parts.motors).enumerate() {
-            if let Some(motor) = self.machine.motor(i) {
-                *torque = branch.torque(|| motor_rates(&motor, start, v_end));
-            }
-        }
-    }
-
-    /// `y = h F(q_m, v_mean)` with the torques of a step that ends with the iterate `v_end`.
-    fn impulse(
-        &mut self,
-        options: &StepOptions,
-        (start, v_end): (&[f64], &[f64]),
-        v_mean: &[f64],
-        y: &mut [f64],
-    ) {
-        self.set_torques(start, v_end);
         let PlanarScratch {
-            middle, torques, ..
+            torques, motors, ..
         } = &mut *self.parts;
-        let gravity = options.gravity.xy();
-        self.machine.force(middle, v_mean, &gravity, torques, y);
-        for y in y {
-            *y *= options.time_step;
+        torques.clear();
+        torques.extend_from_slice(self.inputs);
+        for own in motors {
+            torques[own.input] = (own.branch).torque(|| (own.rate(start), own.rate(v_end)));
         }
     }
 
@@ -260,23 +243,24 @@ impl MechanicalSystem for PlanarSystem<'_> {
         let parts = &mut *self.parts;
         parts.matrices.set_mass(self.machine, &parts.middle);
         let step = (options.time_step, options.theta);
-        for (i, branch) in parts.motors.iter_mut().enumerate() {
-            if let Some(motor) = self.machine.motor(i) {
-                let inertia = *parts.matrices.inertia(motor.coordinate) / motor.gain.abs();
-                let command = drive(&motor, 0.0);
-                branch.set_theta(step, (line_slope(Some(&command)), 0.0), inertia);
-            }
+        for Driven {
+            motor,
+            drive,
+            branch,
+            ..
+        } in &mut parts.motors
+        {
+            let inertia = *parts.matrices.inertia(motor.coordinate) / motor.gain.abs();
+            branch.set_theta(step, (line_slope(Some(drive)), 0.0), inertia);
         }
     }
 
     fn factorise(&mut self, options: &StepOptions) -> bool {
         let parts = &mut *self.parts;
-        for (i, branch) in parts.motors.iter().enumerate() {
-            if let Some(motor) = self.machine.motor(i) {
-                let damping = motor.gain.abs() * branch.damping();
-                let inertia = parts.matrices.inertia(motor.coordinate);
-                *inertia += options.time_step * branch.theta() * damping;
-            }
+        for Driven { motor, branch, .. } in &parts.motors {
+            let damping = motor.gain.abs() * branch.damping();
+            let inertia = parts.matrices.inertia(motor.coordinate);
+            *inertia += options.time_step * branch.theta() * damping;
         }
         parts.matrices.factorise()
     }
@@ -292,31 +276,34 @@ impl MechanicalSystem for PlanarSystem<'_> {
         v_mean: &[f64],
         y: &mut [f64],
     ) {
-        self.impulse(options, (start.v, start.v), v_mean, y);
+        self.load_at_end(options, start, start.v, v_mean, y);
     }
 
     fn choose_branches(&mut self, start: Start<'_, Vec<f64>>) {
-        let parts = &mut *self.parts;
-        parts
-            .motors
-            .resize(self.inputs.len(), MotorBranch::default());
-        for (i, (branch, torque)) in parts.motors.iter_mut().zip(self.inputs).enumerate() {
-            if let Some(motor) = self.machine.motor(i) {
-                let (rate, _) = motor_rates(&motor, start.v, start.v);
-                branch.choose(Some(&drive(&motor, *torque)), rate);
+        let motors = &mut self.parts.motors;
+        motors.clear();
+        for (input, &torque) in self.inputs.iter().enumerate() {
+            if let Some(motor) = self.machine.motor(input) {
+                let mut own = Driven {
+                    input,
+                    motor,
+                    drive: Drive {
+                        torque,
+                        motor: Some(motor.motor),
+                    },
+                    branch: MotorBranch::default(),
+                };
+                own.branch.choose(Some(&own.drive), own.rate(start.v));
+                motors.push(own);
             }
         }
     }
 
     fn revise(&mut self, start: Start<'_, Vec<f64>>, v_end: &[f64]) -> bool {
-        let parts = &mut *self.parts;
         let mut is_new = false;
-        for (i, (branch, torque)) in parts.motors.iter_mut().zip(self.inputs).enumerate() {
-            if let Some(motor) = self.machine.motor(i) {
-                let (begin, end) = motor_rates(&motor, start.v, v_end);
-                let command = drive(&motor, *torque);
-                is_new |= branch.revise(Some(&command), begin, end);
-            }
+        for own in &mut self.parts.motors {
+            let (begin, end) = (own.rate(start.v), own.rate(v_end));
+            is_new |= own.branch.revise(Some(&own.drive), begin, end);
         }
         is_new
     }
@@ -333,7 +320,15 @@ impl MechanicalSystem for PlanarSystem<'_> {
         v_mean: &[f64],
         y: &mut [f64],
     ) {
-        self.impulse(options, (start.v, v_end), v_mean, y);
+        self.set_torques(start.v, v_end);
+        let PlanarScratch {
+            middle, torques, ..
+        } = &mut *self.parts;
+        let gravity = options.gravity.xy();
+        self.machine.force(middle, v_mean, &gravity, torques, y);
+        for y in y {
+            *y *= options.time_step;
+        }
     }
 
     fn energy(
@@ -365,13 +360,11 @@ impl MechanicalSystem for PlanarSystem<'_> {
         let driving = parts.driving.iter().enumerate();
         let power: f64 = driving.map(|(k, f)| f * mean(k)).sum();
         let mut work = h * power;
-        for (i, &torque) in parts.torques.iter().enumerate() {
-            if let Some(motor) = self.machine.motor(i) {
-                let turned = h * motor.gain.signum() * mean(motor.coordinate);
-                let command = drive(&motor, self.inputs[i]);
-                let surplus = torque * turned - MotorBranch::work(Some(&command), torque, turned);
-                work -= motor.gain.abs() * surplus;
-            }
+        for own in &parts.motors {
+            let torque = parts.torques[own.input];
+            let turned = h * own.motor.gain.signum() * mean(own.motor.coordinate);
+            let surplus = torque * turned - MotorBranch::work(Some(&own.drive), torque, turned);
+            work -= own.motor.gain.abs() * surplus;
         }
         work
     }

@@ -214,6 +214,7 @@ impl SandContact {
                         Memory::default()
                     },
                     absorbed: patch.begin.absorbed,
+                    velocity: twist.linear.into(),
                     sinkage,
                     ..WheelInSand::default()
                 };
@@ -237,6 +238,7 @@ impl SandContact {
                 absorbed: patch.begin.absorbed - given,
                 force: [force[0], force[1], force[2]],
                 moment: [force[3], force[4], force[5]],
+                velocity: twist.linear.into(),
                 sinkage,
             };
         }

@@ -13,16 +13,16 @@ use crate::sand::{
 };
 
 /// Error of the linearised force of a wheel, relative to the force, at which it has settled.
-const SETTLED: f64 = 1e-2;
+const SETTLED: f64 = 2e-2;
 
 /// Displacement in units of the sand's memory, and change of the force relative to it, by which a
 /// solution may differ from where its force was linearised without a check.
-const UNTURNED: f64 = 2e-3;
+const UNTURNED: f64 = 5e-3;
 const UNCHANGED: f64 = 1e-2;
 
 /// Residual of a wheel's own problem, relative to the way from the last point, at which it is
 /// solved.
-const LOCALLY_SETTLED: f64 = 2e-3;
+const LOCALLY_SETTLED: f64 = 5e-3;
 
 /// Most evaluations of the force in a wheel's own problem.
 const MOST_EVALUATIONS: usize = 12;

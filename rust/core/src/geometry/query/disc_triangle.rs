@@ -185,11 +185,54 @@ fn slope(disc: &Disc, edge: &Edge, start: &Vector3<f64>, n: &Vector3<f64>) -> (f
     (edge.lean(n, &(point.point - start)), point)
 }
 
+/// The [slope] at normals `m = (1 − τ) n₁ + τ n₂` of any length: with the edge's direction e, the
+/// disc's axle s and the way d from the edge's start to its centre,
+/// `(m × e) · d + R ((m × e) · s) (m · s) / √(m² − (m · s)²)`.
+struct Slopes {
+    /// At τ = 0, and what is added at τ = 1: of `(m × e) · d`, `(m × e) · s` and `m · s`.
+    levels: [[f64; 2]; 3],
+    /// Of m², by powers of τ.
+    squares: [f64; 3],
+    radius: f64,
+}
+
+impl Slopes {
+    fn new(disc: &Disc, edge: &Edge, start: &Vector3<f64>, ends: &[Vector3<f64>; 2]) -> Self {
+        let [first, second] = ends;
+        let (change, d) = (second - first, disc.centre - start);
+        let [about_d, about_s] = [&d, &disc.axle].map(|x| edge.along.cross(x));
+        let level = |x: &Vector3<f64>| [first.dot(x), change.dot(x)];
+        Self {
+            levels: [level(&about_d), level(&about_s), level(&disc.axle)],
+            squares: [
+                first.norm_squared(),
+                2.0 * first.dot(&change),
+                change.norm_squared(),
+            ],
+            radius: disc.radius,
+        }
+    }
+
+    /// The slope, and the length of m.
+    #[inline]
+    fn at(&self, tau: f64) -> (f64, f64) {
+        let [beside, across, along] = self.levels.map(|[level, rise]| level + rise * tau);
+        let [one, two, three] = self.squares;
+        let square = one + tau * (two + tau * three);
+        let length = (square - along * along).max(f64::MIN_POSITIVE).sqrt();
+        (
+            beside + self.radius * across * along / length,
+            square.sqrt(),
+        )
+    }
+}
+
 /// The rim point over an edge, between normals where the slope is below and above zero.
 fn over_edge(disc: &Disc, edge: &Edge, start: &Vector3<f64>, bracket: &Bracket) -> SurfacePoint {
     let [first, second] = &bracket.ends;
+    let slopes = Slopes::new(disc, edge, start, &bracket.ends);
     let (mut a, mut fa, mut b, mut fb) = (0.0, bracket.low, 1.0, bracket.high);
-    let mut point = rim_point_over(disc, first, start, NEAREST);
+    let mut root = 0.0;
     for k in 0..MAX_ITERATIONS {
         // Illinois' rule keeps both ends moving; every third step halves.
         let secant = (a * fb - b * fa) / (fb - fa);
@@ -198,10 +241,10 @@ fn over_edge(disc: &Disc, edge: &Edge, start: &Vector3<f64>, bracket: &Bracket) 
         } else {
             secant
         };
-        let n = (first * (1.0 - tau) + second * tau).normalize();
-        let (f, at) = slope(disc, edge, start, &n);
-        point = at;
-        if f.abs() <= 1e-15 * disc.radius || b - a <= f64::EPSILON || !(tau > a && tau < b) {
+        let (f, length) = slopes.at(tau);
+        root = tau;
+        if f.abs() <= 2e-15 * disc.radius * length || b - a <= f64::EPSILON || !(tau > a && tau < b)
+        {
             break;
         }
         if f < 0.0 {
@@ -212,5 +255,6 @@ fn over_edge(disc: &Disc, edge: &Edge, start: &Vector3<f64>, bracket: &Bracket) 
             fa *= 0.5;
         }
     }
-    point
+    let n = (first * (1.0 - root) + second * root).normalize();
+    rim_point_over(disc, &n, start, NEAREST)
 }

@@ -33,7 +33,7 @@ pub use surface::{Edge, Face, Vertex};
 pub use union::Union;
 
 use super::ray::{Hit, Ray};
-use super::shape::Sphere;
+use super::shape::{Disc, Sphere};
 use crate::sand::test_bed::rules_within;
 use crate::sand::{Rules, SandWheel, Soil};
 
@@ -94,6 +94,20 @@ pub trait Terrain: Send + Sync {
                 visit(id, sphere);
             }
         });
+    }
+
+    /// Visits the pieces of a surface that a thin disc, with its centre in world coordinates, may
+    /// touch by a gap of up to `reach[0]` (m) while it moves by up to `reach[1]` (m): the way of its
+    /// centre, and the way of its axle's tip at 1.5 radii. Returns how far it may move indeed, which
+    /// may be less. Without motion it visits no others than with it from any earlier place. None if
+    /// this is not known; then what was visited means nothing.
+    fn visit_ahead(
+        &self,
+        _disc: &Disc,
+        _reach: [f64; 2],
+        _visit: &mut dyn FnMut(&Primitive),
+    ) -> Option<f64> {
+        None
     }
 
     /// The plane of all pieces of a surface within `radius` (m) of `centre`, seen from above, if

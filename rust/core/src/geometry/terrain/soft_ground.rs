@@ -50,6 +50,15 @@ impl SoftGround {
         })
     }
 
+    /// The same sand under another surface.
+    #[must_use]
+    pub fn under(&self, surface: Arc<dyn Terrain>) -> Self {
+        Self {
+            surface,
+            ..self.clone()
+        }
+    }
+
     /// The soil.
     #[must_use]
     pub fn soil(&self) -> &Arc<Soil> {

@@ -47,6 +47,13 @@ impl Wall {
         (self.normal.dot(x) >= self.offset) != self.is_open
     }
 
+    /// Normal, offset, and whether the side is the open one, where `normal · x < offset`.
+    #[inline]
+    #[must_use]
+    pub fn parts(&self) -> (&Vector3<f64>, f64, bool) {
+        (&self.normal, self.offset, self.is_open)
+    }
+
     /// How far a point (world, m) is beyond this side, m; negative on it.
     #[inline]
     #[must_use]
@@ -141,7 +148,7 @@ impl Edge {
 }
 
 /// How far a part may lean off an edge, in lengths of the edge.
-const LEAN: f64 = 0.2;
+pub const LEAN: f64 = 0.2;
 
 /// Cosine of the angle between the normals of a sharp edge.
 const SHARP: f64 = 0.2;

@@ -9,7 +9,7 @@ use super::error::TerrainError;
 use super::plane::Plane;
 use super::{Coverage, Neighbourhood, Primitive, SoftLayer, Terrain};
 use crate::geometry::ray::{Hit, Ray};
-use crate::geometry::shape::Sphere;
+use crate::geometry::shape::{Disc, Sphere};
 
 /// Everything that any of several terrains has. Immutable.
 ///
@@ -70,6 +70,13 @@ impl Union {
         let k = self.first.partition_point(|&first| first <= id) - 1;
         (&*self.parts[k], id - self.first[k])
     }
+
+    /// The part with a surface, if it is a single one.
+    fn only_surface(&self) -> Option<&dyn Terrain> {
+        let mut surfaces = self.parts.iter().filter(|part| part.has_surface());
+        let only = surfaces.next().filter(|_| surfaces.next().is_none())?;
+        Some(&**only)
+    }
 }
 
 impl Terrain for Union {
@@ -103,10 +110,17 @@ impl Terrain for Union {
         }
     }
 
+    fn visit_ahead(
+        &self,
+        disc: &Disc,
+        reach: [f64; 2],
+        visit: &mut dyn FnMut(&Primitive),
+    ) -> Option<f64> {
+        self.only_surface()?.visit_ahead(disc, reach, visit)
+    }
+
     fn level_near(&self, centre: &Vector3<f64>, radius: f64) -> Option<Plane> {
-        let mut surfaces = self.parts.iter().filter(|part| part.has_surface());
-        let only = surfaces.next().filter(|_| surfaces.next().is_none())?;
-        only.level_near(centre, radius)
+        self.only_surface()?.level_near(centre, radius)
     }
 
     fn can_be_passed(&self) -> bool {

@@ -10,39 +10,27 @@
 //! it sticks, it leaves the cone at once. Such a contact is barred, so that another one changes its
 //! mode. If none is left, its slip has changed its sign, and its friction is reversed.
 
-use super::modes::{Law, Mode, Triple, Violations, is_pressed_to_slide, judge, limit};
-use super::system::{Many, Store, System};
-use super::visits::{Visits, weight};
-use crate::law::coulomb::ContactMode;
+use super::modes::{
+    Law, Mode, Triple, Violations, is_pressed_to_slide, judge, limit, return_to_cone,
+};
+use super::store::{Many, Store};
+use super::system::System;
+use super::visits::Visits;
 use crate::problem::Residual;
 use crate::scalar::{Lane, LaneMask, Single};
 
 /// Squared relative residual below which a rover without a slide counts as parked.
 const PARKED: f64 = 1e-12;
 
-/// Factor by which `α` shrinks when a full step with the right modes gains nothing.
-const SHRINK: f64 = 1e-3;
-
-/// Share of the squared residual that a full step must leave, if it gains nothing, and if it gains
-/// so much that the modes stay.
-pub(crate) const NO_GAIN: f64 = 0.25;
-const HOLD: f64 = 1e-4;
-
 /// Fraction of a step below which the impulse stays where it was.
 const NO_MOVE: f64 = 1e-6;
 
 /// Contacts that block at the same place, or contradict their modes as much, to this share, change
 /// together: in a machine that is its own mirror image one of a pair must not go first.
-const ALIKE: f64 = 1.0 - 1e-6;
-
-/// Steps without progress after which the modes go in circles.
-const PATIENCE: f64 = 4.0;
+pub(super) const ALIKE: f64 = 1.0 - 1e-6;
 
 /// Most reversals of friction.
 const REVERSALS: f64 = 2.0;
-
-/// Impulses that stick may leave the cone by this share, which is rounding.
-const BEYOND: f64 = 1.0 + 1e-12;
 
 /// Share of the squared residual that a correction leaves if another one follows.
 const GAIN: f64 = 0.1;
@@ -57,7 +45,7 @@ pub(crate) struct Pivoting<T: Lane, B: Store> {
     pub(crate) p: B::Of<Triple<T>>,
     pub(crate) u: B::Of<Triple<T>>,
     /// Violations of the law by them.
-    sums: Violations<T>,
+    pub(super) sums: Violations<T>,
     /// Lanes whose modes go in circles, or whose system has no factors.
     pub(crate) lost: T::Mask,
     /// Squares of `1/|q|` and `1/|(ρ_i q_i)|`.
@@ -67,26 +55,26 @@ pub(crate) struct Pivoting<T: Lane, B: Store> {
     pub(crate) asked: T,
     /// Impulses that a step stays near, where the system [returns](System::RETURNS) to them.
     pub(crate) centre: B::Of<Triple<T>>,
-    alpha: T,
-    first_alpha: T,
-    trial: B::Of<Triple<T>>,
+    pub(super) alpha: T,
+    pub(super) first_alpha: T,
+    pub(super) trial: B::Of<Triple<T>>,
     /// Velocities of the trial.
-    renewed: B::Of<Triple<T>>,
-    modes: B::Of<Mode<T>>,
-    closed: B::Of<T::Mask>,
-    sticks: B::Of<T::Mask>,
-    barred: B::Of<T::Mask>,
+    pub(super) renewed: B::Of<Triple<T>>,
+    pub(super) modes: B::Of<Mode<T>>,
+    pub(super) closed: B::Of<T::Mask>,
+    pub(super) sticks: B::Of<T::Mask>,
+    pub(super) barred: B::Of<T::Mask>,
     /// The contacts that have just been let stick.
-    freed: B::Of<T::Mask>,
+    pub(super) freed: B::Of<T::Mask>,
     /// Fraction of the step at which each contact blocks; how much it contradicts its mode.
-    fractions: B::Of<T>,
-    contradictions: B::Of<T>,
+    pub(super) fractions: B::Of<T>,
+    pub(super) contradictions: B::Of<T>,
     /// Lanes whose last step was a full one.
-    full: T::Mask,
+    pub(super) full: T::Mask,
     /// Squared relative residual after the full step before the last.
-    last: T,
-    visits: Visits<T>,
-    reversals: T,
+    pub(super) last: T,
+    pub(super) visits: Visits<T>,
+    pub(super) reversals: T,
 }
 
 impl<T: Lane> Pivoting<T, Many> {
@@ -159,7 +147,7 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
 
     /// Squares of the two numbers of the residual.
     #[inline(always)]
-    fn residual(&self) -> [T; 2] {
+    pub(super) fn residual(&self) -> [T; 2] {
         let speed = self.sums.squares * self.inverses[0];
         let impulse = self.sums.weighted * self.inverses[1];
         [speed.max(impulse), self.sums.largest]
@@ -271,7 +259,7 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
 
     /// `u = W p + q` in the lanes of a mask.
     #[inline(always)]
-    fn renew_velocities<S: System<T, B>>(&mut self, system: &mut S, lanes: T::Mask) {
+    pub(super) fn renew_velocities<S: System<T, B>>(&mut self, system: &mut S, lanes: T::Mask) {
         system.velocities(&self.p, &mut self.trial);
         select::<T, B>(system.places(), lanes, &self.trial, &mut self.u);
     }
@@ -288,7 +276,7 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
             return;
         }
         let centre = if S::RETURNS { &self.centre } else { &self.p };
-        system.newton_point(&self.u, centre, self.alpha, &self.modes, &mut self.trial);
+        newton_point::<T, B, S>(system, centre, self.alpha, &self.modes, &mut self.trial);
         let fine = active & self.alpha.lt(one.like(S::SMALLEST_ALPHA) * self.mean);
         if S::SMALLEST_ALPHA_AGAIN < S::SMALLEST_ALPHA && fine.any() {
             self.improve_trial(system, fine);
@@ -327,8 +315,8 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
     #[inline(always)]
     fn improve_trial<S: System<T, B>>(&mut self, system: &mut S, lanes: T::Mask) {
         let left = self.left_by_trial(system);
-        let mut change = left.clone();
-        system.correction(&left, &self.modes, &mut change);
+        let mut change = left;
+        correction::<T, B, S>(system, &self.modes, &mut change);
         for i in system.places() {
             for k in 0..3 {
                 let improved = self.trial[i][k] + change[i][k];
@@ -361,7 +349,7 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
 
     /// Violations by the present impulses.
     #[inline(always)]
-    fn judge(&mut self, places: impl Iterator<Item = usize>) {
+    pub(super) fn judge(&mut self, places: impl Iterator<Item = usize>) {
         self.sums = judge::<T, B>(places, &self.laws, &self.p, &self.u, self.mean.like(0.0));
     }
 
@@ -387,7 +375,10 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
     fn refine<S: System<T, B>>(&mut self, system: &mut S, lanes: T::Mask) {
         let zero = self.mean.like(0.0);
         self.find_modes(system.places());
-        system.correction(&self.u, &self.modes, &mut self.trial);
+        for i in system.places() {
+            self.trial[i] = self.u[i];
+        }
+        correction::<T, B, S>(system, &self.modes, &mut self.trial);
         for i in system.places() {
             let trial = &mut self.trial[i];
             for (trial, p) in trial.iter_mut().zip(self.p[i]) {
@@ -435,165 +426,40 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
             }
         }
     }
+}
 
-    /// The next modes of the lanes of a mask, where the last step was a full one and did not solve.
-    #[inline(always)]
-    fn correct<S: System<T, B>>(&mut self, system: &mut S, active: T::Mask) {
-        let full = self.full & active;
-        if !full.any() {
-            return;
-        }
-        let like = self.mean;
-        let zero = like.like(0.0);
-        let [relative, _] = self.residual();
-        let gain = relative / self.last;
-        self.last = T::select(full, relative, self.last);
-        let gains_nothing = full & like.like(NO_GAIN).lt(gain);
-        let number = self.number(system.places());
-        self.visits.enter(full, number, relative);
-        let looks = full & !gain.lt(like.like(HOLD));
-        if !looks.any() {
-            return;
-        }
-        let worst = self.worst_contradiction(system.places(), looks);
-        // With the right modes nothing but α is left in the way.
-        let is_settled = gains_nothing & looks & !zero.lt(worst);
-        let (least, again) = (S::SMALLEST_ALPHA, S::SMALLEST_ALPHA_AGAIN);
-        let least = T::select(zero.lt(self.asked), like.like(again), like.like(least)) * self.mean;
-        let smaller = (like.like(SHRINK) * self.alpha).max(least);
-        self.alpha = T::select(is_settled, smaller, self.alpha);
-        let circles = looks & like.like(PATIENCE).lt(self.visits.idle);
-        let stuck = circles | is_settled;
-        let reversed = if stuck.any() {
-            self.reverse(system.places(), stuck)
-        } else {
-            stuck
-        };
-        self.lost = self.lost | (circles & !reversed);
-        let mut moved = reversed;
-        let found = zero.lt(worst) & !reversed;
-        let least = worst * zero.like(ALIKE);
-        for i in system.places() {
-            let here = found & least.le(self.contradictions[i]);
-            self.freed[i] = here;
-            if here.any() {
-                moved = moved | self.change_mode(system, i, here);
-            }
-        }
-        if moved.any() {
-            self.renew_velocities(system, moved);
-        }
-        if reversed.any() {
-            self.judge(system.places());
-            let [relative, _] = self.residual();
-            self.last = T::select(reversed, relative, self.last);
+/// The impulses of the Newton step about the impulses `centre`, into `y`.
+#[inline(always)]
+fn newton_point<T: Lane, B: Store, S: System<T, B>>(
+    system: &mut S,
+    centre: &B::Of<Triple<T>>,
+    alpha: T,
+    modes: &B::Of<Mode<T>>,
+    y: &mut B::Of<Triple<T>>,
+) {
+    for i in system.places() {
+        let (c, q) = (&centre[i], system.free_velocity(i));
+        for k in 0..3 {
+            y[i][k] = alpha * c[k] - q[k];
         }
     }
+    system.solve(modes, y);
+}
 
-    /// The modes as a number that is not zero.
-    #[inline(always)]
-    fn number(&self, places: impl Iterator<Item = usize>) -> T {
-        let one = self.mean.like(1.0);
-        let (zero, two) = (one.like(0.0), one.like(2.0));
-        let mut number = one;
-        for i in places {
-            let digit = T::select(self.closed[i], T::select(self.sticks[i], one, two), zero);
-            number += digit * one.like(weight(i));
-        }
-        number
-    }
-
-    /// How much the contacts contradict their modes, unless they are barred, in the lanes of a
-    /// mask; returns the largest amount, zero where none does.
-    #[inline(always)]
-    fn worst_contradiction(&mut self, places: impl Iterator<Item = usize>, lanes: T::Mask) -> T {
-        let zero = self.mean.like(0.0);
-        let mut worst = zero;
-        for i in places {
-            let (p, u, mu) = (&self.p[i], &self.u[i], self.laws[i].mu);
-            let norm = (p[1] * p[1] + p[2] * p[2]).sqrt();
-            let beyond = zero.lt(p[0]) & (mu * p[0] * zero.like(BEYOND)).lt(norm);
-            let of_stick = T::select(beyond | p[0].lt(zero), zero.like(f64::INFINITY), zero);
-            // Friction that pushes along the slip.
-            let along = (p[1] * u[1] + p[2] * u[2]) / norm;
-            let of_slide = T::select(zero.lt(norm), along, zero);
-            let amount = T::select(self.sticks[i], of_stick, of_slide);
-            let amount = T::select(self.closed[i], amount, -u[0]);
-            let amount = T::select(lanes & !self.barred[i], amount, zero);
-            self.contradictions[i] = amount;
-            worst = amount.max(worst);
-        }
-        worst
-    }
-
-    /// Turns the friction of barred contacts against their slip and frees them, in the lanes of a
-    /// mask. Returns where there was one.
-    #[inline(always)]
-    fn reverse(&mut self, places: impl Iterator<Item = usize>, stuck: T::Mask) -> T::Mask {
-        let zero = self.mean.like(0.0);
-        let may = stuck & zero.lt(self.reversals);
-        let mut reversed = !stuck & stuck;
-        for i in places {
-            let (p, u, mu) = (&mut self.p[i], &self.u[i], self.laws[i].mu);
-            let slip = (u[1] * u[1] + u[2] * u[2]).sqrt();
-            let here = may & self.barred[i] & zero.lt(slip);
-            reversed = reversed | here;
-            self.barred[i] = self.barred[i] & !here;
-            let scale = -(mu * p[0].max(zero)) / slip;
-            p[1] = T::select(here, scale * u[1], p[1]);
-            p[2] = T::select(here, scale * u[2], p[2]);
-        }
-        let left = self.reversals - zero.like(1.0);
-        self.reversals = T::select(reversed, left, self.reversals);
-        self.alpha = T::select(reversed, self.first_alpha, self.alpha);
-        self.visits.forget(reversed);
-        reversed
-    }
-
-    /// Gives contact `i` the mode that its contradiction asks for, in the lanes of a mask. Returns
-    /// where its impulse moved.
-    #[inline(always)]
-    fn change_mode<S: System<T, B>>(&mut self, system: &S, i: usize, lanes: T::Mask) -> T::Mask {
-        let zero = self.mean.like(0.0);
-        let p = &mut self.p[i];
-        let (closed, stuck) = (
-            lanes & self.closed[i],
-            lanes & self.sticks[i] & self.closed[i],
-        );
-        let opens = stuck & p[0].lt(zero);
-        let slides = stuck & !opens;
-        let closes = lanes & !closed;
-        return_to_cone::<T>(slides, self.laws[i].mu, p);
-        for p in p {
-            *p = T::select(opens, zero, *p);
-        }
-        self.closed[i] = (self.closed[i] & !opens) | closes;
-        self.sticks[i] = (self.sticks[i] & !stuck) | (closed & !stuck);
-        let mut bits = closes.bits();
-        while bits != 0 {
-            self.close(system, i, bits.trailing_zeros() as usize);
-            bits &= bits - 1;
-        }
-        opens | slides | closes
-    }
-
-    /// Closes contact `i` of a lane with its own solution, all others fixed, since it may slide at
-    /// once.
-    #[inline(always)]
-    fn close<S: System<T, B>>(&mut self, system: &S, i: usize, lane: usize) {
-        // Its impulse is zero, so that u is its free velocity.
-        let free = self.u[i].map(|u| u.get(lane));
-        let mu = self.laws[i].mu.get(lane);
-        let (mode, impulse) = system.solve_one(i, lane, &free, mu);
-        for (p, own) in self.p[i].iter_mut().zip(impulse) {
-            p.set(lane, own);
-        }
-        let here = T::mask(self.mean.token(), 1 << lane);
-        self.sticks[i] = self.sticks[i] & !here;
-        if mode == ContactMode::Stick {
-            self.sticks[i] = self.sticks[i] | here;
+/// The change of the impulses that removes the velocities `u` as far as the modes allow, in their
+/// place.
+#[inline(always)]
+fn correction<T: Lane, B: Store, S: System<T, B>>(
+    system: &mut S,
+    modes: &B::Of<Mode<T>>,
+    u: &mut B::Of<Triple<T>>,
+) {
+    for i in system.places() {
+        for u in &mut u[i] {
+            *u = -*u;
         }
     }
+    system.solve(modes, u);
 }
 
 /// `new` in the lanes of a mask, `old` elsewhere.
@@ -617,20 +483,6 @@ fn select<T: Lane, B: Store>(
     }
 }
 
-/// Scales the tangential impulse to `μ p_N` in the lanes of a mask.
-#[inline(always)]
-fn return_to_cone<T: Lane>(lanes: T::Mask, mu: T, p: &mut Triple<T>) {
-    if !lanes.any() {
-        return;
-    }
-    let zero = mu.like(0.0);
-    let norm = (p[1] * p[1] + p[2] * p[2]).sqrt();
-    let scale = T::select(zero.lt(norm), mu * p[0].max(zero) / norm, zero);
-    for p in &mut p[1..] {
-        *p = T::select(lanes, *p * scale, *p);
-    }
-}
-
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
@@ -646,7 +498,7 @@ pub(crate) mod tests {
         let mut own = Pivoting::<f64, B>::new(Single::Baseline);
         (own.alpha, own.modes, own.centre) = (alpha, modes, centre);
         assert!(S::RETURNS && system.factorise(alpha, &own.modes));
-        system.newton_point(&own.u, &own.centre, alpha, &own.modes, &mut own.trial);
+        newton_point::<f64, B, S>(system, &own.centre, alpha, &own.modes, &mut own.trial);
         let entries = |x: Triple<f64>| x.into_iter().map(f64::abs);
         let is_small = |x: f64| x < 1e2;
         if !(system.places()).all(|i| entries(own.trial[i]).all(is_small)) {

@@ -1,7 +1,7 @@
 //! Pivoting on the contact modes: from a warm start, one contact at a time changes its mode.
 //!
-//! The source is generic over the scalar ([`Lane`](crate::scalar::Lane)), the [storage](Store) and
-//! the [linear systems](System). `crate::lanes` runs it with fixed arrays on one, four or eight
+//! The source is generic over the scalar ([`Lane`](crate::scalar::Lane)), the storage
+//! (`store`) and the [linear systems](System). `crate::lanes` runs it with fixed arrays on one, four or eight
 //! problems side by side; the stage `pivoting` runs it on one problem with any number of contacts.
 //!
 //! Full Newton steps change all modes at once and cycle if W is rank deficient: six wheels in a
@@ -11,22 +11,26 @@
 //! system is solved. This is the ratio test of a primal active-set method. It may fail for the
 //! nonassociated law; then the caller continues.
 //!
-//! - `iteration`: the steps, and the rules by which contacts change their modes;
+//! - `iteration`: the steps; `mode_changes`: how contacts change their modes after a full one;
 //! - `modes`: the equations of a mode, the violation of the law, and the way to a cone's limit;
 //! - `visits`: which modes a solve has tried;
-//! - `system`: what pivoting needs of a problem, and where it keeps the numbers of the contacts.
+//! - `system`: what pivoting needs of its problems; `store`: where it keeps the contacts' numbers.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 mod iteration;
+mod mode_changes;
 mod modes;
+mod store;
 mod system;
 mod visits;
 
+pub(crate) use iteration::Pivoting;
 #[cfg(test)]
 pub(crate) use iteration::tests::rests;
-pub(crate) use iteration::{NO_GAIN, Pivoting};
+pub(crate) use mode_changes::NO_GAIN;
 pub(crate) use modes::{Mode, Triple};
-pub(crate) use system::{Few, Many, System};
+pub(crate) use store::{Few, Many};
+pub(crate) use system::System;
 
 /// Initial `α` of further attempts from the same start. With a large one each system is a short
 /// step of the proximal point method: modes that decide themselves by a slip of 1e-6 m/s change one

@@ -1,7 +1,7 @@
 //! Modes of the contacts side by side, and their violation of the law, which is measured by the
 //! projection of `z = p − ρ u` (Alart and Curnier 1991).
 
-use super::system::Store;
+use super::store::Store;
 use crate::problem::ContactScales;
 use crate::scalar::{Lane, LaneMask};
 
@@ -281,4 +281,18 @@ fn way_to_the_limit<T: Lane>(mu: T, p: &Triple<T>, trial: &Triple<T>) -> T {
     let second = T::select(zero.le(second), second, one);
     let inside = first.min(second).min(one);
     T::select(zero.le(c), T::select(ahead, zero, one), inside)
+}
+
+/// Scales the tangential impulse to `μ p_N` in the lanes of a mask.
+#[inline(always)]
+pub(super) fn return_to_cone<T: Lane>(lanes: T::Mask, mu: T, p: &mut Triple<T>) {
+    if !lanes.any() {
+        return;
+    }
+    let zero = mu.like(0.0);
+    let norm = (p[1] * p[1] + p[2] * p[2]).sqrt();
+    let scale = T::select(zero.lt(norm), mu * p[0].max(zero) / norm, zero);
+    for p in &mut p[1..] {
+        *p = T::select(lanes, *p * scale, *p);
+    }
 }

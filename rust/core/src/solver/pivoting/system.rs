@@ -1,45 +1,9 @@
 //! What pivoting needs of its problems.
 
-use std::fmt::Debug;
-use std::ops::IndexMut;
-
 use super::modes::{Mode, Triple};
+use super::store::Store;
 use crate::law::coulomb::ContactMode;
 use crate::scalar::Lane;
-
-/// Storage of something by contact.
-pub(crate) trait Store: Clone + Debug + 'static {
-    /// One `X` a contact.
-    type Of<X: Copy + Debug>: IndexMut<usize, Output = X> + Clone + Debug;
-
-    /// The same for every contact that there is room for.
-    fn filled<X: Copy + Debug>(x: X) -> Self::Of<X>;
-}
-
-/// At most `C` contacts.
-#[derive(Clone, Debug)]
-pub(crate) struct Few<const C: usize>;
-
-impl<const C: usize> Store for Few<C> {
-    type Of<X: Copy + Debug> = [X; C];
-
-    #[inline(always)]
-    fn filled<X: Copy + Debug>(x: X) -> [X; C] {
-        [x; C]
-    }
-}
-
-/// Any number of contacts; without room to begin with.
-#[derive(Clone, Debug)]
-pub(crate) struct Many;
-
-impl Store for Many {
-    type Of<X: Copy + Debug> = Vec<X>;
-
-    fn filled<X: Copy + Debug>(_: X) -> Vec<X> {
-        Vec::new()
-    }
-}
 
 /// Problems `u = W p + q`, one a lane, and the linear systems of their modes.
 pub(crate) trait System<T: Lane, B: Store> {
@@ -55,10 +19,10 @@ pub(crate) trait System<T: Lane, B: Store> {
     /// The same for a parked rover.
     const PARKED_ALPHA: f64 = 1e-6;
 
-    /// Smallest `α`, relative to the mean diagonal of `W`, for which the systems are accurate. Wheels
-    /// squeezed to the limit of friction slip at 1e-11 m/s, and the turning stiffness of such a slide
-    /// is as small as `α`. Of 749 recorded steps over rocks at 1 ms none was solved with `α` above
-    /// 1e-10, and nearly all within some ten systems with smaller ones.
+    /// Smallest `α`, relative to the mean diagonal of `W`, for which the systems are accurate.
+    /// Wheels squeezed to the limit of friction slip at 1e-11 m/s, and the turning stiffness of
+    /// such a slide is as small as `α`. Of 749 recorded steps over rocks at 1 ms none was solved
+    /// with `α` above 1e-10, and nearly all within some ten systems with smaller ones.
     const SMALLEST_ALPHA: f64 = 1e-14;
 
     /// Smallest `α` of further attempts. Below [`Self::SMALLEST_ALPHA`] a Newton point is corrected
@@ -80,31 +44,18 @@ pub(crate) trait System<T: Lane, B: Store> {
     /// Places of contacts of any lane.
     fn places(&self) -> Self::Places;
 
+    /// Free velocity `q` of a place, m/s.
+    fn free_velocity(&self, place: usize) -> Triple<T>;
+
     /// `u = W p + q`.
     fn velocities(&mut self, p: &B::Of<Triple<T>>, u: &mut B::Of<Triple<T>>);
 
     /// Factors the systems of the modes; false if one is singular or costs too much.
     fn factorise(&mut self, alpha: T, modes: &B::Of<Mode<T>>) -> bool;
 
-    /// The impulses of the Newton step about the impulses `centre`, into `y`. `u`: the velocities of
-    /// the present impulses.
-    fn newton_point(
-        &mut self,
-        u: &B::Of<Triple<T>>,
-        centre: &B::Of<Triple<T>>,
-        alpha: T,
-        modes: &B::Of<Mode<T>>,
-        y: &mut B::Of<Triple<T>>,
-    );
-
-    /// The change of the impulses, into `y`, that removes the velocities `u` as far as the modes
-    /// allow; the factors may be those of modes at nearby impulses.
-    fn correction(
-        &mut self,
-        u: &B::Of<Triple<T>>,
-        modes: &B::Of<Mode<T>>,
-        y: &mut B::Of<Triple<T>>,
-    );
+    /// Solves `Bᵀ (W + α I) C y + γ y = Bᵀ r` with the last factors, which may be those of modes at
+    /// nearby impulses. The velocities `r` become the impulses `C y`.
+    fn solve(&mut self, modes: &B::Of<Mode<T>>, r: &mut B::Of<Triple<T>>);
 
     /// Mode and impulse of the contact at a place of a lane, all others fixed, from its velocity
     /// `free` without this impulse.

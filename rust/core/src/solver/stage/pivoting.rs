@@ -38,6 +38,8 @@ struct PreparedSystem<'a, const D: usize> {
     u: &'a mut [f64],
     prediction: Prediction,
     factors: Factors,
+    /// Whether the factors have not solved yet: their first solution is paid with them.
+    is_fresh: bool,
 }
 
 /// Writes the first `D` entries of each contact one after the other.
@@ -77,20 +79,6 @@ impl<const D: usize> PreparedSystem<'_, D> {
         self.prediction = prediction;
     }
 
-    /// The Newton point from impulses about a centre, both `p`, into `y`.
-    fn solve(&mut self, alpha: f64, y: &mut [Triple<f64>]) {
-        let step = NewtonStep {
-            alpha,
-            m: self.prediction.m,
-            factors: self.factors,
-            on_cone: false,
-        };
-        self.reduced.centre.copy_from_slice(self.p);
-        self.reduced
-            .newton_point::<D>(self.data, step, self.p, self.u);
-        scatter::<D>(&self.reduced.trial, y);
-    }
-
     /// Writes impulses and velocities to the slices.
     fn show(&mut self, pivoting: &Pivoting<f64, Many>) {
         gather::<D>(&pivoting.p, self.p);
@@ -114,6 +102,11 @@ impl<const D: usize> System<f64, Many> for PreparedSystem<'_, D> {
         0..self.data.mu.len()
     }
 
+    fn free_velocity(&self, place: usize) -> Triple<f64> {
+        let q = &self.data.q[D * place..][..D];
+        std::array::from_fn(|k| q.get(k).copied().unwrap_or(0.0))
+    }
+
     fn velocities(&mut self, p: &Vec<Triple<f64>>, u: &mut Vec<Triple<f64>>) {
         gather::<D>(p, self.p);
         self.data.W.multiply_add(self.p, self.data.q, self.u);
@@ -125,36 +118,33 @@ impl<const D: usize> System<f64, Many> for PreparedSystem<'_, D> {
         self.factors =
             self.reduced
                 .factorise::<D>(self.data, alpha, self.prediction, true, self.work);
+        self.is_fresh = true;
         self.factors != Factors::None || self.prediction.m == 0
     }
 
-    fn newton_point(
-        &mut self,
-        u: &Vec<Triple<f64>>,
-        centre: &Vec<Triple<f64>>,
-        alpha: f64,
-        _: &Vec<Mode<f64>>,
-        y: &mut Vec<Triple<f64>>,
-    ) {
-        gather::<D>(centre, self.p);
-        gather::<D>(u, self.u);
-        self.solve(alpha, y);
-    }
-
-    fn correction(
-        &mut self,
-        u: &Vec<Triple<f64>>,
-        modes: &Vec<Mode<f64>>,
-        y: &mut Vec<Triple<f64>>,
-    ) {
-        if !self.work.affords(2 * self.data.product) {
-            y.fill([0.0; 3]);
+    fn solve(&mut self, modes: &Vec<Mode<f64>>, r: &mut Vec<Triple<f64>>) {
+        let is_paid = std::mem::take(&mut self.is_fresh);
+        if !is_paid && !self.work.affords(2 * self.data.product) {
+            r.fill([0.0; 3]);
             return;
         }
+        // Newton's step from impulses and about a centre of zero, where the velocities are −r.
         self.linearise(modes);
+        gather::<D>(r, self.u);
+        for u in &mut *self.u {
+            *u = -*u;
+        }
         self.p.fill(0.0);
-        gather::<D>(u, self.u);
-        self.solve(0.0, y);
+        self.reduced.centre.fill(0.0);
+        let step = NewtonStep {
+            alpha: 0.0,
+            m: self.prediction.m,
+            factors: self.factors,
+            on_cone: false,
+        };
+        self.reduced
+            .newton_point::<D>(self.data, step, self.p, self.u);
+        scatter::<D>(&self.reduced.trial, r);
     }
 
     fn solve_one(
@@ -210,6 +200,7 @@ pub(in crate::solver) fn pivots<const D: usize>(
         u,
         prediction: Prediction::default(),
         factors: Factors::None,
+        is_fresh: false,
     };
     let tolerances = [options.tolerance, options.velocity_tolerance].map(|x| x * x);
     let most = MAX_PIVOTS.max(data.mu.len()).min(options.max_newton_steps);

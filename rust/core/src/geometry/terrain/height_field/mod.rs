@@ -10,6 +10,7 @@
 //! along z, 4 the diagonal, 5 the vertex. Faces are computed when they are needed, so the map costs
 //! four bytes a height, and a hundredth of that for the bounds of tiles.
 
+mod ahead;
 mod neighbourhood;
 mod pieces;
 mod terrain;

@@ -26,7 +26,7 @@ const MOST_CELLS: usize = 48;
 /// Slope up to which a lowest point is off its face, seen from above, by so many gaps at most. The
 /// normals lean by 45 degrees then, and walls by as much from their face's: sin 45° + tan 45°.
 const GENTLE: f64 = 1.0;
-const OFF: f64 = 1.75;
+pub(super) const OFF: f64 = 1.75;
 
 /// How deep a disc must be to touch a piece beside it, in the distance between them: walls that
 /// lean move the point by less than [`OFF`] depths, and an edge has points beyond its ends that are
@@ -42,7 +42,7 @@ const STANDS: f64 = 0.4;
 const UNSHARP: f64 = 1.64;
 
 /// Covers the rounding of places, m.
-const ROUNDING: f64 = 1e-6;
+pub(super) const ROUNDING: f64 = 1e-6;
 
 impl HeightField {
     /// The pieces that a part may touch: [`Terrain::visit_around`](super::super::Terrain).
@@ -303,7 +303,7 @@ impl HeightField {
     /// disc is about as deep in the ground. `rises`: heights of the cell's corners over the first,
     /// m.
     #[inline]
-    fn beside(&self, disc: &Disc, from: &Vector3<f64>, rises: [f64; 4]) -> f64 {
+    pub(super) fn beside(&self, disc: &Disc, from: &Vector3<f64>, rises: [f64; 4]) -> f64 {
         let (s, [dx, dz]) = (&disc.axle, self.spacing);
         let (x, z) = (s.x * dx, s.z * dz);
         let (mut nearest, mut furthest) = (f64::INFINITY, f64::NEG_INFINITY);

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::{Half, HeightField, PIECES, index, narrow, number};
 use crate::geometry::ray::{self, Hit, Ray};
-use crate::geometry::shape::Sphere;
+use crate::geometry::shape::{Disc, Sphere};
 use crate::geometry::terrain::{Coverage, GROUND, Neighbourhood, Plane, Primitive, Terrain};
 
 impl Terrain for HeightField {
@@ -23,6 +23,15 @@ impl Terrain for HeightField {
 
     fn visit_around(&self, part: &Neighbourhood<'_>, visit: &mut dyn FnMut(u32, &Primitive)) {
         self.visit_pieces_around(part, visit);
+    }
+
+    fn visit_ahead(
+        &self,
+        disc: &Disc,
+        reach: [f64; 2],
+        visit: &mut dyn FnMut(&Primitive),
+    ) -> Option<f64> {
+        self.visit_pieces_ahead(disc, reach, visit)
     }
 
     fn level_near(&self, centre: &Vector3<f64>, radius: f64) -> Option<Plane> {

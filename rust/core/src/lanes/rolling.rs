@@ -1,0 +1,72 @@
+//! Contacts of thin wheels with the faces of a surface, all lanes at once: [`super::pieces`].
+
+use super::contacts::{Contacts, Sight};
+use super::ground::Ground;
+use super::pieces::{LanePlane, Rim};
+use crate::contact::ways_out::SHALLOW;
+use crate::scalar::{Lane, LaneMask, Vec3};
+
+impl<T: Lane> Contacts<T> {
+    /// Adds the contacts of a wheel with faces at the midpoint, in some lanes; it has the axle `s`
+    /// and the centre `centre` there. Returns the lanes where they must be found lane by lane.
+    #[inline(always)]
+    pub(super) fn look_at_pieces(
+        &mut self,
+        (w, lanes): (usize, T::Mask),
+        ground: &mut Ground<T>,
+        sight: &Sight<'_, T>,
+        (s, centre): (Vec3<T>, Vec3<T>),
+        reach: T,
+    ) -> T::Mask {
+        let origin = sight.middle.origin;
+        let (radius, first) = (
+            self.parts.wheels[w].radius,
+            self.parts.wheels[w].slots.start,
+        );
+        let rim = Rim {
+            centre: origin + centre,
+            axle: s,
+            radius,
+            reach,
+        };
+        let pieces = ground.find_pieces(w, lanes, &rim);
+        let Some((pieces, known)) = pieces else {
+            return lanes;
+        };
+        let mut rest = (lanes & !known) | (known & pieces.may_touch_others(&rim));
+        let shallow = reach.like(-SHALLOW * radius);
+        for face in pieces.faces() {
+            let plane = (face.plane.normal, face.plane.height(origin));
+            let stand = self.stands((w, 0), plane, sight, (s, centre), reach);
+            let near = lanes & stand.gap.le(reach);
+            if !near.any() {
+                continue;
+            }
+            let across = face.plane.normal.cross(s);
+            let t = across * (reach.like(1.0) / across.norm());
+            let low = rim.centre + t.cross(s) * reach.like(radius);
+            let over = near & face.admits(low);
+            rest = rest | (over & stand.gap.lt(shallow));
+            rest = rest | self.enter_on_plane(first, over & stand.admitted, &face.plane);
+        }
+        rest
+    }
+
+    /// Enters a contact with a plane into the first free one of a wheel's slots. Returns where none
+    /// is.
+    #[inline(always)]
+    fn enter_on_plane(&mut self, first: usize, admitted: T::Mask, plane: &LanePlane<T>) -> T::Mask {
+        let end = self.parts.wheels[self.part_of[first]].slots.end;
+        let mut rest = admitted;
+        for slot in &mut self.slots[first..end] {
+            let here = rest & !slot.active;
+            rest = rest & slot.active;
+            if here.any() {
+                slot.active = slot.active | here;
+                slot.plane.normal = Vec3::select(here, plane.normal, slot.plane.normal);
+                slot.plane.offset = T::select(here, plane.offset, slot.plane.offset);
+            }
+        }
+        rest
+    }
+}
