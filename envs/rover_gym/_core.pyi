@@ -56,6 +56,7 @@ __all__ = [
     "OptionError",
     "PathSearch",
     "PlanarContacts",
+    "PlanarGround",
     "PlanarSimulation",
     "PlanarSnapshot",
     "Plane",
@@ -186,24 +187,23 @@ class Motor:
 class RoverModel:
     """A machine: a tree of solids under a free base, read from data. Immutable.
 
-    `RoverModel()` is the built-in six-wheel rover. The other constructors are `named`,
-    `from_file`, `from_text`, `from_dict`, `from_urdf` and `from_mjcf`.
+    `RoverModel()` is the built-in six-wheel rover. The other constructors are `named`, `from_text`
+    and `from_dict`, and those that read files: `from_file`, `from_urdf` and `from_mjcf`.
 
     Methods that take coordinates understand two sets of them, by the argument `coordinates`:
     "state", the `q` and `v` of `Simulation`, and "report", the Cardan angles of the 2010 report and
-    their rates.
+    their rates. They raise StateError where `q` or `qdot` has a wrong length or an entry that is
+    not finite, OptionError where `coordinates` is neither of the two, and TerrainError where
+    `terrain` is not a terrain.
     """
 
     def __new__(cls) -> RoverModel: ...
     @staticmethod
-    def from_file(path: str | Any) -> RoverModel:
+    def from_file(path: str | PathLike[str]) -> RoverModel:
         """Reads a model file (TOML).
 
         Args:
             path: Path of the file.
-
-        Returns:
-            The model.
 
         Raises:
             ModelError: The file does not describe a model; the message names the path.
@@ -216,9 +216,6 @@ class RoverModel:
         Args:
             text: What a model file holds.
 
-        Returns:
-            The model.
-
         Raises:
             ModelError: The text does not describe a model.
         """
@@ -229,13 +226,10 @@ class RoverModel:
         Args:
             description: What `to_dict` returns.
 
-        Returns:
-            The model.
-
         Raises:
             ModelError: The dictionaries do not describe a model.
         """
-    def to_file(self, path: str | Any) -> None:
+    def to_file(self, path: str | PathLike[str]) -> None:
         """Writes a model file (TOML), with locked joints.
 
         Args:
@@ -255,9 +249,6 @@ class RoverModel:
         Args:
             name: One of `names()`.
 
-        Returns:
-            The model.
-
         Raises:
             ModelError: There is no such model; the message lists those that there are.
         """
@@ -266,7 +257,7 @@ class RoverModel:
         """Names of the models of the gallery; the first is the built-in rover."""
     @staticmethod
     def from_urdf(
-        path: str | Any,
+        path: str | PathLike[str],
         *,
         wheels: Sequence[str] | Mapping[str, float] | None = None,
         steering: Sequence[str] | Mapping[str, str] | None = None,
@@ -309,9 +300,6 @@ class RoverModel:
                 those of the environment variables `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH` and
                 the folders above the file.
 
-        Returns:
-            The model.
-
         Raises:
             ModelError: The file is malformed, holds what cannot be simulated, or leaves open which
                 links are wheels; the message names file, element and value.
@@ -320,7 +308,7 @@ class RoverModel:
         """
     @staticmethod
     def from_mjcf(
-        path: str | Any,
+        path: str | PathLike[str],
         *,
         wheels: Sequence[str] | Mapping[str, float] | None = None,
         steering: Sequence[str] | Mapping[str, str] | None = None,
@@ -359,9 +347,6 @@ class RoverModel:
             ignore: Kinds of what changes the motion and is left out all the same: "friction",
                 "actuators", "closed loops", "tendons", "springs", "fluid".
 
-        Returns:
-            The model.
-
         Raises:
             ModelError: MuJoCo refuses the file, it holds what cannot be simulated, or it leaves
                 open which bodies are wheels.
@@ -375,7 +360,8 @@ class RoverModel:
         A `rover_gym.models.ImportReport`; None for a model that was not imported, and for one that
         was derived from an imported one.
         """
-    def to_urdf(self, path: str | Any, *, ignore: Collection[str] = ()) -> None:
+    def _with_import_report(self, report: object) -> RoverModel: ...
+    def to_urdf(self, path: str | PathLike[str], *, ignore: Collection[str] = ()) -> None:
         """Writes a URDF file, for other programs: x forward, y left, z up.
 
         Wheels are written as cylinders; a thin disc is a tenth of its radius wide and named so.
@@ -390,7 +376,7 @@ class RoverModel:
                 express and `ignore` does not name.
             OSError: The file cannot be written.
         """
-    def to_mjcf(self, path: str | Any) -> None:
+    def to_mjcf(self, path: str | PathLike[str]) -> None:
         """Writes an MJCF file, for MuJoCo: x forward, y left, z up.
 
         Wheels are written as cylinders, of which a thin disc is a tenth of its radius wide and
@@ -434,9 +420,6 @@ class RoverModel:
             mass_scale: Factor of all masses and inertias.
             motor: The motor of all wheels: a `Motor`, its fields by name, or None for wheels that
                 give their command at any speed. Left out, the motors stay.
-
-        Returns:
-            The new model; this one stays as it is.
 
         Raises:
             ModelError: A number is out of its range, a solid has no such name, or a wheel radius is
@@ -513,10 +496,6 @@ class RoverModel:
         Returns:
             (nv, nv), in kg, kg m and kg m².
 
-        Raises:
-            StateError: `q` has a wrong length or an entry that is not finite.
-            OptionError: `coordinates` is neither of the two.
-
         Source: Featherstone 2008, ch. 6.
         """
     def bias(
@@ -538,9 +517,7 @@ class RoverModel:
             (nv,), in N and N m.
 
         Raises:
-            StateError: `q` or `qdot` has a wrong length or an entry that is not finite.
-            OptionError: `gravity` is not three finite numbers, or `coordinates` is neither of the
-                two.
+            OptionError: `gravity` is not three finite numbers.
 
         Source: Featherstone 2008, ch. 5.
         """
@@ -552,19 +529,12 @@ class RoverModel:
             steering torque.
         """
     def kinetic_energy(self, q: npt.ArrayLike, qdot: npt.ArrayLike, coordinates: _Coordinates = "state") -> float:
-        """The kinetic energy, half of v · M v.
+        """The kinetic energy, half of v · M v, J.
 
         Args:
             q: Coordinates, (nq,).
             qdot: Velocity in the same coordinates, (nv,).
             coordinates: "state" or "report".
-
-        Returns:
-            The energy, J.
-
-        Raises:
-            StateError: `q` or `qdot` has a wrong length or an entry that is not finite.
-            OptionError: `coordinates` is neither of the two.
         """
     def tags(self, q: npt.ArrayLike, coordinates: _Coordinates = "state") -> dict[str, _Array]:
         """Named points and axes of the machine in the world frame.
@@ -576,10 +546,6 @@ class RoverModel:
         Returns:
             Vectors (3,) by name: the origin of every solid and the tags of the model, m; the unit
             axle of every wheel, `axle_FL` and so on; the mass centre, `centre_of_mass`, m.
-
-        Raises:
-            StateError: `q` has a wrong length or an entry that is not finite.
-            OptionError: `coordinates` is neither of the two.
         """
     def poses(self, q: npt.ArrayLike, coordinates: _Coordinates = "state") -> dict[str, tuple[_Array, _Array]]:
         """The pose of every solid in the world frame.
@@ -590,10 +556,6 @@ class RoverModel:
 
         Returns:
             Origin (3,), m, and rotation matrix (3, 3) by name of the solid.
-
-        Raises:
-            StateError: `q` has a wrong length or an entry that is not finite.
-            OptionError: `coordinates` is neither of the two.
         """
     def wheel_gaps(self, q: npt.ArrayLike, terrain: Terrain | _Terrains, coordinates: _Coordinates = "state") -> _Array:
         """The distance of each wheel to the terrain.
@@ -605,11 +567,6 @@ class RoverModel:
 
         Returns:
             (n_wheels,), m, positive when apart.
-
-        Raises:
-            StateError: `q` has a wrong length or an entry that is not finite.
-            TerrainError: `terrain` is not a terrain.
-            OptionError: `coordinates` is neither of the two.
         """
     def resting_pose(self, terrain: Terrain | _Terrains, position: Sequence[float], heading: float) -> _Array:
         """The coordinates of the rover at rest on a terrain.
@@ -645,11 +602,6 @@ class RoverModel:
 
         Returns:
             (n_wheels, 3), world frame, m.
-
-        Raises:
-            StateError: `q` has a wrong length or an entry that is not finite.
-            TerrainError: `terrain` is not a terrain.
-            OptionError: `coordinates` is neither of the two.
         """
     def wheel_jacobians(
         self, q: npt.ArrayLike, terrain: Terrain | _Terrains, coordinates: _Coordinates = "state"
@@ -664,11 +616,6 @@ class RoverModel:
         Returns:
             (n_wheels, 3, nv): rows along the normal, the rolling direction and the lateral
             direction.
-
-        Raises:
-            StateError: `q` has a wrong length or an entry that is not finite.
-            TerrainError: `terrain` is not a terrain.
-            OptionError: `coordinates` is neither of the two.
         """
     def to_report(self, q: npt.ArrayLike, v: npt.ArrayLike) -> tuple[_Array, _Array]:
         """Converts a state to the report's coordinates.
@@ -771,9 +718,6 @@ class Plane(Terrain):
             slope: Slope, rad.
             uphill: Direction of steepest ascent, rad: an angle about +y from +x.
 
-        Returns:
-            The plane.
-
         Raises:
             TerrainError: An angle is no finite number.
         """
@@ -790,7 +734,7 @@ class Plane(Terrain):
         Raises:
             TerrainError: The plane is vertical, or an argument is not a number.
         """
-    def __reduce__(self) -> Any: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
 
 @final
 class SoftGround(Terrain):
@@ -901,6 +845,8 @@ class WheelBed:
 class SphereField(Terrain):
     """Fixed spheres, with or without a plane under them. Immutable.
 
+    `SphereField.from_file` reads them.
+
     Args:
         centres: Centres of the spheres, (n, 3), m.
         radii: Their radii, (n,), m.
@@ -924,9 +870,6 @@ class SphereField(Terrain):
             path: Path of the file.
             ground: The plane under the spheres; none by default.
             material: Name of the spheres' material.
-
-        Returns:
-            The field.
 
         Raises:
             TerrainError: The file does not describe spheres; the message names the path.
@@ -970,9 +913,6 @@ class SphereField(Terrain):
             clear: Circles x, z, radius that no rock reaches into, (n, 3), m; none by default.
             material: Name of the rocks' material.
 
-        Returns:
-            The field.
-
         Raises:
             TerrainError: An argument is out of its range.
 
@@ -991,7 +931,7 @@ class SphereField(Terrain):
     def ground(self) -> Plane | None:
         """The plane under the spheres, or None."""
     def __len__(self) -> int: ...
-    def __reduce__(self) -> Any: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
 
 @final
 class HeightField(Terrain):
@@ -1000,7 +940,8 @@ class HeightField(Terrain):
     Row j and column i stand at z = origin[1] + j spacing[1] and x = origin[0] + i spacing[0]. Each
     cell is cut along the diagonal from its corner (j, i) to (j + 1, i + 1). A height that is nan is
     no data: a rover that comes near it, or to the border of the map, ends the call with a
-    `StepError` that names the place. Heights are kept in single precision.
+    `StepError` that names the place. Heights are kept in single precision. `HeightField.from_file`
+    reads a map, `HeightField.fractal` makes one by a seed.
 
     Args:
         heights: Heights y, (n_z, n_x), m; nan for no data.
@@ -1050,9 +991,6 @@ class HeightField(Terrain):
             band: Band of a GeoTIFF, from 1; needed if the file has several.
             material: Name of its material.
 
-        Returns:
-            The map.
-
         Raises:
             TerrainError: The file is no such map or does not say enough; the message names it.
             OSError: The file cannot be read.
@@ -1096,9 +1034,6 @@ class HeightField(Terrain):
                 at the world's origin.
             material: Name of its material.
 
-        Returns:
-            The map.
-
         Raises:
             TerrainError: An argument is out of its range.
 
@@ -1123,7 +1058,7 @@ class HeightField(Terrain):
     @property
     def bounds(self) -> tuple[float, float, float, float]:
         """Corners x_min, z_min, x_max, z_max of the map, m."""
-    def __reduce__(self) -> tuple[Any, ...]: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
 
 @final
 class TriangleMesh(Terrain):
@@ -1135,6 +1070,7 @@ class TriangleMesh(Terrain):
     Corners at exactly equal positions are joined, so triangles may each bring their own three
     corners, as in an STL file. `triangles` then names the first of equal corners. Corners that
     differ by rounding are not joined: wheels catch on the seam between them.
+    `TriangleMesh.from_file` reads a mesh.
 
     Args:
         vertices: Corners, (n, 3), m.
@@ -1167,9 +1103,6 @@ class TriangleMesh(Terrain):
             up: Axis of the file that points up: "y" or "z".
             material: Name of its material.
 
-        Returns:
-            The mesh.
-
         Raises:
             TerrainError: The file holds no such mesh; the message names it.
             OSError: The file cannot be read.
@@ -1188,7 +1121,7 @@ class TriangleMesh(Terrain):
     def is_closed(self) -> bool:
         """Whether no triangle has a free border."""
     def __len__(self) -> int: ...
-    def __reduce__(self) -> tuple[Any, ...]: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
 
 @final
 class Union(Terrain):
@@ -1209,7 +1142,7 @@ class Union(Terrain):
     def parts(self) -> list[Terrain]:
         """The terrains, in the order they were given."""
     def __len__(self) -> int: ...
-    def __reduce__(self) -> tuple[Any, ...]: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
 
 @final
 class StepReport:
@@ -1558,9 +1491,6 @@ class Snapshot:
         Args:
             data: What `to_bytes` returned.
 
-        Returns:
-            The snapshot.
-
         Raises:
             StateError: The bytes are not those of a snapshot.
         """
@@ -1821,9 +1751,6 @@ class Simulation:
         Args:
             n: Number of steps.
 
-        Returns:
-            How the steps went.
-
         Raises:
             StepError: A step could not be taken; the state before it stays.
             OptionError: `n` is not a count.
@@ -1994,9 +1921,32 @@ class Simulation:
         """
     def __reduce__(self) -> Any: ...
 
+@disjoint_base
+class PlanarGround:
+    """Ground of a planar scene, of any kind: x forward, y up. Immutable.
+
+    `Line`, `Sine`, `Spline` and `Polyline` are its kinds.
+    """
+
+    @overload
+    def height(self, x: float) -> float:
+        """The height of the ground at one place or at many.
+
+        Args:
+            x: Places, a number or (m,), m.
+
+        Returns:
+            Heights, a number or (m,), m.
+
+        Raises:
+            OptionError: `x` is not a number or an array of one dimension.
+        """
+    @overload
+    def height(self, x: Sequence[float] | _Array) -> _Array: ...
+
 @final
-class Line:
-    """The ground y = slope x + offset of a planar scene: x forward, y up.
+class Line(PlanarGround):
+    """The ground y = slope x + offset of a planar scene.
 
     Args:
         slope: Tangent of the inclination.
@@ -2013,25 +1963,10 @@ class Line:
     @property
     def offset(self) -> float:
         """Height at x = 0, m."""
-    @overload
-    def height(self, x: float) -> float:
-        """The height of the ground at one place or at many.
-
-        Args:
-            x: Places, a number or (m,), m.
-
-        Returns:
-            Heights, a number or (m,), m.
-
-        Raises:
-            OptionError: `x` is not a number or an array of one dimension.
-        """
-    @overload
-    def height(self, x: Sequence[float] | _Array) -> _Array: ...
-    def __reduce__(self) -> Any: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
 
 @final
-class Sine:
+class Sine(PlanarGround):
     """The ground y = amplitude sin(2 pi x / wavelength + phase) + offset of a planar scene.
 
     Args:
@@ -2058,25 +1993,10 @@ class Sine:
     @property
     def offset(self) -> float:
         """Mean height, m."""
-    @overload
-    def height(self, x: float) -> float:
-        """The height of the ground at one place or at many.
-
-        Args:
-            x: Places, a number or (m,), m.
-
-        Returns:
-            Heights, a number or (m,), m.
-
-        Raises:
-            OptionError: `x` is not a number or an array of one dimension.
-        """
-    @overload
-    def height(self, x: Sequence[float] | _Array) -> _Array: ...
-    def __reduce__(self) -> Any: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
 
 @final
-class Spline:
+class Spline(PlanarGround):
     """The natural cubic spline through points: a ground with continuous curvature.
 
     It goes on along its tangents beyond the first and the last point.
@@ -2097,25 +2017,10 @@ class Spline:
     @property
     def y(self) -> _Array:
         """Heights of the points, (n,), m."""
-    @overload
-    def height(self, x: float) -> float:
-        """The height of the ground at one place or at many.
-
-        Args:
-            x: Places, a number or (m,), m.
-
-        Returns:
-            Heights, a number or (m,), m.
-
-        Raises:
-            OptionError: `x` is not a number or an array of one dimension.
-        """
-    @overload
-    def height(self, x: Sequence[float] | _Array) -> _Array: ...
-    def __reduce__(self) -> Any: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
 
 @final
-class Polyline:
+class Polyline(PlanarGround):
     """Straight pieces between points, with corners: a ground of steps, ramps and kerbs.
 
     Two points may stand above each other.
@@ -2138,9 +2043,6 @@ class Polyline:
             x: Place of the step, m.
             height: Height of the ground beyond it, m; negative for a step down.
 
-        Returns:
-            The ground.
-
         Raises:
             TerrainError: A number is not finite or beyond 1e6 m, or the step has no height.
         """
@@ -2150,22 +2052,7 @@ class Polyline:
     @property
     def y(self) -> _Array:
         """Heights of the points, (n,), m."""
-    @overload
-    def height(self, x: float) -> float:
-        """The height of the ground at one place or at many.
-
-        Args:
-            x: Places, a number or (m,), m.
-
-        Returns:
-            Heights, a number or (m,), m.
-
-        Raises:
-            OptionError: `x` is not a number or an array of one dimension.
-        """
-    @overload
-    def height(self, x: Sequence[float] | _Array) -> _Array: ...
-    def __reduce__(self) -> Any: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
 
 @final
 class PlanarContacts:
@@ -2205,9 +2092,6 @@ class PlanarSnapshot:
         Args:
             data: What `to_bytes` returned.
 
-        Returns:
-            The snapshot.
-
         Raises:
             StateError: The bytes are not those of a snapshot.
         """
@@ -2221,12 +2105,11 @@ class PlanarSnapshot:
 class PlanarSimulation:
     """A planar machine on a ground: what the machines share. Made by the classes derived from it.
 
-    One call at a time: a call during another one, from another thread or a signal handler, raises
-    BusyError.
+    One call at a time, as of `Simulation`.
     """
 
     @property
-    def ground(self) -> Line | Sine | Spline | Polyline:
+    def ground(self) -> PlanarGround:
         """The ground."""
     @property
     def time(self) -> float:
@@ -2283,12 +2166,8 @@ class PlanarSimulation:
         Args:
             n: Number of steps.
 
-        Returns:
-            How the steps went.
-
         Raises:
             StepError: A step could not be taken; the state before it stays.
-            OptionError: `n` is not a count.
         """
     @property
     def contacts(self) -> PlanarContacts:
@@ -2339,7 +2218,7 @@ class BallSimulation(PlanarSimulation):
 
     def __new__(
         cls,
-        ground: Line | Sine | Spline | Polyline,
+        ground: PlanarGround,
         *,
         mass: float = 3.0,
         radius: float = 1.5,
@@ -2379,7 +2258,7 @@ class TwoWheelRoverSimulation(PlanarSimulation):
 
     def __new__(
         cls,
-        ground: Line | Sine | Spline | Polyline,
+        ground: PlanarGround,
         *,
         mass: float = 130.0,
         inertia: float | None = None,
@@ -2413,7 +2292,7 @@ class MirroredRoverSimulation(PlanarSimulation):
     """
 
     def __new__(
-        cls, ground: Line | Sine | Spline | Polyline, *, model: RoverModel | None = None, **options: Any
+        cls, ground: PlanarGround, *, model: RoverModel | None = None, **options: Any
     ) -> MirroredRoverSimulation: ...
     @property
     def joints(self) -> list[list[str]]:
@@ -2498,9 +2377,6 @@ class SimulationBatch:
 
         Args:
             index: Index of the rover.
-
-        Returns:
-            The copy; stepping it does not move the rover.
 
         Raises:
             OptionError: There is no such rover.
@@ -2783,9 +2659,6 @@ class EpisodeDistribution:
                 after it, `difficulty`, `field_seed`, `q`, `v`; one mapping for all or a list of one
                 for each generator; none by default.
 
-        Returns:
-            The episodes.
-
         Raises:
             TerrainError: A rover has no room in `attempts` scenes, or the ground refuses a number.
             StateError: `q` or `v` has a wrong length or an entry that is not finite, or float32
@@ -2868,7 +2741,8 @@ class DrawnEpisodes:
 class EpisodeBatch:
     """Many rovers with their episodes, each bit for bit as it would be alone.
 
-    One call at a time: a call during another one raises BusyError.
+    One call at a time: a call during another one raises BusyError. Methods that take the index of a
+    rover raise OptionError where there is no such rover, or where its episode has not begun.
 
     Args:
         rules: What all episodes share.
@@ -2967,18 +2841,12 @@ class EpisodeBatch:
         Returns:
             For each entry an array (n_rovers,), and under its name after an underscore the mask of
             the rovers that have it: all.
-
-        Raises:
-            OptionError: An episode has not begun.
         """
     def info(self, index: int) -> dict[str, Any]:
         """The info of one rover, of its last period or beginning.
 
         Args:
             index: Index of the rover.
-
-        Raises:
-            OptionError: There is no such rover, or its episode has not begun.
         """
     def observations(self) -> _Observation:
         """The last observations of all rovers, (n_rovers, size) float32; zeros before an episode."""
@@ -2996,9 +2864,9 @@ class EpisodeBatch:
         Args:
             distribution: What the episodes are drawn from.
             generators: Generators, (m, 4) uint64.
-            attempts: As of `EpisodeDistribution.draw`.
-            difficulties: As of `EpisodeDistribution.draw`.
-            fixed: As of `EpisodeDistribution.draw`.
+            attempts: As of `EpisodeDistribution.draw`, as the next two.
+            difficulties: See there.
+            fixed: See there.
 
         Returns:
             The episodes, the same for any number of threads.
@@ -3049,18 +2917,12 @@ class EpisodeBatch:
 
         Args:
             index: Index of the rover.
-
-        Raises:
-            OptionError: There is no such rover, or its episode has not begun.
         """
     def steps(self, index: int) -> int:
         """Control periods of one rover since its episode began.
 
         Args:
             index: Index of the rover.
-
-        Raises:
-            OptionError: There is no such rover, or its episode has not begun.
         """
     def generators(self, indices: Sequence[int]) -> _Rows:
         """The generators of rovers, from which their noise is drawn.
@@ -3070,9 +2932,6 @@ class EpisodeBatch:
 
         Returns:
             (m, 4) uint64: high and low half of each state, high and low half of each increment.
-
-        Raises:
-            OptionError: There is no such rover, or its episode has not begun.
         """
     def set_generators(self, indices: Sequence[int], generators: _Rows) -> None:
         """Sets the generators of rovers.
@@ -3093,18 +2952,12 @@ class EpisodeBatch:
 
         Returns:
             Its rows of `DrawnEpisodes.starts`, `rocks`, `rock_seeds` and `domains`.
-
-        Raises:
-            OptionError: There is no such rover, or its episode has not begun.
         """
     def difficulty(self, index: int) -> _Range | None:
         """Range (low, high) of the rocks' difficulty in the next episodes of a rover, if any is set.
 
         Args:
             index: Index of the rover.
-
-        Raises:
-            OptionError: There is no such rover.
         """
     def set_difficulty(self, index: int, difficulty: _Range | None) -> None:
         """Sets the range of the rocks' difficulty in the episodes that `step_on` begins with a rover.
@@ -3121,21 +2974,12 @@ class EpisodeBatch:
 
         Args:
             index: Index of the rover.
-
-        Raises:
-            OptionError: There is no such rover.
         """
     def simulation(self, index: int) -> Simulation:
-        """Returns a copy of one rover.
+        """A copy of one rover; stepping it does not move the rover.
 
         Args:
             index: Index of the rover.
-
-        Returns:
-            The copy; stepping it does not move the rover.
-
-        Raises:
-            OptionError: There is no such rover.
         """
     def __len__(self) -> int: ...
 
@@ -3183,9 +3027,6 @@ class SoilSnapshot:
         Args:
             data: What `to_bytes` returned.
 
-        Returns:
-            The snapshot.
-
         Raises:
             StateError: The bytes are not those of a snapshot.
         """
@@ -3201,8 +3042,7 @@ class SoilSimulation:
 
     The disks are free, with friction, between walls or on a ground.
 
-    One call at a time: a call during another one, from another thread or a signal handler, raises
-    BusyError.
+    One call at a time, as of `Simulation`.
 
     Args:
         radius: Radii of the disks, (n,), m.
@@ -3254,7 +3094,7 @@ class SoilSimulation:
         *,
         kinematic: npt.ArrayLike | None = None,
         walls: npt.ArrayLike | None = None,
-        ground: Line | Sine | Spline | Polyline | None = None,
+        ground: PlanarGround | None = None,
         rover: dict[str, Any] | None = None,
         rig: npt.ArrayLike | None = None,
         machine: npt.ArrayLike | None = None,
@@ -3368,12 +3208,8 @@ class SoilSimulation:
         Args:
             n: Number of steps.
 
-        Returns:
-            How the steps went.
-
         Raises:
             StepError: A step could not be taken; the state before it stays.
-            OptionError: `n` is not a count.
         """
     @property
     def contacts(self) -> SoilContacts:
@@ -3521,9 +3357,6 @@ class GrainSnapshot:
         Args:
             data: What `to_bytes` returned.
 
-        Returns:
-            The snapshot.
-
         Raises:
             StateError: The bytes are not those of a snapshot.
         """
@@ -3537,8 +3370,7 @@ class GrainSnapshot:
 class GrainSimulation:
     """Grains in space: free balls with friction, between walls or on a terrain.
 
-    World axes: x forward, y up, z to the right. One call at a time: a call during another one, from
-    another thread or a signal handler, raises BusyError.
+    World axes: x forward, y up, z to the right. One call at a time, as of `Simulation`.
 
     Args:
         radius: Radii of the balls, (n,), m.
@@ -3721,12 +3553,8 @@ class GrainSimulation:
         Args:
             n: Number of steps.
 
-        Returns:
-            How the steps went.
-
         Raises:
             StepError: A step could not be taken; the state before it stays.
-            OptionError: `n` is not a count.
         """
     @property
     def contacts(self) -> GrainContacts:
@@ -3764,9 +3592,6 @@ class RoverGrainSnapshot:
 
         Args:
             data: What `to_bytes` returned.
-
-        Returns:
-            The snapshot.
 
         Raises:
             StateError: The bytes are not those of a snapshot.
@@ -3822,12 +3647,8 @@ class RoverGrainSimulation:
         Args:
             n: Number of steps.
 
-        Returns:
-            How the steps went.
-
         Raises:
             StepError: A step could not be taken; the state before it stays.
-            OptionError: `n` is not a count.
         """
     @property
     def wheel_gaps(self) -> npt.NDArray[np.float64]:

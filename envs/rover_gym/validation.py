@@ -144,6 +144,26 @@ def span(
     return (low, high)
 
 
+def text_of_file(path: object, most_bytes: int, *, error: type[RoverGymError]) -> str:
+    """Reads a file of UTF-8 text, of which no more than `most_bytes` are read.
+
+    Raises:
+        RoverGymError: `path` is no path, or the file is longer or no such text.
+        OSError: The file cannot be read.
+    """
+    if not isinstance(path, (str, os.PathLike)):
+        refuse(error, "path", path, "must be a path")
+    place = Path(os.fsdecode(path))
+    with place.open("rb") as file:
+        content = file.read(most_bytes + 1)
+    if len(content) > most_bytes:
+        refuse(error, "path", str(place), f"the file is longer than {most_bytes} bytes")
+    try:
+        return content.decode()
+    except UnicodeDecodeError:
+        refuse(error, "path", str(place), "the file is not UTF-8 text")
+
+
 def mapping(field: str, value: object) -> Mapping[str, Any]:
     """Checks a mapping and returns it; None gives an empty one."""
     if value is None:

@@ -269,11 +269,11 @@ def test_a_bad_distribution_is_refused_by_name() -> None:
     }
     assert len(EpisodeDistribution(rules, Simulation(), **good).draw(seed_generators([0]))) == 1
     for change, field in (
-        ({"start": {"slope": (0.0, 1.0)}}, "start"),
+        ({"start": {"slope": (0.0, 1.0)}}, "start.uphill"),
         ({"domain": 3}, "domain"),
         ({"start": {**good["start"], "slope": (1.0, 0.0)}}, "start.slope"),
         ({"trunk_load_limit": "much"}, "trunk_load_limit"),
-        ({"rocks": {"abundance": 0.1}}, "rocks"),
+        ({"rocks": {"abundance": 0.1}}, "rocks.difficulty"),
         ({"ground": 3}, "terrain"),
         ({"hills": -1.0}, "hills"),
         ({"ground": Plane(), "hills": 0.1}, "hills"),

@@ -16,13 +16,14 @@ from rover_gym.mechanics import (
     BallSimulation,
     Line,
     OptionError,
+    PlanarGround,
     PlanarSimulation,
     Polyline,
     Sine,
     Spline,
     TwoWheelRoverSimulation,
 )
-from rover_gym.planar.planar_run import PlanarGround, PlanarRun, describe_planar, record_planar
+from rover_gym.planar.planar_run import PlanarRun, describe_planar, record_planar
 from rover_gym.runs import open_run
 from rover_gym.validation import number, refuse
 

@@ -1,9 +1,10 @@
 """Maps and meshes of the ground: from files, and made by a seed.
 
-These functions return arrays; `HeightField.from_file`, `HeightField.fractal` and `TriangleMesh.from_file` make terrains
-of them.
+These functions return arrays; `HeightField.from_file`, `HeightField.fractal`, `TriangleMesh.from_file` and
+`SphereField.from_file`, in `terrain_files`, make terrains of them.
 """
 
+import rover_gym.maps.terrain_files  # noqa: F401 - methods of the terrains
 from rover_gym.maps.fractal import fractal_map
 from rover_gym.maps.map_files import read_map, read_mesh
 

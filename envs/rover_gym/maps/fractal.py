@@ -35,7 +35,7 @@ CRATER_RIM = 0.036
 EJECTA = 3.0
 
 
-def _pair(field: str, value: object, *, above: float | None = None) -> Pair:
+def pair(field: str, value: object, *, above: float | None = None) -> Pair:
     """One number for both, or two."""
     try:
         first, second = value  # type: ignore[misc]
@@ -71,7 +71,7 @@ def fractal_map(
     Raises:
         TerrainError: An argument is out of its range.
     """
-    extent, step = _pair("size", size, above=0.0), _pair("spacing", spacing, above=0.0)
+    extent, step = pair("size", size, above=0.0), pair("spacing", spacing, above=0.0)
     rms = number("roughness", roughness, at_least=0.0, error=TerrainError)
     exponent = number("hurst", hurst, above=0.0, at_most=1.0, error=TerrainError)
     counts = [extent[k] / step[k] for k in range(2)]
@@ -82,11 +82,11 @@ def fractal_map(
     if longest_wave is not None:
         longest = number("longest_wave", longest_wave, at_least=2.0 * max(step), error=TerrainError)
     random = np.random.default_rng(whole("seed", seed, error=TerrainError))
-    place = (-0.5 * step[0] * (columns - 1), -0.5 * step[1] * (rows - 1)) if origin is None else _pair("origin", origin)
+    place = (-0.5 * step[0] * (columns - 1), -0.5 * step[1] * (rows - 1)) if origin is None else pair("origin", origin)
 
     heights = _rough(random, (rows, columns), step, rms, exponent, longest)
     density = number("craters", craters, at_least=0.0, error=TerrainError)
-    smallest, largest = _pair("crater_diameter", crater_diameter, above=0.0)
+    smallest, largest = pair("crater_diameter", crater_diameter, above=0.0)
     number("crater_diameter", smallest, at_least=LEAST_DIAMETER, error=TerrainError)
     if largest < smallest:
         refuse(TerrainError, "crater_diameter", crater_diameter, "must be the smallest and the largest")

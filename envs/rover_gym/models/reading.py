@@ -58,7 +58,9 @@ def _read(
     wheel_width: float | None = None,
     wheel_stiffness: float | None = None,
     ignore: Collection[str] = (),
+    frames: int = 3,
 ) -> tuple[RoverModel, ImportReport]:
+    """Reads a file; `frames`: calls from here up to the user's, whose line a warning names."""
     place = checked_path(path)
     if free_base is not None and not isinstance(free_base, bool):
         refuse(ModelError, "free_base", free_base, "must be True or False")
@@ -95,7 +97,7 @@ def _read(
     except ModelError as error:
         raise _by_name(tree, description, error) from None
     for warning in tree.warnings:
-        warnings.warn(warning, RobotFileWarning, stacklevel=3)
+        warnings.warn(warning, RobotFileWarning, stacklevel=frames)
     lists = together(tree.assumed), together(tree.left_out), solid_rows(model), tuple(tree.warnings)
     report = ImportReport(str(place), *lists)
     return model, report

@@ -15,6 +15,7 @@ from rover_gym.mechanics import (
     Line,
     MirroredRoverSimulation,
     PlanarContacts,
+    PlanarGround,
     PlanarSimulation,
     PlanarSnapshot,
     Polyline,
@@ -23,7 +24,6 @@ from rover_gym.mechanics import (
     TwoWheelRoverSimulation,
 )
 from rover_gym.planar.planar_run import (
-    PlanarGround,
     PlanarRun,
     PlanarSampler,
     describe_planar,

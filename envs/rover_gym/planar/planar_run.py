@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from rover_gym.mechanics import (
     Line,
+    PlanarGround,
     PlanarSimulation,
     Polyline,
     RoverModel,
@@ -38,7 +39,6 @@ from rover_gym.record.trajectory import Trajectory
 from rover_gym.validation import refuse
 
 Array = npt.NDArray[np.float64]
-PlanarGround = Line | Sine | Spline | Polyline
 
 COORDINATES = {
     3: ("x", "y", "theta"),

@@ -4,10 +4,11 @@
 //! A number is a float, an integer, or what numpy or Python hold to be real; a truth value, a
 //! complex number, a time and a text are none, though `float()` or numpy would take some of them.
 
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyFloat, PyInt, PyString};
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyMapping, PyString};
 
-use crate::errors::{BorderError, Kind, Value};
+use crate::errors::{BorderError, Kind, Result, Value};
 
 /// Longest piece of a value that a message shows.
 const SHOWN: usize = 80;
@@ -38,52 +39,191 @@ impl<'py> Given<'py> {
     }
 
     /// A number.
-    pub fn number(self, default: f64, kind: Kind, field: &str) -> PyResult<f64> {
+    pub fn number(self, default: f64, kind: Kind, field: &str) -> Result<f64> {
         self.0
             .map_or(Ok(default), |given| number(&given, kind, field))
     }
 
     /// A number, or nothing where `None` was given.
-    pub fn maybe(self, kind: Kind, field: &str) -> PyResult<Option<f64>> {
+    pub fn maybe(self, kind: Kind, field: &str) -> Result<Option<f64>> {
         self.some()
             .map(|given| number(&given, kind, field))
             .transpose()
     }
 
     /// A whole number that is not negative.
-    pub fn whole(self, default: u64, kind: Kind, field: &str) -> PyResult<u64> {
+    pub fn whole(self, default: u64, kind: Kind, field: &str) -> Result<u64> {
         self.0
             .map_or(Ok(default), |given| whole(&given, kind, field))
     }
 
     /// A count.
-    pub fn count(self, default: usize, kind: Kind, field: &str) -> PyResult<usize> {
+    pub fn count(self, default: usize, kind: Kind, field: &str) -> Result<usize> {
         self.0
             .map_or(Ok(default), |given| count(&given, kind, field))
     }
 
     /// A truth value.
-    pub fn flag(self, default: bool, kind: Kind, field: &str) -> PyResult<bool> {
+    pub fn flag(self, default: bool, kind: Kind, field: &str) -> Result<bool> {
         self.0
             .map_or(Ok(default), |given| flag(&given, kind, field))
     }
 
     /// A text.
-    pub fn text(self, default: &str, kind: Kind, field: &str) -> PyResult<String> {
+    pub fn text(self, default: &str, kind: Kind, field: &str) -> Result<String> {
         self.0
             .map_or_else(|| Ok(default.to_owned()), |given| text(&given, kind, field))
     }
 
     /// An object of a class, or nothing where `None` was given. `what`: its name with an article.
-    pub fn object<T>(self, kind: Kind, field: &str, what: &str) -> PyResult<Option<T>>
+    pub fn object<T>(self, kind: Kind, field: &str, what: &str) -> Result<Option<T>>
     where
         T: for<'a> FromPyObject<'a, 'py>,
     {
         let read = |given: Bound<'py, PyAny>| {
             let found = given.extract::<T>();
-            found.map_err(|_| refused(&given, kind, field, what).into())
+            found.map_err(|_| refused(&given, kind, field, what))
         };
         self.some().map(read).transpose()
+    }
+}
+
+/// Values by name: keyword arguments, or a mapping that was given as one argument.
+pub struct Named<'py> {
+    given: Bound<'py, PyMapping>,
+    /// Name of the argument that is the mapping; none of keyword arguments.
+    outer: Option<&'static str>,
+    kind: Kind,
+}
+
+impl<'py> Named<'py> {
+    /// Keyword arguments, which are read once each; what is left at [`Self::finish`] is unknown.
+    pub fn keywords(py: Python<'py>, given: Option<&Bound<'py, PyDict>>) -> Result<Self> {
+        let given = given.map_or_else(|| Ok(PyDict::new(py)), pyo3::types::PyDictMethods::copy)?;
+        Ok(Self {
+            given: given.into_mapping(),
+            outer: None,
+            kind: Kind::Option,
+        })
+    }
+
+    /// A mapping that is the argument `outer`.
+    pub fn mapping(given: &Bound<'py, PyAny>, outer: &'static str, kind: Kind) -> Result<Self> {
+        match given.cast::<PyMapping>() {
+            Ok(mapping) => Ok(Self {
+                given: mapping.clone(),
+                outer: Some(outer),
+                kind,
+            }),
+            Err(_) => Err(refused(given, kind, outer, "a mapping")),
+        }
+    }
+
+    /// The same values, with errors of another kind.
+    pub fn of(&self, kind: Kind) -> Self {
+        Self {
+            given: self.given.clone(),
+            outer: self.outer,
+            kind,
+        }
+    }
+
+    /// Refuses what has not been read.
+    pub fn finish(self) -> Result<()> {
+        match self.given.try_iter()?.next() {
+            None => Ok(()),
+            Some(name) => {
+                let message = format!("got an unexpected keyword argument {}", name?.repr()?);
+                Err(PyTypeError::new_err(message).into())
+            }
+        }
+    }
+
+    /// Full name of a value.
+    pub fn path(&self, name: &str) -> String {
+        self.outer
+            .map_or_else(|| name.to_owned(), |outer| format!("{outer}.{name}"))
+    }
+
+    /// The error of a value that is not what it must be.
+    pub fn refused(&self, value: &Bound<'_, PyAny>, name: &str, what: &str) -> BorderError {
+        refused(value, self.kind, &self.path(name), what)
+    }
+
+    /// A value, be it `None`.
+    pub fn get(&self, name: &str) -> Result<Given<'py>> {
+        if !self.given.contains(name)? {
+            return Ok(Given::MISSING);
+        }
+        let value = self.given.get_item(name)?;
+        if self.outer.is_none() {
+            self.given.del_item(name)?;
+        }
+        Ok(Given(Some(value)))
+    }
+
+    /// A value that is there and not `None`.
+    pub fn some(&self, name: &str) -> Result<Option<Bound<'py, PyAny>>> {
+        Ok(self.get(name)?.some())
+    }
+
+    /// What a function reads of a value, nothing where that is missing or `None`.
+    pub fn read<T>(
+        &self,
+        name: &str,
+        read: impl FnOnce(&Bound<'py, PyAny>, Kind, &str) -> Result<T>,
+    ) -> Result<Option<T>> {
+        let path = self.path(name);
+        self.some(name)?
+            .map(|value| read(&value, self.kind, &path))
+            .transpose()
+    }
+
+    /// The same of a value that must be given.
+    pub fn need<T>(
+        &self,
+        name: &str,
+        read: impl FnOnce(&Bound<'py, PyAny>, Kind, &str) -> Result<T>,
+    ) -> Result<T> {
+        let missing = || match self.outer {
+            None => {
+                let message = format!("missing a required keyword argument: '{name}'");
+                PyTypeError::new_err(message).into()
+            }
+            Some(_) => refused(self.given.as_any(), self.kind, &self.path(name), "given"),
+        };
+        let value = self.get(name)?.given().ok_or_else(missing)?;
+        read(&value, self.kind, &self.path(name))
+    }
+
+    /// A number.
+    pub fn number(&self, name: &str, default: f64) -> Result<f64> {
+        self.get(name)?.number(default, self.kind, &self.path(name))
+    }
+
+    /// A number, or nothing where it is missing or `None`.
+    pub fn maybe(&self, name: &str) -> Result<Option<f64>> {
+        self.get(name)?.maybe(self.kind, &self.path(name))
+    }
+
+    /// A whole number that is not negative.
+    pub fn whole(&self, name: &str, default: u64) -> Result<u64> {
+        self.get(name)?.whole(default, self.kind, &self.path(name))
+    }
+
+    /// A count.
+    pub fn count(&self, name: &str, default: usize) -> Result<usize> {
+        self.get(name)?.count(default, self.kind, &self.path(name))
+    }
+
+    /// A truth value.
+    pub fn flag(&self, name: &str, default: bool) -> Result<bool> {
+        self.get(name)?.flag(default, self.kind, &self.path(name))
+    }
+
+    /// A text.
+    pub fn text(&self, name: &str, default: &str) -> Result<String> {
+        self.get(name)?.text(default, self.kind, &self.path(name))
     }
 }
 
@@ -101,12 +241,11 @@ pub fn shown(value: &Bound<'_, PyAny>) -> String {
 
 /// The error of a value that is not what it must be.
 pub fn refused(value: &Bound<'_, PyAny>, kind: Kind, field: &str, what: &str) -> BorderError {
-    BorderError {
-        kind,
-        message: format!("{field}: must be {what}, is {}", shown(value)),
-        field: Some(field.to_owned()),
-        value: Value::Object(value.clone().unbind()),
-    }
+    kind.error(
+        field,
+        format!("{field}: must be {what}, is {}", shown(value)),
+        Value::Object(value.clone().unbind()),
+    )
 }
 
 /// The letter of numpy's kind (`dtype.kind`) of a scalar or of an array of no dimension.
@@ -118,7 +257,7 @@ fn scalar_kind(value: &Bound<'_, PyAny>) -> Option<char> {
 }
 
 /// A number: real, and within a double's range.
-pub fn number(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<f64> {
+pub fn number(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<f64> {
     if let Ok(x) = value.cast_exact::<PyFloat>() {
         return Ok(x.value());
     }
@@ -126,7 +265,7 @@ pub fn number(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<f64
         || value.is_instance_of::<PyString>()
         || scalar_kind(value).is_some_and(|k| !"fiu".contains(k));
     if is_other {
-        return Err(refused(value, kind, field, "a number").into());
+        return Err(refused(value, kind, field, "a number"));
     }
     let found = value.extract::<f64>();
     let is_huge = value.is_instance_of::<PyInt>();
@@ -136,12 +275,28 @@ pub fn number(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<f64
         } else {
             "a number"
         };
-        refused(value, kind, field, what).into()
+        refused(value, kind, field, what)
     })
 }
 
+/// A finite number.
+pub fn finite(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<f64> {
+    match number(value, kind, field)? {
+        found if found.is_finite() => Ok(found),
+        _ => Err(refused(value, kind, field, "finite")),
+    }
+}
+
+/// A finite number above 0.
+pub fn positive(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<f64> {
+    match finite(value, kind, field)? {
+        found if found > 0.0 => Ok(found),
+        _ => Err(refused(value, kind, field, "positive")),
+    }
+}
+
 /// A whole number that is not negative.
-pub fn whole(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<u64> {
+pub fn whole(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<u64> {
     if let Ok(plain) = value.cast_exact::<PyInt>()
         && let Ok(count) = plain.extract()
     {
@@ -152,7 +307,7 @@ pub fn whole(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<u64>
         None => value.is_instance_of::<PyInt>() && !value.is_instance_of::<PyBool>(),
     };
     if !is_whole {
-        return Err(refused(value, kind, field, "a whole number").into());
+        return Err(refused(value, kind, field, "a whole number"));
     }
     value.extract::<u64>().map_err(|_| {
         let what = if value.lt(0).unwrap_or(false) {
@@ -160,39 +315,52 @@ pub fn whole(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<u64>
         } else {
             "below 2^64"
         };
-        refused(value, kind, field, what).into()
+        refused(value, kind, field, what)
     })
 }
 
 /// A whole number of things.
-pub fn count(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<usize> {
+pub fn count(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<usize> {
     let n = whole(value, kind, field)?;
-    usize::try_from(n).map_err(|_| refused(value, kind, field, "smaller").into())
+    usize::try_from(n).map_err(|_| refused(value, kind, field, "smaller"))
+}
+
+/// An index among `len` things.
+pub fn below(index: &Bound<'_, PyAny>, len: usize) -> Result<usize> {
+    match count(index, Kind::Option, "index")? {
+        i if i < len => Ok(i),
+        _ => Err(refused(
+            index,
+            Kind::Option,
+            "index",
+            &format!("below {len}"),
+        )),
+    }
 }
 
 /// A count of at least one.
-pub fn at_least_one(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<usize> {
+pub fn at_least_one(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<usize> {
     match count(value, kind, field)? {
-        0 => Err(refused(value, kind, field, "at least 1").into()),
+        0 => Err(refused(value, kind, field, "at least 1")),
         n => Ok(n),
     }
 }
 
 /// A truth value.
-pub fn flag(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<bool> {
+pub fn flag(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<bool> {
     let is_flag = value.is_instance_of::<PyBool>() || scalar_kind(value) == Some('b');
     let found = is_flag.then(|| value.is_truthy()).transpose()?;
-    found.ok_or_else(|| refused(value, kind, field, "True or False").into())
+    found.ok_or_else(|| refused(value, kind, field, "True or False"))
 }
 
 /// A text.
-pub fn text(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<String> {
+pub fn text(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<String> {
     let found = value.extract::<String>();
-    found.map_err(|_| refused(value, kind, field, "a text").into())
+    found.map_err(|_| refused(value, kind, field, "a text"))
 }
 
 /// Truth values (n,).
-pub fn flags(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<Vec<bool>> {
+pub fn flags(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Vec<bool>> {
     let entries = value
         .try_iter()
         .map_err(|_| refused(value, kind, field, "truth values"))?;
@@ -203,7 +371,7 @@ pub fn flags(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<Vec<
 }
 
 /// Texts, or one.
-pub fn texts(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<Vec<String>> {
+pub fn texts(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Vec<String>> {
     if let Ok(one) = value.extract::<String>() {
         return Ok(vec![one]);
     }

@@ -1,14 +1,12 @@
 //! Array-likes in, fresh arrays out.
 
-use numpy::{
-    PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn,
-};
+use numpy::{Element, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 use pyo3::types::PyString;
 
 use crate::arguments::{number, refused, shown};
-use crate::errors::{BorderError, Kind, Value};
+use crate::errors::{BorderError, Kind, Result, Value};
 
 /// Most entries of what is no array, such as lists, nested lists and ranges. Each becomes a Python
 /// object of its own before numpy has an array of them.
@@ -19,7 +17,7 @@ const DEPTH: usize = 4;
 
 /// Refuses what is no array and states more than [`MOST_LISTED`] entries, before any of them is
 /// read.
-pub fn check_size(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<()> {
+pub fn check_size(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<()> {
     let py = value.py();
     let is_array = value.hasattr("__array__")? || value.is_instance_of::<PyString>();
     let (mut count, mut entry) = (1_usize, Ok(value.clone()));
@@ -36,7 +34,7 @@ pub fn check_size(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult
         return Ok(());
     }
     let what = format!("an array, or at most {MOST_LISTED} numbers in lists");
-    Err(refused(value, kind, field, &what).into())
+    Err(refused(value, kind, field, &what))
 }
 
 /// Any array-like as float64 of any shape.
@@ -44,16 +42,17 @@ pub fn array<'py>(
     value: &Bound<'py, PyAny>,
     kind: Kind,
     field: &str,
-) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
+) -> Result<PyReadonlyArrayDyn<'py, f64>> {
     if let Ok(ready) = value.cast::<PyArrayDyn<f64>>() {
         return Ok(ready.readonly());
     }
     let py = value.py();
-    let refuse = |e: &PyErr| BorderError {
-        kind,
-        message: format!("{field}: must be an array of numbers ({})", e.value(py)),
-        field: Some(field.to_owned()),
-        value: Value::Text(shown(value)),
+    let refuse = |e: &PyErr| {
+        kind.error(
+            field,
+            format!("{field}: must be an array of numbers ({})", e.value(py)),
+            Value::Text(shown(value)),
+        )
     };
     check_size(value, kind, field)?;
     let numpy = py.import("numpy")?;
@@ -71,19 +70,20 @@ pub fn array<'py>(
             .getattr("flat")?
             .try_iter()?
             .map(|entry| number(&entry?, kind, field))
-            .collect::<PyResult<_>>()?;
+            .collect::<Result<_>>()?;
         PyArray1::from_vec(py, numbers).call_method1("reshape", (found.getattr("shape")?,))
     } else {
-        return Err(refused(value, kind, field, "an array of numbers").into());
+        return Err(refused(value, kind, field, "an array of numbers"));
     };
     let typed = converted
         .map_err(|e| refuse(&e))?
-        .cast_into::<PyArrayDyn<f64>>()?;
+        .cast_into::<PyArrayDyn<f64>>()
+        .map_err(PyErr::from)?;
     Ok(typed.readonly())
 }
 
 /// Any array-like of one dimension as a vector.
-pub fn vector(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<Vec<f64>> {
+pub fn vector(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Vec<f64>> {
     if let Ok(ready) = value.extract::<PyReadonlyArray1<'_, f64>>() {
         return Ok(ready.as_array().to_vec());
     }
@@ -91,106 +91,133 @@ pub fn vector(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<Vec
     let view = any.as_array();
     if view.ndim() != 1 {
         let message = format!("{field}: needs one dimension, has shape {:?}", view.shape());
-        return Err(BorderError {
-            kind,
-            message,
-            field: Some(field.to_owned()),
-            value: Value::Count(view.ndim()),
-        }
-        .into());
+        return Err(kind.error(field, message, Value::Count(view.ndim())));
     }
     Ok(view.iter().copied().collect())
 }
 
 /// The same with at most `n` entries: of more, none is read. Fewer are for the caller to refuse.
-pub fn at_most(value: &Bound<'_, PyAny>, n: usize, kind: Kind, field: &str) -> PyResult<Vec<f64>> {
+pub fn at_most(value: &Bound<'_, PyAny>, n: usize, kind: Kind, field: &str) -> Result<Vec<f64>> {
     match value.len() {
-        Ok(length) if length > n => Err(BorderError {
-            kind,
-            message: format!("{field}: needs {n} entries, has {length}"),
-            field: Some(field.to_owned()),
-            value: Value::Count(length),
-        }
-        .into()),
+        Ok(length) if length > n => Err(kind.error(
+            field,
+            format!("{field}: needs {n} entries, has {length}"),
+            Value::Count(length),
+        )),
         _ => vector(value, kind, field),
     }
 }
 
 /// One number for both, or two.
-pub fn one_or_two(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<[f64; 2]> {
+pub fn one_or_two(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<[f64; 2]> {
     if value.len().is_err() {
         return Ok([number(value, kind, field)?; 2]);
     }
     let values = vector(value, kind, field)?;
     let wrong = || refused(value, kind, field, "one number or two");
-    Ok(<[f64; 2]>::try_from(values).map_err(|_| wrong())?)
+    <[f64; 2]>::try_from(values).map_err(|_| wrong())
 }
 
 /// Two numbers.
-pub fn two(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<[f64; 2]> {
+pub fn two(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<[f64; 2]> {
     let values = vector(value, kind, field)?;
     let wrong = || refused(value, kind, field, "two numbers");
-    Ok(<[f64; 2]>::try_from(values).map_err(|_| wrong())?)
+    <[f64; 2]>::try_from(values).map_err(|_| wrong())
 }
 
 /// Three numbers.
-pub fn triple(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<[f64; 3]> {
+pub fn triple(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<[f64; 3]> {
     let values = vector(value, kind, field)?;
     <[f64; 3]>::try_from(values.as_slice()).map_err(|_| {
         let message = format!("{field}: needs 3 entries, has {}", values.len());
-        BorderError {
-            kind,
-            message,
-            field: Some(field.to_owned()),
-            value: Value::Count(values.len()),
-        }
-        .into()
+        kind.error(field, message, Value::Count(values.len()))
     })
 }
 
-/// Fresh (n,) array.
-pub fn fresh<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyArray1<f64>> {
-    PyArray1::from_slice(py, values)
+/// Numbers on their way to Python, where they become a new array.
+#[derive(Clone)]
+pub struct Array<T = f64> {
+    values: Vec<T>,
+    shape: Vec<usize>,
 }
 
-/// Fresh (n, m) array from rows.
-pub fn fresh_rows<'py, const M: usize>(
-    py: Python<'py>,
-    rows: &[[f64; M]],
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    PyArray1::from_iter(py, rows.iter().flatten().copied()).reshape([rows.len(), M])
+impl<T> Array<T> {
+    /// Row-major numbers, as many as the shape has entries.
+    pub fn shaped(values: Vec<T>, shape: &[usize]) -> Self {
+        let shape = shape.to_vec();
+        Self { values, shape }
+    }
+
+    /// Entries along the first axis.
+    pub fn len(&self) -> usize {
+        self.shape[0]
+    }
+
+    /// All numbers in row-major order.
+    pub fn values(&self) -> &[T] {
+        &self.values
+    }
 }
 
-/// Fresh (n, a, b) array from a row-major list.
-pub fn fresh_blocks(
-    py: Python<'_>,
-    values: Vec<f64>,
-    shape: [usize; 3],
-) -> PyResult<Bound<'_, PyArray3<f64>>> {
-    PyArray1::from_vec(py, values).reshape(shape)
+impl<T> From<Vec<T>> for Array<T> {
+    fn from(values: Vec<T>) -> Self {
+        let shape = vec![values.len()];
+        Self { values, shape }
+    }
 }
 
-/// Fresh (n, n) array from a nalgebra matrix.
-pub fn fresh_matrix<'py>(
-    py: Python<'py>,
-    m: &rover_core::nalgebra::DMatrix<f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let (rows, columns) = m.shape();
-    let transposed = m.transpose();
-    PyArray1::from_slice(py, transposed.as_slice()).reshape([rows, columns])
+impl<T> FromIterator<T> for Array<T> {
+    fn from_iter<I: IntoIterator<Item = T>>(values: I) -> Self {
+        Vec::from_iter(values).into()
+    }
 }
 
-/// Fresh (m, M) array of any type.
-pub fn fresh_table<T: numpy::Element, const M: usize>(
-    py: Python<'_>,
-    rows: impl ExactSizeIterator<Item = [T; M]>,
-) -> PyResult<Bound<'_, PyArray2<T>>> {
-    let m = rows.len();
-    PyArray1::from_iter(py, rows.flatten()).reshape([m, M])
+impl<'py, T: Element + Clone> IntoPyObject<'py> for &Array<T> {
+    type Target = PyArrayDyn<T>;
+    type Output = Bound<'py, Self::Target>;
+    type Error = PyErr;
+
+    fn into_pyobject(self, py: Python<'py>) -> PyResult<Self::Output> {
+        let array = PyArrayDyn::zeros(py, self.shape.clone(), false);
+        array
+            .readwrite()
+            .as_slice_mut()?
+            .clone_from_slice(&self.values);
+        Ok(array)
+    }
+}
+
+impl<'py, T: Element + Clone> IntoPyObject<'py> for Array<T> {
+    type Target = PyArrayDyn<T>;
+    type Output = Bound<'py, Self::Target>;
+    type Error = PyErr;
+
+    fn into_pyobject(self, py: Python<'py>) -> PyResult<Self::Output> {
+        (&self).into_pyobject(py)
+    }
+}
+
+/// New (n,) array.
+pub fn fresh<T: Clone>(values: &[T]) -> Array<T> {
+    values.to_vec().into()
+}
+
+/// New (n, M) array from rows.
+pub fn fresh_rows<T, const M: usize>(rows: impl IntoIterator<Item = [T; M]>) -> Array<T> {
+    let values: Vec<T> = rows.into_iter().flatten().collect();
+    Array {
+        shape: vec![values.len() / M, M],
+        values,
+    }
+}
+
+/// New (n, m) array from a nalgebra matrix.
+pub fn fresh_matrix(m: &rover_core::nalgebra::DMatrix<f64>) -> Array {
+    Array::shaped(m.transpose().as_slice().to_vec(), &[m.nrows(), m.ncols()])
 }
 
 /// (n, N) numbers of a terrain.
-pub fn rows<const N: usize>(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<[f64; N]>> {
+pub fn rows<const N: usize>(value: &Bound<'_, PyAny>, field: &str) -> Result<Vec<[f64; N]>> {
     let given = array(value, Kind::Terrain, field)?;
     let view = given.as_array();
     let is_empty = view.is_empty();
@@ -202,8 +229,7 @@ pub fn rows<const N: usize>(value: &Bound<'_, PyAny>, field: &str) -> PyResult<V
             message,
             field: name,
             value,
-        }
-        .into());
+        });
     }
     let flat: Vec<f64> = view.iter().copied().collect();
     Ok(flat

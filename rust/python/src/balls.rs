@@ -2,18 +2,20 @@
 
 use std::sync::Arc;
 
-use numpy::PyArray2;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use rover_core::draw::DrawnGround;
 use rover_core::geometry::{Support, TerrainSupport};
 use rover_core::integrator::StepOptions;
 use rover_core::nalgebra::Vector3;
-use rover_core::system::grains::{COORDINATES, Cohesion, GrainScene, Grains, SleepOptions, Wall};
+use rover_core::system::grains::{
+    COORDINATES, Cohesion, GrainScene, Grains, Packing, SleepOptions, Wall,
+};
 
-use crate::arguments::{Given, refused};
-use crate::arrays::fresh_rows;
+use crate::arguments::{Given, Named, refused};
+use crate::arrays::{Array, fresh, fresh_rows, triple};
 use crate::bed_arguments::{self, StepArguments, Usual, check_rows, grain_error, rows};
-use crate::errors::{BorderError, Kind, Value};
+use crate::errors::{Kind, Result, Value};
 use crate::planar_ground::quantity;
 use crate::terrain::parse;
 use crate::vessels::Vessel;
@@ -21,24 +23,51 @@ use crate::vessels::Vessel;
 /// Velocities of a ball: of its centre, then its spin.
 const VELOCITIES: usize = 6;
 
-/// A bed of balls as it was given.
-pub struct BallArguments<'a, 'py> {
-    pub radius: &'a Bound<'py, PyAny>,
-    pub mass: &'a Bound<'py, PyAny>,
-    pub position: &'a Bound<'py, PyAny>,
-    pub kinematic: Given<'py>,
-    pub walls: Option<&'a Bound<'py, PyAny>>,
-    pub wall_velocity: Option<&'a Bound<'py, PyAny>>,
-    pub vessel: Option<&'a Bound<'py, PyAny>>,
-    pub terrain: Option<&'a Bound<'py, PyAny>>,
-    pub friction: Given<'py>,
-    pub wall_friction: Given<'py>,
-    pub cohesion: Given<'py>,
-    pub cohesion_range: Given<'py>,
-    pub steps: StepArguments<'py>,
-    pub sleep: Given<'py>,
-    pub sleep_speed: Given<'py>,
-    pub sleep_distance: Given<'py>,
+/// Radii, masses and centres of a packing.
+pub type Packed = (Array, Array, Array);
+
+/// Grains of a packing, built with the interpreter free for others.
+pub fn packed<const D: usize>(py: Python<'_>, packing: &Packing<D>) -> Result<Packed> {
+    let built = py.detach(|| packing.build());
+    let (grains, q) = built.map_err(|e| grain_error(&e))?;
+    let centres: Vec<f64> = q
+        .chunks_exact(COORDINATES)
+        .flat_map(|c| &c[..D])
+        .copied()
+        .collect();
+    let centres = Array::shaped(centres, &[grains.len(), D]);
+    Ok((fresh(grains.radius()), fresh(grains.mass()), centres))
+}
+
+/// Options of the steps of a bed, by their names; `gravity` is each class's own.
+///
+/// `is_hollow`: whether what slides along a surface goes into it, as along the inside of a curve.
+pub fn steps<'py>(
+    given: &Named<'py>,
+    gravity: Option<Vector3<f64>>,
+    is_hollow: bool,
+) -> Result<StepArguments<'py>> {
+    Ok(StepArguments {
+        restitution: given.get("restitution")?,
+        gravity,
+        time_step: given.get("time_step")?,
+        tolerance: given.get("tolerance")?,
+        max_iterations: given.get("max_iterations")?,
+        stabilisation: given.get("stabilisation")?,
+        is_hollow,
+        penetration_tolerance: given.get("penetration_tolerance")?,
+        threads: Given::MISSING,
+    })
+}
+
+/// When the grains of a bed sleep; None where they never do.
+pub fn sleep(given: &Named<'_>) -> Result<Option<SleepOptions>> {
+    let [sleep, speed, distance] = ["sleep", "sleep_speed", "sleep_distance"];
+    Ok(bed_arguments::sleep(
+        given.get(sleep)?,
+        given.get(speed)?,
+        given.get(distance)?,
+    )?)
 }
 
 /// A bed of balls that was read: without a machine, not yet checked as a whole.
@@ -63,15 +92,32 @@ fn usual(balls: &Grains<3>) -> Usual {
     }
 }
 
-impl BallArguments<'_, '_> {
-    /// Reads everything.
-    pub fn read(self) -> PyResult<Balls> {
-        let grains = bed_arguments::grains::<3>(self.radius, self.mass, self.kinematic)?;
-        let q = rows(self.position, Kind::State, "position", COORDINATES)?;
+impl Balls {
+    /// Reads everything: radii, masses, centres, and options by their names.
+    pub fn read(
+        radius: &Bound<'_, PyAny>,
+        mass: &Bound<'_, PyAny>,
+        position: &Bound<'_, PyAny>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> Result<Self> {
+        let given = Named::keywords(radius.py(), options)?;
+        let grains = bed_arguments::grains::<3>(radius, mass, given.get("kinematic")?)?;
+        let q = rows(position, Kind::State, "position", COORDINATES)?;
         check_rows("balls", grains.len(), &q)?;
-        let options = self.steps.options(&grains, usual(&grains))?;
-        let force = self.cohesion.number(0.0, Kind::Option, "cohesion")?;
-        let range = (self.cohesion_range).maybe(Kind::Option, "cohesion_range")?;
+        let vessel = given
+            .some("vessel")?
+            .as_ref()
+            .map(Vessel::parse)
+            .transpose()?;
+        let gravity = given.read("gravity", triple)?.map(Vector3::from);
+        let threads = given.get("threads")?;
+        let steps = StepArguments {
+            threads,
+            ..steps(&given, gravity, vessel.is_some())?
+        };
+        let options = steps.options(&grains, usual(&grains))?;
+        let force = given.number("cohesion", 0.0)?;
+        let range = given.maybe("cohesion_range")?;
         let cohesion = Cohesion::new(force, range, grains.smallest());
         let cohesion = cohesion.map_err(|e| grain_error(&e))?;
         let grains = if force > 0.0 {
@@ -79,29 +125,34 @@ impl BallArguments<'_, '_> {
         } else {
             grains
         };
-        let walls = moving(bed_arguments::walls(self.walls)?, self.wall_velocity)?;
-        let vessel = self.vessel.map(Vessel::parse).transpose()?;
-        let terrain = self.terrain.map(parse).transpose()?;
+        let walls = bed_arguments::walls(given.some("walls")?.as_ref())?;
+        let walls = moving(walls, given.some("wall_velocity")?.as_ref())?;
+        let terrain = given.some("terrain")?.as_ref().map(parse).transpose()?;
         let ground: Option<Arc<dyn Support<3>>> = match (&terrain, &vessel) {
             (Some(terrain), None) => Some(Arc::new(TerrainSupport::new(terrain.terrain()))),
-            (None, Some(vessel)) => Some(vessel.support()),
+            (None, Some(vessel)) => Some(vessel.support()?),
             (None, None) => None,
             (Some(_), Some(_)) => {
                 let message = "vessel: balls have a terrain or a vessel, not both".to_owned();
-                return Err(BorderError::option("vessel", message, Value::Nothing).into());
+                return Err(Kind::Option.error("vessel", message, Value::Nothing));
             }
         };
-        let friction = bed_arguments::friction(self.friction, self.wall_friction, Given::MISSING)?;
-        Ok(Balls {
-            scene: GrainScene {
-                grains,
-                walls,
-                ground,
-                machine: None,
-                friction,
-            },
+        let friction = [given.get("friction")?, given.get("wall_friction")?];
+        let [between, on_walls] = friction;
+        let friction = bed_arguments::friction(between, on_walls, Given::MISSING)?;
+        let sleep = sleep(&given)?;
+        given.finish()?;
+        let scene = GrainScene {
+            grains,
+            walls,
+            ground,
+            machine: None,
+            friction,
+        };
+        Ok(Self {
+            scene,
             options,
-            sleep: bed_arguments::sleep(self.sleep, self.sleep_speed, self.sleep_distance)?,
+            sleep,
             q,
             terrain,
             vessel,
@@ -110,7 +161,7 @@ impl BallArguments<'_, '_> {
 }
 
 /// The same walls with their velocities, (m, 3).
-fn moving(walls: Vec<Wall<3>>, velocity: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<Wall<3>>> {
+fn moving(walls: Vec<Wall<3>>, velocity: Option<&Bound<'_, PyAny>>) -> Result<Vec<Wall<3>>> {
     let Some(velocity) = velocity else {
         return Ok(walls);
     };
@@ -118,17 +169,15 @@ fn moving(walls: Vec<Wall<3>>, velocity: Option<&Bound<'_, PyAny>>) -> PyResult<
     let count = flat.len() / 3;
     if count != walls.len() {
         let n = walls.len();
-        return Err(BorderError {
-            kind: Kind::Terrain,
-            message: format!("wall_velocity: needs one row for each of {n} walls, has {count}"),
-            field: Some("wall_velocity".to_owned()),
-            value: Value::Count(count),
-        }
-        .into());
+        return Err(Kind::Terrain.error(
+            "wall_velocity",
+            format!("wall_velocity: needs one row for each of {n} walls, has {count}"),
+            Value::Count(count),
+        ));
     }
     let move_one = |(wall, v): (Wall<3>, &[f64])| {
         let moved = wall.moving(Vector3::new(v[0], v[1], v[2]));
-        moved.map_err(|e| quantity(Kind::Terrain, &e).into())
+        moved.map_err(|e| quantity(Kind::Terrain, &e))
     };
     walls
         .into_iter()
@@ -143,29 +192,25 @@ pub fn state(
     position: &Bound<'_, PyAny>,
     velocity: Option<&Bound<'_, PyAny>>,
     spin: Option<&Bound<'_, PyAny>>,
-) -> PyResult<(Vec<f64>, Vec<f64>)> {
-    let read = |value: &Bound<'_, PyAny>, field: &str| -> PyResult<Vec<f64>> {
+) -> Result<(Vec<f64>, Vec<f64>)> {
+    let read = |value: &Bound<'_, PyAny>, field: &str| -> Result<Vec<f64>> {
         let flat = rows(value, Kind::State, field, 3)?;
         if let Some(i) = flat.iter().position(|x| !x.is_finite()) {
-            return Err(BorderError {
-                kind: Kind::State,
-                message: format!("{field}[{}]: must be finite, is {}", i / 3, flat[i]),
-                field: Some(format!("{field}[{}]", i / 3)),
-                value: Value::Number(flat[i]),
-            }
-            .into());
+            return Err(Kind::State.error(
+                format!("{field}[{}]", i / 3),
+                format!("{field}[{}]: must be finite, is {}", i / 3, flat[i]),
+                Value::Number(flat[i]),
+            ));
         }
         if flat.len() == 3 * n {
             return Ok(flat);
         }
         let count = flat.len() / 3;
-        Err(BorderError {
-            kind: Kind::State,
-            message: format!("{field}: needs one row for each of the {n} balls, has {count}"),
-            field: Some(field.to_owned()),
-            value: Value::Count(count),
-        }
-        .into())
+        Err(Kind::State.error(
+            field,
+            format!("{field}: needs one row for each of the {n} balls, has {count}"),
+            Value::Count(count),
+        ))
     };
     let q = read(position, "position")?;
     let mut v = vec![0.0; VELOCITIES * n];
@@ -181,7 +226,7 @@ pub fn state(
 }
 
 /// Numbers of balls, (n,); none for -1.
-pub fn numbers(before: &Bound<'_, PyAny>) -> PyResult<Vec<Option<u32>>> {
+pub fn numbers(before: &Bound<'_, PyAny>) -> Result<Vec<Option<u32>>> {
     let wrong = |value: &Bound<'_, PyAny>, field: &str| {
         refused(value, Kind::Model, field, "a whole number from -1")
     };
@@ -191,38 +236,33 @@ pub fn numbers(before: &Bound<'_, PyAny>) -> PyResult<Vec<Option<u32>>> {
         match entry.extract::<i64>() {
             Ok(-1) => Ok(None),
             Ok(number) if u32::try_from(number).is_ok() => Ok(u32::try_from(number).ok()),
-            _ => Err(wrong(&entry, &format!("before[{i}]")).into()),
+            _ => Err(wrong(&entry, &format!("before[{i}]"))),
         }
     };
     entries.enumerate().map(read).collect()
 }
 
-/// Columns `from` to `from + 2` of `n` rows of `width` entries as a fresh (n, 3) array.
-fn columns<'py>(
-    py: Python<'py>,
-    values: &[f64],
-    (n, width, from): (usize, usize, usize),
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let rows = values.chunks_exact(width).take(n);
-    let three = rows.map(|row| [row[from], row[from + 1], row[from + 2]]);
-    fresh_rows(py, &three.collect::<Vec<_>>())
+/// Columns `from` to `from + 2` of `n` rows of `width` entries as a new (n, 3) array.
+fn columns(values: &[f64], (n, width, from): (usize, usize, usize)) -> Array {
+    fresh_rows(
+        values
+            .chunks_exact(width)
+            .take(n)
+            .map(|row| [row[from], row[from + 1], row[from + 2]]),
+    )
 }
 
 /// Centres of the first `n` bodies, (n, 3).
-pub fn centres<'py>(py: Python<'py>, q: &[f64], n: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    columns(py, q, (n, COORDINATES, 0))
+pub fn centres(q: &[f64], n: usize) -> Array {
+    columns(q, (n, COORDINATES, 0))
 }
 
 /// Velocities of the centres of the first `n` bodies, (n, 3).
-pub fn velocities<'py>(
-    py: Python<'py>,
-    v: &[f64],
-    n: usize,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    columns(py, v, (n, VELOCITIES, 0))
+pub fn velocities(v: &[f64], n: usize) -> Array {
+    columns(v, (n, VELOCITIES, 0))
 }
 
 /// Spins of the first `n` bodies, (n, 3).
-pub fn spins<'py>(py: Python<'py>, v: &[f64], n: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    columns(py, v, (n, VELOCITIES, 3))
+pub fn spins(v: &[f64], n: usize) -> Array {
+    columns(v, (n, VELOCITIES, 3))
 }

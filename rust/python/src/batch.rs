@@ -1,15 +1,15 @@
 //! `SimulationBatch`: many rovers stepped side by side, one call a control period.
 
-use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::scalar::instructions::Instructions;
-use rover_core::simulation::{Batch, RoverSimulation as CoreSimulation};
+use rover_core::simulation::Batch;
 
-use crate::arguments::{Given, at_least_one, count, flags, refused};
-use crate::arrays::array;
-use crate::episode::simulation;
-use crate::errors::{BorderError, Kind, Value};
+use crate::arguments::{Given, at_least_one, below, flags, refused};
+use crate::arrays::{Array, array};
+use crate::episode::{GivenSimulation, simulation};
+use crate::errors::{Kind, Result, Value};
 use crate::reading::{place, scan_points, slices};
 use crate::shared::{Shared, Watch};
 use crate::simulation::{Origin, Simulation};
@@ -37,7 +37,7 @@ struct Inner {
 }
 
 /// (n,) truth values: which rovers move.
-pub fn mask(value: &Bound<'_, PyAny>, n: usize) -> PyResult<Vec<bool>> {
+pub fn mask(value: &Bound<'_, PyAny>, n: usize) -> Result<Vec<bool>> {
     let active = match value.extract::<PyReadonlyArray1<'_, bool>>() {
         Ok(ready) => ready.as_array().to_vec(),
         Err(_) => flags(value, Kind::Option, "active")?,
@@ -46,43 +46,18 @@ pub fn mask(value: &Bound<'_, PyAny>, n: usize) -> PyResult<Vec<bool>> {
         return Ok(active);
     }
     let what = format!("{n} truth values");
-    Err(refused(value, Kind::Option, "active", &what).into())
+    Err(refused(value, Kind::Option, "active", &what))
 }
 
 /// (n, wheels) commands in row-major order.
-fn commands(
-    value: &Bound<'_, PyAny>,
-    field: &'static str,
-    shape: [usize; 2],
-) -> PyResult<Vec<f64>> {
-    if let Ok(ready) = value.extract::<PyReadonlyArray2<'_, f64>>()
-        && ready.as_array().shape() == shape
-    {
-        return Ok(ready.as_array().iter().copied().collect());
-    }
+fn commands(value: &Bound<'_, PyAny>, field: &'static str, shape: [usize; 2]) -> Result<Vec<f64>> {
     let given = array(value, Kind::Command, field)?;
     let view = given.as_array();
     if view.shape() != shape {
         let message = format!("{field}: needs shape {shape:?}, has {:?}", view.shape());
-        return Err(BorderError {
-            kind: Kind::Command,
-            message,
-            field: Some(field.to_owned()),
-            value: Value::Count(view.ndim()),
-        }
-        .into());
+        return Err(Kind::Command.error(field, message, Value::Count(view.ndim())));
     }
     Ok(view.iter().copied().collect())
-}
-
-/// The index of one of these rovers.
-pub fn index(index: &Bound<'_, PyAny>, rovers: &[CoreSimulation]) -> PyResult<usize> {
-    let i = count(index, Kind::Option, "index")?;
-    if i < rovers.len() {
-        return Ok(i);
-    }
-    let len = rovers.len();
-    Err(refused(index, Kind::Option, "index", &format!("below {len}")).into())
 }
 
 #[pymethods]
@@ -93,7 +68,7 @@ impl SimulationBatch {
         simulations: &Bound<'_, PyAny>,
         scan: Option<&Bound<'_, PyAny>>,
         threads: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Self> {
+    ) -> Result<Self> {
         let field = "simulations";
         let items = simulations
             .try_iter()
@@ -107,13 +82,13 @@ impl SimulationBatch {
         }
         let threads = threads.map(|given| at_least_one(given, Kind::Option, "threads"));
         let threads = threads.transpose()?;
-        let inner = Batch::new(rovers, scan_points(scan)?, threads).map_err(BorderError::from)?;
+        let inner = Batch::new(rovers, scan_points(scan)?, threads)?;
         Ok(Self(Shared::new(Inner { inner, origins })))
     }
 
     /// Number of threads.
     #[getter]
-    fn threads(&self) -> PyResult<usize> {
+    fn threads(&self) -> Result<usize> {
         Ok(self.0.open()?.inner.threads())
     }
 
@@ -126,7 +101,7 @@ impl SimulationBatch {
 
     /// Place of each quantity in a row of readings; `Simulation.reading_layout` lists them.
     #[getter]
-    fn reading_layout<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn reading_layout<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         slices(py, self.0.open()?.inner.layout())
     }
 
@@ -148,7 +123,6 @@ impl SimulationBatch {
     ///     CommandError: An array has a wrong shape or an entry that a rover refuses. No rover has
     ///         moved.
     ///     OptionError: `n` or `active` is invalid.
-    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     #[pyo3(signature = (torques, set_points, n = Given::MISSING, *, active = None),
         text_signature = "($self, torques, set_points, n=1, *, active=None)")]
     fn step<'py>(
@@ -158,7 +132,7 @@ impl SimulationBatch {
         set_points: &Bound<'_, PyAny>,
         n: Given<'_>,
         active: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyDict>)> {
+    ) -> Result<(Array, Bound<'py, PyDict>)> {
         let mut held = self.0.open()?;
         let inner = &mut held.inner;
         let n_rovers = inner.rovers().len();
@@ -167,33 +141,29 @@ impl SimulationBatch {
         let set_points = commands(set_points, "set_points", shape)?;
         let n = n.count(1, Kind::Option, "n")?;
         let active = active.map(|given| mask(given, n_rovers)).transpose()?;
-        let rows = PyArray2::zeros(py, [n_rovers, inner.layout().size()], false);
-        {
-            let mut writable = rows.readwrite();
-            let out = writable.as_slice_mut()?;
-            let mut watch = Watch::new();
-            let active = active.as_deref();
-            let done = py.detach(|| {
-                inner.step_while(&torques, &set_points, n, active, out, &mut || watch.go_on())
-            });
-            watch.result(done)?;
-        }
+        let width = inner.layout().size();
+        let mut rows = vec![0.0; n_rovers * width];
+        let (mut watch, active, out) = (Watch::new(), active.as_deref(), &mut rows[..]);
+        let done = py.detach(|| {
+            inner.step_while(&torques, &set_points, n, active, out, &mut || watch.go_on())
+        });
+        watch.result(done)?;
         let errors = PyDict::new(py);
         for (index, error) in inner.errors().iter().enumerate() {
             if let Some(error) = error {
                 errors.set_item(index, error.to_string())?;
             }
         }
-        Ok((rows, errors))
+        Ok((Array::shaped(rows, &[n_rovers, width]), errors))
     }
 
     /// The readings of all rovers now, (n_rovers, size).
-    fn readings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn readings(&self) -> Result<Array> {
         let held = self.0.open()?;
         let shape = [held.inner.rovers().len(), held.inner.layout().size()];
-        let rows = PyArray2::zeros(py, shape, false);
-        held.inner.read(rows.readwrite().as_slice_mut()?);
-        Ok(rows)
+        let mut rows = vec![0.0; shape[0] * shape[1]];
+        held.inner.read(&mut rows);
+        Ok(Array::shaped(rows, &shape))
     }
 
     /// Puts a copy of a simulation, with its own terrain, in the place of a rover.
@@ -210,16 +180,15 @@ impl SimulationBatch {
     fn replace(
         &self,
         index: &Bound<'_, PyAny>,
-        simulation: &Bound<'_, PyAny>,
+        simulation: GivenSimulation<'_>,
         target: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<()> {
-        let one = crate::episode::simulation(simulation, "simulation")?.get();
+    ) -> Result<()> {
+        let one = simulation.0.get();
         let target = place(target)?;
         let rover = one.open()?.clone();
         let mut held = self.0.open()?;
-        let index = self::index(index, held.inner.rovers())?;
-        let replaced = held.inner.replace(index, rover, target);
-        replaced.map_err(BorderError::from)?;
+        let index = below(index, held.inner.rovers().len())?;
+        held.inner.replace(index, rover, target)?;
         held.origins[index] = one.origin().clone();
         Ok(())
     }
@@ -229,22 +198,19 @@ impl SimulationBatch {
     /// Args:
     ///     index: Index of the rover.
     ///
-    /// Returns:
-    ///     The copy; stepping it does not move the rover.
-    ///
     /// Raises:
     ///     OptionError: There is no such rover.
-    fn simulation(&self, index: &Bound<'_, PyAny>) -> PyResult<Simulation> {
+    fn simulation(&self, index: &Bound<'_, PyAny>) -> Result<Simulation> {
         let held = self.0.open()?;
         let rovers = held.inner.rovers();
-        let index = self::index(index, rovers)?;
+        let index = below(index, rovers.len())?;
         Ok(Simulation::of(
             rovers[index].clone(),
             held.origins[index].clone(),
         ))
     }
 
-    fn __len__(&self) -> PyResult<usize> {
+    fn __len__(&self) -> Result<usize> {
         Ok(self.0.open()?.inner.rovers().len())
     }
 

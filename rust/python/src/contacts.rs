@@ -1,7 +1,6 @@
 //! `Contacts`, `PlanarContacts`, `SoilContacts`, `GrainContacts`: the contacts of the last step as
 //! arrays.
 
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use rover_core::contact::{Contact, Part};
 use rover_core::multibody::Model;
@@ -9,150 +8,122 @@ use rover_core::simulation::{ActiveContact, Components, LocatedContact};
 use rover_core::system::PlanarContact;
 use rover_core::system::grains::GrainContact;
 
-use crate::arrays::fresh_blocks;
+use crate::arrays::{Array, fresh_rows};
 
-/// What all lists of contacts have: columns with one row a contact.
-struct Columns<C: LocatedContact>(Vec<ActiveContact<C>>);
+/// What all lists of contacts have, one row a contact.
+struct Columns {
+    points: Array,
+    normals: Array,
+    gaps: Array,
+    impulses: Array,
+    velocities: Array,
+}
 
-impl<C: LocatedContact> Columns<C> {
-    fn rows<'py>(
-        &self,
-        py: Python<'py>,
-        f: impl Fn(&ActiveContact<C>) -> C::Vector,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let rows: Vec<C::Vector> = self.0.iter().map(f).collect();
-        let numbers = rows.iter().flat_map(AsRef::as_ref).copied();
-        PyArray1::from_iter(py, numbers).reshape([rows.len(), C::Vector::N])
-    }
+fn rows<C: LocatedContact>(
+    active: &[ActiveContact<C>],
+    f: impl Fn(&ActiveContact<C>) -> C::Vector,
+) -> Array {
+    let rows: Vec<C::Vector> = active.iter().map(f).collect();
+    let numbers = rows.iter().flat_map(AsRef::as_ref).copied();
+    Array::shaped(numbers.collect(), &[rows.len(), C::Vector::N])
+}
 
-    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.rows(py, |a| a.position)
-    }
-
-    fn normals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.rows(py, |a| a.contact.normal())
-    }
-
-    fn impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.rows(py, |a| a.impulse)
-    }
-
-    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.rows(py, |a| a.velocity)
-    }
-
-    fn gaps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_iter(py, self.0.iter().map(|a| a.contact.gap()))
+impl Columns {
+    fn of<C: LocatedContact>(active: &[ActiveContact<C>]) -> Self {
+        Self {
+            points: rows(active, |a| a.position),
+            normals: rows(active, |a| a.contact.normal()),
+            gaps: active.iter().map(|a| a.contact.gap()).collect(),
+            impulses: rows(active, |a| a.impulse),
+            velocities: rows(active, |a| a.velocity),
+        }
     }
 }
 
-impl<const D: usize> Columns<GrainContact<D>> {
-    /// Numbers of both bodies; -1 from `n_moving` on.
-    fn bodies<'py>(&self, py: Python<'py>, n_moving: usize) -> PyResult<Bound<'py, PyAny>> {
-        let name = |body: u32| {
-            let is_fixed = body as usize >= n_moving;
-            if is_fixed { -1 } else { i64::from(body) }
-        };
-        let keys = self.0.iter().map(|a| a.contact.key);
-        let flat = PyArray1::from_iter(py, keys.flat_map(|k| [name(k.a), name(k.b)]));
-        flat.call_method1("reshape", (self.0.len(), 2))
-    }
+/// Numbers of both bodies; -1 from `n_moving` on.
+fn numbers<const D: usize>(
+    active: &[ActiveContact<GrainContact<D>>],
+    n_moving: usize,
+) -> Array<i64> {
+    let name = |body: u32| {
+        if body as usize >= n_moving {
+            -1
+        } else {
+            i64::from(body)
+        }
+    };
+    let keys = active.iter().map(|a| a.contact.key);
+    fresh_rows(keys.map(|k| [name(k.a), name(k.b)]))
+}
+
+/// Frames (n, 3, 3) of their rows.
+fn frames(rows: impl Iterator<Item = [[f64; 3]; 3]>) -> Array {
+    let values: Vec<f64> = rows.flatten().flatten().collect();
+    let n = values.len() / 9;
+    Array::shaped(values, &[n, 3, 3])
 }
 
 /// The contacts of a rover's last step, as new arrays with one row a contact.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
 pub struct Contacts {
-    active: Columns<Contact>,
+    /// Names of the solids that touch, and of the joints that are at a stop.
     bodies: Vec<String>,
+    /// What touches in each contact, "wheel", "box" or "sphere"; "limit" for a joint's stop.
+    ///
+    /// The point of a stop is the origin of the solid that the joint carries, its normal is the
+    /// joint's axis that opens the gap. Along it, at a revolute joint, the gap is in rad, the
+    /// impulse in N m s and the velocity in rad/s; tangential entries are zero.
+    kinds: Vec<&'static str>,
+    /// Indices of the wheels that touch, (n,); -1 where it is another solid or a joint's stop.
+    wheels: Array<i64>,
+    /// Contact points, world frame, (n, 3), m.
+    points: Array,
+    /// Contact frames, world frame, (n, 3, 3).
+    ///
+    /// Rows are the unit vectors n (normal), t (rolling direction) and b (lateral).
+    frames: Array,
+    /// Gaps, (n,), m, at the configuration where the step evaluated the contacts.
+    gaps: Array,
+    /// Impulses of the step along n, t, b, (n, 3), N s.
+    ///
+    /// Where the step was split, they are sums over its parts.
+    impulses: Array,
+    /// Relative velocities after the step along n, t, b, (n, 3), m/s.
+    velocities: Array,
 }
 
 impl Contacts {
     pub fn new(model: &Model, active: &[ActiveContact<Contact>]) -> Self {
-        let name = |a: &ActiveContact<Contact>| a.contact.part.name(model).to_owned();
+        let parts = active.iter().map(|a| &a.contact.part);
+        let told = |part: &Part| match part {
+            Part::Wheel(i) => ("wheel", i64::try_from(*i).unwrap_or(-1)),
+            Part::Box(_) => ("box", -1),
+            Part::Sphere(_) => ("sphere", -1),
+            Part::Limit(..) => ("limit", -1),
+        };
+        let (kinds, wheels): (_, Vec<i64>) = parts.clone().map(told).unzip();
+        let columns = Columns::of(active);
         Self {
-            active: Columns(active.to_vec()),
-            bodies: active.iter().map(name).collect(),
+            bodies: parts.map(|part| part.name(model).to_owned()).collect(),
+            kinds,
+            wheels: wheels.into(),
+            points: columns.points,
+            frames: frames(
+                active
+                    .iter()
+                    .map(|a| a.contact.frame.rows().map(Into::into)),
+            ),
+            gaps: columns.gaps,
+            impulses: columns.impulses,
+            velocities: columns.velocities,
         }
     }
 }
 
 #[pymethods]
 impl Contacts {
-    /// Names of the solids that touch, and of the joints that are at a stop.
-    #[getter]
-    fn bodies(&self) -> Vec<String> {
-        self.bodies.clone()
-    }
-
-    /// What touches in each contact, "wheel", "box" or "sphere"; "limit" for a joint's stop.
-    ///
-    /// The point of a stop is the origin of the solid that the joint carries, its normal is the
-    /// joint's axis that opens the gap. Along it, at a revolute joint, the gap is in rad, the
-    /// impulse in N m s and the velocity in rad/s; tangential entries are zero.
-    #[getter]
-    fn kinds(&self) -> Vec<&'static str> {
-        let kind = |a: &ActiveContact<Contact>| match a.contact.part {
-            Part::Wheel(_) => "wheel",
-            Part::Box(_) => "box",
-            Part::Sphere(_) => "sphere",
-            Part::Limit(..) => "limit",
-        };
-        self.active.0.iter().map(kind).collect()
-    }
-
-    /// Indices of the wheels that touch, (n,); -1 where it is another solid or a joint's stop.
-    #[getter]
-    fn wheels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-        let index = |a: &ActiveContact<Contact>| match a.contact.part {
-            Part::Wheel(i) => i64::try_from(i).unwrap_or(-1),
-            Part::Box(_) | Part::Sphere(_) | Part::Limit(..) => -1,
-        };
-        PyArray1::from_iter(py, self.active.0.iter().map(index))
-    }
-
-    /// Contact points, world frame, (n, 3), m.
-    #[getter]
-    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.active.points(py)
-    }
-
-    /// Contact frames, world frame, (n, 3, 3).
-    ///
-    /// Rows are the unit vectors n (normal), t (rolling direction) and b (lateral).
-    #[getter]
-    fn frames<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        let values = self
-            .active
-            .0
-            .iter()
-            .flat_map(|a| a.contact.frame.rows().map(<[f64; 3]>::from))
-            .flatten()
-            .collect();
-        fresh_blocks(py, values, [self.active.0.len(), 3, 3])
-    }
-
-    /// Gaps, (n,), m, at the configuration where the step evaluated the contacts.
-    #[getter]
-    fn gaps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.active.gaps(py)
-    }
-
-    /// Impulses of the step along n, t, b, (n, 3), N s.
-    ///
-    /// Where the step was split, they are sums over its parts.
-    #[getter]
-    fn impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.active.impulses(py)
-    }
-
-    /// Relative velocities after the step along n, t, b, (n, 3), m/s.
-    #[getter]
-    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.active.velocities(py)
-    }
-
     fn __len__(&self) -> usize {
-        self.active.0.len()
+        self.bodies.len()
     }
 
     fn __repr__(&self) -> String {
@@ -161,154 +132,143 @@ impl Contacts {
 }
 
 /// The contacts of a planar simulation's last step, as new arrays with one row a contact.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
 pub struct PlanarContacts {
-    active: Columns<PlanarContact>,
+    /// Indices of the discs that touch, (n,); 0 is the ball or wheel A, 1 wheel B.
+    discs: Array<i64>,
+    /// Points of the ground, world frame, (n, 2), m.
+    points: Array,
+    /// Unit normals out of the ground, (n, 2); the tangent is (n_y, -n_x).
+    normals: Array,
+    /// Gaps, (n,), m.
+    gaps: Array,
+    /// Impulses of the step along normal and tangent, (n, 2), N s.
+    ///
+    /// Where the step was split, they are sums over its parts.
+    impulses: Array,
+    /// Velocities of the rim after the step along normal and tangent, (n, 2), m/s.
+    velocities: Array,
 }
 
 impl PlanarContacts {
     pub fn new(active: &[ActiveContact<PlanarContact>]) -> Self {
+        let Columns {
+            points,
+            normals,
+            gaps,
+            impulses,
+            velocities,
+        } = Columns::of(active);
+        let discs = active
+            .iter()
+            .map(|a| i64::from(a.contact.key.disc))
+            .collect();
         Self {
-            active: Columns(active.to_vec()),
+            discs,
+            points,
+            normals,
+            gaps,
+            impulses,
+            velocities,
         }
     }
 }
 
 #[pymethods]
 impl PlanarContacts {
-    /// Indices of the discs that touch, (n,); 0 is the ball or wheel A, 1 wheel B.
-    #[getter]
-    fn discs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-        PyArray1::from_iter(
-            py,
-            self.active.0.iter().map(|a| i64::from(a.contact.key.disc)),
-        )
-    }
-
-    /// Points of the ground, world frame, (n, 2), m.
-    #[getter]
-    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.active.points(py)
-    }
-
-    /// Unit normals out of the ground, (n, 2); the tangent is (n_y, -n_x).
-    #[getter]
-    fn normals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.active.normals(py)
-    }
-
-    /// Gaps, (n,), m.
-    #[getter]
-    fn gaps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.active.gaps(py)
-    }
-
-    /// Impulses of the step along normal and tangent, (n, 2), N s.
-    ///
-    /// Where the step was split, they are sums over its parts.
-    #[getter]
-    fn impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.active.impulses(py)
-    }
-
-    /// Velocities of the rim after the step along normal and tangent, (n, 2), m/s.
-    #[getter]
-    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.active.velocities(py)
-    }
-
     fn __len__(&self) -> usize {
-        self.active.0.len()
+        self.discs.len()
     }
 
     fn __repr__(&self) -> String {
-        format!("PlanarContacts({})", self.active.0.len())
+        format!("PlanarContacts({})", self.discs.len())
     }
 }
 
 /// The contacts of a soil's last step, as new arrays with one row a contact.
 ///
 /// Contacts between sleeping disks are left out.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
 pub struct SoilContacts {
-    active: Columns<GrainContact<2>>,
-    n_moving: usize,
+    /// Numbers of both bodies, (n, 2), disks from 0, then the wheels; -1 for a wall or the ground.
+    bodies: Array<i64>,
+    /// Points of the first body's rim, (n, 2), m.
+    points: Array,
+    /// Unit normals from the second body into the first, (n, 2).
+    normals: Array,
+    /// Gaps at the start of the step, (n,), m; negative where bodies overlap.
+    gaps: Array,
+    /// Impulses on the first body along the normal and the tangent (n_y, -n_x), (n, 2), N s.
+    impulses: Array,
+    /// Relative velocities after the step along normal and tangent, (n, 2), m/s.
+    ///
+    /// Of the first body against the second.
+    velocities: Array,
+    /// Impulses on the first body along x and y, (n, 2), N s.
+    world_impulses: Array,
 }
 
 impl SoilContacts {
     /// `n_moving`: number of disks and wheels.
     pub fn new(active: &[ActiveContact<GrainContact<2>>], n_moving: usize) -> Self {
+        let Columns {
+            points,
+            normals,
+            impulses,
+            velocities,
+            ..
+        } = Columns::of(active);
+        let on_first = |a: &ActiveContact<GrainContact<2>>| {
+            (a.contact.n * a.impulse[0] + a.contact.t() * a.impulse[1]).into()
+        };
         Self {
-            active: Columns(active.to_vec()),
-            n_moving,
+            bodies: numbers(active, n_moving),
+            points,
+            normals,
+            gaps: active.iter().map(|a| a.contact.gap_start).collect(),
+            impulses,
+            velocities,
+            world_impulses: rows(active, on_first),
         }
     }
 }
 
 #[pymethods]
 impl SoilContacts {
-    /// Numbers of both bodies, (n, 2), disks from 0, then the wheels; -1 for a wall or the ground.
-    #[getter]
-    fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.active.bodies(py, self.n_moving)
-    }
-
-    /// Points of the first body's rim, (n, 2), m.
-    #[getter]
-    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.active.points(py)
-    }
-
-    /// Unit normals from the second body into the first, (n, 2).
-    #[getter]
-    fn normals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.active.normals(py)
-    }
-
-    /// Gaps at the start of the step, (n,), m; negative where bodies overlap.
-    #[getter]
-    fn gaps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_iter(py, self.active.0.iter().map(|a| a.contact.gap_start))
-    }
-
-    /// Impulses on the first body along the normal and the tangent (n_y, -n_x), (n, 2), N s.
-    #[getter]
-    fn impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.active.impulses(py)
-    }
-
-    /// Relative velocities after the step along normal and tangent, (n, 2), m/s.
-    ///
-    /// Of the first body against the second.
-    #[getter]
-    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.active.velocities(py)
-    }
-
-    /// Impulses on the first body along x and y, (n, 2), N s.
-    #[getter]
-    fn world_impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.active.rows(py, |a| {
-            (a.contact.n * a.impulse[0] + a.contact.t() * a.impulse[1]).into()
-        })
-    }
-
     fn __len__(&self) -> usize {
-        self.active.0.len()
+        self.bodies.len()
     }
 
     fn __repr__(&self) -> String {
-        format!("SoilContacts({})", self.active.0.len())
+        format!("SoilContacts({})", self.bodies.len())
     }
 }
 
 /// The contacts of the last step of grains in space, as new arrays with one row a contact.
 ///
 /// Contacts between sleeping balls are left out.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
 pub struct GrainContacts {
-    active: Columns<GrainContact<3>>,
-    n_moving: usize,
+    /// Numbers of both bodies, (n, 2), balls from 0; -1 for a wall or the terrain.
+    bodies: Array<i64>,
+    /// Points of the first body's surface, (n, 3), m.
+    points: Array,
+    /// Unit normals from the second body into the first, (n, 3).
+    normals: Array,
+    /// Contact frames, world frame, (n, 3, 3).
+    ///
+    /// Rows are the unit vectors n (normal), t and b (tangents).
+    frames: Array,
+    /// Gaps at the start of the step, (n,), m; negative where bodies overlap.
+    gaps: Array,
+    /// Impulses on the first body along n, t, b of `frames`, (n, 3), N s.
+    ///
+    /// Cohesion is part of the normal ones, which are negative where a contact bears tension.
+    impulses: Array,
+    /// Velocities of the first body against the second after the step along n, t, b, (n, 3), m/s.
+    velocities: Array,
+    /// Impulses on the first body along x, y, z, (n, 3), N s.
+    world_impulses: Array,
 }
 
 impl GrainContacts {
@@ -323,77 +283,37 @@ impl GrainContacts {
         for one in &mut active {
             one.impulse[0] -= attraction(&one.contact);
         }
+        let Columns {
+            points,
+            normals,
+            impulses,
+            velocities,
+            ..
+        } = Columns::of(&active);
+        let on_first = |a: &ActiveContact<GrainContact<3>>| {
+            let [n, t, b] = a.contact.frame();
+            (n * a.impulse[0] + t * a.impulse[1] + b * a.impulse[2]).into()
+        };
         Self {
-            active: Columns(active),
-            n_moving,
+            bodies: numbers(&active, n_moving),
+            points,
+            normals,
+            frames: frames(active.iter().map(|a| a.contact.frame().map(Into::into))),
+            gaps: active.iter().map(|a| a.contact.gap_start).collect(),
+            impulses,
+            velocities,
+            world_impulses: rows(&active, on_first),
         }
     }
 }
 
 #[pymethods]
 impl GrainContacts {
-    /// Numbers of both bodies, (n, 2), balls from 0; -1 for a wall or the terrain.
-    #[getter]
-    fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.active.bodies(py, self.n_moving)
-    }
-
-    /// Points of the first body's surface, (n, 3), m.
-    #[getter]
-    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.active.points(py)
-    }
-
-    /// Unit normals from the second body into the first, (n, 3).
-    #[getter]
-    fn normals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.active.normals(py)
-    }
-
-    /// Contact frames, world frame, (n, 3, 3).
-    ///
-    /// Rows are the unit vectors n (normal), t and b (tangents).
-    #[getter]
-    fn frames<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        let active = self.active.0.iter();
-        let frames = active.flat_map(|a| a.contact.frame().map(<[f64; 3]>::from));
-        fresh_blocks(py, frames.flatten().collect(), [self.active.0.len(), 3, 3])
-    }
-
-    /// Gaps at the start of the step, (n,), m; negative where bodies overlap.
-    #[getter]
-    fn gaps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_iter(py, self.active.0.iter().map(|a| a.contact.gap_start))
-    }
-
-    /// Impulses on the first body along n, t, b of `frames`, (n, 3), N s.
-    ///
-    /// Cohesion is part of the normal ones, which are negative where a contact bears tension.
-    #[getter]
-    fn impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.active.impulses(py)
-    }
-
-    /// Velocities of the first body against the second after the step along n, t, b, (n, 3), m/s.
-    #[getter]
-    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.active.velocities(py)
-    }
-
-    /// Impulses on the first body along x, y, z, (n, 3), N s.
-    #[getter]
-    fn world_impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.active.rows(py, |a| {
-            let [n, t, b] = a.contact.frame();
-            (n * a.impulse[0] + t * a.impulse[1] + b * a.impulse[2]).into()
-        })
-    }
-
     fn __len__(&self) -> usize {
-        self.active.0.len()
+        self.bodies.len()
     }
 
     fn __repr__(&self) -> String {
-        format!("GrainContacts({})", self.active.0.len())
+        format!("GrainContacts({})", self.bodies.len())
     }
 }

@@ -1,31 +1,26 @@
 //! `EpisodeDistribution` and `DrawnEpisodes`: the next episodes of rovers, drawn at random.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
 use rover_core::draw::{
-    Domain, DomainDistribution, DrawnGround, Fixed, FixedStart, GroundDistribution,
-    HillDistribution, Order, Pcg64, Range, RockDistribution, RockDraw, SandDistribution,
-    SceneDistribution, Start, StartDistribution,
+    DomainDistribution, DrawnGround, Fixed, FixedStart, GroundDistribution, HillDistribution,
+    Order, Pcg64, Range, RockDistribution, RockDraw, SandDistribution, SceneDistribution,
+    StartDistribution,
 };
 use rover_core::episode::{Beginning, EpisodeBatch, EpisodeDistribution as CoreDistribution};
-use rover_core::geometry::Plane as CorePlane;
 use rover_core::simulation::RoverSimulation;
 
-use crate::arguments::{Given, count, number, refused, whole};
-use crate::arrays::{fresh_table, two, vector};
-use crate::episode::{self, EpisodeRun};
-use crate::errors::{BorderError, Kind};
-use crate::generators::{generators, halves};
+use crate::arguments::{Named, below, number, refused, whole};
+use crate::arrays::{Array, fresh_rows, two, vector};
+use crate::episode::{EpisodeRun, GivenRules, GivenSimulation};
+use crate::errors::{Kind, Result};
+use crate::generators::generators;
 use crate::options::SolverWords;
 use crate::plane::Plane;
 use crate::reading::points;
 use crate::shared::Watch;
 use crate::simulation::{Origin, Simulation};
 use crate::{terrain, union};
-
-/// Positional and keyword arguments.
-type NewArguments<'py> = ((Bound<'py, PyAny>, Bound<'py, PyAny>), Bound<'py, PyDict>);
 
 /// What the episodes of a task are drawn from.
 ///
@@ -61,7 +56,7 @@ pub struct EpisodeDistribution {
     pub inner: CoreDistribution,
     pub words: SolverWords,
     /// What it was made with, for pickling.
-    given: (Py<PyAny>, Py<PyAny>, Py<PyDict>),
+    given: ((GivenRules, Py<Simulation>), Py<PyDict>),
 }
 
 /// Drawn episodes, in the order of the generators.
@@ -72,100 +67,49 @@ pub struct DrawnEpisodes {
 }
 
 /// A range (low, high).
-pub fn range(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Range> {
-    let found = vector(value, Kind::Option, field)?;
-    match found[..] {
+pub fn range(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Range> {
+    match vector(value, kind, field)?[..] {
         [low, high] if low.is_finite() && high.is_finite() && low <= high => Ok([low, high]),
         _ => Err(refused(
             value,
-            Kind::Option,
+            kind,
             field,
             "a pair (low, high), low <= high",
-        )
-        .into()),
-    }
-}
-
-/// A mapping that was given by name.
-struct Named<'a, 'py> {
-    given: &'a Bound<'py, PyMapping>,
-    field: &'static str,
-}
-
-impl<'a, 'py> Named<'a, 'py> {
-    fn of(given: &'a Bound<'py, PyAny>, field: &'static str) -> PyResult<Self> {
-        let found = given.cast::<PyMapping>();
-        let given = found.map_err(|_| refused(given, Kind::Option, field, "a mapping"))?;
-        Ok(Self { given, field })
-    }
-
-    /// What has a name, if it is there and not None.
-    fn some(&self, name: &str) -> PyResult<Option<Bound<'py, PyAny>>> {
-        if !self.given.contains(name)? {
-            return Ok(None);
-        }
-        Ok(Some(self.given.get_item(name)?).filter(|value| !value.is_none()))
-    }
-
-    fn path(&self, name: &str) -> String {
-        format!("{}.{name}", self.field)
-    }
-
-    fn number(&self, name: &str) -> PyResult<Option<f64>> {
-        let found = self.some(name)?;
-        let read = |value: Bound<'py, PyAny>| number(&value, Kind::Option, &self.path(name));
-        found.map(read).transpose()
-    }
-
-    fn point(&self, name: &str) -> PyResult<Option<[f64; 2]>> {
-        let read = |value: Bound<'py, PyAny>| two(&value, Kind::Option, &self.path(name));
-        self.some(name)?.map(read).transpose()
-    }
-
-    fn range(&self, name: &str) -> PyResult<Range> {
-        if let Some(value) = self.some(name)? {
-            return range(&value, &self.path(name));
-        }
-        let what = format!("a mapping with the range {name:?}");
-        Err(refused(self.given.as_any(), Kind::Option, self.field, &what).into())
+        )),
     }
 }
 
 /// What replaces draws, by name.
-fn fixed(given: &Bound<'_, PyAny>) -> PyResult<Fixed> {
-    let named = Named::of(given, "fixed")?;
-    let read = |name, field| {
-        let found: Option<Bound<'_, PyAny>> = named.some(name)?;
-        found
-            .map(|value| vector(&value, Kind::State, field))
+fn fixed(given: &Bound<'_, PyAny>) -> Result<Fixed> {
+    let named = Named::mapping(given, "fixed", Kind::Option)?;
+    let state = |name: &str| -> Result<Option<Vec<f64>>> {
+        named
+            .some(name)?
+            .map(|value| vector(&value, Kind::State, name))
             .transpose()
     };
-    let v = read("v", "v")?;
+    let further = |value: &Bound<'_, PyAny>, _, field: &str| points(value, field);
+    let v = state("v")?;
     Ok(Fixed {
         start: FixedStart {
-            slope: named.number("slope")?,
-            uphill: named.number("uphill")?,
-            position: named.point("position")?,
-            heading: named.number("heading")?,
-            goal: named.point("goal")?,
-            further: (named.some("further")?).map_or(Ok(Vec::new()), |given| {
-                points(&given, &named.path("further"))
-            })?,
+            slope: named.maybe("slope")?,
+            uphill: named.maybe("uphill")?,
+            position: named.read("position", two)?,
+            heading: named.maybe("heading")?,
+            goal: named.read("goal", two)?,
+            further: named.read("further", further)?.unwrap_or_default(),
         },
-        difficulty: named.number("difficulty")?,
-        field_seed: (named.some("field_seed")?)
-            .map(|given| whole(&given, Kind::Option, &named.path("field_seed")))
-            .transpose()?,
-        state: read("q", "q")?.map(|q| (q, v)),
+        difficulty: named.maybe("difficulty")?,
+        field_seed: named.read("field_seed", whole)?,
+        state: state("q")?.map(|q| (q, v)),
     })
 }
 
 /// A list with one entry for each of `n` generators.
-fn list<'py>(given: &Bound<'py, PyAny>, n: usize, field: &str) -> PyResult<Vec<Bound<'py, PyAny>>> {
+fn list<'py>(given: &Bound<'py, PyAny>, n: usize, field: &str) -> Result<Vec<Bound<'py, PyAny>>> {
     let fits = given.len().is_ok_and(|length| length == n);
-    let found = fits.then(|| given.extract::<Vec<Bound<'py, PyAny>>>().ok());
-    let found = found.flatten();
-    found.ok_or_else(|| refused(given, Kind::Option, field, &format!("a list of {n}")).into())
+    let found = fits.then(|| given.extract().ok()).flatten();
+    found.ok_or_else(|| refused(given, Kind::Option, field, &format!("a list of {n}")))
 }
 
 /// How many scenes are drawn at most, and what replaces draws.
@@ -179,34 +123,34 @@ pub struct Request {
 impl Request {
     pub fn parse(
         generators: &Bound<'_, PyAny>,
-        attempts: Given<'_>,
-        difficulties: Option<&Bound<'_, PyAny>>,
-        fixed: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Self> {
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> Result<Self> {
+        let given = Named::keywords(generators.py(), options)?;
         let randoms = self::generators(generators)?;
         let n = randoms.len();
-        let attempts = attempts.count(100, Kind::Option, "attempts")?;
-        let read = |(i, one): (usize, &Bound<'_, PyAny>)| {
+        let attempts = given.count("attempts", 100)?;
+        let one = |(i, one): (usize, &Bound<'_, PyAny>)| {
             let given = Some(one).filter(|one| !one.is_none());
-            let field = format!("difficulties[{i}]");
-            given.map(|one| range(one, &field)).transpose()
+            given
+                .map(|one| range(one, Kind::Option, &format!("difficulties[{i}]")))
+                .transpose()
         };
-        let difficulties = match difficulties {
+        let difficulties = match given.some("difficulties")? {
             None => vec![None; n],
             Some(given) => {
-                let entries = list(given, n, "difficulties")?;
-                let read = entries.iter().enumerate().map(read);
-                read.collect::<PyResult<_>>()?
+                let entries = list(&given, n, "difficulties")?;
+                entries.iter().enumerate().map(one).collect::<Result<_>>()?
             }
         };
-        let fixed = match fixed {
+        let fixed = match given.some("fixed")? {
             None => vec![Fixed::default()],
-            Some(given) if given.cast::<PyMapping>().is_ok() => vec![self::fixed(given)?],
-            Some(given) => {
-                let entries = list(given, n, "fixed")?;
-                entries.iter().map(self::fixed).collect::<PyResult<_>>()?
-            }
+            Some(given) if given.cast::<PyMapping>().is_ok() => vec![fixed(&given)?],
+            Some(given) => list(&given, n, "fixed")?
+                .iter()
+                .map(fixed)
+                .collect::<Result<_>>()?,
         };
+        given.finish()?;
         Ok(Self {
             randoms,
             difficulties,
@@ -223,7 +167,7 @@ impl EpisodeDistribution {
         py: Python<'_>,
         request: &Request,
         batch: Option<&mut EpisodeBatch>,
-    ) -> PyResult<DrawnEpisodes> {
+    ) -> Result<DrawnEpisodes> {
         let places = request.randoms.iter().zip(&request.difficulties);
         let orders: Vec<Order<'_>> = places
             .enumerate()
@@ -252,82 +196,61 @@ impl EpisodeDistribution {
 #[pymethods]
 impl EpisodeDistribution {
     #[new]
-    #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
-    #[pyo3(signature = (rules, simulation, *, start, domain, trunk_load_limit, rocks = None, slope_by_difficulty = Given::MISSING,
-        ground = None, hills = None, sand = None),
+    #[pyo3(signature = (rules, simulation, **options),
         text_signature = "(rules, simulation, *, start, domain, trunk_load_limit, rocks=None, slope_by_difficulty=False, ground=None, hills=None, sand=None)")]
     fn new(
-        rules: &Bound<'_, PyAny>,
-        simulation: &Bound<'_, PyAny>,
-        start: &Bound<'_, PyAny>,
-        domain: &Bound<'_, PyAny>,
-        trunk_load_limit: &Bound<'_, PyAny>,
-        rocks: Option<&Bound<'_, PyAny>>,
-        slope_by_difficulty: Given<'_>,
-        ground: Option<&Bound<'_, PyAny>>,
-        hills: Option<&Bound<'_, PyAny>>,
-        sand: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Self> {
-        let slope_by_difficulty =
-            slope_by_difficulty.flag(false, Kind::Option, "slope_by_difficulty")?;
-        let given = PyDict::new(simulation.py());
-        for (name, value) in [
-            ("start", Some(start)),
-            ("domain", Some(domain)),
-            ("trunk_load_limit", Some(trunk_load_limit)),
-            ("rocks", rocks),
-            ("ground", ground),
-            ("hills", hills),
-            ("sand", sand),
-        ] {
-            given.set_item(name, value)?;
-        }
-        given.set_item("slope_by_difficulty", slope_by_difficulty)?;
-        let given = (
-            rules.clone().unbind(),
-            simulation.clone().unbind(),
-            given.unbind(),
-        );
-
-        let rules = episode::rules(rules)?;
-        let made = episode::simulation(simulation, "simulation")?.get();
+        rules: GivenRules,
+        simulation: GivenSimulation<'_>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> Result<Self> {
+        let simulation = simulation.0;
+        let py = simulation.py();
+        let kept = options
+            .map_or_else(|| Ok(PyDict::new(py)), pyo3::types::PyDictMethods::copy)?
+            .unbind();
+        let kept = ((rules.clone(), simulation.clone().unbind()), kept);
+        let given = Named::keywords(py, options)?;
+        let start = given.need("start", |v, k, _| Named::mapping(v, "start", k))?;
+        let domain = given.need("domain", |v, k, _| Named::mapping(v, "domain", k))?;
+        let (made, rules) = (simulation.get(), rules.0);
         let rover = made.open()?;
-        let ground = match sand {
-            Some(sand) => sand_distribution(sand, &[("ground", ground), ("hills", hills)])?,
-            None => ground_distribution(ground, hills)?,
-        };
-        let (start, domain) = (Named::of(start, "start")?, Named::of(domain, "domain")?);
         let scenes = SceneDistribution {
             rover: rover.scene().clone(),
             options: rover.options().clone(),
-            ground,
-            rocks: rocks.map(rock_distribution).transpose()?,
-            slope_by_difficulty,
+            ground: ground_distribution(&given)?,
+            rocks: given
+                .some("rocks")?
+                .as_ref()
+                .map(rock_distribution)
+                .transpose()?,
+            slope_by_difficulty: given.flag("slope_by_difficulty", false)?,
             start: StartDistribution {
-                slope: start.range("slope")?,
-                uphill: start.range("uphill")?,
-                heading: start.range("heading")?,
-                goal_distance: start.range("goal_distance")?,
-                goal_bearing: start.range("goal_bearing")?,
+                slope: start.need("slope", range)?,
+                uphill: start.need("uphill", range)?,
+                heading: start.need("heading", range)?,
+                goal_distance: start.need("goal_distance", range)?,
+                goal_bearing: start.need("goal_bearing", range)?,
                 further: rules.settings().goals - 1,
-                turn: start.range("turn")?,
+                turn: start.need("turn", range)?,
             },
             domain: DomainDistribution {
-                mass_scale: domain.range("mass_scale")?,
-                friction: domain.range("friction")?,
-                actuator_gain: domain.range("actuator_gain")?,
-                gravity_scale: domain.range("gravity_scale")?,
+                mass_scale: domain.need("mass_scale", range)?,
+                friction: domain.need("friction", range)?,
+                actuator_gain: domain.need("actuator_gain", range)?,
+                gravity_scale: domain.need("gravity_scale", range)?,
             },
             goal_tolerance: rules.settings().goal_tolerance,
         };
+        let trunk_load_limit = given.need("trunk_load_limit", number)?;
+        given.finish()?;
         Ok(Self {
             inner: CoreDistribution {
                 scenes,
                 rules,
-                trunk_load_limit: number(trunk_load_limit, Kind::Option, "trunk_load_limit")?,
+                trunk_load_limit,
             },
             words: made.origin().words.clone(),
-            given,
+            given: kept,
         })
     }
 
@@ -346,207 +269,138 @@ impl EpisodeDistribution {
     ///         after it, `difficulty`, `field_seed`, `q`, `v`; one mapping for all or a list of one
     ///         for each generator; none by default.
     ///
-    /// Returns:
-    ///     The episodes.
-    ///
     /// Raises:
     ///     TerrainError: A rover has no room in `attempts` scenes, or the ground refuses a number.
     ///     StateError: `q` or `v` has a wrong length or an entry that is not finite, or float32
     ///         cannot hold the observation.
     ///     ModelError: A scaled mass is out of its range.
     ///     OptionError: Any other argument is invalid.
-    #[pyo3(signature = (generators, *, attempts = Given::MISSING, difficulties = None, fixed = None),
+    #[pyo3(signature = (generators, **options),
         text_signature = "($self, generators, *, attempts=100, difficulties=None, fixed=None)")]
     fn draw(
         &self,
-        py: Python<'_>,
         generators: &Bound<'_, PyAny>,
-        attempts: Given<'_>,
-        difficulties: Option<&Bound<'_, PyAny>>,
-        fixed: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<DrawnEpisodes> {
-        let request = Request::parse(generators, attempts, difficulties, fixed)?;
-        self.draw_on(py, &request, None)
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> Result<DrawnEpisodes> {
+        let request = Request::parse(generators, options)?;
+        self.draw_on(generators.py(), &request, None)
     }
 
-    fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> NewArguments<'py> {
-        let (rules, simulation, given) = &self.given;
-        let first = (rules.bind(py).clone(), simulation.bind(py).clone());
-        (first, given.bind(py).clone())
-    }
-}
-
-/// The ground of episodes.
-fn ground_distribution(
-    ground: Option<&Bound<'_, PyAny>>,
-    hills: Option<&Bound<'_, PyAny>>,
-) -> PyResult<GroundDistribution> {
-    match (ground, hills) {
-        (None, None) => Ok(GroundDistribution::Tilted),
-        (Some(ground), None) => Ok(GroundDistribution::Given(terrain::parse(ground)?)),
-        (None, Some(hills)) => {
-            let what = "a number from 0 to 10, or nan";
-            let wrong = || refused(hills, Kind::Option, "hills", what);
-            let slope: f64 = hills.extract().map_err(|_| wrong())?;
-            if !(slope.is_nan() || (0.0..=10.0).contains(&slope)) {
-                return Err(wrong().into());
-            }
-            Ok(GroundDistribution::Hills(HillDistribution {
-                rms_slope: Some(slope).filter(|slope| !slope.is_nan()),
-            }))
-        }
-        (Some(_), Some(hills)) => {
-            Err(refused(hills, Kind::Option, "hills", "None beside a ground").into())
-        }
+    fn __getnewargs_ex__(&self, py: Python<'_>) -> ((GivenRules, Py<Simulation>), Py<PyDict>) {
+        let ((rules, simulation), options) = &self.given;
+        (
+            (rules.clone(), simulation.clone_ref(py)),
+            options.clone_ref(py),
+        )
     }
 }
 
 /// Sand of episodes: a list of soft grounds, whose surfaces do not count.
-fn sand_distribution(
-    sand: &Bound<'_, PyAny>,
-    others: &[(&str, Option<&Bound<'_, PyAny>>)],
-) -> PyResult<GroundDistribution> {
-    for (name, other) in others {
-        if let Some(other) = other {
-            return Err(refused(other, Kind::Option, name, "None beside sand").into());
-        }
-    }
-    let wrong = || {
-        refused(
-            sand,
-            Kind::Option,
-            "sand",
-            "a list of one or more SoftGround",
-        )
-    };
+fn sand_distribution(sand: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<SandDistribution> {
+    let wrong = || refused(sand, kind, field, "a list of one or more SoftGround");
     let mut soils = Vec::new();
     for one in sand.try_iter().map_err(|_| wrong())? {
         match terrain::parse(&one?)? {
             DrawnGround::Soft(soft, _) => soils.push(soft),
-            _ => return Err(wrong().into()),
+            _ => return Err(wrong()),
         }
     }
     if soils.is_empty() {
-        return Err(wrong().into());
+        return Err(wrong());
     }
-    Ok(GroundDistribution::Sand(SandDistribution { soils }))
+    Ok(SandDistribution { soils })
 }
 
-fn rock_distribution(given: &Bound<'_, PyAny>) -> PyResult<RockDistribution> {
-    let named = Named::of(given, "rocks")?;
+/// The ground of episodes.
+fn ground_distribution(given: &Named<'_>) -> Result<GroundDistribution> {
+    let (ground, hills) = (given.some("ground")?, given.some("hills")?);
+    if let Some(sand) = given.read("sand", sand_distribution)? {
+        for (name, other) in [("ground", &ground), ("hills", &hills)] {
+            if let Some(other) = other {
+                return Err(given.refused(other, name, "None beside sand"));
+            }
+        }
+        return Ok(GroundDistribution::Sand(sand));
+    }
+    match (ground, hills) {
+        (None, None) => Ok(GroundDistribution::Tilted),
+        (Some(ground), None) => Ok(GroundDistribution::Given(terrain::parse(&ground)?)),
+        (None, Some(hills)) => match hills.extract::<f64>() {
+            Ok(slope) if slope.is_nan() || (0.0..=10.0).contains(&slope) => {
+                let rms_slope = Some(slope).filter(|slope| !slope.is_nan());
+                Ok(GroundDistribution::Hills(HillDistribution { rms_slope }))
+            }
+            _ => Err(given.refused(&hills, "hills", "a number from 0 to 10, or nan")),
+        },
+        (Some(_), Some(hills)) => Err(given.refused(&hills, "hills", "None beside a ground")),
+    }
+}
+
+fn rock_distribution(given: &Bound<'_, PyAny>) -> Result<RockDistribution> {
+    let named = Named::mapping(given, "rocks", Kind::Option)?;
     Ok(RockDistribution {
-        difficulty: named.range("difficulty")?,
-        abundance: named.number("abundance")?,
-        max_radius: named.number("max_radius")?,
+        difficulty: named.need("difficulty", range)?,
+        abundance: named.maybe("abundance")?,
+        max_radius: named.maybe("max_radius")?,
     })
 }
 
 impl DrawnEpisodes {
-    fn at(&self, index: &Bound<'_, PyAny>) -> PyResult<&Beginning> {
-        let i = count(index, Kind::Option, "index")?;
-        let len = self.drawn.len();
-        let found = self.drawn.get(i);
-        found.ok_or_else(|| refused(index, Kind::Option, "index", &format!("below {len}")).into())
+    /// Rows of equal length.
+    fn table<T>(&self, row: impl Fn(&Beginning) -> Vec<T>) -> Array<T> {
+        let rows: Vec<Vec<T>> = self.drawn.iter().map(row).collect();
+        let shape = [rows.len(), rows.first().map_or(0, Vec::len)];
+        Array::shaped(rows.into_iter().flatten().collect(), &shape)
     }
-}
 
-/// A row of `DrawnEpisodes.starts`.
-pub fn start_row(start: &Start) -> Vec<f64> {
-    let [x, z] = start.position;
-    let pose = [start.slope, start.uphill, x, z, start.heading];
-    pose.into_iter().chain(start.goals().flatten()).collect()
-}
-
-/// What a row of `DrawnEpisodes.starts` tells; None if it has another length.
-pub fn start_of(row: &[f64]) -> Option<Start> {
-    let (&[slope, uphill, x, z, heading, goal_x, goal_z], rest) = row.split_first_chunk()?;
-    let (further, []) = rest.as_chunks() else {
-        return None;
-    };
-    Some(Start {
-        slope,
-        uphill,
-        position: [x, z],
-        heading,
-        goal: [goal_x, goal_z],
-        further: further.to_vec(),
-    })
-}
-
-/// A row of `DrawnEpisodes.domains`.
-pub fn domain_row(domain: &Domain) -> [f64; 4] {
-    let (mass, gravity) = (domain.mass_scale, domain.gravity_scale);
-    [mass, domain.friction, domain.actuator_gain, gravity]
-}
-
-/// A row of `DrawnEpisodes.rocks`.
-pub fn rocks_row(rocks: Option<RockDraw>) -> [f64; 3] {
-    rocks.map_or([0.0; 3], |r| [r.difficulty, r.abundance, r.max_radius])
-}
-
-/// What a row of `DrawnEpisodes.rocks` tells; None for that of no rocks.
-pub fn rocks_of([difficulty, abundance, max_radius]: [f64; 3], seed: u64) -> Option<RockDraw> {
-    (max_radius > 0.0).then_some(RockDraw {
-        difficulty,
-        abundance,
-        max_radius,
-        seed,
-    })
+    fn at(&self, index: &Bound<'_, PyAny>) -> Result<&Beginning> {
+        Ok(&self.drawn[below(index, self.drawn.len())?])
+    }
 }
 
 #[pymethods]
 impl DrawnEpisodes {
     /// The generators after the draws, (m, 4) uint64.
     #[getter]
-    fn generators<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u64>>> {
-        fresh_table(py, self.drawn.iter().map(|one| halves(&one.random)))
+    fn generators(&self) -> Array<u64> {
+        fresh_rows(self.drawn.iter().map(|one| one.random.state().halves()))
     }
 
     /// First observations, (m, size) float32.
     #[getter]
-    fn observations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let size = (self.drawn.first()).map_or(0, |one| one.episode.observation().len());
-        let entries = self.drawn.iter().flat_map(|one| one.episode.observation());
-        PyArray1::from_iter(py, entries.copied()).reshape([self.drawn.len(), size])
+    fn observations(&self) -> Array<f32> {
+        self.table(|one| one.episode.observation().to_vec())
     }
 
     /// Starts, (m, 5 + 2 n) with n goals, rad and m.
     ///
     /// Slope, direction of steepest ascent, x and z of the start, heading, x and z of each goal.
     #[getter]
-    fn starts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let rows: Vec<_> = self
-            .drawn
-            .iter()
-            .map(|one| start_row(&one.scene.start))
-            .collect();
-        let width = rows.first().map_or(0, Vec::len);
-        PyArray1::from_iter(py, rows.into_iter().flatten()).reshape([self.drawn.len(), width])
+    fn starts(&self) -> Array {
+        self.table(|one| one.scene.start.row())
     }
 
     /// Properties of rover and world, (m, 4).
     ///
     /// Factor of the masses, friction, gain of the motors, factor of gravity.
     #[getter]
-    fn domains<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let row = |one: &Beginning| domain_row(&one.scene.domain);
-        fresh_table(py, self.drawn.iter().map(row))
+    fn domains(&self) -> Array {
+        fresh_rows(self.drawn.iter().map(|one| one.scene.domain.row()))
     }
 
     /// Rocks, (m, 3); zeros where there are none.
     ///
     /// Difficulty, abundance, radius of the largest in wheel radii.
     #[getter]
-    fn rocks<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let row = |one: &Beginning| rocks_row(one.scene.rocks);
-        fresh_table(py, self.drawn.iter().map(row))
+    fn rocks(&self) -> Array {
+        fresh_rows(self.drawn.iter().map(|one| RockDraw::row(one.scene.rocks)))
     }
 
     /// Seeds of the rocks, (m,) uint64; zeros where there are none.
     #[getter]
-    fn rock_seeds<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u64>> {
+    fn rock_seeds(&self) -> Array<u64> {
         let seed = |one: &Beginning| one.scene.rocks.map_or(0, |rocks| rocks.seed);
-        PyArray1::from_iter(py, self.drawn.iter().map(seed))
+        self.drawn.iter().map(seed).collect()
     }
 
     /// An episode, which has begun.
@@ -556,7 +410,7 @@ impl DrawnEpisodes {
     ///
     /// Raises:
     ///     OptionError: There is no such episode.
-    fn episode(&self, index: &Bound<'_, PyAny>) -> PyResult<EpisodeRun> {
+    fn episode(&self, index: &Bound<'_, PyAny>) -> Result<EpisodeRun> {
         Ok(EpisodeRun::of(self.at(index)?.episode.clone()))
     }
 
@@ -567,12 +421,8 @@ impl DrawnEpisodes {
     ///
     /// Raises:
     ///     OptionError: There is no such episode.
-    fn terrain<'py>(
-        &self,
-        py: Python<'py>,
-        index: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        union::object(py, &self.at(index)?.scene.ground)
+    fn terrain<'py>(&self, index: &Bound<'py, PyAny>) -> Result<Bound<'py, PyAny>> {
+        union::object(index.py(), &self.at(index)?.scene.ground)
     }
 
     /// The plane of an episode, under rocks too; None where the ground has none.
@@ -582,10 +432,12 @@ impl DrawnEpisodes {
     ///
     /// Raises:
     ///     OptionError: There is no such episode.
-    fn plane<'py>(&self, index: &Bound<'py, PyAny>) -> PyResult<Option<Bound<'py, Plane>>> {
+    fn plane(&self, index: &Bound<'_, PyAny>) -> Result<Option<Py<Plane>>> {
         let terrain = &self.at(index)?.scene.placement.scene.terrain;
-        let plane = |plane: &CorePlane| Bound::new(index.py(), Plane::of(*plane));
-        terrain.ground().map(plane).transpose()
+        let plane = terrain
+            .ground()
+            .map(|plane| Py::new(index.py(), Plane::of(*plane)));
+        Ok(plane.transpose()?)
     }
 
     /// A new simulation of the rover at the start of an episode.
@@ -595,15 +447,11 @@ impl DrawnEpisodes {
     ///
     /// Raises:
     ///     OptionError: There is no such episode.
-    fn simulation(&self, index: &Bound<'_, PyAny>) -> PyResult<Simulation> {
+    fn simulation(&self, index: &Bound<'_, PyAny>) -> Result<Simulation> {
         let one = self.at(index)?;
-        let made = RoverSimulation::placed(one.scene.placement.clone());
-        let made = made.map_err(BorderError::from)?;
-        let origin = Origin {
-            terrain: one.scene.ground.clone(),
-            words: self.words.clone(),
-        };
-        Ok(Simulation::of(made, origin))
+        let made = RoverSimulation::placed(one.scene.placement.clone())?;
+        let (terrain, words) = (one.scene.ground.clone(), self.words.clone());
+        Ok(Simulation::of(made, Origin { terrain, words }))
     }
 
     fn __len__(&self) -> usize {

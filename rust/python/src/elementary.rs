@@ -8,7 +8,7 @@ use pyo3::types::PyFloat;
 use rover_core::scalar::elementary;
 
 use crate::arrays::array;
-use crate::errors::{BorderError, Kind, Value};
+use crate::errors::{Kind, Result, Value};
 
 /// Sine and cosine of angles.
 ///
@@ -27,7 +27,7 @@ use crate::errors::{BorderError, Kind, Value};
 pub fn sin_cos<'py>(
     py: Python<'py>,
     x: &Bound<'py, PyAny>,
-) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+) -> Result<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
     if let Ok(x) = x.cast::<PyFloat>() {
         let (sin, cos) = elementary::sin_cos(x.value());
         return Ok((
@@ -64,7 +64,7 @@ pub fn atan2<'py>(
     py: Python<'py>,
     y: &Bound<'py, PyAny>,
     x: &Bound<'py, PyAny>,
-) -> PyResult<Bound<'py, PyAny>> {
+) -> Result<Bound<'py, PyAny>> {
     if let (Ok(y), Ok(x)) = (y.cast::<PyFloat>(), x.cast::<PyFloat>()) {
         return Ok(PyFloat::new(py, elementary::atan2(y.value(), x.value())).into_any());
     }
@@ -73,13 +73,7 @@ pub fn atan2<'py>(
     let [y, x]: [ArrayViewD<'_, f64>; 2] = [given[0].as_array(), given[1].as_array()];
     if x.shape() != y.shape() {
         let message = format!("x: shape {:?}, but y has {:?}", x.shape(), y.shape());
-        return Err(BorderError {
-            kind: Kind::Option,
-            message,
-            field: Some("x".to_owned()),
-            value: Value::Count(x.len()),
-        }
-        .into());
+        return Err(Kind::Option.error("x", message, Value::Count(x.len())));
     }
     let angle = Zip::from(&y)
         .and(&x)
@@ -101,7 +95,7 @@ pub fn atan2<'py>(
 /// Raises:
 ///     OptionError: x is no number and no array of numbers.
 #[pyfunction]
-pub fn exp<'py>(py: Python<'py>, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+pub fn exp<'py>(py: Python<'py>, x: &Bound<'py, PyAny>) -> Result<Bound<'py, PyAny>> {
     if let Ok(x) = x.cast::<PyFloat>() {
         return Ok(PyFloat::new(py, elementary::exp(x.value())).into_any());
     }

@@ -2,10 +2,9 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyRange};
-use rover_core::draw::Domain;
 use rover_core::episode::running::{Period, check_normals};
 use rover_core::episode::{
     Ending, Episode as CoreEpisode, Last, N_QUANTITIES, N_TERMS, Progress, Quantities, Rules,
@@ -13,10 +12,10 @@ use rover_core::episode::{
 };
 use rover_core::simulation::{ReadingScratch, RoverSimulation};
 
-use crate::arguments::{Given, number, refused};
-use crate::arrays::{array, fresh, fresh_rows, vector};
+use crate::arguments::{Named, number, refused};
+use crate::arrays::{Array, array, fresh, fresh_rows, vector};
 use crate::episode_rules::EpisodeRules;
-use crate::errors::{BorderError, Kind, Value};
+use crate::errors::{Kind, Result, Value};
 use crate::infos::info;
 use crate::reading::{place, points};
 use crate::rover_grains::RoverGrainSimulation;
@@ -24,7 +23,7 @@ use crate::shared::{Shared, Watch};
 use crate::simulation::Simulation;
 
 /// Observation, reward, whether the episode has ended, info.
-type Step<'py> = (Bound<'py, PyArray1<f32>>, f64, bool, Bound<'py, PyDict>);
+type Step<'py> = (Array<f32>, f64, bool, Bound<'py, PyDict>);
 
 /// One episode of a driving task: what its simulation does not hold.
 ///
@@ -59,18 +58,17 @@ struct Inner {
 }
 
 /// Actions of a shape in row-major order, as float64.
-pub fn actions(value: &Bound<'_, PyAny>, shape: &[usize]) -> PyResult<Vec<f64>> {
-    let field = "action";
-    let misshapen = |given: &[usize]| BorderError {
-        kind: Kind::Command,
-        message: format!("{field}: must have shape {shape:?}, has {given:?}"),
-        field: Some(field.to_owned()),
-        value: Value::Object(value.clone().unbind()),
+pub fn actions(value: &Bound<'_, PyAny>, shape: &[usize]) -> Result<Vec<f64>> {
+    let (kind, field) = (Kind::Command, "action");
+    let check = |given: &[usize]| {
+        if given == shape {
+            return Ok(());
+        }
+        let message = format!("{field}: must have shape {shape:?}, has {given:?}");
+        Err(kind.error(field, message, Value::Object(value.clone().unbind())))
     };
     if let Ok(ready) = value.extract::<PyReadonlyArrayDyn<'_, f32>>() {
-        if ready.shape() != shape {
-            return Err(misshapen(ready.shape()).into());
-        }
+        check(ready.shape())?;
         return Ok(match ready.as_slice() {
             Ok(entries) => entries.iter().map(|&a| f64::from(a)).collect(),
             Err(_) => ready.as_array().iter().map(|&a| f64::from(a)).collect(),
@@ -78,77 +76,94 @@ pub fn actions(value: &Bound<'_, PyAny>, shape: &[usize]) -> PyResult<Vec<f64>> 
     }
     if value.is_instance_of::<PyRange>() {
         // It may be of any length.
-        return Err(refused(value, Kind::Command, field, "an array of numbers").into());
+        return Err(refused(value, kind, field, "an array of numbers"));
     }
-    let given = array(value, Kind::Command, field)?;
-    if given.shape() != shape {
-        return Err(misshapen(given.shape()).into());
-    }
+    let given = array(value, kind, field)?;
+    check(given.shape())?;
     Ok(given.as_array().iter().copied().collect())
+}
+
+/// The argument `simulation`: a `Simulation`.
+pub struct GivenSimulation<'py>(pub Bound<'py, Simulation>);
+
+impl<'py> FromPyObject<'_, 'py> for GivenSimulation<'py> {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        Ok(Self(simulation(&given, "simulation")?.clone()))
+    }
 }
 
 /// A simulation of the border.
 pub fn simulation<'a, 'py>(
     value: &'a Bound<'py, PyAny>,
     field: &str,
-) -> PyResult<&'a Bound<'py, Simulation>> {
-    let cast = value.cast();
-    cast.map_err(|_| refused(value, Kind::Option, field, "a Simulation").into())
+) -> Result<&'a Bound<'py, Simulation>> {
+    value
+        .cast()
+        .map_err(|_| refused(value, Kind::Option, field, "a Simulation"))
 }
 
-/// Rules of the border.
-pub fn rules(value: &Bound<'_, PyAny>) -> PyResult<Arc<Rules>> {
-    let cast = value.cast::<EpisodeRules>();
-    let found = cast.map_err(|_| refused(value, Kind::Option, "rules", "EpisodeRules"))?;
-    Ok(found.get().inner.clone())
+/// The argument `rules`: `EpisodeRules`.
+#[derive(Clone)]
+pub struct GivenRules(pub Arc<Rules>);
+
+impl FromPyObject<'_, '_> for GivenRules {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, '_, PyAny>) -> PyResult<Self> {
+        let found = given.cast::<EpisodeRules>();
+        let wrong = |_| refused(&given, Kind::Option, "rules", "EpisodeRules");
+        Ok(Self(found.map_err(wrong)?.get().inner.clone()))
+    }
 }
 
-fn setting(
-    goal: &Bound<'_, PyAny>,
-    further: Option<&Bound<'_, PyAny>>,
-    domain: &Bound<'_, PyAny>,
-    trunk_load_limit: &Bound<'_, PyAny>,
-    difficulty: &Bound<'_, PyAny>,
-) -> PyResult<Setting> {
-    let Ok([mass_scale, friction, actuator_gain, gravity_scale]) =
-        <[f64; 4]>::try_from(vector(domain, Kind::Option, "domain")?)
-    else {
-        return Err(refused(domain, Kind::Option, "domain", "four numbers").into());
-    };
+impl<'py> IntoPyObject<'py> for GivenRules {
+    type Target = EpisodeRules;
+    type Output = Bound<'py, EpisodeRules>;
+    type Error = PyErr;
+
+    fn into_pyobject(self, py: Python<'py>) -> PyResult<Self::Output> {
+        Bound::new(py, EpisodeRules::of(self.0))
+    }
+}
+
+/// What is set when an episode begins.
+fn setting(given: &Named<'_>) -> Result<Setting> {
+    let domain = given.need("domain", |value, kind, field| {
+        let numbers = <[f64; 4]>::try_from(vector(value, kind, field)?);
+        numbers.map_err(|_| refused(value, kind, field, "four numbers"))
+    })?;
+    let further = |value: &Bound<'_, PyAny>, _, field: &str| points(value, field);
     Ok(Setting {
-        goal: place(Some(goal))?,
-        further: further.map_or(Ok(Vec::new()), |given| points(given, "further"))?,
-        domain: Domain {
-            mass_scale,
-            friction,
-            actuator_gain,
-            gravity_scale,
-        },
-        trunk_load_limit: number(trunk_load_limit, Kind::Option, "trunk_load_limit")?,
-        difficulty: number(difficulty, Kind::Option, "difficulty")?,
+        goal: given.need("goal", |value, _, _| place(Some(value)))?,
+        further: given.read("further", further)?.unwrap_or_default(),
+        domain: domain.into(),
+        trunk_load_limit: given.need("trunk_load_limit", number)?,
+        difficulty: given.need("difficulty", number)?,
     })
 }
 
 /// What else an episode knows of its last control period.
-fn last(given: &Bound<'_, PyAny>) -> PyResult<Last> {
-    let what = "what `EpisodeRun.state` returns";
-    let refuse = || refused(given, Kind::Option, "outcome", what);
+fn last(given: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Last> {
+    let refuse = || refused(given, kind, field, "what `EpisodeRun.state` returns");
     let found: Option<(Vec<f64>, Vec<f64>, String)> = given.extract().ok();
     let (now, terms, name) = found.ok_or_else(refuse)?;
     let now = <[f64; N_QUANTITIES]>::try_from(now).map_err(|_| refuse())?;
     let terms = <[f64; N_TERMS]>::try_from(terms).map_err(|_| refuse())?;
     let ending = Ending::ALL.into_iter().find(|own| own.name() == name);
     if now.iter().chain(&terms).any(|x| x.is_nan()) {
-        return Err(refuse().into());
+        return Err(refuse());
     }
+    let now = Quantities::from_row(now);
     Ok(Last {
-        now: Quantities::from_row(now),
+        now,
         terms,
         ending: ending.ok_or_else(refuse)?,
     })
 }
 
-fn normals(given: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<f64>>> {
+fn normals(given: Option<&Bound<'_, PyAny>>) -> Result<Option<Vec<f64>>> {
     given
         .map(|given| vector(given, Kind::Option, "normals"))
         .transpose()
@@ -159,11 +174,11 @@ fn given(
     rules: &Rules,
     action: &Bound<'_, PyAny>,
     normals: Option<&Bound<'_, PyAny>>,
-) -> PyResult<(Vec<f64>, Option<Vec<f64>>)> {
+) -> Result<(Vec<f64>, Option<Vec<f64>>)> {
     let action = actions(action, &[rules.n_actions()])?;
-    action::check(&action, action.len(), true).map_err(BorderError::from)?;
+    action::check(&action, action.len(), true)?;
     let normals = self::normals(normals)?;
-    check_normals(rules, normals.as_deref()).map_err(BorderError::from)?;
+    check_normals(rules, normals.as_deref())?;
     Ok((action, normals))
 }
 
@@ -177,7 +192,7 @@ impl EpisodeRun {
     }
 
     /// A copy of what it holds.
-    pub fn copy(&self) -> PyResult<CoreEpisode> {
+    pub fn copy(&self) -> Result<CoreEpisode> {
         Ok(self.0.open()?.episode.clone())
     }
 }
@@ -219,10 +234,10 @@ impl Inner {
         py: Python<'py>,
         observation: &[f32],
         message: Option<String>,
-    ) -> PyResult<Step<'py>> {
+    ) -> Result<Step<'py>> {
         let outcome = self.episode.outcome();
         Ok((
-            PyArray1::from_slice(py, observation),
+            fresh(observation),
             outcome.reward,
             outcome.ending.is_end(),
             info(py, &(&self.episode, message))?,
@@ -233,49 +248,35 @@ impl Inner {
 #[pymethods]
 impl EpisodeRun {
     #[new]
-    #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
-    #[pyo3(signature = (rules, *, goal, domain, trunk_load_limit, difficulty, distance,
-        previous_action, energy, energy_positive, stuck_time, observation, further = None,
-        reached = Given::MISSING, outcome = None, owed = None),
+    #[pyo3(signature = (rules, **state),
         text_signature = "(rules, *, goal, domain, trunk_load_limit, difficulty, distance, previous_action, energy, energy_positive, stuck_time, observation, further=None, reached=0, outcome=None, owed=None)")]
-    fn new(
-        rules: &Bound<'_, PyAny>,
-        goal: &Bound<'_, PyAny>,
-        domain: &Bound<'_, PyAny>,
-        trunk_load_limit: &Bound<'_, PyAny>,
-        difficulty: &Bound<'_, PyAny>,
-        distance: &Bound<'_, PyAny>,
-        previous_action: &Bound<'_, PyAny>,
-        energy: &Bound<'_, PyAny>,
-        energy_positive: &Bound<'_, PyAny>,
-        stuck_time: &Bound<'_, PyAny>,
-        observation: &Bound<'_, PyAny>,
-        further: Option<&Bound<'_, PyAny>>,
-        reached: Given<'_>,
-        outcome: Option<&Bound<'_, PyAny>>,
-        owed: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Self> {
-        let option = |given, field| number(given, Kind::Option, field);
+    fn new(py: Python<'_>, rules: GivenRules, state: Option<&Bound<'_, PyDict>>) -> Result<Self> {
+        let given = Named::keywords(py, state)?;
+        let setting = setting(&given)?;
         let progress = Progress {
-            distance: option(distance, "distance")?,
-            previous_action: vector(previous_action, Kind::Option, "previous_action")?,
-            energy: option(energy, "energy")?,
-            energy_positive: option(energy_positive, "energy_positive")?,
-            stuck_time: option(stuck_time, "stuck_time")?,
-            reached: reached.count(0, Kind::Option, "reached")?,
+            distance: given.need("distance", number)?,
+            previous_action: given.need("previous_action", vector)?,
+            energy: given.need("energy", number)?,
+            energy_positive: given.need("energy_positive", number)?,
+            stuck_time: given.need("stuck_time", number)?,
+            reached: given.count("reached", 0)?,
         };
         #[allow(clippy::cast_possible_truncation)] // float32 is what an observation holds
-        let observation = vector(observation, Kind::Option, "observation")?
+        let observation: Vec<f32> = given
+            .need("observation", vector)?
             .into_iter()
             .map(|x| x as f32)
             .collect();
-        let setting = setting(goal, further, domain, trunk_load_limit, difficulty)?;
-        let last = outcome.map(last).transpose()?;
-        let owed = owed.map(|given| vector(given, Kind::Option, "owed"));
-        let rules = self::rules(rules)?;
-        let owed = owed.transpose()?;
-        let episode = CoreEpisode::resume(rules, setting, progress, observation, last, owed);
-        Ok(Self::of(episode.map_err(BorderError::from)?))
+        let (last, owed) = (given.read("outcome", last)?, given.read("owed", vector)?);
+        given.finish()?;
+        Ok(Self::of(CoreEpisode::resume(
+            rules.0,
+            setting,
+            progress,
+            observation,
+            last,
+            owed,
+        )?))
     }
 
     /// The beginning of an episode.
@@ -298,25 +299,20 @@ impl EpisodeRun {
     ///     OptionError: An argument has a wrong shape or a number that is not finite, or the
     ///         rover's model does not fit the rules.
     #[staticmethod]
-    #[allow(clippy::too_many_arguments)] // keyword arguments in Python
-    #[pyo3(signature = (rules, simulation, *, goal, domain, trunk_load_limit, difficulty,
-        normals = None, further = None))]
+    #[pyo3(signature = (rules, simulation, **options),
+        text_signature = "(rules, simulation, *, goal, domain, trunk_load_limit, difficulty, normals=None, further=None)")]
     fn begin(
-        rules: &Bound<'_, PyAny>,
-        simulation: &Bound<'_, PyAny>,
-        goal: &Bound<'_, PyAny>,
-        domain: &Bound<'_, PyAny>,
-        trunk_load_limit: &Bound<'_, PyAny>,
-        difficulty: &Bound<'_, PyAny>,
-        normals: Option<&Bound<'_, PyAny>>,
-        further: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Option<Self>> {
-        let rules = self::rules(rules)?;
-        let setting = setting(goal, further, domain, trunk_load_limit, difficulty)?;
-        let normals = self::normals(normals)?;
-        let rover = self::simulation(simulation, "simulation")?.get().open()?;
-        let begun = CoreEpisode::begin(rules, setting, &rover, normals.as_deref());
-        Ok(begun.map_err(BorderError::from)?.map(Self::of))
+        rules: GivenRules,
+        simulation: GivenSimulation<'_>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> Result<Option<Self>> {
+        let given = Named::keywords(simulation.0.py(), options)?;
+        let setting = setting(&given)?;
+        let normals = given.read("normals", vector)?;
+        given.finish()?;
+        let rover = simulation.0.get().open()?;
+        let begun = CoreEpisode::begin(rules.0, setting, &rover, normals.as_deref());
+        Ok(begun?.map(Self::of))
     }
 
     /// Gives the simulation an action for one control period.
@@ -348,7 +344,7 @@ impl EpisodeRun {
         action: &Bound<'py, PyAny>,
         normals: Option<&Bound<'py, PyAny>>,
         has_scan: bool,
-    ) -> PyResult<Step<'py>> {
+    ) -> Result<Step<'py>> {
         let mut held = self.0.open()?;
         let inner = &mut *held;
         let rules = inner.episode.rules().clone();
@@ -358,12 +354,8 @@ impl EpisodeRun {
             Some(among) => among.get().of_rover().open()?,
             None => self::simulation(simulation, "simulation")?.get().open()?,
         };
-        rules
-            .check_model(rover.model())
-            .map_err(BorderError::from)?;
-        (inner.episode)
-            .command(&mut rover, &action, &mut inner.commands)
-            .map_err(BorderError::from)?;
+        rules.check_model(rover.model())?;
+        (inner.episode).command(&mut rover, &action, &mut inner.commands)?;
         let mut watch = Watch::new();
         let substeps = rules.settings().substeps;
         let moving = &mut *rover;
@@ -405,7 +397,7 @@ impl EpisodeRun {
         action: &Bound<'py, PyAny>,
         normals: Option<&Bound<'py, PyAny>>,
         message: Option<String>,
-    ) -> PyResult<Step<'py>> {
+    ) -> Result<Step<'py>> {
         let mut held = self.0.open()?;
         let rules = held.episode.rules().clone();
         let (action, normals) = given(&rules, action, normals)?;
@@ -414,7 +406,7 @@ impl EpisodeRun {
         let expected = n_state + rules.settings().scan.len();
         if row.len() != expected {
             let what = format!("{expected} numbers");
-            return Err(refused(reading, Kind::Option, "reading", &what).into());
+            return Err(refused(reading, Kind::Option, "reading", &what));
         }
         let (state, heights) = row.split_at_mut(n_state);
         let period = Period {
@@ -435,78 +427,61 @@ impl EpisodeRun {
     ///
     /// Returns:
     ///     The last observation, (size,) float32.
-    fn complete<'py>(
-        &self,
-        py: Python<'py>,
-        simulation: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+    fn complete(&self, simulation: GivenSimulation<'_>) -> Result<Array<f32>> {
         let mut held = self.0.open()?;
-        let rover = self::simulation(simulation, "simulation")?.get().open()?;
-        held.episode.complete(&rover);
-        Ok(PyArray1::from_slice(py, held.episode.observation()))
+        held.episode.complete(&*simulation.0.get().open()?);
+        Ok(fresh(held.episode.observation()))
     }
 
     /// The last observation, (size,) float32.
     #[getter]
-    fn observation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f32>>> {
-        Ok(PyArray1::from_slice(
-            py,
-            self.0.open()?.episode.observation(),
-        ))
+    fn observation(&self) -> Result<Array<f32>> {
+        Ok(fresh(self.0.open()?.episode.observation()))
     }
 
     /// The present goal (x, z), m; the last one where all are reached.
     #[getter]
-    fn goal(&self) -> PyResult<(f64, f64)> {
+    fn goal(&self) -> Result<(f64, f64)> {
         Ok(self.0.open()?.episode.goal().into())
     }
 
     /// The info of the last period, or of the beginning.
-    fn info<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn info<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         info(py, &(&self.0.open()?.episode, None))
     }
 
     /// The keyword arguments that make an episode which continues as this one.
-    fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn state<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let held = self.0.open()?;
         let (setting, progress) = (held.episode.setting(), held.episode.progress());
-        let domain = &setting.domain;
-        let domain = [
-            domain.mass_scale,
-            domain.friction,
-            domain.actuator_gain,
-            domain.gravity_scale,
-        ];
         let state = PyDict::new(py);
         state.set_item("goal", (setting.goal[0], setting.goal[1]))?;
-        state.set_item("domain", fresh(py, &domain))?;
+        state.set_item("domain", fresh(&setting.domain.row()))?;
         state.set_item("trunk_load_limit", setting.trunk_load_limit)?;
         state.set_item("difficulty", setting.difficulty)?;
         state.set_item("distance", progress.distance)?;
-        state.set_item("previous_action", fresh(py, &progress.previous_action))?;
+        state.set_item("previous_action", fresh(&progress.previous_action))?;
         state.set_item("energy", progress.energy)?;
         state.set_item("energy_positive", progress.energy_positive)?;
         state.set_item("stuck_time", progress.stuck_time)?;
-        let observation = PyArray1::from_slice(py, held.episode.observation());
-        state.set_item("observation", observation)?;
-        state.set_item("further", fresh_rows(py, &setting.further)?)?;
+        state.set_item("observation", fresh(held.episode.observation()))?;
+        state.set_item("further", fresh_rows(setting.further.iter().copied()))?;
         state.set_item("reached", progress.reached)?;
         let outcome = held.episode.outcome();
         let (now, terms) = (outcome.now.row(), outcome.terms);
-        let told = (fresh(py, &now), fresh(py, &terms), outcome.ending.name());
+        let told = (fresh(&now), fresh(&terms), outcome.ending.name());
         state.set_item("outcome", told)?;
         let owed = held.episode.owed();
-        state.set_item("owed", owed.map(|owed| fresh(py, owed)))?;
+        state.set_item("owed", owed.map(fresh))?;
         Ok(state)
     }
 
-    #[allow(clippy::type_complexity)] // what pickle takes
     fn __getnewargs_ex__<'py>(
         &self,
         py: Python<'py>,
-    ) -> PyResult<((Py<EpisodeRules>,), Bound<'py, PyDict>)> {
-        let rules = EpisodeRules::of(self.0.open()?.episode.rules().clone());
-        Ok(((Py::new(py, rules)?,), self.state(py)?))
+    ) -> Result<((GivenRules,), Bound<'py, PyDict>)> {
+        let rules = GivenRules(self.0.open()?.episode.rules().clone());
+        Ok(((rules,), self.state(py)?))
     }
 
     fn __repr__(&self) -> String {

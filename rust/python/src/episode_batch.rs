@@ -1,46 +1,36 @@
 //! `EpisodeBatch`: many rovers with their episodes, one call a control period.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rover_core::draw::{DrawnGround, Pcg64};
+use rover_core::draw::{DrawnGround, Pcg64, RockDraw, Start};
 use rover_core::episode::{
     Autoreset, EpisodeBatch as CoreBatch, EpisodeError, Origin as Began, Stepped, Succession,
 };
 
-use crate::arguments::{Given, at_least_one, refused, whole};
-use crate::arrays::fresh_table;
-use crate::batch::{index, mask};
-use crate::draw::{
-    DrawnEpisodes, EpisodeDistribution, Request, domain_row, range, rocks_of, rocks_row, start_of,
-    start_row,
-};
-use crate::episode::{EpisodeRun, actions, rules, simulation};
-use crate::errors::{BorderError, Kind};
-use crate::generators::halves;
+use crate::arguments::{Given, Named, at_least_one, below, refused, text, whole};
+use crate::arrays::{Array, fresh, fresh_rows};
+use crate::batch::mask;
+use crate::draw::{DrawnEpisodes, EpisodeDistribution, Request, range};
+use crate::episode::{EpisodeRun, GivenRules, GivenSimulation, actions};
+use crate::errors::{Kind, Result};
+use crate::generators::generators;
 use crate::infos::{Told, info, infos};
 use crate::options::SolverWords;
 use crate::shared::{Shared, Watch};
 use crate::simulation::{Origin, Simulation};
-
 use crate::union;
 
 /// Observations, rewards, which episodes have ended, which have reached the time limit, and the
 /// indices of both.
-type Step<'py> = (
-    Bound<'py, PyArray2<f32>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<bool>>,
-    Bound<'py, PyArray1<bool>>,
-    Vec<usize>,
-);
+type Step = (Array<f32>, Array, Array<bool>, Array<bool>, Vec<usize>);
 
 /// Start, rocks, seed of the rocks, and domain, as `EpisodeBatch.origin` tells them.
 type OriginRows = (Vec<f64>, Vec<f64>, u64, Vec<f64>);
 
 /// Many rovers with their episodes, each bit for bit as it would be alone.
 ///
-/// One call at a time: a call during another one raises BusyError.
+/// One call at a time: a call during another one raises BusyError. Methods that take the index of a
+/// rover raise OptionError where there is no such rover, or where its episode has not begun.
 ///
 /// Args:
 ///     rules: What all episodes share.
@@ -67,10 +57,9 @@ impl Inner {
 
     /// One step, by a function of the batch, the actions and the room for the observations; and the
     /// rovers whose next episode has begun.
-    fn step<'py>(
+    fn step(
         &mut self,
-        py: Python<'py>,
-        actions: &Bound<'py, PyAny>,
+        actions: &Bound<'_, PyAny>,
         take: impl FnOnce(
             &mut CoreBatch,
             &[f64],
@@ -78,31 +67,32 @@ impl Inner {
             &mut dyn FnMut() -> bool,
         ) -> Result<Stepped, EpisodeError>
         + Send,
-    ) -> PyResult<(Step<'py>, Vec<usize>)> {
+    ) -> Result<(Step, Vec<usize>)> {
         let batch = &mut self.batch;
-        let (n, rules) = (batch.rovers().len(), batch.rules());
-        let actions = self::actions(actions, &[n, rules.n_actions()])?;
-        let rows = PyArray2::zeros(py, [n, rules.size()], false);
-        let stepped = {
-            let mut writable = rows.readwrite();
-            let out = writable.as_slice_mut()?;
-            let mut watch = Watch::new();
-            let done = py.detach(|| take(batch, &actions, out, &mut || watch.go_on()));
-            watch.result(done)?
-        };
-        let step = (
-            rows,
-            PyArray1::from_slice(py, &stepped.rewards),
-            PyArray1::from_slice(py, &stepped.ended),
-            PyArray1::from_slice(py, &stepped.truncated),
-            stepped.over,
-        );
-        Ok((step, stepped.begun))
+        let (n, size) = (batch.rovers().len(), batch.rules().size());
+        let given = self::actions(actions, &[n, batch.rules().n_actions()])?;
+        let (mut rows, mut watch) = (vec![0.0; n * size], Watch::new());
+        let out = &mut rows[..];
+        let done = actions
+            .py()
+            .detach(|| take(batch, &given, out, &mut || watch.go_on()));
+        let Stepped {
+            rewards,
+            ended,
+            truncated,
+            over,
+            begun,
+        } = watch.result(done)?;
+        let rows = Array::shaped(rows, &[n, size]);
+        Ok((
+            (rows, rewards.into(), ended.into(), truncated.into(), over),
+            begun,
+        ))
     }
 
     /// Keeps what Python is told of the simulation of an episode that has begun.
-    fn set_origin(&mut self, index: usize, words: &SolverWords) -> PyResult<()> {
-        let origin = self.batch.origin(index).map_err(BorderError::from)?;
+    fn set_origin(&mut self, index: usize, words: &SolverWords) -> Result<()> {
+        let origin = self.batch.origin(index)?;
         self.origins[index] = Origin {
             terrain: origin.ground.clone(),
             words: words.clone(),
@@ -111,41 +101,63 @@ impl Inner {
     }
 
     /// Indices of rovers; as many as `expected`, where that is known.
-    fn indices(&self, given: &Bound<'_, PyAny>, expected: Option<usize>) -> PyResult<Vec<usize>> {
+    fn indices(&self, given: &Bound<'_, PyAny>, expected: Option<usize>) -> Result<Vec<usize>> {
         let found: Option<Vec<Bound<'_, PyAny>>> = given.extract().ok();
         let found = found.filter(|found| expected.is_none_or(|n| n == found.len()));
-        let what = expected.map_or_else(
-            || "indices of rovers".to_owned(),
-            |n| format!("{n} indices of rovers"),
-        );
+        let what = match expected {
+            Some(n) => format!("{n} indices of rovers"),
+            None => "indices of rovers".to_owned(),
+        };
         let found = found.ok_or_else(|| refused(given, Kind::Option, "indices", &what))?;
-        let rovers = self.batch.rovers();
-        found.iter().map(|one| index(one, rovers)).collect()
+        found
+            .iter()
+            .map(|one| below(one, self.batch.rovers().len()))
+            .collect()
+    }
+}
+
+impl EpisodeBatch {
+    /// Reads or changes something of one rover.
+    fn one<T>(
+        &self,
+        index: &Bound<'_, PyAny>,
+        act: impl FnOnce(&mut Inner, usize) -> Result<T>,
+    ) -> Result<T> {
+        let mut held = self.0.open()?;
+        let index = below(index, held.batch.rovers().len())?;
+        act(&mut held, index)
     }
 }
 
 fn distribution<'a, 'py>(
     given: &'a Bound<'py, PyAny>,
-) -> PyResult<&'a Bound<'py, EpisodeDistribution>> {
-    let found = given.cast::<EpisodeDistribution>();
-    let what = "an EpisodeDistribution";
-    found.map_err(|_| refused(given, Kind::Option, "distribution", what).into())
+) -> Result<&'a Bound<'py, EpisodeDistribution>> {
+    let wrong = |_| {
+        refused(
+            given,
+            Kind::Option,
+            "distribution",
+            "an EpisodeDistribution",
+        )
+    };
+    given.cast().map_err(wrong)
 }
 
 /// Where and on what an episode has begun, as `EpisodeBatch.origin` tells it.
-fn origin(given: &Bound<'_, PyAny>, terrain: &DrawnGround) -> PyResult<Began> {
+fn origin(given: &Bound<'_, PyAny>, ground: DrawnGround) -> Result<Began> {
     let what = "what `EpisodeBatch.origin` returns";
     let refuse = || refused(given, Kind::Option, "origin", what);
     let found: Option<OriginRows> = given.extract().ok();
     let (start, rocks, seed, _) = found.ok_or_else(refuse)?;
     let rocks = <[f64; 3]>::try_from(rocks).map_err(|_| refuse())?;
     if !start.iter().chain(&rocks).all(|x| x.is_finite()) {
-        return Err(refuse().into());
+        return Err(refuse());
     }
+    let start = Start::from_row(&start).ok_or_else(refuse)?;
     Ok(Began {
-        start: start_of(&start).ok_or_else(refuse)?,
-        rocks: rocks_of(rocks, seed),
-        ground: terrain.clone(),
+        start,
+        rocks: RockDraw::from_row(rocks, seed),
+        ground,
     })
 }
 
@@ -154,34 +166,28 @@ impl EpisodeBatch {
     #[new]
     #[pyo3(signature = (rules, simulation, n, *, max_steps = None, threads = None))]
     fn new(
-        rules: &Bound<'_, PyAny>,
-        simulation: &Bound<'_, PyAny>,
+        rules: GivenRules,
+        simulation: GivenSimulation<'_>,
         n: &Bound<'_, PyAny>,
         max_steps: Option<&Bound<'_, PyAny>>,
         threads: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Self> {
-        let rules = self::rules(rules)?;
+    ) -> Result<Self> {
         let n = at_least_one(n, Kind::Option, "n")?;
         let max_steps = max_steps.map(|given| whole(given, Kind::Option, "max_steps"));
         let threads = threads.map(|given| at_least_one(given, Kind::Option, "threads"));
-        let one = self::simulation(simulation, "simulation")?.get();
-        let rover = one.open()?;
-        let batch = CoreBatch::new(
-            rules,
-            &rover,
-            n,
+        let (one, max_steps, threads) = (
+            simulation.0.get(),
             max_steps.transpose()?,
             threads.transpose()?,
         );
-        Ok(Self(Shared::new(Inner {
-            batch: batch.map_err(BorderError::from)?,
-            origins: vec![one.origin().clone(); n],
-        })))
+        let batch = CoreBatch::new(rules.0, &*one.open()?, n, max_steps, threads)?;
+        let origins = vec![one.origin().clone(); n];
+        Ok(Self(Shared::new(Inner { batch, origins })))
     }
 
     /// Number of threads.
     #[getter]
-    fn threads(&self) -> PyResult<usize> {
+    fn threads(&self) -> Result<usize> {
         Ok(self.0.open()?.batch.threads())
     }
 
@@ -206,18 +212,17 @@ impl EpisodeBatch {
     ///         [-1, 1]. No rover has moved.
     ///     OptionError: `active` is invalid, or an episode has not begun. No rover has moved.
     #[pyo3(signature = (actions, active = None, *, has_scan = true))]
-    fn step<'py>(
+    fn step(
         &self,
-        py: Python<'py>,
-        actions: &Bound<'py, PyAny>,
-        active: Option<&Bound<'py, PyAny>>,
+        actions: &Bound<'_, PyAny>,
+        active: Option<&Bound<'_, PyAny>>,
         has_scan: bool,
-    ) -> PyResult<Step<'py>> {
+    ) -> Result<Step> {
         let mut held = self.0.open()?;
         let n = held.batch.rovers().len();
         let active = active.map(|given| mask(given, n)).transpose()?;
         let active = active.as_deref();
-        let (step, _) = held.step(py, actions, |batch, actions, out, go_on| {
+        let (step, _) = held.step(actions, |batch, actions, out, go_on| {
             batch.step_while(actions, active, has_scan, out, go_on)
         })?;
         Ok(step)
@@ -249,27 +254,27 @@ impl EpisodeBatch {
     ///         whose episode was over before this call. No rover has moved.
     #[pyo3(signature = (actions, distribution, *, same_step, attempts = Given::MISSING, has_scan = true),
         text_signature = "($self, actions, distribution, *, same_step, attempts=100, has_scan=True)")]
-    fn step_on<'py>(
+    fn step_on(
         &self,
-        py: Python<'py>,
-        actions: &Bound<'py, PyAny>,
-        distribution: &Bound<'py, PyAny>,
+        actions: &Bound<'_, PyAny>,
+        distribution: &Bound<'_, PyAny>,
         same_step: bool,
         attempts: Given<'_>,
         has_scan: bool,
-    ) -> PyResult<Step<'py>> {
+    ) -> Result<Step> {
         let distribution = self::distribution(distribution)?.get();
+        let autoreset = if same_step {
+            Autoreset::SameStep
+        } else {
+            Autoreset::NextStep
+        };
         let succession = Succession {
             distribution: &distribution.inner,
             attempts: attempts.count(100, Kind::Option, "attempts")?,
-            autoreset: if same_step {
-                Autoreset::SameStep
-            } else {
-                Autoreset::NextStep
-            },
+            autoreset,
         };
         let mut held = self.0.open()?;
-        let (step, begun) = held.step(py, actions, |batch, actions, out, go_on| {
+        let (step, begun) = held.step(actions, |batch, actions, out, go_on| {
             batch.step_on(actions, &succession, has_scan, out, go_on)
         })?;
         for index in begun {
@@ -280,7 +285,7 @@ impl EpisodeBatch {
 
     /// Indices of the rovers whose episode is over and whose next has not begun, in order.
     #[getter]
-    fn over(&self) -> PyResult<Vec<usize>> {
+    fn over(&self) -> Result<Vec<usize>> {
         Ok(self.0.open()?.batch.over())
     }
 
@@ -289,11 +294,11 @@ impl EpisodeBatch {
     /// Returns:
     ///     For each index of a rover, in order, the last observation (size,) float32 and the last
     ///     info. Empty after `step`.
-    fn finals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn finals<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let held = self.0.open()?;
         let finals = PyDict::new(py);
         for one in held.batch.finals() {
-            let seen = PyArray1::from_slice(py, one.episode.observation());
+            let seen = fresh(one.episode.observation());
             let message = one.error.as_ref().map(ToString::to_string);
             let told = info(py, &(&one.episode, message))?;
             finals.set_item(one.index, (seen, told))?;
@@ -306,13 +311,10 @@ impl EpisodeBatch {
     /// Returns:
     ///     For each entry an array (n_rovers,), and under its name after an underscore the mask of
     ///     the rovers that have it: all.
-    ///
-    /// Raises:
-    ///     OptionError: An episode has not begun.
-    fn infos<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn infos<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let held = self.0.open()?;
         let told = (0..held.batch.rovers().len()).map(|i| held.told(i));
-        let told: Vec<_> = told.collect::<Result<_, _>>().map_err(BorderError::from)?;
+        let told: Vec<_> = told.collect::<Result<_, _>>()?;
         infos(py, &told)
     }
 
@@ -320,32 +322,21 @@ impl EpisodeBatch {
     ///
     /// Args:
     ///     index: Index of the rover.
-    ///
-    /// Raises:
-    ///     OptionError: There is no such rover, or its episode has not begun.
-    fn info<'py>(
-        &self,
-        py: Python<'py>,
-        index: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyDict>> {
-        let held = self.0.open()?;
-        let index = self::index(index, held.batch.rovers())?;
-        info(py, &held.told(index).map_err(BorderError::from)?)
+    fn info<'py>(&self, index: &Bound<'py, PyAny>) -> Result<Bound<'py, PyDict>> {
+        self.one(index, |held, i| info(index.py(), &held.told(i)?))
     }
 
     /// The last observations of all rovers, (n_rovers, size) float32; zeros before an episode.
-    fn observations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    fn observations(&self) -> Result<Array<f32>> {
         let held = self.0.open()?;
         let (n, size) = (held.batch.rovers().len(), held.batch.rules().size());
-        let rows = PyArray2::zeros(py, [n, size], false);
-        let mut writable = rows.readwrite();
-        for (i, row) in writable.as_slice_mut()?.chunks_exact_mut(size).enumerate() {
+        let mut rows = vec![0.0; n * size];
+        for (i, row) in rows.chunks_exact_mut(size).enumerate() {
             if let Ok(episode) = held.batch.episode(i) {
                 row.copy_from_slice(episode.observation());
             }
         }
-        drop(writable);
-        Ok(rows)
+        Ok(Array::shaped(rows, &[n, size]))
     }
 
     /// Draws episodes on the threads of this batch; no rover changes.
@@ -353,30 +344,27 @@ impl EpisodeBatch {
     /// Args:
     ///     distribution: What the episodes are drawn from.
     ///     generators: Generators, (m, 4) uint64.
-    ///     attempts: As of `EpisodeDistribution.draw`.
-    ///     difficulties: As of `EpisodeDistribution.draw`.
-    ///     fixed: As of `EpisodeDistribution.draw`.
+    ///     attempts: As of `EpisodeDistribution.draw`, as the next two.
+    ///     difficulties: See there.
+    ///     fixed: See there.
     ///
     /// Returns:
     ///     The episodes, the same for any number of threads.
     ///
     /// Raises:
     ///     RoverGymError: As of `EpisodeDistribution.draw`, for the first rover that has one.
-    #[pyo3(signature = (distribution, generators, *, attempts = Given::MISSING, difficulties = None, fixed = None),
+    #[pyo3(signature = (distribution, generators, **options),
         text_signature = "($self, distribution, generators, *, attempts=100, difficulties=None, fixed=None)")]
     fn draw(
         &self,
-        py: Python<'_>,
         distribution: &Bound<'_, PyAny>,
         generators: &Bound<'_, PyAny>,
-        attempts: Given<'_>,
-        difficulties: Option<&Bound<'_, PyAny>>,
-        fixed: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<DrawnEpisodes> {
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> Result<DrawnEpisodes> {
         let distribution = self::distribution(distribution)?.get();
-        let request = Request::parse(generators, attempts, difficulties, fixed)?;
+        let request = Request::parse(generators, options)?;
         let mut held = self.0.open()?;
-        distribution.draw_on(py, &request, Some(&mut held.batch))
+        distribution.draw_on(generators.py(), &request, Some(&mut held.batch))
     }
 
     /// Begins drawn episodes.
@@ -387,18 +375,17 @@ impl EpisodeBatch {
     ///
     /// Raises:
     ///     OptionError: There is no such rover, or the episodes do not fit. Nothing has changed.
-    fn begin(&self, indices: &Bound<'_, PyAny>, episodes: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn begin(&self, indices: &Bound<'_, PyAny>, episodes: &Bound<'_, PyAny>) -> Result<()> {
         let found = episodes.cast::<DrawnEpisodes>();
         let refuse = |_| refused(episodes, Kind::Option, "episodes", "DrawnEpisodes");
         let drawn = found.map_err(refuse)?.get();
         let mut held = self.0.open()?;
         let places = held.indices(indices, Some(drawn.drawn.len()))?;
         for (&index, one) in places.iter().zip(&drawn.drawn) {
-            held.batch.check(index, one).map_err(BorderError::from)?;
+            held.batch.check(index, one)?;
         }
         for (&index, one) in places.iter().zip(&drawn.drawn) {
-            let begun = held.batch.begin(index, one.clone());
-            begun.map_err(BorderError::from)?;
+            held.batch.begin(index, one.clone())?;
             held.set_origin(index, &drawn.words)?;
         }
         Ok(())
@@ -420,43 +407,37 @@ impl EpisodeBatch {
     ///
     /// Raises:
     ///     OptionError: There is no such rover, or an argument does not fit. Nothing has changed.
-    #[allow(clippy::too_many_arguments)] // keyword arguments in Python
-    #[pyo3(signature = (indices, simulation, episode, origin, *, generator, steps = Given::MISSING, message = None),
+    #[pyo3(signature = (indices, simulation, episode, origin, **options),
         text_signature = "($self, indices, simulation, episode, origin, *, generator, steps=0, message=None)")]
     fn resume(
         &self,
         indices: &Bound<'_, PyAny>,
-        simulation: &Bound<'_, PyAny>,
+        simulation: GivenSimulation<'_>,
         episode: &Bound<'_, PyAny>,
         origin: &Bound<'_, PyAny>,
-        generator: &Bound<'_, PyAny>,
-        steps: Given<'_>,
-        message: Option<&str>,
-    ) -> PyResult<()> {
-        let one = self::simulation(simulation, "simulation")?.get();
-        let cast = episode.cast::<EpisodeRun>();
-        let refuse = |_| refused(episode, Kind::Option, "episode", "an EpisodeRun");
-        let episode = cast.map_err(refuse)?.get().copy()?;
-        let origin = self::origin(origin, &one.origin().terrain)?;
-        let given = crate::generators::generators(generator)?;
-        let [random] = <[Pcg64; 1]>::try_from(given)
-            .map_err(|_| refused(generator, Kind::Option, "generator", "one row"))?;
-        let steps = steps.count(0, Kind::Option, "steps")? as u64;
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> Result<()> {
+        let one = simulation.0.get();
+        let wrong = |_| refused(episode, Kind::Option, "episode", "an EpisodeRun");
+        let episode = episode.cast::<EpisodeRun>().map_err(wrong)?.get().copy()?;
+        let origin = self::origin(origin, one.origin().terrain.clone())?;
+        let given = Named::keywords(indices.py(), options)?;
+        let random = given.need("generator", |value, kind, field| {
+            let rows = <[Pcg64; 1]>::try_from(generators(value)?);
+            rows.map_err(|_| refused(value, kind, field, "one row"))
+        });
+        let [random] = random?;
+        let steps = given.count("steps", 0)? as u64;
+        let message = given.read("message", text)?;
+        given.finish()?;
         let mut held = self.0.open()?;
         let places = held.indices(indices, None)?;
         let rover = one.open()?.clone();
         for index in places {
-            let whole = (episode.clone(), steps);
-            let batch = &mut held.batch;
-            let resumed = batch.resume(
-                index,
-                rover.clone(),
-                whole,
-                origin.clone(),
-                random,
-                message.map(str::to_owned),
-            );
-            resumed.map_err(BorderError::from)?;
+            let (rover, whole) = (rover.clone(), (episode.clone(), steps));
+            let (began, told) = (origin.clone(), message.clone());
+            held.batch
+                .resume(index, rover, whole, began, random, told)?;
             held.origins[index] = one.origin().clone();
         }
         Ok(())
@@ -466,27 +447,18 @@ impl EpisodeBatch {
     ///
     /// Args:
     ///     index: Index of the rover.
-    ///
-    /// Raises:
-    ///     OptionError: There is no such rover, or its episode has not begun.
-    fn episode(&self, index: &Bound<'_, PyAny>) -> PyResult<EpisodeRun> {
-        let held = self.0.open()?;
-        let index = self::index(index, held.batch.rovers())?;
-        let episode = held.batch.episode(index).map_err(BorderError::from)?;
-        Ok(EpisodeRun::of(episode.clone()))
+    fn episode(&self, index: &Bound<'_, PyAny>) -> Result<EpisodeRun> {
+        self.one(index, |held, i| {
+            Ok(EpisodeRun::of(held.batch.episode(i)?.clone()))
+        })
     }
 
     /// Control periods of one rover since its episode began.
     ///
     /// Args:
     ///     index: Index of the rover.
-    ///
-    /// Raises:
-    ///     OptionError: There is no such rover, or its episode has not begun.
-    fn steps(&self, index: &Bound<'_, PyAny>) -> PyResult<u64> {
-        let held = self.0.open()?;
-        let index = self::index(index, held.batch.rovers())?;
-        Ok(held.batch.steps(index).map_err(BorderError::from)?)
+    fn steps(&self, index: &Bound<'_, PyAny>) -> Result<u64> {
+        self.one(index, |held, i| Ok(held.batch.steps(i)?))
     }
 
     /// The generators of rovers, from which their noise is drawn.
@@ -496,19 +468,14 @@ impl EpisodeBatch {
     ///
     /// Returns:
     ///     (m, 4) uint64: high and low half of each state, high and low half of each increment.
-    ///
-    /// Raises:
-    ///     OptionError: There is no such rover, or its episode has not begun.
-    fn generators<'py>(
-        &self,
-        py: Python<'py>,
-        indices: &Bound<'_, PyAny>,
-    ) -> PyResult<Bound<'py, PyArray2<u64>>> {
+    fn generators(&self, indices: &Bound<'_, PyAny>) -> Result<Array<u64>> {
         let held = self.0.open()?;
         let places = held.indices(indices, None)?;
         let found = places.iter().map(|&index| held.batch.generator(index));
-        let found: Vec<Pcg64> = found.collect::<Result<_, _>>().map_err(BorderError::from)?;
-        fresh_table(py, found.iter().map(halves))
+        let found: Vec<Pcg64> = found.collect::<Result<_, _>>()?;
+        Ok(fresh_rows(
+            found.iter().map(|random| random.state().halves()),
+        ))
     }
 
     /// Sets the generators of rovers.
@@ -524,16 +491,15 @@ impl EpisodeBatch {
         &self,
         indices: &Bound<'_, PyAny>,
         generators: &Bound<'_, PyAny>,
-    ) -> PyResult<()> {
-        let given = crate::generators::generators(generators)?;
+    ) -> Result<()> {
+        let given = self::generators(generators)?;
         let mut held = self.0.open()?;
         let places = held.indices(indices, Some(given.len()))?;
         for &index in &places {
-            held.batch.generator(index).map_err(BorderError::from)?;
+            held.batch.generator(index)?;
         }
         for (index, generator) in places.into_iter().zip(given) {
-            let set = held.batch.set_generator(index, generator);
-            set.map_err(BorderError::from)?;
+            held.batch.set_generator(index, generator)?;
         }
         Ok(())
     }
@@ -545,44 +511,26 @@ impl EpisodeBatch {
     ///
     /// Returns:
     ///     Its rows of `DrawnEpisodes.starts`, `rocks`, `rock_seeds` and `domains`.
-    ///
-    /// Raises:
-    ///     OptionError: There is no such rover, or its episode has not begun.
-    #[allow(clippy::type_complexity)] // a tuple in Python
-    fn origin<'py>(
-        &self,
-        py: Python<'py>,
-        index: &Bound<'_, PyAny>,
-    ) -> PyResult<(
-        Bound<'py, PyArray1<f64>>,
-        Bound<'py, PyArray1<f64>>,
-        u64,
-        Bound<'py, PyArray1<f64>>,
-    )> {
-        let held = self.0.open()?;
-        let index = self::index(index, held.batch.rovers())?;
-        let origin = held.batch.origin(index).map_err(BorderError::from)?;
-        let episode = held.batch.episode(index).map_err(BorderError::from)?;
-        Ok((
-            PyArray1::from_slice(py, &start_row(&origin.start)),
-            PyArray1::from_slice(py, &rocks_row(origin.rocks)),
-            origin.rocks.map_or(0, |rocks| rocks.seed),
-            PyArray1::from_slice(py, &domain_row(&episode.setting().domain)),
-        ))
+    fn origin(&self, index: &Bound<'_, PyAny>) -> Result<(Array, Array, u64, Array)> {
+        self.one(index, |held, i| {
+            let (origin, episode) = (held.batch.origin(i)?, held.batch.episode(i)?);
+            Ok((
+                origin.start.row().into(),
+                fresh(&RockDraw::row(origin.rocks)),
+                origin.rocks.map_or(0, |rocks| rocks.seed),
+                fresh(&episode.setting().domain.row()),
+            ))
+        })
     }
 
     /// Range (low, high) of the rocks' difficulty in the next episodes of a rover, if any is set.
     ///
     /// Args:
     ///     index: Index of the rover.
-    ///
-    /// Raises:
-    ///     OptionError: There is no such rover.
-    fn difficulty(&self, index: &Bound<'_, PyAny>) -> PyResult<Option<(f64, f64)>> {
-        let held = self.0.open()?;
-        let index = self::index(index, held.batch.rovers())?;
-        let found = held.batch.difficulty(index).map_err(BorderError::from)?;
-        Ok(found.map(|[low, high]| (low, high)))
+    fn difficulty(&self, index: &Bound<'_, PyAny>) -> Result<Option<(f64, f64)>> {
+        self.one(index, |held, i| {
+            Ok(held.batch.difficulty(i)?.map(Into::into))
+        })
     }
 
     /// Sets the range of the rocks' difficulty in the episodes that `step_on` begins with a rover.
@@ -597,50 +545,37 @@ impl EpisodeBatch {
         &self,
         index: &Bound<'_, PyAny>,
         difficulty: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<()> {
-        let mut held = self.0.open()?;
-        let index = self::index(index, held.batch.rovers())?;
-        let difficulty = difficulty.map(|given| range(given, "difficulty"));
-        let set = held.batch.set_difficulty(index, difficulty.transpose()?);
-        Ok(set.map_err(BorderError::from)?)
+    ) -> Result<()> {
+        let difficulty = difficulty.map(|given| range(given, Kind::Option, "difficulty"));
+        self.one(index, |held, i| {
+            Ok(held.batch.set_difficulty(i, difficulty.transpose()?)?)
+        })
     }
 
     /// The ground of one rover.
     ///
     /// Args:
     ///     index: Index of the rover.
-    ///
-    /// Raises:
-    ///     OptionError: There is no such rover.
-    fn terrain<'py>(
-        &self,
-        py: Python<'py>,
-        index: &Bound<'_, PyAny>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let held = self.0.open()?;
-        let index = self::index(index, held.batch.rovers())?;
-        union::object(py, &held.origins[index].terrain)
+    fn terrain<'py>(&self, index: &Bound<'py, PyAny>) -> Result<Bound<'py, PyAny>> {
+        self.one(index, |held, i| {
+            union::object(index.py(), &held.origins[i].terrain)
+        })
     }
 
-    /// Returns a copy of one rover.
+    /// A copy of one rover; stepping it does not move the rover.
     ///
     /// Args:
     ///     index: Index of the rover.
-    ///
-    /// Returns:
-    ///     The copy; stepping it does not move the rover.
-    ///
-    /// Raises:
-    ///     OptionError: There is no such rover.
-    fn simulation(&self, index: &Bound<'_, PyAny>) -> PyResult<Simulation> {
-        let held = self.0.open()?;
-        let rovers = held.batch.rovers();
-        let index = self::index(index, rovers)?;
-        let origin = held.origins[index].clone();
-        Ok(Simulation::of(rovers[index].clone(), origin))
+    fn simulation(&self, index: &Bound<'_, PyAny>) -> Result<Simulation> {
+        self.one(index, |held, i| {
+            Ok(Simulation::of(
+                held.batch.rovers()[i].clone(),
+                held.origins[i].clone(),
+            ))
+        })
     }
 
-    fn __len__(&self) -> PyResult<usize> {
+    fn __len__(&self) -> Result<usize> {
         Ok(self.0.open()?.batch.rovers().len())
     }
 

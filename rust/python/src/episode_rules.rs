@@ -6,9 +6,9 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyTuple};
 use rover_core::episode::{Rules, Settings, TERMS, Weights};
 
-use crate::arguments::{Given, count, number, refused};
+use crate::arguments::{Named, count, number, refused};
 use crate::arrays::{fresh, fresh_rows, vector};
-use crate::errors::{BorderError, Kind};
+use crate::errors::{Kind, Result};
 use crate::model::RoverModel;
 use crate::reading::scan_points;
 
@@ -52,17 +52,17 @@ impl EpisodeRules {
 }
 
 /// The weights in the order of the terms.
-fn weights(given: &Bound<'_, PyAny>) -> PyResult<Weights> {
+fn weights(given: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Weights> {
     let what = format!("a mapping of {} to numbers", TERMS.join(", "));
-    let refuse = || refused(given, Kind::Option, "weights", &what);
+    let refuse = || refused(given, kind, field, &what);
     let map = given.cast::<PyMapping>().map_err(|_| refuse())?;
     if map.len()? != TERMS.len() {
-        return Err(refuse().into());
+        return Err(refuse());
     }
     let mut weights = Weights::default();
     for (own, name) in weights.iter_mut().zip(TERMS) {
         let weight = map.get_item(name).map_err(|_| refuse())?;
-        *own = number(&weight, Kind::Option, &format!("weights.{name}"))?;
+        *own = number(&weight, kind, &format!("{field}.{name}"))?;
     }
     Ok(weights)
 }
@@ -70,59 +70,40 @@ fn weights(given: &Bound<'_, PyAny>) -> PyResult<Weights> {
 #[pymethods]
 impl EpisodeRules {
     #[new]
-    #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
-    #[pyo3(signature = (model, *, substeps, dt, torque_limits, max_steering, goal_tolerance,
-        cos_max_tilt, stuck_time, weights, scale, noise = None, scan = None, goals = Given::MISSING, battery = None),
+    #[pyo3(signature = (model, **settings),
         text_signature = "(model, *, substeps, dt, torque_limits, max_steering, goal_tolerance, cos_max_tilt, stuck_time, weights, scale, noise=None, scan=None, goals=1, battery=None)")]
-    fn new(
-        model: &Bound<'_, PyAny>,
-        substeps: &Bound<'_, PyAny>,
-        dt: &Bound<'_, PyAny>,
-        torque_limits: &Bound<'_, PyAny>,
-        max_steering: &Bound<'_, PyAny>,
-        goal_tolerance: &Bound<'_, PyAny>,
-        cos_max_tilt: &Bound<'_, PyAny>,
-        stuck_time: &Bound<'_, PyAny>,
-        weights: &Bound<'_, PyAny>,
-        scale: &Bound<'_, PyAny>,
-        noise: Option<&Bound<'_, PyAny>>,
-        scan: Option<&Bound<'_, PyAny>>,
-        goals: Given<'_>,
-        battery: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Self> {
-        let model = model
-            .extract::<RoverModel>()
-            .map_err(|_| refused(model, Kind::Model, "model", "a RoverModel"))?;
-        let option = |given, field| number(given, Kind::Option, field);
-        let list = |given, field| vector(given, Kind::Option, field);
+    fn new(model: &Bound<'_, PyAny>, settings: Option<&Bound<'_, PyDict>>) -> Result<Self> {
+        let given = Named::keywords(model.py(), settings)?;
+        let wrong = |_| refused(model, Kind::Model, "model", "a RoverModel");
+        let model = model.extract::<RoverModel>().map_err(wrong)?;
         let settings = Settings {
-            substeps: count(substeps, Kind::Option, "substeps")?,
-            dt: option(dt, "dt")?,
-            torque_limits: list(torque_limits, "torque_limits")?,
-            max_steering: option(max_steering, "max_steering")?,
-            goal_tolerance: option(goal_tolerance, "goal_tolerance")?,
-            cos_max_tilt: option(cos_max_tilt, "cos_max_tilt")?,
-            stuck_time: option(stuck_time, "stuck_time")?,
-            weights: self::weights(weights)?,
-            scale: list(scale, "scale")?,
-            noise: noise.map_or(Ok(Vec::new()), |given| list(given, "noise"))?,
-            scan: scan_points(scan)?,
-            goals: goals.count(1, Kind::Option, "goals")?,
-            battery: battery.map(|given| option(given, "battery")).transpose()?,
+            substeps: given.need("substeps", count)?,
+            dt: given.need("dt", number)?,
+            torque_limits: given.need("torque_limits", vector)?,
+            max_steering: given.need("max_steering", number)?,
+            goal_tolerance: given.need("goal_tolerance", number)?,
+            cos_max_tilt: given.need("cos_max_tilt", number)?,
+            stuck_time: given.need("stuck_time", number)?,
+            weights: given.need("weights", weights)?,
+            scale: given.need("scale", vector)?,
+            noise: given.read("noise", vector)?.unwrap_or_default(),
+            scan: scan_points(given.some("scan")?.as_ref())?,
+            goals: given.count("goals", 1)?,
+            battery: given.maybe("battery")?,
         };
-        let inner = Rules::new(model.inner, settings).map_err(BorderError::from)?;
-        Ok(Self::of(Arc::new(inner)))
+        given.finish()?;
+        Ok(Self::of(Arc::new(Rules::new(model.inner, settings)?)))
     }
 
     fn __getnewargs_ex__<'py>(
         &self,
         py: Python<'py>,
-    ) -> PyResult<((RoverModel,), Bound<'py, PyDict>)> {
+    ) -> Result<((RoverModel,), Bound<'py, PyDict>)> {
         let settings = self.inner.settings();
         let named = PyDict::new(py);
         named.set_item("substeps", settings.substeps)?;
         named.set_item("dt", settings.dt)?;
-        named.set_item("torque_limits", fresh(py, &settings.torque_limits))?;
+        named.set_item("torque_limits", fresh(&settings.torque_limits))?;
         named.set_item("max_steering", settings.max_steering)?;
         named.set_item("goal_tolerance", settings.goal_tolerance)?;
         named.set_item("cos_max_tilt", settings.cos_max_tilt)?;
@@ -132,11 +113,11 @@ impl EpisodeRules {
             weights.set_item(name, weight)?;
         }
         named.set_item("weights", weights)?;
-        named.set_item("scale", fresh(py, &settings.scale))?;
+        named.set_item("scale", fresh(&settings.scale))?;
         if self.inner.is_noisy() {
-            named.set_item("noise", fresh(py, &settings.noise))?;
+            named.set_item("noise", fresh(&settings.noise))?;
         }
-        named.set_item("scan", fresh_rows(py, &settings.scan)?)?;
+        named.set_item("scan", fresh_rows(settings.scan.iter().copied()))?;
         named.set_item("goals", settings.goals)?;
         named.set_item("battery", settings.battery)?;
         let model = RoverModel::from(self.inner.model().clone());
@@ -146,8 +127,8 @@ impl EpisodeRules {
     /// Names of the reward's terms, in the order of their sum.
     #[getter]
     #[allow(clippy::unused_self)] // an attribute of the object
-    fn terms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        PyTuple::new(py, TERMS)
+    fn terms<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyTuple>> {
+        Ok(PyTuple::new(py, TERMS)?)
     }
 
     fn __repr__(&self) -> String {

@@ -1,6 +1,10 @@
 //! The exception tree: one root, shape and value mistakes also
 //! `ValueError`, fields kept as attributes.
 
+use std::convert::Infallible;
+use std::fmt::Display;
+
+use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::{PyException, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -13,6 +17,9 @@ use rover_core::multibody::{ModelError, StateError};
 use rover_core::problem::ProblemError;
 use rover_core::simulation::{BatchError, CommandError, SnapshotError};
 
+/// Result of what may be refused or raise.
+pub type Result<T, E = BorderError> = std::result::Result<T, E>;
+
 /// Characters of an exception's message.
 const LONGEST_MESSAGE: usize = 1000;
 
@@ -24,7 +31,7 @@ Attributes:
     value: What was given there, or None.
 ";
 
-/// Which exception.
+/// Which exception, by its place in [`CLASSES`].
 #[derive(Clone, Copy, Debug)]
 pub enum Kind {
     Model,
@@ -37,6 +44,17 @@ pub enum Kind {
     Busy,
 }
 
+/// Name and docstring of each exception, in the order of [`Kind`].
+const CLASSES: &str = "\
+ModelError: A model's description is unreadable or not physical.
+StateError: A state or a snapshot has a wrong shape or an entry that is not finite.
+TerrainError: A terrain's description is invalid.
+OptionError: An option or another argument is out of its range.
+CommandError: A torque, a set-point or an action is invalid.
+ProblemError: A friction-contact problem has a wrong shape or an invalid entry.
+StepError: A time step could not be taken; the state is as it was before that step.
+BusyError: An object was used while another call on it was still going on. Nothing has changed.";
+
 /// What was given where something else was needed.
 #[derive(Debug)]
 pub enum Value {
@@ -46,6 +64,8 @@ pub enum Value {
     Count(usize),
     Text(String),
     Object(Py<PyAny>),
+    /// Python's own exception, which goes on as it is.
+    Raised(Box<PyErr>),
 }
 
 /// An error on its way to Python. A newtype, since neither crate owns both
@@ -58,18 +78,7 @@ pub struct BorderError {
     pub value: Value,
 }
 
-struct Classes {
-    model: Py<PyType>,
-    state: Py<PyType>,
-    terrain: Py<PyType>,
-    option: Py<PyType>,
-    command: Py<PyType>,
-    problem: Py<PyType>,
-    step: Py<PyType>,
-    busy: Py<PyType>,
-}
-
-static CLASSES: PyOnceLock<Classes> = PyOnceLock::new();
+static MADE: PyOnceLock<Vec<Py<PyType>>> = PyOnceLock::new();
 
 /// Makes the exception classes and adds them to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -90,84 +99,62 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let exception = PyTuple::new(py, [py.get_type::<PyException>()])?;
     let root = make("RoverGymError", exception, ROOT)?;
     let root = root.bind(py);
-    let value_error = || PyTuple::new(py, [root.clone(), py.get_type::<PyValueError>()]);
-    let classes = Classes {
-        model: make(
-            "ModelError",
-            value_error()?,
-            "A model's description is unreadable or not physical.",
-        )?,
-        state: make(
-            "StateError",
-            value_error()?,
-            "A state or a snapshot has a wrong shape or an entry that is not finite.",
-        )?,
-        terrain: make(
-            "TerrainError",
-            value_error()?,
-            "A terrain's description is invalid.",
-        )?,
-        option: make(
-            "OptionError",
-            value_error()?,
-            "An option or another argument is out of its range.",
-        )?,
-        command: make(
-            "CommandError",
-            value_error()?,
-            "A torque, a set-point or an action is invalid.",
-        )?,
-        problem: make(
-            "ProblemError",
-            value_error()?,
-            "A friction-contact problem has a wrong shape or an invalid entry.",
-        )?,
-        step: make(
-            "StepError",
-            PyTuple::new(py, [root.clone(), py.get_type::<PyRuntimeError>()])?,
-            "A time step could not be taken; the state is as it was before that step.",
-        )?,
-        busy: make(
-            "BusyError",
-            PyTuple::new(py, [root.clone(), py.get_type::<PyRuntimeError>()])?,
-            "An object was used while another call on it was still going on. Nothing has changed.",
-        )?,
+    let one = |line: &str| {
+        let (name, doc) = line.split_once(": ").unwrap_or_default();
+        let is_event = matches!(name, "StepError" | "BusyError");
+        let builtin = if is_event {
+            py.get_type::<PyRuntimeError>()
+        } else {
+            py.get_type::<PyValueError>()
+        };
+        make(name, PyTuple::new(py, [root.clone(), builtin])?, doc)
     };
-    let _ = CLASSES.set(py, classes);
+    let _ = MADE.set(py, CLASSES.lines().map(one).collect::<PyResult<_>>()?);
     Ok(())
 }
 
 impl From<BorderError> for PyErr {
     fn from(error: BorderError) -> Self {
+        let value = match error.value {
+            Value::Raised(raised) => return *raised,
+            value => value,
+        };
         Python::attach(|py| {
-            let Some(classes) = CLASSES.get(py) else {
+            let Some(classes) = MADE.get(py) else {
                 return PyRuntimeError::new_err(error.message);
             };
-            let class = match error.kind {
-                Kind::Model => &classes.model,
-                Kind::State => &classes.state,
-                Kind::Terrain => &classes.terrain,
-                Kind::Option => &classes.option,
-                Kind::Command => &classes.command,
-                Kind::Problem => &classes.problem,
-                Kind::Step => &classes.step,
-                Kind::Busy => &classes.busy,
-            };
             let raise = || -> PyResult<PyErr> {
-                let instance = class.bind(py).call1((shortened(error.message),))?;
+                let class = classes[error.kind as usize].bind(py);
+                let instance = class.call1((shortened(error.message),))?;
                 instance.setattr("field", error.field)?;
-                match error.value {
-                    Value::Nothing => instance.setattr("value", py.None())?,
-                    Value::Number(x) => instance.setattr("value", x)?,
-                    Value::Numbers(x) => instance.setattr("value", x)?,
-                    Value::Count(x) => instance.setattr("value", x)?,
-                    Value::Text(x) => instance.setattr("value", x)?,
-                    Value::Object(x) => instance.setattr("value", x)?,
-                }
+                let value = match value {
+                    Value::Nothing | Value::Raised(_) => py.None(),
+                    Value::Number(x) => x.into_py_any(py)?,
+                    Value::Numbers(x) => x.into_py_any(py)?,
+                    Value::Count(x) => x.into_py_any(py)?,
+                    Value::Text(x) => x.into_py_any(py)?,
+                    Value::Object(x) => x,
+                };
+                instance.setattr("value", value)?;
                 Ok(PyErr::from_value(instance))
             };
             raise().unwrap_or_else(|e| e)
         })
+    }
+}
+
+impl From<PyErr> for BorderError {
+    fn from(raised: PyErr) -> Self {
+        Self {
+            value: Value::Raised(Box::new(raised)),
+            ..Kind::Option.refusal(String::new(), Value::Nothing)
+        }
+    }
+}
+
+impl From<Infallible> for BorderError {
+    fn from(never: Infallible) -> Self {
+        match never {}
     }
 }
 
@@ -180,167 +167,131 @@ fn shortened(message: String) -> String {
     start.chain("…".chars()).collect()
 }
 
-impl BorderError {
-    /// An option or argument that is not what it must be.
-    pub fn option(field: &str, message: String, value: Value) -> Self {
-        Self {
-            kind: Kind::Option,
+impl Kind {
+    /// An argument that is not what it must be.
+    pub fn error(self, field: impl Into<String>, message: String, value: Value) -> BorderError {
+        let field = Some(field.into());
+        BorderError {
+            field,
+            ..self.refusal(message, value)
+        }
+    }
+
+    /// What is wrong with no argument in particular.
+    pub fn refusal(self, message: String, value: Value) -> BorderError {
+        BorderError {
+            kind: self,
             message,
-            field: Some(field.to_owned()),
+            field: None,
             value,
         }
     }
+
+    /// What the core says of an argument.
+    fn of(self, e: &impl Display, field: impl Into<String>, value: Value) -> BorderError {
+        self.error(field, e.to_string(), value)
+    }
 }
 
-impl BorderError {
-    /// A goal that does not suit the ground; the message is still to be written.
-    fn of_goal(x: f64, z: f64) -> Self {
-        Self {
-            kind: Kind::Terrain,
-            message: String::new(),
-            field: Some("goal".to_owned()),
-            value: Value::Numbers(vec![x, z]),
-        }
-    }
+/// A field and the index of its entry, if there is one.
+pub fn entry(field: &str, index: Option<&usize>) -> String {
+    index.map_or_else(|| field.to_owned(), |index| format!("{field}[{index}]"))
 }
 
 impl From<ModelError> for BorderError {
     fn from(e: ModelError) -> Self {
+        use ModelError as E;
         let value = match &e {
-            ModelError::Unreadable { .. }
-            | ModelError::NoSolids
-            | ModelError::Missing { .. }
-            | ModelError::NotForJoint { .. }
-            | ModelError::OtherTree { .. }
-            | ModelError::CoupledApart { .. }
-            | ModelError::CannotCollide { .. }
-            | ModelError::NotWithShapes { .. }
-            | ModelError::HalfGiven { .. }
-            | ModelError::NoVolume { .. } => Value::Nothing,
-            ModelError::DuplicateName { name, .. }
-            | ModelError::UnknownParent { name, .. }
-            | ModelError::UnknownName { name, .. }
-            | ModelError::NotADisc { solid: name, .. }
-            | ModelError::UnknownModel { name, .. }
-            | ModelError::MaterialName { name, .. }
-            | ModelError::SteeringNotAbove { name, .. } => Value::Text(name.clone()),
-            ModelError::NotFinite { value, .. }
-            | ModelError::NotPositive { value, .. }
-            | ModelError::NotBelow { value, .. }
-            | ModelError::Negative { value, .. }
-            | ModelError::OutOfRange { value, .. }
-            | ModelError::MassesContradict { value, .. }
-            | ModelError::RadiusContradictsShape { value, .. }
-            | ModelError::NotASign { value, .. } => Value::Number(*value),
+            E::DuplicateName { name, .. }
+            | E::UnknownParent { name, .. }
+            | E::UnknownName { name, .. }
+            | E::NotADisc { solid: name, .. }
+            | E::UnknownModel { name, .. }
+            | E::MaterialName { name, .. }
+            | E::SteeringNotAbove { name, .. } => Value::Text(name.clone()),
+            E::NotFinite { value, .. }
+            | E::NotPositive { value, .. }
+            | E::NotBelow { value, .. }
+            | E::Negative { value, .. }
+            | E::OutOfRange { value, .. }
+            | E::MassesContradict { value, .. }
+            | E::RadiusContradictsShape { value, .. }
+            | E::NotASign { value, .. } => Value::Number(*value),
             #[allow(clippy::cast_precision_loss)] // a number to show
-            ModelError::UnknownFormat { format } => Value::Number(*format as f64),
-            ModelError::TooMany { count, .. } => Value::Count(*count),
-            ModelError::NoDirection { value, .. } => Value::Numbers(value.to_vec()),
-            ModelError::ImpossibleInertia { principal, .. } => Value::Numbers(principal.to_vec()),
+            E::UnknownFormat { format } => Value::Number(*format as f64),
+            E::TooMany { count, .. } => Value::Count(*count),
+            E::NoDirection { value, .. } => Value::Numbers(value.to_vec()),
+            E::ImpossibleInertia { principal, .. } => Value::Numbers(principal.to_vec()),
+            _ => Value::Nothing,
         };
-        Self {
-            kind: Kind::Model,
-            message: e.to_string(),
-            field: Some(e.field().to_owned()),
-            value,
-        }
+        Kind::Model.of(&e, e.field(), value)
     }
 }
 
 impl From<StateError> for BorderError {
     fn from(e: StateError) -> Self {
-        let (field, value) = match &e {
-            StateError::Length { field, actual, .. } => {
-                ((*field).to_owned(), Value::Count(*actual))
-            }
+        let (field, index, value) = match &e {
+            StateError::Length { field, actual, .. } => (*field, None, Value::Count(*actual)),
             StateError::NotFinite {
                 field,
                 index,
                 value,
-            } => (format!("{field}[{index}]"), Value::Number(*value)),
+            } => (*field, Some(index), Value::Number(*value)),
             StateError::SingularCardan { index, heading } => {
-                (format!("q[{index}]"), Value::Number(*heading))
+                ("q", Some(index), Value::Number(*heading))
             }
         };
-        Self {
-            kind: Kind::State,
-            message: e.to_string(),
-            field: Some(field),
-            value,
-        }
+        Kind::State.of(&e, entry(field, index), value)
     }
 }
 
 impl From<TerrainError> for BorderError {
     fn from(e: TerrainError) -> Self {
+        use TerrainError as E;
         let (index, value) = match &e {
-            TerrainError::NotFinite { value, .. } | TerrainError::OutOfRange { value, .. } => {
-                (None, Value::Number(*value))
-            }
-            TerrainError::NoDirection { value } => (None, Value::Numbers(value.to_vec())),
-            TerrainError::EntryNotFinite { index, value, .. }
-            | TerrainError::TooFar { index, value, .. }
-            | TerrainError::NonPositiveRadius {
+            E::NotFinite { value, .. }
+            | E::OutOfRange { value, .. }
+            | E::BadHeight { value, .. } => (None, Value::Number(*value)),
+            E::NoDirection { value } => (None, Value::Numbers(value.to_vec())),
+            E::EntryNotFinite { index, value, .. }
+            | E::TooFar { index, value, .. }
+            | E::NonPositiveRadius {
                 index,
                 radius: value,
             } => (Some(index), Value::Number(*value)),
-            TerrainError::MismatchedLengths { radii, .. } => (None, Value::Count(*radii)),
-            TerrainError::TooMany { count, .. } | TerrainError::WrongCount { count, .. } => {
-                (None, Value::Count(*count))
-            }
-            TerrainError::Empty | TerrainError::NoTriangles | TerrainError::NoParts => {
-                (None, Value::Count(0))
-            }
-            TerrainError::BadHeight { value, .. } => (None, Value::Number(*value)),
-            TerrainError::NoSuchVertex { index, vertex, .. } => {
-                (Some(index), Value::Count(*vertex))
-            }
-            TerrainError::FlatTriangle { index }
-            | TerrainError::NotASurface { index, .. }
-            | TerrainError::SecondPlane { index }
-            | TerrainError::SecondSand { index } => (Some(index), Value::Count(*index)),
-            TerrainError::MapSize { .. } | TerrainError::NoData | TerrainError::TooManyPieces => {
-                (None, Value::Nothing)
-            }
+            E::MismatchedLengths { radii: count, .. }
+            | E::TooMany { count, .. }
+            | E::WrongCount { count, .. } => (None, Value::Count(*count)),
+            E::Empty | E::NoTriangles | E::NoParts => (None, Value::Count(0)),
+            E::NoSuchVertex { index, vertex, .. } => (Some(index), Value::Count(*vertex)),
+            E::FlatTriangle { index }
+            | E::NotASurface { index, .. }
+            | E::SecondPlane { index }
+            | E::SecondSand { index } => (Some(index), Value::Count(*index)),
+            E::MapSize { .. } | E::NoData | E::TooManyPieces => (None, Value::Nothing),
         };
-        Self {
-            kind: Kind::Terrain,
-            message: e.to_string(),
-            field: Some(index.map_or_else(
-                || e.field().to_owned(),
-                |index| format!("{}[{index}]", e.field()),
-            )),
-            value,
-        }
+        Kind::Terrain.of(&e, entry(e.field(), index), value)
     }
 }
 
 impl From<OptionsError> for BorderError {
     fn from(e: OptionsError) -> Self {
-        let message = e.to_string();
-        match e {
-            OptionsError::OutOfRange { field, value, .. } => {
-                Self::option(field, message, Value::Number(value))
-            }
-            OptionsError::BetweenMaterials { value, .. } => {
-                Self::option("materials", message, Value::Number(value))
-            }
+        let (field, value) = match &e {
+            OptionsError::OutOfRange { field, value, .. } => (*field, Value::Number(*value)),
+            OptionsError::BetweenMaterials { value, .. } => ("materials", Value::Number(*value)),
             OptionsError::MaterialsTwice { materials } => {
-                Self::option("materials", message, Value::Text(materials.join(", ")))
+                ("materials", Value::Text(materials.join(", ")))
             }
-            OptionsError::MaterialName { name } => {
-                Self::option("materials", message, Value::Text(name))
-            }
-        }
+            OptionsError::MaterialName { name } => ("materials", Value::Text(name.clone())),
+        };
+        Kind::Option.of(&e, field, value)
     }
 }
 
 impl From<CommandError> for BorderError {
     fn from(e: CommandError) -> Self {
-        let (field, value) = match &e {
-            CommandError::Length { field, actual, .. } => {
-                ((*field).to_owned(), Value::Count(*actual))
-            }
+        let (field, index, value) = match &e {
+            CommandError::Length { field, actual, .. } => (*field, None, Value::Count(*actual)),
             CommandError::NotFinite {
                 field,
                 index,
@@ -351,18 +302,11 @@ impl From<CommandError> for BorderError {
                 index,
                 value,
                 ..
-            } => (format!("{field}[{index}]"), Value::Number(*value)),
-            CommandError::Negative { field, value } => ((*field).to_owned(), Value::Number(*value)),
-            CommandError::UnknownJoint { field, name } => {
-                ((*field).to_owned(), Value::Text(name.clone()))
-            }
+            } => (*field, Some(index), Value::Number(*value)),
+            CommandError::Negative { field, value } => (*field, None, Value::Number(*value)),
+            CommandError::UnknownJoint { field, name } => (*field, None, Value::Text(name.clone())),
         };
-        Self {
-            kind: Kind::Command,
-            message: e.to_string(),
-            field: Some(field),
-            value,
-        }
+        Kind::Command.of(&e, entry(field, index), value)
     }
 }
 
@@ -374,7 +318,7 @@ impl From<BatchError> for BorderError {
                 let inner = Self::from(error);
                 let field = inner.field.map(|field| match field.split_once('[') {
                     Some((name, entry)) => format!("{name}[{index}, {entry}"),
-                    None => format!("{field}[{index}]"),
+                    None => entry(&field, Some(&index)),
                 });
                 return Self {
                     message,
@@ -384,7 +328,7 @@ impl From<BatchError> for BorderError {
             }
             BatchError::Options { index, error } => {
                 let inner = Self::from(error);
-                let field = inner.field.map(|field| format!("{field}[{index}]"));
+                let field = inner.field.map(|field| entry(&field, Some(&index)));
                 return Self {
                     message,
                     field,
@@ -393,33 +337,32 @@ impl From<BatchError> for BorderError {
             }
             BatchError::Empty => ("simulations".to_owned(), Value::Count(0)),
             BatchError::Differs { index, actual, .. } => {
-                (format!("simulations[{index}]"), Value::Count(actual))
+                (entry("simulations", Some(&index)), Value::Count(actual))
             }
             BatchError::NoSuchRover { index, .. } => ("index".to_owned(), Value::Count(index)),
             BatchError::Threads { count, .. } => ("threads".to_owned(), Value::Count(count)),
         };
-        Self::option(&field, message, value)
+        Kind::Option.error(field, message, value)
     }
 }
 
 impl From<DrawError> for BorderError {
     fn from(e: DrawError) -> Self {
         match e {
-            DrawError::NoRoom { depth, .. } => Self {
-                kind: Kind::Terrain,
-                message: e.to_string(),
-                field: Some("terrain".to_owned()),
-                value: Value::Number(depth),
-            },
+            DrawError::NoRoom { depth, .. } => {
+                Kind::Terrain.of(&e, "terrain", Value::Number(depth))
+            }
             DrawError::Unsuitable { why, attempts } => {
                 let message = format!("{why}, in the last of {attempts} scenes");
-                let own = match why {
-                    Unsuitable::Placement(why) => why.into(),
+                match why {
+                    Unsuitable::Placement(why) => Self {
+                        message,
+                        ..why.into()
+                    },
                     Unsuitable::NoGoal { x, z } | Unsuitable::NoWay { to: [x, z], .. } => {
-                        Self::of_goal(x, z)
+                        Kind::Terrain.error("goal", message, Value::Numbers(vec![x, z]))
                     }
-                };
-                Self { message, ..own }
+                }
             }
             DrawError::Terrain(e) => e.into(),
             DrawError::Model(e) => e.into(),
@@ -431,58 +374,38 @@ impl From<DrawError> for BorderError {
 
 impl From<EpisodeError> for BorderError {
     fn from(e: EpisodeError) -> Self {
+        use EpisodeError as E;
         let message = e.to_string();
-        match e {
-            EpisodeError::Action { place, value } => Self {
-                kind: Kind::Command,
-                message,
-                field: Some(format!("action{place}")),
-                value: Value::Number(value),
-            },
-            EpisodeError::Length { field, actual, .. } => {
-                Self::option(field, message, Value::Count(actual))
+        let (kind, field, value) = match e {
+            E::Action { place, value } => {
+                let field = format!("action{place}");
+                return Kind::Command.error(field, message, Value::Number(value));
             }
-            EpisodeError::OutOfRange { field, value, .. } => {
-                Self::option(field, message, Value::Number(value))
-            }
-            EpisodeError::OtherRules => Self::option("episode", message, Value::Nothing),
-            EpisodeError::NotBegun { index } => Self::option("index", message, Value::Count(index)),
-            EpisodeError::NotObservable => Self {
-                kind: Kind::State,
-                message,
-                field: Some("q".to_owned()),
-                value: Value::Nothing,
-            },
-            EpisodeError::Draw(error) => Self::from(error),
-            EpisodeError::Batch(error) => Self::from(error),
-        }
+            E::Length { field, actual, .. } => (Kind::Option, field, Value::Count(actual)),
+            E::OutOfRange { field, value, .. } => (Kind::Option, field, Value::Number(value)),
+            E::OtherRules => (Kind::Option, "episode", Value::Nothing),
+            E::NotBegun { index } => (Kind::Option, "index", Value::Count(index)),
+            E::NotObservable => (Kind::State, "q", Value::Nothing),
+            E::Draw(error) => return error.into(),
+            E::Batch(error) => return error.into(),
+        };
+        kind.error(field, message, value)
     }
 }
 
 impl From<SnapshotError> for BorderError {
     fn from(e: SnapshotError) -> Self {
-        Self {
-            kind: Kind::State,
-            message: e.to_string(),
-            field: Some("snapshot".to_owned()),
-            value: Value::Nothing,
-        }
+        Kind::State.of(&e, "snapshot", Value::Nothing)
     }
 }
 
 impl From<StepError> for BorderError {
     fn from(e: StepError) -> Self {
-        let (field, value) = match &e {
+        match e {
             StepError::NoGround { x, z, .. } => {
-                (Some("terrain".to_owned()), Value::Numbers(vec![*x, *z]))
+                Kind::Step.of(&e, "terrain", Value::Numbers(vec![x, z]))
             }
-            _ => (None, Value::Nothing),
-        };
-        Self {
-            kind: Kind::Step,
-            message: e.to_string(),
-            field,
-            value,
+            _ => Kind::Step.refusal(e.to_string(), Value::Nothing),
         }
     }
 }
@@ -490,36 +413,29 @@ impl From<StepError> for BorderError {
 impl From<PlacementError> for BorderError {
     fn from(e: PlacementError) -> Self {
         match e {
-            PlacementError::State(e) => Self::from(e),
-            PlacementError::NoGround { x, z } => Self {
-                kind: Kind::Terrain,
-                message: e.to_string(),
-                field: Some("position".to_owned()),
-                value: Value::Numbers(vec![x, z]),
-            },
+            PlacementError::State(e) => e.into(),
+            PlacementError::NoGround { x, z } => {
+                Kind::Terrain.of(&e, "position", Value::Numbers(vec![x, z]))
+            }
         }
     }
 }
 
 impl From<ProblemError> for BorderError {
     fn from(e: ProblemError) -> Self {
+        use ProblemError as E;
         let value = match &e {
-            ProblemError::VelocityShape { found, .. }
-            | ProblemError::OperatorShape { found, .. }
-            | ProblemError::OperatorComponents { found, .. } => Value::Count(*found),
-            ProblemError::NonFiniteOperator { value, .. }
-            | ProblemError::NonFiniteVelocity { value, .. }
-            | ProblemError::InvalidFrictionCoefficient { value, .. }
-            | ProblemError::NonPositiveNormal { value, .. }
-            | ProblemError::NegativeTangential { value, .. } => Value::Number(*value),
+            E::VelocityShape { found, .. }
+            | E::OperatorShape { found, .. }
+            | E::OperatorComponents { found, .. } => Value::Count(*found),
+            E::NonFiniteOperator { value, .. }
+            | E::NonFiniteVelocity { value, .. }
+            | E::InvalidFrictionCoefficient { value, .. }
+            | E::NonPositiveNormal { value, .. }
+            | E::NegativeTangential { value, .. } => Value::Number(*value),
             // Also of the variants that may come: the enum is not exhaustive.
             _ => Value::Nothing,
         };
-        Self {
-            kind: Kind::Problem,
-            message: e.to_string(),
-            field: Some(e.field()),
-            value,
-        }
+        Kind::Problem.of(&e, e.field(), value)
     }
 }

@@ -1,208 +1,109 @@
 //! `solve_friction_contact`: a problem from anywhere.
 
-use numpy::{PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use rover_core::problem::{Dimension, FrictionContactProblem};
 use rover_core::solver::{
-    ContactLaw, Iterate, Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, solve,
+    ContactLaw, Method, Rung, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, solve,
 };
 
-use crate::arguments::{Given, whole};
-use crate::arrays::fresh;
-use crate::errors::{BorderError, Kind, Value};
+use crate::arguments::{Given, Named, whole};
+use crate::arrays::Array;
+use crate::errors::{Kind, Result, Value};
 use crate::given_problem::{Delassus, coefficients, flat, with_hint};
+use crate::options::solver_options;
 
 /// How the contact solver ended.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
 #[derive(Clone)]
 pub struct SolverReport {
-    inner: SolveReport,
-}
-
-#[pymethods]
-impl SolverReport {
     /// One of "converged", "relaxed", "not_converged" and "budget_exhausted".
     ///
     /// "relaxed": the convex relaxation is solved, which is not Coulomb's law. "budget_exhausted":
     /// the work that `budget` allows is done, and the answer is the best one found.
-    #[getter]
-    fn status(&self) -> &'static str {
-        match self.inner.status {
-            SolveStatus::Converged => "converged",
-            SolveStatus::SolvedRelaxed => "relaxed",
-            SolveStatus::BudgetExhausted => "budget_exhausted",
-            _ => "not_converged",
-        }
-    }
-
+    status: &'static str,
     /// Whether Coulomb's law holds to the tolerance.
-    #[getter]
-    fn is_converged(&self) -> bool {
-        self.inner.is_converged()
-    }
-
+    is_converged: bool,
     /// Iterations of the stage that answered.
-    #[getter]
-    fn iterations(&self) -> usize {
-        self.inner.iterations
-    }
-
+    iterations: usize,
     /// Violation of Signorini's and Coulomb's laws by the returned impulses, relative to the data.
-    #[getter]
-    fn residual(&self) -> f64 {
-        self.inner.residual
-    }
-
+    residual: f64,
     /// Largest violation of Signorini's and Coulomb's laws at one contact, m/s.
-    #[getter]
-    fn velocity_error(&self) -> f64 {
-        self.inner.velocity_error
-    }
-
+    velocity_error: f64,
     /// Name of the method that answered; never "auto".
-    #[getter]
-    fn solver(&self) -> &'static str {
-        self.inner.method.name()
-    }
-
+    solver: &'static str,
     /// Name of the stage that answered; "at_rest" where q = 0 left nothing to do.
-    #[getter]
-    fn stage(&self) -> &'static str {
-        self.inner.stage.name()
-    }
-
+    stage: &'static str,
     /// Every stage that was tried, in order, with the reason for its end and its iterations.
     ///
     /// Reasons are "converged", "max_iterations", "stalled", "budget_exhausted", "non_finite" and
     /// "relaxed".
-    #[getter]
-    fn stages(&self) -> Vec<(&'static str, &'static str, u32)> {
-        let rungs = self.inner.rungs.as_slice().iter();
-        rungs
-            .map(|rung| (rung.stage.name(), rung.status.name(), rung.iterations))
-            .collect()
-    }
-
+    stages: Vec<(&'static str, &'static str, u32)>,
     /// Work done, in the unit of the argument `budget`.
-    #[getter]
-    fn work(&self) -> u64 {
-        self.inner.work
-    }
-
+    work: u64,
     /// The law that the answer obeys, "coulomb" or "relaxed".
-    #[getter]
-    fn law(&self) -> &'static str {
-        match self.inner.method.law() {
-            ContactLaw::Coulomb => "coulomb",
-            ContactLaw::Relaxed => "relaxed",
+    law: &'static str,
+}
+
+impl From<SolveReport> for SolverReport {
+    fn from(inner: SolveReport) -> Self {
+        let rungs = inner.rungs.as_slice().iter();
+        let rung = |rung: &Rung| (rung.stage.name(), rung.status.name(), rung.iterations);
+        Self {
+            status: match inner.status {
+                SolveStatus::Converged => "converged",
+                SolveStatus::SolvedRelaxed => "relaxed",
+                SolveStatus::BudgetExhausted => "budget_exhausted",
+                _ => "not_converged",
+            },
+            is_converged: inner.is_converged(),
+            iterations: inner.iterations,
+            residual: inner.residual,
+            velocity_error: inner.velocity_error,
+            solver: inner.method.name(),
+            stage: inner.stage.name(),
+            stages: rungs.map(rung).collect(),
+            work: inner.work,
+            law: match inner.method.law() {
+                ContactLaw::Coulomb => "coulomb",
+                ContactLaw::Relaxed => "relaxed",
+            },
         }
     }
+}
 
+#[pymethods]
+impl SolverReport {
     fn __repr__(&self) -> String {
-        let (status, r) = (self.status(), &self.inner);
+        let Self {
+            status,
+            stage,
+            iterations,
+            residual,
+            ..
+        } = self;
         format!(
-            "SolverReport(status={status:?}, stage={:?}, iterations={}, residual={:.3e})",
-            r.stage.name(),
-            r.iterations,
-            r.residual
+            "SolverReport(status={status:?}, stage={stage:?}, iterations={iterations}, \
+             residual={residual:.3e})"
         )
     }
 }
 
 /// The solution of a friction-contact problem.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
 pub struct FrictionContactSolution {
-    p: Vec<f64>,
-    u: Vec<f64>,
-    dimension: usize,
-    report: SolverReport,
-    history: Vec<Iterate>,
-}
-
-#[pymethods]
-impl FrictionContactSolution {
     /// Impulses p, (n_c, d), N s, along the normal and the tangents.
-    #[getter]
-    fn impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        fresh(py, &self.p).reshape([self.p.len() / self.dimension, self.dimension])
-    }
-
+    impulses: Array,
     /// Velocities u = W p + q, (n_c, d), m/s, along the normal and the tangents.
-    #[getter]
-    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        fresh(py, &self.u).reshape([self.u.len() / self.dimension, self.dimension])
-    }
-
+    velocities: Array,
     /// How the solver ended.
-    #[getter]
-    fn report(&self) -> SolverReport {
-        self.report.clone()
-    }
-
+    report: SolverReport,
     /// The residuals measured on the way, with the argument `history`.
     ///
     /// Each is a tuple of the stage, the iterations so far and the relative residual. "nsgs" and
     /// "admm" measure every few iterations, the others at every step. Of "relaxed" it is the
     /// residual of the relaxed law.
-    #[getter]
-    fn history(&self) -> Vec<(&'static str, usize, f64)> {
-        let iterates = self.history.iter();
-        iterates
-            .map(|iterate| (iterate.stage.name(), iterate.iterations, iterate.residual))
-            .collect()
-    }
-}
-
-/// A solver by its public name, one of `known`.
-fn method(name: &str, known: &[Method]) -> Result<Method, BorderError> {
-    let found = known.iter().find(|method| method.name() == name);
-    found.copied().ok_or_else(|| {
-        let names: Vec<String> = known.iter().map(|m| format!("{:?}", m.name())).collect();
-        let message = format!("solver: must be one of {}, is {name:?}", names.join(", "));
-        BorderError::option("solver", message, Value::Text(name.to_owned()))
-    })
-}
-
-/// What a simulation may step with: the solvers of Coulomb's law.
-pub const SIMULATION_SOLVERS: [Method; 5] = [
-    Method::Auto,
-    Method::GaussSeidel,
-    Method::Newton,
-    Method::ProximalPoint,
-    Method::Admm,
-];
-
-/// Solver options of the public arguments.
-pub fn solver_options(
-    name: &str,
-    tolerance: f64,
-    max_iterations: usize,
-    known: &[Method],
-) -> Result<SolverOptions, BorderError> {
-    if !(tolerance.is_finite() && tolerance > 0.0) {
-        let message = format!("tolerance: must be finite and positive, is {tolerance}");
-        return Err(BorderError::option(
-            "tolerance",
-            message,
-            Value::Number(tolerance),
-        ));
-    }
-    if max_iterations == 0 {
-        let message = "max_iterations: must be at least 1, is 0".to_owned();
-        return Err(BorderError::option(
-            "max_iterations",
-            message,
-            Value::Count(0),
-        ));
-    }
-    Ok(SolverOptions {
-        method: method(name, known)?,
-        tolerance,
-        velocity_tolerance: tolerance.max(1e-9),
-        max_newton_steps: max_iterations,
-        max_sweeps: max_iterations,
-        ..SolverOptions::default()
-    })
+    history: Vec<(&'static str, usize, f64)>,
 }
 
 /// Solves the friction-contact problem K* contains W p + q + mu |u_T| n, orthogonal to p in K.
@@ -239,43 +140,35 @@ pub fn solver_options(
 ///
 /// Source: Acary and Brogliato 2008; Acary, Brémond and Huber 2018.
 #[pyfunction]
-#[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
-#[pyo3(signature = (
-    W, q, mu, tolerance = Given::MISSING, *, dimension = Given::MISSING, solver = Given::MISSING, max_iterations = Given::MISSING,
-    initial = None, budget = None, history = Given::MISSING
-), text_signature = "(W, q, mu, tolerance=1e-08, *, dimension=3, solver='auto', max_iterations=1000, initial=None, budget=None, history=False)")]
+#[pyo3(signature = (W, q, mu, tolerance = Given::MISSING, **options), text_signature = "(W, q, mu, tolerance=1e-08, *, dimension=3, solver='auto', max_iterations=1000, initial=None, budget=None, history=False)")]
 pub fn solve_friction_contact(
     py: Python<'_>,
     W: &Bound<'_, PyAny>,
     q: &Bound<'_, PyAny>,
     mu: &Bound<'_, PyAny>,
     tolerance: Given<'_>,
-    dimension: Given<'_>,
-    solver: Given<'_>,
-    max_iterations: Given<'_>,
-    initial: Option<&Bound<'_, PyAny>>,
-    budget: Option<&Bound<'_, PyAny>>,
-    history: Given<'_>,
-) -> PyResult<FrictionContactSolution> {
-    let option = Kind::Option;
-    let tolerance = tolerance.number(1e-8, option, "tolerance")?;
-    let dimension = dimension.count(3, option, "dimension")?;
-    let solver = solver.text("auto", option, "solver")?;
-    let max_iterations = max_iterations.count(1000, option, "max_iterations")?;
-    let budget = budget.map(|given| whole(given, option, "budget"));
+    options: Option<&Bound<'_, PyDict>>,
+) -> Result<FrictionContactSolution> {
+    let given = Named::keywords(py, options)?;
+    let tolerance = tolerance.number(1e-8, Kind::Option, "tolerance")?;
+    let dimension = given.count("dimension", 3)?;
+    let solver = given.text("solver", "auto")?;
+    let max_iterations = given.count("max_iterations", 1000)?;
     let kind = match dimension {
         2 => Dimension::Two,
         3 => Dimension::Three,
         _ => {
             let message = format!("dimension: must be 2 or 3, is {dimension}");
-            return Err(BorderError::option("dimension", message, Value::Count(dimension)).into());
+            return Err(Kind::Option.error("dimension", message, Value::Count(dimension)));
         }
     };
     let options = SolverOptions {
-        budget: budget.transpose()?,
-        keeps_history: history.flag(false, option, "history")?,
+        budget: given.read("budget", whole)?,
+        keeps_history: given.flag("history", false)?,
         ..solver_options(&solver, tolerance, max_iterations, &Method::ALL)?
     };
+    let initial = given.some("initial")?;
+    given.finish()?;
     let W = Delassus::read(W, kind)?;
     let q = flat(q, "q")?;
     let mu = coefficients(mu, q.len(), dimension)?;
@@ -286,28 +179,24 @@ pub fn solve_friction_contact(
     .map_err(with_hint)?;
     let mut p = vec![0.0; q.len()];
     if let Some(initial) = initial {
-        let start = flat(initial, "initial")?;
+        let start = flat(&initial, "initial")?;
         if start.len() != p.len() || start.iter().any(|x| !x.is_finite()) {
             let message = format!("initial: needs {} finite entries", p.len());
-            let (field, value) = (Some("initial".to_owned()), Value::Count(start.len()));
-            return Err(BorderError {
-                kind: Kind::Problem,
-                message,
-                field,
-                value,
-            }
-            .into());
+            return Err(Kind::Problem.error("initial", message, Value::Count(start.len())));
         }
         p = start;
     }
     let mut u = vec![0.0; q.len()];
     let mut workspace = SolverWorkspace::default();
     let inner = py.detach(|| solve(&problem, &options, &mut p, &mut u, &mut workspace));
+    let shape = [mu.len(), dimension];
+    let iterates = workspace.history().iter();
     Ok(FrictionContactSolution {
-        p,
-        u,
-        dimension,
-        report: SolverReport { inner },
-        history: workspace.history().to_vec(),
+        impulses: Array::shaped(p, &shape),
+        velocities: Array::shaped(u, &shape),
+        report: inner.into(),
+        history: iterates
+            .map(|one| (one.stage.name(), one.iterations, one.residual))
+            .collect(),
     })
 }

@@ -6,7 +6,7 @@ use pyo3::types::PyTuple;
 use rover_core::problem::{BlockSparseDelassus, Dimension, ProblemError};
 
 use crate::arrays::{array, vector};
-use crate::errors::{BorderError, Kind, Value};
+use crate::errors::{BorderError, Kind, Result, Value};
 
 /// `W` as it was given.
 pub enum Delassus {
@@ -16,7 +16,7 @@ pub enum Delassus {
 
 impl Delassus {
     /// A square array, one of SciPy's sparse arrays, or block rows `(indptr, indices, data)`.
-    pub fn read(W: &Bound<'_, PyAny>, dimension: Dimension) -> PyResult<Self> {
+    pub fn read(W: &Bound<'_, PyAny>, dimension: Dimension) -> Result<Self> {
         let is_array = W.is_instance_of::<PyArrayDyn<f64>>();
         if !is_array && W.hasattr("tobsr")? {
             return Self::read_scipy(W, dimension);
@@ -25,27 +25,27 @@ impl Delassus {
             && rows.len() == 3
             && array(&rows.get_item(2)?, Kind::Problem, "W")?.shape().len() == 3
         {
-            let index = |at: usize| -> PyResult<Vec<usize>> {
+            let index = |at: usize| -> Result<Vec<usize>> {
                 let numbers = flat(&rows.get_item(at)?, "W")?;
                 numbers.into_iter().map(as_index).collect()
             };
             let (starts, columns) = (index(0)?, index(1)?);
             let blocks = flat(&rows.get_item(2)?, "W")?;
             let sparse = BlockSparseDelassus::from_rows(dimension, starts, columns, blocks);
-            return Ok(Self::BlockSparse(sparse.map_err(BorderError::from)?));
+            return Ok(Self::BlockSparse(sparse?));
         }
         let dense = array(W, Kind::Problem, "W")?;
         let shape = dense.shape().to_vec();
         if shape.len() != 2 || shape[0] != shape[1] {
             let message = format!("W: must be square, has shape {shape:?}");
             let value = Value::Numbers(shape.iter().map(|&s| s as f64).collect());
-            return Err(problem_error("W", message, value).into());
+            return Err(problem_error("W", message, value));
         }
         Ok(Self::Dense(dense.as_array().iter().copied().collect()))
     }
 
     /// One of SciPy's sparse arrays, which is not changed.
-    fn read_scipy(W: &Bound<'_, PyAny>, dimension: Dimension) -> PyResult<Self> {
+    fn read_scipy(W: &Bound<'_, PyAny>, dimension: Dimension) -> Result<Self> {
         let d = dimension.components();
         let shape: Vec<usize> = W.getattr("shape")?.extract()?;
         if shape.len() != 2 || shape[0] != shape[1] || !shape[0].is_multiple_of(d) {
@@ -56,53 +56,25 @@ impl Delassus {
             } else {
                 message
             };
-            return Err(problem_error("W", message, value).into());
+            return Err(problem_error("W", message, value));
         }
         let rows = W.call_method1("tocsr", (true,))?; // a copy, which may be rearranged
         rows.call_method0("sum_duplicates")?;
         let rows = rows.call_method1("tobsr", ((d, d),))?;
         rows.call_method0("sort_indices")?;
-        let index = |name: &str| -> PyResult<Vec<usize>> {
+        let index = |name: &str| -> Result<Vec<usize>> {
             let numbers = flat(&rows.getattr(name)?, "W")?;
             numbers.into_iter().map(as_index).collect()
         };
         let (starts, columns) = (index("indptr")?, index("indices")?);
         let blocks = flat(&rows.getattr("data")?, "W")?;
-        let (starts, columns, blocks) = with_diagonal(d * d, &starts, &columns, &blocks);
-        let sparse = BlockSparseDelassus::from_rows(dimension, starts, columns, blocks);
-        Ok(Self::BlockSparse(sparse.map_err(BorderError::from)?))
+        let sparse = BlockSparseDelassus::from_partial_rows(dimension, &starts, &columns, &blocks);
+        Ok(Self::BlockSparse(sparse?))
     }
-}
-
-/// Block rows in which every row has its diagonal block, zero where it was not stored.
-fn with_diagonal(
-    size: usize,
-    starts: &[usize],
-    columns: &[usize],
-    blocks: &[f64],
-) -> (Vec<usize>, Vec<usize>, Vec<f64>) {
-    let (mut all_starts, mut all_columns, mut all_blocks) = (vec![0], Vec::new(), Vec::new());
-    for (row, ends) in starts.windows(2).enumerate() {
-        let own = &columns[ends[0]..ends[1]];
-        let before = own.partition_point(|&column| column < row);
-        let middle = ends[0] + before;
-        let stored = usize::from(own.get(before) == Some(&row));
-        all_columns.extend_from_slice(&columns[ends[0]..middle]);
-        all_columns.push(row);
-        all_columns.extend_from_slice(&columns[middle + stored..ends[1]]);
-        all_blocks.extend_from_slice(&blocks[size * ends[0]..size * (middle + stored)]);
-        all_blocks.resize(
-            size * all_columns.len() - size * (ends[1] - middle - stored),
-            0.0,
-        );
-        all_blocks.extend_from_slice(&blocks[size * (middle + stored)..size * ends[1]]);
-        all_starts.push(all_columns.len());
-    }
-    (all_starts, all_columns, all_blocks)
 }
 
 /// Friction coefficients, one for each contact or one for all.
-pub fn coefficients(mu: &Bound<'_, PyAny>, n: usize, dimension: usize) -> PyResult<Vec<f64>> {
+pub fn coefficients(mu: &Bound<'_, PyAny>, n: usize, dimension: usize) -> Result<Vec<f64>> {
     let given = array(mu, Kind::Problem, "mu")?;
     if given.ndim() > 0 {
         return vector(mu, Kind::Problem, "mu");
@@ -115,7 +87,7 @@ pub fn coefficients(mu: &Bound<'_, PyAny>, n: usize, dimension: usize) -> PyResu
             String::new()
         };
         let message = format!("q: has {n} entries, not {dimension} for each contact{hint}");
-        return Err(problem_error("q", message, Value::Count(n)).into());
+        return Err(problem_error("q", message, Value::Count(n)));
     }
     Ok(vec![given.as_array().sum(); n / dimension])
 }
@@ -140,25 +112,20 @@ pub fn with_hint(error: ProblemError) -> BorderError {
 }
 
 /// Any array-like as a list, whatever its shape.
-pub fn flat(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<f64>> {
+pub fn flat(value: &Bound<'_, PyAny>, field: &str) -> Result<Vec<f64>> {
     let numbers = array(value, Kind::Problem, field)?;
     Ok(numbers.as_array().iter().copied().collect())
 }
 
-fn as_index(number: f64) -> PyResult<usize> {
+fn as_index(number: f64) -> Result<usize> {
     if number >= 0.0 && number.fract() == 0.0 && number < 1e15 {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked above
         return Ok(number as usize);
     }
     let message = format!("W: indices must be whole numbers >= 0, one is {number}");
-    Err(problem_error("W", message, Value::Number(number)).into())
+    Err(problem_error("W", message, Value::Number(number)))
 }
 
 fn problem_error(field: &str, message: String, value: Value) -> BorderError {
-    BorderError {
-        kind: Kind::Problem,
-        message,
-        field: Some(field.to_owned()),
-        value,
-    }
+    Kind::Problem.error(field, message, value)
 }

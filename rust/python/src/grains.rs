@@ -1,40 +1,30 @@
 //! `GrainSimulation` and `ball_packing`: grains in space.
 
-use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::draw::DrawnGround;
-use rover_core::nalgebra::Vector3;
 use rover_core::simulation::GrainSimulation as CoreSimulation;
 use rover_core::system::grains::{GrainContact, Packing, arranged};
 use std::sync::{Arc, MutexGuard};
 
-use crate::arguments::{Given, flags};
-use crate::arrays::{fresh, fresh_rows, triple, vector};
-use crate::balls::{self, BallArguments};
-use crate::bed_arguments::{self, StepArguments, grain_error, setup_error};
+use crate::arguments::{Named, count, flags, number};
+use crate::arrays::{Array, fresh, fresh_rows, vector};
+use crate::balls::{self, Balls, Packed};
+use crate::bed_arguments::{self, grain_error, setup_error};
 use crate::contacts::GrainContacts;
-use crate::errors::{BorderError, Kind};
+use crate::errors::{BorderError, Kind, Result};
 use crate::report::{Energy, StepReport};
 use crate::shared::Shared;
 use crate::snapshot::{GrainSnapshot, belonging};
-use crate::stepping::step;
+use crate::stepping::{Steps, step};
 use crate::union;
 use crate::vessels::{Drum, Silo, Vessel};
 
 type Core = CoreSimulation<3>;
 
-/// Radii, masses and centres of a packing.
-type Packed<'py> = (
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray2<f64>>,
-);
-
 /// Grains in space: free balls with friction, between walls or on a terrain.
 ///
-/// World axes: x forward, y up, z to the right. One call at a time: a call during another one, from
-/// another thread or a signal handler, raises BusyError.
+/// World axes: x forward, y up, z to the right. One call at a time, as of `Simulation`.
 ///
 /// Args:
 ///     radius: Radii of the balls, (n,), m.
@@ -104,70 +94,16 @@ fn n_balls(inner: &Core) -> usize {
 #[pymethods]
 impl GrainSimulation {
     #[new]
-    #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
-    #[pyo3(signature = (radius, mass, position, *, kinematic = Given::MISSING, walls = None, wall_velocity = None, vessel = None, terrain = None,
-        friction = Given::MISSING, wall_friction = Given::MISSING, cohesion = Given::MISSING, cohesion_range = Given::MISSING, restitution = Given::MISSING,
-        gravity = None, time_step = Given::MISSING, tolerance = Given::MISSING, max_iterations = Given::MISSING,
-        stabilisation = Given::MISSING, penetration_tolerance = Given::MISSING,
-        sleep = Given::MISSING, sleep_speed = Given::MISSING, sleep_distance = Given::MISSING, threads = Given::MISSING),
+    #[pyo3(signature = (radius, mass, position, **options),
         text_signature = "(radius, mass, position, *, kinematic=None, walls=None, wall_velocity=None, vessel=None, terrain=None, friction=0.5, wall_friction=0.5, cohesion=0.0, cohesion_range=None, restitution=0.0, gravity=None, time_step=0.002, tolerance=0.001, max_iterations=2000, stabilisation=None, penetration_tolerance=None, sleep=False, sleep_speed=None, sleep_distance=None, threads=1)")]
     fn new(
         radius: &Bound<'_, PyAny>,
         mass: &Bound<'_, PyAny>,
         position: &Bound<'_, PyAny>,
-        kinematic: Given<'_>,
-        walls: Option<&Bound<'_, PyAny>>,
-        wall_velocity: Option<&Bound<'_, PyAny>>,
-        vessel: Option<&Bound<'_, PyAny>>,
-        terrain: Option<&Bound<'_, PyAny>>,
-        friction: Given<'_>,
-        wall_friction: Given<'_>,
-        cohesion: Given<'_>,
-        cohesion_range: Given<'_>,
-        restitution: Given<'_>,
-        gravity: Option<&Bound<'_, PyAny>>,
-        time_step: Given<'_>,
-        tolerance: Given<'_>,
-        max_iterations: Given<'_>,
-        stabilisation: Given<'_>,
-        penetration_tolerance: Given<'_>,
-        sleep: Given<'_>,
-        sleep_speed: Given<'_>,
-        sleep_distance: Given<'_>,
-        threads: Given<'_>,
-    ) -> PyResult<Self> {
-        let gravity = gravity.map(|g| triple(g, Kind::Option, "gravity"));
-        let balls = BallArguments {
-            radius,
-            mass,
-            position,
-            kinematic,
-            walls,
-            wall_velocity,
-            vessel,
-            terrain,
-            friction,
-            wall_friction,
-            cohesion,
-            cohesion_range,
-            steps: StepArguments {
-                restitution,
-                gravity: gravity.transpose()?.map(Vector3::from),
-                time_step,
-                tolerance,
-                max_iterations,
-                stabilisation,
-                is_hollow: vessel.is_some(),
-                penetration_tolerance,
-                threads,
-            },
-            sleep,
-            sleep_speed,
-            sleep_distance,
-        }
-        .read()?;
-        let scene = Arc::new(balls.scene);
-        let made = Core::new(scene, balls.options, balls.sleep, balls.q);
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> Result<Self> {
+        let balls = Balls::read(radius, mass, position, options)?;
+        let made = Core::new(Arc::new(balls.scene), balls.options, balls.sleep, balls.q);
         Ok(Self {
             inner: Shared::new(made.map_err(setup_error)?),
             terrain: balls.terrain,
@@ -177,90 +113,89 @@ impl GrainSimulation {
 
     /// Time since the last call of `set_state`, s.
     #[getter]
-    fn time(&self) -> PyResult<f64> {
+    fn time(&self) -> Result<f64> {
         Ok(self.open()?.time())
     }
 
     /// Time step, s.
     #[getter]
-    fn time_step(&self) -> PyResult<f64> {
+    fn time_step(&self) -> Result<f64> {
         Ok(self.open()?.options().time_step)
     }
 
     /// Radii of the balls, (n,), m.
     #[getter]
-    fn radius<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(fresh(py, self.open()?.soil().grains.radius()))
+    fn radius(&self) -> Result<Array> {
+        Ok(fresh(self.open()?.soil().grains.radius()))
     }
 
     /// Masses of the balls, (n,), kg.
     #[getter]
-    fn mass<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(fresh(py, self.open()?.soil().grains.mass()))
+    fn mass(&self) -> Result<Array> {
+        Ok(fresh(self.open()?.soil().grains.mass()))
     }
 
     /// Centres of the balls, (n, 3), m.
     #[getter]
-    fn position<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn position(&self) -> Result<Array> {
         let inner = self.open()?;
-        balls::centres(py, inner.q(), n_balls(&inner))
+        Ok(balls::centres(inner.q(), n_balls(&inner)))
     }
 
     /// Velocities of the centres, (n, 3), m/s.
     #[getter]
-    fn velocity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn velocity(&self) -> Result<Array> {
         let inner = self.open()?;
-        balls::velocities(py, inner.v(), n_balls(&inner))
+        Ok(balls::velocities(inner.v(), n_balls(&inner)))
     }
 
     /// Angular velocities of the balls, world frame, (n, 3), rad/s.
     #[getter]
-    fn spin<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn spin(&self) -> Result<Array> {
         let inner = self.open()?;
-        balls::spins(py, inner.v(), n_balls(&inner))
+        Ok(balls::spins(inner.v(), n_balls(&inner)))
     }
 
     /// Which balls are kinematic, (n,).
     #[getter]
-    fn kinematic<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
+    fn kinematic(&self) -> Result<Array<bool>> {
         let inner = self.open()?;
-        Ok(PyArray1::from_slice(py, inner.soil().grains.kinematic()))
+        Ok(fresh(inner.soil().grains.kinematic()))
     }
 
     /// Which balls sleep, (n,); kinematic ones always do.
     #[getter]
-    fn asleep<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        Ok(PyArray1::from_slice(py, self.open()?.asleep()))
+    fn asleep(&self) -> Result<Array<bool>> {
+        Ok(fresh(self.open()?.asleep()))
     }
 
     /// The terrain below the balls, or None.
     #[getter]
-    fn terrain<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+    fn terrain<'py>(&self, py: Python<'py>) -> Result<Option<Bound<'py, PyAny>>> {
         let terrain = self.terrain.as_ref();
         terrain.map(|ground| union::object(py, ground)).transpose()
     }
 
     /// The vessel around the balls, or None.
     #[getter]
-    fn vessel<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+    fn vessel<'py>(&self, py: Python<'py>) -> Result<Option<Bound<'py, PyAny>>> {
         self.vessel.as_ref().map(|v| v.to_object(py)).transpose()
     }
 
     /// A point of each wall now and the normal to its free side, (m, 6), m.
     #[getter]
-    fn walls<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn walls(&self) -> Result<Array> {
         let inner = self.open()?;
-        let walls = inner.soil().walls.iter().map(|wall| {
+        Ok(fresh_rows(inner.soil().walls.iter().map(|wall| {
             let (n, offset) = (wall.n(), wall.at(inner.time()).offset());
             let point = n * offset;
             [point.x, point.y, point.z, n.x, n.y, n.z]
-        });
-        fresh_rows(py, &walls.collect::<Vec<_>>())
+        })))
     }
 
     /// The options of contacts, gravity and solver, by the names of the arguments.
     #[getter]
-    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn settings<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let inner = self.open()?;
         let options = inner.options();
         let settings = bed_arguments::settings(py, options, &inner.soil().friction)?;
@@ -288,10 +223,10 @@ impl GrainSimulation {
         position: &Bound<'_, PyAny>,
         velocity: Option<&Bound<'_, PyAny>>,
         spin: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<()> {
+    ) -> Result<()> {
         let mut inner = self.open()?;
         let (q, v) = balls::state(n_balls(&inner), position, velocity, spin)?;
-        Ok(inner.set_state(&q, &v).map_err(|e| grain_error(&e))?)
+        inner.set_state(&q, &v).map_err(|e| grain_error(&e))
     }
 
     /// Takes balls out; the others keep their order.
@@ -302,10 +237,10 @@ impl GrainSimulation {
     /// Raises:
     ///     ModelError: The number of truth values differs, or no ball would be left. Nothing has
     ///         changed.
-    fn remove(&self, which: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn remove(&self, which: &Bound<'_, PyAny>) -> Result<()> {
         let mut inner = self.open()?;
         let which = flags(which, Kind::Model, "which")?;
-        Ok(inner.remove(&which).map_err(|e| grain_error(&e))?)
+        inner.remove(&which).map_err(|e| grain_error(&e))
     }
 
     /// Puts other balls in the place of those so far; time and options stay.
@@ -329,8 +264,7 @@ impl GrainSimulation {
     ///         Nothing has changed.
     ///     StateError: An array has a wrong shape or an entry that is not finite. Nothing has
     ///         changed.
-    #[allow(clippy::too_many_arguments)] // keyword arguments of a Python method
-    #[pyo3(signature = (radius, mass, position, before, *, kinematic = Given::MISSING, velocity = None, spin = None),
+    #[pyo3(signature = (radius, mass, position, before, **options),
         text_signature = "($self, radius, mass, position, before, *, kinematic=None, velocity=None, spin=None)")]
     fn exchange(
         &self,
@@ -338,16 +272,18 @@ impl GrainSimulation {
         mass: &Bound<'_, PyAny>,
         position: &Bound<'_, PyAny>,
         before: &Bound<'_, PyAny>,
-        kinematic: Given<'_>,
-        velocity: Option<&Bound<'_, PyAny>>,
-        spin: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<()> {
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> Result<()> {
         let mut inner = self.open()?;
-        let grains = bed_arguments::grains::<3>(radius, mass, kinematic)?;
-        let (q, v) = balls::state(grains.len(), position, velocity, spin)?;
+        let given = Named::keywords(radius.py(), options)?;
+        let grains = bed_arguments::grains::<3>(radius, mass, given.get("kinematic")?)?;
+        let (velocity, spin) = (given.some("velocity")?, given.some("spin")?);
+        given.finish()?;
+        let (q, v) = balls::state(grains.len(), position, velocity.as_ref(), spin.as_ref())?;
         let before = balls::numbers(before)?;
-        let done = inner.exchange(grains, &q, &v, &before);
-        Ok(done.map_err(|e| grain_error(&e))?)
+        inner
+            .exchange(grains, &q, &v, &before)
+            .map_err(|e| grain_error(&e))
     }
 
     /// Takes n steps, as `Simulation.step` does.
@@ -355,21 +291,16 @@ impl GrainSimulation {
     /// Args:
     ///     n: Number of steps.
     ///
-    /// Returns:
-    ///     How the steps went.
-    ///
     /// Raises:
     ///     StepError: A step could not be taken; the state before it stays.
-    ///     OptionError: `n` is not a count.
-    #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
-    fn step(&self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
-        let steps = n.count(1, Kind::Option, "n")?;
-        step(py, &mut *self.open()?, steps)
+    #[pyo3(signature = (n = Steps(1)), text_signature = "($self, n=1)")]
+    fn step(&self, py: Python<'_>, n: Steps) -> Result<StepReport> {
+        step(py, &mut *self.open()?, n)
     }
 
     /// The contacts of the last step.
     #[getter]
-    fn contacts(&self) -> PyResult<GrainContacts> {
+    fn contacts(&self) -> Result<GrainContacts> {
         let inner = self.open()?;
         let (scene, h) = (inner.soil(), inner.options().time_step);
         let attraction = |contact: &GrainContact<3>| h * scene.attraction(contact);
@@ -378,33 +309,33 @@ impl GrainSimulation {
     }
 
     /// Kinetic and potential energy now.
-    fn energy(&self) -> PyResult<Energy> {
+    fn energy(&self) -> Result<Energy> {
         Ok(self.open()?.energy().into())
     }
 
     /// Momentum of the balls, (6,): along x, y, z, kg m/s, and about the origin, kg m²/s.
     ///
     /// Kinematic balls do not count.
-    fn momentum<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    fn momentum(&self) -> Result<Array> {
         let inner = self.open()?;
         let (linear, moment) = inner.soil().momentum(inner.q(), inner.v());
         let all: Vec<f64> = linear.iter().chain(&moment).copied().collect();
-        Ok(fresh(py, &all))
+        Ok(fresh(&all))
     }
 
     /// Deepest overlap now, m.
-    fn penetration(&self) -> PyResult<f64> {
+    fn penetration(&self) -> Result<f64> {
         Ok(self.open()?.penetration())
     }
 
     /// Wakes all balls.
-    fn wake(&self) -> PyResult<()> {
+    fn wake(&self) -> Result<()> {
         self.open()?.wake();
         Ok(())
     }
 
     /// Everything that is needed to continue bit for bit.
-    fn snapshot(&self) -> PyResult<GrainSnapshot> {
+    fn snapshot(&self) -> Result<GrainSnapshot> {
         let inner = self.open()?;
         Ok(GrainSnapshot {
             inner: inner.snapshot(),
@@ -418,11 +349,11 @@ impl GrainSimulation {
     ///
     /// Raises:
     ///     StateError: The snapshot belongs to other grains or is damaged. Nothing has changed.
-    fn restore(&self, snapshot: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn restore(&self, snapshot: &Bound<'_, PyAny>) -> Result<()> {
         let mut inner = self.open()?;
         let snapshot = belonging::<GrainSnapshot>(snapshot, "a GrainSnapshot")?;
         let restored = inner.restore(&snapshot.get().inner);
-        Ok(restored.map_err(BorderError::from)?)
+        Ok(restored?)
     }
 
     fn __repr__(&self) -> String {
@@ -457,49 +388,43 @@ impl GrainSimulation {
 ///     ModelError: A number is not finite or out of its range, the radii are the wrong way round,
 ///         or a ball does not fit.
 #[pyfunction]
-#[pyo3(signature = (count, *, radius_min, radius_max, mass, width, depth,
-    left = Given::MISSING, back = Given::MISSING, bottom = Given::MISSING, seed = Given::MISSING),
+#[pyo3(signature = (count, **options),
     text_signature = "(count, *, radius_min, radius_max, mass, width, depth, left=0.0, back=0.0, bottom=0.0, seed=0)")]
-#[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
-pub fn ball_packing<'py>(
-    py: Python<'py>,
-    count: Given<'_>,
-    radius_min: Given<'_>,
-    radius_max: Given<'_>,
-    mass: Given<'_>,
-    width: Given<'_>,
-    depth: Given<'_>,
-    left: Given<'_>,
-    back: Given<'_>,
-    bottom: Given<'_>,
-    seed: Given<'_>,
-) -> PyResult<Packed<'py>> {
-    let kind = Kind::Model;
+pub fn ball_packing(
+    count: &Bound<'_, PyAny>,
+    options: Option<&Bound<'_, PyDict>>,
+) -> Result<Packed> {
+    let given = Named::keywords(count.py(), options)?.of(Kind::Model);
     let packing = Packing::<3> {
-        count: count.count(0, kind, "count")?,
-        radius_min: radius_min.number(0.0, kind, "radius_min")?,
-        radius_max: radius_max.number(0.0, kind, "radius_max")?,
-        mass: mass.number(0.0, kind, "mass")?,
-        corner: [
-            left.number(0.0, kind, "left")?,
-            bottom.number(0.0, kind, "bottom")?,
-            back.number(0.0, kind, "back")?,
-        ],
-        sides: [
-            width.number(0.0, kind, "width")?,
-            f64::INFINITY,
-            depth.number(0.0, kind, "depth")?,
-        ],
-        seed: seed.whole(0, kind, "seed")?,
+        count: self::count(count, Kind::Model, "count")?,
+        radius_min: given.need("radius_min", number)?,
+        radius_max: given.need("radius_max", number)?,
+        mass: given.need("mass", number)?,
+        corner: corner(&given)?,
+        sides: sides(&given)?,
+        seed: given.whole("seed", 0)?,
     };
-    let built = py.detach(|| packing.build());
-    let (balls, q) = built.map_err(|e| grain_error(&e))?;
-    let centres: Vec<[f64; 3]> = q.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
-    Ok((
-        fresh(py, balls.radius()),
-        fresh(py, balls.mass()),
-        fresh_rows(py, &centres)?,
-    ))
+    given.finish()?;
+    balls::packed(count.py(), &packing)
+}
+
+/// Lowest corner of the rectangle that balls are laid over, m.
+fn corner(given: &Named<'_>) -> Result<[f64; 3]> {
+    let [left, bottom, back] = ["left", "bottom", "back"];
+    Ok([
+        given.number(left, 0.0)?,
+        given.number(bottom, 0.0)?,
+        given.number(back, 0.0)?,
+    ])
+}
+
+/// Its sides, m, without an upper end.
+fn sides(given: &Named<'_>) -> Result<[f64; 3]> {
+    Ok([
+        given.need("width", number)?,
+        f64::INFINITY,
+        given.need("depth", number)?,
+    ])
 }
 
 /// Places balls of given radii in loose layers over a rectangle, without overlap.
@@ -521,36 +446,27 @@ pub fn ball_packing<'py>(
 /// Raises:
 ///     ModelError: A number is not finite or out of its range, or a ball does not fit.
 #[pyfunction]
-#[pyo3(signature = (radius, *, width, depth, left = Given::MISSING, back = Given::MISSING, bottom = Given::MISSING, seed = Given::MISSING),
-    text_signature = "(radius, *, width, depth, left=0.0, back=0.0, bottom=0.0, seed=0)")]
-#[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
-pub fn arrange_balls<'py>(
-    py: Python<'py>,
-    radius: &Bound<'py, PyAny>,
-    width: Given<'_>,
-    depth: Given<'_>,
-    left: Given<'_>,
-    back: Given<'_>,
-    bottom: Given<'_>,
-    seed: Given<'_>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let kind = Kind::Model;
-    let radius = vector(radius, kind, "radius")?;
-    let corner = [
-        left.number(0.0, kind, "left")?,
-        bottom.number(0.0, kind, "bottom")?,
-        back.number(0.0, kind, "back")?,
-    ];
-    let width = width.number(0.0, kind, "width")?;
-    let sides = [width, f64::INFINITY, depth.number(0.0, kind, "depth")?];
-    let seed = seed.whole(0, kind, "seed")?;
-    let q = py.detach(|| arranged::<3>(&radius, corner, sides, seed));
-    let q = q.map_err(|e| grain_error(&e))?;
-    balls::centres(py, &q, radius.len())
+#[pyo3(signature = (radius, **options), text_signature = "(radius, *, width, depth, left=0.0, back=0.0, bottom=0.0, seed=0)")]
+pub fn arrange_balls(
+    radius: &Bound<'_, PyAny>,
+    options: Option<&Bound<'_, PyDict>>,
+) -> Result<Array> {
+    let given = Named::keywords(radius.py(), options)?.of(Kind::Model);
+    let (corner, sides) = (corner(&given)?, sides(&given)?);
+    let seed = given.whole("seed", 0)?;
+    given.finish()?;
+    let radii = vector(radius, Kind::Model, "radius")?;
+    let q = radius
+        .py()
+        .detach(|| arranged::<3>(&radii, corner, sides, seed));
+    Ok(balls::centres(
+        &q.map_err(|e| grain_error(&e))?,
+        radii.len(),
+    ))
 }
 
 /// Adds the classes of grains in space to the module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+pub fn register(module: &Bound<'_, PyModule>) -> Result<()> {
     module.add_class::<GrainSimulation>()?;
     module.add_class::<GrainContacts>()?;
     module.add_class::<GrainSnapshot>()?;

@@ -6,6 +6,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 use rover_core::episode::{Ending, Episode, TERMS};
 
+use crate::errors::Result;
+
 /// Names of the solver's status: converged, not converged, a step that failed.
 const STATUSES: [&str; 3] = ["converged", "not_converged", "failed"];
 
@@ -55,7 +57,7 @@ fn waypoints(episode: &Episode) -> [i64; 2] {
 }
 
 /// The info of one rover.
-pub fn info<'py>(py: Python<'py>, told: &Told<'_>) -> PyResult<Bound<'py, PyDict>> {
+pub fn info<'py>(py: Python<'py>, told: &Told<'_>) -> Result<Bound<'py, PyDict>> {
     let (episode, message) = told;
     let (outcome, setting) = (episode.outcome(), episode.setting());
     let is_success = outcome.ending == Ending::Goal;
@@ -129,7 +131,7 @@ impl<'py, 'a> Columns<'py, 'a> {
         name: &Bound<'py, PyString>,
         mask: &Bound<'py, PyString>,
         of: impl Fn(&Told<'a>) -> T,
-    ) -> PyResult<()> {
+    ) -> Result<()> {
         let column: Vec<T> = self.told.iter().map(of).collect();
         self.out
             .set_item(name, PyArray1::from_slice(self.py, &column))?;
@@ -142,13 +144,13 @@ impl<'py, 'a> Columns<'py, 'a> {
         name: &Bound<'py, PyString>,
         mask: &Bound<'py, PyString>,
         inner: &Self,
-    ) -> PyResult<()> {
+    ) -> Result<()> {
         self.out.set_item(name, &inner.out)?;
         self.mask(mask)
     }
 
-    fn mask(&self, name: &Bound<'py, PyString>) -> PyResult<()> {
-        self.out.set_item(name, self.everyone)
+    fn mask(&self, name: &Bound<'py, PyString>) -> Result<()> {
+        Ok(self.out.set_item(name, self.everyone)?)
     }
 }
 
@@ -164,7 +166,7 @@ macro_rules! add {
 }
 
 /// The infos of all rovers of a batch.
-pub fn infos<'py>(py: Python<'py>, told: &[Told<'_>]) -> PyResult<Bound<'py, PyDict>> {
+pub fn infos<'py>(py: Python<'py>, told: &[Told<'_>]) -> Result<Bound<'py, PyDict>> {
     let text = |name: &str| PyString::intern(py, name).into_any().unbind();
     let endings = Ending::ALL.map(|ending| text(ending.name()));
     let statuses = STATUSES.map(text);

@@ -1,5 +1,6 @@
 //! The border between `rover-core` and Python: conversions, exceptions, array views. No mechanics.
 #![forbid(unsafe_code)]
+#![allow(clippy::needless_pass_by_value)] // what pyo3 hands over
 
 mod accuracy;
 mod arguments;
@@ -14,7 +15,6 @@ mod episode;
 mod episode_batch;
 mod episode_rules;
 mod errors;
-mod files;
 mod friction_contact;
 mod generators;
 mod given_problem;
@@ -24,7 +24,6 @@ mod infos;
 mod linearisation;
 mod materials;
 mod model;
-mod model_files;
 mod motor;
 mod options;
 mod path_search;
@@ -93,6 +92,7 @@ pub fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
     )?)?;
     module.add_function(wrap_pyfunction!(generators::seed_generators, module)?)?;
     module.add_function(wrap_pyfunction!(generators::standard_normals, module)?)?;
+    module.add_class::<planar_ground::PlanarGround>()?;
     module.add_class::<planar_ground::Line>()?;
     module.add_class::<planar_ground::Sine>()?;
     module.add_class::<planar_ground::Spline>()?;

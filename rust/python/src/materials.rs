@@ -5,14 +5,14 @@ use pyo3::types::{PyDict, PyList};
 use rover_core::law::materials::{MaterialPair, Materials, is_name};
 
 use crate::arguments::{Given, number, refused, text};
-use crate::errors::{BorderError, Kind, Value};
+use crate::errors::{Kind, Result, Value};
 
 const WHAT: &str = "a mapping of pairs of names to (friction, restitution), or a list of \
                     (name, name, friction, restitution)";
 
 /// The laws of pairs: a mapping `{(a, b): (friction, restitution)}`, or rows `(a, b, friction,
 /// restitution)`.
-pub fn parse(given: &Bound<'_, PyAny>) -> PyResult<Materials> {
+pub fn parse(given: &Bound<'_, PyAny>) -> Result<Materials> {
     let wrong = || refused(given, Kind::Option, "materials", WHAT);
     let mut pairs = Vec::new();
     if let Ok(mapping) = given.cast::<PyDict>() {
@@ -46,7 +46,7 @@ fn pair(
     second: Option<Bound<'_, PyAny>>,
     mu: Option<Bound<'_, PyAny>>,
     e: Option<Bound<'_, PyAny>>,
-) -> Option<PyResult<MaterialPair>> {
+) -> Option<Result<MaterialPair>> {
     let (first, second, mu, e) = (first?, second?, mu?, e?);
     let name = |given| text(given, Kind::Option, "materials");
     let of = |given| number(given, Kind::Option, "materials");
@@ -61,7 +61,7 @@ fn pair(
 }
 
 /// The laws as rows that [`parse`] reads, and that every text format can hold.
-pub fn rows<'py>(py: Python<'py>, materials: &Materials) -> PyResult<Bound<'py, PyList>> {
+pub fn rows<'py>(py: Python<'py>, materials: &Materials) -> Result<Bound<'py, PyList>> {
     let row = |pair: &MaterialPair| {
         let [first, second] = &pair.materials;
         (
@@ -71,11 +71,11 @@ pub fn rows<'py>(py: Python<'py>, materials: &Materials) -> PyResult<Bound<'py, 
             pair.restitution,
         )
     };
-    PyList::new(py, materials.pairs().iter().map(row))
+    Ok(PyList::new(py, materials.pairs().iter().map(row))?)
 }
 
 /// Name of a terrain's material, or nothing where none was given.
-pub fn name(given: Given<'_>) -> PyResult<Option<String>> {
+pub fn name(given: Given<'_>) -> Result<Option<String>> {
     let Some(given) = given.some() else {
         return Ok(None);
     };
@@ -83,11 +83,9 @@ pub fn name(given: Given<'_>) -> PyResult<Option<String>> {
     if is_name(&name) {
         return Ok(Some(name));
     }
-    Err(BorderError {
-        kind: Kind::Terrain,
-        message: format!("material: a name has 1 to 100 characters, is {name:?}"),
-        field: Some("material".to_owned()),
-        value: Value::Text(name),
-    }
-    .into())
+    Err(Kind::Terrain.error(
+        "material",
+        format!("material: a name has 1 to 100 characters, is {name:?}"),
+        Value::Text(name),
+    ))
 }

@@ -4,8 +4,11 @@ use pyo3::prelude::*;
 use pyo3::types::PyMapping;
 use rover_core::multibody::Motor as CoreMotor;
 
-use crate::arguments::{Given, flag, number, refused, text};
-use crate::errors::{BorderError, Kind, Value};
+use crate::arguments::{Given, Named, finite, number, refused, text};
+use crate::errors::{Kind, Result, Value};
+
+/// Names of a motor's fields.
+const FIELDS: [&str; 3] = ["stall_torque", "no_load_speed", "regenerating"];
 
 /// What `replace(motor=...)` takes, in words.
 const WHAT: &str = "a Motor, a mapping of its fields, or None";
@@ -38,57 +41,47 @@ impl From<CoreMotor> for Motor {
 }
 
 /// Reads what stands for a motor, or for none.
-pub fn parse(given: &Bound<'_, PyAny>) -> PyResult<Option<CoreMotor>> {
+pub fn parse(given: &Bound<'_, PyAny>) -> Result<Option<CoreMotor>> {
     if given.is_none() {
         return Ok(None);
     }
     if let Ok(motor) = given.cast::<Motor>() {
         return Ok(Some(motor.get().inner));
     }
-    let Ok(fields) = given.cast::<PyMapping>() else {
-        return Err(refused(given, Kind::Model, "motor", WHAT).into());
-    };
-    let (mut stall_torque, mut no_load_speed, mut regenerating) = (None, None, true);
-    for item in fields.items()?.iter() {
-        let (name, value): (Bound<'_, PyAny>, Bound<'_, PyAny>) = item.extract()?;
-        let name = text(&name, Kind::Model, "motor")?;
-        let field = format!("motor.{name}");
-        match name.as_str() {
-            "stall_torque" => stall_torque = Some(number(&value, Kind::Model, &field)?),
-            // A dictionary of the model says None, since JSON has no infinity.
-            "no_load_speed" if value.is_none() => no_load_speed = Some(f64::INFINITY),
-            "no_load_speed" => no_load_speed = Some(number(&value, Kind::Model, &field)?),
-            "regenerating" => regenerating = flag(&value, Kind::Model, &field)?,
-            _ => {
-                let known = "stall_torque, no_load_speed, regenerating";
-                let message = format!("{field}: unknown; known are {known}");
-                return Err(wrong(field, message, Value::Object(value.unbind())).into());
-            }
+    if given.cast::<PyMapping>().is_err() {
+        return Err(refused(given, Kind::Model, "motor", WHAT));
+    }
+    let fields = given;
+    let named = Named::mapping(fields, "motor", Kind::Model)?;
+    for name in fields.try_iter()? {
+        let name = text(&name?, Kind::Model, "motor")?;
+        if !FIELDS.contains(&name.as_str()) {
+            let field = named.path(&name);
+            let message = format!("{field}: unknown; known are {}", FIELDS.join(", "));
+            let value = named.get(&name)?.given().map(Bound::unbind);
+            return Err(Kind::Model.error(
+                field,
+                message,
+                value.map_or(Value::Nothing, Value::Object),
+            ));
         }
     }
-    let known = |value: Option<f64>, name| {
-        value.ok_or_else(|| {
-            let field = format!("motor.{name}");
-            let message = format!("{field}: missing");
-            wrong(field, message, Value::Nothing)
-        })
+    let [stall_torque, no_load_speed, regenerating] = FIELDS;
+    // A dictionary of the model says None for an infinite speed, since JSON has no infinity.
+    let speed = |value: &Bound<'_, PyAny>, kind, field: &str| {
+        if value.is_none() {
+            Ok(f64::INFINITY)
+        } else {
+            number(value, kind, field)
+        }
     };
     let motor = CoreMotor {
-        stall_torque: known(stall_torque, "stall_torque")?,
-        no_load_speed: known(no_load_speed, "no_load_speed")?,
-        regenerating,
+        stall_torque: named.need(stall_torque, number)?,
+        no_load_speed: named.need(no_load_speed, speed)?,
+        regenerating: named.flag(regenerating, true)?,
     };
-    (motor.check(|field| format!("motor.{field}"))).map_err(BorderError::from)?;
+    motor.check(|field| format!("motor.{field}"))?;
     Ok(Some(motor))
-}
-
-fn wrong(field: String, message: String, value: Value) -> BorderError {
-    BorderError {
-        kind: Kind::Model,
-        message,
-        field: Some(field),
-        value,
-    }
 }
 
 #[pymethods]
@@ -99,13 +92,13 @@ impl Motor {
         stall_torque: &Bound<'_, PyAny>,
         no_load_speed: &Bound<'_, PyAny>,
         regenerating: Given<'_>,
-    ) -> PyResult<Self> {
+    ) -> Result<Self> {
         let inner = CoreMotor {
             stall_torque: number(stall_torque, Kind::Model, "stall_torque")?,
             no_load_speed: number(no_load_speed, Kind::Model, "no_load_speed")?,
             regenerating: regenerating.flag(true, Kind::Model, "regenerating")?,
         };
-        inner.check(str::to_owned).map_err(BorderError::from)?;
+        inner.check(str::to_owned)?;
         Ok(Self { inner })
     }
 
@@ -138,17 +131,11 @@ impl Motor {
     ///
     /// Raises:
     ///     CommandError: A number is not finite.
-    fn torque(&self, command: &Bound<'_, PyAny>, speed: &Bound<'_, PyAny>) -> PyResult<f64> {
-        let finite = |given: &Bound<'_, PyAny>, field| {
-            let value = number(given, Kind::Command, field)?;
-            if value.is_finite() {
-                return Ok(value);
-            }
-            Err(PyErr::from(refused(given, Kind::Command, field, "finite")))
-        };
+    fn torque(&self, command: &Bound<'_, PyAny>, speed: &Bound<'_, PyAny>) -> Result<f64> {
+        let command = finite(command, Kind::Command, "command")?;
         Ok(self
             .inner
-            .torque(finite(command, "command")?, finite(speed, "speed")?))
+            .torque(command, finite(speed, Kind::Command, "speed")?))
     }
 
     fn __repr__(&self) -> String {
@@ -163,13 +150,8 @@ impl Motor {
     fn __hash__(&self) -> u64 {
         use std::hash::{DefaultHasher, Hash, Hasher};
         let mut hasher = DefaultHasher::new();
-        let m = &self.inner;
-        (
-            m.stall_torque.to_bits(),
-            m.no_load_speed.to_bits(),
-            m.regenerating,
-        )
-            .hash(&mut hasher);
+        let (torque, speed, regenerating) = self.__getnewargs__();
+        (torque.to_bits(), speed.to_bits(), regenerating).hash(&mut hasher);
         hasher.finish()
     }
 

@@ -1,30 +1,35 @@
-//! Options of a simulation: read from the arguments of every class in one
-//! way, and told again in one way.
+//! Options of a simulation's steps: one table reads them from the arguments of every class and
+//! tells them again.
 
+use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::integrator::{Stabilisation, StepOptions, Variant};
-use rover_core::solver::SolverOptions;
+use rover_core::solver::{Method, SolverOptions};
 
-use crate::arguments::{count, flag, number, text, whole};
-use crate::errors::{BorderError, Kind, Value};
-use crate::friction_contact::{SIMULATION_SOLVERS, solver_options};
+use crate::arguments::{Named, count, flag, number, text, whole};
+use crate::errors::{BorderError, Kind, Result, Value};
 use crate::materials;
 
 /// The value that a word stands for.
 pub fn choice<T: Copy>(field: &str, given: &str, choices: &[(&str, T)]) -> Result<T, BorderError> {
-    let found = choices
-        .iter()
-        .find(|(name, _)| *name == given)
-        .map(|(_, value)| *value);
-    found.ok_or_else(|| {
-        let known: Vec<String> = choices
+    let found = choices.iter().find(|(name, _)| *name == given);
+    found.map(|(_, value)| *value).ok_or_else(|| {
+        let known: Vec<_> = choices
             .iter()
             .map(|(name, _)| format!("{name:?}"))
             .collect();
         let message = format!("{field}: must be one of {}, is {given:?}", known.join(", "));
-        BorderError::option(field, message, Value::Text(given.to_owned()))
+        Kind::Option.error(field, message, Value::Text(given.to_owned()))
     })
+}
+
+/// The word that stands for a value.
+pub fn name_of<T: PartialEq + Copy>(value: T, choices: &[(&'static str, T)]) -> &'static str {
+    choices
+        .iter()
+        .find(|(_, v)| *v == value)
+        .map_or("", |(name, _)| name)
 }
 
 /// Schemes by name.
@@ -44,13 +49,14 @@ pub const GRAIN_STABILISATIONS: [(&str, Stabilisation); 3] = [
     ("none", Stabilisation::None),
 ];
 
-/// The word that stands for a value.
-pub fn name_of<T: PartialEq + Copy>(value: T, choices: &[(&'static str, T)]) -> &'static str {
-    choices
-        .iter()
-        .find(|(_, v)| *v == value)
-        .map_or("", |(name, _)| name)
-}
+/// What a simulation may step with: the solvers of Coulomb's law.
+const SIMULATION_SOLVERS: [Method; 5] = [
+    Method::Auto,
+    Method::GaussSeidel,
+    Method::Newton,
+    Method::ProximalPoint,
+    Method::Admm,
+];
 
 /// What was asked of the solver, in the words and numbers of the arguments:
 /// the core translates them.
@@ -60,65 +66,112 @@ pub struct SolverWords {
     pub max_iterations: usize,
 }
 
-/// Options as they come in.
+/// Options as they come in and as they are told.
 pub struct Options {
     pub step: StepOptions,
-    tolerance: f64,
-    budget: Option<u64>,
     words: SolverWords,
 }
+
+/// One option: its name, how it is read, and how it is told; it is not told where it is left out.
+struct Row {
+    name: &'static str,
+    read: fn(&mut Options, &Bound<'_, PyAny>) -> Result<()>,
+    tell: fn(&Options, Python<'_>) -> PyResult<Option<Py<PyAny>>>,
+}
+
+/// An option that a function of the arguments reads, or a word for a value.
+macro_rules! row {
+    ($name:literal, word of $words:expr, $($place:ident).+) => {
+        Row {
+            name: $name,
+            read: |options, given| {
+                let word = text(given, Kind::Option, $name)?;
+                options.$($place).+ = choice($name, &word, &$words)?;
+                Ok(())
+            },
+            tell: |options, py| name_of(options.$($place).+, &$words).into_py_any(py).map(Some),
+        }
+    };
+    ($name:literal, $read:expr, $($place:ident).+) => {
+        Row {
+            name: $name,
+            read: |options, given| {
+                options.$($place).+ = $read(given, Kind::Option, $name)?;
+                Ok(())
+            },
+            tell: |options, py| options.$($place).+.clone().into_py_any(py).map(Some),
+        }
+    };
+}
+
+/// Every option but gravity, which is each class's own.
+const TABLE: [Row; 13] = [
+    row!("friction", number, step.friction_coefficient),
+    row!("restitution", number, step.restitution),
+    Row {
+        name: "materials",
+        read: |options, given| {
+            options.step.materials = materials::parse(given)?;
+            Ok(())
+        },
+        tell: |options, py| {
+            let rows = materials::rows(py, &options.step.materials)?;
+            Ok((!rows.is_empty()).then(|| rows.into_any().unbind()))
+        },
+    },
+    row!("time_step", number, step.time_step),
+    row!("variant", word of VARIANTS, step.variant),
+    row!("theta", number, step.theta),
+    row!("forecast", number, step.forecast),
+    row!("solver", text, words.solver),
+    row!("tolerance", number, step.solver.tolerance),
+    row!("max_iterations", count, words.max_iterations),
+    Row {
+        name: "budget",
+        read: |options, given| {
+            options.step.solver.budget = Some(whole(given, Kind::Option, "budget")?);
+            Ok(())
+        },
+        tell: |options, py| {
+            let budget = options.step.solver.budget;
+            budget.map(|budget| budget.into_py_any(py)).transpose()
+        },
+    },
+    row!("stabilisation", word of STABILISATIONS, step.stabilisation),
+    row!("warm_start", flag, step.warm_start),
+];
+
+/// Options for which `None` stands for the default.
+const OPTIONAL: [&str; 5] = ["materials", "time_step", "variant", "tolerance", "budget"];
 
 impl Options {
     /// None given yet: those of `step`.
     pub fn of(step: StepOptions) -> Self {
-        Self {
-            tolerance: step.solver.tolerance,
-            budget: step.solver.budget,
-            words: SolverWords {
-                solver: "auto".to_owned(),
-                max_iterations: 1000,
-            },
-            step,
-        }
+        let words = SolverWords {
+            solver: "auto".to_owned(),
+            max_iterations: 1000,
+        };
+        Self { step, words }
     }
 
-    /// Takes an option by its name; false where no simulation has one of
-    /// this name. Gravity is each class's own.
-    pub fn take(&mut self, field: &str, value: &Bound<'_, PyAny>) -> PyResult<bool> {
-        let number = || number(value, Kind::Option, field);
-        let text = || text(value, Kind::Option, field);
-        let step = &mut self.step;
-        match field {
-            "friction" => step.friction_coefficient = number()?,
-            "restitution" => step.restitution = number()?,
-            "materials" => step.materials = materials::parse(value)?,
-            "time_step" => step.time_step = number()?,
-            "variant" => step.variant = choice(field, &text()?, &VARIANTS)?,
-            "theta" => step.theta = number()?,
-            "forecast" => step.forecast = number()?,
-            "stabilisation" => step.stabilisation = choice(field, &text()?, &STABILISATIONS)?,
-            "warm_start" => step.warm_start = flag(value, Kind::Option, field)?,
-            "solver" => self.words.solver = text()?,
-            "tolerance" => self.tolerance = number()?,
-            "max_iterations" => self.words.max_iterations = count(value, Kind::Option, field)?,
-            "budget" if value.is_none() => self.budget = None,
-            "budget" => self.budget = Some(whole(value, Kind::Option, field)?),
-            _ => return Ok(false),
+    /// Reads all options that were given by their names.
+    pub fn read(mut self, given: &Named<'_>) -> Result<(StepOptions, SolverWords)> {
+        for row in &TABLE {
+            if let Some(value) = given.get(row.name)?.given()
+                && !(value.is_none() && OPTIONAL.contains(&row.name))
+            {
+                (row.read)(&mut self, &value)?;
+            }
         }
-        Ok(true)
-    }
-
-    /// All have been given.
-    pub fn finish(mut self) -> PyResult<(StepOptions, SolverWords)> {
+        let SolverOptions {
+            tolerance, budget, ..
+        } = self.step.solver;
         let SolverWords {
             solver,
             max_iterations,
         } = &self.words;
-        let known = &SIMULATION_SOLVERS;
-        self.step.solver = SolverOptions {
-            budget: self.budget,
-            ..solver_options(solver, self.tolerance, *max_iterations, known)?
-        };
+        let solver = solver_options(solver, tolerance, *max_iterations, &SIMULATION_SOLVERS)?;
+        self.step.solver = SolverOptions { budget, ..solver };
         Ok((self.step, self.words))
     }
 }
@@ -128,29 +181,49 @@ impl Options {
 /// `gravity`: as the class gives it, a pair or a triple.
 pub fn settings<'py>(
     gravity: &Bound<'py, PyAny>,
-    options: &StepOptions,
+    step: &StepOptions,
     words: &SolverWords,
-) -> PyResult<Bound<'py, PyDict>> {
-    let settings = PyDict::new(gravity.py());
+) -> Result<Bound<'py, PyDict>> {
+    let py = gravity.py();
+    let settings = PyDict::new(py);
     settings.set_item("gravity", gravity)?;
-    settings.set_item("friction", options.friction_coefficient)?;
-    settings.set_item("restitution", options.restitution)?;
-    if !options.materials.is_empty() {
-        let rows = materials::rows(settings.py(), &options.materials)?;
-        settings.set_item("materials", rows)?;
+    let options = Options {
+        step: step.clone(),
+        words: words.clone(),
+    };
+    for row in &TABLE {
+        if let Some(value) = (row.tell)(&options, py)? {
+            settings.set_item(row.name, value)?;
+        }
     }
-    settings.set_item("time_step", options.time_step)?;
-    settings.set_item("variant", name_of(options.variant, &VARIANTS))?;
-    settings.set_item("theta", options.theta)?;
-    settings.set_item("forecast", options.forecast)?;
-    settings.set_item("solver", &words.solver)?;
-    settings.set_item("tolerance", options.solver.tolerance)?;
-    settings.set_item("max_iterations", words.max_iterations)?;
-    if let Some(budget) = options.solver.budget {
-        settings.set_item("budget", budget)?;
-    }
-    let stabilisation = name_of(options.stabilisation, &STABILISATIONS);
-    settings.set_item("stabilisation", stabilisation)?;
-    settings.set_item("warm_start", options.warm_start)?;
     Ok(settings)
+}
+
+/// Solver options of the public arguments; `known`: the methods that may be named.
+pub fn solver_options(
+    name: &str,
+    tolerance: f64,
+    max_iterations: usize,
+    known: &[Method],
+) -> Result<SolverOptions> {
+    if !(tolerance.is_finite() && tolerance > 0.0) {
+        let message = format!("tolerance: must be finite and positive, is {tolerance}");
+        return Err(Kind::Option.error("tolerance", message, Value::Number(tolerance)));
+    }
+    if max_iterations == 0 {
+        let message = "max_iterations: must be at least 1, is 0".to_owned();
+        return Err(Kind::Option.error("max_iterations", message, Value::Count(0)));
+    }
+    let methods: Vec<_> = known
+        .iter()
+        .map(|method| (method.name(), *method))
+        .collect();
+    Ok(SolverOptions {
+        method: choice("solver", name, &methods)?,
+        tolerance,
+        velocity_tolerance: tolerance.max(1e-9),
+        max_newton_steps: max_iterations,
+        max_sweeps: max_iterations,
+        ..SolverOptions::default()
+    })
 }

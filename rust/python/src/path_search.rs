@@ -1,17 +1,17 @@
 //! `PathSearch`: the cheapest of many paths over a height scan.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn};
+use numpy::{PyReadonlyArray1, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
-use pyo3::types::PyMapping;
+use pyo3::types::PyDict;
 use rover_core::paths::search::STEPS;
 use rover_core::paths::{
     Arcs, MapTask, Outline, PathCosts, PathSearch as Core, Pose, ScanShape, Search, SearchTask,
     WayMap,
 };
 
-use crate::arguments::{at_least_one, count, number, refused};
-use crate::arrays::{array, triple, two, vector};
-use crate::errors::Kind;
+use crate::arguments::{Named, at_least_one, count, finite, positive, refused};
+use crate::arrays::{Array, array, triple, two, vector};
+use crate::errors::{Kind, Result};
 
 /// Finds the cheapest of many paths of a rover over a height scan, by beam search.
 ///
@@ -39,79 +39,47 @@ pub struct PathSearch {
     map: Option<WayMap>,
 }
 
-fn item<'py>(
-    given: &Bound<'py, PyMapping>,
-    outer: &str,
-    name: &str,
-) -> PyResult<(Bound<'py, PyAny>, String)> {
-    let field = format!("{outer}.{name}");
-    let missing = |_| refused(given.as_any(), Kind::Option, &field, "given");
-    Ok((given.get_item(name).map_err(missing)?, field))
-}
-
-fn entry(given: &Bound<'_, PyMapping>, outer: &str, name: &str) -> PyResult<f64> {
-    let (value, field) = item(given, outer, name)?;
-    finite(&value, &field)
-}
-
-fn finite(value: &Bound<'_, PyAny>, field: &str) -> PyResult<f64> {
-    let found = number(value, Kind::Option, field)?;
-    if found.is_finite() {
-        return Ok(found);
-    }
-    Err(refused(value, Kind::Option, field, "finite").into())
-}
-
-fn numbers(given: &Bound<'_, PyMapping>, outer: &str, name: &str) -> PyResult<Vec<f64>> {
-    let (value, field) = item(given, outer, name)?;
-    vector(&value, Kind::Option, &field)
-}
-
 /// Rows of M finite numbers, of any leading shape.
-fn rows<const M: usize>(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<[f64; M]>> {
-    let found: PyReadonlyArrayDyn<'_, f64> = array(value, Kind::Option, field)?;
+fn rows<const M: usize>(
+    value: &Bound<'_, PyAny>,
+    kind: Kind,
+    field: &str,
+) -> Result<Vec<[f64; M]>> {
+    let found: PyReadonlyArrayDyn<'_, f64> = array(value, kind, field)?;
     let view = found.as_array();
-    let wrong = || {
-        refused(
+    if view.shape().last() != Some(&M) || !view.iter().all(|entry| entry.is_finite()) {
+        return Err(refused(
             value,
-            Kind::Option,
+            kind,
             field,
             &format!("finite, in rows of {M}"),
-        )
-    };
-    if view.shape().last() != Some(&M) || !view.iter().all(|entry| entry.is_finite()) {
-        return Err(wrong().into());
+        ));
     }
     let flat: Vec<f64> = view.iter().copied().collect();
     Ok(flat.as_chunks::<M>().0.to_vec())
 }
 
-fn table<const M: usize>(
-    given: &Bound<'_, PyMapping>,
-    outer: &str,
-    name: &str,
-) -> PyResult<Vec<[f64; M]>> {
-    let (value, field) = item(given, outer, name)?;
-    rows(&value, &field)
-}
-
 /// Poses of any leading shape.
-fn poses(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<Pose>> {
-    let pose = |[ahead, right, heading]: [f64; 3]| Pose {
-        ahead,
-        right,
-        heading,
-    };
-    Ok(rows(value, field)?.into_iter().map(pose).collect())
+fn poses(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Vec<Pose>> {
+    let rows = rows(value, kind, field)?.into_iter();
+    Ok(rows
+        .map(|[ahead, right, heading]| Pose {
+            ahead,
+            right,
+            heading,
+        })
+        .collect())
 }
 
-fn arcs(given: &Bound<'_, PyMapping>, outer: &str) -> PyResult<Arcs> {
-    let (value, field) = item(given, outer, "poses")?;
-    let poses = poses(&value, &field)?;
-    let direction = numbers(given, outer, "direction")?;
+fn arcs(given: &Bound<'_, PyAny>, outer: &'static str) -> Result<Arcs> {
+    let named = Named::mapping(given, outer, Kind::Option)?;
+    let (poses, direction) = (
+        named.need("poses", poses)?,
+        named.need("direction", vector)?,
+    );
     if poses.len() != STEPS * direction.len() || direction.is_empty() {
         let what = format!("for arcs of {STEPS} poses each, at least one");
-        return Err(refused(given.as_any(), Kind::Option, outer, &what).into());
+        return Err(refused(given, Kind::Option, outer, &what));
     }
     Ok(Arcs {
         poses: poses.as_chunks::<STEPS>().0.to_vec(),
@@ -119,40 +87,38 @@ fn arcs(given: &Bound<'_, PyMapping>, outer: &str) -> PyResult<Arcs> {
     })
 }
 
-fn outline(given: &Bound<'_, PyMapping>) -> PyResult<Outline> {
+/// Three rows of equal length.
+fn plane_fit(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<[Vec<f64>; 3]> {
+    let found = array(value, kind, field)?;
+    let view = found.as_array();
+    let &[3, n] = view.shape() else {
+        return Err(refused(value, kind, field, "3 rows, an entry a wheel"));
+    };
+    let flat: Vec<f64> = view.iter().copied().collect();
+    Ok([0, 1, 2].map(|i| flat[i * n..(i + 1) * n].to_vec()))
+}
+
+fn outline(given: &Bound<'_, PyAny>) -> Result<Outline> {
+    let named = Named::mapping(given, "outline", Kind::Option)?;
     let read = Outline {
-        wheels: table(given, "outline", "wheels")?,
-        underside: table(given, "outline", "underside")?,
-        clearance: numbers(given, "outline", "clearance")?,
-        plane_fit: {
-            let (value, field) = item(given, "outline", "plane_fit")?;
-            let found = array(&value, Kind::Option, &field)?;
-            let view = found.as_array();
-            let wrong = || refused(&value, Kind::Option, &field, "3 rows, an entry a wheel");
-            let flat: Vec<f64> = view.iter().copied().collect();
-            if view.ndim() != 2 || view.shape()[0] != 3 {
-                return Err(wrong().into());
-            }
-            let n = view.shape()[1];
-            [0, 1, 2].map(|i| flat[i * n..(i + 1) * n].to_vec())
-        },
-        x_c: entry(given, "outline", "x_c")?,
-        radius: entry(given, "outline", "radius")?,
+        wheels: named.need("wheels", rows)?,
+        underside: named.need("underside", rows)?,
+        clearance: named.need("clearance", vector)?,
+        plane_fit: named.need("plane_fit", plane_fit)?,
+        x_c: named.need("x_c", finite)?,
+        radius: named.need("radius", finite)?,
     };
     let fits = read.plane_fit[0].len() == read.wheels.len();
     if !fits || read.clearance.len() != read.underside.len() || read.radius <= 0.0 {
         let what = "of equal lengths, with a positive radius";
-        return Err(refused(given.as_any(), Kind::Option, "outline", what).into());
+        return Err(refused(given, Kind::Option, "outline", what));
     }
     Ok(read)
 }
 
-fn costs(given: &Bound<'_, PyMapping>) -> PyResult<PathCosts> {
-    let cost = |name: &str| entry(given, "costs", name);
-    let whole = |name: &str| -> PyResult<usize> {
-        let (value, field) = item(given, "costs", name)?;
-        at_least_one(&value, Kind::Option, &field)
-    };
+fn costs(given: &Bound<'_, PyAny>) -> Result<PathCosts> {
+    let named = Named::mapping(given, "costs", Kind::Option)?;
+    let cost = |name: &str| named.need(name, finite);
     Ok(PathCosts {
         belly: cost("belly")?,
         margin: cost("margin")?,
@@ -165,72 +131,63 @@ fn costs(given: &Bound<'_, PyMapping>) -> PyResult<PathCosts> {
         reverse: cost("reverse")?,
         memory: cost("memory")?,
         later: cost("later")?,
-        depth: whole("depth")?,
-        width: whole("width")?,
+        depth: named.need("depth", at_least_one)?,
+        width: named.need("width", at_least_one)?,
         length: cost("length")?,
     })
 }
 
-fn scan_shape(value: &Bound<'_, PyAny>) -> PyResult<ScanShape> {
-    let wrong = || {
-        refused(
-            value,
-            Kind::Option,
-            "scan",
-            "two rows and columns or more, and m",
-        )
-    };
-    let (rows, columns, spacing): (Bound<'_, PyAny>, Bound<'_, PyAny>, Bound<'_, PyAny>) =
-        value.extract().map_err(|_| wrong())?;
+fn scan_shape(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<ScanShape> {
+    let wrong = || refused(value, kind, field, "two rows and columns or more, and m");
+    let given: [Bound<'_, PyAny>; 3] = value.extract().map_err(|_| wrong())?;
+    let [rows, columns, spacing] = &given;
     let read = ScanShape {
-        rows: count(&rows, Kind::Option, "scan")?,
-        columns: count(&columns, Kind::Option, "scan")?,
-        spacing: finite(&spacing, "scan")?,
+        rows: count(rows, kind, field)?,
+        columns: count(columns, kind, field)?,
+        spacing: finite(spacing, kind, field)?,
     };
     let fits = |n: usize| (2..=10_000).contains(&n);
     if fits(read.rows) && fits(read.columns) && read.spacing > 0.0 {
         return Ok(read);
     }
-    Err(wrong().into())
-}
-
-fn positive(value: &Bound<'_, PyAny>, field: &str) -> PyResult<f64> {
-    let found = finite(value, field)?;
-    if found > 0.0 {
-        return Ok(found);
-    }
-    Err(refused(value, Kind::Option, field, "positive").into())
+    Err(wrong())
 }
 
 #[pymethods]
 impl PathSearch {
     #[new]
-    #[pyo3(signature = (*, scan, outline, costs, first, further, reach, arrival))]
-    fn new(
-        scan: &Bound<'_, PyAny>,
-        outline: &Bound<'_, PyMapping>,
-        costs: &Bound<'_, PyMapping>,
-        first: &Bound<'_, PyMapping>,
-        further: &Bound<'_, PyMapping>,
-        reach: &Bound<'_, PyAny>,
-        arrival: &Bound<'_, PyAny>,
-    ) -> PyResult<Self> {
-        let read = Search {
-            scan: scan_shape(scan)?,
-            outline: self::outline(outline)?,
-            costs: self::costs(costs)?,
-            commands: table(first, "first", "commands")?,
-            first: arcs(first, "first")?,
-            further: arcs(further, "further")?,
-            reach: positive(reach, "reach")?,
-            arrival: finite(arrival, "arrival")?,
+    #[pyo3(signature = (**options), text_signature = "(*, scan, outline, costs, first, further, reach, arrival)")]
+    fn new(py: Python<'_>, options: Option<&Bound<'_, PyDict>>) -> Result<Self> {
+        let given = Named::keywords(py, options)?;
+        let arcs_of = |name: &'static str| given.need(name, |value, _, _| arcs(value, name));
+        let scan = given.need("scan", scan_shape)?;
+        let outline = given.need("outline", |value, _, _| outline(value))?;
+        let costs = given.need("costs", |value, _, _| costs(value))?;
+        let (first, commands) = given.need("first", |value, kind, name| {
+            let commands = Named::mapping(value, "first", kind)?.need("commands", rows)?;
+            let first = arcs(value, "first")?;
+            if commands.len() != first.direction.len() {
+                let field = format!("{name}.commands");
+                return Err(refused(value, kind, &field, "a command an arc"));
+            }
+            Ok((first, commands))
+        })?;
+        let further = arcs_of("further")?;
+        let reach = given.need("reach", positive)?;
+        let arrival = given.need("arrival", finite)?;
+        given.finish()?;
+        let search = Search {
+            scan,
+            outline,
+            costs,
+            commands,
+            first,
+            further,
+            reach,
+            arrival,
         };
-        if read.commands.len() != read.first.direction.len() {
-            let what = "a command an arc";
-            return Err(refused(first.as_any(), Kind::Option, "first.commands", what).into());
-        }
         Ok(Self {
-            inner: Core::new(read),
+            inner: Core::new(search),
             map: None,
         })
     }
@@ -268,12 +225,12 @@ impl PathSearch {
         retreat: f64,
         extra: Option<&Bound<'_, PyAny>>,
         ways: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<usize> {
+    ) -> Result<usize> {
         let task = SearchTask {
             goal: two(goal, Kind::Option, "goal")?,
             command: triple(command, Kind::Option, "command")?,
             boldness,
-            traps: poses(traps, "traps")?,
+            traps: poses(traps, Kind::Option, "traps")?,
             retreat: (retreat != 0.0).then_some(retreat),
             extra: match extra {
                 Some(given) => self.extra(given)?,
@@ -310,16 +267,15 @@ impl PathSearch {
     /// Raises:
     ///     OptionError: An argument has a wrong shape or an entry out of its range.
     #[pyo3(signature = (heights, spacing, goal, boldness, extra = None))]
-    fn ways<'py>(
+    fn ways(
         &mut self,
-        py: Python<'py>,
         heights: &Bound<'_, PyAny>,
         spacing: &Bound<'_, PyAny>,
         goal: &Bound<'_, PyAny>,
         boldness: &Bound<'_, PyAny>,
         extra: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let refuse = |value, field, what| PyErr::from(refused(value, Kind::Option, field, what));
+    ) -> Result<Array> {
+        let refuse = |value, field, what| refused(value, Kind::Option, field, what);
         let read = array(heights, Kind::Option, "heights")?;
         let shape = match *read.as_array().shape() {
             [rows, columns] if [rows, columns].iter().all(|n| (3..=2000).contains(n)) => {
@@ -345,12 +301,12 @@ impl PathSearch {
                 price
             }
         };
-        let spacing = positive(spacing, "spacing")?;
+        let spacing = positive(spacing, Kind::Option, "spacing")?;
         let aim = two(goal, Kind::Option, "goal")?;
         if !aim.iter().all(|at| at.is_finite()) {
             return Err(refuse(goal, "goal", "finite"));
         }
-        let bold = finite(boldness, "boldness")?;
+        let bold = finite(boldness, Kind::Option, "boldness")?;
         if bold < 0.0 {
             return Err(refuse(boldness, "boldness", "at least 0"));
         }
@@ -365,7 +321,7 @@ impl PathSearch {
             goal: aim,
             boldness: bold,
         });
-        PyArray1::from_vec(py, found).reshape(shape)
+        Ok(Array::shaped(found, &shape))
     }
 
     /// What lies under the rover in poses.
@@ -381,22 +337,24 @@ impl PathSearch {
     ///
     /// Raises:
     ///     OptionError: An argument has a wrong shape or an entry that is not finite.
-    fn under<'py>(
+    fn under(
         &mut self,
-        py: Python<'py>,
         heights: &Bound<'_, PyAny>,
         poses: &Bound<'_, PyAny>,
-    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    ) -> Result<Array<f32>> {
         let heights = self.at_points(heights, "heights")?;
-        let poses = self::poses(poses, "poses")?;
+        let poses = self::poses(poses, Kind::Option, "poses")?;
         let found = self.inner.under(&heights, &poses);
-        PyArray1::from_vec(py, found).reshape([poses.len(), self.inner.n_wheels() + 3])
+        Ok(Array::shaped(
+            found,
+            &[poses.len(), self.inner.n_wheels() + 3],
+        ))
     }
 }
 
 impl PathSearch {
     /// A finite number for each point of the scan.
-    fn at_points(&self, given: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<f64>> {
+    fn at_points(&self, given: &Bound<'_, PyAny>, field: &str) -> Result<Vec<f64>> {
         let found: Vec<f64> = match given.extract::<PyReadonlyArray1<'_, f64>>() {
             Ok(ready) => ready.as_array().to_vec(),
             Err(_) => vector(given, Kind::Option, field)?,
@@ -405,16 +363,26 @@ impl PathSearch {
         if found.len() == n && found.iter().all(|value| value.is_finite()) {
             return Ok(found);
         }
-        Err(refused(given, Kind::Option, field, &format!("{n} finite {field}")).into())
+        Err(refused(
+            given,
+            Kind::Option,
+            field,
+            &format!("{n} finite {field}"),
+        ))
     }
 
     /// A finite cost an arc.
-    fn extra(&self, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    fn extra(&self, given: &Bound<'_, PyAny>) -> Result<Vec<f64>> {
         let n = self.inner.n_first();
         let found = vector(given, Kind::Option, "extra")?;
         if found.len() == n && found.iter().all(|cost| cost.is_finite()) {
             return Ok(found);
         }
-        Err(refused(given, Kind::Option, "extra", &format!("{n} finite costs")).into())
+        Err(refused(
+            given,
+            Kind::Option,
+            "extra",
+            &format!("{n} finite costs"),
+        ))
     }
 }

@@ -1,6 +1,5 @@
 //! `PlanarSimulation`: what the planar machines share.
 
-use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use rover_core::integrator::StepOptions;
@@ -9,16 +8,16 @@ use rover_core::planar::{ContactRule, Ground, PlanarTree};
 use rover_core::simulation::PlanarSimulation as Core;
 use std::sync::{Arc, MutexGuard};
 
-use crate::arguments::{Given, text};
-use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
+use crate::arguments::{Named, text};
+use crate::arrays::{Array, fresh, fresh_matrix, fresh_rows, vector};
 use crate::contacts::PlanarContacts;
-use crate::errors::{BorderError, Kind, Value};
+use crate::errors::{BorderError, Kind, Result, Value};
 use crate::options::{Options, SolverWords, choice, name_of, settings};
 use crate::planar_ground::parse;
 use crate::report::{Energy, StepReport};
 use crate::shared::Shared;
 use crate::snapshot::{PlanarSnapshot, belonging};
-use crate::stepping::{Problem, problem, step};
+use crate::stepping::{Problem, Steps, problem, step};
 
 const RULES: [(&str, ContactRule); 2] = [
     ("nearest", ContactRule::Nearest),
@@ -27,8 +26,7 @@ const RULES: [(&str, ContactRule); 2] = [
 
 /// A planar machine on a ground: what the machines share. Made by the classes derived from it.
 ///
-/// One call at a time: a call during another one, from another thread or a signal handler, raises
-/// BusyError.
+/// One call at a time, as of `Simulation`.
 #[pyclass(module = "rover_gym.mechanics", subclass, frozen)]
 pub struct PlanarSimulation {
     inner: Shared<Core>,
@@ -38,38 +36,26 @@ pub struct PlanarSimulation {
 }
 
 /// Two numbers.
-pub fn pair(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<Vector2<f64>> {
+pub fn pair(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Vector2<f64>> {
     let values = vector(value, kind, field)?;
-    match values[..] {
-        [x, y] => Ok(Vector2::new(x, y)),
-        _ => Err(BorderError {
-            kind,
-            message: format!("{field}: needs 2 entries, has {}", values.len()),
-            field: Some(field.to_owned()),
-            value: Value::Count(values.len()),
-        }
-        .into()),
-    }
+    let [x, y] = values[..] else {
+        let message = format!("{field}: needs 2 entries, has {}", values.len());
+        return Err(kind.error(field, message, Value::Count(values.len())));
+    };
+    Ok(Vector2::new(x, y))
 }
 
 /// Reads the options that all planar simulations take.
-fn options(given: Option<&Bound<'_, PyDict>>) -> PyResult<(StepOptions, SolverWords, ContactRule)> {
-    let mut options = Options::of(StepOptions::default());
-    let mut rule = ContactRule::Nearest;
-    for (key, value) in given.into_iter().flatten() {
-        let key: String = key.extract()?;
-        let field = key.as_str();
-        match field {
-            "gravity" => options.step.gravity = pair(&value, Kind::Option, field)?.push(0.0),
-            "contact" => rule = choice(field, &text(&value, Kind::Option, field)?, &RULES)?,
-            _ if options.take(field, &value)? => (),
-            _ => {
-                let message = format!("{key}: is no option of a planar simulation");
-                return Err(pyo3::exceptions::PyTypeError::new_err(message));
-            }
-        }
+fn options(given: &Named<'_>) -> Result<(StepOptions, SolverWords, ContactRule)> {
+    let mut step = StepOptions::default();
+    if let Some(gravity) = given.read("gravity", pair)? {
+        step.gravity = gravity.push(0.0);
     }
-    let (step, words) = options.finish()?;
+    let rule = |value: &Bound<'_, PyAny>, kind, field: &str| {
+        choice(field, &text(value, kind, field)?, &RULES)
+    };
+    let rule = given.read("contact", rule)?.unwrap_or(ContactRule::Nearest);
+    let (step, words) = Options::of(step).read(given)?;
     Ok((step, words, rule))
 }
 
@@ -83,17 +69,18 @@ impl PlanarSimulation {
         machine: impl Into<PlanarTree>,
         ground: &Bound<'_, PyAny>,
         parameters: Bound<'_, PyDict>,
-        given: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<Self> {
+        given: Named<'_>,
+    ) -> Result<PyClassInitializer<Self>> {
         let terrain: Arc<dyn Ground> = parse(ground)?;
-        let (step, words, rule) = options(given)?;
-        let inner = Core::new(machine, terrain, rule, step).map_err(BorderError::from)?;
-        Ok(Self {
+        let (step, words, rule) = options(&given)?;
+        given.finish()?;
+        let inner = Core::new(machine, terrain, rule, step)?;
+        Ok(PyClassInitializer::from(Self {
             inner: Shared::new(inner),
             ground: ground.clone().unbind(),
             parameters: parameters.unbind(),
             words,
-        })
+        }))
     }
 }
 
@@ -107,57 +94,57 @@ impl PlanarSimulation {
 
     /// Time since the last call of `set_state`, s.
     #[getter]
-    fn time(&self) -> PyResult<f64> {
+    fn time(&self) -> Result<f64> {
         Ok(self.open()?.time())
     }
 
     /// Time step, s.
     #[getter]
-    fn time_step(&self) -> PyResult<f64> {
+    fn time_step(&self) -> Result<f64> {
         Ok(self.open()?.options().time_step)
     }
 
     /// Coordinates, (nv,), x and y, m, then angles, rad, which turn to the left.
     #[getter]
-    fn q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(fresh(py, self.open()?.q()))
+    fn q(&self) -> Result<Array> {
+        Ok(fresh(self.open()?.q()))
     }
 
     /// Rates of the coordinates, (nv,), m/s and rad/s.
     #[getter]
-    fn v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(fresh(py, self.open()?.v()))
+    fn v(&self) -> Result<Array> {
+        Ok(fresh(self.open()?.v()))
     }
 
     /// Centres of the discs, world frame, (n_discs, 2), m.
     #[getter]
-    fn centres<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let discs = self.open()?.discs();
-        let centres: Vec<[f64; 2]> = discs.iter().map(|disc| disc.centre.into()).collect();
-        fresh_rows(py, &centres)
+    fn centres(&self) -> Result<Array> {
+        Ok(fresh_rows(
+            self.open()?.discs().iter().map(|disc| disc.centre.into()),
+        ))
     }
 
     /// Gap of each disc now, (n_discs,), m; negative where it overlaps the ground.
     #[getter]
-    fn gaps<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(fresh(py, &self.open()?.gaps()))
+    fn gaps(&self) -> Result<Array> {
+        Ok(fresh(&self.open()?.gaps()))
     }
 
     /// Commanded torques, (n_discs,), N m, positive forward.
     #[getter]
-    fn torques<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(fresh(py, self.open()?.command()))
+    fn torques(&self) -> Result<Array> {
+        Ok(fresh(self.open()?.command()))
     }
 
     /// The keyword arguments that describe the machine.
     #[getter]
-    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        self.parameters.bind(py).copy()
+    fn parameters<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
+        Ok(self.parameters.bind(py).copy()?)
     }
 
     /// The keyword arguments that make a simulation with the same options.
     #[getter]
-    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn settings<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let inner = self.open()?;
         let options = inner.options();
         let gravity = (options.gravity.x, options.gravity.y).into_pyobject(py)?;
@@ -178,12 +165,12 @@ impl PlanarSimulation {
     ///     StateError: An array has a wrong length or an entry that is not finite. Nothing has
     ///         changed.
     #[pyo3(signature = (q, v = None))]
-    fn set_state(&self, q: &Bound<'_, PyAny>, v: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+    fn set_state(&self, q: &Bound<'_, PyAny>, v: Option<&Bound<'_, PyAny>>) -> Result<()> {
         let mut inner = self.open()?;
         let q = vector(q, Kind::State, "q")?;
         let rest = || Ok(vec![0.0; inner.v().len()]);
         let v = v.map_or_else(rest, |v| vector(v, Kind::State, "v"))?;
-        Ok(inner.set_state(&q, &v).map_err(BorderError::from)?)
+        Ok(inner.set_state(&q, &v)?)
     }
 
     /// Sets the driving torques; each saturates at its limit, where the machine has one.
@@ -193,10 +180,10 @@ impl PlanarSimulation {
     ///
     /// Raises:
     ///     CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
-    fn set_torques(&self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn set_torques(&self, torques: &Bound<'_, PyAny>) -> Result<()> {
         let mut inner = self.open()?;
         let torques = vector(torques, Kind::Command, "torques")?;
-        Ok(inner.set_inputs(&torques).map_err(BorderError::from)?)
+        Ok(inner.set_inputs(&torques)?)
     }
 
     /// Takes n steps, as `Simulation.step` does.
@@ -204,34 +191,33 @@ impl PlanarSimulation {
     /// Args:
     ///     n: Number of steps.
     ///
-    /// Returns:
-    ///     How the steps went.
-    ///
     /// Raises:
     ///     StepError: A step could not be taken; the state before it stays.
-    ///     OptionError: `n` is not a count.
-    #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
-    fn step(&self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
-        let steps = n.count(1, Kind::Option, "n")?;
-        step(py, &mut *self.open()?, steps)
+    #[pyo3(signature = (n = Steps(1)), text_signature = "($self, n=1)")]
+    fn step(&self, py: Python<'_>, n: Steps) -> Result<StepReport> {
+        step(py, &mut *self.open()?, n)
     }
 
     /// The contacts of the last step.
     #[getter]
-    fn contacts(&self) -> PyResult<PlanarContacts> {
+    fn contacts(&self) -> Result<PlanarContacts> {
         Ok(PlanarContacts::new(self.open()?.contacts()))
     }
 
     /// Kinetic and potential energy now.
-    fn energy(&self) -> PyResult<Energy> {
+    fn energy(&self) -> Result<Energy> {
         Ok(self.open()?.energy().into())
     }
 
     /// Mass matrix now, (nv, nv), in kg, kg m and kg m².
-    fn mass_matrix<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn mass_matrix(&self) -> Result<Array> {
         let inner = self.open()?;
         let nv = inner.v().len();
-        fresh_matrix(py, &DMatrix::from_row_slice(nv, nv, &inner.mass_matrix()))
+        Ok(fresh_matrix(&DMatrix::from_row_slice(
+            nv,
+            nv,
+            &inner.mass_matrix(),
+        )))
     }
 
     /// The friction-contact problem of the last step, of the last part of a split one.
@@ -239,12 +225,12 @@ impl PlanarSimulation {
     /// Returns:
     ///     Delassus operator W, (2 n_c, 2 n_c), 1/kg; free velocity, (2 n_c,), m/s; friction
     ///     coefficients, (n_c,).
-    fn last_problem<'py>(&self, py: Python<'py>) -> PyResult<Problem<'py>> {
-        problem(py, &*self.open()?)
+    fn last_problem(&self) -> Result<Problem> {
+        Ok(problem(&*self.open()?))
     }
 
     /// Everything that is needed to continue bit for bit.
-    fn snapshot(&self) -> PyResult<PlanarSnapshot> {
+    fn snapshot(&self) -> Result<PlanarSnapshot> {
         let inner = self.open()?.snapshot();
         Ok(PlanarSnapshot { inner })
     }
@@ -256,14 +242,13 @@ impl PlanarSimulation {
     ///
     /// Raises:
     ///     StateError: The snapshot belongs to another machine or is damaged. Nothing has changed.
-    fn restore(&self, snapshot: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn restore(&self, snapshot: &Bound<'_, PyAny>) -> Result<()> {
         let mut inner = self.open()?;
         let snapshot = belonging::<PlanarSnapshot>(snapshot, "a PlanarSnapshot")?;
-        let restored = inner.restore(&snapshot.get().inner);
-        Ok(restored.map_err(BorderError::from)?)
+        Ok(inner.restore(&snapshot.get().inner)?)
     }
 
-    fn __repr__(slf: &Bound<'_, Self>) -> PyResult<String> {
+    fn __repr__(slf: &Bound<'_, Self>) -> Result<String> {
         let own = slf.get();
         let (kind, ground) = (slf.get_type().name()?, own.ground.bind(slf.py()).repr()?);
         Ok(match own.time() {
@@ -272,14 +257,12 @@ impl PlanarSimulation {
         })
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
-        let py = slf.py();
-        let own = slf.get();
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Result<Bound<'py, PyTuple>> {
+        let (py, own) = (slf.py(), slf.get());
         let settings = own.settings(py)?;
         settings.update(own.parameters.bind(py).as_mapping())?;
-        let rebuild = slf.get_type().getattr("_rebuild")?;
-        let arguments = (slf.get_type(), own.ground(py), settings, own.snapshot()?);
-        (rebuild, arguments).into_pyobject(py)
+        let given = (slf.get_type(), own.ground(py), settings, own.snapshot()?);
+        Ok((slf.get_type().getattr("_rebuild")?, given).into_pyobject(py)?)
     }
 
     #[staticmethod]
@@ -288,9 +271,12 @@ impl PlanarSimulation {
         ground: &Bound<'py, PyAny>,
         settings: &Bound<'py, PyDict>,
         snapshot: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    ) -> Result<Bound<'py, PyAny>> {
         let made = kind.call((ground,), Some(settings))?;
-        made.cast::<Self>()?.get().restore(snapshot)?;
+        made.cast::<Self>()
+            .map_err(PyErr::from)?
+            .get()
+            .restore(snapshot)?;
         Ok(made)
     }
 }

@@ -1,7 +1,6 @@
-//! `Line`, `Sine`, `Spline`, `Polyline`: the grounds of planar scenes.
+//! `PlanarGround` and its kinds `Line`, `Sine`, `Spline`, `Polyline`: the grounds of planar scenes.
 
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
 use rover_core::planar::{
     Ground, Line as CoreLine, PlanarError, Polyline as CorePolyline, Sine as CoreSine,
     Spline as CoreSpline,
@@ -9,9 +8,9 @@ use rover_core::planar::{
 use rover_core::quantity::QuantityError;
 use std::sync::Arc;
 
-use crate::arguments::{Given, number, shown};
-use crate::arrays::{fresh, vector};
-use crate::errors::{BorderError, Kind, Value};
+use crate::arguments::{Given, number, refused};
+use crate::arrays::{Array, fresh, vector};
+use crate::errors::{BorderError, Kind, Result, Value};
 
 /// A planar error on its way to Python, as a terrain's or a machine's.
 pub fn border(kind: Kind, e: &PlanarError) -> BorderError {
@@ -26,41 +25,67 @@ pub fn border(kind: Kind, e: &PlanarError) -> BorderError {
         PlanarError::NotMirrored { body } => Value::Text(body.clone()),
         _ => Value::Nothing,
     };
-    BorderError {
-        kind,
-        message: e.to_string(),
-        field: Some(e.field()),
-        value,
-    }
+    kind.error(e.field(), e.to_string(), value)
 }
 
 /// A number that cannot be, on its way to Python.
 pub fn quantity(kind: Kind, e: &QuantityError) -> BorderError {
-    BorderError {
-        kind,
-        message: e.to_string(),
-        field: Some(e.field().to_owned()),
-        value: Value::Number(e.value()),
+    kind.error(e.field(), e.to_string(), Value::Number(e.value()))
+}
+
+/// Ground of a planar scene, of any kind: x forward, y up. Immutable.
+///
+/// `Line`, `Sine`, `Spline` and `Polyline` are its kinds.
+#[pyclass(module = "rover_gym.mechanics", subclass, frozen)]
+pub struct PlanarGround(Arc<dyn Ground>);
+
+#[pymethods]
+impl PlanarGround {
+    /// The height of the ground at one place or at many.
+    ///
+    /// Args:
+    ///     x: Places, a number or (m,), m.
+    ///
+    /// Returns:
+    ///     Heights, a number or (m,), m.
+    ///
+    /// Raises:
+    ///     OptionError: `x` is not a number or an array of one dimension.
+    fn height<'py>(&self, x: &Bound<'py, PyAny>) -> Result<Bound<'py, PyAny>> {
+        if x.len().is_err() {
+            let place = number(x, Kind::Option, "x")?;
+            return Ok(self.0.height(place).into_pyobject(x.py())?.into_any());
+        }
+        let places = vector(x, Kind::Option, "x")?;
+        let heights: Array = places.iter().map(|x| self.0.height(*x)).collect();
+        Ok(heights.into_pyobject(x.py())?.into_any())
     }
 }
 
-fn terrain<T>(made: Result<T, PlanarError>) -> Result<T, BorderError> {
-    made.map_err(|e| border(Kind::Terrain, &e))
-}
-
-/// Height at one place or at many.
-fn heights<'py>(ground: &dyn Ground, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-    let py = x.py();
-    if x.len().is_err() {
-        let x = number(x, Kind::Option, "x")?;
-        return Ok(ground.height(x).into_pyobject(py)?.into_any());
+impl PlanarGround {
+    /// A ground of the core, for the class of its kind.
+    fn base<G: Ground + Clone + 'static>(ground: &G) -> PyClassInitializer<Self> {
+        PyClassInitializer::from(Self(Arc::new(ground.clone())))
     }
-    let places = vector(x, Kind::Option, "x")?;
-    let heights: Vec<f64> = places.iter().map(|x| ground.height(*x)).collect();
-    Ok(fresh(py, &heights).into_any())
 }
 
-/// The ground y = slope x + offset of a planar scene: x forward, y up.
+/// The class that is made with a ground of the core.
+macro_rules! made {
+    ($result:expr) => {{
+        let inner = $result.map_err(|e| border(Kind::Terrain, &e))?;
+        Ok(PlanarGround::base(&inner).add_subclass(Self { inner }))
+    }};
+}
+
+/// Places and heights of points.
+fn points(x: &Bound<'_, PyAny>, y: &Bound<'_, PyAny>) -> Result<[Vec<f64>; 2]> {
+    Ok([
+        vector(x, Kind::Terrain, "x")?,
+        vector(y, Kind::Terrain, "y")?,
+    ])
+}
+
+/// The ground y = slope x + offset of a planar scene.
 ///
 /// Args:
 ///     slope: Tangent of the inclination.
@@ -68,7 +93,7 @@ fn heights<'py>(ground: &dyn Ground, x: &Bound<'py, PyAny>) -> PyResult<Bound<'p
 ///
 /// Raises:
 ///     TerrainError: A number is not finite, the slope is beyond 1000 or the offset beyond 1e6 m.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen, extends = PlanarGround)]
 pub struct Line {
     inner: CoreLine,
 }
@@ -77,12 +102,10 @@ pub struct Line {
 impl Line {
     #[new]
     #[pyo3(signature = (slope = Given::MISSING, offset = Given::MISSING), text_signature = "(slope=0.0, offset=0.0)")]
-    fn new(slope: Given<'_>, offset: Given<'_>) -> PyResult<Self> {
+    fn new(slope: Given<'_>, offset: Given<'_>) -> Result<PyClassInitializer<Self>> {
         let slope = slope.number(0.0, Kind::Terrain, "slope")?;
         let offset = offset.number(0.0, Kind::Terrain, "offset")?;
-        Ok(Self {
-            inner: terrain(CoreLine::new(slope, offset))?,
-        })
+        made!(CoreLine::new(slope, offset))
     }
 
     /// Tangent of the inclination.
@@ -97,27 +120,12 @@ impl Line {
         self.inner.offset()
     }
 
-    /// The height of the ground at one place or at many.
-    ///
-    /// Args:
-    ///     x: Places, a number or (m,), m.
-    ///
-    /// Returns:
-    ///     Heights, a number or (m,), m.
-    ///
-    /// Raises:
-    ///     OptionError: `x` is not a number or an array of one dimension.
-    fn height<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        heights(&self.inner, x)
-    }
-
     fn __repr__(&self) -> String {
         format!("Line(slope={}, offset={})", self.slope(), self.offset())
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyAny>, (f64, f64)) {
-        let own = slf.get();
-        (slf.get_type().into_any(), (own.slope(), own.offset()))
+    fn __getnewargs__(&self) -> (f64, f64) {
+        (self.slope(), self.offset())
     }
 }
 
@@ -132,7 +140,7 @@ impl Line {
 /// Raises:
 ///     TerrainError: A number is not finite, the wavelength is below 1e-3 m, or the slope 2 pi
 ///         amplitude / wavelength is beyond 1000.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen, extends = PlanarGround)]
 pub struct Sine {
     inner: CoreSine,
 }
@@ -147,14 +155,12 @@ impl Sine {
         wavelength: &Bound<'_, PyAny>,
         phase: Given<'_>,
         offset: Given<'_>,
-    ) -> PyResult<Self> {
+    ) -> Result<PyClassInitializer<Self>> {
         let amplitude = number(amplitude, Kind::Terrain, "amplitude")?;
         let wavelength = number(wavelength, Kind::Terrain, "wavelength")?;
         let phase = phase.number(0.0, Kind::Terrain, "phase")?;
         let offset = offset.number(0.0, Kind::Terrain, "offset")?;
-        Ok(Self {
-            inner: terrain(CoreSine::new(amplitude, wavelength, phase, offset))?,
-        })
+        made!(CoreSine::new(amplitude, wavelength, phase, offset))
     }
 
     /// Amplitude, m.
@@ -181,20 +187,6 @@ impl Sine {
         self.inner.parameters()[3]
     }
 
-    /// The height of the ground at one place or at many.
-    ///
-    /// Args:
-    ///     x: Places, a number or (m,), m.
-    ///
-    /// Returns:
-    ///     Heights, a number or (m,), m.
-    ///
-    /// Raises:
-    ///     OptionError: `x` is not a number or an array of one dimension.
-    fn height<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        heights(&self.inner, x)
-    }
-
     fn __repr__(&self) -> String {
         let [amplitude, wavelength, phase, offset] = self.inner.parameters();
         format!(
@@ -202,11 +194,8 @@ impl Sine {
         )
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyAny>, (f64, f64, f64, f64)) {
-        (
-            slf.get_type().into_any(),
-            slf.get().inner.parameters().into(),
-        )
+    fn __getnewargs__(&self) -> (f64, f64, f64, f64) {
+        self.inner.parameters().into()
     }
 }
 
@@ -221,7 +210,7 @@ impl Sine {
 /// Raises:
 ///     TerrainError: There are fewer than two points or more than 2 000 000, the lengths differ, an
 ///         entry is not finite or beyond 1e6 m, or x does not increase.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen, extends = PlanarGround)]
 pub struct Spline {
     inner: CoreSpline,
 }
@@ -229,52 +218,29 @@ pub struct Spline {
 #[pymethods]
 impl Spline {
     #[new]
-    fn new(x: &Bound<'_, PyAny>, y: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let (x, y) = (
-            vector(x, Kind::Terrain, "x")?,
-            vector(y, Kind::Terrain, "y")?,
-        );
-        Ok(Self {
-            inner: terrain(CoreSpline::new(&x, &y))?,
-        })
+    fn new(x: &Bound<'_, PyAny>, y: &Bound<'_, PyAny>) -> Result<PyClassInitializer<Self>> {
+        let [x, y] = points(x, y)?;
+        made!(CoreSpline::new(&x, &y))
     }
 
     /// Places of the points, (n,), m.
     #[getter]
-    fn x<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        fresh(py, self.inner.x()).into_any()
+    fn x(&self) -> Array {
+        fresh(self.inner.x())
     }
 
     /// Heights of the points, (n,), m.
     #[getter]
-    fn y<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        fresh(py, self.inner.y()).into_any()
-    }
-
-    /// The height of the ground at one place or at many.
-    ///
-    /// Args:
-    ///     x: Places, a number or (m,), m.
-    ///
-    /// Returns:
-    ///     Heights, a number or (m,), m.
-    ///
-    /// Raises:
-    ///     OptionError: `x` is not a number or an array of one dimension.
-    fn height<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        heights(&self.inner, x)
+    fn y(&self) -> Array {
+        fresh(self.inner.y())
     }
 
     fn __repr__(&self) -> String {
         format!("Spline({} points)", self.inner.x().len())
     }
 
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
-        let (py, own) = (slf.py(), slf.get());
-        let points = PyTuple::new(py, [own.x(py), own.y(py)])?;
-        Ok((slf.get_type().into_any(), points))
+    fn __getnewargs__(&self) -> (Array, Array) {
+        (self.x(), self.y())
     }
 }
 
@@ -289,7 +255,7 @@ impl Spline {
 /// Raises:
 ///     TerrainError: There are fewer than two points or more than 2 000 000, the lengths differ, an
 ///         entry is not finite or beyond 1e6 m, x decreases, or a point is given twice.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen, extends = PlanarGround)]
 pub struct Polyline {
     inner: CorePolyline,
 }
@@ -297,14 +263,9 @@ pub struct Polyline {
 #[pymethods]
 impl Polyline {
     #[new]
-    fn new(x: &Bound<'_, PyAny>, y: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let (x, y) = (
-            vector(x, Kind::Terrain, "x")?,
-            vector(y, Kind::Terrain, "y")?,
-        );
-        Ok(Self {
-            inner: terrain(CorePolyline::new(&x, &y))?,
-        })
+    fn new(x: &Bound<'_, PyAny>, y: &Bound<'_, PyAny>) -> Result<PyClassInitializer<Self>> {
+        let [x, y] = points(x, y)?;
+        made!(CorePolyline::new(&x, &y))
     }
 
     /// Level ground at height 0 with one step.
@@ -313,82 +274,46 @@ impl Polyline {
     ///     x: Place of the step, m.
     ///     height: Height of the ground beyond it, m; negative for a step down.
     ///
-    /// Returns:
-    ///     The ground.
-    ///
     /// Raises:
     ///     TerrainError: A number is not finite or beyond 1e6 m, or the step has no height.
     #[staticmethod]
-    fn step(x: &Bound<'_, PyAny>, height: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let x = number(x, Kind::Terrain, "x")?;
+    fn step(x: &Bound<'_, PyAny>, height: &Bound<'_, PyAny>) -> Result<Py<Self>> {
+        let place = number(x, Kind::Terrain, "x")?;
         let height = number(height, Kind::Terrain, "height")?;
-        Ok(Self {
-            inner: terrain(CorePolyline::step(x, height))?,
-        })
+        let made: Result<PyClassInitializer<Self>> = made!(CorePolyline::step(place, height));
+        Ok(Py::new(x.py(), made?)?)
     }
 
     /// Places of the points, (n,), m.
     #[getter]
-    fn x<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        let x: Vec<f64> = self.inner.points().iter().map(|p| p.x).collect();
-        fresh(py, &x).into_any()
+    fn x(&self) -> Array {
+        self.inner.points().iter().map(|p| p.x).collect()
     }
 
     /// Heights of the points, (n,), m.
     #[getter]
-    fn y<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        let y: Vec<f64> = self.inner.points().iter().map(|p| p.y).collect();
-        fresh(py, &y).into_any()
-    }
-
-    /// The height of the ground at one place or at many.
-    ///
-    /// Args:
-    ///     x: Places, a number or (m,), m.
-    ///
-    /// Returns:
-    ///     Heights, a number or (m,), m.
-    ///
-    /// Raises:
-    ///     OptionError: `x` is not a number or an array of one dimension.
-    fn height<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        heights(&self.inner, x)
+    fn y(&self) -> Array {
+        self.inner.points().iter().map(|p| p.y).collect()
     }
 
     fn __repr__(&self) -> String {
         format!("Polyline({} points)", self.inner.points().len())
     }
 
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
-        let (py, own) = (slf.py(), slf.get());
-        let points = PyTuple::new(py, [own.x(py), own.y(py)])?;
-        Ok((slf.get_type().into_any(), points))
+    fn __getnewargs__(&self) -> (Array, Array) {
+        (self.x(), self.y())
     }
 }
 
 /// The ground in a Python object.
-pub fn parse(given: &Bound<'_, PyAny>) -> PyResult<Arc<dyn Ground>> {
-    if let Ok(line) = given.cast::<Line>() {
-        return Ok(Arc::new(line.get().inner));
+pub fn parse(given: &Bound<'_, PyAny>) -> Result<Arc<dyn Ground>> {
+    match given.cast::<PlanarGround>() {
+        Ok(ground) => Ok(ground.get().0.clone()),
+        Err(_) => Err(refused(
+            given,
+            Kind::Terrain,
+            "ground",
+            "a Line, Sine, Spline or Polyline",
+        )),
     }
-    if let Ok(sine) = given.cast::<Sine>() {
-        return Ok(Arc::new(sine.get().inner));
-    }
-    if let Ok(spline) = given.cast::<Spline>() {
-        return Ok(Arc::new(spline.get().inner.clone()));
-    }
-    if let Ok(polyline) = given.cast::<Polyline>() {
-        return Ok(Arc::new(polyline.get().inner.clone()));
-    }
-    let shown = shown(given);
-    let message = format!("ground: must be a Line, Sine, Spline or Polyline, is {shown}");
-    Err(BorderError {
-        kind: Kind::Terrain,
-        message,
-        field: Some("ground".to_owned()),
-        value: Value::Text(shown),
-    }
-    .into())
 }

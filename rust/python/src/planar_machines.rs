@@ -7,8 +7,8 @@ use rover_core::nalgebra::Vector2;
 use rover_core::planar::{Ball, MirroredRover, PlanarWheel, TwoWheelRover};
 use std::sync::Arc;
 
-use crate::arguments::{Given, number};
-use crate::errors::Kind;
+use crate::arguments::{Named, number, refused};
+use crate::errors::{Kind, Result};
 use crate::model::RoverModel;
 use crate::planar::{PlanarSimulation, pair};
 use crate::planar_ground::border;
@@ -35,26 +35,24 @@ pub struct BallSimulation;
 #[pymethods]
 impl BallSimulation {
     #[new]
-    #[pyo3(signature = (ground, *, mass = Given::MISSING, radius = Given::MISSING, inertia = Given::MISSING, **options),
-        text_signature = "(ground, *, mass=3.0, radius=1.5, inertia=None, **options)")]
+    #[pyo3(signature = (ground, **options), text_signature = "(ground, *, mass=3.0, radius=1.5, inertia=None, **options)")]
     fn new(
         ground: &Bound<'_, PyAny>,
-        mass: Given<'_>,
-        radius: Given<'_>,
-        inertia: Given<'_>,
         options: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<PyClassInitializer<Self>> {
-        let mass = mass.number(3.0, Kind::Model, "mass")?;
-        let radius = radius.number(1.5, Kind::Model, "radius")?;
-        let inertia = inertia.maybe(Kind::Model, "inertia")?;
-        let inertia = inertia.unwrap_or(0.5 * mass * radius * radius);
+    ) -> Result<PyClassInitializer<Self>> {
+        let given = Named::keywords(ground.py(), options)?;
+        let own = given.of(Kind::Model);
+        let (mass, radius) = (own.number("mass", 3.0)?, own.number("radius", 1.5)?);
+        let inertia = own
+            .maybe("inertia")?
+            .unwrap_or(0.5 * mass * radius * radius);
         let ball = Ball::new(mass, radius, inertia).map_err(|e| border(Kind::Model, &e))?;
         let parameters = PyDict::new(ground.py());
-        parameters.set_item("mass", mass)?;
-        parameters.set_item("radius", radius)?;
-        parameters.set_item("inertia", inertia)?;
-        let base = PlanarSimulation::build(ball, ground, parameters, options)?;
-        Ok(PyClassInitializer::from(base).add_subclass(Self))
+        for (name, value) in [("mass", mass), ("radius", radius), ("inertia", inertia)] {
+            parameters.set_item(name, value)?;
+        }
+        let base = PlanarSimulation::build(ball, ground, parameters, given)?;
+        Ok(base.add_subclass(Self))
     }
 }
 
@@ -90,74 +88,47 @@ pub struct TwoWheelRoverSimulation;
 #[pymethods]
 impl TwoWheelRoverSimulation {
     #[new]
-    #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
-    #[pyo3(signature = (ground, *, mass = Given::MISSING, inertia = Given::MISSING, wheel_mass = None, wheel_radius = None,
-        wheel_inertia = None, axle_a = None, axle_b = None, **options),
+    #[pyo3(signature = (ground, **options),
         text_signature = "(ground, *, mass=130.0, inertia=None, wheel_mass=None, wheel_radius=None, wheel_inertia=None, axle_a=None, axle_b=None, **options)")]
     fn new(
         ground: &Bound<'_, PyAny>,
-        mass: Given<'_>,
-        inertia: Given<'_>,
-        wheel_mass: Option<Bound<'_, PyAny>>,
-        wheel_radius: Option<Bound<'_, PyAny>>,
-        wheel_inertia: Option<Bound<'_, PyAny>>,
-        axle_a: Option<Bound<'_, PyAny>>,
-        axle_b: Option<Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<PyClassInitializer<Self>> {
-        let given = [
-            ("mass", mass.given()),
-            ("inertia", inertia.some()),
-            ("wheel_mass", wheel_mass),
-            ("wheel_radius", wheel_radius),
-            ("wheel_inertia", wheel_inertia),
-            ("axle_a", axle_a),
-            ("axle_b", axle_b),
-        ];
+    ) -> Result<PyClassInitializer<Self>> {
+        let given = Named::keywords(ground.py(), options)?;
         let parameters = PyDict::new(ground.py());
-        for (field, value) in given {
-            if let Some(value) = value {
-                parameters.set_item(field, value)?;
-            }
-        }
-        let rover = two_wheel_rover(&parameters)?;
-        let base = PlanarSimulation::build(rover, ground, parameters, options)?;
-        Ok(PyClassInitializer::from(base).add_subclass(Self))
+        let rover = two_wheel_rover(&given, &parameters)?;
+        let base = PlanarSimulation::build(rover, ground, parameters, given)?;
+        Ok(base.add_subclass(Self))
     }
 }
 
 /// One number for both, or two.
-fn one_or_two(value: &Bound<'_, PyAny>, field: &str) -> PyResult<[f64; 2]> {
+fn one_or_two(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<[f64; 2]> {
     if value.len().is_err() {
-        return Ok([number(value, Kind::Model, field)?; 2]);
+        return Ok([number(value, kind, field)?; 2]);
     }
-    Ok(pair(value, Kind::Model, field)?.into())
+    Ok(pair(value, kind, field)?.into())
 }
 
-/// The rover of these keyword arguments, each of which may be missing; on return none is.
-pub fn two_wheel_rover(parameters: &Bound<'_, PyDict>) -> PyResult<TwoWheelRover> {
-    let read = |field: &str, default: f64| match parameters.get_item(field)? {
-        Some(value) => number(&value, Kind::Model, field),
-        None => Ok(default),
+/// The rover of these keyword arguments, which are told in full in `parameters`.
+pub fn two_wheel_rover(given: &Named<'_>, parameters: &Bound<'_, PyDict>) -> Result<TwoWheelRover> {
+    let given = given.of(Kind::Model);
+    let both = |field: &str, usual: [f64; 2]| -> Result<[f64; 2]> {
+        Ok(given.read(field, one_or_two)?.unwrap_or(usual))
     };
-    let both = |field: &str, default: [f64; 2]| match parameters.get_item(field)? {
-        Some(value) => one_or_two(&value, field),
-        None => Ok(default),
-    };
-    let mass = read("mass", 130.0)?;
+    let mass = given.number("mass", 130.0)?;
     let masses = both("wheel_mass", [60.0; 2])?;
     let radii = both("wheel_radius", [0.2; 2])?;
     // Discs, unless told otherwise.
     let of_disc = |i: usize| 0.5 * masses[i] * radii[i] * radii[i];
     let inertias = both("wheel_inertia", [of_disc(0), of_disc(1)])?;
-    let axle = |field: &str, x: f64| match parameters.get_item(field)? {
-        Some(value) => pair(&value, Kind::Model, field),
-        None => Ok(Vector2::new(x, 0.0)),
+    let axle = |field: &str, x: f64| -> Result<Vector2<f64>> {
+        Ok(given.read(field, pair)?.unwrap_or(Vector2::new(x, 0.0)))
     };
     let axles = [axle("axle_a", -0.4)?, axle("axle_b", 0.4)?];
     // A rod from axle to axle, unless told otherwise.
     let rod = mass * (axles[1] - axles[0]).norm_squared() / 12.0;
-    let inertia = read("inertia", rod)?;
+    let inertia = given.maybe("inertia")?.unwrap_or(rod);
     let wheel = |i: usize| PlanarWheel {
         mass: masses[i],
         radius: radii[i],
@@ -176,7 +147,7 @@ pub fn two_wheel_rover(parameters: &Bound<'_, PyDict>) -> PyResult<TwoWheelRover
         parameters.set_item(field, (a, b))?;
     }
     let made = TwoWheelRover::new(mass, inertia, wheel(0), wheel(1));
-    Ok(made.map_err(|e| border(Kind::Model, &e))?)
+    made.map_err(|e| border(Kind::Model, &e))
 }
 
 /// The six-wheel rover driven straight, in its plane of symmetry.
@@ -196,23 +167,30 @@ pub fn two_wheel_rover(parameters: &Bound<'_, PyDict>) -> PyResult<TwoWheelRover
 ///     TerrainError: `ground` is not a ground.
 ///     OptionError: An option is out of its range.
 ///     TypeError: An option is unknown.
-#[pyclass(module = "rover_gym.mechanics", extends = PlanarSimulation, frozen)]
+#[pyclass(module = "rover_gym.mechanics", extends = PlanarSimulation, frozen, get_all)]
 pub struct MirroredRoverSimulation {
+    /// Names of the joints that share each coordinate from the fourth on.
     joints: Vec<Vec<String>>,
+    /// Names of the wheels of each disc.
     wheels: Vec<Vec<String>>,
 }
 
 #[pymethods]
 impl MirroredRoverSimulation {
     #[new]
-    #[pyo3(signature = (ground, *, model = Given::MISSING, **options), text_signature = "(ground, *, model=None, **options)")]
+    #[pyo3(signature = (ground, **options), text_signature = "(ground, *, model=None, **options)")]
     fn new(
         ground: &Bound<'_, PyAny>,
-        model: Given<'_>,
         options: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<PyClassInitializer<Self>> {
-        let model = model.object::<RoverModel>(Kind::Model, "model", "a RoverModel")?;
-        let inner = model.map_or_else(|| Arc::new(Model::rover()), |m| m.inner);
+    ) -> Result<PyClassInitializer<Self>> {
+        let given = Named::keywords(ground.py(), options)?;
+        let model = given.some("model")?.map(|model| {
+            let wrong = |_| refused(&model, Kind::Model, "model", "a RoverModel");
+            model.extract::<RoverModel>().map_err(wrong)
+        });
+        let inner = model
+            .transpose()?
+            .map_or_else(|| Arc::new(Model::rover()), |m| m.inner);
         let rover = MirroredRover::new(&inner).map_err(|e| border(Kind::Model, &e))?;
         let own = Self {
             joints: rover.joints(),
@@ -220,19 +198,7 @@ impl MirroredRoverSimulation {
         };
         let parameters = PyDict::new(ground.py());
         parameters.set_item("model", RoverModel::from(inner))?;
-        let base = PlanarSimulation::build(rover, ground, parameters, options)?;
-        Ok(PyClassInitializer::from(base).add_subclass(own))
-    }
-
-    /// Names of the joints that share each coordinate from the fourth on.
-    #[getter]
-    fn joints(&self) -> Vec<Vec<String>> {
-        self.joints.clone()
-    }
-
-    /// Names of the wheels of each disc.
-    #[getter]
-    fn wheels(&self) -> Vec<Vec<String>> {
-        self.wheels.clone()
+        let base = PlanarSimulation::build(rover, ground, parameters, given)?;
+        Ok(base.add_subclass(own))
     }
 }

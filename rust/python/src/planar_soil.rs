@@ -1,6 +1,5 @@
 //! `SoilSimulation` and `soil_packing`: granular soil of disks.
 
-use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::geometry::Support;
@@ -9,20 +8,19 @@ use rover_core::simulation::SoilSimulation as Core;
 use rover_core::system::grains::{GrainScene, Packing};
 use std::sync::{Arc, MutexGuard};
 
-use crate::arguments::{Given, flags};
-use crate::arrays::{array, fresh, fresh_rows, vector};
-use crate::bed_arguments::{
-    self, StepArguments, Usual, check_rows, grain_error, grains, rows, setup_error,
-};
+use crate::arguments::{Given, Named, flags, refused};
+use crate::arrays::{Array, array, fresh, fresh_rows, vector};
+use crate::balls::{self, Packed, steps};
+use crate::bed_arguments::{self, Usual, check_rows, grain_error, grains, rows, setup_error};
 use crate::contacts::SoilContacts;
-use crate::errors::{BorderError, Kind, Value};
+use crate::errors::{BorderError, Kind, Result, Value};
 use crate::planar::pair;
 use crate::planar_ground::{border, parse};
 use crate::planar_machines::two_wheel_rover;
 use crate::report::{Energy, StepReport};
 use crate::shared::Shared;
 use crate::snapshot::{SoilSnapshot, belonging};
-use crate::stepping::step;
+use crate::stepping::{Steps, step};
 
 /// Of the steps of a soil: its velocities are right to ten times the tolerance, m/s.
 const USUAL: Usual = Usual {
@@ -31,19 +29,11 @@ const USUAL: Usual = Usual {
     speed: 10.0,
 };
 
-/// Radii, masses and centres of a packing.
-type Packed<'py> = (
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray2<f64>>,
-);
-
 /// A granular soil of disks, and a machine that drives on it.
 ///
 /// The disks are free, with friction, between walls or on a ground.
 ///
-/// One call at a time: a call during another one, from another thread or a signal handler, raises
-/// BusyError.
+/// One call at a time, as of `Simulation`.
 ///
 /// Args:
 ///     radius: Radii of the disks, (n,), m.
@@ -95,9 +85,9 @@ impl SoilSimulation {
         self.inner.open()
     }
 
-    fn disks(values: &[f64], n: usize) -> Vec<[f64; 3]> {
-        let rows = values.chunks_exact(3).take(n);
-        rows.map(|row| [row[0], row[1], row[2]]).collect()
+    /// A row (x, y, angle) of each disk.
+    fn disks(values: &[f64], n: usize) -> Array {
+        Array::shaped(values[..3 * n].to_vec(), &[n, 3])
     }
 }
 
@@ -106,101 +96,77 @@ fn n_disks(inner: &Core) -> usize {
 }
 
 /// Positions with an angle where none was given.
-fn with_angles(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<f64>> {
-    let width = array(value, Kind::State, field)?
-        .as_array()
-        .shape()
-        .get(1)
-        .copied();
-    if width == Some(2) {
-        let flat = rows(value, Kind::State, field, 2)?;
-        return Ok(flat
-            .chunks_exact(2)
-            .flat_map(|r| [r[0], r[1], 0.0])
-            .collect());
+fn with_angles(value: &Bound<'_, PyAny>, field: &str) -> Result<Vec<f64>> {
+    let given = array(value, Kind::State, field)?;
+    if given.as_array().shape().get(1) != Some(&2) {
+        return Ok(rows(value, Kind::State, field, 3)?);
     }
-    rows(value, Kind::State, field, 3)
+    let flat = rows(value, Kind::State, field, 2)?;
+    Ok(flat
+        .chunks_exact(2)
+        .flat_map(|r| [r[0], r[1], 0.0])
+        .collect())
+}
+
+/// The machine on the soil, if there is one.
+fn machine(given: &Named<'_>) -> Result<Option<PlanarTree>> {
+    let rover = given.of(Kind::Model).read("rover", |rover, kind, field| {
+        let wrong = |_| refused(rover, kind, field, "a dict");
+        let described = Named::keywords(rover.py(), Some(rover.cast().map_err(wrong)?))?;
+        let made = two_wheel_rover(&described, &PyDict::new(rover.py()))?;
+        described.finish()?;
+        Ok(made.into())
+    })?;
+    let rig = given.of(Kind::Model).read("rig", |rig, kind, field| {
+        let rig = pair(rig, kind, field)?;
+        Ok(WheelRig::new(rig.x, rig.y)
+            .map_err(|e| border(kind, &e))?
+            .into())
+    })?;
+    if rover.is_some() && rig.is_some() {
+        let message = "rig: a soil has a rover or a rig, not both".to_owned();
+        return Err(Kind::Option.error("rig", message, Value::Nothing));
+    }
+    Ok(rover.or(rig))
 }
 
 #[pymethods]
 impl SoilSimulation {
     #[new]
-    #[allow(clippy::too_many_arguments, clippy::too_many_lines)] // keyword arguments
-    #[pyo3(signature = (radius, mass, position, *, kinematic = Given::MISSING, walls = None, ground = None, rover = Given::MISSING, rig = None, machine = None,
-        friction = Given::MISSING, wall_friction = Given::MISSING, wheel_friction = Given::MISSING, restitution = Given::MISSING,
-        gravity = None, time_step = Given::MISSING, tolerance = Given::MISSING, max_iterations = Given::MISSING,
-        stabilisation = Given::MISSING, penetration_tolerance = Given::MISSING,
-        sleep = Given::MISSING, sleep_speed = Given::MISSING, sleep_distance = Given::MISSING),
+    #[pyo3(signature = (radius, mass, position, **options),
         text_signature = "(radius, mass, position, *, kinematic=None, walls=None, ground=None, rover=None, rig=None, machine=None, friction=0.5, wall_friction=0.5, wheel_friction=0.9, restitution=0.0, gravity=None, time_step=0.001, tolerance=0.0001, max_iterations=2000, stabilisation=None, penetration_tolerance=None, sleep=False, sleep_speed=None, sleep_distance=None)")]
     fn new(
         radius: &Bound<'_, PyAny>,
         mass: &Bound<'_, PyAny>,
         position: &Bound<'_, PyAny>,
-        kinematic: Given<'_>,
-        walls: Option<&Bound<'_, PyAny>>,
-        ground: Option<&Bound<'_, PyAny>>,
-        rover: Given<'_>,
-        rig: Option<&Bound<'_, PyAny>>,
-        machine: Option<&Bound<'_, PyAny>>,
-        friction: Given<'_>,
-        wall_friction: Given<'_>,
-        wheel_friction: Given<'_>,
-        restitution: Given<'_>,
-        gravity: Option<&Bound<'_, PyAny>>,
-        time_step: Given<'_>,
-        tolerance: Given<'_>,
-        max_iterations: Given<'_>,
-        stabilisation: Given<'_>,
-        penetration_tolerance: Given<'_>,
-        sleep: Given<'_>,
-        sleep_speed: Given<'_>,
-        sleep_distance: Given<'_>,
-    ) -> PyResult<Self> {
-        let disks = grains::<2>(radius, mass, kinematic)?;
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> Result<Self> {
+        let given = Named::keywords(radius.py(), options)?;
+        let disks = grains::<2>(radius, mass, given.get("kinematic")?)?;
         let mut q = with_angles(position, "position")?;
         check_rows("disks", disks.len(), &q)?;
-        let gravity = gravity
-            .map(|g| pair(g, Kind::Option, "gravity"))
-            .transpose()?;
-        let steps = StepArguments {
-            restitution,
-            gravity: gravity.map(|g| g.push(0.0)),
-            time_step,
-            tolerance,
-            max_iterations,
-            stabilisation,
-            is_hollow: false,
-            penetration_tolerance,
-            threads: Given::MISSING,
-        };
-        let options = steps.options(&disks, USUAL)?;
-        let lines = bed_arguments::walls(walls)?;
-        let ground: Option<Arc<dyn Ground>> = ground.map(parse).transpose()?;
-        let rover = rover.object::<Bound<'_, PyDict>>(Kind::Model, "rover", "a dict")?;
-        let who: Option<PlanarTree> = match (&rover, rig) {
-            (Some(given), None) => Some(two_wheel_rover(&given.copy()?)?.into()),
-            (None, Some(given)) => {
-                let given = pair(given, Kind::Model, "rig")?;
-                let rig = WheelRig::new(given.x, given.y);
-                Some(rig.map_err(|e| border(Kind::Model, &e))?.into())
-            }
-            (None, None) => None,
-            _ => {
-                let message = "rig: a soil has a rover or a rig, not both".to_owned();
-                return Err(BorderError::option("rig", message, Value::Nothing).into());
-            }
-        };
-        if let Some(machine) = machine {
-            q.extend(vector(machine, Kind::State, "machine")?);
+        let gravity = given.read("gravity", pair)?.map(|g| g.push(0.0));
+        let options = steps(&given, gravity, false)?.options(&disks, USUAL)?;
+        let walls = bed_arguments::walls(given.some("walls")?.as_ref())?;
+        let ground: Option<Arc<dyn Ground>> =
+            given.some("ground")?.as_ref().map(parse).transpose()?;
+        let machine = self::machine(&given)?;
+        if let Some(machine) = given.of(Kind::State).read("machine", vector)? {
+            q.extend(machine);
         }
         let scene = GrainScene {
             grains: disks,
-            walls: lines,
+            walls,
             ground: ground.map(|ground| ground as Arc<dyn Support<2>>),
-            machine: who.map(Arc::new),
-            friction: bed_arguments::friction(friction, wall_friction, wheel_friction)?,
+            machine: machine.map(Arc::new),
+            friction: bed_arguments::friction(
+                given.get("friction")?,
+                given.get("wall_friction")?,
+                given.get("wheel_friction")?,
+            )?,
         };
-        let sleep = bed_arguments::sleep(sleep, sleep_speed, sleep_distance)?;
+        let sleep = balls::sleep(&given)?;
+        given.finish()?;
         let inner = Core::new(Arc::new(scene), options, sleep, q).map_err(setup_error)?;
         Ok(Self {
             inner: Shared::new(inner),
@@ -209,91 +175,87 @@ impl SoilSimulation {
 
     /// Time since the last call of `set_state`, s.
     #[getter]
-    fn time(&self) -> PyResult<f64> {
+    fn time(&self) -> Result<f64> {
         Ok(self.open()?.time())
     }
 
     /// Time step, s.
     #[getter]
-    fn time_step(&self) -> PyResult<f64> {
+    fn time_step(&self) -> Result<f64> {
         Ok(self.open()?.options().time_step)
     }
 
     /// Radii of the disks, (n,), m.
     #[getter]
-    fn radius<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(fresh(py, self.open()?.soil().grains.radius()))
+    fn radius(&self) -> Result<Array> {
+        Ok(fresh(self.open()?.soil().grains.radius()))
     }
 
     /// Masses of the disks, (n,), kg.
     #[getter]
-    fn mass<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(fresh(py, self.open()?.soil().grains.mass()))
+    fn mass(&self) -> Result<Array> {
+        Ok(fresh(self.open()?.soil().grains.mass()))
     }
 
     /// Centres and angles of the disks, (n, 3), m and rad.
     #[getter]
-    fn position<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn position(&self) -> Result<Array> {
         let inner = self.open()?;
-        fresh_rows(py, &Self::disks(inner.q(), n_disks(&inner)))
+        Ok(Self::disks(inner.q(), n_disks(&inner)))
     }
 
     /// Rates of `position`, (n, 3), m/s and rad/s.
     #[getter]
-    fn velocity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn velocity(&self) -> Result<Array> {
         let inner = self.open()?;
-        fresh_rows(py, &Self::disks(inner.v(), n_disks(&inner)))
+        Ok(Self::disks(inner.v(), n_disks(&inner)))
     }
 
     /// Which disks are kinematic, (n,).
     #[getter]
-    fn kinematic<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        Ok(PyArray1::from_slice(
-            py,
-            self.open()?.soil().grains.kinematic(),
-        ))
+    fn kinematic(&self) -> Result<Array<bool>> {
+        Ok(fresh(self.open()?.soil().grains.kinematic()))
     }
 
     /// Which disks sleep, (n,); kinematic ones always do.
     #[getter]
-    fn asleep<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        Ok(PyArray1::from_slice(py, self.open()?.asleep()))
+    fn asleep(&self) -> Result<Array<bool>> {
+        Ok(fresh(self.open()?.asleep()))
     }
 
     /// Coordinates of the machine, (5,), m and rad; empty without one.
     #[getter]
-    fn machine<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    fn machine(&self) -> Result<Array> {
         let inner = self.open()?;
-        Ok(fresh(py, &inner.q()[3 * n_disks(&inner)..]))
+        Ok(fresh(&inner.q()[3 * n_disks(&inner)..]))
     }
 
     /// Rates of the machine's coordinates, (5,), m/s and rad/s; empty without one.
     #[getter]
-    fn machine_rate<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    fn machine_rate(&self) -> Result<Array> {
         let inner = self.open()?;
-        Ok(fresh(py, &inner.v()[3 * n_disks(&inner)..]))
+        Ok(fresh(&inner.v()[3 * n_disks(&inner)..]))
     }
 
     /// Centre and radius of each wheel, (n_wheels, 3), m.
     #[getter]
-    fn wheels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn wheels(&self, _py: Python<'_>) -> Result<Array> {
         let inner = self.open()?;
-        let wheels = inner.soil().wheels(inner.q());
-        let rows = wheels
-            .iter()
-            .map(|(centre, radius)| [centre.x, centre.y, *radius]);
-        fresh_rows(py, &rows.collect::<Vec<_>>())
+        let wheels = inner.soil().wheels(inner.q()).into_iter();
+        Ok(fresh_rows(
+            wheels.map(|(centre, radius)| [centre.x, centre.y, radius]),
+        ))
     }
 
     /// Commanded torques of the rover's wheels, (2,), N m, positive forward; empty without a rover.
     #[getter]
-    fn torques<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(fresh(py, &self.open()?.command().torques))
+    fn torques(&self) -> Result<Array> {
+        Ok(fresh(&self.open()?.command().torques))
     }
 
     /// Force at the machine's centre along x and y, N.
     #[getter]
-    fn pull(&self) -> PyResult<(f64, f64)> {
+    fn pull(&self) -> Result<(f64, f64)> {
         let inner = self.open()?;
         let pull = inner.command().pull;
         Ok((pull.x, pull.y))
@@ -301,7 +263,7 @@ impl SoilSimulation {
 
     /// The options of contacts, gravity and solver, by the names of the arguments.
     #[getter]
-    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn settings<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let inner = self.open()?;
         let (o, friction) = (inner.options(), &inner.soil().friction);
         let settings = bed_arguments::settings(py, o, friction)?;
@@ -329,7 +291,7 @@ impl SoilSimulation {
         velocity: Option<&Bound<'_, PyAny>>,
         machine: Option<&Bound<'_, PyAny>>,
         machine_rate: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<()> {
+    ) -> Result<()> {
         let mut inner = self.open()?;
         let n = n_disks(&inner);
         let mut q = with_angles(position, "position")?;
@@ -345,7 +307,7 @@ impl SoilSimulation {
             Some(rate) => v.extend(vector(rate, Kind::State, "machine_rate")?),
             None => v.resize(v.len() + inner.v().len() - 3 * n, 0.0),
         }
-        Ok(inner.set_state(&q, &v).map_err(|e| grain_error(&e))?)
+        inner.set_state(&q, &v).map_err(|e| grain_error(&e))
     }
 
     /// Takes disks out; the others keep their order.
@@ -356,10 +318,10 @@ impl SoilSimulation {
     /// Raises:
     ///     ModelError: The number of truth values differs, or no disk would be left. Nothing has
     ///         changed.
-    fn remove(&self, which: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn remove(&self, which: &Bound<'_, PyAny>) -> Result<()> {
         let mut inner = self.open()?;
         let which = flags(which, Kind::Model, "which")?;
-        Ok(inner.remove(&which).map_err(|e| grain_error(&e))?)
+        inner.remove(&which).map_err(|e| grain_error(&e))
     }
 
     /// Sets the torques of the rover's wheels.
@@ -369,12 +331,11 @@ impl SoilSimulation {
     ///
     /// Raises:
     ///     CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
-    fn set_torques(&self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn set_torques(&self, torques: &Bound<'_, PyAny>) -> Result<()> {
         let torques = vector(torques, Kind::Command, "torques")?;
-        Ok(self
-            .open()?
+        self.open()?
             .set_inputs(&torques)
-            .map_err(|e| grain_error(&e))?)
+            .map_err(|e| grain_error(&e))
     }
 
     /// Sets the force at the machine's centre, such as that of a drawbar.
@@ -384,12 +345,11 @@ impl SoilSimulation {
     ///
     /// Raises:
     ///     CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
-    fn set_pull(&self, pull: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn set_pull(&self, pull: &Bound<'_, PyAny>) -> Result<()> {
         let pull = pair(pull, Kind::Command, "pull")?;
-        Ok(self
-            .open()?
+        self.open()?
             .set_pull(pull.into())
-            .map_err(|e| grain_error(&e))?)
+            .map_err(|e| grain_error(&e))
     }
 
     /// Takes n steps, as `Simulation.step` does.
@@ -397,21 +357,16 @@ impl SoilSimulation {
     /// Args:
     ///     n: Number of steps.
     ///
-    /// Returns:
-    ///     How the steps went.
-    ///
     /// Raises:
     ///     StepError: A step could not be taken; the state before it stays.
-    ///     OptionError: `n` is not a count.
-    #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
-    fn step(&self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
-        let steps = n.count(1, Kind::Option, "n")?;
-        step(py, &mut *self.open()?, steps)
+    #[pyo3(signature = (n = Steps(1)), text_signature = "($self, n=1)")]
+    fn step(&self, py: Python<'_>, n: Steps) -> Result<StepReport> {
+        step(py, &mut *self.open()?, n)
     }
 
     /// The contacts of the last step.
     #[getter]
-    fn contacts(&self) -> PyResult<SoilContacts> {
+    fn contacts(&self) -> Result<SoilContacts> {
         let inner = self.open()?;
         let wheels = inner.soil().machine.as_ref().map_or(0, |m| m.n_wheels());
         Ok(SoilContacts::new(
@@ -421,35 +376,35 @@ impl SoilSimulation {
     }
 
     /// Kinetic and potential energy now.
-    fn energy(&self) -> PyResult<Energy> {
+    fn energy(&self) -> Result<Energy> {
         Ok(self.open()?.energy().into())
     }
 
     /// Momentum of the disks, (3,): along x and y, kg m/s, and about the origin, kg m²/s.
     ///
     /// Kinematic disks do not count.
-    fn momentum<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(fresh(py, &self.open()?.momentum()))
+    fn momentum(&self) -> Result<Array> {
+        Ok(fresh(&self.open()?.momentum()))
     }
 
     /// Sum of the last step's contact impulses on the wheels, along x and y, (2,), N s.
-    fn impulse_on_wheels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(fresh(py, &self.open()?.impulse_on_wheels()))
+    fn impulse_on_wheels(&self) -> Result<Array> {
+        Ok(fresh(&self.open()?.impulse_on_wheels()))
     }
 
     /// Deepest overlap now, m.
-    fn penetration(&self) -> PyResult<f64> {
+    fn penetration(&self) -> Result<f64> {
         Ok(self.open()?.penetration())
     }
 
     /// Wakes all disks.
-    fn wake(&self) -> PyResult<()> {
+    fn wake(&self) -> Result<()> {
         self.open()?.wake();
         Ok(())
     }
 
     /// Everything that is needed to continue bit for bit.
-    fn snapshot(&self) -> PyResult<SoilSnapshot> {
+    fn snapshot(&self) -> Result<SoilSnapshot> {
         let inner = self.open()?;
         Ok(SoilSnapshot {
             inner: inner.snapshot(),
@@ -463,11 +418,11 @@ impl SoilSimulation {
     ///
     /// Raises:
     ///     StateError: The snapshot belongs to another soil or is damaged. Nothing has changed.
-    fn restore(&self, snapshot: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn restore(&self, snapshot: &Bound<'_, PyAny>) -> Result<()> {
         let mut inner = self.open()?;
         let snapshot = belonging::<SoilSnapshot>(snapshot, "a SoilSnapshot")?;
         let restored = inner.restore(&snapshot.get().inner);
-        Ok(restored.map_err(BorderError::from)?)
+        Ok(restored?)
     }
 
     fn __repr__(&self) -> String {
@@ -501,46 +456,29 @@ impl SoilSimulation {
 ///     ModelError: A number is not finite or out of its range, the radii are the wrong way round,
 ///         or a disk does not fit.
 #[pyfunction]
-#[pyo3(signature = (count = Given::MISSING, *, radius_min = Given::MISSING, radius_max = Given::MISSING, mass = Given::MISSING,
-    left = Given::MISSING, width = Given::MISSING, bottom = Given::MISSING, seed = Given::MISSING),
+#[pyo3(signature = (count = Given::MISSING, **options),
     text_signature = "(count=222, *, radius_min=0.016, radius_max=0.0165, mass=0.7, left=0.0, width=2.4494, bottom=0.0, seed=0)")]
-#[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
-pub fn soil_packing<'py>(
-    py: Python<'py>,
+pub fn soil_packing(
+    py: Python<'_>,
     count: Given<'_>,
-    radius_min: Given<'_>,
-    radius_max: Given<'_>,
-    mass: Given<'_>,
-    left: Given<'_>,
-    width: Given<'_>,
-    bottom: Given<'_>,
-    seed: Given<'_>,
-) -> PyResult<Packed<'py>> {
-    let kind = Kind::Model;
+    options: Option<&Bound<'_, PyDict>>,
+) -> Result<Packed> {
+    let given = Named::keywords(py, options)?.of(Kind::Model);
     let packing = Packing {
-        count: count.count(222, kind, "count")?,
-        radius_min: radius_min.number(0.016, kind, "radius_min")?,
-        radius_max: radius_max.number(0.0165, kind, "radius_max")?,
-        mass: mass.number(0.7, kind, "mass")?,
-        corner: [
-            left.number(0.0, kind, "left")?,
-            bottom.number(0.0, kind, "bottom")?,
-        ],
-        sides: [width.number(2.4494, kind, "width")?, f64::INFINITY],
-        seed: seed.whole(0, kind, "seed")?,
+        count: count.count(222, Kind::Model, "count")?,
+        radius_min: given.number("radius_min", 0.016)?,
+        radius_max: given.number("radius_max", 0.0165)?,
+        mass: given.number("mass", 0.7)?,
+        corner: [given.number("left", 0.0)?, given.number("bottom", 0.0)?],
+        sides: [given.number("width", 2.4494)?, f64::INFINITY],
+        seed: given.whole("seed", 0)?,
     };
-    let built = py.detach(|| packing.build());
-    let (disks, q) = built.map_err(|e| grain_error(&e))?;
-    let centres: Vec<[f64; 2]> = q.chunks_exact(3).map(|c| [c[0], c[1]]).collect();
-    Ok((
-        fresh(py, disks.radius()),
-        fresh(py, disks.mass()),
-        fresh_rows(py, &centres)?,
-    ))
+    given.finish()?;
+    balls::packed::<2>(py, &packing)
 }
 
 /// Adds the soil's classes to the module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+pub fn register(module: &Bound<'_, PyModule>) -> Result<()> {
     module.add_class::<SoilSimulation>()?;
     module.add_class::<SoilContacts>()?;
     module.add_class::<SoilSnapshot>()?;

@@ -1,16 +1,13 @@
 //! `Plane`.
 
-use numpy::PyArray1;
 use pyo3::prelude::*;
 use rover_core::draw::{DrawnGround, tilted_plane};
 use rover_core::geometry::Plane as CorePlane;
 
 use crate::arguments::{Given, number};
-use crate::arrays::{fresh, triple};
-use crate::errors::{BorderError, Kind, Value};
+use crate::arrays::{Array, fresh, triple};
+use crate::errors::{Kind, Result, Value};
 use crate::terrain::Terrain;
-
-type Normal = (f64, f64, f64);
 
 /// A plane as ground: the half-space `normal · x + offset >= 0` is free, the ground lies below.
 ///
@@ -44,10 +41,10 @@ impl Plane {
     fn new(
         normal: Option<&Bound<'_, PyAny>>,
         offset: Given<'_>,
-    ) -> PyResult<PyClassInitializer<Self>> {
+    ) -> Result<PyClassInitializer<Self>> {
         let offset = offset.number(0.0, Kind::Terrain, "offset")?;
         let normal = normal.map_or(Ok([0.0, 1.0, 0.0]), |n| triple(n, Kind::Terrain, "normal"))?;
-        let inner = CorePlane::new(normal, offset).map_err(BorderError::from)?;
+        let inner = CorePlane::new(normal, offset)?;
         Ok(Self::of(inner))
     }
 
@@ -57,27 +54,19 @@ impl Plane {
     ///     slope: Slope, rad.
     ///     uphill: Direction of steepest ascent, rad: an angle about +y from +x.
     ///
-    /// Returns:
-    ///     The plane.
-    ///
     /// Raises:
     ///     TerrainError: An angle is no finite number.
     #[staticmethod]
-    fn tilted<'py>(
-        slope: &Bound<'py, PyAny>,
-        uphill: &Bound<'_, PyAny>,
-    ) -> PyResult<Bound<'py, Self>> {
-        let py = slope.py();
-        let slope = number(slope, Kind::Terrain, "slope")?;
+    fn tilted(slope: &Bound<'_, PyAny>, uphill: &Bound<'_, PyAny>) -> Result<Py<Self>> {
+        let angle = number(slope, Kind::Terrain, "slope")?;
         let uphill = number(uphill, Kind::Terrain, "uphill")?;
-        let inner = tilted_plane(slope, uphill).map_err(BorderError::from)?;
-        Bound::new(py, Self::of(inner))
+        Ok(Py::new(slope.py(), Self::of(tilted_plane(angle, uphill)?))?)
     }
 
     /// Unit normal out of the ground, (3,).
     #[getter]
-    fn normal<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, self.inner.normal().as_slice())
+    fn normal(&self) -> Array {
+        fresh(self.inner.normal().as_slice())
     }
 
     /// Gap between the world's origin and the plane, m; flat ground at height y has the offset -y.
@@ -97,40 +86,25 @@ impl Plane {
     ///
     /// Raises:
     ///     TerrainError: The plane is vertical, or an argument is not a number.
-    fn height(&self, x: &Bound<'_, PyAny>, z: &Bound<'_, PyAny>) -> PyResult<f64> {
+    fn height(&self, x: &Bound<'_, PyAny>, z: &Bound<'_, PyAny>) -> Result<f64> {
         let x = number(x, Kind::Terrain, "x")?;
         let z = number(z, Kind::Terrain, "z")?;
         let n = self.inner.normal();
         if n.y.abs() < 1e-12 {
             let message = "normal: a vertical plane has no height".to_owned();
             let value = Value::Numbers(n.as_slice().to_vec());
-            return Err(BorderError {
-                kind: Kind::Terrain,
-                message,
-                field: Some("normal".to_owned()),
-                value,
-            }
-            .into());
+            return Err(Kind::Terrain.error("normal", message, value));
         }
         Ok(-(n.x * x + n.z * z + self.inner.offset()) / n.y)
     }
 
     fn __repr__(&self) -> String {
-        let n = self.inner.normal();
-        format!(
-            "Plane(normal=({}, {}, {}), offset={})",
-            n.x,
-            n.y,
-            n.z,
-            self.inner.offset()
-        )
+        let (n, offset) = (self.inner.normal(), self.inner.offset());
+        format!("Plane(normal=({}, {}, {}), offset={offset})", n.x, n.y, n.z)
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyAny>, (Normal, f64)) {
-        let n = slf.get().inner.normal();
-        (
-            slf.get_type().into_any(),
-            ((n.x, n.y, n.z), slf.get().inner.offset()),
-        )
+    fn __getnewargs__(&self) -> ((f64, f64, f64), f64) {
+        let n = self.inner.normal();
+        ((n.x, n.y, n.z), self.inner.offset())
     }
 }

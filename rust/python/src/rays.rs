@@ -1,16 +1,15 @@
 //! Rays as arrays, and what they meet as arrays.
 
-use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use rover_core::geometry::RayError;
 use rover_core::geometry::ray::{Hit, Ray, check_rays};
 
 use crate::arguments::{Given, shown};
-use crate::arrays::{array, fresh, fresh_rows};
-use crate::errors::{BorderError, Kind, Value};
+use crate::arrays::{Array, array, fresh_rows};
+use crate::errors::{BorderError, Kind, Result, Value, entry};
 
 /// Distances (n,) and normals (n, 3).
-pub type Met<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
+pub type Met = (Array, Array);
 
 impl From<RayError> for BorderError {
     fn from(e: RayError) -> Self {
@@ -22,28 +21,19 @@ impl From<RayError> for BorderError {
             RayError::NoDirection { index } => (Some(index), Value::Numbers(vec![0.0; 3])),
             RayError::BadRange { value } => (None, Value::Number(*value)),
         };
-        let field = index.map_or_else(
-            || e.field().to_owned(),
-            |index| format!("{}[{index}]", e.field()),
-        );
-        Self {
-            kind: Kind::Option,
-            message: e.to_string(),
-            field: Some(field),
-            value,
-        }
+        Kind::Option.error(entry(e.field(), index), e.to_string(), value)
     }
 }
 
 /// (n, 3) numbers, or (3,) for all rays.
-fn triples(value: &Bound<'_, PyAny>, field: &str) -> PyResult<(Vec<[f64; 3]>, bool)> {
+fn triples(value: &Bound<'_, PyAny>, field: &str) -> Result<(Vec<[f64; 3]>, bool)> {
     let given = array(value, Kind::Option, field)?;
     let view = given.as_array();
     let is_one = view.shape() == [3];
     if !is_one && (view.ndim() != 2 || view.shape()[1] != 3) {
         let shape = view.shape();
         let message = format!("{field}: needs shape (n, 3) or (3,), has {shape:?}");
-        return Err(BorderError::option(field, message, Value::Text(shown(value))).into());
+        return Err(Kind::Option.error(field, message, Value::Text(shown(value))));
     }
     let flat: Vec<f64> = view.iter().copied().collect();
     let rows = flat.chunks_exact(3).map(|x| [x[0], x[1], x[2]]).collect();
@@ -55,7 +45,7 @@ pub fn rays(
     origins: &Bound<'_, PyAny>,
     directions: &Bound<'_, PyAny>,
     max_range: Given<'_>,
-) -> PyResult<(Vec<Ray>, f64)> {
+) -> Result<(Vec<Ray>, f64)> {
     let (mut origins, has_one_origin) = triples(origins, "origins")?;
     let (mut directions, has_one_direction) = triples(directions, "directions")?;
     if has_one_origin && !has_one_direction {
@@ -66,15 +56,16 @@ pub fn rays(
     let range = max_range
         .maybe(Kind::Option, "max_range")?
         .unwrap_or(f64::INFINITY);
-    let rays = check_rays(&origins, &directions, range).map_err(BorderError::from)?;
+    let rays = check_rays(&origins, &directions, range)?;
     Ok((rays, range))
 }
 
 /// Hits as arrays: infinite distances and nan where nothing is met.
-pub fn met<'py>(py: Python<'py>, hits: &[Option<Hit>]) -> PyResult<Met<'py>> {
+pub fn met(hits: &[Option<Hit>]) -> Met {
     let distance = |hit: &Option<Hit>| hit.map_or(f64::INFINITY, |hit| hit.distance);
     let normal = |hit: &Option<Hit>| hit.map_or([f64::NAN; 3], |hit| hit.normal.into());
-    let distances: Vec<f64> = hits.iter().map(distance).collect();
-    let normals: Vec<[f64; 3]> = hits.iter().map(normal).collect();
-    Ok((fresh(py, &distances), fresh_rows(py, &normals)?))
+    (
+        hits.iter().map(distance).collect(),
+        fresh_rows(hits.iter().map(normal)),
+    )
 }

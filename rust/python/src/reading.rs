@@ -5,10 +5,10 @@ use pyo3::types::{PyDict, PySlice};
 use rover_core::simulation::ReadingLayout;
 
 use crate::arrays::{array, two};
-use crate::errors::{BorderError, Kind, Value};
+use crate::errors::{Kind, Result, Value};
 
 /// Names with their slices.
-pub fn slices<'py>(py: Python<'py>, layout: &ReadingLayout) -> PyResult<Bound<'py, PyDict>> {
+pub fn slices<'py>(py: Python<'py>, layout: &ReadingLayout) -> Result<Bound<'py, PyDict>> {
     let names = PyDict::new(py);
     for (name, place) in layout.fields() {
         let (start, stop) = (place.start.cast_signed(), place.end.cast_signed());
@@ -18,7 +18,7 @@ pub fn slices<'py>(py: Python<'py>, layout: &ReadingLayout) -> PyResult<Bound<'p
 }
 
 /// Points (n, 2) of a height scan; none where nothing is given.
-pub fn scan_points(given: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<[f64; 2]>> {
+pub fn scan_points(given: Option<&Bound<'_, PyAny>>) -> Result<Vec<[f64; 2]>> {
     let Some(given) = given else {
         return Ok(Vec::new());
     };
@@ -26,21 +26,21 @@ pub fn scan_points(given: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<[f64; 2]>> 
 }
 
 /// Finite points (n, 2).
-pub fn points(given: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<[f64; 2]>> {
+pub fn points(given: &Bound<'_, PyAny>, field: &str) -> Result<Vec<[f64; 2]>> {
     let points = array(given, Kind::Option, field)?;
     let view = points.as_array();
     let is_finite = view.iter().all(|x| x.is_finite());
     if view.ndim() != 2 || view.shape()[1] != 2 || !is_finite {
         let shape = view.shape();
         let message = format!("{field}: needs finite numbers of shape (n, 2), has {shape:?}");
-        return Err(BorderError::option(field, message, Value::Count(view.ndim())).into());
+        return Err(Kind::Option.error(field, message, Value::Count(view.ndim())));
     }
     let flat: Vec<f64> = view.iter().copied().collect();
     Ok(flat.chunks_exact(2).map(|p| [p[0], p[1]]).collect())
 }
 
 /// A finite place on the map; the origin where nothing is given.
-pub fn place(target: Option<&Bound<'_, PyAny>>) -> PyResult<[f64; 2]> {
+pub fn place(target: Option<&Bound<'_, PyAny>>) -> Result<[f64; 2]> {
     let Some(given) = target else {
         return Ok([0.0; 2]);
     };
@@ -51,7 +51,7 @@ pub fn place(target: Option<&Bound<'_, PyAny>>) -> PyResult<[f64; 2]> {
             let value = target[index];
             let field = format!("target[{index}]");
             let message = format!("{field}: must be finite, is {value}");
-            Err(BorderError::option(&field, message, Value::Number(value)).into())
+            Err(Kind::Option.error(&field, message, Value::Number(value)))
         }
     }
 }

@@ -2,14 +2,14 @@
 
 use std::sync::MutexGuard;
 
-use numpy::PyArray1;
 use pyo3::prelude::*;
 use rover_core::integrator::{StepError, StepReport as CoreReport};
 use rover_core::simulation::{RoverInGrains, RoverSimulation, TogetherError};
 
 use crate::arguments::{Given, refused};
+use crate::arrays::Array;
 use crate::bed_arguments::grain_error;
-use crate::errors::{BorderError, Kind, Value};
+use crate::errors::{BorderError, Kind, Result, Value};
 use crate::grains::GrainSimulation;
 use crate::report::StepReport;
 use crate::shared::{Shared, Watch};
@@ -92,7 +92,7 @@ impl RoverGrainSimulation {
         rover: &Bound<'_, PyAny>,
         grains: &Bound<'_, PyAny>,
         wheel_friction: Given<'_>,
-    ) -> PyResult<Self> {
+    ) -> Result<Self> {
         let rover = rover
             .cast::<Simulation>()
             .map_err(|_| refused(rover, Kind::Model, "rover", "a Simulation"))?;
@@ -102,7 +102,7 @@ impl RoverGrainSimulation {
         let friction = wheel_friction.number(0.9, Kind::Option, "wheel_friction")?;
         let link = RoverInGrains::new(&*rover.get().open()?, &*grains.get().open()?, friction);
         Ok(Self {
-            link: Shared::new(link.map_err(BorderError::from)?),
+            link: Shared::new(link?),
             rover: rover.clone().unbind(),
             grains: grains.clone().unbind(),
         })
@@ -122,19 +122,19 @@ impl RoverGrainSimulation {
 
     /// Coulomb's coefficient between the rover and grains.
     #[getter]
-    fn wheel_friction(&self) -> PyResult<f64> {
+    fn wheel_friction(&self) -> Result<f64> {
         Ok(self.link()?.friction())
     }
 
     /// Time of the grains, s.
     #[getter]
-    fn time(&self) -> PyResult<f64> {
+    fn time(&self) -> Result<f64> {
         Ok(self.grains.get().open()?.time())
     }
 
     /// Time step, s.
     #[getter]
-    fn time_step(&self) -> PyResult<f64> {
+    fn time_step(&self) -> Result<f64> {
         Ok(self.grains.get().open()?.options().time_step)
     }
 
@@ -143,14 +143,10 @@ impl RoverGrainSimulation {
     /// Args:
     ///     n: Number of steps.
     ///
-    /// Returns:
-    ///     How the steps went.
-    ///
     /// Raises:
     ///     StepError: A step could not be taken; the state before it stays.
-    ///     OptionError: `n` is not a count.
     #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
-    fn step(&self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
+    fn step(&self, py: Python<'_>, n: Given<'_>) -> Result<StepReport> {
         let steps = n.count(1, Kind::Option, "n")?;
         let mut rover = self.of_rover().open()?;
         let moving = &mut *rover;
@@ -163,20 +159,20 @@ impl RoverGrainSimulation {
     ///
     /// Positive when apart. A wheel without a grain within its radius has the gap to the terrain.
     #[getter]
-    fn wheel_gaps<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    fn wheel_gaps(&self) -> Result<Array> {
         let link = self.link()?;
         let gaps = link.wheel_gaps(&*self.rover.get().open()?, &*self.grains.get().open()?);
-        Ok(PyArray1::from_vec(py, gaps))
+        Ok(Array::from(gaps))
     }
 
     /// Deepest overlap now, m: of grains with anything, and of the rover with grains.
-    fn penetration(&self) -> PyResult<f64> {
+    fn penetration(&self) -> Result<f64> {
         let link = self.link()?;
         Ok(link.penetration(&*self.rover.get().open()?, &*self.grains.get().open()?))
     }
 
     /// Everything that is needed to continue bit for bit.
-    fn snapshot(&self) -> PyResult<RoverGrainSnapshot> {
+    fn snapshot(&self) -> Result<RoverGrainSnapshot> {
         let rover = self.rover.get().open()?.snapshot();
         let grains = self.grains.get().open()?.snapshot();
         Ok(RoverGrainSnapshot {
@@ -192,16 +188,16 @@ impl RoverGrainSimulation {
     /// Raises:
     ///     StateError: The snapshot belongs to another rover or other grains, or is damaged.
     ///         Nothing has changed.
-    fn restore(&self, snapshot: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn restore(&self, snapshot: &Bound<'_, PyAny>) -> Result<()> {
         let mut rover = self.rover.get().open()?;
         let mut grains = self.grains.get().open()?;
         let snapshot = belonging::<RoverGrainSnapshot>(snapshot, "a RoverGrainSnapshot")?;
         let (of_rover, of_grains) = &snapshot.get().inner;
         let before = rover.snapshot();
-        rover.restore(of_rover).map_err(BorderError::from)?;
+        rover.restore(of_rover)?;
         if let Err(e) = grains.restore(of_grains) {
-            rover.restore(&before).map_err(BorderError::from)?;
-            return Err(BorderError::from(e).into());
+            rover.restore(&before)?;
+            return Err(BorderError::from(e));
         }
         Ok(())
     }
@@ -217,7 +213,7 @@ impl RoverGrainSimulation {
 }
 
 /// Adds the class of a rover among grains to the module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+pub fn register(module: &Bound<'_, PyModule>) -> Result<()> {
     module.add_class::<RoverGrainSimulation>()?;
     module.add_class::<RoverGrainSnapshot>()?;
     Ok(())

@@ -1,6 +1,5 @@
 //! Soils, the sand of a simulation, and one wheel on a virtual test bed.
 
-use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
 use rover_core::sand::{
@@ -9,7 +8,7 @@ use rover_core::sand::{
 };
 
 use crate::arguments::{Given, number, refused, whole};
-use crate::arrays::{fresh, fresh_table, rows};
+use crate::arrays::{Array, fresh, fresh_rows, rows};
 use crate::errors::{BorderError, Kind};
 use crate::planar_ground::quantity;
 
@@ -41,7 +40,7 @@ impl<'py> Numbers<'py> {
             field: Some("soil".to_owned()),
             value: crate::errors::Value::Text(name.to_owned()),
         })?;
-        number(&value, Kind::Terrain, name)
+        Ok(number(&value, Kind::Terrain, name)?)
     }
 
     fn interface(&self, name: &str) -> PyResult<Interface> {
@@ -140,11 +139,11 @@ pub fn sand_to_dict<'py>(
     };
     let forces: Vec<[f64; 3]> = sand.wheels.iter().map(|wheel| wheel.force).collect();
     let moments: Vec<[f64; 3]> = sand.wheels.iter().map(|wheel| wheel.moment).collect();
-    found.set_item("force", fresh_table(py, forces.into_iter())?)?;
-    found.set_item("moment", fresh_table(py, moments.into_iter())?)?;
-    found.set_item("sinkage", fresh(py, &of(|wheel| wheel.sinkage)))?;
-    found.set_item("absorbed", fresh(py, &of(|wheel| wheel.absorbed)))?;
-    found.set_item("slip", fresh(py, slip))?;
+    found.set_item("force", fresh_rows(forces))?;
+    found.set_item("moment", fresh_rows(moments))?;
+    found.set_item("sinkage", fresh(&of(|wheel| wheel.sinkage)))?;
+    found.set_item("absorbed", fresh(&of(|wheel| wheel.absorbed)))?;
+    found.set_item("slip", fresh(slip))?;
     let ruts = sand.ruts.cells().into_iter();
     let ruts: Vec<[f64; 3]> = ruts
         .map(|(i, k, depth)| {
@@ -152,7 +151,7 @@ pub fn sand_to_dict<'py>(
             [place(i), place(k), depth]
         })
         .collect();
-    found.set_item("ruts", fresh_table(py, ruts.into_iter())?)?;
+    found.set_item("ruts", fresh_rows(ruts))?;
     Ok(found)
 }
 
@@ -278,11 +277,7 @@ impl WheelBed {
     ///
     /// Raises:
     ///     OptionError: `drives` has a wrong shape or an entry that is not finite.
-    fn steady<'py>(
-        &self,
-        py: Python<'py>,
-        drives: &Bound<'_, PyAny>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn steady(&self, py: Python<'_>, drives: &Bound<'_, PyAny>) -> PyResult<Array> {
         let drives = rows::<5>(drives, "drives")?;
         let found = py.detach(|| {
             let runs = drives
@@ -291,7 +286,7 @@ impl WheelBed {
             let runs = runs.map(|run| run.map_or([f64::NAN; 5], listed));
             runs.collect::<Vec<_>>()
         });
-        fresh_table(py, found.into_iter())
+        Ok(fresh_rows(found))
     }
 
     /// Forces in steady motion at a given sinkage.
@@ -305,18 +300,13 @@ impl WheelBed {
     ///
     /// Raises:
     ///     OptionError: An argument has a wrong shape or is not finite.
-    fn forces<'py>(
-        &self,
-        py: Python<'py>,
-        sinkage: &Bound<'_, PyAny>,
-        drives: &Bound<'_, PyAny>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn forces(&self, sinkage: &Bound<'_, PyAny>, drives: &Bound<'_, PyAny>) -> PyResult<Array> {
         let sinkage = number(sinkage, Kind::Option, "sinkage")?;
         let drives = rows::<5>(drives, "drives")?;
         let found = drives
             .iter()
             .map(|drive| listed(self.bed.at(sinkage, &drive_of(*drive))));
-        fresh_table(py, found.collect::<Vec<_>>().into_iter())
+        Ok(fresh_rows(found.collect::<Vec<_>>()))
     }
 
     /// A run from rest on the surface: the wheel is let down and driven.
@@ -331,13 +321,12 @@ impl WheelBed {
     ///
     /// Raises:
     ///     OptionError: An argument has a wrong shape, is not finite, or is not positive.
-    fn run<'py>(
+    fn run(
         &self,
-        py: Python<'py>,
         drives: &Bound<'_, PyAny>,
         mass: &Bound<'_, PyAny>,
         time_step: &Bound<'_, PyAny>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    ) -> PyResult<Array> {
         let drives = rows::<5>(drives, "drives")?;
         let positive = |given: &Bound<'_, PyAny>, field: &str| {
             let value = number(given, Kind::Option, field)?;
@@ -350,6 +339,6 @@ impl WheelBed {
             let drive = drive_of(*drive);
             listed(self.bed.advance(&mut state, &drive, mass, h))
         });
-        fresh_table(py, found.collect::<Vec<_>>().into_iter())
+        Ok(fresh_rows(found.collect::<Vec<_>>()))
     }
 }

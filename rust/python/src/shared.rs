@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use pyo3::prelude::*;
 
-use crate::errors::{BorderError, Kind, Value};
+use crate::errors::{BorderError, Kind, Result, Value};
 
 /// How often a long call looks for signals.
 const LOOKING: Duration = Duration::from_millis(20);
@@ -28,14 +28,12 @@ impl<T> Shared<T> {
         match self.0.try_lock() {
             Ok(inner) => Ok(inner),
             Err(TryLockError::Poisoned(inner)) => Ok(inner.into_inner()),
-            Err(TryLockError::WouldBlock) => Err(BorderError {
-                kind: Kind::Busy,
-                message: "another call on this object is still going on, in another thread or under a signal \
-                          handler: give each thread an object of its own, or wait for the call's end"
-                    .to_owned(),
-                field: None,
-                value: Value::Nothing,
-            }),
+            Err(TryLockError::WouldBlock) => {
+                let message = "another call on this object is still going on, in another thread or \
+                               under a signal handler: give each thread an object of its own, or wait \
+                               for the call's end";
+                Err(Kind::Busy.refusal(message.to_owned(), Value::Nothing))
+            }
         }
     }
 }
@@ -65,13 +63,13 @@ impl Watch {
     }
 
     /// What a handler raised.
-    pub fn raised(self) -> PyResult<()> {
-        self.raised.map_or(Ok(()), Err)
+    pub fn raised(self) -> Result<()> {
+        Ok(self.raised.map_or(Ok(()), Err)?)
     }
 
     /// The call's result, or what a handler raised.
-    pub fn result<T>(self, result: Result<T, impl Into<BorderError>>) -> PyResult<T> {
+    pub fn result<T>(self, result: Result<T, impl Into<BorderError>>) -> Result<T> {
         self.raised()?;
-        Ok(result.map_err(Into::into)?)
+        result.map_err(Into::into)
     }
 }

@@ -1,12 +1,11 @@
 //! `Simulation`: one rover on one terrain.
 
-use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use rover_core::contact::Part;
 use rover_core::draw::DrawnGround;
 use rover_core::geometry::Plane;
-use rover_core::integrator::{Accuracy, StepOptions};
+use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Model, coordinates};
 use rover_core::nalgebra::DMatrix;
 use rover_core::simulation::{
@@ -16,10 +15,10 @@ use rover_core::solver::SolverOptions;
 use std::sync::{Arc, MutexGuard};
 
 use crate::accuracy;
-use crate::arguments::{Given, number, texts};
-use crate::arrays::{at_most, fresh, fresh_matrix, fresh_rows, vector};
+use crate::arguments::{Given, Named, number, texts};
+use crate::arrays::{Array, at_most, fresh, fresh_matrix, fresh_rows, vector};
 use crate::contacts::Contacts;
-use crate::errors::{BorderError, Kind, Value};
+use crate::errors::{BorderError, Kind, Result, Value};
 use crate::linearisation::Linearisation;
 use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
 use crate::options::{Options, SolverWords, settings};
@@ -29,7 +28,7 @@ use crate::report::{Energy, StepReport};
 use crate::sand::sand_to_dict;
 use crate::shared::{Shared, Watch};
 use crate::snapshot::{Snapshot, belonging};
-use crate::stepping::{Problem, problem, step};
+use crate::stepping::{Problem, Steps, problem, step};
 use crate::{terrain, union};
 
 /// A rover on a terrain, stepped through time.
@@ -85,7 +84,7 @@ pub struct Origin {
     pub words: SolverWords,
 }
 
-fn names(joints: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
+fn names(joints: &Bound<'_, PyAny>) -> Result<Vec<String>> {
     texts(joints, Kind::Command, "joints")
 }
 
@@ -111,7 +110,7 @@ impl Simulation {
     }
 
     /// Commands, one for each wheel.
-    fn commands(&self, value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<f64>> {
+    fn commands(&self, value: &Bound<'_, PyAny>, field: &str) -> Result<Vec<f64>> {
         at_most(value, self.model.wheels().len(), Kind::Command, field)
     }
 }
@@ -119,65 +118,24 @@ impl Simulation {
 #[pymethods]
 impl Simulation {
     #[new]
-    #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
-    #[pyo3(signature = (model = Given::MISSING, terrain = None, *, gravity = None, friction = Given::MISSING, restitution = Given::MISSING,
-        materials = None, time_step = Given::MISSING, variant = Given::MISSING, theta = Given::MISSING, forecast = Given::MISSING,
-        solver = Given::MISSING, tolerance = Given::MISSING, max_iterations = Given::MISSING, budget = None,
-        stabilisation = Given::MISSING, warm_start = Given::MISSING, accuracy = None),
+    #[pyo3(signature = (model = Given::MISSING, terrain = None, **options),
         text_signature = "(model=None, terrain=None, *, gravity=None, friction=0.7, restitution=0.0, materials=None, time_step=None, variant=None, theta=0.5, forecast=0.5, solver='auto', tolerance=None, max_iterations=1000, budget=None, stabilisation='projection', warm_start=True, accuracy=None)")]
     fn new(
+        py: Python<'_>,
         model: Given<'_>,
         terrain: Option<&Bound<'_, PyAny>>,
-        gravity: Option<&Bound<'_, PyAny>>,
-        friction: Given<'_>,
-        restitution: Given<'_>,
-        materials: Option<&Bound<'_, PyAny>>,
-        time_step: Given<'_>,
-        variant: Given<'_>,
-        theta: Given<'_>,
-        forecast: Given<'_>,
-        solver: Given<'_>,
-        tolerance: Given<'_>,
-        max_iterations: Given<'_>,
-        budget: Option<&Bound<'_, PyAny>>,
-        stabilisation: Given<'_>,
-        warm_start: Given<'_>,
-        accuracy: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Self> {
-        let free = [
-            ("time_step", time_step.some()),
-            ("variant", variant.some()),
-            ("tolerance", tolerance.some()),
-        ];
-        let clash = free.iter().find(|(_, given)| given.is_some());
-        let given = [
-            ("friction", friction.given()),
-            ("restitution", restitution.given()),
-            ("materials", materials.cloned()),
-            ("theta", theta.given()),
-            ("forecast", forecast.given()),
-            ("solver", solver.given()),
-            ("max_iterations", max_iterations.given()),
-            ("budget", budget.cloned()),
-            ("stabilisation", stabilisation.given()),
-            ("warm_start", warm_start.given()),
-        ];
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> Result<Self> {
+        let given = Named::keywords(py, options)?;
         let model = model.object::<RoverModel>(Kind::Model, "model", "a RoverModel")?;
         let model = model.map_or_else(|| Arc::new(Model::rover()), |m| m.inner);
         let terrain = match terrain {
             None => DrawnGround::Plane(Plane::ground()),
             Some(given) => terrain::parse(given)?,
         };
-        let chosen = match (accuracy, clash) {
-            (None, _) => Accuracy::BALANCED,
-            (Some(given), None) => accuracy::parse(given)?,
-            (Some(_), Some((field, _))) => {
-                let message = format!("{field}: accuracy chooses it, so it cannot be given beside");
-                return Err(BorderError::option(field, message, Value::Nothing).into());
-            }
-        };
-        let mut options = Options::of(StepOptions {
-            gravity: checked_gravity(gravity)?,
+        let chosen = accuracy::chosen(&given)?;
+        let options = Options::of(StepOptions {
+            gravity: checked_gravity(given.some("gravity")?.as_ref())?,
             time_step: chosen.time_step,
             variant: chosen.variant,
             solver: SolverOptions {
@@ -186,16 +144,10 @@ impl Simulation {
             },
             ..StepOptions::default()
         });
-        for (field, value) in free.iter().chain(&given) {
-            if let Some(value) = value {
-                options.take(field, value)?;
-            }
-        }
-        let (options, words) = options.finish()?;
-        let inner =
-            CoreSimulation::new(model, terrain.terrain(), options).map_err(BorderError::from)?;
-        let origin = Origin { terrain, words };
-        Ok(Self::of(inner, origin))
+        let (options, words) = options.read(&given)?;
+        given.finish()?;
+        let inner = CoreSimulation::new(model, terrain.terrain(), options)?;
+        Ok(Self::of(inner, Origin { terrain, words }))
     }
 
     /// The machine.
@@ -206,7 +158,7 @@ impl Simulation {
 
     /// The ground.
     #[getter]
-    fn terrain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn terrain<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
         union::object(py, &self.origin.terrain)
     }
 
@@ -222,7 +174,7 @@ impl Simulation {
     ///
     /// Raises:
     ///     BusyError: Another thread is stepping this simulation.
-    fn sand<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+    fn sand<'py>(&self, py: Python<'py>) -> Result<Option<Bound<'py, PyDict>>> {
         let open = self.open()?;
         let Some(sand) = open.sand() else {
             return Ok(None);
@@ -237,7 +189,7 @@ impl Simulation {
 
     /// Time since the last call of `set_state`, s.
     #[getter]
-    fn time(&self) -> PyResult<f64> {
+    fn time(&self) -> Result<f64> {
         Ok(self.open()?.state().time)
     }
 
@@ -249,8 +201,8 @@ impl Simulation {
 
     /// Gravity, world frame, (3,), m/s².
     #[getter]
-    fn gravity<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, self.options.gravity.as_slice())
+    fn gravity(&self) -> Array {
+        fresh(self.options.gravity.as_slice())
     }
 
     /// Coulomb's coefficient of every contact whose pair is not in `materials`.
@@ -267,21 +219,19 @@ impl Simulation {
 
     /// Friction and restitution by pair of materials, as given.
     #[getter]
-    fn materials<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn materials<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let laws = PyDict::new(py);
         for pair in self.options.materials.pairs() {
             let [first, second] = &pair.materials;
-            laws.set_item(
-                (first, second),
-                (pair.friction_coefficient, pair.restitution),
-            )?;
+            let law = (pair.friction_coefficient, pair.restitution);
+            laws.set_item((first, second), law)?;
         }
         Ok(laws)
     }
 
     /// The keyword arguments that make a simulation with the same options.
     #[getter]
-    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn settings<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let gravity = &self.options.gravity;
         let gravity = (gravity.x, gravity.y, gravity.z).into_pyobject(py)?;
         settings(&gravity, &self.options, &self.origin.words)
@@ -291,7 +241,7 @@ impl Simulation {
     ///
     /// Either 8, 4 or 1, and always 1 if all steps are general: see `fallback_reason`.
     #[getter]
-    fn lanes(&self) -> PyResult<usize> {
+    fn lanes(&self) -> Result<usize> {
         Ok(self.open()?.lanes())
     }
 
@@ -299,7 +249,7 @@ impl Simulation {
     ///
     /// Of fast steps, `StepReport.fallbacks` counts those that had to be general after all.
     #[getter]
-    fn fallback_reason(&self) -> PyResult<Option<String>> {
+    fn fallback_reason(&self) -> Result<Option<String>> {
         Ok(self.open()?.fallback_reason().map(|why| why.to_string()))
     }
 
@@ -307,35 +257,30 @@ impl Simulation {
     ///
     /// x, y, z of the trunk's origin; roll, heading, pitch; joints.
     #[getter]
-    fn q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let q = {
-            let simulation = self.open()?;
-            coordinates::to_public(simulation.model(), &simulation.state().configuration)
-        };
-        Ok(fresh(py, &q))
+    fn q(&self) -> Result<Array> {
+        let held = self.open()?;
+        Ok(coordinates::to_public(&self.model, &held.state().configuration).into())
     }
 
     /// Velocities, (nv,), m/s and rad/s.
     ///
     /// Velocity of the trunk, world frame; its angular velocity, world frame; joint rates.
     #[getter]
-    fn v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(fresh(py, &self.open()?.state().v))
+    fn v(&self) -> Result<Array> {
+        Ok(fresh(&self.open()?.state().v))
     }
 
     /// Rotation matrix R_WB, (3, 3), from coordinates in the trunk to coordinates in the world.
     #[getter]
-    fn rotation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn rotation(&self) -> Result<Array> {
         let R = self
             .open()?
             .state()
             .configuration
             .attitude
             .to_rotation_matrix();
-        fresh_matrix(
-            py,
-            &DMatrix::from_iterator(3, 3, R.matrix().iter().copied()),
-        )
+        let R = DMatrix::from_iterator(3, 3, R.matrix().iter().copied());
+        Ok(fresh_matrix(&R))
     }
 
     /// Sets coordinates and velocities.
@@ -351,21 +296,19 @@ impl Simulation {
     ///     StateError: An array has a wrong length or an entry that is not finite. Nothing has
     ///         changed.
     ///     OptionError: `coordinates` is neither of the two.
-    #[pyo3(signature = (q, qdot = None, *, coordinates = Given::MISSING), text_signature = "($self, q, qdot=None, *, coordinates='state')")]
+    #[pyo3(signature = (q, qdot = None, *, coordinates = Coordinates::STATE), text_signature = "($self, q, qdot=None, *, coordinates='state')")]
     fn set_state(
         &self,
         q: &Bound<'_, PyAny>,
         qdot: Option<&Bound<'_, PyAny>>,
-        coordinates: Given<'_>,
-    ) -> PyResult<()> {
-        let kind = Coordinates::given(coordinates)?;
+        coordinates: Coordinates,
+    ) -> Result<()> {
+        let chart = coordinates.chart();
         let q = vector(q, Kind::State, "q")?;
-        let configuration = kind.configuration(&self.model, &q)?;
-        let qdot = qdot.map_or_else(
-            || Ok(vec![0.0; self.model.nv()]),
-            |v| vector(v, Kind::State, "qdot"),
-        )?;
-        let v = kind.velocity(&self.model, &q, &qdot)?;
+        let configuration = chart.configuration(&self.model, &q)?;
+        let rest = || Ok(vec![0.0; self.model.nv()]);
+        let qdot = qdot.map_or_else(rest, |v| vector(v, Kind::State, "qdot"))?;
+        let v = chart.velocity(&self.model, &q, &qdot)?;
         self.open()?.set_state(configuration, v);
         Ok(())
     }
@@ -377,26 +320,25 @@ impl Simulation {
     ///
     /// Raises:
     ///     StateError: The heading is ±90 degrees, where these coordinates are singular.
-    fn report_state<'py>(&self, py: Python<'py>) -> PyResult<Pair<'py>> {
+    fn report_state(&self) -> Result<Pair> {
         let held = self.open()?;
         let state = held.state();
-        let (q, qdot) = coordinates::to_report(&self.model, &state.configuration, &state.v)
-            .map_err(BorderError::from)?;
-        Ok((fresh(py, &q), fresh(py, &qdot)))
+        let (q, qdot) = coordinates::to_report(&self.model, &state.configuration, &state.v)?;
+        Ok((q.into(), qdot.into()))
     }
 
     /// Commanded torques, within the model's limits, (n_wheels,), N m, positive forward.
     #[getter]
-    fn wheel_torques<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(fresh(py, self.open()?.wheel_torques()))
+    fn wheel_torques(&self) -> Result<Array> {
+        Ok(fresh(self.open()?.wheel_torques()))
     }
 
     /// Mean torques of the drives over the last step, (n_wheels,), N m, positive forward.
     ///
     /// Each is the command within the line of the wheel's `Motor`; 0 before any step.
     #[getter]
-    fn motor_torques<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(fresh(py, self.open()?.motor_torques()))
+    fn motor_torques(&self) -> Result<Array> {
+        Ok(fresh(self.open()?.motor_torques()))
     }
 
     /// Sets the driving torques; each saturates at its wheel's limit.
@@ -406,18 +348,15 @@ impl Simulation {
     ///
     /// Raises:
     ///     CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
-    fn set_wheel_torques(&self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn set_wheel_torques(&self, torques: &Bound<'_, PyAny>) -> Result<()> {
         let torques = self.commands(torques, "torques")?;
-        Ok(self
-            .open()?
-            .set_wheel_torques(&torques)
-            .map_err(BorderError::from)?)
+        Ok(self.open()?.set_wheel_torques(&torques)?)
     }
 
     /// Steering set-points, (n_wheels,), rad; 0 for wheels whose steering is not held.
     #[getter]
-    fn steering<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(fresh(py, &self.open()?.steering()))
+    fn steering(&self) -> Result<Array> {
+        Ok(fresh(&self.open()?.steering()))
     }
 
     /// Sets the steering set-points, which an implicit PD controller holds with the model's gains.
@@ -428,12 +367,9 @@ impl Simulation {
     /// Raises:
     ///     CommandError: A wrong length, an entry that is not finite or beyond the wheel's limit,
     ///         or one that is not 0 for a wheel that cannot be steered. Nothing has changed.
-    fn set_steering(&self, set_points: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn set_steering(&self, set_points: &Bound<'_, PyAny>) -> Result<()> {
         let set_points = self.commands(set_points, "set_points")?;
-        Ok(self
-            .open()?
-            .set_steering(&set_points)
-            .map_err(BorderError::from)?)
+        Ok(self.open()?.set_steering(&set_points)?)
     }
 
     /// Sets torques and steering together: both, or neither where either is refused.
@@ -448,13 +384,10 @@ impl Simulation {
         &self,
         torques: &Bound<'_, PyAny>,
         set_points: &Bound<'_, PyAny>,
-    ) -> PyResult<()> {
+    ) -> Result<()> {
         let torques = self.commands(torques, "torques")?;
         let set_points = self.commands(set_points, "set_points")?;
-        Ok(self
-            .open()?
-            .set_commands(&torques, &set_points)
-            .map_err(BorderError::from)?)
+        Ok(self.open()?.set_commands(&torques, &set_points)?)
     }
 
     /// Sets torques about the joint axes.
@@ -467,13 +400,10 @@ impl Simulation {
     ///
     /// Raises:
     ///     CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
-    fn set_joint_torques(&self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn set_joint_torques(&self, torques: &Bound<'_, PyAny>) -> Result<()> {
         let n_joints = self.model.n_joints();
         let torques = at_most(torques, n_joints, Kind::Command, "torques")?;
-        Ok(self
-            .open()?
-            .set_joint_torques(&torques)
-            .map_err(BorderError::from)?)
+        Ok(self.open()?.set_joint_torques(&torques)?)
     }
 
     /// Holds joints at set-points by an implicit PD controller.
@@ -494,7 +424,7 @@ impl Simulation {
         set_points: Option<&Bound<'_, PyAny>>,
         stiffness: Option<&Bound<'_, PyAny>>,
         damping: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<()> {
+    ) -> Result<()> {
         let one = |x: &Bound<'_, PyAny>, field| number(x, Kind::Command, field);
         let read = |s: &Bound<'_, PyAny>| match s.len() {
             Ok(_) => vector(s, Kind::Command, "set_points"),
@@ -506,7 +436,7 @@ impl Simulation {
         let joints = names(joints)?;
         let mut inner = self.open()?;
         let held = inner.hold(&joints, set_points.as_deref(), stiffness, damping);
-        Ok(held.map_err(BorderError::from)?)
+        Ok(held?)
     }
 
     /// Releases joints that are held.
@@ -516,15 +446,12 @@ impl Simulation {
     ///
     /// Raises:
     ///     CommandError: There is no such joint. Nothing has changed.
-    fn release(&self, joints: &Bound<'_, PyAny>) -> PyResult<()> {
-        Ok(self
-            .open()?
-            .release(&names(joints)?)
-            .map_err(BorderError::from)?)
+    fn release(&self, joints: &Bound<'_, PyAny>) -> Result<()> {
+        Ok(self.open()?.release(&names(joints)?)?)
     }
 
     /// Holds all wheels where they are, as `hold` does, and sets their torques to 0.
-    fn brake(&self) -> PyResult<()> {
+    fn brake(&self) -> Result<()> {
         self.open()?.brake();
         Ok(())
     }
@@ -538,52 +465,52 @@ impl Simulation {
     /// Args:
     ///     n: Number of steps.
     ///
-    /// Returns:
-    ///     How the steps went.
-    ///
     /// Raises:
     ///     StepError: A step could not be taken; the state before it stays.
     ///     OptionError: `n` is not a count.
-    #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
-    fn step(&self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
-        let steps = n.count(1, Kind::Option, "n")?;
+    #[pyo3(signature = (n = Steps(1)), text_signature = "($self, n=1)")]
+    fn step(&self, py: Python<'_>, n: Steps) -> Result<StepReport> {
         let mut simulation = self.open()?;
-        let report = step(py, &mut *simulation, steps)?;
+        let report = step(py, &mut *simulation, n)?;
         Ok(report.with_undetermined_loads(simulation.undetermined_loads()))
     }
 
     /// The contacts of the last step.
     #[getter]
-    fn contacts(&self) -> PyResult<Contacts> {
+    fn contacts(&self) -> Result<Contacts> {
         Ok(Contacts::new(&self.model, self.open()?.contacts()))
     }
 
     /// Gap of each wheel now, (n_wheels,), m, positive when apart.
     #[getter]
-    fn wheel_gaps<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let contacts = self.open()?.wheel_contacts();
-        Ok(PyArray1::from_iter(py, contacts.iter().map(|c| c.gap)))
+    fn wheel_gaps(&self) -> Result<Array> {
+        Ok(self
+            .open()?
+            .wheel_contacts()
+            .iter()
+            .map(|c| c.gap)
+            .collect())
     }
 
     /// Mean contact force on each wheel over the last step, (n_wheels, 3), N.
     ///
     /// Along n, t, b of the wheel's contact frame.
     #[getter]
-    fn wheel_forces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        fresh_rows(py, &self.open()?.wheel_forces())
+    fn wheel_forces(&self) -> Result<Array> {
+        Ok(fresh_rows(self.open()?.wheel_forces()))
     }
 
     /// Mean normal force over the last step on all solids but the wheels, N.
     ///
     /// It is large when the rover is high-centred.
     #[getter]
-    fn trunk_force(&self) -> PyResult<f64> {
+    fn trunk_force(&self) -> Result<f64> {
         Ok(self.open()?.body_force())
     }
 
     /// Deepest overlap of a wheel or a box with the ground now, as a gap, m; 0 without overlap.
     #[getter]
-    fn deepest_overlap(&self) -> PyResult<f64> {
+    fn deepest_overlap(&self) -> Result<f64> {
         Ok(self.open()?.deepest_overlap())
     }
 
@@ -601,12 +528,11 @@ impl Simulation {
     /// Raises:
     ///     OptionError: An argument has a wrong shape or an entry that is not finite.
     #[pyo3(signature = (target = None, scan = None))]
-    fn reading<'py>(
+    fn reading(
         &self,
-        py: Python<'py>,
         target: Option<&Bound<'_, PyAny>>,
         scan: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    ) -> Result<Array> {
         let scan = scan_points(scan)?;
         let look = Look {
             target: place(target)?,
@@ -615,7 +541,7 @@ impl Simulation {
         let mut row = vec![0.0; ReadingLayout::new(&self.model, scan.len()).size()];
         let mut scratch = ReadingScratch::default();
         self.open()?.read(&look, &mut scratch, &mut row);
-        Ok(PyArray1::from_vec(py, row))
+        Ok(row.into())
     }
 
     /// The place of each quantity in a reading.
@@ -651,12 +577,11 @@ impl Simulation {
     /// Raises:
     ///     OptionError: `n_scan` is not a count.
     #[pyo3(signature = (n_scan = Given::MISSING), text_signature = "($self, n_scan=0)")]
-    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn reading_layout<'py>(
         &self,
         py: Python<'py>,
         n_scan: Given<'_>,
-    ) -> PyResult<Bound<'py, PyDict>> {
+    ) -> Result<Bound<'py, PyDict>> {
         let n_scan = n_scan.count(0, Kind::Option, "n_scan")?;
         slices(py, &ReadingLayout::new(&self.model, n_scan))
     }
@@ -680,43 +605,38 @@ impl Simulation {
     ///     OptionError: As of `Plane.cast_rays`, or `without` names no solid of the model.
     #[pyo3(signature = (origins, directions, max_range = Given::MISSING, *, parts = Given::MISSING, without = None),
         text_signature = "($self, origins, directions, max_range=None, *, parts=False, without=())")]
-    fn cast_rays<'py>(
+    fn cast_rays(
         &self,
-        py: Python<'py>,
         origins: &Bound<'_, PyAny>,
         directions: &Bound<'_, PyAny>,
         max_range: Given<'_>,
         parts: Given<'_>,
         without: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Met<'py>> {
+    ) -> Result<Met> {
         let (rays, range) = rays(origins, directions, max_range)?;
         let sees_parts = parts.flag(false, Kind::Option, "parts")?;
-        let without = without.map_or_else(
-            || Ok(Vec::new()),
-            |given| texts(given, Kind::Option, "without"),
-        )?;
+        let without = without
+            .map(|given| texts(given, Kind::Option, "without"))
+            .transpose()?;
+        let without = without.unwrap_or_default();
         for name in &without {
             if !self.model.frames().iter().any(|frame| frame.name == *name) {
                 let message = format!("without: the model has no solid {name:?}");
-                return Err(
-                    BorderError::option("without", message, Value::Text(name.clone())).into(),
-                );
+                return Err(Kind::Option.error("without", message, Value::Text(name.clone())));
             }
         }
-        let is_seen = |part: &Part| !without.iter().any(|name| name == part.name(&self.model));
-        let seen: Vec<Part> = if sees_parts {
-            Part::all(&self.model).filter(is_seen).collect()
-        } else {
-            Vec::new()
-        };
+        let is_seen =
+            |part: &Part| sees_parts && !without.iter().any(|name| name == part.name(&self.model));
+        let seen: Vec<Part> = Part::all(&self.model).filter(is_seen).collect();
         let held = self.open()?;
         let inner = &*held;
-        let hits = py.detach(|| inner.cast(&rays, range, &seen));
-        met(py, &hits)
+        Ok(met(&origins
+            .py()
+            .detach(|| inner.cast(&rays, range, &seen))))
     }
 
     /// Kinetic and potential energy now.
-    fn energy(&self) -> PyResult<Energy> {
+    fn energy(&self) -> Result<Energy> {
         Ok(self.open()?.energy().into())
     }
 
@@ -725,31 +645,31 @@ impl Simulation {
     /// Returns:
     ///     Linear momentum, (3,), kg m/s, and angular momentum about the origin, (3,), kg m²/s,
     ///     world frame.
-    fn momentum<'py>(&self, py: Python<'py>) -> PyResult<Pair<'py>> {
+    fn momentum(&self) -> Result<Pair> {
         let momentum = self.open()?.momentum();
         Ok((
-            fresh(py, momentum.linear.as_slice()),
-            fresh(py, momentum.angular.as_slice()),
+            fresh(momentum.linear.as_slice()),
+            fresh(momentum.angular.as_slice()),
         ))
     }
 
     /// Mass centre, world frame, (3,), m.
-    fn centre_of_mass<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(fresh(py, self.open()?.centre_of_mass().as_slice()))
+    fn centre_of_mass(&self) -> Result<Array> {
+        Ok(fresh(self.open()?.centre_of_mass().as_slice()))
     }
 
     /// Named points and axes of the machine now, world frame, (3,) by name, as `RoverModel.tags`.
-    fn tags<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn tags<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         tags(py, &self.model, &self.open()?.kinematics())
     }
 
     /// Origin (3,), m, and rotation matrix (3, 3) of every solid now, world frame, by name.
-    fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn poses<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         poses(py, &self.model, &self.open()?.kinematics())
     }
 
     /// Everything that is needed to continue bit for bit.
-    fn snapshot(&self) -> PyResult<Snapshot> {
+    fn snapshot(&self) -> Result<Snapshot> {
         Ok(Snapshot {
             inner: self.open()?.snapshot(),
         })
@@ -762,10 +682,10 @@ impl Simulation {
     ///
     /// Raises:
     ///     StateError: The snapshot belongs to another model or is damaged. Nothing has changed.
-    fn restore(&self, snapshot: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn restore(&self, snapshot: &Bound<'_, PyAny>) -> Result<()> {
         let snapshot = belonging::<Snapshot>(snapshot, "a Snapshot")?;
         let restored = self.open()?.restore(&snapshot.get().inner);
-        Ok(restored.map_err(BorderError::from)?)
+        Ok(restored?)
     }
 
     /// The friction-contact problem of the last step, of the last part of a split one.
@@ -773,8 +693,8 @@ impl Simulation {
     /// Returns:
     ///     Delassus operator W, (3 n_c, 3 n_c), 1/kg; free velocity, (3 n_c,), m/s; friction
     ///     coefficients, (n_c,).
-    fn last_problem<'py>(&self, py: Python<'py>) -> PyResult<Problem<'py>> {
-        problem(py, &*self.open()?)
+    fn last_problem(&self) -> Result<Problem> {
+        Ok(problem(&*self.open()?))
     }
 
     /// Derivatives of the next step by state and command. The simulation does not change.
@@ -797,12 +717,12 @@ impl Simulation {
     ///     StepError: A step could not be taken, or was taken in parts or not solved, so that it
     ///         has no derivative.
     #[pyo3(signature = (perturbation = Given::MISSING), text_signature = "($self, perturbation=1e-6)")]
-    fn linearise(&self, py: Python<'_>, perturbation: Given<'_>) -> PyResult<Linearisation> {
+    fn linearise(&self, py: Python<'_>, perturbation: Given<'_>) -> Result<Linearisation> {
         let perturbation = perturbation.number(1e-6, Kind::Option, "perturbation")?;
         let held = self.open()?;
         let inner = &*held;
         let found = py.detach(|| inner.linearise(perturbation));
-        let found = found.map_err(BorderError::from)?;
+        let found = found?;
         Ok(Linearisation::new(&self.model, found))
     }
 
@@ -818,7 +738,7 @@ impl Simulation {
     ///     StepError: A step could not be taken.
     ///     OptionError: `n` is not a count.
     #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1000)")]
-    fn profile<'py>(&self, py: Python<'py>, n: Given<'_>) -> PyResult<Bound<'py, PyDict>> {
+    fn profile<'py>(&self, py: Python<'py>, n: Given<'_>) -> Result<Bound<'py, PyDict>> {
         let steps = n.count(1000, Kind::Option, "n")?;
         let (held, mut watch) = (self.open()?, Watch::new());
         let inner = &*held;
@@ -826,7 +746,7 @@ impl Simulation {
         let stopwatch = watch.result(stopwatch)?;
         let parts = PyDict::new(py);
         for (phase, microseconds) in stopwatch.microseconds() {
-            parts.set_item(snake_case(&format!("{phase:?}")), microseconds)?;
+            parts.set_item(phase.name(), microseconds)?;
         }
         Ok(parts)
     }
@@ -839,42 +759,28 @@ impl Simulation {
         }
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
-        let py = slf.py();
-        let own = slf.get();
-        let rebuild = slf.get_type().getattr("_rebuild")?;
-        let arguments = (
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Result<Bound<'py, PyTuple>> {
+        let (py, own) = (slf.py(), slf.get());
+        let given = (
             own.model(),
             own.terrain(py)?,
             own.settings(py)?,
             own.snapshot()?,
         );
-        (rebuild, arguments).into_pyobject(py)
+        Ok((slf.get_type().getattr("_rebuild")?, given).into_pyobject(py)?)
     }
 
     #[staticmethod]
     fn _rebuild<'py>(
-        py: Python<'py>,
         model: &Bound<'py, PyAny>,
         terrain: &Bound<'py, PyAny>,
         settings: &Bound<'py, PyDict>,
         snapshot: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let made = py
-            .get_type::<Self>()
-            .call((model, terrain), Some(settings))?;
-        made.cast::<Self>()?.get().restore(snapshot)?;
+    ) -> Result<Bound<'py, Self>> {
+        let class = model.py().get_type::<Self>();
+        let made = class.call((model, terrain), Some(settings))?;
+        let made = made.cast_into::<Self>().map_err(PyErr::from)?;
+        made.get().restore(snapshot)?;
         Ok(made)
     }
-}
-
-fn snake_case(camel: &str) -> String {
-    let mut out = String::new();
-    for c in camel.chars() {
-        if c.is_uppercase() && !out.is_empty() {
-            out.push('_');
-        }
-        out.extend(c.to_lowercase());
-    }
-    out
 }

@@ -7,7 +7,7 @@ use rover_core::simulation::{GrainBed, PlanarScene, RoverScene, Snapshot as Snap
 use serde::de::DeserializeOwned;
 
 use crate::arguments;
-use crate::errors::{BorderError, Kind, Value};
+use crate::errors::{BorderError, Kind, Result, Value};
 
 /// A snapshot of the class that a simulation takes. `what`: the class with its article.
 pub fn belonging<'a, 'py, T: PyTypeInfo>(
@@ -37,12 +37,7 @@ fn damaged(e: &postcard::Error) -> BorderError {
 
 fn refused(reason: &str) -> BorderError {
     let message = format!("snapshot: its bytes are damaged ({reason})");
-    BorderError {
-        kind: Kind::State,
-        message,
-        field: Some("snapshot".to_owned()),
-        value: Value::Nothing,
-    }
+    Kind::State.error("snapshot", message, Value::Nothing)
 }
 
 /// A class of snapshots: all of them are read, written, compared and pickled alike.
@@ -61,18 +56,15 @@ macro_rules! snapshot_class {
             /// Args:
             ///     data: What `to_bytes` returned.
             ///
-            /// Returns:
-            ///     The snapshot.
-            ///
             /// Raises:
             ///     StateError: The bytes are not those of a snapshot.
             #[staticmethod]
-            fn from_bytes(data: &Bound<'_, PyAny>) -> PyResult<Self> {
+            fn from_bytes(data: &Bound<'_, PyAny>) -> Result<Self> {
                 Ok(Self { inner: read(data)? })
             }
 
             /// The snapshot as bytes, as `from_bytes` reads them.
-            fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+            fn to_bytes<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyBytes>> {
                 let bytes = postcard::to_stdvec(&self.inner).map_err(|e| damaged(&e))?;
                 Ok(PyBytes::new(py, &bytes))
             }
@@ -82,7 +74,7 @@ macro_rules! snapshot_class {
                 other.is_ok_and(|o| o.get().inner == self.inner)
             }
 
-            fn __hash__(&self) -> PyResult<u64> {
+            fn __hash__(&self) -> Result<u64> {
                 use std::hash::{DefaultHasher, Hasher};
                 let mut hasher = DefaultHasher::new();
                 hasher.write(&postcard::to_stdvec(&self.inner).map_err(|e| damaged(&e))?);
@@ -91,7 +83,7 @@ macro_rules! snapshot_class {
 
             fn __reduce__<'py>(
                 slf: &Bound<'py, Self>,
-            ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+            ) -> Result<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
                 let bytes = slf.get().to_bytes(slf.py())?;
                 Ok((slf.get_type().getattr("from_bytes")?, (bytes,)))
             }

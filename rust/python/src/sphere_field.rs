@@ -2,43 +2,32 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use rover_core::draw::DrawnGround;
 use rover_core::geometry::{
     Clearing, Plane as CorePlane, Rocks, SphereField as CoreField, Terrain as _,
 };
 
-use crate::arguments::{Given, number, refused, whole};
-use crate::arrays::{fresh_rows, one_or_two, rows, vector};
-use crate::errors::{BorderError, Kind, Value};
-use crate::files::{self, in_file, read_text};
+use crate::arguments::{Given, Named, number, refused, whole};
+use crate::arrays::{Array, fresh_rows, one_or_two, rows, vector};
+use crate::errors::{Kind, Result};
 use crate::materials;
 use crate::plane::Plane;
 use crate::terrain::{Terrain, parse};
 
-/// Longest file of spheres, bytes.
-const MAX_FILE: usize = 1 << 28;
-
-fn build(
-    py: Python<'_>,
-    centres: &[[f64; 3]],
-    radii: &[f64],
-    ground: Option<CorePlane>,
-) -> Result<CoreField, BorderError> {
-    Ok(py.detach(|| CoreField::new(centres, radii, ground))?)
-}
-
 /// A plane, or none.
-fn plane(given: Option<&Bound<'_, PyAny>>) -> PyResult<Option<CorePlane>> {
+fn plane(given: Option<&Bound<'_, PyAny>>) -> Result<Option<CorePlane>> {
     let read = |given: &Bound<'_, PyAny>| match given.cast::<Plane>() {
         Ok(plane) => Ok(plane.get().inner),
-        Err(_) => Err(refused(given, Kind::Terrain, "ground", "a Plane").into()),
+        Err(_) => Err(refused(given, Kind::Terrain, "ground", "a Plane")),
     };
     given.map(read).transpose()
 }
 
 /// Fixed spheres, with or without a plane under them. Immutable.
+///
+/// `SphereField.from_file` reads them.
 ///
 /// Args:
 ///     centres: Centres of the spheres, (n, 3), m.
@@ -81,84 +70,13 @@ impl SphereField {
         radii: &Bound<'_, PyAny>,
         ground: Option<&Bound<'_, PyAny>>,
         material: Given<'_>,
-    ) -> PyResult<PyClassInitializer<Self>> {
+    ) -> Result<PyClassInitializer<Self>> {
         let material = materials::name(material)?;
         let centres = rows::<3>(centres, "centres")?;
         let radii = vector(radii, Kind::Terrain, "radii")?;
-        let field = build(py, &centres, &radii, plane(ground)?)?;
-        Ok(made(field, material))
-    }
-
-    /// Reads spheres from a CSV file with the header `x,y,z,radius`, in m.
-    ///
-    /// Args:
-    ///     path: Path of the file.
-    ///     ground: The plane under the spheres; none by default.
-    ///     material: Name of the spheres' material.
-    ///
-    /// Returns:
-    ///     The field.
-    ///
-    /// Raises:
-    ///     TerrainError: The file does not describe spheres; the message names the path.
-    ///     OSError: The file cannot be read.
-    #[staticmethod]
-    #[pyo3(signature = (path, ground = None, material = Given::MISSING),
-        text_signature = "(path, ground=None, material='rock')")]
-    fn from_file<'py>(
-        py: Python<'py>,
-        path: &Bound<'_, PyAny>,
-        ground: Option<&Bound<'_, PyAny>>,
-        material: Given<'_>,
-    ) -> PyResult<Bound<'py, Self>> {
-        let material = materials::name(material)?;
         let ground = plane(ground)?;
-        let path = files::path(path, Kind::Terrain)?;
-        let text = read_text(py, &path, Kind::Terrain, MAX_FILE)?;
-        let refuse = |message: String| {
-            let (field, value) = (
-                Some("path".to_owned()),
-                Value::Text(path.display().to_string()),
-            );
-            PyErr::from(BorderError {
-                kind: Kind::Terrain,
-                message,
-                field,
-                value,
-            })
-        };
-        let mut lines = text.lines();
-        let header: Vec<String> = lines
-            .next()
-            .unwrap_or("")
-            .split(',')
-            .map(|s| s.trim().to_lowercase())
-            .collect();
-        if header != ["x", "y", "z", "radius"] {
-            return Err(refuse(format!(
-                "path: {} must begin with the header x,y,z,radius",
-                path.display()
-            )));
-        }
-        let body: Vec<&str> = lines.collect();
-        let kwargs = pyo3::types::PyDict::new(py);
-        kwargs.set_item("delimiter", ",")?;
-        kwargs.set_item("ndmin", 2)?;
-        let table = py
-            .import("numpy")?
-            .call_method("loadtxt", (body,), Some(&kwargs))
-            .map_err(|e| {
-                refuse(format!(
-                    "path: {} is not a table of numbers ({})",
-                    path.display(),
-                    e.value(py)
-                ))
-            })?;
-        let table = rows::<4>(&table, "path")?;
-        let centres: Vec<[f64; 3]> = table.iter().map(|r| [r[0], r[1], r[2]]).collect();
-        let radii: Vec<f64> = table.iter().map(|r| r[3]).collect();
-        let field = build(py, &centres, &radii, ground).map_err(|e| in_file(e, &path))?;
-        Bound::new(py, made(field, material))
+        let field = py.detach(|| CoreField::new(&centres, &radii, ground))?;
+        Ok(made(field, material))
     }
 
     /// The wavy ground of the 2010 report's Fig. 6.6.
@@ -167,8 +85,8 @@ impl SphereField {
     ///
     /// Source: Yang 2010, Fig. 6.6.
     #[staticmethod]
-    fn rug(py: Python<'_>) -> PyResult<Bound<'_, Self>> {
-        Bound::new(py, Self::of(Arc::new(CoreField::rug())))
+    fn rug(py: Python<'_>) -> Result<Py<Self>> {
+        Ok(Py::new(py, Self::of(Arc::new(CoreField::rug())))?)
     }
 
     /// Rocks on a plane, with the size-frequency distribution of rocks on Mars.
@@ -188,42 +106,34 @@ impl SphereField {
     ///     clear: Circles x, z, radius that no rock reaches into, (n, 3), m; none by default.
     ///     material: Name of the rocks' material.
     ///
-    /// Returns:
-    ///     The field.
-    ///
     /// Raises:
     ///     TerrainError: An argument is out of its range.
     ///
     /// Source: Golombek and Rapp 1997.
     #[staticmethod]
-    #[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
-    #[pyo3(signature = (abundance, area, seed, *, max_diameter = Given::MISSING, min_diameter = Given::MISSING, burial = None, ground = None,
-        clear = None, material = Given::MISSING),
+    #[pyo3(signature = (abundance, area, seed, **options),
         text_signature = "(abundance, area, seed, *, max_diameter=0.5, min_diameter=0.05, burial=None, ground=None, clear=None, \
         material='rock')")]
-    fn rocks<'py>(
-        py: Python<'py>,
+    fn rocks(
+        py: Python<'_>,
         abundance: &Bound<'_, PyAny>,
         area: &Bound<'_, PyAny>,
         seed: &Bound<'_, PyAny>,
-        max_diameter: Given<'_>,
-        min_diameter: Given<'_>,
-        burial: Option<&Bound<'_, PyAny>>,
-        ground: Option<&Bound<'_, PyAny>>,
-        clear: Option<&Bound<'_, PyAny>>,
-        material: Given<'_>,
-    ) -> PyResult<Bound<'py, Self>> {
-        let material = materials::name(material)?;
-        let burial = burial.map_or(Ok([0.5; 2]), |given| {
-            one_or_two(given, Kind::Terrain, "burial")
-        })?;
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> Result<Py<Self>> {
+        let given = Named::keywords(py, options)?.of(Kind::Terrain);
+        let material = materials::name(given.get("material")?)?;
         let corners = vector(area, Kind::Terrain, "area")?;
         let [x_min, z_min, x_max, z_max] = corners[..] else {
             let what = "the four numbers x_min, z_min, x_max, z_max";
-            return Err(refused(area, Kind::Terrain, "area", what).into());
+            return Err(refused(area, Kind::Terrain, "area", what));
         };
-        let clear = clear.map_or_else(|| Ok(Vec::new()), |c| rows::<3>(c, "clear"))?;
-        let ground = ground.map(parse).transpose()?;
+        let clear = given
+            .some("clear")?
+            .map(|c| rows::<3>(&c, "clear"))
+            .transpose()?;
+        let clear = clear.unwrap_or_default().into_iter();
+        let ground = given.some("ground")?.as_ref().map(parse).transpose()?;
         let plane = match &ground {
             Some(DrawnGround::Plane(plane)) => *plane,
             _ => CorePlane::ground(),
@@ -233,21 +143,20 @@ impl SphereField {
             area: [x_max - x_min, z_max - z_min],
             middle: [0.5 * (x_min + x_max), 0.5 * (z_min + z_max)],
             seed: whole(seed, Kind::Terrain, "seed")?,
-            max_diameter: max_diameter.number(0.5, Kind::Terrain, "max_diameter")?,
-            min_diameter: min_diameter.number(0.05, Kind::Terrain, "min_diameter")?,
-            burial,
+            max_diameter: given.number("max_diameter", 0.5)?,
+            min_diameter: given.number("min_diameter", 0.05)?,
+            burial: given.read("burial", one_or_two)?.unwrap_or([0.5; 2]),
             clearings: clear
-                .iter()
-                .map(|&[x, z, radius]| Clearing { x, z, radius })
+                .map(|[x, z, radius]| Clearing { x, z, radius })
                 .collect(),
             ground: plane,
         };
+        given.finish()?;
         let field = py.detach(|| match ground {
             None | Some(DrawnGround::Plane(_)) => CoreField::rocks(&rocks),
             Some(other) => CoreField::rocks_on(&rocks, &*other.terrain()),
-        });
-        let field = field.map_err(BorderError::from)?;
-        Bound::new(py, made(field, material))
+        })?;
+        Ok(Py::new(py, made(field, material))?)
     }
 
     /// Name of the spheres' material.
@@ -258,24 +167,23 @@ impl SphereField {
 
     /// Centres of the spheres, (n, 3), m.
     #[getter]
-    fn centres<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let centres: Vec<[f64; 3]> = self.inner.spheres().map(|s| s.centre.into()).collect();
-        fresh_rows(py, &centres)
+    fn centres(&self) -> Array {
+        fresh_rows(self.inner.spheres().map(|s| s.centre.into()))
     }
 
     /// Radii of the spheres, (n,), m.
     #[getter]
-    fn radii<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_iter(py, self.inner.spheres().map(|s| s.radius))
+    fn radii(&self) -> Array {
+        self.inner.spheres().map(|s| s.radius).collect()
     }
 
     /// The plane under the spheres, or None.
     #[getter]
-    fn ground<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, Plane>>> {
+    fn ground(&self, py: Python<'_>) -> Result<Option<Py<Plane>>> {
         let plane = self.inner.ground();
-        plane
-            .map(|plane| Bound::new(py, Plane::of(*plane)))
-            .transpose()
+        Ok(plane
+            .map(|plane| Py::new(py, Plane::of(*plane)))
+            .transpose()?)
     }
 
     fn __len__(&self) -> usize {
@@ -283,29 +191,20 @@ impl SphereField {
     }
 
     fn __repr__(&self) -> String {
-        let ground = if self.inner.ground().is_some() {
-            "on a plane"
-        } else {
-            "without a plane"
-        };
+        let (n, is_on) = (self.inner.spheres().len(), self.inner.ground().is_some());
         format!(
-            "SphereField({} spheres, {ground})",
-            self.inner.spheres().len()
+            "SphereField({n} spheres, {} a plane)",
+            if is_on { "on" } else { "without" }
         )
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-        let py = slf.py();
-        let own = slf.get();
-        let arguments = (
-            own.centres(py)?,
-            own.radii(py),
-            own.ground(py)?,
-            own.material(),
-        );
+    #[allow(clippy::type_complexity)] // the arguments of the class
+    fn __getnewargs__(&self, py: Python<'_>) -> Result<(Array, Array, Option<Py<Plane>>, &str)> {
         Ok((
-            slf.get_type().into_any(),
-            arguments.into_pyobject(py)?.into_any(),
+            self.centres(),
+            self.radii(),
+            self.ground(py)?,
+            self.material(),
         ))
     }
 }

@@ -2,15 +2,14 @@
 
 use std::sync::Arc;
 
-use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};
 use rover_core::draw::DrawnGround;
 use rover_core::geometry::{Union as CoreUnion, ray};
 
-use crate::arguments::{Given, refused, shown};
-use crate::arrays::{fresh, rows};
-use crate::errors::{BorderError, Kind, Value};
+use crate::arguments::{Given, refused};
+use crate::arrays::{Array, rows};
+use crate::errors::{Kind, Result};
 use crate::rays::{Met, met, rays};
 
 /// Ground of any kind. Immutable.
@@ -29,34 +28,26 @@ impl Terrain {
 }
 
 /// Any object as ground, a list or tuple as a union, or a `TerrainError`.
-pub fn parse(given: &Bound<'_, PyAny>) -> PyResult<DrawnGround> {
+pub fn parse(given: &Bound<'_, PyAny>) -> Result<DrawnGround> {
     if given.is_instance_of::<PyList>() || given.is_instance_of::<PyTuple>() {
         return union(given);
     }
     if let Ok(terrain) = given.cast::<Terrain>() {
         return Ok(terrain.get().ground.clone());
     }
-    let shown = shown(given);
-    Err(BorderError {
-        kind: Kind::Terrain,
-        message: format!(
-            "terrain: must be a Plane, SphereField, HeightField, TriangleMesh, SoftGround or \
-             Union, or a list of them, is {shown}"
-        ),
-        field: Some("terrain".to_owned()),
-        value: Value::Text(shown),
-    }
-    .into())
+    let what = "a Plane, SphereField, HeightField, TriangleMesh, SoftGround or Union, or a list of \
+                them";
+    Err(refused(given, Kind::Terrain, "terrain", what))
 }
 
 /// Several terrains as one.
-pub fn union(parts: &Bound<'_, PyAny>) -> PyResult<DrawnGround> {
+pub fn union(parts: &Bound<'_, PyAny>) -> Result<DrawnGround> {
     let listed = parts
         .try_iter()
         .map_err(|_| refused(parts, Kind::Terrain, "parts", "a list of terrains"))?;
-    let parts = (listed.map(|part| parse(&part?))).collect::<PyResult<Arc<[DrawnGround]>>>()?;
+    let parts = (listed.map(|part| parse(&part?))).collect::<Result<Arc<[DrawnGround]>>>()?;
     let terrains = parts.iter().map(DrawnGround::terrain).collect();
-    let union = CoreUnion::new(terrains).map_err(BorderError::from)?;
+    let union = CoreUnion::new(terrains)?;
     Ok(DrawnGround::Union(Arc::new(union), parts))
 }
 
@@ -72,15 +63,10 @@ impl Terrain {
     ///
     /// Raises:
     ///     TerrainError: `points` has a wrong shape.
-    fn heights<'py>(
-        &self,
-        py: Python<'py>,
-        points: &Bound<'_, PyAny>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    fn heights(&self, points: &Bound<'_, PyAny>) -> Result<Array> {
         let (terrain, points) = (self.ground.terrain(), rows::<2>(points, "points")?);
         let height = |&[x, z]: &[f64; 2]| terrain.height(x, z).unwrap_or(f64::NAN);
-        let heights: Vec<f64> = points.iter().map(height).collect();
-        Ok(fresh(py, &heights))
+        Ok(points.iter().map(height).collect())
     }
 
     /// Where rays meet the ground first.
@@ -101,16 +87,16 @@ impl Terrain {
     ///         zero, an origin is beyond 1e6 m, or `max_range` is not positive.
     #[pyo3(signature = (origins, directions, max_range = Given::MISSING),
         text_signature = "($self, origins, directions, max_range=None)")]
-    fn cast_rays<'py>(
+    fn cast_rays(
         &self,
-        py: Python<'py>,
+        py: Python<'_>,
         origins: &Bound<'_, PyAny>,
         directions: &Bound<'_, PyAny>,
         max_range: Given<'_>,
-    ) -> PyResult<Met<'py>> {
+    ) -> Result<Met> {
         let (terrain, (rays, range)) =
             (self.ground.terrain(), rays(origins, directions, max_range)?);
         let hits = py.detach(|| ray::cast(&*terrain, &rays, range));
-        met(py, &hits)
+        Ok(met(&hits))
     }
 }

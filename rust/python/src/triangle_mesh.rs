@@ -2,15 +2,13 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 use rover_core::draw::DrawnGround;
 use rover_core::geometry::{Terrain as _, TriangleMesh as CoreMesh};
 
 use crate::arguments::{Given, refused};
-use crate::arrays::{array, fresh_rows, rows};
-use crate::errors::{BorderError, Kind};
+use crate::arrays::{Array, array, fresh_rows, rows};
+use crate::errors::{Kind, Result};
 use crate::materials;
 use crate::terrain::Terrain;
 
@@ -22,6 +20,7 @@ use crate::terrain::Terrain;
 /// Corners at exactly equal positions are joined, so triangles may each bring their own three
 /// corners, as in an STL file. `triangles` then names the first of equal corners. Corners that
 /// differ by rounding are not joined: wheels catch on the seam between them.
+/// `TriangleMesh.from_file` reads a mesh.
 ///
 /// Args:
 ///     vertices: Corners, (n, 3), m.
@@ -37,19 +36,19 @@ pub struct TriangleMesh {
 }
 
 /// Whole numbers (m, 3).
-fn indices(value: &Bound<'_, PyAny>) -> PyResult<Vec<[usize; 3]>> {
+fn indices(value: &Bound<'_, PyAny>) -> Result<Vec<[usize; 3]>> {
     let given = array(value, Kind::Terrain, "triangles")?;
     let wrong = || refused(value, Kind::Terrain, "triangles", "whole numbers, (m, 3)");
     let view = given.as_array();
     if !view.is_empty() && (view.ndim() != 2 || view.shape()[1] != 3) {
-        return Err(wrong().into());
+        return Err(wrong());
     }
     let whole = |x: f64| {
         let fits = (0.0..4.0e9).contains(&x) && x.fract().abs() <= 0.0;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked
         fits.then_some(x as usize).ok_or_else(wrong)
     };
-    let flat: Vec<usize> = view.iter().map(|&x| whole(x)).collect::<Result<_, _>>()?;
+    let flat: Vec<usize> = view.iter().map(|&x| whole(x)).collect::<Result<_>>()?;
     Ok(flat.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect())
 }
 
@@ -70,49 +69,15 @@ impl TriangleMesh {
         vertices: &Bound<'_, PyAny>,
         triangles: &Bound<'_, PyAny>,
         material: Given<'_>,
-    ) -> PyResult<PyClassInitializer<Self>> {
+    ) -> Result<PyClassInitializer<Self>> {
         let material = materials::name(material)?;
         let vertices = rows::<3>(vertices, "vertices")?;
         let triangles = indices(triangles)?;
-        let mesh = py.detach(|| CoreMesh::new(&vertices, &triangles));
-        let mut mesh = mesh.map_err(BorderError::from)?;
+        let mut mesh = py.detach(|| CoreMesh::new(&vertices, &triangles))?;
         if let Some(material) = material {
             mesh = mesh.with_material(&material);
         }
         Ok(Self::of(Arc::new(mesh)))
-    }
-
-    /// Reads a mesh from a file: OBJ, PLY, STL, GLB and what else `trimesh` reads.
-    ///
-    /// Equal corners are joined, and triangles without an area are left out.
-    ///
-    /// Args:
-    ///     path: Path of the file; its ending tells the format.
-    ///     scale: Factor from the file's numbers to m.
-    ///     position: Place of the file's origin, (3,), m; the world's origin by default.
-    ///     up: Axis of the file that points up: "y" or "z".
-    ///     material: Name of its material.
-    ///
-    /// Returns:
-    ///     The mesh.
-    ///
-    /// Raises:
-    ///     TerrainError: The file holds no such mesh; the message names it.
-    ///     OSError: The file cannot be read.
-    ///     MissingExtraError: The extra `maps` is not installed.
-    #[staticmethod]
-    #[pyo3(signature = (path, *, material = Given::MISSING, **options),
-        text_signature = "(path, *, scale=1.0, position=(0.0, 0.0, 0.0), up='y', material='ground')")]
-    fn from_file<'py>(
-        py: Python<'py>,
-        path: &Bound<'py, PyAny>,
-        material: Given<'_>,
-        options: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<Bound<'py, Self>> {
-        let maps = py.import("rover_gym.maps")?;
-        let made = maps.getattr("read_mesh")?.call((path,), options)?;
-        let (vertices, triangles) = made.extract::<(Bound<'_, PyAny>, Bound<'_, PyAny>)>()?;
-        Bound::new(py, Self::new(py, &vertices, &triangles, material)?)
     }
 
     /// Name of its material.
@@ -123,16 +88,14 @@ impl TriangleMesh {
 
     /// Corners, (n, 3), m.
     #[getter]
-    fn vertices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let vertices: Vec<[f64; 3]> = self.inner.vertices().iter().map(|&v| v.into()).collect();
-        fresh_rows(py, &vertices)
+    fn vertices(&self) -> Array {
+        fresh_rows(self.inner.vertices().iter().map(|&v| v.into()))
     }
 
     /// Numbers of the corners of each triangle, (m, 3).
     #[getter]
-    fn triangles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
-        let triangles = self.inner.triangles();
-        PyArray1::from_iter(py, triangles.iter().flatten().copied()).reshape([triangles.len(), 3])
+    fn triangles(&self) -> Array<u32> {
+        fresh_rows(self.inner.triangles().iter().copied())
     }
 
     /// Whether no triangle has a free border.
@@ -150,13 +113,7 @@ impl TriangleMesh {
         format!("TriangleMesh({n} vertices, {m} triangles)")
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-        let py = slf.py();
-        let own = slf.get();
-        let arguments = (own.vertices(py)?, own.triangles(py)?, own.material());
-        Ok((
-            slf.get_type().into_any(),
-            arguments.into_pyobject(py)?.into_any(),
-        ))
+    fn __getnewargs__(&self) -> (Array, Array<u32>, &str) {
+        (self.vertices(), self.triangles(), self.material())
     }
 }

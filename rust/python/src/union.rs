@@ -3,6 +3,7 @@
 use pyo3::prelude::*;
 use rover_core::draw::DrawnGround;
 
+use crate::errors::Result;
 use crate::height_field::HeightField;
 use crate::plane::Plane;
 use crate::soft_ground::SoftGround;
@@ -11,7 +12,7 @@ use crate::terrain::{Terrain, union};
 use crate::triangle_mesh::TriangleMesh;
 
 /// A ground of the core as the object of its kind.
-pub fn object<'py>(py: Python<'py>, ground: &DrawnGround) -> PyResult<Bound<'py, PyAny>> {
+pub fn object<'py>(py: Python<'py>, ground: &DrawnGround) -> Result<Bound<'py, PyAny>> {
     Ok(match ground {
         DrawnGround::Plane(plane) => Bound::new(py, Plane::of(*plane))?.into_any(),
         DrawnGround::Field(field) => Bound::new(py, SphereField::of(field.clone()))?.into_any(),
@@ -53,33 +54,31 @@ impl Union {
 #[pymethods]
 impl Union {
     #[new]
-    fn new(parts: &Bound<'_, PyAny>) -> PyResult<PyClassInitializer<Self>> {
+    fn new(parts: &Bound<'_, PyAny>) -> Result<PyClassInitializer<Self>> {
         Ok(Terrain::base(union(parts)?).add_subclass(Self))
     }
 
     /// The terrains, in the order they were given.
     #[getter]
-    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
-    fn parts(slf: PyRef<'_, Self>) -> PyResult<Vec<Bound<'_, PyAny>>> {
+    fn parts(slf: PyRef<'_, Self>) -> Result<Vec<Bound<'_, PyAny>>> {
         let grounds = Self::grounds(&slf).iter();
         grounds.map(|ground| object(slf.py(), ground)).collect()
     }
 
-    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn __len__(slf: PyRef<'_, Self>) -> usize {
         Self::grounds(&slf).len()
     }
 
-    fn __repr__(slf: PyRef<'_, Self>) -> PyResult<String> {
+    fn __repr__(slf: PyRef<'_, Self>) -> Result<String> {
         let parts = Self::parts(slf)?;
         let shown = parts.iter().map(|part| Ok(part.repr()?.to_string()));
-        let shown = shown.collect::<PyResult<Vec<_>>>()?;
-        Ok(format!("Union([{}])", shown.join(", ")))
+        Ok(format!(
+            "Union([{}])",
+            shown.collect::<PyResult<Vec<_>>>()?.join(", ")
+        ))
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-        let parts = (Self::parts(slf.borrow())?,);
-        let parts = parts.into_pyobject(slf.py())?.into_any();
-        Ok((slf.get_type().into_any(), parts))
+    fn __getnewargs__(slf: PyRef<'_, Self>) -> Result<(Vec<Bound<'_, PyAny>>,)> {
+        Ok((Self::parts(slf)?,))
     }
 }

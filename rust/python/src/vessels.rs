@@ -6,9 +6,9 @@ use pyo3::prelude::*;
 use rover_core::geometry::{Drum as CoreDrum, Floor, Silo as CoreSilo, Support};
 use rover_core::nalgebra::Vector3;
 
-use crate::arguments::{Given, number, shown};
+use crate::arguments::{Given, number, refused};
 use crate::arrays::{triple, two};
-use crate::errors::{BorderError, Kind, Value};
+use crate::errors::{Kind, Result, Value};
 use crate::planar_ground::quantity;
 
 const KIND: Kind = Kind::Terrain;
@@ -23,10 +23,17 @@ const KIND: Kind = Kind::Terrain;
 ///
 /// Raises:
 ///     TerrainError: A number is not finite, or the radius or length is not positive.
-#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
+#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object, get_all)]
 #[derive(Clone)]
 pub struct Drum {
-    inner: CoreDrum,
+    /// Inner radius, m.
+    radius: f64,
+    /// Distance between the ends, m.
+    length: f64,
+    /// Angular velocity about +z, rad/s.
+    rate: f64,
+    /// Its middle, m.
+    centre: (f64, f64, f64),
 }
 
 #[pymethods]
@@ -38,46 +45,35 @@ impl Drum {
         length: &Bound<'_, PyAny>,
         rate: Given<'_>,
         centre: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Self> {
-        let radius = number(radius, KIND, "radius")?;
-        let length = number(length, KIND, "length")?;
-        let rate = rate.number(0.0, KIND, "rate")?;
+    ) -> Result<Self> {
         let centre = centre.map(|c| triple(c, KIND, "centre")).transpose()?;
-        let centre = Vector3::from(centre.unwrap_or_default());
-        let made = CoreDrum::new(centre, radius, length, rate);
-        Ok(Self {
-            inner: made.map_err(|e| quantity(KIND, &e))?,
-        })
-    }
-
-    /// Inner radius, m.
-    #[getter]
-    fn radius(&self) -> f64 {
-        self.inner.radius()
-    }
-
-    /// Distance between the ends, m.
-    #[getter]
-    fn length(&self) -> f64 {
-        self.inner.length()
-    }
-
-    /// Angular velocity about +z, rad/s.
-    #[getter]
-    fn rate(&self) -> f64 {
-        self.inner.rate()
-    }
-
-    /// Its middle, m.
-    #[getter]
-    fn centre(&self) -> (f64, f64, f64) {
-        let centre = self.inner.centre();
-        (centre.x, centre.y, centre.z)
+        let made = Self {
+            radius: number(radius, KIND, "radius")?,
+            length: number(length, KIND, "length")?,
+            rate: rate.number(0.0, KIND, "rate")?,
+            centre: centre.unwrap_or_default().into(),
+        };
+        made.inner()?;
+        Ok(made)
     }
 
     fn __repr__(&self) -> String {
-        let [radius, length, rate] = [self.radius(), self.length(), self.rate()];
+        let Self {
+            radius,
+            length,
+            rate,
+            ..
+        } = self;
         format!("Drum(radius={radius}, length={length}, rate={rate})")
+    }
+}
+
+impl Drum {
+    /// The drum of the core.
+    fn inner(&self) -> Result<CoreDrum> {
+        let centre = Vector3::from(<[f64; 3]>::from(self.centre));
+        let made = CoreDrum::new(centre, self.radius, self.length, self.rate);
+        made.map_err(|e| quantity(KIND, &e))
     }
 }
 
@@ -94,10 +90,17 @@ impl Drum {
 /// Raises:
 ///     TerrainError: A number is not finite, the radius is not positive, or the hole is as wide as
 ///         the tube.
-#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
+#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object, get_all)]
 #[derive(Clone)]
 pub struct Silo {
-    inner: CoreSilo,
+    /// Inner radius, m.
+    radius: f64,
+    /// Height of the floor, m, or None.
+    floor: Option<f64>,
+    /// Radius of the hole, m.
+    hole: f64,
+    /// Place (x, z) of the axis, m.
+    axis: (f64, f64),
 }
 
 #[pymethods]
@@ -109,60 +112,47 @@ impl Silo {
         floor: Given<'_>,
         hole: Given<'_>,
         axis: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Self> {
+    ) -> Result<Self> {
         let radius = number(radius, KIND, "radius")?;
         let hole = hole.number(0.0, KIND, "hole")?;
         let floor = floor.maybe(KIND, "floor")?;
         if floor.is_none() && hole != 0.0 {
-            return Err(BorderError {
-                kind: KIND,
-                message: format!("hole: must be 0 without a floor, is {hole}"),
-                field: Some("hole".to_owned()),
-                value: Value::Number(hole),
-            }
-            .into());
+            let message = format!("hole: must be 0 without a floor, is {hole}");
+            return Err(KIND.error("hole", message, Value::Number(hole)));
         }
-        let axis = axis.map(|a| two(a, KIND, "axis")).transpose()?;
-        let floor = floor.map(|height| Floor { height, hole });
-        let made = CoreSilo::new(axis.unwrap_or_default(), radius, floor);
-        Ok(Self {
-            inner: made.map_err(|e| quantity(KIND, &e))?,
-        })
-    }
-
-    /// Inner radius, m.
-    #[getter]
-    fn radius(&self) -> f64 {
-        self.inner.radius()
-    }
-
-    /// Height of the floor, m, or None.
-    #[getter]
-    fn floor(&self) -> Option<f64> {
-        self.inner.floor().map(|floor| floor.height)
-    }
-
-    /// Radius of the hole, m.
-    #[getter]
-    fn hole(&self) -> f64 {
-        self.inner.floor().map_or(0.0, |floor| floor.hole)
-    }
-
-    /// Place (x, z) of the axis, m.
-    #[getter]
-    fn axis(&self) -> (f64, f64) {
-        self.inner.axis().into()
+        let axis = axis
+            .map(|a| two(a, KIND, "axis"))
+            .transpose()?
+            .unwrap_or_default()
+            .into();
+        let made = Self {
+            radius,
+            floor,
+            hole,
+            axis,
+        };
+        made.inner()?;
+        Ok(made)
     }
 
     fn __repr__(&self) -> String {
-        match self.floor() {
-            Some(floor) => format!(
-                "Silo(radius={}, floor={floor}, hole={})",
-                self.radius(),
-                self.hole()
-            ),
-            None => format!("Silo(radius={})", self.radius()),
+        let Self { radius, hole, .. } = self;
+        match self.floor {
+            Some(floor) => format!("Silo(radius={radius}, floor={floor}, hole={hole})"),
+            None => format!("Silo(radius={radius})"),
         }
+    }
+}
+
+impl Silo {
+    /// The silo of the core.
+    fn inner(&self) -> Result<CoreSilo> {
+        let floor = self.floor.map(|height| Floor {
+            height,
+            hole: self.hole,
+        });
+        let made = CoreSilo::new(self.axis.into(), self.radius, floor);
+        made.map_err(|e| quantity(KIND, &e))
     }
 }
 
@@ -177,29 +167,21 @@ pub enum Vessel {
 
 impl Vessel {
     /// Any object as a vessel, or a `TerrainError`.
-    pub fn parse(given: &Bound<'_, PyAny>) -> PyResult<Self> {
-        given.extract::<Self>().map_err(|_| {
-            let shown = shown(given);
-            BorderError {
-                kind: KIND,
-                message: format!("vessel: must be a Drum or a Silo, is {shown}"),
-                field: Some("vessel".to_owned()),
-                value: Value::Text(shown),
-            }
-            .into()
-        })
+    pub fn parse(given: &Bound<'_, PyAny>) -> Result<Self> {
+        let wrong = |_| refused(given, KIND, "vessel", "a Drum or a Silo");
+        given.extract::<Self>().map_err(wrong)
     }
 
     /// The core's view of it.
-    pub fn support(&self) -> Arc<dyn Support<3>> {
-        match self {
-            Self::Drum(drum) => Arc::new(drum.inner),
-            Self::Silo(silo) => Arc::new(silo.inner),
-        }
+    pub fn support(&self) -> Result<Arc<dyn Support<3>>> {
+        Ok(match self {
+            Self::Drum(drum) => Arc::new(drum.inner()?),
+            Self::Silo(silo) => Arc::new(silo.inner()?),
+        })
     }
 
     /// Back to Python.
-    pub fn to_object<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    pub fn to_object<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
         Ok(match self {
             Self::Drum(drum) => drum.clone().into_pyobject(py)?.into_any(),
             Self::Silo(silo) => silo.clone().into_pyobject(py)?.into_any(),

@@ -34,6 +34,27 @@ pub struct Domain {
     pub gravity_scale: f64,
 }
 
+impl Domain {
+    /// Factor of the masses, friction, gain of the motors, factor of gravity.
+    #[must_use]
+    pub fn row(&self) -> [f64; 4] {
+        let (mass, gravity) = (self.mass_scale, self.gravity_scale);
+        [mass, self.friction, self.actuator_gain, gravity]
+    }
+}
+
+impl From<[f64; 4]> for Domain {
+    /// What [`Domain::row`] tells.
+    fn from([mass_scale, friction, actuator_gain, gravity_scale]: [f64; 4]) -> Self {
+        Self {
+            mass_scale,
+            friction,
+            actuator_gain,
+            gravity_scale,
+        }
+    }
+}
+
 impl DomainDistribution {
     /// Draws the properties of an episode.
     pub fn draw(&self, random: &mut Pcg64) -> Domain {

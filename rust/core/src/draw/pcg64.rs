@@ -24,6 +24,31 @@ pub struct Pcg64State {
     pub increment: u128,
 }
 
+impl Pcg64State {
+    /// High and low half of the state, high and low half of the increment.
+    #[must_use]
+    #[allow(clippy::cast_possible_truncation)] // the halves are meant
+    pub fn halves(self) -> [u64; 4] {
+        let Self { state, increment } = self;
+        [
+            (state >> 64) as u64,
+            state as u64,
+            (increment >> 64) as u64,
+            increment as u64,
+        ]
+    }
+
+    /// What [`Self::halves`] tells.
+    #[must_use]
+    pub fn from_halves([a, b, c, d]: [u64; 4]) -> Self {
+        let join = |high: u64, low: u64| (u128::from(high) << 64) | u128::from(low);
+        Self {
+            state: join(a, b),
+            increment: join(c, d),
+        }
+    }
+}
+
 /// A generator.
 ///
 /// It keeps no spare 32 bits: NumPy's do not change by what is drawn here.

@@ -54,6 +54,25 @@ pub struct RockDraw {
     pub seed: u64,
 }
 
+impl RockDraw {
+    /// Difficulty, abundance, radius of the largest rocks; zeros where there are none.
+    #[must_use]
+    pub fn row(rocks: Option<Self>) -> [f64; 3] {
+        rocks.map_or([0.0; 3], |r| [r.difficulty, r.abundance, r.max_radius])
+    }
+
+    /// What [`Self::row`] tells; None of no rocks.
+    #[must_use]
+    pub fn from_row([difficulty, abundance, max_radius]: [f64; 3], seed: u64) -> Option<Self> {
+        (max_radius > 0.0).then_some(Self {
+            difficulty,
+            abundance,
+            max_radius,
+            seed,
+        })
+    }
+}
+
 impl RockDistribution {
     /// Draws the rocks of an episode. `range` replaces the range of the difficulty, `fixed` the
     /// difficulty and the seed; all draws are made all the same.

@@ -70,6 +70,32 @@ pub struct Start {
 }
 
 impl Start {
+    /// Slope, direction of steepest ascent, x and z of the start, heading, x and z of each goal.
+    #[must_use]
+    pub fn row(&self) -> Vec<f64> {
+        let [x, z] = self.position;
+        let pose = [self.slope, self.uphill, x, z, self.heading];
+        pose.into_iter().chain(self.goals().flatten()).collect()
+    }
+
+    /// What [`Self::row`] tells; None of a row of another length.
+    #[must_use]
+    pub fn from_row(row: &[f64]) -> Option<Self> {
+        let (&[slope, uphill, x, z, heading, goal_x, goal_z], rest) = row.split_first_chunk()?;
+        let (further, []) = rest.as_chunks() else {
+            return None;
+        };
+        let (position, goal, further) = ([x, z], [goal_x, goal_z], further.to_vec());
+        Some(Self {
+            slope,
+            uphill,
+            position,
+            heading,
+            goal,
+            further,
+        })
+    }
+
     /// All goals in order, x and z, m.
     pub fn goals(&self) -> impl Iterator<Item = [f64; 2]> {
         std::iter::once(self.goal).chain(self.further.iter().copied())

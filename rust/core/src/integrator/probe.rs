@@ -23,6 +23,24 @@ pub enum Phase {
     Projection,
 }
 
+impl Phase {
+    /// Name in lower case, with underscores.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Kinematics => "kinematics",
+            Self::Detection => "detection",
+            Self::MassMatrix => "mass_matrix",
+            Self::Bias => "bias",
+            Self::Factor => "factor",
+            Self::Delassus => "delassus",
+            Self::Solve => "solve",
+            Self::Update => "update",
+            Self::Projection => "projection",
+        }
+    }
+}
+
 /// Receives the end of each part of a step.
 pub trait Probe {
     /// `phase` has just ended.

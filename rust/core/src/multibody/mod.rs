@@ -13,6 +13,7 @@
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 pub mod bias;
+pub mod chart;
 mod composite;
 pub mod coordinates;
 pub mod coriolis;
@@ -23,6 +24,7 @@ pub mod factor;
 pub mod inertias;
 pub mod joint;
 pub mod kinematics;
+pub mod landmarks;
 pub mod mass_matrix;
 pub mod mechanism;
 pub mod model;
@@ -32,6 +34,7 @@ pub mod place;
 pub mod poses;
 pub mod state;
 
+pub use chart::Chart;
 pub use description::{
     CouplingDescription, DriveDescription, FORMAT, Hold, JointKind, Limits, MAX_SHAPES, MAX_SOLIDS,
     MassProperties, ModelDescription, Shape, ShapeDescription, SolidDescription, Spring,
@@ -47,7 +50,8 @@ pub use mass_matrix::MassMatrix;
 pub use mechanism::Mechanism;
 pub(crate) use model::fingerprint;
 pub use model::{
-    BASE, Body, CollisionBox, CollisionSphere, Frame, JointProperties, Model, Passive, Tree, Wheel,
+    BASE, Body, Changes, CollisionBox, CollisionSphere, Frame, JointProperties, Model, Passive,
+    Tree, Wheel,
 };
 pub use momentum::Momentum;
 pub use motor::{DriveTrial, Motor, MotorRegime};

@@ -1,12 +1,96 @@
 //! Copies of a machine with some of its data changed.
 
 use super::Model;
-use crate::multibody::description::JointKind;
 use crate::multibody::description::check_values::{in_range, length};
+use crate::multibody::description::{JointKind, WheelDescription};
 use crate::multibody::error::ModelError;
 use crate::multibody::motor::Motor;
 
+/// What of a copy of a machine is changed; `None` leaves it as it is.
+#[derive(Clone, Debug, Default)]
+pub struct Changes {
+    /// Radius of all wheels, m, as of [`Model::with_wheel_radius`].
+    pub wheel_radius: Option<f64>,
+    /// Radius at which the wheels touch, m, as of [`Model::with_contact_radius`].
+    pub contact_radius: Option<f64>,
+    /// Normal stiffness of all wheels, N/m; 0 for rigid wheels, which have no damping either.
+    pub wheel_stiffness: Option<f64>,
+    /// Normal damping of all wheels, N s/m.
+    pub wheel_damping: Option<f64>,
+    /// Masses by the solids' names, kg; inertias scale with them.
+    pub masses: Vec<(String, f64)>,
+    /// Factor of all masses and inertias.
+    pub mass_scale: Option<f64>,
+    /// Stiffness of every steering controller, N m/rad.
+    pub steering_stiffness: Option<f64>,
+    /// Damping of every steering controller, N m s/rad.
+    pub steering_damping: Option<f64>,
+    /// Largest torque of every wheel, N m.
+    pub wheel_torque_limit: Option<f64>,
+    /// The motor of all wheels, or none.
+    pub motor: Option<Option<Motor>>,
+}
+
+impl Changes {
+    fn change_wheels(&self, wheels: &mut [WheelDescription]) {
+        for wheel in wheels {
+            wheel.torque_limit = self.wheel_torque_limit.unwrap_or(wheel.torque_limit);
+            if let Some(stiffness) = self.wheel_stiffness {
+                let yields = stiffness != 0.0;
+                wheel.stiffness = yields.then_some(stiffness);
+                wheel.damping = wheel.damping.filter(|_| yields);
+            }
+            wheel.damping = self.wheel_damping.or(wheel.damping);
+            wheel.motor = self.motor.unwrap_or(wheel.motor);
+        }
+    }
+}
+
 impl Model {
+    /// A copy with changes.
+    ///
+    /// # Errors
+    /// A number out of its range; `UnknownName` for a solid that does not exist; `NotADisc` as of
+    /// [`Model::with_wheel_radius`].
+    pub fn changed(&self, changes: &Changes) -> Result<Self, ModelError> {
+        let mut description = self.description.clone();
+        changes.change_wheels(&mut description.wheels);
+        for (name, mass) in &changes.masses {
+            let Some(solid) = description.solids.iter_mut().find(|s| &s.name == name) else {
+                let field = "masses".to_owned();
+                return Err(ModelError::UnknownName {
+                    field,
+                    name: name.clone(),
+                });
+            };
+            solid.set_mass(*mass);
+        }
+        let steering: Vec<_> = description
+            .wheels
+            .iter()
+            .map(|w| w.steering.clone())
+            .collect();
+        for solid in &mut description.solids {
+            if let Some(scale) = changes.mass_scale {
+                solid.set_mass(solid.mass * scale);
+            }
+            if let Some(hold) = &mut solid.hold
+                && steering.iter().flatten().any(|name| *name == solid.name)
+            {
+                hold.stiffness = changes.steering_stiffness.unwrap_or(hold.stiffness);
+                hold.damping = changes.steering_damping.unwrap_or(hold.damping);
+            }
+        }
+        let mut model = Self::from_description(description)?;
+        if let Some(radius) = changes.wheel_radius {
+            model = model.with_wheel_radius(radius)?;
+        }
+        if let Some(radius) = changes.contact_radius {
+            model = model.with_contact_radius(radius)?;
+        }
+        Ok(model)
+    }
+
     /// A copy with joints locked at angles (rad) or displacements (m): their solids are merged and
     /// their coordinates removed.
     ///
@@ -97,5 +181,49 @@ impl Model {
             wheel.motor = motor;
         }
         Self::from_description(description)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_copy_differs_in_what_is_changed_alone() {
+        let rover = Model::rover();
+        assert_eq!(
+            rover.changed(&Changes::default()).unwrap().description(),
+            rover.description()
+        );
+        let name = rover.description().solids[0].name.clone();
+        let changes = Changes {
+            masses: vec![(name.clone(), 100.0)],
+            mass_scale: Some(2.0),
+            contact_radius: Some(0.2),
+            wheel_torque_limit: Some(7.0),
+            ..Changes::default()
+        };
+        let changed = rover.changed(&changes).unwrap();
+        assert!((changed.description().solids[0].mass - 200.0).abs() < 1e-12);
+        assert!(
+            changed
+                .wheels()
+                .iter()
+                .all(|w| (w.torque_limit - 7.0).abs() < 1e-12)
+        );
+        assert!(
+            changed
+                .wheels()
+                .iter()
+                .all(|w| (w.radius - 0.2).abs() < 1e-12)
+        );
+        let changes = Changes {
+            masses: vec![("none".to_owned(), 1.0)],
+            ..Changes::default()
+        };
+        assert!(matches!(
+            rover.changed(&changes),
+            Err(ModelError::UnknownName { .. })
+        ));
     }
 }

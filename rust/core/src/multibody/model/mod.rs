@@ -18,6 +18,7 @@ use std::ops::Range;
 use nalgebra::Vector3;
 
 pub use body::Body;
+pub use edit::Changes;
 pub use parts::{CollisionBox, CollisionSphere, Frame, Wheel};
 pub use properties::{JointProperties, Passive};
 pub use tree::Tree;

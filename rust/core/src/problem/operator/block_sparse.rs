@@ -63,6 +63,41 @@ impl BlockSparseDelassus {
         Ok(sparse)
     }
 
+    /// Takes block rows of which some may lack their diagonal block, which then is zero; otherwise
+    /// as [`Self::from_rows`].
+    ///
+    /// # Errors
+    /// As [`Self::from_rows`].
+    ///
+    /// # Panics
+    /// If `row_starts` lead beyond the columns or blocks.
+    pub fn from_partial_rows(
+        dimension: Dimension,
+        starts: &[usize],
+        columns: &[usize],
+        blocks: &[f64],
+    ) -> Result<Self, ProblemError> {
+        let size = dimension.components().pow(2);
+        let (mut all_starts, mut all_columns, mut all_blocks) = (vec![0], Vec::new(), Vec::new());
+        for (row, ends) in starts.windows(2).enumerate() {
+            let own = &columns[ends[0]..ends[1]];
+            let before = own.partition_point(|&column| column < row);
+            let middle = ends[0] + before;
+            let stored = usize::from(own.get(before) == Some(&row));
+            all_columns.extend_from_slice(&columns[ends[0]..middle]);
+            all_columns.push(row);
+            all_columns.extend_from_slice(&columns[middle + stored..ends[1]]);
+            all_blocks.extend_from_slice(&blocks[size * ends[0]..size * (middle + stored)]);
+            all_blocks.resize(
+                size * all_columns.len() - size * (ends[1] - middle - stored),
+                0.0,
+            );
+            all_blocks.extend_from_slice(&blocks[size * (middle + stored)..size * ends[1]]);
+            all_starts.push(all_columns.len());
+        }
+        Self::from_rows(dimension, all_starts, all_columns, all_blocks)
+    }
+
     /// Takes block rows as given (SciPy's BSR format).
     ///
     /// `row_starts` (`n_c + 1`), `columns` (`n_blocks`) ascending in each row, `blocks`

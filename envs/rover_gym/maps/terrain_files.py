@@ -1,0 +1,188 @@
+"""Grounds from files and by a seed: the constructors of terrains beside the compiled ones.
+
+The compiled classes build terrains from arrays; reading files is Python, and the functions of this page become their
+methods.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+
+import numpy as np
+
+from rover_gym.maps.fractal import fractal_map, pair
+from rover_gym.maps.map_files import read_map, read_mesh
+from rover_gym.mechanics import HeightField, Plane, SphereField, TerrainError, TriangleMesh
+from rover_gym.validation import refuse, text_of_file
+
+#: Longest file of spheres, bytes.
+MOST_BYTES = 1 << 28
+
+
+def sphere_field_from_file(
+    path: str | os.PathLike[str], ground: Plane | None = None, material: str = "rock"
+) -> SphereField:
+    """Reads spheres from a CSV file with the header `x,y,z,radius`, in m.
+
+    Args:
+        path: Path of the file.
+        ground: The plane under the spheres; none by default.
+        material: Name of the spheres' material.
+
+    Raises:
+        TerrainError: The file does not describe spheres; the message names the path.
+        OSError: The file cannot be read.
+    """
+    header, *rows = text_of_file(path, MOST_BYTES, error=TerrainError).splitlines() or [""]
+    if [name.strip().lower() for name in header.split(",")] != ["x", "y", "z", "radius"]:
+        refuse(TerrainError, "path", os.fsdecode(path), "the file must begin with the header x,y,z,radius")
+    try:
+        table = np.loadtxt(rows, delimiter=",", ndmin=2) if rows else np.empty((0, 4))
+    except ValueError as error:
+        refuse(TerrainError, "path", os.fsdecode(path), f"the file is not a table of numbers ({error})")
+    if table.shape[1] != 4:
+        refuse(TerrainError, "path", os.fsdecode(path), f"the file must have 4 columns, has {table.shape[1]}")
+    try:
+        return SphereField(table[:, :3], table[:, 3], ground, material)
+    except TerrainError as error:
+        named = TerrainError(f"{os.fsdecode(path)}: {error}")
+        named.field, named.value = error.field, error.value
+        raise named from None
+
+
+def height_field_from_file(
+    path: str | os.PathLike[str],
+    *,
+    spacing: float | tuple[float, float] | None = None,
+    origin: tuple[float, float] | None = None,
+    height_range: tuple[float, float] | None = None,
+    scale: float | None = None,
+    datum: float | None = None,
+    band: int | None = None,
+    material: str = "ground",
+) -> HeightField:
+    """Reads a map from a GeoTIFF, a PNG or a .npy file.
+
+    Columns run along x and rows along z; of a map with north up, x is east and z south. A
+    GeoTIFF brings its spacing, its unit and its mark for no data.
+
+    Args:
+        path: Path of the file; its ending tells the format.
+        spacing: Distance of columns and of rows, m; needed unless the file gives it.
+        origin: Place (x, z) of the first height, m; by default such that the map's middle is
+            at the world's origin.
+        height_range: Of a PNG: heights of black and white, (2,), m.
+        scale: Factor from the file's numbers to m; of a GeoTIFF by default its own.
+        datum: Height of the file that becomes 0, in its own numbers; of a GeoTIFF by default
+            its lowest, otherwise 0.
+        band: Band of a GeoTIFF, from 1; needed if the file has several.
+        material: Name of its material.
+
+    Raises:
+        TerrainError: The file is no such map or does not say enough; the message names it.
+        OSError: The file cannot be read.
+        MissingExtraError: The extra `maps` is not installed.
+    """
+    read = read_map(
+        path,
+        spacing=None if spacing is None else pair("spacing", spacing),
+        origin=None if origin is None else pair("origin", origin),
+        height_range=height_range,
+        scale=scale,
+        datum=datum,
+        band=band,
+    )
+    return HeightField(*read, material)
+
+
+def fractal(
+    size: float | tuple[float, float],
+    spacing: float | tuple[float, float],
+    roughness: float,
+    *,
+    hurst: float = 0.7,
+    longest_wave: float | None = None,
+    craters: float = 0.0,
+    crater_diameter: tuple[float, float] = (0.5, 5.0),
+    ripple_height: float = 0.0,
+    ripple_length: float = 1.0,
+    seed: int = 0,
+    origin: tuple[float, float] | None = None,
+    material: str = "ground",
+) -> HeightField:
+    """Rough ground made by a seed: a self-affine surface, with craters and ripples on demand.
+
+    The power of a wave of k cycles a metre falls as k^(-2 hurst - 2) from `longest_wave` to two
+    cells. Craters are bowls with a rim, a fifth as deep as wide; those as wide as D or wider
+    number D^-2. Ripples are waves across x, steeper on one side.
+
+    Args:
+        size: Extent along x and z, m: one number, or two.
+        spacing: Distance of columns and of rows, m.
+        roughness: Root mean square of the rough part's heights, m.
+        hurst: Hurst exponent, in (0, 1); 0.7 by default.
+        longest_wave: Longest wave, m; half the smaller extent by default.
+        craters: Expected number of craters in each m² of a diameter of 1 m or more; 0 by
+            default.
+        crater_diameter: Smallest and largest diameter of craters, m; (0.5, 5) by default.
+        ripple_height: Height of ripples from trough to crest, m; 0 by default.
+        ripple_length: Their wavelength, m.
+        seed: Seed of the random numbers; equal seeds give equal ground.
+        origin: Place (x, z) of the first height, m; by default such that the map's middle is
+            at the world's origin.
+        material: Name of its material.
+
+    Raises:
+        TerrainError: An argument is out of its range.
+
+    Source: Turcotte 1997 (spectral synthesis); Pike 1977 and McGetchin, Settle and Head
+    1973 (craters).
+    """
+    made = fractal_map(
+        size,
+        spacing,
+        roughness,
+        hurst=hurst,
+        longest_wave=longest_wave,
+        craters=craters,
+        crater_diameter=crater_diameter,
+        ripple_height=ripple_height,
+        ripple_length=ripple_length,
+        seed=seed,
+        origin=origin,
+    )
+    return HeightField(*made, material)
+
+
+def triangle_mesh_from_file(
+    path: str | os.PathLike[str],
+    *,
+    scale: float = 1.0,
+    position: Sequence[float] = (0.0, 0.0, 0.0),
+    up: str = "y",
+    material: str = "ground",
+) -> TriangleMesh:
+    """Reads a mesh from a file: OBJ, PLY, STL, GLB and what else `trimesh` reads.
+
+    Equal corners are joined, and triangles without an area are left out.
+
+    Args:
+        path: Path of the file; its ending tells the format.
+        scale: Factor from the file's numbers to m.
+        position: Place of the file's origin, (3,), m; the world's origin by default.
+        up: Axis of the file that points up: "y" or "z".
+        material: Name of its material.
+
+    Raises:
+        TerrainError: The file holds no such mesh; the message names it.
+        OSError: The file cannot be read.
+        MissingExtraError: The extra `maps` is not installed.
+    """
+    return TriangleMesh(*read_mesh(path, scale=scale, position=position, up=up), material)
+
+
+SphereField.from_file = staticmethod(sphere_field_from_file)  # type: ignore[method-assign]
+HeightField.from_file = staticmethod(height_field_from_file)  # type: ignore[method-assign]
+HeightField.fractal = staticmethod(fractal)  # type: ignore[method-assign]
+TriangleMesh.from_file = staticmethod(triangle_mesh_from_file)  # type: ignore[method-assign]

@@ -1,0 +1,203 @@
+"""Files of models: the methods of `RoverModel` that read and write them.
+
+The compiled class builds a model from text and dictionaries; reading and writing files is Python, and the functions of
+this page become its methods.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Collection
+from typing import Any
+
+from rover_gym.mechanics import ModelError, RoverModel
+from rover_gym.models.file_writing import write_mjcf, write_urdf
+from rover_gym.models.import_report import ImportReport
+from rover_gym.models.reading import read_mjcf, read_urdf
+from rover_gym.models.robot_tree import checked_path
+from rover_gym.models.roles import Steering, Wheels
+from rover_gym.validation import text_of_file
+
+#: Longest model file, bytes.
+MOST_BYTES = 16 << 20
+
+
+def from_file(path: str | os.PathLike[str]) -> RoverModel:
+    """Reads a model file (TOML).
+
+    Args:
+        path: Path of the file.
+
+    Raises:
+        ModelError: The file does not describe a model; the message names the path.
+        OSError: The file cannot be read.
+    """
+    text = text_of_file(path, MOST_BYTES, error=ModelError)
+    try:
+        return RoverModel.from_text(text)
+    except ModelError as error:
+        named = ModelError(f"{os.fsdecode(path)}: {error}")
+        named.field, named.value = error.field, error.value
+        raise named from None
+
+
+def to_file(self: RoverModel, path: str | os.PathLike[str]) -> None:  # noqa: D417 - a method
+    """Writes a model file (TOML), with locked joints.
+
+    Args:
+        path: Path of the file.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    checked_path(path).write_text(self.to_text(), encoding="utf-8", newline="\n")
+
+
+def from_urdf(
+    path: str | os.PathLike[str],
+    *,
+    wheels: Wheels = None,
+    steering: Steering = None,
+    free_base: bool = True,
+    forward: str = "x",
+    torque_limit: float | None = None,
+    steering_stiffness: float | None = None,
+    steering_damping: float | None = None,
+    steering_limit: float | None = None,
+    wheel_width: float | None = None,
+    wheel_stiffness: float | None = None,
+    ignore: Collection[str] = (),
+    package_paths: Collection[str | os.PathLike[str]] = (),
+) -> RoverModel:
+    """Reads a URDF file.
+
+    The file's axes (x forward, y left, z up) are converted to ours (x forward, y up, z right)
+    in every frame. `import_report` says what was understood, assumed and left out.
+
+    Args:
+        path: Path of the file.
+        wheels: Names of the wheels' links or joints, or their radii by name, m. None: found
+            from shapes and names. An empty list: none.
+        steering: Names of the steering links or joints, or those of each wheel by its name.
+            None: found from their axes. An empty list: none.
+        free_base: Whether the root moves freely; otherwise it is fixed to the world.
+        forward: The file's axis along which the machine drives: "x", "-x", "y" or "-y".
+        torque_limit: Largest torque of every wheel, N m; by default the file's.
+        steering_stiffness: Stiffness of every steering controller, N m/rad.
+        steering_damping: Damping of every steering controller, N m s/rad.
+        steering_limit: Largest steering set-point, rad; by default the joint's stop.
+        wheel_width: Width of every wheel, m, 0 for thin discs, which cost less to simulate; by
+            default that of the cylinder that touches for it in the file, or 0.
+        wheel_stiffness: Normal stiffness of every wheel where it touches, N/m, 0 for rigid
+            wheels. By default a wheel yields 0.03 mm under its share of the weight, which
+            decides how the ground shares the weight among the wheels of a rigid chassis.
+        ignore: Kinds of what changes the motion and is left out all the same: "friction",
+            "actuators", "closed loops", "tendons", "springs", "fluid".
+        package_paths: Folders that are searched for the packages of `package://` names, before
+            those of the environment variables `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH` and
+            the folders above the file.
+
+    Raises:
+        ModelError: The file is malformed, holds what cannot be simulated, or leaves open which
+            links are wheels; the message names file, element and value.
+        ImportError: The extra `models` is not installed.
+        OSError: The file cannot be read.
+    """
+    return _imported(read_urdf, locals())
+
+
+def from_mjcf(
+    path: str | os.PathLike[str],
+    *,
+    wheels: Wheels = None,
+    steering: Steering = None,
+    free_base: bool | None = None,
+    forward: str = "x",
+    torque_limit: float | None = None,
+    steering_stiffness: float | None = None,
+    steering_damping: float | None = None,
+    steering_limit: float | None = None,
+    wheel_width: float | None = None,
+    wheel_stiffness: float | None = None,
+    ignore: Collection[str] = (),
+) -> RoverModel:
+    """Reads an MJCF file, which MuJoCo compiles.
+
+    As `from_urdf`, but that the file says whether the base is free, and position servos become
+    gains of held joints.
+
+    Args:
+        path: Path of the file.
+        wheels: Names of the wheels' bodies or joints, or their radii by name, m. None: found
+            from shapes and names. An empty list: none.
+        steering: Names of the steering bodies or joints, or those of each wheel by its name.
+            None: found from their axes. An empty list: none.
+        free_base: Whether the root moves freely. None: as in the file.
+        forward: The file's axis along which the machine drives: "x", "-x", "y" or "-y".
+        torque_limit: Largest torque of every wheel, N m; by default the file's.
+        steering_stiffness: Stiffness of every steering controller, N m/rad.
+        steering_damping: Damping of every steering controller, N m s/rad.
+        steering_limit: Largest steering set-point, rad; by default the joint's stop.
+        wheel_width: Width of every wheel, m, 0 for thin discs, which cost less to simulate; by
+            default that of the cylinder that touches for it in the file, or 0.
+        wheel_stiffness: Normal stiffness of every wheel where it touches, N/m, 0 for rigid
+            wheels. By default a wheel yields 0.03 mm under its share of the weight, which
+            decides how the ground shares the weight among the wheels of a rigid chassis.
+        ignore: Kinds of what changes the motion and is left out all the same: "friction",
+            "actuators", "closed loops", "tendons", "springs", "fluid".
+
+    Raises:
+        ModelError: MuJoCo refuses the file, it holds what cannot be simulated, or it leaves
+            open which bodies are wheels.
+        ImportError: MuJoCo is not installed.
+        OSError: The file cannot be read.
+    """
+    return _imported(read_mjcf, locals())
+
+
+def _imported(read: Callable[..., tuple[RoverModel, ImportReport]], given: dict[str, Any]) -> RoverModel:
+    """The model that a reader returns, with the report of its import."""
+    model, report = read(**given, frames=5)
+    return model._with_import_report(report)
+
+
+def to_urdf(self: RoverModel, path: str | os.PathLike[str], *, ignore: Collection[str] = ()) -> None:  # noqa: D417 - a method
+    """Writes a URDF file, for other programs: x forward, y left, z up.
+
+    Wheels are written as cylinders; a thin disc is a tenth of its radius wide and named so.
+
+    Args:
+        path: Path of the file.
+        ignore: Kinds of what the format cannot express and is left out all the same: "springs",
+            "armature".
+
+    Raises:
+        ModelError: The model has a spherical joint, several trees, or what the format cannot
+            express and `ignore` does not name.
+        OSError: The file cannot be written.
+    """
+    write_urdf(self, path, ignore=ignore)
+
+
+def to_mjcf(self: RoverModel, path: str | os.PathLike[str]) -> None:  # noqa: D417 - a method
+    """Writes an MJCF file, for MuJoCo: x forward, y left, z up.
+
+    Wheels are written as cylinders, of which a thin disc is a tenth of its radius wide and
+    named so, their drives as motors, held steering as position servos, and coupled joints as
+    equality constraints, which MuJoCo satisfies approximately.
+
+    Args:
+        path: Path of the file.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    write_mjcf(self, path)
+
+
+RoverModel.from_file = staticmethod(from_file)  # type: ignore[method-assign]
+RoverModel.from_urdf = staticmethod(from_urdf)  # type: ignore[method-assign]
+RoverModel.from_mjcf = staticmethod(from_mjcf)  # type: ignore[method-assign]
+RoverModel.to_file = to_file  # type: ignore[method-assign]
+RoverModel.to_urdf = to_urdf  # type: ignore[method-assign]
+RoverModel.to_mjcf = to_mjcf  # type: ignore[method-assign]
