@@ -26,7 +26,7 @@ use super::parts::{Parts, Twist};
 use super::pieces::LanePlane;
 use super::problem::{MAX_CONTACTS, MAX_DENSE};
 use crate::contact::detection::{touch_of_disc, touch_of_roller};
-use crate::contact::{Contact, ContactFrame, ContactKey, Opposite, Part};
+use crate::contact::{Contact, ContactFrame, ContactKey, Opposite, Part, Side};
 use crate::geometry::query::sweep::DEEP;
 use crate::geometry::query::{CIRCLE, NEAREST};
 use crate::geometry::{Disc, Roller, Sphere};

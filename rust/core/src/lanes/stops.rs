@@ -5,7 +5,6 @@
 use super::contacts::Contacts;
 use super::forecast::Forecast;
 use super::machine::{Machine, Stop};
-use crate::contact::Side;
 use crate::multibody::mechanism::LinkJoint;
 use crate::multibody::{Place, Poses};
 use crate::scalar::{Lane, LaneMask};
