@@ -3,8 +3,8 @@
 //! Its linear systems are those of Newton's method ([`ReducedSystem`]). In addition it stops where
 //! the budget ends, and where the rounding of `W p + q` allows no better answer.
 //!
-//! Measured on 19 200 solves of a rover whose torques and set-points are drawn anew every ten
-//! steps, on the plane and among rocks: 4.1 systems on average, and one solve in a thousand fails.
+//! Measured on 48 000 general steps of a rover whose torques (up to 0, 60 and 150 N m) and
+//! set-points are drawn anew every ten steps, on the plane and among rocks: 3.3 systems on average.
 
 use std::ops::Range;
 
