@@ -10,8 +10,8 @@
 //! The dynamics of the tree are those of [`crate::multibody`].
 //!
 //! - [`admission`]: which options have a fast step; [`machine`]: what the rovers share;
-//! - `parts`, [`ground`], `footing`, `pieces`, `rolling`, [`forecast`], [`contacts`], `by_lane`, `rare`, `spares`,
-//!   `stops`: what touches what;
+//! - `parts`, [`ground`], `footing`, `pieces`, `rolling`, [`forecast`], [`contacts`], `by_lane`,
+//!   `rare`, `spares`, `stops`: what touches what;
 //!   [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield;
 //! - [`problem`], [`modes`], [`equations`], [`pattern`], `tree_matrix`, `velocity_equations`,
 //!   `sweeps`, `pivoting`, `visits`, `bench`, [`queue`]: the friction-contact problems;
