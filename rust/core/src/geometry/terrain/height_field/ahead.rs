@@ -223,7 +223,7 @@ impl Search<'_> {
 mod tests {
     use super::*;
     use crate::geometry::query::dispatch;
-    use crate::geometry::{Neighbourhood, PlacedShape};
+    use crate::geometry::{Neighbourhood, PlacedShape, SupportMap};
     use nalgebra::Rotation3;
     use proptest::prelude::*;
 
@@ -255,7 +255,8 @@ mod tests {
             };
             // Lowered onto the ground.
             let gap = |disc: &Disc| {
-                crate::contact::detection::disc_gap(disc, &Vector3::zeros(), &field)
+                let low = PlacedShape::Disc(*disc).support(&-Vector3::y());
+                field.height(low.x, low.z).map_or(0.0, |height| low.y - height)
             };
             disc.centre.y = 0.5;
             for _ in 0..20 {
