@@ -41,7 +41,11 @@ fn drawn(seed: usize) -> f64 {
 /// Torques and steering, the latter of the wheels that can steer.
 fn command(model: &Model, scene: &str, k: usize) -> ([f64; 6], [f64; 6]) {
     let at = |i: usize, size: f64| size * drawn(17 * k + i);
-    let steering = |i: usize| model.wheels()[i].steering.map_or(0.0, |_| at(6 + i, STEERING));
+    let steering = |i: usize| {
+        model.wheels()[i]
+            .steering
+            .map_or(0.0, |_| at(6 + i, STEERING))
+    };
     match scene {
         "rest" => ([0.0; 6], [0.0; 6]),
         "drive" => ([1.0; 6], [0.0; 6]),

@@ -411,7 +411,14 @@ fn sand_distribution(
             return Err(refused(other, Kind::Option, name, "None beside sand").into());
         }
     }
-    let wrong = || refused(sand, Kind::Option, "sand", "a list of one or more SoftGround");
+    let wrong = || {
+        refused(
+            sand,
+            Kind::Option,
+            "sand",
+            "a list of one or more SoftGround",
+        )
+    };
     let mut soils = Vec::new();
     for one in sand.try_iter().map_err(|_| wrong())? {
         match terrain::parse(&one?)? {

@@ -71,7 +71,11 @@ impl SandDraw {
     /// # Errors
     /// As [`HeightField::new`].
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a grid, small numbers
-    pub fn lay_out(&self, start: &Start, plane: &Plane) -> Result<Option<HeightField>, TerrainError> {
+    pub fn lay_out(
+        &self,
+        start: &Start,
+        plane: &Plane,
+    ) -> Result<Option<HeightField>, TerrainError> {
         if self.amplitude <= 0.0 {
             return Ok(None);
         }
@@ -82,7 +86,12 @@ impl SandDraw {
             let angle = wind + SPREAD * (2.0 * random.uniform() - 1.0);
             let (sine, cosine) = sin_cos(angle);
             let k = turn / length;
-            [k * cosine, k * sine, turn * random.uniform(), share * self.amplitude]
+            [
+                k * cosine,
+                k * sine,
+                turn * random.uniform(),
+                share * self.amplitude,
+            ]
         });
         let ends = |[low, high]: Range| {
             let first = ((low - MARGIN) / SPACING).floor();
@@ -97,7 +106,9 @@ impl SandDraw {
                 z + SPACING * (at / columns) as f64,
             ];
             let waves = waves.map(|[a, b, phase, size]| size * sin_cos(a * x + b * z + phase).0);
-            plane.height(x, z).map_or(f64::NAN, |y| y + waves[0] + waves[1])
+            plane
+                .height(x, z)
+                .map_or(f64::NAN, |y| y + waves[0] + waves[1])
         };
         let heights = (0..rows * columns).map(|at| height(at) as f32).collect();
         HeightField::new(heights, [rows, columns], [SPACING; 2], [x, z]).map(Some)

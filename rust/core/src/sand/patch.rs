@@ -275,7 +275,10 @@ impl<'a> Frame<'a> {
                 ([ring, None], &self.rules.arc)
             } else {
                 let ring = self.rules.side(self.wheel, self.dry, index - strips);
-                ([ring, ring.map(|ring| ring.mirrored())], &self.rules.side_arc)
+                (
+                    [ring, ring.map(|ring| ring.mirrored())],
+                    &self.rules.side_arc,
+                )
             };
             let pair = pair.map(|ring| ring.and_then(|ring| self.arc(ring)));
             let n = rule.places.len();
@@ -303,7 +306,11 @@ impl<'a> Frame<'a> {
         if raised <= -swing {
             return None;
         }
-        let cos = if raised >= swing { -1.0 } else { -raised / swing };
+        let cos = if raised >= swing {
+            -1.0
+        } else {
+            -raised / swing
+        };
         let end = quarter(cos, 1.0);
         let [from, to] = self.pushing(&ring, end);
         (from < to).then_some((ring, Arc { from, to, cos }))

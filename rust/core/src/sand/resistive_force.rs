@@ -204,12 +204,7 @@ struct Seen<T> {
 
 impl<T: Lane> Seen<T> {
     #[inline(always)]
-    fn of(
-        n: Vec3<T>,
-        x: Vec3<T>,
-        size: T,
-        (surface, flow): (&Interface, &Flow),
-    ) -> Self {
+    fn of(n: Vec3<T>, x: Vec3<T>, size: T, (surface, flow): (&Interface, &Flow)) -> Self {
         let number = |value: f64| n.x.like(value);
         let (zero, one, k) = (number(0.0), number(1.0), number(surface.follow));
         let psi = number(flow.dilatancy);
@@ -276,12 +271,7 @@ struct Flowing<T: Lane> {
 
 impl<T: Lane> Flowing<T> {
     #[inline(always)]
-    fn of(
-        n: Vec3<T>,
-        v: Vec3<T>,
-        g: Vec3<T>,
-        (surface, flow): (&Interface, &Flow),
-    ) -> Self {
+    fn of(n: Vec3<T>, v: Vec3<T>, g: Vec3<T>, (surface, flow): (&Interface, &Flow)) -> Self {
         let number = |value: f64| n.x.like(value);
         let (zero, one, tiny) = (number(0.0), number(1.0), number(TINY));
         let (a, b, c) = (v.dot(g), n.dot(g), n.dot(v));
@@ -353,7 +343,8 @@ fn evaluated<T: Lane>(k: &[f64; 20], a: T, b: T, c: T) -> [T; 3] {
     ];
     let q_at = q[0] + c * (q[1] + c * number(18));
     let r = number(4) + b * number(14) + c * number(17);
-    let at = p[0] + c * (p[1] + c * (p[2] + c * number(12))) + a * (q_at + a * (r + a * number(10)));
+    let at =
+        p[0] + c * (p[1] + c * (p[2] + c * number(12))) + a * (q_at + a * (r + a * number(10)));
     let by_a = q_at + a * (two * r + a * (three * number(10)));
     let by_c = p[1]
         + c * (two * p[2] + c * (three * number(12)))

@@ -344,7 +344,13 @@ mod tests {
         assert!(ruts.depth([0.5, 0.1], 0.01) < 1e-12);
         let mut window = Window::default();
         assert!(ruts.read([0.5, 0.05], [0.03; 2], 0.01, &mut window));
-        for place in [[0.5, 0.05], [0.48, 0.031], [0.519, 0.07], [0.5, 0.0], [0.7, 0.01]] {
+        for place in [
+            [0.5, 0.05],
+            [0.48, 0.031],
+            [0.519, 0.07],
+            [0.5, 0.0],
+            [0.7, 0.01],
+        ] {
             let found = ruts.depth_in(&window, place, 0.01);
             assert!((found - ruts.depth(place, 0.01)).abs() < 1e-15);
         }

@@ -138,7 +138,11 @@ impl Rules {
     #[must_use]
     pub fn new([arc, across, radial]: [usize; 3]) -> Self {
         let whole = arc.max(1).next_multiple_of(MAX_LANES);
-        let side = if arc <= MAX_LANES / 2 { MAX_LANES / 2 } else { whole };
+        let side = if arc <= MAX_LANES / 2 {
+            MAX_LANES / 2
+        } else {
+            whole
+        };
         Self {
             arc: Gauss::new(whole),
             side_arc: Gauss::new(side),
@@ -190,7 +194,7 @@ impl Rules {
         let inner = wheel.drum() - edge;
         let diagonal = std::f64::consts::FRAC_1_SQRT_2;
         if index == 0 {
-            return (edge > 0.0).then(|| Ring {
+            return (edge > 0.0).then_some(Ring {
                 offset: half - edge + diagonal * edge,
                 radius: inner + diagonal * edge,
                 normal: [diagonal, diagonal],

@@ -41,7 +41,9 @@ impl RoverSimulation {
             let tangent = ground.tangent(&disc.centre, 0.5 * wheel.radius)?;
             let frame = ContactFrame::of_wheel(&tangent.normal, &disc.axle, &disc.spoke);
             let (force, velocity) = (Vector3::from(own.force), Vector3::from(own.velocity));
-            let rate = wheel.joint.map_or(0.0, |j| self.v()[model.joint_velocity(j)]);
+            let rate = wheel
+                .joint
+                .map_or(0.0, |j| self.v()[model.joint_velocity(j)]);
             let rim = wheel.radius * wheel.drive_sign * rate;
             let (ahead, across) = (velocity.dot(&frame.t), velocity.dot(&frame.b));
             let faster = rim.abs().max(hypot(ahead, across)).max(SLIP_SPEED);

@@ -58,6 +58,7 @@ struct Evaluated {
 
 /// A wheel of a machine in sand: geometry, linearised force and trial.
 #[derive(Clone, Debug)]
+#[allow(clippy::struct_excessive_bools)] // facts that do not depend on each other
 pub(super) struct Patch {
     pub(super) wheel: SandWheel,
     pub(super) rules: Arc<Rules>,
@@ -210,7 +211,7 @@ impl Patch {
             return false;
         }
         let compliance = self.compliance(place.model, factor) * step.h;
-        let found = self.settle(step, place, &compliance, found);
+        let found = self.settle(step, place, &compliance, &found);
         self.take(&found);
         true
     }
@@ -237,7 +238,7 @@ impl Patch {
         step: &SandStep,
         place: SandScene<'_>,
         A: &Matrix6<f64>,
-        start: Evaluated,
+        start: &Evaluated,
     ) -> Evaluated {
         let arm = self.wheel.drum();
         let u = start.at;
@@ -245,7 +246,7 @@ impl Patch {
             |x: &Evaluated| x.at - u - A * (x.force - self.force + self.tangent * (x.at - self.at));
         let length = |g: &Vector6<f64>| scaled(g, arm).norm();
         let near = LOCALLY_SETTLED * length(&(u - self.at));
-        let mut best = start;
+        let mut best = *start;
         let mut rest = residual(&best);
         let mut evaluations = 1;
         while length(&rest) > near {
