@@ -847,7 +847,7 @@ class WheelBed:
         rounding: float = 0.0,
         grouser_height: float = 0.0,
         grousers: int = 0,
-        accuracy: float = 0.01,
+        accuracy: float = 0.002,
     ) -> WheelBed: ...
     @property
     def n_points(self) -> int:
@@ -1646,8 +1646,9 @@ class Simulation:
             Arrays by name. `force` (N) and `moment` about the wheel's centre (N m) of the sand on
             each wheel in the last step, (n_wheels, 3), world frame; `sinkage` of each wheel's
             lowest point under the undisturbed surface, (n_wheels,), m, negative where it is clear;
-            `absorbed`, energy that the sand has taken from each wheel, (n_wheels,), J; `ruts`,
-            place x and z and depth of each cell that a wheel has pressed down, (n, 3), m.
+            `absorbed`, energy that the sand has taken from each wheel, (n_wheels,), J; `slip`, rim
+            slip of each wheel over the faster of rim and ground, (n_wheels,), 0 where it is clear;
+            `ruts`, place x and z and depth of each cell that a wheel has pressed down, (n, 3), m.
 
         Raises:
             BusyError: Another thread is stepping this simulation.
@@ -2738,6 +2739,9 @@ class EpisodeDistribution:
         ground: The ground of every episode, a terrain of any kind; None for a tilted plane.
         hills: Fractal ground: root mean square of its slope, rise over run, or nan for one that
             follows from the difficulty of the rocks; None for none. Not together with `ground`.
+        sand: Soft grounds, one of which is drawn, on a tilted plane with ripples by the difficulty
+            of the rocks; their surfaces do not count; None for none. Not together with the two
+            others.
 
     Raises:
         OptionError: An argument is missing, no number, or out of its range.
@@ -2756,6 +2760,7 @@ class EpisodeDistribution:
         slope_by_difficulty: bool = False,
         ground: Terrain | _Terrains | None = None,
         hills: float | None = None,
+        sand: Sequence[SoftGround] | None = None,
     ) -> EpisodeDistribution: ...
     def draw(
         self,

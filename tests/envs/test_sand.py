@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rover_gym import RoverEnv, RoverGymError, RoverModel
-from rover_gym.env.sand import DRAWN_SOILS
+from rover_gym.env.sand_ground import DRAWN_SOILS
 from rover_gym.ground import plane_of, spheres_of, surfaces_of
 from rover_gym.policy import PDPolicy
 from rover_gym.sand import Soil, named_soil

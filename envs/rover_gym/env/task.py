@@ -11,7 +11,7 @@ import numpy.typing as npt
 from rover_gym.env.observation import ObservationLayout, build_layout
 from rover_gym.env.reward_terms import WEIGHTS, RewardTerms
 from rover_gym.env.rocks import MAX_GOAL_DISTANCE, RockDistribution, rock_distribution
-from rover_gym.env.sand import check_wheels_for_sand, sand_rover, soils_of
+from rover_gym.env.sand_ground import check_wheels_for_sand, sand_rover, soils_of
 from rover_gym.env.start import Domain, DomainDistribution, StartDistribution, Steering, slope_of
 from rover_gym.mechanics import (
     CommandError,

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 
-use super::sand::SandScene;
 use crate::geometry::{SoftLayer, Tangent};
 use crate::multibody::{Factor, Kinematics, Model};
 use crate::sand::patch::Relief;
 use crate::sand::{
-    Bed, Memory, Reaction, Rules, SandWheel, Twist, Want, WheelInSand, WheelPose, Window, react,
+    Bed, Memory, Reaction, Rules, RutMap, SandWheel, Twist, Want, WheelInSand, WheelPose, Window,
+    react,
 };
 
 /// Error of the linearised force of a wheel, relative to the force, at which it has settled.
@@ -35,6 +35,19 @@ const MARGIN: f64 = 2.0;
 
 /// Twist, m/s, below which two points are the same.
 const TINY: f64 = 1e-12;
+
+/// Ground and poses of a step.
+#[derive(Clone, Copy)]
+pub(crate) struct SandScene<'a> {
+    /// The machine.
+    pub model: &'a Model,
+    /// The ground.
+    pub ground: SoftLayer<'a>,
+    /// Where wheels have been.
+    pub ruts: &'a RutMap,
+    /// Poses at which the step evaluates its forces.
+    pub kinematics: &'a Kinematics,
+}
 
 /// What the wheels of a step share.
 #[derive(Clone, Debug)]
