@@ -33,8 +33,8 @@ const SHORTER: f64 = 0.4;
 /// Cells around what of a wheel is in the sand in which ruts are looked for: it moves in a step.
 const MARGIN: f64 = 2.0;
 
-/// Twist, m/s, below which two points are the same.
-const TINY: f64 = 1e-12;
+/// Twist, m/s, below which two points are the same: a secant between them would be noise.
+const TINY: f64 = 1e-6;
 
 /// Ground and poses of a step.
 #[derive(Clone, Copy)]
