@@ -791,7 +791,7 @@ class WheelBed:
         rounding: float = 0.0,
         grouser_height: float = 0.0,
         grousers: int = 0,
-        accuracy: float = 0.01,
+        accuracy: float = 0.002,
     ) -> WheelBed: ...
     @property
     def n_points(self) -> int:
@@ -2635,6 +2635,7 @@ class EpisodeDistribution:
         slope_by_difficulty: bool = False,
         ground: Terrain | _Terrains | None = None,
         hills: float | None = None,
+        sand: Sequence[SoftGround] | None = None,
     ) -> EpisodeDistribution: ...
     def draw(
         self,

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from rover_gym.env.episode_scene import EpisodeScene
 from rover_gym.env.observation import ObservationLayout
-from rover_gym.env.sand import soil_of
+from rover_gym.env.sand_ground import soil_of
 from rover_gym.env.start import Domain, Rocks, Start
 from rover_gym.env.task import Task
 from rover_gym.mechanics import RoverModel, Simulation

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from rover_gym.env.observation import ObservationLayout, build_layout
 from rover_gym.env.reward_terms import WEIGHTS, RewardTerms
-from rover_gym.env.sand import check_wheels_for_sand, sand_rover, soils_of
+from rover_gym.env.sand_ground import check_wheels_for_sand, sand_rover, soils_of
 from rover_gym.env.start import (
     MAX_GOAL_DISTANCE,
     Domain,

@@ -3,8 +3,8 @@
 //! - [`pcg64`]: the generator of NumPy's `default_rng`, number for number; [`seed_sequence`]: its
 //!   state for a seed; [`normal`]: standard normal numbers;
 //! - [`start`]: slope, pose and goal; [`rocks`]: rocks by difficulty; [`hills`]: fractal ground;
-//!   [`sand`]: soils and ripples; [`ground`]: the ground of all of them; [`way`]: whether a way leads to the goal; [`domain`]:
-//!   properties of rover and world;
+//!   [`sand`]: soils and ripples; [`ground`]: the ground of all of them; [`way`]: whether a way
+//!   leads to the goal; [`domain`]: properties of rover and world;
 //! - [`scene`]: all of these, and the rover in them; [`many`]: the next scenes of many rovers, on
 //!   several threads.
 

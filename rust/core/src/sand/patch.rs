@@ -1,7 +1,7 @@
 //! Force of sand on a wheel: the stress over what is under the surface, with its derivatives.
 //!
 //! The points of arcs lie side by side in lanes, eight at a time. A machine with fewer lanes takes
-//! them in turns and keeps a sum for each of the eight, so that the bits do not depend on the lanes.
+//! them in turns and keeps a sum for each of the eight: the bits do not depend on the lanes.
 //!
 //! A surface that recedes feels nothing. Of a ring, only the part of the arc under the surface that
 //! may push is integrated. Angles on it are `θ = 4 atan u`, so that sine and cosine are rational.

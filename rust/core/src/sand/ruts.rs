@@ -5,8 +5,8 @@
 //! therefore never loses the support of its own sinkage. Between the centres of cells the depth is
 //! interpolated.
 //!
-//! Depths are kept in tiles of [`SIDE`] by [`SIDE`] cells. A step reads those near a wheel once, into
-//! a [`Window`].
+//! Depths are kept in tiles of 16 by 16 cells. A step reads those near a wheel once, into a
+//! [`Window`].
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;

@@ -194,7 +194,7 @@ impl Rules {
         let inner = wheel.drum() - edge;
         let diagonal = std::f64::consts::FRAC_1_SQRT_2;
         if index == 0 {
-            return (edge > 0.0).then(|| Ring {
+            return (edge > 0.0).then_some(Ring {
                 offset: half - edge + diagonal * edge,
                 radius: inner + diagonal * edge,
                 normal: [diagonal, diagonal],

@@ -6,16 +6,13 @@ use nalgebra::Vector3;
 
 use super::rover::RoverSimulation;
 use super::rover_contacts::WheelForces;
-use super::rover_sand::WheelContactInSand;
+use super::rover_sand::{SLIP_SPEED, WheelContactInSand};
 use crate::contact::{Part, WheelGaps};
 use crate::geometry::Terrain;
 use crate::integrator::StepStatus;
 use crate::multibody::{Model, coordinates};
 use crate::scalar::elementary::{hypot, sin_cos};
 use crate::spatial::HeadingPitchRoll;
-
-/// Speed below which, for both rim and ground, a slip ratio is meaningless, m/s.
-pub const SLIP_SPEED: f64 = 0.05;
 
 /// A wheel touches when its gap is at most this, m. Resting wheels show gaps below a micrometre.
 pub const CONTACT_GAP: f64 = 1e-3;

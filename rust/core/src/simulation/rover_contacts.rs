@@ -24,8 +24,8 @@ impl RoverSimulation {
         deepest_overlap(self.model(), &self.kinematics(), &**self.terrain())
     }
 
-    /// Mean contact force of the last step on every wheel along its frame's n, t, b, N, that of sand
-    /// included.
+    /// Mean contact force of the last step on every wheel along its frame's n, t, b, N; that of
+    /// sand is included.
     ///
     /// Several contacts of one wheel are summed in the frame of its first; where grains are among
     /// them, in that of their mean normal, weighted by the normal impulses.

@@ -2,12 +2,14 @@
 
 use nalgebra::Vector3;
 
-use super::reading::SLIP_SPEED;
 use super::rover::RoverSimulation;
 use crate::contact::ContactFrame;
 use crate::contact::part::place_wheel;
 use crate::multibody::Kinematics;
 use crate::scalar::elementary::hypot;
+
+/// Speed below which, for both rim and ground, a slip ratio is meaningless, m/s.
+pub const SLIP_SPEED: f64 = 0.05;
 
 /// A wheel that is in sand.
 #[derive(Clone, Copy, Debug)]

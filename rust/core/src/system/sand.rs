@@ -22,11 +22,11 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::sand_patch::{Patch, SandStep, depth, moved, pose};
+use super::sand_patch::{Patch, SandScene, SandStep, depth, moved, pose};
 use crate::geometry::SoftLayer;
 use crate::integrator::StepOptions;
 use crate::multibody::{Factor, Kinematics, MassMatrix, Model};
-use crate::sand::{Memory, RutMap, SandState, SandWheel, Soil, Twist, WheelInSand};
+use crate::sand::{Memory, SandState, SandWheel, Soil, Twist, WheelInSand};
 
 /// Way in a step under gravity, in units of `|g| h²`, below which memory is not resolved.
 ///
@@ -47,19 +47,6 @@ pub(crate) struct SandContact {
     guess: Vec<f64>,
     soil: Arc<Soil>,
     step: SandStep,
-}
-
-/// Ground and poses of a step.
-#[derive(Clone, Copy)]
-pub(crate) struct SandScene<'a> {
-    /// The machine.
-    pub model: &'a Model,
-    /// The ground.
-    pub ground: SoftLayer<'a>,
-    /// Where wheels have been.
-    pub ruts: &'a RutMap,
-    /// Poses at which the step evaluates its forces.
-    pub kinematics: &'a Kinematics,
 }
 
 impl SandContact {

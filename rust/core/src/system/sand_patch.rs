@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 
-use super::sand::SandScene;
 use crate::geometry::{SoftLayer, Tangent};
 use crate::multibody::{Factor, Kinematics, Model};
 use crate::sand::patch::Relief;
 use crate::sand::{
-    Bed, Memory, Reaction, Rules, SandWheel, Twist, Want, WheelInSand, WheelPose, Window, react,
+    Bed, Memory, Reaction, Rules, RutMap, SandWheel, Twist, Want, WheelInSand, WheelPose, Window,
+    react,
 };
 
 /// Error of the linearised force of a wheel, relative to the force, at which it has settled.
@@ -33,8 +33,21 @@ const SHORTER: f64 = 0.4;
 /// Cells around what of a wheel is in the sand in which ruts are looked for: it moves in a step.
 const MARGIN: f64 = 2.0;
 
-/// Twist, m/s, below which two points are the same.
-const TINY: f64 = 1e-12;
+/// Twist, m/s, below which two points are the same: a secant between them would be noise.
+const TINY: f64 = 1e-6;
+
+/// Ground and poses of a step.
+#[derive(Clone, Copy)]
+pub(crate) struct SandScene<'a> {
+    /// The machine.
+    pub model: &'a Model,
+    /// The ground.
+    pub ground: SoftLayer<'a>,
+    /// Where wheels have been.
+    pub ruts: &'a RutMap,
+    /// Poses at which the step evaluates its forces.
+    pub kinematics: &'a Kinematics,
+}
 
 /// What the wheels of a step share.
 #[derive(Clone, Debug)]
@@ -58,6 +71,7 @@ struct Evaluated {
 
 /// A wheel of a machine in sand: geometry, linearised force and trial.
 #[derive(Clone, Debug)]
+#[allow(clippy::struct_excessive_bools)] // facts that do not depend on each other
 pub(super) struct Patch {
     pub(super) wheel: SandWheel,
     pub(super) rules: Arc<Rules>,
@@ -210,7 +224,7 @@ impl Patch {
             return false;
         }
         let compliance = self.compliance(place.model, factor) * step.h;
-        let found = self.settle(step, place, &compliance, found);
+        let found = self.settle(step, place, &compliance, &found);
         self.take(&found);
         true
     }
@@ -237,7 +251,7 @@ impl Patch {
         step: &SandStep,
         place: SandScene<'_>,
         A: &Matrix6<f64>,
-        start: Evaluated,
+        start: &Evaluated,
     ) -> Evaluated {
         let arm = self.wheel.drum();
         let u = start.at;
@@ -245,7 +259,7 @@ impl Patch {
             |x: &Evaluated| x.at - u - A * (x.force - self.force + self.tangent * (x.at - self.at));
         let length = |g: &Vector6<f64>| scaled(g, arm).norm();
         let near = LOCALLY_SETTLED * length(&(u - self.at));
-        let mut best = start;
+        let mut best = *start;
         let mut rest = residual(&best);
         let mut evaluations = 1;
         while length(&rest) > near {

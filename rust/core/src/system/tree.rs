@@ -10,7 +10,8 @@ use nalgebra::Vector3;
 use super::command::{Command, HeldJoint};
 use super::gyroscopic::GyroscopicScratch;
 use super::motor_branch::{MotorBranch, line_slope};
-use super::sand::{SandContact, SandScene};
+use super::sand::SandContact;
+use super::sand_patch::SandScene;
 use crate::contact::{
     Activation, Contact, ContactKey, ContactSystem, Opposite, PairSearch, detect, detect_limits,
     detect_pairs, generalized_impulse, relocate, relocate_limit,
