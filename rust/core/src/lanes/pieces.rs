@@ -25,6 +25,13 @@ const MAX_TIPS: usize = 6;
 /// Twice as far finds more pieces, which every step examines, and searches half as often.
 const AHEAD: [f64; 2] = [0.08, 0.0];
 
+/// How deep the rim may be in the ground, in radii, for its contacts to be those of the kept
+/// pieces: a search finds no more than that beside it.
+const DEEP: f64 = 0.02;
+
+/// Cosine and sine of the places of the rim that are measured, from its lowest point.
+const SIDES: [[f64; 2]; 3] = [[1.0, 0.0], [0.88, 0.475], [0.88, -0.475]];
+
 /// Covers the rounding of distances, m.
 const ROUNDING: f64 = 1e-6;
 
@@ -145,6 +152,17 @@ impl<T: Lane> Pieces<T> {
                 others |= 1 << lane;
             }
         }
+        let rim_points = rim.low_points();
+        for (lane, terrain) in surfaces.iter().enumerate() {
+            if (lanes.bits() & !others) >> lane & 1 == 1
+                && let Some(terrain) = terrain
+                && rim_points
+                    .iter()
+                    .any(|x| is_deep(&**terrain, x.get(lane), DEEP * rim.radius))
+            {
+                others |= 1 << lane;
+            }
+        }
         lanes & !T::mask(rim.reach.token(), others)
     }
 
@@ -258,6 +276,32 @@ impl<T: Lane> Pieces<T> {
         }
         touched
     }
+}
+
+impl<T: Lane> Rim<T> {
+    /// The lowest point of the rim and one to either side, world, m.
+    #[inline(always)]
+    fn low_points(&self) -> [Vec3<T>; 3] {
+        let like = self.reach;
+        let s = self.axle;
+        let up = Vec3::new(-(s.x * s.y), like.like(1.0) - s.y * s.y, -(s.z * s.y));
+        let up = up * (like.like(1.0) / up.norm());
+        let along = up.cross(s);
+        SIDES.map(
+            #[inline(always)]
+            |[a, b]| {
+                let [a, b] = [a, b].map(|x| like.like(x * self.radius));
+                self.centre - up * a + along * b
+            },
+        )
+    }
+}
+
+/// Whether a point is further than `depth` (m) below a surface, or over none.
+fn is_deep(terrain: &dyn Terrain, [x, y, z]: [f64; 3], depth: f64) -> bool {
+    !terrain
+        .height(x, z)
+        .is_some_and(|height| y >= height - depth)
 }
 
 impl<P: Copy, const N: usize> Kept<P, N> {
