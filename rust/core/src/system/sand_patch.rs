@@ -434,7 +434,8 @@ pub(super) fn depth(wheel: &SandWheel, pose: &WheelPose, tangent: &Tangent) -> f
 const DROPPED: f64 = 1e-9;
 
 /// The symmetric part of a matrix without its negative pivots: `Σ d_k l_k l_kᵀ` over the positive
-/// pivots d_k of its factor `L D Lᵀ`. Rotations are scaled to lengths by `arm`, m.
+/// pivots d_k of its factor `L D Lᵀ`, with entries of l_k that leave no diagonal negative. Rotations
+/// are scaled to lengths by `arm`, m.
 fn dissipative(matrix: &Matrix6<f64>, arm: f64) -> Matrix6<f64> {
     let scale = |i: usize| if i < 3 { 1.0 } else { arm };
     let mut rest =
@@ -446,7 +447,12 @@ fn dissipative(matrix: &Matrix6<f64>, arm: f64) -> Matrix6<f64> {
         if pivot <= DROPPED * largest {
             continue;
         }
-        let column = rest.column(k) / pivot;
+        // Of a positive matrix no entry is larger; of another one, a small pivot would give an
+        // arbitrarily large part.
+        let column = Vector6::from_fn(|j, _| {
+            let most = (pivot * rest[(j, j)].max(0.0)).sqrt();
+            rest[(j, k)].clamp(-most, most) / pivot
+        });
         let part = column * column.transpose() * pivot;
         sum += part;
         rest -= part;
@@ -464,5 +470,18 @@ mod tests {
         let positive = a * a.transpose() + Matrix6::identity();
         assert!((dissipative(&positive, 0.1) - positive).norm() < 1e-9);
         assert_eq!(dissipative(&-positive, 0.1), Matrix6::zeros());
+    }
+
+    /// A wheel that hardly touches had a tangent of 5e19 N s/m, and the mass matrix no factor.
+    #[test]
+    fn a_matrix_that_is_not_positive_gives_no_part_beyond_its_diagonal() {
+        let mut saddle = Matrix6::from_diagonal_element(1e-22);
+        (saddle[(0, 1)], saddle[(1, 0)]) = (0.1, 0.1);
+        saddle[(2, 2)] = 1e-23;
+        let found = dissipative(&saddle, 0.1);
+        assert!(
+            (0..6).all(|k| found[(k, k)] <= 2.0 * saddle[(k, k)]),
+            "{found}"
+        );
     }
 }
