@@ -363,7 +363,7 @@ mod tests {
         for x in [-0.33, -0.1, 0.0, 0.2] {
             ruts.pass(1, [x, -x], ([0.05; 2], 0.01), |[a, b]| {
                 let t = (a - x).hypot(b + x);
-                (t < 0.04).then_some(0.01 - t)
+                (t < 0.04).then_some(0.05 - t)
             });
         }
         let text = serde_json::to_string(&ruts).unwrap();
