@@ -144,6 +144,13 @@ impl SandContact {
         }
     }
 
+    /// Takes the forces as they are, without their tangents.
+    pub(crate) fn drop_tangents(&mut self) {
+        for patch in &mut self.patches {
+            patch.tangent.fill(0.0);
+        }
+    }
+
     /// `M += h Σ Jᵀ C J`.
     pub(crate) fn add_to_mass(&self, model: &Model, h: f64, mass: &mut MassMatrix<f64>) {
         for patch in self.patches.iter().filter(|patch| patch.is_touching) {

@@ -434,7 +434,7 @@ pub(super) fn depth(wheel: &SandWheel, pose: &WheelPose, tangent: &Tangent) -> f
 const DROPPED: f64 = 1e-9;
 
 /// The symmetric part of a matrix without its negative pivots: `Σ d_k l_k l_kᵀ` over the positive
-/// pivots d_k of its factor `L D Lᵀ`, with entries of l_k that leave no diagonal negative. Rotations
+/// pivots d_k of its factor `L D Lᵀ`, with entries of l_k that leave no diagonal negative. Angles
 /// are scaled to lengths by `arm`, m.
 fn dissipative(matrix: &Matrix6<f64>, arm: f64) -> Matrix6<f64> {
     let scale = |i: usize| if i < 3 { 1.0 } else { arm };

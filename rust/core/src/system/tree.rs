@@ -278,6 +278,25 @@ impl TreeSystem<'_> {
     fn work_of_sand(&mut self, v: &[f64], v_end: &[f64]) -> f64 {
         (self.sand()).map_or(0.0, |(sand, place, _)| sand.work(place, v, v_end))
     }
+
+    /// Adds what is implicit to the mass matrix and factors it; whether it is positive.
+    fn factor_implicit(&mut self, options: &StepOptions) -> bool {
+        let (h, theta) = (options.time_step, options.theta);
+        let parts = &mut *self.parts;
+        let joints = parts.motors.iter().zip(&self.command.held);
+        for ((motor, held), joint) in joints.zip(self.model.joints()) {
+            let (damping, stiffness) = feedback(motor.damping(), held.as_ref(), &joint.passive);
+            if damping > 0.0 || stiffness > 0.0 {
+                let implicit = h * motor.theta() * (damping + h * theta * stiffness);
+                let k = joint.velocity;
+                (parts.mass_matrix).add_to_diagonal(self.model.mechanism(), k, implicit);
+            }
+        }
+        if let Some(sand) = &parts.sand {
+            sand.add_to_mass(self.model, h, &mut parts.mass_matrix);
+        }
+        (parts.mass_matrix).factorise(self.model.mechanism(), &mut parts.factor)
+    }
 }
 
 impl MechanicalSystem for TreeSystem<'_> {
@@ -416,21 +435,18 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn factorise(&mut self, options: &StepOptions) -> bool {
-        let (h, theta) = (options.time_step, options.theta);
+        if self.factor_implicit(options) {
+            return true;
+        }
+        // Tangents of sand whose sizes differ too much leave no factor.
         let parts = &mut *self.parts;
-        let joints = parts.motors.iter().zip(&self.command.held);
-        for ((motor, held), joint) in joints.zip(self.model.joints()) {
-            let (damping, stiffness) = feedback(motor.damping(), held.as_ref(), &joint.passive);
-            if damping > 0.0 || stiffness > 0.0 {
-                let implicit = h * motor.theta() * (damping + h * theta * stiffness);
-                let k = joint.velocity;
-                (parts.mass_matrix).add_to_diagonal(self.model.mechanism(), k, implicit);
-            }
-        }
-        if let Some(sand) = &parts.sand {
-            sand.add_to_mass(self.model, h, &mut parts.mass_matrix);
-        }
-        (parts.mass_matrix).factorise(self.model.mechanism(), &mut parts.factor)
+        let Some(sand) = &mut parts.sand else {
+            return false;
+        };
+        sand.drop_tangents();
+        let (mechanism, inertias) = (self.model.mechanism(), self.model.inertias());
+        (parts.mass_matrix).update(mechanism, inertias, parts.kinematics.poses());
+        self.factor_implicit(options)
     }
 
     fn multiply_mass(&self, v: &[f64], out: &mut [f64]) {
