@@ -83,10 +83,8 @@ fn models() -> Vec<Arc<Model>> {
         for wheel in &mut own.wheels {
             wheel.width = width;
             wheel.rounding = width.map(|_| rounding);
-            if is_soft {
-                wheel.stiffness = Some(2e6);
-                wheel.damping = Some(1e4);
-            }
+            wheel.stiffness = Some(if is_soft { 2e6 } else { 0.0 });
+            wheel.damping = is_soft.then_some(1e4);
         }
         Arc::new(Model::from_description(own).unwrap())
     };
