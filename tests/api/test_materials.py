@@ -126,6 +126,13 @@ def test_a_rover_on_wide_wheels_stands_on_two_points_a_wheel() -> None:
     assert sim.wheel_forces[:, 0].sum() == pytest.approx(sim.model.mass * 9.81, rel=1e-2)
 
 
+def test_cylinders_yield_by_a_hair_unless_they_are_said_to_be_rigid() -> None:
+    (wheel, *_) = wide(width=0.15).to_dict()["wheels"]
+    assert wheel["stiffness"] == pytest.approx(wide(width=0.15).mass * 9.81 / 6 / 3e-5, rel=0.05)
+    assert wide(width=0.15, stiffness=0.0).to_dict()["wheels"][0]["stiffness"] == 0.0
+    assert "stiffness" not in wide(width=0.15, rounding=0.075).to_dict()["wheels"][0]
+
+
 @pytest.mark.parametrize(
     ("fields", "path"), [({"width": -1.0}, "width"), ({"width": 0.1, "rounding": 0.2}, "rounding")]
 )

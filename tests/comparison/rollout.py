@@ -64,16 +64,14 @@ class Row:
     ground: Callable[[np.random.Generator], Any]
 
 
-def wide(width: float, rounding: float, stiffness: float = 0.0) -> RoverModel:
-    """The built-in rover on wheels of 0.20 m with a width and a rounding, m (0: thin discs), and a stiffness, N/m."""
+def wide(width: float, rounding: float, **more: float) -> RoverModel:
+    """The built-in rover on wheels of 0.20 m with a width and a rounding, m, 0 for thin discs."""
     model = RoverModel().replace(contact_radius=0.20, motor=None)
     if width == 0.0:
         return model
     machine = model.to_dict()
     tread = {"width": width, "rounding": rounding}
-    if stiffness > 0.0:
-        tread |= {"stiffness": stiffness, "damping": stiffness * 3.5e-3}
-    machine["wheels"] = [wheel | tread for wheel in machine["wheels"]]
+    machine["wheels"] = [wheel | tread | more for wheel in machine["wheels"]]
     return RoverModel.from_dict(machine)
 
 
@@ -109,7 +107,7 @@ def rows(robots: list[Path]) -> Iterator[Row]:
     wheels = {
         "thin discs": wide(0.0, 0.0),
         "cylinders": wide(0.15, 0.0),
-        "yielding": wide(0.15, 0.0, 5.2e7),
+        "rigid cylinders": wide(0.15, 0.0, stiffness=0.0),
         "tori": wide(0.15, 0.075),
     }
     for ground, make in grounds.items():

@@ -75,7 +75,7 @@ def test_what_is_assumed_is_said_and_what_is_given_is_taken(tmp_path):
     assert any("yields 0.03 mm" in entry for entry in report.assumed)
     given = {"torque_limit": 12.0, "steering_stiffness": 300.0, "steering_damping": 4.0, "steering_limit": 0.3}
     model = RoverModel.from_urdf(path, wheel_stiffness=0.0, **given)
-    assert "stiffness" not in model.to_dict()["wheels"][0]
+    assert model.to_dict()["wheels"][0]["stiffness"] == 0.0
     soft = RoverModel.from_urdf(path, wheel_stiffness=2e5).to_dict()["wheels"][0]
     assert soft["stiffness"] == 2e5
     assert soft["damping"] == pytest.approx(2e5 * 2.0 * (3e-5 / 9.81) ** 0.5, rel=0.05)

@@ -208,7 +208,7 @@ def _wheel(tree: RobotTree, role: WheelRole, A: Array, weight: float, options: W
 
 
 def _yielding(tree: RobotTree, role: WheelRole, weight: float, options: WheelOptions) -> dict[str, float]:
-    """Stiffness, N/m, and damping, N s/m, where a wheel touches; nothing for a rigid wheel.
+    """Stiffness, N/m, and damping, N s/m, where a wheel touches; stiffness 0 for a rigid wheel.
 
     Without them the weight of a rigid chassis rests on three of its wheels, and micrometres decide on which.
     """
@@ -220,7 +220,7 @@ def _yielding(tree: RobotTree, role: WheelRole, weight: float, options: WheelOpt
             "under its share of the weight, and critical damping"
         )
     if stiffness == 0.0:
-        return {}
+        return {"stiffness": 0.0}
     return {"stiffness": stiffness, "damping": float(f"{YIELDING_TIME * stiffness:.2g}")}
 
 

@@ -468,6 +468,7 @@ fn wide(width: f64, rounding: f64) -> Model {
     let mut description = Model::rover().description().clone();
     for wheel in &mut description.wheels {
         (wheel.width, wheel.rounding) = (Some(width), Some(rounding));
+        wheel.stiffness = Some(0.0);
     }
     Model::from_description(description).unwrap()
 }

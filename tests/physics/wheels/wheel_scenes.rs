@@ -6,10 +6,11 @@ use rover_core::nalgebra::{Rotation3, Vector3};
 
 use crate::spheres::sphere_scenes::lone_wheel;
 
-/// A model whose wheels all have this width and rounding, m.
+/// A model whose wheels all have this width and rounding, m, and are rigid.
 pub fn widened(mut description: ModelDescription, width: f64, rounding: f64) -> Model {
     for wheel in &mut description.wheels {
         (wheel.width, wheel.rounding) = (Some(width), Some(rounding));
+        wheel.stiffness = Some(0.0);
     }
     Model::from_description(description).unwrap()
 }

@@ -319,7 +319,7 @@ fn check_compliance(
     wheel: &WheelDescription,
 ) -> Result<(), ModelError> {
     if let Some(stiffness) = wheel.stiffness {
-        positive(&at("stiffness"), stiffness)?;
+        not_negative(&at("stiffness"), stiffness)?;
         in_range(&at("stiffness"), stiffness, 1e12, "at most 1e12 N/m")?;
     }
     let Some(damping) = wheel.damping else {
@@ -327,7 +327,7 @@ fn check_compliance(
     };
     not_negative(&at("damping"), damping)?;
     in_range(&at("damping"), damping, 1e12, "at most 1e12 N s/m")?;
-    if wheel.stiffness.is_none() {
+    if wheel.stiffness.is_none_or(|stiffness| stiffness == 0.0) && damping != 0.0 {
         return Err(ModelError::OutOfRange {
             field: at("damping"),
             range: "given beside a stiffness",

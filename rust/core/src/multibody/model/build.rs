@@ -423,9 +423,11 @@ fn wheels(
             rounding: wheel.rounding.unwrap_or(0.0),
             grouser_height: wheel.grouser_height.unwrap_or(0.0),
             grousers: wheel.grousers.unwrap_or(0),
-            compliance: wheel.stiffness.map(|stiffness| Compliance {
-                stiffness,
-                damping: wheel.damping.unwrap_or(0.0),
+            compliance: (wheel.stiffness.filter(|stiffness| *stiffness > 0.0)).map(|stiffness| {
+                Compliance {
+                    stiffness,
+                    damping: wheel.damping.unwrap_or(0.0),
+                }
             }),
             material: named(wheel.material.as_ref(), "wheel"),
             torque_limit: wheel.torque_limit,

@@ -36,9 +36,8 @@ impl Changes {
         for wheel in wheels {
             wheel.torque_limit = self.wheel_torque_limit.unwrap_or(wheel.torque_limit);
             if let Some(stiffness) = self.wheel_stiffness {
-                let yields = stiffness != 0.0;
-                wheel.stiffness = yields.then_some(stiffness);
-                wheel.damping = wheel.damping.filter(|_| yields);
+                wheel.stiffness = Some(stiffness);
+                wheel.damping = wheel.damping.filter(|_| stiffness != 0.0);
             }
             wheel.damping = self.wheel_damping.or(wheel.damping);
             wheel.motor = self.motor.unwrap_or(wheel.motor);

@@ -67,8 +67,9 @@ impl Model {
     ///
     /// # Errors
     /// The first invalid entry, named by its field.
-    pub fn from_description(description: ModelDescription) -> Result<Self, ModelError> {
+    pub fn from_description(mut description: ModelDescription) -> Result<Self, ModelError> {
         check(&description)?;
+        description.state_yielding();
         Self::build(description)
     }
 

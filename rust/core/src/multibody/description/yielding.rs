@@ -1,0 +1,70 @@
+//! Wheels that stand on a line yield, unless their description says otherwise.
+//!
+//! Two contacts share the load of a rigid cylinder on rigid ground by micrometres: an axle that
+//! tilts by a hair puts all of it on one end, and the path follows. Real wheels yield by more than
+//! that. A cylinder whose stiffness is not stated has that under which it deflects by [`DEFLECTION`]
+//! at its share of the weight.
+
+use super::{ModelDescription, WheelDescription};
+
+/// Deflection under a wheel's share of the weight, m.
+const DEFLECTION: f64 = 3e-5;
+
+/// Standard gravity, m/s².
+const GRAVITY: f64 = 9.81;
+
+impl WheelDescription {
+    /// Whether it touches a plane along a line: it has a width, and its edges are not rounded to a
+    /// torus.
+    fn stands_on_a_line(&self) -> bool {
+        0.5 * self.width.unwrap_or(0.0) > self.rounding.unwrap_or(0.0)
+    }
+}
+
+impl ModelDescription {
+    /// Writes stiffness and critical damping, to two digits, into wheels that touch along a line
+    /// and state none.
+    pub(in crate::multibody) fn state_yielding(&mut self) {
+        let mass: f64 = self.solids.iter().map(|solid| solid.mass).sum();
+        let stiffness = two_digits(mass * GRAVITY / (self.wheels.len() as f64 * DEFLECTION));
+        let time = 2.0 * (DEFLECTION / GRAVITY).sqrt();
+        let lines = self
+            .wheels
+            .iter_mut()
+            .filter(|wheel| wheel.stands_on_a_line());
+        for wheel in lines.filter(|wheel| wheel.stiffness.is_none()) {
+            wheel.stiffness = Some(stiffness.min(1e12));
+            wheel.damping = Some(two_digits(time * stiffness).min(1e12));
+        }
+    }
+}
+
+/// A positive number to two significant digits.
+fn two_digits(x: f64) -> f64 {
+    format!("{x:.1e}").parse().unwrap_or(x)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::multibody::Model;
+
+    #[test]
+    fn cylinders_yield_by_their_share_of_the_weight_and_what_is_stated_stays() {
+        let mut wide = Model::rover().description().clone();
+        let mass: f64 = wide.solids.iter().map(|solid| solid.mass).sum();
+        for (i, wheel) in wide.wheels.iter_mut().enumerate() {
+            wheel.width = [Some(0.1), Some(0.1), Some(0.1), None, Some(0.1), Some(0.1)][i];
+            wheel.rounding = (i == 1).then_some(0.05);
+            wheel.stiffness = [None, None, Some(0.0), None, Some(1e6), None][i];
+        }
+        let model = Model::from_description(wide).unwrap();
+        let own: Vec<_> = (model.wheels().iter())
+            .map(|wheel| wheel.compliance.map(|own| own.stiffness))
+            .collect();
+        let share = mass * 9.81 / 6.0 / 3e-5;
+        assert!((own[0].unwrap() / share - 1.0).abs() < 0.05);
+        assert_eq!(own[1..], [None, None, None, Some(1e6), own[0]]);
+        let heavier = model.with_masses_scaled(1.3).unwrap();
+        assert_eq!(heavier.wheels()[0].compliance, model.wheels()[0].compliance);
+    }
+}
