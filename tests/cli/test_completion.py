@@ -45,7 +45,7 @@ def test_the_shell_is_offered_options_and_their_values(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("complete", "begun", "expected"),
     [
-        (complete_terrain, "", ["plane", "rocks", "hills", "maps/"]),
+        (complete_terrain, "", ["plane", "rocks", "hills", "sand", "maps/"]),
         (complete_terrain, "maps/h", ["maps/hill.tif"]),
         (complete_policy, "s", ["scan"]),
         (complete_policy, "m", ["maps/"]),

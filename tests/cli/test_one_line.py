@@ -294,7 +294,7 @@ def test_the_title_names_the_file_of_the_ground(tmp_path: Path) -> None:
 def test_a_difficulty_means_rocks_and_no_plane() -> None:
     refused = said("drive", "--terrain", "plane", "--difficulty", "1")
     assert refused.exit_code == 2
-    assert refused.stderr == "error: --difficulty: needs terrain 'rocks' or 'hills', got 1.0\n"
+    assert refused.stderr == "error: --difficulty: needs terrain 'rocks', 'hills' or 'sand', got 1.0\n"
 
 
 def test_a_policy_is_a_runs_folder_or_the_policy_in_it_or_a_shipped_name(tmp_path: Path) -> None:

@@ -339,7 +339,7 @@ def test_a_given_field_is_the_ground_of_every_episode() -> None:
     env = RoverEnv(terrain=field, heading_deg=0.0, goal_bearing_deg=0.0)
     for seed in range(3):
         observation, _ = env.reset(seed=seed)
-        assert env.simulation.terrain.__reduce__()[1][1] == pytest.approx([0.15])
+        assert env.simulation.terrain.radii == pytest.approx([0.15])
         assert env.start.slope == pytest.approx(0.1)
         assert env.simulation.deepest_overlap > -1e-9
         assert np.isfinite(observation).all()

@@ -75,7 +75,7 @@ def heard(page: Any, key: str, condition: Callable[[Any], bool] = lambda _: True
 def test_a_page_hears_states_and_drives(served: Served) -> None:
     with served.page() as page:
         choices = heard(page, "choices")
-        assert choices["ground"] == ["plane", "rocks", "hills"]
+        assert choices["ground"] == ["plane", "rocks", "hills", "sand"]
         assert heard(page, "state")["wheel"] == "here"
         for _ in range(12):
             say(page, do="drive", forward=1.0, turn=0.0)

@@ -8,6 +8,7 @@ from importlib.resources import files
 from typing import Any
 
 from rover_gym.mechanics import OptionError
+from rover_gym.validation import refuse
 
 #: Numbers that both laws take.
 SHARED = ("memory", "reload")
@@ -113,7 +114,7 @@ def named_soil(name: str) -> Soil:
     """
     catalogue = _catalogue()
     if name not in catalogue["soils"]:
-        raise OptionError(f"soil: no soil {name!r}; they are {', '.join(soil_names())}")
+        refuse(OptionError, "soil", name, f"must be one of {', '.join(soil_names())}")
     own = dict(catalogue["soils"][name])
     law, source = own.pop("law"), own.pop("source")
     common = {key: catalogue["common"][key] for key in (*_OF_LAW[law], *SHARED) if key in catalogue["common"]}

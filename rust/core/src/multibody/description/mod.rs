@@ -169,8 +169,8 @@ pub struct WheelDescription {
     /// Number of grousers around the rim; 0 by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grousers: Option<u32>,
-    /// Normal stiffness where it touches, N/m; 0: rigid. By default a wheel that can stand on a line
-    /// yields by 0.03 mm under its share of the weight, and any other one is rigid.
+    /// Normal stiffness where it touches, N/m; 0: rigid. By default a wheel that can stand on a
+    /// line yields by 0.03 mm under its share of the weight, and any other one is rigid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<f64>,
     /// Normal damping beside the stiffness, N s/m; 0 by default.

@@ -1,9 +1,8 @@
 //! Wheels that stand on a line yield, unless their description says otherwise.
 //!
 //! Two contacts share the load of a rigid cylinder on rigid ground by micrometres: an axle that
-//! tilts by a hair puts all of it on one end, and the path follows. Real wheels yield by more than
-//! that. A cylinder whose stiffness is not stated has that under which it deflects by [`DEFLECTION`]
-//! at its share of the weight.
+//! tilts by a hair puts all of it on one end, and the path follows. Real wheels yield by more. A
+//! cylinder whose stiffness is not stated deflects by [`DEFLECTION`] under its share of the weight.
 
 use super::{ModelDescription, WheelDescription};
 
