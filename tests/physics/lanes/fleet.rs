@@ -180,7 +180,8 @@ fn obeys_the_law_of_the_general_step(model: &Arc<Model>) {
     // Of rigid cylinders some problems have several answers, or none that is found: 45 to 52 steps
     // of the 600 differ, depending on how often old factors correct the impulses.
     let wheel = &model.description().wheels[0];
-    let is_hard = wheel.stiffness == Some(0.0) && wheel.width.is_some() && wheel.rounding == Some(0.0);
+    let is_hard =
+        wheel.stiffness == Some(0.0) && wheel.width.is_some() && wheel.rounding == Some(0.0);
     let (most_other, most_unsolved) = if is_hard { (56, 10) } else { (6, 0) };
     assert!(
         n_other <= most_other,
