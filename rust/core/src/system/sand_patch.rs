@@ -263,7 +263,7 @@ impl Patch {
         let mut rest = residual(&best);
         let mut evaluations = 1;
         while length(&rest) > near {
-            let slope = Matrix6::identity() - A * (best.slope + self.tangent);
+            let slope = Matrix6::identity() - product(A, &(best.slope + self.tangent));
             let Some(way) = slope.lu().solve(&rest) else {
                 break;
             };
@@ -402,6 +402,12 @@ fn six(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
 fn size(wrench: &Vector6<f64>, arm: f64) -> f64 {
     let moment = wrench.fixed_rows::<3>(3).norm_squared() / (arm * arm);
     (wrench.fixed_rows::<3>(0).norm_squared() + moment).sqrt()
+}
+
+/// `a b`. That of nalgebra multiplies matrices of this size by fused multiply-adds where the
+/// processor has them.
+fn product(a: &Matrix6<f64>, b: &Matrix6<f64>) -> Matrix6<f64> {
+    Matrix6::from_fn(|i, j| (0..6).fold(0.0, |sum, k| sum + a[(i, k)] * b[(k, j)]))
 }
 
 /// Pose of a wheel, world.
