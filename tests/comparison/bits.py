@@ -124,7 +124,6 @@ def trajectories() -> dict[str, Callable[[], Trajectory]]:
         "plane": {},
         "rocks": {"terrain": "rocks", "height_scan": True},
         "hills": {"terrain": "hills"},
-        "sand": {"terrain": "sand", "difficulty": 0.5},
         "slope, randomised": {"slope_deg": 8.0, "friction": (0.4, 0.9), "mass_scale": (0.8, 1.2)},
     }.items():
         found[f"environment, {name}"] = partial(environment, **arguments)

@@ -1,6 +1,6 @@
 //! Sand of an episode: a soil drawn among several, under ripples as high as the difficulty says.
 //!
-//! Two trains of waves run within [`SPREAD`] of one direction:
+//! Two trains of waves run within `SPREAD` of one direction:
 //!
 //! ```text
 //! h = A (sin(k₁·x + φ₁) + sin(k₂·x + φ₂) / 2),    A = 0.02 d metres, d the difficulty

@@ -205,7 +205,7 @@ impl PlanarTree {
         })
     }
 
-    /// See [`Self::new`].
+    /// Fingerprint of the numbers that it was made of.
     #[must_use]
     pub fn fingerprint(&self) -> u64 {
         self.fingerprint
