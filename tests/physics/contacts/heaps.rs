@@ -1,7 +1,6 @@
 //! Heaps of loose boxes, in which many contacts share few loads: every step is solved.
 //!
-//! The ignored tests take longer and run in the nightly tier; each names the test of every run that
-//! fails for the same defect.
+//! The ignored test runs in the nightly tier and names the test of every run for the same defect.
 
 use super::heap_scenes::heap;
 
@@ -25,6 +24,7 @@ fn every_step_of_27_boxes_is_solved_while_they_pile_up() {
     assert!(most > 90, "{most} contacts");
 }
 
+/// Fails: two steps spend their budget, 358 at 4e-9 and a later one at 6e-4.
 #[test]
 #[ignore = "tests/physics/contacts/heaps.rs::every_step_of_27_boxes_is_solved_while_they_pile_up"]
 fn every_step_of_27_boxes_is_solved_until_they_lie() {
@@ -34,13 +34,11 @@ fn every_step_of_27_boxes_is_solved_until_they_lie() {
 
 /// From the first touch until the lower half lies.
 #[test]
-#[ignore = "tests/physics/contacts/heaps.rs::every_step_of_27_boxes_is_solved_while_they_pile_up"]
 fn every_step_of_64_boxes_is_solved() {
     solve_every_step(4, 1, 220);
 }
 
 #[test]
-#[ignore = "tests/physics/contacts/heaps.rs::every_step_of_27_boxes_is_solved_while_they_pile_up"]
 fn every_step_of_125_boxes_is_solved() {
     let most = solve_every_step(5, 1, 225);
     assert!(most > 200, "{most} contacts");
