@@ -11,7 +11,7 @@ use fearless_simd::{f64x4, f64x8};
 use rover_core::scalar::{Instructions, Lane, Single};
 
 mod contacts;
-mod fleet;
+mod lane_batch;
 mod machines;
 mod rigid_bodies;
 mod solver;

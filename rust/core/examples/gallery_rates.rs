@@ -14,7 +14,7 @@ use rover_core::integrator::{StepError, StepOptions};
 use rover_core::multibody::{Configuration, Model, ModelDescription};
 use rover_core::scalar::Instructions;
 use rover_core::simulation::RoverSimulation;
-use rover_core::simulation::fleet::{Fleet, Rider};
+use rover_core::simulation::lane_batch::{BatchRover, LaneBatch};
 
 /// Rovers of the batch.
 const BATCH: usize = 64;
@@ -60,7 +60,7 @@ fn command(rover: &mut RoverSimulation, state: &mut u64) {
 }
 
 /// Rover-steps a second of one call after another.
-fn rate(rovers: &mut [RoverSimulation], fleet: &mut Fleet) -> f64 {
+fn rate(rovers: &mut [RoverSimulation], batch: &mut LaneBatch) -> f64 {
     let mut state = 7;
     let mut errors: Vec<Option<StepError>> = vec![None; rovers.len()];
     let mut run = || {
@@ -69,10 +69,10 @@ fn rate(rovers: &mut [RoverSimulation], fleet: &mut Fleet) -> f64 {
             for rover in rovers.iter_mut() {
                 command(rover, &mut state);
             }
-            let mut riders: Vec<Rider<'_>> = (rovers.iter_mut().zip(&mut errors))
-                .map(|(rover, error)| Rider { rover, error })
+            let mut entries: Vec<BatchRover<'_>> = (rovers.iter_mut().zip(&mut errors))
+                .map(|(rover, error)| BatchRover { rover, error })
                 .collect();
-            fleet.advance(&mut riders, STEPS, &mut || true);
+            batch.advance(&mut entries, STEPS, &mut || true);
         }
         (COMMANDS * STEPS * rovers.len()) as f64 / begin.elapsed().as_secs_f64()
     };
@@ -88,10 +88,10 @@ fn main() {
     for name in names {
         let description = ModelDescription::named(&name).expect("a model of the gallery");
         let model = Arc::new(Model::from_description(description).expect("valid"));
-        let mut fleet = Fleet::new(Instructions::of_this_machine());
-        let alone = rate(&mut [rover(&model)], &mut fleet);
+        let mut batch = LaneBatch::new(Instructions::of_this_machine());
+        let alone = rate(&mut [rover(&model)], &mut batch);
         let mut rovers: Vec<RoverSimulation> = (0..BATCH).map(|_| rover(&model)).collect();
-        let batch = rate(&mut rovers, &mut fleet);
+        let batch = rate(&mut rovers, &mut batch);
         println!("{name:13} {:3} {alone:9.0} {batch:11.0}", model.nv());
     }
 }

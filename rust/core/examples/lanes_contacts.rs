@@ -24,7 +24,7 @@ use rover_core::lanes::machine::Machine;
 use rover_core::lanes::problem::ContactProblem;
 use rover_core::lanes::rows::Rows;
 use rover_core::multibody::inertias::Inertias;
-use rover_core::multibody::place::Place;
+use rover_core::multibody::lane_configuration::LaneConfiguration;
 use rover_core::multibody::poses::Poses;
 use rover_core::multibody::{Configuration, Model};
 use rover_core::multibody::{Factor, MassMatrix};
@@ -92,7 +92,7 @@ impl<T: Lane> Block<T> {
         }
         let mut states = Vec::with_capacity(STEPS);
         for k in 0..STEPS {
-            let mut place = Place::new(token, &machine);
+            let mut place = LaneConfiguration::new(token, &machine);
             let mut v = vec![T::splat(token, 0.0); machine.nv()];
             for lane in 0..T::LANES {
                 let (q, of_lane) = &records[lane].states[k];

@@ -12,7 +12,7 @@ use rover_core::lanes::machine::Machine;
 use rover_core::multibody::bias::{BiasScratch, bias};
 use rover_core::multibody::energy::{EnergyScratch, energy};
 use rover_core::multibody::inertias::Inertias;
-use rover_core::multibody::place::Place;
+use rover_core::multibody::lane_configuration::LaneConfiguration;
 use rover_core::multibody::poses::Poses;
 use rover_core::multibody::{Configuration, Model};
 use rover_core::multibody::{Factor, MassMatrix};
@@ -32,8 +32,8 @@ struct Block<T: Lane> {
     token: T::Token,
     machine: Machine,
     inertias: Inertias<T>,
-    start: Place<T>,
-    place: Place<T>,
+    start: LaneConfiguration<T>,
+    place: LaneConfiguration<T>,
     v: Vec<T>,
     gravity: Vec3<T>,
     poses: Poses<T>,
@@ -50,8 +50,8 @@ impl<T: Lane> Block<T> {
         let mut block = Self {
             token,
             inertias: Inertias::new(token, &machine),
-            start: Place::new(token, &machine),
-            place: Place::new(token, &machine),
+            start: LaneConfiguration::new(token, &machine),
+            place: LaneConfiguration::new(token, &machine),
             v: vec![T::splat(token, 0.0); machine.nv()],
             gravity: Vec3::splat(token, [0.0, -9.81, 0.0]),
             poses: Poses::new(token, &machine),

@@ -19,7 +19,7 @@ use rover_core::lanes::problem::ContactProblem;
 use rover_core::lanes::rows::{Answer, Rows};
 use rover_core::multibody::description::SolidDescription;
 use rover_core::multibody::inertias::Inertias;
-use rover_core::multibody::place::Place;
+use rover_core::multibody::lane_configuration::LaneConfiguration;
 use rover_core::multibody::poses::Poses;
 use rover_core::multibody::{
     Configuration, Factor, Kinematics, MassMatrix, Model, ModelDescription,
@@ -109,7 +109,7 @@ impl<T: Lane> Block<T> {
             ..
         } = self;
         let token = *token;
-        let mut start = Place::new(token, machine);
+        let mut start = LaneConfiguration::new(token, machine);
         for (lane, rover) in rovers.iter().enumerate() {
             start.set_lane(lane, &rover.q);
         }

@@ -10,7 +10,7 @@ use rover_core::multibody::description::{
 };
 use rover_core::multibody::energy::{EnergyScratch, energy};
 use rover_core::multibody::{
-    Configuration, Factor, Inertias, MassMatrix, Model, ModelDescription, Place, Poses,
+    Configuration, Factor, Inertias, LaneConfiguration, MassMatrix, Model, ModelDescription, Poses,
 };
 use rover_core::scalar::{Lane, LaneMask, Single, Vec3};
 
@@ -44,7 +44,7 @@ impl Found {
 fn found<T: Lane>(token: T::Token, rovers: &[Rover]) -> Vec<Found> {
     let machine = rovers[0].model.mechanism().clone();
     let mut inertias = Inertias::<T>::new(token, &machine);
-    let mut start = Place::new(token, &machine);
+    let mut start = LaneConfiguration::new(token, &machine);
     for (lane, rover) in rovers.iter().enumerate() {
         assert!(*rover.model.mechanism() == machine);
         inertias.set_lane(lane, rover.model.inertias());

@@ -6,10 +6,10 @@
 
 use std::ops::Range;
 
+use super::body_motion::Still;
 use super::jacobian::{Columns, columns, columns_of_other, relative_velocity};
 use super::limit;
 use super::pair::{Contact, Opposite};
-use super::stance::Still;
 use crate::multibody::{BASE, Factor, Kinematics, Model};
 
 /// The contacts of a step in matrix form. The storage grows to the largest step and is then reused.

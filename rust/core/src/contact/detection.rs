@@ -3,10 +3,10 @@
 use nalgebra::Vector3;
 
 use super::activation::Activation;
+use super::body_motion::{BodyMotion, Still};
 use super::frame::ContactFrame;
 use super::pair::{Contact, ContactKey, ON_SURFACE, Opposite};
 use super::part::{Part, wheel_shape};
-use super::stance::{Stance, Still};
 use super::ways_out::{OverSurfaces, WaysOut};
 use crate::geometry::query::sweep::{DEEP, first_touch};
 use crate::geometry::query::{
@@ -73,7 +73,7 @@ pub(crate) struct Moving<'a, S> {
 
 /// [`detect`] for some parts; adds to `out`.
 #[inline]
-pub(crate) fn detect_parts<S: Stance>(
+pub(crate) fn detect_parts<S: BodyMotion>(
     parts: impl Iterator<Item = Part>,
     machine: &Moving<'_, S>,
     terrain: &dyn Terrain,
@@ -148,7 +148,7 @@ impl Placed {
     }
 }
 
-impl<S: Stance> Gate<'_, S> {
+impl<S: BodyMotion> Gate<'_, S> {
     #[inline]
     fn offer(&mut self, placed: &Placed, point: &SurfacePoint, primitive: u32) {
         let u_N = || {
@@ -217,7 +217,7 @@ impl<S: Stance> Gate<'_, S> {
 
 /// Offers the ground contacts of one part.
 #[inline]
-fn candidates<S: Stance>(part: Part, terrain: &dyn Terrain, gate: &mut Gate<'_, S>) {
+fn candidates<S: BodyMotion>(part: Part, terrain: &dyn Terrain, gate: &mut Gate<'_, S>) {
     let Moving { model, middle, end } = *gate.machine;
     let body = part.body(model);
     let base = &middle.origin(body);
@@ -290,7 +290,7 @@ fn candidates<S: Stance>(part: Part, terrain: &dyn Terrain, gate: &mut Gate<'_, 
     }
 }
 
-/// Visits the points of a shape on a piece of a surface whose gap is at most `reach`, m.
+/// ModeMemory the points of a shape on a piece of a surface whose gap is at most `reach`, m.
 ///
 /// One behind the piece's plane must be in the ground, and not only beyond the far side of a ridge
 /// or a rock.
@@ -365,7 +365,7 @@ fn is_far(shape: &PlacedShape, between: &Vector3<f64>, within: f64) -> bool {
 
 /// Normal from a sphere of the ground to a part at their first contact in this step, if the part
 /// passes the sphere.
-fn touch<S: Stance>(
+fn touch<S: BodyMotion>(
     placed: &Placed,
     machine: &Moving<'_, S>,
     ground: &Sphere,
@@ -517,7 +517,7 @@ pub fn wheel_gap(shape: &PlacedShape, base: &Vector3<f64>, terrain: &dyn Terrain
     gap
 }
 
-/// Visits points of the ground near a wheel, each nearer than those before; the last one is the
+/// ModeMemory points of the ground near a wheel, each nearer than those before; the last one is the
 /// nearest. `base` as for [`disc_gap`].
 #[inline]
 fn visit_nearer(

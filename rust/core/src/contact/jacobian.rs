@@ -6,9 +6,9 @@
 
 use nalgebra::Vector3;
 
+use super::body_motion::BodyMotion;
 use super::limit;
 use super::pair::Contact;
-use super::stance::Stance;
 use crate::multibody::{BASE, Kinematics, Model};
 
 /// Entries of a contact's three rows n, t, b for one velocity, padded to two pairs of SIMD lanes.
@@ -23,13 +23,13 @@ fn place_in_tree_of(kinematics: &Kinematics, contact: &Contact, body: usize) -> 
 /// Velocity (m/s, world) of the contact's part relative to its other side, at the contact point.
 #[inline]
 #[must_use]
-pub(crate) fn relative_velocity(stance: &impl Stance, contact: &Contact) -> Vector3<f64> {
-    let velocity = stance.point_velocity(contact.body, &contact.point);
+pub(crate) fn relative_velocity(motion: &impl BodyMotion, contact: &Contact) -> Vector3<f64> {
+    let velocity = motion.point_velocity(contact.body, &contact.point);
     let Some(other) = contact.other else {
         return velocity;
     };
-    let x = contact.point + (stance.origin(contact.body) - stance.origin(other.body));
-    velocity - stance.point_velocity(other.body, &x)
+    let x = contact.point + (motion.origin(contact.body) - motion.origin(other.body));
+    velocity - motion.point_velocity(other.body, &x)
 }
 
 /// Rows of Hᵀ along the path of the contact's own body: velocity of the body's point along n, t, b

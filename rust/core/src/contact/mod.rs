@@ -4,7 +4,7 @@
 //! A contact ([`pair`]) connects a part of a body to the ground or to a part of another body.
 //! [`detection`] finds contacts with the ground, [`pair_detection`] contacts between bodies, and
 //! [`limit`] joints at their stops. The broad phase selects candidates, [`crate::geometry::query`]
-//! computes gaps and normals of a machine in a `stance`, and [`activation`] decides which contacts
+//! computes gaps and normals of a machine with its `body_motion`, and [`activation`] decides which contacts
 //! enter the step.
 //! [`wheel_gaps`] measures how far the wheels are from the ground and nothing else,
 //! `box_clearance` how far a box is from a surface at least.
@@ -12,6 +12,7 @@
 //! assemble the matrices.
 
 pub mod activation;
+pub(crate) mod body_motion;
 pub(crate) mod box_clearance;
 pub mod delassus;
 pub mod detection;
@@ -22,7 +23,6 @@ pub mod pair;
 pub mod pair_detection;
 pub mod part;
 pub mod relocation;
-pub(crate) mod stance;
 pub(crate) mod ways_out;
 pub mod wheel_gaps;
 

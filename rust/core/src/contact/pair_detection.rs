@@ -6,12 +6,12 @@
 //! is not detected.
 
 use super::activation::Activation;
+use super::body_motion::{BodyMotion, Still};
 use super::frame::ContactFrame;
 use super::jacobian::relative_velocity;
 use super::pair::{Contact, ContactKey, OtherSide};
 use super::part::Part;
 use super::relocation::place_pair;
-use super::stance::{Stance, Still};
 use crate::geometry::Sphere;
 use crate::geometry::broad_phase::IntervalSweep;
 use crate::geometry::query::dispatch;
@@ -68,10 +68,10 @@ pub fn detect_pairs(
     detect_pairs_of(model, &machine, activation, search, out);
 }
 
-/// The same by the stance of a machine.
+/// The same by the motion of a machine's bodies.
 pub(crate) fn detect_pairs_of(
     model: &Model,
-    stance: &impl Stance,
+    motion: &impl BodyMotion,
     activation: &Activation,
     search: &mut PairSearch,
     out: &mut Vec<Contact>,
@@ -85,12 +85,12 @@ pub(crate) fn detect_pairs_of(
         return;
     }
     let reach = activation.hover.max(2.0 * activation.margin);
-    let first_origin = stance.origin(parts[0].body(model));
+    let first_origin = motion.origin(parts[0].body(model));
     balls.clear();
     balls.extend(parts.iter().map(|part| {
         let body = part.body(model);
-        let shift = stance.origin(body) - first_origin;
-        let (R, r) = stance.pose(body);
+        let shift = motion.origin(body) - first_origin;
+        let (R, r) = motion.pose(body);
         Sphere {
             centre: r + R * part.centre(model) + shift,
             radius: part.bound(model),
@@ -104,7 +104,7 @@ pub(crate) fn detect_pairs_of(
             part: other,
             body: other.body(model),
         };
-        let (first, second) = place_pair(model, stance, other.part, part);
+        let (first, second) = place_pair(model, motion, other.part, part);
         dispatch::visit_pair(&first, &second, reach, |point| {
             let contact = Contact {
                 key: ContactKey::between(part, point.feature, other.part),
@@ -116,7 +116,7 @@ pub(crate) fn detect_pairs_of(
                 gap: point.gap,
                 excess: 0.0,
             };
-            let u_N = || (contact.frame.n).dot(&relative_velocity(stance, &contact));
+            let u_N = || (contact.frame.n).dot(&relative_velocity(motion, &contact));
             if activation.admits(contact.gap, u_N) {
                 out.push(contact);
             }

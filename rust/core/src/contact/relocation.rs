@@ -2,11 +2,11 @@
 
 use nalgebra::Vector3;
 
+use super::body_motion::{BodyMotion, Still};
 use super::detection::PASSING;
 use super::frame::ContactFrame;
 use super::pair::{Contact, ON_SURFACE, Opposite, OtherSide};
 use super::part::Part;
-use super::stance::{Stance, Still};
 use crate::geometry::query::dispatch;
 use crate::geometry::{PlacedShape, Primitive, Sphere, Terrain};
 use crate::multibody::{Kinematics, Model};
@@ -28,25 +28,25 @@ pub fn relocate(
     relocate_to(model, &machine, terrain, contact);
 }
 
-/// The same by the stance of a machine.
+/// The same by the motion of a machine's bodies.
 #[inline]
 pub(crate) fn relocate_to(
     model: &Model,
-    stance: &impl Stance,
+    motion: &impl BodyMotion,
     terrain: &dyn Terrain,
     contact: &mut Contact,
 ) {
     let primitive = match (contact.key.opposite, contact.other) {
         (Opposite::Ground(primitive), _) => primitive,
         (Opposite::Part(_), Some(other)) => {
-            relocate_pair(model, stance, other, contact);
+            relocate_pair(model, motion, other, contact);
             return;
         }
         (Opposite::Part(_), None) | (Opposite::Grain(_) | Opposite::Stop, _) => return,
     };
-    let base = &stance.origin(contact.body);
+    let base = &motion.origin(contact.body);
     let feature = usize::from(contact.key.feature) & !ON_SURFACE;
-    let (R, r) = stance.pose(contact.body);
+    let (R, r) = motion.pose(contact.body);
     let shape = contact.part.place_at(model, (&R, &r));
     let point = match terrain.primitive(primitive) {
         Primitive::Plane(plane) => dispatch::point_on_plane(&shape, &plane, base, feature),
@@ -63,8 +63,8 @@ pub(crate) fn relocate_to(
     (contact.point, contact.gap) = (point.point, point.gap + contact.excess);
 }
 
-fn relocate_pair(model: &Model, stance: &impl Stance, other: OtherSide, contact: &mut Contact) {
-    let (first, second) = place_pair(model, stance, other.part, contact.part);
+fn relocate_pair(model: &Model, motion: &impl BodyMotion, other: OtherSide, contact: &mut Contact) {
+    let (first, second) = place_pair(model, motion, other.part, contact.part);
     let feature = usize::from(contact.key.feature);
     let point = dispatch::point_of_pair(&first, &second, feature);
     contact.frame = ContactFrame::of_pair(&second, &point);
@@ -74,15 +74,15 @@ fn relocate_pair(model: &Model, stance: &impl Stance, other: OtherSide, contact:
 /// Two parts, both relative to the origin of the second one's tree.
 pub(super) fn place_pair(
     model: &Model,
-    stance: &impl Stance,
+    motion: &impl BodyMotion,
     first: Part,
     second: Part,
 ) -> (PlacedShape, PlacedShape) {
     let place = |part: Part| {
-        let (R, r) = stance.pose(part.body(model));
+        let (R, r) = motion.pose(part.body(model));
         part.place_at(model, (&R, &r))
     };
-    let shift = stance.origin(first.body(model)) - stance.origin(second.body(model));
+    let shift = motion.origin(first.body(model)) - motion.origin(second.body(model));
     let mut shape = place(first);
     match &mut shape {
         PlacedShape::Disc(disc) => disc.centre += shift,

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::action;
 use super::beginning::{Beginning, EpisodeDistribution};
-use super::control_period::{ControlPeriod, Origin, Place, Seat};
+use super::control_period::{ControlPeriod, Origin, PeriodSlot, Slot};
 use super::error::{EpisodeError, check_lengths};
 use super::rules::Rules;
 use super::running::Episode;
@@ -19,7 +19,7 @@ use crate::simulation::{Batch, BatchError, RoverSimulation};
 pub struct EpisodeBatch {
     rules: Arc<Rules>,
     batch: Batch,
-    pub(super) seats: Vec<Option<Seat>>,
+    pub(super) slots: Vec<Option<Slot>>,
     max_steps: Option<u64>,
     difficulties: Vec<Option<Range>>,
     pub(super) finals: Vec<Final>,
@@ -68,7 +68,7 @@ impl EpisodeBatch {
         rules.check_model(rover.model())?;
         Ok(Self {
             batch: Batch::new(vec![rover.clone(); n], Vec::new(), threads)?,
-            seats: (0..n).map(|_| None).collect(),
+            slots: (0..n).map(|_| None).collect(),
             max_steps,
             difficulties: vec![None; n],
             finals: Vec::new(),
@@ -104,10 +104,10 @@ impl EpisodeBatch {
     #[must_use]
     pub fn message(&self, index: usize) -> Option<String> {
         let error = self.batch.errors()[index].as_ref();
-        let seat = self.seats[index].as_ref();
+        let slot = self.slots[index].as_ref();
         error
             .map(ToString::to_string)
-            .or_else(|| seat?.message.clone())
+            .or_else(|| slot?.message.clone())
     }
 
     /// The episode of a rover.
@@ -115,7 +115,7 @@ impl EpisodeBatch {
     /// # Errors
     /// `NoSuchRover`, `NotBegun`.
     pub fn episode(&self, index: usize) -> Result<&Episode, EpisodeError> {
-        Ok(&self.seat(index)?.episode)
+        Ok(&self.slot(index)?.episode)
     }
 
     /// Whether an episode has reached the time limit.
@@ -123,19 +123,19 @@ impl EpisodeBatch {
     /// # Errors
     /// `NoSuchRover`, `NotBegun`.
     pub fn is_truncated(&self, index: usize) -> Result<bool, EpisodeError> {
-        Ok(self.seat(index)?.is_truncated(self.max_steps))
+        Ok(self.slot(index)?.is_truncated(self.max_steps))
     }
 
     /// Rovers whose episode has ended or reached the time limit, and whose next has not begun.
     #[must_use]
     pub fn over(&self) -> Vec<usize> {
-        let is_over = |seat: &Option<Seat>| {
-            let seat = seat.as_ref();
-            seat.is_some_and(|seat| seat.is_over(self.max_steps))
+        let is_over = |slot: &Option<Slot>| {
+            let slot = slot.as_ref();
+            slot.is_some_and(|slot| slot.is_over(self.max_steps))
         };
-        let seats = self.seats.iter().enumerate();
-        seats
-            .filter(|(_, seat)| is_over(seat))
+        let slots = self.slots.iter().enumerate();
+        slots
+            .filter(|(_, slot)| is_over(slot))
             .map(|(i, _)| i)
             .collect()
     }
@@ -145,7 +145,7 @@ impl EpisodeBatch {
     /// # Errors
     /// `NoSuchRover`, `NotBegun`.
     pub fn origin(&self, index: usize) -> Result<&Origin, EpisodeError> {
-        Ok(&self.seat(index)?.origin)
+        Ok(&self.slot(index)?.origin)
     }
 
     /// Range that replaces that of the rocks' difficulty in the next episodes of a rover.
@@ -153,7 +153,7 @@ impl EpisodeBatch {
     /// # Errors
     /// `NoSuchRover`.
     pub fn difficulty(&self, index: usize) -> Result<Option<Range>, EpisodeError> {
-        let len = self.seats.len();
+        let len = self.slots.len();
         let found = self.difficulties.get(index);
         Ok(*found.ok_or(BatchError::NoSuchRover { index, len })?)
     }
@@ -177,7 +177,7 @@ impl EpisodeBatch {
     /// # Errors
     /// `NoSuchRover`, `NotBegun`.
     pub fn generator(&self, index: usize) -> Result<Pcg64, EpisodeError> {
-        Ok(self.seat(index)?.generator)
+        Ok(self.slot(index)?.generator)
     }
 
     /// Sets where the noise of a rover comes from.
@@ -185,18 +185,18 @@ impl EpisodeBatch {
     /// # Errors
     /// `NoSuchRover`, `NotBegun`.
     pub fn set_generator(&mut self, index: usize, generator: Pcg64) -> Result<(), EpisodeError> {
-        self.seat(index)?;
-        if let Some(seat) = &mut self.seats[index] {
-            seat.generator = generator;
+        self.slot(index)?;
+        if let Some(slot) = &mut self.slots[index] {
+            slot.generator = generator;
         }
         Ok(())
     }
 
-    fn seat(&self, index: usize) -> Result<&Seat, EpisodeError> {
-        let len = self.seats.len();
-        let seat = self.seats.get(index);
-        let seat = seat.ok_or(BatchError::NoSuchRover { index, len })?;
-        seat.as_ref().ok_or(EpisodeError::NotBegun { index })
+    fn slot(&self, index: usize) -> Result<&Slot, EpisodeError> {
+        let len = self.slots.len();
+        let slot = self.slots.get(index);
+        let slot = slot.ok_or(BatchError::NoSuchRover { index, len })?;
+        slot.as_ref().ok_or(EpisodeError::NotBegun { index })
     }
 
     /// Draws episodes on the threads of the batch, see [`EpisodeDistribution::draw`]. No rover
@@ -220,7 +220,7 @@ impl EpisodeBatch {
     /// # Errors
     /// `OtherRules`, `NoSuchRover`, or as [`Rules::check_model`].
     pub fn check(&self, index: usize, beginning: &Beginning) -> Result<(), EpisodeError> {
-        let len = self.seats.len();
+        let len = self.slots.len();
         if index >= len {
             return Err(BatchError::NoSuchRover { index, len }.into());
         }
@@ -248,7 +248,7 @@ impl EpisodeBatch {
             rocks: scene.rocks,
             ground: scene.ground,
         };
-        self.seats[index] = Some(Seat::new(episode, origin, random));
+        self.slots[index] = Some(Slot::new(episode, origin, random));
         Ok(())
     }
 
@@ -274,9 +274,9 @@ impl EpisodeBatch {
         }
         self.rules.check_model(rover.model())?;
         self.batch.replace(index, rover, episode.goal())?;
-        let mut seat = Seat::new(episode, origin, random);
-        (seat.steps, seat.message) = (steps, message);
-        self.seats[index] = Some(seat);
+        let mut slot = Slot::new(episode, origin, random);
+        (slot.steps, slot.message) = (steps, message);
+        self.slots[index] = Some(slot);
         Ok(())
     }
 
@@ -285,7 +285,7 @@ impl EpisodeBatch {
     /// # Errors
     /// `NoSuchRover`, `NotBegun`.
     pub fn steps(&self, index: usize) -> Result<u64, EpisodeError> {
-        Ok(self.seat(index)?.steps)
+        Ok(self.slot(index)?.steps)
     }
 
     /// Gives every rover its action for one control period and writes the observations
@@ -311,15 +311,15 @@ impl EpisodeBatch {
     ) -> Result<Stepped, EpisodeError> {
         self.check_step(actions, active)?;
         self.finals.clear();
-        let (n, size) = (self.seats.len(), self.rules.size());
+        let (n, size) = (self.slots.len(), self.rules.size());
         assert_eq!(observations.len(), n * size, "one row a rover");
         let rows = observations.chunks_exact_mut(size);
         let actions = actions.chunks_exact(self.rules.n_actions());
-        let seats = self.seats.iter_mut().flatten();
-        let mut places: Vec<_> = (seats.zip(rows).zip(actions).enumerate())
-            .map(|(index, ((seat, row), action))| Place {
+        let slots = self.slots.iter_mut().flatten();
+        let mut places: Vec<_> = (slots.zip(rows).zip(actions).enumerate())
+            .map(|(index, ((slot, row), action))| PeriodSlot {
                 is_active: active.is_none_or(|active| active[index]),
-                seat,
+                slot,
                 row,
                 action,
             })
@@ -340,11 +340,11 @@ impl EpisodeBatch {
         actions: &[f64],
         active: Option<&[bool]>,
     ) -> Result<(), EpisodeError> {
-        let (n, width) = (self.seats.len(), self.rules.n_actions());
+        let (n, width) = (self.slots.len(), self.rules.n_actions());
         let flags = active.map_or(n, <[bool]>::len);
         check_lengths([("action", actions.len(), n * width), ("active", flags, n)])?;
         action::check(actions, width, false)?;
-        if let Some(index) = self.seats.iter().position(Option::is_none) {
+        if let Some(index) = self.slots.iter().position(Option::is_none) {
             return Err(EpisodeError::NotBegun { index });
         }
         Ok(())
@@ -353,9 +353,9 @@ impl EpisodeBatch {
     /// How the last control periods went.
     pub(super) fn results(&self) -> Stepped {
         let mut results = Stepped::default();
-        for (i, seat) in self.seats.iter().flatten().enumerate() {
-            let outcome = seat.episode.outcome();
-            let (ended, truncated) = (outcome.ending.is_end(), seat.is_truncated(self.max_steps));
+        for (i, slot) in self.slots.iter().flatten().enumerate() {
+            let outcome = slot.episode.outcome();
+            let (ended, truncated) = (outcome.ending.is_end(), slot.is_truncated(self.max_steps));
             results.rewards.push(outcome.reward);
             results.ended.push(ended);
             results.truncated.push(truncated);

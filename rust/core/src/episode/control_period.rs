@@ -7,7 +7,7 @@ use crate::draw::{DrawnGround, Pcg64, RockDraw, Start};
 use crate::simulation::{Done, ReadingScratch, RoverSimulation, Turn};
 
 /// A rover's episode, and what a batch keeps beside it.
-pub(super) struct Seat {
+pub(super) struct Slot {
     pub(super) episode: Episode,
     /// Where and on what it began.
     pub(super) origin: Origin,
@@ -32,7 +32,7 @@ pub struct Origin {
     pub ground: DrawnGround,
 }
 
-impl Seat {
+impl Slot {
     pub(super) fn new(episode: Episode, origin: Origin, generator: Pcg64) -> Self {
         Self {
             commands: vec![0.0; episode.rules().n_commands()],
@@ -56,9 +56,9 @@ impl Seat {
 }
 
 /// A rover's part of a control period.
-pub(super) struct Place<'a> {
+pub(super) struct PeriodSlot<'a> {
     pub(super) is_active: bool,
-    pub(super) seat: &'a mut Seat,
+    pub(super) slot: &'a mut Slot,
     pub(super) action: &'a [f64],
     pub(super) row: &'a mut [f32],
 }
@@ -70,14 +70,14 @@ pub(super) struct ControlPeriod<'a> {
     pub(super) max_steps: Option<u64>,
 }
 
-impl Turn<Place<'_>> for ControlPeriod<'_> {
-    fn is_moving(&self, place: &Place<'_>) -> bool {
+impl Turn<PeriodSlot<'_>> for ControlPeriod<'_> {
+    fn is_moving(&self, place: &PeriodSlot<'_>) -> bool {
         place.is_active
     }
 
-    fn begin(&self, rover: &mut RoverSimulation, place: &mut Place<'_>) {
-        let seat = &mut *place.seat;
-        let given = (seat.episode).command(rover, place.action, &mut seat.commands);
+    fn begin(&self, rover: &mut RoverSimulation, place: &mut PeriodSlot<'_>) {
+        let slot = &mut *place.slot;
+        let given = (slot.episode).command(rover, place.action, &mut slot.commands);
         assert!(
             given.is_ok(),
             "invariant: commands of a checked action are within the model's limits"
@@ -88,12 +88,12 @@ impl Turn<Place<'_>> for ControlPeriod<'_> {
         &self,
         rover: &RoverSimulation,
         done: Done<'_>,
-        place: &mut Place<'_>,
+        place: &mut PeriodSlot<'_>,
         scratch: &mut ReadingScratch,
     ) {
-        let seat = &mut *place.seat;
+        let slot = &mut *place.slot;
         if !done.has_moved {
-            place.row.copy_from_slice(seat.episode.observation());
+            place.row.copy_from_slice(slot.episode.observation());
             return;
         }
         let rules = self.rules;
@@ -102,22 +102,22 @@ impl Turn<Place<'_>> for ControlPeriod<'_> {
         numbers.resize(rules.places().size + scan.len() + rules.noise().len(), 0.0);
         let (reading, rest) = numbers.split_at_mut(rules.places().size);
         let (heights, normals) = rest.split_at_mut(scan.len());
-        rover.read_state(seat.episode.goal(), scratch, reading);
+        rover.read_state(slot.episode.goal(), scratch, reading);
         if self.has_scan {
             rover.read_heights(scan, heights);
         }
-        noise::draw(&mut seat.generator, normals);
+        noise::draw(&mut slot.generator, normals);
         let period = Period {
             action: place.action,
             heights: self.has_scan.then_some(&*heights),
             normals: rules.is_noisy().then_some(&*normals),
             has_failed: done.error.is_some(),
         };
-        seat.episode.advance(reading, &period, place.row);
-        seat.steps += 1;
-        if seat.episode.lacks_heights() && seat.is_over(self.max_steps) {
-            seat.episode.complete(rover);
-            place.row.copy_from_slice(seat.episode.observation());
+        slot.episode.advance(reading, &period, place.row);
+        slot.steps += 1;
+        if slot.episode.lacks_heights() && slot.is_over(self.max_steps) {
+            slot.episode.complete(rover);
+            place.row.copy_from_slice(slot.episode.observation());
         }
         scratch.numbers = numbers;
     }

@@ -58,9 +58,9 @@ impl Settings {
     }
 }
 
-/// Places of what an episode needs in a reading without heights.
+/// ReadingIndices of what an episode needs in a reading without heights.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Places {
+pub struct ReadingIndices {
     /// Leading entries that an observation shares with it.
     pub shared: usize,
     /// Those of [`super::Quantities`], in order.
@@ -75,7 +75,7 @@ pub struct Rules {
     model: Arc<Model>,
     settings: Settings,
     inverse_scale: Vec<f64>,
-    places: Places,
+    places: ReadingIndices,
     sizes: [usize; 3],
     steering: Steering,
 }
@@ -147,7 +147,7 @@ impl Rules {
             found.map_or(0..0, |(_, place)| place.clone())
         };
         let shared = place("target").end;
-        let places = Places {
+        let places = ReadingIndices {
             shared,
             // The last entry of the target is the distance to the goal.
             scalars: shared - 1..place("solver").end,
@@ -315,9 +315,9 @@ impl Rules {
         }
     }
 
-    /// Places in a reading.
+    /// ReadingIndices in a reading.
     #[must_use]
-    pub fn places(&self) -> &Places {
+    pub fn places(&self) -> &ReadingIndices {
         &self.places
     }
 

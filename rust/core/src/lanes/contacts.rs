@@ -9,7 +9,7 @@
 //! the rolling direction `t = n × s / |n × s|`, the lowest point of a circle over a plane lies
 //! along `t × s` from its centre.
 //!
-//! What is rare is found lane by lane (`rare`): a wheel that nearly lies flat, passes a sphere
+//! What is rare is found lane by lane (`lane_detection`): a wheel that nearly lies flat, passes a sphere
 //! within the step, touches more things than it has slots, or an edge of a surface, and a body
 //! near the ground or another one. A lane with more contacts than a problem has is declined.
 
@@ -495,7 +495,7 @@ impl<T: Lane> Contacts<T> {
         let mut plane = (ground.normal, height);
         if ground.has_surfaces() {
             let origin = sight.middle.origin;
-            rest = ground.find_footing(w, origin + centre, wheel.bound, reach);
+            rest = ground.find_plane(w, origin + centre, wheel.bound, reach);
             let own = ground.under_wheel(w);
             plane = (own.normal, own.height(origin));
             for slot in &mut self.slots[wheel.slots.clone()] {

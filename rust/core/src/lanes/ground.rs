@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::footing::Footing;
+use super::contact_plane::ContactPlane;
 use super::pieces::{LanePlane, Pieces, Rim};
 use crate::contact::box_clearance::over_surfaces;
 use crate::geometry::query::sweep::DEEP;
@@ -115,7 +115,7 @@ pub struct Ground<T: Lane> {
     has_surfaces: bool,
     /// Rovers on a surface and a plane.
     mixed: T::Mask,
-    footings: Vec<Footing<T>>,
+    planes: Vec<ContactPlane<T>>,
     /// Near each wheel.
     pieces: Vec<Pieces<T>>,
     wheels: Vec<Near<T>>,
@@ -158,7 +158,7 @@ impl<T: Lane> Ground<T> {
             surfaces: vec![None; T::LANES],
             has_surfaces: false,
             mixed: T::mask(token, 0),
-            footings: vec![Footing::new(token); n_wheels],
+            planes: vec![ContactPlane::new(token); n_wheels],
             pieces: vec![Pieces::new(token); n_wheels],
             wheels: vec![near; n_wheels],
             boxes: vec![around; n_boxes],
@@ -190,8 +190,8 @@ impl<T: Lane> Ground<T> {
         if has_surface && plane.is_some() {
             self.mixed = self.mixed | own;
         }
-        for footing in &mut self.footings {
-            footing.set_lane(lane, normal, offset);
+        for plane in &mut self.planes {
+            plane.set_lane(lane, normal, offset);
         }
         for pieces in &mut self.pieces {
             pieces.forget(lane);
@@ -230,22 +230,22 @@ impl<T: Lane> Ground<T> {
     }
 
     /// Finds the plane that the rovers' wheel stands on where the ground is a surface: see
-    /// [`Footing::find`].
+    /// [`ContactPlane::find`].
     #[inline(always)]
-    pub(super) fn find_footing(
+    pub(super) fn find_plane(
         &mut self,
         wheel: usize,
         centre: Vec3<T>,
         bound: f64,
         reach: T,
     ) -> T::Mask {
-        self.footings[wheel].find(&self.surfaces, centre, bound, reach) | self.mixed
+        self.planes[wheel].find(&self.surfaces, centre, bound, reach) | self.mixed
     }
 
     /// The plane under a wheel.
     #[inline(always)]
     pub(super) fn under_wheel(&self, wheel: usize) -> LanePlane<T> {
-        let Footing { normal, offset, .. } = self.footings[wheel];
+        let ContactPlane { normal, offset, .. } = self.planes[wheel];
         LanePlane { normal, offset }
     }
 
@@ -538,7 +538,7 @@ pub(super) fn turning<T: Lane>(R: &Mat3<T>, S: &Mat3<T>) -> T {
     (x.dot(x) + y.dot(y) + z.dot(z)).sqrt()
 }
 
-/// Visits exactly the spheres that come as near to `centre` (world, m) as `within`, m.
+/// ModeMemory exactly the spheres that come as near to `centre` (world, m) as `within`, m.
 fn visit_spheres(
     field: &dyn Terrain,
     centre: &Vector3<f64>,

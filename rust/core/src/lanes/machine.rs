@@ -46,7 +46,7 @@ pub struct Machine {
     pub boxes: Vec<BodyBox>,
     /// Joints with stops, ascending.
     pub stops: Vec<Stop>,
-    /// Slots between those of the wheels and the stops: [`Self::find_spares`].
+    /// Slots between those of the wheels and the stops: [`Self::find_free_slots`].
     pub(super) spares: Vec<Option<usize>>,
     /// Whether its bodies can touch each other.
     pub(super) has_pairs: bool,
@@ -138,7 +138,7 @@ impl Machine {
                 .collect(),
             pattern: None,
         };
-        machine.spares = machine.find_spares(machine.has_pairs);
+        machine.spares = machine.find_free_slots(machine.has_pairs);
         machine.pattern = machine.find_pattern();
         Ok(machine)
     }

@@ -10,40 +10,40 @@
 //! The dynamics of the tree are those of [`crate::multibody`].
 //!
 //! - [`admission`]: which options have a fast step; [`machine`]: what the rovers share;
-//! - `parts`, [`ground`], `footing`, `pieces`, `rolling`, [`forecast`], [`contacts`], `by_lane`,
-//!   `rare`, `spares`, `stops`: what touches what;
+//! - `parts`, [`ground`], `contact_plane`, `pieces`, `rolling`, [`forecast`], [`contacts`],
+//!   `by_lane`, `lane_detection`, `free_slots`, `stops`: what touches what;
 //!   [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield;
 //! - [`problem`], `system`, `equations`, [`pattern`], `tree_matrix`, `velocity_equations`,
-//!   `sweeps`, `bench`, [`queue`]: the friction-contact problems, which
+//!   `sweeps`, `lane_solver`, [`queue`]: the friction-contact problems, which
 //!   [`crate::solver`]'s pivoting solves;
 //! - [`step`]: the step.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 pub mod admission;
-mod bench;
 mod by_lane;
+mod contact_plane;
 pub mod contacts;
 pub mod drives;
 mod equations;
-mod footing;
 pub mod forecast;
+mod free_slots;
 pub mod ground;
+mod lane_detection;
+pub mod lane_rover;
+mod lane_solver;
 pub mod machine;
 mod parts;
-pub mod passenger;
 pub mod pattern;
 mod pieces;
 pub mod problem;
 pub mod queue;
-mod rare;
 mod rolling;
 pub mod rows;
-mod spares;
 pub mod step;
 mod stops;
 mod sweeps;
 mod system;
-mod tread;
 mod tree_matrix;
 mod velocity_equations;
+mod wide_wheel;
 pub mod yielding;

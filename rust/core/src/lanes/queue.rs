@@ -10,13 +10,13 @@
 
 use std::collections::VecDeque;
 
-use super::bench::{DenseBench, FactoredBench, Line};
+use super::lane_solver::{DenseSolver, FactoredSolver, ProblemSource};
 use super::problem::{ContactProblem, MAX_CONTACTS, MAX_DENSE};
 use crate::problem::Residual;
 use crate::scalar::Lane;
 use crate::solver::SolverOptions;
 
-pub use super::bench::MAX_ITERATIONS;
+pub use super::lane_solver::MAX_ITERATIONS;
 
 /// Contacts up to which the smaller system serves, that of a rover with six wheels on the plane.
 const FEW: usize = 6;
@@ -106,7 +106,7 @@ fn solve_some<T: Lane, const C: usize>(
         least,
         most: C,
     };
-    DenseBench::<T, C>::new(token).run(token, problems, tolerances, &mut line);
+    DenseSolver::<T, C>::new(token).run(token, problems, tolerances, &mut line);
 }
 
 /// The problems of a list with `least` to `most` contacts that are to be solved.
@@ -116,7 +116,7 @@ struct List {
     most: usize,
 }
 
-impl Line for List {
+impl ProblemSource for List {
     #[inline(always)]
     fn next(&mut self, problems: &[ContactProblem]) -> Option<usize> {
         let rest = problems.get(self.at..)?;
@@ -141,15 +141,15 @@ impl Line for List {
 /// has lanes: problem `k` is of group `k / T::LANES`.
 pub struct Queue<T: Lane> {
     token: T::Token,
-    few: Box<DenseBench<T, FEW>>,
-    many: Box<DenseBench<T, MAX_DENSE>>,
-    factored: Box<FactoredBench<T>>,
+    few: Box<DenseSolver<T, FEW>>,
+    many: Box<DenseSolver<T, MAX_DENSE>>,
+    factored: Box<FactoredSolver<T>>,
     /// Problems that wait for a lane, by [`Kind`].
     waiting: [VecDeque<usize>; 3],
     groups: Groups,
 }
 
-/// Which of the benches a problem needs.
+/// Which of the solvers a problem needs.
 #[derive(Clone, Copy, Debug)]
 enum Kind {
     Few,
@@ -179,15 +179,15 @@ struct Groups {
     ready: VecDeque<usize>,
 }
 
-/// The waiting problems of a bench.
+/// The waiting problems of a solver.
 struct Waiting<'a> {
     problems: &'a mut VecDeque<usize>,
     groups: &'a mut Groups,
-    /// Problems of the other bench that has most.
+    /// Problems of the other solver that has most.
     n_others: usize,
 }
 
-impl Line for Waiting<'_> {
+impl ProblemSource for Waiting<'_> {
     #[inline(always)]
     fn next(&mut self, _: &[ContactProblem]) -> Option<usize> {
         self.problems.pop_front()
@@ -221,9 +221,9 @@ impl<T: Lane> Queue<T> {
     pub fn new(token: T::Token) -> Self {
         Self {
             token,
-            few: Box::new(DenseBench::new(token)),
-            many: Box::new(DenseBench::new(token)),
-            factored: Box::new(FactoredBench::new(token)),
+            few: Box::new(DenseSolver::new(token)),
+            many: Box::new(DenseSolver::new(token)),
+            factored: Box::new(FactoredSolver::new(token)),
             waiting: [const { VecDeque::new() }; 3],
             groups: Groups {
                 n_lanes: T::LANES,
@@ -313,7 +313,7 @@ impl<T: Lane> Queue<T> {
         while self.next_group(problems, options).is_some() {}
     }
 
-    /// Lets one of the benches work; `n_others`: as of [`Waiting`].
+    /// Lets one of the solvers work; `n_others`: as of [`Waiting`].
     fn work(
         &mut self,
         problems: &mut [ContactProblem],

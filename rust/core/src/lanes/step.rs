@@ -20,8 +20,8 @@ use super::contacts::{Contacts, Sight};
 use super::drives::Drives;
 use super::forecast::Forecast;
 use super::ground::Ground;
+use super::lane_rover::LaneRover;
 use super::machine::Machine;
-use super::passenger::Passenger;
 use super::problem::{ContactProblem, MAX_CONTACTS, Triple};
 use super::rows::{Answer, Rows};
 use super::sweeps::write_start;
@@ -35,7 +35,9 @@ use crate::integrator::{Phase, Probe, Stabilisation, StepOptions, StepReport, Wa
 use crate::multibody::bias::{BiasScratch, bias};
 use crate::multibody::energy::energy;
 use crate::multibody::mechanism::BASE;
-use crate::multibody::{Energy, EnergyScratch, Factor, Inertias, MassMatrix, Model, Place, Poses};
+use crate::multibody::{
+    Energy, EnergyScratch, Factor, Inertias, LaneConfiguration, MassMatrix, Model, Poses,
+};
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 use crate::system::tree::{JOINT_ARM, MOST_JOINT_TURN, MOST_SPIN, MOST_TURN};
 
@@ -110,11 +112,11 @@ pub struct Block<T: Lane> {
     persists: T::Mask,
     /// Lanes whose contacts are those of the last step.
     is_same: T::Mask,
-    start: Place<T>,
+    start: LaneConfiguration<T>,
     v: Vec<T>,
     time: T,
-    middle: Place<T>,
-    end: Place<T>,
+    middle: LaneConfiguration<T>,
+    end: LaneConfiguration<T>,
     v_end: Vec<T>,
     v_mean: Vec<T>,
     poses_middle: Poses<T>,
@@ -178,7 +180,7 @@ impl<T: Lane> Block<T> {
         let zero = T::splat(token, 0.0);
         let nobody = T::mask(token, 0);
         let vector = || vec![zero; machine.nv()];
-        let place = || Place::new(token, machine);
+        let place = || LaneConfiguration::new(token, machine);
         let contacts = Contacts::new(token, machine);
         let slots = vec![[zero; 3]; contacts.n_slots()];
         Self {
@@ -246,12 +248,12 @@ impl<T: Lane> Block<T> {
 
     /// Gives a lane to a rover of this machine, with options alike those of the others.
     /// [`Self::begin`] follows.
-    pub fn board(&mut self, lane: usize, rover: &Passenger<'_>) {
+    pub fn load_rover(&mut self, lane: usize, rover: &LaneRover<'_>) {
         let own = T::mask(self.token, 1 << lane);
         self.occupied = self.occupied | own;
         if !self.holds(lane, rover) {
             self.is_new = self.is_new | own;
-            self.seat(lane, rover);
+            self.fill(lane, rover);
         }
         self.options.clone_from(rover.options);
         self.friction.set(lane, rover.options.friction_coefficient);
@@ -278,7 +280,7 @@ impl<T: Lane> Block<T> {
     }
 
     /// Whether a lane has the inertia and the state of a rover, so that its energy is known.
-    fn holds(&self, lane: usize, rover: &Passenger<'_>) -> bool {
+    fn holds(&self, lane: usize, rover: &LaneRover<'_>) -> bool {
         let is_own = |own: &T, x: &f64| own.get(lane).to_bits() == x.to_bits();
         (self.models[lane].as_ref()).is_some_and(|own| Arc::ptr_eq(own, rover.model))
             && self.gravity.get(lane).map(f64::to_bits)
@@ -288,7 +290,7 @@ impl<T: Lane> Block<T> {
     }
 
     /// Gives a lane the inertia and the state of a rover.
-    fn seat(&mut self, lane: usize, rover: &Passenger<'_>) {
+    fn fill(&mut self, lane: usize, rover: &LaneRover<'_>) {
         if !(self.models[lane].as_ref()).is_some_and(|own| Arc::ptr_eq(own, rover.model)) {
             self.inertias.set_lane(lane, rover.model.inertias());
             self.models[lane] = Some(Arc::clone(rover.model));
@@ -301,7 +303,7 @@ impl<T: Lane> Block<T> {
     }
 
     /// Writes a lane's state back, without its contacts.
-    pub fn alight(&self, lane: usize, rover: &mut Passenger<'_>) {
+    pub fn store_rover(&self, lane: usize, rover: &mut LaneRover<'_>) {
         self.start.to_lane(lane, rover.configuration);
         for (x, own) in rover.v.iter_mut().zip(&self.v) {
             *x = own.get(lane);
@@ -329,7 +331,7 @@ impl<T: Lane> Block<T> {
         self.occupied = self.occupied & !T::mask(self.token, 1 << lane);
     }
 
-    /// Follows after rovers have boarded.
+    /// Follows after rovers were loaded.
     pub fn begin(&mut self) {
         self.drives.finish_loading();
         if self.is_new.any() {
@@ -355,7 +357,7 @@ impl<T: Lane> Block<T> {
         )
     }
 
-    /// Options of the rovers; gravity and friction are those of the last that boarded.
+    /// Options of the rovers; gravity and friction are those of the last that was loaded.
     #[must_use]
     pub fn options(&self) -> &StepOptions {
         &self.options
@@ -391,7 +393,7 @@ impl<T: Lane> Block<T> {
         self.poses_end.origin.get(lane)
     }
 
-    /// Visits the contacts of a lane's last step, in order: contact, position (world, m), impulse
+    /// ModeMemory the contacts of a lane's last step, in order: contact, position (world, m), impulse
     /// (N s) and local velocity (m/s).
     pub fn visit_contacts(
         &self,

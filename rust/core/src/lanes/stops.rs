@@ -6,7 +6,7 @@ use super::contacts::Contacts;
 use super::forecast::Forecast;
 use super::machine::{Machine, Stop};
 use crate::multibody::mechanism::LinkJoint;
-use crate::multibody::{Place, Poses};
+use crate::multibody::{LaneConfiguration, Poses};
 use crate::scalar::{Lane, LaneMask};
 
 impl<T: Lane> Contacts<T> {
@@ -29,7 +29,7 @@ impl<T: Lane> Contacts<T> {
     pub fn detect_stops(
         &mut self,
         machine: &Machine,
-        (middle, end): (&Place<T>, &Place<T>),
+        (middle, end): (&LaneConfiguration<T>, &LaneConfiguration<T>),
         poses: &Poses<T>,
         v: &[T],
         forecast: &Forecast<T>,

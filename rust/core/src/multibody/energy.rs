@@ -1,8 +1,8 @@
 //! Energy and linear momentum of a state in one sweep, without poses for any other use.
 
 use super::inertias::{Inertia, Inertias};
+use super::lane_configuration::LaneConfiguration;
 use super::mechanism::{BASE, Link, LinkJoint, Mechanism};
-use super::place::Place;
 use super::poses::{NextTurn, Turns};
 use crate::scalar::quaternion::rotation;
 use crate::scalar::{Lane, Mat3, Vec3};
@@ -78,7 +78,7 @@ impl<T: Lane> EnergyScratch<T> {
 pub fn energy<T: Lane>(
     mechanism: &Mechanism,
     inertias: &Inertias<T>,
-    place: &Place<T>,
+    place: &LaneConfiguration<T>,
     v: &[T],
     gravity: Vec3<T>,
     scratch: &mut EnergyScratch<T>,
@@ -177,7 +177,7 @@ impl<T: Lane> Moving<T> {
     fn carry_root(
         &self,
         link: &Link,
-        state: (&Place<T>, &[T], Vec3<T>),
+        state: (&LaneConfiguration<T>, &[T], Vec3<T>),
         turns: &mut NextTurn<'_, T>,
     ) -> Self {
         let (frame, lever) = (link.frame(&self.R), link.lever(&self.R));
@@ -191,7 +191,7 @@ impl<T: Lane> Moving<T> {
         &self,
         link: &Link,
         (frame, mut lever): (&Mat3<T>, Vec3<T>),
-        (place, v, gravity): (&Place<T>, &[T], Vec3<T>),
+        (place, v, gravity): (&LaneConfiguration<T>, &[T], Vec3<T>),
         turns: &mut NextTurn<'_, T>,
     ) -> Self {
         let k = link.velocity;

@@ -7,9 +7,9 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::bias::{BiasScratch, bias};
 use super::energy::{Energy, EnergyScratch, energy};
+use super::lane_configuration::LaneConfiguration;
 use super::mass_matrix::MassMatrix;
 use super::model::Model;
-use super::place::Place;
 use super::poses::{Motion, Poses};
 use super::state::Configuration;
 use crate::scalar::Single;
@@ -20,7 +20,7 @@ pub struct Kinematics {
     /// World position of every tree's reference origin, m.
     origins: Vec<Vector3<f64>>,
     poses: Poses<f64>,
-    place: Place<f64>,
+    place: LaneConfiguration<f64>,
     tree_of: Vec<usize>,
 }
 
@@ -31,7 +31,7 @@ impl Kinematics {
         Self {
             origins: vec![Vector3::zeros(); model.trees().len()],
             poses: Poses::new(Single::best(), model.mechanism()),
-            place: Place::new(Single::best(), model.mechanism()),
+            place: LaneConfiguration::new(Single::best(), model.mechanism()),
             tree_of: model.bodies().iter().map(|body| body.tree).collect(),
         }
     }

@@ -25,12 +25,12 @@ pub mod inertias;
 pub mod joint;
 pub mod kinematics;
 pub mod landmarks;
+pub mod lane_configuration;
 pub mod mass_matrix;
 pub mod mechanism;
 pub mod model;
 pub mod momentum;
 pub mod motor;
-pub mod place;
 pub mod poses;
 pub mod state;
 
@@ -46,6 +46,7 @@ pub use factor::Factor;
 pub use inertias::Inertias;
 pub use joint::{Joint, JointAxis, Pose};
 pub use kinematics::Kinematics;
+pub use lane_configuration::LaneConfiguration;
 pub use mass_matrix::MassMatrix;
 pub use mechanism::Mechanism;
 pub(crate) use model::fingerprint;
@@ -55,6 +56,5 @@ pub use model::{
 };
 pub use momentum::Momentum;
 pub use motor::{DriveTrial, Motor, MotorRegime};
-pub use place::Place;
 pub use poses::{Motion, Poses};
 pub use state::Configuration;

@@ -6,8 +6,8 @@
 
 use super::inertias::{Inertia, Inertias};
 use super::joint::Coupling;
+use super::lane_configuration::LaneConfiguration;
 use super::mechanism::{Link, LinkJoint, Mechanism};
-use super::place::Place;
 use crate::scalar::elementary::{sin_cos, sines_cosines};
 use crate::scalar::quaternion::rotation;
 use crate::scalar::{Lane, Mat3, Vec3};
@@ -89,7 +89,12 @@ impl<T: Lane> Poses<T> {
     ///
     /// # Panics
     /// If an argument is of another mechanism.
-    pub fn update(&mut self, mechanism: &Mechanism, inertias: &Inertias<T>, place: &Place<T>) {
+    pub fn update(
+        &mut self,
+        mechanism: &Mechanism,
+        inertias: &Inertias<T>,
+        place: &LaneConfiguration<T>,
+    ) {
         T::vectorize(
             self.token,
             #[inline(always)]
@@ -98,7 +103,12 @@ impl<T: Lane> Poses<T> {
     }
 
     #[inline(always)]
-    fn update_here(&mut self, mechanism: &Mechanism, inertias: &Inertias<T>, place: &Place<T>) {
+    fn update_here(
+        &mut self,
+        mechanism: &Mechanism,
+        inertias: &Inertias<T>,
+        place: &LaneConfiguration<T>,
+    ) {
         let n = mechanism.links.len();
         let (links, inertias) = (&mechanism.links[..n], &inertias.bodies[..n]);
         let bodies = &mut self.bodies[..n];
@@ -156,7 +166,7 @@ impl<T: Lane> Poses<T> {
     ///
     /// # Panics
     /// If an argument is of another mechanism.
-    pub fn spin(&mut self, mechanism: &Mechanism, place: &Place<T>) {
+    pub fn spin(&mut self, mechanism: &Mechanism, place: &LaneConfiguration<T>) {
         for (link, pose) in mechanism.links.iter().zip(&mut self.bodies) {
             if let Some(joint) = link.spin {
                 let angle = link.coordinate(place.joints[joint]);
@@ -191,7 +201,7 @@ fn follow_world<T: Lane>(
     link: &Link,
     inertia: &Inertia<T>,
     world: &Pose<T>,
-    place: &Place<T>,
+    place: &LaneConfiguration<T>,
     turns: &mut NextTurn<'_, T>,
     motions: &mut [Motion<T>],
 ) -> Pose<T> {
@@ -204,7 +214,7 @@ fn follow<T: Lane>(
     link: &Link,
     inertia: &Inertia<T>,
     carrier: &Pose<T>,
-    place: &Place<T>,
+    place: &LaneConfiguration<T>,
     turns: &mut NextTurn<'_, T>,
     motions: &mut [Motion<T>],
 ) -> Pose<T> {
@@ -295,7 +305,11 @@ impl<T: Lane> Turns<T> {
     }
 
     #[inline(always)]
-    pub(super) fn of(&mut self, mechanism: &Mechanism, place: &Place<T>) -> NextTurn<'_, T> {
+    pub(super) fn of(
+        &mut self,
+        mechanism: &Mechanism,
+        place: &LaneConfiguration<T>,
+    ) -> NextTurn<'_, T> {
         let turning = &mechanism.angles[..];
         let [angles, sines, cosines] = &mut self.numbers;
         let angles = &mut angles[..];

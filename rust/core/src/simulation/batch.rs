@@ -8,7 +8,7 @@ use rayon::ThreadPool;
 use super::error::BatchError;
 use super::reading::{Look, ReadingLayout, ReadingScratch};
 use super::rover::{Placement, RoverSimulation};
-use super::turns::{Bench, Done, Turn, take_turns};
+use super::turns::{Done, Turn, Worker, take_turns};
 use crate::integrator::StepError;
 use crate::multibody::Model;
 use crate::pool::Pool;
@@ -23,7 +23,7 @@ pub struct Batch {
     /// The threads besides the caller's; None if it does all the work.
     pool: Option<Pool>,
     /// One for each thread.
-    benches: Vec<Bench>,
+    workers: Vec<Worker>,
 }
 
 impl Batch {
@@ -52,7 +52,7 @@ impl Batch {
             pool: (threads > 1)
                 .then(|| Pool::start(threads - 1))
                 .transpose()?,
-            benches: (0..threads).map(|_| Bench::default()).collect(),
+            workers: (0..threads).map(|_| Worker::default()).collect(),
             rovers,
             scan,
             layout,
@@ -84,7 +84,7 @@ impl Batch {
     /// Threads that step them.
     #[must_use]
     pub fn threads(&self) -> usize {
-        self.benches.len()
+        self.workers.len()
     }
 
     /// Layout of the rows of readings.
@@ -210,8 +210,8 @@ impl Batch {
             .collect();
         let turn = ReadingTurn { scan: &self.scan };
         let rovers = self.rovers.iter_mut().zip(&mut self.errors);
-        let seats = rovers.zip(&mut places);
-        take_turns(seats, n, &turn, &mut self.benches, pool, go_on);
+        let slots = rovers.zip(&mut places);
+        take_turns(slots, n, &turn, &mut self.workers, pool, go_on);
         Ok(())
     }
 
@@ -233,8 +233,8 @@ impl Batch {
         assert_eq!(places.len(), self.rovers.len(), "one place a rover");
         let pool = self.pool.as_mut().map(Pool::of_this_process).transpose()?;
         let rovers = self.rovers.iter_mut().zip(&mut self.errors);
-        let seats = rovers.zip(places);
-        take_turns(seats, n, turn, &mut self.benches, pool, go_on);
+        let slots = rovers.zip(places);
+        take_turns(slots, n, turn, &mut self.workers, pool, go_on);
         Ok(())
     }
 

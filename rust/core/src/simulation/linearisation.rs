@@ -116,18 +116,18 @@ impl RoverSimulation {
         if self.options.variant != Variant::Linearised {
             return Err(LinearisationError::Variant);
         }
-        let mut bench = Bench::new(self)?;
-        let next_state = bench.take(None)?;
-        let key = bench.modes();
-        let parts = bench
+        let mut scratch = ScratchSimulation::new(self)?;
+        let next_state = scratch.take(None)?;
+        let key = scratch.modes();
+        let parts = scratch
             .sim
             .scratch
             .contacts()
             .iter()
             .map(|c| c.part)
             .collect();
-        let nv = bench.v.len();
-        let (held, reached) = bench
+        let nv = scratch.v.len();
+        let (held, reached) = scratch
             .at(None, |system, options, start, ws| {
                 let held = HeldStep::of(system, options, start, &next_state[nv..], ws)?;
                 let (v, displacement) = held.solution();
@@ -135,21 +135,21 @@ impl RoverSimulation {
                 Some((held, reached))
             })
             .ok_or(LinearisationError::NotHeld)?;
-        let reached = bench.state(&reached);
-        let off = bench.difference(&reached, &next_state, 1.0);
+        let reached = scratch.state(&reached);
+        let off = scratch.difference(&reached, &next_state, 1.0);
         let size = next_state.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
         if off.amax() > SAME * size {
             return Err(LinearisationError::NotHeld);
         }
-        let all = bench
+        let all = scratch
             .derive(&held, &reached)
             .ok_or(LinearisationError::NotHeld)?;
-        let (holds, errors) = bench.test(&all, &key, perturbation)?;
-        let (nx, nu) = (2 * nv, bench.n_inputs());
+        let (holds, errors) = scratch.test(&all, &key, perturbation)?;
+        let (nx, nu) = (2 * nv, scratch.n_inputs());
         Ok(Linearisation {
             a: all.columns(0, nx).into_owned(),
             b: all.columns(nx, nu).into_owned(),
-            state: [&bench.q[..], &bench.v].concat(),
+            state: [&scratch.q[..], &scratch.v].concat(),
             command: [self.wheel_torques(), &self.steering()].concat(),
             next_state,
             parts,
@@ -167,7 +167,7 @@ impl RoverSimulation {
 type Modes = (Vec<(SceneKey<RoverScene>, ContactMode)>, [bool; 2]);
 
 /// A copy of a simulation that is set to states and commands near a base.
-struct Bench {
+struct ScratchSimulation {
     sim: RoverSimulation,
     q: Vec<f64>,
     v: Vec<f64>,
@@ -178,7 +178,7 @@ struct Bench {
     is_slowed: bool,
 }
 
-impl Bench {
+impl ScratchSimulation {
     fn new(of: &RoverSimulation) -> Result<Self, LinearisationError> {
         let model: &Arc<Model> = of.model();
         let q = coordinates::to_public(model, of.q());

@@ -1,4 +1,4 @@
-//! The fast steps of a rover, alone and as a passenger of a block.
+//! The fast steps of a rover, alone and in a lane of a block.
 
 use std::sync::Arc;
 
@@ -8,8 +8,8 @@ use super::rover::{RoverScene, RoverSimulation};
 use super::scene::QuickStep;
 use crate::integrator::{NoProbe, Phase, Probe, StepError, StepOptions, StepReport};
 use crate::lanes::admission::{FallbackReason, admit};
+use crate::lanes::lane_rover::LaneRover;
 use crate::lanes::machine::Machine;
-use crate::lanes::passenger::Passenger;
 use crate::lanes::queue::Queue;
 use crate::lanes::step::{Block, Next};
 use crate::scalar::{Lane, Single};
@@ -52,7 +52,7 @@ impl RoverScene {
         let queue = quick
             .queue
             .get_or_insert_with(|| Box::new(Queue::new(token)));
-        let mut passenger = Passenger {
+        let mut lane_rover = LaneRover {
             model: &self.model,
             terrain: &self.terrain,
             options: step.options,
@@ -64,7 +64,7 @@ impl RoverScene {
             drive_work: &mut step.parts.drive_work,
             wheel_torque: &mut step.memory.wheel_torque,
         };
-        block.board(0, &passenger);
+        block.load_rover(0, &lane_rover);
         block.begin();
         let problem = &mut *quick.problem;
         block.prepare(problem, probe);
@@ -86,7 +86,7 @@ impl RoverScene {
         if block.declined(0).is_some() {
             return None;
         }
-        block.alight(0, &mut passenger);
+        block.store_rover(0, &mut lane_rover);
         let report = *block.report(0);
         quick.set_last(true);
         Some(report)
@@ -115,13 +115,13 @@ impl RoverSimulation {
     }
 
     /// Takes a lane of a block. [`Block::begin`] follows.
-    pub(super) fn board<T: Lane>(&mut self, block: &mut Block<T>, lane: usize) {
-        block.board(lane, &self.passenger());
+    pub(super) fn load<T: Lane>(&mut self, block: &mut Block<T>, lane: usize) {
+        block.load_rover(lane, &self.lane_rover());
     }
 
     /// Takes back what the block has made of it.
-    pub(super) fn alight<T: Lane>(&mut self, block: &Block<T>, lane: usize) {
-        block.alight(lane, &mut self.passenger());
+    pub(super) fn store<T: Lane>(&mut self, block: &Block<T>, lane: usize) {
+        block.store_rover(lane, &mut self.lane_rover());
     }
 
     /// Lists the contacts of its last step in a block.
@@ -144,8 +144,8 @@ impl RoverSimulation {
         self.general_step(&variant, &mut NoProbe)
     }
 
-    fn passenger(&mut self) -> Passenger<'_> {
-        Passenger {
+    fn lane_rover(&mut self) -> LaneRover<'_> {
+        LaneRover {
             model: &self.scene.model,
             terrain: &self.scene.terrain,
             options: &self.options,

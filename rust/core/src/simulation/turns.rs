@@ -1,8 +1,8 @@
 //! The turns of many rovers, distributed over threads.
 //!
 //! In its turn a rover is given its commands, takes its steps and is read, all on one thread. The
-//! threads take the rovers in groups from a queue, and each thread steps its group as a fleet
-//! ([`super::fleet`]). The calling thread is one of them; it also asks whether to continue.
+//! threads take the rovers in groups from a queue, and each thread steps its group as a batch
+//! ([`super::lane_batch`]). The calling thread is one of them; it also asks whether to continue.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use rayon::ThreadPool;
 
-use super::fleet::{Fleet, Rider};
+use super::lane_batch::{BatchRover, LaneBatch};
 use super::reading::ReadingScratch;
 use super::rover::RoverSimulation;
 use crate::integrator::StepError;
@@ -48,7 +48,7 @@ pub struct Done<'a> {
 }
 
 /// A rover with its data.
-pub(super) type Seat<'a, P> = (
+pub(super) type Slot<'a, P> = (
     (&'a mut RoverSimulation, &'a mut Option<StepError>),
     &'a mut P,
 );
@@ -58,15 +58,15 @@ pub(super) type Seat<'a, P> = (
 const GROUP: usize = 32;
 
 /// What a thread needs for the turns of its rovers. Holds no state between calls.
-pub(super) struct Bench {
-    fleet: Fleet,
+pub(super) struct Worker {
+    batch: LaneBatch,
     reading: ReadingScratch,
 }
 
-impl Default for Bench {
+impl Default for Worker {
     fn default() -> Self {
         Self {
-            fleet: Fleet::new(Instructions::of_this_machine()),
+            batch: LaneBatch::new(Instructions::of_this_machine()),
             reading: ReadingScratch::default(),
         }
     }
@@ -74,22 +74,22 @@ impl Default for Bench {
 
 /// Gives every rover its turn of `n` steps.
 ///
-/// `benches`: one for each thread, at least one; `pool`: the threads besides the calling one. Once
+/// `workers`: one for each thread, at least one; `pool`: the threads besides the calling one. Once
 /// `go_on` returns false, each rover stops after a whole step.
 pub(super) fn take_turns<'a, P: Send + 'a>(
-    seats: impl ExactSizeIterator<Item = Seat<'a, P>> + Send,
+    slots: impl ExactSizeIterator<Item = Slot<'a, P>> + Send,
     n: usize,
     turn: &impl Turn<P>,
-    benches: &mut [Bench],
+    workers: &mut [Worker],
     pool: Option<&ThreadPool>,
     go_on: &mut dyn FnMut() -> bool,
 ) {
-    let n_rovers = seats.len();
+    let n_rovers = slots.len();
     // All threads get work, in whole blocks where there are enough rovers.
-    let group = n_rovers.div_ceil(benches.len().max(1));
+    let group = n_rovers.div_ceil(workers.len().max(1));
     let group = group.next_multiple_of(MAX_LANES).clamp(1, GROUP);
-    let queue = Mutex::new(seats);
-    let work = |bench: &mut Bench, go_on: &mut dyn FnMut() -> bool| {
+    let queue = Mutex::new(slots);
+    let work = |worker: &mut Worker, go_on: &mut dyn FnMut() -> bool| {
         let mut own = Vec::with_capacity(group);
         loop {
             own.extend({
@@ -100,26 +100,26 @@ pub(super) fn take_turns<'a, P: Send + 'a>(
                 return;
             }
             let may_move = go_on();
-            let mut riders = Vec::with_capacity(group);
+            let mut rovers = Vec::with_capacity(group);
             for ((rover, error), place) in &mut own {
                 **error = None;
                 if may_move && turn.is_moving(place) {
                     turn.begin(rover, place);
-                    riders.push(Rider { rover, error });
+                    rovers.push(BatchRover { rover, error });
                 }
             }
-            bench.fleet.advance(&mut riders, n, go_on);
-            drop(riders);
+            worker.batch.advance(&mut rovers, n, go_on);
+            drop(rovers);
             for ((rover, error), place) in own.drain(..) {
                 let done = Done {
                     has_moved: may_move && turn.is_moving(place),
                     error: error.as_ref(),
                 };
-                turn.end(rover, done, place, &mut bench.reading);
+                turn.end(rover, done, place, &mut worker.reading);
             }
         }
     };
-    let [own, others @ ..] = benches else {
+    let [own, others @ ..] = workers else {
         return;
     };
     let Some(pool) = pool else {
@@ -130,10 +130,10 @@ pub(super) fn take_turns<'a, P: Send + 'a>(
     pool.in_place_scope(|scope| {
         let (done, is_done) = channel::<()>();
         let (stop, work) = (&stop, &work);
-        for bench in others {
+        for worker in others {
             let done = done.clone();
             scope.spawn(move |_| {
-                work(bench, &mut || !stop.load(Ordering::Relaxed));
+                work(worker, &mut || !stop.load(Ordering::Relaxed));
                 drop(done); // tells the calling thread, also where a rover panics
             });
         }

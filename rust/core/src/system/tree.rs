@@ -27,8 +27,8 @@ use crate::multibody::bias::{BiasScratch, bias};
 use crate::multibody::energy::energy;
 use crate::multibody::momentum::body_momenta;
 use crate::multibody::{
-    Configuration, EnergyScratch, Factor, Joint, JointProperties, Kinematics, MassMatrix, Model,
-    Momentum, Passive, Place, Tree,
+    Configuration, EnergyScratch, Factor, Joint, JointProperties, Kinematics, LaneConfiguration,
+    MassMatrix, Model, Momentum, Passive, Tree,
 };
 use crate::problem::{Dimension, FrictionContactProblem};
 use crate::sand::{RutMap, SandState};
@@ -76,7 +76,7 @@ pub struct TreeScratch {
     motors: Vec<MotorBranch>,
     drives_tried: Vec<DriveAction>,
     drives: Vec<DriveAction>,
-    place: Place<f64>,
+    place: LaneConfiguration<f64>,
     energy: EnergyScratch<f64>,
     gyroscopic: GyroscopicScratch,
     force: Vec<f64>,
@@ -116,7 +116,7 @@ impl TreeScratch {
             motors: vec![MotorBranch::default(); model.n_joints()],
             drives_tried: vec![DriveAction::default(); model.n_joints()],
             drives: vec![DriveAction::default(); model.n_joints()],
-            place: Place::new(token, mechanism),
+            place: LaneConfiguration::new(token, mechanism),
             energy: EnergyScratch::new(token, mechanism),
             gyroscopic: GyroscopicScratch::default(),
             force: vec![0.0; model.nv()],

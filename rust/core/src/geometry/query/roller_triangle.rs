@@ -40,7 +40,7 @@ pub fn rim_points_over_face(
     });
 }
 
-/// Visits the points at an edge whose gap is at most `reach`.
+/// ModeMemory the points at an edge whose gap is at most `reach`.
 pub fn points_at_edge(
     roller: &Roller,
     edge: &Edge,

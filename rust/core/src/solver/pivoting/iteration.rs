@@ -10,12 +10,12 @@
 //! it sticks, it leaves the cone at once. Such a contact is barred, so that another one changes its
 //! mode. If none is left, its slip has changed its sign, and its friction is reversed.
 
+use super::mode_memory::ModeMemory;
 use super::modes::{
     Law, Mode, Triple, Violations, is_pressed_to_slide, judge, limit, return_to_cone,
 };
 use super::store::{Many, Store};
 use super::system::System;
-use super::visits::Visits;
 use crate::problem::Residual;
 use crate::scalar::{Lane, LaneMask, Single};
 
@@ -73,7 +73,7 @@ pub(crate) struct Pivoting<T: Lane, B: Store> {
     pub(super) full: T::Mask,
     /// Squared relative residual after the full step before the last.
     pub(super) last: T,
-    pub(super) visits: Visits<T>,
+    pub(super) memory: ModeMemory<T>,
     pub(super) reversals: T,
 }
 
@@ -140,7 +140,7 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
             contradictions: B::filled(zero),
             full: none,
             last: zero,
-            visits: Visits::new(zero),
+            memory: ModeMemory::new(zero),
             reversals: zero,
         }
     }
@@ -251,7 +251,7 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
         let first = T::select(zero.lt(self.asked), self.asked, first) * self.mean;
         self.first_alpha = T::select(lanes, first, self.first_alpha);
         self.alpha = T::select(lanes, first, self.alpha);
-        self.visits.forget(lanes);
+        self.memory.forget(lanes);
         self.reversals = T::select(lanes, zero.like(REVERSALS), self.reversals);
         self.full = self.full & !lanes;
         self.lost = self.lost & !lanes;

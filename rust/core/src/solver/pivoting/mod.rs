@@ -13,16 +13,16 @@
 //!
 //! - `iteration`: the steps; `mode_changes`: how contacts change their modes after a full one;
 //! - `modes`: the equations of a mode, the violation of the law, and the way to a cone's limit;
-//! - `visits`: which modes a solve has tried;
+//! - `mode_memory`: which modes a solve has tried;
 //! - `system`: what pivoting needs of its problems; `store`: where it keeps the contacts' numbers.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 mod iteration;
 mod mode_changes;
+mod mode_memory;
 mod modes;
 mod store;
 mod system;
-mod visits;
 
 pub(crate) use iteration::Pivoting;
 #[cfg(test)]

@@ -1,10 +1,10 @@
 //! How contacts change their modes after a full step.
 
 use super::iteration::{ALIKE, Pivoting};
+use super::mode_memory::weight;
 use super::modes::return_to_cone;
 use super::store::Store;
 use super::system::System;
-use super::visits::weight;
 use crate::law::coulomb::ContactMode;
 use crate::scalar::{Lane, LaneMask};
 
@@ -37,7 +37,7 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
         self.last = T::select(full, relative, self.last);
         let gains_nothing = full & like.like(NO_GAIN).lt(gain);
         let number = self.number(system.places());
-        self.visits.enter(full, number, relative);
+        self.memory.enter(full, number, relative);
         let looks = full & !gain.lt(like.like(HOLD));
         if !looks.any() {
             return;
@@ -49,7 +49,7 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
         let least = T::select(zero.lt(self.asked), like.like(again), like.like(least)) * self.mean;
         let smaller = (like.like(SHRINK) * self.alpha).max(least);
         self.alpha = T::select(is_settled, smaller, self.alpha);
-        let circles = looks & like.like(PATIENCE).lt(self.visits.idle);
+        let circles = looks & like.like(PATIENCE).lt(self.memory.idle);
         let stuck = circles | is_settled;
         let reversed = if stuck.any() {
             self.reverse(system.places(), stuck)
@@ -133,7 +133,7 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
         let left = self.reversals - zero.like(1.0);
         self.reversals = T::select(reversed, left, self.reversals);
         self.alpha = T::select(reversed, self.first_alpha, self.alpha);
-        self.visits.forget(reversed);
+        self.memory.forget(reversed);
         reversed
     }
 

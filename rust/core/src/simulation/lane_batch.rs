@@ -18,9 +18,9 @@ use crate::scalar::{Instructions, Lane};
 /// Rovers that together cost less alone than as a block, as a fraction of its lanes.
 const FEW: f64 = 0.4;
 
-/// A rover of a fleet, and the place for the error that ended its last call.
+/// A rover of a batch, and the place for the error that ended its last call.
 #[derive(Debug)]
-pub struct Rider<'a> {
+pub struct BatchRover<'a> {
     /// The rover.
     pub rover: &'a mut RoverSimulation,
     /// Why its call ended early, if it did.
@@ -28,12 +28,12 @@ pub struct Rider<'a> {
 }
 
 /// The blocks that a thread steps rovers with. Holds no state between calls.
-pub struct Fleet {
-    crew: Crew,
+pub struct LaneBatch {
+    blocks: Blocks,
 }
 
 /// Blocks of this machine's widest lanes.
-enum Crew {
+enum Blocks {
     Singles,
     #[cfg(target_arch = "x86_64")]
     Fours(Box<Lanes<fearless_simd::f64x4<fearless_simd::Avx2>>>),
@@ -41,39 +41,44 @@ enum Crew {
     Eights(Box<Lanes<fearless_simd::f64x8<fearless_simd::Avx512>>>),
 }
 
-impl Fleet {
+impl LaneBatch {
     /// For a set of instructions; mostly [`Instructions::of_this_machine`].
     #[must_use]
     pub fn new(instructions: Instructions) -> Self {
-        let crew = match instructions {
-            Instructions::Baseline => Crew::Singles,
+        let blocks = match instructions {
+            Instructions::Baseline => Blocks::Singles,
             #[cfg(target_arch = "x86_64")]
-            Instructions::Avx2(token) => Crew::Fours(Box::new(Lanes::new(token))),
+            Instructions::Avx2(token) => Blocks::Fours(Box::new(Lanes::new(token))),
             #[cfg(target_arch = "x86_64")]
-            Instructions::Avx512(token) => Crew::Eights(Box::new(Lanes::new(token))),
+            Instructions::Avx512(token) => Blocks::Eights(Box::new(Lanes::new(token))),
         };
-        Self { crew }
+        Self { blocks }
     }
 
     /// Takes `n` steps with each rover, but lets each stop after a whole one once `go_on`, asked
     /// after each step of a block, returns false. A failed step ends the call of its own rover
     /// only.
-    pub fn advance(&mut self, riders: &mut [Rider<'_>], n: usize, go_on: &mut dyn FnMut() -> bool) {
-        match &mut self.crew {
-            Crew::Singles => {
-                for rider in riders {
-                    rider.go_alone(n, go_on);
+    pub fn advance(
+        &mut self,
+        rovers: &mut [BatchRover<'_>],
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) {
+        match &mut self.blocks {
+            Blocks::Singles => {
+                for entry in rovers {
+                    entry.go_alone(n, go_on);
                 }
             }
             #[cfg(target_arch = "x86_64")]
-            Crew::Fours(lanes) => lanes.advance(riders, n, go_on),
+            Blocks::Fours(lanes) => lanes.advance(rovers, n, go_on),
             #[cfg(target_arch = "x86_64")]
-            Crew::Eights(lanes) => lanes.advance(riders, n, go_on),
+            Blocks::Eights(lanes) => lanes.advance(rovers, n, go_on),
         }
     }
 }
 
-impl Rider<'_> {
+impl BatchRover<'_> {
     fn go_alone(&mut self, n: usize, go_on: &mut dyn FnMut() -> bool) {
         *self.error = self.rover.step_while(n, go_on).err();
     }
@@ -81,9 +86,9 @@ impl Rider<'_> {
 
 /// A lane's rover in a call.
 #[derive(Clone, Copy, Debug)]
-struct Seat {
-    /// Index of the rider.
-    rider: usize,
+struct Slot {
+    /// Index of the rover.
+    index: usize,
     report: StepReport,
     has_failed: bool,
     /// Whether its last step was a general one.
@@ -98,7 +103,7 @@ struct Lanes<T: Lane> {
     courses: Vec<Course>,
     queue: Queue<T>,
     problems: Vec<ContactProblem>,
-    seats: Vec<Option<Seat>>,
+    slots: Vec<Option<Slot>>,
 }
 
 /// How far a block is in a call.
@@ -119,81 +124,86 @@ impl<T: Lane> Lanes<T> {
             courses: Vec::new(),
             queue: Queue::new(token),
             problems: Vec::new(),
-            seats: Vec::new(),
+            slots: Vec::new(),
         }
     }
 
-    fn advance(&mut self, riders: &mut [Rider<'_>], n: usize, go_on: &mut dyn FnMut() -> bool) {
-        let n_seats = self.seat(riders);
-        let mut seated = self.seats[..n_seats].iter().flatten().peekable();
-        for (k, rider) in riders.iter_mut().enumerate() {
-            if seated.next_if(|seat| seat.rider == k).is_none() {
-                rider.go_alone(n, go_on);
+    fn advance(
+        &mut self,
+        rovers: &mut [BatchRover<'_>],
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) {
+        let n_slots = self.slot(rovers);
+        let mut taken = self.slots[..n_slots].iter().flatten().peekable();
+        for (k, entry) in rovers.iter_mut().enumerate() {
+            if taken.next_if(|slot| slot.index == k).is_none() {
+                entry.go_alone(n, go_on);
             }
         }
-        if n_seats == 0 {
+        if n_slots == 0 {
             return;
         }
-        let n_blocks = n_seats / T::LANES;
+        let n_blocks = n_slots / T::LANES;
         for (b, block) in self.blocks[..n_blocks].iter_mut().enumerate() {
             for lane in 0..T::LANES {
-                match &mut self.seats[b * T::LANES + lane] {
-                    Some(seat) => {
-                        let rover = &mut *riders[seat.rider].rover;
+                match &mut self.slots[b * T::LANES + lane] {
+                    Some(slot) => {
+                        let rover = &mut *rovers[slot.index].rover;
                         rover.begin_call();
-                        rover.board(block, lane);
+                        rover.load(block, lane);
                     }
                     None => block.clear(lane),
                 }
             }
             block.begin();
         }
-        self.step(n_blocks, riders, n, go_on);
+        self.step(n_blocks, rovers, n, go_on);
         for (b, block) in self.blocks[..n_blocks].iter_mut().enumerate() {
-            for (lane, seat) in self.seats[b * T::LANES..][..T::LANES].iter().enumerate() {
-                if let Some(seat) = seat.filter(|seat| !seat.has_failed) {
-                    let rover = &mut *riders[seat.rider].rover;
-                    if seat.is_general {
+            for (lane, slot) in self.slots[b * T::LANES..][..T::LANES].iter().enumerate() {
+                if let Some(slot) = slot.filter(|slot| !slot.has_failed) {
+                    let rover = &mut *rovers[slot.index].rover;
+                    if slot.is_general {
                         rover.list_active();
                     } else {
-                        rover.alight(block, lane);
+                        rover.store(block, lane);
                         rover.list_from(block, lane);
                     }
-                    rover.end_call(seat.report);
+                    rover.end_call(slot.report);
                 }
             }
         }
     }
 
-    /// Gives the rovers that can share blocks their seats, in order; returns how many seats the
+    /// Gives the rovers that can share blocks their slots, in order; returns how many slots the
     /// blocks have.
-    fn seat(&mut self, riders: &mut [Rider<'_>]) -> usize {
-        self.seats.clear();
-        let mut machines = riders.iter().filter_map(|rider| rider.rover.machine());
+    fn slot(&mut self, rovers: &mut [BatchRover<'_>]) -> usize {
+        self.slots.clear();
+        let mut machines = rovers.iter().filter_map(|entry| entry.rover.machine());
         let Some(machine) = machines.next().cloned() else {
             return 0;
         };
         let mut leader: Option<StepOptions> = None;
-        for (k, rider) in riders.iter_mut().enumerate() {
-            if !rider.rover.shares(&machine) {
+        for (k, entry) in rovers.iter_mut().enumerate() {
+            if !entry.rover.shares(&machine) {
                 continue;
             }
-            let own = rider.rover.options();
+            let own = entry.rover.options();
             if are_alike(own, leader.get_or_insert_with(|| own.clone())) {
-                self.seats.push(Some(Seat {
-                    rider: k,
+                self.slots.push(Some(Slot {
+                    index: k,
                     report: StepReport::default(),
                     has_failed: false,
                     is_general: false,
                 }));
             }
         }
-        let rest = self.seats.len() % T::LANES;
+        let rest = self.slots.len() % T::LANES;
         if (rest as f64) < FEW * T::LANES as f64 {
-            self.seats.truncate(self.seats.len() - rest);
+            self.slots.truncate(self.slots.len() - rest);
         }
-        let n_seats = self.seats.len().next_multiple_of(T::LANES);
-        self.seats.resize(n_seats, None);
+        let n_slots = self.slots.len().next_multiple_of(T::LANES);
+        self.slots.resize(n_slots, None);
         if !self
             .machine
             .as_ref()
@@ -202,20 +212,20 @@ impl<T: Lane> Lanes<T> {
             self.machine = Some(Arc::clone(&machine));
             self.blocks.clear();
         }
-        while self.blocks.len() < n_seats / T::LANES {
+        while self.blocks.len() < n_slots / T::LANES {
             self.blocks.push(Block::new(self.token, &machine));
         }
-        if self.problems.len() < n_seats {
-            self.problems.resize_with(n_seats, ContactProblem::default);
+        if self.problems.len() < n_slots {
+            self.problems.resize_with(n_slots, ContactProblem::default);
         }
-        n_seats
+        n_slots
     }
 
     /// `n` steps of every block, or fewer once `go_on` returns false.
     fn step(
         &mut self,
         n_blocks: usize,
-        riders: &mut [Rider<'_>],
+        rovers: &mut [BatchRover<'_>],
         n: usize,
         go_on: &mut dyn FnMut() -> bool,
     ) {
@@ -238,7 +248,7 @@ impl<T: Lane> Lanes<T> {
             if self.conclude(b) {
                 continue;
             }
-            self.settle(b, riders);
+            self.settle(b, rovers);
             goes_on = goes_on && go_on();
             self.courses[b].left -= 1;
             if goes_on && self.courses[b].left > 0 {
@@ -280,33 +290,33 @@ impl<T: Lane> Lanes<T> {
     }
 
     /// Notes the reports of a block's step; rovers that need the general step take it alone.
-    fn settle(&mut self, b: usize, riders: &mut [Rider<'_>]) {
+    fn settle(&mut self, b: usize, rovers: &mut [BatchRover<'_>]) {
         let block = &mut self.blocks[b];
-        let seats = &mut self.seats[b * T::LANES..][..T::LANES];
+        let slots = &mut self.slots[b * T::LANES..][..T::LANES];
         let mut is_changed = false;
-        for (lane, seat) in seats.iter_mut().enumerate() {
-            let Some(seat) = seat.as_mut().filter(|seat| !seat.has_failed) else {
+        for (lane, slot) in slots.iter_mut().enumerate() {
+            let Some(slot) = slot.as_mut().filter(|slot| !slot.has_failed) else {
                 continue;
             };
             if block.declined(lane).is_none() {
-                seat.report.merge(block.report(lane));
-                seat.is_general = false;
+                slot.report.merge(block.report(lane));
+                slot.is_general = false;
                 continue;
             }
-            let Rider { rover, error } = &mut riders[seat.rider];
-            rover.alight(block, lane);
+            let BatchRover { rover, error } = &mut rovers[slot.index];
+            rover.store(block, lane);
             match rover.step_generally() {
                 Ok(report) => {
-                    seat.report.merge(&StepReport {
+                    slot.report.merge(&StepReport {
                         fallbacks: 1,
                         ..report
                     });
-                    seat.is_general = true;
-                    rover.board(block, lane);
+                    slot.is_general = true;
+                    rover.load(block, lane);
                 }
                 Err(why) => {
                     **error = Some(why);
-                    seat.has_failed = true;
+                    slot.has_failed = true;
                     block.clear(lane);
                 }
             }

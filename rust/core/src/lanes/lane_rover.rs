@@ -8,12 +8,12 @@ use crate::multibody::{Configuration, Model};
 use crate::system::Command;
 
 /// A rover by its parts.
-pub struct Passenger<'a> {
+pub struct LaneRover<'a> {
     /// Its model, whose machine is the block's.
     pub model: &'a Arc<Model>,
     /// Its ground.
     pub terrain: &'a Arc<dyn Terrain>,
-    /// Its options, alike those of all passengers of the block.
+    /// Its options, alike those of all rovers of the block.
     pub options: &'a StepOptions,
     /// Its command.
     pub command: &'a Command,

@@ -8,10 +8,10 @@ use super::by_lane::{Asked, Found, motion};
 use super::contacts::{Contacts, Sight};
 use super::ground::Ground;
 use super::machine::Machine;
+use crate::contact::body_motion::BodyMotion;
 use crate::contact::detection::{Moving, detect_parts};
 use crate::contact::pair_detection::detect_pairs_of;
 use crate::contact::relocation::relocate_to;
-use crate::contact::stance::Stance;
 use crate::contact::{Activation, Contact, PairSearch, Part};
 use crate::multibody::Poses;
 use crate::scalar::{Lane, LaneMask};
@@ -24,7 +24,7 @@ struct OneLane<'a, T: Lane> {
     lane: usize,
 }
 
-impl<T: Lane> Stance for OneLane<'_, T> {
+impl<T: Lane> BodyMotion for OneLane<'_, T> {
     #[inline]
     fn origin(&self, _: usize) -> Vector3<f64> {
         self.poses.origin.get(self.lane).into()

@@ -1,4 +1,4 @@
-//! Rovers of a fleet move as they would alone, to the last bit.
+//! Rovers of a batch move as they would alone, to the last bit.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use rover_core::integrator::{StepError, StepOptions, moreau_jean::MoreauJean};
 use rover_core::multibody::{Configuration, Model, ModelDescription};
 use rover_core::scalar::Instructions;
 use rover_core::simulation::RoverSimulation;
-use rover_core::simulation::fleet::{Fleet, Rider};
+use rover_core::simulation::lane_batch::{BatchRover, LaneBatch};
 
 use super::Random;
 use super::machines::equipped;
@@ -103,7 +103,7 @@ fn models() -> Vec<Arc<Model>> {
     ]
 }
 
-/// Drives rovers in a fleet and alone.
+/// Drives rovers in a batch and alone.
 fn drive(instructions: Instructions, n: usize, torque: f64, seed: u64) {
     let mut numbers = Random(seed);
     let models = models();
@@ -111,7 +111,7 @@ fn drive(instructions: Instructions, n: usize, torque: f64, seed: u64) {
     let mut together: Vec<RoverSimulation> =
         (0..n).map(|i| rover(i, model, &mut numbers)).collect();
     let mut alone = together.clone();
-    let mut fleet = Fleet::new(instructions);
+    let mut batch = LaneBatch::new(instructions);
     for _ in 0..8 {
         for (a, b) in together.iter_mut().zip(&mut alone) {
             let mut same = Random(numbers.0);
@@ -119,10 +119,10 @@ fn drive(instructions: Instructions, n: usize, torque: f64, seed: u64) {
             command(b, torque, &mut same);
         }
         let mut errors: Vec<Option<StepError>> = vec![None; n];
-        let mut riders: Vec<Rider<'_>> = (together.iter_mut().zip(&mut errors))
-            .map(|(rover, error)| Rider { rover, error })
+        let mut entries: Vec<BatchRover<'_>> = (together.iter_mut().zip(&mut errors))
+            .map(|(rover, error)| BatchRover { rover, error })
             .collect();
-        fleet.advance(&mut riders, 10, &mut || true);
+        batch.advance(&mut entries, 10, &mut || true);
         for (k, (a, b)) in together.iter().zip(&mut alone).enumerate() {
             let error = b.step(10).err();
             assert_eq!(error.is_some(), errors[k].is_some());

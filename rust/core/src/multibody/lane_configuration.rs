@@ -9,7 +9,7 @@ use crate::scalar::{Lane, Vec3};
 
 /// A configuration a lane.
 #[derive(Clone, Debug)]
-pub struct Place<T: Lane> {
+pub struct LaneConfiguration<T: Lane> {
     /// Origin of the first body, world, m; zero where that body is not free.
     pub position: Vec3<T>,
     /// Attitude of the first body: a unit quaternion x, y, z, w.
@@ -23,7 +23,7 @@ pub struct Place<T: Lane> {
     others: Vec<(Vec3<T>, [T; 4])>,
 }
 
-impl<T: Lane> Place<T> {
+impl<T: Lane> LaneConfiguration<T> {
     /// The zero configuration.
     #[must_use]
     pub fn new(token: T::Token, mechanism: &Mechanism) -> Self {

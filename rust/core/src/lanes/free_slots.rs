@@ -20,7 +20,7 @@ const FOR_PAIRS: usize = 6;
 impl Machine {
     /// Bodies whose path the further slots have, as far as there is room; `None`: all velocities.
     /// `has_pairs`: whether bodies can touch each other.
-    pub(super) fn find_spares(&self, has_pairs: bool) -> Vec<Option<usize>> {
+    pub(super) fn find_free_slots(&self, has_pairs: bool) -> Vec<Option<usize>> {
         let wheels = || self.wheels.iter().map(|wheel| wheel.body);
         let bodies = || self.boxes.iter().map(|solid| solid.body);
         let is_on_wheel = |body: usize| wheels().any(|wheel| self.carries(body, wheel));

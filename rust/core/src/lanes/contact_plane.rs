@@ -24,7 +24,7 @@ const ROUNDING: f64 = 1e-6;
 
 /// The plane under a wheel.
 #[derive(Clone, Debug)]
-pub struct Footing<T> {
+pub struct ContactPlane<T> {
     /// Unit normal.
     pub normal: Vec3<T>,
     /// m; ∞ where there is nothing.
@@ -40,7 +40,7 @@ pub struct Footing<T> {
     rough: [f64; MAX_LANES],
 }
 
-impl<T: Lane> Footing<T> {
+impl<T: Lane> ContactPlane<T> {
     /// Nothing anywhere.
     pub fn new(token: T::Token) -> Self {
         Self {

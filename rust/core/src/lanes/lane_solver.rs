@@ -15,8 +15,8 @@ use crate::solver::pivoting::{FURTHER_ALPHAS, Few, Pivoting};
 pub const MAX_ITERATIONS: usize =
     <DenseSystem<f64, MAX_DENSE> as Loaded<f64, MAX_DENSE>>::MAX_STEPS * (1 + FURTHER_ALPHAS.len());
 
-/// Where a bench gets its problems and leaves their answers.
-pub(super) trait Line {
+/// Where a solver gets its problems and leaves their answers.
+pub(super) trait ProblemSource {
     /// Index of the next problem.
     fn next(&mut self, problems: &[ContactProblem]) -> Option<usize>;
 
@@ -28,13 +28,13 @@ pub(super) trait Line {
 }
 
 /// Lanes for problems with their whole operator.
-pub(super) type DenseBench<T, const C: usize> = Bench<T, C, DenseSystem<T, C>>;
+pub(super) type DenseSolver<T, const C: usize> = LaneSolver<T, C, DenseSystem<T, C>>;
 
 /// Lanes for problems with a factored operator.
-pub(super) type FactoredBench<T> = Bench<T, MAX_CONTACTS, VelocitySystem<T, MAX_CONTACTS>>;
+pub(super) type FactoredSolver<T> = LaneSolver<T, MAX_CONTACTS, VelocitySystem<T, MAX_CONTACTS>>;
 
 /// Lanes with their problems of at most `C` contacts.
-pub(super) struct Bench<T: Lane, const C: usize, S: Loaded<T, C>> {
+pub(super) struct LaneSolver<T: Lane, const C: usize, S: Loaded<T, C>> {
     system: S,
     pivoting: Pivoting<T, Few<C>>,
     /// Lanes with a problem, those that have taken all steps of an attempt, and those that begin
@@ -50,7 +50,7 @@ pub(super) struct Bench<T: Lane, const C: usize, S: Loaded<T, C>> {
     before: [usize; MAX_LANES],
 }
 
-impl<T: Lane, const C: usize, S: Loaded<T, C>> Bench<T, C, S> {
+impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
     #[inline(always)]
     pub(super) fn new(token: T::Token) -> Self {
         Self {
@@ -195,7 +195,7 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> Bench<T, C, S> {
         (self.active | self.again).count_ones() as usize
     }
 
-    /// Solves the problems of a line, until it has no more or lets the bench leave. Problems that
+    /// Solves the problems of a line, until it has no more or lets the solver leave. Problems that
     /// are not solved then stay with their lanes. `tolerances`: squares.
     #[inline(always)]
     pub(super) fn run(
@@ -203,7 +203,7 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> Bench<T, C, S> {
         token: T::Token,
         problems: &mut [ContactProblem],
         tolerances: [T; 2],
-        line: &mut impl Line,
+        line: &mut impl ProblemSource,
     ) {
         let mut has_gone_on = false;
         loop {

@@ -35,7 +35,7 @@ const LEAST_GAIN: f64 = 0.25;
 
 /// The modes of past full steps and the smallest squared residual with each, lane by lane.
 #[derive(Clone, Debug)]
-pub(super) struct Visits<T> {
+pub(super) struct ModeMemory<T> {
     modes: [T; MEMORY],
     least: [T; MEMORY],
     /// Place of the next modes.
@@ -44,7 +44,7 @@ pub(super) struct Visits<T> {
     pub(super) idle: T,
 }
 
-impl<T: Lane> Visits<T> {
+impl<T: Lane> ModeMemory<T> {
     /// Nothing visited.
     #[inline(always)]
     pub(super) fn new(zero: T) -> Self {

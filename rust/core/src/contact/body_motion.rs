@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::multibody::{Kinematics, Model};
 
 /// A machine at one instant, as the detection of its contacts needs it.
-pub(crate) trait Stance {
+pub(crate) trait BodyMotion {
     /// Origin of a body's tree, world, m.
     fn origin(&self, body: usize) -> Vector3<f64>;
 
@@ -24,7 +24,7 @@ pub(crate) struct Still<'a> {
     pub v: &'a [f64],
 }
 
-impl Stance for Still<'_> {
+impl BodyMotion for Still<'_> {
     #[inline]
     fn origin(&self, body: usize) -> Vector3<f64> {
         *self.kinematics.origin(body)
