@@ -290,7 +290,7 @@ fn candidates<S: BodyMotion>(part: Part, terrain: &dyn Terrain, gate: &mut Gate<
     }
 }
 
-/// ModeMemory the points of a shape on a piece of a surface whose gap is at most `reach`, m.
+/// Visits the points of a shape on a piece of a surface whose gap is at most `reach`, m.
 ///
 /// One behind the piece's plane must be in the ground, and not only beyond the far side of a ridge
 /// or a rock.
@@ -517,7 +517,7 @@ pub fn wheel_gap(shape: &PlacedShape, base: &Vector3<f64>, terrain: &dyn Terrain
     gap
 }
 
-/// ModeMemory points of the ground near a wheel, each nearer than those before; the last one is the
+/// Visits points of the ground near a wheel, each nearer than those before; the last one is the
 /// nearest. `base` as for [`disc_gap`].
 #[inline]
 fn visit_nearer(

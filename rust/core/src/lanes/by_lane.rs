@@ -1,4 +1,5 @@
-//! The contacts of a block that are found lane by lane (`lane_detection`), and their part in its matrices.
+//! The contacts of a block that are found lane by lane (`lane_detection`), and their part in its
+//! matrices.
 
 use nalgebra::Vector3;
 

@@ -9,9 +9,9 @@
 //! the rolling direction `t = n × s / |n × s|`, the lowest point of a circle over a plane lies
 //! along `t × s` from its centre.
 //!
-//! What is rare is found lane by lane (`lane_detection`): a wheel that nearly lies flat, passes a sphere
-//! within the step, touches more things than it has slots, or an edge of a surface, and a body
-//! near the ground or another one. A lane with more contacts than a problem has is declined.
+//! What is rare is found lane by lane (`lane_detection`): a wheel that nearly lies flat, passes a
+//! sphere within the step, touches more things than it has slots, or an edge of a surface, and a
+//! body near the ground or another one. A lane with more contacts than a problem has is declined.
 
 use std::ops::Range;
 use std::sync::Arc;

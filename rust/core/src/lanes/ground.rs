@@ -538,7 +538,7 @@ pub(super) fn turning<T: Lane>(R: &Mat3<T>, S: &Mat3<T>) -> T {
     (x.dot(x) + y.dot(y) + z.dot(z)).sqrt()
 }
 
-/// ModeMemory exactly the spheres that come as near to `centre` (world, m) as `within`, m.
+/// Visits exactly the spheres that come as near to `centre` (world, m) as `within`, m.
 fn visit_spheres(
     field: &dyn Terrain,
     centre: &Vector3<f64>,

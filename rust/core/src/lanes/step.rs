@@ -393,7 +393,7 @@ impl<T: Lane> Block<T> {
         self.poses_end.origin.get(lane)
     }
 
-    /// ModeMemory the contacts of a lane's last step, in order: contact, position (world, m), impulse
+    /// Visits the contacts of a lane's last step, in order: contact, position (world, m), impulse
     /// (N s) and local velocity (m/s).
     pub fn visit_contacts(
         &self,

@@ -265,7 +265,7 @@ impl<'a> Frame<'a> {
         );
     }
 
-    /// ModeMemory the points of the wheel that may be in the sand, [`MAX_LANES`] at a time.
+    /// Visits the points of the wheel that may be in the sand, [`MAX_LANES`] at a time.
     #[inline(always)]
     fn visit_groups(&self, mut visit: impl FnMut(&Group)) {
         let (strips, sides) = (self.rules.n_strips(), self.rules.n_of_a_side());

@@ -114,7 +114,7 @@ impl BallTree {
         &self.balls[self.places[index] as usize].sphere
     }
 
-    /// ModeMemory exactly the balls whose surface comes closer than `reach` to
+    /// Visits exactly the balls whose surface comes closer than `reach` to
     /// `centre`, or that contain it.
     #[inline]
     pub fn visit_near(
@@ -131,7 +131,7 @@ impl BallTree {
         });
     }
 
-    /// ModeMemory exactly the balls that the vertical line through (x, z) meets.
+    /// Visits exactly the balls that the vertical line through (x, z) meets.
     pub fn visit_column(&self, x: f64, z: f64, mut visit: impl FnMut(&Sphere)) {
         self.visit_column_indexed(x, z, |index| visit(self.ball(index as usize)));
     }
@@ -147,7 +147,7 @@ impl BallTree {
         });
     }
 
-    /// ModeMemory all balls that come closer than `radius` to `centre`, seen from above, and some more.
+    /// Visits all balls that come closer than `radius` to `centre`, seen from above, and some more.
     pub fn visit_pillar(&self, centre: &Vector3<f64>, radius: f64, mut visit: impl FnMut(&Sphere)) {
         let reach = [radius, f64::INFINITY, radius];
         self.search(centre, &reach, |ball| visit(&ball.sphere));
@@ -222,7 +222,7 @@ impl BallTree {
         }
     }
 
-    /// ModeMemory the balls of all leaves that come closer than `reach` to `centre` along each axis.
+    /// Visits the balls of all leaves that come closer than `reach` to `centre` along each axis.
     #[inline]
     fn search(&self, centre: &Vector3<f64>, reach: &[f64; 3], mut visit: impl FnMut(&Ball)) {
         if self.nodes.is_empty() {

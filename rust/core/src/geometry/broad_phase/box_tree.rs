@@ -90,7 +90,7 @@ impl BoxTree {
         Self { nodes, items }
     }
 
-    /// ModeMemory boxes that a ray crosses within `reach` (m), nearer halves first. `visit` gets the
+    /// Visits boxes that a ray crosses within `reach` (m), nearer halves first. `visit` gets the
     /// number of a box in the input and the reach, and returns the reach from there on.
     #[inline]
     pub fn visit_along(&self, ray: &Ray, mut reach: f64, mut visit: impl FnMut(u32, f64) -> f64) {

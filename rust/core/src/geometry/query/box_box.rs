@@ -44,7 +44,7 @@ const EDGES: usize = 1 << 14;
 /// Points that two faces can have: corners of the second, corners of the first, crossings.
 const CANDIDATES: usize = 24;
 
-/// ModeMemory all points whose gap is at most `reach`, m.
+/// Visits all points whose gap is at most `reach`, m.
 pub fn points(
     first: &OrientedBox,
     second: &OrientedBox,

@@ -6,7 +6,7 @@ use super::SurfacePoint;
 use crate::geometry::shape::oriented_box::signs;
 use crate::geometry::{OrientedBox, Plane};
 
-/// ModeMemory corners whose gap is at most `reach`.
+/// Visits corners whose gap is at most `reach`.
 ///
 /// `base` (m, world) is where the box's coordinates have their origin. The
 /// feature is the corner's number.

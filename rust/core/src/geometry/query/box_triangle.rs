@@ -31,7 +31,7 @@ pub fn corners_over_face(
     });
 }
 
-/// ModeMemory the crossings of the box's edges with an edge of the surface whose gap is at most
+/// Visits the crossings of the box's edges with an edge of the surface whose gap is at most
 /// `reach`.
 pub fn crossings(
     solid: &OrientedBox,

@@ -21,7 +21,7 @@ const ALONG: f64 = 1e-5;
 const RIM: usize = 1 << 13;
 const CORNER: usize = 1 << 14;
 
-/// ModeMemory all points whose gap is at most `reach`, m; n from the disc to the box.
+/// Visits all points whose gap is at most `reach`, m; n from the disc to the box.
 pub fn points(disc: &Disc, solid: &OrientedBox, reach: f64, mut visit: impl FnMut(&PairPoint)) {
     let near = convex::nearest_points(disc, solid);
     if near.gap > reach {

@@ -12,7 +12,7 @@ use super::{
 use crate::geometry::terrain::surface::{Edge, Face, Vertex};
 use crate::geometry::{PlacedShape, Plane, Sphere};
 
-/// ModeMemory the points of a shape over a plane of the ground whose gap is at most `reach`, m.
+/// Visits the points of a shape over a plane of the ground whose gap is at most `reach`, m.
 ///
 /// `base` (m, world) is where the shape's coordinates have their origin, here and below.
 #[inline]
@@ -77,7 +77,7 @@ pub fn point_on_sphere(shape: &PlacedShape, ground: &Sphere, base: &Vector3<f64>
     }
 }
 
-/// ModeMemory the points of a shape over a face of a surface whose gap is at most `reach`, m.
+/// Visits the points of a shape over a face of a surface whose gap is at most `reach`, m.
 #[inline]
 pub fn visit_on_face(
     shape: &PlacedShape,
@@ -105,7 +105,7 @@ pub fn visit_on_face(
     }
 }
 
-/// ModeMemory the points of a shape at a convex edge of a surface whose gap is at most `reach`, m.
+/// Visits the points of a shape at a convex edge of a surface whose gap is at most `reach`, m.
 #[inline]
 pub fn visit_at_edge(
     shape: &PlacedShape,
@@ -177,7 +177,7 @@ pub fn point_over_tangent(
     }
 }
 
-/// ModeMemory the points of two moving shapes whose gap is at most `reach`, m;
+/// Visits the points of two moving shapes whose gap is at most `reach`, m;
 /// n from the first to the second.
 pub fn visit_pair(
     first: &PlacedShape,

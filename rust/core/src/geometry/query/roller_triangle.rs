@@ -40,7 +40,7 @@ pub fn rim_points_over_face(
     });
 }
 
-/// ModeMemory the points at an edge whose gap is at most `reach`.
+/// Visits the points at an edge whose gap is at most `reach`.
 pub fn points_at_edge(
     roller: &Roller,
     edge: &Edge,

@@ -212,7 +212,7 @@ impl TriangleMesh {
         });
     }
 
-    /// ModeMemory a triangle and the convex edges and vertices that are its own.
+    /// Visits a triangle and the convex edges and vertices that are its own.
     fn visit_pieces(&self, t: u32, visit: &mut dyn FnMut(u32, &Primitive)) {
         let m = narrow(self.triangles.len());
         visit(t, &Primitive::Face(self.face(t as usize)));
@@ -280,7 +280,7 @@ impl TriangleMesh {
         Vertex { place, spokes, n }
     }
 
-    /// ModeMemory the height at which each triangle crosses the vertical through (x, z), and whether it
+    /// Visits the height at which each triangle crosses the vertical through (x, z), and whether it
     /// faces up. Of triangles that share an edge one has it.
     fn visit_crossings(&self, x: f64, z: f64, mut visit: impl FnMut(f64, bool)) {
         self.tree.visit_column_indexed(x, z, |t| {

@@ -71,12 +71,12 @@ pub enum Coverage {
 
 /// The ground. Immutable, shared between threads.
 pub trait Terrain: Send + Sync {
-    /// ModeMemory every primitive that comes closer than `reach` (m) to `centre` (world, m), with a
+    /// Visits every primitive that comes closer than `reach` (m) to `centre` (world, m), with a
     /// number that identifies it for the lifetime of the terrain. May visit others too; the result
     /// must not depend on distant ones.
     fn visit_near(&self, centre: &Vector3<f64>, reach: f64, visit: &mut dyn FnMut(u32, &Primitive));
 
-    /// ModeMemory every primitive that a part may touch, as [`Self::visit_near`] does. Pieces of a
+    /// Visits every primitive that a part may touch, as [`Self::visit_near`] does. Pieces of a
     /// surface that are clear of the part or out of its reach may be left out.
     fn visit_around(&self, part: &Neighbourhood<'_>, visit: &mut dyn FnMut(u32, &Primitive)) {
         self.visit_near(&part.centre, part.radius(), visit);
@@ -96,7 +96,7 @@ pub trait Terrain: Send + Sync {
         });
     }
 
-    /// ModeMemory the pieces of a surface that a thin disc, with its centre in world coordinates, may
+    /// Visits the pieces of a surface that a thin disc, with its centre in world coordinates, may
     /// touch by a gap of up to `reach[0]` (m) while it moves by up to `reach[1]` (m): the way of
     /// its centre plus that of its axle's tip at 1.5 radii. Returns how far it may move, which is
     /// `reach[1]` or less. What is visited without motion is among what was visited from any

@@ -148,7 +148,7 @@ impl Tiles {
             .sum()
     }
 
-    /// ModeMemory the cells in ranges of columns and rows (first and last) whose tiles are all wanted.
+    /// Visits the cells in ranges of columns and rows (first and last) whose tiles are all wanted.
     #[inline]
     pub(super) fn visit(
         &self,

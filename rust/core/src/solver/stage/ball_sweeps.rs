@@ -47,7 +47,7 @@ struct Rest {
 }
 
 impl Rest {
-    /// ModeMemory a contact unless it rests; the square of its change.
+    /// Visits a contact unless it rests; the square of its change.
     #[inline(always)]
     fn visit(&mut self, row: &mut BallRow, share: f64, quiet: f64, balls: &mut [Ball]) -> f64 {
         if self.left > 0 {
@@ -145,7 +145,7 @@ struct Layout<'a> {
 }
 
 impl Layout<'_> {
-    /// ModeMemory the blocks `parity + 2 k` for k in `range`; the sum of what they return, in an order
+    /// Visits the blocks `parity + 2 k` for k in `range`; the sum of what they return, in an order
     /// that does not depend on threads. `rows` and `balls` begin with those of the first.
     fn each<T: Send>(
         self,
@@ -340,7 +340,7 @@ impl BallSweeps {
             }));
     }
 
-    /// ModeMemory all contacts but the machine's: the sum of what they return.
+    /// Visits all contacts but the machine's: the sum of what they return.
     fn each<T: Send + Default>(
         &mut self,
         visit: impl Fn(&mut [BallRow], &mut [Rest], &mut [Ball]) -> T + Sync,

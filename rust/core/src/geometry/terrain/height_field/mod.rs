@@ -222,7 +222,7 @@ impl HeightField {
         size_of_val(&self.heights[..]) + self.tiles.size()
     }
 
-    /// ModeMemory the corners (column, row) of the cells that a ball of radius `reach` (m) about
+    /// Visits the corners (column, row) of the cells that a ball of radius `reach` (m) about
     /// `centre` (world, m) may touch, from above or from within the ground.
     #[inline]
     pub fn visit_cells(&self, centre: &Vector3<f64>, reach: f64, visit: impl FnMut(usize, usize)) {
@@ -324,7 +324,7 @@ impl HeightField {
         half.normal([a, other, d], self.spacing)
     }
 
-    /// ModeMemory the pieces that belong to a corner.
+    /// Visits the pieces that belong to a corner.
     fn visit_pieces(&self, [i, j]: [usize; 2], visit: &mut dyn FnMut(u32, &Primitive)) {
         let first = number(j * self.columns + i);
         let patch = self.patch([i, j]);

@@ -221,7 +221,7 @@ impl HeightField {
         [Half::Low, Half::High].map(|half| self.normal(own, half).unwrap_or_else(Vector3::y))
     }
 
-    /// ModeMemory the pieces that belong to a corner and are within reach. `lowest`: the disc that the
+    /// Visits the pieces that belong to a corner and are within reach. `lowest`: the disc that the
     /// part is, if its lowest points over the faces tell what it may touch.
     #[inline]
     fn visit_reachable(
