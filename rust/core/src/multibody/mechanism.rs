@@ -7,6 +7,7 @@
 use std::ops::Range;
 
 use super::joint::{Coupling, JointAxis, free};
+use super::poses::Motion;
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Number of velocities of a free root. Every path of its tree starts with them.
@@ -218,6 +219,35 @@ impl Mechanism {
     #[inline]
     pub(super) fn longest_path(&self) -> usize {
         self.longest_path
+    }
+
+    /// First velocity of the free root of body `b`'s tree.
+    #[inline(always)]
+    #[must_use]
+    pub fn base_of(&self, b: usize) -> Option<usize> {
+        let tree = &self.trees[self.links[b].tree];
+        tree.is_free.then_some(tree.velocities.start)
+    }
+
+    /// Velocity of the material point of body `b` at `x`, relative to its tree's origin. `motion`:
+    /// of each joint velocity, by its index; `v`: each velocity.
+    #[inline(always)]
+    pub(crate) fn point_velocity<T: Lane>(
+        &self,
+        b: usize,
+        x: Vec3<T>,
+        motion: impl Fn(usize) -> Motion<T>,
+        v: impl Fn(usize) -> T,
+    ) -> Vec3<T> {
+        let vector = |k| Vec3::new(v(k), v(k + 1), v(k + 2));
+        let mut velocity = match self.base_of(b) {
+            Some(first) => vector(first) + vector(first + 3).cross(x),
+            None => Vec3::splat(x.x.token(), [0.0; 3]),
+        };
+        for mover in self.movers(b) {
+            velocity += motion(mover.motion).velocity_at(x) * v(mover.velocity);
+        }
+        velocity
     }
 
     /// Velocities that move body `b`: those of a free root, then of the joints outwards.
