@@ -17,7 +17,6 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::contacts::{Contacts, Sight};
-use super::drives::Drives;
 use super::forecast::Forecast;
 use super::ground::Ground;
 use super::lane_rover::LaneRover;
@@ -39,6 +38,7 @@ use crate::multibody::{
     Energy, EnergyScratch, Factor, Inertias, LaneConfiguration, MassMatrix, Model, Poses,
 };
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
+use crate::system::drives::Drives;
 use crate::system::tree::{JOINT_ARM, MOST_JOINT_TURN, MOST_SPIN, MOST_TURN};
 
 /// Sweeps before pivoting, of machines with many contacts. Measured on six cylinders with torques
@@ -259,13 +259,8 @@ impl<T: Lane> Block<T> {
         self.friction.set(lane, rover.options.friction_coefficient);
         self.ground.set_lane(lane, rover.terrain);
         let joints = rover.model.joints();
-        self.drives.set_lane(
-            lane,
-            &self.machine,
-            rover.command,
-            |joint| joints[joint].passive,
-            rover.drive_work,
-        );
+        self.drives.set_lane(lane, joints, rover.command);
+        self.drives.set_work(lane, rover.drive_work);
         self.time.set(lane, *rover.time);
         let memory = &mut self.memories[lane].impulses;
         memory.clone_from(&rover.warm_start.impulses);
@@ -612,9 +607,9 @@ impl<T: Lane> Block<T> {
         let (h, theta) = self.time_step();
         let mass_matrix = &mut self.mass_matrix;
         if is_first {
-            self.drives.choose(machine, (h, theta), &self.v, |k| {
-                mass_matrix.diagonal(machine, k)
-            });
+            self.drives.choose_branches(machine, &self.v);
+            let inertia = |k| mass_matrix.diagonal(machine, k);
+            self.drives.set_theta(machine, (h, theta), inertia);
         }
         self.drives.add_implicit(machine, (h, theta), |k, a| {
             mass_matrix.add_to_diagonal(machine, k, a);
@@ -660,7 +655,7 @@ impl<T: Lane> Block<T> {
     #[inline(always)]
     fn push_and_drive(&mut self, is_any: bool, problems: Option<&[ContactProblem]>) {
         let zero = self.number(0.0);
-        let (h, _) = self.time_step();
+        let step = self.time_step();
         if let Some(problems) = problems {
             self.rows
                 .read(&self.contacts, problems, Answer::Impulses, &mut self.p_last);
@@ -679,9 +674,9 @@ impl<T: Lane> Block<T> {
         self.torque.fill(zero);
         self.drives.add_impulse(
             &self.machine,
-            h,
+            step,
             &self.start.joints,
-            &self.v,
+            [&self.v, &self.v],
             &mut self.torque,
         );
     }
@@ -927,7 +922,7 @@ impl<T: Lane> Block<T> {
         let places = &self.start.joints;
         let work = self
             .drives
-            .work(&self.machine, (h, theta), places, &self.v, &self.v_end);
+            .work(&self.machine, (h, theta), places, [&self.v, &self.v_end]);
         let ([kinetic, potential], [end_kinetic, end_potential]) = (self.before, self.after);
         self.released = h.like(0.0);
         if !self.yields.is_empty() {

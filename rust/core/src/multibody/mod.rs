@@ -55,6 +55,6 @@ pub use model::{
     Tree, Wheel,
 };
 pub use momentum::Momentum;
-pub use motor::{DriveTrial, Motor, MotorRegime};
+pub use motor::{Motor, MotorLine};
 pub use poses::{Motion, Poses};
 pub use state::Configuration;

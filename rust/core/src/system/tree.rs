@@ -7,9 +7,9 @@
 
 use nalgebra::Vector3;
 
-use super::command::{Command, HeldJoint};
+use super::command::Command;
+use super::drives::Drives;
 use super::gyroscopic::GyroscopicScratch;
-use super::motor_branch::{MotorBranch, line_slope};
 use super::sand::SandContact;
 use super::sand_patch::SandScene;
 use crate::contact::{
@@ -27,8 +27,8 @@ use crate::multibody::bias::{BiasScratch, bias};
 use crate::multibody::energy::energy;
 use crate::multibody::momentum::body_momenta;
 use crate::multibody::{
-    Configuration, EnergyScratch, Factor, Joint, JointProperties, Kinematics, LaneConfiguration,
-    MassMatrix, Model, Momentum, Passive, Tree,
+    Configuration, EnergyScratch, Factor, Joint, Kinematics, LaneConfiguration, MassMatrix, Model,
+    Momentum, Tree,
 };
 use crate::problem::{Dimension, FrictionContactProblem};
 use crate::sand::{RutMap, SandState};
@@ -52,15 +52,6 @@ impl UnilateralContact for Contact {
     }
 }
 
-/// Impulse and work of a joint's drive.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct DriveAction {
-    /// Time integral of its torque, N m s.
-    pub impulse: f64,
-    /// Work, J.
-    pub work: f64,
-}
-
 /// Poses, matrices and momenta of a tree: scratch, allocated once.
 #[derive(Clone, Debug)]
 pub struct TreeScratch {
@@ -73,9 +64,7 @@ pub struct TreeScratch {
     momenta_end: Vec<Momentum>,
     sums: Vec<Momentum>,
     c_start: Vec<Vector3<f64>>,
-    motors: Vec<MotorBranch>,
-    drives_tried: Vec<DriveAction>,
-    drives: Vec<DriveAction>,
+    drives: Drives<f64>,
     place: LaneConfiguration<f64>,
     energy: EnergyScratch<f64>,
     gyroscopic: GyroscopicScratch,
@@ -113,9 +102,7 @@ impl TreeScratch {
             momenta_end: momenta.clone(),
             sums: momenta,
             c_start: vec![Vector3::zeros(); model.bodies().len()],
-            motors: vec![MotorBranch::default(); model.n_joints()],
-            drives_tried: vec![DriveAction::default(); model.n_joints()],
-            drives: vec![DriveAction::default(); model.n_joints()],
+            drives: Drives::new(token, mechanism),
             place: LaneConfiguration::new(token, mechanism),
             energy: EnergyScratch::new(token, mechanism),
             gyroscopic: GyroscopicScratch::default(),
@@ -129,9 +116,11 @@ impl TreeScratch {
         }
     }
 
-    /// Resets the impulse and work of the drives at the start of a step.
-    pub fn begin_step(&mut self) {
-        self.drives.fill(DriveAction::default());
+    /// Resets the impulses of the drives at the start of a step. `work`: of each drive since the
+    /// call began (n_joints), J.
+    pub fn begin_step(&mut self, work: &[f64]) {
+        self.drives.begin_step();
+        self.drives.set_work(0, work);
     }
 
     /// Takes over the sand at the start of a step; none on firm ground.
@@ -172,10 +161,9 @@ impl TreeScratch {
         }
     }
 
-    /// Impulse and work of each joint's drive since [`Self::begin_step`] (n_joints), summed over
-    /// all accepted parts of a step.
+    /// Impulses and work of the drives, with those of all accepted parts of the step.
     #[must_use]
-    pub fn drives(&self) -> &[DriveAction] {
+    pub fn drives(&self) -> &Drives<f64> {
         &self.drives
     }
 
@@ -281,21 +269,29 @@ impl TreeSystem<'_> {
 
     /// Adds what is implicit to the mass matrix and factors it; whether it is positive.
     fn factor_implicit(&mut self, options: &StepOptions) -> bool {
-        let (h, theta) = (options.time_step, options.theta);
-        let parts = &mut *self.parts;
-        let joints = parts.motors.iter().zip(&self.command.held);
-        for ((motor, held), joint) in joints.zip(self.model.joints()) {
-            let (damping, stiffness) = feedback(motor.damping(), held.as_ref(), &joint.passive);
-            if damping > 0.0 || stiffness > 0.0 {
-                let implicit = h * motor.theta() * (damping + h * theta * stiffness);
-                let k = joint.velocity;
-                (parts.mass_matrix).add_to_diagonal(self.model.mechanism(), k, implicit);
-            }
-        }
+        let (mechanism, parts) = (self.model.mechanism(), &mut *self.parts);
+        let mass_matrix = &mut parts.mass_matrix;
+        let add = |k, a| mass_matrix.add_to_diagonal(mechanism, k, a);
+        (parts.drives).add_implicit(mechanism, step(options), add);
         if let Some(sand) = &parts.sand {
-            sand.add_to_mass(self.model, h, &mut parts.mass_matrix);
+            sand.add_to_mass(self.model, options.time_step, mass_matrix);
         }
-        (parts.mass_matrix).factorise(self.model.mechanism(), &mut parts.factor)
+        mass_matrix.factorise(mechanism, &mut parts.factor)
+    }
+
+    /// Adds `h τ` of the drives and of the sand to `y`, for a step that ends with the iterate
+    /// `v_end`.
+    fn add_actuation(
+        &self,
+        options: &StepOptions,
+        start: Start<'_, Configuration>,
+        v_end: &[f64],
+        y: &mut [f64],
+    ) {
+        let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
+        let velocities = [start.v, v_end];
+        (self.parts.drives).add_impulse(mechanism, step(options), places, velocities, y);
+        self.parts.add_sand(options.time_step, v_end, y);
     }
 }
 
@@ -425,12 +421,11 @@ impl MechanicalSystem for TreeSystem<'_> {
     #[inline]
     fn update_mass_matrix(&mut self, options: &StepOptions) {
         self.linearise_sand(options);
-        self.parts.mass_matrix.update(
-            self.model.mechanism(),
-            self.model.inertias(),
-            self.parts.kinematics.poses(),
-        );
-        set_held_theta(self.model, options, self.command, self.parts);
+        let (mechanism, parts) = (self.model.mechanism(), &mut *self.parts);
+        let mass_matrix = &mut parts.mass_matrix;
+        mass_matrix.update(mechanism, self.model.inertias(), parts.kinematics.poses());
+        let inertia = |k| mass_matrix.diagonal(mechanism, k);
+        (parts.drives).set_theta(mechanism, step(options), inertia);
     }
 
     #[inline]
@@ -474,16 +469,7 @@ impl MechanicalSystem for TreeSystem<'_> {
         for (y, f) in y.iter_mut().zip(&parts.force) {
             *y = -options.time_step * f;
         }
-        add_command(
-            self.model,
-            options,
-            self.command,
-            start,
-            start.v,
-            &parts.motors,
-            y,
-        );
-        self.parts.add_sand(options.time_step, start.v, y);
+        self.add_actuation(options, start, start.v, y);
     }
 
     #[inline]
@@ -538,16 +524,8 @@ impl MechanicalSystem for TreeSystem<'_> {
         for (y, f) in y.iter_mut().zip(&parts.force) {
             *y = -options.time_step * f;
         }
-        add_command(
-            self.model,
-            options,
-            self.command,
-            start,
-            start.v,
-            &parts.motors,
-            y,
-        );
-        parts.add_sand(options.time_step, start.v, y);
+        self.add_actuation(options, start, start.v, y);
+        let parts = &mut *self.parts;
         parts.gyroscopic.solve(
             model,
             &parts.kinematics,
@@ -562,10 +540,10 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn choose_branches(&mut self, start: Start<'_, Configuration>) {
-        let drives = self.parts.motors.iter_mut().zip(&self.command.drives);
-        for ((motor, drive), &k) in drives.zip(self.model.joint_velocities()) {
-            motor.choose(drive.as_ref(), start.v[k]);
-        }
+        let drives = &mut self.parts.drives;
+        drives.set_lane(0, self.model.joints(), self.command);
+        drives.finish_loading();
+        drives.choose_branches(self.model.mechanism(), start.v);
         if let Some(sand) = &mut self.parts.sand {
             sand.start_from(start.v);
         }
@@ -580,11 +558,8 @@ impl MechanicalSystem for TreeSystem<'_> {
     }
 
     fn revise(&mut self, start: Start<'_, Configuration>, v_end: &[f64]) -> bool {
-        let drives = self.parts.motors.iter_mut().zip(&self.command.drives);
-        let mut is_new = false;
-        for ((motor, drive), &k) in drives.zip(self.model.joint_velocities()) {
-            is_new |= motor.revise(drive.as_ref(), start.v[k], v_end[k]);
-        }
+        let mechanism = self.model.mechanism();
+        let is_new = (self.parts.drives).revise(mechanism, true, start.v, v_end);
         is_new | self.revise_sand(v_end)
     }
 
@@ -622,36 +597,10 @@ impl MechanicalSystem for TreeSystem<'_> {
         start: Start<'_, Configuration>,
         v_end: &[f64],
     ) -> f64 {
-        let h = options.time_step;
-        let of_sand = self.work_of_sand(start.v, v_end);
-        let TreeScratch {
-            motors,
-            drives_tried,
-            ..
-        } = &mut *self.parts;
-        let trial = Trial {
-            options,
-            command: self.command,
-            start,
-            v_end,
-            motors,
-        };
-        let mut total = of_sand;
-        let mut drives = self.command.drives.iter().zip(drives_tried);
-        trial.for_each(self.model, |joint, torque| {
-            let turned = h * trial.mean_rate(joint.velocity);
-            if let Some((drive, tried)) = drives.next() {
-                let work = MotorBranch::work(drive.as_ref(), torque.drive, turned);
-                *tried = DriveAction {
-                    impulse: torque.drive * h,
-                    work,
-                };
-                // A damper only dissipates. In a step that reverses the rate, torque and
-                // displacement are evaluated at different times, and their product may be positive.
-                total += work + torque.other * turned + (torque.damper * turned).min(0.0);
-            }
-        });
-        total
+        let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
+        let velocities = [start.v, v_end];
+        let of_drives = (self.parts.drives).work(mechanism, step(options), places, velocities);
+        of_drives + self.work_of_sand(start.v, v_end)
     }
 
     fn work_of_displacement(
@@ -661,27 +610,15 @@ impl MechanicalSystem for TreeSystem<'_> {
         v_end: &[f64],
         displacement: &[f64],
     ) -> f64 {
-        let trial = Trial {
-            options,
-            command: self.command,
-            start,
-            v_end,
-            motors: &self.parts.motors,
-        };
-        let mut total = 0.0;
-        trial.for_each(self.model, |joint, torque| {
-            total += (torque.drive + torque.other) * displacement[joint.velocity];
-        });
-        total
+        let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
+        let motion = [start.v, v_end, displacement];
+        (self.parts.drives).work_of_displacement(mechanism, step(options), places, motion)
     }
 
     #[inline]
     fn accept(&mut self) {
         let parts = &mut *self.parts;
-        for (done, tried) in parts.drives.iter_mut().zip(&parts.drives_tried) {
-            done.impulse += tried.impulse;
-            done.work += tried.work;
-        }
+        parts.drives.accept_part();
         if let Some(sand) = &mut parts.sand {
             sand.accept();
         }
@@ -723,16 +660,7 @@ impl MechanicalSystem for TreeSystem<'_> {
             self.parts,
             y,
         );
-        add_command(
-            self.model,
-            options,
-            self.command,
-            start,
-            v_end,
-            &self.parts.motors,
-            y,
-        );
-        self.parts.add_sand(options.time_step, v_end, y);
+        self.add_actuation(options, start, v_end, y);
     }
 
     #[inline]
@@ -838,122 +766,10 @@ fn fastest(joints: &[usize], v: &[f64]) -> f64 {
     joints.iter().fold(0.0, |most, &k| most.max(v[k].abs()))
 }
 
-/// Effective damping (N m s/rad) and stiffness (N m/rad) of a joint's torque: those of its motor,
-/// of its position control, and of its own damper and spring.
+/// h and θ.
 #[inline]
-fn feedback(motor: f64, held: Option<&HeldJoint>, passive: &Passive) -> (f64, f64) {
-    let (mut damping, mut stiffness) = (motor + passive.damping, passive.stiffness);
-    if let Some(held) = held {
-        damping += held.damping;
-        stiffness += held.stiffness;
-    }
-    (damping, stiffness)
-}
-
-/// Sets the implicit weights of each joint's PD control and motor.
-fn set_held_theta(
-    model: &Model,
-    options: &StepOptions,
-    command: &Command,
-    parts: &mut TreeScratch,
-) {
-    let joints = (parts.motors.iter_mut().zip(&command.held)).zip(&command.drives);
-    for (((motor, held), drive), joint) in joints.zip(model.joints()) {
-        let inertia = (parts.mass_matrix).diagonal(model.mechanism(), joint.velocity);
-        let feedback = feedback(line_slope(drive.as_ref()), held.as_ref(), &joint.passive);
-        motor.set_theta((options.time_step, options.theta), feedback, inertia);
-    }
-}
-
-/// Mean torque of a joint over the step, N m.
-struct Actuation {
-    /// Torque of its drive.
-    drive: f64,
-    /// Torque of its dampers.
-    damper: f64,
-    /// All other torques.
-    other: f64,
-}
-
-/// A trial step: its start, the velocity at its end, and the acting forces.
-#[derive(Clone, Copy)]
-struct Trial<'a> {
-    options: &'a StepOptions,
-    command: &'a Command,
-    start: Start<'a, Configuration>,
-    v_end: &'a [f64],
-    motors: &'a [MotorBranch],
-}
-
-impl Trial<'_> {
-    /// Mean velocity over the step, rad/s or m/s.
-    #[inline]
-    fn mean_rate(&self, k: usize) -> f64 {
-        let theta = self.options.theta;
-        theta * self.v_end[k] + (1.0 - theta) * self.start.v[k]
-    }
-
-    /// Torques of every joint. PD control, spring and motor line are evaluated at the θ_j-weighted
-    /// position and velocity of the iterate.
-    #[inline]
-    fn for_each(&self, model: &Model, mut act: impl FnMut(&JointProperties, Actuation)) {
-        let h = self.options.time_step;
-        let acting = self.command.torque.iter().zip(&self.command.held);
-        let joints = model.joints().iter().zip(self.motors);
-        let places = &self.start.configuration.joints;
-        for (((joint, motor), (torque, held)), q) in joints.zip(acting).zip(places) {
-            let k = joint.velocity;
-            let (mut other, mut damper) = (*torque, 0.0);
-            if held.is_some() || joint.is_passive {
-                let place = q + h * motor.theta() * self.mean_rate(k);
-                let (spring, brake) = answer(held.as_ref(), &joint.passive, place);
-                other -= spring;
-                damper = -brake * motor.rate(self.start.v[k], self.v_end[k]);
-            }
-            let actuation = Actuation {
-                drive: motor.torque(|| (self.start.v[k], self.v_end[k])),
-                damper,
-                other,
-            };
-            act(joint, actuation);
-        }
-    }
-}
-
-/// Spring torque (N m) at a coordinate, and damping (N m s/rad), of the position control and of the
-/// joint's own elements.
-#[inline]
-fn answer(held: Option<&HeldJoint>, passive: &Passive, place: f64) -> (f64, f64) {
-    let own = passive.stiffness * (place - passive.rest);
-    match held {
-        Some(held) => {
-            let spring = held.stiffness * (place - held.set_point);
-            (spring + own, held.damping + passive.damping)
-        }
-        None => (own, passive.damping),
-    }
-}
-
-/// Adds `h τ` to `y` for a step that ends with the iterate `v_end`.
-fn add_command(
-    model: &Model,
-    options: &StepOptions,
-    command: &Command,
-    start: Start<'_, Configuration>,
-    v_end: &[f64],
-    motors: &[MotorBranch],
-    y: &mut [f64],
-) {
-    let trial = Trial {
-        options,
-        command,
-        start,
-        v_end,
-        motors,
-    };
-    trial.for_each(model, |joint, torque| {
-        y[joint.velocity] += options.time_step * (torque.other + torque.damper + torque.drive);
-    });
+fn step(options: &StepOptions) -> (f64, f64) {
+    (options.time_step, options.theta)
 }
 
 /// `y = −(left-hand side)` of the principle of [`crate::integrator::moreau_jean_newton`] at the
