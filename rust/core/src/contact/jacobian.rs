@@ -113,7 +113,14 @@ pub(crate) fn add_impulse(
     mut act: impl FnMut(usize, f64),
 ) {
     for (body, sign, path) in sides(motion.mechanism(), contact) {
-        let wrench = place_at(motion, contact, body).wrench(p.map(|p| sign * p));
-        path.for_each_force(|m| motion.motion(m), wrench, &mut act);
+        let place = place_at(motion, contact, body);
+        let [force, moment] = place.wrench(p.map(|p| sign * p));
+        if let Some(first) = path.base {
+            let both = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
+            (first..).zip(both).for_each(|(k, x)| act(k, x));
+        }
+        for mover in path.movers {
+            act(mover.velocity, motion.motion(mover.motion).power(force, moment));
+        }
     }
 }

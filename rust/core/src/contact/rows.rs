@@ -27,6 +27,29 @@ pub(crate) struct Place<T> {
 }
 
 impl<T: Lane> Place<T> {
+    /// Rows of Hᵀ for a free base: the velocity of the point along n, t, b per unit of each of its
+    /// velocities.
+    #[inline(always)]
+    fn rows_of_base(&self) -> [Triple<T>; BASE] {
+        let Self { x, n, t, b } = *self;
+        let (xn, xt, xb) = (x.cross(n), x.cross(t), x.cross(b));
+        [
+            [n.x, t.x, b.x],
+            [n.y, t.y, b.y],
+            [n.z, t.z, b.z],
+            [xn.x, xt.x, xb.x],
+            [xn.y, xt.y, xb.y],
+            [xn.z, xt.z, xb.z],
+        ]
+    }
+
+    /// The row of a joint velocity.
+    #[inline(always)]
+    fn row_of(&self, motion: &Motion<T>) -> Triple<T> {
+        let moved = motion.velocity_at(self.x);
+        [moved.dot(self.n), moved.dot(self.t), moved.dot(self.b)]
+    }
+
     /// The force of an impulse `p`, and its moment about the tree's origin.
     #[inline(always)]
     pub(crate) fn wrench(&self, [p_n, p_t, p_b]: Triple<T>) -> [Vec3<T>; 2] {
@@ -72,8 +95,8 @@ impl<'a> Path<'a> {
         if self.base.is_some() { BASE } else { 0 }
     }
 
-    /// Calls `act` with each velocity and its entries of the rows of Hᵀ: the velocity of the point
-    /// along n, t, b per unit of it. `motion`: of each joint velocity, by its index.
+    /// Calls `act` with each velocity and its entries of the rows of Hᵀ. `motion`: of each joint
+    /// velocity, by its index.
     #[inline(always)]
     pub(crate) fn for_each_row<T: Lane>(
         &self,
@@ -81,19 +104,13 @@ impl<'a> Path<'a> {
         place: &Place<T>,
         mut act: impl FnMut(usize, Triple<T>),
     ) {
-        let Place { x, n, t, b } = *place;
         if let Some(first) = self.base {
-            let (xn, xt, xb) = (x.cross(n), x.cross(t), x.cross(b));
-            act(first, [n.x, t.x, b.x]);
-            act(first + 1, [n.y, t.y, b.y]);
-            act(first + 2, [n.z, t.z, b.z]);
-            act(first + 3, [xn.x, xt.x, xb.x]);
-            act(first + 4, [xn.y, xt.y, xb.y]);
-            act(first + 5, [xn.z, xt.z, xb.z]);
+            for (k, row) in (first..).zip(place.rows_of_base()) {
+                act(k, row);
+            }
         }
         for mover in self.movers {
-            let moved = motion(mover.motion).velocity_at(x);
-            act(mover.velocity, [moved.dot(n), moved.dot(t), moved.dot(b)]);
+            act(mover.velocity, place.row_of(&motion(mover.motion)));
         }
     }
 
@@ -107,12 +124,18 @@ impl<'a> Path<'a> {
         rows: &mut [Triple<T>],
     ) -> Triple<T> {
         let mut u = [place.x.x.like(0.0); 3];
-        let mut k = 0;
-        self.for_each_row(motion, place, |velocity, row| {
-            rows[k] = row;
-            k += 1;
-            add_scaled(&mut u, &row, v[velocity]);
-        });
+        let (base, joints) = rows.split_at_mut(self.lead());
+        if let (Some(first), Some(base)) = (self.base, base.first_chunk_mut::<BASE>()) {
+            *base = place.rows_of_base();
+            let v = &v[first..][..BASE];
+            for k in 0..BASE {
+                add_scaled(&mut u, &base[k], v[k]);
+            }
+        }
+        for (row, mover) in joints.iter_mut().zip(self.movers) {
+            *row = place.row_of(&motion(mover.motion));
+            add_scaled(&mut u, row, v[mover.velocity]);
+        }
         u
     }
 
@@ -175,28 +198,6 @@ impl<'a> Path<'a> {
         let joints = &joints[..self.movers.len()];
         for k in 0..self.movers.len() {
             add(here, &mut y[self.movers[k].velocity], along(&joints[k], p));
-        }
-    }
-
-    /// Calls `act` with each velocity and the generalized force on it of a force and its moment
-    /// about the tree's origin.
-    #[inline(always)]
-    pub(crate) fn for_each_force<T: Lane>(
-        &self,
-        motion: impl Fn(usize) -> Motion<T>,
-        [force, moment]: [Vec3<T>; 2],
-        mut act: impl FnMut(usize, T),
-    ) {
-        if let Some(first) = self.base {
-            act(first, force.x);
-            act(first + 1, force.y);
-            act(first + 2, force.z);
-            act(first + 3, moment.x);
-            act(first + 4, moment.y);
-            act(first + 5, moment.z);
-        }
-        for mover in self.movers {
-            act(mover.velocity, motion(mover.motion).power(force, moment));
         }
     }
 }

@@ -16,7 +16,7 @@ use crate::contact::jacobian::{add_impulse, for_each_row};
 use crate::contact::rows::{Path, Place, add, close_stop, product, square};
 use crate::multibody::mechanism::{BASE, Mover};
 use crate::multibody::{Factor, Poses};
-use crate::scalar::{Lane, LaneMask, MAX_LANES};
+use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 
 /// What is read of a problem.
 #[derive(Clone, Copy, Debug)]
@@ -283,34 +283,64 @@ impl<T: Lane> Rows<T> {
         p: &[Triple<T>],
         out: &mut [T],
     ) {
-        out.fill(T::splat(self.token, 0.0));
+        let zero = T::splat(self.token, 0.0);
+        out.fill(zero);
+        let mut sums = [Vec3::new(zero, zero, zero); 2];
+        let mut guests = 0;
         for &slot in contacts.used_by_shapes() {
             let own = contacts.slot(slot);
-            let mut here = own.active & lanes;
-            for (lane, contact) in contacts.by_lane.guests(slot) {
-                if here.get(lane) {
-                    here = here & !T::mask(self.token, 1 << lane);
-                    let one = OneLane {
-                        machine,
-                        poses: end,
-                        v: &[],
-                        lane,
-                    };
-                    let p = p[slot].map(|p| p.get(lane));
-                    add_impulse(&one, contact, p, |k, x| {
-                        out[k].set(lane, out[k].get(lane) + x);
-                    });
-                }
-            }
-            let path = Path::from_trunk(&self.movers[contacts.part(slot)]);
+            let own_guests = contacts.by_lane.guests(slot);
+            let of_guests = own_guests.fold(0, |all, (lane, _)| all | 1 << lane);
+            guests |= of_guests;
+            let here = own.active & lanes & !T::mask(self.token, of_guests);
             let wrench = place_of(own).wrench(p[slot]);
-            path.for_each_force(|m| end.motions[m], wrench, |k, x| add(here, &mut out[k], x));
+            for (sum, x) in sums.iter_mut().zip(wrench) {
+                *sum = Vec3::select(here, *sum + x, *sum);
+            }
+            let [force, moment] = wrench;
+            for mover in &self.movers[contacts.part(slot)] {
+                let power = end.motions[mover.motion].power(force, moment);
+                add(here, &mut out[mover.velocity], power);
+            }
+        }
+        let [total, couple] = sums;
+        out[..BASE].copy_from_slice(&[total.x, total.y, total.z, couple.x, couple.y, couple.z]);
+        if (lanes & T::mask(self.token, guests)).any() {
+            self.add_impulses_of_guests(machine, contacts, end, lanes, p, out);
         }
         for &slot in contacts.used_by_stops() {
             let here = contacts.slot(slot).active & lanes;
             let mover = self.movers[contacts.part(slot)].last();
             if let (Some((_, sign)), Some(mover)) = (contacts.stop(slot), mover) {
                 add(here, &mut out[mover.velocity], sign * p[slot][0]);
+            }
+        }
+    }
+
+    /// The part of contacts whose path is not that of their slots.
+    #[cold]
+    fn add_impulses_of_guests(
+        &self,
+        machine: &Machine,
+        contacts: &Contacts<T>,
+        end: &Poses<T>,
+        lanes: T::Mask,
+        p: &[Triple<T>],
+        out: &mut [T],
+    ) {
+        for &slot in contacts.used_by_shapes() {
+            let guests = contacts.by_lane.guests(slot);
+            for (lane, contact) in guests.filter(|(lane, _)| lanes.get(*lane)) {
+                let one = OneLane {
+                    machine,
+                    poses: end,
+                    v: &[],
+                    lane,
+                };
+                let p = p[slot].map(|p| p.get(lane));
+                add_impulse(&one, contact, p, |k, x| {
+                    out[k].set(lane, out[k].get(lane) + x);
+                });
             }
         }
     }
