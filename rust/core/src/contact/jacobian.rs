@@ -120,7 +120,10 @@ pub(crate) fn add_impulse(
             (first..).zip(both).for_each(|(k, x)| act(k, x));
         }
         for mover in path.movers {
-            act(mover.velocity, motion.motion(mover.motion).power(force, moment));
+            act(
+                mover.velocity,
+                motion.motion(mover.motion).power(force, moment),
+            );
         }
     }
 }
