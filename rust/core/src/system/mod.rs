@@ -1,6 +1,7 @@
 //! Mechanical systems, advanced by the time-stepping schemes of [`crate::integrator`].
 //!
 //! - [`tree`]: a multibody tree on a terrain, under a [`command`];
+//! - `extent`: how far a step turns and displaces it;
 //! - [`planar`]: a planar machine on a ground, with its matrices;
 //! - [`among_grains`]: a tree among balls;
 //! - [`gyroscopic`]: implicit gyroscopic terms of the tree; [`drives`]: its torques, motors and held
@@ -10,6 +11,7 @@
 pub mod among_grains;
 pub mod command;
 pub mod drives;
+pub(crate) mod extent;
 pub mod fitted_theta;
 pub mod grains;
 pub mod gyroscopic;

@@ -9,6 +9,7 @@ use nalgebra::Vector3;
 
 use super::command::Command;
 use super::drives::Drives;
+use super::extent::{Turning, displacement};
 use super::gyroscopic::GyroscopicScratch;
 use super::sand::SandContact;
 use super::sand_patch::SandScene;
@@ -208,27 +209,6 @@ impl TreeSystem<'_> {
             return None;
         }
         contact.between_materials(self.model, self.terrain, &options.materials)
-    }
-
-    /// Largest angular speed of a free base, rad/s.
-    #[inline]
-    fn turning_of_bases(&self, v: &[f64]) -> f64 {
-        let mut base = 0.0_f64;
-        for tree in self.model.trees() {
-            if let [_, _, _, x, y, z, ..] = v[tree.velocities.clone()]
-                && tree.is_free
-            {
-                base = base.max((x * x + y * y + z * z).sqrt());
-            }
-        }
-        base
-    }
-
-    /// Largest rate of a joint that turns a frame, rad/s.
-    #[inline]
-    fn turning_of_joints(&self, v: &[f64]) -> f64 {
-        let turning = self.model.mechanism().turning.iter();
-        turning.fold(0.0, |most, &(k, ratio)| most.max(v[k].abs() * ratio))
     }
 }
 
@@ -474,19 +454,12 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn is_gyroscopic(&self, options: &StepOptions, v: &[f64]) -> bool {
-        let h = options.time_step;
-        let (base, spin) = (
-            self.turning_of_bases(v),
-            fastest(&self.model.mechanism().spinning, v),
-        );
-        h * base > MOST_TURN
-            || h * (base + self.turning_of_joints(v)) > MOST_JOINT_TURN
-            || h * spin > MOST_SPIN
+        Turning::of(0.0, self.model.mechanism(), v).is_gyroscopic(options.time_step)
     }
 
     #[inline]
     fn turning(&self, v: &[f64]) -> f64 {
-        self.turning_of_bases(v) + self.turning_of_joints(v)
+        Turning::of(0.0, self.model.mechanism(), v).of_frames()
     }
 
     fn translation_axis(&self, velocity: usize) -> Option<usize> {
@@ -717,17 +690,8 @@ impl MechanicalSystem for TreeSystem<'_> {
         FrictionContactProblem::from_assembled(Dimension::Three, &self.parts.system.W, q, mu)
     }
 
-    /// Largest displacement: of the free bases, and of the joints at their arm.
     fn displacement(&self, y: &[f64]) -> f64 {
-        let mut largest = 0.0_f64;
-        for tree in self.model.trees() {
-            let (base, joints) = y[tree.velocities.clone()].split_at(tree.lead());
-            let joints = joints.iter().map(|angle| angle * JOINT_ARM);
-            largest = (base.iter().copied())
-                .chain(joints)
-                .fold(largest, |m, d| m.max(d.abs()));
-        }
-        largest
+        displacement(0.0, self.model.mechanism(), y)
     }
 }
 
@@ -741,30 +705,6 @@ fn keep(kept: &mut [f64], joints: &[f64]) {
 
 /// Most repetitions of a step in sand. Wheels that fall and come to rest in a long step need them.
 const MOST_REVISIONS_IN_SAND: usize = 24;
-
-/// Arm that converts a joint rotation to a length, m. A freely steered wheel that is moved out of a
-/// penetration of 2 cm rotates by 0.4 rad.
-pub(crate) const JOINT_ARM: f64 = 0.05;
-
-/// Rotation of a free base in a step, rad, beyond which gyroscopic terms are implicit. At this
-/// angle the third-order error of the explicit terms is a thousandth of the energy.
-pub(crate) const MOST_TURN: f64 = 0.1;
-
-/// The same limit for the rotation of the fastest frame, joints included, rad. A joint that snaps
-/// to a new set-point turns a light part of the machine. Measured on the drives of random policies:
-/// implicit terms between this limit and the one above change no error in its third digit.
-pub(crate) const MOST_JOINT_TURN: f64 = 0.5;
-
-/// The same limit for the rotation of a wheel about its axle in a step, rad. The spin couples the
-/// motions across the axle at a frequency of a few per cent of the spin rate, so explicit terms
-/// would stay acceptable up to some twenty times more.
-pub(crate) const MOST_SPIN: f64 = 1.0;
-
-/// Largest rate of a set of joints, rad/s.
-#[inline]
-fn fastest(joints: &[usize], v: &[f64]) -> f64 {
-    joints.iter().fold(0.0, |most, &k| most.max(v[k].abs()))
-}
 
 /// h and θ.
 #[inline]

@@ -4,12 +4,11 @@ use super::balance::{Conditions, select_both};
 use super::{Block, Decline, Next, State};
 use crate::integrator::mechanical_system::MOST_REVISIONS;
 use crate::integrator::{Phase, Probe, StepReport};
-use crate::lanes::machine::Machine;
 use crate::lanes::problem::ContactProblem;
 use crate::lanes::rows::Answer;
 use crate::lanes::sweeps::write_start;
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
-use crate::system::tree::{MOST_JOINT_TURN, MOST_SPIN, MOST_TURN};
+use crate::system::extent::Turning;
 
 /// Sweeps before pivoting, of machines with many contacts. Measured on six cylinders with torques
 /// of up to 60 N m, drawn anew every ten steps: 5.2 systems a problem after one, 4.8 after two, 4.7
@@ -118,11 +117,8 @@ impl<T: Lane> Block<T> {
     #[inline(always)]
     fn predict(&mut self) {
         let (h, theta) = (self.options.time_step, self.options.theta);
-        let (base, joints, spin) = fastest(&self.machine, &self.v);
-        let step = self.number(h);
-        let is_fast = self.number(MOST_TURN).lt(step * base)
-            | self.number(MOST_JOINT_TURN).lt(step * (base + joints))
-            | self.number(MOST_SPIN).lt(step * spin);
+        let zero = self.number(0.0);
+        let is_fast = Turning::of(zero, &self.machine, &self.v).is_gyroscopic(self.number(h));
         self.decline(Decline::Turning, is_fast);
         let machine = &*self.machine;
         self.middle
@@ -343,20 +339,4 @@ impl<T: Lane> Block<T> {
         self.time = T::select(going, self.time + h, self.time);
         self.drives.accept(going);
     }
-}
-
-/// Angular speeds of the trunk, of the fastest joint that turns a frame, and of the fastest spinner
-/// about its axle, rad/s.
-#[inline(always)]
-fn fastest<T: Lane>(machine: &Machine, v: &[T]) -> (T, T, T) {
-    let [x, y, z] = [v[3], v[4], v[5]];
-    let zero = x.like(0.0);
-    let (mut joints, mut spin) = (zero, zero);
-    for &(k, ratio) in &machine.turning {
-        joints = (v[k].abs() * v[k].like(ratio)).max(joints);
-    }
-    for &k in &machine.spinning {
-        spin = v[k].abs().max(spin);
-    }
-    ((x * x + y * y + z * z).sqrt(), joints, spin)
 }

@@ -6,9 +6,8 @@ use crate::integrator::Stabilisation;
 use crate::integrator::position_projection::FARTHEST;
 use crate::lanes::problem::ContactProblem;
 use crate::lanes::rows::Answer;
-use crate::multibody::mechanism::BASE;
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
-use crate::system::tree::JOINT_ARM;
+use crate::system::extent::displacement;
 
 impl<T: Lane> Block<T> {
     /// Penetration that is tolerated, m, if positions are projected.
@@ -137,7 +136,7 @@ impl<T: Lane> Block<T> {
             .add_impulses(&self.contacts, self.is_deep, &pushes, &mut self.y);
         self.pushes = pushes;
         self.factor.half_solve_back(&self.machine, &mut self.y);
-        let size = displacement(&self.y).max(farthest);
+        let size = displacement(zero, &self.machine, &self.y).max(farthest);
         let limit = zero.like(-FARTHEST) * self.deepest;
         self.decline(Decline::Projection, !size.le(limit) & self.is_deep);
         let is_moved = self.is_deep & self.going;
@@ -146,15 +145,4 @@ impl<T: Lane> Block<T> {
         self.middle.normalise();
         self.end.select_from(is_moved, &self.middle);
     }
-}
-
-/// Largest displacement: of the base, and of the joints at their arm, m.
-#[inline(always)]
-fn displacement<T: Lane>(y: &[T]) -> T {
-    let mut largest = y[0].like(0.0);
-    for (k, y) in y.iter().enumerate() {
-        let arm = if k < BASE { 1.0 } else { JOINT_ARM };
-        largest = (y.abs() * y.like(arm)).max(largest);
-    }
-    largest
 }
