@@ -141,9 +141,9 @@ impl<T: Lane> ByLane<T> {
             .then(|| &self.found[usize::from(self.places[slot][lane])].contact)
     }
 
-    /// Those of a slot whose path is another one.
+    /// Contacts of a slot that were found lane by lane.
     #[inline(always)]
-    pub(super) fn guests(&self, slot: usize) -> impl Iterator<Item = (usize, &Contact)> {
+    fn found(&self, slot: usize) -> impl Iterator<Item = &Found> {
         let mut lanes = self.given[slot];
         std::iter::from_fn(move || {
             if lanes == 0 {
@@ -153,8 +153,18 @@ impl<T: Lane> ByLane<T> {
             lanes &= lanes - 1;
             Some(&self.found[usize::from(self.places[slot][lane])])
         })
-        .filter(|found| found.is_guest)
-        .map(|found| (found.lane, &found.contact))
+    }
+
+    /// The same with their lanes.
+    #[inline(always)]
+    pub(super) fn contacts(&self, slot: usize) -> impl Iterator<Item = (usize, &Contact)> {
+        (self.found(slot)).map(|found| (found.lane, &found.contact))
+    }
+
+    /// Those whose path is not the slot's.
+    #[inline(always)]
+    pub(super) fn guests(&self, slot: usize) -> impl Iterator<Item = (usize, &Contact)> {
+        (self.found(slot).filter(|found| found.is_guest)).map(|found| (found.lane, &found.contact))
     }
 
     /// Lanes with contacts between bodies.

@@ -216,10 +216,10 @@ impl<T: Lane> Rows<T> {
     }
 
     /// Adds a number by slot, 1/kg, to the three entries on W's diagonal.
-    pub fn soften(&mut self, contacts: &Contacts<T>, diagonal: &[T]) {
+    pub fn soften(&mut self, contacts: &Contacts<T>, diagonal: impl Fn(usize) -> T) {
         let soften = |own: &mut [T; 9], slot: usize| {
             for k in [0, 4, 8] {
-                own[k] += diagonal[slot];
+                own[k] += diagonal(slot);
             }
         };
         for (i, &slot) in contacts.used_densely().iter().enumerate() {
@@ -227,7 +227,7 @@ impl<T: Lane> Rows<T> {
         }
         if contacts.factored() != 0 {
             for &slot in contacts.used() {
-                self.softness[slot] = diagonal[slot];
+                self.softness[slot] = diagonal(slot);
                 soften(&mut self.diagonal[slot], slot);
             }
         }

@@ -1,8 +1,6 @@
 //! The velocity without contact impulses.
 
 use super::Block;
-use crate::lanes::problem::ContactProblem;
-use crate::lanes::rows::Answer;
 use crate::multibody::bias::bias;
 use crate::scalar::{Lane, LaneMask};
 
@@ -27,15 +25,13 @@ impl<T: Lane> Block<T> {
     /// The free change of the velocity, `y` in factor coordinates, and the contacts' free velocity
     /// `u`: first with the forces at v, then with those at the mean velocity that follows from them
     /// and from the last step's impulses.
-    ///
-    /// `problems`: those that hold the last step's impulses; none if they are known.
-    pub(super) fn load(&mut self, problems: Option<&[ContactProblem]>) {
+    pub(super) fn load(&mut self) {
         let token = self.token;
         let is_any = (self.persists & self.going).any();
         T::vectorize(
             token,
             #[inline(always)]
-            || self.push_and_drive(is_any, problems),
+            || self.push_and_drive(is_any),
         );
         self.weigh(true);
         T::vectorize(
@@ -52,13 +48,9 @@ impl<T: Lane> Block<T> {
     }
 
     #[inline(always)]
-    fn push_and_drive(&mut self, is_any: bool, problems: Option<&[ContactProblem]>) {
+    fn push_and_drive(&mut self, is_any: bool) {
         let zero = self.number(0.0);
         let step = self.time_step();
-        if let Some(problems) = problems {
-            self.rows
-                .read(&self.contacts, problems, Answer::Impulses, &mut self.p_last);
-        }
         if is_any {
             let (contacts, end) = (&self.contacts, &self.poses_end);
             self.rows.generalized_impulse(

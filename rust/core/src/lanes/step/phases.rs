@@ -60,14 +60,19 @@ impl<T: Lane> Block<T> {
         let (machine, end) = (&*self.machine, &self.poses_end);
         self.rows
             .assemble(machine, end, &self.factor, &self.contacts, &self.v);
+        if is_first {
+            T::vectorize(
+                token,
+                #[inline(always)]
+                || self.recall(problems),
+            );
+        }
         if !self.yields.is_empty() {
-            if is_first {
-                self.find_laws(problems);
-            }
-            self.rows.soften(&self.contacts, &self.yields.diagonal);
+            let laws = &self.yields.laws;
+            self.rows.soften(&self.contacts, |slot| laws[slot].diagonal);
         }
         probe.end(Phase::Delassus);
-        self.load(is_first.then_some(&*problems));
+        self.load();
         self.rows
             .to_problems(&self.contacts, &self.u, &self.mu, problems);
         probe.end(Phase::Bias);
@@ -96,20 +101,27 @@ impl<T: Lane> Block<T> {
         write_start(&self.contacts, lanes, &self.p, problems);
     }
 
-    /// The laws of contacts that yield.
-    fn find_laws(&mut self, problems: &[ContactProblem]) {
-        let (memories, h) = (&self.memories, self.options.time_step);
-        let weight = self.inertias.mass * self.gravity.norm();
+    /// Impulses of the last step by slot, and the laws of contacts that yield.
+    #[inline(always)]
+    fn recall(&mut self, problems: &[ContactProblem]) {
+        let last = &mut self.p_last;
+        (self.rows).read(&self.contacts, problems, Answer::Impulses, last);
+        if self.yields.is_empty() {
+            return;
+        }
+        let step = self.time_step();
+        let mut unknown = 0;
+        for (lane, memory) in self.memories[..T::LANES].iter().enumerate() {
+            unknown |= u32::from(memory.impulses.is_empty()) << lane;
+        }
+        let weight = self.inertias.mass * self.gravity.norm() * step.0;
         self.yields.update(
             &self.machine,
             &self.contacts,
+            step,
             &self.rows.u_before,
-            (h, self.options.theta),
-            problems,
-            |lane| {
-                let is_unknown = memories[lane].impulses.is_empty();
-                is_unknown.then(|| weight.get(lane) * h)
-            },
+            &self.p_last,
+            (T::mask(self.token, unknown), weight),
         );
     }
 
@@ -252,7 +264,6 @@ impl<T: Lane> Block<T> {
         let mut released = h.like(0.0);
         if !self.yields.is_empty() {
             let (contacts, before) = (&self.contacts, &self.rows.u_before);
-            let h = self.options.time_step;
             released = self.yields.supplied(contacts, h, &self.p, &self.u, before);
         }
         let nobody = T::mask(self.token, 0);

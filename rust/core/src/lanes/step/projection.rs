@@ -38,8 +38,8 @@ impl<T: Lane> Block<T> {
         let (u, before) = (self.u[slot][0], self.rows.u_before[slot][0]);
         let mut gap = own.gap + theta * h * (u - before);
         if !self.yields.is_empty() {
-            let is_soft = zero.lt(self.yields.diagonal[slot]);
-            gap = T::select(is_soft, self.yields.unexplained[slot], gap);
+            let law = &self.yields.laws[slot];
+            gap = T::select(zero.lt(law.diagonal), law.unexplained, gap);
         }
         let parts = gap.lt(zero) & !(gap + h * u).lt(zero);
         let gap = T::select(parts, zero, gap);

@@ -13,8 +13,6 @@ mod properties;
 mod spinners;
 mod tree;
 
-use std::ops::Range;
-
 use nalgebra::Vector3;
 
 pub use body::Body;
@@ -312,16 +310,6 @@ impl Model {
     #[must_use]
     pub fn body_of_velocity(&self, k: usize) -> usize {
         self.body_of_velocity[k]
-    }
-
-    /// The path of body `b` in two parts: the velocities of a free base, which are consecutive, and
-    /// those of the joints.
-    #[inline]
-    #[must_use]
-    pub fn split_path(&self, b: usize) -> (Range<usize>, &[usize]) {
-        let tree = &self.trees[self.bodies[b].tree];
-        let (first, lead) = (tree.velocities.start, tree.lead());
-        (first..first + lead, &self.path(b)[lead..])
     }
 
     /// The velocities that move body `b` beyond [`Self::lead`], in path order, and their motions
