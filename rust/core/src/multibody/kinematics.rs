@@ -7,10 +7,11 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::bias::{BiasScratch, bias};
 use super::energy::{Energy, EnergyScratch, energy};
+use super::joint::{Motion, free};
 use super::lane_configuration::LaneConfiguration;
 use super::mass_matrix::MassMatrix;
 use super::model::Model;
-use super::poses::{Motion, Poses};
+use super::poses::Poses;
 use super::state::Configuration;
 use crate::scalar::Single;
 
@@ -136,11 +137,10 @@ impl Kinematics {
         v: &[f64],
     ) -> Vector3<f64> {
         let (lead, _) = model.split_path(b);
-        let mut velocity = match v[lead].first_chunk() {
-            Some(&[x_dot, y_dot, z_dot, w_x, w_y, w_z]) => {
-                Vector3::new(x_dot, y_dot, z_dot) + Vector3::new(w_x, w_y, w_z).cross(x)
-            }
-            None => Vector3::zeros(),
+        let mut velocity = if lead.is_empty() {
+            Vector3::zeros()
+        } else {
+            free::velocity(&v[lead]).velocity_at((*x).into()).into()
         };
         for mover in model.movers(b) {
             velocity += self.velocity_at(mover.motion, x) * v[mover.velocity];
