@@ -14,6 +14,62 @@ use nalgebra::{DMatrix, DVector, DVectorView};
 use crate::multibody::coriolis::{CoriolisScratch, coriolis_matrix};
 use crate::multibody::{Kinematics, MassMatrix, Model};
 
+/// Rotation of a free base in a step, rad, beyond which gyroscopic terms are implicit. At this
+/// angle the third-order error of the explicit terms is a thousandth of the energy.
+pub(crate) const MOST_TURN: f64 = 0.1;
+
+/// The same limit for the rotation of the fastest frame, joints included, rad. A joint that snaps
+/// to a new set-point turns a light part of the machine. Measured on the drives of random policies:
+/// implicit terms between this limit and the one above change no error in its third digit.
+pub(crate) const MOST_JOINT_TURN: f64 = 0.5;
+
+/// The same limit for the rotation of a wheel about its axle in a step, rad. The spin couples the
+/// motions across the axle at a frequency of a few per cent of the spin rate, so explicit terms
+/// would stay acceptable up to some twenty times more.
+pub(crate) const MOST_SPIN: f64 = 1.0;
+
+/// Whether gyroscopic terms are implicit in a step of h at the velocity `v`.
+#[inline]
+pub(super) fn is_gyroscopic(model: &Model, h: f64, v: &[f64]) -> bool {
+    let base = turning_of_bases(model, v);
+    h * base > MOST_TURN
+        || h * (base + turning_of_joints(model, v)) > MOST_JOINT_TURN
+        || h * fastest(&model.mechanism().spinning, v) > MOST_SPIN
+}
+
+/// Upper bound on the angular speed of every frame, rad/s.
+#[inline]
+pub(super) fn turning(model: &Model, v: &[f64]) -> f64 {
+    turning_of_bases(model, v) + turning_of_joints(model, v)
+}
+
+/// Largest angular speed of a free base, rad/s.
+#[inline]
+fn turning_of_bases(model: &Model, v: &[f64]) -> f64 {
+    let mut base = 0.0_f64;
+    for tree in model.trees() {
+        if let [_, _, _, x, y, z, ..] = v[tree.velocities.clone()]
+            && tree.is_free
+        {
+            base = base.max((x * x + y * y + z * z).sqrt());
+        }
+    }
+    base
+}
+
+/// Largest rate of a joint that turns a frame, rad/s.
+#[inline]
+fn turning_of_joints(model: &Model, v: &[f64]) -> f64 {
+    let turning = model.mechanism().turning.iter();
+    turning.fold(0.0, |most, &(k, ratio)| most.max(v[k].abs() * ratio))
+}
+
+/// Largest rate of a set of joints, rad/s.
+#[inline]
+fn fastest(joints: &[usize], v: &[f64]) -> f64 {
+    joints.iter().fold(0.0, |most, &k| most.max(v[k].abs()))
+}
+
 /// Scratch, filled at the first step that needs it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct GyroscopicScratch {

@@ -125,16 +125,15 @@ pub fn moved<T: Lane>(
     v: &[T],
     h: T,
 ) -> (Vec3<T>, [T; 4]) {
-    let turn = exp_rotation(Vec3::new(v[3], v[4], v[5]) * h);
-    (
-        *position + Vec3::new(v[0], v[1], v[2]) * h,
-        product(&turn, attitude),
-    )
+    let Motion { axis, swing } = velocity(v);
+    let turn = exp_rotation(axis * h);
+    (*position + swing * h, product(&turn, attitude))
 }
 
 /// The velocity `v` (6) as a motion: of its angular velocity and of its origin.
 #[inline(always)]
 pub fn velocity<T: Lane>(v: &[T]) -> Motion<T> {
+    let v = &v[..NV];
     Motion {
         axis: Vec3::new(v[3], v[4], v[5]),
         swing: Vec3::new(v[0], v[1], v[2]),
