@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::multibody::Motion;
 use crate::multibody::mechanism::Mechanism;
-use crate::multibody::poses::Motion;
 use crate::multibody::{Kinematics, Model};
 
 /// A machine at one instant, as its contacts need it.

@@ -10,8 +10,8 @@
 //! (`crate::lanes::rows`).
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
+use crate::multibody::Motion;
 use crate::multibody::mechanism::{BASE, Mechanism, Mover};
-use crate::multibody::poses::Motion;
 use crate::scalar::{Lane, Vec3};
 
 /// Numbers of a contact along n, t and b.

@@ -5,9 +5,9 @@ use nalgebra::{Matrix3, Vector3};
 use super::machine::Machine;
 use crate::contact::body_motion::BodyMotion;
 use crate::contact::{Contact, PairSearch, Part};
+use crate::multibody::Motion;
 use crate::multibody::Poses;
 use crate::multibody::mechanism::Mechanism;
-use crate::multibody::poses::Motion;
 use crate::scalar::{Lane, MAX_LANES, Vec3};
 
 /// A lane of a block.

@@ -7,10 +7,11 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::bias::{BiasScratch, bias};
 use super::energy::{Energy, EnergyScratch, energy};
+use super::joint::Motion;
 use super::lane_configuration::LaneConfiguration;
 use super::mass_matrix::MassMatrix;
 use super::model::Model;
-use super::poses::{Motion, Poses};
+use super::poses::Poses;
 use super::state::Configuration;
 use crate::scalar::Single;
 

@@ -15,13 +15,16 @@ pub(crate) mod extent;
 pub mod fitted_theta;
 pub mod grains;
 pub mod gyroscopic;
+mod momentum_balance;
 pub mod planar;
 mod planar_matrices;
 mod sand;
 mod sand_patch;
 pub mod tree;
+pub mod tree_scratch;
 
 pub use among_grains::{AmongContact, AmongGrains, AmongKey, AmongParts, GrainTouch};
 pub use command::{Command, Drive, HeldJoint};
 pub use planar::{PlanarContact, PlanarKey, PlanarScratch, PlanarSystem};
-pub use tree::{TreeScratch, TreeSystem};
+pub use tree::TreeSystem;
+pub use tree_scratch::TreeScratch;

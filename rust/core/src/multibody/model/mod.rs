@@ -51,11 +51,7 @@ pub struct Model {
     armatures: Vec<(usize, f64)>,
     /// Indices of the joints with stops.
     limited: Vec<usize>,
-    n_poses: usize,
-    n_rotations: usize,
     has_slides: bool,
-    /// Free and spherical joints, with their first velocities.
-    rotating: Vec<(Joint, usize)>,
     mass: f64,
     fingerprint: u64,
 }
@@ -137,7 +133,7 @@ impl Model {
             let farthest = tree.bodies.clone().map(|body| (place(body) - first).norm());
             reach = farthest.fold(reach, f64::max);
         }
-        let couplings = self.mechanism.links.iter().filter_map(|link| link.coupling);
+        let couplings = (self.mechanism.links.iter()).filter_map(|link| link.joint.coupling());
         let coupled: f64 = couplings.map(|coupling| coupling.ratio.abs()).sum();
         linear + turning * reach * (1.0 + coupled)
     }
@@ -199,13 +195,13 @@ impl Model {
     /// Number of poses in a configuration: the first body's and those of all other free bodies.
     #[must_use]
     pub fn n_poses(&self) -> usize {
-        self.n_poses
+        self.mechanism.n_poses
     }
 
     /// Number of spherical joints.
     #[must_use]
     pub fn n_rotations(&self) -> usize {
-        self.n_rotations
+        self.mechanism.n_rotations
     }
 
     /// Whether it is a single tree on a free base, like a rover.
@@ -252,7 +248,7 @@ impl Model {
     #[inline]
     #[must_use]
     pub fn rotating_joints(&self) -> &[(Joint, usize)] {
-        &self.rotating
+        &self.mechanism.rotating
     }
 
     /// Velocities of joints with rotors, and the rotor inertias (kg m² or kg).
