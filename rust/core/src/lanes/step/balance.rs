@@ -1,7 +1,7 @@
 //! The energy balance of a step, and its audit as [`crate::integrator::energy_audit`] does it.
 
 use crate::integrator::StepReport;
-use crate::integrator::energy_audit::{COARSE, GAIN, RAISE, ROUNDINGS};
+use crate::integrator::energy_audit::{Excess, GAIN};
 use crate::scalar::{Lane, MAX_LANES, Vec3};
 
 /// What the energies of a step are judged by.
@@ -29,7 +29,7 @@ pub(super) struct Balance<T: Lane> {
     pub contact_work: T,
     /// Energy beyond what was supplied; what the audit removed of it; what is left of it, as a
     /// fraction of the kinetic energy.
-    excess: T,
+    excess: Option<Excess<T>>,
     removed: T,
     gain: T,
     /// Lanes whose velocity the audit corrects.
@@ -47,7 +47,7 @@ impl<T: Lane> Balance<T> {
             supplied: zero,
             released: zero,
             contact_work: zero,
-            excess: zero,
+            excess: None,
             removed: zero,
             gain: zero,
             is_corrected: T::mask(token, 0),
@@ -65,35 +65,22 @@ impl<T: Lane> Balance<T> {
         conditions: &Conditions<T>,
         going: T::Mask,
     ) -> T::Mask {
-        let zero = work.like(0.0);
-        let ([kinetic, potential], [end_kinetic, end_potential]) = (self.before, self.after);
-        self.released = released;
-        self.supplied = work + released;
-        let excess = (end_kinetic - kinetic) + (end_potential - potential) - self.supplied;
+        let (zero, gain) = (work.like(0.0), work.like(GAIN));
         let Conditions {
             mass,
             fall,
             is_free,
             ..
         } = *conditions;
-        let least = zero.like(0.5) * mass * fall * fall;
-        let size = kinetic.max(end_kinetic).max(least);
-        let sum =
-            kinetic.abs() + end_kinetic.abs() + potential.abs() + end_potential.abs() + work.abs();
-        let rounding = zero.like(ROUNDINGS * f64::EPSILON) * sum;
-        let allowed = rounding + T::select(is_free, zero, zero.like(GAIN) * size);
-        let measured = T::select(is_free, excess.abs(), excess);
-        let is_balanced = measured.le(allowed);
-        let left = excess - end_kinetic;
-        let is_left = !left.le(rounding + zero.like(GAIN) * size);
-        // What is not finite is not within the bounds either.
-        let is_coarse = !measured.le(zero.like(COARSE) * size) | is_left;
-        let is_lost = is_coarse & !is_balanced;
+        self.released = released;
+        self.supplied = work + released;
+        let excess = Excess::new(self.before, self.after, [work, released], (mass, fall));
+        let is_balanced = excess.is_balanced(is_free, [gain, zero]);
+        let is_lost = excess.is_coarse(is_free, gain) & !is_balanced;
         self.is_corrected = !is_balanced & going & !is_lost;
-        self.excess = excess;
-        let gain = (excess - rounding).max(zero) / size.max(zero.like(f64::MIN_POSITIVE));
-        self.gain = T::select(self.is_corrected, zero, gain);
-        self.removed = T::select(self.is_corrected, excess.max(zero), zero);
+        self.excess = Some(excess);
+        self.gain = T::select(self.is_corrected, zero, excess.relative());
+        self.removed = T::select(self.is_corrected, excess.value.max(zero), zero);
         is_lost
     }
 
@@ -101,20 +88,18 @@ impl<T: Lane> Balance<T> {
     /// whole velocity was shortened, and by which factor.
     #[inline(always)]
     pub fn correct(&self, conditions: &Conditions<T>, v: &mut [T]) -> (T::Mask, T) {
-        let excess = self.excess;
-        let (zero, one) = (excess.like(0.0), excess.like(1.0));
-        let [kinetic, _] = self.after;
+        let zero = conditions.mass.like(0.0);
+        let Some(excess) = self.excess else {
+            return (self.is_corrected & !self.is_corrected, zero);
+        };
         let (lanes, mass, momentum) = (self.is_corrected, conditions.mass, self.momentum);
-        let whole = momentum.dot(momentum) / (mass.like(2.0) * mass);
-        let relative = kinetic - whole;
-        let is_relative =
-            conditions.untouched & (conditions.is_free | zero.lt(excess)) & excess.lt(relative);
-        let all = (one - excess / kinetic).max(zero).sqrt();
-        let of_relative = (one - excess / relative).min(one.like(1.0 + RAISE)).sqrt();
-        let share = T::select(is_relative, of_relative, all);
+        let (of_relative, is_enough) = excess.share_of_relative_motion(momentum, mass);
+        let (is_free, is_gain) = (conditions.is_free, zero.lt(excess.value));
+        let is_relative = conditions.untouched & (is_free | is_gain) & is_enough;
+        let share = T::select(is_relative, of_relative, excess.share());
         // Free flight that loses more than its relative energy is left as it is.
-        let lanes = lanes & (is_relative | zero.lt(excess));
-        let translation = momentum * (one / mass);
+        let lanes = lanes & (is_relative | is_gain);
+        let translation = momentum * (mass.like(1.0) / mass);
         let common = [translation.x, translation.y, translation.z];
         for (k, v) in v.iter_mut().enumerate() {
             let common = if k < 3 {
