@@ -8,8 +8,8 @@
 //! contacts enter the step.
 //! [`wheel_gaps`] measures how far the wheels are from the ground and nothing else,
 //! `box_clearance` how far a box is from a surface at least.
-//! [`relocation`] re-evaluates them in another configuration. [`jacobian`] and [`delassus`]
-//! assemble the matrices.
+//! [`relocation`] re-evaluates them in another configuration. `rows` has the rows of the contact
+//! Jacobian and the products with them, [`jacobian`] and [`delassus`] assemble the matrices.
 
 pub mod activation;
 pub(crate) mod body_motion;
@@ -23,6 +23,7 @@ pub mod pair;
 pub mod pair_detection;
 pub mod part;
 pub mod relocation;
+pub(crate) mod rows;
 pub(crate) mod ways_out;
 pub mod wheel_gaps;
 

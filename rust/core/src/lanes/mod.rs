@@ -23,7 +23,6 @@ pub mod admission;
 mod by_lane;
 mod contact_plane;
 pub mod contacts;
-pub mod drives;
 mod equations;
 pub mod forecast;
 mod free_slots;

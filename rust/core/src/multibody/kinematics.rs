@@ -7,10 +7,11 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::bias::{BiasScratch, bias};
 use super::energy::{Energy, EnergyScratch, energy};
+use super::joint::Motion;
 use super::lane_configuration::LaneConfiguration;
 use super::mass_matrix::MassMatrix;
 use super::model::Model;
-use super::poses::{Motion, Poses};
+use super::poses::Poses;
 use super::state::Configuration;
 use crate::scalar::Single;
 
@@ -135,17 +136,9 @@ impl Kinematics {
         x: &Vector3<f64>,
         v: &[f64],
     ) -> Vector3<f64> {
-        let (lead, _) = model.split_path(b);
-        let mut velocity = match v[lead].first_chunk() {
-            Some(&[x_dot, y_dot, z_dot, w_x, w_y, w_z]) => {
-                Vector3::new(x_dot, y_dot, z_dot) + Vector3::new(w_x, w_y, w_z).cross(x)
-            }
-            None => Vector3::zeros(),
-        };
-        for mover in model.movers(b) {
-            velocity += self.velocity_at(mover.motion, x) * v[mover.velocity];
-        }
-        velocity
+        let motion = |m: usize| self.poses.motions[m];
+        let mechanism = model.mechanism();
+        (mechanism.point_velocity(b, (*x).into(), motion, |k| v[k])).into()
     }
 
     /// Velocity of the material point at `x` per unit of the joint velocity of motion `m`.

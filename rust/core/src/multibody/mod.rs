@@ -44,7 +44,7 @@ pub use energy::{Energy, EnergyScratch};
 pub use error::{ModelError, StateError};
 pub use factor::Factor;
 pub use inertias::Inertias;
-pub use joint::{Joint, JointAxis, Pose};
+pub use joint::{Joint, JointAxis, JointModel, Motion, Pose};
 pub use kinematics::Kinematics;
 pub use lane_configuration::LaneConfiguration;
 pub use mass_matrix::MassMatrix;
@@ -55,6 +55,6 @@ pub use model::{
     Tree, Wheel,
 };
 pub use momentum::Momentum;
-pub use motor::{DriveTrial, Motor, MotorRegime};
-pub use poses::{Motion, Poses};
+pub use motor::{Motor, MotorLine};
+pub use poses::Poses;
 pub use state::Configuration;
