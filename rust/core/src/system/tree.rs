@@ -1,7 +1,7 @@
 //! A multibody tree on a terrain as a mechanical system: the rover.
 //!
-//! The forces of its joints are implicit ([`super::joint_forces`]). `M̂ = Lᵀ D L` along the tree; the
-//! contact system stores `Z` along each contact's path.
+//! The forces of its joints are implicit ([`super::joint_forces`]). `M̂ = Lᵀ D L` along the tree;
+//! the contact system stores `Z` along each contact's path.
 
 use nalgebra::Vector3;
 
@@ -108,8 +108,8 @@ impl<'a> TreeSystem<'a> {
         mass_matrix.factorise(self.model.mechanism(), &mut parts.factor)
     }
 
-    /// `y = h (τ − b)` with the bias b at a velocity, and the forces of joints and sand at the start
-    /// of the step. `v_bias`: `None` for the bias at rest, gravity's.
+    /// `y = h (τ − b)` with the bias b at a velocity, and the forces of joints and sand at the
+    /// start of the step. `v_bias`: `None` for the bias at rest, gravity's.
     #[inline]
     fn load_with_bias(
         &mut self,
@@ -381,14 +381,14 @@ impl MechanicalSystem for TreeSystem<'_> {
         v: &[f64],
     ) -> Option<MechanicalEnergy> {
         let TreeScratch {
-            place,
+            q: lane,
             energy: scratch,
             ..
         } = &mut *self.parts;
-        place.set_lane(0, q);
+        lane.set_lane(0, q);
         let (mechanism, inertias) = (self.model.mechanism(), self.model.inertias());
         let gravity = options.gravity.into();
-        let (energy, momentum) = energy(mechanism, inertias, place, v, gravity, scratch);
+        let (energy, momentum) = energy(mechanism, inertias, lane, v, gravity, scratch);
         Some(MechanicalEnergy {
             kinetic: energy.kinetic,
             potential: energy.potential,
