@@ -9,6 +9,22 @@
 //!
 //! Vectors are `[normal, tangent, (tangent)]`, velocities in m/s and
 //! impulses in N s. A law never sees a solver.
+//!
+//! # One call
+//!
+//! A residual, for one contact:
+//!
+//! ```text
+//! u = W p + q ──► newton_impact::rebound      the shift e u_N⁻ of the free velocity
+//!             ──► coulomb::modified_velocity  ũ = u + μ |u_T| n
+//!             ──► coulomb::natural_map        p − Π_K(p − ρ ũ), zero where the law holds
+//! ```
+//!
+//! # May use
+//!
+//! [`crate::cone`].
+//!
+//! A law sees one contact; it knows no solver and no body.
 
 pub mod compliance;
 pub mod coulomb;
