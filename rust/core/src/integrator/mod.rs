@@ -34,7 +34,7 @@
 //!
 //! # May use
 //!
-//! [`crate::law`], [`crate::contact`], [`crate::problem`], [`crate::solver`].
+//! [`crate::scalar`], [`crate::law`], [`crate::contact`], [`crate::problem`], [`crate::solver`].
 //!
 //! No machine: a scheme knows a [`MechanicalSystem`].
 

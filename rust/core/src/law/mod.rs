@@ -22,7 +22,7 @@
 //!
 //! # May use
 //!
-//! [`crate::cone`].
+//! [`crate::scalar`], [`crate::cone`].
 //!
 //! A law sees one contact; it knows no solver and no body.
 
