@@ -10,6 +10,7 @@ mod joints;
 mod lanes;
 mod materials;
 mod planar;
+mod rolling;
 mod rover;
 mod sand;
 mod shapes;

@@ -9,7 +9,7 @@ mod disc;
 mod dual_cone;
 mod second_order_cone;
 
-pub use disc::project_on_disc;
+pub use disc::{project_on_disc, shortened, split};
 pub use dual_cone::DualCone;
 pub use second_order_cone::SecondOrderCone;
 

@@ -4,7 +4,7 @@ use super::options::{ContactLaw, Method, SolverOptions};
 use super::reference::relaxed;
 use super::report::{Outcome, Rung, Rungs, SolveReport, SolveStatus, Stage};
 use super::scratch::Scratch;
-use super::stage::body_sweeps::Swept;
+use super::stage::body_sweeps::{Answer, Swept};
 use super::stage::{admm, gauss_seidel, newton, proximal};
 use super::strategy::auto;
 use super::strategy::islands::IslandSolver;
@@ -59,16 +59,15 @@ pub fn solve(
 /// Solves the contacts of very many free bodies: [`Method::Auto`] and
 /// [`Method::GaussSeidel`] sweep over their pairs and need no `W`.
 ///
-/// `p`, `u`, `workspace` and the report are as in [`solve`]. `max_sweeps` bounds the sweeps; the
-/// budget bounds the stages after them.
+/// p, u, `workspace` and the report are as in [`solve`]. `max_sweeps` bounds the sweeps; the budget
+/// bounds the stages after them. Contacts with rolling friction are swept, whatever the method.
 ///
 /// # Panics
 /// If a length does not fit.
 pub fn solve_many_bodies<const D: usize>(
     bodies: &ManyBodies<'_, D>,
     options: &SolverOptions,
-    p: &mut [f64],
-    u: &mut [f64],
+    answer: Answer<'_>,
     workspace: &mut SolverWorkspace,
 ) -> SolveReport
 where
@@ -80,7 +79,7 @@ where
          options: &SolverOptions,
          p: &mut [f64],
          u: &mut [f64]| solve(problem, options, p, u, workspace);
-    let report = many_bodies::solve(bodies, options, p, u, &mut sweeps, &mut solve_whole);
+    let report = many_bodies::solve(bodies, options, answer, &mut sweeps, &mut solve_whole);
     workspace.body_sweeps = sweeps;
     report
 }

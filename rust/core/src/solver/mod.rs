@@ -44,6 +44,6 @@ pub use history::Iterate;
 pub use local::one_contact::{OneContactSolution, solve_one_contact};
 pub use options::{ContactLaw, Method, SolverOptions};
 pub use report::{Rung, Rungs, SolveReport, SolveStatus, Stage};
-pub use stage::body_sweeps::{BodySweeps, Swept, solve_body_pairs};
+pub use stage::body_sweeps::{Answer, BodySweeps, Swept, solve_body_pairs};
 pub use strategy::many_bodies::ManyBodies;
 pub use workspace::SolverWorkspace;

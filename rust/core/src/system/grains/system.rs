@@ -8,6 +8,7 @@ use nalgebra::SVector;
 use super::bodies::COORDINATES;
 use super::contact::{GrainContact, GrainKey, WALL};
 use super::grid::Grid;
+use super::rolling::{Moments, RollingParts};
 use super::scene::{GrainScene, flat};
 use super::search::{Neighbour, Search};
 use super::slabs::Slabs;
@@ -19,13 +20,23 @@ use crate::problem::{
     BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem, RoundPair,
 };
 use crate::solver::{
-    ManyBodies, SolveReport, SolverOptions, SolverWorkspace, Swept, solve_many_bodies,
+    Answer, ManyBodies, SolveReport, SolverOptions, SolverWorkspace, Swept, solve_many_bodies,
 };
 use crate::spatial::space::body_velocities;
 use crate::system::planar_matrices::PlanarMatrices;
 
 /// The place of fixed bodies, with c = s = 0.
 const NOWHERE: u32 = 0;
+
+/// The motion of a surface at a contact with it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Driven<const D: usize> {
+    pub key: GrainKey,
+    /// m/s.
+    pub velocity: SVector<f64, D>,
+    /// Angular velocity, rad/s.
+    pub spin: [f64; 3],
+}
 
 /// Matrices of a step: scratch.
 #[derive(Debug, Default)]
@@ -37,13 +48,14 @@ pub struct GrainParts<const D: usize> {
     pub(in crate::system) search: Search,
     pub(super) found: Vec<Neighbour<D>>,
     pub(super) facing: Vec<Facing<D>>,
-    /// Contacts with surfaces that move, in the order of the keys, and their velocities, m/s.
-    pub(super) driven: Vec<(GrainKey, SVector<f64, D>)>,
+    /// Contacts with surfaces that move, in the order of the keys.
+    pub(super) driven: Vec<Driven<D>>,
     /// How long walls have been moving, s.
     pub(crate) wall_time: f64,
     /// Force of the cohesion on every grain's coordinates, N and N m.
     attraction: Vec<f64>,
     pub(in crate::system) pairs: BodyPairs<D>,
+    pub(crate) rolling: RollingParts,
     /// The machine at the middle and at the end of the step.
     pub(super) machine_poses: [PlanarPoses; 2],
     machine: PlanarMatrices,
@@ -66,14 +78,14 @@ impl<const D: usize> GrainParts<D> {
         &self.pairs
     }
 
-    /// Velocity of the surface at a contact, m/s, if it moves.
+    /// Motion of the surface at a contact, if it moves.
     #[inline]
-    pub(super) fn surface_velocity(&self, key: GrainKey) -> Option<SVector<f64, D>> {
+    pub(super) fn surface(&self, key: GrainKey) -> Option<&Driven<D>> {
         if self.driven.is_empty() {
             return None;
         }
-        let place = self.driven.binary_search_by_key(&key, |(key, _)| *key);
-        place.ok().map(|k| self.driven[k].1)
+        let place = (self.driven).binary_search_by_key(&key, |driven| driven.key);
+        place.ok().map(|k| &self.driven[k])
     }
 
     /// The operator W of the last step's contacts, block by block, 1/kg.
@@ -89,6 +101,8 @@ pub struct GrainSystem<'a, const D: usize> {
     pub scene: &'a GrainScene<D>,
     /// Which grains sleep (n): they have no velocity and stay in place, whatever touches them.
     pub asleep: &'a [bool],
+    /// Moments of rolling friction in the last step.
+    pub moments: &'a Moments,
     /// Torques of the machine, N m.
     pub inputs: &'a [f64],
     /// A force at the machine's origin, N.
@@ -235,6 +249,29 @@ impl<const D: usize> GrainSystem<'_, D> {
                 *y /= J;
             }
         }
+    }
+}
+
+impl<const D: usize> GrainSystem<'_, D>
+where
+    BodyPairs<D>: Swept<D>,
+{
+    /// Solves the contacts of the pairs of bodies.
+    pub(in crate::system) fn solve_rolling(
+        &self,
+        q: &[f64],
+        mu: &[f64],
+        options: &SolverOptions,
+        answer: Answer<'_>,
+        workspace: &mut SolverWorkspace,
+    ) -> SolveReport {
+        let bodies = ManyBodies {
+            pairs: &self.parts.pairs,
+            q,
+            mu,
+            operator: &|| self.parts.operator(),
+        };
+        solve_many_bodies(&bodies, options, answer, workspace)
     }
 }
 
@@ -445,6 +482,7 @@ where
             }
         }
         self.attract(contacts);
+        self.assemble_rolling(contacts);
         u.fill(0.0);
         self.add_local_of_velocity(contacts, v, u);
     }
@@ -466,8 +504,8 @@ where
             }
             if contact.is_with_grain() {
                 add_rim_velocity(&v[V * b..V * (b + 1)], -radius[b], &contact.n, -1.0, &mut u);
-            } else if let Some(velocity) = self.parts.surface_velocity(contact.key) {
-                u -= velocity;
+            } else if let Some(surface) = self.parts.surface(contact.key) {
+                u -= surface.velocity;
             }
             for (out, direction) in out.iter_mut().zip(contact.frame()) {
                 *out += direction.dot(&u);
@@ -546,13 +584,30 @@ where
         u: &mut [f64],
         workspace: &mut SolverWorkspace,
     ) -> SolveReport {
-        let bodies = ManyBodies {
-            pairs: &self.parts.pairs,
-            q,
-            mu,
-            operator: &|| self.parts.operator(),
-        };
-        solve_many_bodies(&bodies, options, p, u, workspace)
+        let rolling = &mut [];
+        self.solve_rolling(q, mu, options, Answer { p, u, rolling }, workspace)
+    }
+
+    fn solve_step(
+        &mut self,
+        (v, y): (&[f64], &[f64]),
+        q: &[f64],
+        mu: &[f64],
+        options: &SolverOptions,
+        p: &mut [f64],
+        u: &mut [f64],
+        workspace: &mut SolverWorkspace,
+    ) -> SolveReport {
+        self.set_free_rolling(v, y);
+        let mut contacts = std::mem::take(&mut self.parts.rolling.contacts);
+        let rolling = &mut contacts;
+        let report = self.solve_rolling(q, mu, options, Answer { p, u, rolling }, workspace);
+        self.parts.rolling.contacts = contacts;
+        report
+    }
+
+    fn add_moments(&self, y: &mut [f64]) {
+        self.add_rolling(y);
     }
 
     fn displacement(&self, y: &[f64]) -> f64 {
