@@ -8,6 +8,7 @@ mod exploring_scenes;
 mod grains;
 mod joints;
 mod lanes;
+mod laws;
 mod materials;
 mod planar;
 mod rolling;

@@ -113,6 +113,24 @@ fn a_ball_and_a_disk_rest_on_a_slope_up_to_the_angle_of_rolling_friction() {
     rests_or_rolls::<2>();
 }
 
+/// A floor without Coulomb friction transmits no moment either.
+#[test]
+fn a_ball_rolls_on_over_a_smooth_floor() {
+    let mut scene = scene::<3>(1, 0.3, 0.3);
+    scene.friction.walls = 0.0;
+    let options = exact(&scene);
+    let q = vec![0.0, RADIUS, 0.0];
+    let mut run = GrainSimulation::new(Arc::new(scene), options, None, q.clone()).expect("a bed");
+    let v = [0.2, 0.0, 0.0, 0.0, 1.0, -2.0];
+    run.set_state(&q, &v).expect("a state");
+    run.step(100).expect("finite");
+    assert!(
+        run.v().iter().zip(v).all(|(a, b)| (a - b).abs() < 1e-9),
+        "{:?}",
+        run.v()
+    );
+}
+
 /// A ball that spins about the vertical: `dω/dt = −μ_d r m g/J = −5/2 μ_d g/r`.
 #[test]
 fn a_spinning_ball_stops() {

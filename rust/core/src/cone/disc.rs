@@ -23,6 +23,21 @@ pub fn project_on_disc<const D: usize>(v: &[f64; D], radius: f64) -> [f64; D] {
     out
 }
 
+/// Projects the tangential part of an impulse onto the friction disc of a nonnegative radius.
+#[inline]
+pub fn draw_in<const D: usize>(p: &mut [f64; D], limit: f64) {
+    if D == 2 {
+        p[1] = p[1].min(limit).max(-limit);
+        return;
+    }
+    let square = p[1] * p[1] + p[2] * p[2];
+    if square > limit * limit {
+        let share = limit / square.sqrt();
+        p[1] *= share;
+        p[2] *= share;
+    }
+}
+
 /// Shortens a vector of the world to a nonnegative `limit`.
 #[allow(clippy::inline_always)] // a visit of a contact is one piece of code
 #[inline(always)]

@@ -454,6 +454,14 @@ where
         sum.into()
     }
 
+    /// Moment of rolling and drilling friction of a contact of the last step on its first body,
+    /// N m s.
+    #[must_use]
+    pub fn moment(&self, contact: &GrainContact<D>) -> [f64; 3] {
+        let radius = self.soil().grains.radius();
+        grains::moment_of(radius, &self.memory.moments, contact.key)
+    }
+
     /// Current deepest overlap, m: 0 if nothing overlaps. Overlaps of kinematic grains with each
     /// other and with walls do not count.
     #[must_use]

@@ -13,11 +13,10 @@
 
 #![allow(clippy::inline_always)] // a visit is one piece of code: calls cost as much as sums
 
-use crate::cone::{shortened, split};
+use crate::law::coulomb::Coulomb;
+use crate::law::one_contact::solve_one_contact;
 use crate::law::rolling::RollingFriction;
-use crate::law::signorini;
 use crate::problem::{BodyPairs, RollingContact, RoundPair};
-use crate::solver::local::one_contact::solve_one_contact;
 use crate::spatial::space::dot;
 
 /// A ball: its velocity with 1/m, and `r ω` with `r²/J`.
@@ -156,19 +155,14 @@ impl BallRow {
     pub(super) fn visit(&mut self, share: f64, balls: &mut [Ball]) -> f64 {
         let u = self.velocity(balls);
         let mut start = self.p;
-        let mut wanted = self.p;
         for k in 0..3 {
             start[k] += share * (self.p[k] - self.before[k]);
-            wanted[k] = start[k] - self.inverse[1] * u[k];
         }
-        let normal = (dot(&self.n, &start) - self.inverse[0] * dot(&self.n, &u)).max(0.0);
-        let (_, across) = split(&self.n, &wanted);
-        let across = shortened(across, self.mu * normal);
-        let mut change = [0.0; 3];
         self.before = self.p;
+        self.p = Coulomb(self.mu).answer_of_round(&self.n, self.inverse, &start, &u);
+        let mut change = self.p;
         for k in 0..3 {
-            self.p[k] = self.n[k] * normal + across[k];
-            change[k] = self.p[k] - start[k];
+            change[k] -= start[k];
         }
         self.add(&change, balls);
         dot(&change, &change)
@@ -191,20 +185,9 @@ impl BallRow {
         let u = self.velocity(balls);
         let mass = mass_of(self.inverse);
         let or_mass = |i: f64| if i > 0.0 { i } else { mass };
-        let (i_n, i_t) = (or_mass(self.inverse[0]), or_mass(self.inverse[1]));
-        let (u_n, u_t) = split(&self.n, &u);
-        let (p_n, p_t) = split(&self.n, &self.p);
-        let mut wanted = p_t;
-        for k in 0..3 {
-            wanted[k] -= i_t * u_t[k];
-        }
-        let across = shortened(wanted, self.mu * p_n);
-        let mut square = signorini::violation(u_n, p_n, i_n).powi(2);
-        for k in 0..3 {
-            square += ((p_t[k] - across[k]) / i_t).powi(2);
-        }
+        let scales = self.inverse.map(or_mass);
         Judged {
-            square,
+            square: Coulomb(self.mu).violation_of_round(&self.n, scales, &self.p, &u),
             mass,
             work: dot(&self.p, &u),
             free: dot(&self.p, &self.q),

@@ -16,9 +16,10 @@
 
 #![allow(clippy::inline_always)] // a visit is one piece of code
 
-use super::accelerated::{Measured, Relaxation, draw_in};
+use super::accelerated::{Measured, Relaxation};
 use super::ball_leap::{Anchor, Leaping};
 use super::ball_rows::{Ball, BallRow, Judged, MachineRow, RollRow, mass_of, to_frame};
+use crate::cone::draw_in;
 use crate::law::coulomb::violation;
 use crate::problem::{BodyPairs, Magnitudes, RollingContact, Violations};
 use crate::solver::options::SolverOptions;

@@ -17,10 +17,11 @@
 //! Source: Jean 1999 and Moreau 1999 (the sweep); Nesterov 1983, O'Donoghue
 //! and Candès 2015 (extrapolation with restart).
 
-use super::accelerated::{accelerate, draw_in};
+use super::accelerated::accelerate;
 use super::ball_sweeps::{BallSolve, BallSweeps};
 use super::disk_sweeps::{DiskSolve, DiskSweeps};
 use super::helpers::Helpers;
+use crate::cone::draw_in;
 use crate::problem::{BodyPairs, RollingContact};
 use crate::solver::options::{Method, SolverOptions};
 use crate::solver::report::{Rung, Rungs, SolveReport, SolveStatus, Stage};

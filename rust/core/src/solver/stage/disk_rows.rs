@@ -1,9 +1,9 @@
 //! Contact rows of [`super::disk_sweeps`]: all data that a visit reads and writes, side by side.
 
-use super::accelerated::draw_in;
+use crate::cone::draw_in;
+use crate::law::one_contact::solve_one_contact;
 use crate::law::rolling::RollingFriction;
 use crate::problem::{BodyPairs, RollingContact, RoundPair};
-use crate::solver::local::one_contact::solve_one_contact;
 use crate::spatial::space::{body_velocities, dot};
 
 /// Numbers of a body: its velocity, that of its rim, and a zero as padding.

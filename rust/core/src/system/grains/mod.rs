@@ -23,7 +23,6 @@
 //! Anitescu and Potra 1997 (the gap in the velocity's law).
 
 pub mod bodies;
-pub mod cohesion;
 pub mod contact;
 mod detection;
 pub mod error;
@@ -39,14 +38,14 @@ pub mod sleep;
 pub mod system;
 pub mod wall;
 
+pub use crate::law::cohesion::Cohesion;
 pub use bodies::{COORDINATES, Grains, MAX_GRAINS};
-pub use cohesion::Cohesion;
 pub use contact::{GrainContact, GrainKey};
 pub use error::GrainError;
 pub use grid::Grid;
 pub use packing::{Packing, arranged};
 pub use removal::Renumbering;
-pub use rolling::Moments;
+pub use rolling::{Moments, moment_of};
 pub use scene::{GrainFriction, GrainScene, OVERLAP};
 pub use sleep::{Mover, Sleep, SleepOptions, StepTaken};
 pub use system::{GrainParts, GrainSystem};

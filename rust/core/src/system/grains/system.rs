@@ -15,6 +15,7 @@ use super::slabs::Slabs;
 use crate::contact::Activation;
 use crate::geometry::Facing;
 use crate::integrator::{MechanicalSystem, Stabilisation, Start, StepOptions};
+use crate::law::newton_impact::rebound_at_gap;
 use crate::planar::{PlanarPoses, PlanarTree};
 use crate::problem::{
     BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem, RoundPair,
@@ -482,7 +483,7 @@ where
             }
         }
         self.attract(contacts);
-        self.assemble_rolling(contacts);
+        (self.parts.rolling).assemble(scene, contacts, self.moments);
         u.fill(0.0);
         self.add_local_of_velocity(contacts, v, u);
     }
@@ -598,16 +599,17 @@ where
         u: &mut [f64],
         workspace: &mut SolverWorkspace,
     ) -> SolveReport {
-        self.set_free_rolling(v, y);
-        let mut contacts = std::mem::take(&mut self.parts.rolling.contacts);
-        let rolling = &mut contacts;
+        let mut moments = std::mem::take(&mut self.parts.rolling);
+        let surface = |key| self.parts.surface(key).map(|surface| surface.spin);
+        moments.set_free(self.scene, (v, y), surface);
+        let rolling = &mut moments.contacts;
         let report = self.solve_rolling(q, mu, options, Answer { p, u, rolling }, workspace);
-        self.parts.rolling.contacts = contacts;
+        self.parts.rolling = moments;
         report
     }
 
     fn add_moments(&self, y: &mut [f64]) {
-        self.add_rolling(y);
+        self.parts.rolling.add(&self.parts.pairs.round, y);
     }
 
     fn displacement(&self, y: &[f64]) -> f64 {
@@ -621,25 +623,16 @@ where
 /// Share of an excessive overlap by which a pair parts in a step, see [`Stabilisation::PushOut`].
 const PUSHED_OUT: f64 = 0.2;
 
-/// Newton's law for a pair that collides within the step; any other pair may close by its gap
-/// (`gap_start`, m).
-///
-/// With `e u_N⁻ + s` and any s ≥ 0 a frictionless impact gains no energy, see
-/// [`crate::law::newton_impact`]: here s is what the gap allows.
+/// Shift of the normal free velocity of a pair with the gap `gap_start`, m, see
+/// [`rebound_at_gap`]; an excessive overlap is pushed out.
 pub(in crate::system) fn gap_law(options: &StepOptions, gap_start: f64, u_N_before: f64) -> f64 {
     let h = options.time_step;
     let excess = gap_start + options.penetration_tolerance;
     if excess < 0.0 && options.stabilisation == Stabilisation::PushOut {
         return PUSHED_OUT * excess / h;
     }
-    let gap = gap_start.max(0.0);
-    let rebound = options.restitution * u_N_before;
     let slow = 2.0 * options.gravity.norm() * h;
-    if rebound < 0.0 && u_N_before < -slow && gap + h * u_N_before <= 0.0 {
-        rebound
-    } else {
-        gap / h + rebound.max(0.0)
-    }
+    rebound_at_gap(options.restitution, u_N_before, gap_start, (h, slow))
 }
 
 /// Moment of the tangential impulses, divided by r: p_t in the plane, `b p_t − t p_b` in space.
