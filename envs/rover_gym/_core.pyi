@@ -4,13 +4,15 @@ SI units and radians everywhere. World frame: x forward, y up, z to the right. W
 listed FL, FR, ML, BL, MR, BR. Every array returned is new.
 """
 
-from collections.abc import Collection, Mapping, Sequence
-from os import PathLike
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal, Protocol, TypeAlias, final, overload
 
 import numpy as np
 import numpy.typing as npt
 from typing_extensions import disjoint_base
+
+from rover_gym.maps import terrain_files
+from rover_gym.models import model_files
 
 _Array: TypeAlias = npt.NDArray[np.float64]
 _Rows: TypeAlias = npt.NDArray[np.uint64]
@@ -198,17 +200,7 @@ class RoverModel:
     """
 
     def __new__(cls) -> RoverModel: ...
-    @staticmethod
-    def from_file(path: str | PathLike[str]) -> RoverModel:
-        """Reads a model file (TOML).
-
-        Args:
-            path: Path of the file.
-
-        Raises:
-            ModelError: The file does not describe a model; the message names the path.
-            OSError: The file cannot be read.
-        """
+    from_file = staticmethod(model_files.from_file)
     @staticmethod
     def from_text(text: str) -> RoverModel:
         """Reads a model from TOML text.
@@ -229,15 +221,7 @@ class RoverModel:
         Raises:
             ModelError: The dictionaries do not describe a model.
         """
-    def to_file(self, path: str | PathLike[str]) -> None:
-        """Writes a model file (TOML), with locked joints.
-
-        Args:
-            path: Path of the file.
-
-        Raises:
-            OSError: The file cannot be written.
-        """
+    to_file = model_files.to_file
     def to_text(self) -> str:
         """The description as TOML text, as `from_text` reads it."""
     def to_dict(self) -> dict[str, Any]:
@@ -255,104 +239,8 @@ class RoverModel:
     @staticmethod
     def names() -> list[str]:
         """Names of the models of the gallery; the first is the built-in rover."""
-    @staticmethod
-    def from_urdf(
-        path: str | PathLike[str],
-        *,
-        wheels: Sequence[str] | Mapping[str, float] | None = None,
-        steering: Sequence[str] | Mapping[str, str] | None = None,
-        free_base: bool = True,
-        forward: str = "x",
-        torque_limit: float | None = None,
-        steering_stiffness: float | None = None,
-        steering_damping: float | None = None,
-        steering_limit: float | None = None,
-        wheel_width: float | None = None,
-        wheel_stiffness: float | None = None,
-        ignore: Collection[str] = (),
-        package_paths: Collection[str | PathLike[str]] = (),
-    ) -> RoverModel:
-        """Reads a URDF file.
-
-        The file's axes (x forward, y left, z up) are converted to ours (x forward, y up, z right)
-        in every frame. `import_report` says what was understood, assumed and left out.
-
-        Args:
-            path: Path of the file.
-            wheels: Names of the wheels' links or joints, or their radii by name, m. None: found
-                from shapes and names. An empty list: none.
-            steering: Names of the steering links or joints, or those of each wheel by its name.
-                None: found from their axes. An empty list: none.
-            free_base: Whether the root moves freely; otherwise it is fixed to the world.
-            forward: The file's axis along which the machine drives: "x", "-x", "y" or "-y".
-            torque_limit: Largest torque of every wheel, N m; by default the file's.
-            steering_stiffness: Stiffness of every steering controller, N m/rad.
-            steering_damping: Damping of every steering controller, N m s/rad.
-            steering_limit: Largest steering set-point, rad; by default the joint's stop.
-            wheel_width: Width of every wheel, m, 0 for thin discs, which cost less to simulate; by
-                default that of the cylinder that touches for it in the file, or 0.
-            wheel_stiffness: Normal stiffness of every wheel where it touches, N/m, 0 for rigid
-                wheels. By default a wheel yields 0.03 mm under its share of the weight, which
-                decides how the ground shares the weight among the wheels of a rigid chassis.
-            ignore: Kinds of what changes the motion and is left out all the same: "friction",
-                "actuators", "closed loops", "tendons", "springs", "fluid".
-            package_paths: Folders that are searched for the packages of `package://` names, before
-                those of the environment variables `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH` and
-                the folders above the file.
-
-        Raises:
-            ModelError: The file is malformed, holds what cannot be simulated, or leaves open which
-                links are wheels; the message names file, element and value.
-            ImportError: The extra `models` is not installed.
-            OSError: The file cannot be read.
-        """
-    @staticmethod
-    def from_mjcf(
-        path: str | PathLike[str],
-        *,
-        wheels: Sequence[str] | Mapping[str, float] | None = None,
-        steering: Sequence[str] | Mapping[str, str] | None = None,
-        free_base: bool | None = None,
-        forward: str = "x",
-        torque_limit: float | None = None,
-        steering_stiffness: float | None = None,
-        steering_damping: float | None = None,
-        steering_limit: float | None = None,
-        wheel_width: float | None = None,
-        wheel_stiffness: float | None = None,
-        ignore: Collection[str] = (),
-    ) -> RoverModel:
-        """Reads an MJCF file, which MuJoCo compiles.
-
-        As `from_urdf`, but that the file says whether the base is free, and position servos become
-        gains of held joints.
-
-        Args:
-            path: Path of the file.
-            wheels: Names of the wheels' bodies or joints, or their radii by name, m. None: found
-                from shapes and names. An empty list: none.
-            steering: Names of the steering bodies or joints, or those of each wheel by its name.
-                None: found from their axes. An empty list: none.
-            free_base: Whether the root moves freely. None: as in the file.
-            forward: The file's axis along which the machine drives: "x", "-x", "y" or "-y".
-            torque_limit: Largest torque of every wheel, N m; by default the file's.
-            steering_stiffness: Stiffness of every steering controller, N m/rad.
-            steering_damping: Damping of every steering controller, N m s/rad.
-            steering_limit: Largest steering set-point, rad; by default the joint's stop.
-            wheel_width: Width of every wheel, m, 0 for thin discs, which cost less to simulate; by
-                default that of the cylinder that touches for it in the file, or 0.
-            wheel_stiffness: Normal stiffness of every wheel where it touches, N/m, 0 for rigid
-                wheels. By default a wheel yields 0.03 mm under its share of the weight, which
-                decides how the ground shares the weight among the wheels of a rigid chassis.
-            ignore: Kinds of what changes the motion and is left out all the same: "friction",
-                "actuators", "closed loops", "tendons", "springs", "fluid".
-
-        Raises:
-            ModelError: MuJoCo refuses the file, it holds what cannot be simulated, or it leaves
-                open which bodies are wheels.
-            ImportError: MuJoCo is not installed.
-            OSError: The file cannot be read.
-        """
+    from_urdf = staticmethod(model_files.from_urdf)
+    from_mjcf = staticmethod(model_files.from_mjcf)
     @property
     def import_report(self) -> Any:
         """What the import of this model understood, assumed and left out.
@@ -361,34 +249,8 @@ class RoverModel:
         was derived from an imported one.
         """
     def _with_import_report(self, report: object) -> RoverModel: ...
-    def to_urdf(self, path: str | PathLike[str], *, ignore: Collection[str] = ()) -> None:
-        """Writes a URDF file, for other programs: x forward, y left, z up.
-
-        Wheels are written as cylinders; a thin disc is a tenth of its radius wide and named so.
-
-        Args:
-            path: Path of the file.
-            ignore: Kinds of what the format cannot express and is left out all the same: "springs",
-                "armature".
-
-        Raises:
-            ModelError: The model has a spherical joint, several trees, or what the format cannot
-                express and `ignore` does not name.
-            OSError: The file cannot be written.
-        """
-    def to_mjcf(self, path: str | PathLike[str]) -> None:
-        """Writes an MJCF file, for MuJoCo: x forward, y left, z up.
-
-        Wheels are written as cylinders, of which a thin disc is a tenth of its radius wide and
-        named so, their drives as motors, held steering as position servos, and coupled joints as
-        equality constraints, which MuJoCo satisfies approximately.
-
-        Args:
-            path: Path of the file.
-
-        Raises:
-            OSError: The file cannot be written.
-        """
+    to_urdf = model_files.to_urdf
+    to_mjcf = model_files.to_mjcf
     def replace(
         self,
         *,
@@ -862,19 +724,7 @@ class SphereField(Terrain):
     def __new__(
         cls, centres: npt.ArrayLike, radii: npt.ArrayLike, ground: Plane | None = None, material: str = "rock"
     ) -> SphereField: ...
-    @staticmethod
-    def from_file(path: str | PathLike[str], ground: Plane | None = None, material: str = "rock") -> SphereField:
-        """Reads spheres from a CSV file with the header `x,y,z,radius`, in m.
-
-        Args:
-            path: Path of the file.
-            ground: The plane under the spheres; none by default.
-            material: Name of the spheres' material.
-
-        Raises:
-            TerrainError: The file does not describe spheres; the message names the path.
-            OSError: The file cannot be read.
-        """
+    from_file = staticmethod(terrain_files.sphere_field_from_file)
     @staticmethod
     def rug() -> SphereField:
         """The wavy ground of the 2010 report's Fig. 6.6.
@@ -962,84 +812,8 @@ class HeightField(Terrain):
         origin: tuple[float, float] | None = None,
         material: str = "ground",
     ) -> HeightField: ...
-    @staticmethod
-    def from_file(
-        path: str | PathLike[str],
-        *,
-        spacing: float | tuple[float, float] | None = None,
-        origin: tuple[float, float] | None = None,
-        height_range: tuple[float, float] | None = None,
-        scale: float | None = None,
-        datum: float | None = None,
-        band: int | None = None,
-        material: str = "ground",
-    ) -> HeightField:
-        """Reads a map from a GeoTIFF, a PNG or a .npy file.
-
-        Columns run along x and rows along z; of a map with north up, x is east and z south. A
-        GeoTIFF brings its spacing, its unit and its mark for no data.
-
-        Args:
-            path: Path of the file; its ending tells the format.
-            spacing: Distance of columns and of rows, m; needed unless the file gives it.
-            origin: Place (x, z) of the first height, m; by default such that the map's middle is
-                at the world's origin.
-            height_range: Of a PNG: heights of black and white, (2,), m.
-            scale: Factor from the file's numbers to m; of a GeoTIFF by default its own.
-            datum: Height of the file that becomes 0, in its own numbers; of a GeoTIFF by default
-                its lowest, otherwise 0.
-            band: Band of a GeoTIFF, from 1; needed if the file has several.
-            material: Name of its material.
-
-        Raises:
-            TerrainError: The file is no such map or does not say enough; the message names it.
-            OSError: The file cannot be read.
-            MissingExtraError: The extra `maps` is not installed.
-        """
-    @staticmethod
-    def fractal(
-        size: float | tuple[float, float],
-        spacing: float | tuple[float, float],
-        roughness: float,
-        *,
-        hurst: float = 0.7,
-        longest_wave: float | None = None,
-        craters: float = 0.0,
-        crater_diameter: tuple[float, float] = (0.5, 5.0),
-        ripple_height: float = 0.0,
-        ripple_length: float = 1.0,
-        seed: int = 0,
-        origin: tuple[float, float] | None = None,
-        material: str = "ground",
-    ) -> HeightField:
-        """Rough ground made by a seed: a self-affine surface, with craters and ripples on demand.
-
-        The power of a wave of k cycles a metre falls as k^(-2 hurst - 2) from `longest_wave` to two
-        cells. Craters are bowls with a rim, a fifth as deep as wide; those as wide as D or wider
-        number D^-2. Ripples are waves across x, steeper on one side.
-
-        Args:
-            size: Extent along x and z, m: one number, or two.
-            spacing: Distance of columns and of rows, m.
-            roughness: Root mean square of the rough part's heights, m.
-            hurst: Hurst exponent, in (0, 1); 0.7 by default.
-            longest_wave: Longest wave, m; half the smaller extent by default.
-            craters: Expected number of craters in each m² of a diameter of 1 m or more; 0 by
-                default.
-            crater_diameter: Smallest and largest diameter of craters, m; (0.5, 5) by default.
-            ripple_height: Height of ripples from trough to crest, m; 0 by default.
-            ripple_length: Their wavelength, m.
-            seed: Seed of the random numbers; equal seeds give equal ground.
-            origin: Place (x, z) of the first height, m; by default such that the map's middle is
-                at the world's origin.
-            material: Name of its material.
-
-        Raises:
-            TerrainError: An argument is out of its range.
-
-        Source: Turcotte 1997 (spectral synthesis); Pike 1977 and McGetchin, Settle and Head
-        1973 (craters).
-        """
+    from_file = staticmethod(terrain_files.height_field_from_file)
+    fractal = staticmethod(terrain_files.fractal)
     @property
     def material(self) -> str:
         """Name of its material."""
@@ -1083,31 +857,7 @@ class TriangleMesh(Terrain):
     """
 
     def __new__(cls, vertices: npt.ArrayLike, triangles: npt.ArrayLike, material: str = "ground") -> TriangleMesh: ...
-    @staticmethod
-    def from_file(
-        path: str | PathLike[str],
-        *,
-        scale: float = 1.0,
-        position: tuple[float, float, float] = (0.0, 0.0, 0.0),
-        up: Literal["y", "z"] = "y",
-        material: str = "ground",
-    ) -> TriangleMesh:
-        """Reads a mesh from a file: OBJ, PLY, STL, GLB and what else `trimesh` reads.
-
-        Equal corners are joined, and triangles without an area are left out.
-
-        Args:
-            path: Path of the file; its ending tells the format.
-            scale: Factor from the file's numbers to m.
-            position: Place of the file's origin, (3,), m; the world's origin by default.
-            up: Axis of the file that points up: "y" or "z".
-            material: Name of its material.
-
-        Raises:
-            TerrainError: The file holds no such mesh; the message names it.
-            OSError: The file cannot be read.
-            MissingExtraError: The extra `maps` is not installed.
-        """
+    from_file = staticmethod(terrain_files.triangle_mesh_from_file)
     @property
     def material(self) -> str:
         """Name of its material."""
