@@ -55,7 +55,7 @@ def _read(
     frames: int = 3,
     **limits: float | None,
 ) -> tuple[RoverModel, ImportReport]:
-    """Reads a file; `frames`: calls from here to the user's, whose line a warning names; `limits`: as `WheelOptions`."""
+    """Reads a file; `frames`: calls from here to the user's, whose line a warning names; `limits`: of wheels."""
     place = checked_path(path)
     if free_base is not None and not isinstance(free_base, bool):
         refuse(ModelError, "free_base", free_base, "must be True or False")
