@@ -34,6 +34,7 @@ class _SparseArray(Protocol):
     def tobsr(self, blocksize: tuple[int, int] | None = ..., copy: bool = ...) -> Any: ...
 
 __all__ = [
+    "AnySimulation",
     "BallSimulation",
     "BusyError",
     "CommandError",
@@ -48,7 +49,6 @@ __all__ = [
     "FrictionContactSolution",
     "GrainContacts",
     "GrainSimulation",
-    "GrainSnapshot",
     "HeightField",
     "Line",
     "Linearisation",
@@ -60,12 +60,10 @@ __all__ = [
     "PlanarContacts",
     "PlanarGround",
     "PlanarSimulation",
-    "PlanarSnapshot",
     "Plane",
     "Polyline",
     "ProblemError",
     "RoverGrainSimulation",
-    "RoverGrainSnapshot",
     "RoverGymError",
     "RoverModel",
     "Silo",
@@ -74,9 +72,7 @@ __all__ = [
     "Sine",
     "Snapshot",
     "SoftGround",
-    "SoilContacts",
     "SoilSimulation",
-    "SoilSnapshot",
     "SolverReport",
     "SphereField",
     "Spline",
@@ -1250,13 +1246,58 @@ class Snapshot:
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
 
+@disjoint_base
+class AnySimulation:
+    """What all simulations share. Made by the classes derived from it.
+
+    They are `Simulation`, `PlanarSimulation`, `SoilSimulation`, `GrainSimulation` and
+    `RoverGrainSimulation`.
+
+    One call at a time: a call during another one, from another thread or a signal handler, raises
+    BusyError.
+    """
+
+    @property
+    def time(self) -> float:
+        """Time since the last call of `set_state`, s; of a rover among grains that of the grains."""
+    @property
+    def time_step(self) -> float:
+        """Time step, s."""
+    def step(self, n: int = 1) -> StepReport:
+        """Takes n steps.
+
+        Other threads run meanwhile. Ctrl-C, or whatever else a signal handler raises, ends the call
+        after a whole step, whose state stays. A contact solver that does not converge is no error:
+        the report says so.
+
+        Args:
+            n: Number of steps.
+
+        Raises:
+            StepError: A step could not be taken; the state before it stays.
+            OptionError: `n` is not a count.
+        """
+    def energy(self) -> Energy:
+        """Kinetic and potential energy now."""
+    def snapshot(self) -> Snapshot:
+        """Everything that is needed to continue bit for bit."""
+    def restore(self, snapshot: Snapshot) -> None:
+        """Goes back to a snapshot.
+
+        Args:
+            snapshot: A snapshot of the same kind of simulation, with the same model or grains.
+
+        Raises:
+            StateError: The snapshot belongs to another simulation or is damaged. Nothing has
+                changed.
+        """
+
 @final
-class Simulation:
+class Simulation(AnySimulation):
     """A rover on a terrain, stepped through time.
 
     It starts at rest with all coordinates 0, with its steering held at 0 and every other joint
-    free. One call at a time: a call during another one, from another thread or a signal handler,
-    raises BusyError.
+    free.
 
     Args:
         model: The machine; the built-in rover by default.
@@ -1333,12 +1374,6 @@ class Simulation:
         Raises:
             BusyError: Another thread is stepping this simulation.
         """
-    @property
-    def time(self) -> float:
-        """Time since the last call of `set_state`, s."""
-    @property
-    def time_step(self) -> float:
-        """Time step, s."""
     @property
     def gravity(self) -> _Array:
         """Gravity, world frame, (3,), m/s²."""
@@ -1491,20 +1526,6 @@ class Simulation:
         """
     def brake(self) -> None:
         """Holds all wheels where they are, as `hold` does, and sets their torques to 0."""
-    def step(self, n: int = 1) -> StepReport:
-        """Takes n steps.
-
-        Other threads run meanwhile. Ctrl-C, or whatever else a signal handler raises, ends the call
-        after a whole step, whose state stays. A contact solver that does not converge is no error:
-        the report says so.
-
-        Args:
-            n: Number of steps.
-
-        Raises:
-            StepError: A step could not be taken; the state before it stays.
-            OptionError: `n` is not a count.
-        """
     @property
     def contacts(self) -> Contacts:
         """The contacts of the last step."""
@@ -1602,8 +1623,6 @@ class Simulation:
         Raises:
             OptionError: As of `Plane.cast_rays`, or `without` names no solid of the model.
         """
-    def energy(self) -> Energy:
-        """Kinetic and potential energy now."""
     def momentum(self) -> tuple[_Array, _Array]:
         """Momentum of the rover.
 
@@ -1617,17 +1636,6 @@ class Simulation:
         """Named points and axes of the machine now, world frame, (3,) by name, as `RoverModel.tags`."""
     def poses(self) -> dict[str, tuple[_Array, _Array]]:
         """Origin (3,), m, and rotation matrix (3, 3) of every solid now, world frame, by name."""
-    def snapshot(self) -> Snapshot:
-        """Everything that is needed to continue bit for bit."""
-    def restore(self, snapshot: Snapshot) -> None:
-        """Goes back to a snapshot.
-
-        Args:
-            snapshot: A snapshot of a simulation of the same model.
-
-        Raises:
-            StateError: The snapshot belongs to another model or is damaged. Nothing has changed.
-        """
     def last_problem(self) -> tuple[_Array, _Array, _Array]:
         """The friction-contact problem of the last step, of the last part of a split one.
 
@@ -1831,42 +1839,13 @@ class PlanarContacts:
         """Velocities of the rim after the step along normal and tangent, (n, 2), m/s."""
     def __len__(self) -> int: ...
 
-@final
-class PlanarSnapshot:
-    """Everything that a planar simulation needs to continue bit for bit. Picklable."""
-
-    @staticmethod
-    def from_bytes(data: bytes) -> PlanarSnapshot:
-        """Reads a snapshot.
-
-        Args:
-            data: What `to_bytes` returned.
-
-        Raises:
-            StateError: The bytes are not those of a snapshot.
-        """
-    def to_bytes(self) -> bytes:
-        """The snapshot as bytes, as `from_bytes` reads them."""
-    def __eq__(self, other: object, /) -> bool: ...
-    def __hash__(self) -> int: ...
-    def __reduce__(self) -> Any: ...
-
 @disjoint_base
-class PlanarSimulation:
-    """A planar machine on a ground: what the machines share. Made by the classes derived from it.
-
-    One call at a time, as of `Simulation`.
-    """
+class PlanarSimulation(AnySimulation):
+    """A planar machine on a ground: what the machines share. Made by the classes derived from it."""
 
     @property
     def ground(self) -> PlanarGround:
         """The ground."""
-    @property
-    def time(self) -> float:
-        """Time since the last call of `set_state`, s."""
-    @property
-    def time_step(self) -> float:
-        """Time step, s."""
     @property
     def q(self) -> _Array:
         """Coordinates, (nv,), x and y, m, then angles, rad, which turn to the left."""
@@ -1910,20 +1889,9 @@ class PlanarSimulation:
         Raises:
             CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
         """
-    def step(self, n: int = 1) -> StepReport:
-        """Takes n steps, as `Simulation.step` does.
-
-        Args:
-            n: Number of steps.
-
-        Raises:
-            StepError: A step could not be taken; the state before it stays.
-        """
     @property
     def contacts(self) -> PlanarContacts:
         """The contacts of the last step."""
-    def energy(self) -> Energy:
-        """Kinetic and potential energy now."""
     def mass_matrix(self) -> _Array:
         """Mass matrix now, (nv, nv), in kg, kg m and kg m²."""
     def last_problem(self) -> tuple[_Array, _Array, _Array]:
@@ -1932,17 +1900,6 @@ class PlanarSimulation:
         Returns:
             Delassus operator W, (2 n_c, 2 n_c), 1/kg; free velocity, (2 n_c,), m/s; friction
             coefficients, (n_c,).
-        """
-    def snapshot(self) -> PlanarSnapshot:
-        """Everything that is needed to continue bit for bit."""
-    def restore(self, snapshot: PlanarSnapshot) -> None:
-        """Goes back to a snapshot.
-
-        Args:
-            snapshot: A snapshot of a simulation of the same machine.
-
-        Raises:
-            StateError: The snapshot belongs to another machine or is damaged. Nothing has changed.
         """
     def __reduce__(self) -> Any: ...
 
@@ -2735,65 +2692,10 @@ class EpisodeBatch:
     def __len__(self) -> int: ...
 
 @final
-class SoilContacts:
-    """The contacts of a soil's last step, as new arrays with one row a contact.
-
-    Contacts between sleeping disks are left out.
-    """
-
-    @property
-    def bodies(self) -> npt.NDArray[np.int64]:
-        """Numbers of both bodies, (n, 2), disks from 0, then the wheels; -1 for a wall or the ground."""
-    @property
-    def points(self) -> npt.NDArray[np.float64]:
-        """Points of the first body's rim, (n, 2), m."""
-    @property
-    def normals(self) -> npt.NDArray[np.float64]:
-        """Unit normals from the second body into the first, (n, 2)."""
-    @property
-    def gaps(self) -> npt.NDArray[np.float64]:
-        """Gaps at the start of the step, (n,), m; negative where bodies overlap."""
-    @property
-    def impulses(self) -> npt.NDArray[np.float64]:
-        """Impulses on the first body along the normal and the tangent (n_y, -n_x), (n, 2), N s."""
-    @property
-    def velocities(self) -> npt.NDArray[np.float64]:
-        """Relative velocities after the step along normal and tangent, (n, 2), m/s.
-
-        Of the first body against the second.
-        """
-    @property
-    def world_impulses(self) -> npt.NDArray[np.float64]:
-        """Impulses on the first body along x and y, (n, 2), N s."""
-    def __len__(self) -> int: ...
-
-@final
-class SoilSnapshot:
-    """Everything that a soil needs to continue bit for bit. Picklable."""
-
-    @staticmethod
-    def from_bytes(data: bytes) -> SoilSnapshot:
-        """Reads a snapshot.
-
-        Args:
-            data: What `to_bytes` returned.
-
-        Raises:
-            StateError: The bytes are not those of a snapshot.
-        """
-    def to_bytes(self) -> bytes:
-        """The snapshot as bytes, as `from_bytes` reads them."""
-    def __eq__(self, other: object, /) -> bool: ...
-    def __hash__(self) -> int: ...
-    def __reduce__(self) -> Any: ...
-
-@final
-class SoilSimulation:
+class SoilSimulation(AnySimulation):
     """A granular soil of disks, and a machine that drives on it.
 
     The disks are free, with friction, between walls or on a ground.
-
-    One call at a time, as of `Simulation`.
 
     Args:
         radius: Radii of the disks, (n,), m.
@@ -2863,12 +2765,6 @@ class SoilSimulation:
         sleep_speed: float | None = None,
         sleep_distance: float | None = None,
     ) -> SoilSimulation: ...
-    @property
-    def time(self) -> float:
-        """Time since the last call of `set_state`, s."""
-    @property
-    def time_step(self) -> float:
-        """Time step, s."""
     @property
     def radius(self) -> npt.NDArray[np.float64]:
         """Radii of the disks, (n,), m."""
@@ -2953,20 +2849,9 @@ class SoilSimulation:
         Raises:
             CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
         """
-    def step(self, n: int = 1) -> StepReport:
-        """Takes n steps, as `Simulation.step` does.
-
-        Args:
-            n: Number of steps.
-
-        Raises:
-            StepError: A step could not be taken; the state before it stays.
-        """
     @property
-    def contacts(self) -> SoilContacts:
+    def contacts(self) -> GrainContacts:
         """The contacts of the last step."""
-    def energy(self) -> Energy:
-        """Kinetic and potential energy now."""
     def momentum(self) -> npt.NDArray[np.float64]:
         """Momentum of the disks, (3,): along x and y, kg m/s, and about the origin, kg m²/s.
 
@@ -2978,17 +2863,6 @@ class SoilSimulation:
         """Deepest overlap now, m."""
     def wake(self) -> None:
         """Wakes all disks."""
-    def snapshot(self) -> SoilSnapshot:
-        """Everything that is needed to continue bit for bit."""
-    def restore(self, snapshot: SoilSnapshot) -> None:
-        """Goes back to a snapshot.
-
-        Args:
-            snapshot: A snapshot of the same soil.
-
-        Raises:
-            StateError: The snapshot belongs to another soil or is damaged. Nothing has changed.
-        """
 
 @final
 class Drum:
@@ -3060,68 +2934,49 @@ class Silo:
 
 @final
 class GrainContacts:
-    """The contacts of the last step of grains in space, as new arrays with one row a contact.
+    """The contacts of the last step of grains, as new arrays with one row a contact.
 
-    Contacts between sleeping balls are left out.
+    Vectors have D entries: 2 of disks in the plane, 3 of balls in space. Contacts between sleeping
+    grains are left out.
     """
 
     @property
     def bodies(self) -> npt.NDArray[np.int64]:
-        """Numbers of both bodies, (n, 2), balls from 0; -1 for a wall or the terrain."""
+        """Numbers of both bodies, (n, 2), grains from 0, then wheels; -1 for a wall or the ground."""
     @property
     def points(self) -> _Array:
-        """Points of the first body's surface, (n, 3), m."""
+        """Points of the first body's surface, (n, D), m."""
     @property
     def normals(self) -> _Array:
-        """Unit normals from the second body into the first, (n, 3)."""
+        """Unit normals from the second body into the first, (n, D)."""
     @property
     def frames(self) -> _Array:
-        """Contact frames, world frame, (n, 3, 3).
+        """Contact frames, world frame, (n, D, D).
 
-        Rows are the unit vectors n (normal), t and b (tangents).
+        Rows are the unit vectors n (normal), t and b (tangents); t = (n_y, -n_x) in the plane.
         """
     @property
     def gaps(self) -> _Array:
         """Gaps at the start of the step, (n,), m; negative where bodies overlap."""
     @property
     def impulses(self) -> _Array:
-        """Impulses on the first body along n, t, b of `frames`, (n, 3), N s.
+        """Impulses on the first body along n, t, b of `frames`, (n, D), N s.
 
         Cohesion is part of the normal ones, which are negative where a contact bears tension.
         """
     @property
     def velocities(self) -> _Array:
-        """Velocities of the first body against the second after the step along n, t, b, (n, 3), m/s."""
+        """Velocities of the first body against the second after the step along n, t, b, (n, D), m/s."""
     @property
     def world_impulses(self) -> _Array:
-        """Impulses on the first body along x, y, z, (n, 3), N s."""
+        """Impulses on the first body along x, y, z, (n, D), N s."""
     def __len__(self) -> int: ...
 
 @final
-class GrainSnapshot:
-    """Everything that grains in space need to continue bit for bit. Picklable."""
-
-    @staticmethod
-    def from_bytes(data: bytes) -> GrainSnapshot:
-        """Reads a snapshot.
-
-        Args:
-            data: What `to_bytes` returned.
-
-        Raises:
-            StateError: The bytes are not those of a snapshot.
-        """
-    def to_bytes(self) -> bytes:
-        """The snapshot as bytes, as `from_bytes` reads them."""
-    def __eq__(self, other: object, /) -> bool: ...
-    def __hash__(self) -> int: ...
-    def __reduce__(self) -> Any: ...
-
-@final
-class GrainSimulation:
+class GrainSimulation(AnySimulation):
     """Grains in space: free balls with friction, between walls or on a terrain.
 
-    World axes: x forward, y up, z to the right. One call at a time, as of `Simulation`.
+    World axes: x forward, y up, z to the right.
 
     Args:
         radius: Radii of the balls, (n,), m.
@@ -3199,12 +3054,6 @@ class GrainSimulation:
         sleep_distance: float | None = None,
         threads: int = 1,
     ) -> GrainSimulation: ...
-    @property
-    def time(self) -> float:
-        """Time since the last call of `set_state`, s."""
-    @property
-    def time_step(self) -> float:
-        """Time step, s."""
     @property
     def radius(self) -> _Array:
         """Radii of the balls, (n,), m."""
@@ -3298,20 +3147,9 @@ class GrainSimulation:
             StateError: An array has a wrong shape or an entry that is not finite. Nothing has
                 changed.
         """
-    def step(self, n: int = 1) -> StepReport:
-        """Takes n steps, as `Simulation.step` does.
-
-        Args:
-            n: Number of steps.
-
-        Raises:
-            StepError: A step could not be taken; the state before it stays.
-        """
     @property
     def contacts(self) -> GrainContacts:
         """The contacts of the last step."""
-    def energy(self) -> Energy:
-        """Kinetic and potential energy now."""
     def momentum(self) -> _Array:
         """Momentum of the balls, (6,): along x, y, z, kg m/s, and about the origin, kg m²/s.
 
@@ -3321,40 +3159,9 @@ class GrainSimulation:
         """Deepest overlap now, m."""
     def wake(self) -> None:
         """Wakes all balls."""
-    def snapshot(self) -> GrainSnapshot:
-        """Everything that is needed to continue bit for bit."""
-    def restore(self, snapshot: GrainSnapshot) -> None:
-        """Goes back to a snapshot.
-
-        Args:
-            snapshot: A snapshot of the same grains.
-
-        Raises:
-            StateError: The snapshot belongs to other grains or is damaged. Nothing has changed.
-        """
 
 @final
-class RoverGrainSnapshot:
-    """Everything that a rover among grains needs to continue bit for bit. Picklable."""
-
-    @staticmethod
-    def from_bytes(data: bytes) -> RoverGrainSnapshot:
-        """Reads a snapshot.
-
-        Args:
-            data: What `to_bytes` returned.
-
-        Raises:
-            StateError: The bytes are not those of a snapshot.
-        """
-    def to_bytes(self) -> bytes:
-        """The snapshot as bytes, as `from_bytes` reads them."""
-    def __eq__(self, other: object, /) -> bool: ...
-    def __hash__(self) -> int: ...
-    def __reduce__(self) -> Any: ...
-
-@final
-class RoverGrainSimulation:
+class RoverGrainSimulation(AnySimulation):
     """A rover among grains in space, stepped together.
 
     Wheels, boxes and balls of the rover meet the grains with exact contact and friction, and forces
@@ -3387,21 +3194,6 @@ class RoverGrainSimulation:
     def wheel_friction(self) -> float:
         """Coulomb's coefficient between the rover and grains."""
     @property
-    def time(self) -> float:
-        """Time of the grains, s."""
-    @property
-    def time_step(self) -> float:
-        """Time step, s."""
-    def step(self, n: int = 1) -> StepReport:
-        """Takes n steps with both, as `Simulation.step` does.
-
-        Args:
-            n: Number of steps.
-
-        Raises:
-            StepError: A step could not be taken; the state before it stays.
-        """
-    @property
     def wheel_gaps(self) -> npt.NDArray[np.float64]:
         """Gap of each wheel now to the nearest grain or the terrain, (n_wheels,), m.
 
@@ -3409,18 +3201,6 @@ class RoverGrainSimulation:
         """
     def penetration(self) -> float:
         """Deepest overlap now, m: of grains with anything, and of the rover with grains."""
-    def snapshot(self) -> RoverGrainSnapshot:
-        """Everything that is needed to continue bit for bit."""
-    def restore(self, snapshot: RoverGrainSnapshot) -> None:
-        """Goes back to a snapshot.
-
-        Args:
-            snapshot: A snapshot of the same rover among the same grains.
-
-        Raises:
-            StateError: The snapshot belongs to another rover or other grains, or is damaged.
-                Nothing has changed.
-        """
 
 def seed_generators(seeds: Sequence[int]) -> _Rows:
     """Seeds generators as `numpy.random.PCG64` does.

@@ -27,7 +27,7 @@ from rover_gym.grains import (
     tiled,
     with_wheel_width,
 )
-from rover_gym.mechanics import Drum, GrainSimulation, GrainSnapshot, Silo, arrange_balls, ball_packing
+from rover_gym.mechanics import Drum, GrainSimulation, Silo, Snapshot, arrange_balls, ball_packing
 from rover_gym.runs import open_run
 
 G = 9.81
@@ -148,7 +148,7 @@ def bed() -> BallBed:
 def test_a_snapshot_continues_bit_for_bit_and_balls_can_be_taken(bed: BallBed) -> None:
     sim = bed.simulation(walls=bed.walls[:4])
     sim.step(20)
-    taken = GrainSnapshot.from_bytes(sim.snapshot().to_bytes())
+    taken = Snapshot.from_bytes(sim.snapshot().to_bytes())
     sim.step(20)
     other = bed.simulation(walls=bed.walls[:4])
     other.restore(taken)

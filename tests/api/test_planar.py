@@ -12,6 +12,7 @@ import pytest
 from rover_gym import CommandError, ModelError, OptionError, StateError, TerrainError
 from rover_gym.figures import draw_run
 from rover_gym.figures.grain_frames import draw_soil
+from rover_gym.mechanics import Snapshot
 from rover_gym.planar import (
     BallSimulation,
     Line,
@@ -29,7 +30,6 @@ from rover_gym.soil import (
     Pull,
     SoilRun,
     SoilSimulation,
-    SoilSnapshot,
     drawbar_pull,
     drive_on_soil,
     fit_traction,
@@ -330,7 +330,7 @@ def test_the_rover_drives_and_a_snapshot_continues_bit_for_bit(bed: Bed, tmp_pat
     sim.set_torques([50.0, 50.0])
     start = sim.machine
     sim.step(40)
-    snapshot = SoilSnapshot.from_bytes(sim.snapshot().to_bytes())
+    snapshot = Snapshot.from_bytes(sim.snapshot().to_bytes())
     assert snapshot == sim.snapshot()
     pressed = sim.impulse_on_wheels()
     path = tmp_path / "soil.h5"

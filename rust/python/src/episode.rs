@@ -351,7 +351,7 @@ impl EpisodeRun {
         let (action, normals) = given(&rules, action, normals)?;
         let among = simulation.cast::<RoverGrainSimulation>().ok();
         let mut rover = match among {
-            Some(among) => among.get().of_rover().open()?,
+            Some(among) => among.get().together.rover.open()?,
             None => self::simulation(simulation, "simulation")?.get().open()?,
         };
         rules.check_model(rover.model())?;
@@ -359,7 +359,7 @@ impl EpisodeRun {
         let mut watch = Watch::new();
         let substeps = rules.settings().substeps;
         let moving = &mut *rover;
-        let among = among.map(pyo3::Bound::get);
+        let among = among.map(|among| &among.get().together);
         let done = py.detach(|| match among {
             Some(among) => among.step_with(moving, substeps, &mut || watch.go_on()),
             None => Ok(moving.step_while(substeps, &mut || watch.go_on())),
