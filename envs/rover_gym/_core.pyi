@@ -2793,6 +2793,9 @@ class SoilSimulation(AnySimulation):
     def wheels(self) -> npt.NDArray[np.float64]:
         """Centre and radius of each wheel, (n_wheels, 3), m."""
     @property
+    def walls(self) -> _Array:
+        """A point of each wall and the normal to its free side, (m, 4), m."""
+    @property
     def torques(self) -> npt.NDArray[np.float64]:
         """Commanded torques of the rover's wheels, (2,), N m, positive forward; empty without a rover."""
     @property

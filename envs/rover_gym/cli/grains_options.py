@@ -70,13 +70,13 @@ def recorded(
     until: Callable[[Any], bool] = lambda _: False,
 ) -> "GrainRun":
     """Records a run, films it if wanted, says where both are, and reads it back."""
-    from rover_gym.grains.grain_run import GrainRun, record_grains  # noqa: PLC0415 - as above
-    from rover_gym.runs import open_run  # noqa: PLC0415 - as above
+    from rover_gym.grains.grain_run import GrainRun  # noqa: PLC0415 - as above
+    from rover_gym.runs import open_run, record_run  # noqa: PLC0415 - as above
 
     path = given.output / f"{name}.h5"
     with results.keeping("trajectory", path), progress_bar() as bar:
         task = bar.add_task(name, total=given.duration, state="")
-        record_grains(
+        record_run(
             sim,
             given.duration,
             path,

@@ -23,8 +23,8 @@ from rover_gym.mechanics import (
     Spline,
     TwoWheelRoverSimulation,
 )
-from rover_gym.planar.planar_run import PlanarRun, describe_planar, record_planar
-from rover_gym.runs import open_run
+from rover_gym.planar.planar_run import PlanarRun
+from rover_gym.runs import open_run, record_run
 from rover_gym.validation import number, refuse
 
 planar = typer.Typer(
@@ -186,11 +186,12 @@ def _run(sim: PlanarSimulation, who: str, given: Course, path: Path) -> None:
     with Results(as_json=given.as_json) as results:
         with results.keeping("trajectory", path), progress_bar() as bar:
             task = bar.add_task(who, total=longest, state="")
-            rows = record_planar(
+            rows = record_run(
                 sim,
+                longest,
                 path,
-                describe_planar(sim, title),
-                duration=longest,
+                None,
+                title=title,
                 until=lambda now: bool(abs(now.q[0] - start) >= farthest),
                 progress=lambda time: bar.update(task, completed=time, state=f"{time:.1f} s"),
             )

@@ -123,12 +123,12 @@ def _cross(
     video: bool,
 ) -> None:
     from rover_gym.figures.grain_frames import draw_soil, film_soil  # noqa: PLC0415 - matplotlib is slow to load
-    from rover_gym.runs import open_run  # noqa: PLC0415 - as above
+    from rover_gym.runs import open_run, record_run  # noqa: PLC0415 - as above
     from rover_gym.soil.bed import (  # noqa: PLC0415
         rover_on_soil,
         settled_bed,
     )
-    from rover_gym.soil.soil_run import SoilRun, record_soil  # noqa: PLC0415 - as above
+    from rover_gym.soil.soil_run import SoilRun  # noqa: PLC0415 - as above
 
     _check_width("disks", disks, layers, CROSSING)
     bed = settled_bed(disks, layers, seed=seed, **options)
@@ -139,13 +139,12 @@ def _cross(
     rate = FRAMES * float(np.sqrt(-options["gravity"][1] / EARTH))
     with results.keeping("trajectory", path), progress_bar() as bar:
         task = bar.add_task("soil", total=duration, state="")
-        rows = record_soil(
+        rows = record_run(
             sim,
+            duration,
             path,
-            title,
-            duration=duration,
-            steps_per_row=max(1, round(0.5 / rate / sim.time_step)),
-            walls=bed.walls,
+            2.0 * rate,
+            title=title,
             until=lambda now: bool(now.wheels[-1, 0] + now.wheels[-1, 2] > bed.width - END),
             progress=lambda time: bar.update(task, completed=time, state=f"{time:.1f} s"),
         )

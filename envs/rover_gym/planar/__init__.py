@@ -25,10 +25,8 @@ from rover_gym.mechanics import (
 from rover_gym.planar.planar_run import (
     PlanarRun,
     PlanarSampler,
-    describe_planar,
     is_planar,
     planar_run_of,
-    record_planar,
 )
 
 __all__ = [
@@ -44,8 +42,6 @@ __all__ = [
     "Sine",
     "Spline",
     "TwoWheelRoverSimulation",
-    "describe_planar",
     "is_planar",
     "planar_run_of",
-    "record_planar",
 ]

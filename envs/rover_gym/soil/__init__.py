@@ -9,7 +9,7 @@
 
 from rover_gym.mechanics import GrainContacts, SoilSimulation, soil_packing
 from rover_gym.soil.bed import Bed, rover_on_soil, settled_bed
-from rover_gym.soil.soil_run import SoilRun, SoilSampler, record_soil
+from rover_gym.soil.soil_run import SoilRun, SoilSampler
 from rover_gym.soil.soil_trials import (
     BedEstimate,
     Pull,
@@ -35,7 +35,6 @@ __all__ = [
     "drive_on_soil",
     "fit_traction",
     "over_beds",
-    "record_soil",
     "rover_on_soil",
     "settled_bed",
     "soil_packing",

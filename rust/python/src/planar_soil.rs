@@ -230,6 +230,16 @@ impl SoilSimulation {
         ))
     }
 
+    /// A point of each wall and the normal to its free side, (m, 4), m.
+    #[getter]
+    fn walls(&self) -> Result<Array> {
+        let inner = self.open()?;
+        Ok(fresh_rows(inner.soil().walls.iter().map(|wall| {
+            let (n, point) = (wall.n(), wall.n() * wall.offset());
+            [point.x, point.y, n.x, n.y]
+        })))
+    }
+
     /// Commanded torques of the rover's wheels, (2,), N m, positive forward; empty without a rover.
     #[getter]
     fn torques(&self) -> Result<Array> {
