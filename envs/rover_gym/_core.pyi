@@ -20,7 +20,6 @@ _Observation: TypeAlias = npt.NDArray[np.float32]
 _Terrains: TypeAlias = "Sequence[Terrain]"
 _Coordinates: TypeAlias = Literal["report", "state"]
 _Range: TypeAlias = tuple[float, float]
-_Outcome: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike, str]
 _MaterialRow: TypeAlias = tuple[str, str, float, float]
 _Materials: TypeAlias = Mapping[tuple[str, str], tuple[float, float]] | Sequence[_MaterialRow]
 
@@ -2149,48 +2148,9 @@ class EpisodeRules:
 class EpisodeRun:
     """One episode of a driving task: what its simulation does not hold.
 
-    Args:
-        rules: What all episodes of the task share.
-        goal: The goal (x, z), m.
-        domain: Properties of rover and world: mass_scale, friction, actuator_gain, gravity_scale.
-        trunk_load_limit: Force on the trunk beyond which the rover is high-centred, N.
-        difficulty: Difficulty of the rocks.
-        distance: Horizontal distance to the goal, m.
-        previous_action: The last action, (n_actions,).
-        energy: Work of the motors since the beginning, driving or braking, J.
-        energy_positive: Its driving part, J.
-        stuck_time: How long the rover has been high-centred, s.
-        observation: The last observation, (size,).
-        further: Goals after the first, (n, 2), x and z, m; none by default.
-        reached: How many goals have been reached.
-        outcome: What else is known of the last control period, as `state` returns it; by default
-            the episode runs, and its info tells its progress only.
-        owed: Standard normal numbers of an observation that lacks its heights, (size,), or (0,)
-            without noise; None where it lacks none.
-
-    Raises:
-        OptionError: An argument has a wrong shape or a number that is not finite.
+    `begin` and `from_bytes` make one.
     """
 
-    def __new__(
-        cls,
-        rules: EpisodeRules,
-        *,
-        goal: Sequence[float],
-        domain: npt.ArrayLike,
-        trunk_load_limit: float,
-        difficulty: float,
-        distance: float,
-        previous_action: npt.ArrayLike,
-        energy: float,
-        energy_positive: float,
-        stuck_time: float,
-        observation: npt.ArrayLike,
-        further: npt.ArrayLike | None = None,
-        reached: int = 0,
-        outcome: _Outcome | None = None,
-        owed: npt.ArrayLike | None = None,
-    ) -> EpisodeRun: ...
     @staticmethod
     def begin(
         rules: EpisodeRules,
@@ -2209,12 +2169,13 @@ class EpisodeRun:
             rules: What all episodes of the task share.
             simulation: The rover at its start.
             goal: The goal (x, z), m.
-            domain: As of the class.
+            domain: Properties of rover and world: mass_scale, friction, actuator_gain,
+                gravity_scale.
             trunk_load_limit: Force on the trunk beyond which the rover is high-centred, N.
             difficulty: Difficulty of the rocks.
             normals: A standard normal number for each entry of the observation, (size,), where the
                 rules have noise.
-            further: As of the class.
+            further: Goals after the first, (n, 2), x and z, m; none by default.
 
         Returns:
             The episode; None if its observation is not finite in float32.
@@ -2289,13 +2250,51 @@ class EpisodeRun:
     def observation(self) -> _Observation:
         """The last observation, (size,) float32."""
     @property
+    def previous_action(self) -> _Array:
+        """The last action, (n_actions,); zeros at the beginning."""
+    @property
     def goal(self) -> _Range:
         """The present goal (x, z), m; the last one where all are reached."""
     def info(self) -> dict[str, Any]:
         """The info of the last period, or of the beginning."""
-    def state(self) -> dict[str, Any]:
-        """The keyword arguments that make an episode which continues as this one."""
-    def __getnewargs_ex__(self) -> tuple[tuple[EpisodeRules], dict[str, Any]]: ...
+    def changed(
+        self,
+        *,
+        goal: Sequence[float] | None = None,
+        distance: float | None = None,
+        domain: npt.ArrayLike | None = None,
+        trunk_load_limit: float | None = None,
+        seen: EpisodeRun | None = None,
+    ) -> EpisodeRun:
+        """The same episode with other properties, another goal, or seen by other rules.
+
+        Args:
+            goal: The first goal, (x, z), m; none counts as reached, and an episode that has ended
+                goes on.
+            distance: Horizontal distance to the present goal, m.
+            domain: Properties of rover and world, as of `begin`.
+            trunk_load_limit: Force on the trunk beyond which the rover is high-centred, N.
+            seen: An episode whose rules and observation are taken over.
+
+        Raises:
+            OptionError: An argument has a wrong shape or a number that is not finite, or does not
+                fit the rules.
+        """
+    def to_bytes(self) -> bytes:
+        """All that an episode holds, as `from_bytes` reads it."""
+    @staticmethod
+    def from_bytes(rules: EpisodeRules, data: bytes) -> EpisodeRun:
+        """An episode that goes on.
+
+        Args:
+            rules: What all episodes of the task share.
+            data: What `to_bytes` returned.
+
+        Raises:
+            StateError: The bytes are not those of an episode.
+            OptionError: The episode does not fit the rules.
+        """
+    def __reduce__(self) -> Any: ...
 
 @final
 class EpisodeDistribution:

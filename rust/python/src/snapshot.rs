@@ -7,6 +7,7 @@ use pyo3::types::PyBytes;
 use rover_core::simulation::{
     GrainBed, PlanarScene, RoverScene, Scene, Simulation, Snapshot as SnapshotOf,
 };
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::arguments;
@@ -79,15 +80,28 @@ pub fn snapshot<'a, 'py>(given: &'a Bound<'py, PyAny>) -> Result<&'a Bound<'py, 
     found.map_err(|_| arguments::refused(given, Kind::State, "snapshot", "a Snapshot"))
 }
 
-/// A snapshot whose bytes cannot be read.
-fn damaged(reason: &impl ToString) -> BorderError {
-    let message = format!("snapshot: its bytes are damaged ({})", reason.to_string());
-    Kind::State.error("snapshot", message, Value::Nothing)
+/// Bytes of a snapshot or an episode that cannot be read.
+pub fn damaged(field: &str, reason: &impl ToString) -> BorderError {
+    let message = format!("{field}: its bytes are damaged ({})", reason.to_string());
+    Kind::State.error(field, message, Value::Nothing)
+}
+
+/// Reads exactly these bytes.
+pub fn read_bytes<T: DeserializeOwned>(data: &Bound<'_, PyAny>, field: &str) -> Result<T> {
+    let wrong = |_| arguments::refused(data, Kind::State, "data", "bytes");
+    let data: &[u8] = data.extract().map_err(wrong)?;
+    match postcard::take_from_bytes(data).map_err(|e| damaged(field, &e))? {
+        (kept, []) => Ok(kept),
+        (_, rest) => {
+            let reason = format!("{} bytes follow its end", rest.len());
+            Err(damaged(field, &reason))
+        }
+    }
 }
 
 impl Snapshot {
     fn bytes(&self) -> Result<Vec<u8>> {
-        postcard::to_stdvec(&self.0).map_err(|e| damaged(&e))
+        postcard::to_stdvec(&self.0).map_err(|e| damaged("snapshot", &e))
     }
 }
 
@@ -102,12 +116,7 @@ impl Snapshot {
     ///     StateError: The bytes are not those of a snapshot.
     #[staticmethod]
     fn from_bytes(data: &Bound<'_, PyAny>) -> Result<Self> {
-        let wrong = |_| arguments::refused(data, Kind::State, "data", "bytes");
-        let data: &[u8] = data.extract().map_err(wrong)?;
-        match postcard::take_from_bytes(data).map_err(|e| damaged(&e))? {
-            (kept, []) => Ok(Self(kept)),
-            (_, rest) => Err(damaged(&format!("{} bytes follow its end", rest.len()))),
-        }
+        Ok(Self(read_bytes(data, "snapshot")?))
     }
 
     /// The snapshot as bytes, as `from_bytes` reads them.
