@@ -6,6 +6,7 @@ use std::sync::Arc;
 use rover_core::contact::Activation;
 use rover_core::geometry::{Plane, SphereField, Terrain};
 use rover_core::integrator::{MechanicalSystem, Stabilisation, StepOptions, StepReport};
+use rover_core::law::rolling::RollingFriction;
 use rover_core::multibody::{Model, coordinates};
 use rover_core::nalgebra::Vector3;
 use rover_core::simulation::{
@@ -89,6 +90,18 @@ fn balls(
     kinematic: bool,
     options: &StepOptions,
 ) -> GrainSimulation<3> {
+    let friction = GrainFriction::default();
+    balls_with(friction, centres, radius, mass, kinematic, options)
+}
+
+fn balls_with(
+    friction: GrainFriction,
+    centres: &[[f64; 3]],
+    radius: f64,
+    mass: f64,
+    kinematic: bool,
+    options: &StepOptions,
+) -> GrainSimulation<3> {
     let n = centres.len();
     let grains = Grains::new(vec![radius; n], vec![mass; n]).unwrap();
     let scene = GrainScene {
@@ -96,7 +109,7 @@ fn balls(
         walls: Vec::new(),
         ground: None,
         machine: None,
-        friction: GrainFriction::default(),
+        friction,
     };
     let q = centres.concat();
     GrainSimulation::new(Arc::new(scene), options.clone(), None, q).unwrap()
@@ -104,6 +117,18 @@ fn balls(
 
 #[test]
 fn a_hail_of_balls_keeps_the_momenta_and_gains_no_energy() {
+    hail(GrainFriction::default());
+    // Moments between balls, beside the contacts of the rover.
+    hail(GrainFriction {
+        rolling: RollingFriction {
+            rolling: 0.3,
+            drilling: 0.1,
+        },
+        ..GrainFriction::default()
+    });
+}
+
+fn hail(friction: GrainFriction) {
     let options = options(0.0, 1e-3, 1e-10);
     let rover = rover(nowhere(), [0.0, 0.0, 0.0], &options);
     let mut centres = Vec::new();
@@ -116,7 +141,7 @@ fn a_hail_of_balls_keeps_the_momenta_and_gains_no_energy() {
         }
     }
     let n = centres.len();
-    let mut bed = balls(&centres, 0.1, 6.0, false, &options);
+    let mut bed = balls_with(friction, &centres, 0.1, 6.0, false, &options);
     let mut v = vec![0.0; 6 * n];
     for (i, v) in v.chunks_exact_mut(6).enumerate() {
         v.copy_from_slice(&[-3.0, 0.1, 0.0, 0.0, 0.0, (i % 3) as f64 - 1.0]);

@@ -21,13 +21,14 @@
 //!
 //! # May use
 //!
-//! No other chapter: a cone is a set of vectors.
+//! [`crate::spatial`].
 
 mod disc;
 mod dual_cone;
+pub(crate) mod lorentz;
 mod second_order_cone;
 
-pub use disc::project_on_disc;
+pub use disc::{draw_in, project_on_disc, shortened, split};
 pub use dual_cone::DualCone;
 pub use second_order_cone::SecondOrderCone;
 

@@ -66,5 +66,5 @@ pub use progress::Progress;
 pub use quantities::{N_QUANTITIES, Quantities};
 pub use reward::{N_TERMS, TERMS, Weights};
 pub use rules::{Rules, Settings};
-pub use running::{Episode, Last};
+pub use running::{Episode, EpisodeState};
 pub use setting::Setting;

@@ -46,6 +46,7 @@ mod passivity;
 mod prepared;
 mod redundancy;
 mod residual;
+mod rolling;
 mod scales;
 
 pub use dimension::Dimension;
@@ -58,4 +59,5 @@ pub(crate) use prepared::{Prepared, Proximal};
 pub use redundancy::undetermined_loads;
 pub(crate) use residual::{Magnitudes, Violations, evaluate_contact};
 pub use residual::{Residual, evaluate, evaluate_into};
+pub use rolling::RollingContact;
 pub(crate) use scales::{ContactScales, Scales, power_of_two};

@@ -261,7 +261,7 @@ impl RoverInGrains {
 
     /// Lets grains sleep and wake after a step.
     fn rest(&self, rover: &RoverSimulation, bed: &mut GrainSimulation<3>, options: &StepOptions) {
-        bed.memory.count_step(options.time_step);
+        bed.memory.count_step(options.time_step, &bed.parts);
         let Some(sleep) = &bed.scene.sleep else {
             return;
         };

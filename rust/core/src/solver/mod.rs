@@ -60,11 +60,11 @@ mod strategy;
 mod work;
 mod workspace;
 
-pub use entry::{solve, solve_many_bodies};
+pub use crate::law::one_contact::{OneContactSolution, solve_one_contact};
+pub use entry::{solve, solve_many_bodies, solve_poisson_impact, solve_with_laws};
 pub use history::Iterate;
-pub use local::one_contact::{OneContactSolution, solve_one_contact};
 pub use options::{ContactLaw, Method, SolverOptions};
 pub use report::{Rung, Rungs, SolveReport, SolveStatus, Stage};
-pub use stage::body_sweeps::{BodySweeps, Swept, solve_body_pairs};
+pub use stage::body_sweeps::{Answer, BodySweeps, Swept, solve_body_pairs};
 pub use strategy::many_bodies::ManyBodies;
 pub use workspace::SolverWorkspace;

@@ -7,7 +7,7 @@ use crate::contact::{Activation, Contact, generalized_impulse};
 use crate::integrator::{MechanicalSystem, Start, StepOptions, UnilateralContact};
 use crate::multibody::Configuration;
 use crate::problem::{BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem};
-use crate::solver::{ManyBodies, SolveReport, SolverOptions, SolverWorkspace, solve_many_bodies};
+use crate::solver::{SolveReport, SolverOptions, SolverWorkspace};
 use crate::system::grains::GrainSystem;
 use crate::system::grains::system::gap_law;
 use crate::system::tree::TreeSystem;
@@ -418,13 +418,7 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
     ) -> SolveReport {
         let parts = &*self.parts;
         if !parts.touches.is_empty() {
-            let bodies = ManyBodies {
-                pairs: &self.bed.parts.pairs,
-                q,
-                mu,
-                operator: &|| self.bed.parts.operator(),
-            };
-            return solve_many_bodies(&bodies, options, p, u, workspace);
+            return self.bed.solve(q, mu, options, p, u, workspace);
         }
         let (mu_a, mu_b) = mu.split_at(parts.of_grains.len());
         let ([q_a, q_b, _], [p_a, p_b, _]) = (parts.split(q), parts.split_mut(p));
@@ -433,6 +427,35 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
             &self.bed.solve(q_a, mu_a, options, p_a, u_a, workspace),
             &self.tree.solve(q_b, mu_b, options, p_b, u_b, workspace),
         )
+    }
+
+    fn solve_step(
+        &mut self,
+        (v, y): (&[f64], &[f64]),
+        q: &[f64],
+        mu: &[f64],
+        options: &SolverOptions,
+        p: &mut [f64],
+        u: &mut [f64],
+        workspace: &mut SolverWorkspace,
+    ) -> SolveReport {
+        let free = (self.halves(v).0, self.halves(y).0);
+        let parts = &*self.parts;
+        if !parts.touches.is_empty() {
+            return (self.bed).solve_step(free, q, mu, options, p, u, workspace);
+        }
+        let (mu_a, mu_b) = mu.split_at(parts.of_grains.len());
+        let ([q_a, q_b, _], [p_a, p_b, _]) = (parts.split(q), parts.split_mut(p));
+        let [u_a, u_b, _] = parts.split_mut(u);
+        harder(
+            &(self.bed).solve_step(free, q_a, mu_a, options, p_a, u_a, workspace),
+            &self.tree.solve(q_b, mu_b, options, p_b, u_b, workspace),
+        )
+    }
+
+    fn add_moments(&self, y: &mut [f64]) {
+        let (y_a, _) = self.halves_mut(y);
+        self.bed.add_moments(y_a);
     }
 
     fn displacement(&self, y: &[f64]) -> f64 {
