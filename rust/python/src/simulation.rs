@@ -9,7 +9,7 @@ use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Model, coordinates};
 use rover_core::nalgebra::DMatrix;
 use rover_core::simulation::{
-    Look, ReadingLayout, ReadingScratch, RoverSimulation as CoreSimulation,
+    ReadingLayout, ReadingRequest, ReadingScratch, RoverSimulation as CoreSimulation,
 };
 use rover_core::solver::SolverOptions;
 use std::sync::{Arc, MutexGuard};
@@ -502,7 +502,7 @@ impl Simulation {
         scan: Option<&Bound<'_, PyAny>>,
     ) -> Result<Array> {
         let scan = scan_points(scan)?;
-        let look = Look {
+        let look = ReadingRequest {
             target: place(target)?,
             scan: &scan,
         };

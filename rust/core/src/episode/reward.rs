@@ -54,7 +54,7 @@ pub type Weights = [f64; N_TERMS];
 
 /// What a control period earns.
 #[derive(Clone, Copy, Debug)]
-pub struct Earned<'a> {
+pub struct PeriodReward<'a> {
     /// The quantities at its end.
     pub now: &'a Quantities,
     /// How much nearer it brought the goal, m.
@@ -71,7 +71,7 @@ pub struct Earned<'a> {
 
 /// The terms of the reward.
 #[must_use]
-pub fn terms(weights: &Weights, earned: &Earned<'_>) -> [f64; N_TERMS] {
+pub fn terms(weights: &Weights, earned: &PeriodReward<'_>) -> [f64; N_TERMS] {
     let now = earned.now;
     let [
         progress,
@@ -129,7 +129,7 @@ mod tests {
     const WEIGHTS: Weights = [1.0, -0.05, -5e-5, -0.1, -0.1, -0.02, -0.02, 10.0, -10.0];
 
     fn reward(now: &Quantities, dt: f64, ending: Ending) -> [f64; N_TERMS] {
-        let earned = Earned {
+        let earned = PeriodReward {
             now,
             approach: 1e30,
             changes: squared_changes(&[1.0; 12], &[-1.0; 12], 6),

@@ -34,7 +34,7 @@ pub struct Settings {
     pub scale: Vec<f64>,
     /// Standard deviation of each entry's noise (size); empty without noise.
     pub noise: Vec<f64>,
-    /// Points of the height scan, as of [`crate::simulation::Look`].
+    /// Points of the height scan, as of [`crate::simulation::ReadingRequest`].
     pub scan: Vec<[f64; 2]>,
     /// Goals that an episode reaches one after the other, at least one.
     pub goals: usize,

@@ -10,7 +10,7 @@ use super::observation::{write_heights, write_state};
 use super::outcome::Outcome;
 use super::progress::Progress;
 use super::quantities::Quantities;
-use super::reward::{Earned, squared_changes, terms};
+use super::reward::{PeriodReward, squared_changes, terms};
 use super::rules::Rules;
 use super::setting::Setting;
 use crate::simulation::{CommandError, ReadingScratch, RoverSimulation, seen_from};
@@ -278,7 +278,7 @@ impl Episode {
         }
 
         let ending = rules.ending(&now, &self.progress, has_failed);
-        let earned = Earned {
+        let earned = PeriodReward {
             now: &now,
             approach,
             changes,

@@ -36,6 +36,6 @@ pub mod ways;
 pub use cost::PathCosts;
 pub use grid::{GroundGrid, ScanShape};
 pub use pose::Pose;
-pub use risk::{Outline, PathRisk, Stand};
+pub use risk::{GroundFit, Outline, PathRisk};
 pub use search::{Arcs, PathSearch, Search, SearchTask, Trap};
 pub use ways::{MapTask, WayMap};

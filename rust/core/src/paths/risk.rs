@@ -33,9 +33,9 @@ impl Outline {
     }
 }
 
-/// How a rover would stand in a pose.
+/// How the ground fits a rover in a pose: slopes, and the gap under it.
 #[derive(Clone, Copy, Debug)]
-pub struct Stand {
+pub struct GroundFit {
     /// Slope ahead of the plane through the ground under the wheels, rise over run.
     pub ahead: f32,
     /// Slope to the right.
@@ -105,7 +105,7 @@ impl PathRisk {
     }
 
     /// The heights under the rover's points in a pose, and how the rover would stand there.
-    pub fn stand(&self, heights: &[f32], pose: Pose, seen: &mut [f32]) -> Stand {
+    pub fn stand(&self, heights: &[f32], pose: Pose, seen: &mut [f32]) -> GroundFit {
         self.grid.under(heights, pose, seen);
         self.stand_on(seen)
     }
@@ -113,7 +113,7 @@ impl PathRisk {
     /// How the rover would stand with these heights under its points. Those under the underside may
     /// be unknown (nan).
     #[must_use]
-    pub fn stand_on(&self, seen: &[f32]) -> Stand {
+    pub fn stand_on(&self, seen: &[f32]) -> GroundFit {
         let (wheels, under) = seen.split_at(self.n_wheels);
         let [level, ahead, right] = [0, 1, 2].map(|i| {
             let products = wheels.iter().zip(&self.fit[i]);
@@ -124,20 +124,20 @@ impl PathRisk {
         } else {
             (self.smallest_gap(under, ahead, right) + level) / self.radius
         };
-        Stand { ahead, right, gap }
+        GroundFit { ahead, right, gap }
     }
 
     /// Cost of a pose, and writes the heights under the rover's points to `seen`; `before` are
     /// those under its wheels at the pose before.
     pub fn of(&self, heights: &[f32], pose: Pose, before: &[f32], seen: &mut [f32]) -> f32 {
         let stand = self.stand(heights, pose, seen);
-        self.of_stand(&stand) + self.of_rise(&seen[..self.n_wheels], before)
+        self.of_fit(&stand) + self.of_rise(&seen[..self.n_wheels], before)
     }
 
     /// Cost of standing so, without the climb.
     #[must_use]
-    pub fn of_stand(&self, stand: &Stand) -> f32 {
-        let Stand { ahead, right, gap } = *stand;
+    pub fn of_fit(&self, stand: &GroundFit) -> f32 {
+        let GroundFit { ahead, right, gap } = *stand;
         let low = (self.margin - gap).max(0.0);
         self.lean * (ahead * ahead + right * right) + self.belly * low * (1.0 + low)
     }

@@ -182,7 +182,7 @@ impl WayMap {
             }
         }
         let climb = f64::from(self.risk.of_rise(&seen[..n], before));
-        length * f64::from(self.risk.of_stand(&self.risk.stand_on(seen))) + climb
+        length * f64::from(self.risk.of_fit(&self.risk.stand_on(seen))) + climb
     }
 }
 

@@ -46,7 +46,7 @@ pub mod wheel;
 
 pub use bekker::Bekker;
 pub use memory::{Memory, Twist};
-pub use patch::{Bed, Reaction, Want, WheelPose, react, react_with};
+pub use patch::{Bed, Derivatives, Reaction, WheelPose, react, react_with};
 pub use resistive_force::{Flow, Interface};
 pub use ruts::{RutMap, Window};
 pub use soil::{Law, Resistive, Soil};

@@ -59,7 +59,7 @@ pub struct Reaction {
 
 /// Derivatives are not computed where they are not asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Want {
+pub enum Derivatives {
     /// The wrench alone.
     Wrench,
     /// The wrench and a sum of its derivatives.
@@ -85,7 +85,7 @@ struct Frame<'a> {
     soil: &'a Soil,
     bed: &'a Bed<'a>,
     pose: &'a WheelPose,
-    want: Want,
+    want: Derivatives,
     setting: Setting,
     /// Columns: down, along and axle in world axes.
     axes: Matrix3<f64>,
@@ -117,7 +117,7 @@ pub fn react(
     bed: &Bed<'_>,
     pose: &WheelPose,
     memory: &Memory,
-    want: Want,
+    want: Derivatives,
 ) -> Reaction {
     let instructions = Instructions::of_this_machine();
     react_with(instructions, wheel, soil, bed, (pose, memory), want)
@@ -131,7 +131,7 @@ pub fn react_with(
     soil: &Soil,
     bed: &Bed<'_>,
     (pose, memory): (&WheelPose, &Memory),
-    want: Want,
+    want: Derivatives,
 ) -> Reaction {
     let frame = Frame::new((wheel, rules), soil, bed, (pose, memory), want);
     let lean = pose.axle.dot(&bed.normal);
@@ -164,7 +164,7 @@ pub fn react_with(
         let part = frame.axes * of(k);
         reaction.wrench.fixed_rows_mut::<3>(3 * k).copy_from(&part);
     }
-    if want != Want::Wrench {
+    if want != Derivatives::Wrench {
         for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
             let part = Matrix3::from_fn(|a, b| total(&sums.slope[6 * (3 * j + b) + 3 * i + a]));
             let turned = frame.axes * part * frame.axes.transpose();
@@ -198,7 +198,7 @@ impl<'a> Frame<'a> {
         soil: &'a Soil,
         bed: &'a Bed<'a>,
         (pose, memory): (&'a WheelPose, &Memory),
-        want: Want,
+        want: Derivatives,
     ) -> Self {
         let lean = pose.axle.dot(&bed.normal);
         let flat = pose.axle * lean - bed.normal;
@@ -438,11 +438,11 @@ impl<'a> Frame<'a> {
             arc,
             skin,
         };
-        let wants_slopes = self.want != Want::Wrench;
+        let wants_slopes = self.want != Derivatives::Wrench;
         let stress = self.soil.stress(&piece, &self.setting, wants_slopes);
         let force = stress.value * area;
         add_wrench(&mut own.wrench, r, force);
-        let Want::Slopes { by_memory, by_pose } = self.want else {
+        let Derivatives::Slopes { by_memory, by_pose } = self.want else {
             return;
         };
         let fresh = area * depth.like(by_memory);

@@ -7,7 +7,7 @@
 use nalgebra::{Vector3, Vector6};
 
 use super::memory::{Memory, Twist};
-use super::patch::{Bed, Reaction, Want, WheelPose, react};
+use super::patch::{Bed, Derivatives, Reaction, WheelPose, react};
 use super::soil::Soil;
 use super::wheel::{Rules, SandWheel};
 use crate::scalar::elementary::sin_cos;
@@ -112,7 +112,7 @@ pub fn rules_within(wheel: &SandWheel, soil: &Soil, tolerance: f64) -> Rules {
                     gravity: 9.81,
                 };
                 let memory = Memory::steady(&drive.twist(), wheel.drum());
-                let force = bed.force(share * wheel.drum(), &memory, &drive, Want::Wrench);
+                let force = bed.force(share * wheel.drum(), &memory, &drive, Derivatives::Wrench);
                 found.push(force.wrench.fixed_rows::<3>(0).into());
             }
         }
@@ -137,7 +137,13 @@ const DEEPEST: f64 = 3.0;
 impl TestBed {
     /// The reaction at a sinkage, m, with a memory.
     #[must_use]
-    pub fn force(&self, sinkage: f64, memory: &Memory, drive: &Drive, want: Want) -> Reaction {
+    pub fn force(
+        &self,
+        sinkage: f64,
+        memory: &Memory,
+        drive: &Drive,
+        want: Derivatives,
+    ) -> Reaction {
         let bed = Bed {
             place: Vector3::zeros(),
             normal: Vector3::y(),
@@ -173,7 +179,7 @@ impl TestBed {
     #[must_use]
     pub fn at(&self, sinkage: f64, drive: &Drive) -> Measured {
         let memory = Memory::steady(&drive.twist(), self.wheel.drum());
-        let force = self.force(sinkage, &memory, drive, Want::Wrench);
+        let force = self.force(sinkage, &memory, drive, Derivatives::Wrench);
         Self::measured(sinkage, &force.wrench)
     }
 
@@ -183,7 +189,10 @@ impl TestBed {
     pub fn steady(&self, drive: &Drive) -> Option<Measured> {
         let radius = self.wheel.drum();
         let memory = Memory::steady(&drive.twist(), radius);
-        let lift = |sinkage: f64| self.force(sinkage, &memory, drive, Want::Wrench).wrench[1];
+        let lift = |sinkage: f64| {
+            self.force(sinkage, &memory, drive, Derivatives::Wrench)
+                .wrench[1]
+        };
         let (mut low, mut high) = (0.0, 0.02 * radius);
         while lift(high) < drive.load {
             low = high;
@@ -203,7 +212,7 @@ impl TestBed {
                 high = middle;
             }
         }
-        let force = self.force(high, &memory, drive, Want::Wrench);
+        let force = self.force(high, &memory, drive, Derivatives::Wrench);
         Some(Self::measured(high, &force.wrench))
     }
 
@@ -218,7 +227,7 @@ impl TestBed {
             twist.linear.y = -rate;
             let recalled = state.memory.after(&twist, radius, times);
             let sinkage = state.sinkage + h * rate;
-            let want = Want::Slopes {
+            let want = Derivatives::Slopes {
                 by_memory: recalled.fresh,
                 by_pose: h,
             };

@@ -6,7 +6,7 @@
 use rayon::ThreadPool;
 
 use super::error::BatchError;
-use super::reading::{Look, ReadingLayout, ReadingScratch};
+use super::reading::{ReadingLayout, ReadingRequest, ReadingScratch};
 use super::rover::{Placement, RoverSimulation};
 use super::turns::{Done, Turn, Worker, take_turns};
 use crate::integrator::StepError;
@@ -248,7 +248,7 @@ impl Batch {
         let mut scratch = ReadingScratch::default();
         let rovers = self.rovers.iter().zip(&self.targets);
         for ((rover, target), row) in rovers.zip(rows.chunks_exact_mut(width)) {
-            let look = Look {
+            let look = ReadingRequest {
                 target: *target,
                 scan: &self.scan,
             };
@@ -289,7 +289,7 @@ impl Turn<ReadingPlace<'_>> for ReadingTurn<'_> {
         place: &mut ReadingPlace<'_>,
         scratch: &mut ReadingScratch,
     ) {
-        let look = Look {
+        let look = ReadingRequest {
             target: place.target,
             scan: self.scan,
         };

@@ -69,7 +69,7 @@ pub use grains::{
 };
 pub use linearisation::{Linearisation, LinearisationError};
 pub use planar::{PlanarScene, PlanarSimulation};
-pub use reading::{Look, ReadingLayout, ReadingScratch, seen_from};
+pub use reading::{ReadingLayout, ReadingRequest, ReadingScratch, seen_from};
 pub use rover::{LastCall, Placement, RoverScene, RoverSimulation};
 pub use rover_command::RoverCommand;
 pub use rover_in_grains::{RoverInGrains, TogetherError};

@@ -38,7 +38,7 @@ fn ground_normal(terrain: &dyn Terrain, x: f64, z: f64) -> Option<Vector3<f64>> 
 
 /// Request for a reading.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Look<'a> {
+pub struct ReadingRequest<'a> {
     /// A place on the map, x and z, m.
     pub target: [f64; 2],
     /// Points of the height scan, ahead and to the right of the trunk's origin in the heading
@@ -168,7 +168,7 @@ impl RoverSimulation {
     ///
     /// # Panics
     /// If the size of `out` is not that of the layout of this model and scan.
-    pub fn read(&self, look: &Look<'_>, scratch: &mut ReadingScratch, out: &mut [f64]) {
+    pub fn read(&self, look: &ReadingRequest<'_>, scratch: &mut ReadingScratch, out: &mut [f64]) {
         let heights = out.len().saturating_sub(look.scan.len());
         let (state, heights) = out.split_at_mut(heights);
         self.read_state(look.target, scratch, state);

@@ -8,8 +8,8 @@ use crate::geometry::{SoftLayer, Tangent};
 use crate::multibody::{Factor, Kinematics, Model};
 use crate::sand::patch::Relief;
 use crate::sand::{
-    Bed, Memory, Reaction, Rules, RutMap, SandWheel, Twist, Want, WheelInSand, WheelPose, Window,
-    react,
+    Bed, Derivatives, Memory, Reaction, Rules, RutMap, SandWheel, Twist, WheelInSand, WheelPose,
+    Window, react,
 };
 
 /// Error of the linearised force of a wheel, relative to the force, at which it has settled.
@@ -171,7 +171,7 @@ impl Patch {
         let times = (step.h, step.length);
         let recalled = self.begin.memory.after(&twist, self.wheel.drum(), times);
         // A memory that fades as a whole hardly changes the force.
-        let want = Want::Slopes {
+        let want = Derivatives::Slopes {
             by_memory: recalled.fresh,
             by_pose: lag,
         };
@@ -341,7 +341,7 @@ impl Patch {
         (place, gravity): (SandScene<'_>, &Vector3<f64>),
         pose: &WheelPose,
         memory: &Memory,
-        want: Want,
+        want: Derivatives,
     ) -> Option<Reaction> {
         let ground = place.ground;
         let radius = self.wheel.drum();
