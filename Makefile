@@ -62,7 +62,7 @@ lint: $(STAMPS)/test ## formatting and lint, Rust and Python
 
 types: $(STAMPS)/test $(STAMPS)/core ## mypy, and the stub against the compiled module
 	$(BIN)/mypy
-	MYPYPATH=envs $(BIN)/stubtest --mypy-config-file rust/python/stubtest.ini rover_gym._core
+	MYPYPATH=envs $(BIN)/stubtest --mypy-config-file rust/python/stubtest.ini --allowlist rust/python/stubtest_allowlist.txt rover_gym._core
 
 deny: ## licences, bans and sources of the crates, without the network, where cargo-deny is installed
 	@if command -v cargo-deny > /dev/null; then cargo deny --offline --log-level error check licenses bans sources; \

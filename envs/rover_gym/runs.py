@@ -1,24 +1,107 @@
-"""Saved runs of every kind: one reader, which tells by the file what was simulated.
+"""Runs of every kind: one recorder, and one reader, which tells by the file what was simulated.
 
-run = open_run("runs/planar/soil.h5").resample(25.0)
+record_run(sim, 5.0, "run.h5")
+run = open_run("run.h5").resample(25.0)
 """
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar, overload
 
-from rover_gym.grains.grain_run import GrainRun, grain_run_of, is_grains
-from rover_gym.planar.planar_run import PlanarRun, is_planar, planar_run_of
-from rover_gym.record.channels import RecordingError
+import numpy as np
+
+from rover_gym.grains.grain_run import GrainRun, GrainSampler, Recordable, grain_run_of, is_grains
+from rover_gym.mechanics import PlanarSimulation, Simulation, SoilSimulation
+from rover_gym.planar.planar_run import PlanarRun, PlanarSampler, is_planar, planar_run_of
+from rover_gym.record.channels import RecordingError, RoverSampler, Sampler, row_count
+from rover_gym.record.recorder import Recorder
 from rover_gym.record.rover_run import RoverRun, Run, run_of
 from rover_gym.record.trajectory import Trajectory, read_trajectory
-from rover_gym.soil.soil_run import SoilRun, is_soil, soil_run_of
-from rover_gym.validation import refuse
+from rover_gym.soil.soil_run import SoilRun, SoilSampler, is_soil, soil_run_of
+from rover_gym.validation import checked, number, refuse
 
-__all__ = ["SavedRun", "open_run", "saved_run_of"]
+__all__ = ["SavedRun", "open_run", "record_run", "saved_run_of"]
 
 #: A rover, a planar machine, a soil of disks, or balls in space.
 SavedRun: TypeAlias = RoverRun | PlanarRun | SoilRun | GrainRun
 R = TypeVar("R", bound=Run)
+
+
+def sampler_of(sim: Simulation | PlanarSimulation | SoilSimulation | Recordable) -> Sampler:
+    """What steps a simulation from row to row.
+
+    Raises:
+        OptionError: It is no simulation that can be recorded.
+    """
+    if isinstance(sim, Simulation):
+        sampler = RoverSampler(sim.model)
+        sampler.sim = sim
+        return sampler
+    if isinstance(sim, PlanarSimulation):
+        return PlanarSampler(sim)
+    return SoilSampler(sim) if isinstance(sim, SoilSimulation) else GrainSampler(sim)
+
+
+@checked(
+    scene=(Mapping, None),
+    title=(str, None),
+    seed=(int, str, None),
+    before_row=callable,
+    until=callable,
+    progress=callable,
+)
+def record_run(
+    sim: Simulation | PlanarSimulation | SoilSimulation | Recordable,
+    duration: float,
+    path: str | Path,
+    fps: float | None = 25.0,
+    *,
+    title: str | None = None,
+    scene: Mapping[str, Any] | None = None,
+    seed: int | str | None = None,
+    before_row: Callable[[Any], None] = lambda _: None,
+    until: Callable[[Any], bool] = lambda _: False,
+    progress: Callable[[float], None] = lambda _: None,
+) -> int:
+    """Runs a simulation of any kind from its current state and records it.
+
+    Args:
+        sim: The simulation, or a `MovingWindow`.
+        duration: Time to simulate, s.
+        path: HDF5 file to write.
+        fps: Rows per second of simulated time, rounded to whole steps from row to row; None for a row a step.
+        title: Title of the recording.
+        scene: Further parameters of the scene, stored with it.
+        seed: Seed of the start, or why there is none.
+        before_row: Called with the simulation before the steps of each row, to command a rover or move walls.
+        until: Called with the simulation after each row; the run stops when it returns true.
+        progress: Called with the simulated time after each row.
+
+    Returns:
+        Number of rows with steps that did not converge to the tolerance; the file has it as `unconverged_rows`.
+
+    Raises:
+        OptionError: `duration` or `fps` is not positive, or the run has too many rows.
+        RecordingError: The file is in use, or the disk is full.
+        MissingExtraError: h5py is not installed.
+        StepError: A step failed; the rows before it are on disk.
+    """
+    sampler = sampler_of(sim)
+    steps_per_row = 1 if fps is None else max(1, round(1.0 / (number("fps", fps, above=0.0) * sim.time_step)))
+    rows, unconverged = row_count(duration, sim.time_step, steps_per_row), 0
+    facts, flush = sampler.describe(title, scene or {}, seed), sampler.rows_per_flush
+    with Recorder(path, sampler.channels, facts, terrain=sampler.terrain, rows_per_flush=flush) as recorder:
+        recorder.append(sampler.read())
+        for _ in range(rows):
+            before_row(sim)
+            unconverged += not sampler.step(steps_per_row)
+            row = sampler.read()
+            recorder.append(row)
+            progress(float(np.asarray(row["time"])))
+            if until(sim):
+                break
+        recorder.note(unconverged_rows=unconverged)
+    return unconverged
 
 
 @overload

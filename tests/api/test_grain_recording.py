@@ -17,7 +17,6 @@ from rover_gym.grains import (
     BallBed,
     MovingWindow,
     SurfaceMap,
-    record_grains,
     rover_on_bed,
     settled_track,
     surface_map,
@@ -26,7 +25,7 @@ from rover_gym.grains import (
 from rover_gym.grains.grain_surface import Footprint, Parts
 from rover_gym.mechanics import GrainSimulation, Plane, RoverGrainSimulation, Simulation, ball_packing
 from rover_gym.record import RecordingError, read_frames
-from rover_gym.runs import open_run
+from rover_gym.runs import open_run, record_run
 
 FLOOR = [[0.0, 0.0, 0.0, 0.0, 1.0, 0.0]]
 
@@ -41,7 +40,7 @@ def test_places_are_stored_within_the_resolution_and_facts_beside_them(tmp_path:
     sim = falling()
     places = [sim.position]
     path = tmp_path / "fall.h5"
-    unconverged = record_grains(
+    unconverged = record_run(
         sim, 0.4, path, 50.0, title="a fall", seed=3, until=lambda now: places.append(now.position) or False
     )
     run = open_run(path)
@@ -70,7 +69,7 @@ def test_a_bed_at_rest_takes_little_room(tmp_path: Path) -> None:
     sizes = []
     for moving in (0.0, 1.0):
         path = tmp_path / f"{moving}.h5"
-        record_grains(MovingBalls((40, 5, 20), 0.005, moving), 4.0, path)
+        record_run(MovingBalls((40, 5, 20), 0.005, moving), 4.0, path)
         sizes.append(path.stat().st_size / 4000 / 101)
     assert sizes[0] < 1.2  # bytes a ball and frame
     assert sizes[1] < 6.0
@@ -79,7 +78,7 @@ def test_a_bed_at_rest_takes_little_room(tmp_path: Path) -> None:
 
 def test_a_resampled_run_reads_its_own_rows(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
-    record_grains(MovingBalls(), 2.0, path)
+    record_run(MovingBalls(), 2.0, path)
     run = open_run(path)
     coarse = run.resample(5.0)
     assert coarse.n_frames == 11
@@ -94,7 +93,7 @@ def test_a_resampled_run_reads_its_own_rows(tmp_path: Path) -> None:
 def test_a_rover_among_balls_is_recorded_with_its_forces_and_sinkage(tmp_path: Path) -> None:
     sim = RoverOnMovingBalls((60, 2, 30), 0.03, 0.02)
     path = tmp_path / "rover.h5"
-    record_grains(sim, 0.4, path)
+    record_run(sim, 0.4, path)
     run = open_run(path)
     assert run.model is not None
     assert run.model.to_dict() == RoverModel().to_dict()
@@ -108,7 +107,7 @@ def test_a_rover_among_balls_is_recorded_with_its_forces_and_sinkage(tmp_path: P
 
 
 def keep_recording(path: Path) -> None:
-    record_grains(MovingBalls((10, 3, 10)), 1e4, path, progress=lambda _: time.sleep(0.002))
+    record_run(MovingBalls((10, 3, 10)), 1e4, path, progress=lambda _: time.sleep(0.002))
 
 
 def test_a_killed_run_keeps_what_it_had(tmp_path: Path) -> None:
@@ -130,7 +129,7 @@ def test_a_killed_run_keeps_what_it_had(tmp_path: Path) -> None:
 
 def test_a_run_of_something_else_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
-    record_grains(MovingBalls((4, 2, 4)), 0.1, path)
+    record_run(MovingBalls((4, 2, 4)), 0.1, path)
     with h5py.File(path, "r+") as file:
         file["frames/position"][0, 3] = np.nan
     with pytest.raises(RecordingError, match="must be finite"):
@@ -157,7 +156,7 @@ def test_a_run_of_something_else_is_refused(tmp_path: Path) -> None:
 def test_bad_options_are_refused_before_a_file_is_made(duration: float, fps: float, tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     with pytest.raises(OptionError):
-        record_grains(MovingBalls((4, 2, 4)), duration, path, fps)
+        record_run(MovingBalls((4, 2, 4)), duration, path, fps)
     assert not path.exists()
 
 
@@ -373,7 +372,7 @@ def test_a_drive_is_recorded_with_all_balls(bed: BallBed, tmp_path: Path) -> Non
     sim = window(bed)
     push(sim, 1.0)
     path = tmp_path / "track.h5"
-    record_grains(sim, 0.12, path)
+    record_run(sim, 0.12, path)
     run = open_run(path)
     assert run.positions.shape == (4, len(bed.radius), 3)
     np.testing.assert_allclose(run.positions[-1], sim.position, atol=1e-3)

@@ -16,7 +16,6 @@ from rover_gym.grains import (
     lognormal_radii,
     outflow,
     penetration_depths,
-    record_grains,
     rover_on_bed,
     run_out,
     settled_balls,
@@ -27,8 +26,8 @@ from rover_gym.grains import (
     tiled,
     with_wheel_width,
 )
-from rover_gym.mechanics import Drum, GrainSimulation, GrainSnapshot, Silo, arrange_balls, ball_packing
-from rover_gym.runs import open_run
+from rover_gym.mechanics import Drum, GrainSimulation, Silo, Snapshot, arrange_balls, ball_packing
+from rover_gym.runs import open_run, record_run
 
 G = 9.81
 
@@ -170,7 +169,7 @@ def bed() -> BallBed:
 def test_a_snapshot_continues_bit_for_bit_and_balls_can_be_taken(bed: BallBed) -> None:
     sim = bed.simulation(walls=bed.walls[:4])
     sim.step(20)
-    taken = GrainSnapshot.from_bytes(sim.snapshot().to_bytes())
+    taken = Snapshot.from_bytes(sim.snapshot().to_bytes())
     sim.step(20)
     other = bed.simulation(walls=bed.walls[:4])
     other.restore(taken)
@@ -327,7 +326,7 @@ def test_a_bed_is_at_rest_within_its_walls_and_as_dense_as_a_loose_packing(scene
 def test_a_column_without_its_tube_spreads(tmp_path: Path) -> None:
     sim = column(300, 0.06, 0.008, time_step=0.002)
     assert np.hypot(*sim.position[:, [0, 2]].T).max() < 0.06
-    record_grains(sim, 0.4, tmp_path / "run.h5")
+    record_run(sim, 0.4, tmp_path / "run.h5")
     aspect, spread = run_out(open_run(tmp_path / "run.h5"), 0.06)
     assert 0.8 < aspect < 2.2
     assert 0.3 * aspect < spread < 1.6 * aspect
@@ -337,7 +336,7 @@ def test_a_silo_empties_through_its_hole_only_if_it_is_wide(tmp_path: Path) -> N
     shares = []
     for hole in (0.01, 0.04):
         sim = silo(150, 0.06, hole, 0.008, time_step=0.002)
-        record_grains(sim, 0.4, tmp_path / "run.h5")
+        record_run(sim, 0.4, tmp_path / "run.h5")
         run = open_run(tmp_path / "run.h5")
         out = outflow(run) / run.mass.sum()
         assert (np.diff(out) >= 0.0).all()
@@ -350,7 +349,7 @@ def test_a_silo_empties_through_its_hole_only_if_it_is_wide(tmp_path: Path) -> N
 
 def test_balls_in_a_drum_rise_with_it(tmp_path: Path) -> None:
     sim = drum(150, 0.08, 0.05, 1.0, 0.007, time_step=0.002)
-    record_grains(sim, 1.0, tmp_path / "run.h5")
+    record_run(sim, 1.0, tmp_path / "run.h5")
     run = open_run(tmp_path / "run.h5")
     angles = np.degrees(slopes(run))
     assert abs(angles[0]) < 8.0
@@ -366,7 +365,7 @@ def test_a_sphere_that_falls_farther_goes_deeper(scene_bed: BallBed, tmp_path: P
     for drop in (0.02, 0.5):
         sim = striking_sphere(scene_bed, 0.02, 7800.0, drop, time_step=0.002)
         assert sim.velocity[-1, 1] == pytest.approx(-np.sqrt(2.0 * 9.81 * drop))
-        record_grains(sim, 0.12, tmp_path / "run.h5", 100.0)
+        record_run(sim, 0.12, tmp_path / "run.h5", 100.0)
         deepest.append(penetration_depths(open_run(tmp_path / "run.h5")).max())
     assert 0.004 < deepest[0] < 0.8 * deepest[1]
     with pytest.raises(OptionError, match="half of the bed"):
@@ -378,7 +377,7 @@ def test_a_rover_on_a_bed_stands_with_its_weight_on_its_wheels(tmp_path: Path) -
     assert {wheel["width"] for wheel in model.to_dict()["wheels"]} == {0.12}
     scene_bed = settled_balls(250, 1.5, 0.9, radius_min=0.045, radius_max=0.055, sleep=True)
     sim = rover_on_bed(scene_bed, model, 0.0, sleep=True)
-    record_grains(sim, 0.6, tmp_path / "run.h5")
+    record_run(sim, 0.6, tmp_path / "run.h5")
     run = open_run(tmp_path / "run.h5")
     loads = run.wheel_forces[-6:, :, 1].sum(axis=1).mean()
     assert loads == pytest.approx(model.mass * 9.81, rel=0.05)

@@ -12,6 +12,7 @@ import pytest
 from rover_gym import CommandError, ModelError, OptionError, StateError, TerrainError
 from rover_gym.figures import draw_run
 from rover_gym.figures.grain_frames import draw_soil
+from rover_gym.mechanics import Snapshot
 from rover_gym.planar import (
     BallSimulation,
     Line,
@@ -19,22 +20,18 @@ from rover_gym.planar import (
     Sine,
     Spline,
     TwoWheelRoverSimulation,
-    describe_planar,
-    record_planar,
 )
 from rover_gym.record import RecordingError, read_trajectory
-from rover_gym.runs import open_run
+from rover_gym.runs import open_run, record_run
 from rover_gym.soil import (
     Bed,
     Pull,
     SoilRun,
     SoilSimulation,
-    SoilSnapshot,
     drawbar_pull,
     drive_on_soil,
     fit_traction,
     over_beds,
-    record_soil,
     rover_on_soil,
     settled_bed,
     soil_packing,
@@ -224,7 +221,7 @@ def test_runs_are_recorded_with_all_that_made_them(tmp_path: Path) -> None:
     sim = TwoWheelRoverSimulation(Sine(0.05, 2.0), friction=0.9)
     sim.set_state([0.0, 0.4, 0.0, 0.0, 0.0])
     sim.set_torques([40.0, 40.0])
-    unconverged = record_planar(sim, tmp_path / "run.h5", describe_planar(sim, "a test"), duration=1.0, steps_per_row=4)
+    unconverged = record_run(sim, 1.0, tmp_path / "run.h5", 50.0, title="a test")
     assert unconverged == 0
     run = read_trajectory(tmp_path / "run.h5")
     assert run["q"].shape == (51, 5)
@@ -330,11 +327,11 @@ def test_the_rover_drives_and_a_snapshot_continues_bit_for_bit(bed: Bed, tmp_pat
     sim.set_torques([50.0, 50.0])
     start = sim.machine
     sim.step(40)
-    snapshot = SoilSnapshot.from_bytes(sim.snapshot().to_bytes())
+    snapshot = Snapshot.from_bytes(sim.snapshot().to_bytes())
     assert snapshot == sim.snapshot()
     pressed = sim.impulse_on_wheels()
     path = tmp_path / "soil.h5"
-    record_soil(sim, path, "a test", duration=0.08, steps_per_row=20, walls=bed.walls)
+    record_run(sim, 0.08, path, 50.0, title="a test")
     end = sim.position
     assert sim.machine[0] > start[0]
     assert snapshot != sim.snapshot()
@@ -365,7 +362,7 @@ def test_the_rover_drives_and_a_snapshot_continues_bit_for_bit(bed: Bed, tmp_pat
 
 def test_a_soil_without_a_machine_is_recorded_and_drawn(bed: Bed, tmp_path: Path) -> None:
     sim = SoilSimulation(bed.radius, bed.mass, bed.position, walls=bed.walls)
-    record_soil(sim, tmp_path / "soil.h5", "disks alone", duration=0.04, steps_per_row=20, walls=bed.walls)
+    record_run(sim, 0.04, tmp_path / "soil.h5", 50.0, title="disks alone")
     run = open_run(tmp_path / "soil.h5")
     assert run.wheels.shape == (3, 0, 3)
     np.testing.assert_array_equal(run.positions[-1], sim.position)
@@ -376,7 +373,7 @@ def test_a_soil_without_a_machine_is_recorded_and_drawn(bed: Bed, tmp_path: Path
 
 def test_a_file_without_a_soil_is_refused(tmp_path: Path) -> None:
     sim = BallSimulation(Line())
-    record_planar(sim, tmp_path / "ball.h5", describe_planar(sim, "a ball"), duration=0.01)
+    record_run(sim, 0.01, tmp_path / "ball.h5", None, title="a ball")
     with pytest.raises(RecordingError, match="holds a PlanarRun, no SoilRun"):
         open_run(tmp_path / "ball.h5", SoilRun)
 
@@ -531,11 +528,8 @@ def test_removed_disks_leave_the_others_as_they_are() -> None:
         (lambda bed: drawbar_pull(bed, 1.0 - 1e-12, run_in=0.1, distance=0.1, radius=0.1), "slip"),
         (lambda bed: drawbar_pull(bed, 0.5, radius=-1.0), "radius"),
         (lambda bed: over_beds(lambda *_: 0, [1.0], [bed], workers=-1), "workers"),
-        (lambda bed: record_soil(rover_on_soil(bed, start=0.61), "no.h5", "", duration=1e300), "duration"),
-        (
-            lambda bed: record_soil(rover_on_soil(bed, start=0.61), "no.h5", "", duration=1, steps_per_row=0.5),
-            "steps",
-        ),
+        (lambda bed: record_run(rover_on_soil(bed, start=0.61), 1e300, "no.h5"), "duration"),
+        (lambda bed: record_run(rover_on_soil(bed, start=0.61), 1.0, "no.h5", -1.0), "fps"),
     ],
 )
 def test_soils_that_would_not_end_or_cannot_be_are_refused_by_name(

@@ -20,14 +20,14 @@ from torture.hostile import hostile_values
 
 from rover_gym import PDPolicy, Plane, RoverGymError, RoverModel, Simulation
 from rover_gym.extras import MissingExtraError
-from rover_gym.grains import record_grains, settled_balls
+from rover_gym.grains import settled_balls
 from rover_gym.grains.lab import PlatePoint, ShearLaw, ShearPoint, WheelPoint
 from rover_gym.live import LiveChoices, LiveLoop, LiveRover
 from rover_gym.mechanics import GrainSimulation, ball_packing
-from rover_gym.planar import BallSimulation, Line, describe_planar, record_planar
+from rover_gym.planar import BallSimulation, Line
 from rover_gym.record import Channel, Recorder, RoverSampler, describe, read_run
-from rover_gym.runs import open_run
-from rover_gym.soil import SoilSimulation, record_soil, soil_packing
+from rover_gym.runs import open_run, record_run
+from rover_gym.soil import SoilSimulation, soil_packing
 
 pytest.importorskip("h5py")
 
@@ -58,13 +58,13 @@ class World:
                 recorder.append(self.sampler.row(self.sim))
                 self.sim.step(5)
         self.run = read_run(folder / "run.h5")
-        record_grains(fall(), 0.05, folder / "grains.h5")
+        record_run(fall(), 0.05, folder / "grains.h5")
         self.grains = open_run(folder / "grains.h5")
         ball = BallSimulation(Line())
-        record_planar(ball, folder / "planar.h5", describe_planar(ball, "a ball"), duration=0.1)
+        record_run(ball, 0.1, folder / "planar.h5")
         self.planar = open_run(folder / "planar.h5")
         soil = SoilSimulation(*soil_packing(6, width=0.2), walls=[(0.0, 0.0, 0.0, 1.0)])
-        record_soil(soil, folder / "soil.h5", "a soil", duration=0.02)
+        record_run(soil, 0.02, folder / "soil.h5", 50.0)
         self.soil = open_run(folder / "soil.h5")
         self.bed = settled_balls(20, 0.12, 0.12, radius_min=0.01, radius_max=0.012)
         self.rover = LiveRover()
@@ -101,14 +101,13 @@ def arguments(name: str, w: World) -> dict[str, Any]:
         "MovingWindow": {"rover": w.sim, "grains": fall()},
         "box_walls": {"width": 1.0, "depth": 1.0},
         "column": {"count": 5, "tube": 0.1, "radius": 0.02},
-        "describe_grains": {"sim": fall(), "title": "a"},
         "drum": {"count": 5, "wall": 0.1, "length": 0.1, "rate": 1.0, "radius": 0.02},
         "even_radii": {"count": 5, "radius_min": 0.01, "radius_max": 0.02},
         "lognormal_radii": {"count": 5, "median": 0.01, "deviation": 0.1},
         "outflow": {"run": w.grains},
         "penetration_depths": {"run": w.grains},
         "open_run": {"path": w.folder / "grains.h5"},
-        "record_grains": {"sim": fall(), "duration": 0.01, "path": out / "g.h5"},
+        "record_run": {"sim": fall(), "duration": 0.01, "path": out / "g.h5"},
         "rover_on_bed": {"bed": w.bed, "model": RoverModel(), "torque": 1.0},
         "run_out": {"run": w.grains, "tube": 0.1},
         "settle": {"sim": fall()},

@@ -5,6 +5,7 @@ then drifts. Files and recordings must keep welds.
 """
 
 import copy
+import itertools
 import math
 import pickle
 import struct
@@ -19,7 +20,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField, StateError, StepError
-from rover_gym.mechanics import PlanarSnapshot, Snapshot, SoilSimulation, SoilSnapshot, soil_packing
+from rover_gym.mechanics import Snapshot, SoilSimulation, soil_packing
 from rover_gym.planar import (
     BallSimulation,
     Line,
@@ -184,7 +185,7 @@ def test_copied_planar_simulations_go_on_alike(make: Any, a: float, b: float, ma
         sim.set_state([0.3, 2.5] + [0.0] * (sim.q.size - 2))
         sim.step(200)
         twins = list(copies(sim))
-        twins[0].restore(PlanarSnapshot.from_bytes(sim.snapshot().to_bytes()))
+        twins[0].restore(Snapshot.from_bytes(sim.snapshot().to_bytes()))
         sim.step(60)
         for twin in twins:
             twin.step(60)
@@ -202,7 +203,7 @@ def soil(**changed: Any) -> SoilSimulation:
 def test_a_soils_snapshot_goes_on_alike() -> None:
     sim, twin = soil(), soil()
     sim.step(80)
-    snapshot = SoilSnapshot.from_bytes(sim.snapshot().to_bytes())
+    snapshot = Snapshot.from_bytes(sim.snapshot().to_bytes())
     twin.restore(pickle.loads(pickle.dumps(snapshot)))  # noqa: S301 - our own
     for one in (sim, twin):
         one.step(80)
@@ -236,24 +237,25 @@ def test_snapshots_of_other_masses_are_refused() -> None:
         assert other.snapshot().to_bytes() == before
 
 
-@pytest.mark.parametrize(
-    ("sim", "read"),
-    [
-        (Simulation(), Snapshot.from_bytes),
-        (BallSimulation(Line()), PlanarSnapshot.from_bytes),
-        (soil(), SoilSnapshot.from_bytes),
-    ],
-)
-def test_bytes_that_are_no_snapshot_are_refused(sim: Any, read: Any) -> None:
+def test_snapshots_of_another_kind_are_refused() -> None:
+    sims = [Simulation(), BallSimulation(Line()), soil()]
+    for one, other in itertools.permutations(sims, 2):
+        with pytest.raises(StateError, match="another kind") as caught:
+            one.restore(other.snapshot())
+        assert caught.value.field == "snapshot"
+
+
+@pytest.mark.parametrize("sim", [Simulation(), BallSimulation(Line()), soil()])
+def test_bytes_that_are_no_snapshot_are_refused(sim: Any) -> None:
     data = sim.snapshot().to_bytes()
-    sim.restore(read(data))
+    sim.restore(Snapshot.from_bytes(data))
     for damaged in (data + b"\0", data + data, data[:-1], b"", b"\xff" * 40):
         with pytest.raises(StateError, match="damaged") as caught:
-            read(damaged)
+            Snapshot.from_bytes(damaged)
         assert caught.value.field == "snapshot"
     for other in (3, "text", None):
         with pytest.raises(StateError):
-            read(other)
+            Snapshot.from_bytes(other)
         with pytest.raises(StateError) as caught:
             sim.restore(other)
         assert caught.value.field == "snapshot"
@@ -279,18 +281,14 @@ def test_a_quaternion_that_is_no_rotation_is_refused() -> None:
 @settings(max_examples=60, deadline=None)
 def test_a_snapshot_with_damaged_bytes_is_refused_or_goes_on(data: st.DataObject) -> None:
     """Snapshots on a damaged sine hung: a place a million kilometres down was searched wave by wave."""
-    for sim, read in [
-        (TwoWheelRoverSimulation(Sine(0.05, 2.0)), PlanarSnapshot.from_bytes),
-        (driven(Simulation()), Snapshot.from_bytes),
-        (soil(), SoilSnapshot.from_bytes),
-    ]:
+    for sim in [TwoWheelRoverSimulation(Sine(0.05, 2.0)), driven(Simulation()), soil()]:
         sim.step(3)
         damaged = bytearray(sim.snapshot().to_bytes())
         for _ in range(data.draw(st.integers(1, 4))):
             at = data.draw(st.integers(0, len(damaged) - 1))
             damaged[at] = data.draw(st.integers(0, 255))
         try:
-            sim.restore(read(bytes(damaged)))
+            sim.restore(Snapshot.from_bytes(bytes(damaged)))
         except StateError:
             continue
         with suppress(StepError):

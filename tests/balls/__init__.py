@@ -118,6 +118,7 @@ class RoverOnMovingBalls:
         moving: float = 0.3,
     ) -> None:
         self.grains = MovingBalls(shape, radius, moving)
+        self.time_step = self.grains.time_step
         size = self.grains.size
         plane = Plane([0.0, 1.0, 0.0], sinks - float(size[1]))
         rover = Simulation(RoverModel(), plane, time_step=self.grains.time_step)

@@ -27,11 +27,11 @@ from browser.test_replay_page import (
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 
-from rover_gym.grains import GrainRun, record_grains
+from rover_gym.grains import GrainRun
 from rover_gym.rendering.appearance import SAND_COLOUR
 from rover_gym.replay import write_page
 from rover_gym.replay.player import LOAD_TIME, moving_mean
-from rover_gym.runs import open_run
+from rover_gym.runs import open_run, record_run
 
 # Time of the script for a new sample, on any thread: rebuilt from its differences, and given to the graphics card.
 SAMPLE_TIMES = """
@@ -60,7 +60,7 @@ const done = arguments[arguments.length - 1];
 @pytest.fixture(scope="module")
 def shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown[GrainRun]]:
     folder = tmp_path_factory.mktemp("grains")
-    record_grains(RoverOnMovingBalls(), 1.2, folder / "run.h5", 10.0, title="a rover & <balls>")
+    record_run(RoverOnMovingBalls(), 1.2, folder / "run.h5", 10.0, title="a rover & <balls>")
     run = open_run(folder / "run.h5")
     page = write_page(run, folder / "replay.html")
     with opened(page, folder / "profile") as browser:
@@ -173,7 +173,7 @@ def test_it_plays_and_the_wheel_of_the_mouse_zooms(shown: Shown[GrainRun]) -> No
 @pytest.mark.nightly("tests/browser/test_grain_page.py::test_the_page_holds_the_places_of_every_sample")
 def test_twenty_thousand_balls_cost_the_script_little(tmp_path: Path) -> None:
     """60 pictures a second leave 17 ms for each; of 50 000 balls a new sample may take 3, and time goes with balls."""
-    record_grains(MovingBalls((50, 10, 40), 0.01, 0.5), 0.4, tmp_path / "run.h5")
+    record_run(MovingBalls((50, 10, 40), 0.01, 0.5), 0.4, tmp_path / "run.h5")
     page = write_page(open_run(tmp_path / "run.h5"), tmp_path / "replay.html")
     with opened(page, tmp_path / "profile") as browser:
         took = browser.execute_async_script(SAMPLE_TIMES)
@@ -194,7 +194,7 @@ def parts(page: Path) -> dict[str, Any]:
 
 def test_the_page_holds_the_places_of_every_sample(tmp_path: Path) -> None:
     """Rebuilt here as the page's script does."""
-    record_grains(MovingBalls((12, 4, 8), moving=0.6), 2.4, tmp_path / "run.h5")
+    record_run(MovingBalls((12, 4, 8), moving=0.6), 2.4, tmp_path / "run.h5")
     run = open_run(tmp_path / "run.h5")
     page = write_page(run, tmp_path / "replay.html")
     held = parts(page)

@@ -24,8 +24,8 @@ from rover_gym.rendering.appearance import GROUND_COLOUR, TRUNK_COLOUR
 from rover_gym.replay import write_page
 from rover_gym.replay.page import WHEEL_NAMES
 from rover_gym.replay.player import LOAD_TIME, moving_mean
-from rover_gym.runs import open_run
-from rover_gym.soil import SoilRun, record_soil, rover_on_soil, settled_bed
+from rover_gym.runs import open_run, record_run
+from rover_gym.soil import SoilRun, rover_on_soil, settled_bed
 
 R = TypeVar("R")
 
@@ -346,7 +346,7 @@ def soil_shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown[SoilR
     bed = settled_bed(150, 2, settle=0.1)
     sim = rover_on_soil(bed)
     sim.set_torques([50.0, 50.0])
-    record_soil(sim, folder / "soil.h5", "the rover on 150 disks", duration=0.5, steps_per_row=50, walls=bed.walls)
+    record_run(sim, 0.5, folder / "soil.h5", 20.0, title="the rover on 150 disks")
     run = open_run(folder / "soil.h5")
     page = write_page(run, folder / "soil.html")
     with opened(page, folder / "profile") as browser:

@@ -14,9 +14,8 @@ from typer.testing import CliRunner
 from rover_gym.cli import app
 from rover_gym.figures.grain_frames import draw_grains
 from rover_gym.figures.grain_run_figures import GRAIN_DRAWINGS, slip_of_wheels
-from rover_gym.grains import record_grains
 from rover_gym.rendering.appearance import SAND_COLOUR
-from rover_gym.runs import open_run
+from rover_gym.runs import open_run, record_run
 
 
 def rover(*arguments: str) -> str:
@@ -78,8 +77,8 @@ def test_bad_options_end_with_one_line(command: str, options: list[str], field: 
 def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A run with a rover and one without."""
     folder = tmp_path_factory.mktemp("runs")
-    record_grains(RoverOnMovingBalls(), 1.0, folder / "rover.h5")
-    record_grains(MovingBalls((16, 4, 10)), 1.0, folder / "bed.h5")
+    record_run(RoverOnMovingBalls(), 1.0, folder / "rover.h5")
+    record_run(MovingBalls((16, 4, 10)), 1.0, folder / "bed.h5")
     return {"rover": folder / "rover.h5", "bed": folder / "bed.h5"}
 
 

@@ -16,10 +16,10 @@ from rover_gym.figures.chapter_3 import draw_chapter_3
 from rover_gym.figures.drawing import KINDS
 from rover_gym.figures.planar_drawing import PLANAR_DRAWINGS, path_over_ground
 from rover_gym.figures.soil_run_figures import SOIL_DRAWINGS
-from rover_gym.planar import BallSimulation, PlanarRun, Sine, describe_planar, record_planar
+from rover_gym.planar import BallSimulation, PlanarRun, Sine
 from rover_gym.record import RecordingError, read_trajectory
 from rover_gym.reproduction.scene_runs import ball_on_incline, published
-from rover_gym.runs import open_run
+from rover_gym.runs import open_run, record_run
 from rover_gym.soil import SoilRun
 
 NIGHTLY_BALL = pytest.mark.nightly("tests/cli/test_planar.py::test_a_planar_run_is_plotted_and_replayed")
@@ -208,7 +208,7 @@ def test_a_soil_that_cannot_be_ends_with_one_line(options: list[str], message: s
 def test_the_incline_is_the_published_figure(tmp_path: Path) -> None:
     # The figure's curves were read off the page to about a pixel: 0.3 m of 190 m, 0.1 m/s.
     sim, duration = ball_on_incline()
-    record_planar(sim, tmp_path / "run.h5", describe_planar(sim, "figure 3.2"), duration=duration)
+    record_run(sim, duration, tmp_path / "run.h5", None, title="figure 3.2")
     run = read_trajectory(tmp_path / "run.h5")
     t, speed = np.array(published()["fig_3_3_ball_incline_velocity_forces"]["curves"]["Ball Velocity"]).T
     ours = np.interp(t, run["time"], np.linalg.norm(run["v"][:, :2], axis=1))
@@ -263,7 +263,7 @@ def test_a_planar_run_is_plotted_and_replayed(command: str, tmp_path: Path) -> N
 def test_a_planar_run_read_back_is_the_simulations(tmp_path: Path) -> None:
     sim = BallSimulation(Sine(0.1, 2.0), radius=0.3)
     sim.set_state([0.0, 0.5, 0.0], [1.0, 0.0, 0.0])
-    record_planar(sim, tmp_path / "ball.h5", describe_planar(sim, "a ball"), duration=0.5)
+    record_run(sim, 0.5, tmp_path / "ball.h5", None, title="a ball")
     run = open_run(tmp_path / "ball.h5")
     assert run.radius == pytest.approx([sim.parameters["radius"]])
     assert run.discs[-1, 0] == pytest.approx(sim.q)

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import struct
 from collections.abc import Callable
 from typing import Any
 
@@ -22,6 +23,7 @@ from rover_gym import (
     TerrainError,
 )
 from rover_gym.env import episode_scene
+from rover_gym.mechanics import EpisodeRun
 from rover_gym.vector import RoverVectorEnv
 from rover_gym.vector.sb3 import RoverVecEnv
 
@@ -262,6 +264,19 @@ def damage(part: str, change: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return lambda snapshot: dataclasses.replace(snapshot, **{part: change(getattr(snapshot, part))})
 
 
+def without_distance(progress: bytes) -> bytes:
+    """The same progress, but that the distance to the goal is nan."""
+    away = EpisodeRun.from_bytes(RoverEnv().task.rules, progress).info()["distance_to_goal"]
+    return progress.replace(struct.pack("<d", away), struct.pack("<d", np.nan))
+
+
+def other_progress() -> bytes:
+    """That of an environment with a height scan."""
+    env = RoverEnv(height_scan=True)
+    env.reset(seed=1)
+    return env.snapshot().progress
+
+
 @pytest.mark.parametrize(
     ("damaged", "field"),
     [
@@ -274,8 +289,9 @@ def damage(part: str, change: Callable[[Any], Any]) -> Callable[[Any], Any]:
         (damage("scene", lambda _: None), "snapshot.scene"),
         (damage("simulation", lambda s: s.to_bytes()), "snapshot.simulation"),
         (damage("progress", lambda _: 3), "snapshot.progress"),
-        (damage("progress", lambda p: dataclasses.replace(p, energy=np.nan)), "snapshot.progress"),
-        (damage("progress", lambda p: dataclasses.replace(p, observation=np.zeros(3))), "snapshot.progress"),
+        (damage("progress", lambda p: p[:-1]), "snapshot.progress"),
+        (damage("progress", without_distance), "snapshot.progress"),
+        (damage("progress", lambda _: other_progress()), "snapshot.progress"),
         (damage("difficulty", lambda _: 7.0), "difficulty"),
         (lambda _: "snapshot", "snapshot"),
     ],

@@ -67,9 +67,7 @@ def driven(episodes: EpisodeBatch, actions: npt.NDArray[np.float64], steps: int)
 
 def test_a_copy_of_a_rover_continues_bit_for_bit() -> None:
     first, second = (begun(observation_noise=0.01).episodes for _ in range(2))
-    n = len(first.observations()[0])
-    assert n > 0
-    actions = np.full((2, first.episode(0).state()["previous_action"].size), 0.4)
+    actions = np.full((2, 12), 0.4)
     driven(first, actions, 15)
     rover = first.simulation(0)
     second.resume([1], rover, first.episode(0), first.origin(0), generator=first.generators([0]), steps=first.steps(0))

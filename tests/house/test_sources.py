@@ -11,6 +11,7 @@ import re
 import runpy
 from functools import reduce
 from pathlib import Path
+from types import FunctionType
 
 import pytest
 from house.test_tree import tracked_files
@@ -153,6 +154,11 @@ def is_class(name: str) -> bool:
     return isinstance(runtime(name), type)
 
 
+def is_of_the_package(name: str) -> bool:
+    """Whether a member is a function of the package, which documents it, that has become a method."""
+    return isinstance(runtime(name), FunctionType)
+
+
 # Sorted: PyO3 keeps members in no order that two processes would share.
 PUBLIC = sorted(name for name in vars(_core) if not name.startswith("_"))
 
@@ -161,7 +167,7 @@ MEMBERS = [
     for name in PUBLIC
     if is_class(name) and not issubclass(runtime(name), Exception)
     for member in sorted(vars(runtime(name)))
-    if not member.startswith("_")
+    if not member.startswith("_") and not is_of_the_package(f"{name}.{member}")
 ]
 
 # A class is called if it has a constructor; the signature is the class's own, and Python keeps no other.

@@ -16,7 +16,7 @@ use rover_core::solver::SolverOptions;
 use rover_core::system::grains::{
     COORDINATES, GrainFriction, GrainScene, Grains, Packing, SleepOptions, Wall,
 };
-use rover_core::system::{AmongContact, AmongGrains, AmongParts};
+use rover_core::system::{CompositeContact, CompositeScratch, TreeAmongGrains};
 
 /// θ = γ = 1, solved to `tolerance`.
 fn options(gravity: f64, time_step: f64, tolerance: f64) -> StepOptions {
@@ -320,10 +320,10 @@ fn the_assembled_operator_is_that_of_the_impulses() {
         let place = [wheel.x + side, wheel.y, wheel.z];
         let above = [place[0], place[1] + 0.2, place[2]];
         let bed = balls(&[place, above], 0.1, 4.0, false, &options);
-        let mut parts = AmongParts::new(rover.model());
+        let mut parts = CompositeScratch::new(rover.model());
         let (mut bed_parts, mut rover_parts) = (bed.scene().parts(), rover.scene().parts());
         let (bed_memory, rover_memory) = (bed.scene().memory(), rover.scene().memory());
-        let mut system = AmongGrains {
+        let mut system = TreeAmongGrains {
             bed: (bed.scene()).system(bed.command(), &bed_memory, &mut bed_parts),
             tree: (rover.scene()).system(rover.command(), &rover_memory, &mut rover_parts),
             friction: 0.7,
@@ -343,10 +343,13 @@ fn the_assembled_operator_is_that_of_the_impulses() {
         assert!(system.factorise(&options));
         let n = 3 * contacts.len();
         system.assemble(&contacts, &v, &mut vec![0.0; n]);
-        let count = |is: fn(&AmongContact) -> bool| contacts.iter().filter(|c| is(c)).count();
-        assert!(count(|c| matches!(c, AmongContact::Grains(_))) > 0);
-        assert!(count(|c| matches!(c, AmongContact::Tree(_))) > 0);
-        assert_eq!(count(|c| matches!(c, AmongContact::Touch(_))) > 0, touch_it);
+        let count = |is: fn(&CompositeContact) -> bool| contacts.iter().filter(|c| is(c)).count();
+        assert!(count(|c| matches!(c, CompositeContact::Grains(_))) > 0);
+        assert!(count(|c| matches!(c, CompositeContact::Tree(_))) > 0);
+        assert_eq!(
+            count(|c| matches!(c, CompositeContact::Touch(_))) > 0,
+            touch_it
+        );
         let p: Vec<f64> = (0..n).map(|i| (1.7 * i as f64).sin()).collect();
         let (mut y, mut expected) = (vec![0.0; system.nv()], vec![0.0; n]);
         system.add_impulses(&p, &mut y);

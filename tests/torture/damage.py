@@ -21,19 +21,19 @@ from rover_gym import (
     RoverGymError,
     RoverModel,
     Simulation,
-    Snapshot,
     SphereField,
     StepError,
     TriangleMesh,
     solve_friction_contact,
 )
+from rover_gym.mechanics import Snapshot
 from rover_gym.models import RobotFileWarning
-from rover_gym.planar import BallSimulation, Line, PlanarSnapshot, Polyline, Sine, Spline, TwoWheelRoverSimulation
+from rover_gym.planar import BallSimulation, Line, Polyline, Sine, Spline, TwoWheelRoverSimulation
 from rover_gym.policy import PolicyError, TrainedPolicy
 from rover_gym.policy.policy_card import FOLDER
 from rover_gym.record import Recorder, RecordingError, RoverSampler, describe, read_run
 from rover_gym.runs import open_run
-from rover_gym.soil import SoilRun, SoilSimulation, SoilSnapshot, soil_packing
+from rover_gym.soil import SoilRun, SoilSimulation, soil_packing
 from torture.hostile import NUMBERS, TEXTS, THINGS
 from torture.ledger import Bounds, Ledger, Regime
 from torture.mutate import (
@@ -257,12 +257,12 @@ def _soil() -> SoilSimulation:
 
 def snapshots(random: Random, ledger: Ledger) -> None:
     """Snapshots of the rover, a ball and a soil with bytes changed; what is accepted is stepped."""
-    make, kind = [(_moving, Snapshot), (_ball, PlanarSnapshot), (_soil, SoilSnapshot)][random.integers(3)]
+    make = (_moving, _ball, _soil)[random.integers(3)]
     sim: Any = make()
     data = sim.snapshot().to_bytes()
     for _ in range(15):
         damaged = mutate_bytes(random, data)
-        snapshot = attempt(ledger, "from_bytes", lambda damaged=damaged: kind.from_bytes(damaged))
+        snapshot = attempt(ledger, "from_bytes", lambda damaged=damaged: Snapshot.from_bytes(damaged))
         if snapshot is None:
             continue
         before = sim.snapshot().to_bytes()
@@ -273,7 +273,7 @@ def snapshots(random: Random, ledger: Ledger) -> None:
 
         if attempt(ledger, "restore", restore):
             use(ledger, "a damaged snapshot", sim)
-            sim.restore(kind.from_bytes(data))
+            sim.restore(Snapshot.from_bytes(data))
         elif sim.snapshot().to_bytes() != before:
             ledger.find("a refused snapshot changed the state")
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, is_dataclass
 from pathlib import Path
-from typing import Annotated, Any, NoReturn, ParamSpec, TextIO, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, ParamSpec, TextIO, TypeVar
 
 import numpy as np
 import typer
@@ -28,7 +28,12 @@ from rover_gym.validation import refuse
 
 P = ParamSpec("P")
 
+if TYPE_CHECKING:
+    from rover_gym.record.rover_run import Run
+
+
 R = TypeVar("R")
+RecordedRun = TypeVar("RecordedRun", bound="Run")
 
 #: Arguments that an option of another name sets: the command's parameter, and the option.
 SET_BY = {
@@ -335,6 +340,21 @@ class Results:
                 if path.exists():
                     self.path(f"{what}, incomplete", path)
             raise
+
+    def record(
+        self, sim: Any, duration: float, path: Path, kind: type[RecordedRun], fps: float | None = None, **options: Any
+    ) -> RecordedRun:
+        """Records a run as `record_run` does, under a progress bar, and reads it back."""
+        from rover_gym.runs import open_run, record_run  # noqa: PLC0415 - h5py is slow to load
+
+        with self.keeping("trajectory", path), progress_bar() as bar:
+            task = bar.add_task(path.stem, total=duration, state="")
+
+            def show(time: float) -> None:
+                bar.update(task, completed=time, state=f"{time:.2f} s")
+
+            record_run(sim, duration, path, fps, progress=show, **options)
+        return open_run(path, kind)
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rover_gym.cli.console import LARGEST_SEED, AsJson, Results, Row, check_folder, progress_bar, row, status
+from rover_gym.cli.console import LARGEST_SEED, AsJson, Results, Row, check_folder, row, status
 
 if TYPE_CHECKING:
     from rover_gym.grains.grain_run import GrainRun, Recordable
@@ -73,24 +73,11 @@ def recorded(
     until: Callable[[Any], bool] = lambda _: False,
 ) -> "GrainRun":
     """Records a run, films it if wanted, says where both are, and reads it back."""
-    from rover_gym.grains.grain_run import GrainRun, record_grains  # noqa: PLC0415 - as above
-    from rover_gym.runs import open_run  # noqa: PLC0415 - as above
+    from rover_gym.grains.grain_run import GrainRun  # noqa: PLC0415 - h5py is slow to load
 
     path = given.output / f"{name}.h5"
-    with results.keeping("trajectory", path), progress_bar() as bar:
-        task = bar.add_task(name, total=given.duration, state="")
-        record_grains(
-            sim,
-            given.duration,
-            path,
-            given.fps,
-            title=title,
-            scene=scene,
-            seed=given.seed,
-            until=until,
-            progress=lambda time: bar.update(task, completed=time, state=f"{time:.2f} s"),
-        )
-    run = open_run(path, GrainRun)
+    facts = {"title": title, "scene": scene, "seed": given.seed}
+    run = results.record(sim, given.duration, path, GrainRun, given.fps, until=until, **facts)
     results.path("trajectory", path)
     if given.film:
         from rover_gym.figures.grain_frames import film_grains  # noqa: PLC0415 - VTK is slow to load

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from rover_gym.cli.console import AsJson, Results, check_folder, plain_errors, progress_bar, row
+from rover_gym.cli.console import AsJson, Results, check_folder, plain_errors, row
 from rover_gym.cli.options import takes, warn_of_slope
 from rover_gym.cli.soil_command import soil
 from rover_gym.mechanics import (
@@ -23,8 +23,7 @@ from rover_gym.mechanics import (
     Spline,
     TwoWheelRoverSimulation,
 )
-from rover_gym.planar.planar_run import PlanarRun, describe_planar, record_planar
-from rover_gym.runs import open_run
+from rover_gym.planar.planar_run import PlanarRun
 from rover_gym.validation import number, refuse
 
 planar = typer.Typer(
@@ -184,18 +183,12 @@ def _run(sim: PlanarSimulation, who: str, given: Course, path: Path) -> None:
     start = float(sim.q[0])
     title = f"{who} on {_words(sim.ground)}"
     with Results(as_json=given.as_json) as results:
-        with results.keeping("trajectory", path), progress_bar() as bar:
-            task = bar.add_task(who, total=longest, state="")
-            rows = record_planar(
-                sim,
-                path,
-                describe_planar(sim, title),
-                duration=longest,
-                until=lambda now: bool(abs(now.q[0] - start) >= farthest),
-                progress=lambda time: bar.update(task, completed=time, state=f"{time:.1f} s"),
-            )
-        x, y = sim.q[:2]
-        run = open_run(path, PlanarRun)
+
+        def is_far(now: PlanarSimulation) -> bool:
+            return bool(abs(now.q[0] - start) >= farthest)
+
+        run = results.record(sim, longest, path, PlanarRun, title=title, until=is_far)
+        rows, (x, y) = int(run.trajectory.attributes["unconverged_rows"]), sim.q[:2]
         speed, gap = float(np.hypot(*sim.v[:2])), float(run.trajectory["gaps"].min())
         results.table(
             title,

@@ -26,6 +26,7 @@ from rover_gym.mechanics import OptionError
 from rover_gym.validation import refuse
 
 if TYPE_CHECKING:
+    from rover_gym.mechanics import SoilSimulation
     from rover_gym.soil.soil_trials import Traction
 
 EARTH = 9.81  # m/s^2
@@ -123,12 +124,11 @@ def _cross(
     video: bool,
 ) -> None:
     from rover_gym.figures.grain_frames import draw_soil, film_soil  # noqa: PLC0415 - matplotlib is slow to load
-    from rover_gym.runs import open_run  # noqa: PLC0415 - as above
     from rover_gym.soil.bed import (  # noqa: PLC0415
         rover_on_soil,
         settled_bed,
     )
-    from rover_gym.soil.soil_run import SoilRun, record_soil  # noqa: PLC0415 - as above
+    from rover_gym.soil.soil_run import SoilRun  # noqa: PLC0415 - as above
 
     _check_width("disks", disks, layers, CROSSING)
     bed = settled_bed(disks, layers, seed=seed, **options)
@@ -137,19 +137,12 @@ def _cross(
     title = f"the two-wheel rover on a soil of {disks} disks"
     path = output / "soil.h5"
     rate = FRAMES * float(np.sqrt(-options["gravity"][1] / EARTH))
-    with results.keeping("trajectory", path), progress_bar() as bar:
-        task = bar.add_task("soil", total=duration, state="")
-        rows = record_soil(
-            sim,
-            path,
-            title,
-            duration=duration,
-            steps_per_row=max(1, round(0.5 / rate / sim.time_step)),
-            walls=bed.walls,
-            until=lambda now: bool(now.wheels[-1, 0] + now.wheels[-1, 2] > bed.width - END),
-            progress=lambda time: bar.update(task, completed=time, state=f"{time:.1f} s"),
-        )
-    run = open_run(path, SoilRun)
+
+    def is_across(now: "SoilSimulation") -> bool:
+        return bool(now.wheels[-1, 0] + now.wheels[-1, 2] > bed.width - END)
+
+    run = results.record(sim, duration, path, SoilRun, 2.0 * rate, title=title, until=is_across)
+    rows = int(run.trajectory.attributes["unconverged_rows"])
     machine = run.trajectory["machine"]
     distance = float(machine[-1, 0] - machine[0, 0])
     rims = -float((run.wheels[0, :, 2] * (machine[-1] - machine[0])[3:]).mean())

@@ -8,61 +8,9 @@ from typing import Any
 import numpy as np
 
 from rover_gym.env.episode_scene import EpisodeScene
-from rover_gym.env.observation import Array, Observations
 from rover_gym.env.task import Task
-from rover_gym.mechanics import EpisodeRules, EpisodeRun, RoverGymError, Snapshot, StateError
+from rover_gym.mechanics import EpisodeRun, RoverGymError, Snapshot, StateError
 from rover_gym.validation import Range, refuse
-
-
-@dataclass(frozen=True)
-class Progress:
-    """The state of an episode outside the simulation.
-
-    Attributes:
-        goal: The goal (x, z), m; the first of several.
-        domain: `(4,)` fields of `Domain`, in its order.
-        trunk_load_limit: Trunk force beyond which the rover is high-centred, N.
-        difficulty: Difficulty of the rocks.
-        distance: Horizontal distance to the present goal, m.
-        previous_action: `(n_actions,)` last action.
-        energy: Motor work since reset, braking counted, J.
-        energy_positive: Motor work since reset, driving only, J.
-        stuck_time: How long the rover has been high-centred, s.
-        observation: `(size,) float32`, the last observation.
-        further: `(n, 2)` goals after the first, m.
-        reached: How many goals have been reached.
-        outcome: Quantities, reward terms and termination of the last control period.
-        owed: Noise of the heights that the last observation lacks; None where it lacks none.
-    """
-
-    goal: tuple[float, float]
-    domain: Array
-    trunk_load_limit: float
-    difficulty: float
-    distance: float
-    previous_action: Array
-    energy: float
-    energy_positive: float
-    stuck_time: float
-    observation: Observations
-    further: Array
-    reached: int
-    outcome: tuple[Array, Array, str]
-    owed: Array | None
-
-    @classmethod
-    def of(cls, episode: EpisodeRun) -> "Progress":
-        """The progress of an episode."""
-        return cls(**episode.state())
-
-    def episode(self, rules: EpisodeRules) -> EpisodeRun:
-        """The episode that continues from here.
-
-        Raises:
-            OptionError: A value does not fit the rules, or is not finite.
-        """
-        state: dict[str, Any] = vars(self)
-        return EpisodeRun(rules, **state)
 
 
 @dataclass(frozen=True)
@@ -75,14 +23,14 @@ class EnvSnapshot:
     Attributes:
         simulation: The rover in the core.
         scene: What the episode was drawn as: ground, start, goals.
-        progress: How far the episode has come.
+        progress: How far the episode has come, as `EpisodeRun.to_bytes` returns it.
         difficulty: The range that difficulties are drawn from; None without rocks.
         random_state: State of the environment's random generators.
     """
 
     simulation: Snapshot
     scene: EpisodeScene
-    progress: Progress
+    progress: bytes
     difficulty: Range | None
     random_state: Mapping[str, Any]
 
@@ -95,12 +43,12 @@ def check_snapshot(task: Task, snapshot: object) -> EpisodeRun:
     """
     if not isinstance(snapshot, EnvSnapshot):
         refuse(StateError, "snapshot", snapshot, "must come from RoverEnv.snapshot()")
-    for name, kind in (("scene", EpisodeScene), ("progress", Progress), ("simulation", Snapshot)):
+    for name, kind in (("scene", EpisodeScene), ("progress", bytes), ("simulation", Snapshot)):
         part = getattr(snapshot, name)
         if not isinstance(part, kind):
             refuse(StateError, f"snapshot.{name}", part, f"must be of the class {kind.__name__}")
     try:
-        return snapshot.progress.episode(task.rules)
+        return EpisodeRun.from_bytes(task.rules, snapshot.progress)
     except RoverGymError as error:
         reason = f"must be of an environment with these arguments ({error})"
         refuse(StateError, "snapshot.progress", snapshot.progress, reason)

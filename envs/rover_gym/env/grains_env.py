@@ -15,11 +15,11 @@ from rover_gym.env.episode_scene import EpisodeScene, ResetOptions
 from rover_gym.env.rover_env import RoverEnv, RunningEpisode
 from rover_gym.mechanics import (
     GrainSimulation,
-    GrainSnapshot,
     OptionError,
     RoverGrainSimulation,
     RoverModel,
     Simulation,
+    Snapshot,
     StateError,
 )
 from rover_gym.validation import flag, number, refuse, span, whole
@@ -70,7 +70,7 @@ class GrainsEnvSnapshot(EnvSnapshot):
     """
 
     bed: BedDraw
-    grains: GrainSnapshot
+    grains: Snapshot
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from rover_gym.env.arguments import RoverArguments, check_arguments, takes_arguments, with_tables
-from rover_gym.env.env_snapshot import EnvSnapshot, Progress, check_random_state, check_snapshot
+from rover_gym.env.env_snapshot import EnvSnapshot, check_random_state, check_snapshot
 from rover_gym.env.episode_scene import (
     EpisodeScene,
     ResetOptions,
@@ -237,7 +237,7 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
 
     A wheel in sand counts as in contact: its `wheel_gap` is minus its sinkage, `normal_force` and `tangential_force` are
     those of the sand, and `slip_ratio` in `info` counts it. `simulation.sand()` has the sinkage, slip and force of each wheel,
-    and the ruts. Frames show the undisturbed surface.
+    and the ruts. Frames show the ruts on the undisturbed surface.
 
     ## End
 
@@ -453,7 +453,7 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
         return EnvSnapshot(
             scene=self.scene,
             simulation=self.simulation.snapshot(),
-            progress=Progress.of(self.episode.progress),
+            progress=self.episode.progress.to_bytes(),
             difficulty=self._difficulty,
             random_state=copy.deepcopy(self.np_random.bit_generator.state),
         )

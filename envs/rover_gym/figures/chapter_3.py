@@ -13,10 +13,10 @@ import numpy.typing as npt
 
 from rover_gym.figures.planar_drawing import GROUND
 from rover_gym.figures.style import save_figures
-from rover_gym.planar.planar_run import describe_planar, record_planar
 from rover_gym.record.trajectory import Trajectory, read_trajectory
 from rover_gym.rendering.appearance import PLANAR_WHEEL_COLOURS
 from rover_gym.reproduction.scene_runs import ball_on_incline, ball_on_sine, published
+from rover_gym.runs import record_run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,9 +41,8 @@ def draw_chapter_3(folder: str | Path) -> list[Path]:
             sim, duration = scene(contact)
             path = folder / f"ball-{name}-{contact.replace('_', '-')}.h5"
             # Impulses are those of a row's last step, drawn for the report's contact rule only.
-            steps_per_row = 1 if contact == "centre_height" else 10
-            title = f"chapter 3 of the report: ball, {name}"
-            record_planar(sim, path, describe_planar(sim, title), duration=duration, steps_per_row=steps_per_row)
+            fps = None if contact == "centre_height" else 0.1 / sim.time_step
+            record_run(sim, duration, path, fps, title=f"chapter 3 of the report: ball, {name}")
             pair.append(read_trajectory(path))
         runs[name] = (pair[0], pair[1])
     return save_figures(

@@ -29,7 +29,7 @@ from rover_gym.grains.bed_scenes import (
     striking_sphere,
     with_wheel_width,
 )
-from rover_gym.grains.grain_run import GrainRun, GrainSampler, describe_grains, record_grains
+from rover_gym.grains.grain_run import GrainRun, GrainSampler
 from rover_gym.grains.grain_surface import SurfaceMap, surface_map
 from rover_gym.grains.moving_window import BedEnergy, MovingWindow, WindowSnapshot
 from rover_gym.grains.pit import Pit, PitFill
@@ -46,13 +46,11 @@ __all__ = [
     "WindowSnapshot",
     "box_walls",
     "column",
-    "describe_grains",
     "drum",
     "even_radii",
     "lognormal_radii",
     "outflow",
     "penetration_depths",
-    "record_grains",
     "rover_on_bed",
     "run_out",
     "settle",

@@ -10,7 +10,7 @@ run.positions[-1, :, 1].max()
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -42,14 +42,12 @@ from rover_gym.record.channels import (
     energy_channels,
     origins,
     rover_channels,
-    row_count,
     sound,
     wheel_solids,
 )
-from rover_gym.record.recorder import record_rows
 from rover_gym.record.rover_run import LARGEST, RoverRun, Run, check_rows, check_time, title_of
 from rover_gym.record.trajectory import Trajectory, read_frames
-from rover_gym.validation import checked, number, refuse
+from rover_gym.validation import refuse
 
 if TYPE_CHECKING:
     from rover_gym.mechanics import Terrain
@@ -99,8 +97,6 @@ Recordable: TypeAlias = GrainSimulation | RoverGrainSimulation | MovingWindow
 KIND = "GrainSimulation"
 #: Share of the smallest radius by which a stored position may be off.
 RESOLUTION = 1.0 / 250.0
-#: Rows of a flush and of a chunk: a kill loses at most these, 0.6 s at 25 frames a second.
-ROWS_PER_FLUSH = 16
 
 
 def _both(sim: Recordable) -> tuple[GrainSimulation | MovingWindow, Simulation | None]:
@@ -159,6 +155,8 @@ class GrainSampler(Sampler):
         sim: A `GrainSimulation`, a `RoverGrainSimulation` or a `MovingWindow`.
     """
 
+    rows_per_flush = 16  # 0.6 s at 25 frames a second
+
     def __init__(self, sim: Recordable) -> None:
         self.grains, self.rover = _both(sim)
         model = None if self.rover is None else self.rover.model
@@ -204,6 +202,30 @@ class GrainSampler(Sampler):
         """(n_wheels, 3) m, world."""
         return np.zeros((0, 3)) if self.rover is None else origins(self.rover, self._solids)
 
+    @property
+    def terrain(self) -> Terrain | None:
+        """The ground of rover and balls, or of the balls."""
+        return self.grains.terrain if self.rover is None else self.rover.terrain
+
+    def describe(self, title: str | None, scene: Mapping[str, Any], seed: int | str | None) -> dict[str, Any]:
+        """The attributes of a recording, taken from the simulation at its start."""
+        grains = self.grains
+        return {
+            "title": title or "balls in space",
+            "scene": {
+                **scene,
+                "kind": KIND,
+                "resolution": self._stored.resolution,
+                "vessel": stored_vessel(grains.vessel),
+                **({} if self.rover is None else {"model": self.rover.model.to_dict()}),
+            },
+            "grain_radius": np.asarray(grains.radius, dtype=np.float64),
+            "grain_mass": np.asarray(grains.mass, dtype=np.float64),
+            "grain_kinematic": np.asarray(grains.kinematic, dtype=np.uint8),
+            "seed": "none" if seed is None else seed,
+            "solver": grains.settings,
+        }
+
 
 def wheel_impulses(rover: Simulation) -> Array:
     """(n_wheels, 3) impulse of balls and ground on each wheel in the last step, world, N s."""
@@ -214,97 +236,6 @@ def wheel_impulses(rover: Simulation) -> Array:
     world = np.einsum("ci,cij->cj", contacts.impulses[touching], contacts.frames[touching])
     np.add.at(impulses, contacts.wheels[touching], world)
     return impulses
-
-
-@checked(scene=(Mapping, None))
-def describe_grains(
-    sim: Recordable,
-    title: str,
-    scene: Mapping[str, Any] | None = None,
-    *,
-    seed: int | str = "none",
-) -> dict[str, Any]:
-    """The attributes of a recording, taken from the simulation at its start.
-
-    Args:
-        sim: The simulation.
-        title: Title of the run.
-        scene: Further parameters of the scene.
-        seed: Seed of the packing, or why there is none.
-    """
-    grains, rover = _both(sim)
-    return {
-        "title": title,
-        "scene": {
-            **(scene or {}),
-            "kind": KIND,
-            "resolution": StoredPlaces(grains.radius).resolution,
-            "vessel": stored_vessel(grains.vessel),
-            **({} if rover is None else {"model": rover.model.to_dict()}),
-        },
-        "grain_radius": np.asarray(grains.radius, dtype=np.float64),
-        "grain_mass": np.asarray(grains.mass, dtype=np.float64),
-        "grain_kinematic": np.asarray(grains.kinematic, dtype=np.uint8),
-        "seed": seed,
-        "solver": grains.settings,
-    }
-
-
-@checked(scene=(Mapping, None), title=str, seed=(int, str), before_row=callable, until=callable, progress=callable)
-def record_grains(
-    sim: Recordable,
-    duration: float,
-    path: str | Path,
-    fps: float = 25.0,
-    *,
-    title: str = "balls in space",
-    scene: Mapping[str, Any] | None = None,
-    seed: int | str = "none",
-    before_row: Callable[[Any], None] = lambda _: None,
-    until: Callable[[Any], bool] = lambda _: False,
-    progress: Callable[[float], None] = lambda _: None,
-) -> int:
-    """Runs balls, alone or under a rover, from their current state and records them.
-
-    Rows are written 16 at a time: a run that is killed keeps all but its last 15 rows at most.
-
-    Args:
-        sim: A `GrainSimulation`, a `RoverGrainSimulation` or a `MovingWindow`.
-        duration: Time to simulate, s.
-        path: HDF5 file to write.
-        fps: Rows per second of simulated time, rounded to a whole number of steps from row to row.
-        title: Title of the recording.
-        scene: Further parameters of the scene, stored with it.
-        seed: Seed of the packing, or why there is none.
-        before_row: Called with the simulation before the steps of each row, to command a rover or move walls.
-        until: Called with the simulation after each row; the run stops when it returns true.
-        progress: Called with the simulated time after each row.
-
-    Returns:
-        Number of rows with steps that did not converge to the tolerance.
-
-    Raises:
-        OptionError: `duration` or `fps` is not positive, or the run has too many rows.
-        RecordingError: The file is in use, or the disk is full.
-        MissingExtraError: h5py is not installed.
-        StepError: A step failed; the rows before it are on disk.
-    """
-    fps = number("fps", fps, above=0.0)
-    grains, rover = _both(sim)
-    steps_per_row = max(1, round(1.0 / (fps * grains.time_step)))
-    rows = row_count(duration, grains.time_step, steps_per_row)
-    return record_rows(
-        GrainSampler(sim),
-        path,
-        describe_grains(sim, title, scene, seed=seed),
-        rows,
-        steps_per_row,
-        terrain=grains.terrain if rover is None else rover.terrain,
-        rows_per_flush=ROWS_PER_FLUSH,
-        before_row=before_row,
-        until=until,
-        progress=progress,
-    )
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from rover_gym.mechanics import GrainSimulation, OptionError, RoverGrainSimulati
 from rover_gym.validation import checked, number, refuse, whole
 
 if TYPE_CHECKING:
-    from rover_gym.mechanics import Drum, RoverGrainSnapshot, Silo, StepReport
+    from rover_gym.mechanics import Drum, Silo, Snapshot, StepReport
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -66,7 +66,7 @@ class WindowSnapshot:
     low: float
     frozen_momentum: float
     moves: int
-    both: RoverGrainSnapshot
+    both: Snapshot
 
 
 class MovingWindow:

@@ -15,12 +15,11 @@ from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import TRUNK_LOAD
 from rover_gym.ground import heights_of
 from rover_gym.live.live_scene import LiveChoices, LiveScene
-from rover_gym.mechanics import OptionError, SphereField, TerrainError, Union, sin_cos
+from rover_gym.mechanics import EpisodeRun, OptionError, SphereField, TerrainError, Union, sin_cos
 from rover_gym.policy.command import CommandController
 from rover_gym.validation import checked, number, refuse
 
 if TYPE_CHECKING:
-    from rover_gym.env.env_snapshot import Progress
     from rover_gym.env.episode_scene import EpisodeScene
     from rover_gym.policy.named_policy import NamedPolicy, Policy
 
@@ -170,7 +169,7 @@ class LiveRover:
         if wheel.driver is None:
             action = self._hand.act(self.env.complete_observation()[None], np.array([[*command, 0.0]]))[0]
         elif wheel.seen is None:
-            action = self.env.snapshot().progress.previous_action.astype(np.float32)
+            action = self.env.episode.progress.previous_action.astype(np.float32)
         else:
             action, state = wheel.driver.predict(wheel.seen, state)
         seen, _, terminated, _, self.info = self.env.step(action)
@@ -269,9 +268,9 @@ class LiveRover:
         env, now = self._environment(scene, policy), self.env.snapshot()
         env.reset(seed=scene.seed)
         fresh = env.snapshot()
-        progress = replace(now.progress, observation=fresh.progress.observation, owed=fresh.progress.owed)
+        progress = self.env.episode.progress.changed(seen=env.episode.progress)
         world, progress = _with_properties(env, now.scene, progress, scene.friction, scene.gravity)
-        env.restore(replace(now, scene=world, progress=progress, random_state=fresh.random_state))
+        env.restore(replace(now, scene=world, progress=progress.to_bytes(), random_state=fresh.random_state))
         self._take(_Wheel(env, policy, None if policy is None else policy.make(env)))
         self.scene = scene
 
@@ -285,7 +284,7 @@ class LiveRover:
     ) -> None:
         """Continues in a world with other properties, another goal or other rocks."""
         now = self.env.snapshot()
-        scene, progress = now.scene, now.progress
+        scene, progress = now.scene, self.env.episode.progress
         if friction is not None and gravity is not None:
             scene, progress = _with_properties(self.env, scene, progress, friction, gravity)
         if rocks is not None:
@@ -294,18 +293,18 @@ class LiveRover:
             q = self.env.simulation.q
             away = math.dist(goal, (q[0], q[2]))
             scene = replace(scene, start=replace(scene.start, goal=goal))
-            progress = replace(progress, goal=goal, distance=away, outcome=(*progress.outcome[:2], ""), reached=0)
-        self.env.restore(replace(now, scene=scene, progress=progress))
+            progress = progress.changed(goal=goal, distance=away)
+        self.env.restore(replace(now, scene=scene, progress=progress.to_bytes()))
         policy = self._wheel.policy
         if policy is not None and friction is None:  # its plan of the ground, or to the goal, is out of date
             self._wheel = _Wheel(self.env, policy, policy.make(self.env))
 
 
 def _with_properties(
-    env: RoverEnv, scene: EpisodeScene, progress: Progress, friction: float, gravity: float
-) -> tuple[EpisodeScene, Progress]:
+    env: RoverEnv, scene: EpisodeScene, progress: EpisodeRun, friction: float, gravity: float
+) -> tuple[EpisodeScene, EpisodeRun]:
     """Scene and progress of an environment with another friction and another gravity, m/s²."""
     domain = replace(scene.domain, friction=friction, gravity_scale=gravity / math.hypot(*env.gravity))
     limit = TRUNK_LOAD * env.model.mass * domain.mass_scale * gravity
-    properties = np.array(list(domain.as_info().values()))
-    return replace(scene, domain=domain), replace(progress, domain=properties, trunk_load_limit=limit)
+    properties = list(domain.as_info().values())
+    return replace(scene, domain=domain), progress.changed(domain=properties, trunk_load_limit=limit)

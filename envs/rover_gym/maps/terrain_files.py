@@ -182,7 +182,7 @@ def triangle_mesh_from_file(
     return TriangleMesh(*read_mesh(path, scale=scale, position=position, up=up), material)
 
 
-SphereField.from_file = staticmethod(sphere_field_from_file)  # type: ignore[method-assign]
-HeightField.from_file = staticmethod(height_field_from_file)  # type: ignore[method-assign]
-HeightField.fractal = staticmethod(fractal)  # type: ignore[method-assign]
-TriangleMesh.from_file = staticmethod(triangle_mesh_from_file)  # type: ignore[method-assign]
+SphereField.from_file = staticmethod(sphere_field_from_file)
+HeightField.from_file = staticmethod(height_field_from_file)
+HeightField.fractal = staticmethod(fractal)
+TriangleMesh.from_file = staticmethod(triangle_mesh_from_file)

@@ -7,7 +7,7 @@ this page become its methods.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 from rover_gym.mechanics import ModelError, RoverModel
@@ -15,7 +15,6 @@ from rover_gym.models.file_writing import write_mjcf, write_urdf
 from rover_gym.models.import_report import ImportReport
 from rover_gym.models.reading import read_mjcf, read_urdf
 from rover_gym.models.robot_tree import checked_path
-from rover_gym.models.roles import Steering, Wheels
 from rover_gym.validation import text_of_file
 
 #: Longest model file, bytes.
@@ -56,8 +55,8 @@ def to_file(self: RoverModel, path: str | os.PathLike[str]) -> None:  # noqa: D4
 def from_urdf(
     path: str | os.PathLike[str],
     *,
-    wheels: Wheels = None,
-    steering: Steering = None,
+    wheels: Sequence[str] | Mapping[str, float] | None = None,
+    steering: Sequence[str] | Mapping[str, str] | None = None,
     free_base: bool = True,
     forward: str = "x",
     torque_limit: float | None = None,
@@ -109,8 +108,8 @@ def from_urdf(
 def from_mjcf(
     path: str | os.PathLike[str],
     *,
-    wheels: Wheels = None,
-    steering: Steering = None,
+    wheels: Sequence[str] | Mapping[str, float] | None = None,
+    steering: Sequence[str] | Mapping[str, str] | None = None,
     free_base: bool | None = None,
     forward: str = "x",
     torque_limit: float | None = None,
@@ -195,9 +194,9 @@ def to_mjcf(self: RoverModel, path: str | os.PathLike[str]) -> None:  # noqa: D4
     write_mjcf(self, path)
 
 
-RoverModel.from_file = staticmethod(from_file)  # type: ignore[method-assign]
-RoverModel.from_urdf = staticmethod(from_urdf)  # type: ignore[method-assign]
-RoverModel.from_mjcf = staticmethod(from_mjcf)  # type: ignore[method-assign]
-RoverModel.to_file = to_file  # type: ignore[method-assign]
-RoverModel.to_urdf = to_urdf  # type: ignore[method-assign]
-RoverModel.to_mjcf = to_mjcf  # type: ignore[method-assign]
+RoverModel.from_file = staticmethod(from_file)
+RoverModel.from_urdf = staticmethod(from_urdf)
+RoverModel.from_mjcf = staticmethod(from_mjcf)
+RoverModel.to_file = to_file
+RoverModel.to_urdf = to_urdf
+RoverModel.to_mjcf = to_mjcf

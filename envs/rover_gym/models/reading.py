@@ -51,34 +51,18 @@ def _read(
     wheels: Wheels = None,
     steering: Steering = None,
     forward: str = "x",
-    torque_limit: float | None = None,
-    steering_stiffness: float | None = None,
-    steering_damping: float | None = None,
-    steering_limit: float | None = None,
-    wheel_width: float | None = None,
-    wheel_stiffness: float | None = None,
     ignore: Collection[str] = (),
     frames: int = 3,
+    **limits: float | None,
 ) -> tuple[RoverModel, ImportReport]:
-    """Reads a file; `frames`: calls from here up to the user's, whose line a warning names."""
+    """Reads a file; `frames`: calls from here to the user's, whose line a warning names; `limits`: of wheels."""
     place = checked_path(path)
     if free_base is not None and not isinstance(free_base, bool):
         refuse(ModelError, "free_base", free_base, "must be True or False")
     P = axes_of(forward)
     ignored = check_kinds(ignore, IGNORABLE)
-    given = {
-        "torque_limit": torque_limit,
-        "steering_stiffness": steering_stiffness,
-        "steering_damping": steering_damping,
-        "steering_limit": steering_limit,
-        "wheel_width": wheel_width,
-        "wheel_stiffness": wheel_stiffness,
-    }
     options = WheelOptions(
-        **{
-            name: None if value is None else number(name, value, at_least=0.0, error=ModelError)
-            for name, value in given.items()
-        }
+        **{k: None if x is None else number(k, x, at_least=0.0, error=ModelError) for k, x in limits.items()}
     )
     tree = reader(place, ignore=ignored)
     drop_distant_limits(tree)

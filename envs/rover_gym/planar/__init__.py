@@ -17,7 +17,6 @@ from rover_gym.mechanics import (
     PlanarContacts,
     PlanarGround,
     PlanarSimulation,
-    PlanarSnapshot,
     Polyline,
     Sine,
     Spline,
@@ -26,10 +25,8 @@ from rover_gym.mechanics import (
 from rover_gym.planar.planar_run import (
     PlanarRun,
     PlanarSampler,
-    describe_planar,
     is_planar,
     planar_run_of,
-    record_planar,
 )
 
 __all__ = [
@@ -41,13 +38,10 @@ __all__ = [
     "PlanarRun",
     "PlanarSampler",
     "PlanarSimulation",
-    "PlanarSnapshot",
     "Polyline",
     "Sine",
     "Spline",
     "TwoWheelRoverSimulation",
-    "describe_planar",
     "is_planar",
     "planar_run_of",
-    "record_planar",
 ]

@@ -6,7 +6,7 @@ run.discs[-1, 0, :2]
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,10 +30,8 @@ from rover_gym.record.channels import (
     RecordingError,
     Sampler,
     energy_channels,
-    row_count,
     sound,
 )
-from rover_gym.record.recorder import record_rows
 from rover_gym.record.rover_run import LARGEST, Run, check_rows, check_time, title_of
 from rover_gym.record.trajectory import Trajectory
 from rover_gym.validation import refuse
@@ -99,68 +97,32 @@ class PlanarSampler(Sampler):
         self.residual = report.residual
         return bool(report.is_converged)
 
-
-def describe_planar(sim: PlanarSimulation, title: str) -> dict[str, Any]:
-    """Attributes of a recording, from the simulation's initial state."""
-    ground = sim.ground
-    names = {
-        Line: ("slope", "offset"),
-        Sine: ("amplitude", "wavelength", "phase", "offset"),
-        Spline: ("x", "y"),
-        Polyline: ("x", "y"),
-    }[type(ground)]
-    shape = {name: getattr(ground, name) for name in names}
-    return {
-        "title": title,
-        "scene": {
-            "kind": type(sim).__name__,
-            "ground": {"kind": type(ground).__name__.lower(), **shape},
-            "machine": {
-                name: value.to_dict() if isinstance(value, RoverModel) else value
-                for name, value in sim.parameters.items()
+    def describe(self, title: str | None, scene: Mapping[str, Any], seed: int | str | None) -> dict[str, Any]:
+        """The attributes of a recording, taken from the simulation at its start."""
+        sim, ground = self.sim, self.sim.ground
+        names = {
+            Line: ("slope", "offset"),
+            Sine: ("amplitude", "wavelength", "phase", "offset"),
+            Spline: ("x", "y"),
+            Polyline: ("x", "y"),
+        }[type(ground)]
+        machine = {
+            name: value.to_dict() if isinstance(value, RoverModel) else value for name, value in sim.parameters.items()
+        }
+        return {
+            "title": title or "a machine in the plane",
+            "scene": {
+                **scene,
+                "kind": type(sim).__name__,
+                "ground": {"kind": type(ground).__name__.lower(), **{name: getattr(ground, name) for name in names}},
+                "machine": machine,
+                "q": sim.q,
+                "v": sim.v,
+                "torques": sim.torques,
             },
-            "q": sim.q,
-            "v": sim.v,
-            "torques": sim.torques,
-        },
-        "seed": "none: the scene has no randomness",
-        "solver": sim.settings,
-    }
-
-
-def record_planar(
-    sim: PlanarSimulation,
-    path: str | Path,
-    attributes: Mapping[str, Any],
-    *,
-    duration: float,
-    steps_per_row: int = 1,
-    until: Callable[[PlanarSimulation], bool] = lambda _: False,
-    progress: Callable[[float], None] = lambda _: None,
-) -> int:
-    """Runs a simulation from its current state and records it.
-
-    Args:
-        sim: The simulation.
-        path: HDF5 file to write.
-        attributes: Attributes of the run, from `describe_planar`.
-        duration: Time to simulate, s.
-        steps_per_row: Steps from one row to the next.
-        until: Asked after each row whether the run ends before its time.
-        progress: Called with the simulated time after each row.
-
-    Returns:
-        Number of rows with steps that did not converge to the tolerance.
-
-    Raises:
-        OptionError: `duration` or `steps_per_row` is not positive, or the run has too many rows.
-        RecordingError: The file is in use, or the disk is full.
-        MissingExtraError: h5py is not installed.
-        StepError: A step failed; the rows before it are on disk.
-    """
-    rows = row_count(duration, sim.time_step, steps_per_row)
-    sampler = PlanarSampler(sim)
-    return record_rows(sampler, path, attributes, rows, steps_per_row, until=until, progress=progress)
+            "seed": "none: the scene has no randomness" if seed is None else seed,
+            "solver": sim.settings,
+        }
 
 
 GROUNDS = {"line": Line, "sine": Sine, "spline": Spline, "polyline": Polyline}

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.mechanics import EpisodeBatch, EpisodeRules, RoverModel, Simulation, Terrain
+from rover_gym.mechanics import EpisodeBatch, EpisodeRules, EpisodeRun, RoverModel, Simulation, Terrain
 from rover_gym.validation import number, whole
 
 Array = npt.NDArray[np.float64]
@@ -109,11 +109,10 @@ class Futures:
         now, snapshot = self._env.simulation, self._env.snapshot()
         simulation = self._simulation(now.terrain if terrain is None else terrain)
         simulation.set_state(now.q, now.v)
-        progress = snapshot.progress
         start = snapshot.scene.start
         row = [start.slope, start.uphill, *start.position, start.heading, *start.goal]
         origin = (row, [0.0, 0.0, 0.0], 0, [1.0] * 4)
-        episode = progress.episode(self._rules)
+        episode = EpisodeRun.from_bytes(self._rules, snapshot.progress)
         self._batch.resume(range(self.n), simulation, episode, origin, generator=np.zeros((1, 4), np.uint64))
         seen = self._batch.observations()
         alive = np.ones(self.n, np.bool_)
@@ -132,7 +131,7 @@ class Futures:
             time,
             reached,
             ~alive & ~reached,
-            np.asarray(told["energy"]) - progress.energy,
+            np.asarray(told["energy"]) - self._env.episode.progress.info()["energy"],
             np.asarray(told["tilt"]),
             seen[:, self._stuck].astype(np.float64),
         )

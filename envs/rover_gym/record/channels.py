@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
     import h5py
 
+    from rover_gym.mechanics import Terrain
+
 
 FORMAT = "rover-gym trajectory"
 FORMAT_VERSION = 3
@@ -124,14 +126,25 @@ class Sampler:
         residual: Largest residual since the last row.
         iterations: Iterations since the last row.
         energy: Kinetic and potential energy in the row.
+        rows_per_flush: Most rows that a kill may lose.
     """
 
     channels: tuple[Channel, ...]
+    rows_per_flush = 200
 
     def __init__(self, sim: Any) -> None:
         self.sim = sim
         self.energy: Any = None
         self.clear()
+
+    def describe(self, title: str | None, scene: Mapping[str, Any], seed: int | str | None) -> dict[str, Any]:
+        """The attributes of a recording, taken from the simulation at its start; None: as is usual."""
+        return describe(self.sim, title or "a rover", scene, seed="none" if seed is None else seed)
+
+    @property
+    def terrain(self) -> Terrain | None:
+        """The ground that a recording holds; None for none."""
+        return getattr(self.sim, "terrain", None)
 
     def measure(self) -> None:
         """Measures what several channels read."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import weakref
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -25,7 +25,6 @@ from rover_gym.record.channels import (
     TERRAIN,
     Channel,
     RecordingError,
-    Sampler,
     file_path,
     import_h5py,
     storable,
@@ -217,57 +216,6 @@ class Recorder:
             )
             stopped.field, stopped.value = "path", str(self.path)
             raise stopped from error
-
-
-def record_rows(
-    sampler: Sampler,
-    path: str | Path,
-    attributes: Mapping[str, Any],
-    rows: int,
-    steps_per_row: int,
-    *,
-    terrain: Terrain | None = None,
-    rows_per_flush: int = 200,
-    before_row: Callable[[Any], None] = lambda _: None,
-    until: Callable[[Any], bool] = lambda _: False,
-    progress: Callable[[float], None] = lambda _: None,
-) -> int:
-    """Runs a sampler's simulation from its current state and records it.
-
-    Args:
-        sampler: Steps the simulation and reads its rows.
-        path: HDF5 file to write.
-        attributes: Metadata of the run.
-        rows: Rows after the first.
-        steps_per_row: Steps from one row to the next.
-        terrain: The ground.
-        rows_per_flush: Most rows that a kill may lose.
-        before_row: Called with the simulation before the steps of each row.
-        until: Called with the simulation after each row; the run stops when it returns true.
-        progress: Called with the simulated time after each row.
-
-    Returns:
-        Number of rows with steps that did not converge to the tolerance; the file has it as `unconverged_rows`.
-
-    Raises:
-        RecordingError: The file is in use, or the disk is full.
-        MissingExtraError: h5py is not installed.
-        StepError: A step failed; the rows before it are on disk.
-    """
-    unconverged = 0
-    with Recorder(path, sampler.channels, attributes, terrain=terrain, rows_per_flush=rows_per_flush) as recorder:
-        row = sampler.read()
-        recorder.append(row)
-        for _ in range(rows):
-            before_row(sampler.sim)
-            unconverged += not sampler.step(steps_per_row)
-            row = sampler.read()
-            recorder.append(row)
-            progress(float(np.asarray(row["time"])))
-            if until(sampler.sim):
-                break
-        recorder.note(unconverged_rows=unconverged)
-    return unconverged
 
 
 def _numbers(name: str, value: npt.ArrayLike) -> npt.NDArray[np.float64]:

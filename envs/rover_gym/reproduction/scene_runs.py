@@ -28,9 +28,8 @@ from typing import Any
 import numpy as np
 
 from rover_gym.mechanics import BallSimulation, Line, Plane, RoverModel, Simulation, Sine, SphereField, Terrain
-from rover_gym.record.channels import RoverSampler, describe, row_count
-from rover_gym.record.recorder import Recorder
-from rover_gym.record.trajectory import Trajectory
+from rover_gym.record.trajectory import Trajectory, read_trajectory
+from rover_gym.runs import record_run
 
 BALL: dict[str, Any] = {
     "mass": 3.0,
@@ -136,52 +135,6 @@ class SceneResult:
     worst_residual: float
 
 
-def record_scene(
-    sim: Simulation,
-    path: str | Path,
-    attributes: Mapping[str, Any],
-    *,
-    duration: float,
-    progress: Callable[[float], None] = lambda _: None,
-) -> SceneResult:
-    """Runs a simulation from its current state and records every step.
-
-    Args:
-        sim: The simulation.
-        path: HDF5 file to write.
-        attributes: Attributes of the run, from `describe`.
-        duration: Time to simulate, s.
-        progress: Called periodically with the simulated time.
-
-    Raises:
-        OptionError: `duration` is not positive, or the run has too many rows.
-        RecordingError: The file is in use, or the disk is full.
-        MissingExtraError: h5py is not installed.
-        StepError: A step failed; the rows before it are on disk.
-    """
-    steps = row_count(duration, sim.time_step)
-    first_contact: float | None = None
-    smallest_gap = float(sim.wheel_gaps.min())
-    unconverged, worst = 0, 0.0
-    sampler = RoverSampler(sim.model)
-    with Recorder(path, sampler.channels, attributes, terrain=sim.terrain) as recorder:
-        recorder.append(sampler.row(sim))
-        begin = time.perf_counter()
-        for step in range(1, steps + 1):
-            report = sim.step()
-            recorder.append(sampler.row(sim, residual=report.residual, iterations=report.iterations))
-            unconverged += not report.is_converged
-            worst = max(worst, report.residual)
-            smallest_gap = min(smallest_gap, float(sim.wheel_gaps.min()))
-            if first_contact is None and report.n_contacts > 0:
-                first_contact = sim.time
-            if step % 100 == 0:
-                progress(sim.time)
-        wall_time = time.perf_counter() - begin
-        recorder.note(wall_time=wall_time, unconverged_steps=unconverged)
-    return SceneResult(Path(path), sim.time, wall_time, first_contact, smallest_gap, unconverged, worst)
-
-
 @dataclass(frozen=True)
 class ReportScene:
     """A scene of the report.
@@ -243,8 +196,21 @@ class ReportScene:
             StepError: A step failed; the rows before it are on disk.
         """
         sim = self.simulation(time_step, **options)
-        attributes = describe(sim, self.title, {"terrain": dict(self.ground)}, seed=SEED)
-        return record_scene(sim, path, attributes, duration=duration, progress=progress)
+        scene = {"terrain": dict(self.ground)}
+        begin = time.perf_counter()
+        unconverged = record_run(sim, duration, path, None, title=self.title, scene=scene, seed=SEED, progress=progress)
+        wall_time = time.perf_counter() - begin
+        run = read_trajectory(path)
+        loaded = run["time"][run["wheel_forces"].any(axis=(1, 2))]
+        return SceneResult(
+            path=Path(path),
+            duration=sim.time,
+            wall_time=wall_time,
+            first_contact=float(loaded[0]) if len(loaded) else None,
+            smallest_gap=float(run["wheel_gaps"].min()),
+            unconverged_steps=unconverged,
+            worst_residual=float(run["solver_residual"].max()),
+        )
 
 
 def report_plane() -> Plane:

@@ -7,9 +7,9 @@
 100
 """
 
-from rover_gym.mechanics import SoilContacts, SoilSimulation, SoilSnapshot, soil_packing
+from rover_gym.mechanics import GrainContacts, SoilSimulation, soil_packing
 from rover_gym.soil.bed import Bed, rover_on_soil, settled_bed
-from rover_gym.soil.soil_run import SoilRun, SoilSampler, record_soil
+from rover_gym.soil.soil_run import SoilRun, SoilSampler
 from rover_gym.soil.soil_trials import (
     BedEstimate,
     Pull,
@@ -24,19 +24,17 @@ from rover_gym.soil.soil_trials import (
 __all__ = [
     "Bed",
     "BedEstimate",
+    "GrainContacts",
     "Pull",
-    "SoilContacts",
     "SoilDrive",
     "SoilRun",
     "SoilSampler",
     "SoilSimulation",
-    "SoilSnapshot",
     "Traction",
     "drawbar_pull",
     "drive_on_soil",
     "fit_traction",
     "over_beds",
-    "record_soil",
     "rover_on_soil",
     "settled_bed",
     "soil_packing",

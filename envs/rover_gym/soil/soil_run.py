@@ -6,9 +6,10 @@ run.wheels[-1, 0, :2]
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,10 +22,8 @@ from rover_gym.record.channels import (
     RecordingError,
     Sampler,
     energy_channels,
-    row_count,
     sound,
 )
-from rover_gym.record.recorder import record_rows
 from rover_gym.record.rover_run import LARGEST, Run, check_rows, check_time, title_of
 from rover_gym.record.trajectory import Trajectory
 from rover_gym.soil.bed import Array, surface_height
@@ -132,54 +131,16 @@ class SoilSampler(Sampler):
         super().measure()
         self.force_chains, self.wheel_forces = self._forces.read(self.sim, self._n_chains)
 
-
-def record_soil(
-    sim: SoilSimulation,
-    path: str | Path,
-    title: str,
-    *,
-    duration: float,
-    steps_per_row: int = 20,
-    walls: npt.ArrayLike | None = None,
-    until: Callable[[SoilSimulation], bool] = lambda _: False,
-    progress: Callable[[float], None] = lambda _: None,
-) -> int:
-    """Runs a soil from its current state and records it.
-
-    Args:
-        sim: The soil.
-        path: HDF5 file to write.
-        title: Title of the recording.
-        duration: Time to simulate, s.
-        steps_per_row: Steps from one row to the next.
-        walls: (n, 4) walls of the soil, for drawing.
-        until: Called after each row; the run stops when it returns true.
-        progress: Called with the simulated time after each row.
-
-    Returns:
-        Number of rows with steps that did not converge to the tolerance.
-
-    Raises:
-        OptionError: `duration` or `steps_per_row` is not positive, or the run has too many rows.
-        RecordingError: The file is in use, or the disk is full.
-        MissingExtraError: h5py is not installed.
-        StepError: A step failed; the rows before it are on disk.
-    """
-    rows, steps_per_row = row_count(duration, sim.time_step, steps_per_row), int(steps_per_row)
-    scene = {
-        "kind": "SoilSimulation",
-        "radius": sim.radius,
-        "mass": sim.mass,
-        "walls": np.empty((0, 4)) if walls is None else np.asarray(walls, dtype=np.float64),
-        "torques": sim.torques,
-    }
-    attributes = {
-        "title": title,
-        "scene": scene,
-        "seed": "the start's positions are the first row",
-        "solver": sim.settings,
-    }
-    return record_rows(SoilSampler(sim), path, attributes, rows, steps_per_row, until=until, progress=progress)
+    def describe(self, title: str | None, scene: Mapping[str, Any], seed: int | str | None) -> dict[str, Any]:
+        """The attributes of a recording, taken from the simulation at its start."""
+        sim = self.sim
+        facts = {"radius": sim.radius, "mass": sim.mass, "walls": sim.walls, "torques": sim.torques}
+        return {
+            "title": title or "a soil of disks",
+            "scene": {**scene, "kind": "SoilSimulation", **facts},
+            "seed": "the start's positions are the first row" if seed is None else seed,
+            "solver": sim.settings,
+        }
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from gymnasium.error import ResetNeeded
 
 from rover_gym.env import episode_scene
 from rover_gym.env.arguments import RoverArguments, takes_arguments
-from rover_gym.env.env_snapshot import EnvSnapshot, Progress, check_random_state, check_snapshot
+from rover_gym.env.env_snapshot import EnvSnapshot, check_random_state, check_snapshot
 from rover_gym.env.episode_scene import (
     EpisodeScene,
     ResetOptions,
@@ -437,7 +437,7 @@ class RoverBatch:
             EnvSnapshot(
                 simulation=self.episodes.simulation(i).snapshot(),
                 scene=self.scene(i),
-                progress=Progress.of(self.episodes.episode(i)),
+                progress=self.episodes.episode(i).to_bytes(),
                 difficulty=self.episodes.difficulty(i),
                 random_state=generator_at(rows[i]).bit_generator.state,
             )

@@ -12,9 +12,9 @@ use rover_core::system::grains::{
     COORDINATES, Cohesion, GrainScene, Grains, Packing, SleepOptions, Wall,
 };
 
-use crate::arguments::{Given, Named, refused};
+use crate::arguments::{Named, refused};
 use crate::arrays::{Array, fresh, fresh_rows, triple};
-use crate::bed_arguments::{self, StepArguments, Usual, check_rows, grain_error, rows};
+use crate::bed_arguments::{self, Usual, check_rows, grain_error, rows};
 use crate::errors::{Kind, Result, Value};
 use crate::planar_ground::quantity;
 use crate::terrain::parse;
@@ -39,35 +39,16 @@ pub fn packed<const D: usize>(py: Python<'_>, packing: &Packing<D>) -> Result<Pa
     Ok((fresh(grains.radius()), fresh(grains.mass()), centres))
 }
 
-/// Options of the steps of a bed, by their names; `gravity` is each class's own.
-///
-/// `is_hollow`: whether what slides along a surface goes into it, as along the inside of a curve.
-pub fn steps<'py>(
-    given: &Named<'py>,
-    gravity: Option<Vector3<f64>>,
-    is_hollow: bool,
-) -> Result<StepArguments<'py>> {
-    Ok(StepArguments {
-        restitution: given.get("restitution")?,
-        gravity,
-        time_step: given.get("time_step")?,
-        tolerance: given.get("tolerance")?,
-        max_iterations: given.get("max_iterations")?,
-        stabilisation: given.get("stabilisation")?,
-        is_hollow,
-        penetration_tolerance: given.get("penetration_tolerance")?,
-        threads: Given::MISSING,
-    })
-}
-
 /// When the grains of a bed sleep; None where they never do.
 pub fn sleep(given: &Named<'_>) -> Result<Option<SleepOptions>> {
-    let [sleep, speed, distance] = ["sleep", "sleep_speed", "sleep_distance"];
-    Ok(bed_arguments::sleep(
-        given.get(sleep)?,
-        given.get(speed)?,
-        given.get(distance)?,
-    )?)
+    let usual = SleepOptions::default();
+    let rest = SleepOptions {
+        speed: given.maybe("sleep_speed")?.unwrap_or(usual.speed),
+        distance: given.maybe("sleep_distance")?.unwrap_or(usual.distance),
+        ..usual
+    };
+    rest.check()?;
+    Ok(given.flag("sleep", false)?.then_some(rest))
 }
 
 /// A bed of balls that was read: without a machine, not yet checked as a whole.
@@ -110,12 +91,9 @@ impl Balls {
             .map(Vessel::parse)
             .transpose()?;
         let gravity = given.read("gravity", triple)?.map(Vector3::from);
-        let threads = given.get("threads")?;
-        let steps = StepArguments {
-            threads,
-            ..steps(&given, gravity, vessel.is_some())?
-        };
-        let options = steps.options(&grains, usual(&grains))?;
+        let how = (gravity, vessel.is_some());
+        let mut options = bed_arguments::step_options(&given, &grains, how, usual(&grains))?;
+        options.solver.threads = given.count("threads", 1)?;
         let force = given.number("cohesion", 0.0)?;
         let range = given.maybe("cohesion_range")?;
         let cohesion = Cohesion::new(force, range, grains.smallest());

@@ -200,14 +200,12 @@ impl SimulationBatch {
     ///
     /// Raises:
     ///     OptionError: There is no such rover.
-    fn simulation(&self, index: &Bound<'_, PyAny>) -> Result<Simulation> {
+    fn simulation(&self, index: &Bound<'_, PyAny>) -> Result<Py<Simulation>> {
         let held = self.0.open()?;
         let rovers = held.inner.rovers();
-        let index = below(index, rovers.len())?;
-        Ok(Simulation::of(
-            rovers[index].clone(),
-            held.origins[index].clone(),
-        ))
+        let i = below(index, rovers.len())?;
+        let copy = Simulation::of(rovers[i].clone(), held.origins[i].clone());
+        Ok(Py::new(index.py(), copy)?)
     }
 
     fn __len__(&self) -> Result<usize> {

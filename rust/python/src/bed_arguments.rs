@@ -6,9 +6,7 @@ use rover_core::integrator::{Stabilisation, StepOptions};
 use rover_core::law::rolling::RollingFriction;
 use rover_core::nalgebra::{SVector, Vector3};
 use rover_core::simulation::{SoilSetupError, soil_options};
-use rover_core::system::grains::{
-    COORDINATES, GrainError, GrainFriction, Grains, SleepOptions, Wall,
-};
+use rover_core::system::grains::{COORDINATES, GrainError, GrainFriction, Grains, Wall};
 
 use crate::arguments::{Given, Named, flags, text};
 use crate::arrays::{array, vector};
@@ -131,21 +129,6 @@ pub struct Usual {
     pub speed: f64,
 }
 
-/// Options of the steps of a bed, as they were given.
-pub struct StepArguments<'py> {
-    pub restitution: Given<'py>,
-    /// Already read.
-    pub gravity: Option<Vector3<f64>>,
-    pub time_step: Given<'py>,
-    pub tolerance: Given<'py>,
-    pub max_iterations: Given<'py>,
-    pub stabilisation: Given<'py>,
-    /// Whether what slides along a surface goes into it, as along the inside of a curve.
-    pub is_hollow: bool,
-    pub penetration_tolerance: Given<'py>,
-    pub threads: Given<'py>,
-}
-
 /// What is struck away meets others that were not forecast, and goes into them. Under a machine
 /// balls sink into the ground by what the solver's tolerance allows.
 fn usual_stabilisation(dimension: usize, restitution: f64, is_hollow: bool) -> &'static str {
@@ -168,41 +151,33 @@ fn speed_scale(gravity: f64, usual: f64) -> f64 {
     }
 }
 
-impl StepArguments<'_> {
-    /// The options of the steps of these grains.
-    pub fn options<const D: usize>(
-        self,
-        grains: &Grains<D>,
-        usual: Usual,
-    ) -> PyResult<StepOptions> {
-        let option = Kind::Option;
-        let restitution = self.restitution.number(0.0, option, "restitution")?;
-        let tolerance = self
-            .tolerance
-            .number(usual.tolerance, option, "tolerance")?;
-        let mut options = soil_options(grains);
-        let usual_weight = options.gravity.norm();
-        if let Some(gravity) = self.gravity {
-            options.gravity = gravity;
-        }
-        options.time_step = (self.time_step).number(usual.time_step, option, "time_step")?;
-        options.restitution = restitution;
-        options.solver.tolerance = tolerance;
-        options.solver.max_sweeps = (self.max_iterations).count(2000, option, "max_iterations")?;
-        options.solver.threads = self.threads.count(1, option, "threads")?;
-        let stabilisation = match self.stabilisation.some() {
-            Some(given) => text(&given, option, "stabilisation")?,
-            None => usual_stabilisation(D, restitution, self.is_hollow).to_owned(),
-        };
-        options.stabilisation =
-            choice::<Stabilisation>("stabilisation", &stabilisation, &GRAIN_STABILISATIONS)?;
-        options.solver.velocity_tolerance =
-            usual.speed * tolerance * speed_scale(options.gravity.norm(), usual_weight);
-        if let Some(depth) = (self.penetration_tolerance).maybe(option, "penetration_tolerance")? {
-            options.penetration_tolerance = depth;
-        }
-        Ok(options)
+/// The options of the steps of these grains, by their names. `gravity` has been read; `is_hollow`:
+/// whether what slides along a surface goes into it, as along the inside of a curve.
+pub fn step_options<const D: usize>(
+    given: &Named<'_>,
+    grains: &Grains<D>,
+    (gravity, is_hollow): (Option<Vector3<f64>>, bool),
+    usual: Usual,
+) -> Result<StepOptions> {
+    let mut options = soil_options(grains);
+    let usual_weight = options.gravity.norm();
+    options.gravity = gravity.unwrap_or(options.gravity);
+    options.restitution = given.number("restitution", 0.0)?;
+    options.solver.tolerance = given.number("tolerance", usual.tolerance)?;
+    options.time_step = given.number("time_step", usual.time_step)?;
+    options.solver.max_sweeps = given.count("max_iterations", 2000)?;
+    let stabilisation = usual_stabilisation(D, options.restitution, is_hollow);
+    let stabilisation = given
+        .read("stabilisation", text)?
+        .unwrap_or_else(|| stabilisation.to_owned());
+    options.stabilisation =
+        choice::<Stabilisation>("stabilisation", &stabilisation, &GRAIN_STABILISATIONS)?;
+    options.solver.velocity_tolerance =
+        usual.speed * options.solver.tolerance * speed_scale(options.gravity.norm(), usual_weight);
+    if let Some(depth) = given.maybe("penetration_tolerance")? {
+        options.penetration_tolerance = depth;
     }
+    Ok(options)
 }
 
 /// Coulomb's coefficients, and those of rolling friction, by their names; `wheel_friction` where
@@ -225,24 +200,6 @@ pub fn friction(given: &Named<'_>, has_wheels: bool, is_flat: bool) -> Result<Gr
             drilling: optional(!is_flat, "drilling_friction", 0.0)?,
         },
     })
-}
-
-/// When grains sleep; None where they never do.
-pub fn sleep(
-    sleep: Given<'_>,
-    speed: Given<'_>,
-    distance: Given<'_>,
-) -> PyResult<Option<SleepOptions>> {
-    let option = Kind::Option;
-    let mut rest = SleepOptions::default();
-    if let Some(speed) = speed.maybe(option, "sleep_speed")? {
-        rest.speed = speed;
-    }
-    if let Some(distance) = distance.maybe(option, "sleep_distance")? {
-        rest.distance = distance;
-    }
-    rest.check().map_err(BorderError::from)?;
-    Ok(sleep.flag(false, option, "sleep")?.then_some(rest))
 }
 
 /// The options of contacts and solver by the names of the arguments, without gravity.

@@ -1,10 +1,11 @@
-//! `Contacts`, `PlanarContacts`, `SoilContacts`, `GrainContacts`: the contacts of the last step as
-//! arrays.
+//! `Contacts`, `PlanarContacts`, `GrainContacts`: the contacts of the last step as arrays.
 
 use pyo3::prelude::*;
 use rover_core::contact::{Contact, Part};
 use rover_core::multibody::Model;
-use rover_core::simulation::{ActiveContact, Components, LocatedContact};
+use rover_core::simulation::{
+    ActiveContact, BedMemory, Components, GrainBed, GrainSimulation, LocatedContact, Scene,
+};
 use rover_core::system::PlanarContact;
 use rover_core::system::grains::GrainContact;
 
@@ -56,11 +57,11 @@ fn numbers<const D: usize>(
     fresh_rows(keys.map(|k| [name(k.a), name(k.b)]))
 }
 
-/// Frames (n, 3, 3) of their rows.
-fn frames(rows: impl Iterator<Item = [[f64; 3]; 3]>) -> Array {
+/// Frames (n, D, D) of their rows.
+fn frames<const D: usize>(rows: impl Iterator<Item = [[f64; D]; D]>) -> Array {
     let values: Vec<f64> = rows.flatten().flatten().collect();
-    let n = values.len() / 9;
-    Array::shaped(values, &[n, 3, 3])
+    let n = values.len() / (D * D);
+    Array::shaped(values, &[n, D, D])
 }
 
 /// The contacts of a rover's last step, as new arrays with one row a contact.
@@ -185,106 +186,47 @@ impl PlanarContacts {
     }
 }
 
-/// The contacts of a soil's last step, as new arrays with one row a contact.
+/// The contacts of the last step of grains, as new arrays with one row a contact.
 ///
-/// Contacts between sleeping disks are left out.
-#[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
-pub struct SoilContacts {
-    /// Numbers of both bodies, (n, 2), disks from 0, then the wheels; -1 for a wall or the ground.
-    bodies: Array<i64>,
-    /// Points of the first body's rim, (n, 2), m.
-    points: Array,
-    /// Unit normals from the second body into the first, (n, 2).
-    normals: Array,
-    /// Gaps at the start of the step, (n,), m; negative where bodies overlap.
-    gaps: Array,
-    /// Impulses on the first body along the normal and the tangent (n_y, -n_x), (n, 2), N s.
-    impulses: Array,
-    /// Relative velocities after the step along normal and tangent, (n, 2), m/s.
-    ///
-    /// Of the first body against the second.
-    velocities: Array,
-    /// Impulses on the first body along x and y, (n, 2), N s.
-    world_impulses: Array,
-}
-
-impl SoilContacts {
-    /// `n_moving`: number of disks and wheels.
-    pub fn new(active: &[ActiveContact<GrainContact<2>>], n_moving: usize) -> Self {
-        let Columns {
-            points,
-            normals,
-            impulses,
-            velocities,
-            ..
-        } = Columns::of(active);
-        let on_first = |a: &ActiveContact<GrainContact<2>>| {
-            (a.contact.n * a.impulse[0] + a.contact.t() * a.impulse[1]).into()
-        };
-        Self {
-            bodies: numbers(active, n_moving),
-            points,
-            normals,
-            gaps: active.iter().map(|a| a.contact.gap_start).collect(),
-            impulses,
-            velocities,
-            world_impulses: rows(active, on_first),
-        }
-    }
-}
-
-#[pymethods]
-impl SoilContacts {
-    fn __len__(&self) -> usize {
-        self.bodies.len()
-    }
-
-    fn __repr__(&self) -> String {
-        format!("SoilContacts({})", self.bodies.len())
-    }
-}
-
-/// The contacts of the last step of grains in space, as new arrays with one row a contact.
-///
-/// Contacts between sleeping balls are left out.
+/// Vectors have D entries: 2 of disks in the plane, 3 of balls in space. Contacts between sleeping
+/// grains are left out.
 #[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
 pub struct GrainContacts {
-    /// Numbers of both bodies, (n, 2), balls from 0; -1 for a wall or the terrain.
+    /// Numbers of both bodies, (n, 2), grains from 0, then wheels; -1 for a wall or the ground.
     bodies: Array<i64>,
-    /// Points of the first body's surface, (n, 3), m.
+    /// Points of the first body's surface, (n, D), m.
     points: Array,
-    /// Unit normals from the second body into the first, (n, 3).
+    /// Unit normals from the second body into the first, (n, D).
     normals: Array,
-    /// Contact frames, world frame, (n, 3, 3).
+    /// Contact frames, world frame, (n, D, D).
     ///
-    /// Rows are the unit vectors n (normal), t and b (tangents).
+    /// Rows are the unit vectors n (normal), t and b (tangents); t = (n_y, -n_x) in the plane.
     frames: Array,
     /// Gaps at the start of the step, (n,), m; negative where bodies overlap.
     gaps: Array,
-    /// Impulses on the first body along n, t, b of `frames`, (n, 3), N s.
+    /// Impulses on the first body along n, t, b of `frames`, (n, D), N s.
     ///
     /// Cohesion is part of the normal ones, which are negative where a contact bears tension.
     impulses: Array,
-    /// Velocities of the first body against the second after the step along n, t, b, (n, 3), m/s.
+    /// Velocities of the first body against the second after the step along n, t, b, (n, D), m/s.
     velocities: Array,
-    /// Impulses on the first body along x, y, z, (n, 3), N s.
+    /// Impulses on the first body along x, y, z, (n, D), N s.
     world_impulses: Array,
     /// Moments of rolling and drilling friction on the first body, (n, 3), N m s.
     world_moments: Array,
 }
 
 impl GrainContacts {
-    /// `n_moving`: number of balls and of what moves among them. `attraction`: impulse of the
-    /// cohesion in a contact, N s, which the solver's has to bear. `moment`: on the first body.
-    pub fn new(
-        active: &[ActiveContact<GrainContact<3>>],
-        n_moving: usize,
-        attraction: impl Fn(&GrainContact<3>) -> f64,
-        moment: impl Fn(&GrainContact<3>) -> [f64; 3],
-    ) -> Self {
-        let mut active = active.to_vec();
+    /// The contacts of a bed. The solver's impulses bear the cohesion as well.
+    pub fn of<const D: usize>(bed: &GrainSimulation<D>) -> Self
+    where
+        GrainBed<D>: Scene<Contact = GrainContact<D>, Memory = BedMemory>,
+    {
+        let (scene, h) = (&bed.scene().soil, bed.options().time_step);
+        let wheels = scene.machine.as_ref().map_or(0, |m| m.n_wheels());
+        let mut active = bed.contacts().to_vec();
         for one in &mut active {
-            one.impulse[0] -= attraction(&one.contact);
+            one.impulse[0] -= h * scene.attraction(&one.contact);
         }
         let Columns {
             points,
@@ -293,12 +235,14 @@ impl GrainContacts {
             velocities,
             ..
         } = Columns::of(&active);
-        let on_first = |a: &ActiveContact<GrainContact<3>>| {
-            let [n, t, b] = a.contact.frame();
-            (n * a.impulse[0] + t * a.impulse[1] + b * a.impulse[2]).into()
+        let on_first = |a: &ActiveContact<GrainContact<D>>| {
+            let (axes, p) = (a.contact.frame(), &a.impulse);
+            (1..D)
+                .fold(axes[0] * p[0], |sum, k| sum + axes[k] * p[k])
+                .into()
         };
         Self {
-            bodies: numbers(&active, n_moving),
+            bodies: numbers(&active, scene.grains.len() + wheels),
             points,
             normals,
             frames: frames(active.iter().map(|a| a.contact.frame().map(Into::into))),
@@ -306,7 +250,7 @@ impl GrainContacts {
             impulses,
             velocities,
             world_impulses: rows(&active, on_first),
-            world_moments: rows(&active, |a| moment(&a.contact)),
+            world_moments: rows(&active, |a| bed.moment(&a.contact)),
         }
     }
 }

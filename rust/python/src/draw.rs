@@ -447,11 +447,12 @@ impl DrawnEpisodes {
     ///
     /// Raises:
     ///     OptionError: There is no such episode.
-    fn simulation(&self, index: &Bound<'_, PyAny>) -> Result<Simulation> {
+    fn simulation(&self, index: &Bound<'_, PyAny>) -> Result<Py<Simulation>> {
         let one = self.at(index)?;
         let made = RoverSimulation::placed(one.scene.placement.clone())?;
         let (terrain, words) = (one.scene.ground.clone(), self.words.clone());
-        Ok(Simulation::of(made, Origin { terrain, words }))
+        let made = Simulation::of(made, Origin { terrain, words });
+        Ok(Py::new(index.py(), made)?)
     }
 
     fn __len__(&self) -> usize {

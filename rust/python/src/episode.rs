@@ -4,16 +4,14 @@ use std::sync::Arc;
 
 use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyRange};
+use pyo3::types::{PyBytes, PyDict, PyRange, PyTuple};
+use rover_core::draw::Domain;
 use rover_core::episode::running::{Period, check_normals};
-use rover_core::episode::{
-    Ending, Episode as CoreEpisode, Last, N_QUANTITIES, N_TERMS, Progress, Quantities, Rules,
-    Setting, action,
-};
+use rover_core::episode::{Ending, Episode as CoreEpisode, EpisodeState, Rules, Setting, action};
 use rover_core::simulation::{ReadingScratch, RoverSimulation};
 
 use crate::arguments::{Named, number, refused};
-use crate::arrays::{Array, array, fresh, fresh_rows, vector};
+use crate::arrays::{Array, array, fresh, vector};
 use crate::episode_rules::EpisodeRules;
 use crate::errors::{Kind, Result, Value};
 use crate::infos::info;
@@ -21,33 +19,14 @@ use crate::reading::{place, points};
 use crate::rover_grains::RoverGrainSimulation;
 use crate::shared::{Shared, Watch};
 use crate::simulation::Simulation;
+use crate::snapshot::{damaged, read_bytes};
 
 /// Observation, reward, whether the episode has ended, info.
 type Step<'py> = (Array<f32>, f64, bool, Bound<'py, PyDict>);
 
 /// One episode of a driving task: what its simulation does not hold.
 ///
-/// Args:
-///     rules: What all episodes of the task share.
-///     goal: The goal (x, z), m.
-///     domain: Properties of rover and world: mass_scale, friction, actuator_gain, gravity_scale.
-///     trunk_load_limit: Force on the trunk beyond which the rover is high-centred, N.
-///     difficulty: Difficulty of the rocks.
-///     distance: Horizontal distance to the goal, m.
-///     previous_action: The last action, (n_actions,).
-///     energy: Work of the motors since the beginning, driving or braking, J.
-///     energy_positive: Its driving part, J.
-///     stuck_time: How long the rover has been high-centred, s.
-///     observation: The last observation, (size,).
-///     further: Goals after the first, (n, 2), x and z, m; none by default.
-///     reached: How many goals have been reached.
-///     outcome: What else is known of the last control period, as `state` returns it; by default
-///         the episode runs, and its info tells its progress only.
-///     owed: Standard normal numbers of an observation that lacks its heights, (size,), or (0,)
-///         without noise; None where it lacks none.
-///
-/// Raises:
-///     OptionError: An argument has a wrong shape or a number that is not finite.
+/// `begin` and `from_bytes` make one.
 #[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct EpisodeRun(Shared<Inner>);
 
@@ -128,39 +107,11 @@ impl<'py> IntoPyObject<'py> for GivenRules {
     }
 }
 
-/// What is set when an episode begins.
-fn setting(given: &Named<'_>) -> Result<Setting> {
-    let domain = given.need("domain", |value, kind, field| {
-        let numbers = <[f64; 4]>::try_from(vector(value, kind, field)?);
-        numbers.map_err(|_| refused(value, kind, field, "four numbers"))
-    })?;
-    let further = |value: &Bound<'_, PyAny>, _, field: &str| points(value, field);
-    Ok(Setting {
-        goal: given.need("goal", |value, _, _| place(Some(value)))?,
-        further: given.read("further", further)?.unwrap_or_default(),
-        domain: domain.into(),
-        trunk_load_limit: given.need("trunk_load_limit", number)?,
-        difficulty: given.need("difficulty", number)?,
-    })
-}
-
-/// What else an episode knows of its last control period.
-fn last(given: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Last> {
-    let refuse = || refused(given, kind, field, "what `EpisodeRun.state` returns");
-    let found: Option<(Vec<f64>, Vec<f64>, String)> = given.extract().ok();
-    let (now, terms, name) = found.ok_or_else(refuse)?;
-    let now = <[f64; N_QUANTITIES]>::try_from(now).map_err(|_| refuse())?;
-    let terms = <[f64; N_TERMS]>::try_from(terms).map_err(|_| refuse())?;
-    let ending = Ending::ALL.into_iter().find(|own| own.name() == name);
-    if now.iter().chain(&terms).any(|x| x.is_nan()) {
-        return Err(refuse());
-    }
-    let now = Quantities::from_row(now);
-    Ok(Last {
-        now,
-        terms,
-        ending: ending.ok_or_else(refuse)?,
-    })
+/// Properties of rover and world, by their order.
+fn domain(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Domain> {
+    let numbers = <[f64; 4]>::try_from(vector(value, kind, field)?);
+    let numbers = numbers.map_err(|_| refused(value, kind, field, "four numbers"))?;
+    Ok(numbers.into())
 }
 
 fn normals(given: Option<&Bound<'_, PyAny>>) -> Result<Option<Vec<f64>>> {
@@ -247,50 +198,19 @@ impl Inner {
 
 #[pymethods]
 impl EpisodeRun {
-    #[new]
-    #[pyo3(signature = (rules, **state),
-        text_signature = "(rules, *, goal, domain, trunk_load_limit, difficulty, distance, previous_action, energy, energy_positive, stuck_time, observation, further=None, reached=0, outcome=None, owed=None)")]
-    fn new(py: Python<'_>, rules: GivenRules, state: Option<&Bound<'_, PyDict>>) -> Result<Self> {
-        let given = Named::keywords(py, state)?;
-        let setting = setting(&given)?;
-        let progress = Progress {
-            distance: given.need("distance", number)?,
-            previous_action: given.need("previous_action", vector)?,
-            energy: given.need("energy", number)?,
-            energy_positive: given.need("energy_positive", number)?,
-            stuck_time: given.need("stuck_time", number)?,
-            reached: given.count("reached", 0)?,
-        };
-        #[allow(clippy::cast_possible_truncation)] // float32 is what an observation holds
-        let observation: Vec<f32> = given
-            .need("observation", vector)?
-            .into_iter()
-            .map(|x| x as f32)
-            .collect();
-        let (last, owed) = (given.read("outcome", last)?, given.read("owed", vector)?);
-        given.finish()?;
-        Ok(Self::of(CoreEpisode::resume(
-            rules.0,
-            setting,
-            progress,
-            observation,
-            last,
-            owed,
-        )?))
-    }
-
     /// The beginning of an episode.
     ///
     /// Args:
     ///     rules: What all episodes of the task share.
     ///     simulation: The rover at its start.
     ///     goal: The goal (x, z), m.
-    ///     domain: As of the class.
+    ///     domain: Properties of rover and world: mass_scale, friction, actuator_gain,
+    ///         gravity_scale.
     ///     trunk_load_limit: Force on the trunk beyond which the rover is high-centred, N.
     ///     difficulty: Difficulty of the rocks.
     ///     normals: A standard normal number for each entry of the observation, (size,), where the
     ///         rules have noise.
-    ///     further: As of the class.
+    ///     further: Goals after the first, (n, 2), x and z, m; none by default.
     ///
     /// Returns:
     ///     The episode; None if its observation is not finite in float32.
@@ -307,7 +227,14 @@ impl EpisodeRun {
         options: Option<&Bound<'_, PyDict>>,
     ) -> Result<Option<Self>> {
         let given = Named::keywords(simulation.0.py(), options)?;
-        let setting = setting(&given)?;
+        let further = |value: &Bound<'_, PyAny>, _, field: &str| points(value, field);
+        let setting = Setting {
+            goal: given.need("goal", |value, _, _| place(Some(value)))?,
+            further: given.read("further", further)?.unwrap_or_default(),
+            domain: given.need("domain", domain)?,
+            trunk_load_limit: given.need("trunk_load_limit", number)?,
+            difficulty: given.need("difficulty", number)?,
+        };
         let normals = given.read("normals", vector)?;
         given.finish()?;
         let rover = simulation.0.get().open()?;
@@ -351,7 +278,7 @@ impl EpisodeRun {
         let (action, normals) = given(&rules, action, normals)?;
         let among = simulation.cast::<RoverGrainSimulation>().ok();
         let mut rover = match among {
-            Some(among) => among.get().of_rover().open()?,
+            Some(among) => among.get().together.rover.open()?,
             None => self::simulation(simulation, "simulation")?.get().open()?,
         };
         rules.check_model(rover.model())?;
@@ -359,7 +286,7 @@ impl EpisodeRun {
         let mut watch = Watch::new();
         let substeps = rules.settings().substeps;
         let moving = &mut *rover;
-        let among = among.map(pyo3::Bound::get);
+        let among = among.map(|among| &among.get().together);
         let done = py.detach(|| match among {
             Some(among) => among.step_with(moving, substeps, &mut || watch.go_on()),
             None => Ok(moving.step_while(substeps, &mut || watch.go_on())),
@@ -439,6 +366,12 @@ impl EpisodeRun {
         Ok(fresh(self.0.open()?.episode.observation()))
     }
 
+    /// The last action, (n_actions,); zeros at the beginning.
+    #[getter]
+    fn previous_action(&self) -> Result<Array> {
+        Ok(fresh(&self.0.open()?.episode.progress().previous_action))
+    }
+
     /// The present goal (x, z), m; the last one where all are reached.
     #[getter]
     fn goal(&self) -> Result<(f64, f64)> {
@@ -450,38 +383,82 @@ impl EpisodeRun {
         info(py, &(&self.0.open()?.episode, None))
     }
 
-    /// The keyword arguments that make an episode which continues as this one.
-    fn state<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
+    /// The same episode with other properties, another goal, or seen by other rules.
+    ///
+    /// Args:
+    ///     goal: The first goal, (x, z), m; none counts as reached, and an episode that has ended
+    ///         goes on.
+    ///     distance: Horizontal distance to the present goal, m.
+    ///     domain: Properties of rover and world, as of `begin`.
+    ///     trunk_load_limit: Force on the trunk beyond which the rover is high-centred, N.
+    ///     seen: An episode whose rules and observation are taken over.
+    ///
+    /// Raises:
+    ///     OptionError: An argument has a wrong shape or a number that is not finite, or does not
+    ///         fit the rules.
+    #[pyo3(signature = (**changes), text_signature = "($self, *, goal=None, distance=None, domain=None, trunk_load_limit=None, seen=None)")]
+    fn changed(&self, py: Python<'_>, changes: Option<&Bound<'_, PyDict>>) -> Result<Self> {
+        let given = Named::keywords(py, changes)?;
         let held = self.0.open()?;
-        let (setting, progress) = (held.episode.setting(), held.episode.progress());
-        let state = PyDict::new(py);
-        state.set_item("goal", (setting.goal[0], setting.goal[1]))?;
-        state.set_item("domain", fresh(&setting.domain.row()))?;
-        state.set_item("trunk_load_limit", setting.trunk_load_limit)?;
-        state.set_item("difficulty", setting.difficulty)?;
-        state.set_item("distance", progress.distance)?;
-        state.set_item("previous_action", fresh(&progress.previous_action))?;
-        state.set_item("energy", progress.energy)?;
-        state.set_item("energy_positive", progress.energy_positive)?;
-        state.set_item("stuck_time", progress.stuck_time)?;
-        state.set_item("observation", fresh(held.episode.observation()))?;
-        state.set_item("further", fresh_rows(setting.further.iter().copied()))?;
-        state.set_item("reached", progress.reached)?;
-        let outcome = held.episode.outcome();
-        let (now, terms) = (outcome.now.row(), outcome.terms);
-        let told = (fresh(&now), fresh(&terms), outcome.ending.name());
-        state.set_item("outcome", told)?;
-        let owed = held.episode.owed();
-        state.set_item("owed", owed.map(fresh))?;
-        Ok(state)
+        let (mut rules, mut state) = (held.episode.rules().clone(), held.episode.state());
+        drop(held);
+        if let Some(goal) = given.read("goal", |value, _, _| place(Some(value)))? {
+            (state.setting.goal, state.progress.reached) = (goal, 0);
+            state.outcome.ending = Ending::None;
+        }
+        if let Some(distance) = given.maybe("distance")? {
+            (state.progress.distance, state.outcome.now.distance) = (distance, distance);
+        }
+        if let Some(domain) = given.read("domain", domain)? {
+            state.setting.domain = domain;
+        }
+        if let Some(limit) = given.maybe("trunk_load_limit")? {
+            state.setting.trunk_load_limit = limit;
+        }
+        if let Some(seen) =
+            given
+                .get("seen")?
+                .object::<Bound<'_, Self>>(Kind::Option, "seen", "an EpisodeRun")?
+        {
+            let other = seen.get().copy()?;
+            let EpisodeState {
+                observation, owed, ..
+            } = other.state();
+            (rules, state.observation, state.owed) = (other.rules().clone(), observation, owed);
+        }
+        given.finish()?;
+        Ok(Self::of(CoreEpisode::resume(rules, state)?))
     }
 
-    fn __getnewargs_ex__<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> Result<((GivenRules,), Bound<'py, PyDict>)> {
-        let rules = GivenRules(self.0.open()?.episode.rules().clone());
-        Ok(((rules,), self.state(py)?))
+    /// All that an episode holds, as `from_bytes` reads it.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyBytes>> {
+        let state = postcard::to_stdvec(&self.0.open()?.episode.state());
+        Ok(PyBytes::new(
+            py,
+            &state.map_err(|e| damaged("episode", &e))?,
+        ))
+    }
+
+    /// An episode that goes on.
+    ///
+    /// Args:
+    ///     rules: What all episodes of the task share.
+    ///     data: What `to_bytes` returned.
+    ///
+    /// Raises:
+    ///     StateError: The bytes are not those of an episode.
+    ///     OptionError: The episode does not fit the rules.
+    #[staticmethod]
+    fn from_bytes(rules: GivenRules, data: &Bound<'_, PyAny>) -> Result<Self> {
+        let state: EpisodeState = read_bytes(data, "episode")?;
+        Ok(Self::of(CoreEpisode::resume(rules.0, state)?))
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Result<Bound<'py, PyTuple>> {
+        let (py, own) = (slf.py(), slf.get());
+        let rules = GivenRules(own.0.open()?.episode.rules().clone());
+        let given = (rules, own.to_bytes(py)?);
+        Ok((slf.get_type().getattr("from_bytes")?, given).into_pyobject(py)?)
     }
 
     fn __repr__(&self) -> String {

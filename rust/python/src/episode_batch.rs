@@ -566,12 +566,11 @@ impl EpisodeBatch {
     ///
     /// Args:
     ///     index: Index of the rover.
-    fn simulation(&self, index: &Bound<'_, PyAny>) -> Result<Simulation> {
+    fn simulation(&self, index: &Bound<'_, PyAny>) -> Result<Py<Simulation>> {
         self.one(index, |held, i| {
-            Ok(Simulation::of(
-                held.batch.rovers()[i].clone(),
-                held.origins[i].clone(),
-            ))
+            let rover = held.batch.rovers()[i].clone();
+            let copy = Simulation::of(rover, held.origins[i].clone());
+            Ok(Py::new(index.py(), copy)?)
         })
     }
 

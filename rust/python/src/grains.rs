@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::draw::DrawnGround;
 use rover_core::simulation::GrainSimulation as CoreSimulation;
-use rover_core::system::grains::{GrainContact, Packing, arranged};
+use rover_core::system::grains::{Packing, arranged};
 use std::sync::{Arc, MutexGuard};
 
 use crate::arguments::{Named, count, flags, number};
@@ -13,10 +13,8 @@ use crate::balls::{self, Balls, Packed};
 use crate::bed_arguments::{self, grain_error, setup_error};
 use crate::contacts::GrainContacts;
 use crate::errors::{BorderError, Kind, Result};
-use crate::report::{Energy, StepReport};
 use crate::shared::Shared;
-use crate::snapshot::{GrainSnapshot, belonging};
-use crate::stepping::{Steps, step};
+use crate::stepping::AnySimulation;
 use crate::union;
 use crate::vessels::{Drum, Silo, Vessel};
 
@@ -24,7 +22,7 @@ type Core = CoreSimulation<3>;
 
 /// Grains in space: free balls with friction, between walls or on a terrain.
 ///
-/// World axes: x forward, y up, z to the right. One call at a time, as of `Simulation`.
+/// World axes: x forward, y up, z to the right.
 ///
 /// Args:
 ///     radius: Radii of the balls, (n,), m.
@@ -78,9 +76,9 @@ type Core = CoreSimulation<3>;
 ///         terrain overlap.
 ///     TerrainError: A wall has no direction, or `terrain` or `vessel` is none.
 ///     OptionError: An option is out of its range, or both `terrain` and `vessel` are given.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.mechanics", extends = AnySimulation, frozen)]
 pub struct GrainSimulation {
-    inner: Shared<Core>,
+    pub inner: Arc<Shared<Core>>,
     terrain: Option<DrawnGround>,
     vessel: Option<Vessel>,
 }
@@ -106,26 +104,15 @@ impl GrainSimulation {
         mass: &Bound<'_, PyAny>,
         position: &Bound<'_, PyAny>,
         options: Option<&Bound<'_, PyDict>>,
-    ) -> Result<Self> {
+    ) -> Result<PyClassInitializer<Self>> {
         let balls = Balls::read(radius, mass, position, options)?;
         let made = Core::new(Arc::new(balls.scene), balls.options, balls.sleep, balls.q);
-        Ok(Self {
-            inner: Shared::new(made.map_err(setup_error)?),
+        let inner = Arc::new(Shared::new(made.map_err(setup_error)?));
+        Ok(AnySimulation::base(inner.clone()).add_subclass(Self {
+            inner,
             terrain: balls.terrain,
             vessel: balls.vessel,
-        })
-    }
-
-    /// Time since the last call of `set_state`, s.
-    #[getter]
-    fn time(&self) -> Result<f64> {
-        Ok(self.open()?.time())
-    }
-
-    /// Time step, s.
-    #[getter]
-    fn time_step(&self) -> Result<f64> {
-        Ok(self.open()?.options().time_step)
+        }))
     }
 
     /// Radii of the balls, (n,), m.
@@ -293,32 +280,10 @@ impl GrainSimulation {
             .map_err(|e| grain_error(&e))
     }
 
-    /// Takes n steps, as `Simulation.step` does.
-    ///
-    /// Args:
-    ///     n: Number of steps.
-    ///
-    /// Raises:
-    ///     StepError: A step could not be taken; the state before it stays.
-    #[pyo3(signature = (n = Steps(1)), text_signature = "($self, n=1)")]
-    fn step(&self, py: Python<'_>, n: Steps) -> Result<StepReport> {
-        step(py, &mut *self.open()?, n)
-    }
-
     /// The contacts of the last step.
     #[getter]
     fn contacts(&self) -> Result<GrainContacts> {
-        let inner = self.open()?;
-        let (scene, h) = (inner.soil(), inner.options().time_step);
-        let attraction = |contact: &GrainContact<3>| h * scene.attraction(contact);
-        let n = n_balls(&inner);
-        let moment = |contact: &GrainContact<3>| inner.moment(contact);
-        Ok(GrainContacts::new(inner.contacts(), n, attraction, moment))
-    }
-
-    /// Kinetic and potential energy now.
-    fn energy(&self) -> Result<Energy> {
-        Ok(self.open()?.energy().into())
+        Ok(GrainContacts::of(&*self.open()?))
     }
 
     /// Momentum of the balls, (6,): along x, y, z, kg m/s, and about the origin, kg m²/s.
@@ -342,34 +307,9 @@ impl GrainSimulation {
         Ok(())
     }
 
-    /// Everything that is needed to continue bit for bit.
-    fn snapshot(&self) -> Result<GrainSnapshot> {
-        let inner = self.open()?;
-        Ok(GrainSnapshot {
-            inner: inner.snapshot(),
-        })
-    }
-
-    /// Goes back to a snapshot.
-    ///
-    /// Args:
-    ///     snapshot: A snapshot of the same grains.
-    ///
-    /// Raises:
-    ///     StateError: The snapshot belongs to other grains or is damaged. Nothing has changed.
-    fn restore(&self, snapshot: &Bound<'_, PyAny>) -> Result<()> {
-        let mut inner = self.open()?;
-        let snapshot = belonging::<GrainSnapshot>(snapshot, "a GrainSnapshot")?;
-        let restored = inner.restore(&snapshot.get().inner);
-        Ok(restored?)
-    }
-
-    fn __repr__(&self) -> String {
-        let Ok(inner) = self.open() else {
-            return "GrainSimulation(stepping)".to_owned();
-        };
-        let (n, time) = (n_balls(&inner), inner.time());
-        format!("GrainSimulation({n} balls, time={time} s)")
+    fn __repr__(slf: PyRef<'_, Self>) -> String {
+        let what = slf.open().map(|inner| format!("{} balls", n_balls(&inner)));
+        slf.as_super().shown("GrainSimulation", what)
     }
 }
 
@@ -477,7 +417,6 @@ pub fn arrange_balls(
 pub fn register(module: &Bound<'_, PyModule>) -> Result<()> {
     module.add_class::<GrainSimulation>()?;
     module.add_class::<GrainContacts>()?;
-    module.add_class::<GrainSnapshot>()?;
     module.add_class::<Drum>()?;
     module.add_class::<Silo>()?;
     module.add_function(wrap_pyfunction!(arrange_balls, module)?)?;

@@ -68,6 +68,7 @@ pub fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<sand::WheelBed>()?;
     module.add_class::<union::Union>()?;
     module.add_class::<contacts::Contacts>()?;
+    module.add_class::<stepping::AnySimulation>()?;
     module.add_class::<simulation::Simulation>()?;
     module.add_class::<linearisation::Linearisation>()?;
     module.add_class::<batch::SimulationBatch>()?;
@@ -97,7 +98,6 @@ pub fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<planar_ground::Sine>()?;
     module.add_class::<planar_ground::Spline>()?;
     module.add_class::<planar_ground::Polyline>()?;
-    module.add_class::<snapshot::PlanarSnapshot>()?;
     module.add_class::<contacts::PlanarContacts>()?;
     module.add_class::<planar::PlanarSimulation>()?;
     module.add_class::<planar_machines::BallSimulation>()?;

@@ -427,16 +427,9 @@ impl RoverModel {
     /// Source: Featherstone 2008, ch. 6.
     #[pyo3(signature = (q, coordinates = Coordinates::STATE), text_signature = "($self, q, coordinates='state')")]
     fn mass_matrix(&self, q: &Bound<'_, PyAny>, coordinates: Coordinates) -> Result<Array> {
-        let Placed {
-            chart,
-            q,
-            kinematics,
-        } = self.placed(q, coordinates)?;
-        Ok(fresh_matrix(&chart.mass_matrix(
-            &self.inner,
-            &q,
-            &kinematics,
-        )))
+        let at = self.placed(q, coordinates)?;
+        let M = at.chart.mass_matrix(&self.inner, &at.q, &at.kinematics);
+        Ok(fresh_matrix(&M))
     }
 
     /// The bias N(q, v) v + G(q) of the equations of motion, M dv/dt + bias = generalized forces.
@@ -462,15 +455,11 @@ impl RoverModel {
         gravity: Option<&Bound<'_, PyAny>>,
         coordinates: Coordinates,
     ) -> Result<Array> {
-        let Placed {
-            chart,
-            q,
-            kinematics,
-        } = self.placed(q, coordinates)?;
+        let at = self.placed(q, coordinates)?;
         let qdot = vector(qdot, Kind::State, "qdot")?;
-        chart.velocity(&self.inner, &q, &qdot)?;
-        let gravity = checked_gravity(gravity)?;
-        let bias = chart.bias(&self.inner, (&q, &qdot), &kinematics, &gravity)?;
+        at.chart.velocity(&self.inner, &at.q, &qdot)?;
+        let (gravity, state) = (checked_gravity(gravity)?, (&at.q[..], &qdot[..]));
+        let bias = (at.chart).bias(&self.inner, state, &at.kinematics, &gravity)?;
         Ok(fresh(bias.as_slice()))
     }
 
@@ -496,15 +485,11 @@ impl RoverModel {
         qdot: &Bound<'_, PyAny>,
         coordinates: Coordinates,
     ) -> Result<f64> {
-        let Placed {
-            chart,
-            q,
-            kinematics,
-        } = self.placed(q, coordinates)?;
-        let v = chart.velocity(&self.inner, &q, &vector(qdot, Kind::State, "qdot")?)?;
-        Ok(kinematics
-            .energy(&self.inner, &v, &Vector3::zeros())
-            .kinetic)
+        let at = self.placed(q, coordinates)?;
+        let qdot = vector(qdot, Kind::State, "qdot")?;
+        let v = at.chart.velocity(&self.inner, &at.q, &qdot)?;
+        let energy = at.kinematics.energy(&self.inner, &v, &Vector3::zeros());
+        Ok(energy.kinetic)
     }
 
     /// Named points and axes of the machine in the world frame.
@@ -522,11 +507,8 @@ impl RoverModel {
         q: &Bound<'py, PyAny>,
         coordinates: Coordinates,
     ) -> Result<Bound<'py, PyDict>> {
-        tags(
-            q.py(),
-            &self.inner,
-            &self.placed(q, coordinates)?.kinematics,
-        )
+        let at = self.placed(q, coordinates)?;
+        tags(q.py(), &self.inner, &at.kinematics)
     }
 
     /// The pose of every solid in the world frame.
@@ -543,11 +525,8 @@ impl RoverModel {
         q: &Bound<'py, PyAny>,
         coordinates: Coordinates,
     ) -> Result<Bound<'py, PyDict>> {
-        poses(
-            q.py(),
-            &self.inner,
-            &self.placed(q, coordinates)?.kinematics,
-        )
+        let at = self.placed(q, coordinates)?;
+        poses(q.py(), &self.inner, &at.kinematics)
     }
 
     /// The distance of each wheel to the terrain.
@@ -566,12 +545,8 @@ impl RoverModel {
         terrain: &Bound<'_, PyAny>,
         coordinates: Coordinates,
     ) -> Result<Array> {
-        Ok(self
-            .contacts(q, terrain, coordinates)?
-            .1
-            .iter()
-            .map(|c| c.gap)
-            .collect())
+        let (_, contacts) = self.contacts(q, terrain, coordinates)?;
+        Ok(contacts.iter().map(|c| c.gap).collect())
     }
 
     /// The coordinates of the rover at rest on a terrain.
@@ -651,14 +626,7 @@ impl RoverModel {
         terrain: &Bound<'_, PyAny>,
         coordinates: Coordinates,
     ) -> Result<Array> {
-        let (
-            Placed {
-                chart,
-                q,
-                kinematics,
-            },
-            contacts,
-        ) = self.contacts(q, terrain, coordinates)?;
+        let (at, contacts) = self.contacts(q, terrain, coordinates)?;
         let model = &self.inner;
         let mut rows = Vec::with_capacity(contacts.len() * 3 * model.nv());
         for Contact {
@@ -668,12 +636,12 @@ impl RoverModel {
             let path = model.path(*body);
             let mut along = vec![0.0; path.len()];
             for d in frame.rows() {
-                kinematics.point_jacobian_row(model, *body, point, &d, &mut along);
+                (at.kinematics).point_jacobian_row(model, *body, point, &d, &mut along);
                 let mut full = DVector::zeros(model.nv());
                 for (entry, &k) in along.iter().zip(path) {
                     full[k] = *entry;
                 }
-                rows.extend_from_slice(chart.covector(model, &q, full).as_slice());
+                rows.extend_from_slice(at.chart.covector(model, &at.q, full).as_slice());
             }
         }
         Ok(Array::shaped(rows, &[contacts.len(), 3, model.nv()]))

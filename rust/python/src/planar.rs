@@ -14,10 +14,8 @@ use crate::contacts::PlanarContacts;
 use crate::errors::{BorderError, Kind, Result, Value};
 use crate::options::{Options, SolverWords, choice, name_of, settings};
 use crate::planar_ground::parse;
-use crate::report::{Energy, StepReport};
 use crate::shared::Shared;
-use crate::snapshot::{PlanarSnapshot, belonging};
-use crate::stepping::{Problem, Steps, problem, step};
+use crate::stepping::{AnySimulation, Problem, problem};
 
 const RULES: [(&str, ContactRule); 2] = [
     ("nearest", ContactRule::Nearest),
@@ -25,11 +23,9 @@ const RULES: [(&str, ContactRule); 2] = [
 ];
 
 /// A planar machine on a ground: what the machines share. Made by the classes derived from it.
-///
-/// One call at a time, as of `Simulation`.
-#[pyclass(module = "rover_gym.mechanics", subclass, frozen)]
+#[pyclass(module = "rover_gym.mechanics", extends = AnySimulation, subclass, frozen)]
 pub struct PlanarSimulation {
-    inner: Shared<Core>,
+    inner: Arc<Shared<Core>>,
     ground: Py<PyAny>,
     parameters: Py<PyDict>,
     words: SolverWords,
@@ -74,9 +70,9 @@ impl PlanarSimulation {
         let terrain: Arc<dyn Ground> = parse(ground)?;
         let (step, words, rule) = options(&given)?;
         given.finish()?;
-        let inner = Core::new(machine, terrain, rule, step)?;
-        Ok(PyClassInitializer::from(Self {
-            inner: Shared::new(inner),
+        let inner = Arc::new(Shared::new(Core::new(machine, terrain, rule, step)?));
+        Ok(AnySimulation::base(inner.clone()).add_subclass(Self {
+            inner,
             ground: ground.clone().unbind(),
             parameters: parameters.unbind(),
             words,
@@ -90,18 +86,6 @@ impl PlanarSimulation {
     #[getter]
     fn ground(&self, py: Python<'_>) -> Py<PyAny> {
         self.ground.clone_ref(py)
-    }
-
-    /// Time since the last call of `set_state`, s.
-    #[getter]
-    fn time(&self) -> Result<f64> {
-        Ok(self.open()?.time())
-    }
-
-    /// Time step, s.
-    #[getter]
-    fn time_step(&self) -> Result<f64> {
-        Ok(self.open()?.options().time_step)
     }
 
     /// Coordinates, (nv,), x and y, m, then angles, rad, which turn to the left.
@@ -186,27 +170,10 @@ impl PlanarSimulation {
         Ok(inner.set_inputs(&torques)?)
     }
 
-    /// Takes n steps, as `Simulation.step` does.
-    ///
-    /// Args:
-    ///     n: Number of steps.
-    ///
-    /// Raises:
-    ///     StepError: A step could not be taken; the state before it stays.
-    #[pyo3(signature = (n = Steps(1)), text_signature = "($self, n=1)")]
-    fn step(&self, py: Python<'_>, n: Steps) -> Result<StepReport> {
-        step(py, &mut *self.open()?, n)
-    }
-
     /// The contacts of the last step.
     #[getter]
     fn contacts(&self) -> Result<PlanarContacts> {
         Ok(PlanarContacts::new(self.open()?.contacts()))
-    }
-
-    /// Kinetic and potential energy now.
-    fn energy(&self) -> Result<Energy> {
-        Ok(self.open()?.energy().into())
     }
 
     /// Mass matrix now, (nv, nv), in kg, kg m and kg m².
@@ -229,39 +196,17 @@ impl PlanarSimulation {
         Ok(problem(&*self.open()?))
     }
 
-    /// Everything that is needed to continue bit for bit.
-    fn snapshot(&self) -> Result<PlanarSnapshot> {
-        let inner = self.open()?.snapshot();
-        Ok(PlanarSnapshot { inner })
-    }
-
-    /// Goes back to a snapshot.
-    ///
-    /// Args:
-    ///     snapshot: A snapshot of a simulation of the same machine.
-    ///
-    /// Raises:
-    ///     StateError: The snapshot belongs to another machine or is damaged. Nothing has changed.
-    fn restore(&self, snapshot: &Bound<'_, PyAny>) -> Result<()> {
-        let mut inner = self.open()?;
-        let snapshot = belonging::<PlanarSnapshot>(snapshot, "a PlanarSnapshot")?;
-        Ok(inner.restore(&snapshot.get().inner)?)
-    }
-
     fn __repr__(slf: &Bound<'_, Self>) -> Result<String> {
-        let own = slf.get();
-        let (kind, ground) = (slf.get_type().name()?, own.ground.bind(slf.py()).repr()?);
-        Ok(match own.time() {
-            Ok(time) => format!("{kind}({ground}, time={time})"),
-            Err(_) => format!("{kind}({ground}, stepping)"),
-        })
+        let ground = slf.get().ground.bind(slf.py()).repr()?.to_string();
+        let kind = slf.get_type().name()?.to_string();
+        Ok(slf.as_super().get().shown(&kind, Ok(ground)))
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Result<Bound<'py, PyTuple>> {
-        let (py, own) = (slf.py(), slf.get());
+        let (py, own, base) = (slf.py(), slf.get(), slf.as_super().get());
         let settings = own.settings(py)?;
         settings.update(own.parameters.bind(py).as_mapping())?;
-        let given = (slf.get_type(), own.ground(py), settings, own.snapshot()?);
+        let given = (slf.get_type(), own.ground(py), settings, base.snapshot()?);
         Ok((slf.get_type().getattr("_rebuild")?, given).into_pyobject(py)?)
     }
 
@@ -273,10 +218,8 @@ impl PlanarSimulation {
         snapshot: &Bound<'py, PyAny>,
     ) -> Result<Bound<'py, PyAny>> {
         let made = kind.call((ground,), Some(settings))?;
-        made.cast::<Self>()
-            .map_err(PyErr::from)?
-            .get()
-            .restore(snapshot)?;
+        let base = made.cast::<AnySimulation>().map_err(PyErr::from)?;
+        base.get().restore(snapshot)?;
         Ok(made)
     }
 }

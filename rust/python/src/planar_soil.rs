@@ -10,17 +10,15 @@ use std::sync::{Arc, MutexGuard};
 
 use crate::arguments::{Given, Named, flags, refused};
 use crate::arrays::{Array, array, fresh, fresh_rows, vector};
-use crate::balls::{self, Packed, steps};
+use crate::balls::{self, Packed};
 use crate::bed_arguments::{self, Usual, check_rows, grain_error, grains, rows, setup_error};
-use crate::contacts::SoilContacts;
+use crate::contacts::GrainContacts;
 use crate::errors::{BorderError, Kind, Result, Value};
 use crate::planar::pair;
 use crate::planar_ground::{border, parse};
 use crate::planar_machines::two_wheel_rover;
-use crate::report::{Energy, StepReport};
 use crate::shared::Shared;
-use crate::snapshot::{SoilSnapshot, belonging};
-use crate::stepping::{Steps, step};
+use crate::stepping::AnySimulation;
 
 /// Of the steps of a soil: its velocities are right to ten times the tolerance, m/s.
 const USUAL: Usual = Usual {
@@ -32,8 +30,6 @@ const USUAL: Usual = Usual {
 /// A granular soil of disks, and a machine that drives on it.
 ///
 /// The disks are free, with friction, between walls or on a ground.
-///
-/// One call at a time, as of `Simulation`.
 ///
 /// Args:
 ///     radius: Radii of the disks, (n,), m.
@@ -79,9 +75,9 @@ const USUAL: Usual = Usual {
 ///         wheels overlap.
 ///     TerrainError: A wall has no direction, or `ground` is not a ground.
 ///     OptionError: An option is out of its range, or both `rover` and `rig` are given.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.mechanics", extends = AnySimulation, frozen)]
 pub struct SoilSimulation {
-    inner: Shared<Core>,
+    inner: Arc<Shared<Core>>,
 }
 
 impl SoilSimulation {
@@ -144,13 +140,13 @@ impl SoilSimulation {
         mass: &Bound<'_, PyAny>,
         position: &Bound<'_, PyAny>,
         options: Option<&Bound<'_, PyDict>>,
-    ) -> Result<Self> {
+    ) -> Result<PyClassInitializer<Self>> {
         let given = Named::keywords(radius.py(), options)?;
         let disks = grains::<2>(radius, mass, given.get("kinematic")?)?;
         let mut q = with_angles(position, "position")?;
         check_rows("disks", disks.len(), &q)?;
         let gravity = given.read("gravity", pair)?.map(|g| g.push(0.0));
-        let options = steps(&given, gravity, false)?.options(&disks, USUAL)?;
+        let options = bed_arguments::step_options(&given, &disks, (gravity, false), USUAL)?;
         let walls = bed_arguments::walls(given.some("walls")?.as_ref())?;
         let ground: Option<Arc<dyn Ground>> =
             given.some("ground")?.as_ref().map(parse).transpose()?;
@@ -168,21 +164,8 @@ impl SoilSimulation {
         let sleep = balls::sleep(&given)?;
         given.finish()?;
         let inner = Core::new(Arc::new(scene), options, sleep, q).map_err(setup_error)?;
-        Ok(Self {
-            inner: Shared::new(inner),
-        })
-    }
-
-    /// Time since the last call of `set_state`, s.
-    #[getter]
-    fn time(&self) -> Result<f64> {
-        Ok(self.open()?.time())
-    }
-
-    /// Time step, s.
-    #[getter]
-    fn time_step(&self) -> Result<f64> {
-        Ok(self.open()?.options().time_step)
+        let inner = Arc::new(Shared::new(inner));
+        Ok(AnySimulation::base(inner.clone()).add_subclass(Self { inner }))
     }
 
     /// Radii of the disks, (n,), m.
@@ -245,6 +228,16 @@ impl SoilSimulation {
         Ok(fresh_rows(
             wheels.map(|(centre, radius)| [centre.x, centre.y, radius]),
         ))
+    }
+
+    /// A point of each wall and the normal to its free side, (m, 4), m.
+    #[getter]
+    fn walls(&self) -> Result<Array> {
+        let inner = self.open()?;
+        Ok(fresh_rows(inner.soil().walls.iter().map(|wall| {
+            let (n, point) = (wall.n(), wall.n() * wall.offset());
+            [point.x, point.y, n.x, n.y]
+        })))
     }
 
     /// Commanded torques of the rover's wheels, (2,), N m, positive forward; empty without a rover.
@@ -352,32 +345,10 @@ impl SoilSimulation {
             .map_err(|e| grain_error(&e))
     }
 
-    /// Takes n steps, as `Simulation.step` does.
-    ///
-    /// Args:
-    ///     n: Number of steps.
-    ///
-    /// Raises:
-    ///     StepError: A step could not be taken; the state before it stays.
-    #[pyo3(signature = (n = Steps(1)), text_signature = "($self, n=1)")]
-    fn step(&self, py: Python<'_>, n: Steps) -> Result<StepReport> {
-        step(py, &mut *self.open()?, n)
-    }
-
     /// The contacts of the last step.
     #[getter]
-    fn contacts(&self) -> Result<SoilContacts> {
-        let inner = self.open()?;
-        let wheels = inner.soil().machine.as_ref().map_or(0, |m| m.n_wheels());
-        Ok(SoilContacts::new(
-            inner.contacts(),
-            n_disks(&inner) + wheels,
-        ))
-    }
-
-    /// Kinetic and potential energy now.
-    fn energy(&self) -> Result<Energy> {
-        Ok(self.open()?.energy().into())
+    fn contacts(&self) -> Result<GrainContacts> {
+        Ok(GrainContacts::of(&*self.open()?))
     }
 
     /// Momentum of the disks, (3,): along x and y, kg m/s, and about the origin, kg m²/s.
@@ -403,34 +374,9 @@ impl SoilSimulation {
         Ok(())
     }
 
-    /// Everything that is needed to continue bit for bit.
-    fn snapshot(&self) -> Result<SoilSnapshot> {
-        let inner = self.open()?;
-        Ok(SoilSnapshot {
-            inner: inner.snapshot(),
-        })
-    }
-
-    /// Goes back to a snapshot.
-    ///
-    /// Args:
-    ///     snapshot: A snapshot of the same soil.
-    ///
-    /// Raises:
-    ///     StateError: The snapshot belongs to another soil or is damaged. Nothing has changed.
-    fn restore(&self, snapshot: &Bound<'_, PyAny>) -> Result<()> {
-        let mut inner = self.open()?;
-        let snapshot = belonging::<SoilSnapshot>(snapshot, "a SoilSnapshot")?;
-        let restored = inner.restore(&snapshot.get().inner);
-        Ok(restored?)
-    }
-
-    fn __repr__(&self) -> String {
-        let Ok(inner) = self.open() else {
-            return "SoilSimulation(stepping)".to_owned();
-        };
-        let (n, time) = (n_disks(&inner), inner.time());
-        format!("SoilSimulation({n} disks, time={time} s)")
+    fn __repr__(slf: PyRef<'_, Self>) -> String {
+        let what = slf.open().map(|inner| format!("{} disks", n_disks(&inner)));
+        slf.as_super().shown("SoilSimulation", what)
     }
 }
 
@@ -480,8 +426,6 @@ pub fn soil_packing(
 /// Adds the soil's classes to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> Result<()> {
     module.add_class::<SoilSimulation>()?;
-    module.add_class::<SoilContacts>()?;
-    module.add_class::<SoilSnapshot>()?;
     module.add_function(wrap_pyfunction!(soil_packing, module)?)?;
     Ok(())
 }

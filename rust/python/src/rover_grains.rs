@@ -1,20 +1,24 @@
 //! `RoverGrainSimulation`: a rover among balls.
 
-use std::sync::MutexGuard;
+use std::sync::Arc;
 
 use pyo3::prelude::*;
 use rover_core::integrator::{StepError, StepReport as CoreReport};
-use rover_core::simulation::{RoverInGrains, RoverSimulation, TogetherError};
+use rover_core::multibody::Energy as CoreEnergy;
+use rover_core::simulation::{
+    GrainSimulation as Grains, RoverInGrains, RoverSimulation, TogetherError,
+};
 
 use crate::arguments::{Given, refused};
 use crate::arrays::Array;
 use crate::bed_arguments::grain_error;
 use crate::errors::{BorderError, Kind, Result, Value};
 use crate::grains::GrainSimulation;
-use crate::report::StepReport;
+use crate::report::{Energy, StepReport};
 use crate::shared::{Shared, Watch};
 use crate::simulation::Simulation;
-use crate::snapshot::{RoverGrainSnapshot, belonging};
+use crate::snapshot::{Kept, other_kind};
+use crate::stepping::{AnySimulation, Stepped};
 
 impl From<TogetherError> for BorderError {
     fn from(e: TogetherError) -> Self {
@@ -54,33 +58,85 @@ impl From<TogetherError> for BorderError {
 ///     OptionError: The time steps or gravities differ, or the coefficient is negative or not
 ///         finite.
 ///     StateError: A part of the rover is in a grain.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.mechanics", extends = AnySimulation, frozen)]
 pub struct RoverGrainSimulation {
-    link: Shared<RoverInGrains>,
+    pub together: Arc<Together>,
     rover: Py<Simulation>,
     grains: Py<GrainSimulation>,
 }
 
-impl RoverGrainSimulation {
-    /// The rover.
-    pub fn of_rover(&self) -> &Simulation {
-        self.rover.get()
-    }
+/// A rover, grains, and what acts between them.
+pub struct Together {
+    link: Shared<RoverInGrains>,
+    pub rover: Arc<Shared<RoverSimulation>>,
+    grains: Arc<Shared<Grains<3>>>,
+}
 
-    /// Takes n steps with both, as [`RoverInGrains::step`]; `rover` is the open simulation of
-    /// [`Self::of_rover`].
+impl Together {
+    /// Takes n steps with both, as [`RoverInGrains::step`]; `rover`: its open simulation.
     pub fn step_with(
         &self,
         rover: &mut RoverSimulation,
         n: usize,
         go_on: &mut dyn FnMut() -> bool,
     ) -> Result<Result<CoreReport, StepError>, BorderError> {
-        let (mut link, mut grains) = (self.link()?, self.grains.get().open()?);
+        let (mut link, mut grains) = (self.link.open()?, self.grains.open()?);
         Ok(link.step(rover, &mut grains, n, go_on))
     }
 
-    fn link(&self) -> Result<MutexGuard<'_, RoverInGrains>, BorderError> {
-        self.link.open()
+    /// What is read of all three.
+    fn read<T>(
+        &self,
+        read: impl FnOnce(&RoverInGrains, &RoverSimulation, &Grains<3>) -> T,
+    ) -> Result<T> {
+        let link = self.link.open()?;
+        Ok(read(&link, &*self.rover.open()?, &*self.grains.open()?))
+    }
+}
+
+impl Stepped for Together {
+    fn time(&self) -> Result<f64> {
+        self.grains.time()
+    }
+
+    fn time_step(&self) -> Result<f64> {
+        self.grains.time_step()
+    }
+
+    fn step(&self, py: Python<'_>, n: usize) -> Result<StepReport> {
+        let mut rover = self.rover.open()?;
+        let (moving, mut watch) = (&mut *rover, Watch::new());
+        let report = py.detach(|| self.step_with(moving, n, &mut || watch.go_on()))?;
+        Ok(watch.result(report)?.into())
+    }
+
+    fn energy(&self) -> Result<Energy> {
+        self.read(|_, rover, grains| {
+            let (rover, grains) = (rover.energy(), grains.energy());
+            let (kinetic, potential) = (
+                rover.kinetic + grains.kinetic,
+                rover.potential + grains.potential,
+            );
+            CoreEnergy { kinetic, potential }.into()
+        })
+    }
+
+    fn snapshot(&self) -> Result<Kept> {
+        self.read(|_, rover, grains| Kept::Among(rover.snapshot(), grains.snapshot()))
+    }
+
+    fn restore(&self, kept: &Kept) -> Result<()> {
+        let Kept::Among(of_rover, of_grains) = kept else {
+            return Err(other_kind());
+        };
+        let (mut rover, mut grains) = (self.rover.open()?, self.grains.open()?);
+        let before = rover.snapshot();
+        rover.restore(of_rover)?;
+        if let Err(e) = grains.restore(of_grains) {
+            rover.restore(&before)?;
+            return Err(e.into());
+        }
+        Ok(())
     }
 }
 
@@ -92,7 +148,7 @@ impl RoverGrainSimulation {
         rover: &Bound<'_, PyAny>,
         grains: &Bound<'_, PyAny>,
         wheel_friction: Given<'_>,
-    ) -> Result<Self> {
+    ) -> Result<PyClassInitializer<Self>> {
         let rover = rover
             .cast::<Simulation>()
             .map_err(|_| refused(rover, Kind::Model, "rover", "a Simulation"))?;
@@ -100,12 +156,18 @@ impl RoverGrainSimulation {
             .cast::<GrainSimulation>()
             .map_err(|_| refused(grains, Kind::Model, "grains", "a GrainSimulation"))?;
         let friction = wheel_friction.number(0.9, Kind::Option, "wheel_friction")?;
-        let link = RoverInGrains::new(&*rover.get().open()?, &*grains.get().open()?, friction);
-        Ok(Self {
-            link: Shared::new(link?),
+        let (moving, bed) = (rover.get().inner.clone(), grains.get().inner.clone());
+        let link = RoverInGrains::new(&*moving.open()?, &*bed.open()?, friction)?;
+        let together = Arc::new(Together {
+            link: Shared::new(link),
+            rover: moving,
+            grains: bed,
+        });
+        Ok(AnySimulation::base(together.clone()).add_subclass(Self {
+            together,
             rover: rover.clone().unbind(),
             grains: grains.clone().unbind(),
-        })
+        }))
     }
 
     /// The rover's simulation. Its own `step` moves it without the grains.
@@ -123,36 +185,7 @@ impl RoverGrainSimulation {
     /// Coulomb's coefficient between the rover and grains.
     #[getter]
     fn wheel_friction(&self) -> Result<f64> {
-        Ok(self.link()?.friction())
-    }
-
-    /// Time of the grains, s.
-    #[getter]
-    fn time(&self) -> Result<f64> {
-        Ok(self.grains.get().open()?.time())
-    }
-
-    /// Time step, s.
-    #[getter]
-    fn time_step(&self) -> Result<f64> {
-        Ok(self.grains.get().open()?.options().time_step)
-    }
-
-    /// Takes n steps with both, as `Simulation.step` does.
-    ///
-    /// Args:
-    ///     n: Number of steps.
-    ///
-    /// Raises:
-    ///     StepError: A step could not be taken; the state before it stays.
-    #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
-    fn step(&self, py: Python<'_>, n: Given<'_>) -> Result<StepReport> {
-        let steps = n.count(1, Kind::Option, "n")?;
-        let mut rover = self.of_rover().open()?;
-        let moving = &mut *rover;
-        let mut watch = Watch::new();
-        let report = py.detach(|| self.step_with(moving, steps, &mut || watch.go_on()))?;
-        Ok(watch.result(report)?.into())
+        Ok(self.together.link.open()?.friction())
     }
 
     /// Gap of each wheel now to the nearest grain or the terrain, (n_wheels,), m.
@@ -160,61 +193,28 @@ impl RoverGrainSimulation {
     /// Positive when apart. A wheel without a grain within its radius has the gap to the terrain.
     #[getter]
     fn wheel_gaps(&self) -> Result<Array> {
-        let link = self.link()?;
-        let gaps = link.wheel_gaps(&*self.rover.get().open()?, &*self.grains.get().open()?);
-        Ok(Array::from(gaps))
+        let read = |link: &RoverInGrains, rover: &_, grains: &_| link.wheel_gaps(rover, grains);
+        Ok(self.together.read(read)?.into())
     }
 
     /// Deepest overlap now, m: of grains with anything, and of the rover with grains.
     fn penetration(&self) -> Result<f64> {
-        let link = self.link()?;
-        Ok(link.penetration(&*self.rover.get().open()?, &*self.grains.get().open()?))
+        self.together
+            .read(|link, rover, grains| link.penetration(rover, grains))
     }
 
-    /// Everything that is needed to continue bit for bit.
-    fn snapshot(&self) -> Result<RoverGrainSnapshot> {
-        let rover = self.rover.get().open()?.snapshot();
-        let grains = self.grains.get().open()?.snapshot();
-        Ok(RoverGrainSnapshot {
-            inner: (rover, grains),
-        })
-    }
-
-    /// Goes back to a snapshot.
-    ///
-    /// Args:
-    ///     snapshot: A snapshot of the same rover among the same grains.
-    ///
-    /// Raises:
-    ///     StateError: The snapshot belongs to another rover or other grains, or is damaged.
-    ///         Nothing has changed.
-    fn restore(&self, snapshot: &Bound<'_, PyAny>) -> Result<()> {
-        let mut rover = self.rover.get().open()?;
-        let mut grains = self.grains.get().open()?;
-        let snapshot = belonging::<RoverGrainSnapshot>(snapshot, "a RoverGrainSnapshot")?;
-        let (of_rover, of_grains) = &snapshot.get().inner;
-        let before = rover.snapshot();
-        rover.restore(of_rover)?;
-        if let Err(e) = grains.restore(of_grains) {
-            rover.restore(&before)?;
-            return Err(BorderError::from(e));
-        }
-        Ok(())
-    }
-
-    fn __repr__(&self) -> String {
-        let (Ok(rover), Ok(grains)) = (self.rover.get().open(), self.grains.get().open()) else {
-            return "RoverGrainSimulation(stepping)".to_owned();
+    fn __repr__(slf: PyRef<'_, Self>) -> String {
+        let read = |_: &_, rover: &RoverSimulation, grains: &Grains<3>| {
+            let name = &rover.model().description().name;
+            format!("{name:?} among {} balls", grains.soil().grains.len())
         };
-        let name = &rover.model().description().name;
-        let (n, time) = (grains.soil().grains.len(), grains.time());
-        format!("RoverGrainSimulation({name:?} among {n} balls, time={time} s)")
+        let what = slf.together.read(read);
+        slf.as_super().shown("RoverGrainSimulation", what)
     }
 }
 
 /// Adds the class of a rover among grains to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> Result<()> {
     module.add_class::<RoverGrainSimulation>()?;
-    module.add_class::<RoverGrainSnapshot>()?;
     Ok(())
 }

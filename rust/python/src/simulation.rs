@@ -24,18 +24,15 @@ use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
 use crate::options::{Options, SolverWords, settings};
 use crate::rays::{Met, met, rays};
 use crate::reading::{place, scan_points, slices};
-use crate::report::{Energy, StepReport};
 use crate::sand::sand_to_dict;
 use crate::shared::{Shared, Watch};
-use crate::snapshot::{Snapshot, belonging};
-use crate::stepping::{Problem, Steps, problem, step};
+use crate::stepping::{AnySimulation, Problem, problem};
 use crate::{terrain, union};
 
 /// A rover on a terrain, stepped through time.
 ///
 /// It starts at rest with all coordinates 0, with its steering held at 0 and every other joint
-/// free. One call at a time: a call during another one, from another thread or a signal handler,
-/// raises BusyError.
+/// free.
 ///
 /// Args:
 ///     model: The machine; the built-in rover by default.
@@ -69,9 +66,9 @@ use crate::{terrain, union};
 ///     ModelError: `model` is not a RoverModel.
 ///     TerrainError: `terrain` is not a terrain.
 ///     OptionError: An option is out of its range, or is given beside `accuracy`.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.mechanics", extends = AnySimulation, frozen)]
 pub struct Simulation {
-    inner: Shared<CoreSimulation>,
+    pub inner: Arc<Shared<CoreSimulation>>,
     model: Arc<Model>,
     options: StepOptions,
     origin: Origin,
@@ -90,13 +87,15 @@ fn names(joints: &Bound<'_, PyAny>) -> Result<Vec<String>> {
 
 impl Simulation {
     /// A simulation, and what it was made with.
-    pub fn of(inner: CoreSimulation, origin: Origin) -> Self {
-        Self {
-            model: inner.model().clone(),
-            options: inner.options().clone(),
-            inner: Shared::new(inner),
+    pub fn of(inner: CoreSimulation, origin: Origin) -> PyClassInitializer<Self> {
+        let (model, options) = (inner.model().clone(), inner.options().clone());
+        let inner = Arc::new(Shared::new(inner));
+        AnySimulation::base(inner.clone()).add_subclass(Self {
+            inner,
+            model,
+            options,
             origin,
-        }
+        })
     }
 
     /// The simulation, for one call.
@@ -125,7 +124,7 @@ impl Simulation {
         model: Given<'_>,
         terrain: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
-    ) -> Result<Self> {
+    ) -> Result<PyClassInitializer<Self>> {
         let given = Named::keywords(py, options)?;
         let model = model.object::<RoverModel>(Kind::Model, "model", "a RoverModel")?;
         let model = model.map_or_else(|| Arc::new(Model::rover()), |m| m.inner);
@@ -185,18 +184,6 @@ impl Simulation {
             slip[contact.wheel] = contact.slip;
         }
         Ok(Some(sand_to_dict(py, sand, &slip, cell)?))
-    }
-
-    /// Time since the last call of `set_state`, s.
-    #[getter]
-    fn time(&self) -> Result<f64> {
-        Ok(self.open()?.state().time)
-    }
-
-    /// Time step, s.
-    #[getter]
-    fn time_step(&self) -> f64 {
-        self.options.time_step
     }
 
     /// Gravity, world frame, (3,), m/s².
@@ -456,25 +443,6 @@ impl Simulation {
         Ok(())
     }
 
-    /// Takes n steps.
-    ///
-    /// Other threads run meanwhile. Ctrl-C, or whatever else a signal handler raises, ends the call
-    /// after a whole step, whose state stays. A contact solver that does not converge is no error:
-    /// the report says so.
-    ///
-    /// Args:
-    ///     n: Number of steps.
-    ///
-    /// Raises:
-    ///     StepError: A step could not be taken; the state before it stays.
-    ///     OptionError: `n` is not a count.
-    #[pyo3(signature = (n = Steps(1)), text_signature = "($self, n=1)")]
-    fn step(&self, py: Python<'_>, n: Steps) -> Result<StepReport> {
-        let mut simulation = self.open()?;
-        let report = step(py, &mut *simulation, n)?;
-        Ok(report.with_undetermined_loads(simulation.undetermined_loads()))
-    }
-
     /// The contacts of the last step.
     #[getter]
     fn contacts(&self) -> Result<Contacts> {
@@ -635,11 +603,6 @@ impl Simulation {
             .detach(|| inner.cast(&rays, range, &seen))))
     }
 
-    /// Kinetic and potential energy now.
-    fn energy(&self) -> Result<Energy> {
-        Ok(self.open()?.energy().into())
-    }
-
     /// Momentum of the rover.
     ///
     /// Returns:
@@ -666,26 +629,6 @@ impl Simulation {
     /// Origin (3,), m, and rotation matrix (3, 3) of every solid now, world frame, by name.
     fn poses<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         poses(py, &self.model, &self.open()?.kinematics())
-    }
-
-    /// Everything that is needed to continue bit for bit.
-    fn snapshot(&self) -> Result<Snapshot> {
-        Ok(Snapshot {
-            inner: self.open()?.snapshot(),
-        })
-    }
-
-    /// Goes back to a snapshot.
-    ///
-    /// Args:
-    ///     snapshot: A snapshot of a simulation of the same model.
-    ///
-    /// Raises:
-    ///     StateError: The snapshot belongs to another model or is damaged. Nothing has changed.
-    fn restore(&self, snapshot: &Bound<'_, PyAny>) -> Result<()> {
-        let snapshot = belonging::<Snapshot>(snapshot, "a Snapshot")?;
-        let restored = self.open()?.restore(&snapshot.get().inner);
-        Ok(restored?)
     }
 
     /// The friction-contact problem of the last step, of the last part of a split one.
@@ -751,22 +694,16 @@ impl Simulation {
         Ok(parts)
     }
 
-    fn __repr__(&self) -> String {
-        let (name, nv) = (&self.model.description().name, self.model.nv());
-        match self.open() {
-            Ok(inner) => format!("Simulation({name:?}, nv={nv}, time={})", inner.state().time),
-            Err(_) => format!("Simulation({name:?}, nv={nv}, stepping)"),
-        }
+    fn __repr__(slf: PyRef<'_, Self>) -> String {
+        let (name, nv) = (&slf.model.description().name, slf.model.nv());
+        let what = format!("{name:?}, nv={nv}");
+        slf.as_super().shown("Simulation", Ok(what))
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Result<Bound<'py, PyTuple>> {
-        let (py, own) = (slf.py(), slf.get());
-        let given = (
-            own.model(),
-            own.terrain(py)?,
-            own.settings(py)?,
-            own.snapshot()?,
-        );
+        let (py, own, base) = (slf.py(), slf.get(), slf.as_super().get());
+        let (terrain, settings) = (own.terrain(py)?, own.settings(py)?);
+        let given = (own.model(), terrain, settings, base.snapshot()?);
         Ok((slf.get_type().getattr("_rebuild")?, given).into_pyobject(py)?)
     }
 
@@ -780,7 +717,7 @@ impl Simulation {
         let class = model.py().get_type::<Self>();
         let made = class.call((model, terrain), Some(settings))?;
         let made = made.cast_into::<Self>().map_err(PyErr::from)?;
-        made.get().restore(snapshot)?;
+        made.as_super().get().restore(snapshot)?;
         Ok(made)
     }
 }

@@ -1,117 +1,143 @@
-//! `Snapshot`, `PlanarSnapshot`, `SoilSnapshot`, `GrainSnapshot`, `RoverGrainSnapshot`.
+//! `Snapshot`: everything that a simulation needs to continue.
 
-use pyo3::PyTypeInfo;
+use std::hash::{DefaultHasher, Hasher};
+
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use rover_core::simulation::{GrainBed, PlanarScene, RoverScene, Snapshot as SnapshotOf};
+use rover_core::simulation::{
+    GrainBed, PlanarScene, RoverScene, Scene, Simulation, Snapshot as SnapshotOf,
+};
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 
 use crate::arguments;
 use crate::errors::{BorderError, Kind, Result, Value};
 
-/// A snapshot of the class that a simulation takes. `what`: the class with its article.
-pub fn belonging<'a, 'py, T: PyTypeInfo>(
-    given: &'a Bound<'py, PyAny>,
-    what: &str,
-) -> Result<&'a Bound<'py, T>, BorderError> {
-    let found = given.cast::<T>();
-    found.map_err(|_| arguments::refused(given, Kind::State, "snapshot", what))
+/// What a simulation of each kind needs to continue.
+#[derive(PartialEq, Serialize, Deserialize)]
+pub enum Kept {
+    Rover(SnapshotOf<RoverScene>),
+    Planar(SnapshotOf<PlanarScene>),
+    Disks(SnapshotOf<GrainBed<2>>),
+    Balls(SnapshotOf<GrainBed<3>>),
+    Among(SnapshotOf<RoverScene>, SnapshotOf<GrainBed<3>>),
 }
 
-/// Reads a snapshot from exactly these bytes.
-fn read<T: DeserializeOwned>(data: &Bound<'_, PyAny>) -> Result<T, BorderError> {
-    let data: &[u8] = data
-        .extract()
-        .map_err(|_| arguments::refused(data, Kind::State, "data", "bytes"))?;
-    let (snapshot, rest) = postcard::take_from_bytes(data).map_err(|e| damaged(&e))?;
-    if rest.is_empty() {
-        return Ok(snapshot);
+/// A scene whose snapshots Python keeps.
+pub trait KeptScene: Scene {
+    fn keep(snapshot: SnapshotOf<Self>) -> Kept;
+    /// The snapshot, if it is of such a scene.
+    fn kept(kept: &Kept) -> Option<&SnapshotOf<Self>>;
+    /// Independent sets of wheel loads that balance one another in the last step.
+    fn undetermined_loads(_: &Simulation<Self>) -> usize {
+        0
     }
-    Err(refused(&format!("{} bytes follow its end", rest.len())))
 }
 
-/// A snapshot whose bytes cannot be read.
-fn damaged(e: &postcard::Error) -> BorderError {
-    refused(&e.to_string())
-}
-
-fn refused(reason: &str) -> BorderError {
-    let message = format!("snapshot: its bytes are damaged ({reason})");
-    Kind::State.error("snapshot", message, Value::Nothing)
-}
-
-/// A class of snapshots: all of them are read, written, compared and pickled alike.
-macro_rules! snapshot_class {
-    ($(#[doc = $doc:literal])* $class:ident, $inner:ty) => {
-        $(#[doc = $doc])*
-        #[pyclass(module = "rover_gym.mechanics", frozen)]
-        pub struct $class {
-            pub inner: $inner,
-        }
-
-        #[pymethods]
-        impl $class {
-            /// Reads a snapshot.
-            ///
-            /// Args:
-            ///     data: What `to_bytes` returned.
-            ///
-            /// Raises:
-            ///     StateError: The bytes are not those of a snapshot.
-            #[staticmethod]
-            fn from_bytes(data: &Bound<'_, PyAny>) -> Result<Self> {
-                Ok(Self { inner: read(data)? })
+macro_rules! kept_scene {
+    ($scene:ty, $variant:ident $(, $more:item)?) => {
+        impl KeptScene for $scene {
+            fn keep(snapshot: SnapshotOf<Self>) -> Kept {
+                Kept::$variant(snapshot)
             }
 
-            /// The snapshot as bytes, as `from_bytes` reads them.
-            fn to_bytes<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyBytes>> {
-                let bytes = postcard::to_stdvec(&self.inner).map_err(|e| damaged(&e))?;
-                Ok(PyBytes::new(py, &bytes))
+            fn kept(kept: &Kept) -> Option<&SnapshotOf<Self>> {
+                match kept {
+                    Kept::$variant(own) => Some(own),
+                    _ => None,
+                }
             }
 
-            fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-                let other = other.cast::<Self>();
-                other.is_ok_and(|o| o.get().inner == self.inner)
-            }
-
-            fn __hash__(&self) -> Result<u64> {
-                use std::hash::{DefaultHasher, Hasher};
-                let mut hasher = DefaultHasher::new();
-                hasher.write(&postcard::to_stdvec(&self.inner).map_err(|e| damaged(&e))?);
-                Ok(hasher.finish())
-            }
-
-            fn __reduce__<'py>(
-                slf: &Bound<'py, Self>,
-            ) -> Result<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
-                let bytes = slf.get().to_bytes(slf.py())?;
-                Ok((slf.get_type().getattr("from_bytes")?, (bytes,)))
-            }
+            $($more)?
         }
     };
 }
 
-snapshot_class! {
-    /// Everything that a simulation needs to continue bit for bit. Picklable.
-    Snapshot, SnapshotOf<RoverScene>
+kept_scene!(
+    RoverScene,
+    Rover,
+    fn undetermined_loads(rover: &Simulation<Self>) -> usize {
+        rover.undetermined_loads()
+    }
+);
+kept_scene!(PlanarScene, Planar);
+kept_scene!(GrainBed<2>, Disks);
+kept_scene!(GrainBed<3>, Balls);
+
+/// Everything that a simulation needs to continue bit for bit. Picklable.
+#[pyclass(module = "rover_gym.mechanics", frozen)]
+pub struct Snapshot(pub Kept);
+
+/// A snapshot of another kind of simulation.
+pub fn other_kind() -> BorderError {
+    let message = "snapshot: is of another kind of simulation".to_owned();
+    Kind::State.error("snapshot", message, Value::Nothing)
 }
 
-snapshot_class! {
-    /// Everything that a planar simulation needs to continue bit for bit. Picklable.
-    PlanarSnapshot, SnapshotOf<PlanarScene>
+/// The argument `snapshot`.
+pub fn snapshot<'a, 'py>(given: &'a Bound<'py, PyAny>) -> Result<&'a Bound<'py, Snapshot>> {
+    let found = given.cast::<Snapshot>();
+    found.map_err(|_| arguments::refused(given, Kind::State, "snapshot", "a Snapshot"))
 }
 
-snapshot_class! {
-    /// Everything that a soil needs to continue bit for bit. Picklable.
-    SoilSnapshot, SnapshotOf<GrainBed<2>>
+/// Bytes of a snapshot or an episode that cannot be read.
+pub fn damaged(field: &str, reason: &impl ToString) -> BorderError {
+    let message = format!("{field}: its bytes are damaged ({})", reason.to_string());
+    Kind::State.error(field, message, Value::Nothing)
 }
 
-snapshot_class! {
-    /// Everything that grains in space need to continue bit for bit. Picklable.
-    GrainSnapshot, SnapshotOf<GrainBed<3>>
+/// Reads exactly these bytes.
+pub fn read_bytes<T: DeserializeOwned>(data: &Bound<'_, PyAny>, field: &str) -> Result<T> {
+    let wrong = |_| arguments::refused(data, Kind::State, "data", "bytes");
+    let data: &[u8] = data.extract().map_err(wrong)?;
+    match postcard::take_from_bytes(data).map_err(|e| damaged(field, &e))? {
+        (kept, []) => Ok(kept),
+        (_, rest) => {
+            let reason = format!("{} bytes follow its end", rest.len());
+            Err(damaged(field, &reason))
+        }
+    }
 }
 
-snapshot_class! {
-    /// Everything that a rover among grains needs to continue bit for bit. Picklable.
-    RoverGrainSnapshot, (SnapshotOf<RoverScene>, SnapshotOf<GrainBed<3>>)
+impl Snapshot {
+    fn bytes(&self) -> Result<Vec<u8>> {
+        postcard::to_stdvec(&self.0).map_err(|e| damaged("snapshot", &e))
+    }
+}
+
+#[pymethods]
+impl Snapshot {
+    /// Reads a snapshot.
+    ///
+    /// Args:
+    ///     data: What `to_bytes` returned.
+    ///
+    /// Raises:
+    ///     StateError: The bytes are not those of a snapshot.
+    #[staticmethod]
+    fn from_bytes(data: &Bound<'_, PyAny>) -> Result<Self> {
+        Ok(Self(read_bytes(data, "snapshot")?))
+    }
+
+    /// The snapshot as bytes, as `from_bytes` reads them.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyBytes>> {
+        Ok(PyBytes::new(py, &self.bytes()?))
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|o| o.get().0 == self.0)
+    }
+
+    fn __hash__(&self) -> Result<u64> {
+        let mut hasher = DefaultHasher::new();
+        hasher.write(&self.bytes()?);
+        Ok(hasher.finish())
+    }
+
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> Result<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let bytes = slf.get().to_bytes(slf.py())?;
+        Ok((slf.get_type().getattr("from_bytes")?, (bytes,)))
+    }
 }

@@ -1,17 +1,143 @@
-//! What the classes of all simulations do alike.
+//! `AnySimulation`: what the classes of all simulations do alike.
 
 use pyo3::prelude::*;
 use rover_core::nalgebra::DMatrix;
 use rover_core::simulation::{Components, DenseOperator, LocatedContact, Scene, Simulation};
+use std::sync::Arc;
 
 use crate::arguments::count;
 use crate::arrays::{Array, fresh, fresh_matrix};
 use crate::errors::{Kind, Result};
-use crate::report::StepReport;
-use crate::shared::Watch;
+use crate::report::{Energy, StepReport};
+use crate::shared::{Shared, Watch};
+use crate::snapshot::{Kept, KeptScene, Snapshot, other_kind, snapshot};
+
+/// What all simulations share. Made by the classes derived from it.
+///
+/// They are `Simulation`, `PlanarSimulation`, `SoilSimulation`, `GrainSimulation` and
+/// `RoverGrainSimulation`.
+///
+/// One call at a time: a call during another one, from another thread or a signal handler, raises
+/// BusyError.
+#[pyclass(module = "rover_gym.mechanics", subclass, frozen)]
+pub struct AnySimulation(Arc<dyn Stepped>);
+
+/// What is stepped from Python.
+pub trait Stepped: Send + Sync {
+    fn time(&self) -> Result<f64>;
+    fn time_step(&self) -> Result<f64>;
+    fn step(&self, py: Python<'_>, n: usize) -> Result<StepReport>;
+    fn energy(&self) -> Result<Energy>;
+    fn snapshot(&self) -> Result<Kept>;
+    fn restore(&self, kept: &Kept) -> Result<()>;
+}
+
+impl<S: KeptScene + 'static> Stepped for Shared<Simulation<S>>
+where
+    Simulation<S>: Send,
+{
+    fn time(&self) -> Result<f64> {
+        Ok(self.open()?.time())
+    }
+
+    fn time_step(&self) -> Result<f64> {
+        Ok(self.open()?.options().time_step)
+    }
+
+    fn step(&self, py: Python<'_>, n: usize) -> Result<StepReport> {
+        let mut held = self.open()?;
+        let (inner, mut watch) = (&mut *held, Watch::new());
+        let done = py.detach(|| inner.step_while(n, &mut || watch.go_on()));
+        let report = StepReport::from(watch.result(done)?);
+        Ok(report.with_undetermined_loads(S::undetermined_loads(&held)))
+    }
+
+    fn energy(&self) -> Result<Energy> {
+        Ok(self.open()?.energy().into())
+    }
+
+    fn snapshot(&self) -> Result<Kept> {
+        Ok(S::keep(self.open()?.snapshot()))
+    }
+
+    fn restore(&self, kept: &Kept) -> Result<()> {
+        let own = S::kept(kept).ok_or_else(other_kind)?;
+        Ok(self.open()?.restore(own)?)
+    }
+}
+
+impl AnySimulation {
+    /// The base of a class that holds this simulation.
+    pub fn base(inner: Arc<dyn Stepped>) -> PyClassInitializer<Self> {
+        Self(inner).into()
+    }
+
+    /// A simulation as Python shows it: what it holds, unless it is in use, and its time.
+    pub fn shown(&self, class: &str, what: Result<String>) -> String {
+        match (what, self.0.time()) {
+            (Ok(what), Ok(time)) => format!("{class}({what}, time={time} s)"),
+            (Ok(what), _) => format!("{class}({what}, stepping)"),
+            _ => format!("{class}(stepping)"),
+        }
+    }
+}
+
+#[pymethods]
+impl AnySimulation {
+    /// Time since the last call of `set_state`, s; of a rover among grains that of the grains.
+    #[getter]
+    pub fn time(&self) -> Result<f64> {
+        self.0.time()
+    }
+
+    /// Time step, s.
+    #[getter]
+    fn time_step(&self) -> Result<f64> {
+        self.0.time_step()
+    }
+
+    /// Takes n steps.
+    ///
+    /// Other threads run meanwhile. Ctrl-C, or whatever else a signal handler raises, ends the call
+    /// after a whole step, whose state stays. A contact solver that does not converge is no error:
+    /// the report says so.
+    ///
+    /// Args:
+    ///     n: Number of steps.
+    ///
+    /// Raises:
+    ///     StepError: A step could not be taken; the state before it stays.
+    ///     OptionError: `n` is not a count.
+    #[pyo3(signature = (n = Steps(1)), text_signature = "($self, n=1)")]
+    fn step(&self, py: Python<'_>, n: Steps) -> Result<StepReport> {
+        self.0.step(py, n.0)
+    }
+
+    /// Kinetic and potential energy now.
+    fn energy(&self) -> Result<Energy> {
+        self.0.energy()
+    }
+
+    /// Everything that is needed to continue bit for bit.
+    pub fn snapshot(&self) -> Result<Snapshot> {
+        Ok(Snapshot(self.0.snapshot()?))
+    }
+
+    /// Goes back to a snapshot.
+    ///
+    /// Args:
+    ///     snapshot: A snapshot of the same kind of simulation, with the same model or grains.
+    ///
+    /// Raises:
+    ///     StateError: The snapshot belongs to another simulation or is damaged. Nothing has
+    ///         changed.
+    pub fn restore(&self, snapshot: &Bound<'_, PyAny>) -> Result<()> {
+        self.0.restore(&self::snapshot(snapshot)?.get().0)
+    }
+}
 
 /// The argument `n` of `step`: a number of steps.
-pub struct Steps(pub usize);
+struct Steps(usize);
 
 impl FromPyObject<'_, '_> for Steps {
     type Error = PyErr;
@@ -23,20 +149,6 @@ impl FromPyObject<'_, '_> for Steps {
 
 /// W, free velocity and friction coefficients.
 pub type Problem = (Array, Array, Array);
-
-/// Takes `n` steps with the interpreter free for others; Ctrl-C stops after a whole step.
-pub fn step<S: Scene>(
-    py: Python<'_>,
-    simulation: &mut Simulation<S>,
-    Steps(n): Steps,
-) -> Result<StepReport>
-where
-    Simulation<S>: Send,
-{
-    let mut watch = Watch::new();
-    let report = py.detach(|| simulation.step_while(n, &mut || watch.go_on()));
-    Ok(watch.result(report)?.into())
-}
 
 /// W (n, n), free velocity (n,) and friction (n_c,) of the last step's friction-contact problem.
 pub fn problem<S: Scene>(simulation: &Simulation<S>) -> Problem

@@ -4,6 +4,24 @@
 //! ([`SecondOrderCone`]); the modified velocity `ũ` of the law lives in its dual
 //! `K_μ* = { u_N ≥ μ |u_T| }` ([`DualCone`]). Vectors are arrays `[normal, tangent, (tangent)]`, so
 //! that `D = 2` is the planar problem and `D = 3` the spatial one.
+//!
+//! # One call
+//!
+//! A solver projects what an iteration proposes for a contact:
+//!
+//! ```text
+//! p − ρ ũ                        [p_N, p_T]
+//!    │
+//!    ▼
+//! SecondOrderCone::project       in K_μ: as it is; in −K_μ*: 0; else: onto the side
+//!    │
+//!    ▼
+//! p⁺ ∈ K_μ                       p = p⁺ at a solution: the natural map of crate::law
+//! ```
+//!
+//! # May use
+//!
+//! [`crate::spatial`].
 
 mod disc;
 mod dual_cone;

@@ -1,7 +1,9 @@
 //! Whether and why an episode ends.
 
+use serde::{Deserialize, Serialize};
+
 /// Why an episode has ended, in the order of the codes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Ending {
     /// It has not.
     #[default]

@@ -3,9 +3,10 @@
 use super::ending::Ending;
 use super::quantities::Quantities;
 use super::reward::N_TERMS;
+use serde::{Deserialize, Serialize};
 
 /// The outcome of a control period, or the beginning of an episode, which earns nothing.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// Quantities at the end of the period.
     pub now: Quantities,

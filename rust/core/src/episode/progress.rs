@@ -1,13 +1,14 @@
 //! The state of an episode outside the simulation.
 
 use super::quantities::Quantities;
+use serde::{Deserialize, Serialize};
 
 /// A rover is high-centred while its trunk carries too much of the weight and it is no faster than
 /// this, m/s.
 pub const STUCK_SPEED: f64 = 0.05;
 
 /// What an episode remembers from period to period.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Progress {
     /// Horizontal distance to the present goal, m.
     pub distance: f64,

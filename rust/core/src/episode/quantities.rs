@@ -1,12 +1,13 @@
 //! The quantities of a reading that the episode uses.
 
 use crate::scalar::elementary::acos;
+use serde::{Deserialize, Serialize};
 
 /// Number of the quantities.
 pub const N_QUANTITIES: usize = 12;
 
 /// Quantities of a reading that rewards, ends and reports are made of.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Quantities {
     /// Horizontal distance to the goal, m.
     pub distance: f64,

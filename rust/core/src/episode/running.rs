@@ -2,14 +2,15 @@
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use super::action;
-use super::ending::Ending;
 use super::error::{EpisodeError, check_lengths};
 use super::observation::{write_heights, write_state};
 use super::outcome::Outcome;
 use super::progress::Progress;
 use super::quantities::Quantities;
-use super::reward::{Earned, N_TERMS, squared_changes, terms};
+use super::reward::{Earned, squared_changes, terms};
 use super::rules::Rules;
 use super::setting::Setting;
 use crate::simulation::{CommandError, ReadingScratch, RoverSimulation, seen_from};
@@ -27,15 +28,19 @@ pub struct Period<'a> {
     pub has_failed: bool,
 }
 
-/// What the outcome of the last period adds to the progress of an episode.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Last {
-    /// Quantities at its end.
-    pub now: Quantities,
-    /// Terms of the reward, in the order of [`super::TERMS`].
-    pub terms: [f64; N_TERMS],
-    /// Whether and how the episode has ended.
-    pub ending: Ending,
+/// What an episode needs to go on, besides its rules.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EpisodeState {
+    /// What was drawn for it.
+    pub setting: Setting,
+    /// Its progress.
+    pub progress: Progress,
+    /// The last observation (size).
+    pub observation: Vec<f32>,
+    /// The outcome of the last period.
+    pub outcome: Outcome,
+    /// Normal numbers of an observation that lacks its heights, empty without noise.
+    pub owed: Option<Vec<f64>>,
 }
 
 /// An episode outside its simulation.
@@ -93,21 +98,30 @@ impl Episode {
         }))
     }
 
-    /// An episode that goes on from its progress and its last observation.
-    ///
-    /// `last`: what else is known of its last period. `owed`: the normal numbers of an observation
-    /// that lacks its heights, empty without noise.
+    /// What it needs to go on.
+    #[must_use]
+    pub fn state(&self) -> EpisodeState {
+        EpisodeState {
+            setting: self.setting.clone(),
+            progress: self.progress.clone(),
+            observation: self.observation.clone(),
+            outcome: self.outcome,
+            owed: self.lacks_heights.then(|| self.owed.clone()),
+        }
+    }
+
+    /// An episode that goes on from a state.
     ///
     /// # Errors
-    /// `Length`, `OutOfRange`: they do not fit the rules, or are not finite.
-    pub fn resume(
-        rules: Arc<Rules>,
-        setting: Setting,
-        progress: Progress,
-        observation: Vec<f32>,
-        last: Option<Last>,
-        owed: Option<Vec<f64>>,
-    ) -> Result<Self, EpisodeError> {
+    /// `Length`, `OutOfRange`: it does not fit the rules, or is not finite.
+    pub fn resume(rules: Arc<Rules>, state: EpisodeState) -> Result<Self, EpisodeError> {
+        let EpisodeState {
+            setting,
+            progress,
+            observation,
+            outcome,
+            owed,
+        } = state;
         setting.check(&rules)?;
         check_normals(&rules, owed.as_deref().or(Some(rules.noise())))?;
         let (previous, size) = (progress.previous_action.len(), observation.len());
@@ -123,7 +137,10 @@ impl Episode {
         ];
         let entries = (progress.previous_action.iter()).map(|&a| ("previous_action", a));
         let seen = observation.iter().map(|&x| ("observation", f64::from(x)));
-        for (field, value) in numbers.into_iter().chain(entries).chain(seen) {
+        let told = outcome.now.row().into_iter().chain(outcome.terms);
+        // A step that failed has an infinite residual.
+        let told = told.filter(|x| x.is_nan()).map(|x| ("outcome", x));
+        for (field, value) in numbers.into_iter().chain(entries).chain(seen).chain(told) {
             if !value.is_finite() {
                 return Err(EpisodeError::OutOfRange {
                     field,
@@ -132,26 +149,12 @@ impl Episode {
                 });
             }
         }
-        let Last { now, terms, ending } = last.unwrap_or_else(|| Last {
-            now: Quantities {
-                distance: progress.distance,
-                ..Quantities::default()
-            },
-            ..Last::default()
-        });
         Ok(Self {
-            outcome: Outcome {
-                now,
-                energy: progress.energy,
-                energy_positive: progress.energy_positive,
-                terms,
-                reward: terms.iter().fold(0.0, |sum, term| sum + term),
-                ending,
-            },
             rules,
             setting,
             progress,
             observation,
+            outcome,
             lacks_heights: owed.is_some(),
             owed: owed.unwrap_or_default(),
         })
@@ -181,12 +184,6 @@ impl Episode {
         self.progress.distance + self.setting.way_from(self.progress.reached)
     }
 
-    /// The normal numbers of the last observation, if it lacks its heights; empty without noise.
-    #[must_use]
-    pub fn owed(&self) -> Option<&[f64]> {
-        self.lacks_heights.then_some(&self.owed[..])
-    }
-
     /// Its progress.
     #[must_use]
     pub fn progress(&self) -> &Progress {
@@ -199,8 +196,7 @@ impl Episode {
         &self.observation
     }
 
-    /// The outcome of the last period; that of the beginning earns nothing, that of a resumed
-    /// episode knows only its progress.
+    /// The outcome of the last period; that of the beginning earns nothing.
     #[must_use]
     pub fn outcome(&self) -> &Outcome {
         &self.outcome

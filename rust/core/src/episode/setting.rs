@@ -4,9 +4,10 @@ use super::error::{EpisodeError, check_lengths};
 use super::rules::Rules;
 use crate::draw::Domain;
 use crate::scalar::elementary::hypot;
+use serde::{Deserialize, Serialize};
 
 /// What was drawn for an episode. Only goals, gain and load limit act; the rest is reported.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Setting {
     /// The goal (x, z), m; the first of several.
     pub goal: [f64; 2],

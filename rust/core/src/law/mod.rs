@@ -20,6 +20,8 @@
 //! [`mode`] names the states open, stick and slide, in which Newton's method linearises the law.
 //! [`materials`] has the coefficients by pair of materials.
 //!
+//! # One call
+//!
 //! ```text
 //! stages (sweeps, Newton, pivoting) → answer, linearise    one contact with all others fixed
 //! residual                          → violation            every answer of every solver
@@ -27,8 +29,13 @@
 //! systems (tree, grains)            → normal_shift         rebound, gap, compliance
 //! ```
 //!
-//! Vectors are `[normal, tangent, (tangent)]`, velocities in m/s and impulses in N s. A law never
-//! sees a solver: it uses the cones, and the checks of quantities.
+//! Vectors are `[normal, tangent, (tangent)]`, velocities in m/s and impulses in N s.
+//!
+//! # May use
+//!
+//! [`crate::cone`], [`crate::quantity`], [`crate::scalar`], [`crate::spatial`].
+//!
+//! A law sees one contact; it knows no solver and no body.
 
 pub mod associated;
 pub mod cohesion;

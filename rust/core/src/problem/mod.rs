@@ -16,6 +16,27 @@
 //! - `prepared`: a problem together with its scales, for iterative methods.
 //! - `redundancy`: loads that equilibrium leaves open.
 //! - `passivity`: scales down an approximate answer that would add energy.
+//!
+//! # One call
+//!
+//! ```text
+//! W, q, μ ──► FrictionContactProblem         checked: sizes, finite numbers, μ ≥ 0
+//!                  │
+//!                  ▼
+//!             Prepared                       with scales ρ of every contact, for iterative methods
+//!                  │
+//!                  ▼  a solver's p
+//!             evaluate                       u = W p + q, residual of the law at every contact
+//!                  │
+//!                  ▼
+//!             passive_share                  how much of an approximate p adds no energy
+//! ```
+//!
+//! # May use
+//!
+//! [`crate::spatial`], [`crate::law`].
+//!
+//! No solver and no body: a problem read from a file is as good as one from a rover.
 
 mod dimension;
 mod error;

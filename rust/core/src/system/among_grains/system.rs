@@ -1,177 +1,20 @@
-//! A multibody tree among balls as one system: block-diagonal M, the contacts of each, and those
-//! of the tree's wheels, boxes and balls with the grains.
-//!
-//! Each side runs its own code, and its coordinates and velocities keep their order: grains, then
-//! the tree; so do the contacts: grains, the tree's own, the touches between. With the factors of
-//! M̂ = diag(M̂_a, M̂_b)
-//!
-//! ```text
-//! Z = diag(F_a, F_b)⁻ᵀ H,        W = Zᵀ Z.
-//! ```
-//!
-//! The law of a touch is that of the grains ([`super::grains`]): frames are those of the start of
-//! the step, and a pair may close by its gap. Both sides are pushed at the same point, that of the
-//! grain's surface, so the impulses conserve linear and angular momentum. With touches, all
-//! contacts of a step are one problem, solved on the bodies' velocities
-//! ([`crate::problem::BodyPairs`]): forces go both ways within the step. Without, each side is
-//! solved by its own method and moves as it would alone.
-//!
-//! Decisions about a whole step apply to both: whether to repeat it, and whether the last step's
-//! impulses serve as a forecast. The energy is not audited, as that of grains is not.
+//! The two as one mechanical system.
 
-use std::sync::OnceLock;
-
-use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
-
-use super::grains::search::Search;
-use super::grains::system::gap_law;
-use super::grains::{COORDINATES, GrainContact, GrainKey, GrainSystem};
-use super::tree::{TreeScratch, TreeSystem};
-use crate::contact::{
-    Activation, Contact, ContactFrame, ContactKey, ContactSystem, Part, generalized_impulse,
-};
-use crate::geometry::query::dispatch;
-use crate::geometry::{PlacedShape, Sphere, SupportMap};
+use super::contact::{CompositeContact, GrainTouch};
+use super::parts::CompositeScratch;
+use super::touches;
+use crate::contact::{Activation, Contact, generalized_impulse};
 use crate::integrator::{MechanicalSystem, Start, StepOptions, UnilateralContact};
-use crate::multibody::{Configuration, Kinematics, Model};
+use crate::multibody::Configuration;
 use crate::problem::{BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem};
 use crate::solver::{SolveReport, SolverOptions, SolverWorkspace};
-
-/// A contact of a part of the tree with a grain. Its normal points from the grain to the part.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct GrainTouch {
-    /// Its key among all contacts of grains: the part's code after the grains, then the grain.
-    pub key: GrainKey,
-    /// As a contact of the tree.
-    pub contact: Contact,
-    /// Gap at the start of the step, m.
-    pub gap_start: f64,
-}
-
-impl GrainTouch {
-    /// The grain's number.
-    #[must_use]
-    pub fn grain(&self) -> u32 {
-        self.key.b
-    }
-}
-
-/// A contact of a step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum AmongContact {
-    /// Of the grains.
-    Grains(GrainContact<3>),
-    /// Of the tree, with anything else.
-    Tree(Contact),
-    /// Between them.
-    Touch(GrainTouch),
-}
-
-/// Key of a contact, in the order of the lists.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum AmongKey {
-    /// Of the grains.
-    Grains(GrainKey),
-    /// Of the tree.
-    Tree(ContactKey),
-    /// Of a touch.
-    Touch(GrainKey),
-}
-
-impl UnilateralContact for AmongContact {
-    type Key = AmongKey;
-
-    fn key(&self) -> AmongKey {
-        match self {
-            Self::Grains(contact) => AmongKey::Grains(contact.key),
-            Self::Tree(contact) => AmongKey::Tree(contact.key),
-            Self::Touch(touch) => AmongKey::Touch(touch.key),
-        }
-    }
-
-    fn gap(&self) -> f64 {
-        match self {
-            Self::Grains(contact) => contact.gap,
-            Self::Tree(contact) => contact.gap,
-            Self::Touch(touch) => touch.contact.gap,
-        }
-    }
-}
-
-/// Scratch of the two together.
-#[derive(Clone, Debug)]
-pub struct AmongParts {
-    /// The contacts of a step, sorted by kind.
-    of_grains: Vec<GrainContact<3>>,
-    of_tree: Vec<Contact>,
-    touches: Vec<GrainTouch>,
-    /// The touches as contacts of the tree, and their rows.
-    contacts: Vec<Contact>,
-    rows: ContactSystem,
-    /// Grains near a part: number, centre in the world (m), radius (m).
-    near: Vec<(u32, Vector3<f64>, f64)>,
-    /// W of a step without touches, assembled on request.
-    operator: OnceLock<BlockSparseDelassus>,
-}
-
-impl AmongParts {
-    /// Scratch for a model.
-    #[must_use]
-    pub fn new(model: &Model) -> Self {
-        Self {
-            of_grains: Vec::new(),
-            of_tree: Vec::new(),
-            touches: Vec::new(),
-            contacts: Vec::new(),
-            rows: ContactSystem::with_capacity(model, 0),
-            near: Vec::new(),
-            operator: OnceLock::new(),
-        }
-    }
-
-    fn sort(&mut self, contacts: &[AmongContact]) {
-        self.of_grains.clear();
-        self.of_tree.clear();
-        self.touches.clear();
-        for contact in contacts {
-            match *contact {
-                AmongContact::Grains(contact) => self.of_grains.push(contact),
-                AmongContact::Tree(contact) => self.of_tree.push(contact),
-                AmongContact::Touch(touch) => self.touches.push(touch),
-            }
-        }
-    }
-
-    fn listed(&self) -> impl Iterator<Item = AmongContact> + '_ {
-        let of_grains = self.of_grains.iter().copied().map(AmongContact::Grains);
-        let of_tree = self.of_tree.iter().copied().map(AmongContact::Tree);
-        let touches = self.touches.iter().copied().map(AmongContact::Touch);
-        of_grains.chain(of_tree).chain(touches)
-    }
-
-    /// Where the local components of each kind end and the next begin.
-    fn ends(&self) -> [usize; 2] {
-        let n = 3 * self.of_grains.len();
-        [n, n + 3 * self.of_tree.len()]
-    }
-
-    /// The local components of each kind.
-    fn split<'v>(&self, local: &'v [f64]) -> [&'v [f64]; 3] {
-        let [a, b] = self.ends();
-        [&local[..a], &local[a..b], &local[b..]]
-    }
-
-    fn split_mut<'v>(&self, local: &'v mut [f64]) -> [&'v mut [f64]; 3] {
-        let [a, b] = self.ends();
-        let (local, touches) = local.split_at_mut(b);
-        let (of_grains, of_tree) = local.split_at_mut(a);
-        [of_grains, of_tree, touches]
-    }
-}
+use crate::system::grains::GrainSystem;
+use crate::system::grains::system::gap_law;
+use crate::system::tree::TreeSystem;
+use crate::system::tree_scratch::TreeScratch;
 
 /// A tree among balls in a step.
-pub struct AmongGrains<'a> {
+pub struct TreeAmongGrains<'a> {
     /// The balls.
     pub bed: GrainSystem<'a, 3>,
     /// The tree.
@@ -179,81 +22,10 @@ pub struct AmongGrains<'a> {
     /// μ of the tree's parts on grains.
     pub friction: f64,
     /// Scratch.
-    pub parts: &'a mut AmongParts,
+    pub parts: &'a mut CompositeScratch,
 }
 
 type Both = (Vec<f64>, Configuration);
-
-/// Upper bound on the speed at which a point of a part's surface approaches anything, m/s. The spin
-/// of a wheel about its axle moves its surface within itself.
-fn approach(tree: &TreeSystem<'_>, part: Part, shape: &PlacedShape, v: &[f64]) -> f64 {
-    let (model, kinematics) = (tree.model, &tree.parts.kinematics);
-    let (body, centre) = (part.body(model), shape.centre());
-    let velocity = |x: &Vector3<f64>| kinematics.point_velocity(model, body, x, v);
-    let at_centre = velocity(&centre);
-    let turning = |e: &Vector3<f64>| (velocity(&(centre + e)) - at_centre).norm();
-    let turning = match shape {
-        PlacedShape::Sphere(_) => 0.0,
-        PlacedShape::Disc(disc) => turning(&disc.axle),
-        PlacedShape::Roller(roller) => turning(&roller.core.axle),
-        PlacedShape::Box(_) => [Vector3::x(), Vector3::y(), Vector3::z()]
-            .iter()
-            .map(turning)
-            .sum(),
-    };
-    at_centre.norm() + turning * shape.bound()
-}
-
-/// Half sides of a box with the world's axes about a shape, m.
-fn extent(shape: &PlacedShape) -> Vector3<f64> {
-    let centre = shape.centre();
-    let along = |e: &Vector3<f64>| (shape.support(e) - centre).dot(e);
-    Vector3::new(
-        along(&Vector3::x()),
-        along(&Vector3::y()),
-        along(&Vector3::z()),
-    )
-}
-
-/// A shape of the tree and a grain, both relative to the origin of the part's tree.
-fn placed(
-    model: &Model,
-    kinematics: &Kinematics,
-    part: Part,
-    centre: &Vector3<f64>,
-    radius: f64,
-) -> (PlacedShape, PlacedShape) {
-    let origin = kinematics.origin(part.body(model));
-    let ball = Sphere {
-        centre: centre - origin,
-        radius,
-    };
-    (PlacedShape::Sphere(ball), part.place(model, kinematics))
-}
-
-/// Centre of a ball of the coordinates q, m.
-fn centre_of(q: &[f64], grain: u32) -> Vector3<f64> {
-    Vector3::from_column_slice(&q[COORDINATES * grain as usize..][..3])
-}
-
-/// Grains within `reach` (m) of a box about a place, in the order of their numbers.
-fn gather(
-    bed: &GrainSystem<'_, 3>,
-    (centre, half): (&Vector3<f64>, &Vector3<f64>),
-    reach: f64,
-    near: &mut Vec<(u32, Vector3<f64>, f64)>,
-) {
-    near.clear();
-    let reach = reach + bed.scene.grains.largest();
-    let place: [f64; 3] = (*centre).into();
-    bed.parts.grid.near(&place, half.max() + reach, |item| {
-        let apart = Vector3::from(item.centre) - centre;
-        if apart.iter().zip(half).all(|(x, h)| x.abs() <= h + reach) {
-            near.push((item.index, item.centre.into(), item.radius));
-        }
-    });
-    near.sort_unstable_by_key(|(index, ..)| *index);
-}
 
 /// Report of the harder of two solves, with the work of both.
 fn harder(a: &SolveReport, b: &SolveReport) -> SolveReport {
@@ -271,7 +43,7 @@ fn harder(a: &SolveReport, b: &SolveReport) -> SolveReport {
     }
 }
 
-impl AmongGrains<'_> {
+impl TreeAmongGrains<'_> {
     /// Velocities of the grains, and of the tree.
     fn halves<'v>(&self, v: &'v [f64]) -> (&'v [f64], &'v [f64]) {
         v.split_at(self.bed.nv())
@@ -298,18 +70,6 @@ impl AmongGrains<'_> {
         (of_grains, of_tree)
     }
 
-    /// Normal velocity of a touch's two sides, m/s.
-    fn approach_of(&self, touch: &GrainTouch, (v_a, v_b): (&[f64], &[f64])) -> f64 {
-        let Contact {
-            body, point, frame, ..
-        } = &touch.contact;
-        let tree = &self.tree;
-        let own = (tree.parts.kinematics).point_velocity(tree.model, *body, point, v_b);
-        let mut u = [frame.n.dot(&own), 0.0, 0.0];
-        (self.bed).subtract_rim(touch.grain(), v_a, &frame.rows(), &mut u);
-        u[0]
-    }
-
     /// Subtracts the grains' velocities from those of the touches.
     fn subtract_rims(&self, touches: &[GrainTouch], v: &[f64], u: &mut [f64]) {
         for (touch, u) in touches.iter().zip(u.as_chunks_mut::<3>().0) {
@@ -317,61 +77,9 @@ impl AmongGrains<'_> {
         }
     }
 
-    /// Finds the touches of a step. Both sides are placed and have found their own contacts.
-    fn find_touches(&mut self, v: (&[f64], &[f64]), activation: Activation) {
-        let mut touches = std::mem::take(&mut self.parts.touches);
-        let mut near = std::mem::take(&mut self.parts.near);
-        touches.clear();
-        let (bed, tree) = (&self.bed, &self.tree);
-        let (model, kinematics) = (tree.model, &tree.parts.kinematics);
-        let grains = &bed.scene.grains;
-        #[allow(clippy::cast_possible_truncation)] // grains are numbered by u32
-        let n = grains.len() as u32;
-        for part in Part::all(model) {
-            let shape = part.place(model, kinematics);
-            let speed = approach(tree, part, &shape, v.1).max(bed.parts.search.fastest);
-            let sizes = [grains.smallest(), grains.largest()];
-            let search = Search::new(&activation, sizes, speed);
-            let origin = *kinematics.origin(part.body(model));
-            let centre = origin + shape.centre();
-            gather(bed, (&centre, &extent(&shape)), search.reach, &mut near);
-            for (index, centre, radius) in &near {
-                let ball = PlacedShape::Sphere(Sphere {
-                    centre: centre - origin,
-                    radius: *radius,
-                });
-                dispatch::visit_pair(&ball, &shape, search.reach, |point| {
-                    let touch = GrainTouch {
-                        key: GrainKey {
-                            a: n + u32::from(part.code()),
-                            b: *index,
-                        },
-                        contact: Contact {
-                            key: ContactKey::on_grain(part, point.feature, *index),
-                            part,
-                            body: part.body(model),
-                            other: None,
-                            point: point.on_first(),
-                            frame: ContactFrame::of_normal(&point.n),
-                            gap: point.gap,
-                            excess: 0.0,
-                        },
-                        gap_start: point.gap,
-                    };
-                    if search.admits(point.gap, self.approach_of(&touch, v)) {
-                        touches.push(touch);
-                    }
-                });
-            }
-        }
-        touches.sort_by_key(|touch| touch.key);
-        self.parts.touches = touches;
-        self.parts.near = near;
-    }
-
     /// Rows of the touches, and all contacts of the tree among the grains' pairs of bodies.
     fn assemble_touches(&mut self, v: (&[f64], &[f64]), u: &mut [f64]) {
-        let AmongParts {
+        let CompositeScratch {
             touches,
             contacts,
             rows,
@@ -426,9 +134,9 @@ impl AmongGrains<'_> {
     }
 }
 
-impl MechanicalSystem for AmongGrains<'_> {
+impl MechanicalSystem for TreeAmongGrains<'_> {
     type Configuration = Both;
-    type Contact = AmongContact;
+    type Contact = CompositeContact;
 
     const DIMENSION: Dimension = Dimension::Three;
 
@@ -466,16 +174,17 @@ impl MechanicalSystem for AmongGrains<'_> {
         self.tree.place_end(&q.1);
     }
 
-    fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<AmongContact>) {
+    fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<CompositeContact>) {
         let v = self.halves(v);
-        let AmongParts {
+        let CompositeScratch {
             of_grains, of_tree, ..
         } = &mut *self.parts;
         self.bed.detect(v.0, activation, of_grains);
         self.tree.detect(v.1, activation, of_tree);
         // The order of the keys, in which the last step's impulses are looked up.
         of_tree.sort_by_key(UnilateralContact::key);
-        self.find_touches(v, activation);
+        let CompositeScratch { touches, near, .. } = &mut *self.parts;
+        touches::find(&self.bed, &self.tree, v, activation, near, touches);
         out.clear();
         out.extend(self.parts.listed());
     }
@@ -484,28 +193,24 @@ impl MechanicalSystem for AmongGrains<'_> {
         self.tree.unknown_ground()
     }
 
-    fn relocate(&mut self, contacts: &mut [AmongContact]) {
+    fn relocate(&mut self, contacts: &mut [CompositeContact]) {
         let parts = &mut *self.parts;
         parts.sort(contacts);
         self.bed.relocate(&mut parts.of_grains);
         self.tree.relocate(&mut parts.of_tree);
-        let (model, kinematics) = (self.tree.model, &self.tree.parts.kinematics_end);
         for touch in &mut parts.touches {
-            let centre = centre_of(&self.bed.parts.end, touch.grain());
-            let radius = self.bed.scene.grains.radius()[touch.grain() as usize];
-            let (ball, shape) = placed(model, kinematics, touch.contact.part, &centre, radius);
-            touch.contact.gap = dispatch::nearest_points(&ball, &shape).gap;
+            touch.contact.gap = touches::gap_at_end(&self.bed, &self.tree, touch);
         }
         for (place, contact) in contacts.iter_mut().zip(parts.listed()) {
             *place = contact;
         }
     }
 
-    fn friction_coefficient(&self, options: &StepOptions, contact: &AmongContact) -> f64 {
+    fn friction_coefficient(&self, options: &StepOptions, contact: &CompositeContact) -> f64 {
         match contact {
-            AmongContact::Grains(contact) => self.bed.friction_coefficient(options, contact),
-            AmongContact::Tree(contact) => self.tree.friction_coefficient(options, contact),
-            AmongContact::Touch(_) => self.friction,
+            CompositeContact::Grains(contact) => self.bed.friction_coefficient(options, contact),
+            CompositeContact::Tree(contact) => self.tree.friction_coefficient(options, contact),
+            CompositeContact::Touch(_) => self.friction,
         }
     }
 
@@ -612,7 +317,7 @@ impl MechanicalSystem for AmongGrains<'_> {
         self.tree.half_solve_back(y_b);
     }
 
-    fn assemble(&mut self, contacts: &[AmongContact], v: &[f64], u: &mut [f64]) {
+    fn assemble(&mut self, contacts: &[CompositeContact], v: &[f64], u: &mut [f64]) {
         let v = self.halves(v);
         let parts = &mut *self.parts;
         parts.sort(contacts);
@@ -638,7 +343,7 @@ impl MechanicalSystem for AmongGrains<'_> {
         }
     }
 
-    fn add_local_of_velocity(&self, _contacts: &[AmongContact], v: &[f64], out: &mut [f64]) {
+    fn add_local_of_velocity(&self, _contacts: &[CompositeContact], v: &[f64], out: &mut [f64]) {
         let (v_a, v_b) = self.halves(v);
         let (tree, parts) = (&self.tree, &*self.parts);
         let [out_a, out_b, touches] = parts.split_mut(out);
@@ -662,7 +367,7 @@ impl MechanicalSystem for AmongGrains<'_> {
         }
     }
 
-    fn generalized_impulse(&self, _contacts: &[AmongContact], p: &[f64], out: &mut [f64]) {
+    fn generalized_impulse(&self, _contacts: &[CompositeContact], p: &[f64], out: &mut [f64]) {
         let (out_a, out_b) = self.halves_mut(out);
         let (tree, parts) = (&self.tree, &*self.parts);
         let [p_a, p_b, touches] = parts.split(p);
@@ -683,11 +388,18 @@ impl MechanicalSystem for AmongGrains<'_> {
         FrictionContactProblem::from_assembled_sparse(self.operator(), q, mu)
     }
 
-    fn normal_shift(&self, options: &StepOptions, contact: &AmongContact, u_N_before: f64) -> f64 {
+    fn normal_shift(
+        &self,
+        options: &StepOptions,
+        contact: &CompositeContact,
+        u_N_before: f64,
+    ) -> f64 {
         match contact {
-            AmongContact::Grains(contact) => self.bed.normal_shift(options, contact, u_N_before),
-            AmongContact::Tree(contact) => self.tree.normal_shift(options, contact, u_N_before),
-            AmongContact::Touch(touch) => gap_law(options, touch.gap_start, u_N_before),
+            CompositeContact::Grains(contact) => {
+                self.bed.normal_shift(options, contact, u_N_before)
+            }
+            CompositeContact::Tree(contact) => self.tree.normal_shift(options, contact, u_N_before),
+            CompositeContact::Touch(touch) => gap_law(options, touch.gap_start, u_N_before),
         }
     }
 
