@@ -4,8 +4,8 @@
 //! - `extent`: how far a step turns and displaces it;
 //! - [`planar`]: a planar machine on a ground, with its matrices;
 //! - [`among_grains`]: a tree among balls;
-//! - [`gyroscopic`]: implicit gyroscopic terms of the tree; [`drives`]: its torques, motors and held
-//!   joints, implicit with [`fitted_theta`];
+//! - [`gyroscopic`]: implicit gyroscopic terms of the tree; [`drives`]: its torques, motors and
+//!   held joints, implicit with [`fitted_theta`];
 //! - [`grains`]: thousands of free disks or balls, and a planar machine among them.
 
 pub mod among_grains;
