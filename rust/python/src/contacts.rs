@@ -269,15 +269,18 @@ pub struct GrainContacts {
     velocities: Array,
     /// Impulses on the first body along x, y, z, (n, 3), N s.
     world_impulses: Array,
+    /// Moments of rolling and drilling friction on the first body, (n, 3), N m s.
+    world_moments: Array,
 }
 
 impl GrainContacts {
     /// `n_moving`: number of balls and of what moves among them. `attraction`: impulse of the
-    /// cohesion in a contact, N s, which the solver's has to bear.
+    /// cohesion in a contact, N s, which the solver's has to bear. `moment`: on the first body.
     pub fn new(
         active: &[ActiveContact<GrainContact<3>>],
         n_moving: usize,
         attraction: impl Fn(&GrainContact<3>) -> f64,
+        moment: impl Fn(&GrainContact<3>) -> [f64; 3],
     ) -> Self {
         let mut active = active.to_vec();
         for one in &mut active {
@@ -303,6 +306,7 @@ impl GrainContacts {
             impulses,
             velocities,
             world_impulses: rows(&active, on_first),
+            world_moments: rows(&active, |a| moment(&a.contact)),
         }
     }
 }

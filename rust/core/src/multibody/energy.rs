@@ -4,7 +4,7 @@ use super::inertias::{Inertia, Inertias};
 use super::joint::{Free, Joint, JointModel, Motion, Placement, free};
 use super::lane_configuration::LaneConfiguration;
 use super::mechanism::{BASE, Link, Mechanism};
-use super::poses::{NextTurn, Turns};
+use super::poses::{JointAngles, NextAngle};
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Kinetic and potential energy, J.
@@ -37,7 +37,7 @@ impl<T: Lane> Energy<T> {
 pub struct EnergyScratch<T: Lane> {
     token: T::Token,
     bodies: Vec<Moving<T>>,
-    turns: Turns<T>,
+    angles: JointAngles<T>,
 }
 
 /// Pose and velocity of a body's frame.
@@ -64,7 +64,7 @@ impl<T: Lane> EnergyScratch<T> {
         Self {
             token,
             bodies: vec![Moving::of_world(token); mechanism.n_bodies()],
-            turns: Turns::new(token, mechanism),
+            angles: JointAngles::new(token, mechanism),
         }
     }
 }
@@ -78,7 +78,7 @@ impl<T: Lane> EnergyScratch<T> {
 pub fn energy<T: Lane>(
     mechanism: &Mechanism,
     inertias: &Inertias<T>,
-    place: &LaneConfiguration<T>,
+    q: &LaneConfiguration<T>,
     v: &[T],
     gravity: Vec3<T>,
     scratch: &mut EnergyScratch<T>,
@@ -91,7 +91,7 @@ pub fn energy<T: Lane>(
             let (links, own_inertias) = (&mechanism.links[..n], &inertias.bodies[..n]);
             let bodies = &mut scratch.bodies[..n];
             let world = Moving::of_world(scratch.token);
-            let mut turns = scratch.turns.of(mechanism, place);
+            let mut angles = scratch.angles.of(mechanism, q);
             let zero = T::splat(scratch.token, 0.0);
             let mut sums = Sums {
                 twice_kinetic: zero,
@@ -102,28 +102,28 @@ pub fn energy<T: Lane>(
                 let (root, end) = (tree.bodies.start, tree.bodies.end.min(n)); // below n: no checks
                 bodies[root] = if tree.is_free {
                     let free = Free { pose: tree.pose };
-                    sums.fall += gravity.dot(*place.pose(tree.pose).0) * mass;
+                    sums.fall += gravity.dot(*q.pose(tree.pose).0) * mass;
                     let Motion { axis, swing } =
                         free::velocity(&v[tree.velocities.start..][..BASE]);
                     Moving {
-                        R: free.place(&world.R, place, || None).R,
+                        R: free.place(&world.R, q, || None).R,
                         velocity: swing,
                         omega: axis,
                         fall: zero,
                     }
                 } else {
-                    world.carry_root(&links[root], (place, v, gravity), &mut turns)
+                    world.carry_root(&links[root], (q, v, gravity), &mut angles)
                 };
                 sums.add(&links[root], &own_inertias[root], &bodies[root], gravity);
                 for b in root + 1..end {
                     let (before, own) = bodies.split_at_mut(b);
                     let link = &links[b];
                     let carrier = &before[link.parent];
-                    let state = (place, v, gravity);
+                    let state = (q, v, gravity);
                     let body = if let Joint::Revolute(joint) = &link.joint {
-                        carrier.carry(joint, link, state, &mut turns)
+                        carrier.carry(joint, link, state, &mut angles)
                     } else {
-                        carrier.carry(&link.joint, link, state, &mut turns)
+                        carrier.carry(&link.joint, link, state, &mut angles)
                     };
                     sums.add(link, &own_inertias[b], &body, gravity);
                     if !link.is_leaf {
@@ -167,9 +167,9 @@ impl<T: Lane> Moving<T> {
         &self,
         link: &Link,
         state: (&LaneConfiguration<T>, &[T], Vec3<T>),
-        turns: &mut NextTurn<'_, T>,
+        angles: &mut NextAngle<'_, T>,
     ) -> Self {
-        self.carry(&link.joint, link, state, turns)
+        self.carry(&link.joint, link, state, angles)
     }
 
     /// A body that it carries.
@@ -178,13 +178,13 @@ impl<T: Lane> Moving<T> {
         &self,
         joint: &J,
         link: &Link,
-        (place, v, gravity): (&LaneConfiguration<T>, &[T], Vec3<T>),
-        turns: &mut NextTurn<'_, T>,
+        (q, v, gravity): (&LaneConfiguration<T>, &[T], Vec3<T>),
+        angles: &mut NextAngle<'_, T>,
     ) -> Self {
         let mut lever = link.lever(&self.R);
         let frame = link.frame(&self.R);
-        let turn = || (!link.is_spinner).then(|| turns.next());
-        let Placement { R, shift } = joint.place(&frame, place, turn);
+        let turn = || (!link.is_spinner).then(|| angles.next());
+        let Placement { R, shift } = joint.place(&frame, q, turn);
         if let Some(shift) = shift {
             lever += shift;
         }

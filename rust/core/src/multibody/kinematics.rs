@@ -21,7 +21,7 @@ pub struct Kinematics {
     /// World position of every tree's reference origin, m.
     origins: Vec<Vector3<f64>>,
     poses: Poses<f64>,
-    place: LaneConfiguration<f64>,
+    q: LaneConfiguration<f64>,
     tree_of: Vec<usize>,
 }
 
@@ -32,7 +32,7 @@ impl Kinematics {
         Self {
             origins: vec![Vector3::zeros(); model.trees().len()],
             poses: Poses::new(Single::best(), model.mechanism()),
-            place: LaneConfiguration::new(Single::best(), model.mechanism()),
+            q: LaneConfiguration::new(Single::best(), model.mechanism()),
             tree_of: model.bodies().iter().map(|body| body.tree).collect(),
         }
     }
@@ -55,14 +55,14 @@ impl Kinematics {
     /// Recomputes all poses.
     pub fn update(&mut self, model: &Model, configuration: &Configuration) {
         self.update_for_step(model, configuration);
-        self.poses.spin(model.mechanism(), &self.place);
+        self.poses.spin(model.mechanism(), &self.q);
     }
 
     /// Recomputes the poses that a step needs. Spinners ([`super::Body::is_spinner`]) are not
     /// rotated about their own axis.
     pub fn update_for_step(&mut self, model: &Model, configuration: &Configuration) {
-        self.place.set_lane(0, configuration);
-        (self.poses).update(model.mechanism(), model.inertias(), &self.place);
+        self.q.set_lane(0, configuration);
+        (self.poses).update(model.mechanism(), model.inertias(), &self.q);
         let others = self.poses.other_origins.iter();
         let origins = std::iter::once(&self.poses.origin).chain(others);
         for (own, origin) in self.origins.iter_mut().zip(origins) {
@@ -212,6 +212,6 @@ impl Kinematics {
         let mechanism = model.mechanism();
         let mut scratch = EnergyScratch::new(Single::best(), mechanism);
         let (inertias, gravity) = (model.inertias(), (*gravity).into());
-        energy(mechanism, inertias, &self.place, v, gravity, &mut scratch).0
+        energy(mechanism, inertias, &self.q, v, gravity, &mut scratch).0
     }
 }

@@ -23,7 +23,7 @@ pub struct Poses<T: Lane> {
     pub bodies: Vec<Pose<T>>,
     /// Motion of each joint velocity, in the order of the bodies; see [`Mechanism::movers`].
     pub motions: Vec<Motion<T>>,
-    turns: Turns<T>,
+    angles: JointAngles<T>,
 }
 
 /// Pose of a body.
@@ -55,7 +55,7 @@ impl<T: Lane> Poses<T> {
             other_origins: vec![zero; mechanism.trees.len().saturating_sub(1)],
             bodies: vec![Pose::of_world(token); mechanism.n_bodies()],
             motions: vec![motion; mechanism.n_motions()],
-            turns: Turns::new(token, mechanism),
+            angles: JointAngles::new(token, mechanism),
         }
     }
 
@@ -67,12 +67,12 @@ impl<T: Lane> Poses<T> {
         &mut self,
         mechanism: &Mechanism,
         inertias: &Inertias<T>,
-        place: &LaneConfiguration<T>,
+        q: &LaneConfiguration<T>,
     ) {
         T::vectorize(
             self.token,
             #[inline(always)]
-            || self.update_here(mechanism, inertias, place),
+            || self.update_here(mechanism, inertias, q),
         );
     }
 
@@ -81,30 +81,30 @@ impl<T: Lane> Poses<T> {
         &mut self,
         mechanism: &Mechanism,
         inertias: &Inertias<T>,
-        place: &LaneConfiguration<T>,
+        q: &LaneConfiguration<T>,
     ) {
         let n = mechanism.links.len();
         let (links, inertias) = (&mechanism.links[..n], &inertias.bodies[..n]);
         let bodies = &mut self.bodies[..n];
         let motions = &mut self.motions[..mechanism.n_motions()];
-        let mut turns = self.turns.of(mechanism, place);
-        self.origin = place.position;
+        let mut angles = self.angles.of(mechanism, q);
+        self.origin = q.position;
         for (t, tree) in mechanism.trees.iter().enumerate() {
             let (root, end) = (tree.bodies.start, tree.bodies.end.min(n)); // below n: no checks
             if tree.is_free {
                 let free = Free { pose: tree.pose };
                 if t > 0 {
-                    self.other_origins[t - 1] = *place.pose(tree.pose).0;
+                    self.other_origins[t - 1] = *q.pose(tree.pose).0;
                 }
                 let trunk = &mut bodies[root];
-                trunk.R = free.place(&trunk.R, place, || None).R;
+                trunk.R = free.place(&trunk.R, q, || None).R;
                 if !links[root].is_centred {
                     trunk.c = trunk.R.times(inertias[root].centre);
                 }
             } else {
                 let world = Pose::of_world(self.token);
                 let (link, inertia) = (&links[root], &inertias[root]);
-                bodies[root] = follow_world(link, inertia, &world, place, &mut turns, motions);
+                bodies[root] = follow_world(link, inertia, &world, q, &mut angles, motions);
             }
             for b in root + 1..end {
                 let (link, inertia) = (&links[b], &inertias[b]);
@@ -112,17 +112,9 @@ impl<T: Lane> Poses<T> {
                 let carrier = &before[link.parent];
                 // Nearly all joints are revolute: their code stands apart from the choice.
                 own[0] = if let Joint::Revolute(joint) = &link.joint {
-                    follow(joint, link, inertia, carrier, place, &mut turns, motions)
+                    follow(joint, link, inertia, carrier, q, &mut angles, motions)
                 } else {
-                    follow(
-                        &link.joint,
-                        link,
-                        inertia,
-                        carrier,
-                        place,
-                        &mut turns,
-                        motions,
-                    )
+                    follow(&link.joint, link, inertia, carrier, q, &mut angles, motions)
                 };
             }
         }
@@ -133,15 +125,15 @@ impl<T: Lane> Poses<T> {
     ///
     /// # Panics
     /// If an argument is of another mechanism.
-    pub fn spin(&mut self, mechanism: &Mechanism, place: &LaneConfiguration<T>) {
+    pub fn spin(&mut self, mechanism: &Mechanism, q: &LaneConfiguration<T>) {
         for (link, pose) in mechanism.links.iter().zip(&mut self.bodies) {
             if link.is_spinner
                 && let Some((joint, coupling)) = link.joint.angle()
             {
-                let q = place.joints[joint];
-                let angle = coupling.map_or(q, |coupling| coupling.value(q));
+                let number = q.joints[joint];
+                let angle = coupling.map_or(number, |coupling| coupling.value(number));
                 let turn = || Some(sin_cos(angle));
-                pose.R = link.joint.place(&pose.R, place, turn).R;
+                pose.R = link.joint.place(&pose.R, q, turn).R;
             }
         }
     }
@@ -171,11 +163,11 @@ fn follow_world<T: Lane>(
     link: &Link,
     inertia: &Inertia<T>,
     world: &Pose<T>,
-    place: &LaneConfiguration<T>,
-    turns: &mut NextTurn<'_, T>,
+    q: &LaneConfiguration<T>,
+    angles: &mut NextAngle<'_, T>,
     motions: &mut [Motion<T>],
 ) -> Pose<T> {
-    follow(&link.joint, link, inertia, world, place, turns, motions)
+    follow(&link.joint, link, inertia, world, q, angles, motions)
 }
 
 /// Places a body on its carrier and writes the motions of its joint.
@@ -185,14 +177,14 @@ fn follow<T: Lane, J: JointModel>(
     link: &Link,
     inertia: &Inertia<T>,
     carrier: &Pose<T>,
-    place: &LaneConfiguration<T>,
-    turns: &mut NextTurn<'_, T>,
+    q: &LaneConfiguration<T>,
+    angles: &mut NextAngle<'_, T>,
     motions: &mut [Motion<T>],
 ) -> Pose<T> {
     let mut lever = link.lever(&carrier.R);
     let frame = link.frame(&carrier.R);
-    let turn = || (!link.is_spinner).then(|| turns.next());
-    let Placement { R, shift } = joint.place(&frame, place, turn);
+    let turn = || (!link.is_spinner).then(|| angles.next());
+    let Placement { R, shift } = joint.place(&frame, q, turn);
     if let Some(shift) = shift {
         lever += shift;
     }
@@ -217,19 +209,19 @@ fn follow<T: Lane, J: JointModel>(
 
 /// Sines and cosines of the joints that a step turns.
 #[derive(Clone, Debug)]
-pub(super) struct Turns<T> {
+pub(super) struct JointAngles<T> {
     /// Angles, sines and cosines; those of a single rover fill up whole registers.
     numbers: [Vec<T>; 3],
 }
 
 /// The same, one after the other.
-pub(super) struct NextTurn<'a, T> {
+pub(super) struct NextAngle<'a, T> {
     sines: &'a [T],
     cosines: &'a [T],
     at: usize,
 }
 
-impl<T: Lane> Turns<T> {
+impl<T: Lane> JointAngles<T> {
     pub(super) fn new(token: T::Token, mechanism: &Mechanism) -> Self {
         let n = mechanism.angles.len();
         let n = if T::LANES == 1 {
@@ -247,19 +239,19 @@ impl<T: Lane> Turns<T> {
     pub(super) fn of(
         &mut self,
         mechanism: &Mechanism,
-        place: &LaneConfiguration<T>,
-    ) -> NextTurn<'_, T> {
+        q: &LaneConfiguration<T>,
+    ) -> NextAngle<'_, T> {
         let turning = &mechanism.angles[..];
         let [angles, sines, cosines] = &mut self.numbers;
         let angles = &mut angles[..];
         for k in 0..turning.len() {
-            angles[k] = place.joints[turning[k]];
+            angles[k] = q.joints[turning[k]];
         }
         for (k, coupling) in &mechanism.coupled_angles {
             angles[*k] = coupling.value(angles[*k]);
         }
         sines_cosines(angles, sines, cosines);
-        NextTurn {
+        NextAngle {
             sines,
             cosines,
             at: 0,
@@ -267,7 +259,7 @@ impl<T: Lane> Turns<T> {
     }
 }
 
-impl<T: Lane> NextTurn<'_, T> {
+impl<T: Lane> NextAngle<'_, T> {
     #[inline(always)]
     pub(super) fn next(&mut self) -> (T, T) {
         let k = self.at;

@@ -93,9 +93,9 @@ impl MomentumBalance {
         }
     }
 
-    /// `y = −Sᵀ` of the sums of everything that each joint carries, with the screws at the midpoint;
-    /// `middle_of`: from a tree's origin at the start to the one at the midpoint, the reference of
-    /// the screws.
+    /// `y = −Sᵀ` of the sums of everything that each joint carries, with the screws at the
+    /// midpoint. `middle_of`: from a tree's origin at the start to the one at the midpoint, the
+    /// reference of the screws.
     fn project(
         &mut self,
         model: &Model,

@@ -105,8 +105,8 @@ impl TreeSystem<'_> {
         self.parts.add_sand(options.time_step, v_end, y);
     }
 
-    /// `y = h (τ − b)` with the bias b at a velocity, and the forces of joints and sand at the start
-    /// of the step. `v_bias`: `None` for the bias at rest, gravity's.
+    /// `y = h (τ − b)` with the bias b at a velocity, and the forces of joints and sand at the
+    /// start of the step. `v_bias`: `None` for the bias at rest, gravity's.
     #[inline]
     fn load_with_bias(
         &mut self,
@@ -377,14 +377,14 @@ impl MechanicalSystem for TreeSystem<'_> {
         v: &[f64],
     ) -> Option<MechanicalEnergy> {
         let TreeScratch {
-            place,
+            q: lane,
             energy: scratch,
             ..
         } = &mut *self.parts;
-        place.set_lane(0, q);
+        lane.set_lane(0, q);
         let (mechanism, inertias) = (self.model.mechanism(), self.model.inertias());
         let gravity = options.gravity.into();
-        let (energy, momentum) = energy(mechanism, inertias, place, v, gravity, scratch);
+        let (energy, momentum) = energy(mechanism, inertias, lane, v, gravity, scratch);
         Some(MechanicalEnergy {
             kinetic: energy.kinetic,
             potential: energy.potential,

@@ -79,8 +79,8 @@ pub trait JointModel {
         None
     }
 
-    /// Places its body, where the joint's frame has the attitude `frame`. `turn`: sine and cosine of
-    /// its angle; `None` for a body whose rotation shows in nothing but its appearance.
+    /// Places its body, where the joint's frame has the attitude `frame`. `turn`: sine and cosine
+    /// of its angle; `None` for a body whose rotation shows in nothing but its appearance.
     fn place<T: Lane>(
         &self,
         frame: &Mat3<T>,

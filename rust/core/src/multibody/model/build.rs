@@ -25,7 +25,7 @@ use crate::spatial::{SymmetricMatrix3, exp_rotation};
 /// Mass, first moment, and inertia about the body frame's origin, accumulated while solids are
 /// merged.
 #[derive(Clone, Default)]
-struct Lump {
+struct MassSum {
     mass: f64,
     moment: Vector3<f64>,
     inertia: Matrix3<f64>,
@@ -35,7 +35,7 @@ struct Lump {
 #[derive(Default)]
 struct Builder {
     bodies: Vec<Body>,
-    lumps: Vec<Lump>,
+    mass_sums: Vec<MassSum>,
     frames: Vec<Frame>,
     boxes: Vec<CollisionBox>,
     spheres: Vec<CollisionSphere>,
@@ -199,7 +199,7 @@ impl Builder {
             principal_axes: None,
             is_spinner: false,
         });
-        self.lumps.push(Lump::default());
+        self.mass_sums.push(MassSum::default());
         Ok(Frame {
             name: solid.name.clone(),
             body: self.bodies.len() - 1,
@@ -280,11 +280,10 @@ impl Builder {
         let own = solid.mass_properties()?;
         let centre = frame.position + frame.rotation * own.centre;
         let about_centre = frame.rotation * own.inertia * frame.rotation.transpose();
-        let lump = &mut self.lumps[frame.body];
-        lump.mass += solid.mass;
-        lump.moment += centre * solid.mass;
-        lump.inertia +=
-            about_centre + SymmetricMatrix3::point_mass(solid.mass, &centre).to_matrix();
+        let sum = &mut self.mass_sums[frame.body];
+        sum.mass += solid.mass;
+        sum.moment += centre * solid.mass;
+        sum.inertia += about_centre + SymmetricMatrix3::point_mass(solid.mass, &centre).to_matrix();
         if let (true, Some(shape)) = (solid.collides, &solid.shape) {
             let material = named(solid.material.as_ref(), "body");
             self.touch_with(shape, material, &frame, centre, frame.rotation);
@@ -331,11 +330,11 @@ impl Builder {
     }
 
     fn settle_masses(&mut self) {
-        for (body, lump) in self.bodies.iter_mut().zip(&self.lumps) {
-            body.mass = lump.mass;
-            body.centre_of_mass = lump.moment / lump.mass;
-            let steiner = SymmetricMatrix3::point_mass(lump.mass, &body.centre_of_mass).to_matrix();
-            let about = SymmetricMatrix3::from_matrix(&(lump.inertia - steiner));
+        for (body, sum) in self.bodies.iter_mut().zip(&self.mass_sums) {
+            body.mass = sum.mass;
+            body.centre_of_mass = sum.moment / sum.mass;
+            let steiner = SymmetricMatrix3::point_mass(sum.mass, &body.centre_of_mass).to_matrix();
+            let about = SymmetricMatrix3::from_matrix(&(sum.inertia - steiner));
             let off = about.xy.abs() + about.xz.abs() + about.yz.abs();
             if off <= 1e-14 * (about.xx + about.yy + about.zz) {
                 body.principal_inertia = Vector3::new(about.xx, about.yy, about.zz);

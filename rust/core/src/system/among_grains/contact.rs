@@ -27,7 +27,7 @@ impl GrainTouch {
 
 /// A contact of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum AmongContact {
+pub enum CompositeContact {
     /// Of the grains.
     Grains(GrainContact<3>),
     /// Of the tree, with anything else.
@@ -38,7 +38,7 @@ pub enum AmongContact {
 
 /// Key of a contact, in the order of the lists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum AmongKey {
+pub enum CompositeKey {
     /// Of the grains.
     Grains(GrainKey),
     /// Of the tree.
@@ -47,14 +47,14 @@ pub enum AmongKey {
     Touch(GrainKey),
 }
 
-impl UnilateralContact for AmongContact {
-    type Key = AmongKey;
+impl UnilateralContact for CompositeContact {
+    type Key = CompositeKey;
 
-    fn key(&self) -> AmongKey {
+    fn key(&self) -> CompositeKey {
         match self {
-            Self::Grains(contact) => AmongKey::Grains(contact.key),
-            Self::Tree(contact) => AmongKey::Tree(contact.key),
-            Self::Touch(touch) => AmongKey::Touch(touch.key),
+            Self::Grains(contact) => CompositeKey::Grains(contact.key),
+            Self::Tree(contact) => CompositeKey::Tree(contact.key),
+            Self::Touch(touch) => CompositeKey::Touch(touch.key),
         }
     }
 

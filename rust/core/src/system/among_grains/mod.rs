@@ -24,6 +24,6 @@ mod parts;
 pub mod system;
 mod touches;
 
-pub use contact::{AmongContact, AmongKey, GrainTouch};
-pub use parts::AmongParts;
-pub use system::AmongGrains;
+pub use contact::{CompositeContact, CompositeKey, GrainTouch};
+pub use parts::CompositeScratch;
+pub use system::TreeAmongGrains;

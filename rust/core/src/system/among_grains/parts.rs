@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use super::contact::{AmongContact, GrainTouch};
+use super::contact::{CompositeContact, GrainTouch};
 use super::touches::NearGrain;
 use crate::contact::{Contact, ContactSystem};
 use crate::multibody::Model;
@@ -11,7 +11,7 @@ use crate::system::grains::GrainContact;
 
 /// Scratch of the two together.
 #[derive(Clone, Debug)]
-pub struct AmongParts {
+pub struct CompositeScratch {
     /// The contacts of a step, sorted by kind.
     pub(super) of_grains: Vec<GrainContact<3>>,
     pub(super) of_tree: Vec<Contact>,
@@ -25,7 +25,7 @@ pub struct AmongParts {
     pub(super) operator: OnceLock<BlockSparseDelassus>,
 }
 
-impl AmongParts {
+impl CompositeScratch {
     /// Scratch for a model.
     #[must_use]
     pub fn new(model: &Model) -> Self {
@@ -40,23 +40,23 @@ impl AmongParts {
         }
     }
 
-    pub(super) fn sort(&mut self, contacts: &[AmongContact]) {
+    pub(super) fn sort(&mut self, contacts: &[CompositeContact]) {
         self.of_grains.clear();
         self.of_tree.clear();
         self.touches.clear();
         for contact in contacts {
             match *contact {
-                AmongContact::Grains(contact) => self.of_grains.push(contact),
-                AmongContact::Tree(contact) => self.of_tree.push(contact),
-                AmongContact::Touch(touch) => self.touches.push(touch),
+                CompositeContact::Grains(contact) => self.of_grains.push(contact),
+                CompositeContact::Tree(contact) => self.of_tree.push(contact),
+                CompositeContact::Touch(touch) => self.touches.push(touch),
             }
         }
     }
 
-    pub(super) fn listed(&self) -> impl Iterator<Item = AmongContact> + '_ {
-        let of_grains = self.of_grains.iter().copied().map(AmongContact::Grains);
-        let of_tree = self.of_tree.iter().copied().map(AmongContact::Tree);
-        let touches = self.touches.iter().copied().map(AmongContact::Touch);
+    pub(super) fn listed(&self) -> impl Iterator<Item = CompositeContact> + '_ {
+        let of_grains = self.of_grains.iter().copied().map(CompositeContact::Grains);
+        let of_tree = self.of_tree.iter().copied().map(CompositeContact::Tree);
+        let touches = self.touches.iter().copied().map(CompositeContact::Touch);
         of_grains.chain(of_tree).chain(touches)
     }
 

@@ -1,20 +1,20 @@
 //! The two as one mechanical system.
 
-use super::contact::{AmongContact, GrainTouch};
-use super::parts::AmongParts;
+use super::contact::{CompositeContact, GrainTouch};
+use super::parts::CompositeScratch;
 use super::touches;
 use crate::contact::{Activation, Contact, generalized_impulse};
 use crate::integrator::{MechanicalSystem, Start, StepOptions, UnilateralContact};
 use crate::multibody::Configuration;
 use crate::problem::{BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem};
-use crate::solver::{ManyBodies, SolveReport, SolverOptions, SolverWorkspace, solve_many_bodies};
+use crate::solver::{SolveReport, SolverOptions, SolverWorkspace};
 use crate::system::grains::GrainSystem;
 use crate::system::grains::system::gap_law;
 use crate::system::tree::TreeSystem;
 use crate::system::tree_scratch::TreeScratch;
 
 /// A tree among balls in a step.
-pub struct AmongGrains<'a> {
+pub struct TreeAmongGrains<'a> {
     /// The balls.
     pub bed: GrainSystem<'a, 3>,
     /// The tree.
@@ -22,7 +22,7 @@ pub struct AmongGrains<'a> {
     /// μ of the tree's parts on grains.
     pub friction: f64,
     /// Scratch.
-    pub parts: &'a mut AmongParts,
+    pub parts: &'a mut CompositeScratch,
 }
 
 type Both = (Vec<f64>, Configuration);
@@ -43,7 +43,7 @@ fn harder(a: &SolveReport, b: &SolveReport) -> SolveReport {
     }
 }
 
-impl AmongGrains<'_> {
+impl TreeAmongGrains<'_> {
     /// Velocities of the grains, and of the tree.
     fn halves<'v>(&self, v: &'v [f64]) -> (&'v [f64], &'v [f64]) {
         v.split_at(self.bed.nv())
@@ -79,7 +79,7 @@ impl AmongGrains<'_> {
 
     /// Rows of the touches, and all contacts of the tree among the grains' pairs of bodies.
     fn assemble_touches(&mut self, v: (&[f64], &[f64]), u: &mut [f64]) {
-        let AmongParts {
+        let CompositeScratch {
             touches,
             contacts,
             rows,
@@ -134,9 +134,9 @@ impl AmongGrains<'_> {
     }
 }
 
-impl MechanicalSystem for AmongGrains<'_> {
+impl MechanicalSystem for TreeAmongGrains<'_> {
     type Configuration = Both;
-    type Contact = AmongContact;
+    type Contact = CompositeContact;
 
     const DIMENSION: Dimension = Dimension::Three;
 
@@ -174,16 +174,16 @@ impl MechanicalSystem for AmongGrains<'_> {
         self.tree.place_end(&q.1);
     }
 
-    fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<AmongContact>) {
+    fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<CompositeContact>) {
         let v = self.halves(v);
-        let AmongParts {
+        let CompositeScratch {
             of_grains, of_tree, ..
         } = &mut *self.parts;
         self.bed.detect(v.0, activation, of_grains);
         self.tree.detect(v.1, activation, of_tree);
         // The order of the keys, in which the last step's impulses are looked up.
         of_tree.sort_by_key(UnilateralContact::key);
-        let AmongParts { touches, near, .. } = &mut *self.parts;
+        let CompositeScratch { touches, near, .. } = &mut *self.parts;
         touches::find(&self.bed, &self.tree, v, activation, near, touches);
         out.clear();
         out.extend(self.parts.listed());
@@ -193,7 +193,7 @@ impl MechanicalSystem for AmongGrains<'_> {
         self.tree.unknown_ground()
     }
 
-    fn relocate(&mut self, contacts: &mut [AmongContact]) {
+    fn relocate(&mut self, contacts: &mut [CompositeContact]) {
         let parts = &mut *self.parts;
         parts.sort(contacts);
         self.bed.relocate(&mut parts.of_grains);
@@ -206,11 +206,11 @@ impl MechanicalSystem for AmongGrains<'_> {
         }
     }
 
-    fn friction_coefficient(&self, options: &StepOptions, contact: &AmongContact) -> f64 {
+    fn friction_coefficient(&self, options: &StepOptions, contact: &CompositeContact) -> f64 {
         match contact {
-            AmongContact::Grains(contact) => self.bed.friction_coefficient(options, contact),
-            AmongContact::Tree(contact) => self.tree.friction_coefficient(options, contact),
-            AmongContact::Touch(_) => self.friction,
+            CompositeContact::Grains(contact) => self.bed.friction_coefficient(options, contact),
+            CompositeContact::Tree(contact) => self.tree.friction_coefficient(options, contact),
+            CompositeContact::Touch(_) => self.friction,
         }
     }
 
@@ -317,7 +317,7 @@ impl MechanicalSystem for AmongGrains<'_> {
         self.tree.half_solve_back(y_b);
     }
 
-    fn assemble(&mut self, contacts: &[AmongContact], v: &[f64], u: &mut [f64]) {
+    fn assemble(&mut self, contacts: &[CompositeContact], v: &[f64], u: &mut [f64]) {
         let v = self.halves(v);
         let parts = &mut *self.parts;
         parts.sort(contacts);
@@ -343,7 +343,7 @@ impl MechanicalSystem for AmongGrains<'_> {
         }
     }
 
-    fn add_local_of_velocity(&self, _contacts: &[AmongContact], v: &[f64], out: &mut [f64]) {
+    fn add_local_of_velocity(&self, _contacts: &[CompositeContact], v: &[f64], out: &mut [f64]) {
         let (v_a, v_b) = self.halves(v);
         let (tree, parts) = (&self.tree, &*self.parts);
         let [out_a, out_b, touches] = parts.split_mut(out);
@@ -367,7 +367,7 @@ impl MechanicalSystem for AmongGrains<'_> {
         }
     }
 
-    fn generalized_impulse(&self, _contacts: &[AmongContact], p: &[f64], out: &mut [f64]) {
+    fn generalized_impulse(&self, _contacts: &[CompositeContact], p: &[f64], out: &mut [f64]) {
         let (out_a, out_b) = self.halves_mut(out);
         let (tree, parts) = (&self.tree, &*self.parts);
         let [p_a, p_b, touches] = parts.split(p);
@@ -388,11 +388,18 @@ impl MechanicalSystem for AmongGrains<'_> {
         FrictionContactProblem::from_assembled_sparse(self.operator(), q, mu)
     }
 
-    fn normal_shift(&self, options: &StepOptions, contact: &AmongContact, u_N_before: f64) -> f64 {
+    fn normal_shift(
+        &self,
+        options: &StepOptions,
+        contact: &CompositeContact,
+        u_N_before: f64,
+    ) -> f64 {
         match contact {
-            AmongContact::Grains(contact) => self.bed.normal_shift(options, contact, u_N_before),
-            AmongContact::Tree(contact) => self.tree.normal_shift(options, contact, u_N_before),
-            AmongContact::Touch(touch) => gap_law(options, touch.gap_start, u_N_before),
+            CompositeContact::Grains(contact) => {
+                self.bed.normal_shift(options, contact, u_N_before)
+            }
+            CompositeContact::Tree(contact) => self.tree.normal_shift(options, contact, u_N_before),
+            CompositeContact::Touch(touch) => gap_law(options, touch.gap_start, u_N_before),
         }
     }
 
@@ -411,13 +418,7 @@ impl MechanicalSystem for AmongGrains<'_> {
     ) -> SolveReport {
         let parts = &*self.parts;
         if !parts.touches.is_empty() {
-            let bodies = ManyBodies {
-                pairs: &self.bed.parts.pairs,
-                q,
-                mu,
-                operator: &|| self.bed.parts.operator(),
-            };
-            return solve_many_bodies(&bodies, options, p, u, workspace);
+            return self.bed.solve(q, mu, options, p, u, workspace);
         }
         let (mu_a, mu_b) = mu.split_at(parts.of_grains.len());
         let ([q_a, q_b, _], [p_a, p_b, _]) = (parts.split(q), parts.split_mut(p));
@@ -426,6 +427,35 @@ impl MechanicalSystem for AmongGrains<'_> {
             &self.bed.solve(q_a, mu_a, options, p_a, u_a, workspace),
             &self.tree.solve(q_b, mu_b, options, p_b, u_b, workspace),
         )
+    }
+
+    fn solve_step(
+        &mut self,
+        (v, y): (&[f64], &[f64]),
+        q: &[f64],
+        mu: &[f64],
+        options: &SolverOptions,
+        p: &mut [f64],
+        u: &mut [f64],
+        workspace: &mut SolverWorkspace,
+    ) -> SolveReport {
+        let free = (self.halves(v).0, self.halves(y).0);
+        let parts = &*self.parts;
+        if !parts.touches.is_empty() {
+            return (self.bed).solve_step(free, q, mu, options, p, u, workspace);
+        }
+        let (mu_a, mu_b) = mu.split_at(parts.of_grains.len());
+        let ([q_a, q_b, _], [p_a, p_b, _]) = (parts.split(q), parts.split_mut(p));
+        let [u_a, u_b, _] = parts.split_mut(u);
+        harder(
+            &(self.bed).solve_step(free, q_a, mu_a, options, p_a, u_a, workspace),
+            &self.tree.solve(q_b, mu_b, options, p_b, u_b, workspace),
+        )
+    }
+
+    fn add_moments(&self, y: &mut [f64]) {
+        let (y_a, _) = self.halves_mut(y);
+        self.bed.add_moments(y_a);
     }
 
     fn displacement(&self, y: &[f64]) -> f64 {
