@@ -250,7 +250,7 @@ impl GrainContacts {
             impulses,
             velocities,
             world_impulses: rows(&active, on_first),
-            world_moments: rows(&active, |a| bed.moment(&a.contact)),
+            world_moments: fresh_rows(active.iter().map(|a| bed.moment(&a.contact))),
         }
     }
 }
