@@ -6,7 +6,7 @@ use rover_core::geometry::{Plane, Rocks, SphereField, Terrain};
 use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Configuration, Model};
 use rover_core::simulation::{
-    Batch, BatchError, CommandError, Look, ReadingLayout, ReadingScratch, RoverSimulation,
+    Batch, BatchError, CommandError, ReadingLayout, ReadingRequest, ReadingScratch, RoverSimulation,
 };
 
 const SCAN: [[f64; 2]; 3] = [[1.0, -0.5], [0.0, 0.0], [-0.3, 0.8]];
@@ -82,7 +82,7 @@ fn a_batch_is_its_rovers_alone_for_any_number_of_threads() {
             rover.set_steering(&set_points(i, period)).unwrap();
             rover.step(5).unwrap();
         }
-        let look = Look {
+        let look = ReadingRequest {
             target: TARGET,
             scan: &SCAN,
         };
@@ -231,7 +231,7 @@ fn a_reading_says_what_the_simulation_says() {
     let layout = ReadingLayout::new(sim.model(), SCAN.len());
     let mut row = vec![0.0; layout.size()];
     sim.read(
-        &Look {
+        &ReadingRequest {
             target: TARGET,
             scan: &SCAN,
         },

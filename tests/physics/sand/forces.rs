@@ -3,8 +3,8 @@
 use rover_core::nalgebra::Vector3;
 use rover_core::sand::test_bed::rules_within;
 use rover_core::sand::{
-    Bed, Drive, Law, Measured, Memory, Resistive, Rules, SandWheel, Soil, Sunk, TestBed, Twist,
-    Want, WheelPose, react, react_with,
+    Bed, Derivatives, Drive, Law, Measured, Memory, Resistive, Rules, SandWheel, Soil, Sunk,
+    TestBed, Twist, WheelPose, react, react_with,
 };
 use rover_core::scalar::Instructions;
 
@@ -63,7 +63,7 @@ fn a_wheel_pressed_down_bears_as_a_plate_does() {
         rules: Rules::new([24, 4, 8]),
         soil: soil.clone(),
     }
-    .force(z, &pressed, &drive(0.0, 0.0, 1.0), Want::Wrench);
+    .force(z, &pressed, &drive(0.0, 0.0, 1.0), Derivatives::Wrench);
     let area = 2.0 * (2.0_f64 * 0.1 * z).sqrt() * 0.08;
     let plate = 1.0308 * stiffness(&soil) * z * 2.0 / 3.0 * area;
     let found = force.wrench[1];
@@ -100,7 +100,15 @@ fn the_force_is_continuous_along_random_paths() {
                     shift: [x[3], x[4], x[5]],
                     turn: [3.0 * x[6], 3.0 * x[7], 10.0 * x[8]],
                 };
-                react((&WHEEL, &rules), &soil, &bed, &pose, &memory, Want::Wrench).wrench
+                react(
+                    (&WHEEL, &rules),
+                    &soil,
+                    &bed,
+                    &pose,
+                    &memory,
+                    Derivatives::Wrench,
+                )
+                .wrench
             };
             let size = (0..=20).map(|k| force(f64::from(k) / 20.0).norm());
             let size = size.fold(1.0, f64::max);
@@ -148,7 +156,7 @@ const LEVEL: Bed<'static> = Bed {
 #[test]
 fn the_force_has_the_same_bits_with_any_number_of_lanes() {
     let (wheel, pose, memory) = askew();
-    let want = Want::Slopes {
+    let want = Derivatives::Slopes {
         by_memory: 0.7,
         by_pose: 0.002,
     };
@@ -175,7 +183,7 @@ fn the_slopes_of_a_wheel_are_its_derivatives() {
     for (soil, left_out) in [(dry_sand(), 0.03), (bekker_sand(), 0.2)] {
         let rules = Rules::new([24, 4, 8]);
         let force = |pose: &WheelPose, memory: &Memory, by_memory: f64, by_pose: f64| {
-            let want = Want::Slopes { by_memory, by_pose };
+            let want = Derivatives::Slopes { by_memory, by_pose };
             react((&wheel, &rules), &soil, &LEVEL, pose, memory, want)
         };
         let by_memory = force(&pose, &memory, 1.0, 0.0).slope;
@@ -233,7 +241,8 @@ fn the_number_of_points_follows_the_accuracy() {
             },
             0.1,
         );
-        bed.force(0.023, &memory, &drive, Want::Wrench).wrench
+        bed.force(0.023, &memory, &drive, Derivatives::Wrench)
+            .wrench
     };
     let error = (at(&fine) - at(&exact)).norm() / at(&exact).norm();
     assert!(error < 0.02, "{error}");
