@@ -12,7 +12,8 @@ import numpy.typing as npt
 from typing_extensions import disjoint_base
 
 from rover_gym.maps import terrain_files
-from rover_gym.models import model_files
+from rover_gym.maps.fractal import fractal_map
+from rover_gym.models import file_writing, model_files
 
 _Array: TypeAlias = npt.NDArray[np.float64]
 _Rows: TypeAlias = npt.NDArray[np.uint64]
@@ -32,7 +33,7 @@ class _SparseArray(Protocol):
     def shape(self) -> tuple[int, ...]: ...
     def tobsr(self, blocksize: tuple[int, int] | None = ..., copy: bool = ...) -> Any: ...
 
-__all__ = [
+__all__: list[str] = [
     "AnySimulation",
     "BallSimulation",
     "BusyError",
@@ -244,8 +245,8 @@ class RoverModel:
         was derived from an imported one.
         """
     def _with_import_report(self, report: object) -> RoverModel: ...
-    to_urdf = model_files.to_urdf
-    to_mjcf = model_files.to_mjcf
+    to_urdf = file_writing.write_urdf
+    to_mjcf = file_writing.write_mjcf
     def replace(
         self,
         *,
@@ -808,7 +809,7 @@ class HeightField(Terrain):
         material: str = "ground",
     ) -> HeightField: ...
     from_file = staticmethod(terrain_files.height_field_from_file)
-    fractal = staticmethod(terrain_files.fractal)
+    fractal = staticmethod(fractal_map)
     @property
     def material(self) -> str:
         """Name of its material."""
@@ -2714,6 +2715,10 @@ class SoilSimulation(AnySimulation):
         friction: Coulomb's coefficient between disks.
         wall_friction: Coulomb's coefficient of disks on walls and ground.
         wheel_friction: Coulomb's coefficient of wheels.
+        rolling_friction: Largest moment that resists the rolling of a disk on a disk, wall or
+            ground, over the normal force and the rolling radius: 1/r = 1/r_1 + 1/r_2 of two disks,
+            the disk's own radius elsewhere. It does not act on wheels, or where Coulomb's
+            coefficient is 0.
         restitution: Newton's coefficient of all contacts, in [0, 1].
         gravity: Gravity, (2,), m/s²; (0, -9.81) by default.
         time_step: Time step, s.
@@ -2753,6 +2758,7 @@ class SoilSimulation(AnySimulation):
         friction: float = 0.5,
         wall_friction: float = 0.5,
         wheel_friction: float = 0.9,
+        rolling_friction: float = 0.0,
         restitution: float = 0.0,
         gravity: npt.ArrayLike | None = None,
         time_step: float = 0.001,
@@ -2972,6 +2978,9 @@ class GrainContacts:
     @property
     def world_impulses(self) -> _Array:
         """Impulses on the first body along x, y, z, (n, D), N s."""
+    @property
+    def world_moments(self) -> _Array:
+        """Moments of rolling and drilling friction on the first body, (n, 3), N m s."""
     def __len__(self) -> int: ...
 
 @final
@@ -2996,6 +3005,11 @@ class GrainSimulation(AnySimulation):
             have a vessel or a terrain, not both.
         friction: Coulomb's coefficient between balls.
         wall_friction: Coulomb's coefficient of balls on walls, vessel and terrain.
+        rolling_friction: Largest moment that resists the rolling of a ball on a ball, wall, vessel
+            or terrain, over the normal force and the rolling radius: 1/r = 1/r_1 + 1/r_2 of two
+            balls, the ball's own radius elsewhere. A ball rests on a slope up to this tangent.
+        drilling_friction: The same for rotation about the contact's normal. Neither acts on a
+            rover, or where Coulomb's coefficient is 0.
         cohesion: Attraction of bodies that touch, N: the pull that breaks their contact. The law of
             a contact is 0 <= u_N + gap/h, p_N + h cohesion >= 0, one of them 0; friction is bounded
             by friction (p_N + h cohesion).
@@ -3042,6 +3056,8 @@ class GrainSimulation(AnySimulation):
         terrain: Terrain | _Terrains | None = None,
         friction: float = 0.5,
         wall_friction: float = 0.5,
+        rolling_friction: float = 0.0,
+        drilling_friction: float = 0.0,
         cohesion: float = 0.0,
         cohesion_range: float | None = None,
         restitution: float = 0.0,
@@ -3515,7 +3531,7 @@ def solve_friction_contact(
         max_iterations: Largest number of Newton steps, sweeps or ADMM iterations.
         initial: Impulses from which the solver starts, (n_c d,), N s; zero by default.
         budget: Largest amount of work, counted and not timed: a unit is one multiplication and
-            addition in a product with W. None allows 3e8 units, about 0.3 s, for up to 100
+            addition in a product with W. None allows 1.2e9 units, 1 to 2 s, for up to 200
             contacts, and more in proportion to the square of the contacts. What exceeds the budget
             is left undone, and the report says so.
         history: Whether the solution keeps the residuals measured on the way.

@@ -89,6 +89,28 @@ def test_vessels_hold_balls() -> None:
     assert repr(silo.vessel) == "Silo(radius=0.3, floor=0, hole=0.15)"
 
 
+def test_rolling_friction_slows_a_ball_and_shows_in_the_moments() -> None:
+    """A ball that rolls slows down by 5/7 mu g, and the moment about its contact is mu r N."""
+    ball = one(walls=FLOOR, rolling_friction=0.05, drilling_friction=0.02)
+    ball.set_state([[0.0, 0.1, 0.0]], [[0.5, 0.0, 0.0]], [[0.0, 3.0, -5.0]])
+    ball.step(100)
+    np.testing.assert_allclose(ball.velocity, [[0.5 - 5 / 7 * 0.05 * G * 0.1, 0.0, 0.0]], atol=1e-8)
+    np.testing.assert_allclose(ball.spin[0, 1], 3.0 - 2.5 * 0.02 * G / 0.1 * 0.1, atol=1e-7)
+    weight = 2.0 * G * 1e-3
+    np.testing.assert_allclose(
+        ball.contacts.world_moments, [[0.0, -0.02 * 0.1 * weight, 0.05 * 0.1 * weight]], atol=1e-9
+    )
+    assert (ball.settings["rolling_friction"], ball.settings["drilling_friction"]) == (0.05, 0.02)
+    snapshot = Snapshot.from_bytes(ball.snapshot().to_bytes())
+    ball.step(50)
+    velocity = ball.velocity
+    ball.restore(snapshot)
+    ball.step(50)
+    np.testing.assert_array_equal(ball.velocity, velocity)
+    with pytest.raises(OptionError, match="rolling_friction"):
+        one(walls=FLOOR, rolling_friction=-0.1)
+
+
 def test_cohesion_shows_in_the_impulses() -> None:
     ball = one(walls=[[0.0, 0.2, 0.0, 0.0, -1.0, 0.0]], cohesion=25.0)
     ball.step(100)

@@ -72,6 +72,7 @@ NUMBERS: list[tuple[str, Callable[[Any], Any]]] = [
     ("radius_min", lambda x: soil_packing(radius_min=x)),
     ("width", lambda x: soil_packing(width=x)),
     ("wall_friction", lambda x: SoilSimulation(*one_disk, wall_friction=x)),
+    ("rolling_friction", lambda x: SoilSimulation(*one_disk, rolling_friction=x)),
     ("sleep_distance", lambda x: SoilSimulation(*one_disk, sleep_distance=x)),
     ("tolerance", lambda x: solve_friction_contact(*one_contact, x)),
 ]

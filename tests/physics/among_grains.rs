@@ -6,6 +6,7 @@ use std::sync::Arc;
 use rover_core::contact::Activation;
 use rover_core::geometry::{Plane, SphereField, Terrain};
 use rover_core::integrator::{MechanicalSystem, Stabilisation, StepOptions, StepReport};
+use rover_core::law::rolling::RollingFriction;
 use rover_core::multibody::{Model, coordinates};
 use rover_core::nalgebra::Vector3;
 use rover_core::simulation::{
@@ -15,7 +16,7 @@ use rover_core::solver::SolverOptions;
 use rover_core::system::grains::{
     COORDINATES, GrainFriction, GrainScene, Grains, Packing, SleepOptions, Wall,
 };
-use rover_core::system::{AmongContact, AmongGrains, AmongParts};
+use rover_core::system::{CompositeContact, CompositeScratch, TreeAmongGrains};
 
 /// θ = γ = 1, solved to `tolerance`.
 fn options(gravity: f64, time_step: f64, tolerance: f64) -> StepOptions {
@@ -89,6 +90,18 @@ fn balls(
     kinematic: bool,
     options: &StepOptions,
 ) -> GrainSimulation<3> {
+    let friction = GrainFriction::default();
+    balls_with(friction, centres, radius, mass, kinematic, options)
+}
+
+fn balls_with(
+    friction: GrainFriction,
+    centres: &[[f64; 3]],
+    radius: f64,
+    mass: f64,
+    kinematic: bool,
+    options: &StepOptions,
+) -> GrainSimulation<3> {
     let n = centres.len();
     let grains = Grains::new(vec![radius; n], vec![mass; n]).unwrap();
     let scene = GrainScene {
@@ -96,7 +109,7 @@ fn balls(
         walls: Vec::new(),
         ground: None,
         machine: None,
-        friction: GrainFriction::default(),
+        friction,
     };
     let q = centres.concat();
     GrainSimulation::new(Arc::new(scene), options.clone(), None, q).unwrap()
@@ -104,6 +117,18 @@ fn balls(
 
 #[test]
 fn a_hail_of_balls_keeps_the_momenta_and_gains_no_energy() {
+    hail(GrainFriction::default());
+    // Moments between balls, beside the contacts of the rover.
+    hail(GrainFriction {
+        rolling: RollingFriction {
+            rolling: 0.3,
+            drilling: 0.1,
+        },
+        ..GrainFriction::default()
+    });
+}
+
+fn hail(friction: GrainFriction) {
     let options = options(0.0, 1e-3, 1e-10);
     let rover = rover(nowhere(), [0.0, 0.0, 0.0], &options);
     let mut centres = Vec::new();
@@ -116,7 +141,7 @@ fn a_hail_of_balls_keeps_the_momenta_and_gains_no_energy() {
         }
     }
     let n = centres.len();
-    let mut bed = balls(&centres, 0.1, 6.0, false, &options);
+    let mut bed = balls_with(friction, &centres, 0.1, 6.0, false, &options);
     let mut v = vec![0.0; 6 * n];
     for (i, v) in v.chunks_exact_mut(6).enumerate() {
         v.copy_from_slice(&[-3.0, 0.1, 0.0, 0.0, 0.0, (i % 3) as f64 - 1.0]);
@@ -295,10 +320,10 @@ fn the_assembled_operator_is_that_of_the_impulses() {
         let place = [wheel.x + side, wheel.y, wheel.z];
         let above = [place[0], place[1] + 0.2, place[2]];
         let bed = balls(&[place, above], 0.1, 4.0, false, &options);
-        let mut parts = AmongParts::new(rover.model());
+        let mut parts = CompositeScratch::new(rover.model());
         let (mut bed_parts, mut rover_parts) = (bed.scene().parts(), rover.scene().parts());
         let (bed_memory, rover_memory) = (bed.scene().memory(), rover.scene().memory());
-        let mut system = AmongGrains {
+        let mut system = TreeAmongGrains {
             bed: (bed.scene()).system(bed.command(), &bed_memory, &mut bed_parts),
             tree: (rover.scene()).system(rover.command(), &rover_memory, &mut rover_parts),
             friction: 0.7,
@@ -318,10 +343,13 @@ fn the_assembled_operator_is_that_of_the_impulses() {
         assert!(system.factorise(&options));
         let n = 3 * contacts.len();
         system.assemble(&contacts, &v, &mut vec![0.0; n]);
-        let count = |is: fn(&AmongContact) -> bool| contacts.iter().filter(|c| is(c)).count();
-        assert!(count(|c| matches!(c, AmongContact::Grains(_))) > 0);
-        assert!(count(|c| matches!(c, AmongContact::Tree(_))) > 0);
-        assert_eq!(count(|c| matches!(c, AmongContact::Touch(_))) > 0, touch_it);
+        let count = |is: fn(&CompositeContact) -> bool| contacts.iter().filter(|c| is(c)).count();
+        assert!(count(|c| matches!(c, CompositeContact::Grains(_))) > 0);
+        assert!(count(|c| matches!(c, CompositeContact::Tree(_))) > 0);
+        assert_eq!(
+            count(|c| matches!(c, CompositeContact::Touch(_))) > 0,
+            touch_it
+        );
         let p: Vec<f64> = (0..n).map(|i| (1.7 * i as f64).sin()).collect();
         let (mut y, mut expected) = (vec![0.0; system.nv()], vec![0.0; n]);
         system.add_impulses(&p, &mut y);

@@ -30,10 +30,17 @@ pub enum Ground {
     Hills,
     /// The same hills with cells of 0.05 m, and the roughness that those can show.
     FineHills,
+    /// Cylinders that do not yield.
+    RigidCylinders,
+    /// Cylinders on the other grounds.
+    CylindersAmongRocks,
+    RigidCylindersAmongRocks,
+    CylindersOnHills,
+    CylindersOnFineHills,
 }
 
 impl Ground {
-    /// All grounds.
+    /// The grounds of the tables and tests.
     pub const ALL: [Self; 7] = [
         Self::Plane,
         Self::LargeWheels,
@@ -42,6 +49,15 @@ impl Ground {
         Self::Tori,
         Self::Hills,
         Self::FineHills,
+    ];
+
+    /// Those that are only counted.
+    const MORE: [Self; 5] = [
+        Self::RigidCylinders,
+        Self::CylindersAmongRocks,
+        Self::RigidCylindersAmongRocks,
+        Self::CylindersOnHills,
+        Self::CylindersOnFineHills,
     ];
 
     /// Name in tables and on command lines.
@@ -54,25 +70,43 @@ impl Ground {
             Self::Tori => "plane, tori",
             Self::Hills => "hills, cells 0.25 m",
             Self::FineHills => "hills, cells 0.05 m",
+            Self::RigidCylinders => "plane, rigid cylinders",
+            Self::CylindersAmongRocks => "rocks, cylinders",
+            Self::RigidCylindersAmongRocks => "rocks, rigid cylinders",
+            Self::CylindersOnHills => "hills, cells 0.25 m, cylinders",
+            Self::CylindersOnFineHills => "hills, cells 0.05 m, cylinders",
         }
+    }
+
+    /// Whether it has rocks.
+    const fn has_rocks(self) -> bool {
+        matches!(
+            self,
+            Self::Rocks | Self::CylindersAmongRocks | Self::RigidCylindersAmongRocks
+        )
     }
 
     /// Distance of the heights of its map, m.
     const fn spacing(self) -> Option<f64> {
         match self {
-            Self::Plane | Self::LargeWheels | Self::Rocks | Self::Cylinders | Self::Tori => None,
-            Self::Hills => Some(0.25),
-            Self::FineHills => Some(0.05),
+            Self::Hills | Self::CylindersOnHills => Some(0.25),
+            Self::FineHills | Self::CylindersOnFineHills => Some(0.05),
+            _ => None,
         }
     }
 
     /// Width and rounding of the wheels, m, if they have any.
     const fn tread(self) -> Option<[f64; 2]> {
         match self {
-            Self::Cylinders => Some([0.15, 0.0]),
-            Self::Tori => Some([0.15, 0.075]),
             Self::Plane | Self::LargeWheels | Self::Rocks | Self::Hills | Self::FineHills => None,
+            Self::Tori => Some([0.15, 0.075]),
+            _ => Some([0.15, 0.0]),
         }
+    }
+
+    /// Whether the wheels are rigid although they are cylinders.
+    const fn is_rigid(self) -> bool {
+        matches!(self, Self::RigidCylinders | Self::RigidCylindersAmongRocks)
     }
 
     /// The built-in rover on the wheels of the scene.
@@ -88,18 +122,25 @@ impl Ground {
         let mut wide = model.description().clone();
         for wheel in &mut wide.wheels {
             (wheel.width, wheel.rounding) = (Some(width), Some(rounding));
+            if self.is_rigid() {
+                wheel.stiffness = Some(0.0);
+            }
         }
         Model::from_description(wide).unwrap()
     }
 
     /// The ground of a name.
     pub fn of(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|ground| ground.name() == name)
+        let mut all = Self::ALL.into_iter().chain(Self::MORE);
+        all.find(|ground| ground.name() == name)
     }
 }
 
 /// Contact radius of large wheels, m.
 const LARGE: f64 = 0.20;
+
+/// How much higher large wheels begin among rocks, m.
+const LIFT: f64 = 0.15;
 
 /// Largest torques, N m; with 0 the rover only steers.
 pub const TORQUES: [f64; 4] = [0.0, 20.0, 60.0, 150.0];
@@ -185,8 +226,11 @@ fn drive(record: &Value, ground: Ground, torque: f64, options: &StepOptions) -> 
     let mut q = vec![0.0; 21];
     q[1] = 0.25 + first.radius;
     let mut terrain: Arc<dyn Terrain> = Arc::new(Plane::ground());
-    if ground == Ground::Rocks {
+    if ground.has_rocks() {
         q = numbers(&record["q"]);
+        if ground != Ground::Rocks {
+            q[1] += LIFT;
+        }
         terrain = Arc::new(rocks(record));
     }
     if let Some(spacing) = ground.spacing() {

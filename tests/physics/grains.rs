@@ -41,6 +41,7 @@ fn rough(mu: f64) -> GrainFriction {
         grains: mu,
         walls: mu,
         wheels: mu,
+        ..GrainFriction::default()
     }
 }
 
@@ -123,6 +124,7 @@ where
             let mut system = GrainSystem {
                 scene: &self.scene,
                 asleep: self.sleep.asleep(),
+                moments: &Vec::new(),
                 inputs: &[],
                 pull: SVector::zeros(),
                 parts: &mut self.parts,

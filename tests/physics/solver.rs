@@ -7,8 +7,8 @@ use rover_core::problem::{
     evaluate,
 };
 use rover_core::solver::{
-    ManyBodies, Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, Stage, solve,
-    solve_many_bodies,
+    Answer, ManyBodies, Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, Stage,
+    solve, solve_many_bodies,
 };
 
 const METHODS: [Method; 5] = [
@@ -933,7 +933,12 @@ fn free_bodies_list_their_sweeps_and_what_came_after_them() {
     };
     let (mut p, mut u) = (vec![0.0; 2 * n], vec![0.0; 2 * n]);
     let mut workspace = SolverWorkspace::new();
-    let report = solve_many_bodies(&bodies, &options, &mut p, &mut u, &mut workspace);
+    let answer = Answer {
+        p: &mut p,
+        u: &mut u,
+        rolling: &mut [],
+    };
+    let report = solve_many_bodies(&bodies, &options, answer, &mut workspace);
     let rungs = report.rungs.as_slice();
     let ends: Vec<_> = rungs.iter().map(|rung| (rung.stage, rung.status)).collect();
     assert_eq!(

@@ -32,6 +32,7 @@ fn scene(
             grains: MU,
             walls: MU,
             wheels: MU,
+            ..GrainFriction::default()
         },
     }
 }

@@ -276,6 +276,7 @@ fn grains_in_space_and_free_spheres_come_to_the_same_motion() {
                 grains: 0.3,
                 walls: 0.3,
                 wheels: 0.3,
+                ..GrainFriction::default()
             },
         };
         let q = centres.iter().flatten().copied().collect();

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import numpy as np
+from rich.console import Console
 
 from rover_gym.grains import surface_map
 from validation.balls import DIAMETER, RADIUS, Array, Balls, free, loose, settle, slow
@@ -37,9 +39,16 @@ def profile(position: Array, radius: Array, length: float) -> tuple[Array, Array
 
 
 def slope(
-    count: int, friction: float, seed: int, ledger: Ledger, *, length: float = LENGTH, width: float = WIDTH
+    count: int,
+    friction: float,
+    seed: int,
+    ledger: Ledger,
+    *,
+    length: float = LENGTH,
+    width: float = WIDTH,
+    rolling: float = 0.0,
 ) -> dict[str, Any]:
-    """Angle of repose of one bed, `length` and `width` in diameters.
+    """Angle of repose of one bed, `length` and `width` in diameters; `rolling`: coefficient of rolling friction.
 
     Returns:
         angle: Degrees. stays: Share of the balls that stay. seconds: Until the slope rests. surface: Places and
@@ -51,6 +60,7 @@ def slope(
     options: dict[str, Any] = {
         "friction": friction,
         "wall_friction": 0.0,
+        "rolling_friction": rolling,
         "time_step": TIME_STEP,
         "tolerance": 5e-4,
     }
@@ -94,3 +104,18 @@ def measure(ledger: Ledger) -> dict[str, object]:
 def means(runs: list[dict[str, Any]]) -> list[dict[str, float]]:
     """Mean angle and share that stays for each friction, with their standard errors."""
     return means_by(runs, "friction", FRICTIONS, {"angle": "error", "stays": "stays_error"})
+
+
+def with_rolling_friction(count: int, coefficients: list[float], seeds: int) -> None:
+    """Prints the angle of repose for each coefficient of rolling friction, at a friction of 0.5."""
+    for rolling in coefficients:
+        ledger = Ledger()
+        angles = [slope(count, 0.5, seed, ledger, rolling=rolling)["angle"] for seed in range(seeds)]
+        spread = np.std(angles, ddof=1) / np.sqrt(seeds) if seeds > 1 else np.nan
+        solved = 100.0 - 100.0 * ledger.unconverged / ledger.steps
+        line = f"{rolling:.2f}  {np.mean(angles):.1f} +- {spread:.1f} degrees, {solved:.1f}% of the steps solved"
+        Console().print(line, highlight=False)
+
+
+if __name__ == "__main__":
+    with_rolling_friction(COUNT, [float(x) for x in sys.argv[1:]], len(SEEDS))

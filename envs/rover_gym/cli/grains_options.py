@@ -31,6 +31,8 @@ class BallScene:
 
     friction: Friction = 0.5
     wall_friction: Annotated[float, typer.Option(help="Friction coefficient at walls, floors and vessels.")] = 0.5
+    rolling_friction: Annotated[float, typer.Option(help="Moment against rolling over normal force and radius.")] = 0.0
+    drilling_friction: Annotated[float, typer.Option(help="The same about the contact's normal.")] = 0.0
     gravity: Gravity = EARTH
     time_step: TimeStep = 0.001
     tolerance: Tolerance = 1e-3
@@ -48,7 +50,8 @@ class BallScene:
     @property
     def options(self) -> dict[str, Any]:
         """The options of `GrainSimulation`."""
-        names = ("friction", "wall_friction", "time_step", "tolerance", "sleep")
+        frictions = ("friction", "wall_friction", "rolling_friction", "drilling_friction")
+        names = (*frictions, "time_step", "tolerance", "sleep")
         return {name: getattr(self, name) for name in names} | {"gravity": (0.0, -self.gravity, 0.0)}
 
 

@@ -14,12 +14,12 @@
 //! - `pool`: threads that survive a fork;
 //! - [`quantity`]: admissible numbers of a description; [`scalar`]: one rover or several to a
 //!   register; [`spatial`]: rotations and inertias;
+//! - [`cone`], [`law`]: the friction cone and the contact laws, one contact at a time;
 //! - [`multibody`]: model, state, kinematics, mass matrix, bias, energy, momentum;
 //! - [`sand`]: the force of sand on a wheel;
 //! - [`geometry`]: shapes, the ground, distances between them; [`contact`]: points, frames, gaps,
 //!   the Delassus operator;
-//! - [`cone`], [`law`], [`problem`], [`solver`]: the friction-contact
-//!   problem, which sees only (W, q, μ);
+//! - [`problem`], [`solver`]: the friction-contact problem, which sees only (W, q, μ);
 //! - [`integrator`]: one step of any mechanical system;
 //! - [`planar`]: grounds and machines in the plane; [`system`]: the mechanical systems that a step
 //!   moves, such as the multibody tree;

@@ -12,7 +12,7 @@ use rover_core::system::grains::{
     COORDINATES, Cohesion, GrainScene, Grains, Packing, SleepOptions, Wall,
 };
 
-use crate::arguments::{Given, Named, refused};
+use crate::arguments::{Named, refused};
 use crate::arrays::{Array, fresh, fresh_rows, triple};
 use crate::bed_arguments::{self, Usual, check_rows, grain_error, rows};
 use crate::errors::{Kind, Result, Value};
@@ -97,7 +97,7 @@ impl Balls {
         let force = given.number("cohesion", 0.0)?;
         let range = given.maybe("cohesion_range")?;
         let cohesion = Cohesion::new(force, range, grains.smallest());
-        let cohesion = cohesion.map_err(|e| grain_error(&e))?;
+        let cohesion = cohesion.map_err(|e| grain_error(&e.into()))?;
         let grains = if force > 0.0 {
             grains.with_cohesion(cohesion)
         } else {
@@ -115,9 +115,7 @@ impl Balls {
                 return Err(Kind::Option.error("vessel", message, Value::Nothing));
             }
         };
-        let friction = [given.get("friction")?, given.get("wall_friction")?];
-        let [between, on_walls] = friction;
-        let friction = bed_arguments::friction(between, on_walls, Given::MISSING)?;
+        let friction = bed_arguments::friction(&given, false, false)?;
         let sleep = sleep(&given)?;
         given.finish()?;
         let scene = GrainScene {

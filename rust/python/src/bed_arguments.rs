@@ -3,6 +3,7 @@
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::integrator::{Stabilisation, StepOptions};
+use rover_core::law::rolling::RollingFriction;
 use rover_core::nalgebra::{SVector, Vector3};
 use rover_core::simulation::{SoilSetupError, soil_options};
 use rover_core::system::grains::{COORDINATES, GrainError, GrainFriction, Grains, Wall};
@@ -19,13 +20,13 @@ pub fn grain_error(e: &GrainError) -> BorderError {
     let kind = match field.split('[').next().unwrap_or_default() {
         "position" | "velocity" | "spin" | "machine" | "machine_rate" => Kind::State,
         "torques" | "pull" => Kind::Command,
-        "friction" | "wall_friction" | "wheel_friction" | "cohesion" | "cohesion_range" => {
-            Kind::Option
-        }
+        "friction" | "wall_friction" | "wheel_friction" | "rolling_friction"
+        | "drilling_friction" | "cohesion" | "cohesion_range" => Kind::Option,
         _ => Kind::Model,
     };
     let value = match e {
         GrainError::Number(number) => return quantity(kind, number),
+        GrainError::Cohesion(e) => Value::Number(e.value()),
         GrainError::Length { count, .. } | GrainError::TooMany { count, .. } => {
             Value::Count(*count)
         }
@@ -34,7 +35,6 @@ pub fn grain_error(e: &GrainError) -> BorderError {
         | GrainError::InWall { value, .. }
         | GrainError::WheelIn { value, .. }
         | GrainError::TooNarrow { value, .. }
-        | GrainError::Reach { value, .. }
         | GrainError::Range { value } => Value::Number(*value),
         GrainError::Empty => Value::Count(0),
         _ => Value::Nothing,
@@ -180,13 +180,25 @@ pub fn step_options<const D: usize>(
     Ok(options)
 }
 
-/// Coulomb's coefficients as they were given; `wheel_friction` where there are wheels.
-pub fn friction(grains: Given<'_>, walls: Given<'_>, wheels: Given<'_>) -> PyResult<GrainFriction> {
-    let (usual, option) = (GrainFriction::default(), Kind::Option);
+/// Coulomb's coefficients, and those of rolling friction, by their names; `wheel_friction` where
+/// there are wheels, `drilling_friction` in space.
+pub fn friction(given: &Named<'_>, has_wheels: bool, is_flat: bool) -> Result<GrainFriction> {
+    let usual = GrainFriction::default();
+    let optional = |is_one: bool, name: &'static str, usual: f64| {
+        if is_one {
+            given.number(name, usual)
+        } else {
+            Ok(usual)
+        }
+    };
     Ok(GrainFriction {
-        grains: grains.number(usual.grains, option, "friction")?,
-        walls: walls.number(usual.walls, option, "wall_friction")?,
-        wheels: wheels.number(usual.wheels, option, "wheel_friction")?,
+        grains: given.number("friction", usual.grains)?,
+        walls: given.number("wall_friction", usual.walls)?,
+        wheels: optional(has_wheels, "wheel_friction", usual.wheels)?,
+        rolling: RollingFriction {
+            rolling: given.number("rolling_friction", 0.0)?,
+            drilling: optional(!is_flat, "drilling_friction", 0.0)?,
+        },
     })
 }
 
@@ -199,6 +211,7 @@ pub fn settings<'py>(
     let settings = PyDict::new(py);
     settings.set_item("friction", friction.grains)?;
     settings.set_item("wall_friction", friction.walls)?;
+    settings.set_item("rolling_friction", friction.rolling.rolling)?;
     settings.set_item("restitution", options.restitution)?;
     settings.set_item("time_step", options.time_step)?;
     settings.set_item("tolerance", options.solver.tolerance)?;

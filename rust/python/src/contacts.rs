@@ -212,11 +212,17 @@ pub struct GrainContacts {
     velocities: Array,
     /// Impulses on the first body along x, y, z, (n, D), N s.
     world_impulses: Array,
+    /// Moments of rolling and drilling friction on the first body, (n, 3), N m s.
+    world_moments: Array,
 }
 
 impl GrainContacts {
-    /// The contacts of a bed. The solver's impulses bear the cohesion as well.
-    pub fn of<const D: usize>(bed: &GrainSimulation<D>) -> Self
+    /// The contacts of a bed. The solver's impulses bear the cohesion as well. `moment`: of rolling
+    /// and drilling friction on the first body.
+    pub fn of<const D: usize>(
+        bed: &GrainSimulation<D>,
+        moment: impl Fn(&GrainContact<D>) -> [f64; 3],
+    ) -> Self
     where
         GrainBed<D>: Scene<Contact = GrainContact<D>>,
     {
@@ -248,6 +254,7 @@ impl GrainContacts {
             impulses,
             velocities,
             world_impulses: rows(&active, on_first),
+            world_moments: fresh_rows(active.iter().map(|a| moment(&a.contact))),
         }
     }
 }

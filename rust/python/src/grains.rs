@@ -40,6 +40,11 @@ type Core = CoreSimulation<3>;
 ///         have a vessel or a terrain, not both.
 ///     friction: Coulomb's coefficient between balls.
 ///     wall_friction: Coulomb's coefficient of balls on walls, vessel and terrain.
+///     rolling_friction: Largest moment that resists the rolling of a ball on a ball, wall, vessel
+///         or terrain, over the normal force and the rolling radius: 1/r = 1/r_1 + 1/r_2 of two
+///         balls, the ball's own radius elsewhere. A ball rests on a slope up to this tangent.
+///     drilling_friction: The same for rotation about the contact's normal. Neither acts on a
+///         rover, or where Coulomb's coefficient is 0.
 ///     cohesion: Attraction of bodies that touch, N: the pull that breaks their contact. The law of
 ///         a contact is 0 <= u_N + gap/h, p_N + h cohesion >= 0, one of them 0; friction is bounded
 ///         by friction (p_N + h cohesion).
@@ -93,7 +98,7 @@ fn n_balls(inner: &Core) -> usize {
 impl GrainSimulation {
     #[new]
     #[pyo3(signature = (radius, mass, position, **options),
-        text_signature = "(radius, mass, position, *, kinematic=None, walls=None, wall_velocity=None, vessel=None, terrain=None, friction=0.5, wall_friction=0.5, cohesion=0.0, cohesion_range=None, restitution=0.0, gravity=None, time_step=0.002, tolerance=0.001, max_iterations=2000, stabilisation=None, penetration_tolerance=None, sleep=False, sleep_speed=None, sleep_distance=None, threads=1)")]
+        text_signature = "(radius, mass, position, *, kinematic=None, walls=None, wall_velocity=None, vessel=None, terrain=None, friction=0.5, wall_friction=0.5, rolling_friction=0.0, drilling_friction=0.0, cohesion=0.0, cohesion_range=None, restitution=0.0, gravity=None, time_step=0.002, tolerance=0.001, max_iterations=2000, stabilisation=None, penetration_tolerance=None, sleep=False, sleep_speed=None, sleep_distance=None, threads=1)")]
     fn new(
         radius: &Bound<'_, PyAny>,
         mass: &Bound<'_, PyAny>,
@@ -186,6 +191,8 @@ impl GrainSimulation {
         let inner = self.open()?;
         let options = inner.options();
         let settings = bed_arguments::settings(py, options, &inner.soil().friction)?;
+        let drilling = inner.soil().friction.rolling.drilling;
+        settings.set_item("drilling_friction", drilling)?;
         let cohesion = inner.soil().grains.cohesion();
         settings.set_item("cohesion", cohesion.map_or(0.0, |c| c.force))?;
         settings.set_item("cohesion_range", cohesion.map(|c| c.range))?;
@@ -276,7 +283,8 @@ impl GrainSimulation {
     /// The contacts of the last step.
     #[getter]
     fn contacts(&self) -> Result<GrainContacts> {
-        Ok(GrainContacts::of(&*self.open()?))
+        let inner = self.open()?;
+        Ok(GrainContacts::of(&inner, |contact| inner.moment(contact)))
     }
 
     /// Momentum of the balls, (6,): along x, y, z, kg m/s, and about the origin, kg m²/s.

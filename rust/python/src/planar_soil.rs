@@ -49,6 +49,10 @@ const USUAL: Usual = Usual {
 ///     friction: Coulomb's coefficient between disks.
 ///     wall_friction: Coulomb's coefficient of disks on walls and ground.
 ///     wheel_friction: Coulomb's coefficient of wheels.
+///     rolling_friction: Largest moment that resists the rolling of a disk on a disk, wall or
+///         ground, over the normal force and the rolling radius: 1/r = 1/r_1 + 1/r_2 of two disks,
+///         the disk's own radius elsewhere. It does not act on wheels, or where Coulomb's
+///         coefficient is 0.
 ///     restitution: Newton's coefficient of all contacts, in [0, 1].
 ///     gravity: Gravity, (2,), m/s²; (0, -9.81) by default.
 ///     time_step: Time step, s.
@@ -130,7 +134,7 @@ fn machine(given: &Named<'_>) -> Result<Option<PlanarTree>> {
 impl SoilSimulation {
     #[new]
     #[pyo3(signature = (radius, mass, position, **options),
-        text_signature = "(radius, mass, position, *, kinematic=None, walls=None, ground=None, rover=None, rig=None, machine=None, friction=0.5, wall_friction=0.5, wheel_friction=0.9, restitution=0.0, gravity=None, time_step=0.001, tolerance=0.0001, max_iterations=2000, stabilisation=None, penetration_tolerance=None, sleep=False, sleep_speed=None, sleep_distance=None)")]
+        text_signature = "(radius, mass, position, *, kinematic=None, walls=None, ground=None, rover=None, rig=None, machine=None, friction=0.5, wall_friction=0.5, wheel_friction=0.9, rolling_friction=0.0, restitution=0.0, gravity=None, time_step=0.001, tolerance=0.0001, max_iterations=2000, stabilisation=None, penetration_tolerance=None, sleep=False, sleep_speed=None, sleep_distance=None)")]
     fn new(
         radius: &Bound<'_, PyAny>,
         mass: &Bound<'_, PyAny>,
@@ -155,11 +159,7 @@ impl SoilSimulation {
             walls,
             ground: ground.map(|ground| ground as Arc<dyn Support<2>>),
             machine: machine.map(Arc::new),
-            friction: bed_arguments::friction(
-                given.get("friction")?,
-                given.get("wall_friction")?,
-                given.get("wheel_friction")?,
-            )?,
+            friction: bed_arguments::friction(&given, true, true)?,
         };
         let sleep = balls::sleep(&given)?;
         given.finish()?;
@@ -348,7 +348,8 @@ impl SoilSimulation {
     /// The contacts of the last step.
     #[getter]
     fn contacts(&self) -> Result<GrainContacts> {
-        Ok(GrainContacts::of(&*self.open()?))
+        let inner = self.open()?;
+        Ok(GrainContacts::of(&inner, |contact| inner.moment(contact)))
     }
 
     /// Momentum of the disks, (3,): along x and y, kg m/s, and about the origin, kg m²/s.

@@ -2,7 +2,7 @@
 //! places and velocities: an independent reference.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitQuaternion, Vector3};
-use rover_core::multibody::joint::Coordinate;
+use rover_core::multibody::joint::SingleJoint;
 use rover_core::multibody::{Body, Configuration, Joint, Model};
 
 /// A body in world axes and in a state.
@@ -38,35 +38,46 @@ pub fn moving(model: &Model, q: &Configuration, v: &[f64]) -> Vec<Moving> {
         let mut r = carrier.r + carrier.R * body.position;
         let (mut turn, mut spin, mut slide) = (Matrix3::identity(), zero, zero);
         let k = body.velocity;
-        match &body.joint {
+        // Of a joint that follows another: its rate and coordinate per unit of the other's.
+        let (ratio, offset) = (body.joint.coupling()).map_or((1.0, 0.0), |c| (c.ratio, c.offset));
+        let coordinate = |joint: usize| ratio * q.joints[joint] + offset;
+        let single = match &body.joint {
             Joint::Free(free) => {
                 let pose = q.pose(*free);
                 r = pose.position;
                 turn = rotation(&pose.attitude);
                 slide = Vector3::new(v[k], v[k + 1], v[k + 2]);
                 spin = Vector3::new(v[k + 3], v[k + 4], v[k + 5]);
+                None
             }
-            Joint::Fixed => {}
+            Joint::Fixed(_) => None,
             Joint::Spherical(joint) => {
                 turn = rotation(&q.rotations[joint.rotation]);
                 spin = frame * Vector3::new(v[k], v[k + 1], v[k + 2]);
+                None
             }
-            Joint::Revolute(joint) => {
+            Joint::Revolute(joint) => Some(SingleJoint::Revolute(*joint)),
+            Joint::Prismatic(joint) => Some(SingleJoint::Prismatic(*joint)),
+            Joint::Coupled(joint) => Some(joint.moves),
+        };
+        match single {
+            Some(SingleJoint::Revolute(joint)) => {
                 let axis = joint.axis.direction();
                 // A spinner is not turned about its own axis.
                 let angle = if body.is_spinner {
                     0.0
                 } else {
-                    coordinate(&joint.coordinate, q)
+                    coordinate(joint.coordinate)
                 };
                 turn = *Rotation3::new(axis * angle).matrix();
-                spin = frame * axis * ratio(&joint.coordinate) * v[k];
+                spin = frame * axis * ratio * v[k];
             }
-            Joint::Prismatic(joint) => {
+            Some(SingleJoint::Prismatic(joint)) => {
                 let axis = frame * joint.axis.direction();
-                r += axis * coordinate(&joint.coordinate, q);
-                slide = axis * (ratio(&joint.coordinate) * v[k]);
+                r += axis * coordinate(joint.coordinate);
+                slide = axis * (ratio * v[k]);
             }
+            None => {}
         }
         // A free root's frame is turned from the world's.
         let R = if matches!(body.joint, Joint::Free(_)) {
@@ -87,16 +98,6 @@ pub fn moving(model: &Model, q: &Configuration, v: &[f64]) -> Vec<Moving> {
         });
     }
     all
-}
-
-/// Rate of a joint per unit of its own velocity, or the one that it follows.
-fn ratio(own: &Coordinate) -> f64 {
-    own.coupling.map_or(1.0, |coupling| coupling.ratio)
-}
-
-fn coordinate(own: &Coordinate, q: &Configuration) -> f64 {
-    let offset = own.coupling.map_or(0.0, |coupling| coupling.offset);
-    ratio(own) * q.joints[own.joint] + offset
 }
 
 fn rotation(q: &UnitQuaternion<f64>) -> Matrix3<f64> {

@@ -161,7 +161,7 @@ fn expected(rover: &Rover) -> Found {
         found.add("attitude", own.R.iter().copied());
         let places = [own.r - origin, own.c - origin];
         found.add("places", places.iter().flatten().copied());
-        for &k in model.split_path(b).1 {
+        for k in model.movers(b).iter().map(|mover| mover.velocity) {
             found.add("turning", units[k][b].omega.iter().copied());
             found.add("moving", units[k][b].c_dot.iter().copied());
         }

@@ -171,6 +171,7 @@ fn energy_never_grows_with_restitution_without_friction() {
                 grains: 0.0,
                 walls: 0.0,
                 wheels: 0.0,
+                ..GrainFriction::default()
             };
         });
         shake(&mut soil, 1.0);

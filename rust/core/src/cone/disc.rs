@@ -2,6 +2,7 @@
 //! the Coulomb cone at one normal impulse.
 
 use super::tangential_norm;
+use crate::spatial::space::dot;
 
 /// Nearest point of the disc `|v_T| ≤ radius` to the tangential part of
 /// `v`; the normal component passes through.
@@ -20,6 +21,48 @@ pub fn project_on_disc<const D: usize>(v: &[f64; D], radius: f64) -> [f64; D] {
         }
     }
     out
+}
+
+/// Projects the tangential part of an impulse onto the friction disc of a nonnegative radius.
+#[inline]
+pub fn draw_in<const D: usize>(p: &mut [f64; D], limit: f64) {
+    if D == 2 {
+        p[1] = p[1].min(limit).max(-limit);
+        return;
+    }
+    let square = p[1] * p[1] + p[2] * p[2];
+    if square > limit * limit {
+        let share = limit / square.sqrt();
+        p[1] *= share;
+        p[2] *= share;
+    }
+}
+
+/// Shortens a vector of the world to a nonnegative `limit`.
+#[allow(clippy::inline_always)] // a visit of a contact is one piece of code
+#[inline(always)]
+#[must_use]
+pub fn shortened(t: [f64; 3], limit: f64) -> [f64; 3] {
+    let square = dot(&t, &t);
+    let share = if square > limit * limit {
+        limit / square.sqrt()
+    } else {
+        1.0
+    };
+    [share * t[0], share * t[1], share * t[2]]
+}
+
+/// Parts of a vector of the world along and across a unit normal.
+#[allow(clippy::inline_always)]
+#[inline(always)]
+#[must_use]
+pub fn split(n: &[f64; 3], x: &[f64; 3]) -> (f64, [f64; 3]) {
+    let along = dot(n, x);
+    let mut across = *x;
+    for k in 0..3 {
+        across[k] -= n[k] * along;
+    }
+    (along, across)
 }
 
 #[cfg(test)]

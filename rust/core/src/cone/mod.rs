@@ -4,12 +4,31 @@
 //! ([`SecondOrderCone`]); the modified velocity `ũ` of the law lives in its dual
 //! `K_μ* = { u_N ≥ μ |u_T| }` ([`DualCone`]). Vectors are arrays `[normal, tangent, (tangent)]`, so
 //! that `D = 2` is the planar problem and `D = 3` the spatial one.
+//!
+//! # One call
+//!
+//! A solver projects what an iteration proposes for a contact:
+//!
+//! ```text
+//! p − ρ ũ                        [p_N, p_T]
+//!    │
+//!    ▼
+//! SecondOrderCone::project       in K_μ: as it is; in −K_μ*: 0; else: onto the side
+//!    │
+//!    ▼
+//! p⁺ ∈ K_μ                       p = p⁺ at a solution: the natural map of crate::law
+//! ```
+//!
+//! # May use
+//!
+//! No other chapter: a cone is a set of vectors.
 
 mod disc;
 mod dual_cone;
+pub(crate) mod lorentz;
 mod second_order_cone;
 
-pub use disc::project_on_disc;
+pub use disc::{draw_in, project_on_disc, shortened, split};
 pub use dual_cone::DualCone;
 pub use second_order_cone::SecondOrderCone;
 

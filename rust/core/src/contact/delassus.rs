@@ -1,16 +1,16 @@
-//! Delassus operator `W = Hᵀ M̂⁻¹ H`, and the map from impulses to velocities.
+//! Delassus operator `W = Hᵀ M̂⁻¹ H` of the contacts of one machine, and the map from impulses to
+//! velocities.
 //!
-//! With `M̂ = Lᵀ D L` and `Z = D^(-1/2) L^(-T) H` the operator is `W = Zᵀ Z`. A column of Z is
-//! nonzero only along its body's path, or along the union of its two bodies' paths. A block of W is
-//! therefore a dot product over the velocities that two contacts share; no dense product is formed.
+//! The [rows](super::rows) of a contact between two bodies lie along the union of their paths.
 
 use std::ops::Range;
 
 use super::body_motion::Still;
-use super::jacobian::{Columns, columns, columns_of_other, relative_velocity};
+use super::jacobian::{for_each_row, relative_velocity, write_rows};
 use super::limit;
 use super::pair::{Contact, Opposite};
-use crate::multibody::{BASE, Factor, Kinematics, Model};
+use super::rows::{Path, Triple, add_product, add_scaled, along, close_stop, product, square};
+use crate::multibody::{Factor, Kinematics, Model};
 
 /// The contacts of a step in matrix form. The storage grows to the largest step and is then reused.
 #[derive(Clone, Debug, Default)]
@@ -20,19 +20,17 @@ pub struct ContactSystem {
     /// Local velocity `Hᵀ v` for the velocity passed to [`Self::assemble`] (3 n_c), m/s.
     pub u: Vec<f64>,
     /// Z along each path: `Z[c * stride + k]` belongs to the k-th velocity of contact c's path.
-    Z: Vec<Columns>,
+    Z: Vec<Triple<f64>>,
     stride: usize,
     /// Body of each contact.
     bodies: Vec<usize>,
-    /// Range in `unions` of the rows of a contact between two bodies, or of a stop; empty for a
-    /// ground contact. The vector is empty if all contacts are ground contacts.
+    /// Range in `unions` of the rows of a contact between two bodies; empty for any other. The
+    /// vector is empty if there is none.
     spans: Vec<Range<usize>>,
-    /// Velocities along the union of two paths, or along a stop's path, ascending, with Z.
-    unions: Vec<(usize, Columns)>,
-    /// One column per velocity (nv), while a union is assembled.
-    full: Vec<Columns>,
-    /// Rows along one path, while a union is assembled.
-    path_rows: Vec<Columns>,
+    /// Velocities along the union of two paths, ascending, with Z.
+    unions: Vec<(usize, Triple<f64>)>,
+    /// One entry a velocity (nv), while a union is assembled.
+    full: Vec<Triple<f64>>,
 }
 
 impl ContactSystem {
@@ -48,7 +46,6 @@ impl ContactSystem {
             spans: Vec::new(),
             unions: Vec::new(),
             full: Vec::new(),
-            path_rows: Vec::new(),
         }
     }
 
@@ -68,13 +65,26 @@ impl ContactSystem {
         v: &[f64],
     ) {
         self.assemble_rows(model, kinematics, factor, contacts, v);
-        let n = contacts.len();
-        self.W.resize(9 * n * n, 0.0);
-        if self.spans.is_empty() {
-            self.fill_operator(n, |system, c, d| system.block_on_ground(model, c, d));
-        } else {
-            self.fill_operator(n, |system, c, d| system.block(model, c, d));
-            self.close_stops(contacts);
+        let size = 3 * contacts.len();
+        self.W.resize(size * size, 0.0);
+        for (c, contact) in contacts.iter().enumerate() {
+            for d in 0..c {
+                let block = self.block(model, c, d);
+                for i in 0..3 {
+                    for j in 0..3 {
+                        let (row, column) = (3 * c + i, 3 * d + j);
+                        self.W[row * size + column] = block[3 * i + j];
+                        self.W[column * size + row] = block[3 * i + j];
+                    }
+                }
+            }
+            let mut own = self.own_block(model, c);
+            if contact.key.opposite == Opposite::Stop {
+                close_stop(&mut own);
+            }
+            for (i, row) in own.chunks_exact(3).enumerate() {
+                self.W[(3 * c + i) * size + 3 * c..][..3].copy_from_slice(row);
+            }
         }
     }
 
@@ -97,34 +107,36 @@ impl ContactSystem {
         contacts: &[Contact],
         v: &[f64],
     ) {
-        let (n, w) = (contacts.len(), self.stride);
+        let n = contacts.len();
+        let motion = Still {
+            model,
+            kinematics,
+            v,
+        };
         self.bodies.clear();
         self.bodies.extend(contacts.iter().map(|c| c.body));
         self.spans.clear();
         self.unions.clear();
-        self.Z.resize(n * w, [0.0; 4]);
+        self.Z.resize(n * self.stride, [0.0; 3]);
         self.u.resize(3 * n, 0.0);
         for (c, contact) in contacts.iter().enumerate() {
-            if matches!(contact.key.opposite, Opposite::Part(_) | Opposite::Stop) {
-                let u = match (limit::row(model, contact), contact.other) {
-                    (Some(row), _) => self.stop(model, factor, row, v),
-                    (None, Some(other)) => {
-                        self.unite(model, kinematics, factor, contact, other.body, v)
-                    }
-                    (None, None) => [0.0; 4],
-                };
-                self.u[3 * c..][..3].copy_from_slice(&u[..3]);
+            let u = if let Some(other) = contact.other {
+                let begin = self.unions.len();
+                let u = self.unite(&motion, factor, contact, other.body);
                 self.spans.resize(n, 0..0);
-                let begin = self.spans[..c].iter().map(|span| span.end).max();
-                self.spans[c] = begin.unwrap_or(0)..self.unions.len();
-                continue;
-            }
-            let path = model.path(contact.body);
-            let rows = &mut self.Z[c * w..][..path.len()];
-            columns(model, kinematics, contact, rows);
-            let u = path_product(model.split_path(contact.body), rows, v);
-            self.u[3 * c..][..3].copy_from_slice(&u[..3]);
-            factor.half_solve_path(model.mechanism(), contact.body, rows);
+                self.spans[c] = begin..self.unions.len();
+                u
+            } else {
+                let path = Path::of(model.mechanism(), contact.body);
+                let rows = &mut self.Z[c * self.stride..][..path.len()];
+                let u = match limit::row(model, contact) {
+                    Some((_, sign)) => path.write_stop(sign, v, rows),
+                    None => write_rows(&motion, contact, v, rows),
+                };
+                factor.half_solve_path(model.mechanism(), contact.body, rows);
+                u
+            };
+            self.u[3 * c..][..3].copy_from_slice(&u);
         }
     }
 
@@ -139,102 +151,31 @@ impl ContactSystem {
         }
     }
 
-    /// W from its blocks on and below the diagonal.
-    #[inline]
-    fn fill_operator(&mut self, n: usize, block: impl Fn(&Self, usize, usize) -> [Columns; 3]) {
-        let size = 3 * n;
-        for c in 0..n {
-            for d in 0..=c {
-                let block = block(self, c, d);
-                for i in 0..3 {
-                    let row = &mut self.W[(3 * c + i) * size + 3 * d..][..3];
-                    row.copy_from_slice(&block[i][..3]);
-                }
-                if c == d {
-                    continue; // Symmetric.
-                }
-                for j in 0..3 {
-                    let row = &mut self.W[(3 * d + j) * size + 3 * c..][..3];
-                    row.copy_from_slice(&[block[0][j], block[1][j], block[2][j]]);
-                }
-            }
-        }
-    }
-
-    /// Rows of Z of a stop, along the path of the joint's velocity, and its `Hᵀ v`, rad/s or m/s.
-    fn stop(
-        &mut self,
-        model: &Model,
-        factor: &Factor<f64>,
-        (k, sign): (usize, f64),
-        v: &[f64],
-    ) -> Columns {
-        self.full.resize(model.nv(), [0.0; 4]);
-        let path = model.velocity_path(k);
-        for &j in path {
-            self.full[j] = [0.0; 4];
-        }
-        self.full[k][0] = sign;
-        factor.half_solve_columns(model.mechanism(), path.iter().copied(), &mut self.full);
-        self.unions.extend(path.iter().map(|&j| (j, self.full[j])));
-        [sign * v[k], 0.0, 0.0, 0.0]
-    }
-
-    /// Sets the tangential diagonals of stops, whose tangential rows are zero, to that of the
-    /// normal.
-    fn close_stops(&mut self, contacts: &[Contact]) {
-        let size = 3 * contacts.len();
-        for (c, contact) in contacts.iter().enumerate() {
-            if contact.key.opposite == Opposite::Stop {
-                let normal = self.W[3 * c * (size + 1)];
-                for i in [3 * c + 1, 3 * c + 2] {
-                    self.W[i * (size + 1)] = normal;
-                }
-            }
-        }
-    }
-
     /// Rows of Z of a contact between two bodies, and its `Hᵀ v`, m/s.
     fn unite(
         &mut self,
-        model: &Model,
-        kinematics: &Kinematics,
+        motion: &Still<'_>,
         factor: &Factor<f64>,
         contact: &Contact,
         other: usize,
-        v: &[f64],
-    ) -> Columns {
-        self.full.resize(model.nv(), [0.0; 4]);
-        self.path_rows.resize(self.stride, [0.0; 4]);
+    ) -> Triple<f64> {
+        let model = motion.model;
         let begin = self.unions.len();
-        let (path, path_of_other) = (model.path(contact.body), model.path(other));
-        for &k in path.iter().chain(path_of_other) {
-            self.full[k] = [0.0; 4];
-        }
-        columns(
-            model,
-            kinematics,
-            contact,
-            &mut self.path_rows[..path.len()],
-        );
-        for (row, &k) in self.path_rows.iter().zip(path) {
-            add(&mut self.full[k], 1.0, row);
-        }
-        let rows = &mut self.path_rows[..path_of_other.len()];
-        columns_of_other(model, kinematics, contact, other, rows);
-        for (row, &k) in self.path_rows.iter().zip(path_of_other) {
-            add(&mut self.full[k], -1.0, row);
-        }
         // Both are in ascending order, so their union is a merge.
-        let (mut left, mut right) = (path, path_of_other);
+        let (mut left, mut right) = (model.path(contact.body), model.path(other));
+        self.full.resize(model.nv(), [0.0; 3]);
         while let Some(&k) = smaller(left, right) {
             left = left.strip_prefix(&[k]).unwrap_or(left);
             right = right.strip_prefix(&[k]).unwrap_or(right);
-            self.unions.push((k, [0.0; 4]));
+            self.unions.push((k, [0.0; 3]));
+            self.full[k] = [0.0; 3];
         }
-        let mut u = [0.0; 4];
+        for_each_row(motion, contact, |k, row| {
+            add_scaled(&mut self.full[k], &row, 1.0);
+        });
+        let mut u = [0.0; 3];
         for (k, _) in &self.unions[begin..] {
-            add(&mut u, v[*k], &self.full[*k]);
+            add_scaled(&mut u, &self.full[*k], motion.v[*k]);
         }
         let velocities = self.unions[begin..].iter().map(|(k, _)| *k);
         factor.half_solve_columns(model.mechanism(), velocities, &mut self.full);
@@ -245,11 +186,13 @@ impl ContactSystem {
     }
 
     /// The block of W for two contacts.
-    fn block(&self, model: &Model, c: usize, d: usize) -> [Columns; 3] {
+    fn block(&self, model: &Model, c: usize, d: usize) -> [f64; 9] {
         if self.union(c).is_empty() && self.union(d).is_empty() {
-            return self.block_on_ground(model, c, d);
+            let shared = model.common_path(self.bodies[c], self.bodies[d]);
+            let z = |c: usize| &self.Z[c * self.stride..][..shared];
+            return product(0.0, z(c), z(d));
         }
-        let mut block = [[0.0; 4]; 3];
+        let mut block = [0.0; 9];
         let mut right = self.entries(model, d).peekable();
         for (k, x) in self.entries(model, c) {
             while right.next_if(|(j, _)| *j < k).is_some() {}
@@ -260,25 +203,23 @@ impl ContactSystem {
         block
     }
 
-    /// The block of W for two ground contacts.
-    #[allow(clippy::inline_always)] // as a call it costs a hundredth of a step
-    #[inline(always)]
-    fn block_on_ground(&self, model: &Model, c: usize, d: usize) -> [Columns; 3] {
-        let shared = model.common_path(self.bodies[c], self.bodies[d]);
-        let (a, b) = (
-            &self.Z[c * self.stride..][..shared],
-            &self.Z[d * self.stride..][..shared],
-        );
-        let mut block = [[0.0; 4]; 3];
-        for (x, y) in a.iter().zip(b) {
-            add_product(&mut block, x, y);
+    /// The block of W on the diagonal.
+    fn own_block(&self, model: &Model, c: usize) -> [f64; 9] {
+        let union = self.union(c);
+        if union.is_empty() {
+            let n = model.path(self.bodies[c]).len();
+            return square(0.0, &self.Z[c * self.stride..][..n]);
+        }
+        let mut block = [0.0; 9];
+        for (_, z) in union {
+            add_product(&mut block, z, z);
         }
         block
     }
 
-    /// Rows of a contact between two bodies or of a stop; empty for a ground contact.
+    /// Rows of a contact between two bodies; empty for any other.
     #[inline]
-    fn union(&self, c: usize) -> &[(usize, Columns)] {
+    fn union(&self, c: usize) -> &[(usize, Triple<f64>)] {
         if self.spans.is_empty() {
             &[]
         } else {
@@ -291,7 +232,7 @@ impl ContactSystem {
         &'a self,
         model: &'a Model,
         c: usize,
-    ) -> impl Iterator<Item = (usize, &'a Columns)> {
+    ) -> impl Iterator<Item = (usize, &'a Triple<f64>)> {
         let unions = self.union(c);
         let path = if unions.is_empty() {
             model.path(self.bodies[c])
@@ -306,17 +247,16 @@ impl ContactSystem {
     pub fn local(&self, model: &Model, y: &[f64], out: &mut [f64]) {
         for (c, values) in out.chunks_exact_mut(3).enumerate() {
             let union = self.union(c);
-            let u = if union.is_empty() {
-                let path = model.split_path(self.bodies[c]);
-                path_product(path, &self.Z[c * self.stride..], y)
+            let mut u = [0.0; 3];
+            if union.is_empty() {
+                let path = Path::of(model.mechanism(), self.bodies[c]);
+                u = path.add_local(&self.Z[c * self.stride..], y, u);
             } else {
-                let mut u = [0.0; 4];
                 for (k, z) in union {
-                    add(&mut u, y[*k], z);
+                    add_scaled(&mut u, z, y[*k]);
                 }
-                u
-            };
-            values.copy_from_slice(&u[..3]);
+            }
+            values.copy_from_slice(&u);
         }
     }
 
@@ -350,45 +290,17 @@ impl ContactSystem {
 
     /// `y += Z p`: velocity change, in factor coordinates, due to impulses `p`.
     pub fn add_impulses(&self, model: &Model, p: &[f64], y: &mut [f64]) {
-        for (c, p) in p.chunks_exact(3).enumerate() {
-            let product = |z: &Columns| z[0] * p[0] + z[1] * p[1] + z[2] * p[2];
+        for (c, p) in p.as_chunks().0.iter().enumerate() {
             let union = self.union(c);
-            if !union.is_empty() {
+            if union.is_empty() {
+                let path = Path::of(model.mechanism(), self.bodies[c]);
+                path.push(true, &self.Z[c * self.stride..], p, y);
+            } else {
                 for (k, z) in union {
-                    y[*k] += product(z);
+                    y[*k] += along(z, p);
                 }
-                continue;
-            }
-            let (lead, rest) = model.split_path(self.bodies[c]);
-            let (Z_lead, Z_rest) = self.Z[c * self.stride..].split_at(lead.len());
-            if let (Some(y), Some(Z)) = (
-                y[lead].first_chunk_mut::<BASE>(),
-                Z_lead.first_chunk::<BASE>(),
-            ) {
-                for (y, z) in y.iter_mut().zip(Z) {
-                    *y += product(z);
-                }
-            }
-            for (z, &k) in Z_rest.iter().zip(rest) {
-                y[k] += product(z);
             }
         }
-    }
-}
-
-/// `block += x yᵀ`: nine independent sums.
-#[inline]
-fn add_product(block: &mut [Columns; 3], x: &Columns, y: &Columns) {
-    for (sums, factor) in block.iter_mut().zip(x) {
-        add(sums, *factor, y);
-    }
-}
-
-/// `sums += a x`.
-#[inline]
-fn add(sums: &mut Columns, a: f64, x: &Columns) {
-    for (sum, value) in sums.iter_mut().zip(x) {
-        *sum += a * value;
     }
 }
 
@@ -398,20 +310,4 @@ fn smaller<'a>(left: &'a [usize], right: &'a [usize]) -> Option<&'a usize> {
         (Some(a), Some(b)) => Some(a.min(b)),
         (a, b) => a.or(b),
     }
-}
-
-/// Product of the columns along a path with a full vector.
-#[inline]
-fn path_product((lead, rest): (Range<usize>, &[usize]), rows: &[Columns], v: &[f64]) -> Columns {
-    let mut sums = [0.0; 4];
-    let (of_lead, of_rest) = rows.split_at(lead.len());
-    if let (Some(rows), Some(v)) = (of_lead.first_chunk::<BASE>(), v[lead].first_chunk::<BASE>()) {
-        for (row, &v) in rows.iter().zip(v) {
-            add(&mut sums, v, row);
-        }
-    }
-    for (row, &k) in of_rest.iter().zip(rest) {
-        add(&mut sums, v[k], row);
-    }
-    sums
 }

@@ -6,18 +6,21 @@
 
 use nalgebra::Vector3;
 
-use super::body_motion::BodyMotion;
+use super::body_motion::{BodyMotion, Still};
 use super::limit;
 use super::pair::Contact;
-use crate::multibody::{BASE, Kinematics, Model};
+use super::rows::{Path, Place, Triple};
+use crate::multibody::mechanism::Mechanism;
+use crate::multibody::{Kinematics, Model};
+use crate::scalar::Vec3;
 
-/// Entries of a contact's three rows n, t, b for one velocity, padded to two pairs of SIMD lanes.
-pub(super) type Columns = [f64; 4];
-
-/// The contact point relative to the origin of another body's tree, m.
+/// The contact point relative to the origin of a body's tree, and the contact's frame.
 #[inline]
-fn place_in_tree_of(kinematics: &Kinematics, contact: &Contact, body: usize) -> Vector3<f64> {
-    contact.point + (kinematics.origin(contact.body) - kinematics.origin(body))
+fn place_at(motion: &impl BodyMotion, contact: &Contact, body: usize) -> Place<f64> {
+    let x = contact.point + (motion.origin(contact.body) - motion.origin(body));
+    let [n, t, b] = contact.frame.rows().map(Vec3::from);
+    let x = x.into();
+    Place { x, n, t, b }
 }
 
 /// Velocity (m/s, world) of the contact's part relative to its other side, at the contact point.
@@ -32,61 +35,49 @@ pub(crate) fn relative_velocity(motion: &impl BodyMotion, contact: &Contact) -> 
     velocity - motion.point_velocity(other.body, &x)
 }
 
-/// Rows of Hᵀ along the path of the contact's own body: velocity of the body's point along n, t, b
-/// per unit of each joint velocity.
+/// Rows of Hᵀ of a contact without another body, along the path of its own, and `Hᵀ v`.
 #[inline]
-pub(super) fn columns(
-    model: &Model,
-    kinematics: &Kinematics,
+pub(super) fn write_rows(
+    motion: &impl BodyMotion,
     contact: &Contact,
-    rows: &mut [Columns],
-) {
-    columns_at(
-        model,
-        kinematics,
-        contact,
-        contact.body,
-        &contact.point,
-        rows,
-    );
+    v: &[f64],
+    rows: &mut [Triple<f64>],
+) -> Triple<f64> {
+    let place = place_at(motion, contact, contact.body);
+    let path = Path::of(motion.mechanism(), contact.body);
+    path.write(|m| motion.motion(m), &place, v, rows)
 }
 
-/// The same along the path of the other body, before subtraction.
-pub(super) fn columns_of_other(
-    model: &Model,
-    kinematics: &Kinematics,
+/// Calls `act` with each velocity that moves a contact and its entries of the rows of Hᵀ. One that
+/// moves both bodies comes twice, with opposite entries.
+pub(crate) fn for_each_row(
+    motion: &impl BodyMotion,
     contact: &Contact,
-    body: usize,
-    rows: &mut [Columns],
+    mut act: impl FnMut(usize, Triple<f64>),
 ) {
-    let x = place_in_tree_of(kinematics, contact, body);
-    columns_at(model, kinematics, contact, body, &x, rows);
+    for (body, sign, path) in sides(motion.mechanism(), contact) {
+        let place = place_at(motion, contact, body);
+        let signed = |k, row: Triple<f64>| act(k, row.map(|x| sign * x));
+        path.for_each_row(|m| motion.motion(m), &place, signed);
+    }
 }
 
-#[allow(clippy::inline_always)] // as a call it costs a hundredth of a step
-#[inline(always)]
-fn columns_at(
-    model: &Model,
-    kinematics: &Kinematics,
+/// The bodies of a contact, the signs of their velocities in the relative one, and their paths. The
+/// base that carries both does not count.
+#[inline]
+fn sides<'a>(
+    mechanism: &'a Mechanism,
     contact: &Contact,
-    body: usize,
-    x: &Vector3<f64>,
-    rows: &mut [Columns],
-) {
-    let [n, t, b] = contact.frame.rows();
-    let (lead, rest) = rows.split_at_mut(model.lead(body));
-    if let Some(rows) = lead.first_chunk_mut::<BASE>() {
-        let (xn, xt, xb) = (x.cross(&n), x.cross(&t), x.cross(&b));
-        for i in 0..3 {
-            rows[i] = [n[i], t[i], b[i], 0.0];
-            rows[3 + i] = [xn[i], xt[i], xb[i], 0.0];
-        }
-    }
-    let of_motion =
-        |velocity: &Vector3<f64>| [velocity.dot(&n), velocity.dot(&t), velocity.dot(&b), 0.0];
-    for (row, mover) in rest.iter_mut().zip(model.movers(body)) {
-        *row = of_motion(&kinematics.velocity_at(mover.motion, x));
-    }
+) -> impl Iterator<Item = (usize, f64, Path<'a>)> {
+    let own = Path::of(mechanism, contact.body);
+    let other = (contact.other).map(|other| (other.body, -1.0, Path::of(mechanism, other.body)));
+    let base = other.and_then(|(.., path)| path.base);
+    let is_common = base.is_some() && base == own.base;
+    let all = std::iter::once((contact.body, 1.0, own)).chain(other);
+    all.map(move |(body, sign, path)| {
+        let base = path.base.filter(|_| !is_common);
+        (body, sign, Path { base, ..path })
+    })
 }
 
 /// `out = H p` (nv): generalized impulse, N s and N m s, of the impulses `p` (3 n_c) at the
@@ -98,56 +89,41 @@ pub fn generalized_impulse(
     p: &[f64],
     out: &mut [f64],
 ) {
+    let motion = Still {
+        model,
+        kinematics,
+        v: &[],
+    };
     out.fill(0.0);
-    for (contact, p) in contacts.iter().zip(p.chunks_exact(3)) {
-        if let Some((k, sign)) = limit::row(model, contact) {
-            out[k] += sign * p[0];
-            continue;
-        }
-        let [n, t, b] = contact.frame.rows();
-        let force = n * p[0] + t * p[1] + b * p[2];
-        push(model, kinematics, contact.body, &contact.point, &force, out);
-        // The other body receives the opposite impulse at the same point.
-        if let Some(other) = contact.other {
-            push_other(model, kinematics, contact, other.body, &-force, out);
+    for (contact, p) in contacts.iter().zip(p.as_chunks().0) {
+        match limit::row(model, contact) {
+            Some((k, sign)) => out[k] += sign * p[0],
+            None => add_impulse(&motion, contact, *p, |k, x| out[k] += x),
         }
     }
 }
 
-/// Adds the generalized impulse of an impulse applied to a body at a point.
-#[allow(clippy::inline_always)] // as columns_at
-#[inline(always)]
-fn push(
-    model: &Model,
-    kinematics: &Kinematics,
-    body: usize,
-    x: &Vector3<f64>,
-    force: &Vector3<f64>,
-    out: &mut [f64],
-) {
-    let moment = x.cross(force);
-    let (lead, _) = model.split_path(body);
-    if let Some(out) = out[lead].first_chunk_mut::<BASE>() {
-        for i in 0..3 {
-            out[i] += force[i];
-            out[3 + i] += moment[i];
-        }
-    }
-    for mover in model.movers(body) {
-        out[mover.velocity] += kinematics.power(mover.motion, force, &moment);
-    }
-}
-
-/// The same for the other body of a contact, kept out of the loop over ground contacts.
-#[cold]
-fn push_other(
-    model: &Model,
-    kinematics: &Kinematics,
+/// Calls `act` with each velocity and the generalized impulse on it of a contact's impulse `p`, N s.
+/// The other body receives the opposite impulse at the same point.
+#[inline]
+pub(crate) fn add_impulse(
+    motion: &impl BodyMotion,
     contact: &Contact,
-    body: usize,
-    force: &Vector3<f64>,
-    out: &mut [f64],
+    p: Triple<f64>,
+    mut act: impl FnMut(usize, f64),
 ) {
-    let x = place_in_tree_of(kinematics, contact, body);
-    push(model, kinematics, body, &x, force, out);
+    for (body, sign, path) in sides(motion.mechanism(), contact) {
+        let place = place_at(motion, contact, body);
+        let [force, moment] = place.wrench(p.map(|p| sign * p));
+        if let Some(first) = path.base {
+            let both = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
+            (first..).zip(both).for_each(|(k, x)| act(k, x));
+        }
+        for mover in path.movers {
+            act(
+                mover.velocity,
+                motion.motion(mover.motion).power(force, moment),
+            );
+        }
+    }
 }

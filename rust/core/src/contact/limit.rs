@@ -12,7 +12,7 @@ use super::activation::Activation;
 use super::frame::ContactFrame;
 use super::pair::{Contact, ContactKey, Opposite};
 use super::part::{Part, Side};
-use crate::multibody::{Joint, Kinematics, Model};
+use crate::multibody::{JointModel, Kinematics, Model};
 
 impl Side {
     /// Gap rate per unit of the joint's velocity.
@@ -96,10 +96,7 @@ fn gap(model: &Model, joints: &[f64], joint: usize, side: Side) -> f64 {
 fn contact(model: &Model, kinematics: &Kinematics, joint: usize, side: Side, gap: f64) -> Contact {
     let body = model.joints()[joint].body;
     let motion = &kinematics.motions()[model.bodies()[body].motion];
-    let axis: Vector3<f64> = match model.bodies()[body].joint {
-        Joint::Prismatic(_) => motion.swing.into(),
-        _ => motion.axis.into(),
-    };
+    let axis: Vector3<f64> = model.bodies()[body].joint.direction(motion).into();
     Contact {
         key: ContactKey::at_limit(joint, side),
         part: Part::Limit(joint, side),

@@ -8,8 +8,30 @@
 //! contacts enter the step.
 //! [`wheel_gaps`] measures how far the wheels are from the ground and nothing else,
 //! `box_clearance` how far a box is from a surface at least.
-//! [`relocation`] re-evaluates them in another configuration. [`jacobian`] and [`delassus`]
-//! assemble the matrices.
+//! [`relocation`] re-evaluates them in another configuration. `rows` has the rows of the contact
+//! Jacobian and the products with them, [`jacobian`] and [`delassus`] assemble the matrices.
+//!
+//! # One call
+//!
+//! Contacts of a step, as [`crate::system::tree`] asks for them:
+//!
+//! ```text
+//! poses at the middle ──► detect            candidates near each part → query → Activation::admits
+//!                         detect_pairs      parts of two bodies
+//!                         detect_limits     joints at their stops
+//!                               │
+//!                               ▼  Vec<Contact>: key, point, frame, gap
+//! poses at the end ─────► relocate, relocate_limit
+//!                               │
+//! factor of M̂ ──────────► ContactSystem::assemble       H, Z = L⁻ᵀ H, W = Zᵀ Z, u = Hᵀ v
+//!                               │
+//!                               ▼
+//!                   local, add_impulses, generalized_impulse      what a step needs of H and Z
+//! ```
+//!
+//! # May use
+//!
+//! [`crate::multibody`], [`crate::geometry`], [`crate::law`].
 
 pub mod activation;
 pub(crate) mod body_motion;
@@ -23,6 +45,7 @@ pub mod pair;
 pub mod pair_detection;
 pub mod part;
 pub mod relocation;
+pub(crate) mod rows;
 pub(crate) mod ways_out;
 pub mod wheel_gaps;
 

@@ -7,6 +7,27 @@
 //!   leads to the goal; [`domain`]: properties of rover and world;
 //! - [`scene`]: all of these, and the rover in them; [`many`]: the next scenes of many rovers, on
 //!   several threads.
+//!
+//! # One call
+//!
+//! SceneDistribution::draw(random)          at most `attempts` times:
+//!
+//! ```text
+//!    │
+//!    ├─ rocks, start, domain               every number is drawn, whatever is fixed
+//!    ├─ ground                             plane, hills or sand under them
+//!    ├─ start::resting_on                  the rover brought down onto the ground
+//!    ├─ way::leads                         on uneven ground: whether the goals can be reached
+//!    └─ deepest_overlap                    too deep → again
+//!    │
+//!    ▼
+//! DrawnScene                               a RoverScene, its options, start and goal
+//! ```
+//!
+//! # May use
+//!
+//! [`crate::scalar`], [`crate::multibody`], [`crate::geometry`], [`crate::contact`],
+//! [`crate::integrator`], [`crate::simulation`].
 
 pub mod domain;
 pub mod error;

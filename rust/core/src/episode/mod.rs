@@ -12,6 +12,31 @@
 //! - [`running`]: one episode and its control period;
 //! - [`batch`]: many rovers side by side, each with its episode; [`autoreset`]: a step in which the
 //!   next episodes begin, too.
+//!
+//! # One call
+//!
+//! One control period, alone or as a row of a batch:
+//!
+//! ```text
+//! action ──► Episode::command      wheel torques and steering           action
+//!               │
+//!               ▼
+//!            simulation            several physics steps                crate::simulation
+//!               │
+//!               ▼
+//!            read_state, read_heights
+//!               │
+//!               ▼
+//!            Episode::advance      quantities → progress → reward terms → ending → observation
+//!               │
+//!               ▼
+//!            Outcome               observation, terms, ending
+//! ```
+//!
+//! # May use
+//!
+//! [`crate::scalar`], [`crate::multibody`], [`crate::integrator`], [`crate::simulation`],
+//! [`crate::draw`].
 
 pub mod action;
 pub mod autoreset;

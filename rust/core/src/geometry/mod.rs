@@ -5,6 +5,28 @@
 //!   one module per pair of shapes;
 //! - [`ray`]: what a ray meets first;
 //! - [`support`]: a ground of any shape under a round body, in the plane or in space.
+//!
+//! # One call
+//!
+//! A wheel on a terrain, as [`crate::contact`] asks:
+//!
+//! ```text
+//! Terrain::visit_near(place, reach)         broad phase: only primitives that can be in reach
+//!    │  Plane, Sphere, Face, Edge, Vertex
+//!    ▼
+//! query::dispatch::visit_on_plane, ...      one page for each pair of shapes
+//!    │
+//!    ▼
+//! gap, normal, point on both sides          zero or more a pair
+//!
+//! Terrain::first_hit(ray) ──► ray::{plane, sphere, triangle, ...} ──► the nearest Hit
+//! ```
+//!
+//! # May use
+//!
+//! [`crate::quantity`], [`crate::scalar`], [`crate::spatial`], [`crate::sand`].
+//!
+//! From [`crate::sand`] only the numbers of a soil, which a terrain carries.
 
 pub mod broad_phase;
 pub mod query;

@@ -30,6 +30,7 @@
 //! ```text
 //! Δ(K + V) = W + released − dissipated − lost − removed + lifted
 //! ```
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use super::mechanical_system::{
     KeyOf, MechanicalEnergy, MechanicalSystem, Start, UnilateralContact,
@@ -39,18 +40,19 @@ use super::report::StepReport;
 use super::scratch::{Scratch, ScratchOf};
 use super::step_contacts::{contact_work, place};
 use super::warm_start::WarmStart;
+use crate::scalar::{Lane, Vec3};
 
 /// Largest gain in a step that is tolerated, as a fraction of the kinetic energy.
 pub const GAIN: f64 = 5e-10;
 
 /// Excess, as a fraction of the kinetic energy, above which the step is repeated.
-pub(crate) const COARSE: f64 = 1e-3;
+const COARSE: f64 = 1e-3;
 
 /// Rounding errors allowed in the difference of two energies.
-pub(crate) const ROUNDINGS: f64 = 64.0;
+const ROUNDINGS: f64 = 64.0;
 
 /// Largest relative increase of the energy of free motion in a step.
-pub(crate) const RAISE: f64 = 1.0;
+const RAISE: f64 = 1.0;
 
 /// Fraction of the kinetic energy after a step that may be removed by scaling the velocity alone.
 const SHORT: f64 = 0.5;
@@ -122,7 +124,7 @@ impl Audit {
         let dissipated = -contact_work::<S>(options, start.v, warm_start, ws);
         let Balance {
             after,
-            excess,
+            excess: balance,
             work,
             released,
         } = if self.is_last {
@@ -130,6 +132,7 @@ impl Audit {
         } else {
             balance(system, options, start, ws, &before)
         };
+        let excess = balance.value;
         if !excess.is_finite() {
             return if self.is_last {
                 Verdict::Sound // not finite: refused when the step ends
@@ -137,41 +140,33 @@ impl Audit {
                 Verdict::Coarse
             };
         }
-        let (size, rounding) = measures(options, &before, &after, work);
         // With θ > ½ the scheme itself dissipates.
         let is_free = ws.contacts.is_empty() && options.theta <= 0.5;
-        let is_balanced = if is_free {
-            excess.abs() <= rounding + self.drift * size
-        } else {
-            excess <= rounding + self.gain * size
-        };
-        if is_balanced {
-            report.energy_gain = report.energy_gain.max(relative(excess - rounding, size));
+        if balance.is_balanced(is_free, [self.gain, self.drift]) {
+            report.energy_gain = report.energy_gain.max(balance.relative());
             report.enter_balance(dissipated, 0.0, released, excess);
             ws.audited.is(&ws.end, &ws.v, after);
             return Verdict::Sound;
         }
-        let coarse = if is_free { excess.abs() } else { excess };
-        // An excess remains at v⁺ = 0.
-        let is_left = excess - after.kinetic > rounding + self.gain * size;
-        if (coarse > COARSE * size || is_left) && !self.is_last {
+        if balance.is_coarse(is_free, self.gain) && !self.is_last {
             return Verdict::Coarse;
         }
         let d = S::DIMENSION.components();
         let nothing_outside = is_free || ws.contacts.iter().all(UnilateralContact::is_internal);
-        let relative = share_of_relative_motion(&after, excess)
-            .filter(|_| nothing_outside && (is_free || excess > 0.0));
-        if relative.is_some() || excess > 0.0 {
-            let share = relative.unwrap_or((1.0 - excess / after.kinetic).max(0.0).sqrt());
+        let (share, is_enough) =
+            balance.share_of_relative_motion(after.momentum.into(), after.mass);
+        let is_relative = is_enough && nothing_outside && (is_free || excess > 0.0);
+        if is_relative || excess > 0.0 {
+            let share = if is_relative { share } else { balance.share() };
             if options.is_elastic() && !is_free {
                 report.residual = report.residual.max(violation_by(share, ws, d));
             }
-            if relative.is_some() {
+            if is_relative {
                 scale_relative_motion(system, ws, share, &after);
             } else {
                 shorten(ws, share);
             }
-            if is_left {
+            if balance.is_left(self.gain) {
                 self.hold_back(system, options, start, ws);
             }
         }
@@ -262,31 +257,99 @@ pub(super) fn count_lift<S: MechanicalSystem>(
 #[derive(Clone, Copy, Debug)]
 struct Balance {
     after: MechanicalEnergy,
-    /// Of the change of the energy over `work` and `released`.
-    excess: f64,
+    excess: Excess<f64>,
     work: f64,
     released: f64,
 }
 
-/// What a change of the energy is compared with, J: the kinetic energy at hand, and the rounding of
-/// the balance.
-fn measures(
-    options: &StepOptions,
-    before: &MechanicalEnergy,
-    after: &MechanicalEnergy,
-    work: f64,
-) -> (f64, f64) {
-    // A machine at rest has no kinetic energy as a measure: use at least what gravity adds in a
-    // step of free fall.
-    let fall = options.gravity.norm() * options.time_step;
-    let least = 0.5 * after.mass * fall * fall;
-    let size = before.kinetic.max(after.kinetic).max(least);
-    let sum = before.kinetic.abs()
-        + after.kinetic.abs()
-        + before.potential.abs()
-        + after.potential.abs()
-        + work.abs();
-    (size, ROUNDINGS * f64::EPSILON * sum)
+/// Excess of the change of the energy over what was supplied, and what it is compared with, J.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Excess<T> {
+    pub value: T,
+    /// Kinetic energy after the step.
+    kinetic: T,
+    /// The kinetic energy at hand. A machine at rest has none as a measure: at least what gravity
+    /// adds in a step of free fall.
+    size: T,
+    /// Rounding of the balance.
+    rounding: T,
+}
+
+impl<T: Lane> Excess<T> {
+    /// `before` and `after`: kinetic and potential energy; `supplied`: work of the actuators, and
+    /// what contacts release; `fall`: speed of a body that falls for the step from rest, m/s.
+    #[inline(always)]
+    pub(crate) fn new(
+        before: [T; 2],
+        after: [T; 2],
+        [work, released]: [T; 2],
+        (mass, fall): (T, T),
+    ) -> Self {
+        let [kinetic, _] = after;
+        let change = (after[0] - before[0]) + (after[1] - before[1]);
+        let least = work.like(0.5) * mass * fall * fall;
+        let sizes = before[0].abs() + after[0].abs() + before[1].abs() + after[1].abs();
+        Self {
+            value: change - (work + released),
+            kinetic,
+            size: before[0].max(kinetic).max(least),
+            rounding: work.like(ROUNDINGS * f64::EPSILON) * (sizes + work.abs()),
+        }
+    }
+
+    /// Free flight may neither gain nor lose.
+    #[inline(always)]
+    fn measured(&self, is_free: T::Mask) -> T {
+        T::select(is_free, self.value.abs(), self.value)
+    }
+
+    /// Where the step is accepted as it is; `gain` and, in free flight, `drift`: fractions of the
+    /// kinetic energy.
+    #[inline(always)]
+    pub(crate) fn is_balanced(&self, is_free: T::Mask, [gain, drift]: [T; 2]) -> T::Mask {
+        let allowed = self.rounding + T::select(is_free, drift, gain) * self.size;
+        self.measured(is_free).le(allowed)
+    }
+
+    /// Where it is coarse, or an excess remains at v⁺ = 0. What is not finite is coarse.
+    #[inline(always)]
+    pub(crate) fn is_coarse(&self, is_free: T::Mask, gain: T) -> T::Mask {
+        let coarse = self.size.like(COARSE) * self.size;
+        !self.measured(is_free).le(coarse) | self.is_left(gain)
+    }
+
+    /// Where an excess remains at v⁺ = 0.
+    #[inline(always)]
+    fn is_left(&self, gain: T) -> T::Mask {
+        !(self.value - self.kinetic).le(self.rounding + gain * self.size)
+    }
+
+    /// As a fraction of the kinetic energy.
+    #[inline(always)]
+    pub(crate) fn relative(&self) -> T {
+        let (zero, tiny) = (self.value.like(0.0), self.value.like(f64::MIN_POSITIVE));
+        (self.value - self.rounding).max(zero) / self.size.max(tiny)
+    }
+
+    /// Scale of the velocity that removes it.
+    #[inline(always)]
+    pub(crate) fn share(&self) -> T {
+        let (zero, one) = (self.value.like(0.0), self.value.like(1.0));
+        (one - self.value / self.kinetic).max(zero).sqrt()
+    }
+
+    /// Scale of the motion relative to the mass centre that removes it, and where it is no larger
+    /// than the energy of that motion.
+    #[inline(always)]
+    pub(crate) fn share_of_relative_motion(&self, momentum: Vec3<T>, mass: T) -> (T, T::Mask) {
+        let one = mass.like(1.0);
+        let whole = momentum.dot(momentum) / (mass.like(2.0) * mass);
+        let relative = self.kinetic - whole;
+        let share = (one - self.value / relative)
+            .min(mass.like(1.0 + RAISE))
+            .sqrt();
+        (share, self.value.lt(relative))
+    }
 }
 
 /// The balance of the step to `ws.end` and `ws.v`.
@@ -300,10 +363,12 @@ fn balance<S: MechanicalSystem>(
     let work = system.work(options, start, &ws.v);
     let after = system.energy(options, &ws.end, &ws.v).unwrap_or(*before);
     let released = supplied_by_contacts::<S>(options, ws);
-    let supplied = work + released;
+    let both = |energy: &MechanicalEnergy| [energy.kinetic, energy.potential];
+    let fall = options.gravity.norm() * options.time_step;
+    let (before, ends) = (both(before), both(&after));
     Balance {
         after,
-        excess: (after.kinetic - before.kinetic) + (after.potential - before.potential) - supplied,
+        excess: Excess::new(before, ends, [work, released], (after.mass, fall)),
         work,
         released,
     }
@@ -334,7 +399,7 @@ fn shortened_balance<S: MechanicalSystem>(
     let mut found = balance(system, options, start, ws, before);
     for _ in 0..MOST_SHORTENINGS {
         let Balance { after, excess, .. } = found;
-        if excess.is_nan() || excess <= SHORT * after.kinetic {
+        if excess.value.is_nan() || excess.value <= SHORT * after.kinetic {
             break;
         }
         // The velocity is far off, and so is the displacement that it caused. Shorten both
@@ -346,15 +411,6 @@ fn shortened_balance<S: MechanicalSystem>(
         found = balance(system, options, start, ws, before);
     }
     found
-}
-
-/// Scale of the motion relative to the mass centre that removes an excess; none where the excess is
-/// larger than the energy of that motion.
-fn share_of_relative_motion(after: &MechanicalEnergy, excess: f64) -> Option<f64> {
-    let whole = after.momentum.norm_squared() / (2.0 * after.mass);
-    let relative_kinetic = after.kinetic - whole;
-    let share = || (1.0 - excess / relative_kinetic).min(1.0 + RAISE).sqrt();
-    (excess < relative_kinetic).then(share)
 }
 
 /// Scales the motion relative to the mass centre, in the local velocities too.

@@ -382,6 +382,27 @@ pub trait MechanicalSystem {
         solve(&self.problem(q, mu), options, p, u, workspace)
     }
 
+    /// Solves the problem of the step that leads to the velocity `v + F⁻¹ y` without contacts
+    /// (`v`, nv; y in factor coordinates), as [`Self::solve`] does.
+    ///
+    /// A system whose contacts bear more than an impulse, such as moments of rolling friction,
+    /// finds these here and keeps them for [`Self::add_moments`].
+    fn solve_step(
+        &mut self,
+        _free: (&[f64], &[f64]),
+        q: &[f64],
+        mu: &[f64],
+        options: &SolverOptions,
+        p: &mut [f64],
+        u: &mut [f64],
+        workspace: &mut SolverWorkspace,
+    ) -> SolveReport {
+        self.solve(q, mu, options, p, u, workspace)
+    }
+
+    /// `y +=` the effect of what [`Self::solve_step`] found besides p. By default there is nothing.
+    fn add_moments(&self, _y: &mut [f64]) {}
+
     /// Largest displacement, m, that `y` (nv) causes away from the contact points; it limits the
     /// projection.
     fn displacement(&self, y: &[f64]) -> f64;

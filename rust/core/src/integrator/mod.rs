@@ -14,6 +14,29 @@
 //! and the planar systems ([`crate::system`], [`crate::planar`]) step through the same code. The
 //! schemes share the treatment of contacts (`step_contacts`), and `variant` chooses one of them by
 //! the options.
+//!
+//! # One call
+//!
+//! A Moreau–Jean step, `attempt` in moreau_jean; every line but the last is a call of the system:
+//!
+//! ```text
+//! q, v ──► place_middle, place_end          q + (1−θ) h v and q + h v
+//!      ──► detect, relocate                 the contacts of the step
+//!      ──► update_mass_matrix, factorise    M̂ = Fᵀ F
+//!      ──► assemble                         Z = F⁻ᵀ H, W = Zᵀ Z
+//!      ──► load, half_solve                 free change of velocity; twice, for the bias at v_m
+//!      ──► solve                            p, by crate::solver
+//!      ──► add_impulses, half_solve_back    v⁺ and q⁺ = q ⊕ h (θ v⁺ + (1−θ) v)
+//!      ──► revise, energy_audit             another branch or too much energy: again, or halved
+//!      ──► position_projection              what penetrates is moved out
+//!      ──► StepReport
+//! ```
+//!
+//! # May use
+//!
+//! [`crate::law`], [`crate::contact`], [`crate::problem`], [`crate::solver`].
+//!
+//! No machine: a scheme knows a [`MechanicalSystem`].
 
 pub mod accuracy;
 pub mod contact_modes;

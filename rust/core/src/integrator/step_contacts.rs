@@ -270,7 +270,7 @@ pub(super) fn add_correction<S: MechanicalSystem>(
 /// Starts from `ws.p`. `is_from_start`: `ws.v` is still the velocity before
 /// the step, whose local velocity is known.
 pub(super) fn solve_contacts<S: MechanicalSystem>(
-    system: &S,
+    system: &mut S,
     options: &StepOptions,
     ws: &mut ScratchOf<S>,
     is_from_start: bool,
@@ -317,6 +317,7 @@ pub(super) fn solve_contacts<S: MechanicalSystem>(
         }
         report.enter(&solved);
         system.add_impulses(&ws.p, &mut ws.y);
+        system.add_moments(&mut ws.y);
         probe.end(Phase::Solve);
     }
     ws.half_solve_back(|y| system.half_solve_back(y));
@@ -344,14 +345,16 @@ fn add_shifts<S: MechanicalSystem>(
 
 /// Solves the assembled problem from `ws.p` and charges the step's budget.
 fn solve_problem<S: MechanicalSystem>(
-    system: &S,
+    system: &mut S,
     options: &StepOptions,
     ws: &mut ScratchOf<S>,
 ) -> SolveReport {
-    let solved = system.solve(
+    let solver_options = ws.solver_options(&options.solver);
+    let solved = system.solve_step(
+        (&ws.v, &ws.y),
         &ws.q_free,
         &ws.mu,
-        &ws.solver_options(&options.solver),
+        &solver_options,
         &mut ws.p,
         &mut ws.u,
         &mut ws.solver,

@@ -1,13 +1,57 @@
-//! The contacts of a block that are found lane by lane (`lane_detection`), and their part in its
-//! matrices.
+//! The contacts of a block that are found lane by lane (`lane_detection`).
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::machine::Machine;
+use crate::contact::body_motion::BodyMotion;
 use crate::contact::{Contact, PairSearch, Part};
+use crate::multibody::Motion;
 use crate::multibody::Poses;
-use crate::multibody::mechanism::{BASE, Mover};
-use crate::scalar::{Lane, MAX_LANES};
+use crate::multibody::mechanism::Mechanism;
+use crate::scalar::{Lane, MAX_LANES, Vec3};
+
+/// A lane of a block.
+#[derive(Clone, Copy)]
+pub(super) struct OneLane<'a, T: Lane> {
+    pub machine: &'a Machine,
+    pub poses: &'a Poses<T>,
+    pub v: &'a [T],
+    pub lane: usize,
+}
+
+impl<T: Lane> BodyMotion for OneLane<'_, T> {
+    #[inline]
+    fn mechanism(&self) -> &Mechanism {
+        self.machine
+    }
+
+    #[inline]
+    fn origin(&self, _: usize) -> Vector3<f64> {
+        self.poses.origin.get(self.lane).into()
+    }
+
+    #[inline]
+    fn pose(&self, body: usize) -> (Matrix3<f64>, Vector3<f64>) {
+        let own = &self.poses.bodies[body];
+        let columns = own.R.columns().map(|x| Vector3::from(x.get(self.lane)));
+        (Matrix3::from_columns(&columns), own.r.get(self.lane).into())
+    }
+
+    #[inline]
+    fn motion(&self, motion: usize) -> Motion<f64> {
+        let own = &self.poses.motions[motion];
+        let vector = |x: Vec3<T>| Vec3::from(Vector3::from(x.get(self.lane)));
+        Motion {
+            axis: vector(own.axis),
+            swing: vector(own.swing),
+        }
+    }
+
+    #[inline]
+    fn velocity(&self, k: usize) -> f64 {
+        self.v[k].get(self.lane)
+    }
+}
 
 /// A part whose contacts are asked for.
 #[derive(Clone, Copy, Debug)]
@@ -42,13 +86,6 @@ pub(super) struct ByLane<T> {
     pub scratch: Vec<Contact>,
     /// Where bodies can touch each other.
     pub pairs: Option<PairSearch>,
-}
-
-/// Axis and swing of a velocity's motion in a lane.
-#[inline]
-pub(super) fn motion<T: Lane>(poses: &Poses<T>, mover: Mover, lane: usize) -> [Vector3<f64>; 2] {
-    let own = &poses.motions[mover.motion];
-    [own.axis.get(lane).into(), own.swing.get(lane).into()]
 }
 
 impl<T: Lane> ByLane<T> {
@@ -104,9 +141,9 @@ impl<T: Lane> ByLane<T> {
             .then(|| &self.found[usize::from(self.places[slot][lane])].contact)
     }
 
-    /// Those of a slot whose path is another one.
+    /// Contacts of a slot that were found lane by lane.
     #[inline(always)]
-    pub(super) fn guests(&self, slot: usize) -> impl Iterator<Item = (usize, &Contact)> {
+    fn found(&self, slot: usize) -> impl Iterator<Item = &Found> {
         let mut lanes = self.given[slot];
         std::iter::from_fn(move || {
             if lanes == 0 {
@@ -116,8 +153,18 @@ impl<T: Lane> ByLane<T> {
             lanes &= lanes - 1;
             Some(&self.found[usize::from(self.places[slot][lane])])
         })
-        .filter(|found| found.is_guest)
-        .map(|found| (found.lane, &found.contact))
+    }
+
+    /// The same with their lanes.
+    #[inline(always)]
+    pub(super) fn contacts(&self, slot: usize) -> impl Iterator<Item = (usize, &Contact)> {
+        (self.found(slot)).map(|found| (found.lane, &found.contact))
+    }
+
+    /// Those whose path is not the slot's.
+    #[inline(always)]
+    pub(super) fn guests(&self, slot: usize) -> impl Iterator<Item = (usize, &Contact)> {
+        (self.found(slot).filter(|found| found.is_guest)).map(|found| (found.lane, &found.contact))
     }
 
     /// Lanes with contacts between bodies.
@@ -135,85 +182,4 @@ impl<T: Lane> ByLane<T> {
             self.given.fill(0);
         }
     }
-}
-
-/// Calls `act` with each velocity of a joint that moves a contact, the velocity (m/s) of its point
-/// per unit of it being `axis × x + swing`: of its own body with the sign 1, of the other one with
-/// −1.
-pub(super) fn for_each_motion<T: Lane>(
-    machine: &Machine,
-    poses: &Poses<T>,
-    (lane, contact): (usize, &Contact),
-    mut act: impl FnMut(usize, f64, Vector3<f64>, Vector3<f64>),
-) {
-    let other = contact.other.map(|other| (other.body, -1.0));
-    for (body, sign) in std::iter::once((contact.body, 1.0)).chain(other) {
-        for mover in machine.movers(body) {
-            let [axis, swing] = motion(poses, *mover, lane);
-            act(mover.velocity, sign, axis, swing);
-        }
-    }
-}
-
-/// Columns of Hᵀ of a contact along a slot's path: those of the base, then of the velocities of
-/// `movers`.
-pub(super) fn write_rows<T: Lane>(
-    machine: &Machine,
-    poses: &Poses<T>,
-    (lane, contact): (usize, &Contact),
-    movers: &[Mover],
-    rows: &mut [[T; 3]],
-) {
-    let frame = contact.frame.rows();
-    let x = contact.point;
-    let (base, joints) = rows.split_at_mut(BASE);
-    for (j, d) in frame.iter().enumerate() {
-        let moment = x.cross(d);
-        let whole = [d.x, d.y, d.z, moment.x, moment.y, moment.z];
-        for (row, own) in base.iter_mut().zip(whole) {
-            row[j].set(lane, if contact.other.is_some() { 0.0 } else { own });
-        }
-    }
-    for row in joints.iter_mut() {
-        for own in row {
-            own.set(lane, 0.0);
-        }
-    }
-    for_each_motion(
-        machine,
-        poses,
-        (lane, contact),
-        |velocity, sign, axis, swing| {
-            let Some(k) = movers.iter().position(|mover| mover.velocity == velocity) else {
-                return;
-            };
-            let moved = (axis.cross(&x) + swing) * sign;
-            for (own, d) in joints[k].iter_mut().zip(&frame) {
-                own.set(lane, own.get(lane) + moved.dot(d));
-            }
-        },
-    );
-}
-
-/// Adds the generalized impulse of a contact's impulse (N s) on the velocities of joints.
-pub(super) fn add_impulse<T: Lane>(
-    machine: &Machine,
-    poses: &Poses<T>,
-    (lane, contact): (usize, &Contact),
-    p: [f64; 3],
-    out: &mut [T],
-) {
-    let [n, t, b] = contact.frame.rows();
-    let force = n * p[0] + t * p[1] + b * p[2];
-    let moment = contact.point.cross(&force);
-    for_each_motion(
-        machine,
-        poses,
-        (lane, contact),
-        |velocity, sign, axis, swing| {
-            let own = &mut out[velocity];
-            let power = sign * (axis.dot(&moment) + swing.dot(&force));
-            own.set(lane, own.get(lane) + power);
-        },
-    );
 }

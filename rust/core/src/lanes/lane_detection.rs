@@ -2,53 +2,15 @@
 //! of boxes and balls, of bodies with each other, and of wheels that touch more than a plane or a
 //! few spheres. They take free slots whose path of velocities begins with their body's.
 
-use nalgebra::{Matrix3, Vector3};
-
-use super::by_lane::{Asked, Found, motion};
+use super::by_lane::{Asked, Found, OneLane};
 use super::contacts::{Contacts, Sight};
 use super::ground::Ground;
 use super::machine::Machine;
-use crate::contact::body_motion::BodyMotion;
 use crate::contact::detection::{Moving, detect_parts};
 use crate::contact::pair_detection::detect_pairs_of;
 use crate::contact::relocation::relocate_to;
 use crate::contact::{Activation, Contact, PairSearch, Part};
-use crate::multibody::Poses;
 use crate::scalar::{Lane, LaneMask};
-
-/// A lane of a block.
-struct OneLane<'a, T: Lane> {
-    machine: &'a Machine,
-    poses: &'a Poses<T>,
-    v: &'a [T],
-    lane: usize,
-}
-
-impl<T: Lane> BodyMotion for OneLane<'_, T> {
-    #[inline]
-    fn origin(&self, _: usize) -> Vector3<f64> {
-        self.poses.origin.get(self.lane).into()
-    }
-
-    #[inline]
-    fn pose(&self, body: usize) -> (Matrix3<f64>, Vector3<f64>) {
-        let own = &self.poses.bodies[body];
-        let columns = [own.R.x, own.R.y, own.R.z].map(|x| Vector3::from(x.get(self.lane)));
-        (Matrix3::from_columns(&columns), own.r.get(self.lane).into())
-    }
-
-    #[inline]
-    fn point_velocity(&self, body: usize, x: &Vector3<f64>) -> Vector3<f64> {
-        let v = |k: usize| self.v[k].get(self.lane);
-        let turning = Vector3::new(v(3), v(4), v(5));
-        let mut velocity = Vector3::new(v(0), v(1), v(2)) + turning.cross(x);
-        for mover in self.machine.movers(body) {
-            let [axis, swing] = motion(self.poses, *mover, self.lane);
-            velocity += (axis.cross(x) + swing) * v(mover.velocity);
-        }
-        velocity
-    }
-}
 
 impl<T: Lane> Contacts<T> {
     /// Finds what was asked for. Returns the lanes with unknown ground or too few slots.

@@ -50,8 +50,6 @@ pub struct Machine {
     pub(super) spares: Vec<Option<usize>>,
     /// Whether its bodies can touch each other.
     pub(super) has_pairs: bool,
-    /// Joints with springs or dampers, ascending.
-    pub(super) passive: Vec<usize>,
     /// Pattern of its contact problems; none if they cannot be solved by the factors of their
     /// operator.
     pub(super) pattern: Option<Arc<Pattern>>,
@@ -133,9 +131,6 @@ impl Machine {
                 .collect(),
             spares: Vec::new(),
             has_pairs: model.description().self_contact,
-            passive: (0..model.n_joints())
-                .filter(|&joint| model.joints()[joint].is_passive)
-                .collect(),
             pattern: None,
         };
         machine.spares = machine.find_free_slots(machine.has_pairs);
@@ -156,9 +151,8 @@ impl Machine {
     }
 
     /// Whether a model differs from this machine only in its inertias, springs, dampers and rotors,
-    /// so that it can be a lane of a block. A joint that gains or loses such an element, a mass
-    /// centre that leaves the frame's origin, or moments that are no longer equal, make another
-    /// machine.
+    /// so that it can be a lane of a block. A joint that gains or loses a rotor, a mass centre that
+    /// leaves the frame's origin, or moments that are no longer equal, make another machine.
     #[must_use]
     pub fn fits(&self, model: &Model) -> bool {
         Self::of(model).is_ok_and(|other| other == *self)

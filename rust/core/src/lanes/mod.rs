@@ -17,13 +17,40 @@
 //!   `sweeps`, `lane_solver`, [`queue`]: the friction-contact problems, which
 //!   [`crate::solver`]'s pivoting solves;
 //! - [`step`]: the step.
+//!
+//! # One call
+//!
+//! A step of a block of rovers; `queue` solves the problems of several blocks together:
+//!
+//! ```text
+//! LaneRover ──► Block::load_rover     state, command and memory of one rover into its lane
+//!                    │
+//!                    ▼
+//!               Block::prepare        poses, contacts, mass matrix, W, free velocity
+//!                    │                a lane that cannot go on is declined; its state is unchanged
+//!                    ▼
+//!               Queue                 the friction-contact problems
+//!                    │
+//!                    ▼
+//!               Block::conclude       new state, motors' branches, energy audit
+//!                    │  Next          again, or the problem of the position projection
+//!                    ▼
+//!               Block::finish ──► Block::store_rover
+//! ```
+//!
+//! A declined lane takes the general step: [`crate::simulation`], [`crate::integrator`].
+//!
+//! # May use
+//!
+//! [`crate::scalar`], [`crate::law`], [`crate::multibody`], [`crate::geometry`],
+//! [`crate::contact`], [`crate::problem`], [`crate::solver`], [`crate::integrator`],
+//! [`crate::system`].
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 pub mod admission;
 mod by_lane;
 mod contact_plane;
 pub mod contacts;
-pub mod drives;
 mod equations;
 pub mod forecast;
 mod free_slots;

@@ -10,7 +10,8 @@ use nalgebra::Vector3;
 use super::machine::Machine;
 use crate::contact::Part;
 use crate::multibody::JointAxis;
-use crate::multibody::mechanism::{Link, LinkJoint, Mover};
+use crate::multibody::joint::{Joint, JointModel, Revolute};
+use crate::multibody::mechanism::{Link, Mover};
 use crate::multibody::poses::{Pose, Poses};
 use crate::scalar::{Lane, Mat3, Vec3};
 
@@ -108,7 +109,7 @@ impl Parts {
                 n_slots += wheel.n_slots();
                 let link = &machine.links[wheel.body];
                 let axle = axle_of(wheel.axle);
-                let spins = link.is_spinner && link.coupling.is_none() && link.turns_about(axle);
+                let spins = link.is_spinner && link.turns_about(axle);
                 let mover = if spins { link.parent } else { wheel.body };
                 Wheel {
                     body: wheel.body,
@@ -175,15 +176,18 @@ impl Parts {
 }
 
 impl Link {
-    /// Whether its joint turns it about this axle.
+    /// Whether a coordinate of its own turns it about this axle.
     fn turns_about(&self, axle: Axle) -> bool {
-        let k = match self.axis {
+        let Joint::Revolute(Revolute { axis, .. }) = self.joint else {
+            return false;
+        };
+        let k = match axis {
             JointAxis::X => 0,
             JointAxis::Y => 1,
             JointAxis::Z => 2,
             JointAxis::General(_) => return false,
         };
-        self.joint == LinkJoint::Turn && matches!(axle, Axle::Frame(i, _) if i == k)
+        matches!(axle, Axle::Frame(i, _) if i == k)
     }
 }
 
@@ -286,11 +290,7 @@ fn carrier_of(machine: &Machine, body: usize, carriers: &mut Vec<Carrier>) -> us
     }
     let link = &machine.links[body];
     let mut parent = carrier_of(machine, link.parent, carriers);
-    let n_velocities = match link.joint {
-        LinkJoint::Ball(_) => 3,
-        _ => 1,
-    };
-    for k in 0..n_velocities {
+    for k in 0..link.joint.n_motions() {
         let mover = Mover {
             velocity: link.velocity + k,
             motion: link.motion + k,

@@ -1,22 +1,19 @@
 //! Contact Jacobian and Delassus operator `W = Hᵀ M̂⁻¹ H` of a block.
 //!
-//! As in [`crate::contact::delassus`]: with `M̂ = Lᵀ D L` and `Z = D^(-1/2) L^(-T) H` the operator
-//! is `W = Zᵀ Z`. A column of Z is nonzero along the path of its wheel, and a block of W is a
-//! product over the part of the path that two wheels share. Rows belong to slots
-//! ([`super::contacts`]). A stop has one row, ±1 at its joint's velocity; the tangential diagonal
-//! of W is that of the normal, as in [`crate::contact::limit`]. A slot that is active in some lanes
-//! only never changes what the others accumulate.
+//! The rows are those of `crate::contact::rows`, along the path of each slot's part
+//! ([`super::contacts`]). A slot that is active in some lanes only never changes what the others
+//! accumulate.
 
 use std::sync::Arc;
 
-use nalgebra::Vector3;
-
-use super::by_lane::{add_impulse, write_rows};
-use super::contacts::Contacts;
+use super::by_lane::OneLane;
+use super::contacts::{Contacts, Slot};
 use super::machine::Machine;
 use super::pattern::Pattern;
 use super::problem::{ContactProblem, Triple, block};
 use crate::contact::Contact;
+use crate::contact::jacobian::{add_impulse, for_each_row};
+use crate::contact::rows::{Path, Place, add, close_stop, product, square};
 use crate::multibody::mechanism::{BASE, Mover};
 use crate::multibody::{Factor, Poses};
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
@@ -38,13 +35,13 @@ pub struct Rows<T: Lane> {
     /// all velocities.
     bodies: Vec<Option<usize>>,
     /// Velocities of the joints that move each part, from the trunk outwards.
-    pub(super) movers: Vec<Vec<Mover>>,
+    movers: Vec<Vec<Mover>>,
     /// Velocities that two parts share: `common[a * n_parts + b]`.
     common: Vec<usize>,
     /// Length of the longest path.
-    pub(super) stride: usize,
+    stride: usize,
     /// Z along the path of each slot's wheel: `Z[slot * stride + k]`.
-    pub(super) Z: Vec<Triple<T>>,
+    Z: Vec<Triple<T>>,
     /// Blocks of W for the slots in use by lanes without factors, row-major: [`block`] of their
     /// positions among them.
     pub(super) W: Vec<[T; 9]>,
@@ -124,24 +121,22 @@ impl<T: Lane> Rows<T> {
             self.token,
             #[inline(always)]
             || {
-                for &slot in contacts.used_by_shapes() {
+                for &slot in contacts.used() {
                     self.build(machine, end, factor, contacts, v, slot);
                 }
-                for &slot in contacts.used_by_stops() {
-                    self.build_stop(machine, factor, contacts, v, slot);
-                }
                 self.multiply(contacts);
-                for (i, &slot) in contacts.used_densely().iter().enumerate() {
-                    if contacts.stop(slot).is_some() {
-                        let own = &mut self.W[block(i, i)];
-                        (own[4], own[8]) = (own[0], own[0]);
-                    }
-                }
                 if contacts.factored() != 0 {
                     self.multiply_diagonal(contacts);
                 }
             },
         );
+    }
+
+    /// Path of a slot, and its rows of Z.
+    #[inline(always)]
+    pub(super) fn of(&self, contacts: &Contacts<T>, slot: usize) -> (Path<'_>, &[Triple<T>]) {
+        let path = Path::from_trunk(&self.movers[contacts.part(slot)]);
+        (path, &self.Z[slot * self.stride..][..path.len()])
     }
 
     /// Z and `Hᵀ v` of a slot.
@@ -156,72 +151,27 @@ impl<T: Lane> Rows<T> {
         slot: usize,
     ) {
         let part = contacts.part(slot);
-        let movers = &self.movers[part][..];
-        let rows = &mut self.Z[slot * self.stride..][..BASE + movers.len()];
-        let own = contacts.slot(slot);
-        let (base, joints) = rows.split_at_mut(BASE);
-        let (x, n, t, b) = (own.point, own.n, own.t, own.b);
-        let (xn, xt, xb) = (x.cross(n), x.cross(t), x.cross(b));
-        base[0] = [n.x, t.x, b.x];
-        base[1] = [n.y, t.y, b.y];
-        base[2] = [n.z, t.z, b.z];
-        base[3] = [xn.x, xt.x, xb.x];
-        base[4] = [xn.y, xt.y, xb.y];
-        base[5] = [xn.z, xt.z, xb.z];
-        let mut u = scaled(&base[0], v[0]);
-        for k in 1..BASE {
-            add_scaled(&mut u, &base[k], v[k]);
-        }
-        let joints = &mut joints[..movers.len()];
-        for k in 0..movers.len() {
-            let moved = end.motions[movers[k].motion].velocity_at(x);
-            let row = [moved.dot(n), moved.dot(t), moved.dot(b)];
-            joints[k] = row;
-            add_scaled(&mut u, &row, v[movers[k].velocity]);
-        }
-        for guest in contacts.by_lane.guests(slot) {
-            let lane = guest.0;
-            write_rows(machine, end, guest, movers, rows);
-            let mut own = [0.0; 3];
-            let velocities = (0..BASE).chain(movers.iter().map(|mover| mover.velocity));
-            for (row, k) in rows.iter().zip(velocities) {
-                for (own, row) in own.iter_mut().zip(row) {
-                    *own += row.get(lane) * v[k].get(lane);
-                }
-            }
-            for (u, own) in u.iter_mut().zip(own) {
-                u.set(lane, own);
+        let path = Path::from_trunk(&self.movers[part]);
+        let rows = &mut self.Z[slot * self.stride..][..path.len()];
+        let u = &mut self.u_before[slot];
+        if let Some((_, sign)) = contacts.stop(slot) {
+            *u = path.write_stop(sign, v, rows);
+        } else {
+            let place = place_of(contacts.slot(slot));
+            *u = path.write(|m| end.motions[m], &place, v, rows);
+            for (lane, contact) in contacts.by_lane.guests(slot) {
+                let one = OneLane {
+                    machine,
+                    poses: end,
+                    v,
+                    lane,
+                };
+                write_guest(&one, contact, path.movers, rows, u);
             }
         }
-        self.u_before[slot] = u;
         match self.bodies[part] {
             Some(body) => factor.half_solve_path(machine, body, rows),
-            None => half_solve_whole(machine, factor, rows),
-        }
-    }
-
-    /// Z and `Hᵀ v` of a stop's slot.
-    #[inline(always)]
-    fn build_stop(
-        &mut self,
-        machine: &Machine,
-        factor: &Factor<T>,
-        contacts: &Contacts<T>,
-        v: &[T],
-        slot: usize,
-    ) {
-        let part = contacts.part(slot);
-        let (Some((_, sign)), Some(mover)) = (contacts.stop(slot), self.movers[part].last()) else {
-            return;
-        };
-        let zero = T::splat(self.token, 0.0);
-        let rows = &mut self.Z[slot * self.stride..][..BASE + self.movers[part].len()];
-        rows.fill([zero; 3]);
-        let last = rows.len() - 1;
-        rows[last][0] = sign;
-        self.u_before[slot] = [sign * v[mover.velocity], zero, zero];
-        if let Some(body) = self.bodies[part] {
-            factor.half_solve_path(machine, body, rows);
+            None => factor.half_solve_columns(machine, 0..v.len(), rows),
         }
     }
 
@@ -229,13 +179,7 @@ impl<T: Lane> Rows<T> {
     #[inline(always)]
     fn multiply_diagonal(&mut self, contacts: &Contacts<T>) {
         for &slot in contacts.used() {
-            let movers = &self.movers[contacts.part(slot)];
-            let z = &self.Z[slot * self.stride..][..BASE + movers.len()];
-            let own = &mut self.diagonal[slot];
-            *own = square(z);
-            if contacts.stop(slot).is_some() {
-                (own[4], own[8]) = (own[0], own[0]);
-            }
+            self.diagonal[slot] = self.own_block(contacts, slot);
         }
     }
 
@@ -243,7 +187,7 @@ impl<T: Lane> Rows<T> {
     #[inline(always)]
     fn multiply(&mut self, contacts: &Contacts<T>) {
         let used = contacts.used_densely();
-        let n_parts = self.movers.len();
+        let (n_parts, zero) = (self.movers.len(), T::splat(self.token, 0.0));
         let mut at = 0;
         for (i, &row) in used.iter().enumerate() {
             let a = contacts.part(row);
@@ -252,20 +196,30 @@ impl<T: Lane> Rows<T> {
                 let shared = self.common[a * n_parts + b];
                 let x = &self.Z[row * self.stride..][..shared];
                 let y = &self.Z[column * self.stride..][..shared];
-                self.W[at] = product(x, y);
+                self.W[at] = product(zero, x, y);
                 at += 1;
             }
-            let x = &self.Z[row * self.stride..][..BASE + self.movers[a].len()];
-            self.W[at] = square(x);
+            self.W[at] = self.own_block(contacts, row);
             at += 1;
         }
     }
 
+    /// Block of W of a slot with itself.
+    #[inline(always)]
+    fn own_block(&self, contacts: &Contacts<T>, slot: usize) -> [T; 9] {
+        let (_, rows) = self.of(contacts, slot);
+        let mut own = square(T::splat(self.token, 0.0), rows);
+        if contacts.stop(slot).is_some() {
+            close_stop(&mut own);
+        }
+        own
+    }
+
     /// Adds a number by slot, 1/kg, to the three entries on W's diagonal.
-    pub fn soften(&mut self, contacts: &Contacts<T>, diagonal: &[T]) {
+    pub fn soften(&mut self, contacts: &Contacts<T>, diagonal: impl Fn(usize) -> T) {
         let soften = |own: &mut [T; 9], slot: usize| {
             for k in [0, 4, 8] {
-                own[k] += diagonal[slot];
+                own[k] += diagonal(slot);
             }
         };
         for (i, &slot) in contacts.used_densely().iter().enumerate() {
@@ -273,7 +227,7 @@ impl<T: Lane> Rows<T> {
         }
         if contacts.factored() != 0 {
             for &slot in contacts.used() {
-                self.softness[slot] = diagonal[slot];
+                self.softness[slot] = diagonal(slot);
                 soften(&mut self.diagonal[slot], slot);
             }
         }
@@ -286,18 +240,10 @@ impl<T: Lane> Rows<T> {
     /// If an argument is of another machine.
     #[inline(always)]
     pub fn local(&self, contacts: &Contacts<T>, y: &[T], q: &mut [Triple<T>]) {
+        let zero = T::splat(self.token, 0.0);
         for &slot in contacts.used() {
-            let movers = &self.movers[contacts.part(slot)][..];
-            let rows = &self.Z[slot * self.stride..][..BASE + movers.len()];
-            let (base, joints) = rows.split_at(BASE);
-            let mut sum = scaled(&base[0], y[0]);
-            for k in 1..BASE {
-                add_scaled(&mut sum, &base[k], y[k]);
-            }
-            let joints = &joints[..movers.len()];
-            for k in 0..movers.len() {
-                add_scaled(&mut sum, &joints[k], y[movers[k].velocity]);
-            }
+            let (path, rows) = self.of(contacts, slot);
+            let sum = path.add_local(rows, y, [zero; 3]);
             let [n, t, b] = self.u_before[slot];
             q[slot] = [sum[0] + n, sum[1] + t, sum[2] + b];
         }
@@ -317,18 +263,8 @@ impl<T: Lane> Rows<T> {
         y: &mut [T],
     ) {
         for &slot in contacts.used() {
-            let movers = &self.movers[contacts.part(slot)][..];
-            let rows = &self.Z[slot * self.stride..][..BASE + movers.len()];
-            let (base, joints) = rows.split_at(BASE);
-            let here = contacts.slot(slot).active & lanes;
-            let p = &p[slot];
-            let joints = &joints[..movers.len()];
-            for k in 0..BASE {
-                add(here, &mut y[k], along(&base[k], p));
-            }
-            for k in 0..movers.len() {
-                add(here, &mut y[movers[k].velocity], along(&joints[k], p));
-            }
+            let (path, rows) = self.of(contacts, slot);
+            path.push(contacts.slot(slot).active & lanes, rows, &p[slot], y);
         }
     }
 
@@ -349,30 +285,28 @@ impl<T: Lane> Rows<T> {
     ) {
         let zero = T::splat(self.token, 0.0);
         out.fill(zero);
-        let mut total = Vec3::new(zero, zero, zero);
-        let mut couple = total;
+        let mut sums = [Vec3::new(zero, zero, zero); 2];
+        let mut guests = 0;
         for &slot in contacts.used_by_shapes() {
             let own = contacts.slot(slot);
-            let mut here = own.active & lanes;
-            for guest in contacts.by_lane.guests(slot) {
-                if here.get(guest.0) {
-                    here = here & !T::mask(self.token, 1 << guest.0);
-                    let p = p[slot].map(|p| p.get(guest.0));
-                    add_impulse(machine, end, guest, p, out);
-                    if guest.1.other.is_none() {
-                        add_to_base(guest, p, &mut total, &mut couple);
-                    }
-                }
+            let own_guests = contacts.by_lane.guests(slot);
+            let of_guests = own_guests.fold(0, |all, (lane, _)| all | 1 << lane);
+            guests |= of_guests;
+            let here = own.active & lanes & !T::mask(self.token, of_guests);
+            let wrench = place_of(own).wrench(p[slot]);
+            for (sum, x) in sums.iter_mut().zip(wrench) {
+                *sum = Vec3::select(here, *sum + x, *sum);
             }
-            let [p_n, p_t, p_b] = p[slot];
-            let force = own.n * p_n + own.t * p_t + own.b * p_b;
-            let moment = own.point.cross(force);
-            add_vector(here, &mut total, force);
-            add_vector(here, &mut couple, moment);
+            let [force, moment] = wrench;
             for mover in &self.movers[contacts.part(slot)] {
                 let power = end.motions[mover.motion].power(force, moment);
                 add(here, &mut out[mover.velocity], power);
             }
+        }
+        let [total, couple] = sums;
+        out[..BASE].copy_from_slice(&[total.x, total.y, total.z, couple.x, couple.y, couple.z]);
+        if (lanes & T::mask(self.token, guests)).any() {
+            self.add_impulses_of_guests(machine, contacts, end, lanes, p, out);
         }
         for &slot in contacts.used_by_stops() {
             let here = contacts.slot(slot).active & lanes;
@@ -381,7 +315,34 @@ impl<T: Lane> Rows<T> {
                 add(here, &mut out[mover.velocity], sign * p[slot][0]);
             }
         }
-        out[..BASE].copy_from_slice(&[total.x, total.y, total.z, couple.x, couple.y, couple.z]);
+    }
+
+    /// The part of contacts whose path is not that of their slots.
+    #[cold]
+    fn add_impulses_of_guests(
+        &self,
+        machine: &Machine,
+        contacts: &Contacts<T>,
+        end: &Poses<T>,
+        lanes: T::Mask,
+        p: &[Triple<T>],
+        out: &mut [T],
+    ) {
+        for &slot in contacts.used_by_shapes() {
+            let guests = contacts.by_lane.guests(slot);
+            for (lane, contact) in guests.filter(|(lane, _)| lanes.get(*lane)) {
+                let one = OneLane {
+                    machine,
+                    poses: end,
+                    v: &[],
+                    lane,
+                };
+                let p = p[slot].map(|p| p.get(lane));
+                add_impulse(&one, contact, p, |k, x| {
+                    out[k].set(lane, out[k].get(lane) + x);
+                });
+            }
+        }
     }
 
     /// Writes each lane's problem: W or its factors, q, μ. Starting impulses stay as they are.
@@ -571,108 +532,38 @@ impl<T: Lane> Rows<T> {
     }
 }
 
-/// `Z` of rows of all velocities, in their place.
-#[cold]
-fn half_solve_whole<T: Lane>(machine: &Machine, factor: &Factor<T>, rows: &mut [Triple<T>]) {
-    for j in 0..3 {
-        let mut column: Vec<T> = rows.iter().map(|row| row[j]).collect();
-        factor.half_solve(machine, &mut column);
-        for (row, x) in rows.iter_mut().zip(column) {
-            row[j] = x;
-        }
-    }
+/// Point and frame of a slot.
+#[inline(always)]
+fn place_of<T: Lane>(own: &Slot<T>) -> Place<T> {
+    let Slot { point, n, t, b, .. } = *own;
+    Place { x: point, n, t, b }
 }
 
-/// Adds the impulse of a contact with the ground, N s, and its moment about the trunk's origin.
-fn add_to_base<T: Lane>(
-    (lane, contact): (usize, &Contact),
-    p: [f64; 3],
-    total: &mut Vec3<T>,
-    couple: &mut Vec3<T>,
+/// Writes the rows of Hᵀ and `Hᵀ v` of a lane's contact along the path of a slot that is not its
+/// own.
+fn write_guest<T: Lane>(
+    one: &OneLane<'_, T>,
+    contact: &Contact,
+    movers: &[Mover],
+    rows: &mut [Triple<T>],
+    u: &mut Triple<T>,
 ) {
-    let [n, t, b] = contact.frame.rows();
-    let force = n * p[0] + t * p[1] + b * p[2];
-    let moment = contact.point.cross(&force);
-    let add = |sum: &mut Vec3<T>, x: Vector3<f64>| {
-        let own = Vector3::from(sum.get(lane));
-        sum.set(lane, (own + x).into());
-    };
-    add(total, force);
-    add(couple, moment);
-}
-
-/// `x += y` where the mask is true.
-#[inline(always)]
-pub(super) fn add<T: Lane>(mask: T::Mask, x: &mut T, y: T) {
-    *x = T::select(mask, *x + y, *x);
-}
-
-#[inline(always)]
-fn add_vector<T: Lane>(mask: T::Mask, x: &mut Vec3<T>, y: Vec3<T>) {
-    *x = Vec3::select(mask, *x + y, *x);
-}
-
-/// A row of Z times an impulse.
-#[inline(always)]
-pub(super) fn along<T: Lane>(z: &Triple<T>, p: &Triple<T>) -> T {
-    z[0] * p[0] + z[1] * p[1] + z[2] * p[2]
-}
-
-/// `a x`.
-#[inline(always)]
-fn scaled<T: Lane>(x: &Triple<T>, a: T) -> Triple<T> {
-    [a * x[0], a * x[1], a * x[2]]
-}
-
-/// `sums += a x`.
-#[inline(always)]
-pub(super) fn add_scaled<T: Lane>(sums: &mut Triple<T>, x: &Triple<T>, a: T) {
-    for i in 0..3 {
-        sums[i] += a * x[i];
+    let lane = one.lane;
+    for own in rows.iter_mut().flatten().chain(&mut *u) {
+        own.set(lane, 0.0);
     }
-}
-
-/// `Xᵀ Y`, row-major.
-#[inline(always)]
-fn product<T: Lane>(x: &[Triple<T>], y: &[Triple<T>]) -> [T; 9] {
-    let ([a, b, c], [d, e, f]) = (x[0], y[0]);
-    let mut sums = [
-        a * d,
-        a * e,
-        a * f,
-        b * d,
-        b * e,
-        b * f,
-        c * d,
-        c * e,
-        c * f,
-    ];
-    let y = &y[..x.len()];
-    for k in 1..x.len() {
-        for i in 0..3 {
-            for j in 0..3 {
-                sums[3 * i + j] += x[k][i] * y[k][j];
-            }
+    for_each_row(one, contact, |velocity, row| {
+        let is_own = |mover: &Mover| mover.velocity == velocity;
+        let own = match movers.iter().position(is_own) {
+            Some(k) => &mut rows[BASE + k],
+            None => &mut rows[velocity],
+        };
+        let v = one.v[velocity].get(lane);
+        for (i, x) in row.iter().enumerate() {
+            own[i].set(lane, own[i].get(lane) + x);
+            u[i].set(lane, u[i].get(lane) + x * v);
         }
-    }
-    sums
-}
-
-/// `Xᵀ X`, row-major.
-#[inline(always)]
-fn square<T: Lane>(x: &[Triple<T>]) -> [T; 9] {
-    let [a, b, c] = x[0];
-    let mut sums = [a * a, b * a, b * b, c * a, c * b, c * c];
-    for [a, b, c] in &x[1..] {
-        sums[0] += *a * *a;
-        sums[1] += *b * *a;
-        sums[2] += *b * *b;
-        sums[3] += *c * *a;
-        sums[4] += *c * *b;
-        sums[5] += *c * *c;
-    }
-    let [nn, tn, tt, bn, bt, bb] = sums;
-    [nn, tn, bn, tn, tt, bt, bn, bt, bb]
+    });
 }
 
 /// The numbers of all lanes.

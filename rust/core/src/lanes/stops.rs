@@ -5,8 +5,7 @@
 use super::contacts::Contacts;
 use super::forecast::Forecast;
 use super::machine::{Machine, Stop};
-use crate::multibody::mechanism::LinkJoint;
-use crate::multibody::{LaneConfiguration, Poses};
+use crate::multibody::{JointModel, LaneConfiguration, Poses};
 use crate::scalar::{Lane, LaneMask};
 
 impl<T: Lane> Contacts<T> {
@@ -44,10 +43,7 @@ impl<T: Lane> Contacts<T> {
                     let own = machine.joints[joint];
                     let link = &machine.links[own.body];
                     let motion = &poses.motions[link.motion];
-                    let axis = match link.joint {
-                        LinkJoint::Slide(_) => motion.swing,
-                        _ => motion.axis,
-                    };
+                    let axis = link.joint.direction(motion);
                     let gaps = |q: T| [q - q.like(limits.lower), q.like(limits.upper) - q];
                     let [lower, upper] = gaps(middle.joints[joint]);
                     let rate = v[own.velocity];

@@ -7,8 +7,8 @@
 
 use super::contacts::Contacts;
 use super::problem::Triple;
-use super::rows::{Rows, add, add_scaled, along};
-use crate::multibody::model::BASE;
+use super::rows::Rows;
+use crate::contact::rows::{add_scaled, along};
 use crate::scalar::{Lane, LaneMask};
 
 /// Newton steps on the multiplier of a slide.
@@ -77,17 +77,22 @@ impl<T: Lane> Rows<T> {
         p: &mut [Triple<T>],
     ) {
         let zero = T::splat(contacts.token, 0.0);
-        self.swept.fill(zero);
+        let mut motion = std::mem::take(&mut self.swept);
+        motion.fill(zero);
         for &slot in contacts.used() {
             let active = contacts.slot(slot).active;
             for p in &mut p[slot] {
                 *p = T::select(active, *p, zero);
             }
-            self.push(contacts, slot, &p[slot]);
+            let (path, rows) = self.of(contacts, slot);
+            path.push(active, rows, &p[slot], &mut motion);
         }
         for _ in 0..n {
             for &slot in contacts.used() {
-                let u = self.velocity(contacts, slot, &q[slot], &p[slot]);
+                let (path, rows) = self.of(contacts, slot);
+                let mut u = q[slot];
+                add_scaled(&mut u, &p[slot], self.softness[slot]);
+                let u = path.add_local(rows, &motion, u);
                 let new = solve(&self.diagonal[slot], mu[slot], &p[slot], &u);
                 let active = contacts.slot(slot).active;
                 let mut change = [zero; 3];
@@ -95,51 +100,10 @@ impl<T: Lane> Rows<T> {
                     change[k] = T::select(active, new[k] - p[slot][k], zero);
                     p[slot][k] += change[k];
                 }
-                self.push(contacts, slot, &change);
+                path.push(active, rows, &change, &mut motion);
             }
         }
-    }
-
-    /// Adds the motion that an impulse causes.
-    #[inline(always)]
-    fn push(&mut self, contacts: &Contacts<T>, slot: usize, p: &Triple<T>) {
-        let movers = &self.movers[contacts.part(slot)][..];
-        let rows = &self.Z[slot * self.stride..][..BASE + movers.len()];
-        let (base, joints) = rows.split_at(BASE);
-        let joints = &joints[..movers.len()];
-        let here = contacts.slot(slot).active;
-        let swept = &mut self.swept[..];
-        for k in 0..BASE {
-            add(here, &mut swept[k], along(&base[k], p));
-        }
-        for k in 0..movers.len() {
-            add(here, &mut swept[movers[k].velocity], along(&joints[k], p));
-        }
-    }
-
-    /// Velocity of a contact with the motion so far.
-    #[inline(always)]
-    fn velocity(
-        &self,
-        contacts: &Contacts<T>,
-        slot: usize,
-        q: &Triple<T>,
-        p: &Triple<T>,
-    ) -> Triple<T> {
-        let movers = &self.movers[contacts.part(slot)][..];
-        let rows = &self.Z[slot * self.stride..][..BASE + movers.len()];
-        let (base, joints) = rows.split_at(BASE);
-        let joints = &joints[..movers.len()];
-        let swept = &self.swept[..];
-        let mut u = *q;
-        add_scaled(&mut u, p, self.softness[slot]);
-        for k in 0..BASE {
-            add_scaled(&mut u, &base[k], swept[k]);
-        }
-        for k in 0..movers.len() {
-            add_scaled(&mut u, &joints[k], swept[movers[k].velocity]);
-        }
-        u
+        self.swept = motion;
     }
 }
 

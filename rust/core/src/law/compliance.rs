@@ -20,31 +20,34 @@
 //!
 //! Source: Anitescu and Potra 2002, *A time-stepping method for stiff multibody dynamics with
 //! contact and friction*, IJNME 55, 753–784.
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
+
+use crate::scalar::Lane;
 
 /// Spring and damper of a contact, the same along the normal and along the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Compliance {
+pub struct Compliance<T = f64> {
     /// k, N/m.
-    pub stiffness: f64,
+    pub stiffness: T,
     /// d, N s/m.
-    pub damping: f64,
+    pub damping: T,
 }
 
 /// Law of one contact over a step: Coulomb's law between impulse p and `u + diagonal p + shift`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Yielding {
+pub struct Yielding<T = f64> {
     /// Term on the diagonal of W, 1/kg; 0 for a rigid contact.
-    pub diagonal: f64,
+    pub diagonal: T,
     /// Shift of the free velocity along n, t, b, m/s.
-    pub shift: [f64; 3],
+    pub shift: [T; 3],
     /// Gap that the law knows, m.
-    pub gap: f64,
+    pub gap: T,
     /// Penetration that no elastic force explains, m, as a negative gap.
-    pub unexplained: f64,
+    pub unexplained: T,
     /// k, N/m.
-    stiffness: f64,
+    stiffness: T,
     /// Tangential impulse at the start, N s.
-    friction: [f64; 2],
+    friction: [T; 2],
 }
 
 /// Deflection that counts as elastic whatever the forces, m.
@@ -66,7 +69,9 @@ impl Compliance {
             (one, other) => one.or(other),
         }
     }
+}
 
+impl<T: Lane> Compliance<T> {
     /// The law over a step of `h`, s, with the scheme's `theta`.
     ///
     /// - `gap`, `u_N`: gap (m) and normal velocity (m/s) at the pose that the step reaches without
@@ -78,31 +83,29 @@ impl Compliance {
     /// A body that strikes a stiff contact penetrates it within the step by more than any spring
     /// would allow. That part is not elastic and is not given back: it is `unexplained`, and
     /// position projection removes it. A deflection that the impulse before explains is elastic.
+    #[inline(always)]
     #[must_use]
-    pub fn over(&self, (h, theta): (f64, f64), gap: f64, u_N: f64, before: [f64; 3]) -> Yielding {
+    pub fn over(&self, (h, theta): (T, T), gap: T, u_N: T, before: [T; 3]) -> Yielding<T> {
         let Self { stiffness, damping } = *self;
+        let (zero, one) = (h.like(0.0), h.like(1.0));
         let moved = h * u_N;
-        let deflection = (moved - gap).max(0.0);
+        let deflection = (moved - gap).max(zero);
         let gap = gap - theta * moved;
         // The damper bore a part of the force while the deflection grew.
         let force = before[0] / h;
-        let by_force = (force + damping * u_N).clamp(0.0, force) / stiffness;
-        let known = gap.max(-((2.0 * deflection).min(by_force) + SLACK));
+        let by_force = (force + damping * u_N).max(zero).min(force) / stiffness;
+        let elastic = (h.like(2.0) * deflection).min(by_force);
+        let known = gap.max(-(elastic + h.like(SLACK)));
         let weight = h * stiffness + damping;
-        let diagonal = 1.0 / (h * weight);
+        let diagonal = one / (h * weight);
         // The damper acts on the deflection, which begins when the gap is closed.
-        let approach = if known > 0.0 {
-            known / h
-        } else {
-            known * stiffness / weight
-        };
+        let approach = T::select(zero.lt(known), known / h, known * stiffness / weight);
         // Of an impact's friction only what the deflection holds is elastic.
-        let held = (deflection / by_force.max(f64::MIN_POSITIVE)).min(1.0);
+        let held = (deflection / by_force.max(h.like(f64::MIN_POSITIVE))).min(one);
         let friction = [held * before[1], held * before[2]];
-        let [t, b] = friction.map(|p| -diagonal * p);
         Yielding {
             diagonal,
-            shift: [approach, t, b],
+            shift: [approach, -diagonal * friction[0], -diagonal * friction[1]],
             gap: known,
             unexplained: gap - known,
             stiffness,
@@ -111,21 +114,51 @@ impl Compliance {
     }
 }
 
-impl Yielding {
+impl<T: Lane> Yielding<T> {
+    /// That of a rigid contact; `zero`: 0 in every lane.
+    #[must_use]
+    pub fn none(zero: T) -> Self {
+        Self {
+            diagonal: zero,
+            shift: [zero; 3],
+            gap: zero,
+            unexplained: zero,
+            stiffness: zero,
+            friction: [zero; 2],
+        }
+    }
+
+    /// The law where the mask is true, that of a rigid contact elsewhere.
+    #[inline(always)]
+    #[must_use]
+    pub fn only(&self, here: T::Mask) -> Self {
+        let only = |x: T| T::select(here, x, x.like(0.0));
+        Self {
+            diagonal: only(self.diagonal),
+            shift: self.shift.map(only),
+            gap: only(self.gap),
+            unexplained: only(self.unexplained),
+            stiffness: only(self.stiffness),
+            friction: self.friction.map(only),
+        }
+    }
+
     /// Energy that a step of `h` may gain by the contact, J. `u_N`: normal velocities before and
     /// after; `p`: impulse.
     ///
     /// It is what the springs give off, negative where they store energy. The normal force is that
     /// at the end of the step and acts over all of it: where it does more work, `p_N (u_N + u_N⁺) /
     /// 2`, that counts.
+    #[inline(always)]
     #[must_use]
-    pub fn supplied(&self, h: f64, u_N: [f64; 2], p: [f64; 3]) -> f64 {
-        let before = self.gap.min(0.0);
-        let after = (self.gap + h * u_N[1]).min(0.0);
-        let released = 0.5 * self.stiffness * (before * before - after * after);
-        let work = 0.5 * p[0] * (u_N[0] + u_N[1]);
+    pub fn supplied(&self, h: T, u_N: [T; 2], p: [T; 3]) -> T {
+        let (zero, half) = (h.like(0.0), h.like(0.5));
+        let before = self.gap.min(zero);
+        let after = (self.gap + h * u_N[1]).min(zero);
+        let released = half * self.stiffness * (before * before - after * after);
+        let work = half * p[0] * (u_N[0] + u_N[1]);
         let [t, b] = self.friction;
         let sheared = (t * t + b * b) - (p[1] * p[1] + p[2] * p[2]);
-        released.max(work) + 0.5 * self.diagonal * sheared
+        released.max(work) + half * self.diagonal * sheared
     }
 }

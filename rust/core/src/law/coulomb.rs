@@ -5,20 +5,15 @@
 //! law nonassociated; without it a sliding contact would lift off with the velocity `μ|u_T|` (the
 //! convex relaxation). Source: De Saxcé and Feng 1998; Acary and Brogliato 2008, ch. 3.
 
+use super::associated;
+use super::friction_law::FrictionLaw;
+use super::mode::Tangent;
+use super::one_contact::solve_one_contact;
 use super::signorini;
-use crate::cone::{SecondOrderCone, project_on_disc, tangential_norm};
+use crate::cone::{project_on_disc, shortened, split, tangential_norm};
+use crate::spatial::space::dot;
 
-/// The three states of a contact with friction.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum ContactMode {
-    /// No impulse, `p = 0` and `u_N ≥ 0`.
-    #[default]
-    Open,
-    /// No velocity, `u = 0` and `|p_T| ≤ μ p_N`.
-    Stick,
-    /// `u_N = 0` and `p_T = −μ p_N u_T/|u_T|`.
-    Slide,
-}
+pub use super::mode::ContactMode;
 
 /// De Saxcé's modified velocity `ũ = u + μ|u_T| n`, m/s.
 ///
@@ -45,16 +40,7 @@ pub fn natural_map<const D: usize>(
     rho: f64,
 ) -> [f64; D] {
     let shifted = modified_velocity(u, friction_coefficient);
-    let mut z = *p;
-    for k in 0..D {
-        z[k] -= rho * shifted[k];
-    }
-    let projected = SecondOrderCone::new(friction_coefficient).project(&z);
-    let mut map = *p;
-    for k in 0..D {
-        map[k] -= projected[k];
-    }
-    map
+    associated::natural_map(p, &shifted, friction_coefficient, rho)
 }
 
 /// Violation of Signorini's condition and of Coulomb's law by one contact,
@@ -76,20 +62,118 @@ pub fn violation<const D: usize>(
     p: &[f64; D],
     u: &[f64; D],
     friction_coefficient: f64,
-    [rho_N, rho_T]: [f64; 2],
+    rho: [f64; 2],
 ) -> [f64; D] {
-    let mut z = *p;
-    for k in 1..D {
-        z[k] -= rho_T * u[k];
+    Coulomb(friction_coefficient).violation(p, u, rho)
+}
+
+/// Impulses below the limit of friction by less than this share slide.
+const AT_THE_LIMIT: f64 = 1e-9;
+
+/// The law with its coefficient μ.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coulomb(pub f64);
+
+impl<const D: usize> FrictionLaw<D> for Coulomb {
+    #[inline]
+    fn project(&self, p_N: f64, z: &[f64; D]) -> [f64; D] {
+        project_on_disc(z, self.0 * p_N)
     }
-    let projected = project_on_disc(&z, friction_coefficient * p[0]);
-    let inverse = 1.0 / rho_T;
-    let mut violation = *u;
-    violation[0] = signorini::violation(u[0], p[0], rho_N);
-    for k in 1..D {
-        violation[k] = (p[k] - projected[k]) * inverse;
+
+    #[inline]
+    fn answer(&self, W: &[[f64; D]; D], q: &[f64; D]) -> [f64; D] {
+        solve_one_contact(W, q, self.0).impulse
     }
-    violation
+
+    #[inline]
+    fn linearise(&self, p: &[f64; D], u: &[f64; D], [rho_N, rho_T]: [f64; 2]) -> Tangent {
+        let mut z: [f64; D] = std::array::from_fn(|k| p[k] - rho_T * u[k]);
+        z[0] = p[0] - rho_N * u[0];
+        let with = |mode| Tangent {
+            mode,
+            ..Tangent::default()
+        };
+        if z[0] <= 0.0 {
+            return with(ContactMode::Open);
+        }
+        let norm = tangential_norm(&z);
+        let radius = self.0 * z[0];
+        if self.0 <= 0.0 {
+            with(ContactMode::Slide)
+        } else if norm <= radius {
+            with(ContactMode::Stick)
+        } else {
+            // A contact about to open would have infinite turning stiffness.
+            let gamma = ((norm - radius) / (rho_T * radius)).min(1e12 / rho_T);
+            Tangent::along(&z, norm, gamma)
+        }
+    }
+}
+
+impl Coulomb {
+    /// Answer of a contact whose block of W is diagonal and the same along each tangent, along the
+    /// world's axes: from the impulse `start`, N s, at the velocity `u`, m/s.
+    ///
+    /// `inverse`: `[1/W_NN, 1/W_TT]`, kg.
+    #[allow(clippy::inline_always)] // a visit of a contact is one piece of code
+    #[inline(always)]
+    #[must_use]
+    pub fn answer_of_round(
+        self,
+        n: &[f64; 3],
+        inverse: [f64; 2],
+        start: &[f64; 3],
+        u: &[f64; 3],
+    ) -> [f64; 3] {
+        let normal = (dot(n, start) - inverse[0] * dot(n, u)).max(0.0);
+        let wanted = std::array::from_fn(|k| start[k] - inverse[1] * u[k]);
+        let (_, across) = split(n, &wanted);
+        let across = shortened(across, self.0 * normal);
+        std::array::from_fn(|k| n[k] * normal + across[k])
+    }
+
+    /// Square of the [`violation`] of such a contact, (m/s)².
+    #[allow(clippy::inline_always)]
+    #[inline(always)]
+    #[must_use]
+    pub fn violation_of_round(
+        self,
+        n: &[f64; 3],
+        [rho_N, rho_T]: [f64; 2],
+        p: &[f64; 3],
+        u: &[f64; 3],
+    ) -> f64 {
+        let (u_n, u_t) = split(n, u);
+        let (p_n, p_t) = split(n, p);
+        let mut wanted = p_t;
+        for k in 0..3 {
+            wanted[k] -= rho_T * u_t[k];
+        }
+        let across = shortened(wanted, self.0 * p_n);
+        let mut square = signorini::violation(u_n, p_n, rho_N).powi(2);
+        for k in 0..3 {
+            square += ((p_t[k] - across[k]) / rho_T).powi(2);
+        }
+        square
+    }
+
+    /// The mode that an impulse shows by itself, at the velocity `u`, m/s: closed contacts stick
+    /// within the cone and slide on it. A contact without impulse sticks if it approaches.
+    #[inline]
+    #[must_use]
+    pub fn recall<const D: usize>(self, p: &[f64; D], u: &[f64]) -> Tangent {
+        let mut tangent = Tangent::default();
+        if p[0] <= 0.0 {
+            if u[0] < 0.0 {
+                tangent.mode = ContactMode::Stick;
+            }
+        } else if self.0 > 0.0 && tangential_norm(p) < self.0 * p[0] * (1.0 - AT_THE_LIMIT) {
+            tangent.mode = ContactMode::Stick;
+        } else {
+            tangent = Tangent::sliding(p, u);
+        }
+        tangent
+    }
 }
 
 #[cfg(test)]

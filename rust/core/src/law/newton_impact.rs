@@ -13,3 +13,34 @@
 pub fn rebound(restitution: f64, u_N_before: f64) -> f64 {
     restitution * u_N_before
 }
+
+/// A pair at a gap: `e u_N⁻` if it collides within the step of h, s; any other may close by its
+/// gap.
+///
+/// With `e u_N⁻ + s` and any s ≥ 0 a frictionless impact gains no energy; here s is what the gap
+/// allows. `gap`: at the start of the step, m. `slow`: speed of an approach that is no impact, m/s.
+#[must_use]
+pub fn rebound_at_gap(restitution: f64, u_N_before: f64, gap: f64, (h, slow): (f64, f64)) -> f64 {
+    let gap = gap.max(0.0);
+    let rebound = rebound(restitution, u_N_before);
+    if rebound < 0.0 && u_N_before < -slow && gap + h * u_N_before <= 0.0 {
+        rebound
+    } else {
+        gap / h + rebound.max(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pair_bounces_only_where_it_meets_fast_and_within_the_step() {
+        let step = (1e-3, 0.02);
+        assert_eq!(rebound_at_gap(0.5, -1.0, 5e-4, step), -0.5, "an impact");
+        assert_eq!(rebound_at_gap(0.5, -1.0, 2e-3, step), 2.0, "too far");
+        assert_eq!(rebound_at_gap(0.5, -0.01, 0.0, step), 0.0, "too slow");
+        assert_eq!(rebound_at_gap(0.5, 1.0, 0.0, step), 0.5, "parts");
+        assert_eq!(rebound_at_gap(0.0, -1.0, -1e-4, step), 0.0, "overlaps");
+    }
+}

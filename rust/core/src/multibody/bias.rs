@@ -6,8 +6,9 @@
 //! Source: Luh, Walker and Paul 1980; here in world axes.
 
 use super::inertias::{Inertia, Inertias};
-use super::mechanism::{BASE, Link, LinkJoint, Mechanism};
-use super::poses::{Motion, Pose, Poses};
+use super::joint::{Joint, JointModel, Motion, Screw, free};
+use super::mechanism::{BASE, Link, Mechanism};
+use super::poses::{Pose, Poses};
 use crate::scalar::{Lane, Vec3};
 
 /// Scratch of the bias.
@@ -70,7 +71,7 @@ pub fn bias<T: Lane>(
                 moved[root] = if tree.is_free {
                     let v = &v[tree.velocities.start..][..BASE];
                     Moved {
-                        omega: Vec3::new(v[3], v[4], v[5]),
+                        omega: free::velocity(v).axis,
                         ..world
                     }
                 } else {
@@ -81,11 +82,10 @@ pub fn bias<T: Lane>(
                     let (before, own) = moved.split_at_mut(b);
                     let (link, pose) = (&links[b], &poses[b]);
                     let carrier = &mut before[link.parent];
-                    let mut body = if link.joint == LinkJoint::Turn {
-                        let spin = motions[link.motion].axis * v[link.velocity];
-                        carrier.carry(pose.lever, spin)
+                    let mut body = if let Joint::Revolute(joint) = &link.joint {
+                        carrier.carry(joint, link, motions, pose.lever, v)
                     } else {
-                        carrier.carry_otherwise(link, motions, pose.lever, v)
+                        carrier.carry(&link.joint, link, motions, pose.lever, v)
                     };
                     body.load(link, &inertias[b], pose);
                     if link.is_plain_leaf {
@@ -136,44 +136,47 @@ impl<T: Lane> Moved<T> {
         }
     }
 
-    /// A body that it carries, `d` from its origin and turning relative to it, without load.
+    /// A body that it carries, `d` from its origin, without load.
+    ///
+    /// The axes of the joint are fixed in the carrier: a slide s adds the Coriolis acceleration
+    /// `2 ω × s`.
     #[inline(always)]
-    fn carry(&self, d: Vec3<T>, spin: Vec3<T>) -> Self {
+    fn carry<J: JointModel>(
+        &self,
+        joint: &J,
+        link: &Link,
+        motions: &[Motion<T>],
+        d: Vec3<T>,
+        v: &[T],
+    ) -> Self {
+        let mut rate = Screw::NONE;
+        for i in 0..joint.n_motions() {
+            let screw = joint.screw(&motions[link.motion + i]);
+            rate = rate.plus(screw.times(v[link.velocity + i]));
+        }
         let omega = self.omega;
         let zero = Vec3::splat(d.x.token(), [0.0; 3]);
-        Self {
-            omega: omega + spin,
-            alpha: self.alpha + omega.cross(spin),
+        let mut body = Self {
+            omega,
+            alpha: self.alpha,
             origin: self.origin + self.alpha.cross(d) + omega.cross(omega.cross(d)),
             force: zero,
             moment: zero,
+        };
+        if let Some(spin) = rate.turning {
+            body.omega += spin;
+            body.alpha += omega.cross(spin);
         }
+        if let Some(slide) = rate.sliding {
+            body.origin += omega.cross(slide) * d.x.like(2.0);
+        }
+        body
     }
 
     /// The same for a root that a joint connects to the world.
     #[cold]
     fn carry_root(&self, link: &Link, motions: &[Motion<T>], d: Vec3<T>, v: &[T]) -> Self {
-        if link.joint == LinkJoint::Base {
-            *self
-        } else {
-            self.carry_otherwise(link, motions, d, v)
-        }
-    }
-
-    /// The same for a joint that is not a plain rotation.
-    #[inline(always)]
-    fn carry_otherwise(&self, link: &Link, motions: &[Motion<T>], d: Vec3<T>, v: &[T]) -> Self {
-        let (k, motions) = (link.velocity, &motions[link.motion..]);
-        let mut spin = motions[0].axis * v[k];
-        if let LinkJoint::Ball(_) = link.joint {
-            spin += motions[1].axis * v[k + 1];
-            spin += motions[2].axis * v[k + 2];
-        }
-        let mut body = self.carry(d, spin);
-        if let LinkJoint::Slide(_) = link.joint {
-            body.origin += self.omega.cross(motions[0].swing * v[k]) * d.x.like(2.0);
-        }
-        body
+        self.carry(&link.joint, link, motions, d, v)
     }
 
     /// Sets force and moment to those of the body alone.
@@ -201,21 +204,25 @@ impl<T: Lane> Moved<T> {
 
     /// Calls `set(k, x)` with the generalized force x of the load on each velocity of its joint.
     #[inline(always)]
-    fn share(&self, link: &Link, motions: &[Motion<T>], mut set: impl FnMut(usize, T)) {
-        let (k, m) = (link.velocity, link.motion);
-        if link.joint == LinkJoint::Turn {
-            set(k, motions[m].axis.dot(self.moment));
-            return;
+    fn share(&self, link: &Link, motions: &[Motion<T>], set: impl FnMut(usize, T)) {
+        if let Joint::Revolute(joint) = &link.joint {
+            self.share_of(joint, link, motions, set);
+        } else {
+            self.share_of(&link.joint, link, motions, set);
         }
-        match link.joint {
-            LinkJoint::Turn | LinkJoint::CoupledTurn => set(k, motions[m].axis.dot(self.moment)),
-            LinkJoint::Slide(_) => set(k, motions[m].swing.dot(self.force)),
-            LinkJoint::Ball(_) => {
-                for i in 0..3 {
-                    set(k + i, motions[m + i].axis.dot(self.moment));
-                }
-            }
-            LinkJoint::Base => {}
+    }
+
+    #[inline(always)]
+    fn share_of<J: JointModel>(
+        &self,
+        joint: &J,
+        link: &Link,
+        motions: &[Motion<T>],
+        mut set: impl FnMut(usize, T),
+    ) {
+        for i in 0..joint.n_motions() {
+            let screw = joint.screw(&motions[link.motion + i]);
+            set(link.velocity + i, screw.power(self.force, self.moment));
         }
     }
 

@@ -1,8 +1,9 @@
 //! Composite bodies: a body and everything it carries, as one rigid body.
 
 use super::inertias::Inertia;
+use super::joint::Motion;
 use super::mechanism::{BASE, Link};
-use super::poses::{Motion, Pose};
+use super::poses::Pose;
 use crate::scalar::{Lane, Vec3};
 
 /// Entries of the lower triangle of a free root's block in the mass matrix.

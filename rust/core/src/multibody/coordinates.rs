@@ -12,9 +12,9 @@
 use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
 
 use super::error::StateError;
-use super::joint::{Joint, Pose, Spherical};
+use super::joint::JointModel;
 use super::model::Model;
-use super::state::Configuration;
+use super::state::{Configuration, components, rotation_of};
 use crate::scalar::elementary::sin_cos;
 use crate::spatial::{CardanReport, HeadingPitchRoll};
 
@@ -48,20 +48,8 @@ fn from_angles(
         *own = q[k];
     }
     for (joint, k) in model.rotating_joints() {
-        let q = &q[*k..];
-        match joint {
-            Joint::Free(free) => {
-                let pose = Pose {
-                    position: Vector3::new(q[0], q[1], q[2]),
-                    attitude: turn([q[3], q[4], q[5]]),
-                };
-                configuration.set_pose(*free, pose);
-            }
-            Joint::Spherical(Spherical { rotation }) => {
-                configuration.rotations[*rotation] = turn([q[0], q[1], q[2]]);
-            }
-            Joint::Fixed | Joint::Revolute(_) | Joint::Prismatic(_) => {}
-        }
+        let turn = |angles| components(&turn(angles));
+        joint.set_public(&q[*k..], turn, &mut configuration);
     }
     Ok(configuration)
 }
@@ -77,18 +65,8 @@ fn write_angles(
         q[k] = *own;
     }
     for (joint, k) in model.rotating_joints() {
-        let (q, rotation) = match joint {
-            Joint::Free(free) => {
-                let pose = configuration.pose(*free);
-                q[*k..*k + 3].copy_from_slice(pose.position.as_slice());
-                (&mut q[*k + 3..], pose.attitude)
-            }
-            Joint::Spherical(Spherical { rotation }) => {
-                (&mut q[*k..], configuration.rotations[*rotation])
-            }
-            Joint::Fixed | Joint::Revolute(_) | Joint::Prismatic(_) => continue,
-        };
-        q[..3].copy_from_slice(&angles(rotation.to_rotation_matrix().matrix()));
+        let angles = |own| angles(rotation_of(own).to_rotation_matrix().matrix());
+        joint.write_public(configuration, angles, &mut q[*k..]);
     }
 }
 
@@ -165,12 +143,10 @@ pub fn report_angles(model: &Model, q: &[f64]) -> ReportAngles {
     }
 }
 
-/// First velocity index of each angular velocity.
-fn angular_blocks(model: &Model) -> impl Iterator<Item = usize> + '_ {
-    (model.rotating_joints().iter()).map(|(joint, k)| match joint {
-        Joint::Free(_) => k + 3,
-        _ => *k,
-    })
+/// First index of the angles, and of the angular velocity, of each rotation.
+pub(crate) fn angular_blocks(model: &Model) -> impl Iterator<Item = usize> + '_ {
+    let joints = model.rotating_joints().iter();
+    joints.filter_map(|(joint, k)| joint.first_angle().map(|at| k + at))
 }
 
 /// A checked velocity (nv).

@@ -31,10 +31,9 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 use super::composite::{Composite, Momentum, Symmetric};
-use super::joint::Joint;
+use super::joint::{Joint, Motion, free};
 use super::kinematics::Kinematics;
 use super::model::Model;
-use super::poses::Motion;
 use crate::scalar::Vec3;
 
 /// Scratch of [`coriolis_matrix`], allocated once for a model.
@@ -94,7 +93,7 @@ pub fn coriolis_matrix(
                 s.screws.push(Screw {
                     velocity: k,
                     S,
-                    S_dot: moved(&carrier, &S),
+                    S_dot: carrier.rate_of(&S),
                 });
             }
             velocity
@@ -139,36 +138,12 @@ pub fn coriolis_matrix(
 impl CoriolisScratch {
     /// Adds the six screws of a free body and returns its velocity.
     fn add_free(&mut self, first: usize, v: &[f64]) -> Motion<f64> {
-        let v = &v[first..];
-        let base = Motion {
-            axis: Vec3::new(v[3], v[4], v[5]),
-            swing: Vec3::new(v[0], v[1], v[2]),
-        };
-        let Motion { axis: zero, .. } = still();
-        let units = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let units = units.map(|[x, y, z]| Vec3::new(x, y, z));
-        for (k, e) in units.into_iter().enumerate() {
+        let base = free::velocity(&v[first..]);
+        for (k, [S, S_dot]) in free::screws_and_rates(&base).into_iter().enumerate() {
             self.screws.push(Screw {
                 velocity: first + k,
-                S: Motion {
-                    axis: zero,
-                    swing: e,
-                },
-                S_dot: still(),
-            });
-        }
-        for (k, e) in units.into_iter().enumerate() {
-            // The body rotates about its own origin, which moves.
-            self.screws.push(Screw {
-                velocity: first + 3 + k,
-                S: Motion {
-                    axis: e,
-                    swing: zero,
-                },
-                S_dot: Motion {
-                    axis: zero,
-                    swing: base.swing.cross(e),
-                },
+                S,
+                S_dot,
             });
         }
         base
@@ -180,15 +155,6 @@ fn still() -> Motion<f64> {
     Motion {
         axis: zero,
         swing: zero,
-    }
-}
-
-/// `V× S`: the rate of a motion vector S carried along at the velocity V.
-#[inline]
-fn moved(V: &Motion<f64>, S: &Motion<f64>) -> Motion<f64> {
-    Motion {
-        axis: V.axis.cross(S.axis),
-        swing: V.swing.cross(S.axis) + V.axis.cross(S.swing),
     }
 }
 

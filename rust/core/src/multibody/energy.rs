@@ -1,10 +1,10 @@
 //! Energy and linear momentum of a state in one sweep, without poses for any other use.
 
 use super::inertias::{Inertia, Inertias};
+use super::joint::{Free, Joint, JointModel, Motion, Placement, free};
 use super::lane_configuration::LaneConfiguration;
-use super::mechanism::{BASE, Link, LinkJoint, Mechanism};
-use super::poses::{NextTurn, Turns};
-use crate::scalar::quaternion::rotation;
+use super::mechanism::{BASE, Link, Mechanism};
+use super::poses::{JointAngles, NextAngle};
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Kinetic and potential energy, J.
@@ -37,7 +37,7 @@ impl<T: Lane> Energy<T> {
 pub struct EnergyScratch<T: Lane> {
     token: T::Token,
     bodies: Vec<Moving<T>>,
-    turns: Turns<T>,
+    angles: JointAngles<T>,
 }
 
 /// Pose and velocity of a body's frame.
@@ -64,7 +64,7 @@ impl<T: Lane> EnergyScratch<T> {
         Self {
             token,
             bodies: vec![Moving::of_world(token); mechanism.n_bodies()],
-            turns: Turns::new(token, mechanism),
+            angles: JointAngles::new(token, mechanism),
         }
     }
 }
@@ -78,7 +78,7 @@ impl<T: Lane> EnergyScratch<T> {
 pub fn energy<T: Lane>(
     mechanism: &Mechanism,
     inertias: &Inertias<T>,
-    place: &LaneConfiguration<T>,
+    q: &LaneConfiguration<T>,
     v: &[T],
     gravity: Vec3<T>,
     scratch: &mut EnergyScratch<T>,
@@ -91,7 +91,7 @@ pub fn energy<T: Lane>(
             let (links, own_inertias) = (&mechanism.links[..n], &inertias.bodies[..n]);
             let bodies = &mut scratch.bodies[..n];
             let world = Moving::of_world(scratch.token);
-            let mut turns = scratch.turns.of(mechanism, place);
+            let mut angles = scratch.angles.of(mechanism, q);
             let zero = T::splat(scratch.token, 0.0);
             let mut sums = Sums {
                 twice_kinetic: zero,
@@ -101,40 +101,29 @@ pub fn energy<T: Lane>(
             for (tree, &mass) in mechanism.trees.iter().zip(&inertias.trees) {
                 let (root, end) = (tree.bodies.start, tree.bodies.end.min(n)); // below n: no checks
                 bodies[root] = if tree.is_free {
-                    let (position, attitude) = place.pose(tree.pose);
-                    sums.fall += gravity.dot(*position) * mass;
-                    let v = &v[tree.velocities.start..][..BASE];
+                    let free = Free { pose: tree.pose };
+                    sums.fall += gravity.dot(*q.pose(tree.pose).0) * mass;
+                    let Motion { axis, swing } =
+                        free::velocity(&v[tree.velocities.start..][..BASE]);
                     Moving {
-                        R: rotation(attitude),
-                        velocity: Vec3::new(v[0], v[1], v[2]),
-                        omega: Vec3::new(v[3], v[4], v[5]),
+                        R: free.place(&world.R, q, || None).R,
+                        velocity: swing,
+                        omega: axis,
                         fall: zero,
                     }
                 } else {
-                    world.carry_root(&links[root], (place, v, gravity), &mut turns)
+                    world.carry_root(&links[root], (q, v, gravity), &mut angles)
                 };
                 sums.add(&links[root], &own_inertias[root], &bodies[root], gravity);
                 for b in root + 1..end {
                     let (before, own) = bodies.split_at_mut(b);
                     let link = &links[b];
                     let carrier = &before[link.parent];
-                    let lever = link.lever(&carrier.R);
-                    let frame = link.frame(&carrier.R);
-                    let body = if link.joint == LinkJoint::Turn {
-                        let axis = link.axis.turned(&frame);
-                        let R = if link.is_spinner {
-                            frame
-                        } else {
-                            link.axis.rotate(&frame, axis, turns.next())
-                        };
-                        Moving {
-                            R,
-                            velocity: carrier.velocity + carrier.omega.cross(lever),
-                            omega: carrier.omega + axis * v[link.velocity],
-                            fall: carrier.fall + gravity.dot(lever),
-                        }
+                    let state = (q, v, gravity);
+                    let body = if let Joint::Revolute(joint) = &link.joint {
+                        carrier.carry(joint, link, state, &mut angles)
                     } else {
-                        carrier.carry(link, (&frame, lever), (place, v, gravity), &mut turns)
+                        carrier.carry(&link.joint, link, state, &mut angles)
                     };
                     sums.add(link, &own_inertias[b], &body, gravity);
                     if !link.is_leaf {
@@ -178,44 +167,42 @@ impl<T: Lane> Moving<T> {
         &self,
         link: &Link,
         state: (&LaneConfiguration<T>, &[T], Vec3<T>),
-        turns: &mut NextTurn<'_, T>,
+        angles: &mut NextAngle<'_, T>,
     ) -> Self {
-        let (frame, lever) = (link.frame(&self.R), link.lever(&self.R));
-        self.carry(link, (&frame, lever), state, turns)
+        self.carry(&link.joint, link, state, angles)
     }
 
-    /// A body that it carries by a joint that is not a plain rotation. `frame` and `lever`: the
-    /// joint's frame, and the way to it.
+    /// A body that it carries.
     #[inline(always)]
-    fn carry(
+    fn carry<J: JointModel>(
         &self,
+        joint: &J,
         link: &Link,
-        (frame, mut lever): (&Mat3<T>, Vec3<T>),
-        (place, v, gravity): (&LaneConfiguration<T>, &[T], Vec3<T>),
-        turns: &mut NextTurn<'_, T>,
+        (q, v, gravity): (&LaneConfiguration<T>, &[T], Vec3<T>),
+        angles: &mut NextAngle<'_, T>,
     ) -> Self {
-        let k = link.velocity;
-        let mut own = Self { R: *frame, ..*self };
-        let axis = link.axis.turned(frame);
-        match link.joint {
-            LinkJoint::Turn | LinkJoint::CoupledTurn => {
-                own.omega += axis * link.rate(v[k]);
-                if !link.is_spinner {
-                    own.R = link.axis.rotate(frame, axis, turns.next());
-                }
-            }
-            LinkJoint::Slide(coordinate) => {
-                lever += axis * link.coordinate(place.joints[coordinate]);
-                own.velocity += axis * link.rate(v[k]);
-            }
-            LinkJoint::Ball(ball) => {
-                own.R = frame.product(&rotation(&place.balls[ball]));
-                own.omega += frame.times(Vec3::new(v[k], v[k + 1], v[k + 2]));
-            }
-            LinkJoint::Base => {}
+        let mut lever = link.lever(&self.R);
+        let frame = link.frame(&self.R);
+        let turn = || (!link.is_spinner).then(|| angles.next());
+        let Placement { R, shift } = joint.place(&frame, q, turn);
+        if let Some(shift) = shift {
+            lever += shift;
         }
-        own.velocity += self.omega.cross(lever);
-        own.fall += gravity.dot(lever);
+        let mut own = Self {
+            R,
+            velocity: self.velocity + self.omega.cross(lever),
+            omega: self.omega,
+            fall: self.fall + gravity.dot(lever),
+        };
+        joint.screws(&frame, |k, screw| {
+            let rate = screw.times(v[link.velocity + k]);
+            if let Some(spin) = rate.turning {
+                own.omega += spin;
+            }
+            if let Some(slide) = rate.sliding {
+                own.velocity += slide;
+            }
+        });
         own
     }
 }

@@ -7,10 +7,11 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::bias::{BiasScratch, bias};
 use super::energy::{Energy, EnergyScratch, energy};
+use super::joint::Motion;
 use super::lane_configuration::LaneConfiguration;
 use super::mass_matrix::MassMatrix;
 use super::model::Model;
-use super::poses::{Motion, Poses};
+use super::poses::Poses;
 use super::state::Configuration;
 use crate::scalar::Single;
 
@@ -20,7 +21,7 @@ pub struct Kinematics {
     /// World position of every tree's reference origin, m.
     origins: Vec<Vector3<f64>>,
     poses: Poses<f64>,
-    place: LaneConfiguration<f64>,
+    q: LaneConfiguration<f64>,
     tree_of: Vec<usize>,
 }
 
@@ -31,7 +32,7 @@ impl Kinematics {
         Self {
             origins: vec![Vector3::zeros(); model.trees().len()],
             poses: Poses::new(Single::best(), model.mechanism()),
-            place: LaneConfiguration::new(Single::best(), model.mechanism()),
+            q: LaneConfiguration::new(Single::best(), model.mechanism()),
             tree_of: model.bodies().iter().map(|body| body.tree).collect(),
         }
     }
@@ -54,14 +55,14 @@ impl Kinematics {
     /// Recomputes all poses.
     pub fn update(&mut self, model: &Model, configuration: &Configuration) {
         self.update_for_step(model, configuration);
-        self.poses.spin(model.mechanism(), &self.place);
+        self.poses.spin(model.mechanism(), &self.q);
     }
 
     /// Recomputes the poses that a step needs. Spinners ([`super::Body::is_spinner`]) are not
     /// rotated about their own axis.
     pub fn update_for_step(&mut self, model: &Model, configuration: &Configuration) {
-        self.place.set_lane(0, configuration);
-        (self.poses).update(model.mechanism(), model.inertias(), &self.place);
+        self.q.set_lane(0, configuration);
+        (self.poses).update(model.mechanism(), model.inertias(), &self.q);
         let others = self.poses.other_origins.iter();
         let origins = std::iter::once(&self.poses.origin).chain(others);
         for (own, origin) in self.origins.iter_mut().zip(origins) {
@@ -135,17 +136,9 @@ impl Kinematics {
         x: &Vector3<f64>,
         v: &[f64],
     ) -> Vector3<f64> {
-        let (lead, _) = model.split_path(b);
-        let mut velocity = match v[lead].first_chunk() {
-            Some(&[x_dot, y_dot, z_dot, w_x, w_y, w_z]) => {
-                Vector3::new(x_dot, y_dot, z_dot) + Vector3::new(w_x, w_y, w_z).cross(x)
-            }
-            None => Vector3::zeros(),
-        };
-        for mover in model.movers(b) {
-            velocity += self.velocity_at(mover.motion, x) * v[mover.velocity];
-        }
-        velocity
+        let motion = |m: usize| self.poses.motions[m];
+        let mechanism = model.mechanism();
+        (mechanism.point_velocity(b, (*x).into(), motion, |k| v[k])).into()
     }
 
     /// Velocity of the material point at `x` per unit of the joint velocity of motion `m`.
@@ -219,6 +212,6 @@ impl Kinematics {
         let mechanism = model.mechanism();
         let mut scratch = EnergyScratch::new(Single::best(), mechanism);
         let (inertias, gravity) = (model.inertias(), (*gravity).into());
-        energy(mechanism, inertias, &self.place, v, gravity, &mut scratch).0
+        energy(mechanism, inertias, &self.q, v, gravity, &mut scratch).0
     }
 }

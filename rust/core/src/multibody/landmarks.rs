@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::joint::Joint;
+use super::joint::JointModel;
 use super::kinematics::Kinematics;
 use super::model::{Frame, Model};
 use super::momentum::centre_of_mass;
@@ -64,23 +64,12 @@ pub fn poses<'a>(
 pub fn coordinate_names(model: &Model) -> Vec<String> {
     let mut names = Vec::with_capacity(model.nv());
     for (b, body) in model.bodies().iter().enumerate() {
-        let of_body = |x: &str| {
-            if b == 0 {
-                x.to_owned()
-            } else {
-                format!("{}.{x}", body.name)
-            }
-        };
-        match body.joint {
-            Joint::Free(_) => {
-                names.extend(["x", "y", "z", "roll", "heading", "pitch"].map(of_body));
-            }
-            Joint::Spherical(_) => names.extend(["roll", "heading", "pitch"].map(of_body)),
-            Joint::Revolute(_) | Joint::Prismatic(_) if !body.is_coupled => {
-                names.push(body.name.clone());
-            }
-            Joint::Revolute(_) | Joint::Prismatic(_) | Joint::Fixed => {}
-        }
+        let names_of_joint = body.joint.names().iter();
+        names.extend(names_of_joint.map(|&x| match x {
+            "" => body.name.clone(),
+            x if b == 0 => x.to_owned(),
+            x => format!("{}.{x}", body.name),
+        }));
     }
     names
 }

@@ -2,9 +2,11 @@
 
 use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 
+use super::joint::joint_model::{JointCoordinates, JointModel, advanced};
+use super::joint::{Joint, free};
 use super::mechanism::Mechanism;
 use super::state::Configuration;
-use crate::scalar::quaternion::{exp_rotation, normalised, product};
+use crate::scalar::quaternion::normalised;
 use crate::scalar::{Lane, Vec3};
 
 /// A configuration a lane.
@@ -18,7 +20,7 @@ pub struct LaneConfiguration<T: Lane> {
     pub joints: Vec<T>,
     /// Rotations of the spherical joints, from the body's frame to the joint's: unit quaternions
     /// x, y, z, w.
-    pub balls: Vec<[T; 4]>,
+    pub rotations: Vec<[T; 4]>,
     /// Positions and attitudes of the free bodies other than the first.
     others: Vec<(Vec3<T>, [T; 4])>,
 }
@@ -32,13 +34,12 @@ impl<T: Lane> LaneConfiguration<T> {
             Vec3::new(zero, zero, zero),
             [zero, zero, zero, T::splat(token, 1.0)],
         );
-        let n_others = mechanism.trees.iter().map(|tree| tree.pose).max();
         Self {
             position: nowhere,
             attitude: unturned,
             joints: vec![zero; mechanism.n_joints()],
-            balls: vec![unturned; mechanism.balls.len()],
-            others: vec![(nowhere, unturned); n_others.unwrap_or(0)],
+            rotations: vec![unturned; mechanism.n_rotations],
+            others: vec![(nowhere, unturned); mechanism.n_poses.saturating_sub(1)],
         }
     }
 
@@ -64,7 +65,7 @@ impl<T: Lane> LaneConfiguration<T> {
         is_place(&self.position, &q.position)
             && is_turn(&self.attitude, &q.attitude)
             && (self.joints.iter().zip(&q.joints)).all(|(own, x)| is_same(own, x))
-            && (self.balls.iter().zip(&q.rotations)).all(|(own, q)| is_turn(own, q))
+            && (self.rotations.iter().zip(&q.rotations)).all(|(own, q)| is_turn(own, q))
             && (self.others.iter().zip(&q.others)).all(|((position, attitude), q)| {
                 is_place(position, &q.position) && is_turn(attitude, &q.attitude)
             })
@@ -83,7 +84,7 @@ impl<T: Lane> LaneConfiguration<T> {
         for (own, angle) in self.joints.iter_mut().zip(&q.joints) {
             own.set(lane, *angle);
         }
-        for (own, q) in self.balls.iter_mut().zip(&q.rotations) {
+        for (own, q) in self.rotations.iter_mut().zip(&q.rotations) {
             turn(own, q);
         }
         for ((position, attitude), q) in self.others.iter_mut().zip(&q.others) {
@@ -103,7 +104,7 @@ impl<T: Lane> LaneConfiguration<T> {
         for (angle, own) in q.joints.iter_mut().zip(&self.joints) {
             *angle = own.get(lane);
         }
-        for (q, own) in q.rotations.iter_mut().zip(&self.balls) {
+        for (q, own) in q.rotations.iter_mut().zip(&self.rotations) {
             *q = quaternion(own);
         }
         for (q, (position, attitude)) in q.others.iter_mut().zip(&self.others) {
@@ -128,34 +129,29 @@ impl<T: Lane> LaneConfiguration<T> {
             // The joints' velocities are in the order of their coordinates.
             let rates = &v[first..][..n];
             for j in 0..n {
-                self.joints[j] = from.joints[j] + h * rates[j];
+                self.joints[j] = advanced(from.joints[j], rates[j], h);
             }
         } else {
             for j in 0..n {
-                self.joints[j] = from.joints[j] + h * v[joints[j].velocity];
+                self.joints[j] = advanced(from.joints[j], v[joints[j].velocity], h);
             }
         }
         if trees[0].is_free {
-            (self.position, self.attitude) = moved((&from.position, &from.attitude), v, h);
+            (self.position, self.attitude) = free::moved((&from.position, &from.attitude), v, h);
         }
-        if !self.others.is_empty() {
-            self.move_others(mechanism, from, v, h);
-        }
-        for ((own, before), &k) in self.balls.iter_mut().zip(&from.balls).zip(&mechanism.balls) {
-            let turn = exp_rotation(Vec3::new(v[k], v[k + 1], v[k + 2]) * h);
-            *own = product(&turn, before);
+        let others = &mechanism.rotating[usize::from(trees[0].is_free)..];
+        if !others.is_empty() {
+            self.rotate(others, from, v, h);
         }
     }
 
-    /// Moves the free bodies other than the first.
-    #[cold]
-    #[inline(never)]
-    fn move_others(&mut self, mechanism: &Mechanism, from: &Self, v: &[T], h: T) {
-        for tree in mechanism.trees.iter().filter(|tree| tree.pose > 0) {
-            if tree.is_free {
-                let before = from.pose(tree.pose);
-                self.others[tree.pose - 1] = moved(before, &v[tree.velocities.clone()], h);
-            }
+    /// Moves the free bodies other than the first, and the spherical joints.
+    #[inline(always)]
+    fn rotate(&mut self, joints: &[(Joint, usize)], from: &Self, v: &[T], h: T) {
+        self.rotations.clone_from(&from.rotations);
+        self.others.clone_from(&from.others);
+        for (joint, k) in joints {
+            joint.advance(self, &v[*k..], h);
         }
     }
 
@@ -163,7 +159,7 @@ impl<T: Lane> LaneConfiguration<T> {
     #[inline(always)]
     pub fn normalise(&mut self) {
         self.attitude = normalised(&self.attitude);
-        for own in &mut self.balls {
+        for own in &mut self.rotations {
             *own = normalised(own);
         }
         for (_, attitude) in &mut self.others {
@@ -182,7 +178,7 @@ impl<T: Lane> LaneConfiguration<T> {
         self.position = Vec3::select(lanes, other.position, self.position);
         select(&mut self.attitude, &other.attitude);
         select(&mut self.joints, &other.joints);
-        for (own, other) in self.balls.iter_mut().zip(&other.balls) {
+        for (own, other) in self.rotations.iter_mut().zip(&other.rotations) {
             select(own, other);
         }
         for ((position, attitude), other) in self.others.iter_mut().zip(&other.others) {
@@ -202,7 +198,7 @@ impl<T: Lane> LaneConfiguration<T> {
         for x in &self.joints {
             all = all & x.is_finite();
         }
-        for [x, y, z, w] in &self.balls {
+        for [x, y, z, w] in &self.rotations {
             all = all & x.is_finite() & y.is_finite() & z.is_finite() & w.is_finite();
         }
         for (Vec3 { x, y, z }, attitude) in &self.others {
@@ -215,12 +211,33 @@ impl<T: Lane> LaneConfiguration<T> {
     }
 }
 
-/// A pose after `h` seconds at the velocity `v` of its free body.
-#[inline(always)]
-fn moved<T: Lane>((position, attitude): (&Vec3<T>, &[T; 4]), v: &[T], h: T) -> (Vec3<T>, [T; 4]) {
-    let turn = exp_rotation(Vec3::new(v[3], v[4], v[5]) * h);
-    (
-        *position + Vec3::new(v[0], v[1], v[2]) * h,
-        product(&turn, attitude),
-    )
+impl<T: Lane> JointCoordinates<T> for LaneConfiguration<T> {
+    #[inline(always)]
+    fn number_at(&self, joint: usize) -> T {
+        self.joints[joint]
+    }
+
+    #[inline(always)]
+    fn rotation_at(&self, index: usize) -> [T; 4] {
+        self.rotations[index]
+    }
+
+    #[inline(always)]
+    fn set_rotation_at(&mut self, index: usize, rotation: [T; 4]) {
+        self.rotations[index] = rotation;
+    }
+
+    #[inline(always)]
+    fn pose_at(&self, index: usize) -> (Vec3<T>, [T; 4]) {
+        let (position, attitude) = self.pose(index);
+        (*position, *attitude)
+    }
+
+    #[inline(always)]
+    fn set_pose_at(&mut self, index: usize, (position, attitude): (Vec3<T>, [T; 4])) {
+        match index.checked_sub(1) {
+            None => (self.position, self.attitude) = (position, attitude),
+            Some(other) => self.others[other] = (position, attitude),
+        }
+    }
 }

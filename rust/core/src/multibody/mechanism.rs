@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use super::joint::{Coupling, JointAxis, free};
+use super::joint::{Coupling, Joint, Motion, free};
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Number of velocities of a free root. Every path of its tree starts with them.
@@ -25,8 +25,12 @@ pub struct Mechanism {
     pub(crate) rotors: Vec<usize>,
     /// Bodies with coupled joints, ascending.
     pub(crate) coupled: Vec<usize>,
-    /// Velocities of the spherical joints.
-    pub(crate) balls: Vec<usize>,
+    /// Joints whose coordinates are rotations, and their first velocities.
+    pub(super) rotating: Vec<(Joint, usize)>,
+    /// Number of poses in a configuration: the first body's and those of all other free bodies.
+    pub(super) n_poses: usize,
+    /// Number of rotations in a configuration.
+    pub(super) n_rotations: usize,
     /// Velocities that turn a frame and their rates per unit, and velocities of the spinners.
     pub(crate) turning: Vec<(usize, f64)>,
     /// See above.
@@ -103,13 +107,7 @@ pub struct Link {
     /// identity.
     pub rotation: Option<[[f64; 3]; 3]>,
     /// Its joint.
-    pub joint: LinkJoint,
-    /// Axis of a revolute or prismatic joint, the same in the joint's frame and the body's.
-    pub axis: JointAxis,
-    /// How the joint follows another one.
-    pub coupling: Option<Coupling>,
-    /// Coordinate of a spinner's joint, or the one that it follows.
-    pub(super) spin: Option<usize>,
+    pub joint: Joint,
     /// Its first velocity, or the one that it follows, and its first motion.
     pub velocity: usize,
     /// See above.
@@ -132,21 +130,6 @@ pub struct Link {
     pub(super) row: Range<usize>,
     pub(super) path: Range<usize>,
     pub(super) movers: Range<usize>,
-}
-
-/// The joint of a body.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum LinkJoint {
-    /// Of a root: free, or fixed to the world.
-    Base,
-    /// A rotation about its axis by a coordinate of its own.
-    Turn,
-    /// A rotation about its axis that follows another joint.
-    CoupledTurn,
-    /// A displacement along its axis, by the coordinate with this index.
-    Slide(usize),
-    /// Any rotation about a point: the index of its quaternion.
-    Ball(usize),
 }
 
 /// Principal axes of a body.
@@ -220,6 +203,35 @@ impl Mechanism {
         self.longest_path
     }
 
+    /// First velocity of the free root of body `b`'s tree.
+    #[inline(always)]
+    #[must_use]
+    pub fn base_of(&self, b: usize) -> Option<usize> {
+        let tree = &self.trees[self.links[b].tree];
+        tree.is_free.then_some(tree.velocities.start)
+    }
+
+    /// Velocity of the material point of body `b` at `x`, relative to its tree's origin. `motion`:
+    /// of each joint velocity, by its index; `v`: each velocity.
+    #[inline(always)]
+    pub(crate) fn point_velocity<T: Lane>(
+        &self,
+        b: usize,
+        x: Vec3<T>,
+        motion: impl Fn(usize) -> Motion<T>,
+        v: impl Fn(usize) -> T,
+    ) -> Vec3<T> {
+        let vector = |k| Vec3::new(v(k), v(k + 1), v(k + 2));
+        let mut velocity = match self.base_of(b) {
+            Some(first) => vector(first) + vector(first + 3).cross(x),
+            None => Vec3::splat(x.x.token(), [0.0; 3]),
+        };
+        for mover in self.movers(b) {
+            velocity += motion(mover.motion).velocity_at(x) * v(mover.velocity);
+        }
+        velocity
+    }
+
     /// Velocities that move body `b`: those of a free root, then of the joints outwards.
     #[inline(always)]
     #[must_use]
@@ -269,24 +281,6 @@ impl Link {
         match &self.rotation {
             None => *R,
             Some(fixed) => R.times_columns(fixed),
-        }
-    }
-
-    /// The coordinate of its joint, where that of its own or the one that it follows is `q`.
-    #[inline(always)]
-    pub(super) fn coordinate<T: Lane>(&self, q: T) -> T {
-        match &self.coupling {
-            None => q,
-            Some(coupling) => coupling.value(q),
-        }
-    }
-
-    /// The rate of its joint, where that of its own or the one that it follows is `v`.
-    #[inline(always)]
-    pub(super) fn rate<T: Lane>(&self, v: T) -> T {
-        match &self.coupling {
-            None => v,
-            Some(coupling) => v.like(coupling.ratio) * v,
         }
     }
 }

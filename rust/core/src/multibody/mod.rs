@@ -8,8 +8,37 @@
 //!
 //! The dynamics are written once, over the scalar ([`crate::scalar`]) that is one machine or
 //! several to a register: [`mechanism`], what machines in one register share; [`inertias`], what
-//! they need not; [`place`], their configurations; [`poses`], [`mass_matrix`], [`factor`], [`bias`]
-//! and [`energy`]. They branch on the kind of joint body by body.
+//! they need not; [`lane_configuration`], their configurations; [`poses`], [`mass_matrix`],
+//! [`factor`], [`bias`] and [`energy`]. They know joints by one interface, [`JointModel`].
+//!
+//! # One call
+//!
+//! Forward dynamics of a tree; every arrow is one sweep over the bodies:
+//!
+//! ```text
+//! description ──► Model                      checked, merged, numbered: once
+//!                   │  Mechanism, Inertias   what the sweeps read
+//!                   ▼
+//! Configuration ──► LaneConfiguration        q in lanes
+//!                   │
+//!                   ▼
+//!                 Poses::update              attitude, origin, mass centre; motion S a velocity
+//!                   │
+//!                   ├──► MassMatrix::update ──► factorise ──► Factor     M = Lᵀ D L
+//!                   ├──► bias                                            N v + G
+//!                   └──► energy                                          kinetic, potential
+//!                   │
+//!                   ▼
+//! v̇ = M⁻¹ (τ − bias)   ──►   set_moved       q ⊕ h v, joint by joint
+//! ```
+//!
+//! A joint is one page of `joint`: where it puts its body, its screws, how its coordinates advance.
+//!
+//! # May use
+//!
+//! [`crate::scalar`], [`crate::spatial`], [`crate::law`].
+//!
+//! From [`crate::law`] only the numbers of materials and of yielding wheels.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 pub mod bias;
@@ -44,7 +73,7 @@ pub use energy::{Energy, EnergyScratch};
 pub use error::{ModelError, StateError};
 pub use factor::Factor;
 pub use inertias::Inertias;
-pub use joint::{Joint, JointAxis, Pose};
+pub use joint::{Joint, JointAxis, JointModel, Motion, Pose};
 pub use kinematics::Kinematics;
 pub use lane_configuration::LaneConfiguration;
 pub use mass_matrix::MassMatrix;
@@ -55,6 +84,6 @@ pub use model::{
     Tree, Wheel,
 };
 pub use momentum::Momentum;
-pub use motor::{DriveTrial, Motor, MotorRegime};
-pub use poses::{Motion, Poses};
+pub use motor::{Motor, MotorLine};
+pub use poses::Poses;
 pub use state::Configuration;

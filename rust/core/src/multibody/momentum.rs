@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::joint::Joint;
+use super::joint::{Joint, Motion, free};
 use super::kinematics::Kinematics;
 use super::model::Model;
 
@@ -33,8 +33,8 @@ pub fn body_momenta(
             .map_or(Momentum::default(), |parent| out[parent]);
         let v = &v[body.velocity..];
         if let Joint::Free(_) = body.joint {
-            own.linear = Vector3::new(v[0], v[1], v[2]);
-            own.angular = Vector3::new(v[3], v[4], v[5]);
+            let Motion { axis, swing } = free::velocity(v);
+            (own.linear, own.angular) = (swing.into(), axis.into());
         }
         for (motion, v) in kinematics.motions()[body.motions()].iter().zip(v) {
             own.linear += Vector3::from(motion.swing) * *v;

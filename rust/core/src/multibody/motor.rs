@@ -12,10 +12,12 @@
 //!
 //! Source: the permanent-magnet DC motor at its supply voltage, e.g. Siciliano et al. 2009,
 //! *Robotics*, ch. 5.
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::error::ModelError;
+use crate::scalar::{Lane, LaneMask, Single};
 
 /// A torque–speed line.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -48,20 +50,6 @@ const TORQUES: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
 
 /// Range of finite no-load speeds, rad/s.
 const SPEEDS: std::ops::RangeInclusive<f64> = 1e-6..=1e9;
-
-/// Local dependence of the torque on the speed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum MotorRegime {
-    /// Constant, N m.
-    Constant(f64),
-    /// `τ = at_rest − slope ω`, N m and N m s/rad.
-    Line {
-        /// N m.
-        at_rest: f64,
-        /// N m s/rad.
-        slope: f64,
-    },
-}
 
 impl Motor {
     /// Checks the ranges; `at` makes a field's full name.
@@ -100,122 +88,175 @@ impl Motor {
         command.clamp(-self.stall_torque, self.stall_torque)
     }
 
-    /// Number of the branch that holds for a command (N m) at a rate (rad/s), both about the
-    /// joint's axis; they are in the order of the rate.
-    #[inline]
-    fn branch(&self, command: f64, rate: f64) -> usize {
-        let command = self.limited(command);
-        let drop = self.slope() * rate;
-        let (upper, lower) = (self.stall_torque - drop, -self.stall_torque - drop);
-        match () {
-            () if command > upper && upper < -self.end(-command) => 4,
-            () if command > upper => 3,
-            () if command < lower && lower > self.end(command) => 0,
-            () if command < lower => 1,
-            () => 2,
-        }
-    }
-
-    /// How far the line is followed beyond the no-load speed, N m.
-    fn end(&self, towards: f64) -> f64 {
-        if self.regenerating {
-            self.stall_torque
-        } else {
-            towards.max(0.0)
-        }
-    }
-
-    /// The torque of a branch.
-    #[inline]
-    fn on_branch(&self, branch: usize, command: f64) -> MotorRegime {
-        let command = self.limited(command);
-        let line = |at_rest| MotorRegime::Line {
-            at_rest,
-            slope: self.slope(),
-        };
-        match branch {
-            0 => MotorRegime::Constant(self.end(command)),
-            1 => line(-self.stall_torque),
-            2 => MotorRegime::Constant(command),
-            3 => line(self.stall_torque),
-            _ => MotorRegime::Constant(-self.end(-command)),
-        }
-    }
-
     /// Torque for a command (N m) at a rate (rad/s), N m.
     #[must_use]
     pub fn torque(&self, command: f64, rate: f64) -> f64 {
-        self.on_branch(self.branch(command, rate), command)
-            .torque(rate)
+        let mut line = MotorLine::new(Single::Baseline);
+        line.set_lane(0, Some(self), command);
+        line.choose(rate);
+        line.torque(rate)
     }
 }
 
-/// The trial branch of a drive's torque in a step.
+/// The branch on which the torque is the command.
+const COMMAND: f64 = 2.0;
+
+/// Drives with their commands and the present branches of their torques in a step, a drive a lane.
 ///
-/// A step with one branch yields the rate at its end, and thus the side of the branch on which the
-/// motor works. For a single wheel, moving one branch at a time terminates after at most four
-/// steps, since the torque falls with the rate. Jumping directly to the branch of that rate may
-/// alternate forever.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DriveTrial {
-    branch: usize,
-    regime: MotorRegime,
+/// Branches are numbered from 0 to 4 in the order of the rate; on each the torque is
+/// `at_rest − active ω`. A step with one branch yields the rate at its end, and thus the side of the
+/// branch on which the motor works. For a single wheel, moving one branch at a time terminates after
+/// at most four steps, since the torque falls with the rate. Jumping directly to the branch of that
+/// rate may alternate forever.
+#[derive(Clone, Copy, Debug)]
+pub struct MotorLine<T> {
+    /// Command within the stall torque, N m; 0 without a drive.
+    command: T,
+    /// Stall torque, N m; infinite without a motor.
+    stall: T,
+    /// Slope of the torque–speed line, N m s/rad; 0 without a motor.
+    slope: T,
+    /// How far the line is followed beyond the no-load speed, forwards and backwards, N m.
+    beyond: [T; 2],
+    branch: T,
+    at_rest: T,
+    active: T,
 }
 
-impl Default for DriveTrial {
-    fn default() -> Self {
+impl<T: Lane> MotorLine<T> {
+    /// Without drives.
+    #[must_use]
+    pub fn new(token: T::Token) -> Self {
+        let zero = T::splat(token, 0.0);
         Self {
-            branch: 2,
-            regime: MotorRegime::Constant(0.0),
+            command: zero,
+            stall: T::splat(token, f64::INFINITY),
+            slope: zero,
+            beyond: [zero; 2],
+            branch: T::splat(token, COMMAND),
+            at_rest: zero,
+            active: zero,
         }
     }
-}
 
-impl DriveTrial {
-    /// The branch that holds for a command (N m) at a rate (rad/s); without a motor the torque is
-    /// the command.
-    #[inline]
+    /// Sets the command of a lane, N m; without a motor it is the torque at any speed.
+    /// [`Self::choose`] follows if there is a motor.
+    pub fn set_lane(&mut self, lane: usize, motor: Option<&Motor>, command: f64) {
+        let limited = motor.map_or(command, |motor| motor.limited(command));
+        let stall = motor.map_or(f64::INFINITY, |motor| motor.stall_torque);
+        let beyond = |towards: f64| match motor {
+            Some(motor) if motor.regenerating => stall,
+            _ => towards.max(0.0),
+        };
+        // No negative zeros: skipped terms must not show in any bit.
+        self.command.set(lane, limited + 0.0);
+        self.stall.set(lane, stall);
+        self.slope.set(lane, motor.map_or(0.0, Motor::slope));
+        self.beyond[0].set(lane, beyond(limited));
+        self.beyond[1].set(lane, beyond(-limited));
+        self.branch.set(lane, COMMAND);
+        self.at_rest.set(lane, limited + 0.0);
+        self.active.set(lane, 0.0);
+    }
+
+    /// Whether any lane has a motor.
+    #[inline(always)]
     #[must_use]
-    pub fn at(motor: Option<&Motor>, command: f64, rate: f64) -> Self {
-        let branch = motor.map_or(2, |motor| motor.branch(command, rate));
-        Self::on(motor, command, branch)
+    pub fn has_motor(&self) -> bool {
+        self.stall.lt(self.stall.like(f64::INFINITY)).any()
     }
 
-    #[inline]
-    fn on(motor: Option<&Motor>, command: f64, branch: usize) -> Self {
-        let constant = MotorRegime::Constant(command);
-        let regime = motor.map_or(constant, |motor| motor.on_branch(branch, command));
-        Self { branch, regime }
-    }
-
-    /// Moves one branch towards that of a rate (rad/s); true if the torque changed.
-    #[inline]
-    pub fn revise(&mut self, motor: Option<&Motor>, command: f64, rate: f64) -> bool {
-        let wanted = motor.map_or(2, |motor| motor.branch(command, rate));
-        let branch = wanted.clamp(self.branch.saturating_sub(1), self.branch + 1);
-        let revised = Self::on(motor, command, branch);
-        let is_new = revised.regime != self.regime;
-        *self = revised;
-        is_new
-    }
-
-    /// The torque.
-    #[inline]
+    /// Slope of the line whatever the branch, N m s/rad.
+    #[inline(always)]
     #[must_use]
-    pub fn regime(&self) -> MotorRegime {
-        self.regime
+    pub fn slope(&self) -> T {
+        self.slope
     }
-}
 
-impl MotorRegime {
-    /// Torque at a rate (rad/s), N m.
-    #[inline]
+    /// Damping of the present branch, N m s/rad.
+    #[inline(always)]
     #[must_use]
-    pub fn torque(&self, rate: f64) -> f64 {
-        match *self {
-            Self::Constant(torque) => torque,
-            Self::Line { at_rest, slope } => at_rest - slope * rate,
-        }
+    pub fn damping(&self) -> T {
+        self.active
+    }
+
+    /// Torque of the present branch at rest, N m.
+    #[inline(always)]
+    #[must_use]
+    pub fn at_rest(&self) -> T {
+        self.at_rest
+    }
+
+    /// Torque of the present branch at a rate (rad/s), N m.
+    #[inline(always)]
+    #[must_use]
+    pub fn torque(&self, rate: T) -> T {
+        self.at_rest - self.active * rate
+    }
+
+    /// Work (J) that the motor is credited with in a step that turns it by `turned` (rad) at the
+    /// mean `torque` (N m).
+    ///
+    /// A torque–speed line only reduces the power of the command, `(τ − command) ω ≤ 0`. In a step
+    /// that reverses the rate, the implicit torque and the mean rate may violate this; the surplus
+    /// is not counted as work.
+    #[inline(always)]
+    #[must_use]
+    pub fn work(&self, torque: T, turned: T) -> T {
+        (torque * turned).min(self.command * turned)
+    }
+
+    /// Takes the branch that holds at a rate, rad/s.
+    #[inline(always)]
+    pub fn choose(&mut self, rate: T) {
+        self.take(self.branch_at(rate));
+    }
+
+    /// Moves one branch towards that of a rate (rad/s) in the lanes of a mask. Returns those in
+    /// which the torque changed.
+    #[inline(always)]
+    pub fn revise(&mut self, lanes: T::Mask, rate: T) -> T::Mask {
+        let one = rate.like(1.0);
+        let wanted = self.branch_at(rate);
+        let wanted = wanted.max(self.branch - one).min(self.branch + one);
+        let (before, slope) = (self.at_rest, self.active);
+        self.take(T::select(lanes, wanted, self.branch));
+        let is_same = before.le(self.at_rest)
+            & self.at_rest.le(before)
+            & slope.le(self.active)
+            & self.active.le(slope);
+        lanes & !is_same
+    }
+
+    /// Number of the branch at a rate.
+    #[inline(always)]
+    fn branch_at(&self, rate: T) -> T {
+        let number = |x: f64| rate.like(x);
+        let drop = self.slope * rate;
+        let (upper, lower) = (self.stall - drop, -self.stall - drop);
+        let [ahead, back] = self.beyond;
+        let is_above = upper.lt(self.command);
+        let is_below = self.command.lt(lower);
+        let mut branch = T::select(is_above, number(COMMAND + 1.0), number(COMMAND));
+        branch = T::select(is_above & upper.lt(-back), number(COMMAND + 2.0), branch);
+        branch = T::select(is_below, number(COMMAND - 1.0), branch);
+        T::select(is_below & ahead.lt(lower), number(COMMAND - 2.0), branch)
+    }
+
+    /// Takes the torque of a branch.
+    #[inline(always)]
+    fn take(&mut self, branch: T) {
+        let number = |x: f64| branch.like(x);
+        let [ahead, back] = self.beyond;
+        let is_on_line = |x: f64| branch.ge(number(x)) & branch.le(number(x));
+        let (upper, lower) = (is_on_line(COMMAND + 1.0), is_on_line(COMMAND - 1.0));
+        let mut at_rest = T::select(upper, self.stall, self.command);
+        at_rest = T::select(number(COMMAND + 1.0).lt(branch), -back, at_rest);
+        at_rest = T::select(lower, -self.stall, at_rest);
+        at_rest = T::select(branch.lt(number(COMMAND - 1.0)), ahead, at_rest);
+        self.branch = branch;
+        self.at_rest = at_rest;
+        self.active = T::select(upper | lower, self.slope, number(0.0));
     }
 }
 
@@ -264,16 +305,14 @@ mod tests {
             regenerating: true,
         };
         let (h, inertia, begin) = (0.05, 0.15, 20.0);
-        let mut drive = DriveTrial::at(Some(&motor), 0.0, begin);
+        let mut line = MotorLine::new(Single::Baseline);
+        line.set_lane(0, Some(&motor), 0.0);
+        line.choose(begin);
         let mut trials = 0;
         loop {
-            let end = match drive.regime() {
-                MotorRegime::Constant(torque) => begin + h * torque / inertia,
-                MotorRegime::Line { at_rest, slope } => {
-                    (inertia * begin + h * at_rest) / (inertia + h * slope)
-                }
-            };
-            if !drive.revise(Some(&motor), 0.0, end) {
+            let (at_rest, slope) = (line.at_rest(), line.damping());
+            let end = (inertia * begin + h * at_rest) / (inertia + h * slope);
+            if !line.revise(true, end) {
                 assert!((0.0..1.0).contains(&end), "{end}");
                 return;
             }

@@ -5,11 +5,10 @@
 //! free, otherwise the world's. A rover far from the world's origin thus loses no precision.
 
 use super::inertias::{Inertia, Inertias};
-use super::joint::Coupling;
+use super::joint::{Free, Joint, JointModel, Motion, Placement};
 use super::lane_configuration::LaneConfiguration;
-use super::mechanism::{Link, LinkJoint, Mechanism};
+use super::mechanism::{Link, Mechanism};
 use crate::scalar::elementary::{sin_cos, sines_cosines};
-use crate::scalar::quaternion::rotation;
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Poses of all bodies.
@@ -24,7 +23,7 @@ pub struct Poses<T: Lane> {
     pub bodies: Vec<Pose<T>>,
     /// Motion of each joint velocity, in the order of the bodies; see [`Mechanism::movers`].
     pub motions: Vec<Motion<T>>,
-    turns: Turns<T>,
+    angles: JointAngles<T>,
 }
 
 /// Pose of a body.
@@ -39,31 +38,6 @@ pub struct Pose<T> {
     pub c: Vec3<T>,
     /// From its carrier's origin to its own, m.
     pub lever: Vec3<T>,
-}
-
-/// The motion that a unit of a joint velocity imparts to everything the joint carries: a rotation,
-/// a translation, or both.
-#[derive(Clone, Copy, Debug)]
-pub struct Motion<T> {
-    /// Angular velocity: the unit axis of a revolute joint, zero of a prismatic one.
-    pub axis: Vec3<T>,
-    /// Velocity of the material point at the tree's origin: `r × axis` of a revolute joint, the
-    /// unit axis of a prismatic one.
-    pub swing: Vec3<T>,
-}
-
-impl<T: Lane> Motion<T> {
-    /// Velocity of the material point at `x`, relative to the tree's origin.
-    #[inline(always)]
-    pub fn velocity_at(&self, x: Vec3<T>) -> Vec3<T> {
-        self.axis.cross(x) + self.swing
-    }
-
-    /// Generalized force on its velocity of a force and its moment about the tree's origin.
-    #[inline(always)]
-    pub fn power(&self, force: Vec3<T>, moment: Vec3<T>) -> T {
-        self.axis.dot(moment) + self.swing.dot(force)
-    }
 }
 
 impl<T: Lane> Poses<T> {
@@ -81,7 +55,7 @@ impl<T: Lane> Poses<T> {
             other_origins: vec![zero; mechanism.trees.len().saturating_sub(1)],
             bodies: vec![Pose::of_world(token); mechanism.n_bodies()],
             motions: vec![motion; mechanism.n_motions()],
-            turns: Turns::new(token, mechanism),
+            angles: JointAngles::new(token, mechanism),
         }
     }
 
@@ -93,12 +67,12 @@ impl<T: Lane> Poses<T> {
         &mut self,
         mechanism: &Mechanism,
         inertias: &Inertias<T>,
-        place: &LaneConfiguration<T>,
+        q: &LaneConfiguration<T>,
     ) {
         T::vectorize(
             self.token,
             #[inline(always)]
-            || self.update_here(mechanism, inertias, place),
+            || self.update_here(mechanism, inertias, q),
         );
     }
 
@@ -107,56 +81,41 @@ impl<T: Lane> Poses<T> {
         &mut self,
         mechanism: &Mechanism,
         inertias: &Inertias<T>,
-        place: &LaneConfiguration<T>,
+        q: &LaneConfiguration<T>,
     ) {
         let n = mechanism.links.len();
         let (links, inertias) = (&mechanism.links[..n], &inertias.bodies[..n]);
         let bodies = &mut self.bodies[..n];
         let motions = &mut self.motions[..mechanism.n_motions()];
-        let mut turns = self.turns.of(mechanism, place);
-        self.origin = place.position;
+        let mut angles = self.angles.of(mechanism, q);
+        self.origin = q.position;
         for (t, tree) in mechanism.trees.iter().enumerate() {
             let (root, end) = (tree.bodies.start, tree.bodies.end.min(n)); // below n: no checks
             if tree.is_free {
-                let (position, attitude) = place.pose(tree.pose);
+                let free = Free { pose: tree.pose };
                 if t > 0 {
-                    self.other_origins[t - 1] = *position;
+                    self.other_origins[t - 1] = *q.pose(tree.pose).0;
                 }
                 let trunk = &mut bodies[root];
-                trunk.R = rotation(attitude);
+                trunk.R = free.place(&trunk.R, q, || None).R;
                 if !links[root].is_centred {
                     trunk.c = trunk.R.times(inertias[root].centre);
                 }
             } else {
                 let world = Pose::of_world(self.token);
                 let (link, inertia) = (&links[root], &inertias[root]);
-                bodies[root] = follow_world(link, inertia, &world, place, &mut turns, motions);
+                bodies[root] = follow_world(link, inertia, &world, q, &mut angles, motions);
             }
             for b in root + 1..end {
-                let link = &links[b];
+                let (link, inertia) = (&links[b], &inertias[b]);
                 let (before, own) = bodies.split_at_mut(b);
-                let (carrier, own) = (&before[link.parent], &mut own[0]);
-                if link.joint != LinkJoint::Turn {
-                    *own = follow(link, &inertias[b], carrier, place, &mut turns, motions);
-                    continue;
-                }
-                let lever = link.lever(&carrier.R);
-                let r = carrier.r + lever;
-                let frame = link.frame(&carrier.R);
-                let axis = link.axis.turned(&frame);
-                own.R = if link.is_spinner {
-                    frame
+                let carrier = &before[link.parent];
+                // Nearly all joints are revolute: their code stands apart from the choice.
+                own[0] = if let Joint::Revolute(joint) = &link.joint {
+                    follow(joint, link, inertia, carrier, q, &mut angles, motions)
                 } else {
-                    link.axis.rotate(&frame, axis, turns.next())
+                    follow(&link.joint, link, inertia, carrier, q, &mut angles, motions)
                 };
-                own.c = if link.is_centred {
-                    r
-                } else {
-                    r + own.R.times(inertias[b].centre)
-                };
-                (own.r, own.lever) = (r, lever);
-                let swing = r.cross(axis);
-                motions[link.motion] = Motion { axis, swing };
             }
         }
     }
@@ -166,12 +125,15 @@ impl<T: Lane> Poses<T> {
     ///
     /// # Panics
     /// If an argument is of another mechanism.
-    pub fn spin(&mut self, mechanism: &Mechanism, place: &LaneConfiguration<T>) {
+    pub fn spin(&mut self, mechanism: &Mechanism, q: &LaneConfiguration<T>) {
         for (link, pose) in mechanism.links.iter().zip(&mut self.bodies) {
-            if let Some(joint) = link.spin {
-                let angle = link.coordinate(place.joints[joint]);
-                let axis = link.axis.turned(&pose.R);
-                pose.R = link.axis.rotate(&pose.R, axis, sin_cos(angle));
+            if link.is_spinner
+                && let Some((joint, coupling)) = link.joint.angle()
+            {
+                let number = q.joints[joint];
+                let angle = coupling.map_or(number, |coupling| coupling.value(number));
+                let turn = || Some(sin_cos(angle));
+                pose.R = link.joint.place(&pose.R, q, turn).R;
             }
         }
     }
@@ -201,56 +163,42 @@ fn follow_world<T: Lane>(
     link: &Link,
     inertia: &Inertia<T>,
     world: &Pose<T>,
-    place: &LaneConfiguration<T>,
-    turns: &mut NextTurn<'_, T>,
+    q: &LaneConfiguration<T>,
+    angles: &mut NextAngle<'_, T>,
     motions: &mut [Motion<T>],
 ) -> Pose<T> {
-    follow(link, inertia, world, place, turns, motions)
+    follow(&link.joint, link, inertia, world, q, angles, motions)
 }
 
-/// Places a body whose joint is not a plain rotation, and writes the motions of the joint.
+/// Places a body on its carrier and writes the motions of its joint.
 #[inline(always)]
-fn follow<T: Lane>(
+fn follow<T: Lane, J: JointModel>(
+    joint: &J,
     link: &Link,
     inertia: &Inertia<T>,
     carrier: &Pose<T>,
-    place: &LaneConfiguration<T>,
-    turns: &mut NextTurn<'_, T>,
+    q: &LaneConfiguration<T>,
+    angles: &mut NextAngle<'_, T>,
     motions: &mut [Motion<T>],
 ) -> Pose<T> {
     let mut lever = link.lever(&carrier.R);
     let frame = link.frame(&carrier.R);
-    let mut R = frame;
-    let axis = link.axis.turned(&frame);
-    let at = carrier.r + lever;
-    match link.joint {
-        LinkJoint::Slide(coordinate) => {
-            lever += axis * link.coordinate(place.joints[coordinate]);
-            motions[link.motion] = Motion {
-                axis: Vec3::splat(at.x.token(), [0.0; 3]),
-                swing: axis,
-            };
-        }
-        LinkJoint::Turn | LinkJoint::CoupledTurn => {
-            if !link.is_spinner {
-                R = link.axis.rotate(&frame, axis, turns.next());
-            }
-            let swing = at.cross(axis);
-            motions[link.motion] = Motion { axis, swing };
-        }
-        LinkJoint::Ball(ball) => {
-            R = frame.product(&rotation(&place.balls[ball]));
-            for (motion, axis) in motions[link.motion..].iter_mut().zip(frame.columns()) {
-                let swing = at.cross(axis);
-                *motion = Motion { axis, swing };
-            }
-        }
-        LinkJoint::Base => {}
-    }
-    if let Some(coupling) = &link.coupling {
-        couple(motions, link.motion, coupling);
+    let turn = || (!link.is_spinner).then(|| angles.next());
+    let Placement { R, shift } = joint.place(&frame, q, turn);
+    if let Some(shift) = shift {
+        lever += shift;
     }
     let r = carrier.r + lever;
+    joint.screws(&frame, |k, screw| {
+        motions[link.motion + k] = screw.motion(r);
+    });
+    if let Some((before, combined)) = joint.combined() {
+        let (before, own) = (motions[before], motions[link.motion]);
+        motions[combined] = Motion {
+            axis: before.axis + own.axis,
+            swing: before.swing + own.swing,
+        };
+    }
     let c = if link.is_centred {
         r
     } else {
@@ -259,38 +207,21 @@ fn follow<T: Lane>(
     Pose { R, r, c, lever }
 }
 
-/// The motion of a coupled joint per unit of the velocity that it follows, and the combined motion
-/// of what it carries.
-#[inline(always)]
-fn couple<T: Lane>(motions: &mut [Motion<T>], m: usize, coupling: &Coupling) {
-    let own = &mut motions[m];
-    let ratio = own.axis.x.like(coupling.ratio);
-    (own.axis, own.swing) = (own.axis * ratio, own.swing * ratio);
-    let own = *own;
-    if let Some((before, combined)) = coupling.combined {
-        let before = motions[before];
-        motions[combined] = Motion {
-            axis: before.axis + own.axis,
-            swing: before.swing + own.swing,
-        };
-    }
-}
-
 /// Sines and cosines of the joints that a step turns.
 #[derive(Clone, Debug)]
-pub(super) struct Turns<T> {
+pub(super) struct JointAngles<T> {
     /// Angles, sines and cosines; those of a single rover fill up whole registers.
     numbers: [Vec<T>; 3],
 }
 
 /// The same, one after the other.
-pub(super) struct NextTurn<'a, T> {
+pub(super) struct NextAngle<'a, T> {
     sines: &'a [T],
     cosines: &'a [T],
     at: usize,
 }
 
-impl<T: Lane> Turns<T> {
+impl<T: Lane> JointAngles<T> {
     pub(super) fn new(token: T::Token, mechanism: &Mechanism) -> Self {
         let n = mechanism.angles.len();
         let n = if T::LANES == 1 {
@@ -308,19 +239,19 @@ impl<T: Lane> Turns<T> {
     pub(super) fn of(
         &mut self,
         mechanism: &Mechanism,
-        place: &LaneConfiguration<T>,
-    ) -> NextTurn<'_, T> {
+        q: &LaneConfiguration<T>,
+    ) -> NextAngle<'_, T> {
         let turning = &mechanism.angles[..];
         let [angles, sines, cosines] = &mut self.numbers;
         let angles = &mut angles[..];
         for k in 0..turning.len() {
-            angles[k] = place.joints[turning[k]];
+            angles[k] = q.joints[turning[k]];
         }
         for (k, coupling) in &mechanism.coupled_angles {
             angles[*k] = coupling.value(angles[*k]);
         }
         sines_cosines(angles, sines, cosines);
-        NextTurn {
+        NextAngle {
             sines,
             cosines,
             at: 0,
@@ -328,7 +259,7 @@ impl<T: Lane> Turns<T> {
     }
 }
 
-impl<T: Lane> NextTurn<'_, T> {
+impl<T: Lane> NextAngle<'_, T> {
     #[inline(always)]
     pub(super) fn next(&mut self) -> (T, T) {
         let k = self.at;

@@ -1,10 +1,12 @@
 //! The configuration: small, cloneable, without scratch.
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::joint::{Free, Joint, Pose, Spherical};
+use super::joint::joint_model::{JointCoordinates, JointModel, advanced};
+use super::joint::{Free, Pose};
 use super::model::Model;
+use crate::scalar::Vec3;
 
 /// Tolerance on the squared length of a unit quaternion; steps keep it within rounding.
 const UNIT: f64 = 1e-12;
@@ -91,17 +93,10 @@ impl Configuration {
     /// `self ⊕= h v`, in place.
     pub fn advance(&mut self, model: &Model, v: &[f64], h: f64) {
         for (q, &k) in self.joints.iter_mut().zip(model.joint_velocities()) {
-            *q += h * v[k];
+            *q = advanced(*q, v[k], h);
         }
         for (joint, k) in model.rotating_joints() {
-            match joint {
-                Joint::Free(free) => self.set_pose(*free, self.pose(*free).moved(&v[*k..], h)),
-                Joint::Spherical(Spherical { rotation }) => {
-                    let own = &mut self.rotations[*rotation];
-                    *own = Spherical::moved(own, &v[*k..], h);
-                }
-                Joint::Fixed | Joint::Revolute(_) | Joint::Prismatic(_) => {}
-            }
+            joint.advance(self, &v[*k..], h);
         }
     }
 
@@ -140,5 +135,42 @@ impl Configuration {
             .chain(self.attitudes().flat_map(|q| q.coords.iter()))
             .chain(&self.joints)
             .all(|x| x.is_finite())
+    }
+}
+
+/// Components x, y, z, w of a rotation.
+pub(super) fn components(rotation: &UnitQuaternion<f64>) -> [f64; 4] {
+    rotation.coords.into()
+}
+
+/// The rotation with the components x, y, z, w.
+pub(super) fn rotation_of([x, y, z, w]: [f64; 4]) -> UnitQuaternion<f64> {
+    Unit::new_unchecked(Quaternion::new(w, x, y, z))
+}
+
+impl JointCoordinates<f64> for Configuration {
+    fn number_at(&self, joint: usize) -> f64 {
+        self.joints[joint]
+    }
+
+    fn rotation_at(&self, index: usize) -> [f64; 4] {
+        components(&self.rotations[index])
+    }
+
+    fn set_rotation_at(&mut self, index: usize, rotation: [f64; 4]) {
+        self.rotations[index] = rotation_of(rotation);
+    }
+
+    fn pose_at(&self, index: usize) -> (Vec3<f64>, [f64; 4]) {
+        let Pose { position, attitude } = self.pose(Free { pose: index });
+        (position.into(), components(&attitude))
+    }
+
+    fn set_pose_at(&mut self, index: usize, (position, attitude): (Vec3<f64>, [f64; 4])) {
+        let pose = Pose {
+            position: position.into(),
+            attitude: rotation_of(attitude),
+        };
+        self.set_pose(Free { pose: index }, pose);
     }
 }

@@ -20,7 +20,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::error::PlanarError;
 use super::tree::{Part, PlanarTree, Wheel};
-use crate::multibody::{Body, Joint, JointAxis, JointProperties, Model, Passive};
+use crate::multibody::{Body, Joint, JointAxis, JointModel, JointProperties, Model, Passive};
 
 /// Relative difference up to which two sides count as mirror images.
 const ALIKE: f64 = 1e-9;
@@ -122,8 +122,7 @@ fn pair_bodies(model: &Model) -> Result<(Vec<Part>, Vec<Vec<usize>>), PlanarErro
         let is_in_plane = match (&body.joint, body.parent) {
             (Joint::Free(_), _) => b == 0,
             (Joint::Revolute(joint), Some(_)) => {
-                let is_own = joint.coordinate.coupling.is_none();
-                body.rotation.is_none() && joint.axis == JointAxis::Z && is_own
+                body.rotation.is_none() && joint.axis == JointAxis::Z
             }
             _ => false,
         };

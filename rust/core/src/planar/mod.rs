@@ -10,6 +10,27 @@
 //! Time stepping, contact law and solver live elsewhere: [`crate::system::planar`] turns a machine
 //! on a ground into a mechanical system, and [`crate::simulation`] steps it like the rover. x
 //! points forward, y up, and angles are positive to the left.
+//!
+//! # One call
+//!
+//! ```text
+//! numbers of a machine ──► ball, two_wheel_rover, mirrored_rover ──► PlanarTree
+//!                                                                       │
+//! q ──► PlanarTree::place ──► PlanarPoses                               │
+//!           ├──► mass_matrix, force         M, F(q, v)  ◄───────────────┘
+//!           ├──► disc                       the wheels in the world
+//!           │       └──► Ground::facing     points of the curve that face a disc
+//!           └──► push_rows                  rows of Hᵀ of a wheel's point
+//! ```
+//!
+//! [`crate::system::planar`] makes a mechanical system of them.
+//!
+//! # May use
+//!
+//! [`crate::quantity`], [`crate::scalar`], [`crate::multibody`], [`crate::geometry`],
+//! [`crate::integrator`].
+//!
+//! From [`crate::multibody`] the model that a mirrored rover is made from, and motors.
 
 pub mod ball;
 pub mod curve;

@@ -16,6 +16,27 @@
 //! - `prepared`: a problem together with its scales, for iterative methods.
 //! - `redundancy`: loads that equilibrium leaves open.
 //! - `passivity`: scales down an approximate answer that would add energy.
+//!
+//! # One call
+//!
+//! ```text
+//! W, q, μ ──► FrictionContactProblem         checked: sizes, finite numbers, μ ≥ 0
+//!                  │
+//!                  ▼
+//!             Prepared                       with scales ρ of every contact, for iterative methods
+//!                  │
+//!                  ▼  a solver's p
+//!             evaluate                       u = W p + q, residual of the law at every contact
+//!                  │
+//!                  ▼
+//!             passive_share                  how much of an approximate p adds no energy
+//! ```
+//!
+//! # May use
+//!
+//! [`crate::spatial`], [`crate::law`].
+//!
+//! No solver and no body: a problem read from a file is as good as one from a rover.
 
 mod dimension;
 mod error;
@@ -25,6 +46,7 @@ mod passivity;
 mod prepared;
 mod redundancy;
 mod residual;
+mod rolling;
 mod scales;
 
 pub use dimension::Dimension;
@@ -37,4 +59,5 @@ pub(crate) use prepared::{Prepared, Proximal};
 pub use redundancy::undetermined_loads;
 pub(crate) use residual::{Magnitudes, Violations, evaluate_contact};
 pub use residual::{Residual, evaluate, evaluate_into};
+pub use rolling::RollingContact;
 pub(crate) use scales::{ContactScales, Scales, power_of_two};

@@ -4,7 +4,8 @@
 use super::residual::{Magnitudes, Violations, evaluate_contact};
 use super::scales::{ContactScales, Scales};
 use super::{FrictionContactProblem, Operator, Residual};
-use crate::law::coulomb::{natural_map, violation};
+use crate::law::coulomb::{Coulomb, natural_map, violation};
+use crate::law::friction_law::FrictionLaw;
 
 /// Friction coefficient above which the natural map does not measure progress.
 const STEEP: f64 = 1e3;
@@ -108,10 +109,20 @@ impl<'a> Prepared<'a> {
     /// [`crate::problem::evaluate`], with the scales already at hand.
     #[inline]
     pub fn measure<const D: usize>(&self, p: &[f64], u: &[f64]) -> Residual {
+        self.measure_under::<D, _>(&|i| Coulomb(self.mu[i]), p, u)
+    }
+
+    /// [`Self::measure`] under the law that contact i has.
+    #[inline]
+    pub fn measure_under<const D: usize, L: FrictionLaw<D>>(
+        &self,
+        law: &impl Fn(usize) -> L,
+        p: &[f64],
+        u: &[f64],
+    ) -> Residual {
         let mut violations = Violations::default();
-        let scales = self.masses.iter().zip(self.modes);
-        for (i, (&mu, (&mass, &modes))) in self.mu.iter().zip(scales).enumerate() {
-            violations.add(evaluate_contact::<D>(p, u, D * i, mu, modes), mass);
+        for (i, (&mass, &modes)) in self.masses.iter().zip(self.modes).enumerate() {
+            violations.add(evaluate_contact::<D>(p, u, D * i, &law(i), modes), mass);
         }
         violations.residual(self.inverse_speed, self.inverse_data)
     }
@@ -152,10 +163,19 @@ impl<'a> Prepared<'a> {
     /// that no impulse does better, and small compared with the largest free velocity: the residual
     /// is a mean over all contacts, which hides the violation of one.
     pub fn is_within_rounding<const D: usize>(&self, p: &[f64], u: &[f64]) -> bool {
+        self.is_within_rounding_under::<D, _>(&|i| Coulomb(self.mu[i]), p, u)
+    }
+
+    /// [`Self::is_within_rounding`] under the law that contact i has.
+    pub fn is_within_rounding_under<const D: usize, L: FrictionLaw<D>>(
+        &self,
+        law: &impl Fn(usize) -> L,
+        p: &[f64],
+        u: &[f64],
+    ) -> bool {
         let largest = self.q.iter().fold(0.0_f64, |m, q| m.max(q.abs()));
-        let contacts = self.mu.iter().zip(self.modes);
-        contacts.enumerate().all(|(i, (&mu, &modes))| {
-            let violation = evaluate_contact::<D>(p, u, D * i, mu, modes).sqrt();
+        self.modes.iter().enumerate().all(|(i, &modes)| {
+            let violation = evaluate_contact::<D>(p, u, D * i, &law(i), modes).sqrt();
             let size: f64 = (D * i..D * (i + 1))
                 .map(|r| self.W.row_magnitude(r, p) + self.q[r].abs())
                 .sum();

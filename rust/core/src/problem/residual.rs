@@ -1,7 +1,7 @@
 //! The residual of an impulse: its violation of Signorini's and Coulomb's laws, relative and in
 //! m/s.
 //!
-//! Each contact is judged by [`violation`], a velocity `v_i` in m/s that vanishes exactly where
+//! Each contact is judged by [`violation`](crate::law::coulomb::violation), a velocity `v_i` in m/s that vanishes exactly where
 //! both laws hold; its scales are the contact's own, `ρ_N = 1/W_NN` and `ρ_T` the inverse mean of
 //! the tangential diagonal, so that no other contact's mass and no friction coefficient enters.
 //! With the contact's mass `ρ_i = d / tr W_ii` the residual has two numbers (none of the three
@@ -14,7 +14,8 @@
 
 use super::scales::{contact_scales, power_of_two};
 use super::{Dimension, FrictionContactProblem};
-use crate::law::coulomb::violation;
+use crate::law::coulomb::Coulomb;
+use crate::law::friction_law::FrictionLaw;
 
 /// Distance of an impulse from the law, see the page above.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,14 +65,14 @@ pub(crate) fn evaluate_contact<const D: usize>(
     p: &[f64],
     u: &[f64],
     offset: usize,
-    mu: f64,
+    law: &impl FrictionLaw<D>,
     scales: [f64; 2],
 ) -> f64 {
     let mut p_i = [0.0; D];
     let mut u_i = [0.0; D];
     p_i.copy_from_slice(&p[offset..offset + D]);
     u_i.copy_from_slice(&u[offset..offset + D]);
-    violation(&p_i, &u_i, mu, scales)
+    law.violation(&p_i, &u_i, scales)
         .iter()
         .map(|x| x * x)
         .sum()
@@ -167,7 +168,13 @@ fn evaluate_in<const D: usize>(
         let p_i: [f64; D] = std::array::from_fn(|k| p[at(k)] / mass / speed);
         let u_i: [f64; D] = std::array::from_fn(|k| u[at(k)] / speed);
         let q_i: [f64; D] = std::array::from_fn(|k| q[at(k)] / speed);
-        let square = evaluate_contact::<D>(&p_i, &u_i, 0, mu, scales.modes.map(|rho| rho / mass));
+        let square = evaluate_contact::<D>(
+            &p_i,
+            &u_i,
+            0,
+            &Coulomb(mu),
+            scales.modes.map(|rho| rho / mass),
+        );
         violations.add(square, scales.mass / mass);
         data.add(&q_i, scales.mass / mass);
     }

@@ -7,6 +7,29 @@
 //!
 //! The chapter sees a wheel, a plane with a relief and six numbers of memory, and no machine: the
 //! coupling to a machine is in [`crate::system`].
+//!
+//! # One call
+//!
+//! A wheel in sand; [`crate::system`] makes a force of the machine of it:
+//!
+//! ```text
+//! WheelPose, Twist ──► patch::react          Bed: tangent plane and relief under the wheel
+//!                         │
+//!                         ▼
+//!                      pieces of the rim     depth and velocity of each
+//!                         │   resistive_force::traction, or Bekker::stress
+//!                         ▼
+//!                      Reaction              force, moment and their derivatives
+//!                         │
+//!                         ▼
+//!                      Memory::after, RutMap the sand as the wheel has left it
+//! ```
+//!
+//! # May use
+//!
+//! [`crate::quantity`], [`crate::scalar`], [`crate::multibody`].
+//!
+//! From [`crate::multibody`] only the wheel of a model.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 pub mod bekker;

@@ -5,6 +5,20 @@
 //!   registers;
 //! - [`elementary`]: sine, cosine and exponential with the same bits everywhere;
 //! - [`linear`]: vectors and matrices of three dimensions over lanes; `quaternion`: rotations.
+//!
+//! # One call
+//!
+//! ```text
+//! Instructions::of_this_machine() ──► token of Single, f64x4 or f64x8
+//! T::vectorize(token, || formula(x, y))    the closure is compiled for the token's instructions
+//!                        │
+//!                        └─ x: T           f64, four or eight lanes; each has the same bits
+//!                           x.lt(y)        a mask; T::select(mask, a, b) in place of a branch
+//! ```
+//!
+//! # May use
+//!
+//! No other chapter.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 pub mod elementary;

@@ -18,7 +18,7 @@ use crate::spatial::space::body_velocities;
 use crate::system::grains::contact::WALL;
 use crate::system::grains::{
     self, COORDINATES, GrainContact, GrainError, GrainParts, GrainScene, GrainSystem, Grains,
-    Renumbering, Sleep, SleepOptions,
+    Moments, Renumbering, Sleep, SleepOptions,
 };
 
 /// Options that suit a bed of these grains.
@@ -76,13 +76,16 @@ pub struct BedMemory {
     pub elapsed: f64,
     /// Who sleeps.
     pub sleep: Sleep,
+    /// Moments of rolling friction, from which the next step's solver starts.
+    pub moments: Moments,
 }
 
 impl BedMemory {
-    /// Counts a step of h, s.
-    pub(super) fn count_step(&mut self, h: f64) {
+    /// Counts a step of h, s, and remembers what it found.
+    pub(super) fn count_step<const D: usize>(&mut self, h: f64, parts: &GrainParts<D>) {
         self.count += 1;
         self.elapsed += h;
+        parts.rolling.remember(&mut self.moments);
     }
 }
 
@@ -136,6 +139,7 @@ where
             count: 0,
             elapsed: 0.0,
             sleep: Sleep::new(self.soil.grains.kinematic()),
+            moments: Moments::new(),
         }
     }
 
@@ -157,6 +161,7 @@ where
         GrainSystem {
             scene: &self.soil,
             asleep: memory.sleep.asleep(),
+            moments: &memory.moments,
             inputs: &command.torques,
             pull: command.pull,
             parts,
@@ -169,7 +174,7 @@ where
 
     /// Lets grains sleep and wake.
     fn after_step(&self, taken: StepTaken<'_, Self>) {
-        taken.memory.count_step(taken.options.time_step);
+        (taken.memory).count_step(taken.options.time_step, taken.parts);
         let Some(options) = &self.sleep else {
             return;
         };
@@ -215,13 +220,16 @@ where
             .chain(pull);
         let n_bodies = grains.len() + expected[1];
         let is_body = |body: u32| (body as usize) < n_bodies;
-        let mut keys = snapshot.active.iter().map(|a| a.contact.key);
+        let moments = &snapshot.memory.moments;
+        let keys = snapshot.active.iter().map(|a| a.contact.key);
+        let mut keys = keys.chain(moments.iter().map(|(key, _)| *key));
         snapshot.state.configuration.len() == self.soil.nq()
             && torques.len() == expected[0]
             && snapshot.memory.count <= MAX_STEPS
             && snapshot.memory.elapsed.is_finite()
             && snapshot.memory.sleep.is_of(grains.kinematic())
             && numbers.all(|x| x.is_finite())
+            && moments.iter().flat_map(|(_, s)| s).all(|x| x.is_finite())
             && keys.all(|key| is_body(key.a) && (key.b >= WALL || is_body(key.b)))
     }
 }
@@ -386,6 +394,10 @@ where
             .filter_map(|(key, p)| Some((renumbering.key(*key)?, *p)))
             .collect();
         let room = 3 * renumbering.left();
+        let moments = self.memory.moments.iter();
+        self.memory.moments = moments
+            .filter_map(|(key, s)| Some((renumbering.key(*key)?, *s)))
+            .collect();
         self.scratch = Scratch::new(&self.state.configuration, self.scene.nv(), room, D);
         self.active.clear();
     }
@@ -440,6 +452,14 @@ where
             sum += impulse;
         }
         sum.into()
+    }
+
+    /// Moment of rolling and drilling friction of a contact of the last step on its first body,
+    /// N m s.
+    #[must_use]
+    pub fn moment(&self, contact: &GrainContact<D>) -> [f64; 3] {
+        let radius = self.soil().grains.radius();
+        grains::moment_of(radius, &self.memory.moments, contact.key)
     }
 
     /// Current deepest overlap, m: 0 if nothing overlaps. Overlaps of kinematic grains with each

@@ -18,7 +18,7 @@ use super::scene::{Scene, SceneKey, SceneScratch};
 use crate::contact::Part;
 use crate::integrator::held_step::{HeldStep, law_of_last};
 use crate::integrator::{ContactMode, NoProbe, Start, StepError, UnilateralContact, Variant};
-use crate::multibody::{Configuration, Joint, Model, coordinates};
+use crate::multibody::{Configuration, Model, coordinates};
 use crate::scalar::elementary::sin_cos;
 use crate::system::TreeSystem;
 
@@ -182,11 +182,7 @@ impl ScratchSimulation {
     fn new(of: &RoverSimulation) -> Result<Self, LinearisationError> {
         let model: &Arc<Model> = of.model();
         let q = coordinates::to_public(model, of.q());
-        let first = |(joint, k): &(Joint, usize)| match joint {
-            Joint::Free(_) => k + 3,
-            _ => *k,
-        };
-        let angles: Vec<usize> = model.rotating_joints().iter().map(first).collect();
+        let angles: Vec<usize> = coordinates::angular_blocks(model).collect();
         for k in &angles {
             let (index, pitch) = (k + 2, q[k + 2]);
             if sin_cos(pitch).1.abs() < SINGULAR {

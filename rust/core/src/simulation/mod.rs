@@ -9,7 +9,33 @@
 //! - [`planar`]: a planar machine on a ground; [`grains`]: a bed of grains,
 //!   perhaps with a machine on it;
 //! - [`rover_in_grains`]: a rover and a bed of balls, stepped together;
-//! - [`batch`]: many rovers side by side, each with its [turn](turns); [`profile`]: time spent in each part of a step.
+//! - [`batch`]: many rovers side by side, each with its [turn](turns); [`profile`]: time
+//!   spent in each part of a step.
+//!
+//! # One call
+//!
+//! ```text
+//! Simulation::step(n)
+//!    │
+//!    ├─ Scene::begin_call
+//!    └─ n times ─┬─ Scene::quick_step         a rover on firm ground: crate::lanes
+//!                └─ general_step              Scene::system ──► Integrator::step
+//!                      │
+//!                      ▼
+//!                   State, WarmStart, ActiveContact
+//!    │
+//!    ▼
+//! StepReport, merged over the call
+//! ```
+//!
+//! A Batch: every rover gets its turns, several rovers to a block of lanes, blocks over threads.
+//!
+//! # May use
+//!
+//! `pool`, [`crate::quantity`], [`crate::scalar`], [`crate::spatial`], [`crate::multibody`],
+//! [`crate::sand`], [`crate::geometry`], [`crate::contact`], [`crate::problem`],
+//! [`crate::solver`], [`crate::integrator`], [`crate::planar`], [`crate::system`],
+//! [`crate::lanes`].
 
 pub mod active_contact;
 pub mod batch;

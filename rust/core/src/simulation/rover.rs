@@ -178,7 +178,7 @@ impl Scene for RoverScene {
         parts: &'a mut RoverParts,
     ) -> TreeSystem<'a> {
         parts.quick.set_last(false);
-        parts.tree.begin_step();
+        parts.tree.begin_step(&parts.drive_work);
         let (ground, sand) = (self.terrain.soft(), memory.sand.as_ref());
         parts.tree.begin_sand(&self.model, ground, sand);
         TreeSystem {
@@ -203,12 +203,10 @@ impl Scene for RoverScene {
     /// Records torques and work of the drives.
     fn after_step(&self, taken: StepTaken<'_, Self>) {
         let drives = taken.parts.tree.drives();
-        for (work, drive) in taken.parts.drive_work.iter_mut().zip(drives) {
-            *work += drive.work;
-        }
+        drives.to_lane(0, &mut taken.parts.drive_work);
         let RoverMemory { wheel_torque, sand } = taken.memory;
         for (torque, wheel) in wheel_torque.iter_mut().zip(self.model.wheels()) {
-            let impulse = wheel.joint.map_or(0.0, |j| drives[j].impulse);
+            let impulse = wheel.joint.map_or(0.0, |j| drives.impulse(0, j));
             *torque = wheel.drive_sign * impulse / taken.options.time_step;
         }
         let (ground, q) = (self.terrain.soft(), &taken.state.configuration);

@@ -2,7 +2,7 @@
 //!
 //! Both keep their own simulation, with state, commands, contacts and snapshots. A step moves both
 //! as one system: the balls by the law of [`crate::system::grains`], the rover's contacts with them
-//! by [`AmongGrains`], and its contacts with the ground by its own law. It is taken with the
+//! by [`TreeAmongGrains`], and its contacts with the ground by its own law. It is taken with the
 //! options of the bed.
 
 use super::active_contact::ActiveContact;
@@ -17,7 +17,9 @@ use crate::integrator::{
 };
 use crate::multibody::{Configuration, Kinematics};
 use crate::system::grains::{self, GrainContact, GrainError, Grid, Mover, OVERLAP};
-use crate::system::{AmongContact, AmongGrains, AmongKey, AmongParts, GrainTouch};
+use crate::system::{
+    CompositeContact, CompositeKey, CompositeScratch, GrainTouch, TreeAmongGrains,
+};
 use nalgebra::Vector3;
 
 type Both = (Vec<f64>, Configuration);
@@ -54,9 +56,9 @@ pub enum TogetherError {
 #[derive(Clone, Debug)]
 pub struct RoverInGrains {
     friction: f64,
-    warm_start: WarmStart<AmongKey>,
-    scratch: Scratch<Both, AmongContact>,
-    parts: AmongParts,
+    warm_start: WarmStart<CompositeKey>,
+    scratch: Scratch<Both, CompositeContact>,
+    parts: CompositeScratch,
 }
 
 impl RoverInGrains {
@@ -98,7 +100,7 @@ impl RoverInGrains {
             friction,
             warm_start: WarmStart::with_capacity(room, 0),
             scratch: Scratch::new(&q, nv, room, 3),
-            parts: AmongParts::new(rover.model()),
+            parts: CompositeScratch::new(rover.model()),
         })
     }
 
@@ -187,7 +189,7 @@ impl RoverInGrains {
         let mut v = [&bed.state.v[..], &rover.state.v[..]].concat();
         let mut time = bed.state.time;
         self.join_warm_starts(rover, bed);
-        let mut system = AmongGrains {
+        let mut system = TreeAmongGrains {
             bed: (bed.scene).system(&bed.command, &bed.memory, &mut bed.parts),
             tree: (rover.scene).system(&rover.command, &rover.memory, &mut rover.parts),
             friction: self.friction,
@@ -232,12 +234,14 @@ impl RoverInGrains {
         all.clear();
         let of_bed = &bed.warm_start.impulses;
         all.extend(
-            (of_bed.iter().filter(|(key, _)| key.a < n)).map(|(k, p)| (AmongKey::Grains(*k), *p)),
+            (of_bed.iter().filter(|(key, _)| key.a < n))
+                .map(|(k, p)| (CompositeKey::Grains(*k), *p)),
         );
         let own = &rover.warm_start.impulses;
-        all.extend(own.iter().map(|(k, p)| (AmongKey::Tree(*k), *p)));
+        all.extend(own.iter().map(|(k, p)| (CompositeKey::Tree(*k), *p)));
         all.extend(
-            (of_bed.iter().filter(|(key, _)| key.a >= n)).map(|(k, p)| (AmongKey::Touch(*k), *p)),
+            (of_bed.iter().filter(|(key, _)| key.a >= n))
+                .map(|(k, p)| (CompositeKey::Touch(*k), *p)),
         );
         self.warm_start.persistent.clear();
     }
@@ -247,17 +251,17 @@ impl RoverInGrains {
         bed.warm_start.clear();
         for (key, p) in &self.warm_start.impulses {
             match key {
-                AmongKey::Grains(key) | AmongKey::Touch(key) => {
+                CompositeKey::Grains(key) | CompositeKey::Touch(key) => {
                     bed.warm_start.impulses.push((*key, *p));
                 }
-                AmongKey::Tree(key) => rover.warm_start.impulses.push((*key, *p)),
+                CompositeKey::Tree(key) => rover.warm_start.impulses.push((*key, *p)),
             }
         }
     }
 
     /// Lets grains sleep and wake after a step.
     fn rest(&self, rover: &RoverSimulation, bed: &mut GrainSimulation<3>, options: &StepOptions) {
-        bed.memory.count_step(options.time_step);
+        bed.memory.count_step(options.time_step, &bed.parts);
         let Some(sleep) = &bed.scene.sleep else {
             return;
         };
@@ -265,15 +269,15 @@ impl RoverInGrains {
         let local = self.scratch.impulses().as_chunks::<3>().0;
         for (contact, p) in self.scratch.contacts().iter().zip(local) {
             let contact = match contact {
-                AmongContact::Grains(contact) => *contact,
-                AmongContact::Touch(touch) => GrainContact {
+                CompositeContact::Grains(contact) => *contact,
+                CompositeContact::Touch(touch) => GrainContact {
                     key: touch.key,
                     n: touch.contact.frame.n,
                     point: touch.contact.point,
                     gap: touch.contact.gap,
                     gap_start: touch.gap_start,
                 },
-                AmongContact::Tree(_) => continue,
+                CompositeContact::Tree(_) => continue,
             };
             contacts.push(contact);
             impulses.extend_from_slice(p);
@@ -319,13 +323,14 @@ impl RoverInGrains {
         for (contact, (impulse, velocity)) in self.scratch.contacts().iter().zip(local) {
             let (impulse, velocity) = (*impulse, *velocity);
             match contact {
-                AmongContact::Grains(contact) => bed.active.push(ActiveContact {
+                CompositeContact::Grains(contact) => bed.active.push(ActiveContact {
                     contact: *contact,
                     position: contact.point.into(),
                     impulse,
                     velocity,
                 }),
-                AmongContact::Tree(contact) | AmongContact::Touch(GrainTouch { contact, .. }) => {
+                CompositeContact::Tree(contact)
+                | CompositeContact::Touch(GrainTouch { contact, .. }) => {
                     rover.active.push(ActiveContact {
                         contact: *contact,
                         position: rover.scene.position(&rover.parts, contact),

@@ -4,13 +4,16 @@ use super::options::{ContactLaw, Method, SolverOptions};
 use super::reference::relaxed;
 use super::report::{Outcome, Rung, Rungs, SolveReport, SolveStatus, Stage};
 use super::scratch::Scratch;
-use super::stage::body_sweeps::Swept;
+use super::stage::body_sweeps::{Answer, Swept};
 use super::stage::{admm, gauss_seidel, newton, proximal};
 use super::strategy::auto;
 use super::strategy::islands::IslandSolver;
 use super::strategy::many_bodies::{self, ManyBodies};
 use super::work::{SweepBudget, Work};
 use super::workspace::SolverWorkspace;
+use crate::law::coulomb::Coulomb;
+use crate::law::friction_law::FrictionLaw;
+use crate::law::poisson_impact::Expansion;
 use crate::problem::{
     BodyPairs, Dimension, FrictionContactProblem, Operator, Prepared, evaluate_into, power_of_two,
 };
@@ -59,16 +62,15 @@ pub fn solve(
 /// Solves the contacts of very many free bodies: [`Method::Auto`] and
 /// [`Method::GaussSeidel`] sweep over their pairs and need no `W`.
 ///
-/// `p`, `u`, `workspace` and the report are as in [`solve`]. `max_sweeps` bounds the sweeps; the
-/// budget bounds the stages after them.
+/// p, u, `workspace` and the report are as in [`solve`]. `max_sweeps` bounds the sweeps; the budget
+/// bounds the stages after them. Contacts with rolling friction are swept, whatever the method.
 ///
 /// # Panics
 /// If a length does not fit.
 pub fn solve_many_bodies<const D: usize>(
     bodies: &ManyBodies<'_, D>,
     options: &SolverOptions,
-    p: &mut [f64],
-    u: &mut [f64],
+    answer: Answer<'_>,
     workspace: &mut SolverWorkspace,
 ) -> SolveReport
 where
@@ -80,9 +82,146 @@ where
          options: &SolverOptions,
          p: &mut [f64],
          u: &mut [f64]| solve(problem, options, p, u, workspace);
-    let report = many_bodies::solve(bodies, options, p, u, &mut sweeps, &mut solve_whole);
+    let report = many_bodies::solve(bodies, options, answer, &mut sweeps, &mut solve_whole);
     workspace.body_sweeps = sweeps;
     report
+}
+
+/// Solves contacts of any [`FrictionLaw`] by sweeps, contact after contact.
+///
+/// `laws` (`n_c`) takes the place of the problem's coefficients. The other arguments, and the
+/// report, are as in [`solve`]; the residual is the violation of these laws. Of the options the
+/// tolerances, `max_sweeps` and the budget apply.
+///
+/// # Panics
+/// If a length or the dimension does not fit.
+pub fn solve_with_laws<const D: usize, L: FrictionLaw<D> + Copy>(
+    problem: &FrictionContactProblem<'_>,
+    laws: &[L],
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    workspace: &mut SolverWorkspace,
+) -> SolveReport {
+    let (n_contacts, n) = (problem.n_contacts(), problem.n_unknowns());
+    assert!(
+        problem.dimension().components() == D && laws.len() == n_contacts,
+        "each contact must have a law of its dimension"
+    );
+    assert!(
+        p.len() == n && u.len() == n,
+        "p and u must have one entry per unknown"
+    );
+    if p.iter().any(|x| !x.is_finite()) {
+        p.fill(0.0);
+    }
+    let SolverWorkspace {
+        scales,
+        storage,
+        scratch,
+        ..
+    } = workspace;
+    let W = storage.choose(problem, options.direct_contacts);
+    scales.resize(n_contacts);
+    scratch.fit(n_contacts, n, W);
+    scratch.history.begin(options.keeps_history);
+    scratch.work = Work::new(options.budget_of(n_contacts));
+    scratch.rungs = Rungs::default();
+    scratch.start.copy_from_slice(p);
+    let data = Prepared::new::<D>(problem, W, scales);
+    let budget = SweepBudget {
+        sweeps: options.max_sweeps,
+        predict: false,
+    };
+    let mut iterations = 0;
+    let law = |i: usize| laws[i];
+    let (status, residual) = gauss_seidel::sweeps_under::<D, _>(
+        (&data, &law),
+        options,
+        budget,
+        p,
+        u,
+        scratch,
+        &mut iterations,
+    );
+    let mut report = SolveReport {
+        status: scratch.list_stage(Stage::Sweeps, status, iterations),
+        iterations,
+        work: scratch.work.spent,
+        residual: residual.relative,
+        velocity_error: residual.velocity,
+        method: Method::GaussSeidel,
+        stage: Stage::Sweeps,
+        rungs: scratch.rungs,
+    };
+    let is_finite = residual.is_finite() && p.iter().chain(&*u).all(|x| x.is_finite());
+    if !is_finite {
+        refuse(&mut report, p, u);
+    }
+    report
+}
+
+/// Solves an impact under [Poisson's law](crate::law::poisson_impact): first the compression, by
+/// [`solve`], then the expansion, by [`solve_with_laws`].
+///
+/// The problem's q is the velocity before the impact, without a shift. `restitution` (`n_c`): e of
+/// each contact, in [0, 1]. `p` (n), N s: on return the whole impulse. `u` (n), m/s: on return the
+/// velocity after the impact. The report is that of the phase with the larger residual, with the
+/// work of both.
+///
+/// # Panics
+/// If a length or the dimension does not fit.
+pub fn solve_poisson_impact<const D: usize>(
+    problem: &FrictionContactProblem<'_>,
+    restitution: &[f64],
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    workspace: &mut SolverWorkspace,
+) -> SolveReport {
+    assert!(
+        restitution.len() == problem.n_contacts(),
+        "each contact must have a coefficient of restitution"
+    );
+    p.fill(0.0);
+    let compressed = solve(problem, options, p, u, workspace);
+    if compressed.status == SolveStatus::NonFinite {
+        return compressed;
+    }
+    let mut given = vec![0.0; p.len()];
+    for (i, e) in restitution.iter().enumerate() {
+        given[D * i] = e * p[D * i];
+    }
+    let mut q = vec![0.0; p.len()];
+    problem.operator().multiply_add(&given, u, &mut q);
+    let mu = problem.friction_coefficients();
+    let expansion = match problem.operator() {
+        Operator::Dense(W) => {
+            FrictionContactProblem::from_assembled(problem.dimension(), W, &q, mu)
+        }
+        Operator::BlockSparse(W) => FrictionContactProblem::from_assembled_sparse(W, &q, mu),
+    };
+    let laws: Vec<Expansion> = (mu.iter().zip(given.chunks_exact(D)))
+        .map(|(mu, given)| Expansion {
+            friction: Coulomb(*mu),
+            least: given[0],
+        })
+        .collect();
+    let mut more = vec![0.0; p.len()];
+    let expanded = solve_with_laws::<D, _>(&expansion, &laws, options, &mut more, u, workspace);
+    for (p, (given, more)) in p.iter_mut().zip(given.iter().zip(&more)) {
+        *p += given + more;
+    }
+    let worse = if expanded.residual > compressed.residual || !expanded.is_converged() {
+        expanded
+    } else {
+        compressed
+    };
+    SolveReport {
+        iterations: compressed.iterations + expanded.iterations,
+        work: compressed.work + expanded.work,
+        ..worse
+    }
 }
 
 /// Solves in dimension `D`, see [`solve`].

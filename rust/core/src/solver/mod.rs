@@ -18,6 +18,27 @@
 //! [`Method`] names a stage or, as [`Method::Auto`], the escalation over the stages. Every report
 //! is computed from the returned impulse, never from the inside of an iteration.
 //!
+//! # One call
+//!
+//! ```text
+//! solve(problem, options, p)
+//!    │
+//!    ├─ workspace                    W dense or block-sparse, and the scales of every contact
+//!    ├─ strategy                     Auto: stage after stage until an answer holds
+//!    │     └─ stage                  pivoting, sweeps, Newton, proximal, ...
+//!    │           └─ local, linear    one contact; the linear system of all
+//!    ├─ judge                        residual of the returned p; passivity
+//!    ▼
+//! SolveReport, p, u = W p + q
+//! ```
+//!
+//! # May use
+//!
+//! `pool`, [`crate::scalar`], [`crate::spatial`], [`crate::cone`], [`crate::law`],
+//! [`crate::problem`].
+//!
+//! No body: a solver sees `(W, q, μ)`, or pairs of bodies that give `W`.
+//!
 //! # The escalation
 //!
 //! What [`Method::Auto`] tries, in this order, until an answer holds.
@@ -39,11 +60,11 @@ mod strategy;
 mod work;
 mod workspace;
 
-pub use entry::{solve, solve_many_bodies};
+pub use crate::law::one_contact::{OneContactSolution, solve_one_contact};
+pub use entry::{solve, solve_many_bodies, solve_poisson_impact, solve_with_laws};
 pub use history::Iterate;
-pub use local::one_contact::{OneContactSolution, solve_one_contact};
 pub use options::{ContactLaw, Method, SolverOptions};
 pub use report::{Rung, Rungs, SolveReport, SolveStatus, Stage};
-pub use stage::body_sweeps::{BodySweeps, Swept, solve_body_pairs};
+pub use stage::body_sweeps::{Answer, BodySweeps, Swept, solve_body_pairs};
 pub use strategy::many_bodies::ManyBodies;
 pub use workspace::SolverWorkspace;

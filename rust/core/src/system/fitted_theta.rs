@@ -21,6 +21,21 @@ pub fn fitted_theta<T: Lane>(z: T) -> T {
     T::select(z.lt(z.like(1e-2)), series, exact)
 }
 
+/// θ_j of a coordinate with this damping (N m s/rad), stiffness (N m/rad) and inertia (kg m²) in a
+/// step of h with the scheme's θ: the fitted one, but at least θ.
+///
+/// The slope of a motor's line counts as damping on every branch: if θ_j changed with the branch,
+/// no branch might be consistent.
+#[allow(clippy::inline_always)] // as fitted_theta
+#[inline(always)]
+#[must_use]
+pub fn implicit_weight<T: Lane>((h, theta): (T, T), (damping, stiffness): (T, T), inertia: T) -> T {
+    let zero = h.like(0.0);
+    let z = h * (damping + h.like(0.5) * h * stiffness) / inertia;
+    let is_stiff = zero.lt(damping) | zero.lt(stiffness);
+    T::select(is_stiff, fitted_theta(z).max(theta), theta)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

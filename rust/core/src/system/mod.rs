@@ -1,25 +1,56 @@
 //! Mechanical systems, advanced by the time-stepping schemes of [`crate::integrator`].
 //!
-//! - [`tree`]: a multibody tree on a terrain, under a [`command`];
+//! - [`tree`]: a multibody tree on a terrain, under a [`command`], with its
+//!   [scratch](tree_scratch); [`drives`]: torques, motors, held joints, springs and dampers,
+//!   implicit with [`fitted_theta`]; `extent`: how far a step turns and displaces it;
+//!   `momentum_balance`: the balance of the Newton variant; [`gyroscopic`]: when gyroscopic terms
+//!   are implicit, and how; `sand`, `sand_patch`: its wheels in sand;
 //! - [`planar`]: a planar machine on a ground, with its matrices;
-//! - [`among_grains`]: a tree among balls;
-//! - [`gyroscopic`]: implicit gyroscopic terms of the tree; `motor_branch`: the branch of a motor's
-//!   torque–speed line in a step, implicit with [`fitted_theta`];
-//! - [`grains`]: thousands of free disks or balls, and a planar machine among them.
+//! - [`grains`]: thousands of free disks or balls, and a planar machine among them;
+//! - [`among_grains`]: a tree among balls.
+//!
+//! # One call
+//!
+//! A rover's step, seen from the tree; the order is that of [`crate::integrator`]:
+//!
+//! ```text
+//! integrator                    TreeSystem                      asks
+//! place_middle, place_end   ──► TreeScratch                     multibody::Kinematics
+//! detect, relocate          ──► TreeSystem                      contact
+//! update_mass_matrix        ──► mass matrix, Drives θ_j         multibody::MassMatrix; sand
+//! factorise                 ──► M̂ with Drives and sand          multibody::Factor
+//! load                      ──► bias, Drives, sand              multibody::bias
+//! load_gyroscopic           ──► GyroscopicScratch               multibody::coriolis
+//! assemble, local, ...      ──► ContactSystem                   contact
+//! balance                   ──► MomentumBalance                 multibody::momentum
+//! revise, work, accept      ──► Drives, sand
+//! ```
+//!
+//! # May use
+//!
+//! [`crate::quantity`], [`crate::scalar`], [`crate::spatial`], [`crate::law`],
+//! [`crate::multibody`], [`crate::sand`], [`crate::geometry`], [`crate::contact`],
+//! [`crate::problem`], [`crate::solver`], [`crate::integrator`], [`crate::planar`].
 
 pub mod among_grains;
 pub mod command;
+pub mod drives;
+pub(crate) mod extent;
 pub mod fitted_theta;
 pub mod grains;
 pub mod gyroscopic;
-pub(crate) mod motor_branch;
+mod momentum_balance;
 pub mod planar;
 mod planar_matrices;
 mod sand;
 mod sand_patch;
 pub mod tree;
+pub mod tree_scratch;
 
-pub use among_grains::{AmongContact, AmongGrains, AmongKey, AmongParts, GrainTouch};
+pub use among_grains::{
+    CompositeContact, CompositeKey, CompositeScratch, GrainTouch, TreeAmongGrains,
+};
 pub use command::{Command, Drive, HeldJoint};
 pub use planar::{PlanarContact, PlanarKey, PlanarScratch, PlanarSystem};
-pub use tree::{DriveAction, TreeScratch, TreeSystem};
+pub use tree::TreeSystem;
+pub use tree_scratch::TreeScratch;

@@ -4,15 +4,16 @@
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
-use super::command::Drive;
-use super::motor_branch::{MotorBranch, line_slope};
+use super::fitted_theta::implicit_weight;
 use super::planar_matrices::{PlanarMatrices, sum_of_products};
 use crate::contact::Activation;
 use crate::integrator::{
     MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact,
 };
+use crate::multibody::MotorLine;
 use crate::planar::{ContactRule, Disc, Facing, Ground, PlanarMotor, PlanarPoses, PlanarTree};
 use crate::problem::{Dimension, FrictionContactProblem};
+use crate::scalar::Single;
 
 /// Key of a contact between a disc and the ground.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -123,14 +124,21 @@ struct Driven {
     input: usize,
     motor: PlanarMotor,
     /// One of them, with its command.
-    drive: Drive,
-    branch: MotorBranch,
+    line: MotorLine<f64>,
+    /// θ_j.
+    theta: f64,
 }
 
 impl Driven {
     /// Rate with which they turn forward, rad/s.
     fn rate(&self, v: &[f64]) -> f64 {
         self.motor.gain.signum() * v[self.motor.coordinate]
+    }
+
+    /// The rate at which a step evaluates the torque, rad/s.
+    fn implicit_rate(&self, start: &[f64], v_end: &[f64]) -> f64 {
+        let (begin, end) = (self.rate(start), self.rate(v_end));
+        begin + self.theta * (end - begin)
     }
 }
 
@@ -143,7 +151,7 @@ impl PlanarSystem<'_> {
         torques.clear();
         torques.extend_from_slice(self.inputs);
         for own in motors {
-            torques[own.input] = (own.branch).torque(|| (own.rate(start), own.rate(v_end)));
+            torques[own.input] = own.line.torque(own.implicit_rate(start, v_end));
         }
     }
 
@@ -243,24 +251,18 @@ impl MechanicalSystem for PlanarSystem<'_> {
         let parts = &mut *self.parts;
         parts.matrices.set_mass(self.machine, &parts.middle);
         let step = (options.time_step, options.theta);
-        for Driven {
-            motor,
-            drive,
-            branch,
-            ..
-        } in &mut parts.motors
-        {
-            let inertia = *parts.matrices.inertia(motor.coordinate) / motor.gain.abs();
-            branch.set_theta(step, (line_slope(Some(drive)), 0.0), inertia);
+        for own in &mut parts.motors {
+            let inertia = *parts.matrices.inertia(own.motor.coordinate) / own.motor.gain.abs();
+            own.theta = implicit_weight(step, (own.line.slope(), 0.0), inertia);
         }
     }
 
     fn factorise(&mut self, options: &StepOptions) -> bool {
         let parts = &mut *self.parts;
-        for Driven { motor, branch, .. } in &parts.motors {
-            let damping = motor.gain.abs() * branch.damping();
-            let inertia = parts.matrices.inertia(motor.coordinate);
-            *inertia += options.time_step * branch.theta() * damping;
+        for own in &parts.motors {
+            let damping = own.motor.gain.abs() * own.line.damping();
+            let inertia = parts.matrices.inertia(own.motor.coordinate);
+            *inertia += options.time_step * own.theta * damping;
         }
         parts.matrices.factorise()
     }
@@ -287,13 +289,11 @@ impl MechanicalSystem for PlanarSystem<'_> {
                 let mut own = Driven {
                     input,
                     motor,
-                    drive: Drive {
-                        torque,
-                        motor: Some(motor.motor),
-                    },
-                    branch: MotorBranch::default(),
+                    line: MotorLine::new(Single::Baseline),
+                    theta: 0.5,
                 };
-                own.branch.choose(Some(&own.drive), own.rate(start.v));
+                own.line.set_lane(0, Some(&motor.motor), torque);
+                own.line.choose(own.rate(start.v));
                 motors.push(own);
             }
         }
@@ -302,8 +302,8 @@ impl MechanicalSystem for PlanarSystem<'_> {
     fn revise(&mut self, start: Start<'_, Vec<f64>>, v_end: &[f64]) -> bool {
         let mut is_new = false;
         for own in &mut self.parts.motors {
-            let (begin, end) = (own.rate(start.v), own.rate(v_end));
-            is_new |= own.branch.revise(Some(&own.drive), begin, end);
+            let rate = own.implicit_rate(start.v, v_end);
+            is_new |= own.line.revise(true, rate);
         }
         is_new
     }
@@ -363,7 +363,7 @@ impl MechanicalSystem for PlanarSystem<'_> {
         for own in &parts.motors {
             let torque = parts.torques[own.input];
             let turned = h * own.motor.gain.signum() * mean(own.motor.coordinate);
-            let surplus = torque * turned - MotorBranch::work(Some(&own.drive), torque, turned);
+            let surplus = torque * turned - own.line.work(torque, turned);
             work -= own.motor.gain.abs() * surplus;
         }
         work

@@ -1,38 +1,32 @@
 //! A multibody tree on a terrain as a mechanical system: the rover.
 //!
-//! `M̂ = M + h θ_j K_d + h² θ_j θ K_p` on held joints. The PD control of a held joint is implicit
-//! with an exponentially fitted θ_j ([`super::fitted_theta`]), so it is stable for every gain and
-//! step size. A motor on its torque–speed line is treated in the same way. `M̂ = Lᵀ D L` along the
-//! tree; the contact system stores `Z` along each contact's path.
+//! The forces of its joints are implicit ([`super::drives`]). `M̂ = Lᵀ D L` along the tree; the
+//! contact system stores `Z` along each contact's path.
 
 use nalgebra::Vector3;
 
-use super::command::{Command, HeldJoint};
-use super::gyroscopic::GyroscopicScratch;
-use super::motor_branch::{MotorBranch, line_slope};
+use super::command::Command;
+use super::extent::{Turning, displacement};
+use super::momentum_balance::BalanceScene;
 use super::sand::SandContact;
 use super::sand_patch::SandScene;
+use super::tree_scratch::TreeScratch;
 use crate::contact::{
-    Activation, Contact, ContactKey, ContactSystem, Opposite, PairSearch, detect, detect_limits,
-    detect_pairs, generalized_impulse, relocate, relocate_limit,
+    Activation, Contact, ContactKey, Opposite, detect, detect_limits, detect_pairs,
+    generalized_impulse, relocate, relocate_limit,
 };
-use crate::geometry::{SoftLayer, Terrain};
+use crate::geometry::Terrain;
 use crate::integrator::mechanical_system::MOST_REVISIONS;
 use crate::integrator::{
     MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact,
 };
 use crate::law::compliance::Compliance;
 use crate::law::newton_impact::rebound;
-use crate::multibody::bias::{BiasScratch, bias};
+use crate::multibody::bias::bias;
 use crate::multibody::energy::energy;
-use crate::multibody::momentum::body_momenta;
-use crate::multibody::{
-    Configuration, EnergyScratch, Factor, Joint, JointProperties, Kinematics, LaneConfiguration,
-    MassMatrix, Model, Momentum, Passive, Tree,
-};
+use crate::multibody::{Configuration, Factor, Model};
 use crate::problem::{Dimension, FrictionContactProblem};
-use crate::sand::{RutMap, SandState};
-use crate::scalar::Single;
+use crate::sand::RutMap;
 
 impl UnilateralContact for Contact {
     type Key = ContactKey;
@@ -49,152 +43,6 @@ impl UnilateralContact for Contact {
 
     fn is_internal(&self) -> bool {
         self.other.is_some() || self.key.opposite == Opposite::Stop
-    }
-}
-
-/// Impulse and work of a joint's drive.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct DriveAction {
-    /// Time integral of its torque, N m s.
-    pub impulse: f64,
-    /// Work, J.
-    pub work: f64,
-}
-
-/// Poses, matrices and momenta of a tree: scratch, allocated once.
-#[derive(Clone, Debug)]
-pub struct TreeScratch {
-    pub(super) kinematics: Kinematics,
-    pub(super) kinematics_end: Kinematics,
-    mass_matrix: MassMatrix<f64>,
-    pub(super) factor: Factor<f64>,
-    bias_scratch: BiasScratch<f64>,
-    momenta: Vec<Momentum>,
-    momenta_end: Vec<Momentum>,
-    sums: Vec<Momentum>,
-    c_start: Vec<Vector3<f64>>,
-    motors: Vec<MotorBranch>,
-    drives_tried: Vec<DriveAction>,
-    drives: Vec<DriveAction>,
-    place: LaneConfiguration<f64>,
-    energy: EnergyScratch<f64>,
-    gyroscopic: GyroscopicScratch,
-    force: Vec<f64>,
-    pairs: PairSearch,
-    /// Found by the last detection, x and z, m.
-    unknown_ground: Option<[f64; 2]>,
-    /// Joint coordinates at the midpoint and at the end of the step (n_joints); empty if no joint
-    /// has a stop.
-    joints_middle: Vec<f64>,
-    joints_end: Vec<f64>,
-    pub(super) system: ContactSystem,
-    /// Of a machine on soft ground.
-    sand: Option<Box<SandContact>>,
-}
-
-impl TreeScratch {
-    /// Scratch for a model with n contacts.
-    #[must_use]
-    pub fn new(model: &Model, n: usize) -> Self {
-        let momenta = vec![Momentum::default(); model.bodies().len()];
-        let (token, mechanism) = (Single::best(), model.mechanism());
-        let limited = if model.limited_joints().is_empty() {
-            Vec::new()
-        } else {
-            vec![0.0; model.n_joints()]
-        };
-        Self {
-            kinematics: Kinematics::new(model),
-            kinematics_end: Kinematics::new(model),
-            mass_matrix: MassMatrix::new(token, mechanism),
-            factor: Factor::new(token, mechanism),
-            bias_scratch: BiasScratch::new(token, mechanism),
-            momenta: momenta.clone(),
-            momenta_end: momenta.clone(),
-            sums: momenta,
-            c_start: vec![Vector3::zeros(); model.bodies().len()],
-            motors: vec![MotorBranch::default(); model.n_joints()],
-            drives_tried: vec![DriveAction::default(); model.n_joints()],
-            drives: vec![DriveAction::default(); model.n_joints()],
-            place: LaneConfiguration::new(token, mechanism),
-            energy: EnergyScratch::new(token, mechanism),
-            gyroscopic: GyroscopicScratch::default(),
-            force: vec![0.0; model.nv()],
-            pairs: PairSearch::new(model),
-            unknown_ground: None,
-            joints_middle: limited.clone(),
-            joints_end: limited,
-            system: ContactSystem::with_capacity(model, n),
-            sand: None,
-        }
-    }
-
-    /// Resets the impulse and work of the drives at the start of a step.
-    pub fn begin_step(&mut self) {
-        self.drives.fill(DriveAction::default());
-    }
-
-    /// Takes over the sand at the start of a step; none on firm ground.
-    pub(crate) fn begin_sand(
-        &mut self,
-        model: &Model,
-        ground: Option<SoftLayer<'_>>,
-        state: Option<&SandState>,
-    ) {
-        let (Some(ground), Some(state)) = (ground, state) else {
-            self.sand = None;
-            return;
-        };
-        let known = self.sand.take().filter(|sand| sand.is_of(ground));
-        let mut sand = known.unwrap_or_else(|| Box::new(SandContact::new(model, ground)));
-        sand.begin(state);
-        self.sand = Some(sand);
-    }
-
-    /// Adds the impulse of the sand over a step of h that ends with the velocity `v`.
-    fn add_sand(&self, h: f64, v: &[f64], y: &mut [f64]) {
-        if let Some(sand) = &self.sand {
-            sand.add_impulse(h, v, y);
-        }
-    }
-
-    /// Writes the sand at the end of a step that led to a configuration.
-    pub(crate) fn end_sand(
-        &mut self,
-        model: &Model,
-        ground: Option<SoftLayer<'_>>,
-        q: &Configuration,
-        state: Option<&mut SandState>,
-    ) {
-        if let (Some(sand), Some(ground), Some(state)) = (&self.sand, ground, state) {
-            self.kinematics.update_for_step(model, q);
-            sand.end(model, ground, &self.kinematics, state);
-        }
-    }
-
-    /// Impulse and work of each joint's drive since [`Self::begin_step`] (n_joints), summed over
-    /// all accepted parts of a step.
-    #[must_use]
-    pub fn drives(&self) -> &[DriveAction] {
-        &self.drives
-    }
-
-    /// Makes a step of the first tree that was taken elsewhere the last one: the world position of
-    /// its origin where contacts were evaluated, m.
-    pub(crate) fn show(&mut self, origin: [f64; 3]) {
-        self.kinematics_end.set_origin(0, origin.into());
-    }
-
-    /// Delassus operator of the last step, row-major, 1/kg.
-    #[must_use]
-    pub fn operator(&self) -> &[f64] {
-        &self.system.W
-    }
-
-    /// World position of the origin of a body's tree at the pose of the last contact evaluation, m.
-    #[must_use]
-    pub fn origin_of_contacts(&self, body: usize) -> &Vector3<f64> {
-        self.kinematics_end.origin(body)
     }
 }
 
@@ -221,81 +69,70 @@ impl TreeSystem<'_> {
         }
         contact.between_materials(self.model, self.terrain, &options.materials)
     }
-
-    /// Largest angular speed of a free base, rad/s.
-    #[inline]
-    fn turning_of_bases(&self, v: &[f64]) -> f64 {
-        let mut base = 0.0_f64;
-        for tree in self.model.trees() {
-            if let [_, _, _, x, y, z, ..] = v[tree.velocities.clone()]
-                && tree.is_free
-            {
-                base = base.max((x * x + y * y + z * z).sqrt());
-            }
-        }
-        base
-    }
-
-    /// Largest rate of a joint that turns a frame, rad/s.
-    #[inline]
-    fn turning_of_joints(&self, v: &[f64]) -> f64 {
-        let turning = self.model.mechanism().turning.iter();
-        turning.fold(0.0, |most, &(k, ratio)| most.max(v[k].abs() * ratio))
-    }
 }
 
 impl TreeSystem<'_> {
-    /// Forces and tangents of the sand at the last guess of the velocity.
-    fn linearise_sand(&mut self, options: &StepOptions) {
-        if let Some((sand, place, _)) = self.sand() {
-            sand.linearise(place, options);
-        }
-    }
-
     /// The sand with its ground and poses, and the factor of M̂.
     fn sand(&mut self) -> Option<(&mut SandContact, SandScene<'_>, &Factor<f64>)> {
-        let TreeScratch {
-            sand,
-            kinematics,
-            factor,
-            ..
-        } = &mut *self.parts;
-        let place = SandScene {
-            model: self.model,
-            ground: self.terrain.soft()?,
-            ruts: self.ruts?,
-            kinematics,
-        };
-        Some((sand.as_mut()?, place, factor))
-    }
-
-    /// Whether the sand asks for another solution.
-    fn revise_sand(&mut self, v_end: &[f64]) -> bool {
-        (self.sand()).is_some_and(|(sand, place, factor)| sand.revise(place, factor, v_end))
-    }
-
-    /// Work of the sand over a step between two velocities, J.
-    fn work_of_sand(&mut self, v: &[f64], v_end: &[f64]) -> f64 {
-        (self.sand()).map_or(0.0, |(sand, place, _)| sand.work(place, v, v_end))
+        (self.parts).sand(self.model, self.terrain.soft(), self.ruts)
     }
 
     /// Adds what is implicit to the mass matrix and factors it; whether it is positive.
     fn factor_implicit(&mut self, options: &StepOptions) -> bool {
-        let (h, theta) = (options.time_step, options.theta);
-        let parts = &mut *self.parts;
-        let joints = parts.motors.iter().zip(&self.command.held);
-        for ((motor, held), joint) in joints.zip(self.model.joints()) {
-            let (damping, stiffness) = feedback(motor.damping(), held.as_ref(), &joint.passive);
-            if damping > 0.0 || stiffness > 0.0 {
-                let implicit = h * motor.theta() * (damping + h * theta * stiffness);
-                let k = joint.velocity;
-                (parts.mass_matrix).add_to_diagonal(self.model.mechanism(), k, implicit);
-            }
-        }
+        let (mechanism, parts) = (self.model.mechanism(), &mut *self.parts);
+        let mass_matrix = &mut parts.mass_matrix;
+        let add = |k, a| mass_matrix.add_to_diagonal(mechanism, k, a);
+        (parts.drives).add_implicit(mechanism, step(options), add);
         if let Some(sand) = &parts.sand {
-            sand.add_to_mass(self.model, h, &mut parts.mass_matrix);
+            sand.add_to_mass(self.model, options.time_step, mass_matrix);
         }
-        (parts.mass_matrix).factorise(self.model.mechanism(), &mut parts.factor)
+        mass_matrix.factorise(mechanism, &mut parts.factor)
+    }
+
+    /// Adds the impulse of the drives and of the sand to `y`, for a step that ends with the iterate
+    /// `v_end`.
+    #[inline]
+    fn add_actuation(
+        &self,
+        options: &StepOptions,
+        start: Start<'_, Configuration>,
+        v_end: &[f64],
+        y: &mut [f64],
+    ) {
+        let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
+        let velocities = [start.v, v_end];
+        (self.parts.drives).add_impulse(mechanism, step(options), places, velocities, y);
+        self.parts.add_sand(options.time_step, v_end, y);
+    }
+
+    /// `y = h (τ − b)` with the bias b at a velocity, and the forces of joints and sand at the
+    /// start of the step. `v_bias`: `None` for the bias at rest, gravity's.
+    #[inline]
+    fn load_with_bias(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Configuration>,
+        v_bias: Option<&[f64]>,
+        y: &mut [f64],
+    ) {
+        let parts = &mut *self.parts;
+        let v_bias = v_bias.unwrap_or_else(|| {
+            y.fill(0.0);
+            y
+        });
+        bias(
+            self.model.mechanism(),
+            self.model.inertias(),
+            parts.kinematics.poses(),
+            v_bias,
+            options.gravity.into(),
+            &mut parts.bias_scratch,
+            &mut parts.force,
+        );
+        for (y, f) in y.iter_mut().zip(&parts.force) {
+            *y = -options.time_step * f;
+        }
+        self.add_actuation(options, start, start.v, y);
     }
 }
 
@@ -327,14 +164,12 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn place_middle(&mut self, q: &Configuration) {
-        self.parts.kinematics.update_for_step(self.model, q);
-        keep(&mut self.parts.joints_middle, &q.joints);
+        self.parts.place_middle(self.model, q);
     }
 
     #[inline]
     fn place_end(&mut self, q: &Configuration) {
-        self.parts.kinematics_end.update_for_step(self.model, q);
-        keep(&mut self.parts.joints_end, &q.joints);
+        self.parts.place_end(self.model, q);
     }
 
     #[inline]
@@ -424,13 +259,14 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn update_mass_matrix(&mut self, options: &StepOptions) {
-        self.linearise_sand(options);
-        self.parts.mass_matrix.update(
-            self.model.mechanism(),
-            self.model.inertias(),
-            self.parts.kinematics.poses(),
-        );
-        set_held_theta(self.model, options, self.command, self.parts);
+        if let Some((sand, place, _)) = self.sand() {
+            sand.linearise(place, options);
+        }
+        let (mechanism, parts) = (self.model.mechanism(), &mut *self.parts);
+        let mass_matrix = &mut parts.mass_matrix;
+        mass_matrix.update(mechanism, self.model.inertias(), parts.kinematics.poses());
+        let inertia = |k| mass_matrix.diagonal(mechanism, k);
+        (parts.drives).set_theta(mechanism, step(options), inertia);
     }
 
     #[inline]
@@ -461,46 +297,17 @@ impl MechanicalSystem for TreeSystem<'_> {
         v_mean: &[f64],
         y: &mut [f64],
     ) {
-        let parts = &mut *self.parts;
-        bias(
-            self.model.mechanism(),
-            self.model.inertias(),
-            parts.kinematics.poses(),
-            v_mean,
-            options.gravity.into(),
-            &mut parts.bias_scratch,
-            &mut parts.force,
-        );
-        for (y, f) in y.iter_mut().zip(&parts.force) {
-            *y = -options.time_step * f;
-        }
-        add_command(
-            self.model,
-            options,
-            self.command,
-            start,
-            start.v,
-            &parts.motors,
-            y,
-        );
-        self.parts.add_sand(options.time_step, start.v, y);
+        self.load_with_bias(options, start, Some(v_mean), y);
     }
 
     #[inline]
     fn is_gyroscopic(&self, options: &StepOptions, v: &[f64]) -> bool {
-        let h = options.time_step;
-        let (base, spin) = (
-            self.turning_of_bases(v),
-            fastest(&self.model.mechanism().spinning, v),
-        );
-        h * base > MOST_TURN
-            || h * (base + self.turning_of_joints(v)) > MOST_JOINT_TURN
-            || h * spin > MOST_SPIN
+        Turning::of(0.0, self.model.mechanism(), v).is_gyroscopic(options.time_step)
     }
 
     #[inline]
     fn turning(&self, v: &[f64]) -> f64 {
-        self.turning_of_bases(v) + self.turning_of_joints(v)
+        Turning::of(0.0, self.model.mechanism(), v).of_frames()
     }
 
     fn translation_axis(&self, velocity: usize) -> Option<usize> {
@@ -522,32 +329,8 @@ impl MechanicalSystem for TreeSystem<'_> {
         impulse: &[f64],
         y: &mut [f64],
     ) {
-        let parts = &mut *self.parts;
-        let model = self.model;
-        // The bias at rest is gravity's.
-        y.fill(0.0);
-        bias(
-            model.mechanism(),
-            model.inertias(),
-            parts.kinematics.poses(),
-            y,
-            options.gravity.into(),
-            &mut parts.bias_scratch,
-            &mut parts.force,
-        );
-        for (y, f) in y.iter_mut().zip(&parts.force) {
-            *y = -options.time_step * f;
-        }
-        add_command(
-            self.model,
-            options,
-            self.command,
-            start,
-            start.v,
-            &parts.motors,
-            y,
-        );
-        parts.add_sand(options.time_step, start.v, y);
+        self.load_with_bias(options, start, None, y);
+        let (parts, model) = (&mut *self.parts, self.model);
         parts.gyroscopic.solve(
             model,
             &parts.kinematics,
@@ -562,10 +345,10 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn choose_branches(&mut self, start: Start<'_, Configuration>) {
-        let drives = self.parts.motors.iter_mut().zip(&self.command.drives);
-        for ((motor, drive), &k) in drives.zip(self.model.joint_velocities()) {
-            motor.choose(drive.as_ref(), start.v[k]);
-        }
+        let drives = &mut self.parts.drives;
+        drives.set_lane(0, self.model.joints(), self.command);
+        drives.finish_loading();
+        drives.choose_branches(self.model.mechanism(), start.v);
         if let Some(sand) = &mut self.parts.sand {
             sand.start_from(start.v);
         }
@@ -580,12 +363,11 @@ impl MechanicalSystem for TreeSystem<'_> {
     }
 
     fn revise(&mut self, start: Start<'_, Configuration>, v_end: &[f64]) -> bool {
-        let drives = self.parts.motors.iter_mut().zip(&self.command.drives);
-        let mut is_new = false;
-        for ((motor, drive), &k) in drives.zip(self.model.joint_velocities()) {
-            is_new |= motor.revise(drive.as_ref(), start.v[k], v_end[k]);
-        }
-        is_new | self.revise_sand(v_end)
+        let mechanism = self.model.mechanism();
+        let is_new = (self.parts.drives).revise(mechanism, true, start.v, v_end);
+        let is_new_in_sand =
+            (self.sand()).is_some_and(|(sand, place, factor)| sand.revise(place, factor, v_end));
+        is_new | is_new_in_sand
     }
 
     fn energy(
@@ -595,14 +377,14 @@ impl MechanicalSystem for TreeSystem<'_> {
         v: &[f64],
     ) -> Option<MechanicalEnergy> {
         let TreeScratch {
-            place,
+            q: lane,
             energy: scratch,
             ..
         } = &mut *self.parts;
-        place.set_lane(0, q);
+        lane.set_lane(0, q);
         let (mechanism, inertias) = (self.model.mechanism(), self.model.inertias());
         let gravity = options.gravity.into();
-        let (energy, momentum) = energy(mechanism, inertias, place, v, gravity, scratch);
+        let (energy, momentum) = energy(mechanism, inertias, lane, v, gravity, scratch);
         Some(MechanicalEnergy {
             kinetic: energy.kinetic,
             potential: energy.potential,
@@ -622,36 +404,11 @@ impl MechanicalSystem for TreeSystem<'_> {
         start: Start<'_, Configuration>,
         v_end: &[f64],
     ) -> f64 {
-        let h = options.time_step;
-        let of_sand = self.work_of_sand(start.v, v_end);
-        let TreeScratch {
-            motors,
-            drives_tried,
-            ..
-        } = &mut *self.parts;
-        let trial = Trial {
-            options,
-            command: self.command,
-            start,
-            v_end,
-            motors,
-        };
-        let mut total = of_sand;
-        let mut drives = self.command.drives.iter().zip(drives_tried);
-        trial.for_each(self.model, |joint, torque| {
-            let turned = h * trial.mean_rate(joint.velocity);
-            if let Some((drive, tried)) = drives.next() {
-                let work = MotorBranch::work(drive.as_ref(), torque.drive, turned);
-                *tried = DriveAction {
-                    impulse: torque.drive * h,
-                    work,
-                };
-                // A damper only dissipates. In a step that reverses the rate, torque and
-                // displacement are evaluated at different times, and their product may be positive.
-                total += work + torque.other * turned + (torque.damper * turned).min(0.0);
-            }
-        });
-        total
+        let of_sand =
+            (self.sand()).map_or(0.0, |(sand, place, _)| sand.work(place, start.v, v_end));
+        let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
+        let velocities = [start.v, v_end];
+        of_sand + (self.parts.drives).work(mechanism, step(options), places, velocities)
     }
 
     fn work_of_displacement(
@@ -661,27 +418,15 @@ impl MechanicalSystem for TreeSystem<'_> {
         v_end: &[f64],
         displacement: &[f64],
     ) -> f64 {
-        let trial = Trial {
-            options,
-            command: self.command,
-            start,
-            v_end,
-            motors: &self.parts.motors,
-        };
-        let mut total = 0.0;
-        trial.for_each(self.model, |joint, torque| {
-            total += (torque.drive + torque.other) * displacement[joint.velocity];
-        });
-        total
+        let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
+        let motion = [start.v, v_end, displacement];
+        (self.parts.drives).work_of_displacement(mechanism, step(options), places, motion)
     }
 
     #[inline]
     fn accept(&mut self) {
         let parts = &mut *self.parts;
-        for (done, tried) in parts.drives.iter_mut().zip(&parts.drives_tried) {
-            done.impulse += tried.impulse;
-            done.work += tried.work;
-        }
+        parts.drives.accept_part();
         if let Some(sand) = &mut parts.sand {
             sand.accept();
         }
@@ -689,19 +434,8 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     fn begin_balance(&mut self, start: Start<'_, Configuration>) {
         let parts = &mut *self.parts;
-        parts
-            .kinematics
-            .update_for_step(self.model, start.configuration);
-        for (b, c) in parts.c_start.iter_mut().enumerate() {
-            *c = parts.kinematics.c(b);
-        }
-        body_momenta(
-            self.model,
-            &parts.kinematics,
-            start.v,
-            |_| Vector3::zeros(),
-            &mut parts.momenta,
-        );
+        (parts.kinematics).update_for_step(self.model, start.configuration);
+        (parts.balance).begin(self.model, &parts.kinematics, start.v);
     }
 
     /// In momentum form, exact at both ends; see [`crate::integrator::moreau_jean_newton`].
@@ -714,25 +448,16 @@ impl MechanicalSystem for TreeSystem<'_> {
         _scratch: &mut [f64],
         y: &mut [f64],
     ) {
-        momentum_residual(
-            self.model,
-            &options.gravity,
-            (options.time_step, options.theta),
-            start,
-            v_end,
-            self.parts,
-            y,
-        );
-        add_command(
-            self.model,
-            options,
-            self.command,
-            start,
-            v_end,
-            &self.parts.motors,
-            y,
-        );
-        self.parts.add_sand(options.time_step, v_end, y);
+        let parts = &mut *self.parts;
+        let scene = BalanceScene {
+            model: self.model,
+            kinematics: [&parts.kinematics, &parts.kinematics_end],
+            gravity: &options.gravity,
+            h: options.time_step,
+            theta: options.theta,
+        };
+        parts.balance.residual(&scene, start, v_end, y);
+        self.add_actuation(options, start, v_end, y);
     }
 
     #[inline]
@@ -789,236 +514,16 @@ impl MechanicalSystem for TreeSystem<'_> {
         FrictionContactProblem::from_assembled(Dimension::Three, &self.parts.system.W, q, mu)
     }
 
-    /// Largest displacement: of the free bases, and of the joints at their arm.
     fn displacement(&self, y: &[f64]) -> f64 {
-        let mut largest = 0.0_f64;
-        for tree in self.model.trees() {
-            let (base, joints) = y[tree.velocities.clone()].split_at(tree.lead());
-            let joints = joints.iter().map(|angle| angle * JOINT_ARM);
-            largest = (base.iter().copied())
-                .chain(joints)
-                .fold(largest, |m, d| m.max(d.abs()));
-        }
-        largest
+        displacement(0.0, self.model.mechanism(), y)
     }
 }
 
-/// Copies the joint coordinates; `kept` is empty if no joint has a stop.
+/// h and θ.
 #[inline]
-fn keep(kept: &mut [f64], joints: &[f64]) {
-    for (kept, q) in kept.iter_mut().zip(joints) {
-        *kept = *q;
-    }
+fn step(options: &StepOptions) -> (f64, f64) {
+    (options.time_step, options.theta)
 }
 
 /// Most repetitions of a step in sand. Wheels that fall and come to rest in a long step need them.
 const MOST_REVISIONS_IN_SAND: usize = 24;
-
-/// Arm that converts a joint rotation to a length, m. A freely steered wheel that is moved out of a
-/// penetration of 2 cm rotates by 0.4 rad.
-pub(crate) const JOINT_ARM: f64 = 0.05;
-
-/// Rotation of a free base in a step, rad, beyond which gyroscopic terms are implicit. At this
-/// angle the third-order error of the explicit terms is a thousandth of the energy.
-pub(crate) const MOST_TURN: f64 = 0.1;
-
-/// The same limit for the rotation of the fastest frame, joints included, rad. A joint that snaps
-/// to a new set-point turns a light part of the machine. Measured on the drives of random policies:
-/// implicit terms between this limit and the one above change no error in its third digit.
-pub(crate) const MOST_JOINT_TURN: f64 = 0.5;
-
-/// The same limit for the rotation of a wheel about its axle in a step, rad. The spin couples the
-/// motions across the axle at a frequency of a few per cent of the spin rate, so explicit terms
-/// would stay acceptable up to some twenty times more.
-pub(crate) const MOST_SPIN: f64 = 1.0;
-
-/// Largest rate of a set of joints, rad/s.
-#[inline]
-fn fastest(joints: &[usize], v: &[f64]) -> f64 {
-    joints.iter().fold(0.0, |most, &k| most.max(v[k].abs()))
-}
-
-/// Effective damping (N m s/rad) and stiffness (N m/rad) of a joint's torque: those of its motor,
-/// of its position control, and of its own damper and spring.
-#[inline]
-fn feedback(motor: f64, held: Option<&HeldJoint>, passive: &Passive) -> (f64, f64) {
-    let (mut damping, mut stiffness) = (motor + passive.damping, passive.stiffness);
-    if let Some(held) = held {
-        damping += held.damping;
-        stiffness += held.stiffness;
-    }
-    (damping, stiffness)
-}
-
-/// Sets the implicit weights of each joint's PD control and motor.
-fn set_held_theta(
-    model: &Model,
-    options: &StepOptions,
-    command: &Command,
-    parts: &mut TreeScratch,
-) {
-    let joints = (parts.motors.iter_mut().zip(&command.held)).zip(&command.drives);
-    for (((motor, held), drive), joint) in joints.zip(model.joints()) {
-        let inertia = (parts.mass_matrix).diagonal(model.mechanism(), joint.velocity);
-        let feedback = feedback(line_slope(drive.as_ref()), held.as_ref(), &joint.passive);
-        motor.set_theta((options.time_step, options.theta), feedback, inertia);
-    }
-}
-
-/// Mean torque of a joint over the step, N m.
-struct Actuation {
-    /// Torque of its drive.
-    drive: f64,
-    /// Torque of its dampers.
-    damper: f64,
-    /// All other torques.
-    other: f64,
-}
-
-/// A trial step: its start, the velocity at its end, and the acting forces.
-#[derive(Clone, Copy)]
-struct Trial<'a> {
-    options: &'a StepOptions,
-    command: &'a Command,
-    start: Start<'a, Configuration>,
-    v_end: &'a [f64],
-    motors: &'a [MotorBranch],
-}
-
-impl Trial<'_> {
-    /// Mean velocity over the step, rad/s or m/s.
-    #[inline]
-    fn mean_rate(&self, k: usize) -> f64 {
-        let theta = self.options.theta;
-        theta * self.v_end[k] + (1.0 - theta) * self.start.v[k]
-    }
-
-    /// Torques of every joint. PD control, spring and motor line are evaluated at the θ_j-weighted
-    /// position and velocity of the iterate.
-    #[inline]
-    fn for_each(&self, model: &Model, mut act: impl FnMut(&JointProperties, Actuation)) {
-        let h = self.options.time_step;
-        let acting = self.command.torque.iter().zip(&self.command.held);
-        let joints = model.joints().iter().zip(self.motors);
-        let places = &self.start.configuration.joints;
-        for (((joint, motor), (torque, held)), q) in joints.zip(acting).zip(places) {
-            let k = joint.velocity;
-            let (mut other, mut damper) = (*torque, 0.0);
-            if held.is_some() || joint.is_passive {
-                let place = q + h * motor.theta() * self.mean_rate(k);
-                let (spring, brake) = answer(held.as_ref(), &joint.passive, place);
-                other -= spring;
-                damper = -brake * motor.rate(self.start.v[k], self.v_end[k]);
-            }
-            let actuation = Actuation {
-                drive: motor.torque(|| (self.start.v[k], self.v_end[k])),
-                damper,
-                other,
-            };
-            act(joint, actuation);
-        }
-    }
-}
-
-/// Spring torque (N m) at a coordinate, and damping (N m s/rad), of the position control and of the
-/// joint's own elements.
-#[inline]
-fn answer(held: Option<&HeldJoint>, passive: &Passive, place: f64) -> (f64, f64) {
-    let own = passive.stiffness * (place - passive.rest);
-    match held {
-        Some(held) => {
-            let spring = held.stiffness * (place - held.set_point);
-            (spring + own, held.damping + passive.damping)
-        }
-        None => (own, passive.damping),
-    }
-}
-
-/// Adds `h τ` to `y` for a step that ends with the iterate `v_end`.
-fn add_command(
-    model: &Model,
-    options: &StepOptions,
-    command: &Command,
-    start: Start<'_, Configuration>,
-    v_end: &[f64],
-    motors: &[MotorBranch],
-    y: &mut [f64],
-) {
-    let trial = Trial {
-        options,
-        command,
-        start,
-        v_end,
-        motors,
-    };
-    trial.for_each(model, |joint, torque| {
-        y[joint.velocity] += options.time_step * (torque.other + torque.damper + torque.drive);
-    });
-}
-
-/// `y = −(left-hand side)` of the principle of [`crate::integrator::moreau_jean_newton`] at the
-/// iterate `v_end`, without commands and contacts.
-fn momentum_residual(
-    model: &Model,
-    gravity: &Vector3<f64>,
-    (h, theta): (f64, f64),
-    start: Start<'_, Configuration>,
-    v_end: &[f64],
-    parts: &mut TreeScratch,
-    y: &mut [f64],
-) {
-    let origin_of = |tree: &Tree| match model.bodies()[tree.bodies.start].joint {
-        Joint::Free(free) => start.configuration.pose(free).position,
-        _ => Vector3::zeros(),
-    };
-    let end_of = |tree: &Tree| parts.kinematics_end.origin(tree.bodies.start) - origin_of(tree);
-    body_momenta(
-        model,
-        &parts.kinematics_end,
-        v_end,
-        |tree| end_of(&model.trees()[tree]),
-        &mut parts.momenta_end,
-    );
-    let bodies = model.bodies();
-    parts.sums.copy_from_slice(&parts.momenta_end);
-    for tree in model.trees() {
-        let end = end_of(tree);
-        for b in tree.bodies.clone() {
-            let (sum, begin) = (&mut parts.sums[b], &parts.momenta[b]);
-            let weight = gravity * (bodies[b].mass * h);
-            // Both mass centres relative to the reference point: the tree's origin at the start of
-            // the step.
-            let centre =
-                (parts.kinematics_end.c(b) + end) * theta + parts.c_start[b] * (1.0 - theta);
-            sum.linear -= begin.linear + weight;
-            sum.angular -= begin.angular + centre.cross(&weight);
-        }
-    }
-    y.fill(0.0);
-    for tree in model.trees() {
-        let middle = parts.kinematics.origin(tree.bodies.start) - origin_of(tree);
-        for b in tree.bodies.clone().rev() {
-            let body = &bodies[b];
-            let (P, L) = (parts.sums[b].linear, parts.sums[b].angular);
-            // About the tree's origin at the midpoint, the reference of the screws.
-            let about_middle = L - middle.cross(&P);
-            if let Joint::Free(_) = body.joint {
-                for k in 0..3 {
-                    y[body.velocity + k] = -P[k];
-                    y[body.velocity + 3 + k] = -about_middle[k];
-                }
-            } else {
-                for (y, m) in y[body.velocity..].iter_mut().zip(body.motions()) {
-                    *y -= parts.kinematics.power(m, &P, &about_middle);
-                }
-            }
-            if let Some(parent) = body.parent {
-                parts.sums[parent].linear += P;
-                parts.sums[parent].angular += L;
-            }
-        }
-    }
-    for &(k, inertia) in model.armatures() {
-        y[k] -= inertia * (v_end[k] - start.v[k]);
-    }
-}

@@ -96,6 +96,11 @@ impl Support<3> for Drum {
         Vector3::new(-from.y, from.x, 0.0) * self.rate
     }
 
+    fn spin(&self, at: &Facing<3>) -> [f64; 3] {
+        let rate = if at.n.z == 0.0 { self.rate } else { 0.0 };
+        [0.0, 0.0, rate]
+    }
+
     fn fastest(&self) -> f64 {
         self.rate.abs() * self.radius
     }

@@ -39,6 +39,11 @@ pub trait Support<const D: usize>: Debug + Send + Sync {
         SVector::zeros()
     }
 
+    /// Angular velocity of what has this point, rad/s; about the viewer's axis in the plane.
+    fn spin(&self, _at: &Facing<D>) -> [f64; 3] {
+        [0.0; 3]
+    }
+
     /// No point of its surface is faster, m/s.
     fn fastest(&self) -> f64 {
         0.0

@@ -58,7 +58,7 @@ fn check_joint(
     let at = |what: &str| format!("solids[{i}].{what}");
     let missing = |what: &str| ModelError::Missing { field: at(what) };
     let kind = solid.joint_kind();
-    let has_axis = matches!(kind, JointKind::Revolute | JointKind::Prismatic);
+    let has_axis = kind.has_axis();
     let given = [
         (solid.parent.is_some(), "parent", kind != JointKind::Free),
         (

@@ -21,6 +21,12 @@ pub enum JointKind {
 }
 
 impl JointKind {
+    /// Whether it has an axis, and the coordinate that springs, limits and couplings act on.
+    #[must_use]
+    pub fn has_axis(self) -> bool {
+        matches!(self, Self::Revolute | Self::Prismatic)
+    }
+
     /// Its name in a file.
     #[must_use]
     pub fn name(self) -> &'static str {

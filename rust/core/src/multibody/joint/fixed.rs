@@ -5,9 +5,50 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::JointAxis;
-use crate::scalar::Mat3;
+use super::axis::JointAxis;
+use super::joint_model::{JointCoordinates, JointModel, Placement};
+use super::screw::{Motion, Screw};
 use crate::scalar::elementary::sin_cos;
+use crate::scalar::{Lane, Mat3};
+
+/// A fixed joint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Fixed;
+
+impl JointModel for Fixed {
+    fn nv(&self) -> usize {
+        0
+    }
+
+    fn turning(&self) -> Option<f64> {
+        None
+    }
+
+    #[inline(always)]
+    fn place<T: Lane>(
+        &self,
+        frame: &Mat3<T>,
+        _q: &impl JointCoordinates<T>,
+        _turn: impl FnOnce() -> Option<(T, T)>,
+    ) -> Placement<T> {
+        Placement {
+            R: *frame,
+            shift: None,
+        }
+    }
+
+    #[inline(always)]
+    fn screws<T: Lane>(&self, _frame: &Mat3<T>, _set: impl FnMut(usize, Screw<T>)) {}
+
+    #[inline(always)]
+    fn screw<T: Lane>(&self, _motion: &Motion<T>) -> Screw<T> {
+        Screw::NONE
+    }
+
+    fn names(&self) -> &'static [&'static str] {
+        &[]
+    }
+}
 
 /// A joint locked at one value of its coordinate: rad about its axis, or m along it.
 #[derive(Clone, Copy, Debug)]

@@ -17,14 +17,15 @@ use crate::multibody::description::{
 use crate::multibody::error::ModelError;
 use crate::multibody::joint::fixed::Lock;
 use crate::multibody::joint::{
-    Coordinate, Coupling, Free, Joint, JointAxis, Prismatic, Revolute, Spherical,
+    Coupled, Coupling, Fixed, Free, Joint, JointAxis, JointModel, Prismatic, Revolute, SingleJoint,
+    Spherical,
 };
 use crate::spatial::{SymmetricMatrix3, exp_rotation};
 
 /// Mass, first moment, and inertia about the body frame's origin, accumulated while solids are
 /// merged.
 #[derive(Clone, Default)]
-struct Lump {
+struct MassSum {
     mass: f64,
     moment: Vector3<f64>,
     inertia: Matrix3<f64>,
@@ -34,7 +35,7 @@ struct Lump {
 #[derive(Default)]
 struct Builder {
     bodies: Vec<Body>,
-    lumps: Vec<Lump>,
+    mass_sums: Vec<MassSum>,
     frames: Vec<Frame>,
     boxes: Vec<CollisionBox>,
     spheres: Vec<CollisionSphere>,
@@ -74,7 +75,7 @@ impl Model {
             joint.is_passive = joint.passive.stiffness > 0.0 || joint.passive.damping > 0.0;
         }
         let common = paths.common(&bodies);
-        let mechanism = mechanism_of(&bodies, &trees, &joints, &paths);
+        let mechanism = mechanism_of(&bodies, &trees, &joints, &paths, (n_poses, n_rotations));
         let inertias = inertias_of(&mechanism, &bodies, &trees, &joints);
         let limited = (0..joints.len())
             .filter(|&joint| joints[joint].limits.is_some())
@@ -84,24 +85,15 @@ impl Model {
             .filter(|joint| joint.passive.armature > 0.0)
             .map(|joint| (joint.velocity, joint.passive.armature))
             .collect();
-        let rotating = (bodies.iter())
-            .filter(|body| matches!(body.joint, Joint::Free(_) | Joint::Spherical(_)))
-            .map(|body| (body.joint.clone(), body.velocity))
-            .collect();
-        let has_slides = bodies
-            .iter()
-            .any(|b| matches!(b.joint, Joint::Prismatic(_)));
+        let has_slides = bodies.iter().any(|body| body.joint.slides());
         let text = description.to_json().unwrap_or_default();
         Ok(Self {
             mass: bodies.iter().map(|b| b.mass).sum(),
             fingerprint: fingerprint(text.bytes()),
-            n_poses,
-            n_rotations,
             has_slides,
             armatures,
             limited,
             joint_velocities,
-            rotating,
             trees,
             mechanism,
             inertias,
@@ -183,7 +175,7 @@ impl Builder {
                 let displacement;
                 (displacement, rotation) = lock.place(&rotation);
                 position += displacement;
-                Joint::Fixed
+                Joint::Fixed(Fixed)
             }
             None => self.joint_of(i, solid, axis)?,
         };
@@ -207,7 +199,7 @@ impl Builder {
             principal_axes: None,
             is_spinner: false,
         });
-        self.lumps.push(Lump::default());
+        self.mass_sums.push(MassSum::default());
         Ok(Frame {
             name: solid.name.clone(),
             body: self.bodies.len() - 1,
@@ -224,7 +216,7 @@ impl Builder {
         axis: JointAxis,
     ) -> Result<Joint, ModelError> {
         match solid.joint_kind() {
-            JointKind::Fixed => Ok(Joint::Fixed),
+            JointKind::Fixed => Ok(Joint::Fixed(Fixed)),
             JointKind::Free => {
                 let pose = if self.bodies.is_empty() {
                     0
@@ -240,28 +232,34 @@ impl Builder {
                 Ok(Joint::Spherical(Spherical { rotation }))
             }
             JointKind::Revolute => {
-                let coordinate = self.coordinate_of(i, solid)?;
-                Ok(Joint::Revolute(Revolute { axis, coordinate }))
+                let (coordinate, coupling) = self.coordinate_of(i, solid)?;
+                let own = Revolute { axis, coordinate };
+                Ok(coupling.map_or(Joint::Revolute(own), |coupling| {
+                    let moves = SingleJoint::Revolute(own);
+                    Joint::Coupled(Coupled { moves, coupling })
+                }))
             }
             JointKind::Prismatic => {
-                let coordinate = self.coordinate_of(i, solid)?;
-                Ok(Joint::Prismatic(Prismatic { axis, coordinate }))
+                let (coordinate, coupling) = self.coordinate_of(i, solid)?;
+                let own = Prismatic { axis, coordinate };
+                Ok(coupling.map_or(Joint::Prismatic(own), |coupling| {
+                    let moves = SingleJoint::Prismatic(own);
+                    Joint::Coupled(Coupled { moves, coupling })
+                }))
             }
         }
     }
 
+    /// Index of a joint's coordinate, or of the one that it follows, and how it follows.
     fn coordinate_of(
         &mut self,
         i: usize,
         solid: &SolidDescription,
-    ) -> Result<Coordinate, ModelError> {
+    ) -> Result<(usize, Option<Coupling>), ModelError> {
         let Some(coupled) = &solid.coupled else {
             self.joints
                 .push(JointProperties::of(self.bodies.len(), solid));
-            return Ok(Coordinate {
-                joint: self.joints.len() - 1,
-                coupling: None,
-            });
+            return Ok((self.joints.len() - 1, None));
         };
         let mut joints = self.joints.iter();
         let joint = joints.position(|joint| self.bodies[joint.body].name == coupled.joint);
@@ -274,10 +272,7 @@ impl Builder {
         // Springs, dampers and rotors of a coupled joint act on the joint that it follows.
         let passive = Passive::of(solid).seen_through(&coupling);
         self.joints[joint].passive = self.joints[joint].passive.with(&passive);
-        Ok(Coordinate {
-            joint,
-            coupling: Some(coupling),
-        })
+        Ok((joint, Some(coupling)))
     }
 
     /// Adds the mass and shapes of a solid to the body that carries its frame.
@@ -285,11 +280,10 @@ impl Builder {
         let own = solid.mass_properties()?;
         let centre = frame.position + frame.rotation * own.centre;
         let about_centre = frame.rotation * own.inertia * frame.rotation.transpose();
-        let lump = &mut self.lumps[frame.body];
-        lump.mass += solid.mass;
-        lump.moment += centre * solid.mass;
-        lump.inertia +=
-            about_centre + SymmetricMatrix3::point_mass(solid.mass, &centre).to_matrix();
+        let sum = &mut self.mass_sums[frame.body];
+        sum.mass += solid.mass;
+        sum.moment += centre * solid.mass;
+        sum.inertia += about_centre + SymmetricMatrix3::point_mass(solid.mass, &centre).to_matrix();
         if let (true, Some(shape)) = (solid.collides, &solid.shape) {
             let material = named(solid.material.as_ref(), "body");
             self.touch_with(shape, material, &frame, centre, frame.rotation);
@@ -336,11 +330,11 @@ impl Builder {
     }
 
     fn settle_masses(&mut self) {
-        for (body, lump) in self.bodies.iter_mut().zip(&self.lumps) {
-            body.mass = lump.mass;
-            body.centre_of_mass = lump.moment / lump.mass;
-            let steiner = SymmetricMatrix3::point_mass(lump.mass, &body.centre_of_mass).to_matrix();
-            let about = SymmetricMatrix3::from_matrix(&(lump.inertia - steiner));
+        for (body, sum) in self.bodies.iter_mut().zip(&self.mass_sums) {
+            body.mass = sum.mass;
+            body.centre_of_mass = sum.moment / sum.mass;
+            let steiner = SymmetricMatrix3::point_mass(sum.mass, &body.centre_of_mass).to_matrix();
+            let about = SymmetricMatrix3::from_matrix(&(sum.inertia - steiner));
             let off = about.xy.abs() + about.xz.abs() + about.yz.abs();
             if off <= 1e-14 * (about.xx + about.yy + about.zz) {
                 body.principal_inertia = Vector3::new(about.xx, about.yy, about.zz);
@@ -400,7 +394,7 @@ fn wheels(
     // A coupled joint has no torque of its own.
     let own = |body: &Body| {
         let coordinate = body.joint.coordinate();
-        coordinate.filter(|c| c.coupling.is_none()).map(|c| c.joint)
+        coordinate.filter(|_| !body.is_coupled)
     };
     let joints: HashMap<&str, usize> = (bodies.iter())
         .filter_map(|body| own(body).map(|joint| (body.name.as_str(), joint)))

@@ -1,8 +1,8 @@
 //! Copies of a machine with some of its data changed.
 
 use super::Model;
+use crate::multibody::description::WheelDescription;
 use crate::multibody::description::check_values::{in_range, length};
-use crate::multibody::description::{JointKind, WheelDescription};
 use crate::multibody::error::ModelError;
 use crate::multibody::motor::Motor;
 
@@ -100,8 +100,7 @@ impl Model {
         let mut description = self.description.clone();
         for (i, (name, angle)) in joints.iter().enumerate() {
             let mut solids = description.solids.iter_mut();
-            let is_joint = |kind| matches!(kind, JointKind::Revolute | JointKind::Prismatic);
-            let found = solids.find(|s| &s.name == name && is_joint(s.joint_kind()));
+            let found = solids.find(|s| &s.name == name && s.joint_kind().has_axis());
             let Some(solid) = found else {
                 return Err(ModelError::UnknownName {
                     field: format!("joints[{i}]"),

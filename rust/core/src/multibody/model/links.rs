@@ -6,10 +6,8 @@ use super::Body;
 use super::properties::JointProperties;
 use super::tree::{Path, Paths, Tree};
 use crate::multibody::inertias::{Inertia, Inertias};
-use crate::multibody::joint::{Joint, JointAxis, Prismatic, Revolute, Spherical};
-use crate::multibody::mechanism::{
-    Link, LinkJoint, Mechanism, Mover, OwnJoint, Symmetry, TreeSpan,
-};
+use crate::multibody::joint::{Joint, JointModel};
+use crate::multibody::mechanism::{Link, Mechanism, Mover, OwnJoint, Symmetry, TreeSpan};
 use crate::scalar::{Single, Vec3};
 
 /// The mechanism of bodies with their paths.
@@ -18,6 +16,7 @@ pub(super) fn mechanism_of(
     trees: &[Tree],
     joints: &[JointProperties],
     paths: &Paths,
+    (n_poses, n_rotations): (usize, usize),
 ) -> Mechanism {
     let own = |has: fn(&Body) -> bool| (0..bodies.len()).filter(move |&b| has(&bodies[b]));
     let mut mechanism = Mechanism {
@@ -34,6 +33,8 @@ pub(super) fn mechanism_of(
         spinning: own(|body| body.is_spinner && !body.is_coupled)
             .map(|b| bodies[b].velocity)
             .collect(),
+        n_poses,
+        n_rotations,
         n_motions: paths.n_motions,
         longest_path: (paths.of.iter().map(|path| path.velocities.len())).fold(1, usize::max),
         ..Mechanism::default()
@@ -101,17 +102,14 @@ fn add_link(mechanism: &mut Mechanism, bodies: &[Body], paths: &Paths, b: usize)
     (mechanism.movers).extend(pairs.map(|(&velocity, &motion)| Mover { velocity, motion }));
     let mut others = bodies[b + 1..].iter();
     let is_leaf = !others.clone().any(|other| other.parent == Some(b));
-    let joint = joint_of(mechanism, body);
+    note_angles(mechanism, body);
     mechanism.links.push(Link {
         tree: body.tree,
         parent: body.parent.unwrap_or(b),
         position: body.position.into(),
         along: (0..3).find(|&k| (0..3).all(|i| i == k || body.position[i] == 0.0)),
         rotation: body.rotation.map(Into::into),
-        joint,
-        axis: body.joint.axis().copied().unwrap_or(JointAxis::X),
-        coupling: body.joint.coupling().copied(),
-        spin: (body.joint.coordinate().filter(|_| body.is_spinner)).map(|own| own.joint),
+        joint: body.joint,
         velocity: body.velocity,
         motion: body.motion,
         is_spinner: body.is_spinner,
@@ -127,33 +125,22 @@ fn add_link(mechanism: &mut Mechanism, bodies: &[Body], paths: &Paths, b: usize)
     });
 }
 
-/// The joint of a body, whose angles and velocities are noted.
-fn joint_of(mechanism: &mut Mechanism, body: &Body) -> LinkJoint {
-    match &body.joint {
-        Joint::Free(_) | Joint::Fixed => LinkJoint::Base,
-        Joint::Revolute(Revolute { coordinate, .. }) => {
-            let coupling = coordinate.coupling;
-            let rate = coupling.map_or(1.0, |coupling| coupling.ratio);
-            if coupling.is_some() || !body.is_spinner {
-                mechanism.turning.push((body.velocity, rate.abs()));
-            }
-            if !body.is_spinner {
-                let own = mechanism.angles.len();
-                (mechanism.coupled_angles).extend(coupling.map(|coupling| (own, coupling)));
-                mechanism.angles.push(coordinate.joint);
-            }
-            match coupling {
-                None => LinkJoint::Turn,
-                Some(_) => LinkJoint::CoupledTurn,
-            }
-        }
-        Joint::Prismatic(Prismatic { coordinate, .. }) => LinkJoint::Slide(coordinate.joint),
-        Joint::Spherical(Spherical { rotation }) => {
-            let k = body.velocity;
-            mechanism.balls.push(k);
-            (mechanism.turning).extend([k, k + 1, k + 2].map(|k| (k, 1.0)));
-            LinkJoint::Ball(*rotation)
-        }
+/// Notes the velocities that turn a body, its angle and its rotation.
+fn note_angles(mechanism: &mut Mechanism, body: &Body) {
+    let (joint, k) = (&body.joint, body.velocity);
+    if let Some(rate) = joint
+        .turning()
+        .filter(|_| body.is_coupled || !body.is_spinner)
+    {
+        (mechanism.turning).extend((0..joint.n_motions()).map(|i| (k + i, rate)));
+    }
+    if let Some((number, coupling)) = joint.angle().filter(|_| !body.is_spinner) {
+        let own = mechanism.angles.len();
+        (mechanism.coupled_angles).extend(coupling.map(|coupling| (own, coupling)));
+        mechanism.angles.push(number);
+    }
+    if joint.first_angle().is_some() {
+        mechanism.rotating.push((*joint, k));
     }
 }
 

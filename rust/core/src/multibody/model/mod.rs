@@ -13,8 +13,6 @@ mod properties;
 mod spinners;
 mod tree;
 
-use std::ops::Range;
-
 use nalgebra::Vector3;
 
 pub use body::Body;
@@ -53,11 +51,7 @@ pub struct Model {
     armatures: Vec<(usize, f64)>,
     /// Indices of the joints with stops.
     limited: Vec<usize>,
-    n_poses: usize,
-    n_rotations: usize,
     has_slides: bool,
-    /// Free and spherical joints, with their first velocities.
-    rotating: Vec<(Joint, usize)>,
     mass: f64,
     fingerprint: u64,
 }
@@ -139,7 +133,7 @@ impl Model {
             let farthest = tree.bodies.clone().map(|body| (place(body) - first).norm());
             reach = farthest.fold(reach, f64::max);
         }
-        let couplings = self.mechanism.links.iter().filter_map(|link| link.coupling);
+        let couplings = (self.mechanism.links.iter()).filter_map(|link| link.joint.coupling());
         let coupled: f64 = couplings.map(|coupling| coupling.ratio.abs()).sum();
         linear + turning * reach * (1.0 + coupled)
     }
@@ -201,13 +195,13 @@ impl Model {
     /// Number of poses in a configuration: the first body's and those of all other free bodies.
     #[must_use]
     pub fn n_poses(&self) -> usize {
-        self.n_poses
+        self.mechanism.n_poses
     }
 
     /// Number of spherical joints.
     #[must_use]
     pub fn n_rotations(&self) -> usize {
-        self.n_rotations
+        self.mechanism.n_rotations
     }
 
     /// Whether it is a single tree on a free base, like a rover.
@@ -254,7 +248,7 @@ impl Model {
     #[inline]
     #[must_use]
     pub fn rotating_joints(&self) -> &[(Joint, usize)] {
-        &self.rotating
+        &self.mechanism.rotating
     }
 
     /// Velocities of joints with rotors, and the rotor inertias (kg m² or kg).
@@ -312,16 +306,6 @@ impl Model {
     #[must_use]
     pub fn body_of_velocity(&self, k: usize) -> usize {
         self.body_of_velocity[k]
-    }
-
-    /// The path of body `b` in two parts: the velocities of a free base, which are consecutive, and
-    /// those of the joints.
-    #[inline]
-    #[must_use]
-    pub fn split_path(&self, b: usize) -> (Range<usize>, &[usize]) {
-        let tree = &self.trees[self.bodies[b].tree];
-        let (first, lead) = (tree.velocities.start, tree.lead());
-        (first..first + lead, &self.path(b)[lead..])
     }
 
     /// The velocities that move body `b` beyond [`Self::lead`], in path order, and their motions

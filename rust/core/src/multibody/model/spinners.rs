@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::Body;
 use super::parts::Wheel;
-use crate::multibody::joint::{Joint, JointAxis, Revolute};
+use crate::multibody::joint::{JointAxis, JointModel};
 
 /// Finds the bodies whose own rotation changes only their appearance.
 pub(super) fn mark_spinners(
@@ -23,7 +23,8 @@ pub(super) fn mark_spinners(
     }
     for b in 0..bodies.len() {
         let body = &bodies[b];
-        let Joint::Revolute(Revolute { axis, .. }) = body.joint else {
+        let turns = body.joint.turning().is_some();
+        let Some(axis) = body.joint.axis().filter(|_| turns) else {
             continue;
         };
         let direction = axis.direction();

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::body::Body;
-use crate::multibody::joint::{Joint, Prismatic, Revolute, free};
+use crate::multibody::joint::{Joint, JointModel, free};
 
 /// Bodies and velocities of a tree: one root and everything it carries.
 #[derive(Clone, Debug)]
@@ -88,8 +88,7 @@ impl Paths {
         let lead = self.leads[b];
         let coordinate = bodies[b].joint.coordinate().ok_or(b)?;
         let is_followed = |other: &&Body| {
-            let own = other.joint.coordinate();
-            own.is_some_and(|c| c.coupling.is_none() && c.joint == coordinate.joint)
+            other.joint.coordinate() == Some(coordinate) && other.joint.coupling().is_none()
         };
         let leader = bodies[..b].iter().find(is_followed).ok_or(b)?;
         if leader.tree != bodies[b].tree {
@@ -109,11 +108,8 @@ impl Paths {
             return Err(b);
         }
         bodies[b].velocity = k;
-        if let Joint::Revolute(Revolute { coordinate, .. })
-        | Joint::Prismatic(Prismatic { coordinate, .. }) = &mut bodies[b].joint
-            && let Some(coupling) = &mut coordinate.coupling
-        {
-            coupling.combined = combined;
+        if let Joint::Coupled(own) = &mut bodies[b].joint {
+            own.coupling.combined = combined;
         }
         Ok(())
     }

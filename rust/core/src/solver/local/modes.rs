@@ -6,8 +6,10 @@
 //! the projection cycles (measured: all recorded rover impacts in at most five steps). Neither
 //! depends on the order of the contacts.
 
-use super::one_contact::solve_one_contact;
-use crate::law::coulomb::ContactMode;
+use crate::law::coulomb::{ContactMode, Coulomb};
+use crate::law::friction_law::FrictionLaw;
+use crate::law::mode::Tangent;
+use crate::law::one_contact::solve_one_contact;
 use crate::problem::{Prepared, Proximal};
 
 /// Mode and sliding frame of one contact in the current linearisation.
@@ -45,13 +47,17 @@ pub(in crate::solver) fn n_unknowns<const D: usize>(mode: ContactMode, mu: f64) 
     }
 }
 
-/// Direction of the tangential part of `v`; zero for a zero vector.
-#[inline]
-fn direction<const D: usize>(v: &[f64; D], norm: f64) -> [f64; 2] {
-    if norm > 0.0 {
-        [v[1] / norm, v[D - 1] / norm]
-    } else {
-        [0.0; 2]
+impl Linearised {
+    /// The law linearised so, with its first unknown.
+    #[inline]
+    fn of(tangent: Tangent, start: usize) -> Self {
+        let Tangent { mode, e, gamma } = tangent;
+        Self {
+            mode,
+            e,
+            gamma,
+            start,
+        }
     }
 }
 
@@ -59,14 +65,8 @@ fn direction<const D: usize>(v: &[f64; D], norm: f64) -> [f64; 2] {
 #[inline]
 pub(in crate::solver) fn set_slide<const D: usize>(contact: &mut Linearised, p: &[f64], u: &[f64]) {
     let p: [f64; D] = std::array::from_fn(|k| p[k]);
-    let norm = crate::cone::tangential_norm(&p);
-    contact.e = direction(&p, norm);
-    let along: f64 = p[1..].iter().zip(&u[1..]).map(|(p, u)| p * u).sum();
-    contact.gamma = if norm > 0.0 {
-        (-along / (norm * norm)).max(0.0)
-    } else {
-        0.0
-    };
+    let Tangent { e, gamma, .. } = Tangent::sliding(&p, u);
+    (contact.e, contact.gamma) = (e, gamma);
 }
 
 /// Reads the modes from the impulse itself, the answer of the last step.
@@ -89,25 +89,8 @@ pub(in crate::solver) fn recall<const D: usize>(
         .zip(p.chunks_exact(D).zip(u.chunks_exact(D)))
     {
         let p: [f64; D] = std::array::from_fn(|k| p[k]);
-        let radius = mu * p[0];
-        let norm = crate::cone::tangential_norm(&p);
-        *contact = Linearised {
-            start: prediction.m,
-            ..Linearised::default()
-        };
-        if p[0] <= 0.0 {
-            contact.mode = if u[0] < 0.0 {
-                ContactMode::Stick
-            } else {
-                ContactMode::Open
-            };
-        } else if mu > 0.0 && norm < radius * (1.0 - 1e-9) {
-            contact.mode = ContactMode::Stick;
-        } else {
-            contact.mode = ContactMode::Slide;
-            set_slide::<D>(contact, &p, u);
-            prediction.slides |= mu > 0.0;
-        }
+        *contact = Linearised::of(Coulomb(mu).recall(&p, u), prediction.m);
+        prediction.slides |= contact.mode == ContactMode::Slide && mu > 0.0;
         prediction.m += n_unknowns::<D>(contact.mode, mu);
     }
     prediction
@@ -139,45 +122,14 @@ pub(in crate::solver) fn predict<const D: usize>(
         let next = if exact {
             by_solving(data, alpha, i, &p, &u_hat, mu)
         } else {
-            by_projection(rho, &p, &u_hat, mu)
+            Coulomb(mu).linearise(&p, &u_hat, rho)
         };
         prediction.changed |= next.mode != contact.mode;
         prediction.slides |= next.mode == ContactMode::Slide && mu > 0.0;
-        *contact = Linearised {
-            start: prediction.m,
-            ..next
-        };
+        *contact = Linearised::of(next, prediction.m);
         prediction.m += n_unknowns::<D>(next.mode, mu);
     }
     prediction
-}
-
-#[inline]
-fn by_projection<const D: usize>(
-    [rho_N, rho_T]: [f64; 2],
-    p: &[f64; D],
-    u_hat: &[f64; D],
-    mu: f64,
-) -> Linearised {
-    let mut contact = Linearised::default();
-    let mut z: [f64; D] = std::array::from_fn(|k| p[k] - rho_T * u_hat[k]);
-    z[0] = p[0] - rho_N * u_hat[0];
-    if z[0] <= 0.0 {
-        return contact;
-    }
-    let norm = crate::cone::tangential_norm(&z);
-    let radius = mu * z[0];
-    if mu <= 0.0 {
-        contact.mode = ContactMode::Slide;
-    } else if norm <= radius {
-        contact.mode = ContactMode::Stick;
-    } else {
-        contact.mode = ContactMode::Slide;
-        contact.e = direction(&z, norm);
-        // A contact about to open would have infinite turning stiffness.
-        contact.gamma = ((norm - radius) / (rho_T * radius)).min(1e12 / rho_T);
-    }
-    contact
 }
 
 fn by_solving<const D: usize>(
@@ -187,7 +139,7 @@ fn by_solving<const D: usize>(
     p: &[f64; D],
     u_hat: &[f64; D],
     mu: f64,
-) -> Linearised {
+) -> Tangent {
     let mut block = data.block::<D>(i);
     let mut q = *u_hat;
     for r in 0..D {
@@ -196,12 +148,5 @@ fn by_solving<const D: usize>(
             q[r] -= block[r][c] * p[c];
         }
     }
-    let solved = solve_one_contact(&block, &q, mu);
-    let norm = crate::cone::tangential_norm(&solved.impulse);
-    Linearised {
-        mode: solved.mode,
-        e: direction(&solved.impulse, norm),
-        gamma: solved.kappa,
-        ..Linearised::default()
-    }
+    solve_one_contact(&block, &q, mu).tangent()
 }

@@ -1,10 +1,7 @@
-//! The convex relaxation of Coulomb's law, `K_μ* ∋ u ⊥ p ∈ K_μ`: a sliding contact separates at the
-//! speed `μ|u_T|`.
-//!
-//! Without De Saxcé's shift the problem is convex, and a different law. Alternating directions
-//! provably solve it.
+//! The convex relaxation of Coulomb's law, [`crate::law::associated`]: a different law, whose
+//! problem is convex. Alternating directions provably solve it.
 
-use crate::cone::SecondOrderCone;
+use crate::law::associated::natural_map;
 use crate::problem::{Prepared, Residual};
 use crate::solver::options::SolverOptions;
 use crate::solver::report::SolveStatus;
@@ -15,9 +12,8 @@ use crate::solver::stage::admm::{self, Law};
 fn measure<const D: usize>(data: &Prepared<'_>, p: &[f64], u: &[f64]) -> Residual {
     let (mut map, mut velocity) = (0.0, 0.0_f64);
     for (i, (&mu, &rho)) in data.mu.iter().zip(data.masses).enumerate() {
-        let z: [f64; D] = std::array::from_fn(|k| p[D * i + k] - rho * u[D * i + k]);
-        let projected = SecondOrderCone::new(mu).project(&z);
-        let square: f64 = (0..D).map(|k| (p[D * i + k] - projected[k]).powi(2)).sum();
+        let [p, u]: [[f64; D]; 2] = [p, u].map(|x| std::array::from_fn(|k| x[D * i + k]));
+        let square: f64 = natural_map(&p, &u, mu, rho).iter().map(|x| x.powi(2)).sum();
         map += square;
         velocity = velocity.max(square / (rho * rho));
     }

@@ -135,18 +135,3 @@ fn next_share(t: &mut f64) -> f64 {
     *t = next;
     share
 }
-
-/// Projects the tangential part of an impulse onto the friction disc of a nonnegative radius.
-#[inline]
-pub(super) fn draw_in<const D: usize>(p: &mut [f64; D], limit: f64) {
-    if D == 2 {
-        p[1] = p[1].min(limit).max(-limit);
-        return;
-    }
-    let square = p[1] * p[1] + p[2] * p[2];
-    if square > limit * limit {
-        let share = limit / square.sqrt();
-        p[1] *= share;
-        p[2] *= share;
-    }
-}

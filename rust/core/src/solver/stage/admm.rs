@@ -16,6 +16,7 @@
 //! contact Acary, Brémond and Huber 2018, Carpentier et al. 2024.
 
 use crate::cone::{SecondOrderCone, tangential_norm};
+use crate::law::coulomb::modified_velocity;
 use crate::problem::{Prepared, Residual};
 use crate::solver::options::SolverOptions;
 use crate::solver::report::SolveStatus;
@@ -86,7 +87,7 @@ fn begin_dual<const D: usize>(mu: &[f64], shifts: bool, u: &[f64], y: &mut [f64]
     for (i, &mu) in mu.iter().enumerate() {
         let mut shifted: [f64; D] = std::array::from_fn(|k| u[D * i + k]);
         if shifts {
-            shifted[0] += mu * tangential_norm(&shifted);
+            shifted = modified_velocity(&shifted, mu);
         }
         let inside = SecondOrderCone::new(mu).dual().project(&shifted);
         for k in 0..D {

@@ -13,9 +13,10 @@
 
 #![allow(clippy::inline_always)] // a visit is one piece of code: calls cost as much as sums
 
-use crate::law::signorini;
-use crate::problem::{BodyPairs, RoundPair};
-use crate::solver::local::one_contact::solve_one_contact;
+use crate::law::coulomb::Coulomb;
+use crate::law::one_contact::solve_one_contact;
+use crate::law::rolling::RollingFriction;
+use crate::problem::{BodyPairs, RollingContact, RoundPair};
 use crate::spatial::space::dot;
 
 /// A ball: its velocity with 1/m, and `r ω` with `r²/J`.
@@ -49,29 +50,6 @@ fn cross(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
         a[2] * b[0] - a[0] * b[2],
         a[0] * b[1] - a[1] * b[0],
     ]
-}
-
-/// Shortens a tangential vector to `limit`.
-#[inline(always)]
-fn shortened(t: [f64; 3], limit: f64) -> [f64; 3] {
-    let square = dot(&t, &t);
-    let share = if square > limit * limit {
-        limit / square.sqrt()
-    } else {
-        1.0
-    };
-    [share * t[0], share * t[1], share * t[2]]
-}
-
-/// A vector's part across n, and its normal part.
-#[inline(always)]
-fn split(n: &[f64; 3], x: &[f64; 3]) -> (f64, [f64; 3]) {
-    let along = dot(n, x);
-    let mut across = *x;
-    for k in 0..3 {
-        across[k] -= n[k] * along;
-    }
-    (along, across)
 }
 
 /// A vector of a contact's frame in the world's axes.
@@ -177,19 +155,14 @@ impl BallRow {
     pub(super) fn visit(&mut self, share: f64, balls: &mut [Ball]) -> f64 {
         let u = self.velocity(balls);
         let mut start = self.p;
-        let mut wanted = self.p;
         for k in 0..3 {
             start[k] += share * (self.p[k] - self.before[k]);
-            wanted[k] = start[k] - self.inverse[1] * u[k];
         }
-        let normal = (dot(&self.n, &start) - self.inverse[0] * dot(&self.n, &u)).max(0.0);
-        let (_, across) = split(&self.n, &wanted);
-        let across = shortened(across, self.mu * normal);
-        let mut change = [0.0; 3];
         self.before = self.p;
+        self.p = Coulomb(self.mu).answer_of_round(&self.n, self.inverse, &start, &u);
+        let mut change = self.p;
         for k in 0..3 {
-            self.p[k] = self.n[k] * normal + across[k];
-            change[k] = self.p[k] - start[k];
+            change[k] -= start[k];
         }
         self.add(&change, balls);
         dot(&change, &change)
@@ -212,23 +185,111 @@ impl BallRow {
         let u = self.velocity(balls);
         let mass = mass_of(self.inverse);
         let or_mass = |i: f64| if i > 0.0 { i } else { mass };
-        let (i_n, i_t) = (or_mass(self.inverse[0]), or_mass(self.inverse[1]));
-        let (u_n, u_t) = split(&self.n, &u);
-        let (p_n, p_t) = split(&self.n, &self.p);
-        let mut wanted = p_t;
-        for k in 0..3 {
-            wanted[k] -= i_t * u_t[k];
-        }
-        let across = shortened(wanted, self.mu * p_n);
-        let mut square = signorini::violation(u_n, p_n, i_n).powi(2);
-        for k in 0..3 {
-            square += ((p_t[k] - across[k]) / i_t).powi(2);
-        }
+        let scales = self.inverse.map(or_mass);
         Judged {
-            square,
+            square: Coulomb(self.mu).violation_of_round(&self.n, scales, &self.p, &u),
             mass,
             work: dot(&self.p, &u),
             free: dot(&self.p, &self.q),
+        }
+    }
+}
+
+/// Rolling and drilling friction of the contact of a [`BallRow`]. A visit of the row precedes each
+/// of its own, which takes the normal impulse as given.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RollRow {
+    /// k of each body.
+    levers: [f64; 2],
+    law: RollingFriction,
+    /// 1/W of the rolling velocity, kg.
+    pub inverse: f64,
+    pub q: [f64; 3],
+    /// The impulse, N s.
+    pub s: [f64; 3],
+    /// s of the previous sweep.
+    pub before: [f64; 3],
+}
+
+impl RollRow {
+    pub(super) fn new(contact: &RollingContact, pair: &RoundPair<3>) -> Self {
+        Self {
+            levers: contact.levers,
+            law: contact.law,
+            inverse: invert(contact.mobility(pair)),
+            q: contact.free,
+            s: contact.impulse,
+            before: contact.impulse,
+        }
+    }
+
+    /// w.
+    #[inline(always)]
+    fn velocity(&self, row: &BallRow, balls: &[Ball]) -> [f64; 3] {
+        let [a, b] = row.bodies.map(|body| &balls[body as usize].turning);
+        let [k_a, k_b] = self.levers;
+        std::array::from_fn(|k| k_a * a[k] - k_b * b[k] + self.q[k])
+    }
+
+    /// The effect of an impulse.
+    #[inline(always)]
+    pub(super) fn add(&self, s: &[f64; 3], row: &BallRow, balls: &mut [Ball]) {
+        let [k_a, k_b] = self.levers;
+        for (body, lever) in row.bodies.into_iter().zip([k_a, -k_b]) {
+            let turning = &mut balls[body as usize].turning;
+            let c = lever * turning[3];
+            for k in 0..3 {
+                turning[k] += c * s[k];
+            }
+        }
+    }
+
+    /// Nearest admissible impulse under the row's normal impulse.
+    #[inline(always)]
+    pub(super) fn admissible(&self, row: &BallRow, s: &[f64; 3]) -> [f64; 3] {
+        self.law.project(&row.n, dot(&row.n, &row.p), s)
+    }
+
+    /// As [`BallRow::visit`].
+    #[inline(always)]
+    pub(super) fn visit(&mut self, row: &BallRow, share: f64, balls: &mut [Ball]) -> f64 {
+        let w = self.velocity(row, balls);
+        let mut start = self.s;
+        let mut wanted = self.s;
+        for k in 0..3 {
+            start[k] += share * (self.s[k] - self.before[k]);
+            wanted[k] = start[k] - self.inverse * w[k];
+        }
+        self.before = self.s;
+        self.s = self.admissible(row, &wanted);
+        let change = std::array::from_fn(|k| self.s[k] - start[k]);
+        self.add(&change, row, balls);
+        dot(&change, &change)
+    }
+
+    /// As [`BallRow::take_back`].
+    #[inline]
+    pub(super) fn take_back(&mut self, row: &BallRow, share: f64, balls: &mut [Ball]) {
+        let back = std::array::from_fn(|k| -share * (self.s[k] - self.before[k]));
+        self.add(&back, row, balls);
+        self.before = self.s;
+    }
+
+    /// As [`BallRow::judge`].
+    #[inline(always)]
+    pub(super) fn judge(&self, row: &BallRow, balls: &[Ball]) -> Judged {
+        let w = self.velocity(row, balls);
+        let mass = if self.inverse > 0.0 {
+            self.inverse
+        } else {
+            1.0
+        };
+        let pressed = (&row.n, dot(&row.n, &row.p));
+        Judged {
+            square: self.law.violation(pressed, &self.s, &w, mass),
+            mass,
+            work: dot(&self.s, &w),
+            free: dot(&self.s, &self.q),
         }
     }
 }

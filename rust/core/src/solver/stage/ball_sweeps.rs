@@ -16,11 +16,12 @@
 
 #![allow(clippy::inline_always)] // a visit is one piece of code
 
-use super::accelerated::{Measured, Relaxation, draw_in};
+use super::accelerated::{Measured, Relaxation};
 use super::ball_leap::{Anchor, Leaping};
-use super::ball_rows::{Ball, BallRow, MachineRow, mass_of, to_frame};
+use super::ball_rows::{Ball, BallRow, Judged, MachineRow, RollRow, mass_of, to_frame};
+use crate::cone::draw_in;
 use crate::law::coulomb::violation;
-use crate::problem::{BodyPairs, Magnitudes, Violations};
+use crate::problem::{BodyPairs, Magnitudes, RollingContact, Violations};
 use crate::solver::options::SolverOptions;
 use crate::spatial::space::{body_velocities, dot};
 
@@ -49,16 +50,28 @@ struct Rest {
 impl Rest {
     /// Visits a contact unless it rests; the square of its change.
     #[inline(always)]
-    fn visit(&mut self, row: &mut BallRow, share: f64, quiet: f64, balls: &mut [Ball]) -> f64 {
+    fn visit(
+        &mut self,
+        row: &mut BallRow,
+        roll: Option<&mut RollRow>,
+        (share, quiet): (f64, f64),
+        balls: &mut [Ball],
+    ) -> f64 {
         if self.left > 0 {
             self.left -= 1;
             if self.is_new {
                 self.is_new = false;
                 row.take_back(share, balls);
+                if let Some(roll) = roll {
+                    roll.take_back(row, share, balls);
+                }
             }
             return 0.0;
         }
-        let change = row.visit(share, balls);
+        let mut change = row.visit(share, balls);
+        if let Some(roll) = roll {
+            change += roll.visit(row, share, balls);
+        }
         if change <= quiet {
             self.length = (2 * self.length + 1).min(LONGEST_REST);
             self.left = self.length;
@@ -70,11 +83,42 @@ impl Rest {
     }
 }
 
+/// Rows of contacts side by side, and what belongs to each.
+struct Rows<'a> {
+    rows: &'a mut [BallRow],
+    rests: &'a mut [Rest],
+    /// None where no contact bears a moment.
+    rolls: &'a mut [RollRow],
+}
+
+impl<'a> Rows<'a> {
+    /// The first `count`, and the others.
+    fn split(self, count: usize) -> (Self, Self) {
+        let (rows, more_rows) = self.rows.split_at_mut(count);
+        let (rests, more_rests) = self.rests.split_at_mut(count);
+        let (rolls, more_rolls) = self.rolls.split_at_mut(count.min(self.rolls.len()));
+        let first = Self { rows, rests, rolls };
+        let others = Self {
+            rows: more_rows,
+            rests: more_rests,
+            rolls: more_rolls,
+        };
+        (first, others)
+    }
+
+    /// Each row with the one that rolls.
+    fn rolling(&mut self) -> impl Iterator<Item = (&mut BallRow, &mut RollRow)> {
+        self.rows.iter_mut().zip(&mut *self.rolls)
+    }
+}
+
 /// Scratch.
 #[derive(Clone, Debug, Default)]
 pub(super) struct BallSweeps {
     rows: Vec<BallRow>,
     rests: Vec<Rest>,
+    /// Rolling friction of each row; none where no contact has any.
+    rolls: Vec<RollRow>,
     /// Square of a change below which a contact rests, N² s².
     quiet: f64,
     /// Number of each row's contact.
@@ -115,6 +159,12 @@ struct Sums {
 }
 
 impl Sums {
+    fn add(&mut self, judged: &Judged) {
+        self.violations.add(judged.square, judged.mass);
+        self.work += judged.work;
+        self.free += judged.free;
+    }
+
     fn plus(mut self, other: Self) -> Self {
         self.violations.join(&other.violations);
         self.work += other.work;
@@ -151,23 +201,20 @@ impl Layout<'_> {
         self,
         parity: usize,
         range: std::ops::Range<usize>,
-        (rows, rests): (&mut [BallRow], &mut [Rest]),
+        rows: Rows<'_>,
         balls: &mut [Ball],
-        visit: &(impl Fn(&mut [BallRow], &mut [Rest], &mut [Ball]) -> T + Sync),
+        visit: &(impl Fn(Rows<'_>, &mut [Ball]) -> T + Sync),
         plus: &(impl Fn(T, T) -> T + Sync),
     ) -> T {
         let first = parity + 2 * range.start;
         if range.len() == 1 {
             let count = self.blocks[first + 1] - self.blocks[first];
-            return visit(&mut rows[..count], &mut rests[..count], balls);
+            return visit(rows.split(count).0, balls);
         }
         let middle = range.start + range.len() / 2;
         let second = parity + 2 * middle;
-        let is_worth_it = self.is_parallel && rows.len() >= FEW;
-        let count = self.blocks[second] - self.blocks[first];
-        let (left, right) = (rows, rests);
-        let (left, right) = (left.split_at_mut(count), right.split_at_mut(count));
-        let (left, right) = ((left.0, right.0), (left.1, right.1));
+        let is_worth_it = self.is_parallel && rows.rows.len() >= FEW;
+        let (left, right) = rows.split(self.blocks[second] - self.blocks[first]);
         let (near, far) = balls.split_at_mut(self.slabs[second] - self.slabs[first]);
         let (left, right) = both(
             is_worth_it,
@@ -184,6 +231,7 @@ impl BallSweeps {
         &mut self,
         pairs: &BodyPairs<3>,
         (q, mu, p): (&[f64], &[f64], &[f64]),
+        rolling: &[RollingContact],
         options: &SolverOptions,
     ) {
         self.is_parallel =
@@ -192,6 +240,17 @@ impl BallSweeps {
         self.place_balls(pairs);
         self.place_rows(pairs, q, mu, p);
         let round = pairs.round.len();
+        self.rolls.clear();
+        if !rolling.is_empty() {
+            self.rolls
+                .extend(self.order.iter().zip(&self.rows).map(|(&i, row)| {
+                    let i = i as usize;
+                    let mut roll = RollRow::new(&rolling[i], &pairs.round[i]);
+                    roll.s = roll.admissible(row, &roll.s);
+                    roll.before = roll.s;
+                    roll
+                }));
+        }
         self.machine.clear();
         let machine = pairs.machine.iter().enumerate();
         let places = &self.places;
@@ -343,12 +402,10 @@ impl BallSweeps {
     /// Visits all contacts but the machine's: the sum of what they return.
     fn each<T: Send + Default>(
         &mut self,
-        visit: impl Fn(&mut [BallRow], &mut [Rest], &mut [Ball]) -> T + Sync,
+        visit: impl Fn(Rows<'_>, &mut [Ball]) -> T + Sync,
         plus: impl Fn(T, T) -> T + Sync,
     ) -> T {
         let n_slabs = self.slabs.len() - 1;
-        let (near, far) = self.rows.split_at_mut(self.blocks[n_slabs]);
-        let (near_rests, far_rests) = self.rests.split_at_mut(self.blocks[n_slabs]);
         let layout = Layout {
             slabs: &self.slabs,
             blocks: &self.blocks,
@@ -358,13 +415,17 @@ impl BallSweeps {
         for parity in 0..n_slabs.min(2) {
             let count = (n_slabs - parity).div_ceil(2);
             let first = self.blocks[parity];
-            let rows = (&mut near[first..], &mut near_rests[first..]);
+            let (near, _) = all_rows(&mut self.rows, &mut self.rests, &mut self.rolls)
+                .split(self.blocks[n_slabs]);
+            let (_, rows) = near.split(first);
             let balls = &mut self.balls[self.slabs[parity]..];
             let found = layout.each(parity, 0..count, rows, balls, &visit, &plus);
             sum = plus(sum, found);
         }
-        if !far.is_empty() {
-            sum = plus(sum, visit(far, far_rests, &mut self.balls));
+        let (_, far) =
+            all_rows(&mut self.rows, &mut self.rests, &mut self.rolls).split(self.blocks[n_slabs]);
+        if !far.rows.is_empty() {
+            sum = plus(sum, visit(far, &mut self.balls));
         }
         sum
     }
@@ -376,9 +437,12 @@ impl BallSweeps {
             ball.turning[..3].fill(0.0);
         }
         self.own.fill(0.0);
-        let add = |rows: &mut [BallRow], _: &mut [Rest], balls: &mut [Ball]| {
-            for row in rows {
+        let add = |mut rows: Rows<'_>, balls: &mut [Ball]| {
+            for row in &*rows.rows {
                 row.add(&row.p, balls);
+            }
+            for (row, roll) in rows.rolling() {
+                roll.add(&roll.s, row, balls);
             }
         };
         self.each(add, |(), ()| ());
@@ -399,7 +463,12 @@ impl BallSweeps {
     }
 
     /// Writes impulses and velocities in the contacts' frames.
-    pub(super) fn write(&self, pairs: &BodyPairs<3>, p: &mut [f64], u: &mut [f64]) {
+    pub(super) fn write(
+        &self,
+        pairs: &BodyPairs<3>,
+        (p, u): (&mut [f64], &mut [f64]),
+        rolling: &mut [RollingContact],
+    ) {
         let (p, u) = (p.as_chunks_mut::<3>().0, u.as_chunks_mut::<3>().0);
         let n_slabs = self.slabs.len() - 1;
         for block in 0..=n_slabs {
@@ -419,12 +488,24 @@ impl BallSweeps {
                 u[i] = to_frame(frame, &row.velocity(&self.balls[first..]));
             }
         }
+        for ((roll, row), &i) in self.rolls.iter().zip(&self.rows).zip(&self.order) {
+            rolling[i as usize].impulse = roll.admissible(row, &roll.s);
+        }
         for (k, row) in self.machine.iter().enumerate() {
             let i = pairs.round.len() + k;
             p[i] = row.p;
             u[i] = row.velocity(pairs, k, &self.balls, &self.own);
         }
     }
+}
+
+/// All rows of the contacts but the machine's.
+fn all_rows<'a>(
+    rows: &'a mut [BallRow],
+    rests: &'a mut [Rest],
+    rolls: &'a mut [RollRow],
+) -> Rows<'a> {
+    Rows { rows, rests, rolls }
 }
 
 /// See [`BallSweeps::extrapolate`].
@@ -460,10 +541,19 @@ impl Relaxation for BallSolve<'_> {
         self.sweeps.extrapolate(share);
         // No change is below that.
         let quiet = if is_hard { -1.0 } else { self.sweeps.quiet };
-        let visit = |rows: &mut [BallRow], rests: &mut [Rest], balls: &mut [Ball]| {
+        let shares = (share, quiet);
+        let visit = |rows: Rows<'_>, balls: &mut [Ball]| {
+            let Rows { rows, rests, rolls } = rows;
             let mut change = 0.0;
-            for (row, rest) in rows.iter_mut().zip(rests) {
-                change += rest.visit(row, share, quiet, balls);
+            let both = rows.iter_mut().zip(rests);
+            if rolls.is_empty() {
+                for (row, rest) in both {
+                    change += rest.visit(row, None, shares, balls);
+                }
+            } else {
+                for ((row, rest), roll) in both.zip(rolls) {
+                    change += rest.visit(row, Some(roll), shares, balls);
+                }
             }
             change
         };
@@ -482,13 +572,13 @@ impl Relaxation for BallSolve<'_> {
 
     fn measure(&mut self) -> Measured {
         self.sweeps.sum(self.pairs);
-        let judge = |rows: &mut [BallRow], _: &mut [Rest], balls: &mut [Ball]| {
+        let judge = |mut rows: Rows<'_>, balls: &mut [Ball]| {
             let mut sums = Sums::default();
-            for row in rows {
-                let judged = row.judge(balls);
-                sums.violations.add(judged.square, judged.mass);
-                sums.work += judged.work;
-                sums.free += judged.free;
+            for row in &*rows.rows {
+                sums.add(&row.judge(balls));
+            }
+            for (row, roll) in rows.rolling() {
+                sums.add(&roll.judge(row, balls));
             }
             sums
         };
@@ -524,6 +614,7 @@ impl Relaxation for BallSolve<'_> {
     fn leap(&mut self) -> bool {
         let BallSweeps {
             rows,
+            rolls,
             machine,
             balls,
             own,
@@ -548,6 +639,9 @@ impl Relaxation for BallSolve<'_> {
             for row in rows {
                 row.before = row.p;
             }
+            for roll in rolls {
+                roll.before = roll.s;
+            }
             for row in machine {
                 row.before = row.p;
             }
@@ -560,6 +654,9 @@ impl Relaxation for BallSolve<'_> {
     fn scale(&mut self, share: f64) {
         for row in &mut self.sweeps.rows {
             row.p = row.p.map(|p| share * p);
+        }
+        for roll in &mut self.sweeps.rolls {
+            roll.s = roll.s.map(|s| share * s);
         }
         self.sweeps.rests.fill(Rest::default());
         for row in &mut self.sweeps.machine {

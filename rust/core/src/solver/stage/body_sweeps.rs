@@ -17,11 +17,12 @@
 //! Source: Jean 1999 and Moreau 1999 (the sweep); Nesterov 1983, O'Donoghue
 //! and Candès 2015 (extrapolation with restart).
 
-use super::accelerated::{accelerate, draw_in};
+use super::accelerated::accelerate;
 use super::ball_sweeps::{BallSolve, BallSweeps};
 use super::disk_sweeps::{DiskSolve, DiskSweeps};
 use super::helpers::Helpers;
-use crate::problem::BodyPairs;
+use crate::cone::draw_in;
+use crate::problem::{BodyPairs, RollingContact};
 use crate::solver::options::{Method, SolverOptions};
 use crate::solver::report::{Rung, Rungs, SolveReport, SolveStatus, Stage};
 
@@ -36,6 +37,17 @@ pub struct BodySweeps {
     helpers: Helpers,
 }
 
+/// What a solve starts from and returns, contact by contact.
+#[derive(Debug)]
+pub struct Answer<'a> {
+    /// Impulses (D `n_c`), N s: on entry the warm start, on return inside their cones.
+    pub p: &'a mut [f64],
+    /// Velocities (D `n_c`), m/s: on return.
+    pub u: &'a mut [f64],
+    /// Rolling friction of the contacts among round bodies; empty if they have none.
+    pub rolling: &'a mut [RollingContact],
+}
+
 /// Contacts that the sweeps support: among disks, and among balls.
 pub trait Swept<const D: usize> {
     /// Solves them as [`solve_body_pairs`] says.
@@ -44,8 +56,7 @@ pub trait Swept<const D: usize> {
         q: &[f64],
         mu: &[f64],
         options: &SolverOptions,
-        p: &mut [f64],
-        u: &mut [f64],
+        answer: Answer<'_>,
         sweeps: &mut BodySweeps,
     ) -> SolveReport;
 }
@@ -56,17 +67,18 @@ impl Swept<2> for BodyPairs<2> {
         q: &[f64],
         mu: &[f64],
         options: &SolverOptions,
-        p: &mut [f64],
-        u: &mut [f64],
+        answer: Answer<'_>,
         sweeps: &mut BodySweeps,
     ) -> SolveReport {
-        sweeps.disks.fit(self, q, mu, p);
+        let Answer { p, u, rolling } = answer;
+        sweeps.disks.fit(self, (q, mu, p), rolling);
         let mut report = unsolved();
         let mut solve = DiskSolve {
             sweeps: &mut sweeps.disks,
             pairs: self,
             p,
             u,
+            rolling,
         };
         accelerate(&mut solve, options, &mut report);
         report
@@ -79,20 +91,20 @@ impl Swept<3> for BodyPairs<3> {
         q: &[f64],
         mu: &[f64],
         options: &SolverOptions,
-        p: &mut [f64],
-        u: &mut [f64],
+        answer: Answer<'_>,
         sweeps: &mut BodySweeps,
     ) -> SolveReport {
+        let Answer { p, u, rolling } = answer;
         let BodySweeps { balls, helpers, .. } = sweeps;
         helpers.run(options.threads, || {
-            balls.fit(self, (q, mu, p), options);
+            balls.fit(self, (q, mu, p), rolling, options);
             let mut report = unsolved();
             let mut solve = BallSolve {
                 sweeps: balls,
                 pairs: self,
             };
             accelerate(&mut solve, options, &mut report);
-            balls.write(self, p, u);
+            balls.write(self, (p, u), rolling);
             report
         })
     }
@@ -100,9 +112,8 @@ impl Swept<3> for BodyPairs<3> {
 
 /// Solves `K_μ* ∋ ũ ⊥ p ∈ K_μ`, `u = Zᵀ Z p + q`, among round bodies and a machine.
 ///
-/// q (D n_c), m/s; mu (n_c); p (D n_c), N s: on entry the warm start, on return the impulses inside
-/// their cones; u (D n_c), m/s: on return. Only the tolerances and `max_sweeps` of the options
-/// apply, not the budget. Allocates only when there are more contacts than ever before.
+/// q (D n_c), m/s; mu (n_c). Only the tolerances and `max_sweeps` of the options apply, not the
+/// budget. Allocates only when there are more contacts than ever before.
 ///
 /// # Panics
 /// If a length does not fit.
@@ -111,17 +122,21 @@ pub fn solve_body_pairs<const D: usize>(
     q: &[f64],
     mu: &[f64],
     options: &SolverOptions,
-    p: &mut [f64],
-    u: &mut [f64],
+    answer: Answer<'_>,
     sweeps: &mut BodySweeps,
 ) -> SolveReport
 where
     BodyPairs<D>: Swept<D>,
 {
     let n = pairs.len();
+    let Answer { p, u, rolling } = answer;
     assert!(
         q.len() == D * n && mu.len() == n && p.len() == D * n && u.len() == D * n,
         "q, mu, p and u must be of the same contacts"
+    );
+    assert!(
+        rolling.is_empty() || rolling.len() == pairs.round.len(),
+        "each contact of round bodies must have its rolling friction, or none"
     );
     for (p, &mu) in p.as_chunks_mut::<D>().0.iter_mut().zip(mu) {
         // Project a start outside its cone (another μ, another step).
@@ -133,10 +148,23 @@ where
             *p = [0.0; D];
         }
     }
-    let mut report = pairs.sweep(q, mu, options, p, u, sweeps);
+    for contact in &mut *rolling {
+        if !contact.impulse.iter().all(|x| x.is_finite()) {
+            contact.impulse = [0.0; 3];
+        }
+    }
+    let answer = Answer {
+        p: &mut *p,
+        u: &mut *u,
+        rolling: &mut *rolling,
+    };
+    let mut report = pairs.sweep(q, mu, options, answer, sweeps);
     if report.status == SolveStatus::NonFinite {
         p.fill(0.0);
         u.fill(0.0);
+        for contact in rolling {
+            contact.impulse = [0.0; 3];
+        }
     }
     report.work = UNITS * (pairs.len() * report.iterations) as u64;
     report.rungs.push(Rung {

@@ -1,8 +1,9 @@
 //! Contact rows of [`super::disk_sweeps`]: all data that a visit reads and writes, side by side.
 
-use super::accelerated::draw_in;
-use crate::problem::{BodyPairs, RoundPair};
-use crate::solver::local::one_contact::solve_one_contact;
+use crate::cone::draw_in;
+use crate::law::one_contact::solve_one_contact;
+use crate::law::rolling::RollingFriction;
+use crate::problem::{BodyPairs, RollingContact, RoundPair};
 use crate::spatial::space::{body_velocities, dot};
 
 /// Numbers of a body: its velocity, that of its rim, and a zero as padding.
@@ -24,6 +25,77 @@ pub(super) struct Row {
     pub(super) p: [f64; 2],
     /// p of the previous sweep.
     before: [f64; 2],
+}
+
+/// Rolling friction of the contact of a [`Row`], which is visited before it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RollRow {
+    /// k of each disk.
+    levers: [f64; 2],
+    law: RollingFriction,
+    /// 1/W of the rolling velocity, kg.
+    inverse: f64,
+    q: f64,
+    /// The impulse, N s.
+    pub(super) s: f64,
+    /// s of the previous sweep.
+    before: f64,
+}
+
+impl RollRow {
+    /// `row`: that of the contact, whose impulse bounds the first one.
+    pub(super) fn new(contact: &RollingContact, pair: &RoundPair<2>, row: &Row) -> Self {
+        let w = contact.mobility(pair);
+        let s = contact.law.project_in_plane(row.p[0], contact.impulse[2]);
+        Self {
+            levers: contact.levers,
+            law: contact.law,
+            inverse: if w > 0.0 { 1.0 / w } else { 0.0 },
+            q: contact.free[2],
+            s,
+            before: s,
+        }
+    }
+
+    /// w.
+    #[inline]
+    fn local(&self, row: &Row, velocity: &[Velocity]) -> f64 {
+        let [a, b] = row.bodies.map(|body| velocity[body as usize][2]);
+        self.levers[0] * a - self.levers[1] * b + self.q
+    }
+
+    #[inline]
+    pub(super) fn add(&self, s: f64, row: &Row, velocity: &mut [Velocity]) {
+        for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
+            let v = &mut velocity[row.bodies[side] as usize];
+            v[2] += sign * self.levers[side] * row.angular[side] * s;
+        }
+    }
+
+    /// As [`Row::visit`].
+    #[inline]
+    pub(super) fn visit(&mut self, row: &Row, share: f64, velocity: &mut [Velocity]) -> f64 {
+        let start = self.s + share * (self.s - self.before);
+        let wanted = start - self.inverse * self.local(row, velocity);
+        self.before = self.s;
+        self.s = self.law.project_in_plane(row.p[0], wanted);
+        let change = self.s - start;
+        self.add(change, row, velocity);
+        change * change
+    }
+
+    /// The impulse, and w; the square of the violation, (m/s)², and the contact's mass, kg.
+    pub(super) fn judge(&self, row: &Row, velocity: &[Velocity]) -> ([f64; 2], [f64; 2]) {
+        let w = self.local(row, velocity);
+        let mass = if self.inverse > 0.0 {
+            self.inverse
+        } else {
+            1.0
+        };
+        let projected = self.law.project_in_plane(row.p[0], self.s - mass * w);
+        let off = (self.s - projected) / mass;
+        ([w, self.q], [off * off, mass])
+    }
 }
 
 /// A contact of the machine.

@@ -4,9 +4,9 @@
 //! the one before it.
 
 use super::accelerated::{Measured, Relaxation};
-use super::disk_rows::{MachineRow, Row, Velocity};
+use super::disk_rows::{MachineRow, RollRow, Row, Velocity};
 use crate::law::coulomb::violation;
-use crate::problem::{BodyPairs, Magnitudes, Violations};
+use crate::problem::{BodyPairs, Magnitudes, RollingContact, Violations};
 use crate::spatial::space::{body_velocities, dot};
 
 /// Places of the list that are visited in turn.
@@ -18,6 +18,8 @@ pub(super) struct DiskSweeps {
     rows: Vec<Row>,
     /// Number of each row's contact.
     order: Vec<u32>,
+    /// Rolling friction of each row; none where no contact has any.
+    rolls: Vec<RollRow>,
     machine: Vec<MachineRow>,
     /// Velocity of each body due to the impulses: of its centre, and r ω, m/s. The last entry
     /// stands for everything fixed.
@@ -33,7 +35,12 @@ const D: usize = 2;
 
 impl DiskSweeps {
     /// Takes over a problem with its start.
-    pub(super) fn fit(&mut self, pairs: &BodyPairs<2>, q: &[f64], mu: &[f64], p: &[f64]) {
+    pub(super) fn fit(
+        &mut self,
+        pairs: &BodyPairs<2>,
+        (q, mu, p): (&[f64], &[f64], &[f64]),
+        rolling: &[RollingContact],
+    ) {
         let round = pairs.round.len();
         let bodies = pairs.n_coordinates / body_velocities(2);
         #[allow(clippy::cast_possible_truncation)] // bodies and contacts are numbered by u32
@@ -56,6 +63,14 @@ impl DiskSweeps {
             let pair = &pairs.round[i];
             Row::new(pair, pair.block(), still, &q[i], mu[i], &p[i])
         }));
+        self.rolls.clear();
+        if !rolling.is_empty() {
+            self.rolls
+                .extend(self.order.iter().zip(&self.rows).map(|(&i, row)| {
+                    let i = i as usize;
+                    RollRow::new(&rolling[i], &pairs.round[i], row)
+                }));
+        }
         self.machine.clear();
         let machine = pairs.machine.iter().enumerate();
         self.machine.extend(machine.map(|(k, pair)| {
@@ -79,6 +94,9 @@ impl DiskSweeps {
         self.own.fill(0.0);
         for row in &self.rows {
             row.add(row.p, &mut self.velocity);
+        }
+        for (row, roll) in self.rows.iter().zip(&self.rolls) {
+            roll.add(roll.s, row, &mut self.velocity);
         }
         for (i, row) in self.machine.iter().enumerate() {
             let (velocity, own) = (&mut self.velocity, &mut self.own);
@@ -106,8 +124,15 @@ impl DiskSweeps {
             self.own_before.copy_from_slice(&self.own);
         }
         let mut change = 0.0;
-        for row in &mut self.rows {
-            change += row.visit(share, &mut self.velocity);
+        if self.rolls.is_empty() {
+            for row in &mut self.rows {
+                change += row.visit(share, &mut self.velocity);
+            }
+        } else {
+            for (row, roll) in self.rows.iter_mut().zip(&mut self.rolls) {
+                change += row.visit(share, &mut self.velocity);
+                change += roll.visit(row, share, &mut self.velocity);
+            }
         }
         for (i, row) in self.machine.iter_mut().enumerate() {
             change += row.visit(pairs, i, share, &mut self.velocity, &mut self.own);
@@ -116,7 +141,12 @@ impl DiskSweeps {
     }
 
     /// The residual as [`crate::problem::evaluate_into`] defines it; writes p and u.
-    fn measure(&mut self, pairs: &BodyPairs<2>, p: &mut [f64], u: &mut [f64]) -> Measured {
+    fn measure(
+        &mut self,
+        pairs: &BodyPairs<2>,
+        (p, u): (&mut [f64], &mut [f64]),
+        rolling: &mut [RollingContact],
+    ) -> Measured {
         self.sum(pairs);
         let (mut violations, mut data) = (Violations::default(), Magnitudes::default());
         let (mut work, mut free) = (0.0, 0.0);
@@ -145,6 +175,13 @@ impl DiskSweeps {
             let own = row.local(pairs, i, &self.velocity, &self.own);
             judge(self.rows.len() + i, &row.round, own);
         }
+        for ((row, roll), i) in self.rows.iter().zip(&self.rolls).zip(&self.order) {
+            let ([w, q], [square, mass]) = roll.judge(row, &self.velocity);
+            violations.add(square, mass);
+            work += roll.s * w;
+            free += roll.s * q;
+            rolling[*i as usize].impulse = [0.0, 0.0, roll.s];
+        }
         let [inverse_speed, inverse_data] = data.inverses();
         let residual = violations.residual(inverse_speed, inverse_data);
         Measured {
@@ -160,6 +197,9 @@ impl DiskSweeps {
         for row in self.rows.iter_mut().chain(machine) {
             row.p = row.p.map(|p| share * p);
         }
+        for roll in &mut self.rolls {
+            roll.s *= share;
+        }
     }
 }
 
@@ -170,6 +210,7 @@ pub(super) struct DiskSolve<'a> {
     /// Impulses and velocities of the last measurement.
     pub p: &'a mut [f64],
     pub u: &'a mut [f64],
+    pub rolling: &'a mut [RollingContact],
 }
 
 impl Relaxation for DiskSolve<'_> {
@@ -181,7 +222,8 @@ impl Relaxation for DiskSolve<'_> {
     }
 
     fn measure(&mut self) -> Measured {
-        self.sweeps.measure(self.pairs, self.p, self.u)
+        let answer = (&mut *self.p, &mut *self.u);
+        self.sweeps.measure(self.pairs, answer, self.rolling)
     }
 
     fn scale(&mut self, share: f64) {

@@ -3,6 +3,8 @@
 //! Source: Jean 1999; Acary and Brogliato 2008, ch. 13. Converges linearly, and very slowly for
 //! redundant contacts with large mass ratios. A sweep costs no more than one product with `W`.
 
+use crate::law::coulomb::Coulomb;
+use crate::law::friction_law::FrictionLaw;
 use crate::problem::{Prepared, Proximal, Residual};
 use crate::scalar::elementary::ln;
 use crate::solver::local::sweep;
@@ -11,9 +13,23 @@ use crate::solver::report::SolveStatus;
 use crate::solver::scratch::Scratch;
 use crate::solver::work::SweepBudget;
 
-/// Sweeps until converged or out of budget. `u` is `W p + q` on return.
+/// Sweeps until converged or out of budget, under Coulomb's law. `u` is `W p + q` on return.
 pub(in crate::solver) fn sweeps<const D: usize>(
     data: &Prepared<'_>,
+    options: &SolverOptions,
+    budget: SweepBudget,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &mut Scratch,
+    iterations: &mut usize,
+) -> (SolveStatus, Residual) {
+    let law = |i: usize| Coulomb(data.mu[i]);
+    sweeps_under::<D, _>((data, &law), options, budget, p, u, scratch, iterations)
+}
+
+/// [`sweeps`] under the law that contact i has.
+pub(in crate::solver) fn sweeps_under<const D: usize, L: FrictionLaw<D>>(
+    (data, law): (&Prepared<'_>, &impl Fn(usize) -> L),
     options: &SolverOptions,
     budget: SweepBudget,
     p: &mut [f64],
@@ -31,7 +47,7 @@ pub(in crate::solver) fn sweeps<const D: usize>(
     };
     loop {
         data.W.multiply_add(p, data.q, u);
-        let residual = data.measure::<D>(p, u);
+        let residual = data.measure_under::<D, _>(law, p, u);
         scratch.history.note(*iterations, residual);
         if residual.relative < best.relative {
             best = residual;
@@ -45,7 +61,7 @@ pub(in crate::solver) fn sweeps<const D: usize>(
         }
         if residual.relative < 1e-7
             && residual.relative > 0.5 * last
-            && data.is_within_rounding::<D>(p, u)
+            && data.is_within_rounding_under::<D, _>(law, p, u)
         {
             return (SolveStatus::Converged, residual);
         }
@@ -70,7 +86,7 @@ pub(in crate::solver) fn sweeps<const D: usize>(
             centre: &scratch.start,
         };
         for _ in 0..batch {
-            sweep::sweep::<D>(data, prox, p);
+            sweep::sweep_under::<D, _>(data, law, prox, p);
         }
         done += batch;
         *iterations += batch;

@@ -7,10 +7,10 @@
 
 use crate::cone::tangential_norm;
 use crate::law::coulomb::ContactMode;
+use crate::law::one_contact::estimate_one_contact;
 use crate::problem::{Operator, Prepared, Residual};
 use crate::solver::linear::reduced_system::{Factors, NewtonStep};
 use crate::solver::local::modes::{self, Linearised};
-use crate::solver::local::one_contact::estimate_one_contact;
 use crate::solver::options::SolverOptions;
 use crate::solver::scratch::Scratch;
 

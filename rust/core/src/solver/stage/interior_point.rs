@@ -21,6 +21,7 @@
 //! this one take it from there in a few factorisations. Source: Acary et al. 2023; Nesterov and
 //! Todd 1998.
 
+use crate::cone::lorentz::{determinant, dot, jordan, tangential, way_out};
 use crate::problem::{Prepared, Residual};
 use crate::solver::options::SolverOptions;
 use crate::solver::report::SolveStatus;
@@ -73,51 +74,6 @@ const COURSES: [Course; 3] = [
         share: 0.995,
     },
 ];
-
-/// `x ∘ z` of Lorentz's cone.
-fn jordan<const D: usize>(x: &[f64; D], z: &[f64; D]) -> [f64; D] {
-    std::array::from_fn(|k| match k {
-        0 => dot(x, z),
-        _ => x[0] * z[k] + z[0] * x[k],
-    })
-}
-
-fn dot<const D: usize>(x: &[f64; D], z: &[f64; D]) -> f64 {
-    x.iter().zip(z).map(|(x, z)| x * z).sum()
-}
-
-/// Length of the tangential part.
-fn tangential<const D: usize>(x: &[f64; D]) -> f64 {
-    x[1..].iter().map(|x| x * x).sum::<f64>().sqrt()
-}
-
-/// `x_0² − |x_T|²`.
-fn determinant<const D: usize>(x: &[f64; D]) -> f64 {
-    let t = tangential(x);
-    (x[0] - t) * (x[0] + t)
-}
-
-/// The step along `d` at which `x` meets the boundary of the cone.
-fn way_out<const D: usize>(x: &[f64; D], d: &[f64; D]) -> f64 {
-    let a = d[0] * d[0] - d[1..].iter().map(|d| d * d).sum::<f64>();
-    let b = x[0] * d[0] - x[1..].iter().zip(&d[1..]).map(|(x, d)| x * d).sum::<f64>();
-    let c = determinant(x);
-    let mut way = if d[0] < 0.0 {
-        -x[0] / d[0]
-    } else {
-        f64::INFINITY
-    };
-    let square = b * b - a * c;
-    if square >= 0.0 {
-        let root = square.sqrt();
-        for candidate in [c / (root - b), -c / (root + b)] {
-            if candidate > 0.0 && candidate < way {
-                way = candidate;
-            }
-        }
-    }
-    way
-}
 
 /// One contact: its point in both cones, and the step of Newton's method.
 #[derive(Clone, Copy, Debug)]

@@ -9,10 +9,10 @@
 use std::ops::Range;
 
 use crate::law::coulomb::ContactMode;
+use crate::law::one_contact::solve_one_contact;
 use crate::problem::{ContactScales, Prepared, Residual};
 use crate::solver::linear::reduced_system::{Factors, NewtonStep, ReducedSystem};
 use crate::solver::local::modes::{Linearised, Prediction, n_unknowns};
-use crate::solver::local::one_contact::solve_one_contact;
 use crate::solver::options::SolverOptions;
 use crate::solver::pivoting::{FURTHER_ALPHAS, Many, Mode, NO_GAIN, Pivoting, System, Triple};
 use crate::solver::report::SolveStatus;

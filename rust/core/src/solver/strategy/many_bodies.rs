@@ -12,7 +12,7 @@ use crate::problem::{
 };
 use crate::solver::options::{Method, SolverOptions};
 use crate::solver::report::{Rung, Rungs, SolveReport, SolveStatus};
-use crate::solver::stage::body_sweeps::{BodySweeps, Swept, solve_body_pairs};
+use crate::solver::stage::body_sweeps::{Answer, BodySweeps, Swept, solve_body_pairs};
 
 /// Most contacts for which factorisation follows unsuccessful sweeps: a step then costs some 3 µs
 /// per contact.
@@ -57,20 +57,25 @@ impl<'a, const D: usize> ManyBodies<'a, D> {
 pub(in crate::solver) fn solve<const D: usize>(
     bodies: &ManyBodies<'_, D>,
     options: &SolverOptions,
-    p: &mut [f64],
-    u: &mut [f64],
+    answer: Answer<'_>,
     sweeps: &mut BodySweeps,
     solve: &mut SolvePart<'_>,
 ) -> SolveReport
 where
     BodyPairs<D>: Swept<D>,
 {
-    match options.method {
+    // No method that factors W knows of moments.
+    let method = if answer.rolling.is_empty() {
+        options.method
+    } else {
+        Method::GaussSeidel
+    };
+    match method {
         Method::GaussSeidel => {
-            solve_body_pairs(bodies.pairs, bodies.q, bodies.mu, options, p, u, sweeps)
+            solve_body_pairs(bodies.pairs, bodies.q, bodies.mu, options, answer, sweeps)
         }
-        Method::Auto => escalate(bodies, options, p, u, sweeps, solve),
-        _ => solve(&bodies.problem(), options, p, u),
+        Method::Auto => escalate(bodies, options, answer, sweeps, solve),
+        _ => solve(&bodies.problem(), options, answer.p, answer.u),
     }
 }
 
@@ -78,8 +83,7 @@ where
 fn escalate<const D: usize>(
     bodies: &ManyBodies<'_, D>,
     options: &SolverOptions,
-    p: &mut [f64],
-    u: &mut [f64],
+    Answer { p, u, .. }: Answer<'_>,
     sweeps: &mut BodySweeps,
     solve: &mut SolvePart<'_>,
 ) -> SolveReport
@@ -87,7 +91,9 @@ where
     BodyPairs<D>: Swept<D>,
 {
     let mut sweep = |p: &mut [f64], u: &mut [f64]| {
-        solve_body_pairs(bodies.pairs, bodies.q, bodies.mu, options, p, u, sweeps)
+        let rolling = &mut [];
+        let answer = Answer { p, u, rolling };
+        solve_body_pairs(bodies.pairs, bodies.q, bodies.mu, options, answer, sweeps)
     };
     let mut report = sweep(p, u);
     let mut rungs = report.rungs;

@@ -1,8 +1,8 @@
 //! The grains: radii and masses, and the factors of their diagonal mass matrix.
 
-use super::cohesion::Cohesion;
 use super::error::GrainError;
 use super::removal::Renumbering;
+use crate::law::cohesion::Cohesion;
 use crate::quantity::{LENGTHS, MASSES, within};
 
 /// Most grains: some hundred megabytes.

@@ -6,7 +6,7 @@ use super::bodies::COORDINATES;
 use super::contact::{GROUND, GrainContact, WALL};
 use super::scene::embedded;
 use super::search::{Neighbour, Search, Seeker, gather};
-use super::system::{GrainParts, GrainSystem};
+use super::system::{Driven, GrainParts, GrainSystem};
 use crate::contact::Activation;
 use crate::problem::BodyPairs;
 use crate::solver::Swept;
@@ -116,11 +116,17 @@ where
             wall_time,
             ..
         } = &mut *self.parts;
-        let mut push = |b: u32, n: SVector<f64, D>, gap: f64, velocity: SVector<f64, D>| {
+        let still = [0.0; 3];
+        let mut push = |b: u32, n: SVector<f64, D>, gap: f64, motion| {
+            let (velocity, spin): (SVector<f64, D>, [f64; 3]) = motion;
             if rule.admits(gap, n.dot(&(seeker.velocity - velocity))) {
                 let contact = seeker.contact(b, n, gap);
-                if velocity.iter().any(|x| *x != 0.0) {
-                    driven.push((contact.key, velocity));
+                if velocity.iter().chain(&spin).any(|x| *x != 0.0) {
+                    driven.push(Driven {
+                        key: contact.key,
+                        velocity,
+                        spin,
+                    });
                 }
                 out.push(contact);
             }
@@ -128,7 +134,7 @@ where
         for (k, wall) in (WALL..).zip(&self.scene.walls) {
             let gap = wall.at(*wall_time).distance(&seeker.centre) - seeker.radius;
             if gap <= rule.reach {
-                push(k, wall.n(), gap, wall.velocity());
+                push(k, wall.n(), gap, (wall.velocity(), still));
             }
         }
         if let Some(ground) = &self.scene.ground {
@@ -136,7 +142,8 @@ where
             ground.facing(&seeker.centre, seeker.radius + rule.reach, facing);
             for (k, facing) in (GROUND..).zip(&*facing) {
                 let gap = facing.distance - seeker.radius;
-                push(k, facing.n, gap, ground.velocity(facing));
+                let motion = (ground.velocity(facing), ground.spin(facing));
+                push(k, facing.n, gap, motion);
             }
         }
     }
@@ -171,8 +178,8 @@ where
             let mut motion = moved(contact.key.a);
             if contact.is_with_grain() {
                 motion -= moved(contact.key.b);
-            } else if let Some(velocity) = self.parts.surface_velocity(contact.key) {
-                motion -= velocity * self.parts.search.lead;
+            } else if let Some(surface) = self.parts.surface(contact.key) {
+                motion -= surface.velocity * self.parts.search.lead;
             }
             contact.gap = contact.gap_start + contact.n.dot(&motion);
         }

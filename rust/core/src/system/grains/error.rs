@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use crate::law::cohesion::CohesionError;
 use crate::quantity::QuantityError;
 
 /// Grains that cannot be.
@@ -84,14 +85,9 @@ pub enum GrainError {
         /// m.
         value: f64,
     },
-    /// A range of attraction that contacts do not have.
-    #[error("cohesion_range: must be positive and at most {limit} m, is {value}")]
-    Reach {
-        /// m.
-        value: f64,
-        /// A fifth of the smallest radius, m.
-        limit: f64,
-    },
+    /// An attraction that contacts do not have.
+    #[error(transparent)]
+    Cohesion(#[from] CohesionError),
     /// A grain that was not there, or not in this order.
     #[error("before[{grain}]: must be the number of a ball, above the ones before it, is {value}")]
     Before {
@@ -119,7 +115,7 @@ impl GrainError {
             Self::Before { grain, .. } => format!("before[{grain}]"),
             Self::WheelIn { .. } | Self::NoMachine => "machine".to_owned(),
             Self::Range { .. } => "radius_max".to_owned(),
-            Self::Reach { .. } => "cohesion_range".to_owned(),
+            Self::Cohesion(e) => e.field().to_owned(),
         }
     }
 }

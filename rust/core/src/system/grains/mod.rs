@@ -23,7 +23,6 @@
 //! Anitescu and Potra 1997 (the gap in the velocity's law).
 
 pub mod bodies;
-pub mod cohesion;
 pub mod contact;
 mod detection;
 pub mod error;
@@ -31,6 +30,7 @@ pub mod grid;
 mod measures;
 pub mod packing;
 pub mod removal;
+mod rolling;
 pub mod scene;
 pub(in crate::system) mod search;
 mod slabs;
@@ -38,13 +38,14 @@ pub mod sleep;
 pub mod system;
 pub mod wall;
 
+pub use crate::law::cohesion::Cohesion;
 pub use bodies::{COORDINATES, Grains, MAX_GRAINS};
-pub use cohesion::Cohesion;
 pub use contact::{GrainContact, GrainKey};
 pub use error::GrainError;
 pub use grid::Grid;
 pub use packing::{Packing, arranged};
 pub use removal::Renumbering;
+pub use rolling::{Moments, moment_of};
 pub use scene::{GrainFriction, GrainScene, OVERLAP};
 pub use sleep::{Mover, Sleep, SleepOptions, StepTaken};
 pub use system::{GrainParts, GrainSystem};

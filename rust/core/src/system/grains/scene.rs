@@ -10,12 +10,13 @@ use super::error::GrainError;
 use super::grid::Grid;
 use super::wall::Wall;
 use crate::geometry::{Facing, Support};
+use crate::law::rolling::RollingFriction;
 use crate::multibody::fingerprint;
 use crate::planar::PlanarTree;
 use crate::quantity::{QuantityError, finite};
 use crate::spatial::space::{body_velocities, length};
 
-/// Coulomb's μ of each kind of contact.
+/// Coulomb's μ of each kind of contact, and rolling friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GrainFriction {
     /// Between grains. Default 0.5, the original's.
@@ -24,6 +25,8 @@ pub struct GrainFriction {
     pub walls: f64,
     /// Wheels against grains, walls and ground. Default 0.9, the original's.
     pub wheels: f64,
+    /// Moments between grains, and of grains on walls and ground. Default none.
+    pub rolling: RollingFriction,
 }
 
 impl Default for GrainFriction {
@@ -32,6 +35,7 @@ impl Default for GrainFriction {
             grains: 0.5,
             walls: 0.5,
             wheels: 0.9,
+            rolling: RollingFriction::default(),
         }
     }
 }
@@ -52,7 +56,7 @@ impl GrainFriction {
                 });
             }
         }
-        Ok(())
+        self.rolling.check()
     }
 }
 

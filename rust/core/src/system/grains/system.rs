@@ -8,24 +8,36 @@ use nalgebra::SVector;
 use super::bodies::COORDINATES;
 use super::contact::{GrainContact, GrainKey, WALL};
 use super::grid::Grid;
+use super::rolling::{Moments, RollingParts};
 use super::scene::{GrainScene, flat};
 use super::search::{Neighbour, Search};
 use super::slabs::Slabs;
 use crate::contact::Activation;
 use crate::geometry::Facing;
 use crate::integrator::{MechanicalSystem, Stabilisation, Start, StepOptions};
+use crate::law::newton_impact::rebound_at_gap;
 use crate::planar::{PlanarPoses, PlanarTree};
 use crate::problem::{
     BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem, RoundPair,
 };
 use crate::solver::{
-    ManyBodies, SolveReport, SolverOptions, SolverWorkspace, Swept, solve_many_bodies,
+    Answer, ManyBodies, SolveReport, SolverOptions, SolverWorkspace, Swept, solve_many_bodies,
 };
 use crate::spatial::space::body_velocities;
 use crate::system::planar_matrices::PlanarMatrices;
 
 /// The place of fixed bodies, with c = s = 0.
 const NOWHERE: u32 = 0;
+
+/// The motion of a surface at a contact with it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Driven<const D: usize> {
+    pub key: GrainKey,
+    /// m/s.
+    pub velocity: SVector<f64, D>,
+    /// Angular velocity, rad/s.
+    pub spin: [f64; 3],
+}
 
 /// Matrices of a step: scratch.
 #[derive(Debug, Default)]
@@ -37,13 +49,14 @@ pub struct GrainParts<const D: usize> {
     pub(in crate::system) search: Search,
     pub(super) found: Vec<Neighbour<D>>,
     pub(super) facing: Vec<Facing<D>>,
-    /// Contacts with surfaces that move, in the order of the keys, and their velocities, m/s.
-    pub(super) driven: Vec<(GrainKey, SVector<f64, D>)>,
+    /// Contacts with surfaces that move, in the order of the keys.
+    pub(super) driven: Vec<Driven<D>>,
     /// How long walls have been moving, s.
     pub(crate) wall_time: f64,
     /// Force of the cohesion on every grain's coordinates, N and N m.
     attraction: Vec<f64>,
     pub(in crate::system) pairs: BodyPairs<D>,
+    pub(crate) rolling: RollingParts,
     /// The machine at the middle and at the end of the step.
     pub(super) machine_poses: [PlanarPoses; 2],
     machine: PlanarMatrices,
@@ -66,14 +79,14 @@ impl<const D: usize> GrainParts<D> {
         &self.pairs
     }
 
-    /// Velocity of the surface at a contact, m/s, if it moves.
+    /// Motion of the surface at a contact, if it moves.
     #[inline]
-    pub(super) fn surface_velocity(&self, key: GrainKey) -> Option<SVector<f64, D>> {
+    pub(super) fn surface(&self, key: GrainKey) -> Option<&Driven<D>> {
         if self.driven.is_empty() {
             return None;
         }
-        let place = self.driven.binary_search_by_key(&key, |(key, _)| *key);
-        place.ok().map(|k| self.driven[k].1)
+        let place = (self.driven).binary_search_by_key(&key, |driven| driven.key);
+        place.ok().map(|k| &self.driven[k])
     }
 
     /// The operator W of the last step's contacts, block by block, 1/kg.
@@ -89,6 +102,8 @@ pub struct GrainSystem<'a, const D: usize> {
     pub scene: &'a GrainScene<D>,
     /// Which grains sleep (n): they have no velocity and stay in place, whatever touches them.
     pub asleep: &'a [bool],
+    /// Moments of rolling friction in the last step.
+    pub moments: &'a Moments,
     /// Torques of the machine, N m.
     pub inputs: &'a [f64],
     /// A force at the machine's origin, N.
@@ -235,6 +250,29 @@ impl<const D: usize> GrainSystem<'_, D> {
                 *y /= J;
             }
         }
+    }
+}
+
+impl<const D: usize> GrainSystem<'_, D>
+where
+    BodyPairs<D>: Swept<D>,
+{
+    /// Solves the contacts of the pairs of bodies.
+    pub(in crate::system) fn solve_rolling(
+        &self,
+        q: &[f64],
+        mu: &[f64],
+        options: &SolverOptions,
+        answer: Answer<'_>,
+        workspace: &mut SolverWorkspace,
+    ) -> SolveReport {
+        let bodies = ManyBodies {
+            pairs: &self.parts.pairs,
+            q,
+            mu,
+            operator: &|| self.parts.operator(),
+        };
+        solve_many_bodies(&bodies, options, answer, workspace)
     }
 }
 
@@ -445,6 +483,7 @@ where
             }
         }
         self.attract(contacts);
+        (self.parts.rolling).assemble(scene, contacts, self.moments);
         u.fill(0.0);
         self.add_local_of_velocity(contacts, v, u);
     }
@@ -466,8 +505,8 @@ where
             }
             if contact.is_with_grain() {
                 add_rim_velocity(&v[V * b..V * (b + 1)], -radius[b], &contact.n, -1.0, &mut u);
-            } else if let Some(velocity) = self.parts.surface_velocity(contact.key) {
-                u -= velocity;
+            } else if let Some(surface) = self.parts.surface(contact.key) {
+                u -= surface.velocity;
             }
             for (out, direction) in out.iter_mut().zip(contact.frame()) {
                 *out += direction.dot(&u);
@@ -546,13 +585,31 @@ where
         u: &mut [f64],
         workspace: &mut SolverWorkspace,
     ) -> SolveReport {
-        let bodies = ManyBodies {
-            pairs: &self.parts.pairs,
-            q,
-            mu,
-            operator: &|| self.parts.operator(),
-        };
-        solve_many_bodies(&bodies, options, p, u, workspace)
+        let rolling = &mut [];
+        self.solve_rolling(q, mu, options, Answer { p, u, rolling }, workspace)
+    }
+
+    fn solve_step(
+        &mut self,
+        (v, y): (&[f64], &[f64]),
+        q: &[f64],
+        mu: &[f64],
+        options: &SolverOptions,
+        p: &mut [f64],
+        u: &mut [f64],
+        workspace: &mut SolverWorkspace,
+    ) -> SolveReport {
+        let mut moments = std::mem::take(&mut self.parts.rolling);
+        let surface = |key| self.parts.surface(key).map(|surface| surface.spin);
+        moments.set_free(self.scene, (v, y), surface);
+        let rolling = &mut moments.contacts;
+        let report = self.solve_rolling(q, mu, options, Answer { p, u, rolling }, workspace);
+        self.parts.rolling = moments;
+        report
+    }
+
+    fn add_moments(&self, y: &mut [f64]) {
+        self.parts.rolling.add(&self.parts.pairs.round, y);
     }
 
     fn displacement(&self, y: &[f64]) -> f64 {
@@ -566,25 +623,16 @@ where
 /// Share of an excessive overlap by which a pair parts in a step, see [`Stabilisation::PushOut`].
 const PUSHED_OUT: f64 = 0.2;
 
-/// Newton's law for a pair that collides within the step; any other pair may close by its gap
-/// (`gap_start`, m).
-///
-/// With `e u_N⁻ + s` and any s ≥ 0 a frictionless impact gains no energy, see
-/// [`crate::law::newton_impact`]: here s is what the gap allows.
+/// Shift of the normal free velocity of a pair with the gap `gap_start`, m, see
+/// [`rebound_at_gap`]; an excessive overlap is pushed out.
 pub(in crate::system) fn gap_law(options: &StepOptions, gap_start: f64, u_N_before: f64) -> f64 {
     let h = options.time_step;
     let excess = gap_start + options.penetration_tolerance;
     if excess < 0.0 && options.stabilisation == Stabilisation::PushOut {
         return PUSHED_OUT * excess / h;
     }
-    let gap = gap_start.max(0.0);
-    let rebound = options.restitution * u_N_before;
     let slow = 2.0 * options.gravity.norm() * h;
-    if rebound < 0.0 && u_N_before < -slow && gap + h * u_N_before <= 0.0 {
-        rebound
-    } else {
-        gap / h + rebound.max(0.0)
-    }
+    rebound_at_gap(options.restitution, u_N_before, gap_start, (h, slow))
 }
 
 /// Moment of the tangential impulses, divided by r: p_t in the plane, `b p_t − t p_b` in space.

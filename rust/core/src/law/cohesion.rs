@@ -9,8 +9,23 @@
 //! The attraction is a load on both bodies, and the solver's impulse is p_N + h F, so no solver
 //! knows of it.
 
-use super::error::GrainError;
 use crate::quantity::{QuantityError, finite};
+
+/// No cohesion.
+#[derive(Clone, Debug, thiserror::Error, PartialEq)]
+pub enum CohesionError {
+    /// The force.
+    #[error(transparent)]
+    Force(#[from] QuantityError),
+    /// A range of attraction that contacts do not have.
+    #[error("cohesion_range: must be positive and at most {limit} m, is {value}")]
+    Range {
+        /// m.
+        value: f64,
+        /// A fifth of the smallest radius, m.
+        limit: f64,
+    },
+}
 
 /// Largest range, as a fraction of the smallest radius: detection looks no farther.
 const FARTHEST: f64 = 0.2;
@@ -18,6 +33,26 @@ const FARTHEST: f64 = 0.2;
 /// Range where none is given, as a fraction of the smallest radius: contacts at rest stay closer in
 /// spite of the solver's tolerance.
 const USUAL: f64 = 0.01;
+
+impl CohesionError {
+    /// Name of the argument that is wrong.
+    #[must_use]
+    pub fn field(&self) -> &str {
+        match self {
+            Self::Force(e) => e.field(),
+            Self::Range { .. } => "cohesion_range",
+        }
+    }
+
+    /// What was given.
+    #[must_use]
+    pub fn value(&self) -> f64 {
+        match self {
+            Self::Force(e) => e.value(),
+            Self::Range { value, .. } => *value,
+        }
+    }
+}
 
 /// The attraction of contacts.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,9 +70,9 @@ impl Cohesion {
     /// # Errors
     /// A force that is not finite or negative; a range that is not positive or beyond a fifth of
     /// the radius.
-    pub fn new(force: f64, range: Option<f64>, smallest: f64) -> Result<Self, GrainError> {
+    pub fn new(force: f64, range: Option<f64>, smallest: f64) -> Result<Self, CohesionError> {
         if finite("cohesion", force)? < 0.0 {
-            return Err(GrainError::Number(QuantityError::Negative {
+            return Err(CohesionError::Force(QuantityError::Negative {
                 field: "cohesion".to_owned(),
                 value: force,
             }));
@@ -45,7 +80,7 @@ impl Cohesion {
         let range = range.unwrap_or(USUAL * smallest);
         let limit = FARTHEST * smallest;
         if !(range > 0.0 && range <= limit) {
-            return Err(GrainError::Reach {
+            return Err(CohesionError::Range {
                 value: range,
                 limit,
             });

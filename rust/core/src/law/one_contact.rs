@@ -15,8 +15,9 @@
 //! `a = adj(Ŵ) q̂`: a convex norm against a quadratic, solved by Newton kept inside a
 //! bracket. Its square is the quartic of Bonnefon and Daviet 2011.
 
+use super::frictionless;
+use super::mode::{ContactMode, Tangent};
 use crate::cone::tangential_norm;
-use crate::law::coulomb::ContactMode;
 
 /// Most steps of the safeguarded Newton on `g(κ)`; bisection alone needs about 60 for all digits.
 const MAX_STEPS: usize = 100;
@@ -36,6 +37,18 @@ pub struct OneContactSolution<const D: usize> {
     pub kappa: f64,
 }
 
+impl<const D: usize> OneContactSolution<D> {
+    /// The law linearised there.
+    #[inline]
+    #[must_use]
+    pub fn tangent(&self) -> Tangent {
+        Tangent {
+            mode: self.mode,
+            ..Tangent::along(&self.impulse, tangential_norm(&self.impulse), self.kappa)
+        }
+    }
+}
+
 /// Solves a single contact under Coulomb's law and Signorini's condition.
 ///
 /// `W`: block of the Delassus operator, row-major, 1/kg; need not be symmetric, tangential part may
@@ -53,7 +66,7 @@ pub fn solve_one_contact<const D: usize>(
 /// As [`solve_one_contact`], but the slip direction is accurate to a few digits only. `kappa`:
 /// value of the last estimate, or zero.
 #[inline]
-pub(in crate::solver) fn estimate_one_contact<const D: usize>(
+pub(crate) fn estimate_one_contact<const D: usize>(
     W: &[[f64; D]; D],
     q: &[f64; D],
     mu: f64,
@@ -78,7 +91,7 @@ fn solve_within<const D: usize, const STEPS: usize>(
     if q[0] >= 0.0 || W_NN <= 0.0 {
         return solution;
     }
-    solution.impulse[0] = -q[0] / W_NN;
+    solution.impulse = frictionless::answer(W_NN, q);
     if mu <= 0.0 {
         solution.mode = ContactMode::Slide;
     } else if D == 2 {

@@ -1,0 +1,146 @@
+//! The energy balance of a step, and its audit as [`crate::integrator::energy_audit`] does it.
+
+use crate::integrator::StepReport;
+use crate::integrator::energy_audit::{Excess, GAIN};
+use crate::scalar::{Lane, MAX_LANES, Vec3};
+
+/// What the energies of a step are judged by.
+pub(super) struct Conditions<T: Lane> {
+    /// Mass, kg.
+    pub mass: T,
+    /// Speed of a body that falls for the step from rest, m/s.
+    pub fall: T,
+    /// Lanes without a contact, and those of them whose scheme conserves energy.
+    pub untouched: T::Mask,
+    pub is_free: T::Mask,
+}
+
+/// Energies of the lanes over a step, J.
+pub(super) struct Balance<T: Lane> {
+    /// Kinetic and potential energy at the start and at the end of the step.
+    pub before: [T; 2],
+    pub after: [T; 2],
+    /// Linear momentum at the end of the step, kg m/s.
+    pub momentum: Vec3<T>,
+    /// Work of the actuators and of wheels that yield; the latter's alone.
+    pub supplied: T,
+    pub released: T,
+    /// Work of the contacts by their law.
+    pub contact_work: T,
+    /// Energy beyond what was supplied; what the audit removed of it; what is left of it, as a
+    /// fraction of the kinetic energy.
+    excess: Option<Excess<T>>,
+    removed: T,
+    gain: T,
+    /// Lanes whose velocity the audit corrects.
+    pub is_corrected: T::Mask,
+}
+
+impl<T: Lane> Balance<T> {
+    /// Nothing.
+    pub fn new(token: T::Token) -> Self {
+        let zero = T::splat(token, 0.0);
+        Self {
+            before: [zero; 2],
+            after: [zero; 2],
+            momentum: Vec3::splat(token, [0.0; 3]),
+            supplied: zero,
+            released: zero,
+            contact_work: zero,
+            excess: None,
+            removed: zero,
+            gain: zero,
+            is_corrected: T::mask(token, 0),
+        }
+    }
+
+    /// Measures the excess of energy. Returns the lanes whose step must be taken otherwise; of the
+    /// others, those with too much are [to be corrected](Self::correct).
+    ///
+    /// `work`: the actuators'; `released`: by wheels that yield, J.
+    #[inline(always)]
+    pub fn audit(
+        &mut self,
+        (work, released): (T, T),
+        conditions: &Conditions<T>,
+        going: T::Mask,
+    ) -> T::Mask {
+        let (zero, gain) = (work.like(0.0), work.like(GAIN));
+        let Conditions {
+            mass,
+            fall,
+            is_free,
+            ..
+        } = *conditions;
+        self.released = released;
+        self.supplied = work + released;
+        let excess = Excess::new(self.before, self.after, [work, released], (mass, fall));
+        let is_balanced = excess.is_balanced(is_free, [gain, zero]);
+        let is_lost = excess.is_coarse(is_free, gain) & !is_balanced;
+        self.is_corrected = !is_balanced & going & !is_lost;
+        self.excess = Some(excess);
+        self.gain = T::select(self.is_corrected, zero, excess.relative());
+        self.removed = T::select(self.is_corrected, excess.value.max(zero), zero);
+        is_lost
+    }
+
+    /// Removes the excess from the velocity `v` at the end of the step. Returns the lanes whose
+    /// whole velocity was shortened, and by which factor.
+    #[inline(always)]
+    pub fn correct(&self, conditions: &Conditions<T>, v: &mut [T]) -> (T::Mask, T) {
+        let zero = conditions.mass.like(0.0);
+        let Some(excess) = self.excess else {
+            return (self.is_corrected & !self.is_corrected, zero);
+        };
+        let (lanes, mass, momentum) = (self.is_corrected, conditions.mass, self.momentum);
+        let (of_relative, is_enough) = excess.share_of_relative_motion(momentum, mass);
+        let (is_free, is_gain) = (conditions.is_free, zero.lt(excess.value));
+        let is_relative = conditions.untouched & (is_free | is_gain) & is_enough;
+        let share = T::select(is_relative, of_relative, excess.share());
+        // Free flight that loses more than its relative energy is left as it is.
+        let lanes = lanes & (is_relative | is_gain);
+        let translation = momentum * (mass.like(1.0) / mass);
+        let common = [translation.x, translation.y, translation.z];
+        for (k, v) in v.iter_mut().enumerate() {
+            let common = if k < 3 {
+                T::select(is_relative, common[k], zero)
+            } else {
+                zero
+            };
+            *v = T::select(lanes, common + share * (*v - common), *v);
+        }
+        (lanes & !is_relative, share)
+    }
+
+    /// Enters the balance into the lanes' reports.
+    #[inline(always)]
+    pub fn report(&self, reports: &mut [StepReport; MAX_LANES]) {
+        let [kinetic, potential] = self.before;
+        let change = (self.after[0] - kinetic) + (self.after[1] - potential);
+        let lost = self.contact_work - (change - self.supplied) - self.removed;
+        let mut entries = [[0.0; MAX_LANES]; 5];
+        let balance = [
+            self.gain,
+            self.removed,
+            self.contact_work,
+            lost,
+            self.released,
+        ];
+        for (entry, x) in entries.iter_mut().zip(balance) {
+            x.store(&mut entry[..T::LANES]);
+        }
+        for (lane, report) in reports[..T::LANES].iter_mut().enumerate() {
+            report.energy_gain = entries[0][lane];
+            report.energy_removed = entries[1][lane];
+            report.energy_dissipated = -entries[2][lane];
+            report.energy_lost = entries[3][lane];
+            report.energy_released = entries[4][lane];
+        }
+    }
+}
+
+/// `yes` in the lanes of a mask, `no` elsewhere.
+#[inline(always)]
+pub(super) fn select_both<T: Lane>(lanes: T::Mask, yes: [T; 2], no: [T; 2]) -> [T; 2] {
+    [0, 1].map(|k| T::select(lanes, yes[k], no[k]))
+}

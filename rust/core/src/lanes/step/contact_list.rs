@@ -1,0 +1,91 @@
+//! Which contacts a block's rovers have, and what is known of them.
+
+use nalgebra::Vector3;
+
+use super::{Block, Decline};
+use crate::contact::Contact;
+use crate::lanes::contacts::Sight;
+use crate::lanes::forecast::Forecast;
+use crate::lanes::problem::{ContactProblem, Triple};
+use crate::scalar::{Lane, LaneMask};
+
+impl<T: Lane> Block<T> {
+    pub(super) fn detect(&mut self, problems: &mut [ContactProblem]) {
+        let (h, theta) = (self.options.time_step, self.options.theta);
+        let forecast = Forecast::new(self.gravity, h, self.options.forecast, (1.0 - theta) * h);
+        let sight = Sight {
+            machine: &self.machine,
+            models: &self.models,
+            going: self.going.bits(),
+            middle: &self.poses_middle,
+            end: &self.poses_end,
+            v: &self.v,
+            needs_pieces: !self.options.materials.is_empty(),
+            forecast: &forecast,
+        };
+        let declined = self.contacts.detect(&mut self.ground, &sight);
+        self.decline(Decline::Contact, declined);
+        if !self.machine.stops.is_empty() {
+            let (machine, places) = (&*self.machine, (&self.middle, &self.end));
+            let end = &self.poses_end;
+            let too_many = self
+                .contacts
+                .detect_stops(machine, places, end, &self.v, &forecast);
+            self.decline(Decline::Contact, too_many);
+        }
+        for &slot in self.contacts.used() {
+            let is_stop = self.contacts.stop(slot).is_some();
+            self.mu[slot] = if is_stop {
+                self.number(0.0)
+            } else {
+                self.friction
+            };
+        }
+        if !self.options.materials.is_empty() {
+            self.mix_materials();
+        }
+        let mut is_same = 0;
+        for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
+            let is_own = self
+                .contacts
+                .recall(lane, &self.memories[lane], &mut problem.p);
+            is_same |= u32::from(is_own) << lane;
+        }
+        self.is_same = T::mask(self.token, is_same);
+        self.persists = self.is_same & self.has_persistent;
+    }
+
+    /// Friction of contacts whose two materials have a law of their own.
+    #[cold]
+    fn mix_materials(&mut self) {
+        for lane in (0..T::LANES).filter(|&lane| self.going.get(lane)) {
+            let (Some(model), Some(terrain)) = (&self.models[lane], self.ground.terrain(lane))
+            else {
+                continue;
+            };
+            for place in 0..self.contacts.list(lane).n {
+                let (slot, contact) = self.contacts.contact(&self.machine, lane, place);
+                let law = contact.between_materials(model, &**terrain, &self.options.materials);
+                if let Some([mu, _]) = law {
+                    self.mu[slot].set(lane, mu);
+                }
+            }
+        }
+    }
+
+    /// Visits the contacts of a lane's last step, in order: contact, position (world, m), impulse
+    /// (N s) and local velocity (m/s).
+    pub fn visit_contacts(
+        &self,
+        lane: usize,
+        mut visit: impl FnMut(Contact, [f64; 3], [f64; 3], [f64; 3]),
+    ) {
+        let origin = Vector3::from(self.origin(lane));
+        for place in 0..self.contacts.list(lane).n {
+            let (slot, contact) = self.contacts.contact(&self.machine, lane, place);
+            let at = |x: &[Triple<T>]| x[slot].map(|x| x.get(lane));
+            let position = (origin + contact.point).into();
+            visit(contact, position, at(&self.p), at(&self.u));
+        }
+    }
+}

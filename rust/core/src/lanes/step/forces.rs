@@ -1,0 +1,123 @@
+//! The velocity without contact impulses.
+
+use super::Block;
+use crate::multibody::bias::bias;
+use crate::scalar::{Lane, LaneMask};
+
+impl<T: Lane> Block<T> {
+    /// The implicit terms of motors, held joints, springs and dampers; `is_first`: their branches
+    /// and weights, too.
+    #[inline(always)]
+    pub(super) fn add_implicit(&mut self, is_first: bool) {
+        let machine = &*self.machine;
+        let (h, theta) = self.time_step();
+        let mass_matrix = &mut self.mass_matrix;
+        if is_first {
+            self.drives.choose_branches(machine, &self.v);
+            let inertia = |k| mass_matrix.diagonal(machine, k);
+            self.drives.set_theta(machine, (h, theta), inertia);
+        }
+        self.drives.add_implicit(machine, (h, theta), |k, a| {
+            mass_matrix.add_to_diagonal(machine, k, a);
+        });
+    }
+
+    /// The free change of the velocity, `y` in factor coordinates, and the contacts' free velocity
+    /// `u`: first with the forces at v, then with those at the mean velocity that follows from them
+    /// and from the last step's impulses.
+    pub(super) fn load(&mut self) {
+        let token = self.token;
+        let is_any = (self.persists & self.going).any();
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.push_and_drive(is_any),
+        );
+        self.weigh(true);
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.add_torque_and_pushed(is_any),
+        );
+        self.weigh(false);
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.add_torque_and_correction(is_any),
+        );
+    }
+
+    #[inline(always)]
+    fn push_and_drive(&mut self, is_any: bool) {
+        let zero = self.number(0.0);
+        let step = self.time_step();
+        if is_any {
+            let (contacts, end) = (&self.contacts, &self.poses_end);
+            self.rows.generalized_impulse(
+                &self.machine,
+                contacts,
+                end,
+                self.persists,
+                &self.p_last,
+                &mut self.pushed,
+            );
+        }
+        self.torque.fill(zero);
+        self.drives.add_impulse(
+            &self.machine,
+            step,
+            &self.start.joints,
+            [&self.v, &self.v],
+            &mut self.torque,
+        );
+    }
+
+    /// `y` = the bias at the velocity v, or at the mean velocity.
+    fn weigh(&mut self, at_start: bool) {
+        let v = if at_start { &self.v } else { &self.v_mean };
+        bias(
+            &self.machine,
+            &self.inertias,
+            &self.poses_middle,
+            v,
+            self.gravity,
+            &mut self.bias_scratch,
+            &mut self.y,
+        );
+    }
+
+    #[inline(always)]
+    fn add_torque_and_pushed(&mut self, is_any: bool) {
+        let (h, theta) = self.time_step();
+        let share = h.like(1.0) - theta;
+        let persists = self.persists;
+        for ((y, torque), pushed) in self.y.iter_mut().zip(&self.torque).zip(&self.pushed) {
+            *y = *torque - h * *y;
+            if is_any {
+                *y = T::select(persists, *y + *pushed, *y);
+            }
+        }
+        self.factor.half_solve(&self.machine, &mut self.y);
+        self.factor.half_solve_back(&self.machine, &mut self.y);
+        for ((mean, v), change) in self.v_mean.iter_mut().zip(&self.v).zip(&self.y) {
+            *mean = *v + share * *change;
+        }
+    }
+
+    #[inline(always)]
+    fn add_torque_and_correction(&mut self, is_any: bool) {
+        let (h, theta) = self.time_step();
+        let share = h.like(1.0) - theta;
+        let persists = self.persists;
+        let pushed = self.pushed.iter().zip(&self.persistent);
+        for ((y, torque), (pushed, before)) in self.y.iter_mut().zip(&self.torque).zip(pushed) {
+            *y = *torque - h * *y;
+            if is_any {
+                *y = T::select(persists, *y + share * (*before - *pushed), *y);
+            }
+        }
+        self.factor.half_solve(&self.machine, &mut self.y);
+        self.rows.local(&self.contacts, &self.y, &mut self.u);
+        self.yields.shift(&self.contacts, &mut self.u);
+    }
+}

@@ -1,0 +1,102 @@
+//! Rovers come into the lanes of a block, and leave them.
+
+use std::sync::Arc;
+
+use super::balance::select_both;
+use super::{Block, State};
+use crate::lanes::lane_rover::LaneRover;
+use crate::scalar::{Lane, LaneMask};
+
+impl<T: Lane> Block<T> {
+    /// Gives a lane to a rover of this machine, with options alike those of the others.
+    /// [`Self::begin`] follows.
+    pub fn load_rover(&mut self, lane: usize, rover: &LaneRover<'_>) {
+        let own = T::mask(self.token, 1 << lane);
+        self.occupied = self.occupied | own;
+        if !self.holds(lane, rover) {
+            self.is_new = self.is_new | own;
+            self.fill(lane, rover);
+        }
+        self.options.clone_from(rover.options);
+        self.friction.set(lane, rover.options.friction_coefficient);
+        self.ground.set_lane(lane, rover.terrain);
+        let joints = rover.model.joints();
+        self.drives.set_lane(lane, joints, rover.command);
+        self.drives.set_work(lane, rover.drive_work);
+        self.time.set(lane, *rover.time);
+        let memory = &mut self.memories[lane].impulses;
+        memory.clone_from(&rover.warm_start.impulses);
+        let persistent = &rover.warm_start.persistent;
+        for (own, x) in self.persistent.iter_mut().zip(persistent) {
+            own.set(lane, *x);
+        }
+        self.has_persistent = self.has_persistent & !own;
+        if !persistent.is_empty() {
+            self.has_persistent = self.has_persistent | own;
+        }
+    }
+
+    /// Whether a lane has the inertia and the state of a rover, so that its energy is known.
+    fn holds(&self, lane: usize, rover: &LaneRover<'_>) -> bool {
+        let is_own = |own: &T, x: &f64| own.get(lane).to_bits() == x.to_bits();
+        (self.models[lane].as_ref()).is_some_and(|own| Arc::ptr_eq(own, rover.model))
+            && self.gravity.get(lane).map(f64::to_bits)
+                == <[f64; 3]>::from(rover.options.gravity).map(f64::to_bits)
+            && self.v.iter().zip(&*rover.v).all(|(own, x)| is_own(own, x))
+            && self.start.is_lane(lane, rover.configuration)
+    }
+
+    /// Gives a lane the inertia and the state of a rover.
+    fn fill(&mut self, lane: usize, rover: &LaneRover<'_>) {
+        if !(self.models[lane].as_ref()).is_some_and(|own| Arc::ptr_eq(own, rover.model)) {
+            self.inertias.set_lane(lane, rover.model.inertias());
+            self.models[lane] = Some(Arc::clone(rover.model));
+        }
+        self.gravity.set(lane, rover.options.gravity.into());
+        self.start.set_lane(lane, rover.configuration);
+        for (own, x) in self.v.iter_mut().zip(&*rover.v) {
+            own.set(lane, *x);
+        }
+    }
+
+    /// Writes a lane's state back, without its contacts.
+    pub fn store_rover(&self, lane: usize, rover: &mut LaneRover<'_>) {
+        self.start.to_lane(lane, rover.configuration);
+        for (x, own) in rover.v.iter_mut().zip(&self.v) {
+            *x = own.get(lane);
+        }
+        *rover.time = self.time.get(lane);
+        rover
+            .warm_start
+            .impulses
+            .clone_from(&self.memories[lane].impulses);
+        rover.warm_start.persistent.clear();
+        if self.has_persistent.get(lane) {
+            let persistent = self.persistent.iter().map(|x| x.get(lane));
+            rover.warm_start.persistent.extend(persistent);
+        }
+        let h = self.options.time_step;
+        self.drives.to_lane(lane, rover.drive_work);
+        for (torque, wheel) in rover.wheel_torque.iter_mut().zip(rover.model.wheels()) {
+            let impulse = wheel.joint.map_or(0.0, |j| self.drives.impulse(lane, j));
+            *torque = wheel.drive_sign * impulse / h;
+        }
+    }
+
+    /// Empties a lane; its numbers stay, unused.
+    pub fn clear(&mut self, lane: usize) {
+        self.occupied = self.occupied & !T::mask(self.token, 1 << lane);
+    }
+
+    /// Follows after rovers were loaded.
+    pub fn begin(&mut self) {
+        self.drives.finish_loading();
+        if self.is_new.any() {
+            let (energy, _) = self.energy(State::Start);
+            let balance = &mut self.balance;
+            let energy = energy.kinetic_and_potential();
+            balance.before = select_both(self.is_new, energy, balance.before);
+            self.is_new = T::mask(self.token, 0);
+        }
+    }
+}

@@ -1,0 +1,319 @@
+//! The fast step of a block of rovers.
+//!
+//! The formulas are those of [`crate::integrator::moreau_jean`] with explicit gyroscopic terms and
+//! inelastic contact. A step has three parts, between which its contact problems are solved with
+//! those of other blocks ([`super::queue`]):
+//!
+//! 1. [`Block::prepare`] — poses, contacts, forces, the friction-contact problem;
+//! 2. [`Block::conclude`] — the new velocity and configuration, energy audit, and where contacts
+//!    penetrate, the problem of the position projection; where a motor has left the branch of its
+//!    line, the friction-contact problem anew;
+//! 3. [`Block::finish`] — the projected configuration, and what the next step remembers.
+//!
+//! A lane whose step cannot be taken falls back to the general one: its state stays as it was.
+//!
+//! `loading`: rovers come and go; `phases`: the three parts, and what they are made of:
+//! `contact_list`, `forces`, `impacts`, `balance`, `projection`.
+
+mod balance;
+mod contact_list;
+mod forces;
+mod impacts;
+mod loading;
+mod phases;
+mod projection;
+
+use std::sync::Arc;
+
+use self::balance::Balance;
+use super::contacts::Contacts;
+use super::ground::Ground;
+use super::machine::Machine;
+use super::problem::{MAX_CONTACTS, Triple};
+use super::rows::Rows;
+use super::yielding::Yields;
+use crate::integrator::{StepOptions, StepReport, WarmStart};
+use crate::multibody::bias::BiasScratch;
+use crate::multibody::energy::energy;
+use crate::multibody::{
+    Energy, EnergyScratch, Factor, Inertias, LaneConfiguration, MassMatrix, Model, Poses,
+};
+use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
+use crate::system::drives::Drives;
+
+/// Why a lane was declined in its last step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Decline {
+    /// It turns too fast for explicit gyroscopic terms.
+    Turning,
+    /// It has more contacts than a problem, or its ground is unknown.
+    Contact,
+    /// The mass matrix has no factor.
+    MassMatrix,
+    /// The contact problem was not solved.
+    Solver,
+    /// The energy audit asks for a safer step.
+    Energy,
+    /// The position projection was not solved, or moves too far.
+    Projection,
+    /// Something is not finite.
+    NotFinite,
+}
+
+/// What follows [`Block::conclude`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Next {
+    /// The problems of the lanes that are [retaken](Block::is_retaken) are solved anew, and the
+    /// step is concluded again.
+    Retake,
+    /// Positions must be projected: [`Block::set_gaps`], then [`Block::finish`].
+    Project,
+    /// [`Block::finish`].
+    Finish,
+}
+
+/// Whether two rovers may share a block: gravity and friction may differ.
+#[must_use]
+pub fn are_alike(a: &StepOptions, b: &StepOptions) -> bool {
+    let own = StepOptions {
+        gravity: a.gravity,
+        friction_coefficient: a.friction_coefficient,
+        ..b.clone()
+    };
+    *a == own
+}
+
+/// Rovers in the lanes of a register, one fast step at a time.
+pub struct Block<T: Lane> {
+    token: T::Token,
+    machine: Arc<Machine>,
+    options: StepOptions,
+    models: [Option<Arc<Model>>; MAX_LANES],
+    inertias: Inertias<T>,
+    gravity: Vec3<T>,
+    /// Friction coefficient of contacts without a law of their materials, and of each slot.
+    friction: T,
+    mu: Vec<T>,
+    ground: Ground<T>,
+    drives: Drives<T>,
+    /// Impulses of each lane's last step, and their generalized impulse (nv) where the contacts
+    /// persisted.
+    memories: [WarmStart; MAX_LANES],
+    /// Impulses of each lane's present step.
+    next_memories: [WarmStart; MAX_LANES],
+    persistent: Vec<T>,
+    has_persistent: T::Mask,
+    /// Lanes whose contacts are those of the last step, which persisted.
+    persists: T::Mask,
+    /// Lanes whose contacts are those of the last step.
+    is_same: T::Mask,
+    start: LaneConfiguration<T>,
+    v: Vec<T>,
+    time: T,
+    middle: LaneConfiguration<T>,
+    end: LaneConfiguration<T>,
+    v_end: Vec<T>,
+    v_mean: Vec<T>,
+    poses_middle: Poses<T>,
+    poses_end: Poses<T>,
+    mass_matrix: MassMatrix<T>,
+    factor: Factor<T>,
+    bias_scratch: BiasScratch<T>,
+    energy_scratch: EnergyScratch<T>,
+    contacts: Contacts<T>,
+    rows: Rows<T>,
+    yields: Yields<T>,
+    /// By slot: impulses of the step and of the projection, N s; velocities, m/s.
+    p: Vec<Triple<T>>,
+    pushes: Vec<Triple<T>>,
+    u: Vec<Triple<T>>,
+    /// Impulses of the last step by slot, N s.
+    p_last: Vec<Triple<T>>,
+    /// Lanes whose contact is in impact, by slot, and lanes with an impact.
+    impact: Vec<T::Mask>,
+    has_impact: T::Mask,
+    /// An impulse (nv), or its factor coordinates, or a change of the velocity.
+    y: Vec<T>,
+    /// Torques' impulse over the step (nv).
+    torque: Vec<T>,
+    /// Generalized impulse of the contacts (nv).
+    pushed: Vec<T>,
+    balance: Balance<T>,
+    /// Lanes whose energy at the start is not known yet.
+    is_new: T::Mask,
+    /// Lanes whose position must be projected, and their deepest gap, m.
+    is_deep: T::Mask,
+    deepest: T,
+    /// Lanes that hold a rover.
+    occupied: T::Mask,
+    /// Lanes that take part in the present step and have not been declined.
+    going: T::Mask,
+    reasons: [Option<Decline>; MAX_LANES],
+    reports: [StepReport; MAX_LANES],
+    /// Lanes whose step is taken again, and how often each lane's was.
+    retaken: T::Mask,
+    n_retaken: [usize; MAX_LANES],
+}
+
+impl<T: Lane> Block<T> {
+    /// Lanes without rovers.
+    #[must_use]
+    pub fn new(token: T::Token, machine: &Arc<Machine>) -> Self {
+        let zero = T::splat(token, 0.0);
+        let nobody = T::mask(token, 0);
+        let vector = || vec![zero; machine.nv()];
+        let place = || LaneConfiguration::new(token, machine);
+        let contacts = Contacts::new(token, machine);
+        let slots = vec![[zero; 3]; contacts.n_slots()];
+        Self {
+            token,
+            options: StepOptions::default(),
+            models: [const { None }; MAX_LANES],
+            inertias: Inertias::new(token, machine),
+            gravity: Vec3::splat(token, [0.0; 3]),
+            friction: zero,
+            ground: Ground::new(token, machine.wheels.len(), machine.boxes.len()),
+            drives: Drives::new(token, machine),
+            memories: std::array::from_fn(|_| WarmStart::with_capacity(MAX_CONTACTS, machine.nv())),
+            next_memories: std::array::from_fn(|_| WarmStart::with_capacity(MAX_CONTACTS, 0)),
+            persistent: vector(),
+            has_persistent: nobody,
+            persists: nobody,
+            is_same: nobody,
+            start: place(),
+            v: vector(),
+            time: zero,
+            middle: place(),
+            end: place(),
+            v_end: vector(),
+            v_mean: vector(),
+            poses_middle: Poses::new(token, machine),
+            poses_end: Poses::new(token, machine),
+            mass_matrix: MassMatrix::new(token, machine),
+            factor: Factor::new(token, machine),
+            bias_scratch: BiasScratch::new(token, machine),
+            energy_scratch: EnergyScratch::new(token, machine),
+            rows: Rows::new(token, machine, contacts.n_slots()),
+            yields: Yields::new(token, machine, contacts.n_slots()),
+            contacts,
+            p: slots.clone(),
+            pushes: slots.clone(),
+            p_last: slots.clone(),
+            impact: vec![nobody; slots.len()],
+            has_impact: nobody,
+            mu: vec![zero; slots.len()],
+            u: slots,
+            y: vector(),
+            torque: vector(),
+            pushed: vector(),
+            balance: Balance::new(token),
+            is_new: nobody,
+            is_deep: nobody,
+            deepest: zero,
+            occupied: nobody,
+            going: nobody,
+            reasons: [None; MAX_LANES],
+            reports: [StepReport::default(); MAX_LANES],
+            retaken: nobody,
+            n_retaken: [0; MAX_LANES],
+            machine: Arc::clone(machine),
+        }
+    }
+
+    /// Options of the rovers; gravity and friction are those of the last that was loaded.
+    #[must_use]
+    pub fn options(&self) -> &StepOptions {
+        &self.options
+    }
+
+    /// Why a lane's last step was not taken, if it was not.
+    #[must_use]
+    pub fn declined(&self, lane: usize) -> Option<Decline> {
+        self.reasons[lane]
+    }
+
+    /// Whether a lane takes part in the present step.
+    #[must_use]
+    pub fn is_going(&self, lane: usize) -> bool {
+        self.going.get(lane)
+    }
+
+    /// Whether a lane's problem must be solved anew, see [`Next::Retake`].
+    #[must_use]
+    pub fn is_retaken(&self, lane: usize) -> bool {
+        (self.retaken & self.going).get(lane)
+    }
+
+    /// Report of a lane's last step.
+    #[must_use]
+    pub fn report(&self, lane: usize) -> &StepReport {
+        &self.reports[lane]
+    }
+
+    /// World position of a lane's trunk where the contacts of the last step were evaluated, m.
+    #[must_use]
+    pub fn origin(&self, lane: usize) -> [f64; 3] {
+        self.poses_end.origin.get(lane)
+    }
+
+    #[inline(always)]
+    fn number(&self, x: f64) -> T {
+        T::splat(self.token, x)
+    }
+
+    /// h and θ.
+    #[inline(always)]
+    fn time_step(&self) -> (T, T) {
+        (
+            self.number(self.options.time_step),
+            self.number(self.options.theta),
+        )
+    }
+
+    /// Takes lanes out of the present step.
+    #[inline(always)]
+    fn decline(&mut self, reason: Decline, lanes: T::Mask) {
+        let mut lost = (self.going & lanes).bits();
+        if lost == 0 {
+            return;
+        }
+        self.going = self.going & !lanes;
+        while lost != 0 {
+            self.reasons[lost.trailing_zeros() as usize] = Some(reason);
+            lost &= lost - 1;
+        }
+    }
+
+    /// Energy of the start or of the end of the step.
+    fn energy(&mut self, state: State) -> (Energy<T>, Vec3<T>) {
+        let (place, v) = match state {
+            State::Start => (&self.start, &self.v),
+            State::End => (&self.end, &self.v_end),
+        };
+        energy(
+            &self.machine,
+            &self.inertias,
+            place,
+            v,
+            self.gravity,
+            &mut self.energy_scratch,
+        )
+    }
+
+    /// Lanes with a contact.
+    #[inline(always)]
+    fn in_touch(&self) -> T::Mask {
+        let mut in_touch = T::mask(self.token, 0);
+        for &slot in self.contacts.used() {
+            in_touch = in_touch | self.contacts.slot(slot).active;
+        }
+        in_touch
+    }
+}
+
+/// A state of a block.
+#[derive(Clone, Copy, Debug)]
+enum State {
+    Start,
+    End,
+}

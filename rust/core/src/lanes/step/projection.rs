@@ -1,0 +1,148 @@
+//! The position projection: contacts that penetrate too deep are moved apart.
+
+use super::balance::select_both;
+use super::{Block, Decline, State};
+use crate::integrator::Stabilisation;
+use crate::integrator::position_projection::FARTHEST;
+use crate::lanes::problem::ContactProblem;
+use crate::lanes::rows::Answer;
+use crate::scalar::{Lane, LaneMask, MAX_LANES};
+use crate::system::extent::displacement;
+
+impl<T: Lane> Block<T> {
+    /// Penetration that is tolerated, m, if positions are projected.
+    pub(super) fn tolerated(&self) -> Option<f64> {
+        (self.options.stabilisation == Stabilisation::Projection)
+            .then_some(self.options.penetration_tolerance)
+    }
+
+    /// Predicts the gaps at the end of the step; true if a lane's position must be projected.
+    #[inline(always)]
+    pub(super) fn measure(&mut self, tolerated: f64) -> bool {
+        let (h, theta) = self.time_step();
+        let zero = h.like(0.0);
+        let mut deepest = zero;
+        for &slot in self.contacts.used() {
+            deepest = deepest.min(self.gap_at_end(slot, h, theta));
+        }
+        self.deepest = deepest;
+        self.is_deep = deepest.lt(zero.like(-tolerated)) & self.going;
+        self.is_deep.any()
+    }
+
+    /// Gap of a slot after the step, m; 0 where it is negative and opening.
+    #[inline(always)]
+    fn gap_at_end(&self, slot: usize, h: T, theta: T) -> T {
+        let zero = h.like(0.0);
+        let own = self.contacts.slot(slot);
+        let (u, before) = (self.u[slot][0], self.rows.u_before[slot][0]);
+        let mut gap = own.gap + theta * h * (u - before);
+        if !self.yields.is_empty() {
+            let law = &self.yields.laws[slot];
+            gap = T::select(zero.lt(law.diagonal), law.unexplained, gap);
+        }
+        let parts = gap.lt(zero) & !(gap + h * u).lt(zero);
+        let gap = T::select(parts, zero, gap);
+        T::select(own.active, gap, zero)
+    }
+
+    /// Turns the problems into those of the position projection; none where nothing penetrates.
+    ///
+    /// # Panics
+    /// If there are fewer problems than lanes.
+    pub fn set_gaps(&mut self, problems: &mut [ContactProblem]) {
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || {
+                let (h, theta) = self.time_step();
+                for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
+                    if !self.is_deep.get(lane) {
+                        problem.n_contacts = 0;
+                    }
+                    let n = problem.n_unknowns();
+                    problem.q[..n].fill(0.0);
+                    problem.p[..n].fill(0.0);
+                    problem.factored.last.fill([0.0; 3]);
+                }
+                for &slot in self.contacts.used() {
+                    let gap = self.gap_at_end(slot, h, theta);
+                    let places = self.contacts.places(slot);
+                    let active = self.contacts.slot(slot).active & self.is_deep;
+                    for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
+                        if active.get(lane) {
+                            problem.q[3 * usize::from(places[lane])] = gap.get(lane);
+                        }
+                    }
+                }
+            },
+        );
+    }
+
+    /// Moves the penetrating lanes by the displacement that the problems found.
+    pub(super) fn project(&mut self, problems: &[ContactProblem]) {
+        let token = self.token;
+        let mut unsolved = 0;
+        for (lane, problem) in problems.iter().enumerate() {
+            if self.is_deep.get(lane) {
+                unsolved |= u32::from(!problem.is_solved) << lane;
+                let report = &mut self.reports[lane];
+                report.iterations += problem.iterations;
+                report.factorisations += problem.iterations;
+                report.residual = report.residual.max(problem.residual.relative);
+            }
+        }
+        self.decline(Decline::Projection, T::mask(token, unsolved));
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.displace(problems),
+        );
+        let lifted = self.energy(State::End).0.kinetic_and_potential();
+        let is_moved = self.is_deep & self.going;
+        let [kinetic, potential] = self.balance.after;
+        let work = self.drives.work_of_displacement(
+            &self.machine,
+            self.time_step(),
+            &self.start.joints,
+            [&self.v, &self.v_end, &self.y],
+        );
+        let gained = (lifted[0] - kinetic) + (lifted[1] - potential) - work;
+        for (lane, report) in self.reports.iter_mut().enumerate().take(T::LANES) {
+            if is_moved.get(lane) {
+                report.energy_lifted = gained.get(lane).max(0.0);
+                report.energy_lost += (-gained.get(lane)).max(0.0);
+            }
+        }
+        self.balance.after = select_both(is_moved, lifted, self.balance.after);
+    }
+
+    #[inline(always)]
+    fn displace(&mut self, problems: &[ContactProblem]) {
+        let zero = self.number(0.0);
+        let mut farthest = [0.0_f64; MAX_LANES];
+        for (lane, problem) in problems.iter().enumerate() {
+            let n = problem.n_unknowns();
+            for (u, q) in problem.u[..n].iter().zip(&problem.q[..n]) {
+                farthest[lane] = farthest[lane].max((u - q).abs());
+            }
+        }
+        let farthest = T::load(self.token, &farthest[..T::LANES]);
+        let mut pushes = std::mem::take(&mut self.pushes);
+        self.rows
+            .read(&self.contacts, problems, Answer::Impulses, &mut pushes);
+        self.y.fill(zero);
+        self.rows
+            .add_impulses(&self.contacts, self.is_deep, &pushes, &mut self.y);
+        self.pushes = pushes;
+        self.factor.half_solve_back(&self.machine, &mut self.y);
+        let size = displacement(zero, &self.machine, &self.y).max(farthest);
+        let limit = zero.like(-FARTHEST) * self.deepest;
+        self.decline(Decline::Projection, !size.le(limit) & self.is_deep);
+        let is_moved = self.is_deep & self.going;
+        self.middle
+            .set_moved(&self.machine, &self.end, &self.y, 1.0);
+        self.middle.normalise();
+        self.end.select_from(is_moved, &self.middle);
+    }
+}

@@ -1,0 +1,68 @@
+//! The contacts of a tree among balls, and their keys.
+
+use serde::{Deserialize, Serialize};
+
+use crate::contact::{Contact, ContactKey};
+use crate::integrator::UnilateralContact;
+use crate::system::grains::{GrainContact, GrainKey};
+
+/// A contact of a part of the tree with a grain. Its normal points from the grain to the part.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GrainTouch {
+    /// Its key among all contacts of grains: the part's code after the grains, then the grain.
+    pub key: GrainKey,
+    /// As a contact of the tree.
+    pub contact: Contact,
+    /// Gap at the start of the step, m.
+    pub gap_start: f64,
+}
+
+impl GrainTouch {
+    /// The grain's number.
+    #[must_use]
+    pub fn grain(&self) -> u32 {
+        self.key.b
+    }
+}
+
+/// A contact of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CompositeContact {
+    /// Of the grains.
+    Grains(GrainContact<3>),
+    /// Of the tree, with anything else.
+    Tree(Contact),
+    /// Between them.
+    Touch(GrainTouch),
+}
+
+/// Key of a contact, in the order of the lists.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum CompositeKey {
+    /// Of the grains.
+    Grains(GrainKey),
+    /// Of the tree.
+    Tree(ContactKey),
+    /// Of a touch.
+    Touch(GrainKey),
+}
+
+impl UnilateralContact for CompositeContact {
+    type Key = CompositeKey;
+
+    fn key(&self) -> CompositeKey {
+        match self {
+            Self::Grains(contact) => CompositeKey::Grains(contact.key),
+            Self::Tree(contact) => CompositeKey::Tree(contact.key),
+            Self::Touch(touch) => CompositeKey::Touch(touch.key),
+        }
+    }
+
+    fn gap(&self) -> f64 {
+        match self {
+            Self::Grains(contact) => contact.gap,
+            Self::Tree(contact) => contact.gap,
+            Self::Touch(touch) => touch.contact.gap,
+        }
+    }
+}

@@ -1,0 +1,465 @@
+//! The two as one mechanical system.
+
+use super::contact::{CompositeContact, GrainTouch};
+use super::parts::CompositeScratch;
+use super::touches;
+use crate::contact::{Activation, Contact, generalized_impulse};
+use crate::integrator::{MechanicalSystem, Start, StepOptions, UnilateralContact};
+use crate::multibody::Configuration;
+use crate::problem::{BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem};
+use crate::solver::{SolveReport, SolverOptions, SolverWorkspace};
+use crate::system::grains::GrainSystem;
+use crate::system::grains::system::gap_law;
+use crate::system::tree::TreeSystem;
+use crate::system::tree_scratch::TreeScratch;
+
+/// A tree among balls in a step.
+pub struct TreeAmongGrains<'a> {
+    /// The balls.
+    pub bed: GrainSystem<'a, 3>,
+    /// The tree.
+    pub tree: TreeSystem<'a>,
+    /// μ of the tree's parts on grains.
+    pub friction: f64,
+    /// Scratch.
+    pub parts: &'a mut CompositeScratch,
+}
+
+type Both = (Vec<f64>, Configuration);
+
+/// Report of the harder of two solves, with the work of both.
+fn harder(a: &SolveReport, b: &SolveReport) -> SolveReport {
+    let worst = if a.is_converged() && (!b.is_converged() || b.residual > a.residual) {
+        b
+    } else {
+        a
+    };
+    SolveReport {
+        iterations: a.iterations + b.iterations,
+        work: a.work + b.work,
+        residual: a.residual.max(b.residual),
+        velocity_error: a.velocity_error.max(b.velocity_error),
+        ..*worst
+    }
+}
+
+impl TreeAmongGrains<'_> {
+    /// Velocities of the grains, and of the tree.
+    fn halves<'v>(&self, v: &'v [f64]) -> (&'v [f64], &'v [f64]) {
+        v.split_at(self.bed.nv())
+    }
+
+    fn halves_mut<'v>(&self, v: &'v mut [f64]) -> (&'v mut [f64], &'v mut [f64]) {
+        v.split_at_mut(self.bed.nv())
+    }
+
+    /// Where a step begins, of each side.
+    fn starts<'q>(
+        &self,
+        start: Start<'q, Both>,
+    ) -> (Start<'q, Vec<f64>>, Start<'q, Configuration>) {
+        let ((q_a, q_b), (v_a, v_b)) = (start.configuration, self.halves(start.v));
+        let of_grains = Start {
+            configuration: q_a,
+            v: v_a,
+        };
+        let of_tree = Start {
+            configuration: q_b,
+            v: v_b,
+        };
+        (of_grains, of_tree)
+    }
+
+    /// Subtracts the grains' velocities from those of the touches.
+    fn subtract_rims(&self, touches: &[GrainTouch], v: &[f64], u: &mut [f64]) {
+        for (touch, u) in touches.iter().zip(u.as_chunks_mut::<3>().0) {
+            (self.bed).subtract_rim(touch.grain(), v, &touch.contact.frame.rows(), u);
+        }
+    }
+
+    /// Rows of the touches, and all contacts of the tree among the grains' pairs of bodies.
+    fn assemble_touches(&mut self, v: (&[f64], &[f64]), u: &mut [f64]) {
+        let CompositeScratch {
+            touches,
+            contacts,
+            rows,
+            ..
+        } = &mut *self.parts;
+        contacts.clear();
+        contacts.extend(touches.iter().map(|touch| touch.contact));
+        if touches.is_empty() {
+            return;
+        }
+        let TreeScratch {
+            kinematics, factor, ..
+        } = &*self.tree.parts;
+        rows.assemble_rows(self.tree.model, kinematics, factor, contacts, v.1);
+        u.copy_from_slice(&rows.u);
+        self.subtract_rims(&self.parts.touches, v.0, u);
+        let mut pairs = std::mem::take(&mut self.bed.parts.pairs);
+        self.push_tree(&mut pairs);
+        self.bed.parts.pairs = pairs;
+    }
+
+    /// Adds the tree as the machine of the grains' pairs, with its own contacts and the touches.
+    fn push_tree(&self, pairs: &mut BodyPairs<3>) {
+        let (bed, parts, model) = (&self.bed, &*self.parts, self.tree.model);
+        let own = parts.of_tree.iter().map(|c| (None, c));
+        let touches = parts.touches.iter();
+        let touches = touches.map(|touch| (Some(touch.grain()), &touch.contact));
+        let pair = |(grain, c): (_, &Contact)| bed.pair_with(grain, &c.frame.rows());
+        pairs.machine.clear();
+        pairs.machine.extend(own.chain(touches).map(pair));
+        pairs.rows.clear();
+        pairs.width = model.nv();
+        pairs.n_coordinates = pairs.machine_at + pairs.width;
+        for c in 0..parts.of_tree.len() {
+            (self.tree.parts.system).push_dense_rows(model, c, &mut pairs.rows);
+        }
+        for c in 0..parts.touches.len() {
+            parts.rows.push_dense_rows(model, c, &mut pairs.rows);
+        }
+    }
+
+    fn operator(&self) -> &BlockSparseDelassus {
+        let pairs = &self.bed.parts.pairs;
+        if !self.parts.touches.is_empty() {
+            return self.bed.parts.operator();
+        }
+        self.parts.operator.get_or_init(|| {
+            let mut pairs = pairs.clone();
+            self.push_tree(&mut pairs);
+            pairs.operator()
+        })
+    }
+}
+
+impl MechanicalSystem for TreeAmongGrains<'_> {
+    type Configuration = Both;
+    type Contact = CompositeContact;
+
+    const DIMENSION: Dimension = Dimension::Three;
+
+    fn nv(&self) -> usize {
+        self.bed.nv() + self.tree.nv()
+    }
+
+    fn set_moved(&self, from: &Both, v: &[f64], h: f64, to: &mut Both) {
+        let (v_a, v_b) = self.halves(v);
+        self.bed.set_moved(&from.0, v_a, h, &mut to.0);
+        self.tree.set_moved(&from.1, v_b, h, &mut to.1);
+    }
+
+    fn advance(&self, q: &mut Both, v: &[f64], h: f64) {
+        let (v_a, v_b) = self.halves(v);
+        self.bed.advance(&mut q.0, v_a, h);
+        self.tree.advance(&mut q.1, v_b, h);
+    }
+
+    fn is_finite(&self, q: &Both) -> bool {
+        self.bed.is_finite(&q.0) && self.tree.is_finite(&q.1)
+    }
+
+    fn normalise(&self, q: &mut Both) {
+        self.tree.normalise(&mut q.1);
+    }
+
+    fn place_middle(&mut self, q: &Both) {
+        self.bed.place_middle(&q.0);
+        self.tree.place_middle(&q.1);
+    }
+
+    fn place_end(&mut self, q: &Both) {
+        self.bed.place_end(&q.0);
+        self.tree.place_end(&q.1);
+    }
+
+    fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<CompositeContact>) {
+        let v = self.halves(v);
+        let CompositeScratch {
+            of_grains, of_tree, ..
+        } = &mut *self.parts;
+        self.bed.detect(v.0, activation, of_grains);
+        self.tree.detect(v.1, activation, of_tree);
+        // The order of the keys, in which the last step's impulses are looked up.
+        of_tree.sort_by_key(UnilateralContact::key);
+        let CompositeScratch { touches, near, .. } = &mut *self.parts;
+        touches::find(&self.bed, &self.tree, v, activation, near, touches);
+        out.clear();
+        out.extend(self.parts.listed());
+    }
+
+    fn unknown_ground(&self) -> Option<[f64; 2]> {
+        self.tree.unknown_ground()
+    }
+
+    fn relocate(&mut self, contacts: &mut [CompositeContact]) {
+        let parts = &mut *self.parts;
+        parts.sort(contacts);
+        self.bed.relocate(&mut parts.of_grains);
+        self.tree.relocate(&mut parts.of_tree);
+        for touch in &mut parts.touches {
+            touch.contact.gap = touches::gap_at_end(&self.bed, &self.tree, touch);
+        }
+        for (place, contact) in contacts.iter_mut().zip(parts.listed()) {
+            *place = contact;
+        }
+    }
+
+    fn friction_coefficient(&self, options: &StepOptions, contact: &CompositeContact) -> f64 {
+        match contact {
+            CompositeContact::Grains(contact) => self.bed.friction_coefficient(options, contact),
+            CompositeContact::Tree(contact) => self.tree.friction_coefficient(options, contact),
+            CompositeContact::Touch(_) => self.friction,
+        }
+    }
+
+    fn update_mass_matrix(&mut self, options: &StepOptions) {
+        self.bed.update_mass_matrix(options);
+        self.tree.update_mass_matrix(options);
+    }
+
+    fn factorise(&mut self, options: &StepOptions) -> bool {
+        self.bed.factorise(options) && self.tree.factorise(options)
+    }
+
+    fn multiply_mass(&self, v: &[f64], out: &mut [f64]) {
+        let ((v_a, v_b), (out_a, out_b)) = (self.halves(v), self.halves_mut(out));
+        self.bed.multiply_mass(v_a, out_a);
+        self.tree.multiply_mass(v_b, out_b);
+    }
+
+    fn load(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Both>,
+        v_mean: &[f64],
+        y: &mut [f64],
+    ) {
+        let (start_a, start_b) = self.starts(start);
+        let ((v_a, v_b), (y_a, y_b)) = (self.halves(v_mean), self.halves_mut(y));
+        self.bed.load(options, start_a, v_a, y_a);
+        self.tree.load(options, start_b, v_b, y_b);
+    }
+
+    fn is_gyroscopic(&self, options: &StepOptions, v: &[f64]) -> bool {
+        self.tree.is_gyroscopic(options, self.halves(v).1)
+    }
+
+    fn load_gyroscopic(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Both>,
+        v_mean: &[f64],
+        impulse: &[f64],
+        y: &mut [f64],
+    ) {
+        let (start_a, start_b) = self.starts(start);
+        let ((v_a, v_b), (y_a, y_b)) = (self.halves(v_mean), self.halves_mut(y));
+        let (own, theirs) = self.halves(impulse);
+        (self.bed).load_gyroscopic(options, start_a, v_a, own, y_a);
+        (self.tree).load_gyroscopic(options, start_b, v_b, theirs, y_b);
+    }
+
+    fn choose_branches(&mut self, start: Start<'_, Both>) {
+        let (_, start) = self.starts(start);
+        self.tree.choose_branches(start);
+    }
+
+    fn most_revisions(&self) -> usize {
+        self.tree.most_revisions()
+    }
+
+    fn revise(&mut self, start: Start<'_, Both>, v_end: &[f64]) -> bool {
+        let (_, start) = self.starts(start);
+        let (_, v_end) = self.halves(v_end);
+        self.tree.revise(start, v_end)
+    }
+
+    fn turning(&self, v: &[f64]) -> f64 {
+        self.tree.turning(self.halves(v).1)
+    }
+
+    fn accept(&mut self) {
+        self.tree.accept();
+    }
+
+    fn begin_balance(&mut self, start: Start<'_, Both>) {
+        let (_, start) = self.starts(start);
+        self.tree.begin_balance(start);
+    }
+
+    fn balance(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Both>,
+        v_end: &[f64],
+        v_mean: &[f64],
+        scratch: &mut [f64],
+        y: &mut [f64],
+    ) {
+        let (start_a, start_b) = self.starts(start);
+        let ((end_a, end_b), (v_a, v_b)) = (self.halves(v_end), self.halves(v_mean));
+        let ((own, theirs), (y_a, y_b)) = (self.halves_mut(scratch), self.halves_mut(y));
+        (self.bed).balance(options, start_a, end_a, v_a, own, y_a);
+        (self.tree).balance(options, start_b, end_b, v_b, theirs, y_b);
+    }
+
+    fn half_solve(&self, y: &mut [f64]) {
+        let (y_a, y_b) = self.halves_mut(y);
+        self.bed.half_solve(y_a);
+        self.tree.half_solve(y_b);
+    }
+
+    fn half_solve_back(&self, y: &mut [f64]) {
+        let (y_a, y_b) = self.halves_mut(y);
+        self.bed.half_solve_back(y_a);
+        self.tree.half_solve_back(y_b);
+    }
+
+    fn assemble(&mut self, contacts: &[CompositeContact], v: &[f64], u: &mut [f64]) {
+        let v = self.halves(v);
+        let parts = &mut *self.parts;
+        parts.sort(contacts);
+        parts.operator.take();
+        let [u_a, u_b, u] = parts.split_mut(u);
+        self.bed.assemble(&parts.of_grains, v.0, u_a);
+        self.tree.assemble(&parts.of_tree, v.1, u_b);
+        self.assemble_touches(v, u);
+    }
+
+    fn local(&self, y: &[f64], out: &mut [f64]) {
+        let (y_a, y_b) = self.halves(y);
+        let parts = &*self.parts;
+        let [out_a, out_b, touches] = parts.split_mut(out);
+        self.bed.local(y_a, out_a);
+        self.tree.local(y_b, out_b);
+        parts.rows.local(self.tree.model, y_b, touches);
+        let pairs = (self.bed.parts.pairs.machine.iter()).skip(parts.of_tree.len());
+        for (out, pair) in touches.as_chunks_mut::<3>().0.iter_mut().zip(pairs) {
+            for (out, u) in out.iter_mut().zip(pair.local(y_a)) {
+                *out += u;
+            }
+        }
+    }
+
+    fn add_local_of_velocity(&self, _contacts: &[CompositeContact], v: &[f64], out: &mut [f64]) {
+        let (v_a, v_b) = self.halves(v);
+        let (tree, parts) = (&self.tree, &*self.parts);
+        let [out_a, out_b, touches] = parts.split_mut(out);
+        self.bed.add_local_of_velocity(&parts.of_grains, v_a, out_a);
+        tree.add_local_of_velocity(&parts.of_tree, v_b, out_b);
+        let (rows, kinematics) = (&parts.rows, &tree.parts.kinematics);
+        rows.add_local_of_velocity(tree.model, kinematics, &parts.contacts, v_b, touches);
+        self.subtract_rims(&parts.touches, v_a, touches);
+    }
+
+    fn add_impulses(&self, p: &[f64], y: &mut [f64]) {
+        let (y_a, y_b) = self.halves_mut(y);
+        let parts = &*self.parts;
+        let [p_a, p_b, touches] = parts.split(p);
+        self.bed.add_impulses(p_a, y_a);
+        self.tree.add_impulses(p_b, y_b);
+        parts.rows.add_impulses(self.tree.model, touches, y_b);
+        let pairs = (self.bed.parts.pairs.machine.iter()).skip(parts.of_tree.len());
+        for (p, pair) in touches.as_chunks::<3>().0.iter().zip(pairs) {
+            pair.add(*p, y_a);
+        }
+    }
+
+    fn generalized_impulse(&self, _contacts: &[CompositeContact], p: &[f64], out: &mut [f64]) {
+        let (out_a, out_b) = self.halves_mut(out);
+        let (tree, parts) = (&self.tree, &*self.parts);
+        let [p_a, p_b, touches] = parts.split(p);
+        (self.bed).generalized_impulse(&parts.of_grains, p_a, out_a);
+        tree.generalized_impulse(&parts.of_tree, p_b, out_b);
+        let mut own = vec![0.0; out_b.len()];
+        let kinematics = &tree.parts.kinematics;
+        generalized_impulse(tree.model, kinematics, &parts.contacts, touches, &mut own);
+        for (out, own) in out_b.iter_mut().zip(own) {
+            *out += own;
+        }
+        for (touch, p) in parts.touches.iter().zip(touches.as_chunks::<3>().0) {
+            (self.bed).push_grain(touch.grain(), &touch.contact.frame.rows(), p, out_a);
+        }
+    }
+
+    fn problem<'a>(&'a self, q: &'a [f64], mu: &'a [f64]) -> FrictionContactProblem<'a> {
+        FrictionContactProblem::from_assembled_sparse(self.operator(), q, mu)
+    }
+
+    fn normal_shift(
+        &self,
+        options: &StepOptions,
+        contact: &CompositeContact,
+        u_N_before: f64,
+    ) -> f64 {
+        match contact {
+            CompositeContact::Grains(contact) => {
+                self.bed.normal_shift(options, contact, u_N_before)
+            }
+            CompositeContact::Tree(contact) => self.tree.normal_shift(options, contact, u_N_before),
+            CompositeContact::Touch(touch) => gap_law(options, touch.gap_start, u_N_before),
+        }
+    }
+
+    fn solves_to_the_end(&self) -> bool {
+        self.bed.solves_to_the_end()
+    }
+
+    fn solve(
+        &self,
+        q: &[f64],
+        mu: &[f64],
+        options: &SolverOptions,
+        p: &mut [f64],
+        u: &mut [f64],
+        workspace: &mut SolverWorkspace,
+    ) -> SolveReport {
+        let parts = &*self.parts;
+        if !parts.touches.is_empty() {
+            return self.bed.solve(q, mu, options, p, u, workspace);
+        }
+        let (mu_a, mu_b) = mu.split_at(parts.of_grains.len());
+        let ([q_a, q_b, _], [p_a, p_b, _]) = (parts.split(q), parts.split_mut(p));
+        let [u_a, u_b, _] = parts.split_mut(u);
+        harder(
+            &self.bed.solve(q_a, mu_a, options, p_a, u_a, workspace),
+            &self.tree.solve(q_b, mu_b, options, p_b, u_b, workspace),
+        )
+    }
+
+    fn solve_step(
+        &mut self,
+        (v, y): (&[f64], &[f64]),
+        q: &[f64],
+        mu: &[f64],
+        options: &SolverOptions,
+        p: &mut [f64],
+        u: &mut [f64],
+        workspace: &mut SolverWorkspace,
+    ) -> SolveReport {
+        let free = (self.halves(v).0, self.halves(y).0);
+        let parts = &*self.parts;
+        if !parts.touches.is_empty() {
+            return (self.bed).solve_step(free, q, mu, options, p, u, workspace);
+        }
+        let (mu_a, mu_b) = mu.split_at(parts.of_grains.len());
+        let ([q_a, q_b, _], [p_a, p_b, _]) = (parts.split(q), parts.split_mut(p));
+        let [u_a, u_b, _] = parts.split_mut(u);
+        harder(
+            &(self.bed).solve_step(free, q_a, mu_a, options, p_a, u_a, workspace),
+            &self.tree.solve(q_b, mu_b, options, p_b, u_b, workspace),
+        )
+    }
+
+    fn add_moments(&self, y: &mut [f64]) {
+        let (y_a, _) = self.halves_mut(y);
+        self.bed.add_moments(y_a);
+    }
+
+    fn displacement(&self, y: &[f64]) -> f64 {
+        let (y_a, y_b) = self.halves(y);
+        (self.bed.displacement(y_a)).max(self.tree.displacement(y_b))
+    }
+}

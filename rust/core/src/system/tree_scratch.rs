@@ -1,0 +1,188 @@
+//! Scratch of a tree in a step: poses, matrices, forces and contacts.
+
+use nalgebra::Vector3;
+
+use super::drives::Drives;
+use super::gyroscopic::GyroscopicScratch;
+use super::momentum_balance::MomentumBalance;
+use super::sand::SandContact;
+use super::sand_patch::SandScene;
+use crate::contact::{ContactSystem, PairSearch};
+use crate::geometry::SoftLayer;
+use crate::multibody::bias::BiasScratch;
+use crate::multibody::{
+    Configuration, EnergyScratch, Factor, Kinematics, LaneConfiguration, MassMatrix, Model,
+};
+use crate::sand::{RutMap, SandState};
+use crate::scalar::Single;
+
+/// Poses, matrices and momenta of a tree: scratch, allocated once.
+#[derive(Clone, Debug)]
+pub struct TreeScratch {
+    pub(super) kinematics: Kinematics,
+    pub(super) kinematics_end: Kinematics,
+    pub(super) mass_matrix: MassMatrix<f64>,
+    pub(super) factor: Factor<f64>,
+    pub(super) bias_scratch: BiasScratch<f64>,
+    pub(super) balance: MomentumBalance,
+    pub(super) drives: Drives<f64>,
+    pub(super) q: LaneConfiguration<f64>,
+    pub(super) energy: EnergyScratch<f64>,
+    pub(super) gyroscopic: GyroscopicScratch,
+    pub(super) force: Vec<f64>,
+    pub(super) pairs: PairSearch,
+    /// Found by the last detection, x and z, m.
+    pub(super) unknown_ground: Option<[f64; 2]>,
+    /// Joint coordinates at the midpoint and at the end of the step (n_joints); empty if no joint
+    /// has a stop.
+    pub(super) joints_middle: Vec<f64>,
+    pub(super) joints_end: Vec<f64>,
+    pub(super) system: ContactSystem,
+    /// Of a machine on soft ground.
+    pub(super) sand: Option<Box<SandContact>>,
+}
+
+impl TreeScratch {
+    /// Scratch for a model with n contacts.
+    #[must_use]
+    pub fn new(model: &Model, n: usize) -> Self {
+        let (token, mechanism) = (Single::best(), model.mechanism());
+        let limited = if model.limited_joints().is_empty() {
+            Vec::new()
+        } else {
+            vec![0.0; model.n_joints()]
+        };
+        Self {
+            kinematics: Kinematics::new(model),
+            kinematics_end: Kinematics::new(model),
+            mass_matrix: MassMatrix::new(token, mechanism),
+            factor: Factor::new(token, mechanism),
+            bias_scratch: BiasScratch::new(token, mechanism),
+            balance: MomentumBalance::new(model.bodies().len()),
+            drives: Drives::new(token, mechanism),
+            q: LaneConfiguration::new(token, mechanism),
+            energy: EnergyScratch::new(token, mechanism),
+            gyroscopic: GyroscopicScratch::default(),
+            force: vec![0.0; model.nv()],
+            pairs: PairSearch::new(model),
+            unknown_ground: None,
+            joints_middle: limited.clone(),
+            joints_end: limited,
+            system: ContactSystem::with_capacity(model, n),
+            sand: None,
+        }
+    }
+
+    /// Resets the impulses of the drives at the start of a step. `work`: of each drive since the
+    /// call began (n_joints), J.
+    pub fn begin_step(&mut self, work: &[f64]) {
+        self.drives.begin_step();
+        self.drives.set_work(0, work);
+    }
+
+    /// Takes over the sand at the start of a step; none on firm ground.
+    pub(crate) fn begin_sand(
+        &mut self,
+        model: &Model,
+        ground: Option<SoftLayer<'_>>,
+        state: Option<&SandState>,
+    ) {
+        let (Some(ground), Some(state)) = (ground, state) else {
+            self.sand = None;
+            return;
+        };
+        let known = self.sand.take().filter(|sand| sand.is_of(ground));
+        let mut sand = known.unwrap_or_else(|| Box::new(SandContact::new(model, ground)));
+        sand.begin(state);
+        self.sand = Some(sand);
+    }
+
+    /// Adds the impulse of the sand over a step of h that ends with the velocity `v`.
+    pub(super) fn add_sand(&self, h: f64, v: &[f64], y: &mut [f64]) {
+        if let Some(sand) = &self.sand {
+            sand.add_impulse(h, v, y);
+        }
+    }
+
+    /// Writes the sand at the end of a step that led to a configuration.
+    pub(crate) fn end_sand(
+        &mut self,
+        model: &Model,
+        ground: Option<SoftLayer<'_>>,
+        q: &Configuration,
+        state: Option<&mut SandState>,
+    ) {
+        if let (Some(sand), Some(ground), Some(state)) = (&self.sand, ground, state) {
+            self.kinematics.update_for_step(model, q);
+            sand.end(model, ground, &self.kinematics, state);
+        }
+    }
+
+    /// Impulses and work of the drives, with those of all accepted parts of the step.
+    #[must_use]
+    pub fn drives(&self) -> &Drives<f64> {
+        &self.drives
+    }
+
+    /// Makes a step of the first tree that was taken elsewhere the last one: the world position of
+    /// its origin where contacts were evaluated, m.
+    pub(crate) fn show(&mut self, origin: [f64; 3]) {
+        self.kinematics_end.set_origin(0, origin.into());
+    }
+
+    /// Delassus operator of the last step, row-major, 1/kg.
+    #[must_use]
+    pub fn operator(&self) -> &[f64] {
+        &self.system.W
+    }
+
+    /// World position of the origin of a body's tree at the pose of the last contact evaluation, m.
+    #[must_use]
+    pub fn origin_of_contacts(&self, body: usize) -> &Vector3<f64> {
+        self.kinematics_end.origin(body)
+    }
+
+    /// The sand with its ground and poses, and the factor of M̂.
+    pub(super) fn sand<'a>(
+        &'a mut self,
+        model: &'a Model,
+        ground: Option<SoftLayer<'a>>,
+        ruts: Option<&'a RutMap>,
+    ) -> Option<(&'a mut SandContact, SandScene<'a>, &'a Factor<f64>)> {
+        let Self {
+            sand,
+            kinematics,
+            factor,
+            ..
+        } = self;
+        let place = SandScene {
+            model,
+            ground: ground?,
+            ruts: ruts?,
+            kinematics,
+        };
+        Some((sand.as_mut()?, place, factor))
+    }
+
+    /// Places the bodies at the midpoint of the step.
+    #[inline]
+    pub(super) fn place_middle(&mut self, model: &Model, q: &Configuration) {
+        self.kinematics.update_for_step(model, q);
+        keep(&mut self.joints_middle, &q.joints);
+    }
+
+    /// The same at its end.
+    #[inline]
+    pub(super) fn place_end(&mut self, model: &Model, q: &Configuration) {
+        self.kinematics_end.update_for_step(model, q);
+        keep(&mut self.joints_end, &q.joints);
+    }
+}
+
+/// Copies the joint coordinates; `kept` is empty if no joint has a stop.
+#[inline]
+fn keep(kept: &mut [f64], joints: &[f64]) {
+    for (kept, q) in kept.iter_mut().zip(joints) {
+        *kept = *q;
+    }
+}
