@@ -21,6 +21,14 @@ def parts_of(terrain: Terrain) -> Iterator[Terrain]:
         yield terrain
 
 
+def sand_of(terrain: Terrain) -> SoftGround | None:
+    """The sand of a terrain; None on firm ground."""
+    if isinstance(terrain, SoftGround):
+        return terrain
+    parts = terrain.parts if isinstance(terrain, Union) else ()
+    return next((sand for sand in map(sand_of, parts) if sand is not None), None)
+
+
 def plane_of(terrain: Terrain) -> Plane | None:
     """The plane of a terrain, under spheres and other parts too; None where there is none."""
     for part in parts_of(terrain):

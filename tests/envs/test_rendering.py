@@ -23,12 +23,15 @@ from gymnasium.wrappers import RecordVideo
 import rover_gym
 from rover_gym import OptionError, Plane, RoverEnv, RoverModel, Simulation, SphereField
 from rover_gym.env import resting_pose, tilted_plane
+from rover_gym.env.sand_ground import sand_rover
 from rover_gym.extras import MissingExtraError
 from rover_gym.mechanics import ModelError
 from rover_gym.rendering import FrameRenderer
 from rover_gym.rendering import appearance as look
 from rover_gym.rendering.appearance import Part, part_mesh, rover_parts
 from rover_gym.rendering.frames import contact_forces
+from rover_gym.rendering.rut_actor import rut_mesh
+from rover_gym.sand import SoftGround, named_soil
 
 Frame = npt.NDArray[np.uint8]
 
@@ -243,6 +246,47 @@ def test_the_camera_follows_and_the_rover_stays_in_the_middle(renderer: Callable
     assert np.all(np.abs(np.array(centres) - (60.0, 80.0)) < (25.0, 30.0))
     steps = np.abs(np.diff(centres, axis=0))
     assert steps.max() < 3.0, "no jump between frames"
+
+
+def test_ruts_lie_on_the_surface_and_are_darker_where_they_are_deep() -> None:
+    square = np.stack(np.meshgrid(np.arange(10), np.arange(10)), axis=-1).reshape(-1, 2)
+    places = (np.vstack((square, square + np.array([30, -4]))) + 0.5) * 0.02
+    depths = np.repeat([0.01, 0.04], 100)
+    slope = tilted_plane(0.2, 0.0)
+    vertices, faces, colours = rut_mesh(np.column_stack((places, depths)), 0.02, slope)
+    middles = vertices[faces].mean(axis=1)
+    np.testing.assert_allclose(middles[:, [0, 2]], places, atol=1e-12)
+    above = [y - slope.height(x, z) for x, y, z in vertices]
+    assert all(0.0 < height < 0.004 for height in above)
+    inside = ((places >= 0.05) & (places <= 0.15)).all(axis=1), (np.abs(places - [0.7, 0.02]) <= 0.05).all(axis=1)
+    shallow, deep = (colours[faces[chosen]] for chosen in inside)
+    assert len(shallow) > 10
+    assert deep.sum(axis=-1).max() < shallow.sum(axis=-1).min()
+
+
+def test_tracks_in_sand_are_seen_behind_the_rover() -> None:
+    rover, sand = sand_rover(), SoftGround(Plane(), named_soil("cmu-sand"))
+    simulation = Simulation(rover, sand, time_step=0.005)
+    q = simulation.q
+    q[1] = 0.23
+    simulation.set_state(q)
+    simulation.step(100)
+    simulation.set_wheel_torques([1.0] * 6)
+    simulation.step(400)
+    state = simulation.sand()
+    assert state is not None
+    ruts, behind = state["ruts"], simulation.q[0] - 0.7
+    assert ruts[:, 0].min() < behind, "it has not driven far enough"
+    with FrameRenderer(rover, sand, **SIZE, camera="top") as renderer:
+        driven = renderer.render(simulation).astype(int)
+    fresh = Simulation(rover, sand, time_step=0.005)
+    fresh.set_state(simulation.q)
+    with FrameRenderer(rover, sand, **SIZE, camera="top") as renderer:
+        untouched = renderer.render(fresh).astype(int)
+    changed = np.abs(driven - untouched).max(axis=2) > 8
+    height, middle = SIZE["height"], SIZE["height"] // 2
+    assert changed[middle + 5 :].sum() > 20, "no track behind the rover"
+    assert not changed[: height // 3].any(), "the ground ahead is untouched"
 
 
 def test_a_slope_is_seen(model: RoverModel, renderer: Callable[..., FrameRenderer]) -> None:

@@ -237,7 +237,7 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
 
     A wheel in sand counts as in contact: its `wheel_gap` is minus its sinkage, `normal_force` and `tangential_force` are
     those of the sand, and `slip_ratio` in `info` counts it. `simulation.sand()` has the sinkage, slip and force of each wheel,
-    and the ruts. Frames show the undisturbed surface.
+    and the ruts. Frames show the ruts on the undisturbed surface.
 
     ## End
 

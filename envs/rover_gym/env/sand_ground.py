@@ -1,6 +1,7 @@
 """The sand of episodes: soils to draw from, and a rover that they carry."""
 
-from rover_gym.mechanics import ModelError, OptionError, RoverModel, SoftGround, Terrain, Union
+from rover_gym.ground import sand_of
+from rover_gym.mechanics import ModelError, OptionError, RoverModel, Terrain
 from rover_gym.sand.soils import Soil, named_soil
 from rover_gym.validation import refuse
 
@@ -56,10 +57,8 @@ def soils_of(terrain: object, given: tuple[Soil, ...] | None) -> tuple[Soil, ...
 
 def soil_of(soils: tuple[Soil, ...], terrain: Terrain) -> Soil | None:
     """Which of some soils lies under a terrain; None on firm ground."""
-    if isinstance(terrain, SoftGround):
-        numbers = terrain.soil
-        alike = (soil for soil in soils if all(numbers.get(name) == own for name, own in soil.numbers.items()))
-        return next(alike, None)
-    parts = terrain.parts if isinstance(terrain, Union) else ()
-    found = (soil_of(soils, part) for part in parts)
-    return next((soil for soil in found if soil is not None), None)
+    sand = sand_of(terrain)
+    if sand is None:
+        return None
+    alike = (soil for soil in soils if all(sand.soil.get(name) == own for name, own in soil.numbers.items()))
+    return next(alike, None)

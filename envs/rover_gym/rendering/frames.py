@@ -19,11 +19,12 @@ from vtkmodules.vtkFiltersSources import vtkArrowSource
 from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkRenderer, vtkRenderWindow
 
 from rover_gym.extras import require
-from rover_gym.ground import plane_of, spheres_of, surfaces_of
+from rover_gym.ground import plane_of, sand_of, spheres_of, surfaces_of
 from rover_gym.mechanics import RoverModel, Simulation, Terrain
 from rover_gym.rendering import appearance as look
 from rover_gym.rendering.appearance import Array, Faces, actor_of, actor_with, level, mesh, set_points, set_pose
 from rover_gym.rendering.render_options import Camera, check_render_options
+from rover_gym.rendering.rut_actor import RutActor
 from rover_gym.rendering.scenery_actors import (
     FAR,
     Goal,
@@ -171,7 +172,10 @@ class FrameRenderer(Picture):
         self._rocks = RockActors(centres, radii, self._ground) if len(radii) else None
         self._surfaces = [SurfaceActor(surface) for surface in surfaces_of(terrain)]
         self._shadows: dict[str, vtkActor] = {}
+        sand = sand_of(terrain)
+        self._ruts = None if sand is None else RutActor(sand)
         self._stage = [surface.actor for surface in self._surfaces]
+        self._stage += [] if self._ruts is None else [self._ruts.actor]
         self._stage += [] if self._rocks is None else self._rocks.actors
         if self._ground is not None:
             self._shadows = {solid: shadow_of(actor, self._ground) for solid, actor in self._solids.items()}
@@ -196,6 +200,9 @@ class FrameRenderer(Picture):
             surface.follow(position)
         if self._rocks is not None:
             self._rocks.follow(position)
+        sand = None if self._ruts is None else simulation.sand()
+        if self._ruts is not None and sand is not None:
+            self._ruts.follow(sand["ruts"])
         if self.options.show_forces:
             self._place_arrows(simulation)
         self._place_camera(simulation, position)

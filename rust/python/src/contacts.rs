@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use rover_core::contact::{Contact, Part};
 use rover_core::multibody::Model;
 use rover_core::simulation::{
-    ActiveContact, Components, GrainBed, GrainSimulation, LocatedContact, Scene,
+    ActiveContact, BedMemory, Components, GrainBed, GrainSimulation, LocatedContact, Scene,
 };
 use rover_core::system::PlanarContact;
 use rover_core::system::grains::GrainContact;
@@ -217,14 +217,10 @@ pub struct GrainContacts {
 }
 
 impl GrainContacts {
-    /// The contacts of a bed. The solver's impulses bear the cohesion as well. `moment`: of rolling
-    /// and drilling friction on the first body.
-    pub fn of<const D: usize>(
-        bed: &GrainSimulation<D>,
-        moment: impl Fn(&GrainContact<D>) -> [f64; 3],
-    ) -> Self
+    /// The contacts of a bed. The solver's impulses bear the cohesion as well.
+    pub fn of<const D: usize>(bed: &GrainSimulation<D>) -> Self
     where
-        GrainBed<D>: Scene<Contact = GrainContact<D>>,
+        GrainBed<D>: Scene<Contact = GrainContact<D>, Memory = BedMemory>,
     {
         let (scene, h) = (&bed.scene().soil, bed.options().time_step);
         let wheels = scene.machine.as_ref().map_or(0, |m| m.n_wheels());
@@ -254,7 +250,7 @@ impl GrainContacts {
             impulses,
             velocities,
             world_impulses: rows(&active, on_first),
-            world_moments: fresh_rows(active.iter().map(|a| moment(&a.contact))),
+            world_moments: fresh_rows(active.iter().map(|a| bed.moment(&a.contact))),
         }
     }
 }

@@ -283,8 +283,7 @@ impl GrainSimulation {
     /// The contacts of the last step.
     #[getter]
     fn contacts(&self) -> Result<GrainContacts> {
-        let inner = self.open()?;
-        Ok(GrainContacts::of(&inner, |contact| inner.moment(contact)))
+        Ok(GrainContacts::of(&*self.open()?))
     }
 
     /// Momentum of the balls, (6,): along x, y, z, kg m/s, and about the origin, kg m²/s.

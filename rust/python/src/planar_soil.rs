@@ -348,8 +348,7 @@ impl SoilSimulation {
     /// The contacts of the last step.
     #[getter]
     fn contacts(&self) -> Result<GrainContacts> {
-        let inner = self.open()?;
-        Ok(GrainContacts::of(&inner, |contact| inner.moment(contact)))
+        Ok(GrainContacts::of(&*self.open()?))
     }
 
     /// Momentum of the disks, (3,): along x and y, kg m/s, and about the origin, kg m²/s.

@@ -21,7 +21,7 @@
 //!
 //! # May use
 //!
-//! No other chapter: a cone is a set of vectors.
+//! [`crate::spatial`].
 
 mod disc;
 mod dual_cone;

@@ -1,7 +1,7 @@
 //! Delassus operator `W = Hᵀ M̂⁻¹ H` of the contacts of one machine, and the map from impulses to
 //! velocities.
 //!
-//! The [rows](super::rows) of a contact between two bodies lie along the union of their paths.
+//! The rows (page `rows`) of a contact between two bodies lie along the union of their paths.
 
 use std::ops::Range;
 

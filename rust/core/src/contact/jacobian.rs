@@ -103,8 +103,8 @@ pub fn generalized_impulse(
     }
 }
 
-/// Calls `act` with each velocity and the generalized impulse on it of a contact's impulse `p`, N s.
-/// The other body receives the opposite impulse at the same point.
+/// Calls `act` with each velocity and the generalized impulse on it of a contact's impulse `p`,
+/// N s. The other body receives the opposite impulse at the same point.
 #[inline]
 pub(crate) fn add_impulse(
     motion: &impl BodyMotion,

@@ -31,7 +31,7 @@
 //!
 //! # May use
 //!
-//! [`crate::multibody`], [`crate::geometry`], [`crate::law`].
+//! [`crate::scalar`], [`crate::multibody`], [`crate::geometry`], [`crate::law`].
 
 pub mod activation;
 pub(crate) mod body_motion;

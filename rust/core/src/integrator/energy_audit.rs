@@ -124,7 +124,7 @@ impl Audit {
         let dissipated = -contact_work::<S>(options, start.v, warm_start, ws);
         let Balance {
             after,
-            excess: balance,
+            excess,
             work,
             released,
         } = if self.is_last {
@@ -132,8 +132,8 @@ impl Audit {
         } else {
             balance(system, options, start, ws, &before)
         };
-        let excess = balance.value;
-        if !excess.is_finite() {
+        let gained = excess.value;
+        if !gained.is_finite() {
             return if self.is_last {
                 Verdict::Sound // not finite: refused when the step ends
             } else {
@@ -142,22 +142,21 @@ impl Audit {
         }
         // With θ > ½ the scheme itself dissipates.
         let is_free = ws.contacts.is_empty() && options.theta <= 0.5;
-        if balance.is_balanced(is_free, [self.gain, self.drift]) {
-            report.energy_gain = report.energy_gain.max(balance.relative());
-            report.enter_balance(dissipated, 0.0, released, excess);
+        if excess.is_balanced(is_free, [self.gain, self.drift]) {
+            report.energy_gain = report.energy_gain.max(excess.relative());
+            report.enter_balance(dissipated, 0.0, released, gained);
             ws.audited.is(&ws.end, &ws.v, after);
             return Verdict::Sound;
         }
-        if balance.is_coarse(is_free, self.gain) && !self.is_last {
+        if excess.is_coarse(is_free, self.gain) && !self.is_last {
             return Verdict::Coarse;
         }
         let d = S::DIMENSION.components();
         let nothing_outside = is_free || ws.contacts.iter().all(UnilateralContact::is_internal);
-        let (share, is_enough) =
-            balance.share_of_relative_motion(after.momentum.into(), after.mass);
-        let is_relative = is_enough && nothing_outside && (is_free || excess > 0.0);
-        if is_relative || excess > 0.0 {
-            let share = if is_relative { share } else { balance.share() };
+        let (share, is_enough) = excess.share_of_relative_motion(after.momentum.into(), after.mass);
+        let is_relative = is_enough && nothing_outside && (is_free || gained > 0.0);
+        if is_relative || gained > 0.0 {
+            let share = if is_relative { share } else { excess.share() };
             if options.is_elastic() && !is_free {
                 report.residual = report.residual.max(violation_by(share, ws, d));
             }
@@ -166,7 +165,7 @@ impl Audit {
             } else {
                 shorten(ws, share);
             }
-            if balance.is_left(self.gain) {
+            if excess.is_left(self.gain) {
                 self.hold_back(system, options, start, ws);
             }
         }
@@ -174,7 +173,7 @@ impl Audit {
             let change =
                 (corrected.kinetic - before.kinetic) + (corrected.potential - before.potential);
             let left = change - work - released;
-            report.enter_balance(dissipated, excess.max(0.0), released, left);
+            report.enter_balance(dissipated, gained.max(0.0), released, left);
             ws.audited.is(&ws.end, &ws.v, corrected);
         }
         Verdict::Sound

@@ -390,8 +390,7 @@ pub trait MechanicalSystem {
     fn solve_step(
         &mut self,
         _free: (&[f64], &[f64]),
-        q: &[f64],
-        mu: &[f64],
+        (q, mu): (&[f64], &[f64]),
         options: &SolverOptions,
         p: &mut [f64],
         u: &mut [f64],

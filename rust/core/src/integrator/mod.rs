@@ -34,7 +34,8 @@
 //!
 //! # May use
 //!
-//! [`crate::law`], [`crate::contact`], [`crate::problem`], [`crate::solver`].
+//! [`crate::scalar`], [`crate::spatial`], [`crate::law`], [`crate::contact`], [`crate::problem`],
+//! [`crate::solver`].
 //!
 //! No machine: a scheme knows a [`MechanicalSystem`].
 

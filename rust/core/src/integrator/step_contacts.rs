@@ -352,8 +352,7 @@ fn solve_problem<S: MechanicalSystem>(
     let solver_options = ws.solver_options(&options.solver);
     let solved = system.solve_step(
         (&ws.v, &ws.y),
-        &ws.q_free,
-        &ws.mu,
+        (&ws.q_free, &ws.mu),
         &solver_options,
         &mut ws.p,
         &mut ws.u,

@@ -1,22 +1,24 @@
 //! The fast step of a rover, one or several to a register.
 //!
 //! Most steps of a wheeled rover are alike: a tree of joints on a free base, wheels that roll and
-//! slip, motors, springs and stops. These sources take such a step over a scalar
-//! ([`crate::scalar`]) that is one rover or four or eight. They branch on the kind of joint body by
-//! body, since the rovers of a block share their tree. What is rare, such as a body that touches
-//! the ground, is found rover by rover. A step that cannot be taken so falls back to
-//! [`crate::integrator`], rover by rover, before anything has changed.
+//! slip, motors, springs and stops. The code of such a step is generic over a scalar
+//! ([`crate::scalar`]): one rover, four or eight. The rovers of a block share their tree, so the
+//! code branches on the kind of a joint or a wheel, never on its state. What is rare, such as a
+//! chassis on the ground, is found rover by rover. If a rover needs something else, it leaves the
+//! block before its state changes, and the general step of [`crate::integrator`] takes it.
 //!
-//! The dynamics of the tree are those of [`crate::multibody`].
-//!
-//! - [`admission`]: which options have a fast step; [`machine`]: what the rovers share;
-//! - `parts`, [`ground`], `contact_plane`, `pieces`, `rolling`, [`forecast`], [`contacts`],
-//!   `by_lane`, `lane_detection`, `free_slots`, `stops`: what touches what;
-//!   [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield;
-//! - [`problem`], `system`, `equations`, [`pattern`], `tree_matrix`, `velocity_equations`,
-//!   `sweeps`, `lane_solver`, [`queue`]: the friction-contact problems, which
-//!   [`crate::solver`]'s pivoting solves;
-//! - [`step`]: the step.
+//! - [`admission`]: which options have a fast step; [`machine`]: what the rovers of a block share;
+//!   `parts`: its wheels, boxes and balls; [`lane_rover`]: what a block reads of a rover;
+//! - [`ground`], `contact_plane`, `pieces`: the ground near a wheel; `rolling`, `wide_wheel`,
+//!   `stops`, [`forecast`]: contacts of all lanes at once; `lane_detection`, `by_lane`,
+//!   `free_slots`: of one lane; [`contacts`]: all of them, in slots;
+//! - [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield; [`pattern`]: which
+//!   velocities a contact moves;
+//! - [`problem`]: a rover's friction-contact problem; [`queue`], `lane_solver`, `sweeps`: how the
+//!   problems of many are solved, by [`crate::solver`]'s pivoting; `system`, `equations`,
+//!   `velocity_equations`, `tree_matrix`: its linear systems;
+//! - [`step`]: the step. The dynamics of the tree are those of [`crate::multibody`], its drives
+//!   those of [`crate::system`].
 //!
 //! # One call
 //!

@@ -43,9 +43,10 @@ mod tests {
     fn it_stops_the_approach_and_leaves_the_slip() {
         let W = [[0.5, 0.1, 0.0], [0.1, 0.5, 0.0], [0.0, 0.0, 0.5]];
         let p = Frictionless.answer(&W, &[-1.0, 3.0, 0.0]);
-        assert!((p[0] - 2.0).abs() < 1e-15 && p[1] == 0.0 && p[2] == 0.0);
-        assert_eq!(Frictionless.answer(&W, &[0.1, 3.0, 0.0]), [0.0; 3]);
+        assert!((p[0] - 2.0).abs() < 1e-15 && p[1].abs() < 1e-300 && p[2].abs() < 1e-300);
+        let open = Frictionless.answer(&W, &[0.1, 3.0, 0.0]);
+        assert!(open.iter().all(|p| p.abs() < 1e-300));
         let off = Frictionless.violation(&p, &[0.0, 3.2, 0.0], [2.0; 2]);
-        assert_eq!(off, [0.0; 3]);
+        assert!(off.iter().all(|v: &f64| v.abs() < 1e-15));
     }
 }

@@ -33,7 +33,7 @@
 //!
 //! # May use
 //!
-//! [`crate::cone`], [`crate::quantity`].
+//! [`crate::cone`], [`crate::quantity`], [`crate::scalar`], [`crate::spatial`].
 //!
 //! A law sees one contact; it knows no solver and no body.
 

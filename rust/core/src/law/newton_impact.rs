@@ -37,10 +37,13 @@ mod tests {
     #[test]
     fn a_pair_bounces_only_where_it_meets_fast_and_within_the_step() {
         let step = (1e-3, 0.02);
-        assert_eq!(rebound_at_gap(0.5, -1.0, 5e-4, step), -0.5, "an impact");
-        assert_eq!(rebound_at_gap(0.5, -1.0, 2e-3, step), 2.0, "too far");
-        assert_eq!(rebound_at_gap(0.5, -0.01, 0.0, step), 0.0, "too slow");
-        assert_eq!(rebound_at_gap(0.5, 1.0, 0.0, step), 0.5, "parts");
-        assert_eq!(rebound_at_gap(0.0, -1.0, -1e-4, step), 0.0, "overlaps");
+        let is = |shift: f64, expected: f64, what: &str| {
+            assert!((shift - expected).abs() < 1e-15, "{what}: {shift}");
+        };
+        is(rebound_at_gap(0.5, -1.0, 5e-4, step), -0.5, "an impact");
+        is(rebound_at_gap(0.5, -1.0, 2e-3, step), 2.0, "too far");
+        is(rebound_at_gap(0.5, -0.01, 0.0, step), 0.0, "too slow");
+        is(rebound_at_gap(0.5, 1.0, 0.0, step), 0.5, "parts");
+        is(rebound_at_gap(0.0, -1.0, -1e-4, step), 0.0, "overlaps");
     }
 }

@@ -104,10 +104,10 @@ const COMMAND: f64 = 2.0;
 /// Drives with their commands and the present branches of their torques in a step, a drive a lane.
 ///
 /// Branches are numbered from 0 to 4 in the order of the rate; on each the torque is
-/// `at_rest − active ω`. A step with one branch yields the rate at its end, and thus the side of the
-/// branch on which the motor works. For a single wheel, moving one branch at a time terminates after
-/// at most four steps, since the torque falls with the rate. Jumping directly to the branch of that
-/// rate may alternate forever.
+/// `at_rest − active ω`. A step with one branch yields the rate at its end, and thus the side of
+/// the branch on which the motor works. For a single wheel, moving one branch at a time terminates
+/// after at most four steps, since the torque falls with the rate. Jumping directly to the branch
+/// of that rate may alternate forever.
 #[derive(Clone, Copy, Debug)]
 pub struct MotorLine<T> {
     /// Command within the stall torque, N m; 0 without a drive.

@@ -454,14 +454,6 @@ where
         sum.into()
     }
 
-    /// Moment of rolling and drilling friction of a contact of the last step on its first body,
-    /// N m s.
-    #[must_use]
-    pub fn moment(&self, contact: &GrainContact<D>) -> [f64; 3] {
-        let radius = self.soil().grains.radius();
-        grains::moment_of(radius, &self.memory.moments, contact.key)
-    }
-
     /// Current deepest overlap, m: 0 if nothing overlaps. Overlaps of kinematic grains with each
     /// other and with walls do not count.
     #[must_use]
@@ -473,6 +465,19 @@ where
     pub fn wake(&mut self) {
         let kinematic = self.scene.soil.grains.kinematic();
         self.memory.sleep.wake_all(kinematic, &mut self.warm_start);
+    }
+}
+
+impl<const D: usize> Simulation<GrainBed<D>>
+where
+    GrainBed<D>: Scene<Contact = GrainContact<D>, Memory = BedMemory>,
+{
+    /// Moment of rolling and drilling friction of a contact of the last step on its first body,
+    /// N m s.
+    #[must_use]
+    pub fn moment(&self, contact: &GrainContact<D>) -> [f64; 3] {
+        let radius = self.scene.soil.grains.radius();
+        grains::moment_of(radius, &self.memory.moments, contact.key)
     }
 }
 

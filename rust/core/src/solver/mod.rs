@@ -5,7 +5,7 @@
 //!
 //! - `options`, `report`, `history`, `work`: the caller's options, the report, the residuals on the
 //!   way, and the count of work;
-//! - `local`: one contact with all others fixed: its exact [solution](solve_one_contact) and its
+//! - `local`: one contact with all others fixed, answered by its law ([`crate::law`]), and its
 //!   mode;
 //! - `linear`: the linear system of a Newton step and its factors, dense or block-sparse;
 //! - `pivoting`: pivoting on the contact modes, over any scalar, storage and linear system;

@@ -80,8 +80,8 @@ impl<T: Lane> Drives<T> {
         }
     }
 
-    /// Sets the command of a lane whose machine has these `joints`. [`Self::finish_loading`] follows
-    /// after all lanes.
+    /// Sets the command of a lane whose machine has these `joints`. [`Self::finish_loading`]
+    /// follows after all lanes.
     pub fn set_lane(&mut self, lane: usize, joints: &[JointProperties], command: &Command) {
         let drives = command.drives.iter().zip(&command.held);
         let commands = command.torque.iter().zip(drives);

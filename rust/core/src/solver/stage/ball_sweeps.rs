@@ -84,14 +84,14 @@ impl Rest {
 }
 
 /// Rows of contacts side by side, and what belongs to each.
-struct Rows<'a> {
+struct Part<'a> {
     rows: &'a mut [BallRow],
     rests: &'a mut [Rest],
     /// None where no contact bears a moment.
     rolls: &'a mut [RollRow],
 }
 
-impl<'a> Rows<'a> {
+impl Part<'_> {
     /// The first `count`, and the others.
     fn split(self, count: usize) -> (Self, Self) {
         let (rows, more_rows) = self.rows.split_at_mut(count);
@@ -201,9 +201,9 @@ impl Layout<'_> {
         self,
         parity: usize,
         range: std::ops::Range<usize>,
-        rows: Rows<'_>,
+        rows: Part<'_>,
         balls: &mut [Ball],
-        visit: &(impl Fn(Rows<'_>, &mut [Ball]) -> T + Sync),
+        visit: &(impl Fn(Part<'_>, &mut [Ball]) -> T + Sync),
         plus: &(impl Fn(T, T) -> T + Sync),
     ) -> T {
         let first = parity + 2 * range.start;
@@ -402,7 +402,7 @@ impl BallSweeps {
     /// Visits all contacts but the machine's: the sum of what they return.
     fn each<T: Send + Default>(
         &mut self,
-        visit: impl Fn(Rows<'_>, &mut [Ball]) -> T + Sync,
+        visit: impl Fn(Part<'_>, &mut [Ball]) -> T + Sync,
         plus: impl Fn(T, T) -> T + Sync,
     ) -> T {
         let n_slabs = self.slabs.len() - 1;
@@ -437,7 +437,7 @@ impl BallSweeps {
             ball.turning[..3].fill(0.0);
         }
         self.own.fill(0.0);
-        let add = |mut rows: Rows<'_>, balls: &mut [Ball]| {
+        let add = |mut rows: Part<'_>, balls: &mut [Ball]| {
             for row in &*rows.rows {
                 row.add(&row.p, balls);
             }
@@ -504,8 +504,8 @@ fn all_rows<'a>(
     rows: &'a mut [BallRow],
     rests: &'a mut [Rest],
     rolls: &'a mut [RollRow],
-) -> Rows<'a> {
-    Rows { rows, rests, rolls }
+) -> Part<'a> {
+    Part { rows, rests, rolls }
 }
 
 /// See [`BallSweeps::extrapolate`].
@@ -542,8 +542,8 @@ impl Relaxation for BallSolve<'_> {
         // No change is below that.
         let quiet = if is_hard { -1.0 } else { self.sweeps.quiet };
         let shares = (share, quiet);
-        let visit = |rows: Rows<'_>, balls: &mut [Ball]| {
-            let Rows { rows, rests, rolls } = rows;
+        let visit = |rows: Part<'_>, balls: &mut [Ball]| {
+            let Part { rows, rests, rolls } = rows;
             let mut change = 0.0;
             let both = rows.iter_mut().zip(rests);
             if rolls.is_empty() {
@@ -572,7 +572,7 @@ impl Relaxation for BallSolve<'_> {
 
     fn measure(&mut self) -> Measured {
         self.sweeps.sum(self.pairs);
-        let judge = |mut rows: Rows<'_>, balls: &mut [Ball]| {
+        let judge = |mut rows: Part<'_>, balls: &mut [Ball]| {
             let mut sums = Sums::default();
             for row in &*rows.rows {
                 sums.add(&row.judge(balls));

@@ -432,8 +432,7 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
     fn solve_step(
         &mut self,
         (v, y): (&[f64], &[f64]),
-        q: &[f64],
-        mu: &[f64],
+        (q, mu): (&[f64], &[f64]),
         options: &SolverOptions,
         p: &mut [f64],
         u: &mut [f64],
@@ -442,13 +441,13 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
         let free = (self.halves(v).0, self.halves(y).0);
         let parts = &*self.parts;
         if !parts.touches.is_empty() {
-            return (self.bed).solve_step(free, q, mu, options, p, u, workspace);
+            return (self.bed).solve_step(free, (q, mu), options, p, u, workspace);
         }
         let (mu_a, mu_b) = mu.split_at(parts.of_grains.len());
         let ([q_a, q_b, _], [p_a, p_b, _]) = (parts.split(q), parts.split_mut(p));
         let [u_a, u_b, _] = parts.split_mut(u);
         harder(
-            &(self.bed).solve_step(free, q_a, mu_a, options, p_a, u_a, workspace),
+            &(self.bed).solve_step(free, (q_a, mu_a), options, p_a, u_a, workspace),
             &self.tree.solve(q_b, mu_b, options, p_b, u_b, workspace),
         )
     }

@@ -6,7 +6,7 @@
 //!
 //! - [`bodies`], [`wall`], [`scene`]: the description; [`packing`]: initial positions without
 //!   overlap, from a seed;
-//! - [`cohesion`]: an attraction of contacts;
+//! - [`crate::law::cohesion`]: an attraction of contacts;
 //! - [`grid`]: the search for neighbours; [`contact`]: a contact and its key;
 //! - [`system`]: grains as a mechanical system for [`crate::integrator`]; `search` and `detection`:
 //!   its contacts; `measures`: energy, momentum, overlap;

@@ -72,10 +72,8 @@ impl RollingParts {
         if friction.rolling.is_none() {
             return;
         }
-        let rough = |mu: f64| match mu > 0.0 {
-            true => friction.rolling,
-            false => RollingFriction::default(),
-        };
+        let smooth = RollingFriction::default();
+        let rough = |mu: f64| if mu > 0.0 { friction.rolling } else { smooth };
         let laws = [rough(friction.grains), rough(friction.walls)];
         let among = contacts.iter().map(|contact| contact.key);
         for key in among.filter(|key| (key.a as usize) < n) {

@@ -592,8 +592,7 @@ where
     fn solve_step(
         &mut self,
         (v, y): (&[f64], &[f64]),
-        q: &[f64],
-        mu: &[f64],
+        (q, mu): (&[f64], &[f64]),
         options: &SolverOptions,
         p: &mut [f64],
         u: &mut [f64],
