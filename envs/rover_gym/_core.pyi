@@ -12,7 +12,8 @@ import numpy.typing as npt
 from typing_extensions import disjoint_base
 
 from rover_gym.maps import terrain_files
-from rover_gym.models import model_files
+from rover_gym.maps.fractal import fractal_map
+from rover_gym.models import file_writing, model_files
 
 _Array: TypeAlias = npt.NDArray[np.float64]
 _Rows: TypeAlias = npt.NDArray[np.uint64]
@@ -32,7 +33,7 @@ class _SparseArray(Protocol):
     def shape(self) -> tuple[int, ...]: ...
     def tobsr(self, blocksize: tuple[int, int] | None = ..., copy: bool = ...) -> Any: ...
 
-__all__ = [
+__all__: list[str] = [
     "AnySimulation",
     "BallSimulation",
     "BusyError",
@@ -244,8 +245,8 @@ class RoverModel:
         was derived from an imported one.
         """
     def _with_import_report(self, report: object) -> RoverModel: ...
-    to_urdf = model_files.to_urdf
-    to_mjcf = model_files.to_mjcf
+    to_urdf = file_writing.write_urdf
+    to_mjcf = file_writing.write_mjcf
     def replace(
         self,
         *,
@@ -808,7 +809,7 @@ class HeightField(Terrain):
         material: str = "ground",
     ) -> HeightField: ...
     from_file = staticmethod(terrain_files.height_field_from_file)
-    fractal = staticmethod(terrain_files.fractal)
+    fractal = staticmethod(fractal_map)
     @property
     def material(self) -> str:
         """Name of its material."""

@@ -214,12 +214,11 @@ def _check_kind(field: str, value: object, kind: Kind) -> None:
     if value is None and None in kinds:
         return
     kinds = tuple(one for one in kinds if one is not None)
-    if any(_is_of_kind(value, one) for one in kinds):
-        for one in kinds:
-            if one is float:
-                number(field, value)
-            elif one is int:
-                whole(field, value)
+    if fitting := [one for one in kinds if _is_of_kind(value, one)]:
+        if float in fitting:
+            number(field, value)
+        elif int in fitting:
+            whole(field, value)
         return
     words = [_in_words(one) for one in kinds]
     if kinds != (kind if isinstance(kind, tuple) else (kind,)):

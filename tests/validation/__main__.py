@@ -6,55 +6,19 @@ Writes `docs/validation/*.json` and pictures, and the tables of `docs/tables/val
 import argparse
 import json
 import os
+from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from rich.console import Console
 
-from validation import (
-    balance,
-    ball_balance,
-    ball_collapse,
-    ball_drum,
-    ball_impact,
-    ball_janssen,
-    ball_packing,
-    ball_repose,
-    ball_silo,
-    collapse,
-    drawing,
-    findings,
-    hourglass,
-    janssen,
-    packing,
-    plate_on_balls,
-    repose,
-    wheel_on_balls,
-)
+from validation import drawing, findings
 from validation.watch import Ledger
 
 DOCS = Path(__file__).parents[2] / "docs"
 FOLDER = DOCS / "validation"
 MARK = "<!-- tables: made by `make validate`, not by hand -->"
-PARTS: dict[str, ModuleType] = {
-    "collapse": collapse,
-    "packing": packing,
-    "repose": repose,
-    "janssen": janssen,
-    "hourglass": hourglass,
-    "balance": balance,
-    "ball_packing": ball_packing,
-    "ball_balance": ball_balance,
-    "ball_impact": ball_impact,
-    "ball_collapse": ball_collapse,
-    "ball_silo": ball_silo,
-    "ball_drum": ball_drum,
-    "ball_repose": ball_repose,
-    "ball_janssen": ball_janssen,
-    "wheel_on_balls": wheel_on_balls,
-    "plate_on_balls": plate_on_balls,
-}
+PARTS = {name: import_module(f"validation.{name}") for name in findings.PARTS}
 PICTURES = drawing.PICTURES
 
 

@@ -376,23 +376,27 @@ def everywhere(ledgers: dict[str, dict[str, float]]) -> Iterator[Finding]:
             )
 
 
+#: What each part must have found, by the name of its module.
 PARTS = {
-    "collapse": collapse,
-    "packing": packing,
-    "repose": repose,
-    "janssen": janssen,
-    "hourglass": hourglass,
-    "balance": balance,
-    "ball_packing": ball_packing,
-    "ball_balance": ball_balance,
-    "ball_impact": ball_impact,
-    "ball_collapse": ball_collapse,
-    "ball_silo": ball_silo,
-    "ball_drum": ball_drum,
-    "ball_repose": ball_repose,
-    "ball_janssen": ball_janssen,
-    "wheel_on_balls": wheel_on_balls,
-    "plate_on_balls": plate_on_balls,
+    part.__name__: part
+    for part in (
+        collapse,
+        packing,
+        repose,
+        janssen,
+        hourglass,
+        balance,
+        ball_packing,
+        ball_balance,
+        ball_impact,
+        ball_collapse,
+        ball_silo,
+        ball_drum,
+        ball_repose,
+        ball_janssen,
+        wheel_on_balls,
+        plate_on_balls,
+    )
 }
 
 

@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import TerrainError
+from rover_gym.mechanics import HeightField, TerrainError
 from rover_gym.validation import number, refuse, whole
 
 Heights: TypeAlias = npt.NDArray[np.float64]
@@ -50,26 +50,47 @@ def pair(field: str, value: object, *, above: float | None = None) -> Pair:
 
 
 def fractal_map(
-    size: object,
-    spacing: object,
-    roughness: object,
+    size: float | tuple[float, float],
+    spacing: float | tuple[float, float],
+    roughness: float,
     *,
-    hurst: object = 0.7,
-    longest_wave: object = None,
-    craters: object = 0.0,
-    crater_diameter: object = (0.5, 5.0),
-    ripple_height: object = 0.0,
-    ripple_length: object = 1.0,
-    seed: object = 0,
-    origin: object = None,
-) -> tuple[npt.NDArray[np.float32], Pair, Pair]:
-    """Makes a map; the arguments are those of `HeightField.fractal`.
+    hurst: float = 0.7,
+    longest_wave: float | None = None,
+    craters: float = 0.0,
+    crater_diameter: tuple[float, float] = (0.5, 5.0),
+    ripple_height: float = 0.0,
+    ripple_length: float = 1.0,
+    seed: int = 0,
+    origin: tuple[float, float] | None = None,
+    material: str = "ground",
+) -> HeightField:
+    """Rough ground made by a seed: a self-affine surface, with craters and ripples on demand.
 
-    Returns:
-        Heights `(n_z, n_x) float32`, spacing and origin, m.
+    The power of a wave of k cycles a metre falls as k^(-2 hurst - 2) from `longest_wave` to two
+    cells. Craters are bowls with a rim, a fifth as deep as wide; those as wide as D or wider
+    number D^-2. Ripples are waves across x, steeper on one side.
+
+    Args:
+        size: Extent along x and z, m: one number, or two.
+        spacing: Distance of columns and of rows, m.
+        roughness: Root mean square of the rough part's heights, m.
+        hurst: Hurst exponent, in (0, 1); 0.7 by default.
+        longest_wave: Longest wave, m; half the smaller extent by default.
+        craters: Expected number of craters in each m² of a diameter of 1 m or more; 0 by
+            default.
+        crater_diameter: Smallest and largest diameter of craters, m; (0.5, 5) by default.
+        ripple_height: Height of ripples from trough to crest, m; 0 by default.
+        ripple_length: Their wavelength, m.
+        seed: Seed of the random numbers; equal seeds give equal ground.
+        origin: Place (x, z) of the first height, m; by default such that the map's middle is
+            at the world's origin.
+        material: Name of its material.
 
     Raises:
         TerrainError: An argument is out of its range.
+
+    Source: Turcotte 1997 (spectral synthesis); Pike 1977 and McGetchin, Settle and Head
+    1973 (craters).
     """
     extent, step = pair("size", size, above=0.0), pair("spacing", spacing, above=0.0)
     rms = number("roughness", roughness, at_least=0.0, error=TerrainError)
@@ -97,7 +118,7 @@ def fractal_map(
     if ripple > 0.0:
         phase = 2.0 * np.pi * (np.arange(columns) * step[0] / length + random.random())
         heights += 0.5 * ripple * np.sin(phase + 0.5 * np.sin(phase))
-    return heights.astype(np.float32), step, place
+    return HeightField(heights.astype(np.float32), step, place, material)
 
 
 def _rough(

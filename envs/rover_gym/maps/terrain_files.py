@@ -96,65 +96,6 @@ def height_field_from_file(
     return HeightField(*read, material)
 
 
-def fractal(
-    size: float | tuple[float, float],
-    spacing: float | tuple[float, float],
-    roughness: float,
-    *,
-    hurst: float = 0.7,
-    longest_wave: float | None = None,
-    craters: float = 0.0,
-    crater_diameter: tuple[float, float] = (0.5, 5.0),
-    ripple_height: float = 0.0,
-    ripple_length: float = 1.0,
-    seed: int = 0,
-    origin: tuple[float, float] | None = None,
-    material: str = "ground",
-) -> HeightField:
-    """Rough ground made by a seed: a self-affine surface, with craters and ripples on demand.
-
-    The power of a wave of k cycles a metre falls as k^(-2 hurst - 2) from `longest_wave` to two
-    cells. Craters are bowls with a rim, a fifth as deep as wide; those as wide as D or wider
-    number D^-2. Ripples are waves across x, steeper on one side.
-
-    Args:
-        size: Extent along x and z, m: one number, or two.
-        spacing: Distance of columns and of rows, m.
-        roughness: Root mean square of the rough part's heights, m.
-        hurst: Hurst exponent, in (0, 1); 0.7 by default.
-        longest_wave: Longest wave, m; half the smaller extent by default.
-        craters: Expected number of craters in each m² of a diameter of 1 m or more; 0 by
-            default.
-        crater_diameter: Smallest and largest diameter of craters, m; (0.5, 5) by default.
-        ripple_height: Height of ripples from trough to crest, m; 0 by default.
-        ripple_length: Their wavelength, m.
-        seed: Seed of the random numbers; equal seeds give equal ground.
-        origin: Place (x, z) of the first height, m; by default such that the map's middle is
-            at the world's origin.
-        material: Name of its material.
-
-    Raises:
-        TerrainError: An argument is out of its range.
-
-    Source: Turcotte 1997 (spectral synthesis); Pike 1977 and McGetchin, Settle and Head
-    1973 (craters).
-    """
-    made = fractal_map(
-        size,
-        spacing,
-        roughness,
-        hurst=hurst,
-        longest_wave=longest_wave,
-        craters=craters,
-        crater_diameter=crater_diameter,
-        ripple_height=ripple_height,
-        ripple_length=ripple_length,
-        seed=seed,
-        origin=origin,
-    )
-    return HeightField(*made, material)
-
-
 def triangle_mesh_from_file(
     path: str | os.PathLike[str],
     *,
@@ -184,5 +125,5 @@ def triangle_mesh_from_file(
 
 SphereField.from_file = staticmethod(sphere_field_from_file)
 HeightField.from_file = staticmethod(height_field_from_file)
-HeightField.fractal = staticmethod(fractal)
+HeightField.fractal = staticmethod(fractal_map)
 TriangleMesh.from_file = staticmethod(triangle_mesh_from_file)

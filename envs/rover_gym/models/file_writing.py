@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Iterable
 from typing import Any, NoReturn
 from xml.etree import ElementTree as ET
@@ -178,8 +179,20 @@ def write_xml(root: ET.Element, path: object) -> None:
 JOINTS = {"revolute": "hinge", "prismatic": "slide", "spherical": "ball"}
 
 
-def write_mjcf(model: RoverModel, path: object) -> None:
-    """Writes an MJCF; the arguments are those of `RoverModel.to_mjcf`."""
+def write_mjcf(model: RoverModel, path: str | os.PathLike[str]) -> None:
+    """Writes an MJCF file, for MuJoCo: x forward, y left, z up.
+
+    Wheels are written as cylinders, of which a thin disc is a tenth of its radius wide and
+    named so, their drives as motors, held steering as position servos, and coupled joints as
+    equality constraints, which MuJoCo satisfies approximately.
+
+    Args:
+        model: The model.
+        path: Path of the file.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
     description = model.to_dict()
     wheels = {wheel["solid"]: wheel for wheel in description["wheels"]}
     steering = {wheel["steering"]: wheel for wheel in description["wheels"] if wheel.get("steering")}
@@ -275,8 +288,22 @@ FAST = 1e3  # rad/s, the velocity limit of a joint whose speed no motor limits: 
 WORLD = "world"
 
 
-def write_urdf(model: RoverModel, path: object, *, ignore: Collection[str] = ()) -> None:
-    """Writes a URDF; the arguments are those of `RoverModel.to_urdf`."""
+def write_urdf(model: RoverModel, path: str | os.PathLike[str], *, ignore: Collection[str] = ()) -> None:
+    """Writes a URDF file, for other programs: x forward, y left, z up.
+
+    Wheels are written as cylinders; a thin disc is a tenth of its radius wide and named so.
+
+    Args:
+        model: The model.
+        path: Path of the file.
+        ignore: Kinds of what the format cannot express and is left out all the same: "springs",
+            "armature".
+
+    Raises:
+        ModelError: The model has a spherical joint, several trees, or what the format cannot
+            express and `ignore` does not name.
+        OSError: The file cannot be written.
+    """
     ignore = check_kinds(ignore, IGNORABLE)
     description = model.to_dict()
     wheels = {wheel["solid"]: wheel for wheel in description["wheels"]}

@@ -160,43 +160,9 @@ def _imported(read: Callable[..., tuple[RoverModel, ImportReport]], given: dict[
     return model._with_import_report(report)
 
 
-def to_urdf(self: RoverModel, path: str | os.PathLike[str], *, ignore: Collection[str] = ()) -> None:  # noqa: D417 - a method
-    """Writes a URDF file, for other programs: x forward, y left, z up.
-
-    Wheels are written as cylinders; a thin disc is a tenth of its radius wide and named so.
-
-    Args:
-        path: Path of the file.
-        ignore: Kinds of what the format cannot express and is left out all the same: "springs",
-            "armature".
-
-    Raises:
-        ModelError: The model has a spherical joint, several trees, or what the format cannot
-            express and `ignore` does not name.
-        OSError: The file cannot be written.
-    """
-    write_urdf(self, path, ignore=ignore)
-
-
-def to_mjcf(self: RoverModel, path: str | os.PathLike[str]) -> None:  # noqa: D417 - a method
-    """Writes an MJCF file, for MuJoCo: x forward, y left, z up.
-
-    Wheels are written as cylinders, of which a thin disc is a tenth of its radius wide and
-    named so, their drives as motors, held steering as position servos, and coupled joints as
-    equality constraints, which MuJoCo satisfies approximately.
-
-    Args:
-        path: Path of the file.
-
-    Raises:
-        OSError: The file cannot be written.
-    """
-    write_mjcf(self, path)
-
-
 RoverModel.from_file = staticmethod(from_file)
 RoverModel.from_urdf = staticmethod(from_urdf)
 RoverModel.from_mjcf = staticmethod(from_mjcf)
 RoverModel.to_file = to_file
-RoverModel.to_urdf = to_urdf
-RoverModel.to_mjcf = to_mjcf
+RoverModel.to_urdf = write_urdf
+RoverModel.to_mjcf = write_mjcf
