@@ -306,7 +306,7 @@ impl<T: Lane> Rows<T> {
         let [total, couple] = sums;
         out[..BASE].copy_from_slice(&[total.x, total.y, total.z, couple.x, couple.y, couple.z]);
         if (lanes & T::mask(self.token, guests)).any() {
-            self.add_impulses_of_guests(machine, contacts, end, lanes, p, out);
+            Self::add_impulses_of_guests(machine, contacts, end, lanes, p, out);
         }
         for &slot in contacts.used_by_stops() {
             let here = contacts.slot(slot).active & lanes;
@@ -320,7 +320,6 @@ impl<T: Lane> Rows<T> {
     /// The part of contacts whose path is not that of their slots.
     #[cold]
     fn add_impulses_of_guests(
-        &self,
         machine: &Machine,
         contacts: &Contacts<T>,
         end: &Poses<T>,

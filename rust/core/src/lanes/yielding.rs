@@ -79,16 +79,12 @@ impl<T: Lane> Yields<T> {
         let (zero, active) = (self.zero, contacts.slot(slot).active);
         let nowhere = active & !active;
         let own = machine.wheels.get(contacts.part(slot)); // none of a stop or a spare slot
-        let (mut spring, mut is_soft) = match own.and_then(|wheel| wheel.compliance) {
-            Some(own) => {
-                let [stiffness, damping] = [own.stiffness, own.damping].map(|x| zero.like(x));
-                (Compliance { stiffness, damping }, active)
-            }
-            None => {
-                let (stiffness, damping) = (zero, zero);
-                (Compliance { stiffness, damping }, nowhere)
-            }
-        };
+        let own = own.and_then(|wheel| wheel.compliance);
+        let mut is_soft = if own.is_some() { active } else { nowhere };
+        let [stiffness, damping] = own
+            .map_or([0.0; 2], |own| [own.stiffness, own.damping])
+            .map(|x| zero.like(x));
+        let mut spring = Compliance { stiffness, damping };
         for (lane, contact) in contacts.by_lane.contacts(slot) {
             let here = T::mask(zero.token(), 1 << lane);
             is_soft = is_soft & !here;
