@@ -122,13 +122,14 @@ impl Stepped for Together {
     }
 
     fn snapshot(&self) -> Result<Kept> {
-        self.read(|_, rover, grains| Kept::Among(rover.snapshot(), grains.snapshot()))
+        self.read(|_, rover, grains| Kept::Among(Box::new((rover.snapshot(), grains.snapshot()))))
     }
 
     fn restore(&self, kept: &Kept) -> Result<()> {
-        let Kept::Among(of_rover, of_grains) = kept else {
+        let Kept::Among(both) = kept else {
             return Err(other_kind());
         };
+        let (of_rover, of_grains) = &**both;
         let (mut rover, mut grains) = (self.rover.open()?, self.grains.open()?);
         let before = rover.snapshot();
         rover.restore(of_rover)?;
@@ -199,8 +200,7 @@ impl RoverGrainSimulation {
 
     /// Deepest overlap now, m: of grains with anything, and of the rover with grains.
     fn penetration(&self) -> Result<f64> {
-        self.together
-            .read(|link, rover, grains| link.penetration(rover, grains))
+        self.together.read(RoverInGrains::penetration)
     }
 
     fn __repr__(slf: PyRef<'_, Self>) -> String {

@@ -20,7 +20,7 @@ pub enum Kept {
     Planar(SnapshotOf<PlanarScene>),
     Disks(SnapshotOf<GrainBed<2>>),
     Balls(SnapshotOf<GrainBed<3>>),
-    Among(SnapshotOf<RoverScene>, SnapshotOf<GrainBed<3>>),
+    Among(Box<(SnapshotOf<RoverScene>, SnapshotOf<GrainBed<3>>)>),
 }
 
 /// A scene whose snapshots Python keeps.
