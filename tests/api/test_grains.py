@@ -101,7 +101,7 @@ def test_rolling_friction_slows_a_ball_and_shows_in_the_moments() -> None:
         ball.contacts.world_moments, [[0.0, -0.02 * 0.1 * weight, 0.05 * 0.1 * weight]], atol=1e-9
     )
     assert (ball.settings["rolling_friction"], ball.settings["drilling_friction"]) == (0.05, 0.02)
-    snapshot = GrainSnapshot.from_bytes(ball.snapshot().to_bytes())
+    snapshot = Snapshot.from_bytes(ball.snapshot().to_bytes())
     ball.step(50)
     velocity = ball.velocity
     ball.restore(snapshot)
