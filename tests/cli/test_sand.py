@@ -28,3 +28,11 @@ def test_soils_and_runs_are_listed() -> None:
 def test_an_unknown_soil_is_refused() -> None:
     result = RUNNER.invoke(app, ["sand", "bed", "--soil", "mud"])
     assert result.exit_code != 0
+
+
+def test_a_rover_that_has_dug_itself_in_gets_free_and_climbs() -> None:
+    given = ("--slope", "5", "--policy", "sand", "--dig", "1", "--episodes", "2", "--seconds", "20", "--json")
+    (row,) = json.loads(run("climb", *given))["climbs"]
+    assert (row["slope_deg"], row["policy"], row["reached"], row["episodes"]) == (5.0, "sand", 2, 2)
+    assert 2.0 < row["time_s"] < 20.0
+    assert 0.0 < row["slip"] < 1.0

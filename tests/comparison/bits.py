@@ -23,8 +23,10 @@ from comparison.peers.ours import OurRunner
 from comparison.scene import Array, RoverScene, steps_in
 from comparison.scenes import flat_drive, parked, rocks, rug
 from rover_gym import PDPolicy
-from rover_gym.mechanics import SimulationBatch
+from rover_gym.env.sand_ground import sand_rover
+from rover_gym.mechanics import Plane, Simulation, SimulationBatch
 from rover_gym.planar import BallSimulation, Line, TwoWheelRoverSimulation
+from rover_gym.sand import SoftGround, named_soil
 from rover_gym.soil import SoilSimulation, soil_packing
 
 #: Simulated of each scene, s, and between two states that are hashed.
@@ -105,6 +107,19 @@ def soil() -> Trajectory:
         yield simulation.position, simulation.velocity
 
 
+def sand() -> Trajectory:
+    """A rover that drops onto sand and then drives by torques that jump."""
+    simulation = Simulation(sand_rover(), terrain=SoftGround(Plane(), named_soil("cmu-sand")), time_step=0.005)
+    q = simulation.q
+    q[1] = 0.245
+    simulation.set_state(q)
+    for k in range(60):
+        simulation.step(2)
+        yield simulation.q, simulation.v
+        if k >= 30:
+            simulation.set_wheel_torques([1.0 - 2.0 * ((3 * k + i) % 4 == 0) for i in range(6)])
+
+
 def trajectories() -> dict[str, Callable[[], Trajectory]]:
     """All of them by name."""
     found: dict[str, Callable[[], Trajectory]] = {}
@@ -124,6 +139,7 @@ def trajectories() -> dict[str, Callable[[], Trajectory]]:
         "plane": {},
         "rocks": {"terrain": "rocks", "height_scan": True},
         "hills": {"terrain": "hills"},
+        "sand": {"terrain": "sand"},
         "slope, randomised": {"slope_deg": 8.0, "friction": (0.4, 0.9), "mass_scale": (0.8, 1.2)},
     }.items():
         found[f"environment, {name}"] = partial(environment, **arguments)
@@ -133,6 +149,7 @@ def trajectories() -> dict[str, Callable[[], Trajectory]]:
     found["ball on a line"] = lambda: planar(BallSimulation(Line(slope=-0.2)))
     found["two-wheel rover"] = lambda: planar(TwoWheelRoverSimulation(Line()), np.array([20.0, 20.0]))
     found["soil"] = soil
+    found["sand"] = sand
     return found
 
 

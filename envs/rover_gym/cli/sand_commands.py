@@ -1,7 +1,8 @@
-"""`rover sand soils|bed|slope|convert`: soils by name, and one wheel on a virtual test bed."""
+"""`rover sand soils|bed|slope|climb|convert`: soils by name, one wheel on a virtual test bed, and rovers on slopes."""
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,9 +11,11 @@ from rich.table import Table
 
 from rover_gym.cli.console import AsJson, Results, plain_errors
 from rover_gym.mechanics import OptionError
+from rover_gym.policy import PDPolicy, Policy, SandGains, SandPolicy, drive_all
+from rover_gym.policy.dug_in import DugIn
 from rover_gym.sand import SingleWheel, climbed_slope, named_soil, soil_names
 from rover_gym.sand.convert import convert_runs
-from rover_gym.validation import number
+from rover_gym.validation import number, refuse
 
 sand = typer.Typer(help="Wheels on sand: soils by name, and a virtual test bed for one wheel.", no_args_is_help=True)
 
@@ -107,6 +110,66 @@ def slope(
         angle, sinkage = climbed_slope(wheel, chosen, mass, s, gravity)
         slopes.append({"slip": s, "slope_deg": math.degrees(angle), "sinkage_mm": 1e3 * sinkage})
     _say("slopes", slopes, as_json=as_json)
+
+
+@sand.command()
+@plain_errors
+def climb(
+    *,
+    soil: SoilName = "cmu-sand",
+    slope: Annotated[list[float] | None, typer.Option(help="Of the sand, degrees; repeat it for several.")] = None,
+    policy: Annotated[list[str] | None, typer.Option(help="'pd' or 'sand'; repeat it for both.")] = None,
+    episodes: Annotated[int, typer.Option(min=1, help="Of each slope and policy, seeds 0, 1, ...")] = 8,
+    seconds: Annotated[float, typer.Option(help="Until an episode is given up, s.")] = 120.0,
+    dig: Annotated[float, typer.Option(help="Time that all wheels spin first, so that the rover digs in, s.")] = 0.0,
+    steepest: Annotated[float, typer.Option(help="Steepest way that 'sand' takes straight, degrees.")] = 14.0,
+    threads: Annotated[int, typer.Option(min=1, help="That step the rovers.")] = 1,
+    as_json: AsJson = False,
+) -> None:
+    """Drive the rover of the sand environments uphill to goals 2 m away, up to 30 degrees aside."""
+
+    def driver(name: str, env: Any) -> Policy:
+        inner = SandPolicy(env, SandGains(steepest=steepest)) if name == "sand" else PDPolicy(env)
+        return DugIn(env, inner, dig) if dig > 0.0 else inner
+
+    names = list(policy or ("pd", "sand"))
+    for name in names:
+        if name not in ("pd", "sand"):
+            refuse(OptionError, "policy", name, "must be 'pd' or 'sand'")
+    rows = []
+    aside = (-30.0, 30.0)
+    for angle in slope or (10.0, 15.0, 20.0):
+        arguments = {
+            "terrain": "sand",
+            "difficulty": 0.0,
+            "soil": soil,
+            "slope_deg": angle,
+            "uphill_deg": aside,
+            "heading_deg": 0.0,
+            "goal_distance": 2.0,
+            "goal_bearing_deg": aside,
+        }
+        for name in names:
+            drives = drive_all(
+                partial(driver, name),
+                range(episodes),
+                arguments=arguments,
+                num_envs=8,
+                threads=threads,
+                max_episode_steps=round(seconds / 0.05),
+            )
+            reached = [drive for drive in drives if drive.end == "goal"]
+            rows.append(
+                {
+                    "slope_deg": angle,
+                    "policy": name,
+                    "reached": len(reached),
+                    "episodes": episodes,
+                    "time_s": sum(drive.time for drive in reached) / len(reached) if reached else math.nan,
+                    "slip": sum(drive.slip for drive in drives) / episodes,
+                }
+            )
+    _say("climbs", rows, as_json=as_json)
 
 
 @sand.command()

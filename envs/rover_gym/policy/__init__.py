@@ -26,6 +26,7 @@ from rover_gym.policy.ground_map import MapOptions
 from rover_gym.policy.named_policy import NamedPolicy, Policy, named_policy
 from rover_gym.policy.pd_policy import PDGains, PDPolicy
 from rover_gym.policy.policy_card import Network, PolicyCard, PolicyError, find_policy, policy_arguments, policy_folder
+from rover_gym.policy.sand_policy import SandGains, SandPolicy
 from rover_gym.policy.scan_policy import ScanGains, ScanPolicy
 from rover_gym.policy.trained_policy import TrainedPolicy
 from rover_gym.policy.trap_env import RoverTrapEnv
@@ -60,6 +61,8 @@ __all__ = [
     "RoverGoalEnv",
     "RoverGoalVectorEnv",
     "RoverTrapEnv",
+    "SandGains",
+    "SandPolicy",
     "ScanGains",
     "ScanPolicy",
     "TrainedPolicy",

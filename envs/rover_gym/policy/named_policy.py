@@ -1,4 +1,4 @@
-"""The policies that have a name: the PD baseline, the scan planner, the one with foresight and the trained policies."""
+"""The policies that have a name: the baseline, those for sand and among rocks, and the trained policies."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,16 +13,23 @@ from rover_gym.mechanics import RoverModel
 from rover_gym.policy.arc_forecast import FORECAST_FILE
 from rover_gym.policy.pd_policy import PDPolicy
 from rover_gym.policy.policy_card import find_policy, is_there, policy_arguments
+from rover_gym.policy.sand_policy import SandPolicy
 from rover_gym.policy.scan_policy import ScanPolicy
 from rover_gym.policy.trained_policy import TrainedPolicy
 
 #: What the command line says about the names.
 NAMES_HELP = (
-    "'pd' for the baseline, 'scan' for the planner by hand, 'foresight' for that planner with a learned forecast, "
+    "'pd' for the baseline, 'sand' for the one that crawls on sand, 'scan' for the planner by hand, 'foresight' for "
+    "that planner with a learned forecast, "
     "'trained' for the trained policy of the package, or the folder of a run, a trained policy or a forecast."
 )
 
-_TITLES = {"pd": "the PD baseline", "scan": "the scan planner", "foresight": "the planner with foresight"}
+_TITLES = {
+    "pd": "the PD baseline",
+    "sand": "the crawler on sand",
+    "scan": "the scan planner",
+    "foresight": "the planner with foresight",
+}
 
 
 def policy_title(policy: str) -> str:
@@ -56,8 +63,8 @@ def named_policy(policy: str, terrain: str, model: RoverModel | None = None) -> 
     """The policy of a name, for a terrain and a rover; None is the built-in one.
 
     Args:
-        policy: "pd", "scan", "foresight", "trained" for the policy shipped for the terrain, or the folder of a run, a
-            trained policy or a forecast.
+        policy: "pd", "sand", "scan", "foresight", "trained" for the policy shipped for the terrain, or the folder of a
+            run, a trained policy or a forecast.
         terrain: The argument of the environment.
         model: The rover, to which the planner fits its height scan.
 
@@ -73,7 +80,7 @@ def named_policy(policy: str, terrain: str, model: RoverModel | None = None) -> 
         return NamedPolicy(policy_arguments(folder), partial(_load, folder))
     if policy == "scan":
         return NamedPolicy(ScanPolicy.arguments(model), ScanPolicy)
-    return NamedPolicy({}, PDPolicy)
+    return NamedPolicy({}, SandPolicy if policy == "sand" else PDPolicy)
 
 
 def _load(folder: Any, env: Any) -> Policy:

@@ -28,7 +28,7 @@ from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.start import Steering, wheel_centres
 from rover_gym.mechanics import OptionError, RoverModel, StateError, atan2, sin_cos
 from rover_gym.policy.features import check_observed
-from rover_gym.policy.regulator import WheelRegulator
+from rover_gym.policy.regulator import Regulator, WheelRegulator
 from rover_gym.validation import array, number, refuse
 
 #: Curvature that wheels which skid are asked for, over that of the path.
@@ -153,9 +153,10 @@ class PDPolicy:
     Args:
         env: A `Rover-v0`, wrapped or not, or a vector of them. It is read once, for layout and rover constants.
         gains: The gains.
+        regulator: What turns rim speeds into torques; a `WheelRegulator` by default.
     """
 
-    def __init__(self, env: Any, gains: PDGains | None = None) -> None:
+    def __init__(self, env: Any, gains: PDGains | None = None, regulator: Regulator | None = None) -> None:
         rover = find_rover_env(env)
         if gains is not None and not isinstance(gains, PDGains):
             refuse(OptionError, "gains", gains, "must be PDGains")
@@ -176,7 +177,7 @@ class PDPolicy:
         self._n_wheels = len(model.wheel_names)
         self._n_actions = rover.task.n_actions
         self._max_steering = rover.max_steering
-        self._regulator = WheelRegulator(rover, self.gains.response)
+        self._regulator = WheelRegulator(rover, self.gains.response) if regulator is None else regulator
         self.max_curvature = self._turning.max_curvature(self._max_steering)
 
     def predict(

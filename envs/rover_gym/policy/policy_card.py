@@ -301,14 +301,14 @@ def forecast_folder(model: RoverModel | None = None, *, hills: bool = False) -> 
 
 
 def find_policy(policy: str, terrain: str) -> Path | None:
-    """The folder of a policy: the shipped one for "trained", otherwise the given path; None for "pd" and "scan".
+    """The folder of a policy: the shipped one for "trained", otherwise the given path; None for those without one.
 
     Of the folder of a run of `rover train` it is the policy at its end.
 
     Raises:
         PolicyError: There is no such policy.
     """
-    if policy in ("pd", "scan"):
+    if policy in ("pd", "scan", "sand"):
         return None
     folder = policy_folder(terrain) if policy == "trained" else Path(policy)
     if is_there(folder / "policy" / "policy.json"):
@@ -318,7 +318,8 @@ def find_policy(policy: str, terrain: str) -> Path | None:
             PolicyError,
             "policy",
             policy,
-            "must be 'pd', 'scan', 'foresight', 'trained' or the folder of a run, a trained policy or a forecast",
+            "must be 'pd', 'sand', 'scan', 'foresight', 'trained' or the folder of a run, a trained policy or a "
+            "forecast",
         )
     return folder
 

@@ -28,7 +28,7 @@ speed by LEAP.
 """
 
 import math
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -46,6 +46,13 @@ LEAP = 1.5
 
 #: A slack below this divides as this, m/s.
 TINY = 1e-9
+
+
+class Regulator(Protocol):
+    """Turns wanted rim speeds into torques."""
+
+    def entries(self, seen: npt.NDArray[Any], wanted: Array, feedforward: Array) -> Array:
+        """The wheels' entries of the actions, as `WheelRegulator.entries` gives them."""
 
 
 class WheelRegulator:

@@ -365,19 +365,19 @@ impl<'a> Frame<'a> {
         let (p, q) = ((one - u * u) * per, two * u * per);
         let (cos, sin) = (p * p - q * q, two * p * q);
         let (radius, radial) = (number(group.radius), number(group.radial));
-        let place = Place {
+        let elements = Elements {
             r: Vec3::new(cos * radius, sin * radius, lanes(&group.offset)),
             normal: Vec3::new(cos * radial, sin * radial, lanes(&group.axial)),
             area: lanes(&group.area) * per,
         };
-        let (depth, by_depth) = self.depth(place.r);
-        let is_under = depth.gt(zero) & place.area.gt(zero);
+        let (depth, by_depth) = self.depth(elements.r);
+        let is_under = depth.gt(zero) & elements.area.gt(zero);
         if is_under.any() {
             own.is_touching = true;
             let depth = T::select(is_under, depth, zero);
             let ends = lanes(&group.end);
             let way = self.way(group.radius, ends, (cos, sin));
-            self.add_pieces(group.skin, &place, (depth, by_depth, way), own);
+            self.add_pieces(group.skin, &elements, (depth, by_depth, way), own);
         }
     }
 
@@ -423,15 +423,15 @@ impl<'a> Frame<'a> {
     fn add_pieces<T: Lane>(
         &self,
         skin: Skin,
-        place: &Place<T>,
+        elements: &Elements<T>,
         (depth, by_depth, arc): (T, T, T),
         own: &mut Own<T>,
     ) {
-        let (r, area, token) = (place.r, place.area, depth.token());
+        let (r, area, token) = (elements.r, elements.area, depth.token());
         let shared = |v: Vector3<f64>| Vec3::<T>::splat(token, v.into());
         let g = shared(self.g);
         let piece = Piece {
-            normal: place.normal,
+            normal: elements.normal,
             x: shared(self.shift) + shared(self.turn).cross(r),
             down: g,
             depth,
@@ -546,8 +546,9 @@ impl Group {
     }
 }
 
-/// Where pieces are, in the wheel's axes, and how large, m².
-struct Place<T> {
+/// Elements of the surface, side by side in lanes: where they are, in the wheel's axes, and how
+/// large, m².
+struct Elements<T> {
     r: Vec3<T>,
     normal: Vec3<T>,
     area: T,
