@@ -77,18 +77,18 @@ impl<T: Lane> Yields<T> {
         slot: usize,
     ) -> (Compliance<T>, T::Mask) {
         let (zero, active) = (self.zero, contacts.slot(slot).active);
-        let nowhere = active & !active;
+        let (mut spring, mut is_soft) = (
+            Compliance {
+                stiffness: zero,
+                damping: zero,
+            },
+            active & !active,
+        );
         let own = machine.wheels.get(contacts.part(slot)); // none of a stop or a spare slot
-        let (mut spring, mut is_soft) = match own.and_then(|wheel| wheel.compliance) {
-            Some(own) => {
-                let [stiffness, damping] = [own.stiffness, own.damping].map(|x| zero.like(x));
-                (Compliance { stiffness, damping }, active)
-            }
-            None => {
-                let (stiffness, damping) = (zero, zero);
-                (Compliance { stiffness, damping }, nowhere)
-            }
-        };
+        if let Some(own) = own.and_then(|wheel| wheel.compliance) {
+            (spring.stiffness, spring.damping) = (zero.like(own.stiffness), zero.like(own.damping));
+            is_soft = active;
+        }
         for (lane, contact) in contacts.by_lane.contacts(slot) {
             let here = T::mask(zero.token(), 1 << lane);
             is_soft = is_soft & !here;
