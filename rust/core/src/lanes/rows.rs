@@ -306,40 +306,13 @@ impl<T: Lane> Rows<T> {
         let [total, couple] = sums;
         out[..BASE].copy_from_slice(&[total.x, total.y, total.z, couple.x, couple.y, couple.z]);
         if (lanes & T::mask(self.token, guests)).any() {
-            Self::add_impulses_of_guests(machine, contacts, end, lanes, p, out);
+            add_impulses_of_guests(machine, contacts, end, lanes, p, out);
         }
         for &slot in contacts.used_by_stops() {
             let here = contacts.slot(slot).active & lanes;
             let mover = self.movers[contacts.part(slot)].last();
             if let (Some((_, sign)), Some(mover)) = (contacts.stop(slot), mover) {
                 add(here, &mut out[mover.velocity], sign * p[slot][0]);
-            }
-        }
-    }
-
-    /// The part of contacts whose path is not that of their slots.
-    #[cold]
-    fn add_impulses_of_guests(
-        machine: &Machine,
-        contacts: &Contacts<T>,
-        end: &Poses<T>,
-        lanes: T::Mask,
-        p: &[Triple<T>],
-        out: &mut [T],
-    ) {
-        for &slot in contacts.used_by_shapes() {
-            let guests = contacts.by_lane.guests(slot);
-            for (lane, contact) in guests.filter(|(lane, _)| lanes.get(*lane)) {
-                let one = OneLane {
-                    machine,
-                    poses: end,
-                    v: &[],
-                    lane,
-                };
-                let p = p[slot].map(|p| p.get(lane));
-                add_impulse(&one, contact, p, |k, x| {
-                    out[k].set(lane, out[k].get(lane) + x);
-                });
             }
         }
     }
@@ -536,6 +509,34 @@ impl<T: Lane> Rows<T> {
 fn place_of<T: Lane>(own: &Slot<T>) -> Place<T> {
     let Slot { point, n, t, b, .. } = *own;
     Place { x: point, n, t, b }
+}
+
+/// Adds the generalized impulses, in the lanes of a mask, of contacts whose path is not that of
+/// their slots.
+#[cold]
+fn add_impulses_of_guests<T: Lane>(
+    machine: &Machine,
+    contacts: &Contacts<T>,
+    end: &Poses<T>,
+    lanes: T::Mask,
+    p: &[Triple<T>],
+    out: &mut [T],
+) {
+    for &slot in contacts.used_by_shapes() {
+        let guests = contacts.by_lane.guests(slot);
+        for (lane, contact) in guests.filter(|(lane, _)| lanes.get(*lane)) {
+            let one = OneLane {
+                machine,
+                poses: end,
+                v: &[],
+                lane,
+            };
+            let p = p[slot].map(|p| p.get(lane));
+            add_impulse(&one, contact, p, |k, x| {
+                out[k].set(lane, out[k].get(lane) + x);
+            });
+        }
+    }
 }
 
 /// Writes the rows of Hᵀ and `Hᵀ v` of a lane's contact along the path of a slot that is not its

@@ -77,14 +77,18 @@ impl<T: Lane> Yields<T> {
         slot: usize,
     ) -> (Compliance<T>, T::Mask) {
         let (zero, active) = (self.zero, contacts.slot(slot).active);
-        let nowhere = active & !active;
+        let (mut spring, mut is_soft) = (
+            Compliance {
+                stiffness: zero,
+                damping: zero,
+            },
+            active & !active,
+        );
         let own = machine.wheels.get(contacts.part(slot)); // none of a stop or a spare slot
-        let own = own.and_then(|wheel| wheel.compliance);
-        let mut is_soft = if own.is_some() { active } else { nowhere };
-        let [stiffness, damping] = own
-            .map_or([0.0; 2], |own| [own.stiffness, own.damping])
-            .map(|x| zero.like(x));
-        let mut spring = Compliance { stiffness, damping };
+        if let Some(own) = own.and_then(|wheel| wheel.compliance) {
+            (spring.stiffness, spring.damping) = (zero.like(own.stiffness), zero.like(own.damping));
+            is_soft = active;
+        }
         for (lane, contact) in contacts.by_lane.contacts(slot) {
             let here = T::mask(zero.token(), 1 << lane);
             is_soft = is_soft & !here;
