@@ -1,8 +1,8 @@
 //! Impulses to start pivoting from: Gauss–Seidel sweeps over a block's contacts.
 //!
-//! When commands change, many contacts of a machine change their modes, and pivoting corrects
-//! little more than one of them a step. So it does where a position is projected, whose problem has
-//! no impulses of an earlier step. A few sweeps find most modes for the price of one step, for all
+//! When commands change, many of the contacts of a machine on lines change their modes, and
+//! pivoting corrects little more than one of them a step. So it does where a position is projected,
+//! whose problem has no impulses of an earlier step. A few sweeps find most modes for the price of one step, for all
 //! lanes of the block at once.
 
 use super::contacts::Contacts;

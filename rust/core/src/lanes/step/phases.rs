@@ -11,10 +11,10 @@ use crate::lanes::sweeps::write_start;
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::system::tree::{MOST_JOINT_TURN, MOST_SPIN, MOST_TURN};
 
-/// Sweeps before pivoting. Measured on six wheels with torques of up to 60 N m, drawn anew every ten
-/// steps, systems a problem: thin discs on the plane 2.7 without, 1.5 after one, 1.3 after two, on
-/// hills with cells of 0.25 m 4.7, 3.3, 2.9, and 2.5 after four; cylinders on the plane 3.4 after
-/// one, 3.1 after two, 3.0 after four. A sweep costs about a fifth of a system.
+/// Sweeps before pivoting, of machines with many contacts. Measured on six cylinders with torques
+/// of up to 60 N m, drawn anew every ten steps: 3.4 systems a problem after one, 3.1 after two, 3.0
+/// after four; a sweep costs about a third of a system. Thin wheels would need half their systems
+/// too, but parked ones then press against each other with what the sweeps leave.
 const SWEEPS: usize = 2;
 
 impl<T: Lane> Block<T> {
@@ -73,7 +73,7 @@ impl<T: Lane> Block<T> {
         self.rows
             .to_problems(&self.contacts, &self.u, &self.mu, problems);
         probe.end(Phase::Bias);
-        if !self.contacts.used().is_empty() {
+        if self.contacts.factored() != 0 {
             T::vectorize(
                 token,
                 #[inline(always)]
@@ -91,6 +91,7 @@ impl<T: Lane> Block<T> {
         } else {
             self.retaken
         };
+        let lanes = lanes & T::mask(self.token, self.contacts.factored());
         self.p.copy_from_slice(&self.p_last);
         let data = (&self.u[..], &self.mu[..]);
         self.rows.sweep(&self.contacts, SWEEPS, data, &mut self.p);
