@@ -254,6 +254,36 @@ fn positions_are_solved_from_zero() {
     assert!(100 * left <= 2 * found.len(), "{left} unsolved");
 }
 
+/// Where a solve starts decides how long it takes. Impulses may differ where wheels work against
+/// each other; the motion does not.
+#[test]
+fn a_start_of_its_own_leaves_the_motion_as_it_is() {
+    let mut draw = Draw(2);
+    let mut problems = drive(60.0, 200);
+    let found = solve_alone(&problems);
+    for problem in &mut problems {
+        problem.has_start = true;
+        for i in 0..problem.n_contacts {
+            let pressed = problem.p[3 * i] * (1.0 + 0.5 * draw.next());
+            problem.start[3 * i] = pressed;
+            problem.start[3 * i + 1] = 0.3 * pressed * draw.next();
+        }
+    }
+    let elsewhere = solve_alone(&problems);
+    let mut longer = 0;
+    for ((one, other), start) in found.iter().zip(&elsewhere).zip(&problems) {
+        assert_sound(other, start);
+        if !(one.is_solved && other.is_solved) {
+            continue;
+        }
+        longer += usize::from(other.iterations > one.iterations);
+        for (a, b) in one.u.iter().zip(&other.u).take(one.n_unknowns()) {
+            assert!((a - b).abs() < 1e-8, "{a} {b}");
+        }
+    }
+    assert!(longer > 10, "the start was not taken: {longer}");
+}
+
 #[test]
 fn what_is_not_finite_is_unsolved_and_harms_no_neighbour() {
     let sound = drive(20.0, 40);

@@ -321,8 +321,8 @@ impl<T: Lane, const C: usize> Loaded<T, C> for DenseSystem<T, C> {
     }
 
     #[inline(always)]
-    fn last_of(_: &ContactProblem, _: usize) -> Triple<f64> {
-        [0.0; 3]
+    fn least_softness(_: &ContactProblem) -> f64 {
+        0.0
     }
 
     #[inline(always)]

@@ -15,6 +15,10 @@ use crate::solver::pivoting::{FURTHER_ALPHAS, Few, Pivoting};
 pub const MAX_ITERATIONS: usize =
     <DenseSystem<f64, MAX_DENSE> as Loaded<f64, MAX_DENSE>>::MAX_STEPS * (1 + FURTHER_ALPHAS.len());
 
+/// What a problem has on its diagonal beside the machine's operator, relative to the mean diagonal,
+/// from which on its answer is unique and the smallest `α` serves.
+const DEFINITE: f64 = 1e-3;
+
 /// Where a solver gets its problems and leaves their answers.
 pub(super) trait ProblemSource {
     /// Index of the next problem.
@@ -90,20 +94,20 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
             let scales = ContactScales::new::<3>(normal, tangential);
             let mu = if is_used { problem.mu[contact] } else { 0.0 };
             own.laws[i].set(lane, mu, scales);
-            if S::RETURNS {
-                let last = S::last_of(problem, contact);
-                for k in 0..3 {
-                    own.centre[i][k].set(lane, if is_used { last[k] } else { 0.0 });
-                }
-            }
+            let start = if problem.has_start {
+                &problem.start
+            } else {
+                &problem.p
+            };
             for k in 0..3 {
                 let at = 3 * contact + k;
-                let (p, q) = if is_used {
-                    (problem.p[at], problem.q[at])
+                let [p, last, q] = if is_used {
+                    [start[at], problem.p[at], problem.q[at]]
                 } else {
-                    (0.0, 0.0)
+                    [0.0; 3]
                 };
                 own.p[i][k].set(lane, p);
+                own.centre[i][k].set(lane, last);
                 self.system.free_velocity_mut(i)[k].set(lane, q);
             }
             if is_used {
@@ -115,6 +119,11 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
         let [speed, impulse] = data.inverses();
         own.mean.set(lane, if mean > 0.0 { mean } else { 1.0 });
         own.asked.set(lane, 0.0);
+        let here = T::mask(own.mean.token(), 1 << lane);
+        own.definite = own.definite & !here;
+        if S::least_softness(problem) > DEFINITE * mean {
+            own.definite = own.definite | here;
+        }
         own.inverses[0].set(lane, speed * speed);
         own.inverses[1].set(lane, impulse * impulse);
         self.steps[lane] = 0;
@@ -123,9 +132,8 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
         self.problem[lane] = index;
     }
 
-    /// Lets a lane try its problem again from the start, or from the last step's impulses where the
-    /// system [returns](crate::solver::pivoting::System::RETURNS) to them, with another `α`, if there is one left.
-    /// [`Pivoting::begin`] follows.
+    /// Lets a lane try its problem again, from the last step's impulses, with another `α`, if there
+    /// is one left. [`Pivoting::begin`] follows.
     #[inline(always)]
     fn retry(&mut self, lane: usize, problem: &ContactProblem) -> bool {
         let Some(alpha) = FURTHER_ALPHAS.get(self.failed[lane]) else {
@@ -139,14 +147,9 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
         for i in self.system.places() {
             if let Some(contact) = S::contact_at(problem, i) {
                 for k in 0..3 {
-                    let start = if S::RETURNS {
-                        let last = S::last_of(problem, contact)[k];
-                        own.centre[i][k].set(lane, last);
-                        last
-                    } else {
-                        problem.p[3 * contact + k]
-                    };
-                    own.p[i][k].set(lane, start);
+                    let last = problem.p[3 * contact + k];
+                    own.centre[i][k].set(lane, last);
+                    own.p[i][k].set(lane, last);
                 }
             }
         }

@@ -42,8 +42,13 @@ pub struct ContactProblem {
     pub q: [f64; MAX_UNKNOWNS],
     /// Friction coefficients.
     pub mu: [f64; MAX_CONTACTS],
-    /// Impulses, N s: the warm start, and the answer.
+    /// Impulses, N s: those of the last step, and the answer. Of answers that the machine cannot
+    /// tell apart one near them is found.
     pub p: [f64; MAX_UNKNOWNS],
+    /// Impulses from which a solve starts if `has_start`, rather than from those of the last step.
+    pub start: [f64; MAX_UNKNOWNS],
+    /// See above.
+    pub has_start: bool,
     /// Velocities `W p + q` of the answer, m/s.
     pub u: [f64; MAX_UNKNOWNS],
     /// Residual of the answer.
@@ -63,9 +68,6 @@ pub struct Factored {
     pub slots: u32,
     /// Z along the path of each contact: `Z[contact * stride + k]`, kg^(-1/2).
     pub Z: Vec<Triple<f64>>,
-    /// Impulses of the last step, N s. Of answers that the machine cannot tell apart one near them
-    /// is found.
-    pub last: Vec<Triple<f64>>,
     /// Diagonal blocks of W, 1/kg.
     pub diagonal: Vec<[f64; 9]>,
     /// Diagonal of D by contact, 1/kg.
@@ -106,7 +108,6 @@ impl Factored {
         if !(self.pattern.as_ref()).is_some_and(|own| Arc::ptr_eq(own, pattern)) {
             self.pattern = Some(Arc::clone(pattern));
             self.Z.resize(MAX_CONTACTS * pattern.stride(), [0.0; 3]);
-            self.last.resize(MAX_CONTACTS, [0.0; 3]);
             self.diagonal.resize(MAX_CONTACTS, [0.0; 9]);
             self.softness.resize(MAX_CONTACTS, 0.0);
         }
@@ -116,7 +117,6 @@ impl Factored {
         self.pattern.clone_from(&other.pattern);
         self.slots = other.slots;
         self.Z.clone_from(&other.Z);
-        self.last.clone_from(&other.last);
         self.diagonal.clone_from(&other.diagonal);
         self.softness.clone_from(&other.softness);
     }
@@ -136,6 +136,7 @@ impl Clone for ContactProblem {
         self.W = other.W;
         (self.q, self.mu) = (other.q, other.mu);
         (self.p, self.u) = (other.p, other.u);
+        (self.start, self.has_start) = (other.start, other.has_start);
         self.residual = other.residual;
         self.iterations = other.iterations;
         self.is_solved = other.is_solved;
@@ -151,6 +152,8 @@ impl Default for ContactProblem {
             q: [0.0; MAX_UNKNOWNS],
             mu: [0.0; MAX_CONTACTS],
             p: [0.0; MAX_UNKNOWNS],
+            start: [0.0; MAX_UNKNOWNS],
+            has_start: false,
             u: [0.0; MAX_UNKNOWNS],
             residual: Residual::UNSOLVED,
             iterations: 0,

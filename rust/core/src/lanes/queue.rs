@@ -90,6 +90,7 @@ impl ContactProblem {
         } else if !self.p[..n].iter().all(|x| x.is_finite()) {
             self.p[..n].fill(0.0);
         }
+        self.has_start &= self.start[..n].iter().all(|x| x.is_finite());
     }
 }
 

@@ -47,7 +47,7 @@ pub struct Rows<T: Lane> {
     pub(super) W: Vec<[T; 9]>,
     /// Pattern of the problems with factors.
     pattern: Option<Arc<Pattern>>,
-    /// Where any has: diagonal blocks of W by slot, and what [`Self::soften`] added to them, 1/kg.
+    /// Diagonal blocks of W by slot, and what [`Self::soften`] added to them, 1/kg.
     pub(super) diagonal: Vec<[T; 9]>,
     pub(super) softness: Vec<T>,
     /// The motion in [`Self::sweep`] (nv, factor coordinates).
@@ -127,6 +127,10 @@ impl<T: Lane> Rows<T> {
                 self.multiply(contacts);
                 if contacts.factored() != 0 {
                     self.multiply_diagonal(contacts);
+                } else {
+                    for (i, &slot) in contacts.used().iter().enumerate() {
+                        self.diagonal[slot] = self.W[block(i, i)];
+                    }
                 }
             },
         );
@@ -225,11 +229,9 @@ impl<T: Lane> Rows<T> {
         for (i, &slot) in contacts.used_densely().iter().enumerate() {
             soften(&mut self.W[block(i, i)], slot);
         }
-        if contacts.factored() != 0 {
-            for &slot in contacts.used() {
-                self.softness[slot] = diagonal(slot);
-                soften(&mut self.diagonal[slot], slot);
-            }
+        for &slot in contacts.used() {
+            self.softness[slot] = diagonal(slot);
+            soften(&mut self.diagonal[slot], slot);
         }
     }
 
@@ -338,6 +340,7 @@ impl<T: Lane> Rows<T> {
                 let factored = contacts.factored();
                 for (lane, problem) in problems.iter_mut().enumerate() {
                     problem.n_contacts = contacts.list(lane).n;
+                    problem.has_start = false;
                     match &self.pattern {
                         Some(pattern) if factored >> lane & 1 == 1 => {
                             problem.factored.adopt(pattern);

@@ -1,9 +1,9 @@
-//! Impulses to start pivoting from, where a machine has many contacts: Gauss–Seidel sweeps over a
-//! block's contacts.
+//! Impulses to start pivoting from: Gauss–Seidel sweeps over a block's contacts.
 //!
 //! When commands change, many of the contacts of a machine on lines change their modes, and
-//! pivoting corrects little more than one of them a step. A few sweeps find most of them for the
-//! price of one step, for all lanes of the block at once.
+//! pivoting corrects little more than one of them a step. So it does where a position is projected,
+//! whose problem has no impulses of an earlier step. A few sweeps find most modes for the price of one step, for all
+//! lanes of the block at once.
 
 use super::contacts::Contacts;
 use super::problem::Triple;
@@ -107,8 +107,7 @@ impl<T: Lane> Rows<T> {
     }
 }
 
-/// Writes impulses by slot as the start of the problems of a mask's lanes, whose impulses are those
-/// of the last step.
+/// Writes impulses by slot as the start of the problems of a mask's lanes.
 #[inline(always)]
 pub(super) fn write_start<T: Lane>(
     contacts: &Contacts<T>,
@@ -116,16 +115,16 @@ pub(super) fn write_start<T: Lane>(
     p: &[Triple<T>],
     problems: &mut [super::problem::ContactProblem],
 ) {
+    for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
+        problem.has_start |= lanes.get(lane);
+    }
     for &slot in contacts.used() {
         let active = contacts.slot(slot).active & lanes;
         let places = contacts.places(slot);
         for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
             if active.get(lane) {
-                let contact = usize::from(places[lane]);
-                let own = &mut problem.p[3 * contact..][..3];
-                let last = &mut problem.factored.last[contact];
+                let own = &mut problem.start[3 * usize::from(places[lane])..][..3];
                 for k in 0..3 {
-                    last[k] = own[k];
                     own[k] = p[slot][k].get(lane);
                 }
             }

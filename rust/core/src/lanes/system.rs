@@ -20,8 +20,8 @@ pub(super) trait Loaded<T: Lane, const C: usize>: System<T, Few<C>> + Sized {
     /// Number of a problem's contact at a place, if it has one there.
     fn contact_at(problem: &ContactProblem, place: usize) -> Option<usize>;
 
-    /// Impulse of a problem's contact in the last step, N s.
-    fn last_of(problem: &ContactProblem, contact: usize) -> Triple<f64>;
+    /// The least that is added to the diagonal of a problem's operator, 1/kg.
+    fn least_softness(problem: &ContactProblem) -> f64;
 
     /// Diagonal block of a problem's contact.
     fn block_of(problem: &ContactProblem, contact: usize) -> &[f64; 9];

@@ -365,8 +365,9 @@ impl<T: Lane, const C: usize> Loaded<T, C> for VelocitySystem<T, C> {
     }
 
     #[inline(always)]
-    fn last_of(problem: &ContactProblem, contact: usize) -> Triple<f64> {
-        problem.factored.last[contact]
+    fn least_softness(problem: &ContactProblem) -> f64 {
+        let softness = problem.factored.softness.iter().take(problem.n_contacts);
+        softness.fold(f64::INFINITY, |least, own| least.min(*own))
     }
 
     #[inline(always)]

@@ -126,6 +126,8 @@ pub struct Block<T: Lane> {
     /// By slot: impulses of the step and of the projection, N s; velocities, m/s.
     p: Vec<Triple<T>>,
     pushes: Vec<Triple<T>>,
+    /// Gaps that the projection removes by slot, along the normal, m.
+    gaps: Vec<Triple<T>>,
     u: Vec<Triple<T>>,
     /// Impulses of the last step by slot, N s.
     p_last: Vec<Triple<T>>,
@@ -198,6 +200,7 @@ impl<T: Lane> Block<T> {
             contacts,
             p: slots.clone(),
             pushes: slots.clone(),
+            gaps: slots.clone(),
             p_last: slots.clone(),
             impact: vec![nobody; slots.len()],
             has_impact: nobody,

@@ -11,8 +11,9 @@ use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::system::extent::Turning;
 
 /// Sweeps before pivoting, of machines with many contacts. Measured on six cylinders with torques
-/// of up to 60 N m, drawn anew every ten steps: 5.2 systems a problem after one, 4.8 after two, 4.7
-/// after four; a sweep costs about a third of a system.
+/// of up to 60 N m, drawn anew every ten steps: 3.4 systems a problem after one, 3.1 after two, 3.0
+/// after four; a sweep costs about a third of a system. Thin wheels would need half their systems
+/// too, but parked ones then press against each other with what the sweeps leave.
 const SWEEPS: usize = 2;
 
 impl<T: Lane> Block<T> {
@@ -85,7 +86,7 @@ impl<T: Lane> Block<T> {
         }
     }
 
-    /// Improves the impulses that the problems start from, those of lanes that are retaken unless
+    /// Finds impulses for the problems to start from, those of lanes that are retaken unless
     /// `is_first`: the others have their answers.
     #[inline(always)]
     fn begin_near(&mut self, problems: &mut [ContactProblem], is_first: bool) {

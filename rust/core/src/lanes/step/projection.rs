@@ -6,8 +6,14 @@ use crate::integrator::Stabilisation;
 use crate::integrator::position_projection::FARTHEST;
 use crate::lanes::problem::ContactProblem;
 use crate::lanes::rows::Answer;
+use crate::lanes::sweeps::write_start;
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::system::extent::displacement;
+
+/// Sweeps before pivoting. On hills with cells of 0.05 m a problem of six thin wheels takes 4.1
+/// systems without them, 2.0 after three and 1.5 after six; one of cylinders on cells of 0.25 m
+/// 5.0, 3.0 and 2.3.
+const SWEEPS: usize = 4;
 
 impl<T: Lane> Block<T> {
     /// Penetration that is tolerated, m, if positions are projected.
@@ -56,6 +62,7 @@ impl<T: Lane> Block<T> {
             #[inline(always)]
             || {
                 let (h, theta) = self.time_step();
+                let zero = h.like(0.0);
                 for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
                     if !self.is_deep.get(lane) {
                         problem.n_contacts = 0;
@@ -63,10 +70,11 @@ impl<T: Lane> Block<T> {
                     let n = problem.n_unknowns();
                     problem.q[..n].fill(0.0);
                     problem.p[..n].fill(0.0);
-                    problem.factored.last.fill([0.0; 3]);
                 }
                 for &slot in self.contacts.used() {
                     let gap = self.gap_at_end(slot, h, theta);
+                    self.gaps[slot] = [gap, zero, zero];
+                    self.pushes[slot] = [zero; 3];
                     let places = self.contacts.places(slot);
                     let active = self.contacts.slot(slot).active & self.is_deep;
                     for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
@@ -75,6 +83,10 @@ impl<T: Lane> Block<T> {
                         }
                     }
                 }
+                let data = (&self.gaps[..], &self.mu[..]);
+                let pushes = &mut self.pushes;
+                self.rows.sweep(&self.contacts, SWEEPS, data, pushes);
+                write_start(&self.contacts, self.is_deep, pushes, problems);
             },
         );
     }

@@ -53,6 +53,8 @@ pub(crate) struct Pivoting<T: Lane, B: Store> {
     /// `α` that an attempt asks for, relative to the mean diagonal of `W`; 0 for that which suits
     /// the start.
     pub(crate) asked: T,
+    /// Lanes whose operator is definite, which begin with the smallest `α`.
+    pub(crate) definite: T::Mask,
     /// Impulses that a step stays near, where the system [returns](System::RETURNS) to them.
     pub(crate) centre: B::Of<Triple<T>>,
     pub(super) alpha: T,
@@ -126,6 +128,7 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
             lost: none,
             inverses: [zero, one],
             asked: zero,
+            definite: none,
             alpha: one,
             first_alpha: one,
             centre: B::filled([zero; 3]),
@@ -248,6 +251,7 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
         self.last = T::select(lanes, relative, self.last);
         let is_parked = !slides & relative.lt(zero.like(PARKED));
         let first = T::select(is_parked, zero.like(S::PARKED_ALPHA), zero.like(S::ALPHA));
+        let first = T::select(self.definite, zero.like(S::SMALLEST_ALPHA), first);
         let first = T::select(zero.lt(self.asked), self.asked, first) * self.mean;
         self.first_alpha = T::select(lanes, first, self.first_alpha);
         self.alpha = T::select(lanes, first, self.alpha);

@@ -2,14 +2,14 @@
 //!
 //! Heights decide about most. Of the cells under a part those count that reach up to it, and with a
 //! wheel those in a strip along its rim. Of a cell's faces those count whose plane is within reach
-//! of the part's lowest point over it, with a disc only if that point is about over the face; of
-//! its edges those that are convex, by four heights, and between two such planes. What is left is
-//! built.
+//! of the part's lowest point over it, with a wheel only if the lowest point of one of its circles
+//! is about over the face; of its edges those that are convex, by four heights, and between two
+//! such planes. What is left is built.
 
 use nalgebra::Vector3;
 
 use super::{Half, HeightField, index, narrow, number};
-use crate::geometry::shape::{Disc, PlacedShape, SupportMap};
+use crate::geometry::shape::{Disc, PlacedShape, Roller, SupportMap};
 use crate::geometry::terrain::{Neighbourhood, Primitive};
 
 /// Cosine of the angle to the way from a part to a face from which on the face looks away, as in
@@ -93,10 +93,8 @@ impl HeightField {
         };
         let beyond = |[a, b]: [usize; 2], n: usize| [a.saturating_sub(1), (b + 1).min(n - 2)];
         let slope = (self.tiles).steepest(beyond(columns, self.columns), beyond(rows, self.rows));
-        let lowest = match part.shape {
-            PlacedShape::Disc(disc) if slope <= GENTLE * GENTLE => Some(disc),
-            _ => None,
-        };
+        let lowest = Rims::of(part.shape).filter(|_| slope <= GENTLE * GENTLE);
+        let lowest = lowest.as_ref();
         // No face looks away from the wheel that lies beside it.
         let is_even = (slope / (1.0 + slope)).sqrt() + axle.y.abs() <= AWAY;
         let floor = c.y - around(&Vector3::y());
@@ -151,7 +149,7 @@ impl HeightField {
         part: &Neighbourhood<'_>,
         [columns, rows]: [[usize; 2]; 2],
         (radius, floor): (f64, f64),
-        lowest: Option<&Disc>,
+        lowest: Option<&Rims>,
         visit: &mut dyn FnMut(u32, &Primitive),
     ) {
         let solid = part.solid();
@@ -221,81 +219,158 @@ impl HeightField {
         [Half::Low, Half::High].map(|half| self.normal(own, half).unwrap_or_else(Vector3::y))
     }
 
-    /// Visits the pieces that belong to a corner and are within reach. `lowest`: the disc that the
-    /// part is, if its lowest points over the faces tell what it may touch.
+    /// Visits the pieces that belong to a corner and are within reach. `lowest`: the circles of the
+    /// part, if their lowest points over the faces tell what it may touch.
     #[inline]
     fn visit_reachable(
         &self,
         cell: [usize; 2],
         part: &Neighbourhood<'_>,
-        lowest: Option<&Disc>,
+        lowest: Option<&Rims>,
         visit: &mut dyn FnMut(u32, &Primitive),
     ) {
         let first = number(cell[1] * self.columns + cell[0]);
         let [i, j] = cell.map(narrow);
-        let [a, b, c, d] = self.cell_heights(cell).map(f64::from);
-        let [dx, dz] = self.spacing;
         let from = part.centre - self.point([i, j]);
-        let rises = [0.0, b - a, c - a, d - a];
-        let beside = lowest.map_or(0.0, |disc| self.beside(disc, &from, rises));
-        let reach = part.reach - SHARE * beside;
-        // The part over a face's plane, from any corner of the edge that it shares.
-        let side = |x: f64, z: f64| {
-            let m = Vector3::new(-x / dx, 1.0, -z / dz);
-            let height = m.dot(&from);
-            let is_beyond = part.is_beyond(&m, height, reach);
-            Side {
-                m,
-                height,
-                is_beyond,
-            }
+        let heights = Heights {
+            own: self.cell_heights(cell).map(f64::from),
+            before: self.corner([i, j - 1]),
+            left: self.corner([i - 1, j]),
+        };
+        let is_near = match lowest {
+            Some(rims) => self.near_rims(rims, part.reach, &heights, &from),
+            None => self.near_part(part, &heights, &from),
         };
         let mut known = None;
         let mut patch = || *known.get_or_insert_with(|| self.patch(cell));
-        let (low, high) = (side(b - a, d - b), side(d - c, c - a));
-        for (k, half, own) in [(0, Half::Low, &low), (1, Half::High, &high)] {
-            let is_near = !own.is_beyond
-                && lowest.is_none_or(|disc| self.is_over(own, (disc, part), &from, half));
+        for (k, is_near, half) in [(0, is_near[0], Half::Low), (1, is_near[1], Half::High)] {
             if let Some(face) = is_near.then(|| patch().face(half)).flatten() {
                 visit(first + k, &Primitive::Face(face));
             }
         }
-        let (before, left) = (self.corner([i, j - 1]), self.corner([i - 1, j]));
-        let may_touch = |first: &Side, second: &Side, x: f64, y: f64, z: f64| {
-            !part.is_beyond_edge([first.is_beyond, second.is_beyond])
-                && lowest.is_none_or(|disc| {
-                    Side::may_touch_between([first, second], disc, &from, &Vector3::new(x, y, z))
-                })
-        };
-        let is_out = |side: &Side| part.is_beyond_edge([side.is_beyond, false]);
-        // Convex where the middle of the edge is above that of the corners on its sides.
-        let edges = [
-            a + b > d + before
-                && !is_out(&low)
-                && may_touch(&side(b - a, a - before), &low, dx, b - a, 0.0),
-            a + c > d + left
-                && !is_out(&high)
-                && may_touch(&high, &side(a - left, c - a), 0.0, c - a, dz),
-            a + d > b + c && may_touch(&low, &high, dx, d - a, dz),
-        ];
-        for (k, is_near) in (2..5).zip(edges) {
-            if let Some(edge) = is_near.then(|| patch().edge(k)).flatten() {
+        for (k, edge) in (2..5).zip(&is_near[2..]) {
+            if let Some(edge) = edge.then(|| patch().edge(k)).flatten() {
                 visit(first + k, &Primitive::Edge(edge));
             }
         }
-        let is_high = 2.0 * a >= b + left && 2.0 * a >= c + before;
         let is_near = || match lowest {
-            // Nothing but a needle pierces a disc that stands.
-            Some(disc) if disc.axle.y.abs() < STANDS => {
-                disc.axle.dot(&from).abs() <= part.reach + ROUNDING
-            }
-            _ => from.norm() <= part.radius() + ROUNDING,
+            Some(rims) => rims.may_touch_vertex(part, &from),
+            None => from.norm() <= part.radius() + ROUNDING,
         };
-        if is_high
+        if heights.is_high()
             && is_near()
             && let Some(vertex) = patch().vertex()
         {
             visit(first + 5, &Primitive::Vertex(vertex));
+        }
+    }
+
+    /// Which faces and edges of a cell a part may touch, in the order of their numbers. `from`:
+    /// place of the part's centre from the cell's corner, m.
+    #[inline]
+    fn near_part(
+        &self,
+        part: &Neighbourhood<'_>,
+        heights: &Heights,
+        from: &Vector3<f64>,
+    ) -> [bool; 5] {
+        let sides = self.sides(heights, from, |m, height| {
+            part.is_beyond(m, height, part.reach)
+        });
+        let convex = heights.convex();
+        let edge = |k: usize| {
+            let [one, two] = sides.at_edge(k).map(|side| side.is_beyond);
+            convex[k - 2] && !part.is_beyond_edge([one, two])
+        };
+        let faces = [&sides.low, &sides.high].map(|side| !side.is_beyond);
+        [faces[0], faces[1], edge(2), edge(3), edge(4)]
+    }
+
+    /// The same of a wheel that comes as near as `reach`, m.
+    #[inline]
+    fn near_rims(
+        &self,
+        rims: &Rims,
+        reach: f64,
+        heights: &Heights,
+        from: &Vector3<f64>,
+    ) -> [bool; 5] {
+        let reach = reach + rims.rounding;
+        let convex = heights.convex();
+        let mut is_near = [false; 5];
+        let beside = self.beside(&rims.disc, from, heights.rises());
+        for along in rims.places() {
+            let from = from + rims.disc.axle * along;
+            let beside = (beside - along.abs() - rims.rounding).max(0.0);
+            let least = reach - SHARE * beside;
+            let sides = self.sides(heights, &from, |m, height| {
+                circle_is_beyond(&rims.disc, m, height, least)
+            });
+            let shift = rims.rounding;
+            for (k, half) in [(0, Half::Low), (1, Half::High)] {
+                let side = sides.face(half);
+                is_near[k] = is_near[k]
+                    || (!side.is_beyond
+                        && self.is_over(side, &rims.disc, [reach, shift], &from, half));
+            }
+            for k in 2..5 {
+                let pair = sides.at_edge(k);
+                is_near[k] = is_near[k]
+                    || (convex[k - 2]
+                        && !pair.iter().any(|side| side.is_beyond)
+                        && Side::may_touch_between(
+                            pair,
+                            &rims.disc,
+                            &from,
+                            &heights.along(k, self.spacing),
+                        ));
+            }
+        }
+        if rims.half > 0.0 {
+            let sides = self.sides(heights, from, |_, _| false);
+            for k in 2..5 {
+                is_near[k] = is_near[k]
+                    || (convex[k - 2]
+                        && rims.may_cross(
+                            sides.at_edge(k),
+                            reach,
+                            from,
+                            &heights.along(k, self.spacing),
+                        ));
+            }
+        }
+        is_near
+    }
+
+    /// The planes around a cell's corner and a part, or a circle of it, whose centre is `from` (m)
+    /// from the corner.
+    #[inline]
+    fn sides(
+        &self,
+        heights: &Heights,
+        from: &Vector3<f64>,
+        is_beyond: impl Fn(&Vector3<f64>, f64) -> bool,
+    ) -> Sides {
+        let [dx, dz] = self.spacing;
+        let Heights {
+            own: [a, b, c, d],
+            before,
+            left,
+        } = *heights;
+        let side = |x: f64, z: f64| {
+            let m = Vector3::new(-x / dx, 1.0, -z / dz);
+            let height = m.dot(from);
+            Side {
+                m,
+                height,
+                is_beyond: is_beyond(&m, height),
+            }
+        };
+        Sides {
+            low: side(b - a, d - b),
+            high: side(d - c, c - a),
+            before: side(b - a, a - before),
+            left: side(a - left, c - a),
         }
     }
 
@@ -314,19 +389,21 @@ impl HeightField {
         nearest.max(-furthest).max(0.0)
     }
 
-    /// Whether the lowest point of a disc over the plane of a face may be over the face, or other
-    /// points may be near it. `from`: place of the disc's centre from the cell's corner, m.
+    /// Whether the lowest point of a circle over the plane of a face, moved by up to `shift` (m),
+    /// may be over the face, or other points may be near it. `from`: place of the circle's centre
+    /// from the cell's corner, m.
     #[inline]
     fn is_over(
         &self,
         side: &Side,
-        (disc, part): (&Disc, &Neighbourhood<'_>),
+        disc: &Disc,
+        [reach, shift]: [f64; 2],
         from: &Vector3<f64>,
         half: Half,
     ) -> bool {
         let (low, length) = side.lowest(disc, from);
         // At least the gap.
-        let off = OFF * (side.height - disc.radius * length).abs() + ROUNDING;
+        let off = OFF * (side.height - disc.radius * length).abs() + shift + ROUNDING;
         let [dx, dz] = self.spacing;
         let is_beside = low.x < -off || low.x > dx + off || low.z < -off || low.z > dz + off;
         let ahead = low.x / dx - low.z / dz;
@@ -337,8 +414,194 @@ impl HeightField {
         };
         // The second and third point of the rim are higher by one and a half radii.
         let others = side.height + 0.5 * disc.radius * length;
-        let is_upright = others > (part.reach + ROUNDING) * side.m.norm();
+        let is_upright = others > (reach + ROUNDING) * side.m.norm();
         !((is_beside || is_in_other) && is_upright)
+    }
+}
+
+/// The circles of a wheel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rims {
+    /// A circle in the middle of the wheel.
+    disc: Disc,
+    /// Distance of the circles from there, 0 if there is one, and what they are swept by, m.
+    half: f64,
+    rounding: f64,
+}
+
+impl Rims {
+    /// Those of a shape; none if it is no wheel.
+    #[inline]
+    fn of(shape: &PlacedShape) -> Option<Self> {
+        match shape {
+            PlacedShape::Disc(disc) => Some(Self {
+                disc: *disc,
+                half: 0.0,
+                rounding: 0.0,
+            }),
+            PlacedShape::Roller(Roller {
+                core,
+                half,
+                rounding,
+            }) => Some(Self {
+                disc: *core,
+                half: *half,
+                rounding: *rounding,
+            }),
+            PlacedShape::Box(_) | PlacedShape::Sphere(_) => None,
+        }
+    }
+
+    /// Places of the circles along the axle, m.
+    #[inline]
+    fn places(&self) -> impl Iterator<Item = f64> {
+        let n = if self.half > 0.0 { 2 } else { 1 };
+        [self.half, -self.half].into_iter().take(n)
+    }
+
+    /// Whether a vertex may be touched from which the wheel's centre is `from`, m.
+    #[inline]
+    fn may_touch_vertex(&self, part: &Neighbourhood<'_>, from: &Vector3<f64>) -> bool {
+        let along = self.disc.axle.dot(from).abs();
+        if self.half + self.rounding > 0.0 {
+            let reach = part.reach + self.rounding + ROUNDING;
+            let away = from.norm_squared() - along * along;
+            let radius = self.disc.radius + reach;
+            return along <= self.half + reach && away <= radius * radius;
+        }
+        // Nothing but a needle pierces a disc that stands.
+        if self.disc.axle.y.abs() < STANDS {
+            along <= part.reach + ROUNDING
+        } else {
+            from.norm() <= part.radius() + ROUNDING
+        }
+    }
+
+    /// Whether the tread between the circles may touch the edge between two planes, at a distance
+    /// of up to `reach` from the cylinder of the circles (m): at a normal between theirs that is
+    /// perpendicular to the axle and to the edge. `along`: the edge, from the corner from which the
+    /// wheel's centre is `from`, m.
+    #[inline]
+    fn may_cross(
+        &self,
+        sides: [&Side; 2],
+        reach: f64,
+        from: &Vector3<f64>,
+        along: &Vector3<f64>,
+    ) -> bool {
+        let s = &self.disc.axle;
+        let across = s.cross(along);
+        let square = across.norm_squared();
+        let length = along.norm_squared();
+        // Nearly parallel: the places along the axle are not accurate.
+        if square <= ALONGSIDE * ALONGSIDE * length {
+            return true;
+        }
+        let up = (sides[0].m + sides[1].m).dot(&across);
+        let n = across * (1.0_f64.copysign(up) / square.sqrt());
+        let gap = n.dot(from) - self.disc.radius;
+        if gap > reach + ROUNDING {
+            return false;
+        }
+        let [one, two] = sides.map(|side| side.m.cross(along).dot(&n));
+        let tolerance = ROUNDING * length.sqrt();
+        if one >= tolerance || two <= -tolerance {
+            return false;
+        }
+        // from − n (n · from) + own s = place along
+        let rest = from - n * n.dot(from);
+        let own = (s.dot(along) * rest.dot(along) - rest.dot(s) * length) / square;
+        own.abs() <= self.half + ROUNDING
+    }
+}
+
+/// Sine of the angle between axle and edge up to which the edge is alongside the wheel.
+const ALONGSIDE: f64 = 1e-3;
+
+/// Whether a circle of a disc is further from a plane than `reach`, m; as
+/// [`Neighbourhood::is_beyond`].
+#[inline]
+fn circle_is_beyond(disc: &Disc, m: &Vector3<f64>, height: f64, reach: f64) -> bool {
+    let square = m.norm_squared();
+    let length = 0.5 * (1.0 + square);
+    let reach = reach + ROUNDING;
+    let rest = height - reach.max(reach * length);
+    let along = m.dot(&disc.axle);
+    rest > 0.0 && rest * rest > disc.radius * disc.radius * (square - along * along)
+}
+
+/// Heights of a cell's corners, and of those before and left of the first, m.
+#[derive(Clone, Copy, Debug)]
+struct Heights {
+    own: [f64; 4],
+    before: f64,
+    left: f64,
+}
+
+impl Heights {
+    /// Of the corners over the first.
+    #[inline]
+    fn rises(&self) -> [f64; 4] {
+        let [a, b, c, d] = self.own;
+        [0.0, b - a, c - a, d - a]
+    }
+
+    /// Which edges are convex: the middle of the edge is above that of the corners on its sides.
+    #[inline]
+    fn convex(&self) -> [bool; 3] {
+        let [a, b, c, d] = self.own;
+        [
+            a + b > d + self.before,
+            a + c > d + self.left,
+            a + d > b + c,
+        ]
+    }
+
+    /// The edge k = 2, 3, 4 from the first corner, m.
+    #[inline]
+    fn along(&self, k: usize, [dx, dz]: [f64; 2]) -> Vector3<f64> {
+        let [_, b, c, d] = self.rises();
+        match k {
+            2 => Vector3::new(dx, b, 0.0),
+            3 => Vector3::new(0.0, c, dz),
+            _ => Vector3::new(dx, d, dz),
+        }
+    }
+
+    /// Whether the vertex at the first corner may be convex.
+    #[inline]
+    fn is_high(&self) -> bool {
+        let [a, b, c, _] = self.own;
+        2.0 * a >= b + self.left && 2.0 * a >= c + self.before
+    }
+}
+
+/// The planes of a cell's faces, and of those before and left of it.
+#[derive(Clone, Copy, Debug)]
+struct Sides {
+    low: Side,
+    high: Side,
+    before: Side,
+    left: Side,
+}
+
+impl Sides {
+    #[inline]
+    fn face(&self, half: Half) -> &Side {
+        match half {
+            Half::Low => &self.low,
+            Half::High => &self.high,
+        }
+    }
+
+    /// Those at the edge k = 2, 3, 4.
+    #[inline]
+    fn at_edge(&self, k: usize) -> [&Side; 2] {
+        match k {
+            2 => [&self.before, &self.low],
+            3 => [&self.high, &self.left],
+            _ => [&self.low, &self.high],
+        }
     }
 }
 
@@ -432,7 +695,7 @@ mod tests {
         gap
     }
 
-    fn shapes(angles: [f64; 3]) -> [PlacedShape; 5] {
+    fn shapes(angles: [f64; 3]) -> [PlacedShape; 6] {
         let R = *Rotation3::from_euler_angles(angles[0], angles[1], angles[2]).matrix();
         let centre = Vector3::new(0.02, -0.01, 0.03);
         let disc = |radius: f64| Disc {
@@ -445,6 +708,7 @@ mod tests {
             PlacedShape::Disc(disc(0.2)),
             PlacedShape::Disc(disc(0.05)),
             PlacedShape::Roller(Roller::new(disc(0.15), 0.1, 0.03)),
+            PlacedShape::Roller(Roller::new(disc(0.2), 0.15, 0.0)),
             PlacedShape::Box(OrientedBox {
                 centre,
                 R,
