@@ -47,7 +47,7 @@ def test_the_shell_is_offered_options_and_their_values(tmp_path: Path) -> None:
     [
         (complete_terrain, "", ["plane", "rocks", "hills", "sand", "maps/"]),
         (complete_terrain, "maps/h", ["maps/hill.tif"]),
-        (complete_policy, "s", ["scan"]),
+        (complete_policy, "s", ["sand", "scan"]),
         (complete_policy, "m", ["maps/"]),
         (complete_model, "mars", ["mars-rover"]),
         (complete_model, "maps/", ["maps/robot.urdf"]),

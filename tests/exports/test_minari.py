@@ -88,7 +88,7 @@ def test_random_actions_drive_any_environment(
         (["a-v0", "--environment", "Rover-v9"], "--environment: must be one of Rover-v0, "),
         (["a-v0", "--environment", "RoverCommand-v0"], "--policy: must be 'random' for this environment"),
         (["a-v0", "--environment", "RoverGoal-v0"], "--policy: must be 'random' for this environment"),
-        (["a-v0", "--policy", "nobody"], "--policy: must be 'pd', 'scan', "),
+        (["a-v0", "--policy", "nobody"], "--policy: must be 'pd', 'sand', 'scan', "),
         (["../a-v0"], "NAME: must be NAME-vN"),
         (["a"], "NAME: must be NAME-vN"),
         (["a-v0", "--difficulty", "nan"], "--difficulty: must be finite"),

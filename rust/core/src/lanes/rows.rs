@@ -127,10 +127,6 @@ impl<T: Lane> Rows<T> {
                 self.multiply(contacts);
                 if contacts.factored() != 0 {
                     self.multiply_diagonal(contacts);
-                } else {
-                    for (i, &slot) in contacts.used().iter().enumerate() {
-                        self.diagonal[slot] = self.W[block(i, i)];
-                    }
                 }
             },
         );
@@ -231,7 +227,11 @@ impl<T: Lane> Rows<T> {
         }
         for &slot in contacts.used() {
             self.softness[slot] = diagonal(slot);
-            soften(&mut self.diagonal[slot], slot);
+        }
+        if contacts.factored() != 0 {
+            for &slot in contacts.used() {
+                soften(&mut self.diagonal[slot], slot);
+            }
         }
     }
 

@@ -2,8 +2,8 @@
 //!
 //! When commands change, many of the contacts of a machine on lines change their modes, and
 //! pivoting corrects little more than one of them a step. So it does where a position is projected,
-//! whose problem has no impulses of an earlier step. A few sweeps find most modes for the price of one step, for all
-//! lanes of the block at once.
+//! whose problem has no impulses of an earlier step. A few sweeps find most modes for the price of
+//! one step, for all lanes of the block at once.
 
 use super::contacts::Contacts;
 use super::problem::Triple;
