@@ -78,7 +78,7 @@ struct Block<T: Lane> {
     rows: Rows<T>,
     q: Vec<[T; 3]>,
     problems: Vec<ContactProblem>,
-    declined: u32,
+    fallbacks: u32,
 }
 
 impl<T: Lane> Block<T> {
@@ -130,7 +130,7 @@ impl<T: Lane> Block<T> {
             factor,
             contacts,
             problems: vec![ContactProblem::default(); T::LANES],
-            declined: 0,
+            fallbacks: 0,
         }
     }
 
@@ -150,8 +150,8 @@ impl<T: Lane> Block<T> {
                 needs_pieces: false,
                 forecast: &forecast,
             };
-            let declined = self.contacts.detect(&mut self.ground, &sight);
-            self.declined += declined.bits().count_ones();
+            let fallbacks = self.contacts.detect(&mut self.ground, &sight);
+            self.fallbacks += fallbacks.bits().count_ones();
         }
         if last >= 2 {
             self.rows
@@ -192,7 +192,7 @@ impl<T: Lane> Block<T> {
             println!("  {phase:12} {:7.1}", time - before);
             before = time;
         }
-        self.declined = 0;
+        self.fallbacks = 0;
         let (mut slots, mut contacts) = (0, 0);
         for k in 0..STEPS {
             self.run(k, 1);
@@ -202,10 +202,10 @@ impl<T: Lane> Block<T> {
                 .sum::<usize>();
         }
         println!(
-            "  contacts {:.2}, slots {:.2} a step; {} of {} steps declined",
+            "  contacts {:.2}, slots {:.2} a step; {} of {} steps fall back",
             contacts as f64 / (STEPS * T::LANES) as f64,
             slots as f64 / STEPS as f64,
-            self.declined,
+            self.fallbacks,
             STEPS * T::LANES
         );
     }

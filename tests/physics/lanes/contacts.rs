@@ -53,10 +53,10 @@ impl Step {
     }
 }
 
-/// What a step finds of a rover: the declined have no numbers.
+/// What a step finds of a rover; one that falls back has no numbers.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Found {
-    is_declined: bool,
+    falls_back: bool,
     keys: Vec<ContactKey>,
     geometry: Vec<f64>,
     u_before: Vec<f64>,
@@ -137,7 +137,7 @@ impl<T: Lane> Block<T> {
             needs_pieces: false,
             forecast: &forecast,
         };
-        let declined = self.contacts.detect(&mut self.ground, &sight);
+        let fallbacks = self.contacts.detect(&mut self.ground, &sight);
         let mut M = MassMatrix::new(token, machine);
         M.update(machine, inertias, middle);
         let mut factor = Factor::new(token, machine);
@@ -169,9 +169,9 @@ impl<T: Lane> Block<T> {
         });
         (0..T::LANES)
             .map(|lane| {
-                if declined.get(lane) {
+                if fallbacks.get(lane) {
                     return Found {
-                        is_declined: true,
+                        falls_back: true,
                         ..Found::default()
                     };
                 }
@@ -228,7 +228,7 @@ fn number(k: usize) -> f64 {
 }
 
 /// The same by the sources for any machine, contacts in the same order; none where the ground is
-/// unknown, and where there are more contacts than slots if the other has been declined.
+/// unknown, and where there are more contacts than slots if the other has fallen back.
 fn expected(model: &Model, rover: &Rover, step: Step, found: &Found) -> Option<Found> {
     let keys = &found.keys[..];
     let moved = |h: f64| {
@@ -267,7 +267,7 @@ fn expected(model: &Model, rover: &Rover, step: Step, found: &Found) -> Option<F
         &mut pairs,
         &mut contacts,
     );
-    if found.is_declined && contacts.len() > 6 {
+    if found.falls_back && contacts.len() > 6 {
         return None;
     }
     assert_eq!(contacts.len(), keys.len(), "{contacts:?}, {keys:?}");
@@ -300,7 +300,7 @@ fn expected(model: &Model, rover: &Rover, step: Step, found: &Found) -> Option<F
     let mut impulse = vec![0.0; model.nv()];
     generalized_impulse(model, &end, &contacts, &p, &mut impulse);
     let mut found = Found {
-        is_declined: false,
+        falls_back: false,
         u_before: system.u.clone(),
         operator: system.W.clone(),
         local,
@@ -403,10 +403,10 @@ fn grounds() -> Vec<Arc<dyn Terrain>> {
 /// Returns whether the lanes have taken the step.
 fn check(model: &Model, rover: &Rover, step: Step, found: &Found) -> bool {
     let Some(right) = expected(model, rover, step, found) else {
-        assert!(found.is_declined);
+        assert!(found.falls_back);
         return false;
     };
-    assert!(!found.is_declined);
+    assert!(!found.falls_back);
     assert_close("geometry", &found.geometry, &right.geometry, 1e-13);
     assert_close("velocity before", &found.u_before, &right.u_before, 1e-12);
     assert_close("operator", &found.operator, &right.operator, 1e-12);
@@ -569,7 +569,7 @@ fn lanes_agree_on<T: Lane>(token: T::Token, model: &Model, grounds: &[Arc<dyn Te
         for (lane, rover) in rovers.iter().enumerate() {
             let rover = std::slice::from_ref(rover);
             let alone = Block::<f64>::new(Single::best(), model, rover).step(rover, step);
-            assert_eq!(found[lane].is_declined, alone[0].is_declined);
+            assert_eq!(found[lane].falls_back, alone[0].falls_back);
             assert_eq!(found[lane].keys, alone[0].keys);
             assert_eq!(bits(&found[lane..=lane]), bits(&alone), "lane {lane}");
         }
@@ -646,8 +646,8 @@ fn what_a_search_keeps_does_not_show() {
             let fresh = Block::<f64>::new(Single::best(), &model, here).step(here, STEPS[0]);
             let found = block.step(here, STEPS[0]);
             assert_eq!(
-                (found[0].is_declined, &found[0].keys),
-                (fresh[0].is_declined, &fresh[0].keys)
+                (found[0].falls_back, &found[0].keys),
+                (fresh[0].falls_back, &fresh[0].keys)
             );
             assert_eq!(bits(&found), bits(&fresh));
         }

@@ -11,7 +11,7 @@
 //!
 //! What is rare is found lane by lane (`lane_detection`): a wheel that nearly lies flat, passes a
 //! sphere within the step, touches more things than it has slots, or an edge of a surface, and a
-//! body near the ground or another one. A lane with more contacts than a problem has is declined.
+//! body near the ground or another one. A lane with more contacts than a problem has falls back.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -354,7 +354,7 @@ impl<T: Lane> Contacts<T> {
         }
     }
 
-    /// Finds the contacts of a step and moves them to its end. Returns the lanes that are declined.
+    /// Finds the contacts of a step and moves them to its end. Returns the lanes that fall back.
     ///
     /// # Panics
     /// If an argument is of another machine.
@@ -414,19 +414,19 @@ impl<T: Lane> Contacts<T> {
             let (near, reach) = self.look_at_box(b, height, ground, sight);
             self.ask(self.parts.boxes[b].part, near, reach, sight);
         }
-        let mut declined = T::mask(self.token, 0);
+        let mut fallbacks = T::mask(self.token, 0);
         if self.by_lane.is_asked() || sight.machine.has_pairs {
             for slot in &mut self.slots[self.first_spare..self.first_stop] {
-                slot.active = declined;
+                slot.active = fallbacks;
             }
-            declined = self.find_by_lane(ground, sight);
+            fallbacks = self.find_by_lane(ground, sight);
             let slots = self.slots[..self.first_stop].iter().enumerate();
             let used = slots.filter(|(_, own)| own.active.any());
             self.used.clear();
             self.used.extend(used.map(|(slot, _)| slot));
         }
         self.n_of_shapes = self.used.len();
-        declined | self.list_contacts(ground)
+        fallbacks | self.list_contacts(ground)
     }
 
     /// Asks for the contacts of a part in the lanes of a mask.
@@ -583,9 +583,9 @@ impl<T: Lane> Contacts<T> {
         let half_way = sight.end.origin - origin + at_end - centre;
         let motion = half_way.norm();
         let need = reach + motion;
-        let mut declined = ground.look_around_wheel(w, origin + centre, wheel.bound, need);
+        let mut fallbacks = ground.look_around_wheel(w, origin + centre, wheel.bound, need);
         if wheel.is_wide() {
-            return declined | self.look_with_tread(w, ground, sight, (s, centre), half_way);
+            return fallbacks | self.look_with_tread(w, ground, sight, (s, centre), half_way);
         }
         let radius = T::splat(self.token, wheel.radius);
         let zero = radius.like(0.0);
@@ -601,7 +601,7 @@ impl<T: Lane> Contacts<T> {
             let is_deep = (gap - motion).lt(-(radius.like(DEEP) * sphere.radius));
             if is_deep.any() {
                 let passes = self.passing(w, is_deep, sphere, sight, half_way);
-                declined = declined | passes;
+                fallbacks = fallbacks | passes;
             }
             let u_N = if sight.forecast.needs_velocity(gap) {
                 let to_point = in_plane * (in_plane_length.min(radius) / in_plane_length);
@@ -614,12 +614,13 @@ impl<T: Lane> Contacts<T> {
             if admitted.any() {
                 // Normal or rolling direction are not defined by differences.
                 let least = radius.like(NO_DIRECTION);
-                declined = declined | (admitted & (in_plane_length.le(least) | distance.le(least)));
+                fallbacks =
+                    fallbacks | (admitted & (in_plane_length.le(least) | distance.le(least)));
                 let slots = self.parts.wheels[w].slots.clone();
-                declined = declined | self.enter(slots, admitted, sphere);
+                fallbacks = fallbacks | self.enter(slots, admitted, sphere);
             }
         }
-        declined
+        fallbacks
     }
 
     /// The same for a wheel with a width.
@@ -640,14 +641,14 @@ impl<T: Lane> Contacts<T> {
         if wheel.n_circles() > 1 {
             slots.start += 2;
         }
-        let mut declined = T::mask(self.token, 0);
+        let mut fallbacks = T::mask(self.token, 0);
         for sphere in ground.near_wheel(w) {
             let offset = sphere.centre - sight.middle.origin - centre;
             let near = self.parts.wheels[w].nearest(s, offset);
             let gap = near.distance - sphere.radius;
             let is_deep = (gap - motion).lt(-(motion.like(DEEP) * sphere.radius));
             if is_deep.any() {
-                declined = declined | self.passing(w, is_deep, sphere, sight, half_way);
+                fallbacks = fallbacks | self.passing(w, is_deep, sphere, sight, half_way);
             }
             let u_N = if sight.forecast.needs_velocity(gap) {
                 near.n.dot(twist.velocity(centre + near.point))
@@ -656,11 +657,11 @@ impl<T: Lane> Contacts<T> {
             };
             let admitted = sight.forecast.admits(gap, u_N);
             if admitted.any() {
-                declined = declined | (admitted & near.undefined);
-                declined = declined | self.enter(slots.clone(), admitted, sphere);
+                fallbacks = fallbacks | (admitted & near.undefined);
+                fallbacks = fallbacks | self.enter(slots.clone(), admitted, sphere);
             }
         }
-        declined
+        fallbacks
     }
 
     /// Enters a contact with a sphere into the first free one of some slots. Returns where none is.

@@ -16,7 +16,7 @@ use crate::geometry::query::sweep::DEEP;
 use crate::geometry::{Coverage, OrientedBox, Sphere, Terrain};
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Mat3, Vec3};
 
-/// Most spheres near a wheel. A wheel near more is declined.
+/// Most spheres near a wheel. A wheel near more falls back.
 const MAX_NEAR: usize = 8;
 
 /// How far beyond its reach a search for a wheel looks, m: first, and where that finds too many.

@@ -16,7 +16,7 @@ impl<T: Lane> Contacts<T> {
     /// Finds what was asked for. Returns the lanes with unknown ground or too few slots.
     #[cold]
     pub(super) fn find_by_lane(&mut self, ground: &Ground<T>, sight: &Sight<'_, T>) -> T::Mask {
-        let mut declined = 0;
+        let mut fallbacks = 0;
         for lane in 0..T::LANES {
             let (Some(model), Some(terrain)) = (&sight.models[lane], ground.terrain(lane)) else {
                 continue;
@@ -46,7 +46,7 @@ impl<T: Lane> Contacts<T> {
                 let activation = activation(asked.reach.get(lane));
                 let parts = std::iter::once(asked.part);
                 let unknown = detect_parts(parts, &machine, &**terrain, &activation, &mut contacts);
-                declined |= u32::from(unknown.is_some()) << lane;
+                fallbacks |= u32::from(unknown.is_some()) << lane;
             }
             if sight.machine.has_pairs && sight.going >> lane & 1 == 1 {
                 let v: Vec<f64> = sight.v.iter().map(|v| v.get(lane)).collect();
@@ -61,11 +61,11 @@ impl<T: Lane> Contacts<T> {
             }
             for contact in &mut contacts {
                 relocate_to(model, &end, &**terrain, contact);
-                declined |= u32::from(!self.give(sight.machine, lane, contact)) << lane;
+                fallbacks |= u32::from(!self.give(sight.machine, lane, contact)) << lane;
             }
             self.by_lane.scratch = contacts;
         }
-        T::mask(self.token, declined)
+        T::mask(self.token, fallbacks)
     }
 
     /// Enters a contact into a free slot. False if none is.

@@ -29,7 +29,7 @@
 //!                    │
 //!                    ▼
 //!               Block::prepare        poses, contacts, mass matrix, W, free velocity
-//!                    │                a lane that cannot go on is declined; its state is unchanged
+//!                    │                a lane that cannot go on falls back; its state is unchanged
 //!                    ▼
 //!               Queue                 the friction-contact problems
 //!                    │
@@ -40,7 +40,7 @@
 //!               Block::finish ──► Block::store_rover
 //! ```
 //!
-//! A declined lane takes the general step: [`crate::simulation`], [`crate::integrator`].
+//! A lane that falls back takes the general step: [`crate::simulation`], [`crate::integrator`].
 //!
 //! # May use
 //!

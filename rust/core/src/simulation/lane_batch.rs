@@ -298,7 +298,7 @@ impl<T: Lane> Lanes<T> {
             let Some(slot) = slot.as_mut().filter(|slot| !slot.has_failed) else {
                 continue;
             };
-            if block.declined(lane).is_none() {
+            if block.fallback(lane).is_none() {
                 slot.report.merge(block.report(lane));
                 slot.is_general = false;
                 continue;

@@ -83,7 +83,7 @@ impl RoverScene {
             solve(queue, gap_problem, solver);
         }
         block.finish(is_deep.then_some(&gap_problem[..]), probe);
-        if block.declined(0).is_some() {
+        if block.fallback(0).is_some() {
             return None;
         }
         block.store_rover(0, &mut lane_rover);

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Block, Decline};
+use super::{Block, Fallback};
 use crate::contact::Contact;
 use crate::lanes::contacts::Sight;
 use crate::lanes::forecast::Forecast;
@@ -23,15 +23,15 @@ impl<T: Lane> Block<T> {
             needs_pieces: !self.options.materials.is_empty(),
             forecast: &forecast,
         };
-        let declined = self.contacts.detect(&mut self.ground, &sight);
-        self.decline(Decline::Contact, declined);
+        let fallbacks = self.contacts.detect(&mut self.ground, &sight);
+        self.fall_back(Fallback::Contact, fallbacks);
         if !self.machine.stops.is_empty() {
             let (machine, places) = (&*self.machine, (&self.middle, &self.end));
             let end = &self.poses_end;
             let too_many = self
                 .contacts
                 .detect_stops(machine, places, end, &self.v, &forecast);
-            self.decline(Decline::Contact, too_many);
+            self.fall_back(Fallback::Contact, too_many);
         }
         for &slot in self.contacts.used() {
             let is_stop = self.contacts.stop(slot).is_some();

@@ -41,9 +41,9 @@ use crate::multibody::{
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 use crate::system::drives::Drives;
 
-/// Why a lane was declined in its last step.
+/// Why a lane fell back in its last step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Decline {
+pub enum Fallback {
     /// It turns too fast for explicit gyroscopic terms.
     Turning,
     /// It has more contacts than a problem, or its ground is unknown.
@@ -148,9 +148,9 @@ pub struct Block<T: Lane> {
     deepest: T,
     /// Lanes that hold a rover.
     occupied: T::Mask,
-    /// Lanes that take part in the present step and have not been declined.
+    /// Lanes that take part in the present step and have not fallen back.
     going: T::Mask,
-    reasons: [Option<Decline>; MAX_LANES],
+    reasons: [Option<Fallback>; MAX_LANES],
     reports: [StepReport; MAX_LANES],
     /// Lanes whose step is taken again, and how often each lane's was.
     retaken: T::Mask,
@@ -231,7 +231,7 @@ impl<T: Lane> Block<T> {
 
     /// Why a lane's last step was not taken, if it was not.
     #[must_use]
-    pub fn declined(&self, lane: usize) -> Option<Decline> {
+    pub fn fallback(&self, lane: usize) -> Option<Fallback> {
         self.reasons[lane]
     }
 
@@ -275,7 +275,7 @@ impl<T: Lane> Block<T> {
 
     /// Takes lanes out of the present step.
     #[inline(always)]
-    fn decline(&mut self, reason: Decline, lanes: T::Mask) {
+    fn fall_back(&mut self, reason: Fallback, lanes: T::Mask) {
         let mut lost = (self.going & lanes).bits();
         if lost == 0 {
             return;

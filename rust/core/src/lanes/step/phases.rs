@@ -1,7 +1,7 @@
 //! The three parts of a step.
 
 use super::balance::{Conditions, select_both};
-use super::{Block, Decline, Next, State};
+use super::{Block, Fallback, Next, State};
 use crate::integrator::mechanical_system::MOST_REVISIONS;
 use crate::integrator::{Phase, Probe, StepReport};
 use crate::lanes::problem::ContactProblem;
@@ -56,7 +56,7 @@ impl<T: Lane> Block<T> {
         let is_definite = self
             .mass_matrix
             .factorise_in_place(&self.machine, &mut self.factor);
-        self.decline(Decline::MassMatrix, !is_definite);
+        self.fall_back(Fallback::MassMatrix, !is_definite);
         probe.end(Phase::Factor);
         let (machine, end) = (&*self.machine, &self.poses_end);
         self.rows
@@ -132,7 +132,7 @@ impl<T: Lane> Block<T> {
         let (h, theta) = (self.options.time_step, self.options.theta);
         let zero = self.number(0.0);
         let is_fast = Turning::of(zero, &self.machine, &self.v).is_gyroscopic(self.number(h));
-        self.decline(Decline::Turning, is_fast);
+        self.fall_back(Fallback::Turning, is_fast);
         let machine = &*self.machine;
         self.middle
             .set_moved(machine, &self.start, &self.v, (1.0 - theta) * h);
@@ -170,7 +170,7 @@ impl<T: Lane> Block<T> {
                 };
             }
         }
-        self.decline(Decline::Solver, !T::mask(token, solved));
+        self.fall_back(Fallback::Solver, !T::mask(token, solved));
         T::vectorize(
             token,
             #[inline(always)]
@@ -253,7 +253,7 @@ impl<T: Lane> Block<T> {
         self.balance.contact_work = self.contact_work();
     }
 
-    /// Declines the lanes whose step does not balance, and corrects the velocity of those with a
+    /// Lets lanes whose step does not balance fall back, and corrects the velocity of those with a
     /// little too much energy.
     #[inline(always)]
     fn audit(&mut self) {
@@ -277,7 +277,7 @@ impl<T: Lane> Block<T> {
             is_free: if conserves { untouched } else { nobody },
         };
         let is_lost = (self.balance).audit((work, released), &conditions, self.going);
-        self.decline(Decline::Energy, is_lost);
+        self.fall_back(Fallback::Energy, is_lost);
         if self.balance.is_corrected.any() {
             let (shortened, share) = self.balance.correct(&conditions, &mut self.v_end);
             for &slot in self.contacts.used() {
@@ -326,7 +326,7 @@ impl<T: Lane> Block<T> {
         for v in &self.v_end {
             is_finite = is_finite & v.is_finite();
         }
-        self.decline(Decline::NotFinite, !is_finite);
+        self.fall_back(Fallback::NotFinite, !is_finite);
         let going = self.going;
         let (h, _) = self.time_step();
         let persists = self.is_same & self.in_touch() & !self.has_impact;

@@ -1,7 +1,7 @@
 //! The position projection: contacts that penetrate too deep are moved apart.
 
 use super::balance::select_both;
-use super::{Block, Decline, State};
+use super::{Block, Fallback, State};
 use crate::integrator::Stabilisation;
 use crate::integrator::position_projection::FARTHEST;
 use crate::lanes::problem::ContactProblem;
@@ -107,7 +107,7 @@ impl<T: Lane> Block<T> {
                 report.residual = report.residual.max(problem.residual.relative);
             }
         }
-        self.decline(Decline::Projection, T::mask(token, unsolved));
+        self.fall_back(Fallback::Projection, T::mask(token, unsolved));
         T::vectorize(
             token,
             #[inline(always)]
@@ -153,7 +153,7 @@ impl<T: Lane> Block<T> {
         self.factor.half_solve_back(&self.machine, &mut self.y);
         let size = displacement(zero, &self.machine, &self.y).max(farthest);
         let limit = zero.like(-FARTHEST) * self.deepest;
-        self.decline(Decline::Projection, !size.le(limit) & self.is_deep);
+        self.fall_back(Fallback::Projection, !size.le(limit) & self.is_deep);
         let is_moved = self.is_deep & self.going;
         self.middle
             .set_moved(&self.machine, &self.end, &self.y, 1.0);
