@@ -8,7 +8,7 @@ use rover_core::geometry::{HeightField, Plane, SphereField, Terrain, TriangleMes
 use rover_core::integrator::{Stabilisation, StepOptions, Variant};
 use rover_core::law::materials::{MaterialPair, Materials};
 use rover_core::nalgebra::Vector3;
-use rover_core::simulation::{RoverScene, Snapshot};
+use rover_core::simulation::{AnySnapshot, RoverScene, Snapshot};
 use rover_core::solver::{Method, SolverOptions};
 use serde::Deserialize;
 
@@ -152,13 +152,17 @@ impl SceneFile {
             let found = file.format;
             return Err(refuse(format!("format: must be {FORMAT}, is {found}")));
         }
-        let start = postcard::from_bytes(&file.snapshot);
+        let start = match postcard::from_bytes(&file.snapshot) {
+            Ok(AnySnapshot::Rover(start)) => start,
+            Ok(_) => return Err(refuse("snapshot: must be a rover's".to_owned())),
+            Err(e) => return Err(refuse(format!("snapshot: {e}"))),
+        };
         Ok(Self {
             token: file.token,
             model: file.model,
             terrain: file.terrain.build().map_err(&refuse)?,
             options: file.settings.options().map_err(&refuse)?,
-            start: start.map_err(|e| refuse(format!("snapshot: {e}")))?,
+            start,
             variables: (file.variables.into_iter())
                 .map(|variable| (variable.reference, variable))
                 .collect(),

@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use rover_core::integrator::{StepError, StepReport as CoreReport};
 use rover_core::multibody::Energy as CoreEnergy;
 use rover_core::simulation::{
-    GrainSimulation as Grains, RoverInGrains, RoverSimulation, TogetherError,
+    AnySnapshot, GrainSimulation as Grains, RoverInGrains, RoverSimulation, TogetherError,
 };
 
 use crate::arguments::{Given, refused};
@@ -17,7 +17,7 @@ use crate::grains::GrainSimulation;
 use crate::report::{Energy, StepReport};
 use crate::shared::{Shared, Watch};
 use crate::simulation::Simulation;
-use crate::snapshot::{Kept, other_kind};
+use crate::snapshot::other_kind;
 use crate::stepping::{AnySimulation, Stepped};
 
 impl From<TogetherError> for BorderError {
@@ -121,12 +121,14 @@ impl Stepped for Together {
         })
     }
 
-    fn snapshot(&self) -> Result<Kept> {
-        self.read(|_, rover, grains| Kept::Among(Box::new((rover.snapshot(), grains.snapshot()))))
+    fn snapshot(&self) -> Result<AnySnapshot> {
+        self.read(|_, rover, grains| {
+            AnySnapshot::Among(Box::new((rover.snapshot(), grains.snapshot())))
+        })
     }
 
-    fn restore(&self, kept: &Kept) -> Result<()> {
-        let Kept::Among(both) = kept else {
+    fn restore(&self, kept: &AnySnapshot) -> Result<()> {
+        let AnySnapshot::Among(both) = kept else {
             return Err(other_kind());
         };
         let (of_rover, of_grains) = &**both;

@@ -5,29 +5,18 @@ use std::hash::{DefaultHasher, Hasher};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use rover_core::simulation::{
-    GrainBed, PlanarScene, RoverScene, Scene, Simulation, Snapshot as SnapshotOf,
+    AnySnapshot, GrainBed, PlanarScene, RoverScene, Scene, Simulation, Snapshot as SnapshotOf,
 };
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
 
 use crate::arguments;
 use crate::errors::{BorderError, Kind, Result, Value};
 
-/// What a simulation of each kind needs to continue.
-#[derive(PartialEq, Serialize, Deserialize)]
-pub enum Kept {
-    Rover(SnapshotOf<RoverScene>),
-    Planar(SnapshotOf<PlanarScene>),
-    Disks(SnapshotOf<GrainBed<2>>),
-    Balls(SnapshotOf<GrainBed<3>>),
-    Among(Box<(SnapshotOf<RoverScene>, SnapshotOf<GrainBed<3>>)>),
-}
-
 /// A scene whose snapshots Python keeps.
 pub trait KeptScene: Scene {
-    fn keep(snapshot: SnapshotOf<Self>) -> Kept;
+    fn keep(snapshot: SnapshotOf<Self>) -> AnySnapshot;
     /// The snapshot, if it is of such a scene.
-    fn kept(kept: &Kept) -> Option<&SnapshotOf<Self>>;
+    fn kept(kept: &AnySnapshot) -> Option<&SnapshotOf<Self>>;
     /// Independent sets of wheel loads that balance one another in the last step.
     fn undetermined_loads(_: &Simulation<Self>) -> usize {
         0
@@ -37,13 +26,13 @@ pub trait KeptScene: Scene {
 macro_rules! kept_scene {
     ($scene:ty, $variant:ident $(, $more:item)?) => {
         impl KeptScene for $scene {
-            fn keep(snapshot: SnapshotOf<Self>) -> Kept {
-                Kept::$variant(snapshot)
+            fn keep(snapshot: SnapshotOf<Self>) -> AnySnapshot {
+                AnySnapshot::$variant(snapshot)
             }
 
-            fn kept(kept: &Kept) -> Option<&SnapshotOf<Self>> {
+            fn kept(kept: &AnySnapshot) -> Option<&SnapshotOf<Self>> {
                 match kept {
-                    Kept::$variant(own) => Some(own),
+                    AnySnapshot::$variant(own) => Some(own),
                     _ => None,
                 }
             }
@@ -66,7 +55,7 @@ kept_scene!(GrainBed<3>, Balls);
 
 /// Everything that a simulation needs to continue bit for bit. Picklable.
 #[pyclass(module = "rover_gym.mechanics", frozen)]
-pub struct Snapshot(pub Kept);
+pub struct Snapshot(pub AnySnapshot);
 
 /// A snapshot of another kind of simulation.
 pub fn other_kind() -> BorderError {

@@ -1,16 +1,19 @@
 //! `AnySimulation`: what the classes of all simulations do alike.
 
+use std::sync::Arc;
+
 use pyo3::prelude::*;
 use rover_core::nalgebra::DMatrix;
-use rover_core::simulation::{Components, DenseOperator, LocatedContact, Scene, Simulation};
-use std::sync::Arc;
+use rover_core::simulation::{
+    AnySnapshot, Components, DenseOperator, LocatedContact, Scene, Simulation,
+};
 
 use crate::arguments::count;
 use crate::arrays::{Array, fresh, fresh_matrix};
 use crate::errors::{Kind, Result};
 use crate::report::{Energy, StepReport};
 use crate::shared::{Shared, Watch};
-use crate::snapshot::{Kept, KeptScene, Snapshot, other_kind, snapshot};
+use crate::snapshot::{KeptScene, Snapshot, other_kind, snapshot};
 
 /// What all simulations share. Made by the classes derived from it.
 ///
@@ -28,8 +31,8 @@ pub trait Stepped: Send + Sync {
     fn time_step(&self) -> Result<f64>;
     fn step(&self, py: Python<'_>, n: usize) -> Result<StepReport>;
     fn energy(&self) -> Result<Energy>;
-    fn snapshot(&self) -> Result<Kept>;
-    fn restore(&self, kept: &Kept) -> Result<()>;
+    fn snapshot(&self) -> Result<AnySnapshot>;
+    fn restore(&self, kept: &AnySnapshot) -> Result<()>;
 }
 
 impl<S: KeptScene + 'static> Stepped for Shared<Simulation<S>>
@@ -56,11 +59,11 @@ where
         Ok(self.open()?.energy().into())
     }
 
-    fn snapshot(&self) -> Result<Kept> {
+    fn snapshot(&self) -> Result<AnySnapshot> {
         Ok(S::keep(self.open()?.snapshot()))
     }
 
-    fn restore(&self, kept: &Kept) -> Result<()> {
+    fn restore(&self, kept: &AnySnapshot) -> Result<()> {
         let own = S::kept(kept).ok_or_else(other_kind)?;
         Ok(self.open()?.restore(own)?)
     }

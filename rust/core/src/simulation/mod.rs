@@ -2,7 +2,7 @@
 //!
 //! - [`scene`]: what can be simulated, and the data needed to continue; [`stepping`]: the one
 //!   simulation of all scenes;
-//! - [`state`], [`active_contact`]: its state, its contacts;
+//! - [`state`], [`active_contact`]: its state, its contacts; [`any_snapshot`]: what files keep;
 //! - [`rover`]: a rover on a terrain, with its [command](rover_command), its
 //!   [controls](rover_controls), its [contacts](rover_contacts), its [fast steps](fallback), its
 //!   [`reading`], what [rays](rover_rays) meet, and the [`linearisation`] of a step;
@@ -38,6 +38,7 @@
 //! [`crate::lanes`].
 
 pub mod active_contact;
+pub mod any_snapshot;
 pub mod batch;
 pub mod error;
 pub mod fallback;
@@ -62,6 +63,7 @@ pub mod stepping;
 pub mod turns;
 
 pub use active_contact::{ActiveContact, Components, LocatedContact};
+pub use any_snapshot::AnySnapshot;
 pub use batch::Batch;
 pub use error::{BatchError, CommandError, SnapshotError};
 pub use grains::{
