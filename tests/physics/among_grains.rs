@@ -268,6 +268,10 @@ fn fixed_balls_carry_a_rover_like_the_spheres_of_a_terrain() {
     let (one, other) = (alone.q().position, scene.rover.q().position);
     assert!(one.x > 0.1, "drives: {one}");
     assert!((one - other).norm() < 0.01, "{one} {other}");
+    // The story: the drives of a rover among grains did no work, so that its energy was free.
+    let (one, other) = (alone.last_call().work, scene.rover.last_call().work);
+    assert!(one > 100.0, "{one} J");
+    assert!((one - other).abs() < 0.05 * one, "{one} {other} J");
 }
 
 #[test]

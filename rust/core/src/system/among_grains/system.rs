@@ -280,6 +280,12 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
         self.tree.turning(self.halves(v).1)
     }
 
+    fn work(&mut self, options: &StepOptions, start: Start<'_, Both>, v_end: &[f64]) -> f64 {
+        let (_, start) = self.starts(start);
+        let (_, v_end) = self.halves(v_end);
+        self.tree.work(options, start, v_end)
+    }
+
     fn accept(&mut self) {
         self.tree.accept();
     }
