@@ -104,7 +104,7 @@ class Bounds:
         gained: Of the energy at hand in one step; None where the laws themselves may add energy.
         lifted: The same by the projection; None where a case starts deep in the ground.
         deepest: m; None for any depth.
-        slowest: s.
+        slowest: s; by default what the solver's budget for up to 200 contacts takes.
         reward: Either way.
     """
 
@@ -113,7 +113,7 @@ class Bounds:
     gained: float | None = 1e-9
     lifted: float | None = 1.0
     deepest: float | None = 1.0
-    slowest: float = 0.5
+    slowest: float = 2.0
     reward: float = 100.0
 
 
