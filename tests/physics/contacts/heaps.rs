@@ -34,3 +34,15 @@ fn every_step_of_125_boxes_is_solved() {
     let most = solve_every_step(5, 1, 225);
     assert!(most > 200, "{most} contacts");
 }
+
+/// 22 400 steps; with 3e8 units for up to 100 contacts six of them are not solved.
+#[test]
+#[ignore = "tests/physics/contacts/heaps.rs::every_step_of_27_boxes_is_solved_until_they_lie"]
+fn every_step_of_fifty_heaps_is_solved() {
+    for seed in 1..=40 {
+        solve_every_step(3, seed, 480);
+    }
+    for seed in 1..=10 {
+        solve_every_step(4, seed, 320);
+    }
+}

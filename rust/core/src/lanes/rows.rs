@@ -225,11 +225,9 @@ impl<T: Lane> Rows<T> {
         for (i, &slot) in contacts.used_densely().iter().enumerate() {
             soften(&mut self.W[block(i, i)], slot);
         }
-        for &slot in contacts.used() {
-            self.softness[slot] = diagonal(slot);
-        }
         if contacts.factored() != 0 {
             for &slot in contacts.used() {
+                self.softness[slot] = diagonal(slot);
                 soften(&mut self.diagonal[slot], slot);
             }
         }
