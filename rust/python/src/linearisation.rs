@@ -9,8 +9,7 @@ use rover_core::simulation::{Linearisation as Core, LinearisationError};
 use crate::arrays::{Array, fresh_matrix};
 use crate::errors::{BorderError, Kind, Value, entry};
 
-/// Derivatives of a time step with respect to state and command, returned by
-/// `Simulation.linearise`.
+/// Derivatives of a time step with respect to state and command. See `Simulation.linearise`.
 ///
 /// `x_next = next_state + a @ (x - state) + b @ (u - command)` to first order. The state is
 /// x = (q, v) as `Simulation.q` and `Simulation.v` return them, the command is u = (wheel torques,
@@ -49,10 +48,10 @@ pub struct Linearisation {
     /// contacts in the same modes, the same projection and energy correction, and agree with the
     /// column within 1%.
     holds: Array<bool>,
-    /// Difference of each column of (a, b) from the difference quotient of its two perturbed steps,
-    /// (nx + nu,).
+    /// Error of each column of (a, b) against its two perturbed steps, (nx + nu,).
     ///
-    /// The largest difference of an entry, relative to the column's largest entry.
+    /// The largest difference of an entry from the difference quotient, relative to the column's
+    /// largest entry.
     errors: Array,
     /// Whether all columns are valid.
     is_smooth: bool,

@@ -343,8 +343,7 @@ impl Simulation {
         Ok(self.open()?.set_wheel_torques(&torques)?)
     }
 
-    /// Steering set-points, (n_wheels,), rad; 0 for wheels whose steering joint is missing or
-    /// released.
+    /// Steering set-points, (n_wheels,), rad; 0 for wheels without steering or released ones.
     #[getter]
     fn steering(&self) -> Result<Array> {
         Ok(fresh(&self.open()?.steering()))
@@ -649,13 +648,12 @@ impl Simulation {
         Ok(problem(&*self.open()?))
     }
 
-    /// Derivatives of the next step with respect to state and command. The simulation does not
-    /// change.
+    /// Derivatives of the next step with respect to state and command.
     ///
-    /// The step is taken as after `set_state(q, v)`, without warm start. The active contacts, their
-    /// modes and the branches of the motors' lines are held constant; the limits of the commands
-    /// are not considered. If the modes change within `perturbation`, the derivative is not valid
-    /// and `Linearisation.holds` is False.
+    /// The simulation does not change. The step is taken as after `set_state(q, v)`, without warm
+    /// start. The active contacts, their modes and the branches of the motors' lines are held
+    /// constant; the limits of the commands are not considered. If the modes change within
+    /// `perturbation`, the derivative is not valid and `Linearisation.holds` is False.
     ///
     /// Args:
     ///     perturbation: Change of each entry of (x, u) in the two steps that test its column, m,
