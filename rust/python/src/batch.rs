@@ -92,7 +92,10 @@ impl SimulationBatch {
         Ok(self.0.open()?.inner.threads())
     }
 
-    /// Either "AVX-512", "AVX2" or "baseline", as the processor has it.
+    /// Either "AVX-512", "AVX2" or "baseline".
+    ///
+    /// The widest that the processor has, unless the environment variable `ROVER_GYM_INSTRUCTIONS`
+    /// names another. Results do not depend on it.
     #[getter]
     #[allow(clippy::unused_self)] // a property in Python
     fn instruction_set(&self) -> &'static str {

@@ -374,6 +374,9 @@ impl<'a> Frame<'a> {
         let is_under = depth.gt(zero) & elements.area.gt(zero);
         if is_under.any() {
             own.is_touching = true;
+            // What is not under counts for nothing, whatever lies beside it in a register.
+            let area = T::select(is_under, elements.area, zero);
+            let elements = Elements { area, ..elements };
             let depth = T::select(is_under, depth, zero);
             let ends = lanes(&group.end);
             let way = self.way(group.radius, ends, (cos, sin));

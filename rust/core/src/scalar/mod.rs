@@ -28,6 +28,6 @@ pub mod linear;
 pub(crate) mod quaternion;
 mod registers;
 
-pub use instructions::{Instructions, Single};
+pub use instructions::{Instructions, InstructionsError, Single};
 pub use lane::{Lane, LaneMask, MAX_LANES};
 pub use linear::{Mat3, Vec3};
