@@ -6,6 +6,7 @@
 //! A surface that recedes feels nothing. Of a ring, only the part of the arc under the surface that
 //! may push is integrated. Angles on it are `θ = 4 atan u`, so that sine and cosine are rational.
 
+#[cfg(target_arch = "x86_64")]
 use fearless_simd::{f64x4, f64x8};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
