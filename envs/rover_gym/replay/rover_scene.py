@@ -26,7 +26,7 @@ from rover_gym.replay.scenery import (
     surroundings,
     trunk_path,
 )
-from rover_gym.replay.wheel_marks import DrawnWheel, drawn_wheels, feet, marks, world_forces
+from rover_gym.replay.wheel_marks import DrawnWheel, drawn_wheels, feet, marks, rut_edits, world_forces
 
 if TYPE_CHECKING:
     from rover_gym.record.rover_run import RoverRun
@@ -115,6 +115,11 @@ def rover_scene(run: RoverRun, *, follow: bool) -> PageScene:
         FrameChannel.fine("forces", np.concatenate((points, np.clip(forces / share, -1e4, 1e4)), axis=2)),
     ]
     scene.arrays["trail"] = ("f4", marks(run, wheels, points).ravel())
+    ruts = rut_edits(run, wheels, points, across)
+    if ruts is not None:
+        rut_map, samples, cells, levels = ruts
+        scene.facts["ruts"] = rut_map.header()
+        scene.arrays |= {"rut-sample": ("u4", samples), "rut-cell": ("u4", cells), "rut-level": ("u1", levels)}
     scene.facts |= {"events": _events(run), "curves": rover_curves(run)}
     return scene
 
