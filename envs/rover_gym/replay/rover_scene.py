@@ -44,6 +44,7 @@ WHEEL_NAMES = {
 LONGEST_FACT = 100
 HAZE = 90.0  # m, distance at which the ground has the colour of the sky
 PLANE = 400.0  # m, half of the edge of a plane
+ABOVE = 0.45  # of the rover's reach: so far above it the eye looks, and the horizon is in the picture
 GRAVITY = 9.81  # m/s², of runs that do not say it
 
 
@@ -91,7 +92,7 @@ def bare_scene(run: RoverRun) -> tuple[PageScene, list[DrawnWheel]]:
     centre = trunk_path(run)[0]
     seen = {
         "eye": (view.eye - centre).tolist(),
-        "target": (view.target - centre).tolist(),
+        "target": (view.target - centre + [0.0, ABOVE * run.model.clear_radius, 0.0]).tolist(),
         "angle": view.field_of_view,
     }
     scene = PageScene("rover", seen, float(run.model.clear_radius))
