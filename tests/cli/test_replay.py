@@ -542,7 +542,6 @@ def test_all_formats_are_written_and_named(recording: Path, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("arguments", "culprit"),
     [
-        ([], "--html, --vrml, --gltf or --film"),
         (["--vrml", "out.wrl", "--fps", "0"], "fps"),
         (["--vrml", "out.wrl", "--fps", "nan"], "fps"),
         (["--vrml", "taken/below/out.wrl"], "taken"),

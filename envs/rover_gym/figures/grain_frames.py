@@ -58,9 +58,9 @@ class GrainFilm:
 
     def __init__(self, run: GrainRun, size: tuple[int, int] = SIZE) -> None:
         try:
-            from rover_gym.rendering.appearance import actor_of, mesh, set_pose  # noqa: PLC0415 - an extra
             from rover_gym.rendering.frames import BedRenderer  # noqa: PLC0415 - an extra
             from rover_gym.rendering.scenery_actors import BallsActor  # noqa: PLC0415 - an extra
+            from rover_gym.rendering.vtk_actors import actor_of, mesh, set_pose  # noqa: PLC0415 - an extra
         except ModuleNotFoundError as error:
             raise MissingExtraError("vtk", "render") from error
         self._run, self._set_pose = run, set_pose

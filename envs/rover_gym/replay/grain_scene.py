@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.ground import spheres_of, surfaces_of, triangles_of
+from rover_gym.ground import plane_of, spheres_of, surfaces_of, triangles_of
 from rover_gym.rendering.appearance import (
     FIXED_BALL_COLOUR,
     GROUND_COLOUR,
-    GROUND_COLOUR_2,
     ROCK_COLOUR,
     SAND_COLOUR,
     WHEEL_COLOURS,
@@ -31,8 +30,6 @@ from rover_gym.replay.scenery import (
     MOST_HEIGHTS,
     Mesh,
     first_view,
-    ground_plane,
-    ground_tiles,
     spheres,
     surfaces,
     vessel_meshes,
@@ -138,10 +135,15 @@ def grain_scene(run: GrainRun, *, follow: bool) -> PageScene:
     if rover is not None:
         add_rover(scene, rover)
         places, turns = rover.positions, continuous(quaternions(rover.rotations))[..., [1, 2, 3, 0]]
+    plane = _floor(run)
+    if plane is not None:
+        scene.facts["plane"] = {"point": plane[0].tolist(), "normal": plane[1].tolist(), "half": 40.0 * reach}
+        scene.facts |= {"haze": 24.0 * reach, "tile": 0.5 if rover is not None else 0.25 * reach}
     scene.put_mesh(_ground(run))
     of_walls = wall_polygons(run, GROUND_COLOUR, ROCK_COLOUR)
-    for frame, mesh in enumerate(of_walls, scene.frames):
-        scene.put_mesh([mesh], frame)
+    for i, mesh in enumerate(of_walls):
+        if plane is None or (i < run.walls.shape[1] and not _is_level(run, i, plane[0])):
+            scene.put_mesh([mesh], scene.frames + i)
     scene.put_mesh(vessel_meshes(run, ROCK_COLOUR, GROUND_COLOUR), scene.frames + len(of_walls))
     scene.frames += len(of_walls) + 1
     poses = np.concatenate((wall_poses(run), vessel_poses(run)[:, None]), axis=1)
@@ -159,6 +161,24 @@ def grain_scene(run: GrainRun, *, follow: bool) -> PageScene:
             FrameChannel.fine("forces", np.concatenate((run.wheel_centres, run.wheel_forces / share), axis=2))
         )
     return scene
+
+
+def _floor(run: GrainRun) -> tuple[Array, Array] | None:
+    """A point, m, and the normal of the plane on which all stands: the ground's, or a level wall below all balls."""
+    if run.terrain is not None:
+        plane = plane_of(run.terrain)
+        return None if plane is None else (-plane.offset * plane.normal, plane.normal)
+    if run.vessel is not None:
+        return None
+    level = [wall for i, wall in enumerate(run.walls[0]) if _is_level(run, i, run.walls[0, i, :3])]
+    return (level[0][:3], np.array([0.0, 1.0, 0.0])) if level else None
+
+
+def _is_level(run: GrainRun, number: int, point: Array) -> bool:
+    """Whether a wall is level, at the height of a point, and stays there."""
+    wall = run.walls[:, number]
+    upright = wall[:, 4] / np.linalg.norm(wall[:, 3:], axis=1)
+    return bool(np.all(upright > 1.0 - 1e-9) and np.all(np.abs(wall[:, 1] - point[1]) < 1e-6))
 
 
 def start_extent(run: GrainRun) -> Array:
@@ -180,10 +200,6 @@ def _bounds(run: GrainRun) -> tuple[Array, Array]:
 def _ground(run: GrainRun) -> list[Mesh]:
     """The fixed ground about the rover's path, or under the balls."""
     meshes: list[Mesh] = []
-    tiles = None if run.rover is None or ground_plane(run.rover) is None else ground_tiles(run.rover)
-    if tiles is not None:
-        vertices, light, dark = tiles
-        meshes += [(GROUND_COLOUR, vertices, light), (GROUND_COLOUR_2, vertices, dark)]
     if run.terrain is None:
         return meshes
     pieces = surfaces(run.rover) if run.rover is not None else _surfaces_under_balls(run, run.terrain)

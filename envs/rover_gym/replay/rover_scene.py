@@ -26,7 +26,7 @@ from rover_gym.replay.scenery import (
     surroundings,
     trunk_path,
 )
-from rover_gym.replay.wheel_marks import DrawnWheel, drawn_wheels, feet, marks, world_forces
+from rover_gym.replay.wheel_marks import DrawnWheel, drawn_wheels, feet, marks, rut_edits, world_forces
 
 if TYPE_CHECKING:
     from rover_gym.record.rover_run import RoverRun
@@ -44,6 +44,7 @@ WHEEL_NAMES = {
 LONGEST_FACT = 100
 HAZE = 90.0  # m, distance at which the ground has the colour of the sky
 PLANE = 400.0  # m, half of the edge of a plane
+ABOVE = 0.45  # of the rover's reach: so far above it the eye looks, and the horizon is in the picture
 GRAVITY = 9.81  # m/s², of runs that do not say it
 
 
@@ -91,7 +92,7 @@ def bare_scene(run: RoverRun) -> tuple[PageScene, list[DrawnWheel]]:
     centre = trunk_path(run)[0]
     seen = {
         "eye": (view.eye - centre).tolist(),
-        "target": (view.target - centre).tolist(),
+        "target": (view.target - centre + [0.0, ABOVE * run.model.clear_radius, 0.0]).tolist(),
         "angle": view.field_of_view,
     }
     scene = PageScene("rover", seen, float(run.model.clear_radius))
@@ -115,6 +116,11 @@ def rover_scene(run: RoverRun, *, follow: bool) -> PageScene:
         FrameChannel.fine("forces", np.concatenate((points, np.clip(forces / share, -1e4, 1e4)), axis=2)),
     ]
     scene.arrays["trail"] = ("f4", marks(run, wheels, points).ravel())
+    ruts = rut_edits(run, wheels, points, across)
+    if ruts is not None:
+        rut_map, samples, cells, levels = ruts
+        scene.facts["ruts"] = rut_map.header()
+        scene.arrays |= {"rut-sample": ("u4", samples), "rut-cell": ("u4", cells), "rut-level": ("u1", levels)}
     scene.facts |= {"events": _events(run), "curves": rover_curves(run)}
     return scene
 
