@@ -1,4 +1,4 @@
-"""`rover sand soils|bed|slope|climb|convert`: soils by name, one wheel on a virtual test bed, and rovers on slopes."""
+"""`rover sand soils|bed|slope|rovers|climb|convert`: soils, one wheel on a virtual test bed, and rovers on slopes."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,8 @@ from rover_gym.cli.console import AsJson, Results, plain_errors
 from rover_gym.mechanics import OptionError
 from rover_gym.policy import PDPolicy, Policy, SandGains, SandPolicy, drive_all
 from rover_gym.policy.dug_in import DugIn
-from rover_gym.sand import SingleWheel, climbed_slope, named_soil, soil_names
+from rover_gym.models import open_model
+from rover_gym.sand import SingleWheel, climbed_slope, named_soil, slip_on_slope, soil_names, with_wide_wheels
 from rover_gym.sand.convert import convert_runs
 from rover_gym.validation import number, refuse
 
@@ -114,12 +115,43 @@ def slope(
 
 @sand.command()
 @plain_errors
+def rovers(
+    *,
+    rover: Annotated[
+        list[str] | None, typer.Option(help="A name of the gallery, or a model's file; repeat it for several.")
+    ] = None,
+    soil: Annotated[list[str] | None, typer.Option(help="Name of a soil; repeat it for several.")] = None,
+    slope: Annotated[list[float] | None, typer.Option(help="Of the sand, degrees; repeat it for several.")] = None,
+    width: Annotated[float, typer.Option(help="Width of the wheels, in radii.")] = 1.0,
+    gravity: Gravity = EARTH,
+    as_json: AsJson = False,
+) -> None:
+    """Drive whole rovers straight uphill at a rim speed of 0.1 m/s: slip and mean sinkage.
+
+    The wheels get the width, and 24 grousers of a twentieth of the radius.
+    """
+    slopes = list(slope or (0.0, 5.0, 10.0, 15.0, 20.0))
+    rows = []
+    for name in rover or ("open-rover", "skid-steered", "four-steered"):
+        model = with_wide_wheels(open_model(name), width)
+        for soil_name in soil or ("cmu-sand", "grc-1"):
+            for angle in slopes:
+                slip, sinkage = slip_on_slope(model, named_soil(soil_name), math.radians(angle), gravity=gravity)
+                rows.append(
+                    {"rover": name, "soil": soil_name, "slope_deg": angle, "slip": slip, "sinkage_mm": 1e3 * sinkage}
+                )
+    _say("rovers", rows, as_json=as_json)
+
+
+@sand.command()
+@plain_errors
 def climb(
     *,
     soil: SoilName = "cmu-sand",
     slope: Annotated[list[float] | None, typer.Option(help="Of the sand, degrees; repeat it for several.")] = None,
     policy: Annotated[list[str] | None, typer.Option(help="'pd' or 'sand'; repeat it for both.")] = None,
-    episodes: Annotated[int, typer.Option(min=1, help="Of each slope and policy, seeds 0, 1, ...")] = 8,
+    episodes: Annotated[int, typer.Option(min=1, help="Of each slope and policy.")] = 8,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the first episode; the next ones count up.")] = 0,
     seconds: Annotated[float, typer.Option(help="Until an episode is given up, s.")] = 120.0,
     dig: Annotated[float, typer.Option(help="Time that all wheels spin first, so that the rover digs in, s.")] = 0.0,
     steepest: Annotated[float, typer.Option(help="Steepest way that 'sand' takes straight, degrees.")] = 14.0,
@@ -152,7 +184,7 @@ def climb(
         for name in names:
             drives = drive_all(
                 partial(driver, name),
-                range(episodes),
+                range(seed, seed + episodes),
                 arguments=arguments,
                 num_envs=8,
                 threads=threads,
