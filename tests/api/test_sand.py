@@ -154,6 +154,42 @@ def test_tables_are_converted_read_and_refused_by_line(tmp_path: Path) -> None:
         read_runs(tmp_path / "broken.csv", {"mine": WHEEL})
 
 
+def test_a_matlab_file_of_structs_is_converted_as_its_authors_store_runs(tmp_path: Path) -> None:
+    io = pytest.importorskip("scipy.io")
+    fields = [
+        ("beta", float),
+        ("Vry", float),
+        ("avg_Fx", float),
+        ("avg_Fy", float),
+        ("avg_Fz", float),
+        ("avg_Z", float),
+    ]
+    runs = np.array([(0.0, 8.0, 0.5, 1.0, -20.0, -10.0), (15.0, 12.0, -7.0, -2.0, -21.0, -12.0)], dtype=fields)
+    io.savemat(tmp_path / "all.mat", {"all_results": runs, "note": "synthetic"})
+    columns = [
+        "slip_angle_deg=beta",
+        "rim_speed_mm_s=Vry",
+        "speed_mm_s=10",
+        "drawbar_N=avg_Fy*-1",
+        "lateral_N=avg_Fx*-1",
+        "load_N=avg_Fz*-1",
+        "sinkage_mm=avg_Z*-1",
+    ]
+    assert convert_runs(tmp_path / "all.mat", tmp_path / "runs.csv", columns, "smooth") == 2
+    read = read_runs(tmp_path / "runs.csv", {"smooth": WHEEL})[0]
+    assert read.measured[1] == pytest.approx([2.0, 7.0, 0.012])
+    assert read.speed == pytest.approx([0.01, 0.01])
+    assert read.load == pytest.approx([20.0, 21.0])
+    with pytest.raises(OptionError, match="has no column 'v'; it has beta, Vry"):
+        convert_runs(tmp_path / "all.mat", tmp_path / "x.csv", [*columns[:2], "speed_mm_s=v", *columns[3:]], "smooth")
+    io.savemat(tmp_path / "two.mat", {"a": runs, "b": runs})
+    with pytest.raises(OptionError, match="must have one array of structs, has a, b"):
+        convert_runs(tmp_path / "two.mat", tmp_path / "x.csv", columns, "smooth")
+    (tmp_path / "text.mat").write_text("beta,v\n" * 40)
+    with pytest.raises(OptionError, match=r"text\.mat: is no MATLAB file"):
+        convert_runs(tmp_path / "text.mat", tmp_path / "x.csv", columns, "smooth")
+
+
 def wide_rover() -> RoverModel:
     description = RoverModel.named("open-rover").to_dict()
     for wheel in description["wheels"]:

@@ -11,9 +11,9 @@ from rich.table import Table
 
 from rover_gym.cli.console import AsJson, Results, plain_errors
 from rover_gym.mechanics import OptionError
+from rover_gym.models import open_model
 from rover_gym.policy import PDPolicy, Policy, SandGains, SandPolicy, drive_all
 from rover_gym.policy.dug_in import DugIn
-from rover_gym.models import open_model
 from rover_gym.sand import SingleWheel, climbed_slope, named_soil, slip_on_slope, soil_names, with_wide_wheels
 from rover_gym.sand.convert import convert_runs
 from rover_gym.validation import number, refuse
@@ -207,11 +207,19 @@ def climb(
 @sand.command()
 @plain_errors
 def convert(
-    source: Annotated[Path, typer.Argument(help="A CSV file of runs in other columns.", exists=True, dir_okay=False)],
+    source: Annotated[
+        Path,
+        typer.Argument(
+            help="Runs in other columns: a CSV file, or a .mat file with an array of structs.",
+            exists=True,
+            dir_okay=False,
+        ),
+    ],
     target: Annotated[Path, typer.Argument(help="The table to write.", dir_okay=False)],
     *,
     column: Annotated[
-        list[str], typer.Option(help="One column of the table, as NAME=COLUMN or NAME=COLUMN*FACTOR; repeat it.")
+        list[str],
+        typer.Option(help="One column of the table, as NAME=COLUMN, NAME=COLUMN*FACTOR or NAME=NUMBER; repeat it."),
     ],
     wheel: Annotated[str, typer.Option(help="Name of the wheel, for all rows.")] = "wheel",
 ) -> None:
