@@ -2034,7 +2034,11 @@ class SimulationBatch:
         """Number of threads."""
     @property
     def instruction_set(self) -> Literal["AVX-512", "AVX2", "baseline"]:
-        """Either "AVX-512", "AVX2" or "baseline", as the processor has it."""
+        """Either "AVX-512", "AVX2" or "baseline".
+
+        The widest that the processor has, unless the environment variable `ROVER_GYM_INSTRUCTIONS`
+        names another. Results do not depend on it.
+        """
     @property
     def reading_layout(self) -> dict[str, slice]:
         """Place of each quantity in a row of readings; `Simulation.reading_layout` lists them."""

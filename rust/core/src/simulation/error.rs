@@ -113,7 +113,7 @@ pub enum BatchError {
 pub enum SnapshotError {
     /// Taken from another model.
     #[error(
-        "snapshot: belongs to another model than this simulation's (or to other locked joints)"
+        "snapshot: belongs to another model, or to other locked joints, than this simulation"
     )]
     OtherModel,
     /// Not finite, or with contacts that the model cannot have.
