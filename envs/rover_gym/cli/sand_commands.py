@@ -14,7 +14,7 @@ from rover_gym.mechanics import OptionError
 from rover_gym.models import open_model
 from rover_gym.policy import PDPolicy, Policy, SandGains, SandPolicy, drive_all
 from rover_gym.policy.dug_in import DugIn
-from rover_gym.sand import SingleWheel, climbed_slope, named_soil, slip_on_slope, soil_names, with_wide_wheels
+from rover_gym.sand import SingleWheel, Soil, climbed_slope, named_soil, slip_on_slope, soil_names, with_wide_wheels
 from rover_gym.sand.convert import convert_runs
 from rover_gym.validation import number, refuse
 
@@ -143,6 +143,18 @@ def rovers(
     _say("rovers", rows, as_json=as_json)
 
 
+def _changed(soil: str, others: Sequence[str]) -> Soil:
+    """A soil by its name with other numbers, each as NAME=NUMBER."""
+    numbers = {}
+    for text in others:
+        name, _, value = text.partition("=")
+        try:
+            numbers[name] = float(value)
+        except ValueError:
+            raise OptionError(f"with: must be NAME=NUMBER, is {text!r}") from None
+    return named_soil(soil).having(**numbers)
+
+
 @sand.command()
 @plain_errors
 def climb(
@@ -155,6 +167,10 @@ def climb(
     seconds: Annotated[float, typer.Option(help="Until an episode is given up, s.")] = 120.0,
     dig: Annotated[float, typer.Option(help="Time that all wheels spin first, so that the rover digs in, s.")] = 0.0,
     steepest: Annotated[float, typer.Option(help="Steepest way that 'sand' takes straight, degrees.")] = 14.0,
+    other: Annotated[
+        list[str] | None,
+        typer.Option("--with", help="Another number of the soil, such as density=1250; repeat it for several."),
+    ] = None,
     threads: Annotated[int, typer.Option(min=1, help="That step the rovers.")] = 1,
     as_json: AsJson = False,
 ) -> None:
@@ -164,6 +180,7 @@ def climb(
         inner = SandPolicy(env, SandGains(steepest=steepest)) if name == "sand" else PDPolicy(env)
         return DugIn(env, inner, dig) if dig > 0.0 else inner
 
+    ground = _changed(soil, other or ())
     names = list(policy or ("pd", "sand"))
     for name in names:
         if name not in ("pd", "sand"):
@@ -174,7 +191,7 @@ def climb(
         arguments = {
             "terrain": "sand",
             "difficulty": 0.0,
-            "soil": soil,
+            "soil": ground,
             "slope_deg": angle,
             "uphill_deg": aside,
             "heading_deg": 0.0,
