@@ -2051,7 +2051,11 @@ class SimulationBatch:
         """Number of threads."""
     @property
     def instruction_set(self) -> Literal["AVX-512", "AVX2", "baseline"]:
-        """Instruction set of the processor, "AVX-512", "AVX2" or "baseline"."""
+        """Instruction set of the processor, "AVX-512", "AVX2" or "baseline".
+
+        The widest that the processor has, unless the environment variable `ROVER_GYM_INSTRUCTIONS`
+        names another. Results do not depend on it.
+        """
     @property
     def reading_layout(self) -> dict[str, slice]:
         """The slice of each quantity in a row of readings; see `Simulation.reading_layout`."""

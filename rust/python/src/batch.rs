@@ -93,6 +93,9 @@ impl SimulationBatch {
     }
 
     /// Instruction set of the processor, "AVX-512", "AVX2" or "baseline".
+    ///
+    /// The widest that the processor has, unless the environment variable `ROVER_GYM_INSTRUCTIONS`
+    /// names another. Results do not depend on it.
     #[getter]
     #[allow(clippy::unused_self)] // a property in Python
     fn instruction_set(&self) -> &'static str {
