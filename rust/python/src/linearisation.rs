@@ -12,8 +12,7 @@ use crate::arguments::texts;
 use crate::arrays::{Array, fresh, fresh_matrix};
 use crate::errors::{BorderError, Kind, Result, Value, entry};
 
-/// Derivatives of a time step by state, command and parameters, as `Simulation.linearise` returns
-/// them.
+/// Derivatives of a time step, as `Simulation.linearise` returns them.
 ///
 /// `x_next = next_state + a @ (x - state) + b @ (u - command)` to first order. The state is
 /// x = (q, v) as `Simulation.q` and `Simulation.v` return them, the command is u = (wheel torques,
@@ -143,8 +142,7 @@ pub fn named_parameters(
     names.iter().enumerate().map(find).collect()
 }
 
-/// Steps of a batch of trajectories with their derivatives, as `Simulation.differentiate` returns
-/// them.
+/// Steps of trajectories with their derivatives, as `Simulation.differentiate` returns them.
 #[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
 pub struct StepDerivatives {
     /// States, (n, steps + 1, nx).

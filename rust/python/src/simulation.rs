@@ -641,13 +641,12 @@ impl Simulation {
         Ok(problem(&*self.open()?))
     }
 
-    /// Derivatives of the next step by state, command and parameters. The simulation does not
-    /// change.
+    /// Derivatives of the next step by state, command and parameters.
     ///
-    /// The step is the one after `set_state(q, v)`, without memory of earlier impulses. Its
+    /// The simulation does not change. The step is the one after `set_state(q, v)`, without memory of earlier impulses. Its
     /// contacts and their modes are held, and so are the branches of the motors; the limits of the
-    /// commands are left out. Where the modes change, the step has no such derivative; with `check`,
-    /// `Linearisation.holds` says for which entries that is so.
+    /// commands are left out. Where the modes change, the step has no such derivative; with
+    /// `check`, `Linearisation.holds` says for which entries that is so.
     ///
     /// Args:
     ///     check: Whether to test each column of (A, B) by two real steps, which takes a hundred
@@ -690,11 +689,10 @@ impl Simulation {
         Ok(Linearisation::new(&self.model, found))
     }
 
-    /// Steps from given states under given commands, each with its derivatives. The simulation does
-    /// not change.
+    /// Takes steps from given states under given commands, with the derivatives of each.
     ///
-    /// Each step is the one after `set_state`, without memory of earlier impulses, so that it is a
-    /// function of state, command and parameters; `linearise` differentiates the same. Torques
+    /// The simulation does not change. Each step is the one after `set_state`, without memory of
+    /// earlier impulses, so that it is a function of state, command and parameters; `linearise` differentiates the same. Torques
     /// saturate at their limits. `rover_gym.derivatives` has products with these derivatives.
     ///
     /// Args:
@@ -746,6 +744,7 @@ impl Simulation {
         let batch = TrajectoryBatch {
             states: &states,
             commands: &commands,
+            steps: shape[1],
             parameters: &parameters,
         };
         let found = py.detach(|| batch.take(inner, threads, &mut || watch.go_on()));

@@ -111,7 +111,10 @@ impl HeldLaw {
                 ContactMode::Slip => {
                     let t = self.direction(i);
                     let off = (1..self.d).map(|k| p[k] + self.mu[i] * p[0] * t[k - 1]);
-                    u[0].abs() + w * norm(&off.collect::<Vec<_>>())
+                    // A little velocity turns the direction of a slow slide.
+                    let (speed, friction) = (norm(&u[1..]), w * self.mu[i] * p[0]);
+                    let share = speed / (speed + friction).max(f64::MIN_POSITIVE);
+                    u[0].abs() + share * w * norm(&off.collect::<Vec<_>>())
                 }
             };
             worst = worst.max(violation);

@@ -49,9 +49,9 @@ pub(crate) struct Projection {
 pub(crate) const SAME: f64 = 1e-7;
 
 impl<C: Clone + UnilateralContact> HeldStep<C> {
-    /// Of the step that was just taken with the scratch `ws`, without memory, by a system that still
-    /// holds its matrices. `is_common`: contacts with the common coefficient of friction. None if
-    /// the step was not solved, or not projected by the law.
+    /// Of the step that was just taken with the scratch `ws`, without memory, by a system that
+    /// still holds its matrices. `is_common`: contacts with the common coefficient of friction.
+    /// None if the step was not solved, or not projected by the law.
     pub(crate) fn of<S: MechanicalSystem<Contact = C>>(
         system: &S,
         options: &StepOptions,
@@ -95,9 +95,9 @@ impl Projection {
         let (h, d) = (options.time_step, S::DIMENSION.components());
         let (n, size) = (ws.contacts.len(), solved.p.len());
         let lambda = ws.p_position[..size].to_vec();
-        let (mut y, mut displacement) = (vec![0.0; system.nv()], vec![0.0; size]);
-        system.add_impulses(&lambda, &mut y);
-        system.local(&y, &mut displacement);
+        let mut displacement: Vec<f64> = (W.chunks_exact(size.max(1)))
+            .map(|row| row.iter().zip(&lambda).map(|(w, p)| w * p).sum())
+            .collect();
         let mut counts = Vec::with_capacity(n);
         for (i, contact) in ws.contacts.iter().enumerate() {
             let given = shift(system, options, ws, i)[0] + yielded(ws, i, ws.p[d * i]);

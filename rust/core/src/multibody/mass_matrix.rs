@@ -243,12 +243,16 @@ impl<T: Lane> MassMatrix<T> {
     #[inline(always)]
     pub fn times(&self, mechanism: &Mechanism, v: &[T], out: &mut [T]) {
         out.fill(T::splat(self.token, 0.0));
-        self.for_each(mechanism, |i, j, x| {
-            out[i] += x * v[j];
-            if i != j {
-                out[j] += x * v[i];
-            }
-        });
+        self.for_each(
+            mechanism,
+            #[inline(always)]
+            |i, j, x| {
+                out[i] += x * v[j];
+                if i != j {
+                    out[j] += x * v[i];
+                }
+            },
+        );
     }
 
     /// Lane `lane` as a full symmetric matrix (nv, nv).

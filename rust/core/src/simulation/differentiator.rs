@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::linearisation::LinearisationError;
+use super::error::LinearisationError;
 use super::rover::{RoverScene, RoverSimulation};
 use super::rover_command::RoverCommand;
 use super::scene::{Scene, SceneKey};
@@ -161,8 +161,20 @@ impl Differentiator {
         Ok(())
     }
 
-    /// Takes a real step and returns the state after it.
-    fn step(&mut self) -> Result<Vec<f64>, LinearisationError> {
+    /// Takes a real step from a state with the command of the copy, and returns the state after it.
+    ///
+    /// The contact problem may have several solutions. The fast step finds that of a simulation,
+    /// and the general step, which leaves its matrices, begins with it.
+    fn step(&mut self, state: &[f64]) -> Result<Vec<f64>, LinearisationError> {
+        let command = self.sim.command.clone();
+        let sim = &mut self.sim;
+        if !sim.model().has_compliance() && sim.quick_step(&mut NoProbe).is_some() {
+            let mut found = sim.warm_start.clone();
+            found.persistent.clear();
+            self.set(state)?;
+            self.sim.command = command;
+            self.sim.warm_start = found;
+        }
         self.report = (self.sim).general_step(&Variant::Linearised, &mut NoProbe)?;
         Ok(self.state_of(&self.sim))
     }
@@ -195,7 +207,7 @@ impl Differentiator {
         if let Some(entry) = entry.checked_sub(state.len()) {
             self.change_command(entry, change);
         }
-        let end = self.step()?;
+        let end = self.step(&changed)?;
         let sim = &mut self.sim;
         let system = sim.scene.system(&sim.command, &sim.memory, &mut sim.parts);
         let law = law_of_last(&system, &sim.scratch);
@@ -272,7 +284,7 @@ impl Differentiator {
         self.check_angles(state)?;
         self.set(state)?;
         let (begin, v) = (self.sim.q().clone(), self.sim.v().to_vec());
-        let next_state = self.step()?;
+        let next_state = self.step(state)?;
         self.check_angles(&next_state)?;
         let directions = self.directions(state, parameters);
         let nv = self.nv();
@@ -359,15 +371,18 @@ pub struct TrajectoryError {
 }
 
 impl Differentiator {
-    /// Takes a step for each command (n, 2 n_wheels) from a state (2 nv), with the derivatives of
-    /// each.
+    /// Takes `n` steps, one for each command (n, 2 n_wheels), from a state (2 nv), with the
+    /// derivatives of each.
     ///
     /// # Errors
     /// The first step that cannot be differentiated.
+    ///
+    /// # Panics
+    /// If there are fewer commands.
     pub fn trajectory(
         &mut self,
         state: &[f64],
-        commands: &[f64],
+        (n, commands): (usize, &[f64]),
         parameters: &[StepParameter],
         go_on: &mut dyn FnMut() -> bool,
     ) -> Result<Trajectory, TrajectoryError> {
@@ -377,7 +392,8 @@ impl Differentiator {
             ..Trajectory::default()
         };
         let mut state = state.to_vec();
-        for (step, command) in commands.chunks_exact(nu.max(1)).enumerate() {
+        for step in 0..n {
+            let command = &commands[step * nu..][..nu];
             let taken =
                 (self.set_command(command)).and_then(|()| self.differentiate(&state, parameters));
             let mut columns = taken.map_err(|error| TrajectoryError { step, error })?;
@@ -409,6 +425,8 @@ pub struct TrajectoryBatch<'a> {
     pub states: &'a [f64],
     /// As many for each.
     pub commands: &'a [f64],
+    /// Number of steps of each.
+    pub steps: usize,
     /// By which the steps are differentiated.
     pub parameters: &'a [StepParameter],
 }
@@ -431,7 +449,7 @@ impl TrajectoryBatch<'_> {
         let nx = 2 * of.model().nv();
         let n = self.states.len() / nx;
         assert_eq!(self.states.len(), n * nx, "one row a trajectory");
-        let length = self.commands.len().checked_div(n).unwrap_or(0);
+        let length = 2 * self.steps * of.model().wheels().len();
         assert_eq!(self.commands.len(), n * length, "as many commands for each");
         let goes_on = AtomicBool::new(true);
         let take = |range: Range<usize>, go_on: &mut dyn FnMut() -> bool| {
@@ -443,6 +461,7 @@ impl TrajectoryBatch<'_> {
                     &self.states[i * nx..][..nx],
                     &self.commands[i * length..][..length],
                 );
+                let commands = (self.steps, commands);
                 (differentiator.trajectory(state, commands, self.parameters, go_on))
                     .map_err(failed(i))
             });

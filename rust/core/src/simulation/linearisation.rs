@@ -6,15 +6,13 @@
 //! real steps for each column of (A, B) and reports where modes change.
 
 use nalgebra::{DMatrix, DVector};
-use thiserror::Error;
 
-use super::differentiator::{Columns, Differentiator};
-use super::error::CommandError;
+use super::differentiator::{Columns, Differentiator, Modes};
+use super::error::LinearisationError;
 use super::rover::RoverSimulation;
 use super::step_parameter::StepParameter;
 use crate::contact::Part;
-use crate::integrator::{ContactMode, StepError};
-use crate::multibody::StateError;
+use crate::integrator::ContactMode;
 
 /// The derivatives of a step, and how far they hold.
 #[derive(Clone, Debug)]
@@ -51,44 +49,6 @@ pub struct ColumnCheck {
     /// Largest difference from the central difference of the two steps, relative to the column's
     /// largest entry.
     pub errors: Vec<f64>,
-}
-
-/// A step that cannot be linearised.
-#[derive(Clone, Debug, Error, PartialEq)]
-pub enum LinearisationError {
-    /// The scheme is implicit in the forces.
-    #[error("variant: only steps of the variant \"linearised\" can be linearised")]
-    Variant,
-    /// A perturbation outside its range.
-    #[error("perturbation: must be from 1e-9 to 1e-3, is {value}")]
-    Perturbation {
-        /// What was given.
-        value: f64,
-    },
-    /// The coordinates are singular.
-    #[error("q[{index}]: the coordinates are singular at a pitch of 90 degrees, is {pitch} rad")]
-    Singular {
-        /// Index of the angle.
-        index: usize,
-        /// rad.
-        pitch: f64,
-    },
-    /// A state that is none.
-    #[error(transparent)]
-    State(#[from] StateError),
-    /// A command that the rover refuses.
-    #[error(transparent)]
-    Command(#[from] CommandError),
-    /// A step failed.
-    #[error(transparent)]
-    Step(#[from] StepError),
-    /// The step is not one solution of the step's equations.
-    #[error(
-        "the step was taken in parts, was not solved to its tolerance, was limited, turns so fast \
-         that gyroscopic terms are implicit, or is in soft ground: it has no derivative with fixed \
-         contact modes"
-    )]
-    NotHeld,
 }
 
 /// Tested change of a torque, N m, for a unit of the perturbation.
@@ -151,7 +111,7 @@ impl RoverSimulation {
 fn test(
     differentiator: &mut Differentiator,
     (state, all): (&[f64], &DMatrix<f64>),
-    base: &super::differentiator::Modes,
+    base: &Modes,
     perturbation: f64,
 ) -> Result<ColumnCheck, LinearisationError> {
     let (nx, nu) = (state.len(), 2 * differentiator.n_wheels());

@@ -68,11 +68,11 @@ pub use active_contact::{ActiveContact, Components, LocatedContact};
 pub use any_snapshot::AnySnapshot;
 pub use batch::Batch;
 pub use differentiator::{Differentiator, Trajectory, TrajectoryBatch, TrajectoryError};
-pub use error::{BatchError, CommandError, SnapshotError};
+pub use error::{BatchError, CommandError, LinearisationError, SnapshotError};
 pub use grains::{
     BedCommand, BedMemory, GrainBed, GrainSimulation, SoilSetupError, SoilSimulation, soil_options,
 };
-pub use linearisation::{ColumnCheck, Linearisation, LinearisationError};
+pub use linearisation::{ColumnCheck, Linearisation};
 pub use planar::{PlanarScene, PlanarSimulation};
 pub use reading::{ReadingLayout, ReadingRequest, ReadingScratch, seen_from};
 pub use rover::{LastCall, Placement, RoverScene, RoverSimulation};

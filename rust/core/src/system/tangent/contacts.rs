@@ -1,7 +1,9 @@
 //! Places of contacts that change with their bodies, and products with their rows of H.
 
+use nalgebra::Vector3;
+
 use super::held_tree::{HeldContact, TangentScene};
-use super::pass::Tangent;
+use super::scratch::{Tangent, Varying};
 use crate::contact::Contact;
 use crate::contact::contact_slope::SlopeOfBody;
 use crate::contact::jacobian::sides;
@@ -10,13 +12,6 @@ use crate::contact::rows::{Place, Triple, add_scaled};
 use crate::law::compliance::Yielding;
 use crate::multibody::{Model, Poses};
 use crate::scalar::{Dual, Lane, Vec3};
-
-/// A contact with its derivatives: its place relative to its body's tree, and its gap.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Varying<T> {
-    pub place: Place<Dual<T>>,
-    pub gap: Dual<T>,
-}
 
 impl<T: Lane> Tangent<T> {
     /// Places all contacts at the predicted end of the step.
@@ -35,48 +30,32 @@ impl<T: Lane> Tangent<T> {
         let token = self.token;
         let poses = &self.poses_end;
         let mut slopes = [T::splat(token, 0.0); 13];
-        let mut add = |body: usize, slope: &SlopeOfBody| {
-            let moved = twist(model, poses, body);
-            for (moved, slope) in moved.iter().zip(slope) {
-                for (sum, x) in slopes.iter_mut().zip(slope) {
-                    *sum += *moved * T::splat(token, *x);
-                }
-            }
-        };
         if held.joint.is_none() {
-            add(contact.body, &held.slope.own);
+            add_slopes(
+                &mut slopes,
+                twist(model, poses, contact.body),
+                &held.slope.own,
+            );
             if let (Some(other), Some(slope)) = (contact.other, &held.slope.other) {
-                add(other.body, slope);
+                add_slopes(&mut slopes, twist(model, poses, other.body), slope);
             }
         }
-        let number = |x: f64, slope: T| Dual::new(T::splat(token, x), slope);
-        let vector = |x: &[f64], k: usize| {
-            Vec3::new(
-                number(x[0], slopes[k]),
-                number(x[1], slopes[k + 1]),
-                number(x[2], slopes[k + 2]),
-            )
-        };
         let origin = poses.origin_of(model.bodies()[contact.body].tree);
-        let mut x = vector(contact.point.as_slice(), 0);
-        for (x, origin) in [
-            (&mut x.x, origin.x),
-            (&mut x.y, origin.y),
-            (&mut x.z, origin.z),
-        ] {
-            x.slope -= origin.slope;
-        }
-        let [n, t, b] = contact.frame.rows();
-        let mut gap = number(contact.gap, slopes[12]);
+        let mut x = vector(&contact.point, &slopes[..3]);
+        x.x.slope -= origin.x.slope;
+        x.y.slope -= origin.y.slope;
+        x.z.slope -= origin.z.slope;
+        let mut gap = Dual::new(T::splat(token, contact.gap), slopes[12]);
         if let (Some(joint), Some((_, sign))) = (held.joint, limit::row(model, contact)) {
             gap.slope = T::splat(token, sign) * self.end.joints[joint].slope;
         }
+        let [n, t, b] = contact.frame.rows();
         Varying {
             place: Place {
                 x,
-                n: vector(n.as_slice(), 3),
-                t: vector(t.as_slice(), 6),
-                b: vector(b.as_slice(), 9),
+                n: vector(&n, &slopes[3..6]),
+                t: vector(&t, &slopes[6..9]),
+                b: vector(&b, &slopes[9..12]),
             },
             gap,
         }
@@ -102,8 +81,10 @@ impl<T: Lane> Tangent<T> {
             let place = self.seen_from(scene.model, i, contact, body);
             let sign = zero.like(sign);
             path.for_each_row(
+                #[inline(always)]
                 |m| poses.motions[m],
                 &place,
+                #[inline(always)]
                 |k, row| add_scaled(&mut sum, &row, sign * x[k]),
             );
         }
@@ -166,6 +147,23 @@ impl<T: Lane> Tangent<T> {
         let step = (h, number(options.theta));
         Some(law.over(step, self.contacts[i].gap, u_N, [weight, zero, zero]))
     }
+}
+
+/// Adds the derivatives of a contact along a displacement and turn of a body.
+#[inline(always)]
+fn add_slopes<T: Lane>(slopes: &mut [T; 13], moved: [T; 6], of_body: &SlopeOfBody) {
+    for (moved, of_body) in moved.iter().zip(of_body) {
+        for (sum, x) in slopes.iter_mut().zip(of_body) {
+            *sum += *moved * moved.like(*x);
+        }
+    }
+}
+
+/// A vector with its derivatives.
+#[inline(always)]
+fn vector<T: Lane>(x: &Vector3<f64>, slopes: &[T]) -> Vec3<Dual<T>> {
+    let number = |k: usize| Dual::new(slopes[k].like(x[k]), slopes[k]);
+    Vec3::new(number(0), number(1), number(2))
 }
 
 /// Displacement of a body's origin and its turn, world axes.

@@ -1,7 +1,7 @@
 //! What varies in a lane.
 
 use super::held_tree::TangentScene;
-use super::pass::Tangent;
+use super::scratch::Tangent;
 use crate::multibody::LaneConfiguration;
 use crate::scalar::{Dual, Lane};
 

@@ -18,14 +18,15 @@
 //! robotics* (Simple), arXiv 2409.07107, for the residuals by the recursive Newton–Euler algorithm.
 //!
 //! - `direction`: what varies; `held_tree`: what a step held; `contacts`: their places and
-//!   velocities; `pass`: one pass, a direction a lane.
+//!   velocities; `scratch`, `pass`: one pass, a direction a lane.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 mod contacts;
 mod direction;
 mod held_tree;
 mod pass;
+mod scratch;
 
 pub(crate) use direction::Direction;
 pub(crate) use held_tree::{HeldTree, TangentScene};
-pub(crate) use pass::Tangent;
+pub(crate) use scratch::Tangent;

@@ -1,114 +1,20 @@
 //! One pass over a step, with as many directions as lanes.
 
-use super::contacts::Varying;
 use super::direction::Direction;
 use super::held_tree::TangentScene;
+use super::scratch::{Correction, Tangent};
 use crate::integrator::held_step::SAME;
 use crate::integrator::mechanical_system::MOST_REVISIONS;
-use crate::multibody::bias::{BiasScratch, bias};
+use crate::multibody::Configuration;
+use crate::multibody::bias::bias;
 use crate::multibody::energy::energy;
 use crate::multibody::mechanism::Mechanism;
-use crate::multibody::{
-    Configuration, EnergyScratch, Factor, Inertias, LaneConfiguration, MassMatrix, Model, Poses,
-};
 use crate::scalar::{Dual, Lane, Vec3};
-use crate::system::drives::Drives;
-
-/// What the energy audit did to the velocity.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Correction {
-    None,
-    /// The motion relative to the mass centre was scaled.
-    Relative,
-    /// All of the velocity was scaled.
-    Whole,
-}
 
 /// Relative difference of velocities that is rounding.
 const ROUNDING: f64 = 1e-13;
 
-/// Scratch of passes with the lanes of `T`.
-pub(crate) struct Tangent<T: Lane> {
-    pub(super) token: T::Token,
-    pub(super) inertias: Inertias<Dual<T>>,
-    pub(super) varies_inertias: bool,
-    /// Drives and configuration of the machine, and with what varies.
-    pub(super) own_drives: Drives<Dual<T>>,
-    pub(super) drives: Drives<Dual<T>>,
-    pub(super) base: LaneConfiguration<Dual<T>>,
-    pub(super) start: LaneConfiguration<Dual<T>>,
-    middle: LaneConfiguration<Dual<T>>,
-    pub(super) end: LaneConfiguration<Dual<T>>,
-    reached: LaneConfiguration<Dual<T>>,
-    /// Displacement that the configuration begins with, velocity at the start (nv).
-    pub(super) moved: Vec<Dual<T>>,
-    pub(super) v: Vec<Dual<T>>,
-    v_mean: Vec<Dual<T>>,
-    v_end: Vec<Dual<T>>,
-    displacement: Vec<Dual<T>>,
-    torque: Vec<Dual<T>>,
-    pub(super) y: Vec<Dual<T>>,
-    product: Vec<Dual<T>>,
-    solved: [Vec<T>; 2],
-    pub(super) poses_middle: Poses<Dual<T>>,
-    pub(super) poses_end: Poses<Dual<T>>,
-    mass_matrix: MassMatrix<Dual<T>>,
-    factor: Factor<T>,
-    bias_scratch: BiasScratch<Dual<T>>,
-    energy_scratch: EnergyScratch<Dual<T>>,
-    pub(super) contacts: Vec<Varying<T>>,
-    du: Vec<T>,
-    dp: Vec<T>,
-    pub(super) d_mu: T,
-    pub(super) d_stiffness: T,
-    pub(super) d_damping: T,
-    correction: Correction,
-}
-
 impl<T: Lane> Tangent<T> {
-    /// Room for a machine.
-    pub(crate) fn new(token: T::Token, model: &Model) -> Self {
-        let mechanism = model.mechanism();
-        let place = || LaneConfiguration::new(token, mechanism);
-        let zero = T::splat(token, 0.0);
-        let vector = || vec![Dual::constant(zero); model.nv()];
-        let drives = Drives::new(token, mechanism);
-        Self {
-            token,
-            inertias: Inertias::new(token, mechanism),
-            varies_inertias: false,
-            own_drives: drives.clone(),
-            drives,
-            base: place(),
-            start: place(),
-            middle: place(),
-            end: place(),
-            reached: place(),
-            moved: vector(),
-            v: vector(),
-            v_mean: vector(),
-            v_end: vector(),
-            displacement: vector(),
-            torque: vector(),
-            y: vector(),
-            product: vector(),
-            solved: [vec![zero; model.nv()], vec![zero; model.nv()]],
-            poses_middle: Poses::new(token, mechanism),
-            poses_end: Poses::new(token, mechanism),
-            mass_matrix: MassMatrix::new(token, mechanism),
-            factor: Factor::new(token, mechanism),
-            bias_scratch: BiasScratch::new(token, mechanism),
-            energy_scratch: EnergyScratch::new(token, mechanism),
-            contacts: Vec::new(),
-            du: Vec::new(),
-            dp: Vec::new(),
-            d_mu: zero,
-            d_stiffness: zero,
-            d_damping: zero,
-            correction: Correction::None,
-        }
-    }
-
     /// Calls `take` with the number of each direction and its derivatives of the configuration's
     /// motion and of the velocity at the end (nv each). False if the step is not the one that the
     /// held equations describe; `end` then is of no use.
@@ -337,8 +243,8 @@ impl<T: Lane> Tangent<T> {
         u.map(|u| u.slope)
     }
 
-    /// The projection's displacement with its derivative, zero without one. `y` is the change of the
-    /// velocity at held impulses.
+    /// The projection's displacement with its derivative. `y` is the change of the velocity at held
+    /// impulses.
     #[inline(always)]
     fn displace(&mut self, scene: &TangentScene<'_>) {
         let zero = Dual::splat(self.token, 0.0);
@@ -370,7 +276,12 @@ impl<T: Lane> Tangent<T> {
         }
         self.solve(scene.model.mechanism());
         for i in 0..step.contacts.len() {
-            let local = self.local(scene, i, &self.y);
+            let mut local = self.local(scene, i, &self.y);
+            if let Some(law) = self.yielding(scene, i) {
+                for (local, p) in local.iter_mut().zip(&projection.law.p[3 * i..]) {
+                    *local += law.diagonal * law.diagonal.like(*p);
+                }
+            }
             for (du, local) in self.du[3 * i..].iter_mut().zip(local) {
                 *du += local.slope;
             }
