@@ -45,10 +45,9 @@ def replay(
     if not any(wanted.values()):
         raise OptionError("say what to write: --html, --vrml, --gltf or --film, with a file's name")
     saved = open_run(run)
-    kind, name = _KINDS[type(saved)], type(saved)
-    for package, path in (("viser", None if name is GrainRun else html), ("pygltflib", gltf)):
-        if path is not None:
-            require(package, "replay")  # before the first file is written
+    kind = _KINDS[type(saved)]
+    if gltf is not None:
+        require("pygltflib", "replay")  # before the first file is written
     for option, path in wanted.items():
         if path is not None and path.exists() and path.samefile(run):
             refuse(OptionError, option, str(path), "would replace the run itself")

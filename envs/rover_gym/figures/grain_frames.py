@@ -11,7 +11,7 @@ import numpy.typing as npt
 from rover_gym.extras import MissingExtraError, require
 from rover_gym.rendering import FrameRenderer, VideoWriter
 from rover_gym.rendering.appearance import GROUND_COLOUR, ROCK_COLOUR
-from rover_gym.replay.grain_page import eye_path, start_view
+from rover_gym.replay.grain_scene import eye_path, start_view
 from rover_gym.replay.scenery import vessel_meshes, vessel_poses, wall_polygons, wall_poses
 
 if TYPE_CHECKING:

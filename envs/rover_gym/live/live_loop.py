@@ -283,7 +283,7 @@ class LiveLoop:
         env, info = rover.env, rover.info
         simulation, solver = env.simulation, info["solver"]
         positions, rotations = poses_of(rover)
-        velocity = simulation.v
+        velocity, forces = simulation.v, simulation.wheel_forces
         factor = math.nan
         if len(self._pace) > 1:
             (first, begin), (last, end) = self._pace[0], self._pace[-1]
@@ -302,7 +302,8 @@ class LiveLoop:
             rotations=rotations,
             heading=float(simulation.q[4]),
             speed=math.hypot(velocity[0], velocity[2]),
-            loads=simulation.wheel_forces[:, 0],
+            wheel_forces=forces,
+            loads=forces[:, 0],
             slip=info["slip_ratio"],
             energy=info["energy"],
             tilt=info["tilt"],

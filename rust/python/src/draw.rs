@@ -22,35 +22,34 @@ use crate::shared::Watch;
 use crate::simulation::{Origin, Simulation};
 use crate::{terrain, union};
 
-/// What the episodes of a task are drawn from.
+/// Distribution of the episodes of a task.
 ///
-/// Draws come from generators that are number for number NumPy's `PCG64`; a generator is given and
-/// returned as four unsigned 64-bit numbers: high and low half of its state, high and low half of
-/// its increment.
+/// Random generators give the same numbers as NumPy's `PCG64`. A generator is four unsigned 64-bit
+/// numbers: high and low half of its state, high and low half of its increment.
 ///
 /// Args:
-///     rules: What all episodes share; rocks leave the goal clear within its tolerance.
-///     simulation: The rover, before its masses are scaled, and the options of its steps.
+///     rules: What all episodes share; rocks keep the goal's tolerance free.
+///     simulation: A rover with unscaled masses, which also sets the options of the time stepping.
 ///     start: Ranges (low, high) of `slope`, `uphill`, `heading`, `goal_distance`, `goal_bearing`
-///         and `turn`, by name, rad and m. A goal after the first lies at a distance from
-///         `goal_distance` from the one before it, in the direction of the last leg turned by
+///         and `turn`, by name, rad and m. Each further goal lies at a distance drawn from
+///         `goal_distance` from the previous goal, in the direction of the last leg, turned by
 ///         `turn`.
 ///     domain: Ranges of `mass_scale`, `friction`, `actuator_gain` and `gravity_scale`, by name.
-///     trunk_load_limit: Force on the trunk beyond which the rover is high-centred, before masses
-///         and gravity are scaled, N.
-///     rocks: Range of `difficulty`, and `abundance` and `max_radius` or None, by name; None for no
-///         rocks.
-///     slope_by_difficulty: Whether the slope follows from the difficulty of the rocks.
-///     ground: The ground of every episode, a terrain of any kind; None for a tilted plane.
-///     hills: Fractal ground: root mean square of its slope, rise over run, or nan for one that
-///         follows from the difficulty of the rocks; None for none. Not together with `ground`.
-///     sand: Soft grounds, one of which is drawn, on a tilted plane with ripples by the difficulty
-///         of the rocks; their surfaces do not count; None for none. Not together with the two
-///         others.
+///     trunk_load_limit: Force on the trunk beyond which the rover is high-centred, N, before
+///         scaling by masses and gravity.
+///     rocks: A mapping with the range of `difficulty`, and `abundance` and `max_radius`, each of
+///         which may be None; None for no rocks.
+///     slope_by_difficulty: Whether the difficulty of the rocks determines the slope.
+///     ground: A terrain for all episodes; None for a tilted plane.
+///     hills: Root mean square slope of fractal ground, rise over run, or NaN if the difficulty of
+///         the rocks determines it; None for no fractal ground. Not together with `ground`.
+///     sand: Soft grounds from which the soil of each episode is drawn; None for rigid ground. The
+///         surface is a tilted plane with ripples that grow with the difficulty of the rocks; the
+///         surfaces of the given grounds are not used. Not together with `ground` or `hills`.
 ///
 /// Raises:
-///     OptionError: An argument is missing, no number, or out of its range.
-///     TerrainError: `ground` is no terrain.
+///     OptionError: An argument is missing, not a number, or out of range.
+///     TerrainError: `ground` is not a terrain.
 #[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct EpisodeDistribution {
     pub inner: CoreDistribution,
@@ -112,7 +111,7 @@ fn list<'py>(given: &Bound<'py, PyAny>, n: usize, field: &str) -> Result<Vec<Bou
     found.ok_or_else(|| refused(given, Kind::Option, field, &format!("a list of {n}")))
 }
 
-/// How many scenes are drawn at most, and what replaces draws.
+/// Largest number of scenes drawn, and values that replace drawn ones.
 pub struct Request {
     randoms: Vec<Pcg64>,
     difficulties: Vec<Option<Range>>,
@@ -254,23 +253,24 @@ impl EpisodeDistribution {
         })
     }
 
-    /// Draws one episode from each generator; `EpisodeBatch.draw` does it on several threads.
+    /// Draws one episode from each generator. `EpisodeBatch.draw` does the same on several threads.
     ///
-    /// A scene in which the rover would stand deeper than 1 cm in the ground or in a sphere is
-    /// drawn again. The given generators do not change: see `DrawnEpisodes.generators`.
+    /// A scene is drawn again if the rover would penetrate the ground or a rock by more than 1 cm.
+    /// The given generators do not change: see `DrawnEpisodes.generators`.
     ///
     /// Args:
     ///     generators: Generators, (m, 4) uint64.
-    ///     attempts: Most scenes drawn for a rover until it has room.
-    ///     difficulties: For each generator a range (low, high) that replaces that of the rocks'
-    ///         difficulty, or None; by default none.
-    ///     fixed: Values that replace draws, which are made all the same, by name: `slope`,
-    ///         `uphill`, `position` (x, z), `heading`, `goal` (x, z), `further` (n, 2) of the goals
-    ///         after it, `difficulty`, `field_seed`, `q`, `v`; one mapping for all or a list of one
-    ///         for each generator; none by default.
+    ///     attempts: Largest number of scenes drawn for each episode.
+    ///     difficulties: For each generator, None or a range (low, high) of the rocks' difficulty
+    ///         that replaces the distribution's; None by default.
+    ///     fixed: Values that replace drawn ones, by name; the random numbers are drawn
+    ///         nevertheless: `slope`, `uphill`, `position` (x, z), `heading`, `goal` (x, z),
+    ///         `further` (n, 2) of the goals after it, `difficulty`, `field_seed`, `q`, `v`; one
+    ///         mapping for all, or a list with one for each generator; none by default.
     ///
     /// Raises:
-    ///     TerrainError: A rover has no room in `attempts` scenes, or the ground refuses a number.
+    ///     TerrainError: In all of the `attempts` scenes the rover penetrates the ground, or a
+    ///         parameter of the ground is invalid.
     ///     StateError: `q` or `v` has a wrong length or an entry that is not finite, or float32
     ///         cannot hold the observation.
     ///     ModelError: A scaled mass is out of its range.
@@ -360,7 +360,7 @@ impl DrawnEpisodes {
 
 #[pymethods]
 impl DrawnEpisodes {
-    /// The generators after the draws, (m, 4) uint64.
+    /// States of the generators after the draws, (m, 4) uint64.
     #[getter]
     fn generators(&self) -> Array<u64> {
         fresh_rows(self.drawn.iter().map(|one| one.random.state().halves()))
@@ -372,7 +372,7 @@ impl DrawnEpisodes {
         self.table(|one| one.episode.observation().to_vec())
     }
 
-    /// Starts, (m, 5 + 2 n) with n goals, rad and m.
+    /// Starts of the episodes, (m, 5 + 2 n) with n goals, rad and m.
     ///
     /// Slope, direction of steepest ascent, x and z of the start, heading, x and z of each goal.
     #[getter]
@@ -380,9 +380,9 @@ impl DrawnEpisodes {
         self.table(|one| one.scene.start.row())
     }
 
-    /// Properties of rover and world, (m, 4).
+    /// Physical properties, (m, 4).
     ///
-    /// Factor of the masses, friction, gain of the motors, factor of gravity.
+    /// Mass scale, friction, actuator gain, gravity scale.
     #[getter]
     fn domains(&self) -> Array {
         fresh_rows(self.drawn.iter().map(|one| one.scene.domain.row()))
@@ -390,7 +390,7 @@ impl DrawnEpisodes {
 
     /// Rocks, (m, 3); zeros where there are none.
     ///
-    /// Difficulty, abundance, radius of the largest in wheel radii.
+    /// Difficulty, abundance, radius of the largest rock in wheel radii.
     #[getter]
     fn rocks(&self) -> Array {
         fresh_rows(self.drawn.iter().map(|one| RockDraw::row(one.scene.rocks)))
@@ -403,7 +403,7 @@ impl DrawnEpisodes {
         self.drawn.iter().map(seed).collect()
     }
 
-    /// An episode, which has begun.
+    /// An episode in its first state.
     ///
     /// Args:
     ///     index: Number of the episode.
@@ -425,7 +425,7 @@ impl DrawnEpisodes {
         union::object(index.py(), &self.at(index)?.scene.ground)
     }
 
-    /// The plane of an episode, under rocks too; None where the ground has none.
+    /// The plane of an episode, also under rocks; None if the ground has none.
     ///
     /// Args:
     ///     index: Number of the episode.

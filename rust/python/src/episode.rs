@@ -24,9 +24,9 @@ use crate::snapshot::{damaged, read_bytes};
 /// Observation, reward, whether the episode has ended, info.
 type Step<'py> = (Array<f32>, f64, bool, Bound<'py, PyDict>);
 
-/// One episode of a driving task: what its simulation does not hold.
+/// State of an episode of a driving task, beside its simulation.
 ///
-/// `begin` and `from_bytes` make one.
+/// Create it by `begin` or `from_bytes`.
 #[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct EpisodeRun(Shared<Inner>);
 
@@ -198,22 +198,22 @@ impl Inner {
 
 #[pymethods]
 impl EpisodeRun {
-    /// The beginning of an episode.
+    /// Begins an episode.
     ///
     /// Args:
-    ///     rules: What all episodes of the task share.
-    ///     simulation: The rover at its start.
+    ///     rules: Rules of the task.
+    ///     simulation: The rover at the start of the episode.
     ///     goal: The goal (x, z), m.
-    ///     domain: Properties of rover and world: mass_scale, friction, actuator_gain,
+    ///     domain: Physical properties of the episode: mass_scale, friction, actuator_gain,
     ///         gravity_scale.
     ///     trunk_load_limit: Force on the trunk beyond which the rover is high-centred, N.
     ///     difficulty: Difficulty of the rocks.
-    ///     normals: A standard normal number for each entry of the observation, (size,), where the
-    ///         rules have noise.
+    ///     normals: A standard normal number for each entry of the observation, (size,); needed if
+    ///         the rules have noise.
     ///     further: Goals after the first, (n, 2), x and z, m; none by default.
     ///
     /// Returns:
-    ///     The episode; None if its observation is not finite in float32.
+    ///     The episode; None if its first observation is not finite in float32.
     ///
     /// Raises:
     ///     OptionError: An argument has a wrong shape or a number that is not finite, or the
@@ -242,22 +242,24 @@ impl EpisodeRun {
         Ok(begun?.map(Self::of))
     }
 
-    /// Gives the simulation an action for one control period.
+    /// Applies an action for one control period.
     ///
-    /// Other threads run meanwhile. Ctrl-C, or whatever else a signal handler raises, ends the call
-    /// after a whole physics step, whose state stays; the episode then stays as before the call.
+    /// Other Python threads run in the meantime. Ctrl-C, or another exception of a signal handler,
+    /// ends the call after the current physics step. The simulation then has the state after that
+    /// step, the episode the state before the call.
     ///
     /// Args:
-    ///     simulation: The rover of this episode, a `Simulation`, or a `RoverGrainSimulation` where
-    ///         it drives among grains.
+    ///     simulation: The rover of this episode: a `Simulation`, or a `RoverGrainSimulation` if it
+    ///         drives among grains.
     ///     action: Torques, then steering, within [-1, 1], (n_actions,).
-    ///     normals: A standard normal number for each entry of the observation, (size,), where the
-    ///         rules have noise.
-    ///     has_scan: Whether the heights are taken. Without, only a period that ends the episode
-    ///         takes them; otherwise the last ones stay until `complete`.
+    ///     normals: A standard normal number for each entry of the observation, (size,); needed if
+    ///         the rules have noise.
+    ///     has_scan: Whether to update the height scan. If False, it is updated only when the
+    ///         episode ends; otherwise the observation keeps the previous heights until `complete`
+    ///         is called.
     ///
     /// Returns:
-    ///     Observation (size,) float32, reward, whether the episode has ended, and info.
+    ///     Observation (size,) float32, reward, whether the episode has terminated, and info.
     ///
     /// Raises:
     ///     CommandError: The action has a wrong shape or an entry that is not finite or outside
@@ -302,19 +304,21 @@ impl EpisodeRun {
         inner.told(py, &observation, error.map(|e| e.to_string()))
     }
 
-    /// Goes on by a control period that ended with a reading, without a simulation.
+    /// Advances the episode by a control period, given the reading at its end instead of a
+    /// simulation.
     ///
     /// Args:
-    ///     reading: As of `Simulation.reading` with the goal as its target and the rules' scan.
-    ///     action: As of `step`.
-    ///     normals: As of `step`.
-    ///     message: The message of the physics step that failed, if one did.
+    ///     reading: A reading from `Simulation.reading`, with the goal as target and the scan of
+    ///         the rules.
+    ///     action: As for `step`.
+    ///     normals: As for `step`.
+    ///     message: The message of the StepError, if a physics step failed.
     ///
     /// Returns:
-    ///     As `step`.
+    ///     As for `step`.
     ///
     /// Raises:
-    ///     CommandError: As `step`.
+    ///     CommandError: As for `step`.
     ///     OptionError: `reading` or `normals` has a wrong length.
     #[pyo3(signature = (reading, action, normals = None, *, message = None))]
     fn advance<'py>(
@@ -347,10 +351,10 @@ impl EpisodeRun {
         held.told(py, &observation, message)
     }
 
-    /// Takes the heights that the last observation lacks, if it lacks any.
+    /// Updates the height scan of the last observation, if `step` left it out.
     ///
     /// Args:
-    ///     simulation: The rover of this episode, which has not moved since.
+    ///     simulation: The rover of this episode, in the state of the last observation.
     ///
     /// Returns:
     ///     The last observation, (size,) float32.
@@ -372,26 +376,26 @@ impl EpisodeRun {
         Ok(fresh(&self.0.open()?.episode.progress().previous_action))
     }
 
-    /// The present goal (x, z), m; the last one where all are reached.
+    /// The present goal (x, z), m; the last one if all are reached.
     #[getter]
     fn goal(&self) -> Result<(f64, f64)> {
         Ok(self.0.open()?.episode.goal().into())
     }
 
-    /// The info of the last period, or of the beginning.
+    /// The info of the last control period, or of the start.
     fn info<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         info(py, &(&self.0.open()?.episode, None))
     }
 
-    /// The same episode with other properties, another goal, or seen by other rules.
+    /// Returns a copy of the episode with another goal, other properties, or other rules.
     ///
     /// Args:
-    ///     goal: The first goal, (x, z), m; none counts as reached, and an episode that has ended
-    ///         goes on.
+    ///     goal: The first goal, (x, z), m. No goal then counts as reached, and a terminated
+    ///         episode continues.
     ///     distance: Horizontal distance to the present goal, m.
-    ///     domain: Properties of rover and world, as of `begin`.
+    ///     domain: Physical properties, as for `begin`.
     ///     trunk_load_limit: Force on the trunk beyond which the rover is high-centred, N.
-    ///     seen: An episode whose rules and observation are taken over.
+    ///     seen: An episode whose rules and observation are copied.
     ///
     /// Raises:
     ///     OptionError: An argument has a wrong shape or a number that is not finite, or does not
@@ -430,7 +434,7 @@ impl EpisodeRun {
         Ok(Self::of(CoreEpisode::resume(rules, state)?))
     }
 
-    /// All that an episode holds, as `from_bytes` reads it.
+    /// The state of the episode as bytes, for `from_bytes`.
     fn to_bytes<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyBytes>> {
         let state = postcard::to_stdvec(&self.0.open()?.episode.state());
         Ok(PyBytes::new(
@@ -439,14 +443,14 @@ impl EpisodeRun {
         ))
     }
 
-    /// An episode that goes on.
+    /// Restores an episode.
     ///
     /// Args:
-    ///     rules: What all episodes of the task share.
-    ///     data: What `to_bytes` returned.
+    ///     rules: Rules of the task.
+    ///     data: Bytes from `to_bytes`.
     ///
     /// Raises:
-    ///     StateError: The bytes are not those of an episode.
+    ///     StateError: The bytes are not an episode.
     ///     OptionError: The episode does not fit the rules.
     #[staticmethod]
     fn from_bytes(rules: GivenRules, data: &Bound<'_, PyAny>) -> Result<Self> {

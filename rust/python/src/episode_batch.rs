@@ -27,17 +27,17 @@ type Step = (Array<f32>, Array, Array<bool>, Array<bool>, Vec<usize>);
 /// Start, rocks, seed of the rocks, and domain, as `EpisodeBatch.origin` tells them.
 type OriginRows = (Vec<f64>, Vec<f64>, u64, Vec<f64>);
 
-/// Many rovers with their episodes, each bit for bit as it would be alone.
+/// Steps many rovers and their episodes. Each gives the same bits as it would alone.
 ///
-/// One call at a time: a call during another one raises BusyError. Methods that take the index of a
-/// rover raise OptionError where there is no such rover, or where its episode has not begun.
+/// Only one call may run at a time; a second call raises BusyError. Methods that take the index of
+/// a rover raise OptionError if there is no such rover or if its episode has not begun.
 ///
 /// Args:
-///     rules: What all episodes share.
-///     simulation: A rover of the task; the batch begins with copies of it, without episodes.
+///     rules: Rules of the task.
+///     simulation: A rover of the task. The batch starts with copies of it, without episodes.
 ///     n: Number of rovers.
 ///     max_steps: Control periods until an episode is truncated; no limit by default.
-///     threads: Number of threads; one a core by default.
+///     threads: Number of threads; one for each core by default.
 ///
 /// Raises:
 ///     OptionError: An argument is out of its range, or the model does not fit the rules.
@@ -90,7 +90,7 @@ impl Inner {
         ))
     }
 
-    /// Keeps what Python is told of the simulation of an episode that has begun.
+    /// Keeps the Python options of the simulation of an episode that has begun.
     fn set_origin(&mut self, index: usize, words: &SolverWords) -> Result<()> {
         let origin = self.batch.origin(index)?;
         self.origins[index] = Origin {
@@ -143,7 +143,7 @@ fn distribution<'a, 'py>(
     given.cast().map_err(wrong)
 }
 
-/// Where and on what an episode has begun, as `EpisodeBatch.origin` tells it.
+/// Start and ground of an episode, as `EpisodeBatch.origin` returns them.
 fn origin(given: &Bound<'_, PyAny>, ground: DrawnGround) -> Result<Began> {
     let what = "what `EpisodeBatch.origin` returns";
     let refuse = || refused(given, Kind::Option, "origin", what);
@@ -191,21 +191,22 @@ impl EpisodeBatch {
         Ok(self.0.open()?.batch.threads())
     }
 
-    /// Gives all rovers their actions for one control period.
+    /// Applies the actions of all rovers for one control period.
     ///
-    /// Ctrl-C ends the call after a whole physics step of each rover, which need not be the same
-    /// one.
+    /// Ctrl-C ends the call after the current physics step of each rover. The rovers may then have
+    /// taken different numbers of steps.
     ///
     /// Args:
-    ///     actions: As of `EpisodeRun.step`, (n_rovers, n_actions).
-    ///     active: Which rovers move, (n_rovers,); all by default. The others stay as they are.
-    ///     has_scan: Whether the heights are taken. Without, only episodes that end or reach the
-    ///         time limit take them; the others keep the last ones.
+    ///     actions: Actions as for `EpisodeRun.step`, (n_rovers, n_actions).
+    ///     active: Which rovers move, (n_rovers,); all by default. The others do not change.
+    ///     has_scan: Whether to update the height scans. If False, they are updated only in
+    ///         episodes that terminate or reach the time limit; the others keep the previous
+    ///         heights.
     ///
     /// Returns:
-    ///     Observations (n_rovers, size) float32, rewards (n_rovers,), which episodes have ended,
-    ///     which have reached the time limit, (n_rovers,), and the indices of all that have done
-    ///     either. A rover that stays has the values of its last period.
+    ///     Observations (n_rovers, size) float32, rewards (n_rovers,), which episodes are
+    ///     terminated and which are truncated, (n_rovers,) each, and the indices of the rovers with
+    ///     either. A rover that is not active keeps the values of its last period.
     ///
     /// Raises:
     ///     CommandError: The actions have a wrong shape or an entry that is not finite or outside
@@ -228,30 +229,31 @@ impl EpisodeBatch {
         Ok(step)
     }
 
-    /// Gives all rovers their actions for one control period and begins the next episodes.
+    /// Applies the actions of all rovers for one control period, and starts new episodes.
     ///
-    /// Those rovers begin anew whose episode is over; what they begin is drawn on the threads of
-    /// this batch from their own generators. Ctrl-C ends the call as it ends that of `step`.
+    /// A rover whose episode is over gets a new one, drawn from the rover's own generator on the
+    /// threads of this batch. Ctrl-C ends the call as in `step`.
     ///
     /// Args:
-    ///     actions: As of `step`.
-    ///     distribution: What the next episodes are drawn from.
-    ///     same_step: Whether an episode is followed by the next in the step that ends it, see
-    ///         `finals`. If not, the next one begins in the following step; its rover does not move
-    ///         in that step and earns nothing.
-    ///     attempts: As of `EpisodeDistribution.draw`.
-    ///     has_scan: As of `step`.
+    ///     actions: As for `step`.
+    ///     distribution: Distribution of the next episodes.
+    ///     same_step: Whether the next episode begins in the same step that ends the previous one
+    ///         (see `finals`). Otherwise it begins in the following step, in which the rover does
+    ///         not move and the reward is 0.
+    ///     attempts: As for `EpisodeDistribution.draw`.
+    ///     has_scan: As for `step`.
     ///
     /// Returns:
-    ///     As of `step`. Where an episode has begun, the observation is its first; with `same_step`
-    ///     all else is that of the episode that has ended. If an episode that is to follow in the
-    ///     same step cannot be drawn, none begins, and the next call refuses it.
+    ///     As for `step`. If an episode has begun, the observation is its first one; with
+    ///     `same_step` the other values belong to the episode that has ended. If with `same_step`
+    ///     the next episode cannot be drawn, none begins, and the next call raises the error.
     ///
     /// Raises:
-    ///     CommandError: As of `step`.
+    ///     CommandError: As for `step`.
     ///     OptionError: An argument is invalid, or an episode has not begun. No rover has moved.
-    ///     RoverGymError: As of `EpisodeDistribution.draw`, for the first rover that has one and
-    ///         whose episode was over before this call. No rover has moved.
+    ///     RoverGymError: The next episode of a rover whose episode was over before this call
+    ///         cannot be drawn, see `EpisodeDistribution.draw`; the error of the first such rover.
+    ///         No rover has moved.
     #[pyo3(signature = (actions, distribution, *, same_step, attempts = Given::MISSING, has_scan = true),
         text_signature = "($self, actions, distribution, *, same_step, attempts=100, has_scan=True)")]
     fn step_on(
@@ -283,17 +285,18 @@ impl EpisodeBatch {
         Ok(step)
     }
 
-    /// Indices of the rovers whose episode is over and whose next has not begun, in order.
+    /// Sorted indices of the rovers whose episode is over and whose next has not begun.
     #[getter]
     fn over(&self) -> Result<Vec<usize>> {
         Ok(self.0.open()?.batch.over())
     }
 
-    /// The episodes that the last call of `step_on` with `same_step` has ended.
+    /// Last observation and info of the episodes that the last call of `step_on` with `same_step`
+    /// ended.
     ///
     /// Returns:
-    ///     For each index of a rover, in order, the last observation (size,) float32 and the last
-    ///     info. Empty after `step`.
+    ///     A mapping from the index of each such rover, sorted, to the last observation (size,)
+    ///     float32 and the last info. Empty after `step`.
     fn finals<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let held = self.0.open()?;
         let finals = PyDict::new(py);
@@ -306,11 +309,11 @@ impl EpisodeBatch {
         Ok(finals)
     }
 
-    /// The infos of all rovers, of their last periods or beginnings.
+    /// The infos of all rovers, each of its last control period or of its start.
     ///
     /// Returns:
-    ///     For each entry an array (n_rovers,), and under its name after an underscore the mask of
-    ///     the rovers that have it: all.
+    ///     For each entry an array (n_rovers,), and under its name with a leading underscore a mask
+    ///     of the rovers that have the entry: all True.
     fn infos<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let held = self.0.open()?;
         let told = (0..held.batch.rovers().len()).map(|i| held.told(i));
@@ -318,7 +321,7 @@ impl EpisodeBatch {
         infos(py, &told)
     }
 
-    /// The info of one rover, of its last period or beginning.
+    /// The info of one rover, of its last control period or of its start.
     ///
     /// Args:
     ///     index: Index of the rover.
@@ -339,20 +342,21 @@ impl EpisodeBatch {
         Ok(Array::shaped(rows, &[n, size]))
     }
 
-    /// Draws episodes on the threads of this batch; no rover changes.
+    /// Draws episodes on the threads of this batch. The rovers do not change.
     ///
     /// Args:
-    ///     distribution: What the episodes are drawn from.
+    ///     distribution: Distribution of the episodes.
     ///     generators: Generators, (m, 4) uint64.
-    ///     attempts: As of `EpisodeDistribution.draw`, as the next two.
-    ///     difficulties: See there.
-    ///     fixed: See there.
+    ///     attempts: As for `EpisodeDistribution.draw`.
+    ///     difficulties: As for `EpisodeDistribution.draw`.
+    ///     fixed: As for `EpisodeDistribution.draw`.
     ///
     /// Returns:
-    ///     The episodes, the same for any number of threads.
+    ///     The episodes. They do not depend on the number of threads.
     ///
     /// Raises:
-    ///     RoverGymError: As of `EpisodeDistribution.draw`, for the first rover that has one.
+    ///     RoverGymError: An episode cannot be drawn, see `EpisodeDistribution.draw`; the error of
+    ///         the first such episode.
     #[pyo3(signature = (distribution, generators, **options),
         text_signature = "($self, distribution, generators, *, attempts=100, difficulties=None, fixed=None)")]
     fn draw(
@@ -367,7 +371,7 @@ impl EpisodeBatch {
         distribution.draw_on(generators.py(), &request, Some(&mut held.batch))
     }
 
-    /// Begins drawn episodes.
+    /// Starts drawn episodes.
     ///
     /// Args:
     ///     indices: Indices of the rovers, one for each episode.
@@ -391,19 +395,19 @@ impl EpisodeBatch {
         Ok(())
     }
 
-    /// Puts copies of a rover in the middle of its episode in the places of others.
+    /// Replaces rovers by copies of a rover in the middle of its episode.
     ///
-    /// With `simulation`, `episode`, `origin`, `steps` and `generators` of one rover the copies
-    /// continue it bit for bit.
+    /// With the `simulation`, `episode`, `origin`, `steps` and `generators` of one rover, the
+    /// copies continue bit for bit.
     ///
     /// Args:
-    ///     indices: Indices of the rovers that it replaces.
+    ///     indices: Indices of the rovers to replace.
     ///     simulation: The rover.
     ///     episode: Its episode, with the rules of the batch.
-    ///     origin: Where and on what it began, as `origin` tells.
+    ///     origin: Start and ground of the episode, as returned by `origin`.
     ///     generator: Generator of the noise, (1, 4) uint64.
     ///     steps: Control periods since the episode began.
-    ///     message: Message of the physics step that failed, if that has ended the episode.
+    ///     message: Message of the StepError, if one has ended the episode.
     ///
     /// Raises:
     ///     OptionError: There is no such rover, or an argument does not fit. Nothing has changed.
@@ -461,7 +465,7 @@ impl EpisodeBatch {
         self.one(index, |held, i| Ok(held.batch.steps(i)?))
     }
 
-    /// The generators of rovers, from which their noise is drawn.
+    /// The random generators of rovers, from which noise and next episodes are drawn.
     ///
     /// Args:
     ///     indices: Indices of the rovers.
@@ -504,13 +508,13 @@ impl EpisodeBatch {
         Ok(())
     }
 
-    /// Where and on what the episode of a rover has begun.
+    /// Start and ground of a rover's episode.
     ///
     /// Args:
     ///     index: Index of the rover.
     ///
     /// Returns:
-    ///     Its rows of `DrawnEpisodes.starts`, `rocks`, `rock_seeds` and `domains`.
+    ///     Its row of each of `DrawnEpisodes.starts`, `rocks`, `rock_seeds` and `domains`.
     fn origin(&self, index: &Bound<'_, PyAny>) -> Result<(Array, Array, u64, Array)> {
         self.one(index, |held, i| {
             let (origin, episode) = (held.batch.origin(i)?, held.batch.episode(i)?);
@@ -523,7 +527,7 @@ impl EpisodeBatch {
         })
     }
 
-    /// Range (low, high) of the rocks' difficulty in the next episodes of a rover, if any is set.
+    /// Range (low, high) of the rocks' difficulty in the next episodes of a rover; None if not set.
     ///
     /// Args:
     ///     index: Index of the rover.
@@ -533,14 +537,15 @@ impl EpisodeBatch {
         })
     }
 
-    /// Sets the range of the rocks' difficulty in the episodes that `step_on` begins with a rover.
+    /// Sets the range of the rocks' difficulty for the next episodes that `step_on` starts with a
+    /// rover.
     ///
     /// Args:
     ///     index: Index of the rover.
-    ///     difficulty: The range (low, high); None for that of the distribution.
+    ///     difficulty: The range (low, high); None for the range of the distribution.
     ///
     /// Raises:
-    ///     OptionError: There is no such rover, or `difficulty` is no range.
+    ///     OptionError: There is no such rover, or `difficulty` is not a range.
     fn set_difficulty(
         &self,
         index: &Bound<'_, PyAny>,

@@ -47,7 +47,7 @@ pub enum EpisodeError {
         index: usize,
     },
     /// A given state whose observation is not finite in float32.
-    #[error("q: must be observable in float32, with v and goal")]
+    #[error("q: with v and goal, must give an observation that is finite in float32")]
     NotObservable,
     /// Why no scene could be drawn.
     #[error(transparent)]

@@ -31,6 +31,6 @@ pub(crate) mod quaternion;
 mod registers;
 
 pub use dual::Dual;
-pub use instructions::{Instructions, Single};
+pub use instructions::{Instructions, InstructionsError, Single};
 pub use lane::{Lane, LaneMask, MAX_LANES};
 pub use linear::{Mat3, Vec3};
