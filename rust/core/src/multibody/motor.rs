@@ -159,6 +159,18 @@ impl<T: Lane> MotorLine<T> {
         self.active.set(lane, 0.0);
     }
 
+    /// Adds to the command; [`Self::choose`] follows if there is a motor.
+    #[inline(always)]
+    pub fn add_command(&mut self, change: T) {
+        let command = (self.command + change).min(self.stall).max(-self.stall);
+        self.command = command;
+        self.at_rest = command;
+        for (beyond, towards) in self.beyond.iter_mut().zip([command, -command]) {
+            let is_whole = self.stall.le(*beyond);
+            *beyond = T::select(is_whole, *beyond, towards.max(command.like(0.0)));
+        }
+    }
+
     /// Whether any lane has a motor.
     #[inline(always)]
     #[must_use]
