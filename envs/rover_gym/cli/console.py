@@ -61,6 +61,7 @@ SET_BY = {
 PLACED = (
     ("path", "run"),
     ("path", "recording"),
+    ("run", "recording"),
     ("path", "file"),
     ("model", "name"),
     ("policy", "policies"),

@@ -254,7 +254,7 @@ def film_episode(path: Path, make_policy: Callable[[Any], Policy], arguments: Ma
         MissingExtraError: The extra `render` is not installed.
         RoverGymError: An argument is out of range.
     """
-    rendering: dict[str, Any] = {"render_mode": "rgb_array", "render_options": {"antialiasing": True}}
+    rendering: dict[str, Any] = {"render_mode": "rgb_array", "render_options": {}}
     limit = round(MAX_EPISODE_STEPS * 0.05 * arguments.get("control_frequency", 20.0))
     env = gym.make("Rover-v0", max_episode_steps=limit, **arguments, **rendering)
     try:
