@@ -1536,7 +1536,7 @@ class Simulation(AnySimulation):
     def wheel_forces(self) -> _Array:
         """Mean contact force on each wheel over the last step, (n_wheels, 3), N.
 
-        Along n, t, b of the wheel's contact frame.
+        Sums over its contacts, each along its own normal, rolling and lateral direction.
         """
     @property
     def trunk_force(self) -> float:
@@ -2115,6 +2115,8 @@ class EpisodeRules:
         battery: Work of the motors, driving or braking, after which the battery is empty and the
             episode ends, J; none by default. The observation of a rover with a battery has one
             entry more, after the time to high-centring: the fraction of its charge.
+        free_distance: Distance from where an episode began at which the rover is free, which ends
+            the episode; progress is then measured from there, m; none by default.
 
     Raises:
         ModelError: `model` is not a RoverModel.
@@ -2122,6 +2124,9 @@ class EpisodeRules:
             those of the terms.
     """
 
+    @staticmethod
+    def info_rows() -> list[tuple[str, str, str]]:
+        """Name, unit and meaning of each entry of an info."""
     @property
     def terms(self) -> tuple[str, ...]:
         """Names of the reward's terms, in the order of their sum."""
@@ -2142,6 +2147,7 @@ class EpisodeRules:
         scan: npt.ArrayLike | None = None,
         goals: int = 1,
         battery: float | None = None,
+        free_distance: float | None = None,
     ) -> EpisodeRules: ...
     def __getnewargs_ex__(self) -> tuple[tuple[RoverModel], dict[str, Any]]: ...
 
@@ -2185,36 +2191,6 @@ class EpisodeRun:
             OptionError: An argument has a wrong shape or a number that is not finite, or the
                 rover's model does not fit the rules.
         """
-    def step(
-        self,
-        simulation: Simulation | RoverGrainSimulation,
-        action: npt.ArrayLike,
-        normals: npt.ArrayLike | None = None,
-        *,
-        has_scan: bool = True,
-    ) -> tuple[_Observation, float, bool, dict[str, Any]]:
-        """Gives the simulation an action for one control period.
-
-        Other threads run meanwhile. Ctrl-C, or whatever else a signal handler raises, ends the call
-        after a whole physics step, whose state stays; the episode then stays as before the call.
-
-        Args:
-            simulation: The rover of this episode, a `Simulation`, or a `RoverGrainSimulation` where
-                it drives among grains.
-            action: Torques, then steering, within [-1, 1], (n_actions,).
-            normals: A standard normal number for each entry of the observation, (size,), where the
-                rules have noise.
-            has_scan: Whether the heights are taken. Without, only a period that ends the episode
-                takes them; otherwise the last ones stay until `complete`.
-
-        Returns:
-            Observation (size,) float32, reward, whether the episode has ended, and info.
-
-        Raises:
-            CommandError: The action has a wrong shape or an entry that is not finite or outside
-                [-1, 1]. Nothing has changed.
-            OptionError: `normals` has a wrong length. Nothing has changed.
-        """
     def advance(
         self,
         reading: npt.ArrayLike,
@@ -2227,25 +2203,18 @@ class EpisodeRun:
 
         Args:
             reading: As of `Simulation.reading` with the goal as its target and the rules' scan.
-            action: As of `step`.
-            normals: As of `step`.
+            action: Torques, then steering, within [-1, 1], (n_actions,).
+            normals: A standard normal number for each entry of the observation, (size,), where the
+                rules have noise.
             message: The message of the physics step that failed, if one did.
 
         Returns:
-            As `step`.
+            Observation (size,) float32, reward, whether the episode has ended, and info.
 
         Raises:
-            CommandError: As `step`.
-            OptionError: `reading` or `normals` has a wrong length.
-        """
-    def complete(self, simulation: Simulation) -> _Observation:
-        """Takes the heights that the last observation lacks, if it lacks any.
-
-        Args:
-            simulation: The rover of this episode, which has not moved since.
-
-        Returns:
-            The last observation, (size,) float32.
+            CommandError: The action has a wrong shape or an entry that is not finite or outside
+                [-1, 1]. Nothing has changed.
+            OptionError: `reading` or `normals` has a wrong length. Nothing has changed.
         """
     @property
     def observation(self) -> _Observation:
@@ -2476,18 +2445,26 @@ class EpisodeBatch:
     def threads(self) -> int:
         """Number of threads."""
     def step(
-        self, actions: object, active: npt.NDArray[np.bool_] | None = None, *, has_scan: bool = True
+        self,
+        actions: object,
+        active: npt.NDArray[np.bool_] | None = None,
+        *,
+        has_scan: bool = True,
+        among: Sequence[RoverGrainSimulation | None] | None = None,
     ) -> tuple[_Observation, _Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_], list[int]]:
         """Gives all rovers their actions for one control period.
 
-        Ctrl-C ends the call after a whole physics step of each rover, which need not be the same
-        one.
+        Other threads run meanwhile. Ctrl-C, or whatever else a signal handler raises, ends the call
+        after a whole physics step of each rover, which need not be the same one.
 
         Args:
-            actions: As of `EpisodeRun.step`, (n_rovers, n_actions).
+            actions: Torques, then steering, within [-1, 1], (n_rovers, n_actions).
             active: Which rovers move, (n_rovers,); all by default. The others stay as they are.
             has_scan: Whether the heights are taken. Without, only episodes that end or reach the
                 time limit take them; the others keep the last ones.
+            among: The grains that each rover drives among, a list of n_rovers
+                RoverGrainSimulation of `simulation`; they move with the rovers, one after the
+                other. None by default.
 
         Returns:
             Observations (n_rovers, size) float32, rewards (n_rovers,), which episodes have ended,
@@ -2497,52 +2474,12 @@ class EpisodeBatch:
         Raises:
             CommandError: The actions have a wrong shape or an entry that is not finite or outside
                 [-1, 1]. No rover has moved.
-            OptionError: `active` is invalid, or an episode has not begun. No rover has moved.
-        """
-    def step_on(
-        self,
-        actions: object,
-        distribution: EpisodeDistribution,
-        *,
-        same_step: bool,
-        attempts: int = 100,
-        has_scan: bool = True,
-    ) -> tuple[_Observation, _Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_], list[int]]:
-        """Gives all rovers their actions for one control period and begins the next episodes.
-
-        Those rovers begin anew whose episode is over; what they begin is drawn on the threads of
-        this batch from their own generators. Ctrl-C ends the call as it ends that of `step`.
-
-        Args:
-            actions: As of `step`.
-            distribution: What the next episodes are drawn from.
-            same_step: Whether an episode is followed by the next in the step that ends it, see
-                `finals`. If not, the next one begins in the following step; its rover does not move
-                in that step and earns nothing.
-            attempts: As of `EpisodeDistribution.draw`.
-            has_scan: As of `step`.
-
-        Returns:
-            As of `step`. Where an episode has begun, the observation is its first; with `same_step`
-            all else is that of the episode that has ended. If an episode that is to follow in the
-            same step cannot be drawn, none begins, and the next call refuses it.
-
-        Raises:
-            CommandError: As of `step`.
-            OptionError: An argument is invalid, or an episode has not begun. No rover has moved.
-            RoverGymError: As of `EpisodeDistribution.draw`, for the first rover that has one and
-                whose episode was over before this call. No rover has moved.
+            OptionError: `active` or `among` is invalid, or an episode has not begun. No rover has
+                moved.
         """
     @property
     def over(self) -> list[int]:
         """Indices of the rovers whose episode is over and whose next has not begun, in order."""
-    def finals(self) -> dict[int, tuple[_Observation, dict[str, Any]]]:
-        """The episodes that the last call of `step_on` with `same_step` has ended.
-
-        Returns:
-            For each index of a rover, in order, the last observation (size,) float32 and the last
-            info. Empty after `step`.
-        """
     def infos(self) -> dict[str, Any]:
         """The infos of all rovers, of their last periods or beginnings.
 
@@ -2661,30 +2598,23 @@ class EpisodeBatch:
         Returns:
             Its rows of `DrawnEpisodes.starts`, `rocks`, `rock_seeds` and `domains`.
         """
-    def difficulty(self, index: int) -> _Range | None:
-        """Range (low, high) of the rocks' difficulty in the next episodes of a rover, if any is set.
-
-        Args:
-            index: Index of the rover.
-        """
-    def set_difficulty(self, index: int, difficulty: _Range | None) -> None:
-        """Sets the range of the rocks' difficulty in the episodes that `step_on` begins with a rover.
-
-        Args:
-            index: Index of the rover.
-            difficulty: The range (low, high); None for that of the distribution.
-
-        Raises:
-            OptionError: There is no such rover, or `difficulty` is no range.
-        """
     def terrain(self, index: int) -> Plane | SphereField:
         """The ground of one rover.
 
         Args:
             index: Index of the rover.
         """
+    def complete(self, index: int) -> _Observation:
+        """Takes the heights that the last observation of one rover lacks, if it lacks any.
+
+        Args:
+            index: Index of the rover.
+
+        Returns:
+            The observation, (size,) float32.
+        """
     def simulation(self, index: int) -> Simulation:
-        """A copy of one rover; stepping it does not move the rover.
+        """The simulation of one rover, which moves with it until its next episode begins.
 
         Args:
             index: Index of the rover.

@@ -296,9 +296,7 @@ def test_failed_step_terminates_openly(env: RoverEnv) -> None:
 
 def test_message_of_a_failed_step_is_told(env: RoverEnv) -> None:
     reading = env.simulation.reading(env.goal)
-    _, _, terminated, info = env.episode.progress.advance(
-        reading, action_of(0.1), message="the numbers have left the road"
-    )
+    _, _, terminated, info = env.progress.advance(reading, action_of(0.1), message="the numbers have left the road")
     assert terminated
     assert info["solver"]["message"] == "the numbers have left the road"
 
@@ -308,7 +306,7 @@ def test_observation_that_is_not_finite_terminates_openly(env: RoverEnv, value: 
     last, *_ = env.step(action_of(0.1))
     reading = env.simulation.reading(env.goal)
     reading[env.simulation.reading_layout()["wheel_gaps"]] = value
-    observation, reward, terminated, info = env.episode.progress.advance(reading, action_of(0.1))
+    observation, reward, terminated, info = env.progress.advance(reading, action_of(0.1))
     assert terminated
     assert info["termination"] == "step_failed"
     assert reward == info["reward_terms"]["failure"] == -10.0

@@ -367,11 +367,11 @@ def test_an_episode_that_ends_takes_its_scan() -> None:
 def test_episodes_and_rules_can_be_copied(duplicate: Any) -> None:
     env = RoverEnv(**SCENES[2])
     env.reset(seed=0)
-    twin: EpisodeRun = duplicate(env.episode.progress)
+    twin: EpisodeRun = duplicate(env.progress)
     reading = env.simulation.reading(env.goal, env.task.scan)
     normals = np.ones(env.observation_layout.size)
     action = np.full(12, 0.3)
-    ours, theirs = (one.advance(reading, action, normals) for one in (env.episode.progress, twin))
+    ours, theirs = (one.advance(reading, action, normals) for one in (env.progress, twin))
     assert ours[0].tobytes() == theirs[0].tobytes()
     assert ours[1:] == theirs[1:]
 

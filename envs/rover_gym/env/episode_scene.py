@@ -183,7 +183,7 @@ def draw_episodes(
     generators: Rows,
     difficulties: Sequence[Range | None],
     options: ResetOptions | Sequence[ResetOptions],
-    batch: EpisodeBatch | None = None,
+    batch: EpisodeBatch,
 ) -> DrawnEpisodes:
     """Draws the next episode of each generator, which keeps its state, and repeats each draw until the rover has room.
 
@@ -192,7 +192,7 @@ def draw_episodes(
         generators: `(m, 4)` random generators; the result's `generators` holds their states after the draws.
         difficulties: Range of each rover's rocks' difficulty; None for the task's own.
         options: The values that reset options fix, for all rovers or one per rover.
-        batch: The batch whose threads draw; None for the caller's alone.
+        batch: The batch whose threads draw.
 
     Raises:
         TerrainError: A rover would penetrate the ground or a sphere in each of `PLACING_ATTEMPTS` scenes.
@@ -200,6 +200,4 @@ def draw_episodes(
     """
     fixed = options.fixed if isinstance(options, ResetOptions) else [one.fixed for one in options]
     given = list(difficulties) if any(difficulties) else None
-    if batch is None:
-        return task.episodes.draw(generators, attempts=PLACING_ATTEMPTS, difficulties=given, fixed=fixed)
     return batch.draw(task.episodes, generators, attempts=PLACING_ATTEMPTS, difficulties=given, fixed=fixed)

@@ -112,8 +112,10 @@ class Task:
         return self.domain.observation_noise > 0.0
 
 
-def make_task(given: Mapping[str, Any]) -> Task:
+def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> Task:
     """Builds the task from arguments that `check_arguments` has passed, and checks that they are consistent.
+
+    `free_distance`: distance from the start at which an episode ends, for rovers that are to come free, m.
 
     Raises:
         OptionError: Two arguments contradict each other, or the core refuses an option; `field` names one.
@@ -149,7 +151,9 @@ def make_task(given: Mapping[str, Any]) -> Task:
         has_battery=given["battery"] is not None,
     )
     max_steering = _steering_limit(rover, steering, given["max_steering_deg"])
-    rules = _rules(given, rover, layout, substeps=substeps, max_steering=max_steering, scan=points)
+    rules = _rules(
+        given, rover, layout, substeps=substeps, max_steering=max_steering, scan=points, free_distance=free_distance
+    )
     slope_by_difficulty = given["slope_deg"] is None and terrain in ("rocks", "sand")
     episodes = EpisodeDistribution(
         rules,
@@ -234,6 +238,7 @@ def _rules(
     substeps: int,
     max_steering: float,
     scan: npt.NDArray[np.float64] | None,
+    free_distance: float | None,
 ) -> EpisodeRules:
     """What the core needs to run an episode."""
     noise = given["observation_noise"]
@@ -252,6 +257,7 @@ def _rules(
         scan=scan,
         goals=given["waypoints"],
         battery=given["battery"],
+        free_distance=free_distance,
     )
 
 

@@ -8,7 +8,6 @@ use pyo3::types::{PyBytes, PyDict, PyRange, PyTuple};
 use rover_core::draw::Domain;
 use rover_core::episode::running::{Period, check_normals};
 use rover_core::episode::{Ending, Episode as CoreEpisode, EpisodeState, Rules, Setting, action};
-use rover_core::simulation::{ReadingScratch, RoverSimulation};
 
 use crate::arguments::{Named, number, refused};
 use crate::arrays::{Array, array, fresh, vector};
@@ -16,8 +15,7 @@ use crate::episode_rules::EpisodeRules;
 use crate::errors::{Kind, Result, Value};
 use crate::infos::info;
 use crate::reading::{place, points};
-use crate::rover_grains::RoverGrainSimulation;
-use crate::shared::{Shared, Watch};
+use crate::shared::{Open, Shared};
 use crate::simulation::Simulation;
 use crate::snapshot::{damaged, read_bytes};
 
@@ -28,13 +26,7 @@ type Step<'py> = (Array<f32>, f64, bool, Bound<'py, PyDict>);
 ///
 /// `begin` and `from_bytes` make one.
 #[pyclass(module = "rover_gym.mechanics", frozen)]
-pub struct EpisodeRun(Shared<Inner>);
-
-struct Inner {
-    episode: CoreEpisode,
-    scratch: ReadingScratch,
-    commands: Vec<f64>,
-}
+pub struct EpisodeRun(Shared<CoreEpisode>);
 
 /// Actions of a shape in row-major order, as float64.
 pub fn actions(value: &Bound<'_, PyAny>, shape: &[usize]) -> Result<Vec<f64>> {
@@ -135,64 +127,12 @@ fn given(
 
 impl EpisodeRun {
     pub fn of(episode: CoreEpisode) -> Self {
-        Self(Shared::new(Inner {
-            commands: vec![0.0; episode.rules().n_commands()],
-            scratch: ReadingScratch::default(),
-            episode,
-        }))
+        Self(Shared::new(episode))
     }
 
     /// A copy of what it holds.
     pub fn copy(&self) -> Result<CoreEpisode> {
-        Ok(self.0.open()?.episode.clone())
-    }
-}
-
-impl Inner {
-    /// Reads the rover after its steps and goes on by a period; returns the observation.
-    fn advance(
-        &mut self,
-        rover: &RoverSimulation,
-        action: &[f64],
-        normals: Option<&[f64]>,
-        has_scan: bool,
-        has_failed: bool,
-    ) -> Vec<f32> {
-        let rules = self.episode.rules().clone();
-        let scan = &rules.settings().scan;
-        let mut numbers = std::mem::take(&mut self.scratch.numbers);
-        numbers.resize(rules.places().size + scan.len(), 0.0);
-        let (reading, heights) = numbers.split_at_mut(rules.places().size);
-        rover.read_state(self.episode.goal(), &mut self.scratch, reading);
-        if has_scan {
-            rover.read_heights(scan, heights);
-        }
-        let mut observation = vec![0.0; rules.size()];
-        let period = Period {
-            action,
-            heights: has_scan.then_some(&*heights),
-            normals,
-            has_failed,
-        };
-        self.episode.advance(reading, &period, &mut observation);
-        self.scratch.numbers = numbers;
-        observation
-    }
-
-    /// What a period gives.
-    fn told<'py>(
-        &self,
-        py: Python<'py>,
-        observation: &[f32],
-        message: Option<String>,
-    ) -> Result<Step<'py>> {
-        let outcome = self.episode.outcome();
-        Ok((
-            fresh(observation),
-            outcome.reward,
-            outcome.ending.is_end(),
-            info(py, &(&self.episode, message))?,
-        ))
+        Ok(self.0.open()?.clone())
     }
 }
 
@@ -242,19 +182,14 @@ impl EpisodeRun {
         Ok(begun?.map(Self::of))
     }
 
-    /// Gives the simulation an action for one control period.
-    ///
-    /// Other threads run meanwhile. Ctrl-C, or whatever else a signal handler raises, ends the call
-    /// after a whole physics step, whose state stays; the episode then stays as before the call.
+    /// Goes on by a control period that ended with a reading, without a simulation.
     ///
     /// Args:
-    ///     simulation: The rover of this episode, a `Simulation`, or a `RoverGrainSimulation` where
-    ///         it drives among grains.
+    ///     reading: As of `Simulation.reading` with the goal as its target and the rules' scan.
     ///     action: Torques, then steering, within [-1, 1], (n_actions,).
     ///     normals: A standard normal number for each entry of the observation, (size,), where the
     ///         rules have noise.
-    ///     has_scan: Whether the heights are taken. Without, only a period that ends the episode
-    ///         takes them; otherwise the last ones stay until `complete`.
+    ///     message: The message of the physics step that failed, if one did.
     ///
     /// Returns:
     ///     Observation (size,) float32, reward, whether the episode has ended, and info.
@@ -262,60 +197,7 @@ impl EpisodeRun {
     /// Raises:
     ///     CommandError: The action has a wrong shape or an entry that is not finite or outside
     ///         [-1, 1]. Nothing has changed.
-    ///     OptionError: `normals` has a wrong length. Nothing has changed.
-    #[pyo3(signature = (simulation, action, normals = None, *, has_scan = true))]
-    fn step<'py>(
-        &self,
-        py: Python<'py>,
-        simulation: &Bound<'py, PyAny>,
-        action: &Bound<'py, PyAny>,
-        normals: Option<&Bound<'py, PyAny>>,
-        has_scan: bool,
-    ) -> Result<Step<'py>> {
-        let mut held = self.0.open()?;
-        let inner = &mut *held;
-        let rules = inner.episode.rules().clone();
-        let (action, normals) = given(&rules, action, normals)?;
-        let among = simulation.cast::<RoverGrainSimulation>().ok();
-        let mut rover = match among {
-            Some(among) => among.get().together.rover.open()?,
-            None => self::simulation(simulation, "simulation")?.get().open()?,
-        };
-        rules.check_model(rover.model())?;
-        (inner.episode).command(&mut rover, &action, &mut inner.commands)?;
-        let mut watch = Watch::new();
-        let substeps = rules.settings().substeps;
-        let moving = &mut *rover;
-        let among = among.map(|among| &among.get().together);
-        let done = py.detach(|| match among {
-            Some(among) => among.step_with(moving, substeps, &mut || watch.go_on()),
-            None => Ok(moving.step_while(substeps, &mut || watch.go_on())),
-        })?;
-        watch.raised()?;
-        let error = done.err();
-        let failed = error.is_some();
-        let mut observation = inner.advance(&rover, &action, normals.as_deref(), has_scan, failed);
-        if inner.episode.outcome().ending.is_end() && inner.episode.lacks_heights() {
-            inner.episode.complete(&rover);
-            observation.copy_from_slice(inner.episode.observation());
-        }
-        inner.told(py, &observation, error.map(|e| e.to_string()))
-    }
-
-    /// Goes on by a control period that ended with a reading, without a simulation.
-    ///
-    /// Args:
-    ///     reading: As of `Simulation.reading` with the goal as its target and the rules' scan.
-    ///     action: As of `step`.
-    ///     normals: As of `step`.
-    ///     message: The message of the physics step that failed, if one did.
-    ///
-    /// Returns:
-    ///     As `step`.
-    ///
-    /// Raises:
-    ///     CommandError: As `step`.
-    ///     OptionError: `reading` or `normals` has a wrong length.
+    ///     OptionError: `reading` or `normals` has a wrong length. Nothing has changed.
     #[pyo3(signature = (reading, action, normals = None, *, message = None))]
     fn advance<'py>(
         &self,
@@ -326,7 +208,7 @@ impl EpisodeRun {
         message: Option<String>,
     ) -> Result<Step<'py>> {
         let mut held = self.0.open()?;
-        let rules = held.episode.rules().clone();
+        let rules = held.rules().clone();
         let (action, normals) = given(&rules, action, normals)?;
         let mut row = vector(reading, Kind::Option, "reading")?;
         let n_state = rules.places().size;
@@ -343,44 +225,37 @@ impl EpisodeRun {
             has_failed: message.is_some(),
         };
         let mut observation = vec![0.0; rules.size()];
-        held.episode.advance(state, &period, &mut observation);
-        held.told(py, &observation, message)
-    }
-
-    /// Takes the heights that the last observation lacks, if it lacks any.
-    ///
-    /// Args:
-    ///     simulation: The rover of this episode, which has not moved since.
-    ///
-    /// Returns:
-    ///     The last observation, (size,) float32.
-    fn complete(&self, simulation: GivenSimulation<'_>) -> Result<Array<f32>> {
-        let mut held = self.0.open()?;
-        held.episode.complete(&*simulation.0.get().open()?);
-        Ok(fresh(held.episode.observation()))
+        held.advance(state, &period, &mut observation);
+        let outcome = *held.outcome();
+        Ok((
+            fresh(&observation),
+            outcome.reward,
+            outcome.ending.is_end(),
+            info(py, &(&*held, message))?,
+        ))
     }
 
     /// The last observation, (size,) float32.
     #[getter]
     fn observation(&self) -> Result<Array<f32>> {
-        Ok(fresh(self.0.open()?.episode.observation()))
+        Ok(fresh(self.0.open()?.observation()))
     }
 
     /// The last action, (n_actions,); zeros at the beginning.
     #[getter]
     fn previous_action(&self) -> Result<Array> {
-        Ok(fresh(&self.0.open()?.episode.progress().previous_action))
+        Ok(fresh(&self.0.open()?.progress().previous_action))
     }
 
     /// The present goal (x, z), m; the last one where all are reached.
     #[getter]
     fn goal(&self) -> Result<(f64, f64)> {
-        Ok(self.0.open()?.episode.goal().into())
+        Ok(self.0.open()?.goal().into())
     }
 
     /// The info of the last period, or of the beginning.
     fn info<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
-        info(py, &(&self.0.open()?.episode, None))
+        info(py, &(&*self.0.open()?, None))
     }
 
     /// The same episode with other properties, another goal, or seen by other rules.
@@ -400,7 +275,7 @@ impl EpisodeRun {
     fn changed(&self, py: Python<'_>, changes: Option<&Bound<'_, PyDict>>) -> Result<Self> {
         let given = Named::keywords(py, changes)?;
         let held = self.0.open()?;
-        let (mut rules, mut state) = (held.episode.rules().clone(), held.episode.state());
+        let (mut rules, mut state) = (held.rules().clone(), held.state());
         drop(held);
         if let Some(goal) = given.read("goal", |value, _, _| place(Some(value)))? {
             (state.setting.goal, state.progress.reached) = (goal, 0);
@@ -432,7 +307,7 @@ impl EpisodeRun {
 
     /// All that an episode holds, as `from_bytes` reads it.
     fn to_bytes<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyBytes>> {
-        let state = postcard::to_stdvec(&self.0.open()?.episode.state());
+        let state = postcard::to_stdvec(&self.0.open()?.state());
         Ok(PyBytes::new(
             py,
             &state.map_err(|e| damaged("episode", &e))?,
@@ -456,7 +331,7 @@ impl EpisodeRun {
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Result<Bound<'py, PyTuple>> {
         let (py, own) = (slf.py(), slf.get());
-        let rules = GivenRules(own.0.open()?.episode.rules().clone());
+        let rules = GivenRules(own.0.open()?.rules().clone());
         let given = (rules, own.to_bytes(py)?);
         Ok((slf.get_type().getattr("from_bytes")?, given).into_pyobject(py)?)
     }
@@ -465,7 +340,7 @@ impl EpisodeRun {
         let Ok(held) = self.0.open() else {
             return "EpisodeRun(stepping)".to_owned();
         };
-        let distance = held.episode.progress().distance;
+        let distance = held.progress().distance;
         format!("EpisodeRun({distance:.2} m to the goal)")
     }
 }

@@ -1,22 +1,23 @@
 //! `EpisodeBatch`: many rovers with their episodes, one call a control period.
 
+use std::sync::Arc;
+
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::draw::{DrawnGround, Pcg64, RockDraw, Start};
-use rover_core::episode::{
-    Autoreset, EpisodeBatch as CoreBatch, EpisodeError, Origin as Began, Stepped, Succession,
-};
+use rover_core::episode::{EpisodeBatch as CoreBatch, EpisodeError, Origin as Began, Stepped};
 
-use crate::arguments::{Given, Named, at_least_one, below, refused, text, whole};
+use crate::arguments::{Named, at_least_one, below, refused, text, whole};
 use crate::arrays::{Array, fresh, fresh_rows};
 use crate::batch::mask;
-use crate::draw::{DrawnEpisodes, EpisodeDistribution, Request, range};
+use crate::draw::{DrawnEpisodes, EpisodeDistribution, Request};
 use crate::episode::{EpisodeRun, GivenRules, GivenSimulation, actions};
 use crate::errors::{Kind, Result};
 use crate::generators::generators;
 use crate::infos::{Told, info, infos};
 use crate::options::SolverWords;
-use crate::shared::{Shared, Watch};
+use crate::rover_grains::{RoverGrainSimulation, Together};
+use crate::shared::{Open, Shared, Watch};
 use crate::simulation::{Origin, Simulation};
 use crate::union;
 
@@ -47,47 +48,14 @@ pub struct EpisodeBatch(Shared<Inner>);
 struct Inner {
     batch: CoreBatch,
     origins: Vec<Origin>,
+    /// Simulations that Python has asked for.
+    lent: Vec<Option<Py<Simulation>>>,
 }
 
 impl Inner {
     /// What the infos tell of a rover.
     fn told(&self, index: usize) -> Result<Told<'_>, EpisodeError> {
         Ok((self.batch.episode(index)?, self.batch.message(index)))
-    }
-
-    /// One step, by a function of the batch, the actions and the room for the observations; and the
-    /// rovers whose next episode has begun.
-    fn step(
-        &mut self,
-        actions: &Bound<'_, PyAny>,
-        take: impl FnOnce(
-            &mut CoreBatch,
-            &[f64],
-            &mut [f32],
-            &mut dyn FnMut() -> bool,
-        ) -> Result<Stepped, EpisodeError>
-        + Send,
-    ) -> Result<(Step, Vec<usize>)> {
-        let batch = &mut self.batch;
-        let (n, size) = (batch.rovers().len(), batch.rules().size());
-        let given = self::actions(actions, &[n, batch.rules().n_actions()])?;
-        let (mut rows, mut watch) = (vec![0.0; n * size], Watch::new());
-        let out = &mut rows[..];
-        let done = actions
-            .py()
-            .detach(|| take(batch, &given, out, &mut || watch.go_on()));
-        let Stepped {
-            rewards,
-            ended,
-            truncated,
-            over,
-            begun,
-        } = watch.result(done)?;
-        let rows = Array::shaped(rows, &[n, size]);
-        Ok((
-            (rows, rewards.into(), ended.into(), truncated.into(), over),
-            begun,
-        ))
     }
 
     /// Keeps what Python is told of the simulation of an episode that has begun.
@@ -97,6 +65,7 @@ impl Inner {
             terrain: origin.ground.clone(),
             words: words.clone(),
         };
+        self.lent[index] = None;
         Ok(())
     }
 
@@ -143,6 +112,18 @@ fn distribution<'a, 'py>(
     given.cast().map_err(wrong)
 }
 
+/// The argument `among`: what links each rover of a batch with its grains.
+fn links(given: &Bound<'_, PyAny>, batch: &CoreBatch) -> Result<Vec<Arc<Together>>> {
+    let what = "a RoverGrainSimulation of each rover";
+    let refuse = || refused(given, Kind::Option, "among", what);
+    let found: Vec<Bound<'_, RoverGrainSimulation>> = given.extract().map_err(|_| refuse())?;
+    let links: Vec<_> = found.iter().map(|one| one.get().together.clone()).collect();
+    let rovers = batch.rovers();
+    let fits = links.len() == rovers.len()
+        && (links.iter().zip(rovers)).all(|(link, rover)| Arc::ptr_eq(&link.rover, rover));
+    fits.then_some(links).ok_or_else(refuse)
+}
+
 /// Where and on what an episode has begun, as `EpisodeBatch.origin` tells it.
 fn origin(given: &Bound<'_, PyAny>, ground: DrawnGround) -> Result<Began> {
     let what = "what `EpisodeBatch.origin` returns";
@@ -181,8 +162,11 @@ impl EpisodeBatch {
             threads.transpose()?,
         );
         let batch = CoreBatch::new(rules.0, &*one.open()?, n, max_steps, threads)?;
-        let origins = vec![one.origin().clone(); n];
-        Ok(Self(Shared::new(Inner { batch, origins })))
+        Ok(Self(Shared::new(Inner {
+            batch,
+            origins: vec![one.origin().clone(); n],
+            lent: (0..n).map(|_| None).collect(),
+        })))
     }
 
     /// Number of threads.
@@ -193,14 +177,17 @@ impl EpisodeBatch {
 
     /// Gives all rovers their actions for one control period.
     ///
-    /// Ctrl-C ends the call after a whole physics step of each rover, which need not be the same
-    /// one.
+    /// Other threads run meanwhile. Ctrl-C, or whatever else a signal handler raises, ends the call
+    /// after a whole physics step of each rover, which need not be the same one.
     ///
     /// Args:
-    ///     actions: As of `EpisodeRun.step`, (n_rovers, n_actions).
+    ///     actions: Torques, then steering, within [-1, 1], (n_rovers, n_actions).
     ///     active: Which rovers move, (n_rovers,); all by default. The others stay as they are.
     ///     has_scan: Whether the heights are taken. Without, only episodes that end or reach the
     ///         time limit take them; the others keep the last ones.
+    ///     among: The grains that each rover drives among, a list of n_rovers
+    ///         RoverGrainSimulation of `simulation`; they move with the rovers, one after the
+    ///         other. None by default.
     ///
     /// Returns:
     ///     Observations (n_rovers, size) float32, rewards (n_rovers,), which episodes have ended,
@@ -210,100 +197,57 @@ impl EpisodeBatch {
     /// Raises:
     ///     CommandError: The actions have a wrong shape or an entry that is not finite or outside
     ///         [-1, 1]. No rover has moved.
-    ///     OptionError: `active` is invalid, or an episode has not begun. No rover has moved.
-    #[pyo3(signature = (actions, active = None, *, has_scan = true))]
+    ///     OptionError: `active` or `among` is invalid, or an episode has not begun. No rover has
+    ///         moved.
+    #[pyo3(signature = (actions, active = None, *, has_scan = true, among = None))]
     fn step(
         &self,
+        py: Python<'_>,
         actions: &Bound<'_, PyAny>,
         active: Option<&Bound<'_, PyAny>>,
         has_scan: bool,
+        among: Option<&Bound<'_, PyAny>>,
     ) -> Result<Step> {
         let mut held = self.0.open()?;
-        let n = held.batch.rovers().len();
+        let batch = &mut held.batch;
+        let (n, size) = (batch.rovers().len(), batch.rules().size());
+        let given = self::actions(actions, &[n, batch.rules().n_actions()])?;
         let active = active.map(|given| mask(given, n)).transpose()?;
         let active = active.as_deref();
-        let (step, _) = held.step(actions, |batch, actions, out, go_on| {
-            batch.step_while(actions, active, has_scan, out, go_on)
-        })?;
-        Ok(step)
-    }
-
-    /// Gives all rovers their actions for one control period and begins the next episodes.
-    ///
-    /// Those rovers begin anew whose episode is over; what they begin is drawn on the threads of
-    /// this batch from their own generators. Ctrl-C ends the call as it ends that of `step`.
-    ///
-    /// Args:
-    ///     actions: As of `step`.
-    ///     distribution: What the next episodes are drawn from.
-    ///     same_step: Whether an episode is followed by the next in the step that ends it, see
-    ///         `finals`. If not, the next one begins in the following step; its rover does not move
-    ///         in that step and earns nothing.
-    ///     attempts: As of `EpisodeDistribution.draw`.
-    ///     has_scan: As of `step`.
-    ///
-    /// Returns:
-    ///     As of `step`. Where an episode has begun, the observation is its first; with `same_step`
-    ///     all else is that of the episode that has ended. If an episode that is to follow in the
-    ///     same step cannot be drawn, none begins, and the next call refuses it.
-    ///
-    /// Raises:
-    ///     CommandError: As of `step`.
-    ///     OptionError: An argument is invalid, or an episode has not begun. No rover has moved.
-    ///     RoverGymError: As of `EpisodeDistribution.draw`, for the first rover that has one and
-    ///         whose episode was over before this call. No rover has moved.
-    #[pyo3(signature = (actions, distribution, *, same_step, attempts = Given::MISSING, has_scan = true),
-        text_signature = "($self, actions, distribution, *, same_step, attempts=100, has_scan=True)")]
-    fn step_on(
-        &self,
-        actions: &Bound<'_, PyAny>,
-        distribution: &Bound<'_, PyAny>,
-        same_step: bool,
-        attempts: Given<'_>,
-        has_scan: bool,
-    ) -> Result<Step> {
-        let distribution = self::distribution(distribution)?.get();
-        let autoreset = if same_step {
-            Autoreset::SameStep
-        } else {
-            Autoreset::NextStep
-        };
-        let succession = Succession {
-            distribution: &distribution.inner,
-            attempts: attempts.count(100, Kind::Option, "attempts")?,
-            autoreset,
-        };
-        let mut held = self.0.open()?;
-        let (step, begun) = held.step(actions, |batch, actions, out, go_on| {
-            batch.step_on(actions, &succession, has_scan, out, go_on)
-        })?;
-        for index in begun {
-            held.set_origin(index, &distribution.words)?;
-        }
-        Ok(step)
+        let among = among.map(|given| links(given, batch)).transpose()?;
+        let open = among
+            .as_ref()
+            .map(|links| links.iter().map(|link| link.open()).collect());
+        let mut open: Option<Vec<_>> = open.transpose()?;
+        let mut parts: Option<Vec<_>> = open.as_mut().map(|open| {
+            let parts = open
+                .iter_mut()
+                .map(|(link, grains)| (&mut **link, &mut **grains));
+            parts.collect()
+        });
+        let (mut rows, mut watch) = (vec![0.0; n * size], Watch::new());
+        let out = &mut rows[..];
+        let done = py.detach(|| match &mut parts {
+            None => batch.step_while(&given, active, has_scan, out, &mut || watch.go_on()),
+            Some(parts) => batch.step_among(&given, active, has_scan, out, &mut |i, rover, n| {
+                let (link, grains) = &mut parts[i];
+                link.step(rover, grains, n, &mut || watch.go_on()).map(drop)
+            }),
+        });
+        let Stepped {
+            rewards,
+            ended,
+            truncated,
+            over,
+        } = watch.result(done)?;
+        let rows = Array::shaped(rows, &[n, size]);
+        Ok((rows, rewards.into(), ended.into(), truncated.into(), over))
     }
 
     /// Indices of the rovers whose episode is over and whose next has not begun, in order.
     #[getter]
     fn over(&self) -> Result<Vec<usize>> {
         Ok(self.0.open()?.batch.over())
-    }
-
-    /// The episodes that the last call of `step_on` with `same_step` has ended.
-    ///
-    /// Returns:
-    ///     For each index of a rover, in order, the last observation (size,) float32 and the last
-    ///     info. Empty after `step`.
-    fn finals<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
-        let held = self.0.open()?;
-        let finals = PyDict::new(py);
-        for one in held.batch.finals() {
-            let seen = fresh(one.episode.observation());
-            let message = one.error.as_ref().map(ToString::to_string);
-            let told = info(py, &(&one.episode, message))?;
-            finals.set_item(one.index, (seen, told))?;
-        }
-        Ok(finals)
     }
 
     /// The infos of all rovers, of their last periods or beginnings.
@@ -439,6 +383,7 @@ impl EpisodeBatch {
             held.batch
                 .resume(index, rover, whole, began, random, told)?;
             held.origins[index] = one.origin().clone();
+            held.lent[index] = None;
         }
         Ok(())
     }
@@ -523,35 +468,6 @@ impl EpisodeBatch {
         })
     }
 
-    /// Range (low, high) of the rocks' difficulty in the next episodes of a rover, if any is set.
-    ///
-    /// Args:
-    ///     index: Index of the rover.
-    fn difficulty(&self, index: &Bound<'_, PyAny>) -> Result<Option<(f64, f64)>> {
-        self.one(index, |held, i| {
-            Ok(held.batch.difficulty(i)?.map(Into::into))
-        })
-    }
-
-    /// Sets the range of the rocks' difficulty in the episodes that `step_on` begins with a rover.
-    ///
-    /// Args:
-    ///     index: Index of the rover.
-    ///     difficulty: The range (low, high); None for that of the distribution.
-    ///
-    /// Raises:
-    ///     OptionError: There is no such rover, or `difficulty` is no range.
-    fn set_difficulty(
-        &self,
-        index: &Bound<'_, PyAny>,
-        difficulty: Option<&Bound<'_, PyAny>>,
-    ) -> Result<()> {
-        let difficulty = difficulty.map(|given| range(given, Kind::Option, "difficulty"));
-        self.one(index, |held, i| {
-            Ok(held.batch.set_difficulty(i, difficulty.transpose()?)?)
-        })
-    }
-
     /// The ground of one rover.
     ///
     /// Args:
@@ -562,16 +478,32 @@ impl EpisodeBatch {
         })
     }
 
-    /// A copy of one rover; stepping it does not move the rover.
+    /// The simulation of one rover, which moves with it until its next episode begins.
     ///
     /// Args:
     ///     index: Index of the rover.
     fn simulation(&self, index: &Bound<'_, PyAny>) -> Result<Py<Simulation>> {
+        let py = index.py();
         self.one(index, |held, i| {
+            if let Some(known) = &held.lent[i] {
+                return Ok(known.clone_ref(py));
+            }
             let rover = held.batch.rovers()[i].clone();
-            let copy = Simulation::of(rover, held.origins[i].clone());
-            Ok(Py::new(index.py(), copy)?)
+            let made = Py::new(py, Simulation::lent(rover, held.origins[i].clone())?)?;
+            held.lent[i] = Some(made.clone_ref(py));
+            Ok(made)
         })
+    }
+
+    /// Takes the heights that the last observation of one rover lacks, if it lacks any.
+    ///
+    /// Args:
+    ///     index: Index of the rover.
+    ///
+    /// Returns:
+    ///     The observation, (size,) float32.
+    fn complete(&self, index: &Bound<'_, PyAny>) -> Result<Array<f32>> {
+        self.one(index, |held, i| Ok(fresh(held.batch.complete(i)?)))
     }
 
     fn __len__(&self) -> Result<usize> {

@@ -9,7 +9,8 @@ use rover_core::draw::start::StartDistribution;
 use rover_core::draw::{Order, Pcg64};
 use rover_core::episode::running::Period;
 use rover_core::episode::{
-    Beginning, Ending, EpisodeBatch, EpisodeDistribution, EpisodeError, Rules, Settings, noise,
+    Beginning, Ending, EpisodeBatch, EpisodeDistribution, EpisodeError, Rules, Settings,
+    SharedRover, noise,
 };
 use rover_core::geometry::Plane;
 use rover_core::integrator::StepOptions;
@@ -34,6 +35,7 @@ fn settings() -> Settings {
         scan: SCAN.to_vec(),
         goals: 1,
         battery: None,
+        free_distance: None,
     }
 }
 
@@ -149,6 +151,11 @@ fn batch(model: &Arc<Model>, n: usize, threads: usize) -> EpisodeBatch {
     batch
 }
 
+fn times(batch: &EpisodeBatch) -> Vec<f64> {
+    let time = |rover: &SharedRover| rover.lock().unwrap().time();
+    batch.rovers().iter().map(time).collect()
+}
+
 fn actions(n: usize, period: usize) -> Vec<f64> {
     (0..n).flat_map(|i| action(i, period)).collect()
 }
@@ -209,7 +216,7 @@ fn what_is_refused_moves_no_rover() {
             ..
         }
     ));
-    assert!(batch.rovers().iter().all(|rover| rover.time() == 0.0));
+    assert!(times(&batch).iter().all(|&time| time == 0.0));
     let (rules, first) = (rules(&model), rover(&begin(&model, 0)));
     let mut unbegun = EpisodeBatch::new(rules, &first, n, None, Some(1)).unwrap();
     let refused = unbegun.step_while(&good, None, true, &mut rows, &mut || true);
@@ -225,9 +232,9 @@ fn a_rover_that_is_stopped_stops_after_a_whole_step() {
         batch
             .step_while(&actions(n, 0), None, true, &mut rows, &mut || false)
             .unwrap();
-        let steps = |rover: &RoverSimulation| rover.time() / rover.options().time_step;
-        assert!(batch.rovers().iter().all(|rover| steps(rover) < 5.5));
-        assert!(batch.rovers().iter().any(|rover| rover.time() == 0.0));
+        let first = batch.rovers()[0].lock().unwrap().options().time_step;
+        assert!(times(&batch).iter().all(|&time| time / first < 5.5));
+        assert!(times(&batch).contains(&0.0));
     }
 }
 

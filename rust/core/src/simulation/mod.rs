@@ -78,4 +78,4 @@ pub use rover_in_grains::{RoverInGrains, TogetherError};
 pub use scene::{DenseOperator, QuickStep, Scene, SceneKey, SceneScratch, Snapshot, StepTaken};
 pub use state::State;
 pub use stepping::Simulation;
-pub use turns::{Done, Turn};
+pub use turns::{Done, Turn, Workers};
