@@ -2191,31 +2191,6 @@ class EpisodeRun:
             OptionError: An argument has a wrong shape or a number that is not finite, or the
                 rover's model does not fit the rules.
         """
-    def advance(
-        self,
-        reading: npt.ArrayLike,
-        action: npt.ArrayLike,
-        normals: npt.ArrayLike | None = None,
-        *,
-        message: str | None = None,
-    ) -> tuple[_Observation, float, bool, dict[str, Any]]:
-        """Goes on by a control period that ended with a reading, without a simulation.
-
-        Args:
-            reading: As of `Simulation.reading` with the goal as its target and the rules' scan.
-            action: Torques, then steering, within [-1, 1], (n_actions,).
-            normals: A standard normal number for each entry of the observation, (size,), where the
-                rules have noise.
-            message: The message of the physics step that failed, if one did.
-
-        Returns:
-            Observation (size,) float32, reward, whether the episode has ended, and info.
-
-        Raises:
-            CommandError: The action has a wrong shape or an entry that is not finite or outside
-                [-1, 1]. Nothing has changed.
-            OptionError: `reading` or `normals` has a wrong length. Nothing has changed.
-        """
     @property
     def observation(self) -> _Observation:
         """The last observation, (size,) float32."""
@@ -2313,36 +2288,6 @@ class EpisodeDistribution:
         hills: float | None = None,
         sand: Sequence[SoftGround] | None = None,
     ) -> EpisodeDistribution: ...
-    def draw(
-        self,
-        generators: _Rows,
-        *,
-        attempts: int = 100,
-        difficulties: Sequence[_Range | None] | None = None,
-        fixed: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
-    ) -> DrawnEpisodes:
-        """Draws one episode from each generator; `EpisodeBatch.draw` does it on several threads.
-
-        A scene in which the rover would stand deeper than 1 cm in the ground or in a sphere is
-        drawn again. The given generators do not change: see `DrawnEpisodes.generators`.
-
-        Args:
-            generators: Generators, (m, 4) uint64.
-            attempts: Most scenes drawn for a rover until it has room.
-            difficulties: For each generator a range (low, high) that replaces that of the rocks'
-                difficulty, or None; by default none.
-            fixed: Values that replace draws, which are made all the same, by name: `slope`,
-                `uphill`, `position` (x, z), `heading`, `goal` (x, z), `further` (n, 2) of the goals
-                after it, `difficulty`, `field_seed`, `q`, `v`; one mapping for all or a list of one
-                for each generator; none by default.
-
-        Raises:
-            TerrainError: A rover has no room in `attempts` scenes, or the ground refuses a number.
-            StateError: `q` or `v` has a wrong length or an entry that is not finite, or float32
-                cannot hold the observation.
-            ModelError: A scaled mass is out of its range.
-            OptionError: Any other argument is invalid.
-        """
     def __getnewargs_ex__(self) -> tuple[tuple[EpisodeRules, Simulation], dict[str, Any]]: ...
 
 @final
@@ -2352,57 +2297,6 @@ class DrawnEpisodes:
     @property
     def generators(self) -> _Rows:
         """The generators after the draws, (m, 4) uint64."""
-    @property
-    def observations(self) -> _Observation:
-        """First observations, (m, size) float32."""
-    @property
-    def starts(self) -> _Array:
-        """Starts, (m, 5 + 2 n) with n goals, rad and m.
-
-        Slope, direction of steepest ascent, x and z of the start, heading, x and z of each goal.
-        """
-    @property
-    def domains(self) -> _Array:
-        """Properties of rover and world, (m, 4).
-
-        Factor of the masses, friction, gain of the motors, factor of gravity.
-        """
-    @property
-    def rocks(self) -> _Array:
-        """Rocks, (m, 3); zeros where there are none.
-
-        Difficulty, abundance, radius of the largest in wheel radii.
-        """
-    @property
-    def rock_seeds(self) -> _Rows:
-        """Seeds of the rocks, (m,) uint64; zeros where there are none."""
-    def episode(self, index: int) -> EpisodeRun:
-        """An episode, which has begun.
-
-        Args:
-            index: Number of the episode.
-
-        Raises:
-            OptionError: There is no such episode.
-        """
-    def terrain(self, index: int) -> Plane | SphereField:
-        """The ground of an episode.
-
-        Args:
-            index: Number of the episode.
-
-        Raises:
-            OptionError: There is no such episode.
-        """
-    def plane(self, index: int) -> Plane:
-        """The plane of an episode, under rocks too; None where the ground has none.
-
-        Args:
-            index: Number of the episode.
-
-        Raises:
-            OptionError: There is no such episode.
-        """
     def simulation(self, index: int) -> Simulation:
         """A new simulation of the rover at the start of an episode.
 
@@ -2504,20 +2398,31 @@ class EpisodeBatch:
         difficulties: Sequence[_Range | None] | None = None,
         fixed: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
     ) -> DrawnEpisodes:
-        """Draws episodes on the threads of this batch; no rover changes.
+        """Draws one episode from each generator on the threads of this batch; no rover changes.
+
+        A scene in which the rover would stand deeper than 1 cm in the ground or in a sphere is
+        drawn again. The given generators do not change: see `DrawnEpisodes.generators`.
 
         Args:
             distribution: What the episodes are drawn from.
             generators: Generators, (m, 4) uint64.
-            attempts: As of `EpisodeDistribution.draw`, as the next two.
-            difficulties: See there.
-            fixed: See there.
+            attempts: Most scenes drawn for a rover until it has room.
+            difficulties: For each generator a range (low, high) that replaces that of the rocks'
+                difficulty, or None; by default none.
+            fixed: Values that replace draws, which are made all the same, by name: `slope`,
+                `uphill`, `position` (x, z), `heading`, `goal` (x, z), `further` (n, 2) of the goals
+                after it, `difficulty`, `field_seed`, `q`, `v`; one mapping for all or a list of one
+                for each generator; none by default.
 
         Returns:
             The episodes, the same for any number of threads.
 
         Raises:
-            RoverGymError: As of `EpisodeDistribution.draw`, for the first rover that has one.
+            TerrainError: A rover has no room in `attempts` scenes, or the ground refuses a number.
+            StateError: `q` or `v` has a wrong length or an entry that is not finite, or float32
+                cannot hold the observation.
+            ModelError: A scaled mass is out of its range.
+            OptionError: Any other argument is invalid.
         """
     def begin(self, indices: Sequence[int], episodes: DrawnEpisodes) -> None:
         """Begins drawn episodes.

@@ -212,8 +212,6 @@ def test_forces_are_measured_in_wheel_loads(env: RoverEnv, gravity: float) -> No
 #: `RoverGrains-v0` settles its grains for ten seconds; `test_grains.py` has its checks.
 NAMES = [name for name in ENVIRONMENTS if name != "RoverGrains-v0"]
 
-VECTORS = [name for name, known in ENVIRONMENTS.items() if known.vector_entry_point]
-
 RANDOMISED: dict[str, Any] = {
     "slope_deg": (0.0, 10.0),
     "goal_distance": (0.6, 1.0),
@@ -251,7 +249,7 @@ SINGLE = [*(pytest.param(name, {}, id=name) for name in NAMES), *VARIANTS]
 
 EPISODES = [*SINGLE, pytest.param("RoverTrap-v0", TRAP, id="trap, randomised")]
 
-MANY = [*(pytest.param(name, {}, id=name) for name in VECTORS), *VARIANTS]
+MANY = [*(pytest.param(name, {}, id=name) for name in NAMES), *VARIANTS]
 
 LIMIT = 7
 
@@ -361,7 +359,6 @@ def assert_same(name: str, ours: tuple[Any, ...], theirs: tuple[Any, ...]) -> No
 def test_the_time_limit_is_the_registered_one(name: str) -> None:
     limit = ENVIRONMENTS[name].max_episode_steps
     assert gym.spec(name).max_episode_steps == limit
-    if name in VECTORS:
-        envs: Any = gym.make_vec(name, 1)
-        repeat = getattr(envs, "repeat", 1)
-        assert envs.unwrapped.batch.max_episode_steps == limit * repeat
+    envs: Any = gym.make_vec(name, 1)
+    repeat = getattr(envs, "repeat", 1)
+    assert envs.unwrapped.batch.max_episode_steps == limit * repeat

@@ -131,35 +131,33 @@ def test_scenes_do_not_hang_on_the_number_of_threads(mode: str) -> None:
 
 def test_episodes_can_be_drawn_without_an_environment() -> None:
     task = RoverEnv(terrain="rocks").task
-    rows = seeded_rows([1, 2, 3])
-    alone = task.episodes.draw(rows, fixed={"difficulty": 0.2, "position": (1.0, 2.0)})
-    batch = EpisodeBatch(task.rules, Simulation(), 4, threads=2)
-    together = batch.draw(task.episodes, rows, fixed=[{"difficulty": 0.2, "position": (1.0, 2.0)}] * 3)
-    assert len(alone) == len(together) == 3
-    for name in ("generators", "observations", "starts", "domains", "rocks", "rock_seeds"):
-        np.testing.assert_array_equal(getattr(alone, name), getattr(together, name))
-    assert alone.rocks[:, 0].tolist() == [0.2] * 3
-    np.testing.assert_array_equal(alone.starts[:, 2:4], [[1.0, 2.0]] * 3)
-    batch.begin([3, 0, 1], alone)
-    assert batch.simulation(3).snapshot() == alone.simulation(0).snapshot()
-    np.testing.assert_array_equal(batch.terrain(0).centres, alone.terrain(1).centres)
-    np.testing.assert_array_equal(batch.terrain(0).ground.normal, alone.plane(1).normal)
-    np.testing.assert_array_equal(batch.generators([3, 1]), alone.generators[[0, 2]])
-    batch.set_generators([1], rows[:1])
-    np.testing.assert_array_equal(batch.generators([3, 1]), [alone.generators[0], rows[0]])
-    assert batch.info(1) == alone.episode(2).info()
-    assert batch.simulation(2).snapshot() == Simulation().snapshot()
-    before = batch.generators([0])
-    for call, given in ((batch.begin, alone), (batch.set_generators, rows)):
+    rows, fixed = seeded_rows([1, 2, 3]), {"difficulty": 0.2, "position": (1.0, 2.0)}
+    one, two = (EpisodeBatch(task.rules, Simulation(), 4, threads=threads) for threads in (1, 2))
+    drawn, again = one.draw(task.episodes, rows, fixed=fixed), two.draw(task.episodes, rows, fixed=[fixed] * 3)
+    assert len(drawn) == len(again) == 3
+    one.begin([3, 0, 1], drawn)
+    two.begin([3, 0, 1], again)
+    for i in (3, 0, 1):
+        assert one.simulation(i).snapshot() == two.simulation(i).snapshot()
+        np.testing.assert_array_equal(one.terrain(i).centres, two.terrain(i).centres)
+        start, rocks, _, _ = one.origin(i)
+        assert (rocks[0], *start[2:4]) == (0.2, 1.0, 2.0)
+    np.testing.assert_array_equal(one.generators([3, 1]), drawn.generators[[0, 2]])
+    np.testing.assert_array_equal(drawn.generators, again.generators)
+    one.set_generators([1], rows[:1])
+    np.testing.assert_array_equal(one.generators([3, 1]), [drawn.generators[0], rows[0]])
+    assert one.simulation(2).snapshot() == Simulation().snapshot()
+    before = one.generators([0])
+    for call, given in ((one.begin, drawn), (one.set_generators, rows)):
         for indices in ([0, 1], [0, 1, 4], [0, 1, -1], 3):
             with pytest.raises(OptionError, match=r"indices|index"):
                 call(indices, given)  # type: ignore[operator]
     other = EpisodeBatch(RoverEnv(goal_tolerance=0.7).task.rules, Simulation(), 3)
     with pytest.raises(OptionError, match="rules"):
-        other.begin([0, 1, 2], alone)
+        other.begin([0, 1, 2], drawn)
     with pytest.raises(OptionError, match="not begun"):
-        batch.set_generators([0, 2, 3], rows)
-    np.testing.assert_array_equal(batch.generators([0]), before)
+        one.set_generators([0, 2, 3], rows)
+    np.testing.assert_array_equal(one.generators([0]), before)
 
 
 @pytest.mark.parametrize(
@@ -177,10 +175,10 @@ def test_episodes_can_be_drawn_without_an_environment() -> None:
     ],
 )
 def test_a_bad_request_for_episodes_is_refused_by_name(arguments: dict[str, Any], field: str) -> None:
-    episodes = RoverEnv().task.episodes
-    request = {"generators": seeded_rows([1, 2]), **arguments}
+    task = RoverEnv().task
+    request: dict[str, Any] = {"generators": seeded_rows([1, 2]), **arguments}
     with pytest.raises(ValueError, match=r"must|needs") as caught:
-        episodes.draw(**request)
+        EpisodeBatch(task.rules, Simulation(), 1).draw(task.episodes, **request)
     assert getattr(caught.value, "field") == field  # noqa: B009 - an attribute of the package's errors
 
 
@@ -191,7 +189,8 @@ def test_a_bad_distribution_is_refused_by_name() -> None:
         "domain": dict.fromkeys(("mass_scale", "friction", "actuator_gain", "gravity_scale"), (1.0, 1.0)),
         "trunk_load_limit": 50.0,
     }
-    assert len(EpisodeDistribution(rules, Simulation(), **good).draw(seed_generators([0]))) == 1
+    batch = EpisodeBatch(rules, Simulation(), 1)
+    assert len(batch.draw(EpisodeDistribution(rules, Simulation(), **good), seed_generators([0]))) == 1
     for change, field in (
         ({"start": {"slope": (0.0, 1.0)}}, "start.uphill"),
         ({"domain": 3}, "domain"),

@@ -23,7 +23,7 @@ from rover_gym.env.episode_scene import (
     check_reset_options,
     draw_episodes,
     origin_of,
-    scene_of_rows,
+    scene_of,
 )
 from rover_gym.env.generators import (
     Rows,
@@ -518,7 +518,7 @@ class RoverBatch:
         self.check_begun(i)
         ground = self.task.ground  # one object for all, so that snapshots hold it once
         terrain = self.episodes.terrain(i) if ground is None else ground
-        return scene_of_rows(self.task, *self.episodes.origin(i), terrain)
+        return scene_of(self.task, *self.episodes.origin(i), terrain)
 
     def progress(self, i: int) -> EpisodeRun:
         """A copy of rover i's episode.

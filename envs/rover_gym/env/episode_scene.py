@@ -66,16 +66,8 @@ class ResetOptions:
     fixed: Mapping[str, Any] = field(default_factory=dict)
 
 
-def scene_of(task: Task, drawn: DrawnEpisodes, i: int) -> EpisodeScene:
-    """The scene of drawn episode i."""
-    rows = drawn.starts[i], drawn.rocks[i], drawn.rock_seeds[i], drawn.domains[i]
-    return scene_of_rows(task, *rows, drawn.terrain(i))
-
-
-def scene_of_rows(
-    task: Task, start: Array, rocks: Array, rock_seed: int, domain: Array, terrain: Terrain
-) -> EpisodeScene:
-    """The scene of an episode from rows of `DrawnEpisodes`: `starts`, `rocks`, `rock_seeds`, `domains`."""
+def scene_of(task: Task, start: Array, rocks: Array, rock_seed: int, domain: Array, terrain: Terrain) -> EpisodeScene:
+    """The scene of an episode from what `EpisodeBatch.origin` tells, and its terrain."""
     slope, uphill, x, z, heading, *places = start.tolist()
     goal, *further = zip(places[::2], places[1::2], strict=True)
     difficulty, abundance, max_radius = rocks.tolist()
@@ -88,7 +80,7 @@ def scene_of_rows(
 
 
 def origin_of(scene: EpisodeScene) -> tuple[list[float], list[float], int, list[float]]:
-    """The rows of `DrawnEpisodes` that `scene_of_rows` makes a scene from: start, rocks, seed of the rocks, domain."""
+    """What `scene_of` makes a scene from: start, rocks, seed of the rocks, domain."""
     start, rocks = scene.start, scene.rocks
     places = [x for goal in start.goals for x in goal]
     row = [start.slope, start.uphill, *start.position, start.heading, *places]

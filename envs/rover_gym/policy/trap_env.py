@@ -10,14 +10,13 @@ from typing import Any, ClassVar, Unpack
 import numpy as np
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
-from rover_gym.env.batch import RoverBatch
-from rover_gym.env.episode_scene import ResetOptions, draw_episodes, origin_of, scene_of
+from rover_gym.env.batch import Drawn, RoverBatch
+from rover_gym.env.episode_scene import ResetOptions, origin_of
 from rover_gym.env.generators import Rows
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.start import Start
 from rover_gym.env.task import TRUNK_LOAD, Task, make_task
 from rover_gym.mechanics import (
-    DrawnEpisodes,
     EpisodeRun,
     OptionError,
     Simulation,
@@ -96,18 +95,20 @@ class TrapBatch(RoverBatch):
 
     def _draw(self, row: Rows, difficulty: Range | None, options: ResetOptions) -> Trapped:
         """The episode of one rover."""
+        driven = self._driven
         for _ in range(DRIVES):
-            drawn = draw_episodes(self._driven.task, row[None], [difficulty], options, self._driven.episodes)
+            drawn = driven.draw_rows(row[None], [difficulty], options)
             row = drawn.generators[0]
-            simulation = drawn.simulation(0) if "q" in options.fixed else self._drive(drawn)
-            if simulation is not None:
+            driven.begin(Drawn(drawn, [0], [0], set()))
+            if "q" in options.fixed or self._is_trapped():
                 break
         else:
             refuse(TerrainError, "terrain", self.task.ground or DRIVES, f"none of {DRIVES} drives ended in a trap")
         normals = None
         if self.task.is_noisy:
             (normals,), (row,) = standard_normals(row[None], self.task.layout.size)
-        scene, q = scene_of(self.task, drawn, 0), simulation.q
+        scene, simulation = driven.scene(0), driven.episodes.simulation(0)
+        q = simulation.q
         domain, old = scene.domain, scene.start
         start = Start(old.slope, old.uphill, (float(q[0]), float(q[2])), float(q[4]), old.goal)
         trapped = self.task.simulate(scene.terrain, domain)
@@ -126,16 +127,14 @@ class TrapBatch(RoverBatch):
             refuse(StateError, "q", q, "must be observable in float32")
         return Trapped(trapped, episode, origin_of(replace(scene, start=start)), row)
 
-    def _drive(self, drawn: DrawnEpisodes) -> Simulation | None:
-        """Lets the baseline drive; the rover where it has ended in a trap."""
-        episodes = self._driven.episodes
-        episodes.begin([0], drawn)
-        seen = drawn.observations
+    def _is_trapped(self) -> bool:
+        """Lets the baseline drive; whether that ends in a trap."""
+        seen = self._driven.observation
         for _ in range(round(LONGEST_DRIVE / self.task.dt)):
-            seen, _, ended, _, _ = episodes.step(np.asarray(self._driver.predict(seen[0])[0])[None])
+            seen, _, ended, _, _ = self._driven.step(np.asarray(self._driver.predict(seen[0])[0])[None])
             if ended[0]:
-                return episodes.simulation(0) if episodes.info(0)["termination"] == "high_centred" else None
-        return None
+                return bool(self._driven.info(0)["termination"] == "high_centred")
+        return False
 
 
 class RoverTrapEnv(RoverEnv):

@@ -6,8 +6,7 @@ use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyRange, PyTuple};
 use rover_core::draw::Domain;
-use rover_core::episode::running::{Period, check_normals};
-use rover_core::episode::{Ending, Episode as CoreEpisode, EpisodeState, Rules, Setting, action};
+use rover_core::episode::{Ending, Episode as CoreEpisode, EpisodeState, Rules, Setting};
 
 use crate::arguments::{Named, number, refused};
 use crate::arrays::{Array, array, fresh, vector};
@@ -15,18 +14,14 @@ use crate::episode_rules::EpisodeRules;
 use crate::errors::{Kind, Result, Value};
 use crate::infos::info;
 use crate::reading::{place, points};
-use crate::shared::{Open, Shared};
 use crate::simulation::Simulation;
 use crate::snapshot::{damaged, read_bytes};
-
-/// Observation, reward, whether the episode has ended, info.
-type Step<'py> = (Array<f32>, f64, bool, Bound<'py, PyDict>);
 
 /// One episode of a driving task: what its simulation does not hold.
 ///
 /// `begin` and `from_bytes` make one.
 #[pyclass(module = "rover_gym.mechanics", frozen)]
-pub struct EpisodeRun(Shared<CoreEpisode>);
+pub struct EpisodeRun(CoreEpisode);
 
 /// Actions of a shape in row-major order, as float64.
 pub fn actions(value: &Bound<'_, PyAny>, shape: &[usize]) -> Result<Vec<f64>> {
@@ -106,33 +101,14 @@ fn domain(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Domain> {
     Ok(numbers.into())
 }
 
-fn normals(given: Option<&Bound<'_, PyAny>>) -> Result<Option<Vec<f64>>> {
-    given
-        .map(|given| vector(given, Kind::Option, "normals"))
-        .transpose()
-}
-
-/// The action and the normal numbers of a control period, checked.
-fn given(
-    rules: &Rules,
-    action: &Bound<'_, PyAny>,
-    normals: Option<&Bound<'_, PyAny>>,
-) -> Result<(Vec<f64>, Option<Vec<f64>>)> {
-    let action = actions(action, &[rules.n_actions()])?;
-    action::check(&action, action.len(), true)?;
-    let normals = self::normals(normals)?;
-    check_normals(rules, normals.as_deref())?;
-    Ok((action, normals))
-}
-
 impl EpisodeRun {
     pub fn of(episode: CoreEpisode) -> Self {
-        Self(Shared::new(episode))
+        Self(episode)
     }
 
     /// A copy of what it holds.
-    pub fn copy(&self) -> Result<CoreEpisode> {
-        Ok(self.0.open()?.clone())
+    pub fn copy(&self) -> CoreEpisode {
+        self.0.clone()
     }
 }
 
@@ -182,80 +158,27 @@ impl EpisodeRun {
         Ok(begun?.map(Self::of))
     }
 
-    /// Goes on by a control period that ended with a reading, without a simulation.
-    ///
-    /// Args:
-    ///     reading: As of `Simulation.reading` with the goal as its target and the rules' scan.
-    ///     action: Torques, then steering, within [-1, 1], (n_actions,).
-    ///     normals: A standard normal number for each entry of the observation, (size,), where the
-    ///         rules have noise.
-    ///     message: The message of the physics step that failed, if one did.
-    ///
-    /// Returns:
-    ///     Observation (size,) float32, reward, whether the episode has ended, and info.
-    ///
-    /// Raises:
-    ///     CommandError: The action has a wrong shape or an entry that is not finite or outside
-    ///         [-1, 1]. Nothing has changed.
-    ///     OptionError: `reading` or `normals` has a wrong length. Nothing has changed.
-    #[pyo3(signature = (reading, action, normals = None, *, message = None))]
-    fn advance<'py>(
-        &self,
-        py: Python<'py>,
-        reading: &Bound<'py, PyAny>,
-        action: &Bound<'py, PyAny>,
-        normals: Option<&Bound<'py, PyAny>>,
-        message: Option<String>,
-    ) -> Result<Step<'py>> {
-        let mut held = self.0.open()?;
-        let rules = held.rules().clone();
-        let (action, normals) = given(&rules, action, normals)?;
-        let mut row = vector(reading, Kind::Option, "reading")?;
-        let n_state = rules.places().size;
-        let expected = n_state + rules.settings().scan.len();
-        if row.len() != expected {
-            let what = format!("{expected} numbers");
-            return Err(refused(reading, Kind::Option, "reading", &what));
-        }
-        let (state, heights) = row.split_at_mut(n_state);
-        let period = Period {
-            action: &action,
-            heights: Some(heights),
-            normals: normals.as_deref(),
-            has_failed: message.is_some(),
-        };
-        let mut observation = vec![0.0; rules.size()];
-        held.advance(state, &period, &mut observation);
-        let outcome = *held.outcome();
-        Ok((
-            fresh(&observation),
-            outcome.reward,
-            outcome.ending.is_end(),
-            info(py, &(&*held, message))?,
-        ))
-    }
-
     /// The last observation, (size,) float32.
     #[getter]
-    fn observation(&self) -> Result<Array<f32>> {
-        Ok(fresh(self.0.open()?.observation()))
+    fn observation(&self) -> Array<f32> {
+        fresh(self.0.observation())
     }
 
     /// The last action, (n_actions,); zeros at the beginning.
     #[getter]
-    fn previous_action(&self) -> Result<Array> {
-        Ok(fresh(&self.0.open()?.progress().previous_action))
+    fn previous_action(&self) -> Array {
+        fresh(&self.0.progress().previous_action)
     }
 
     /// The present goal (x, z), m; the last one where all are reached.
     #[getter]
-    fn goal(&self) -> Result<(f64, f64)> {
-        Ok(self.0.open()?.goal().into())
+    fn goal(&self) -> (f64, f64) {
+        self.0.goal().into()
     }
 
     /// The info of the last period, or of the beginning.
     fn info<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
-        info(py, &(&*self.0.open()?, None))
+        info(py, &(&self.0, None))
     }
 
     /// The same episode with other properties, another goal, or seen by other rules.
@@ -274,9 +197,7 @@ impl EpisodeRun {
     #[pyo3(signature = (**changes), text_signature = "($self, *, goal=None, distance=None, domain=None, trunk_load_limit=None, seen=None)")]
     fn changed(&self, py: Python<'_>, changes: Option<&Bound<'_, PyDict>>) -> Result<Self> {
         let given = Named::keywords(py, changes)?;
-        let held = self.0.open()?;
-        let (mut rules, mut state) = (held.rules().clone(), held.state());
-        drop(held);
+        let (mut rules, mut state) = (self.0.rules().clone(), self.0.state());
         if let Some(goal) = given.read("goal", |value, _, _| place(Some(value)))? {
             (state.setting.goal, state.progress.reached) = (goal, 0);
             state.outcome.ending = Ending::None;
@@ -295,7 +216,7 @@ impl EpisodeRun {
                 .get("seen")?
                 .object::<Bound<'_, Self>>(Kind::Option, "seen", "an EpisodeRun")?
         {
-            let other = seen.get().copy()?;
+            let other = &seen.get().0;
             let EpisodeState {
                 observation, owed, ..
             } = other.state();
@@ -307,7 +228,7 @@ impl EpisodeRun {
 
     /// All that an episode holds, as `from_bytes` reads it.
     fn to_bytes<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyBytes>> {
-        let state = postcard::to_stdvec(&self.0.open()?.state());
+        let state = postcard::to_stdvec(&self.0.state());
         Ok(PyBytes::new(
             py,
             &state.map_err(|e| damaged("episode", &e))?,
@@ -331,16 +252,13 @@ impl EpisodeRun {
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Result<Bound<'py, PyTuple>> {
         let (py, own) = (slf.py(), slf.get());
-        let rules = GivenRules(own.0.open()?.rules().clone());
+        let rules = GivenRules(own.0.rules().clone());
         let given = (rules, own.to_bytes(py)?);
         Ok((slf.get_type().getattr("from_bytes")?, given).into_pyobject(py)?)
     }
 
     fn __repr__(&self) -> String {
-        let Ok(held) = self.0.open() else {
-            return "EpisodeRun(stepping)".to_owned();
-        };
-        let distance = held.progress().distance;
+        let distance = self.0.progress().distance;
         format!("EpisodeRun({distance:.2} m to the goal)")
     }
 }

@@ -283,20 +283,31 @@ impl EpisodeBatch {
         Ok(Array::shaped(rows, &[n, size]))
     }
 
-    /// Draws episodes on the threads of this batch; no rover changes.
+    /// Draws one episode from each generator on the threads of this batch; no rover changes.
+    ///
+    /// A scene in which the rover would stand deeper than 1 cm in the ground or in a sphere is
+    /// drawn again. The given generators do not change: see `DrawnEpisodes.generators`.
     ///
     /// Args:
     ///     distribution: What the episodes are drawn from.
     ///     generators: Generators, (m, 4) uint64.
-    ///     attempts: As of `EpisodeDistribution.draw`, as the next two.
-    ///     difficulties: See there.
-    ///     fixed: See there.
+    ///     attempts: Most scenes drawn for a rover until it has room.
+    ///     difficulties: For each generator a range (low, high) that replaces that of the rocks'
+    ///         difficulty, or None; by default none.
+    ///     fixed: Values that replace draws, which are made all the same, by name: `slope`,
+    ///         `uphill`, `position` (x, z), `heading`, `goal` (x, z), `further` (n, 2) of the goals
+    ///         after it, `difficulty`, `field_seed`, `q`, `v`; one mapping for all or a list of one
+    ///         for each generator; none by default.
     ///
     /// Returns:
     ///     The episodes, the same for any number of threads.
     ///
     /// Raises:
-    ///     RoverGymError: As of `EpisodeDistribution.draw`, for the first rover that has one.
+    ///     TerrainError: A rover has no room in `attempts` scenes, or the ground refuses a number.
+    ///     StateError: `q` or `v` has a wrong length or an entry that is not finite, or float32
+    ///         cannot hold the observation.
+    ///     ModelError: A scaled mass is out of its range.
+    ///     OptionError: Any other argument is invalid.
     #[pyo3(signature = (distribution, generators, **options),
         text_signature = "($self, distribution, generators, *, attempts=100, difficulties=None, fixed=None)")]
     fn draw(
@@ -308,7 +319,7 @@ impl EpisodeBatch {
         let distribution = self::distribution(distribution)?.get();
         let request = Request::parse(generators, options)?;
         let mut held = self.0.open()?;
-        distribution.draw_on(generators.py(), &request, Some(&mut held.batch))
+        distribution.draw_on(generators.py(), &request, &mut held.batch)
     }
 
     /// Begins drawn episodes.
@@ -363,7 +374,7 @@ impl EpisodeBatch {
     ) -> Result<()> {
         let one = simulation.0.get();
         let wrong = |_| refused(episode, Kind::Option, "episode", "an EpisodeRun");
-        let episode = episode.cast::<EpisodeRun>().map_err(wrong)?.get().copy()?;
+        let episode = episode.cast::<EpisodeRun>().map_err(wrong)?.get().copy();
         let origin = self::origin(origin, one.origin().terrain.clone())?;
         let given = Named::keywords(indices.py(), options)?;
         let random = given.need("generator", |value, kind, field| {

@@ -151,6 +151,31 @@ fn batch(model: &Arc<Model>, n: usize, threads: usize) -> EpisodeBatch {
     batch
 }
 
+#[test]
+fn a_reading_that_float32_cannot_hold_ends_the_episode() {
+    let model = model();
+    let begun = begin(&model, 0);
+    let rover = rover(&begun);
+    let mut reading = vec![0.0; rules(&model).places().size];
+    for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300] {
+        let mut episode = begun.episode.clone();
+        rover.read_state(episode.goal(), &mut ReadingScratch::default(), &mut reading);
+        reading[model.nv() + 6 + model.n_joints()] = value; // the first wheel's gap
+        let period = Period {
+            action: &action(0, 0),
+            heights: None,
+            normals: Some(&[0.0; SIZE]),
+            has_failed: false,
+        };
+        let (last, mut observation) = (episode.observation().to_vec(), [0.0; SIZE]);
+        episode.advance(&mut reading, &period, &mut observation);
+        let outcome = episode.outcome();
+        assert_eq!(outcome.ending, Ending::StepFailed);
+        assert_eq!(outcome.reward.to_bits(), outcome.terms[8].to_bits());
+        assert_eq!(bits(&observation), bits(&last));
+    }
+}
+
 fn times(batch: &EpisodeBatch) -> Vec<f64> {
     let time = |rover: &SharedRover| rover.lock().unwrap().time();
     batch.rovers().iter().map(time).collect()
