@@ -7,7 +7,7 @@ SHELL := bash
 PYTHON ?= python3# the interpreter that makes the virtual environment: 3.11 or newer
 VENV   ?= .venv
 
-BIN    := $(VENV)/bin
+BIN    := $(VENV)/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 STAMPS := $(VENV)/stamps# in the environment, so that both go together
 UV     := $(BIN)/uv pip install --quiet --python $(BIN)/python
 
@@ -20,7 +20,7 @@ TIER   ?= test# of the tests: quick, test or all
 SIDE_BY_SIDE = $(MAKE) --no-print-directory --jobs=2 --output-sync
 MODULE := $(or $(wildcard $(STAMPS)/release),$(STAMPS)/core)# as it is installed, or for development
 
-.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras docs bench chart stability torture validate validate-sand orders bits profiles train train-rllib pins clean
+.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras docs bench chart stability torture validate validate-sand orders bits instructions profiles train train-rllib pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -83,17 +83,22 @@ test-rust: $(STAMPS)/core ## the Rust tests only (of tier all with checks of ari
 test-python: $(STAMPS)/test $(STAMPS)/core $(STAMPS)/fmu $(STAMPS)/debian-demo $(STAMPS)/debian-test ## the Python tests only, and the longest ten
 	$(BIN)/pytest --numprocesses auto --tier $(TIER) --durations 10
 
-same-bits: $(STAMPS)/test $(MODULE) ## compare the bits of the development build with those of the build that is shipped
+same-bits: $(STAMPS)/test $(MODULE) ## compare the bits of the development build and of the build that is shipped with the committed ones
 	$(MAKE) --no-print-directory $(STAMPS)/core
-	$(MAKE) --no-print-directory bits BITS="--save runs/bits-development.json"
+	$(MAKE) --no-print-directory bits
 	$(MAKE) --no-print-directory $(STAMPS)/release
-	$(MAKE) --no-print-directory bits BITS="--against runs/bits-development.json"
+	$(MAKE) --no-print-directory bits
 
-wheel: $(STAMPS)/demo ## build the wheel, one for every Python from 3.11 on, and the archive of the sources, into dist/
-	rm -rf dist
-	$(call unit,release,--release -p rover-fmu)
+# zig links for TARGET against glibc 2.17 or musl 1.2, which any Linux of that kind has.
+CROSS  = $(if $(TARGET),--target $(TARGET)$(if $(findstring gnu,$(TARGET)),.2.17))
+LINKED = $(if $(TARGET),--zig --target $(TARGET) --compatibility $(if $(findstring musl,$(TARGET)),musllinux_1_2,manylinux2014))
+
+wheel: $(STAMPS)/demo $(if $(TARGET),$(STAMPS)/cross) ## build the wheel, one for every Python from 3.11 on, and the archive of the sources, into dist/ (for another Linux: TARGET=aarch64-unknown-linux-gnu)
+	rm -rf dist envs/rover_gym/_fmu $(STAMPS)/fmu
+	PATH="$(abspath $(BIN)):$$PATH"; $(call unit,$(if $(TARGET),$(TARGET)/)release,--release -p rover-fmu $(CROSS))
 	$(BIN)/python -m maturin sdist --out dist
-	CARGO_TARGET_DIR=$(abspath target) $(BIN)/python -m maturin build --release --quiet --out dist
+	PATH="$(abspath $(BIN)):$$PATH" CARGO_TARGET_DIR=$(abspath target) $(BIN)/python -m maturin build --release --quiet --out dist $(LINKED)
+	$(if $(TARGET),rm -rf envs/rover_gym/_fmu)
 	@ls dist/*
 
 extras: $(STAMPS)/test wheel ## install the wheel, without Rust, in an empty environment for every Python and for each extra, and try what it promises
@@ -110,11 +115,7 @@ bench: $(STAMPS)/release ## time a step and tell where the time goes, MuJoCo's b
 	$(COMPARE).exploring_bench
 	cargo bench --locked $(addprefix --bench ,step accuracy spheres rays solver soil)
 	cargo run --locked --quiet --profile bench -p rover-core --example sand_steps
-	@if command -v valgrind > /dev/null; then cargo build --release --locked --quiet --example drive_steps; \
-	  count() { valgrind --tool=callgrind --callgrind-out-file=/dev/null target/release/examples/drive_steps $$1 2>&1 \
-	    | awk '/Collected/ { print $$NF }'; }; \
-	  awk -v a=$$(count 1) -v b=$$(count 1001) 'BEGIN { printf "\n%.0f instructions a step of the curve (callgrind)\n", (b - a) / 1000 }'; \
-	else echo "valgrind is not installed: no instruction counts"; fi
+	-$(COMPARE).instructions
 
 train: $(STAMPS)/test $(STAMPS)/release ## train a policy for the rocks (about half an hour of one core) and compare it with the baseline, under runs/
 	$(BIN)/python training/train_ppo.py --config rocks --seed 1
@@ -140,8 +141,11 @@ stability: $(STAMPS)/release $(STAMPS)/peers $(STAMPS)/debian-peers ## the scene
 torture: $(STAMPS)/test $(MODULE) ## tries to break everything: docs/tables/torture.md (5 minutes on two cores; TORTURE="--hours 2", or --regime NAME --case K)
 	PYTHONPATH=tests $(BIN)/python -m torture $(TORTURE)
 
-bits: $(STAMPS)/test $(MODULE) ## hash trajectories bit by bit (BITS="--save runs/bits.json" before a change, BITS="--against runs/bits.json" after it)
+bits: $(STAMPS)/test $(MODULE) ## compare trajectories, bit by bit, with the committed hashes (BITS=--save commits new ones)
 	$(COMPARE).bits $(BITS)
+
+instructions: $(STAMPS)/test ## count the instructions of a step under valgrind and compare them with the committed counts (INSTRUCTIONS=--save commits new ones)
+	$(COMPARE).instructions $(INSTRUCTIONS)
 
 profiles: $(STAMPS)/test $(STAMPS)/release ## performance profiles of the contact solvers, with Siconos' where it is installed
 	$(COMPARE).solver_profiles
@@ -160,6 +164,7 @@ pins: $(STAMPS)/venv ## resolve requirements/*.txt anew from pyproject.toml
 	$(call pin,demo) --extra demo --group build
 	$(call pin,test) --extra test --extra docs --extra train --group build --group lint --constraint requirements/demo.txt
 	$(call pin,rllib) --extra rllib --group build
+	$(call pin,cross) --group cross --constraint requirements/demo.txt
 	$(call pin,peers) --extra peers --constraint requirements/test.txt
 
 clean: ## remove everything that make made, but for runs/
@@ -188,7 +193,7 @@ $(STAMPS)/debian-%: requirements/debian/%.txt | $(STAMPS)/venv
 
 $(STAMPS)/debian-test: | $(STAMPS)/debian-demo # one apt-get at a time
 
-$(STAMPS)/demo $(STAMPS)/test: $(STAMPS)/%: requirements/%.txt $(STAMPS)/venv
+$(STAMPS)/demo $(STAMPS)/test $(STAMPS)/cross: $(STAMPS)/%: requirements/%.txt $(STAMPS)/venv
 	$(UV) --requirement $<
 	@touch $@
 
@@ -215,7 +220,7 @@ $(STAMPS)/core $(STAMPS)/release: $(SOURCES) | $(STAMPS)/demo
 
 # The library of co-simulation units, where the package and its wheel look for it. For development it is built beside the
 # module's crate: with the same features of the dependencies nothing is compiled twice.
-unit = $(CARGO) build --locked --quiet $(2) && mkdir -p envs/rover_gym/_fmu && \
+unit = $(CARGO) $(if $(TARGET),zigbuild,build) --locked --quiet $(2) && mkdir -p envs/rover_gym/_fmu && \
 	for made in target/$(1)/{lib,}rover_fmu.{so,dylib,dll}; do [ ! -f $$made ] || cp $$made envs/rover_gym/_fmu/rover_fmu.$${made\#\#*.}; done
 
 $(STAMPS)/fmu: $(SOURCES) | $(STAMPS)/core

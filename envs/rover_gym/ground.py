@@ -81,21 +81,26 @@ def triangles_of(
     """
     if isinstance(surface, TriangleMesh):
         return np.asarray(surface.vertices), surface.triangles.astype(np.int64)
-    rows, columns = surface.shape
-    places = [_lines(low, high, surface, axis, count) for axis, count in ((0, columns), (1, rows))]
-    step = max(1, int(np.ceil(np.sqrt(len(places[0]) * len(places[1]) / most))))
-    i, j = (np.union1d(lines[::step], lines[-1]) for lines in places)
-    heights = surface.grid[np.ix_(j, i)].astype(np.float64)
-    x = surface.origin[0] + i * surface.spacing[0]
-    z = surface.origin[1] + j * surface.spacing[1]
+    x, z, heights = map_of(surface, low, high, most)
     grid_x, grid_z = np.meshgrid(x, z)
     vertices = np.column_stack((grid_x.ravel(), heights.ravel(), grid_z.ravel()))
-    corner = np.arange(len(j) - 1)[:, None] * len(i) + np.arange(len(i) - 1)
-    a, b, c, d = (corner + shift for shift in (0, 1, len(i) + 1, len(i)))
+    corner = np.arange(len(z) - 1)[:, None] * len(x) + np.arange(len(x) - 1)
+    a, b, c, d = (corner + shift for shift in (0, 1, len(x) + 1, len(x)))
     # The diagonal runs from (j, i) to (j + 1, i + 1).
     triangles = np.stack((np.stack((a, c, b), axis=-1), np.stack((a, d, c), axis=-1)), axis=-2).reshape(-1, 3)
     known = np.isfinite(vertices[:, 1])
     return vertices, triangles[known[triangles].all(axis=1)]
+
+
+def map_of(surface: HeightField, low: npt.ArrayLike, high: npt.ArrayLike, most: int) -> tuple[Array, Array, Array]:
+    """Columns x (n_x,), rows z (n_z,) and heights (n_z, n_x), m, of a piece of a height field, as `triangles_of`."""
+    rows, columns = surface.shape
+    places = [_lines(low, high, surface, axis, count) for axis, count in ((0, columns), (1, rows))]
+    step = max(1, int(np.ceil(np.sqrt(len(places[0]) * len(places[1]) / most))))
+    i, j = (np.union1d(lines[::step], lines[-1]) for lines in places)
+    x = surface.origin[0] + i * surface.spacing[0]
+    z = surface.origin[1] + j * surface.spacing[1]
+    return x, z, surface.grid[np.ix_(j, i)].astype(np.float64)
 
 
 def _lines(

@@ -28,9 +28,9 @@ def test_the_rover_steps_in_lanes_welded_or_not(terrain: Plane | SphereField, we
     ("options", "reason"),
     [
         ({"restitution": 0.25}, "the restitution is 0.25, not 0"),
-        ({"variant": "newton"}, "the variant is Newton's"),
-        ({"solver": "newton"}, "the solver's method is chosen, not automatic"),
-        ({"warm_start": False}, "the warm start is off"),
+        ({"variant": "newton"}, 'variant is "newton"'),
+        ({"solver": "newton"}, 'solver is not "auto"'),
+        ({"warm_start": False}, "warm_start is off"),
     ],
 )
 def test_options_without_a_fast_step_are_named(options: dict[str, Any], reason: str) -> None:

@@ -113,13 +113,13 @@ def test_off_the_map_and_over_holes_the_error_names_the_place() -> None:
     field = HeightField(heights, 0.25)
     model = RoverModel()
     for place in [(2.4, 0.0), (40.0, 0.0), ((-4.9), 0.0)]:
-        with pytest.raises(TerrainError, match="no ground is known at") as caught:
+        with pytest.raises(TerrainError, match="the ground at") as caught:
             model.resting_pose(field, place, 0.0)
         assert caught.value.field == "position"
     simulation = Simulation(model, field)
     simulation.set_state(model.resting_pose(field, (1.0, 0.0), 0.0))
     simulation.set_wheel_torques([20.0] * 6)
-    with pytest.raises(StepError, match=r"terrain: no ground is known at x = ") as failure:
+    with pytest.raises(StepError, match=r"terrain: the ground at x = ") as failure:
         simulation.step(5000)
     assert failure.value.field == "terrain"
     assert failure.value.value[0] == pytest.approx(2.5, abs=0.3)
@@ -206,7 +206,7 @@ def test_a_list_that_holds_no_terrain_is_refused() -> None:
 def test_bad_meshes_are_refused() -> None:
     vertices, triangles = CUBE
     for bad, message in [
-        ([[0, 1, 9]], "names vertex 9"),
+        ([[0, 1, 9]], "refers to vertex 9"),
         ([[0, 1, 1]], "has no area"),
         ([[0, 1, 3], [0, 1, 2]], "its edge from vertex 0 to 1"),
         ([[0, 1, 2.5]], "triangles: must be whole numbers"),

@@ -71,7 +71,7 @@ def test_a_drive_off_the_map_is_recorded_plotted_and_replayed(tmp_path: Path) ->
             solver = info["solver"]
             tape.append(sampler.row(env.simulation, residual=solver["residual"], iterations=solver["iterations"]))
     assert info["termination"] == "step_failed"
-    assert "no ground is known" in solver["message"]
+    assert "is unknown: the place is outside the map" in solver["message"]
     for command in (("plot", "--output", "plots"), ("replay", "--vrml", "run.wrl")):
         result = rover(command[0], str(tmp_path / "run.h5"), command[1], str(tmp_path / command[2]))
         assert result.exit_code == 0, result.output
@@ -245,4 +245,4 @@ def test_a_drive_off_the_map_names_its_option(folder: Path) -> None:
     for option in ("--start", "--goal"):
         result = rover("drive", *place, option, "90", "0")
         assert result.exit_code == 2, result.output
-        assert result.stderr.startswith(f"error: {option}: no ground is known at x = 90 m")
+        assert result.stderr.startswith(f"error: {option}: the ground at x = 90 m")

@@ -1,7 +1,6 @@
 """`rover replay`: VRML97 and glTF are read back and their poses compared with the run's; bad input is one line."""
 
 import io
-import json
 import re
 import sys
 from collections.abc import Iterator
@@ -13,6 +12,7 @@ import numpy as np
 import pygltflib
 import pytest
 import trimesh
+from pages import held
 from typer.testing import CliRunner, Result
 
 from rover_gym import Plane, RoverModel, SphereField
@@ -21,8 +21,9 @@ from rover_gym.figures import draw_run
 from rover_gym.record import RecordingError, RoverRun, Trajectory, read_run
 from rover_gym.rendering.appearance import rover_parts, sphere_mesh
 from rover_gym.replay import write_gltf, write_page, write_vrml
-from rover_gym.replay.page import WHEEL_NAMES, facts
-from rover_gym.replay.player import axis_angles, continuous, moving_mean, quaternions
+from rover_gym.replay.charts import moving_mean
+from rover_gym.replay.rotations import axis_angles, continuous, quaternions
+from rover_gym.replay.rover_scene import WHEEL_NAMES, facts
 from rover_gym.replay.scenery import ground_tiles, identifiers
 
 SLOPE = Plane((-0.1, 1.0, 0.05), 0.2)
@@ -367,22 +368,15 @@ def test_another_reader_finds_the_rover_in_the_gltf(tmp_path: Path) -> None:
 # --- The page, as far as no browser is needed
 
 
-def curves(page: Path) -> dict[str, Any]:
-    text = page.read_text(encoding="utf-8")
-    (found,) = re.findall(r'<script type="application/json" id="curves">(.*?)</script>', text, flags=re.DOTALL)
-    data: dict[str, Any] = json.loads(found)
-    return data
-
-
 def test_the_page_holds_the_curves_of_the_run(tmp_path: Path) -> None:
     run = turning_run()
     page = write_page(run, tmp_path / "deep" / "out.html")
-    data = curves(page)
+    data = held(page).head["curves"]
     assert data["title"] == run.title
     assert data["time"] == pytest.approx(run.time - run.time[0])
     names = [WHEEL_NAMES[name] for name in run.model.wheel_names]
-    assert all([curve["name"] for curve in chart["series"]] == names for chart in data["charts"])
-    loads, gaps = data["charts"]
+    loads, gaps = data["charts"][:2]
+    assert all([curve["name"] for curve in chart["series"]] == names for chart in (loads, gaps))
     assert (loads["unit"], gaps["unit"]) == ("N", "mm")
     assert loads["values"] == [[1.0] * run.n_frames] * 6
     assert gaps["values"] == [[None] * run.n_frames] * 6  # infinite ones, which JSON does not know
@@ -391,7 +385,36 @@ def test_the_page_holds_the_curves_of_the_run(tmp_path: Path) -> None:
 
 def test_a_page_of_a_thousand_frames_stays_small(tmp_path: Path) -> None:
     run = turning_run(FIELD, n=1000)
-    assert write_page(run, tmp_path / "out.html").stat().st_size < 2_500_000
+    assert write_page(run, tmp_path / "out.html").stat().st_size < 1_500_000
+
+
+def test_the_page_holds_the_poses_of_every_sample(tmp_path: Path) -> None:
+    """To 0.06 mm, over several pieces."""
+    run = turning_run(n=61)
+    page = held(write_page(run, tmp_path / "out.html"))
+    assert len(page.pieces) == 3
+    assert np.abs(page.values("places") - run.positions).max() < 2.0**-14
+    turns = page.values("turns")[..., [3, 0, 1, 2]]
+    assert np.linalg.norm(turns, axis=-1) == pytest.approx(1.0, abs=1e-3)
+    assert np.abs(np.sum(turns * quaternions(run.rotations), axis=-1)) == pytest.approx(1.0, abs=1e-3)
+    assert page.head["plane"]["normal"] == pytest.approx(SLOPE.normal.tolist())
+    rocks = page.arrays["rocks"].reshape(-1, 4)
+    assert rocks == pytest.approx(np.column_stack((FIELD.centres, FIELD.radii)), abs=1e-6)
+
+
+def test_forces_point_away_from_the_ground_and_stand_under_the_wheels(tmp_path: Path) -> None:
+    """A force along the normal of a slope: in the world frame, in mean shares of the weight."""
+    run = turning_run(SLOPE)
+    run.trajectory.data["wheel_forces"] = np.tile([200.0, 0.0, 0.0], (run.n_frames, 6, 1))
+    forces = held(write_page(run, tmp_path / "out.html")).values("forces")
+    share = run.model.mass * 9.81 / 6.0
+    assert forces[..., 3:] == pytest.approx(
+        np.broadcast_to(200.0 / share * SLOPE.normal, forces[..., 3:].shape), abs=1e-3
+    )
+    wheels = [run.model.solid_names.index(wheel["solid"]) for wheel in run.model.to_dict()["wheels"]]
+    below = run.positions[:, wheels] - forces[..., :3]
+    assert np.linalg.norm(below, axis=-1) == pytest.approx(np.tile(run.model.wheel_radii, (run.n_frames, 1)), abs=1e-3)
+    assert (below @ SLOPE.normal > 0.0).all()
 
 
 # --- Names and titles of a file that means harm
@@ -444,8 +467,8 @@ def test_names_and_titles_reach_the_page_as_text_only(tmp_path: Path) -> None:
     page = write_page(run, tmp_path / "out.html")
     text = page.read_text(encoding="utf-8")
     assert "<script>alert(1)" not in text
-    assert "onerror" not in text
-    assert curves(page)["title"] == run.title
+    assert "onerror=alert" not in text
+    assert held(page).head["curves"]["title"] == run.title
 
 
 def test_names_and_titles_reach_gltf_as_text(tmp_path: Path) -> None:
@@ -508,7 +531,7 @@ def test_all_formats_are_written_and_named(recording: Path, tmp_path: Path) -> N
     assert result.exit_code == 0, result.output
     for target in targets:
         assert f"{target}" in result.output.replace("\n", "")
-    assert curves(targets[0])["time"] == pytest.approx(np.linspace(0.0, 1.0, 11))
+    assert held(targets[0]).head["time"] == pytest.approx(np.linspace(0.0, 1.0, 11))
     vrml = Vrml(targets[1].read_text(encoding="utf-8"))
     assert len(vrml.named["trunk_place"].fields["key"]) == 11
     goal = read_run(recording).goal
@@ -519,7 +542,6 @@ def test_all_formats_are_written_and_named(recording: Path, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("arguments", "culprit"),
     [
-        ([], "--html, --vrml, --gltf or --film"),
         (["--vrml", "out.wrl", "--fps", "0"], "fps"),
         (["--vrml", "out.wrl", "--fps", "nan"], "fps"),
         (["--vrml", "taken/below/out.wrl"], "taken"),
@@ -546,14 +568,13 @@ def test_what_is_no_run_is_refused_in_one_line(tmp_path: Path) -> None:
         assert message in result.stderr
 
 
-@pytest.mark.parametrize(("option", "package"), [("--html", "viser"), ("--gltf", "pygltflib")])
 def test_a_missing_package_is_named_with_its_extra(
-    option: str, package: str, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(sys.modules, package, None)
-    result = rover("replay", recording, "--vrml", tmp_path / "out.wrl", option, tmp_path / "out")
+    monkeypatch.setitem(sys.modules, "pygltflib", None)
+    result = rover("replay", recording, "--vrml", tmp_path / "out.wrl", "--gltf", tmp_path / "out")
     assert result.exit_code == 2
-    assert result.stderr == f"error: {package} is not installed: pip install 'rover-gym[replay]'\n"
+    assert result.stderr == "error: pygltflib is not installed: pip install 'rover-gym[replay]'\n"
     assert list(tmp_path.iterdir()) == []
 
 

@@ -1,7 +1,7 @@
-"""Hashes of trajectories, to see whether a change keeps their bits: `python -m comparison.bits` (`make bits`).
+"""Hashes of trajectories, compared with the committed ones: `python -m comparison.bits` (`make bits`).
 
-`--save FILE` before a change and `--against FILE` after it names the trajectories that differ and ends with 1. Hashes
-hold for one machine and one build of NumPy; they are no golden data.
+The hashes in `tests/golden/bits.json` hold on every machine. The trajectories that differ are named, and the command
+ends with 1. `--save` writes the file after a change that is meant to change bits.
 """
 
 import argparse
@@ -29,6 +29,7 @@ from rover_gym.planar import BallSimulation, Line, TwoWheelRoverSimulation
 from rover_gym.sand import SoftGround, named_soil
 from rover_gym.soil import SoilSimulation, soil_packing
 
+COMMITTED = Path(__file__).parents[1] / "golden" / "bits.json"
 #: Simulated of each scene, s, and between two states that are hashed.
 DURATION, SAMPLE = 3.0, 0.05
 #: Steps of an environment.
@@ -168,10 +169,9 @@ def differences(before: dict[str, str], now: dict[str, str]) -> list[str]:
 
 
 def main() -> None:
-    """Hashes, and perhaps saves or compares."""
+    """Hashes, and compares or saves."""
     parser = argparse.ArgumentParser(description="Hashes of trajectories: do their bits stay?")
-    parser.add_argument("--save", type=Path, help="write the hashes to this file")
-    parser.add_argument("--against", type=Path, help="compare them with those of this file")
+    parser.add_argument("--save", action="store_true", help=f"write the hashes to {COMMITTED.name}")
     arguments = parser.parse_args()
     console = Console(width=120, highlight=False)
     now = {}
@@ -179,12 +179,11 @@ def main() -> None:
         now[name] = digest(trajectory())
         console.print(f"{now[name]}  {name}")
     if arguments.save:
-        arguments.save.parent.mkdir(parents=True, exist_ok=True)
-        arguments.save.write_text(json.dumps(now, indent=1) + "\n", encoding="utf-8")
-    if arguments.against:
-        changed = differences(json.loads(arguments.against.read_text(encoding="utf-8")), now)
-        console.print(f"{len(changed)} of {len(now)} differ" + "".join(f"\n  {name}" for name in changed))
-        sys.exit(bool(changed))
+        COMMITTED.write_text(json.dumps(now, indent=1) + "\n", encoding="utf-8")
+        return
+    changed = differences(json.loads(COMMITTED.read_text(encoding="utf-8")), now)
+    console.print(f"{len(changed)} of {len(now)} differ" + "".join(f"\n  {name}" for name in changed))
+    sys.exit(bool(changed))
 
 
 if __name__ == "__main__":

@@ -51,7 +51,14 @@ def test_the_packages_copy_of_the_golden_curves_is_current() -> None:
 
 def test_there_is_one_version() -> None:
     workspace = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))
-    assert rover_gym.__version__ == workspace["workspace"]["package"]["version"]
+    version = workspace["workspace"]["package"]["version"]
+    assert rover_gym.__version__ == version
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {version}\n" in citation
+    (released,) = re.findall(r"^date-released: (\S+)$", citation, flags=re.MULTILINE)
+    assert f'\n  version: "{version}"\n' in (ROOT / "packaging" / "conda" / "recipe.yaml").read_text(encoding="utf-8")
+    changelog = re.findall(r"^## (.*)$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
+    assert changelog[:2] == ["[Unreleased]", f"[{version}] - {released}"]
 
 
 def test_pins_hold_versions_and_nothing_else() -> None:

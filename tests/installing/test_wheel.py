@@ -30,6 +30,10 @@ def wheel() -> Path:
     return Path(os.environ["ROVER_GYM_WHEEL"]).resolve()
 
 
+def python_of(environment: Path) -> Path:
+    return environment / "Scripts" / "python.exe" if os.name == "nt" else environment / "bin" / "python"
+
+
 def uv(*arguments: str) -> None:
     command = shutil.which("uv", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
     assert command is not None, "uv is not installed"
@@ -91,7 +95,7 @@ def test_from_installing_to_the_first_episode(place: Path) -> None:
     CPU time is what it takes where nothing else runs, and the same on a busy machine.
     """
     subprocess.run([sys.executable, "-m", "venv", str(place / "venv")], check=True)
-    python = place / "venv" / "bin" / "python"
+    python = python_of(place / "venv")
     run(python, "-m", "pip", "download", "--quiet", "--dest", str(place / "warm"), str(wheel()), folder=place)
     begin, used = time.perf_counter(), cpu_time()
     run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", str(wheel()), folder=place)
@@ -111,7 +115,7 @@ def test_the_wheel_drives_under_every_python(version: str, place: Path) -> None:
     if found is None or subprocess.run([found, "--version"], capture_output=True, check=False).returncode:
         pytest.skip(f"Python {version} is not installed")
     uv("venv", "--quiet", "--no-python-downloads", "--python", version, str(place / "venv"))
-    python = place / "venv" / "bin" / "python"
+    python = python_of(place / "venv")
     uv("pip", "install", "--quiet", "--python", str(python), str(wheel()))
     run(python, "-c", BEGIN + PROMISES[""], folder=place)
 
@@ -121,6 +125,6 @@ def test_the_wheel_drives_under_every_python(version: str, place: Path) -> None:
 @pytest.mark.parametrize("extra", [extra for extra in PROMISES if extra])
 def test_an_extra_keeps_its_promise_alone(extra: str, place: Path) -> None:
     uv("venv", "--quiet", "--python", sys.executable, str(place / "venv"))
-    python = place / "venv" / "bin" / "python"
+    python = python_of(place / "venv")
     uv("pip", "install", "--quiet", "--python", str(python), f"rover-gym[{extra}] @ {wheel().as_uri()}")
     run(python, "-c", BEGIN + PROMISES[extra], folder=place)

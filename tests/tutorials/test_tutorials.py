@@ -47,7 +47,7 @@ def test_the_page_about_contact_problems(folder: Path) -> None:
 
 @pytest.mark.takes_long("imports, drives, plots and replays, as the tutorial does")
 def test_a_rover_over_a_map(folder: Path) -> None:
-    for package in ("yourdfpy", "viser", "h5py"):
+    for package in ("yourdfpy", "h5py"):
         pytest.importorskip(package)
     names = run(TUTORIALS / "a-rover-over-a-map.md")
     assert (folder / "crater.html").stat().st_size > 100_000
@@ -59,7 +59,7 @@ def test_a_rover_over_a_map(folder: Path) -> None:
 @pytest.mark.timeout(900)
 def test_train_a_policy(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With the page's own variables for a rehearsal."""
-    for package in ("stable_baselines3", "tensorboard", "viser", "vtkmodules"):
+    for package in ("stable_baselines3", "tensorboard", "vtkmodules"):
         pytest.importorskip(package)
     monkeypatch.setenv("STEPS", "2048")
     monkeypatch.setenv("EPISODES", "10")

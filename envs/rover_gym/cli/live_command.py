@@ -1,5 +1,6 @@
 """`rover live`: a rover that is driven in real time in the browser."""
 
+import sys
 import webbrowser
 from pathlib import Path
 from typing import Annotated
@@ -58,16 +59,15 @@ def live(
         str, typer.Option(help="Address to listen at. The default refuses other machines; 0.0.0.0 lets them in.")
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="Port to listen at; 0 takes any that is free.")] = 8765,
-    fps: Annotated[
-        float, typer.Option(help="Pictures a second, 1 to 60; fewer for a browser without a graphics card.")
-    ] = 40.0,
-    show: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
+    show: Annotated[
+        bool | None, typer.Option("--open/--no-open", help="Open the page. Default: where there is a terminal.")
+    ] = None,
 ) -> None:
     """Drive a rover in real time behind a page in the browser, by keyboard, gamepad, sliders or a policy.
 
     Ctrl-C ends the drive; what was recorded is kept.
     """
-    require("viser", "replay")
+    require("websockets", "replay")
     if mcap:
         require("mcap", "logs")
     check_folder("output", output)
@@ -94,11 +94,11 @@ def live(
         seed=seed,
     )
     loop = LiveLoop(LiveRover(scene, choices), output, mcap=mcap)
-    server = LiveServer(loop, choices, host=host, port=port, fps=fps)
+    server = LiveServer(loop, choices, host=host, port=port)
     typer.echo(f"live: {server.address} (Ctrl-C ends the drive)")
     loop.start()
     try:
-        if show:
+        if sys.stdout.isatty() if show is None else show:
             webbrowser.open(server.address)
         while not loop.wait(LOOK):
             pass

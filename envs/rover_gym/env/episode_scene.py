@@ -74,7 +74,7 @@ def scene_of(task: Task, start: Array, rocks: Array, rock_seed: int, domain: Arr
     return EpisodeScene(
         start=Start(slope, uphill, (x, z), heading, goal, tuple(further)),
         terrain=terrain,
-        rocks=None if task.rocks is None else Rocks(difficulty, abundance, max_radius, int(rock_seed)),
+        rocks=Rocks(difficulty, abundance, max_radius, int(rock_seed)) if task.has_rocks else None,
         domain=Domain(*domain.tolist()),
     )
 
@@ -93,7 +93,7 @@ def origin_of(scene: EpisodeScene) -> tuple[list[float], list[float], int, list[
 def check_difficulty(task: Task, difficulty: object, field: str = "difficulty") -> Range:
     """Checks a difficulty or a range of difficulties; the task must have rocks."""
     checked = span(field, difficulty, at_least=0.0, at_most=MAX_DIFFICULTY)
-    if task.rocks is None:
+    if not task.has_rocks:
         refuse(OptionError, field, difficulty, "needs terrain 'rocks', 'hills' or 'sand'")
     return checked
 
@@ -107,11 +107,11 @@ def check_reset_options(task: Task, options: Mapping[str, Any] | None, field: st
         difficulty = fixed["difficulty"] = number(
             f"{field}.difficulty", given["difficulty"], at_least=0.0, at_most=MAX_DIFFICULTY
         )
-        if task.rocks is None:
+        if not task.has_rocks:
             refuse(OptionError, f"{field}.difficulty", difficulty, "needs terrain 'rocks', 'hills' or 'sand'")
     if "field_seed" in given:
         seed = fixed["field_seed"] = whole(f"{field}.field_seed", given["field_seed"], at_most=FIELD_SEEDS - 1)
-        if task.rocks is None:
+        if not task.has_rocks:
             refuse(OptionError, f"{field}.field_seed", seed, "needs terrain 'rocks', 'hills' or 'sand'")
     if "slope_deg" in given:
         fixed["slope"] = math.radians(
@@ -139,7 +139,7 @@ def check_reset_options(task: Task, options: Mapping[str, Any] | None, field: st
         fixed["position"], fixed["heading"] = (q[0], q[2]), q[4]
         if "v" in given:
             fixed["v"] = vector(f"{field}.v", given["v"], task.model.nv, error=StateError)
-    if task.rocks is not None and "goal" in fixed:
+    if task.has_rocks and "goal" in fixed:
         name = "goals" if "goals" in given else "goal"
         for place in (fixed["goal"], *fixed.get("further", ())):
             if not math.dist(place, fixed.get("position", (0.0, 0.0))) <= MAX_GOAL_DISTANCE:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from rover_gym.extras import MissingExtraError, require
 from rover_gym.rendering import FrameRenderer, VideoWriter
 from rover_gym.rendering.appearance import GROUND_COLOUR, ROCK_COLOUR
-from rover_gym.replay.grain_page import eye_path, start_view
+from rover_gym.replay.grain_scene import eye_path, start_view
 from rover_gym.replay.scenery import vessel_meshes, vessel_poses, wall_polygons, wall_poses
 
 if TYPE_CHECKING:
@@ -58,9 +58,9 @@ class GrainFilm:
 
     def __init__(self, run: GrainRun, size: tuple[int, int] = SIZE) -> None:
         try:
-            from rover_gym.rendering.appearance import actor_of, mesh, set_pose  # noqa: PLC0415 - an extra
             from rover_gym.rendering.frames import BedRenderer  # noqa: PLC0415 - an extra
             from rover_gym.rendering.scenery_actors import BallsActor  # noqa: PLC0415 - an extra
+            from rover_gym.rendering.vtk_actors import actor_of, mesh, set_pose  # noqa: PLC0415 - an extra
         except ModuleNotFoundError as error:
             raise MissingExtraError("vtk", "render") from error
         self._run, self._set_pose = run, set_pose

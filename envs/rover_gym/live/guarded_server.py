@@ -1,24 +1,19 @@
-"""A viser server behind a guard: one port, one page, one origin, nothing from the network.
+"""The server of a live drive: one port, one page, one connection to the drive, nothing from the network.
 
-Viser [https://viser.studio] sends the scene to its client in the browser. Its server listens to any page that some
-other site may open, takes the next port where its own is in use, and offers to share the scene over a service in the
-network. Here a guard stands before it: it binds the port itself, answers only to its own names, opens sockets only for
-its own page, and has the browser refuse whatever does not come from it.
+It answers only to its own names and opens sockets only for its own page; the browser refuses whatever does not come
+from it.
 """
 
 from __future__ import annotations
 
+import asyncio
 import errno
-import functools
 import http
-import io
 import ipaddress
 import logging
 import socket
 import threading
 from collections.abc import Awaitable, Callable
-from contextlib import redirect_stdout
-from dataclasses import dataclass
 from typing import Any, TypeAlias
 from urllib.parse import urlsplit
 
@@ -29,89 +24,55 @@ from rover_gym.validation import refuse, whole
 #: A connection of a page to the drive; one of the library `websockets`.
 Handler: TypeAlias = Callable[[Any], Awaitable[None]]
 
-#: Path of the pages' connection to the drive, beside viser's own at the root.
+#: Path of the pages' connection to the drive.
 LIVE_PATH = "/live"
-#: What the browser may load and send: nothing but this page's own. Viser's client starts workers and WebAssembly from
-#: its own text; its sorter of splats, which nothing here uses, would also need `eval`.
-POLICY = "; ".join(
-    (
-        "default-src 'none'",
-        "script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval' data: blob:",
-        "worker-src blob: data:",
-        "style-src 'unsafe-inline'",
-        "img-src 'self' data: blob:",
-        "font-src data:",
-        "connect-src 'self' data: blob:",
-        "base-uri 'none'",
-        "form-action 'none'",
-        "frame-ancestors 'none'",
-    )
-)
-
-_BUILDING = threading.Lock()
+STARTING = 30.0  # s, the longest that the server's thread takes to start or stop
 
 
-@dataclass(frozen=True)
 class GuardedServer:
-    """A viser server that is running.
-
-    Attributes:
-        viser: The server.
-        address: Where the page is, as a browser takes it.
-    """
-
-    viser: Any
-    address: str
-
-    def stop(self) -> None:
-        """Closes all connections and frees the port."""
-        with redirect_stdout(io.StringIO()):
-            self.viser.stop()
-
-
-def start_guarded(host: str, port: int, page: str, handler: Handler) -> GuardedServer:
-    """Starts a viser server that serves a page of ours, with a connection of ours beside its own.
+    """Serves a page and its connection to the drive, from a thread of its own.
 
     Args:
         host: Name or address to listen at; "127.0.0.1" refuses other machines.
         port: Port to listen at; 0 for any free one.
         page: The page, HTML.
+        policy: Its content security policy.
         handler: Called with each connection to `LIVE_PATH`, in the server's thread.
+
+    Attributes:
+        address: Where the page is, as a browser takes it.
 
     Raises:
         OptionError: There is no such host, or the port is in use.
-        MissingExtraError: viser is not installed.
+        MissingExtraError: websockets is not installed.
     """
-    viser = require("viser", "replay")
-    messages = require("viser._messages", "replay")
-    serving = require("websockets.asyncio.server", "replay")
-    listening = _listen(host, port)
-    bound = listening.getsockname()[1]
-    guard = _Guard(host, page, handler, viser.__version__)
-    original, guarded = serving.serve, []
 
-    def serve(theirs: Handler, _host: str, _port: int, *, process_request: Any, **options: Any) -> Any:
-        del process_request  # viser's own, which serves its client to anybody
-        guarded.append(True)
-        return original(
-            guard.routes(theirs), sock=listening, process_request=guard.admit, logger=_silent_logger(), **options
-        )
+    def __init__(self, host: str, port: int, page: str, policy: str, handler: Handler) -> None:
+        self._serve = require("websockets.asyncio.server", "replay").serve
+        self._listening = _listen(host, port)
+        shown = f"[{host}]" if ":" in host else host
+        self.address = f"http://{shown}:{self._listening.getsockname()[1]}"
+        self._guard, self._handler = _Guard(host, page, policy), handler
+        self._loop = asyncio.new_event_loop()
+        self._started, self._ending = threading.Event(), asyncio.Event()
+        self._thread = threading.Thread(target=self._run, name="live server", daemon=True)
+        self._thread.start()
+        self._started.wait(STARTING)
 
-    with _BUILDING:  # viser takes the library's function from its module; nobody else may meanwhile
-        serving.serve = functools.wraps(original)(serve)
-        try:
-            with redirect_stdout(io.StringIO()):  # the announcement of its address
-                server = viser.ViserServer(host=host, port=bound, verbose=False)
-        finally:
-            serving.serve = original
-    if not guarded:
-        server.stop()
-        listening.close()
-        raise RuntimeError("viser's server has changed: the guard does not stand before it")
-    for kind in ("ShareUrlRequest", "ShareUrlDisconnect"):  # the scene is shared with nobody
-        server._websock_server.unregister_handler(getattr(messages, kind))
-    shown = f"[{host}]" if ":" in host else host
-    return GuardedServer(server, f"http://{shown}:{bound}")
+    def stop(self) -> None:
+        """Closes all connections and frees the port."""
+        self._loop.call_soon_threadsafe(self._ending.set)
+        self._thread.join(STARTING)
+
+    def _run(self) -> None:
+        self._loop.run_until_complete(self._until_the_end())
+        self._loop.close()
+
+    async def _until_the_end(self) -> None:
+        options = {"sock": self._listening, "process_request": self._guard.admit, "logger": _silent_logger()}
+        async with self._serve(self._handler, **options):
+            self._started.set()
+            await self._ending.wait()
 
 
 def _silent_logger() -> logging.Logger:
@@ -147,33 +108,23 @@ def _listen(host: str, port: int) -> socket.socket:
 class _Guard:
     """Decides about each request to the server."""
 
-    def __init__(self, host: str, page: str, handler: Handler, version: str) -> None:
+    def __init__(self, host: str, page: str, policy: str) -> None:
         self._names = {"localhost", host.lower(), socket.gethostname().lower()}
-        self._page = page.encode()
-        self._handler = handler
-        self._protocol = f"viser-v{version}"
-
-    def routes(self, theirs: Handler) -> Handler:
-        """Takes connections to the drive to our handler, and others to viser's."""
-
-        async def route(connection: Any) -> None:
-            await (self._handler if _path(connection.request) == LIVE_PATH else theirs)(connection)
-
-        return route
+        self._page, self._policy = page.encode(), policy
 
     def admit(self, connection: Any, request: Any) -> Any:
         """The answer to a request; None opens a socket."""
         host = _only(request, "Host")
+        path = str(request.path).partition("?")[0]
         if host is None or not self._is_ours(host):
             return connection.respond(http.HTTPStatus.MISDIRECTED_REQUEST, "This page has another name.\n")
         if (_only(request, "Upgrade") or "").lower() != "websocket":
-            return self._page_at(connection, _path(request))
+            return self._page_at(connection, path)
         origins = request.headers.get_all("Origin")
         if origins and origins != [f"http://{host}"]:
             return connection.respond(http.HTTPStatus.FORBIDDEN, "Other pages may not drive this rover.\n")
-        asked = ",".join(request.headers.get_all("Sec-WebSocket-Protocol"))
-        if _path(request) != LIVE_PATH and self._protocol not in [one.strip() for one in asked.split(",")]:
-            return connection.respond(http.HTTPStatus.BAD_REQUEST, "Only the page's own client is served.\n")
+        if path != LIVE_PATH:
+            return connection.respond(http.HTTPStatus.NOT_FOUND, "There is nothing here.\n")
         return None
 
     def _is_ours(self, host: str) -> bool:
@@ -197,15 +148,11 @@ class _Guard:
         del response.headers["Content-Length"]
         response.headers["Content-Type"] = "text/html; charset=utf-8"
         response.headers["Content-Length"] = str(len(self._page))
-        response.headers["Content-Security-Policy"] = POLICY
+        response.headers["Content-Security-Policy"] = f"{self._policy}; frame-ancestors 'none'"
         response.headers["X-Content-Type-Options"] = "nosniff"
         response.headers["Referrer-Policy"] = "no-referrer"
         response.headers["Cache-Control"] = "no-store"
         return response
-
-
-def _path(request: Any) -> str:
-    return str(request.path).partition("?")[0]
 
 
 def _only(request: Any, name: str) -> str | None:

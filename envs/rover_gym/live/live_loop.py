@@ -18,6 +18,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from rover_gym.extras import MissingExtraError
 from rover_gym.live.live_commands import (
     Change,
@@ -283,7 +285,7 @@ class LiveLoop:
         env, info = rover.env, rover.info
         simulation, solver = env.simulation, info["solver"]
         positions, rotations = poses_of(rover)
-        velocity = simulation.v
+        velocity, forces, sand = simulation.v, simulation.wheel_forces, simulation.sand()
         factor = math.nan
         if len(self._pace) > 1:
             (first, begin), (last, end) = self._pace[0], self._pace[-1]
@@ -302,7 +304,9 @@ class LiveLoop:
             rotations=rotations,
             heading=float(simulation.q[4]),
             speed=math.hypot(velocity[0], velocity[2]),
-            loads=simulation.wheel_forces[:, 0],
+            wheel_forces=forces,
+            ruts=np.zeros((0, 3)) if sand is None else sand["ruts"],
+            loads=forces[:, 0],
             slip=info["slip_ratio"],
             energy=info["energy"],
             tilt=info["tilt"],

@@ -5,22 +5,22 @@ from __future__ import annotations
 import asyncio
 import json
 import math
-from importlib import resources
+import time
 from itertools import cycle, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rover_gym.env.start import MAX_DIFFICULTY
 from rover_gym.extras import require
-from rover_gym.live.guarded_server import GuardedServer, start_guarded
+from rover_gym.live.guarded_server import GuardedServer
 from rover_gym.live.live_commands import command_of, read_message
 from rover_gym.live.live_rover import ROCK_RADII
 from rover_gym.live.live_scene import GOAL_DISTANCES, GRAVITY
 from rover_gym.live.live_view import LiveView
 from rover_gym.mechanics import CommandError, RoverGymError
 from rover_gym.rendering.appearance import WHEEL_COLOURS
-from rover_gym.replay.player import with_parts
-from rover_gym.validation import checked, number, refuse
+from rover_gym.replay.page import page_parts, page_policy
+from rover_gym.validation import checked, refuse
 
 if TYPE_CHECKING:
     from rover_gym.live.live_loop import LiveLoop
@@ -32,6 +32,10 @@ STATES = 10.0
 #: Most pages at a time.
 MOST_PAGES = 16
 TITLE = "rover live"
+#: With this message a page asks for the scene and its frames, binary.
+WATCH = '{"do":"watch"}'
+#: What the page may do besides showing itself: talk with its own server.
+CONNECTION = "'self'"
 
 
 class LiveServer:
@@ -45,29 +49,27 @@ class LiveServer:
         choices: What may be chosen.
         host: Name or address to listen at; "127.0.0.1" refuses other machines.
         port: Port; 0 for any free one.
-        fps: Pictures of the scene a second, 1 to 60; fewer for a browser that draws slowly.
 
     Attributes:
         address: Where the page is, as a browser takes it.
         view: What the pages see.
 
     Raises:
-        OptionError: There is no such host, the port is in use, or `fps` is out of its range.
-        MissingExtraError: viser is not installed.
+        OptionError: There is no such host, or the port is in use.
+        MissingExtraError: websockets is not installed.
     """
 
-    @checked(loop="LiveLoop", choices="LiveChoices", host=str, port=int, fps=float)
-    def __init__(
-        self, loop: LiveLoop, choices: LiveChoices, *, host: str = "127.0.0.1", port: int = 8765, fps: float = 40.0
-    ) -> None:
-        pictures = number("fps", fps, at_least=1.0, at_most=60.0)
+    @checked(loop="LiveLoop", choices="LiveChoices", host=str, port=int)
+    def __init__(self, loop: LiveLoop, choices: LiveChoices, *, host: str = "127.0.0.1", port: int = 8765) -> None:
         self._loop, self._choices = loop, choices
         self._pages: list[Any] = []
         self._at_wheel: Any = None
-        self._served: GuardedServer = start_guarded(host, port, _page(), self._serve)
+        self.view = LiveView()
+        self._seen: tuple[int, bytes] = (-1, b"")
+        self._is_dark = False
+        page = "".join(page_parts(TITLE, "live", more=CONNECTION))
+        self._served = GuardedServer(host, port, page, page_policy("live", CONNECTION), self._serve)
         self.address = self._served.address
-        self.view = LiveView(self._served.viser, loop, pictures)
-        self.view.start()
 
     @property
     def n_pages(self) -> int:
@@ -76,7 +78,6 @@ class LiveServer:
 
     def stop(self) -> None:
         """Closes the pages' connections and frees the port; the drive goes on."""
-        self.view.stop()
         self._served.stop()
 
     async def _serve(self, page: Any) -> None:
@@ -88,17 +89,21 @@ class LiveServer:
         self._pages.append(page)
         if self._at_wheel is None:
             self._at_wheel = page
-        telling = asyncio.ensure_future(self._tell(page))
+        tasks = {"tell": asyncio.ensure_future(self._tell(page))}
         try:
             await page.send(json.dumps({"choices": self._offer()}))
             async for message in page:
+                if message == WATCH:
+                    tasks.setdefault("show", asyncio.ensure_future(self._show(page)))
+                    continue
                 answer = self._hear(page, message)
                 if answer:
                     await page.send(json.dumps({"error": answer}))
         except closed:
             pass  # the browser has vanished: the command that it gave last runs out
         finally:
-            telling.cancel()
+            for task in tasks.values():
+                task.cancel()
             self._pages.remove(page)
             if self._at_wheel is page:
                 self._at_wheel = None
@@ -127,11 +132,43 @@ class LiveServer:
             while True:
                 state = self._loop.state
                 wheel = "here" if self._at_wheel is page else "free" if self._at_wheel is None else "elsewhere"
-                shown = _plain(state) | {"wheel": wheel, "pages": len(self._pages), "pictures": self.view.frames}
+                shown = _plain(state) | {"wheel": wheel, "pages": len(self._pages)}
                 await page.send(json.dumps({"state": shown}))
                 await asyncio.sleep(1.0 / STATES)
         except closed:
             return
+
+    async def _show(self, page: Any) -> None:
+        """Sends the scene and its frames to a page; a page that is slow gets fewer."""
+        closed = require("websockets.exceptions", "replay").ConnectionClosed
+        shown, last, told = -1, -1, 0
+        try:
+            while True:
+                begin, state = time.perf_counter(), self._loop.state
+                if state.number != last and not self._is_dark and self._follow(state):
+                    last, (number, frame) = state.number, self._seen
+                    if self.view.number != shown:
+                        shown, told = self.view.number, 0
+                        await page.send(self.view.scene)
+                    if number == last:
+                        ruts = bytes(self.view.pressed[told:])
+                        told += len(ruts)
+                        await page.send(frame + ruts)
+                await asyncio.sleep(max(0.0, 0.5 * state.period - (time.perf_counter() - begin)))
+        except closed:
+            return
+
+    def _follow(self, state: LiveState) -> bool:
+        """Makes the frame of a state, once for all pages; returns whether that went well."""
+        if self._seen[0] == state.number:
+            return True
+        try:
+            self.view.follow(state)
+            self._seen = state.number, self.view.frame(state)
+        except Exception as error:  # the drive goes on without its picture, and the user must learn of it
+            self._is_dark = True
+            self._loop.tell(f"the scene is shown no further: {type(error).__name__}: {error}")
+        return not self._is_dark
 
     def _offer(self) -> dict[str, Any]:
         """What the page offers to choose from."""
@@ -182,16 +219,3 @@ def _plain(state: LiveState) -> dict[str, Any]:
 def _short(value: float, digits: int = 3) -> float | None:
     """A number for JSON, which knows neither nan nor infinity."""
     return round(float(value), digits) if math.isfinite(value) else None
-
-
-def _page() -> str:
-    """Viser's client with our panel beside it."""
-    viser = require("viser", "replay")
-    client = Path(viser.__file__).parent / "client" / "build" / "index.html"
-    own = resources.files("rover_gym.live")
-    panel = resources.files("rover_gym.replay").joinpath("panel.css").read_text(encoding="utf-8")
-    style, script, body = (
-        own.joinpath(f"live_page.{ending}").read_text(encoding="utf-8") for ending in ("css", "js", "html")
-    )
-    parts = f"<style>{panel}{style}</style>{body}<script>{script}</script>"
-    return with_parts(client.read_text(encoding="utf-8"), TITLE, parts)

@@ -38,6 +38,8 @@ class LiveState:
         rotations: `(n_solids, 3, 3)` rotation matrices from the solids' frames to the world frame.
         heading: Heading of the trunk, rad.
         speed: Horizontal speed of the trunk's origin, m/s.
+        wheel_forces: `(n_wheels, 3)` force on each wheel along normal, rolling direction and their cross product, N.
+        ruts: `(n, 3)` place x and z and depth of each cell of sand that a wheel has pressed down, m.
         loads: `(n_wheels,)` normal force on each wheel, N.
         slip: Mean slip ratio of the wheels in contact.
         energy: Work of the wheel motors since the start, braking counted, J.
@@ -70,6 +72,8 @@ class LiveState:
     rotations: Array
     heading: float
     speed: float
+    wheel_forces: Array
+    ruts: Array
     loads: Array
     slip: float
     energy: float

@@ -1,151 +1,101 @@
-"""The scene of a live drive in viser: rocks and ground are sent once, then what moves, thirty times a second.
-
-Between two control periods the poses are interpolated, so that the picture is one period behind and does not jerk.
-"""
+"""The scene of a live drive for the player: ground, rocks and rover once a world, then a frame each control period."""
 
 from __future__ import annotations
 
-import threading
-import time
-from typing import TYPE_CHECKING, Any
+import struct
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.ground import sand_of
 from rover_gym.mechanics import sin_cos
 from rover_gym.record.rover_run import RoverRun
 from rover_gym.record.trajectory import Trajectory
-from rover_gym.replay.player import add_surroundings, quaternions, shortened
-from rover_gym.replay.scenery import first_view
-from rover_gym.replay.vrml import add_ground, add_rover
+from rover_gym.replay.page_scene import FrameChannel, PageScene
+from rover_gym.replay.rover_scene import bare_scene, poses_of
+from rover_gym.replay.wheel_marks import RUT_CELL, DrawnWheel, RutMap, feet, world_forces
 
 if TYPE_CHECKING:
-    from rover_gym.live.live_loop import LiveLoop
     from rover_gym.live.live_state import LiveState
 
 REACH = 25.0  # m of ground around start and goal
 NEAR_EDGE = 8.0  # m from the edge of that ground, where it is laid anew
-#: The eye comes after the rover with this time constant, s.
-FOLLOW_TIME = 0.4
-#: Movement that nobody sees, m and parts of a turn: such poses are not sent.
-STILL = 2e-4
+
+#: What a binary message is: its kind, the number of its scene, and the simulated time, s.
+HEAD = struct.Struct("<IId")
+SCENE, FRAME = 1, 2
+#: A cell that a wheel presses down, after the frame's channels: its number and its level.
+RUT = np.dtype([("cell", "<u4"), ("level", "<u4")])
+DEEPEST = 0.25  # m, of a rut
 
 Array = npt.NDArray[np.float64]
 
 
 class LiveView:
-    """Shows the states of a loop in a viser server, from a thread of its own.
-
-    Args:
-        server: The viser server.
-        loop: The drive.
-        fps: Pictures a second, at most.
+    """Turns states into messages for the pages.
 
     Attributes:
-        frames: How many pictures have been sent.
+        number: Number of the scene; another one is another ground or rover.
+        scene: The scene as a message.
+        pressed: The cells of sand that became deeper, in order: cell and level of 255, each as `RUT` has them.
     """
 
-    def __init__(self, server: Any, loop: LiveLoop, fps: float) -> None:
-        self._server, self._loop, self._fps = server, loop, fps
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="live view", daemon=True)
-        self._world_shown = -1
-        self._frame: Any = None
-        self._solids: list[Any] = []
-        self._shown: tuple[Array, Array] | None = None
-        self._centre: Array = np.zeros(3)
-        self._middle: Array = self._centre
-        self.frames = 0
-        add_surroundings(server.scene)
+    def __init__(self) -> None:
+        self.number, self.scene, self.pressed = 0, b"", bytearray()
+        self._ruts: RutMap | None = None
+        self._drawn = 0
+        self._world = -1
+        self._middle: Array = np.zeros(3)
+        self._wheels: list[DrawnWheel] = []
 
-    def start(self) -> None:
-        """Shows the present state and starts the thread."""
-        self.show(self._loop.state, None, 1.0)
-        self._thread.start()
+    def follow(self, state: LiveState) -> None:
+        """Builds the scene of a state, if it is another one or the rover has come near its edge."""
+        away = np.abs(state.positions[0] - self._middle).max()
+        if state.world == self._world and away <= REACH - NEAR_EDGE:
+            return
+        scene, self._wheels = bare_scene(_standing(state))
+        scene.channels = self._channels(state)
+        scene.facts |= {"period": state.period}
+        self._ruts, self._drawn, self.pressed = None, 0, bytearray()
+        if sand_of(state.terrain) is not None:
+            middle = state.positions[0][[0, 2]]
+            self._ruts = RutMap(middle - REACH, middle + REACH, RUT_CELL, DEEPEST)
+            scene.facts["ruts"] = self._ruts.header()
+        self._world, self._middle = state.world, state.positions[0].copy()
+        self.number += 1
+        self.scene = HEAD.pack(SCENE, self.number, state.time) + scene.message()
 
-    def stop(self) -> None:
-        """Ends the thread."""
-        self._stopping.set()
-        self._thread.join()
+    def frame(self, state: LiveState) -> bytes:
+        """A state as a frame of the scene; the cells that it presses down go to `pressed`."""
+        if self._ruts is not None and len(state.ruts) > self._drawn:
+            cells, levels = self._ruts.press(state.ruts[:, :2], state.ruts[:, 2])
+            self.pressed += np.array(list(zip(cells, levels, strict=True)), dtype=RUT).tobytes()
+            self._drawn = len(state.ruts)
+        moved = PageScene("rover", {}, 1.0, channels=self._channels(state))
+        return HEAD.pack(FRAME, self.number, state.time) + moved.whole()
 
-    def _run(self) -> None:
-        try:
-            self._follow()
-        except Exception as error:  # the drive goes on without its picture, and the user must learn of it
-            self._loop.tell(f"the scene is shown no further: {type(error).__name__}: {error}")
+    def _channels(self, state: LiveState) -> list[FrameChannel]:
+        run = _Moment(state)
+        points, normals, across = feet(run, self._wheels)
+        share = state.model.mass * state.scene.gravity / max(1, len(self._wheels))
+        forces = np.clip(world_forces(run, normals, across) / share, -1e4, 1e4)
+        return [
+            *poses_of(run.positions, run.rotations),
+            FrameChannel.fine("centre", run.positions[:, :1]),
+            FrameChannel.fine("forces", np.concatenate((points, forces), axis=2)),
+        ]
 
-    def _follow(self) -> None:
-        before = now = self._loop.state
-        since = due = time.perf_counter()
-        while not self._stopping.is_set():
-            state = self._loop.state
-            at = time.perf_counter()
-            if state.number != now.number:
-                before, now, since = now, state, at
-            share = min(1.0, (at - since) / now.period)
-            self.show(now, before if before.world == now.world else None, share)
-            due = max(due + 1.0 / self._fps, at)
-            self._stopping.wait(max(0.0, due - time.perf_counter()))
 
-    def show(self, state: LiveState, before: LiveState | None, share: float) -> None:
-        """Sends a picture.
+class _Moment(RoverRun):
+    """A state as a run of one sample."""
 
-        Args:
-            state: The present state.
-            before: The one before it, of the same world; None to show the present one.
-            share: How far between the two, 0 to 1.
-        """
-        places, turns = state.positions, quaternions(state.rotations)
-        if before is not None:
-            places = before.positions + share * (places - before.positions)
-            turns = _between(quaternions(before.rotations), turns, share)
-        with self._server.atomic():
-            away = np.abs(state.positions[0] - self._middle).max()
-            if state.world != self._world_shown or away > REACH - NEAR_EDGE:
-                self._build(state)
-            self._place(places, turns)
-        self.frames += 1
-
-    def _place(self, places: Array, turns: Array) -> None:
-        """Sends the poses that have changed."""
-        centre = places[0]
-        gap = centre - self._centre
-        if np.abs(gap).max() > STILL:
-            share = 1.0 if np.abs(gap).max() > 3.0 else 1.0 - np.exp(-1.0 / (self._fps * FOLLOW_TIME))
-            self._centre = self._centre + share * gap
-            self._frame.position = shortened(-self._centre)
-        if self._shown is None:
-            moved = turned = np.ones(len(places), dtype=bool)
-            self._shown = places.copy(), turns.copy()
-        else:
-            moved = np.abs(places - self._shown[0]).max(axis=1) > STILL
-            apart = [np.abs(turns + sign * self._shown[1]).max(axis=1) for sign in (-1.0, 1.0)]
-            turned = np.minimum(*apart) > STILL
-        for i in np.flatnonzero(moved):
-            self._solids[i].position = shortened(places[i])
-            self._shown[0][i] = places[i]
-        for i in np.flatnonzero(turned):
-            self._solids[i].wxyz = shortened(turns[i])
-            self._shown[1][i] = turns[i]
-
-    def _build(self, state: LiveState) -> None:
-        """Builds the scene of a world anew."""
-        scene = self._server.scene
-        if self._frame is not None:
-            self._frame.remove()
-        run = _standing(state)
-        self._frame = scene.add_frame("/world", show_axes=False)
-        self._solids = add_rover(scene, run)
-        add_ground(scene, run)
-        self._shown, self._centre = None, state.positions[0].copy()
-        self._middle = self._centre
-        self._frame.position = shortened(-self._centre)
-        if self._world_shown < 0:
-            view = first_view(run)
-            self._server.initial_camera.position = view.eye - state.positions[0]
-            self._server.initial_camera.look_at = view.target - state.positions[0]
-            self._server.initial_camera.fov = view.field_of_view
-        self._world_shown = state.world
+    def __init__(self, state: LiveState) -> None:
+        data = {"time": np.zeros(1), "wheel_forces": state.wheel_forces[None]}
+        super().__init__(
+            Trajectory(data, {}, {}, state.terrain), state.model, state.terrain, state.goal, "a live drive"
+        )
+        self.__dict__["_poses"] = state.positions[None], state.rotations[None]
 
 
 def _standing(state: LiveState) -> RoverRun:
@@ -158,11 +108,3 @@ def _standing(state: LiveState) -> RoverRun:
     q[:, 1], q[:, 4] = state.positions[0][1], state.heading
     trajectory = Trajectory({"q": q, "time": np.zeros(len(q))}, {}, {}, state.terrain)
     return RoverRun(trajectory, state.model, state.terrain, state.goal, "a live drive")
-
-
-def _between(first: Array, last: Array, share: float) -> Array:
-    """Quaternions `(n, 4)` between two close ones."""
-    near = np.where((first * last).sum(axis=1, keepdims=True) < 0.0, -first, first)
-    mixed = near + share * (last - near)
-    result: Array = mixed / np.linalg.norm(mixed, axis=1, keepdims=True)
-    return result

@@ -30,7 +30,7 @@ from rover_gym.policy.policy_card import PolicyCard, PolicyError, find_policy, p
 from rover_gym.policy.scan_policy import ScanPolicy
 from rover_gym.policy.trained_policy import TrainedPolicy
 from rover_gym.record.channels import outcome_words
-from rover_gym.rendering.frames import captioned
+from rover_gym.rendering.caption import captioned
 from rover_gym.rendering.render_options import VideoWriter
 from rover_gym.validation import refuse
 

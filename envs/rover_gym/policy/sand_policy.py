@@ -13,7 +13,8 @@ Sand bears a wheel that climbs only up to some slope. Where the way to the goal 
 goes at the angle gamma to the direction of steepest ascent, `cos(gamma) = tan(steepest) / tan(slope)`, on the side of
 the goal, and changes sides once it can reach the goal on the other one (as a ship tacks). It steers by its course, not
 its heading, since it also slides downhill. It turns by driving backward: forward, a wheel that is steered uphill digs
-itself in.
+itself in. How steep a way sand bears depends on the sand: while a rover climbs more slowly than `slow`, its way becomes
+flatter, down to `flattest`.
 
 A rover whose trunk has hardly moved while its wheels turned is stuck. It drives back out of its ruts, whose sand is
 compacted, and goes on to one side of its way, the next time to the other.
@@ -56,6 +57,9 @@ class SandGains:
     Attributes:
         speed: Rim speed on a straight path, m/s.
         steepest: Steepest way that is taken straight, degrees.
+        flattest: Steepest way in sand that bears the rover badly, degrees.
+        slow: A rover in a zigzag that is slower in the mean than this part of `speed` takes a flatter way.
+        flatter: By how much, degrees a second.
         turn: Height along the slope that a turn in a zigzag costs, m.
         stuck: A rover that is slower in the mean than this part of `speed` is stuck.
         memory: Time constant of that mean, s.
@@ -66,6 +70,9 @@ class SandGains:
 
     speed: float = 0.3
     steepest: float = 14.0
+    flattest: float = 11.0
+    slow: float = 0.2
+    flatter: float = 0.5
     turn: float = 1.5
     stuck: float = 0.07
     memory: float = 3.0
@@ -142,8 +149,9 @@ class SandPolicy:
         given = array("observation", observation, error=StateError)
         check_observed(given, self._size)
         rows = np.atleast_2d(given).astype(np.float32)
-        # Mean speed, time left of a manoeuvre, side of the last one, side of the zigzag, whether it turns backward.
-        fresh = np.tile([self.gains.speed, 0.0, 1.0, 0.0, 0.0], (len(rows), 1))
+        # Mean speed, time left of a manoeuvre, side of the last one, side of the zigzag, whether it turns backward, and
+        # steepest way, degrees.
+        fresh = np.tile([self.gains.speed, 0.0, 1.0, 0.0, 0.0, self.gains.steepest], (len(rows), 1))
         memory = fresh if state is None else state[0].copy()
         if episode_start is not None:
             starts = np.broadcast_to(episode_start, len(rows))
@@ -160,7 +168,7 @@ class SandPolicy:
         gains = self.gains
         ahead, left = row[self._goal], -row[self._goal + 1]
         forward, sideways = row[self._ahead], -row[self._ahead + 2]
-        speed, timer, side, _, _ = memory.tolist()
+        speed, timer, side, _, _, _ = memory.tolist()
         speed += min(1.0, self._dt / gains.memory) * (math.hypot(forward, sideways) - speed)
         if timer <= 0.0 and speed < gains.stuck * gains.speed:
             timer, memory[2] = gains.back + gains.aside, -side
@@ -175,6 +183,8 @@ class SandPolicy:
             return ahead, left
         direction = math.remainder(direction, math.tau)
         memory[4] = is_steep and abs(direction) > (TURNS_TO if memory[4] else TURNS_FROM)
+        if is_steep and timer <= 0.0 and not memory[4] and speed < gains.slow * gains.speed:
+            memory[5] = max(min(gains.flattest, gains.steepest), memory[5] - gains.flatter * self._dt)
         if memory[4]:
             return -LOOK_AHEAD, math.copysign(LOOK_AHEAD, -direction)
         if math.hypot(forward, sideways) > DRIFTING and forward > 0.0:
@@ -191,7 +201,7 @@ class SandPolicy:
         (sin_roll, cos_roll), (sin_pitch, cos_pitch) = sin_cos(row[self._roll]), sin_cos(row[self._pitch])
         uphill = atan2(sin_roll, sin_pitch * cos_roll)
         rise = math.hypot(sin_roll, sin_pitch * cos_roll) / max(cos_pitch * cos_roll, 1e-3)
-        sine, cosine = sin_cos(math.radians(self.gains.steepest))
+        sine, cosine = sin_cos(math.radians(memory[5]))
         most = sine / cosine / max(rise, 1e-9)
         if most >= 1.0:
             memory[3] = 0.0

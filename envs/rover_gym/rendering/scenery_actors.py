@@ -13,9 +13,8 @@ from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLSphereMapper
 from rover_gym.ground import heights_of, plane_of, triangles_of
 from rover_gym.mechanics import HeightField, Plane, Terrain, TriangleMesh
 from rover_gym.rendering import appearance as look
-from rover_gym.rendering.appearance import (
-    FIXED_BALL_COLOUR,
-    SAND_COLOUR,
+from rover_gym.rendering.appearance import FIXED_BALL_COLOUR, SAND_COLOUR
+from rover_gym.rendering.vtk_actors import (
     Array,
     actor_of,
     actor_with,

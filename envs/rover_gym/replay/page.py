@@ -1,114 +1,45 @@
-"""A saved run as a browser page, one file that needs no network; a rover's has 3D view, timeline and curves."""
+"""A saved run as a browser page, one file that needs no network: the scene with a timeline and curves."""
 
 from __future__ import annotations
 
-from itertools import cycle
+import base64
+import hashlib
+import html
+import zlib
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-import numpy.typing as npt
-
 from rover_gym.grains.grain_run import GrainRun
 from rover_gym.planar.planar_run import PlanarRun
-from rover_gym.record.channels import outcome_words
 from rover_gym.record.rover_run import RoverRun
-from rover_gym.rendering.appearance import WHEEL_COLOURS
-from rover_gym.replay.flat_page import planar_page, soil_page
-from rover_gym.replay.grain_page import grain_page
-from rover_gym.replay.player import (
-    FOLLOW_TIME,
-    Chart,
-    continuous,
-    load_chart,
-    moving_mean,
-    panel_contents,
-    quaternions,
-    recorded_page,
-    shortened,
-    with_panel,
-)
-from rover_gym.replay.scenery import first_view, trunk_path
-from rover_gym.replay.vrml import add_ground, add_rover
+from rover_gym.replay.flat_scene import planar_scene, soil_scene
+from rover_gym.replay.grain_scene import grain_scene
+from rover_gym.replay.page_scene import SAMPLES
+from rover_gym.replay.rover_scene import rover_scene
 from rover_gym.soil.soil_run import SoilRun
 from rover_gym.validation import checked
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Iterable, Iterator
 
-    from rover_gym.record.rover_run import RoverRun
     from rover_gym.runs import SavedRun
 
+#: The player's scripts, in order; what plays comes last.
+SCRIPTS = (
+    "three.min.js",
+    "scene.js",
+    "view.js",
+    "ruts.js",
+    "grains.js",
+    "overlays.js",
+    "eye.js",
+    "curves.js",
+    "stage.js",
+)
 
-WHEEL_NAMES = {
-    "FL": "front left",
-    "FR": "front right",
-    "ML": "middle left",
-    "MR": "middle right",
-    "BL": "back left",
-    "BR": "back right",
-}
-LONGEST_FACT = 100
-
-Array = npt.NDArray[np.float64]
-
-
-def rover_page(run: RoverRun, *, follow: bool) -> str:
-    """A rover's run as a page."""
-    view, centre = first_view(run), np.zeros((run.n_frames, 3))
-    if follow:
-        centre = moving_mean(run.time, trunk_path(run), FOLLOW_TIME)
-    turns = continuous(quaternions(run.rotations))
-
-    def build(scene: Any) -> Callable[[int], None]:
-        solids = add_rover(scene, run)
-        add_ground(scene, run)
-
-        def show(frame: int) -> None:
-            for i, solid in enumerate(solids):
-                solid.position = shortened(run.positions[frame, i])
-                solid.wxyz = shortened(turns[frame, i])
-
-        return show
-
-    page = recorded_page(run, centre, build, view.eye - centre[0], view.target - centre[0], view.field_of_view)
-    return with_panel(page, _curves(run))
-
-
-def facts(run: RoverRun) -> list[str]:
-    """What the run was, for the panel: its ground, seed, difficulty and outcome, as far as the file says them."""
-    attributes = run.trajectory.attributes
-    scene = attributes.get("scene", {})
-    terrain, seed, outcome = scene.get("terrain"), attributes.get("seed"), attributes.get("outcome")
-    rocks = scene.get("rocks")
-    difficulty = rocks.get("difficulty") if isinstance(rocks, dict) else None
-    slope = scene.get("slope")
-    told = [
-        f"scene: {terrain}" if isinstance(terrain, str) else None,
-        f"slope: {np.degrees(slope):.1f} degrees" if isinstance(slope, float) and slope else None,
-        f"seed: {seed}" if isinstance(seed, (int, np.integer)) else None,
-        f"difficulty: {difficulty:.2g}" if isinstance(difficulty, float) else None,
-        f"outcome: {outcome_words(str(outcome))}" if outcome is not None else None,
-    ]
-    return [fact[:LONGEST_FACT] for fact in told if fact is not None]
-
-
-def _curves(run: RoverRun) -> dict[str, Any]:
-    """Contents of the panel."""
-    data = run.trajectory
-    wheels = [
-        (WHEEL_NAMES.get(name, name), colour)
-        for name, colour in zip(run.model.wheel_names, cycle(WHEEL_COLOURS), strict=False)
-    ]
-    charts = [
-        load_chart("wheel load", run.time, data["wheel_forces"][:, :, 0], 0, wheels),
-        Chart("wheel gap", "mm", 1e3 * data["wheel_gaps"], 2, wheels),
-    ]
-    return panel_contents(run.title, run.time, charts, facts(run))
-
-
-#: What makes the page, whole or in pieces, of each kind of run.
-VIEWS: dict[type, Any] = {RoverRun: rover_page, PlanarRun: planar_page, SoilRun: soil_page, GrainRun: grain_page}
+#: What makes the scene of each kind of run.
+SCENES: dict[type, Any] = {RoverRun: rover_scene, PlanarRun: planar_scene, SoilRun: soil_scene, GrainRun: grain_scene}
 
 
 @checked(run=("RoverRun", "PlanarRun", "SoilRun", "GrainRun"), path=Path, follow=bool)
@@ -123,12 +54,66 @@ def write_page(run: SavedRun, path: str | Path, *, follow: bool = True) -> Path:
 
     Raises:
         RecordingError: The recording is damaged.
-        MissingExtraError: viser is not installed, which pages of balls do not need.
         OSError: The file cannot be written.
     """
-    page = VIEWS[type(run)](run, follow=follow)
+    scene = SCENES[type(run)](run, follow=follow)
+    scene.facts |= {
+        "time": [round(float(time - run.time[0]), 6) for time in run.time],
+        "samples": SAMPLES,
+        "pieces": -(-run.n_frames // SAMPLES),
+    }
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w", encoding="utf-8") as file:
-        file.writelines([page] if isinstance(page, str) else page)
+        file.writelines(page_parts(run.title, "recorded", _packed(scene.message(), scene.pieces(run.n_frames))))
     return path
+
+
+def page_parts(title: str, kind: str, contents: Iterable[str] = (), more: str = "") -> Iterator[str]:
+    """A page of the player in parts, whose policy lets it load nothing and run no script but its own.
+
+    Args:
+        title: The page's title.
+        kind: "recorded" or "live".
+        contents: Elements that hold data.
+        more: Where else the page may connect to, in the words of its policy.
+    """
+    yield f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}</title>'
+    yield f'<meta http-equiv="Content-Security-Policy" content="{page_policy(kind, more)}">'
+    yield '<meta name="viewport" content="width=device-width,initial-scale=1">'
+    yield f"<style>{player_file('page.css')}</style></head><body>{player_file(f'{kind}.html')}"
+    yield from contents
+    for name in (*SCRIPTS, f"{kind}.js"):
+        yield f"<script>{player_file(name)}</script>\n"
+    yield "</body></html>\n"
+
+
+def page_policy(kind: str, more: str = "") -> str:
+    """The content security policy of a page: its own scripts, by their hashes, and nothing from elsewhere."""
+    scripts = [player_file(name) for name in (*SCRIPTS, f"{kind}.js")]
+    hashes = [base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts]
+    own = " ".join(f"'sha256-{one}'" for one in hashes)
+    rules = [
+        "default-src 'none'",
+        f"script-src {own}",
+        "style-src 'unsafe-inline'",
+        f"connect-src data: {more}".strip(),
+    ]
+    return "; ".join((*rules, "base-uri 'none'", "form-action 'none'"))
+
+
+def player_file(name: str) -> str:
+    """The text of a file of the player."""
+    return resources.files("rover_gym.replay").joinpath("player", name).read_text(encoding="utf-8")
+
+
+def _packed(message: bytes, pieces: Iterable[bytes]) -> Iterator[str]:
+    """The scene and the pieces of its frames as elements that no browser shows."""
+    yield _element("scene", message)
+    for i, piece in enumerate(pieces):
+        yield _element(f"piece-{i}", piece)
+
+
+def _element(name: str, content: bytes) -> str:
+    packed = base64.b64encode(zlib.compress(content, 6)).decode()
+    return f'<script type="application/octet-stream" id="{name}">{packed}</script>\n'

@@ -22,7 +22,7 @@ from rover_gym.rendering.appearance import (
     part_mesh,
     rover_parts,
 )
-from rover_gym.replay.player import quaternions
+from rover_gym.replay.rotations import quaternions
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -104,14 +104,14 @@ def spheres(run: RoverRun) -> tuple[Array, Array]:
     """Centres (n, 3) and radii (n,) of the ground's spheres, m: on a map those of the piece that is shown."""
     centres, radii = spheres_of(run.terrain)
     if ground_plane(run) is None and any(isinstance(surface, HeightField) for surface in surfaces_of(run.terrain)):
-        low, high = _surroundings(run)
+        low, high = surroundings(run)
         places = centres[:, [0, 2]]
         near = ((low <= places) & (places <= high)).all(axis=1)
         return centres[near], radii[near]
     return centres, radii
 
 
-def _surroundings(run: RoverRun) -> tuple[Array, Array]:
+def surroundings(run: RoverRun) -> tuple[Array, Array]:
     """Least and largest x and z of the ground around path and goal, m."""
     places = trunk_path(run)[:, [0, 2]]
     if run.goal is not None:
@@ -121,7 +121,7 @@ def _surroundings(run: RoverRun) -> tuple[Array, Array]:
 
 def surfaces(run: RoverRun) -> list[tuple[Array, list[tuple[Colour, Triangles]]]]:
     """Height fields around the path, in squares of two colours, and meshes: vertices (n, 3), m, triangles by colour."""
-    low, high = _surroundings(run)
+    low, high = surroundings(run)
     pieces: list[tuple[Array, list[tuple[Colour, Triangles]]]] = []
     for surface in surfaces_of(run.terrain):
         vertices, faces = triangles_of(surface, low, high, MOST_HEIGHTS)

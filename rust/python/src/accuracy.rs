@@ -50,7 +50,7 @@ pub fn chosen(given: &Named<'_>) -> Result<Accuracy> {
     parse(&accuracy)
 }
 
-/// The options of `Simulation` that an accuracy stands for.
+/// Options of `Simulation` for a given accuracy.
 ///
 /// Args:
 ///     accuracy: "fast", "balanced" or "reference", or the error allowed on a path of 20 m on flat
@@ -60,7 +60,7 @@ pub fn chosen(given: &Named<'_>) -> Result<Accuracy> {
 ///     The keyword arguments `time_step` (s), `variant` and `tolerance`.
 ///
 /// Raises:
-///     OptionError: The name is unknown, or the error is finer than any choice of options gives.
+///     OptionError: The name is unknown, or no options reach the given error.
 #[pyfunction]
 pub fn accuracy_options<'py>(
     py: Python<'py>,

@@ -97,7 +97,7 @@ pub struct Named<'py> {
 }
 
 impl<'py> Named<'py> {
-    /// Keyword arguments, which are read once each; what is left at [`Self::finish`] is unknown.
+    /// Keyword arguments, each of which is read once. Those left at [`Self::finish`] are unknown.
     pub fn keywords(py: Python<'py>, given: Option<&Bound<'py, PyDict>>) -> Result<Self> {
         let given = given.map_or_else(|| Ok(PyDict::new(py)), pyo3::types::PyDictMethods::copy)?;
         Ok(Self {
@@ -128,7 +128,7 @@ impl<'py> Named<'py> {
         }
     }
 
-    /// Refuses what has not been read.
+    /// Raises an error for arguments that have not been read.
     pub fn finish(self) -> Result<()> {
         match self.given.try_iter()?.next() {
             None => Ok(()),
@@ -145,7 +145,7 @@ impl<'py> Named<'py> {
             .map_or_else(|| name.to_owned(), |outer| format!("{outer}.{name}"))
     }
 
-    /// The error of a value that is not what it must be.
+    /// The error for an invalid value.
     pub fn refused(&self, value: &Bound<'_, PyAny>, name: &str, what: &str) -> BorderError {
         refused(value, self.kind, &self.path(name), what)
     }
@@ -239,7 +239,7 @@ pub fn shown(value: &Bound<'_, PyAny>) -> String {
     repr.chars().take(SHOWN).chain("…".chars()).collect()
 }
 
-/// The error of a value that is not what it must be.
+/// The error for an invalid value.
 pub fn refused(value: &Bound<'_, PyAny>, kind: Kind, field: &str, what: &str) -> BorderError {
     kind.error(
         field,

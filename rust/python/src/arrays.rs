@@ -8,8 +8,8 @@ use pyo3::types::PyString;
 use crate::arguments::{number, refused, shown};
 use crate::errors::{BorderError, Kind, Result, Value};
 
-/// Most entries of what is no array, such as lists, nested lists and ranges. Each becomes a Python
-/// object of its own before numpy has an array of them.
+/// Largest number of entries of a list, a nested list or a range. Each entry becomes a Python
+/// object before NumPy makes an array of them.
 const MOST_LISTED: usize = 1 << 24;
 
 /// Deepest nesting whose entries are counted.

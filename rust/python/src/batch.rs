@@ -14,16 +14,16 @@ use crate::reading::{place, scan_points, slices};
 use crate::shared::{Open, Shared, Watch};
 use crate::simulation::{Origin, Simulation};
 
-/// Many rovers stepped side by side on several threads, each bit for bit as it would be alone.
+/// Steps many rovers on several threads. Each gives the same bits as it would alone.
 ///
-/// The batch copies the simulations. One call at a time: a call during another one raises
+/// The batch copies the simulations. Only one call may run at a time; a second call raises
 /// BusyError.
 ///
 /// Args:
-///     simulations: Simulations of models with equally many coordinates.
+///     simulations: Simulations whose models have the same number of coordinates.
 ///     scan: Points of the height scan ahead and to the right of the trunk's origin in the heading
 ///         frame, (n, 2), m; none by default.
-///     threads: Number of threads; one a core by default.
+///     threads: Number of threads; one for each core by default.
 ///
 /// Raises:
 ///     OptionError: There are no simulations or their models differ in size, `scan` has a wrong
@@ -92,14 +92,17 @@ impl SimulationBatch {
         Ok(self.0.open()?.inner.threads())
     }
 
-    /// Either "AVX-512", "AVX2" or "baseline", as the processor has it.
+    /// Instruction set of the processor: "AVX-512", "AVX2" or "baseline".
+    ///
+    /// The widest that the processor has, unless the environment variable `ROVER_GYM_INSTRUCTIONS`
+    /// names another. Results do not depend on it.
     #[getter]
     #[allow(clippy::unused_self)] // a property in Python
     fn instruction_set(&self) -> &'static str {
         Instructions::of_this_machine().name()
     }
 
-    /// Place of each quantity in a row of readings; `Simulation.reading_layout` lists them.
+    /// The slice of each quantity in a row of readings; see `Simulation.reading_layout`.
     #[getter]
     fn reading_layout<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         slices(py, self.0.open()?.inner.layout())
@@ -107,21 +110,22 @@ impl SimulationBatch {
 
     /// Sets the commands of all rovers and takes n steps.
     ///
-    /// Ctrl-C ends the call after a whole step of each rover, which need not be the same one.
+    /// Ctrl-C ends the call after the current step of each rover. The rovers may then have taken
+    /// different numbers of steps.
     ///
     /// Args:
-    ///     torques: Commands as of `Simulation.set_wheel_torques`, (n_rovers, n_wheels), N m.
-    ///     set_points: Commands as of `Simulation.set_steering`, (n_rovers, n_wheels), rad.
+    ///     torques: Commands for `Simulation.set_wheel_torques`, (n_rovers, n_wheels), N m.
+    ///     set_points: Commands for `Simulation.set_steering`, (n_rovers, n_wheels), rad.
     ///     n: Number of steps.
-    ///     active: Which rovers move, (n_rovers,); all by default. The others stay as they are.
+    ///     active: Which rovers move, (n_rovers,); all by default. The others do not change.
     ///
     /// Returns:
-    ///     A row of readings for each rover, (n_rovers, size), and the message of the StepError of
-    ///     each rover that could not take a step, by its index. The other rovers go on.
+    ///     A row of readings for each rover, (n_rovers, size), and a mapping from the index of each
+    ///     rover whose step failed to the message of its StepError. The other rovers continue.
     ///
     /// Raises:
-    ///     CommandError: An array has a wrong shape or an entry that a rover refuses. No rover has
-    ///         moved.
+    ///     CommandError: An array has a wrong shape or an entry that is invalid for a rover. No
+    ///         rover has moved.
     ///     OptionError: `n` or `active` is invalid.
     #[pyo3(signature = (torques, set_points, n = Given::MISSING, *, active = None),
         text_signature = "($self, torques, set_points, n=1, *, active=None)")]
@@ -166,13 +170,13 @@ impl SimulationBatch {
         Ok(Array::shaped(rows, &shape))
     }
 
-    /// Puts a copy of a simulation, with its own terrain, in the place of a rover.
+    /// Replaces a rover by a copy of a simulation, with its terrain.
     ///
     /// Args:
     ///     index: Index of the rover.
-    ///     simulation: Its replacement, a model with equally many coordinates.
-    ///     target: The place (x, z) on the map that its readings refer to, m; the origin by
-    ///         default.
+    ///     simulation: The new simulation, with the same number of coordinates.
+    ///     target: Place (x, z) to which the entry `target` of its readings refers, m; the origin
+    ///         by default.
     ///
     /// Raises:
     ///     OptionError: There is no such rover, or an argument is invalid. Nothing has changed.

@@ -90,7 +90,8 @@ pub fn grains<const D: usize>(
         .map_err(|e| grain_error(&e))?)
 }
 
-/// Refuses coordinates that are not one row for each grain. `noun`: what a grain is called.
+/// Checks that there is one row of coordinates for each grain. `noun`: "disk" or "ball", for the
+/// message.
 pub fn check_rows(noun: &str, n: usize, q: &[f64]) -> Result<(), BorderError> {
     let count = q.len() / COORDINATES;
     if count == n {

@@ -64,18 +64,19 @@ fn frames<const D: usize>(rows: impl Iterator<Item = [[f64; D]; D]>) -> Array {
     Array::shaped(values, &[n, D, D])
 }
 
-/// The contacts of a rover's last step, as new arrays with one row a contact.
+/// Contacts of a rover in the last step, as new arrays with one row for each contact.
 #[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
 pub struct Contacts {
-    /// Names of the solids that touch, and of the joints that are at a stop.
+    /// Name of the solid in each contact, or of the joint that is at its stop.
     bodies: Vec<String>,
-    /// What touches in each contact, "wheel", "box" or "sphere"; "limit" for a joint's stop.
+    /// Kind of each contact, "wheel", "box" or "sphere"; "limit" for a joint's stop.
     ///
-    /// The point of a stop is the origin of the solid that the joint carries, its normal is the
-    /// joint's axis that opens the gap. Along it, at a revolute joint, the gap is in rad, the
-    /// impulse in N m s and the velocity in rad/s; tangential entries are zero.
+    /// For a stop, the contact point is the origin of the solid that the joint carries, and the
+    /// normal is the joint's axis in the direction that opens the gap. At a revolute joint, gap,
+    /// impulse and velocity along the normal are in rad, N m s and rad/s. Tangential entries are
+    /// zero.
     kinds: Vec<&'static str>,
-    /// Indices of the wheels that touch, (n,); -1 where it is another solid or a joint's stop.
+    /// Index of the wheel in each contact, (n,); -1 for another solid or a joint's stop.
     wheels: Array<i64>,
     /// Contact points, world frame, (n, 3), m.
     points: Array,
@@ -83,11 +84,11 @@ pub struct Contacts {
     ///
     /// Rows are the unit vectors n (normal), t (rolling direction) and b (lateral).
     frames: Array,
-    /// Gaps, (n,), m, at the configuration where the step evaluated the contacts.
+    /// Gaps, (n,), m, at the configuration in which the step detected the contacts.
     gaps: Array,
     /// Impulses of the step along n, t, b, (n, 3), N s.
     ///
-    /// Where the step was split, they are sums over its parts.
+    /// If the step was split, these are sums over its parts.
     impulses: Array,
     /// Relative velocities after the step along n, t, b, (n, 3), m/s.
     velocities: Array,
@@ -132,10 +133,10 @@ impl Contacts {
     }
 }
 
-/// The contacts of a planar simulation's last step, as new arrays with one row a contact.
+/// Contacts of a planar simulation in the last step, as new arrays with one row for each contact.
 #[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
 pub struct PlanarContacts {
-    /// Indices of the discs that touch, (n,); 0 is the ball or wheel A, 1 wheel B.
+    /// Index of the disc in each contact, (n,); 0 is the ball or wheel A, 1 is wheel B.
     discs: Array<i64>,
     /// Points of the ground, world frame, (n, 2), m.
     points: Array,
@@ -145,7 +146,7 @@ pub struct PlanarContacts {
     gaps: Array,
     /// Impulses of the step along normal and tangent, (n, 2), N s.
     ///
-    /// Where the step was split, they are sums over its parts.
+    /// If the step was split, these are sums over its parts.
     impulses: Array,
     /// Velocities of the rim after the step along normal and tangent, (n, 2), m/s.
     velocities: Array,
@@ -186,13 +187,13 @@ impl PlanarContacts {
     }
 }
 
-/// The contacts of the last step of grains, as new arrays with one row a contact.
+/// Contacts of grains in the last step, as new arrays with one row for each contact.
 ///
-/// Vectors have D entries: 2 of disks in the plane, 3 of balls in space. Contacts between sleeping
-/// grains are left out.
+/// Vectors have D entries: 2 for disks, 3 for balls. Contacts between sleeping grains are not
+/// included.
 #[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
 pub struct GrainContacts {
-    /// Numbers of both bodies, (n, 2), grains from 0, then wheels; -1 for a wall or the ground.
+    /// Indices of both bodies, (n, 2): grains from 0, then wheels; -1 for a wall or the ground.
     bodies: Array<i64>,
     /// Points of the first body's surface, (n, D), m.
     points: Array,
@@ -206,9 +207,10 @@ pub struct GrainContacts {
     gaps: Array,
     /// Impulses on the first body along n, t, b of `frames`, (n, D), N s.
     ///
-    /// Cohesion is part of the normal ones, which are negative where a contact bears tension.
+    /// Normal impulses include cohesion and are negative if a contact carries tension.
     impulses: Array,
-    /// Velocities of the first body against the second after the step along n, t, b, (n, D), m/s.
+    /// Velocities of the first body relative to the second after the step along n, t, b, (n, D),
+    /// m/s.
     velocities: Array,
     /// Impulses on the first body along x, y, z, (n, D), N s.
     world_impulses: Array,

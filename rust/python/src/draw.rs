@@ -20,35 +20,34 @@ use crate::shared::Watch;
 use crate::simulation::{Origin, Simulation};
 use crate::terrain;
 
-/// What the episodes of a task are drawn from.
+/// Distribution of the episodes of a task.
 ///
-/// Draws come from generators that are number for number NumPy's `PCG64`; a generator is given and
-/// returned as four unsigned 64-bit numbers: high and low half of its state, high and low half of
-/// its increment.
+/// Random generators give the same numbers as NumPy's `PCG64`. A generator is four unsigned 64-bit
+/// numbers: high and low half of its state, high and low half of its increment.
 ///
 /// Args:
-///     rules: What all episodes share; rocks leave the goal clear within its tolerance.
-///     simulation: The rover, before its masses are scaled, and the options of its steps.
+///     rules: What all episodes share; rocks keep the goal's tolerance free.
+///     simulation: A rover with unscaled masses, which also sets the options of the time stepping.
 ///     start: Ranges (low, high) of `slope`, `uphill`, `heading`, `goal_distance`, `goal_bearing`
-///         and `turn`, by name, rad and m. A goal after the first lies at a distance from
-///         `goal_distance` from the one before it, in the direction of the last leg turned by
+///         and `turn`, by name, rad and m. Each further goal lies at a distance drawn from
+///         `goal_distance` from the previous goal, in the direction of the last leg, turned by
 ///         `turn`.
 ///     domain: Ranges of `mass_scale`, `friction`, `actuator_gain` and `gravity_scale`, by name.
-///     trunk_load_limit: Force on the trunk beyond which the rover is high-centred, before masses
-///         and gravity are scaled, N.
-///     rocks: Range of `difficulty`, and `abundance` and `max_radius` or None, by name; None for no
-///         rocks.
-///     slope_by_difficulty: Whether the slope follows from the difficulty of the rocks.
-///     ground: The ground of every episode, a terrain of any kind; None for a tilted plane.
-///     hills: Fractal ground: root mean square of its slope, rise over run, or nan for one that
-///         follows from the difficulty of the rocks; None for none. Not together with `ground`.
-///     sand: Soft grounds, one of which is drawn, on a tilted plane with ripples by the difficulty
-///         of the rocks; their surfaces do not count; None for none. Not together with the two
-///         others.
+///     trunk_load_limit: Force on the trunk beyond which the rover is high-centred, N, before
+///         scaling by masses and gravity.
+///     rocks: A mapping with the range of `difficulty`, and `abundance` and `max_radius`, each of
+///         which may be None; None for no rocks.
+///     slope_by_difficulty: Whether the difficulty of the rocks determines the slope.
+///     ground: A terrain for all episodes; None for a tilted plane.
+///     hills: Root mean square slope of fractal ground, rise over run, or NaN if the difficulty of
+///         the rocks determines it; None for no fractal ground. Not together with `ground`.
+///     sand: Soft grounds from which the soil of each episode is drawn; None for rigid ground. The
+///         surface is a tilted plane with ripples that grow with the difficulty of the rocks; the
+///         surfaces of the given grounds are not used. Not together with `ground` or `hills`.
 ///
 /// Raises:
-///     OptionError: An argument is missing, no number, or out of its range.
-///     TerrainError: `ground` is no terrain.
+///     OptionError: An argument is missing, not a number, or out of range.
+///     TerrainError: `ground` is not a terrain.
 #[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct EpisodeDistribution {
     pub inner: CoreDistribution,
@@ -110,7 +109,7 @@ fn list<'py>(given: &Bound<'py, PyAny>, n: usize, field: &str) -> Result<Vec<Bou
     found.ok_or_else(|| refused(given, Kind::Option, field, &format!("a list of {n}")))
 }
 
-/// How many scenes are drawn at most, and what replaces draws.
+/// Largest number of scenes drawn, and values that replace drawn ones.
 pub struct Request {
     randoms: Vec<Pcg64>,
     difficulties: Vec<Option<Range>>,
@@ -317,7 +316,7 @@ impl DrawnEpisodes {
 
 #[pymethods]
 impl DrawnEpisodes {
-    /// The generators after the draws, (m, 4) uint64.
+    /// States of the generators after the draws, (m, 4) uint64.
     #[getter]
     fn generators(&self) -> Array<u64> {
         fresh_rows(self.drawn.iter().map(|one| one.random.state().halves()))

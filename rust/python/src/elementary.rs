@@ -12,8 +12,8 @@ use crate::errors::{Kind, Result, Value};
 
 /// Sine and cosine of angles.
 ///
-/// Unlike those of NumPy and of `math` they have the same bits on every machine. They are within
-/// 1 ulp; of what is not finite they are NaN.
+/// Unlike the functions of NumPy and `math`, the results have the same bits on every computer. They
+/// are accurate to 1 ulp. Infinite and NaN arguments give NaN.
 ///
 /// Args:
 ///     x: An angle, or an array of any shape, rad.
@@ -22,7 +22,7 @@ use crate::errors::{Kind, Result, Value};
 ///     Sine and cosine: two numbers, or two new arrays of the shape of x.
 ///
 /// Raises:
-///     OptionError: x is no number and no array of numbers.
+///     OptionError: x is neither a number nor an array of numbers.
 #[pyfunction]
 pub fn sin_cos<'py>(
     py: Python<'py>,
@@ -45,10 +45,10 @@ pub fn sin_cos<'py>(
     Ok((fresh(py, sin), fresh(py, cos)))
 }
 
-/// Angles of the points (x, y), in [-pi, pi].
+/// Polar angles of the points (x, y), in [-pi, pi].
 ///
-/// Unlike those of NumPy and of `math` they have the same bits on every machine. They are within
-/// 1 ulp.
+/// Unlike the functions of NumPy and `math`, the results have the same bits on every computer. They
+/// are accurate to 1 ulp.
 ///
 /// Args:
 ///     y: A number or an array of any shape.
@@ -58,7 +58,7 @@ pub fn sin_cos<'py>(
 ///     The angle, rad: a number, or a new array.
 ///
 /// Raises:
-///     OptionError: An argument is no number and no array of numbers, or the shapes differ.
+///     OptionError: An argument is neither a number nor an array of numbers, or the shapes differ.
 #[pyfunction]
 pub fn atan2<'py>(
     py: Python<'py>,
@@ -83,8 +83,8 @@ pub fn atan2<'py>(
 
 /// Exponentials.
 ///
-/// Unlike those of NumPy and of `math` they have the same bits on every machine. They are within
-/// 1 ulp.
+/// Unlike the functions of NumPy and `math`, the results have the same bits on every computer. They
+/// are accurate to 1 ulp.
 ///
 /// Args:
 ///     x: A number or an array of any shape.
@@ -93,7 +93,7 @@ pub fn atan2<'py>(
 ///     The exponential: a number, or a new array of the shape of x.
 ///
 /// Raises:
-///     OptionError: x is no number and no array of numbers.
+///     OptionError: x is neither a number nor an array of numbers.
 #[pyfunction]
 pub fn exp<'py>(py: Python<'py>, x: &Bound<'py, PyAny>) -> Result<Bound<'py, PyAny>> {
     if let Ok(x) = x.cast::<PyFloat>() {

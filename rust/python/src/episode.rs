@@ -17,9 +17,9 @@ use crate::reading::{place, points};
 use crate::simulation::Simulation;
 use crate::snapshot::{damaged, read_bytes};
 
-/// One episode of a driving task: what its simulation does not hold.
+/// State of an episode of a driving task, beside its simulation.
 ///
-/// `begin` and `from_bytes` make one.
+/// Create it by `begin` or `from_bytes`.
 #[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct EpisodeRun(CoreEpisode);
 
@@ -114,22 +114,22 @@ impl EpisodeRun {
 
 #[pymethods]
 impl EpisodeRun {
-    /// The beginning of an episode.
+    /// Begins an episode.
     ///
     /// Args:
-    ///     rules: What all episodes of the task share.
-    ///     simulation: The rover at its start.
+    ///     rules: Rules of the task.
+    ///     simulation: The rover at the start of the episode.
     ///     goal: The goal (x, z), m.
-    ///     domain: Properties of rover and world: mass_scale, friction, actuator_gain,
+    ///     domain: Physical properties of the episode: mass_scale, friction, actuator_gain,
     ///         gravity_scale.
     ///     trunk_load_limit: Force on the trunk beyond which the rover is high-centred, N.
     ///     difficulty: Difficulty of the rocks.
-    ///     normals: A standard normal number for each entry of the observation, (size,), where the
-    ///         rules have noise.
+    ///     normals: A standard normal number for each entry of the observation, (size,); needed if
+    ///         the rules have noise.
     ///     further: Goals after the first, (n, 2), x and z, m; none by default.
     ///
     /// Returns:
-    ///     The episode; None if its observation is not finite in float32.
+    ///     The episode; None if its first observation is not finite in float32.
     ///
     /// Raises:
     ///     OptionError: An argument has a wrong shape or a number that is not finite, or the
@@ -170,26 +170,26 @@ impl EpisodeRun {
         fresh(&self.0.progress().previous_action)
     }
 
-    /// The present goal (x, z), m; the last one where all are reached.
+    /// The present goal (x, z), m; the last one if all are reached.
     #[getter]
     fn goal(&self) -> (f64, f64) {
         self.0.goal().into()
     }
 
-    /// The info of the last period, or of the beginning.
+    /// The info of the last control period, or of the start.
     fn info<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         info(py, &(&self.0, None))
     }
 
-    /// The same episode with other properties, another goal, or seen by other rules.
+    /// Returns a copy of the episode with another goal, other properties, or other rules.
     ///
     /// Args:
-    ///     goal: The first goal, (x, z), m; none counts as reached, and an episode that has ended
-    ///         goes on.
+    ///     goal: The first goal, (x, z), m. No goal then counts as reached, and a terminated
+    ///         episode continues.
     ///     distance: Horizontal distance to the present goal, m.
-    ///     domain: Properties of rover and world, as of `begin`.
+    ///     domain: Physical properties, as for `begin`.
     ///     trunk_load_limit: Force on the trunk beyond which the rover is high-centred, N.
-    ///     seen: An episode whose rules and observation are taken over.
+    ///     seen: An episode whose rules and observation are copied.
     ///
     /// Raises:
     ///     OptionError: An argument has a wrong shape or a number that is not finite, or does not
@@ -226,7 +226,7 @@ impl EpisodeRun {
         Ok(Self::of(CoreEpisode::resume(rules, state)?))
     }
 
-    /// All that an episode holds, as `from_bytes` reads it.
+    /// The state of the episode as bytes, for `from_bytes`.
     fn to_bytes<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyBytes>> {
         let state = postcard::to_stdvec(&self.0.state());
         Ok(PyBytes::new(
@@ -235,14 +235,14 @@ impl EpisodeRun {
         ))
     }
 
-    /// An episode that goes on.
+    /// Restores an episode.
     ///
     /// Args:
-    ///     rules: What all episodes of the task share.
-    ///     data: What `to_bytes` returned.
+    ///     rules: Rules of the task.
+    ///     data: Bytes from `to_bytes`.
     ///
     /// Raises:
-    ///     StateError: The bytes are not those of an episode.
+    ///     StateError: The bytes are not an episode.
     ///     OptionError: The episode does not fit the rules.
     #[staticmethod]
     fn from_bytes(rules: GivenRules, data: &Bound<'_, PyAny>) -> Result<Self> {

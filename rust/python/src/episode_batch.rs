@@ -28,17 +28,17 @@ type Step = (Array<f32>, Array, Array<bool>, Array<bool>, Vec<usize>);
 /// Start, rocks, seed of the rocks, and domain, as `EpisodeBatch.origin` tells them.
 type OriginRows = (Vec<f64>, Vec<f64>, u64, Vec<f64>);
 
-/// Many rovers with their episodes, each bit for bit as it would be alone.
+/// Steps many rovers and their episodes. Each gives the same bits as it would alone.
 ///
-/// One call at a time: a call during another one raises BusyError. Methods that take the index of a
-/// rover raise OptionError where there is no such rover, or where its episode has not begun.
+/// Only one call may run at a time; a second call raises BusyError. Methods that take the index of
+/// a rover raise OptionError if there is no such rover or if its episode has not begun.
 ///
 /// Args:
-///     rules: What all episodes share.
-///     simulation: A rover of the task; the batch begins with copies of it, without episodes.
+///     rules: Rules of the task.
+///     simulation: A rover of the task. The batch starts with copies of it, without episodes.
 ///     n: Number of rovers.
 ///     max_steps: Control periods until an episode is truncated; no limit by default.
-///     threads: Number of threads; one a core by default.
+///     threads: Number of threads; one for each core by default.
 ///
 /// Raises:
 ///     OptionError: An argument is out of its range, or the model does not fit the rules.
@@ -58,7 +58,7 @@ impl Inner {
         Ok((self.batch.episode(index)?, self.batch.message(index)))
     }
 
-    /// Keeps what Python is told of the simulation of an episode that has begun.
+    /// Keeps the Python options of the simulation of an episode that has begun.
     fn set_origin(&mut self, index: usize, words: &SolverWords) -> Result<()> {
         let origin = self.batch.origin(index)?;
         self.origins[index] = Origin {
@@ -124,7 +124,7 @@ fn links(given: &Bound<'_, PyAny>, batch: &CoreBatch) -> Result<Vec<Arc<Together
     fits.then_some(links).ok_or_else(refuse)
 }
 
-/// Where and on what an episode has begun, as `EpisodeBatch.origin` tells it.
+/// Start and ground of an episode, as `EpisodeBatch.origin` returns them.
 fn origin(given: &Bound<'_, PyAny>, ground: DrawnGround) -> Result<Began> {
     let what = "what `EpisodeBatch.origin` returns";
     let refuse = || refused(given, Kind::Option, "origin", what);
@@ -175,24 +175,25 @@ impl EpisodeBatch {
         Ok(self.0.open()?.batch.threads())
     }
 
-    /// Gives all rovers their actions for one control period.
+    /// Applies the actions of all rovers for one control period.
     ///
-    /// Other threads run meanwhile. Ctrl-C, or whatever else a signal handler raises, ends the call
-    /// after a whole physics step of each rover, which need not be the same one.
+    /// Other Python threads run in the meantime. Ctrl-C, or another exception of a signal handler,
+    /// ends the call after the current physics step of each rover. The rovers may then have taken
+    /// different numbers of steps.
     ///
     /// Args:
     ///     actions: Torques, then steering, within [-1, 1], (n_rovers, n_actions).
-    ///     active: Which rovers move, (n_rovers,); all by default. The others stay as they are.
-    ///     has_scan: Whether the heights are taken. Without, only episodes that end or reach the
-    ///         time limit take them; the others keep the last ones.
-    ///     among: The grains that each rover drives among, a list of n_rovers
-    ///         RoverGrainSimulation of `simulation`; they move with the rovers, one after the
-    ///         other. None by default.
+    ///     active: Which rovers move, (n_rovers,); all by default. The others do not change.
+    ///     has_scan: Whether to update the height scans. If False, they are updated only in
+    ///         episodes that terminate or reach the time limit; the others keep the previous
+    ///         heights.
+    ///     among: A RoverGrainSimulation of each rover's `simulation`, if the rovers drive among
+    ///         grains; they are then stepped one after the other.
     ///
     /// Returns:
-    ///     Observations (n_rovers, size) float32, rewards (n_rovers,), which episodes have ended,
-    ///     which have reached the time limit, (n_rovers,), and the indices of all that have done
-    ///     either. A rover that stays has the values of its last period.
+    ///     Observations (n_rovers, size) float32, rewards (n_rovers,), which episodes are
+    ///     terminated and which are truncated, (n_rovers,) each, and the indices of the rovers with
+    ///     either. A rover that is not active keeps the values of its last period.
     ///
     /// Raises:
     ///     CommandError: The actions have a wrong shape or an entry that is not finite or outside
@@ -244,17 +245,17 @@ impl EpisodeBatch {
         Ok((rows, rewards.into(), ended.into(), truncated.into(), over))
     }
 
-    /// Indices of the rovers whose episode is over and whose next has not begun, in order.
+    /// Sorted indices of the rovers whose episode is over and whose next has not begun.
     #[getter]
     fn over(&self) -> Result<Vec<usize>> {
         Ok(self.0.open()?.batch.over())
     }
 
-    /// The infos of all rovers, of their last periods or beginnings.
+    /// The infos of all rovers, each of its last control period or of its start.
     ///
     /// Returns:
-    ///     For each entry an array (n_rovers,), and under its name after an underscore the mask of
-    ///     the rovers that have it: all.
+    ///     For each entry an array (n_rovers,), and under its name with a leading underscore a mask
+    ///     of the rovers that have the entry: all True.
     fn infos<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let held = self.0.open()?;
         let told = (0..held.batch.rovers().len()).map(|i| held.told(i));
@@ -262,7 +263,7 @@ impl EpisodeBatch {
         infos(py, &told)
     }
 
-    /// The info of one rover, of its last period or beginning.
+    /// The info of one rover, of its last control period or of its start.
     ///
     /// Args:
     ///     index: Index of the rover.
@@ -283,27 +284,28 @@ impl EpisodeBatch {
         Ok(Array::shaped(rows, &[n, size]))
     }
 
-    /// Draws one episode from each generator on the threads of this batch; no rover changes.
+    /// Draws one episode from each generator, on the threads of this batch.
     ///
-    /// A scene in which the rover would stand deeper than 1 cm in the ground or in a sphere is
-    /// drawn again. The given generators do not change: see `DrawnEpisodes.generators`.
+    /// The rovers do not change. A scene is drawn again if the rover would penetrate the ground or a rock by more than 1 cm.
+    /// The given generators do not change: see `DrawnEpisodes.generators`.
     ///
     /// Args:
-    ///     distribution: What the episodes are drawn from.
+    ///     distribution: Distribution of the episodes.
     ///     generators: Generators, (m, 4) uint64.
-    ///     attempts: Most scenes drawn for a rover until it has room.
-    ///     difficulties: For each generator a range (low, high) that replaces that of the rocks'
-    ///         difficulty, or None; by default none.
-    ///     fixed: Values that replace draws, which are made all the same, by name: `slope`,
-    ///         `uphill`, `position` (x, z), `heading`, `goal` (x, z), `further` (n, 2) of the goals
-    ///         after it, `difficulty`, `field_seed`, `q`, `v`; one mapping for all or a list of one
-    ///         for each generator; none by default.
+    ///     attempts: Largest number of scenes drawn for each episode.
+    ///     difficulties: For each generator, None or a range (low, high) of the rocks' difficulty
+    ///         that replaces the distribution's; None by default.
+    ///     fixed: Values that replace drawn ones, by name; the random numbers are drawn
+    ///         nevertheless: `slope`, `uphill`, `position` (x, z), `heading`, `goal` (x, z),
+    ///         `further` (n, 2) of the goals after it, `difficulty`, `field_seed`, `q`, `v`; one
+    ///         mapping for all, or a list with one for each generator; none by default.
     ///
     /// Returns:
-    ///     The episodes, the same for any number of threads.
+    ///     The episodes. They do not depend on the number of threads.
     ///
     /// Raises:
-    ///     TerrainError: A rover has no room in `attempts` scenes, or the ground refuses a number.
+    ///     TerrainError: In all of the `attempts` scenes the rover penetrates the ground, or a
+    ///         parameter of the ground is invalid.
     ///     StateError: `q` or `v` has a wrong length or an entry that is not finite, or float32
     ///         cannot hold the observation.
     ///     ModelError: A scaled mass is out of its range.
@@ -322,7 +324,7 @@ impl EpisodeBatch {
         distribution.draw_on(generators.py(), &request, &mut held.batch)
     }
 
-    /// Begins drawn episodes.
+    /// Starts drawn episodes.
     ///
     /// Args:
     ///     indices: Indices of the rovers, one for each episode.
@@ -346,19 +348,19 @@ impl EpisodeBatch {
         Ok(())
     }
 
-    /// Puts copies of a rover in the middle of its episode in the places of others.
+    /// Replaces rovers by copies of a rover in the middle of its episode.
     ///
-    /// With `simulation`, `episode`, `origin`, `steps` and `generators` of one rover the copies
-    /// continue it bit for bit.
+    /// With the `simulation`, `episode`, `origin`, `steps` and `generators` of one rover, the
+    /// copies continue bit for bit.
     ///
     /// Args:
-    ///     indices: Indices of the rovers that it replaces.
+    ///     indices: Indices of the rovers to replace.
     ///     simulation: The rover.
     ///     episode: Its episode, with the rules of the batch.
-    ///     origin: Where and on what it began, as `origin` tells.
+    ///     origin: Start and ground of the episode, as returned by `origin`.
     ///     generator: Generator of the noise, (1, 4) uint64.
     ///     steps: Control periods since the episode began.
-    ///     message: Message of the physics step that failed, if that has ended the episode.
+    ///     message: Message of the StepError, if one has ended the episode.
     ///
     /// Raises:
     ///     OptionError: There is no such rover, or an argument does not fit. Nothing has changed.
@@ -417,7 +419,7 @@ impl EpisodeBatch {
         self.one(index, |held, i| Ok(held.batch.steps(i)?))
     }
 
-    /// The generators of rovers, from which their noise is drawn.
+    /// The random generators of rovers, from which noise and next episodes are drawn.
     ///
     /// Args:
     ///     indices: Indices of the rovers.
@@ -460,13 +462,13 @@ impl EpisodeBatch {
         Ok(())
     }
 
-    /// Where and on what the episode of a rover has begun.
+    /// Start and ground of a rover's episode.
     ///
     /// Args:
     ///     index: Index of the rover.
     ///
     /// Returns:
-    ///     Its rows of `DrawnEpisodes.starts`, `rocks`, `rock_seeds` and `domains`.
+    ///     Its row of each of `DrawnEpisodes.starts`, `rocks`, `rock_seeds` and `domains`.
     fn origin(&self, index: &Bound<'_, PyAny>) -> Result<(Array, Array, u64, Array)> {
         self.one(index, |held, i| {
             let (origin, episode) = (held.batch.origin(i)?, held.batch.episode(i)?);

@@ -13,36 +13,37 @@ use crate::infos;
 use crate::model::RoverModel;
 use crate::reading::scan_points;
 
-/// What all episodes of a driving task share.
+/// Rules of a driving task, which all its episodes share.
 ///
 /// Args:
 ///     model: The machine.
 ///     substeps: Physics steps of a control period.
 ///     dt: Control period, s.
-///     torque_limits: Torque of a torque action of 1, (n_wheels,), N m.
-///     max_steering: Set-point of a steering action of 1, rad. Actions have an entry for each
-///         steering joint, in the order of the wheels, after the torques; none if this is 0.
+///     torque_limits: Torque for an action of 1, (n_wheels,), N m.
+///     max_steering: Steering set-point for an action of 1, rad. After the torques, actions have an
+///         entry for each steering joint, in the order of the wheels; none if this is 0.
 ///     goal_tolerance: Distance within which the goal is reached, m.
 ///     cos_max_tilt: Cosine of the tilt beyond which the rover has rolled over.
-///     stuck_time: Time until a high-centred rover ends the episode, s.
-///     weights: Weights of the reward, one for each of its terms.
-///     scale: Value of an entry of 1 of the observation, (size,).
-///     noise: Standard deviation of each entry's noise, (size,); no noise by default.
+///     stuck_time: Time after which an episode with a high-centred rover ends, s.
+///     weights: Weights of the terms of the reward, in the order of `terms`.
+///     scale: Physical value that each entry of the observation is divided by, (size,).
+///     noise: Standard deviation of the noise of each entry, (size,); no noise by default.
 ///     scan: Points of the height scan ahead and to the right of the trunk's origin in the heading
 ///         frame, (n, 2), m; none by default.
-///     goals: Number of goals that are reached one after the other. The observation of several has
-///         three entries more before the heights: the goal after the present one, ahead and to the
+///     goals: Number of goals to reach in sequence. With more than one, the observation has three
+///         further entries before the heights: the goal after the present one, ahead and to the
 ///         right, m, and the number of goals still to reach.
-///     battery: Work of the motors, driving or braking, after which the battery is empty and the
-///         episode ends, J; none by default. The observation of a rover with a battery has one
-///         entry more, after the time to high-centring: the fraction of its charge.
-///     free_distance: Distance from where an episode began at which the rover is free, which ends
-///         the episode; progress is then measured from there, m; none by default.
+///     battery: Energy of the battery, J; none by default. The work of the motors, driving or
+///         braking, discharges it, and the episode ends when it is empty. With a battery, the
+///         observation has one further entry after the time to high-centring: the state of charge,
+///         from 0 to 1.
+///     free_distance: Distance from the start at which the rover is free, m; none by default. The
+///         episode then ends, and progress is measured from the start.
 ///
 /// Raises:
 ///     ModelError: `model` is not a RoverModel.
-///     OptionError: A number is out of its range, a list has a wrong length, or the weights are not
-///         those of the terms.
+///     OptionError: A number is out of range, a list has a wrong length, or the number of weights
+///         differs from that of the terms.
 #[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct EpisodeRules {
     pub inner: Arc<Rules>,
@@ -129,7 +130,7 @@ impl EpisodeRules {
         Ok(((model,), named))
     }
 
-    /// Names of the reward's terms, in the order of their sum.
+    /// Names of the terms of the reward, in the order in which they are summed.
     #[getter]
     #[allow(clippy::unused_self)] // an attribute of the object
     fn terms<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyTuple>> {

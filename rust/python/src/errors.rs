@@ -17,18 +17,18 @@ use rover_core::multibody::{ModelError, StateError};
 use rover_core::problem::ProblemError;
 use rover_core::simulation::{BatchError, CommandError, SnapshotError};
 
-/// Result of what may be refused or raise.
+/// Result of a call that may raise a Python exception.
 pub type Result<T, E = BorderError> = std::result::Result<T, E>;
 
 /// Characters of an exception's message.
 const LONGEST_MESSAGE: usize = 1000;
 
 /// Docstring of the root.
-const ROOT: &str = "Root of every error that rover-gym raises.
+const ROOT: &str = "Base class of all rover-gym errors.
 
 Attributes:
-    field: Name of the argument at fault, with the index of the entry; None where there is none.
-    value: What was given there, or None.
+    field: Name of the invalid argument, with the index of the entry; None if the error concerns no argument.
+    value: The value given, or None.
 ";
 
 /// Which exception, by its place in [`CLASSES`].
@@ -46,14 +46,14 @@ pub enum Kind {
 
 /// Name and docstring of each exception, in the order of [`Kind`].
 const CLASSES: &str = "\
-ModelError: A model's description is unreadable or not physical.
+ModelError: The description of a model cannot be read or is not physical.
 StateError: A state or a snapshot has a wrong shape or an entry that is not finite.
 TerrainError: A terrain's description is invalid.
-OptionError: An option or another argument is out of its range.
+OptionError: An option or another argument is invalid or out of range.
 CommandError: A torque, a set-point or an action is invalid.
 ProblemError: A friction-contact problem has a wrong shape or an invalid entry.
-StepError: A time step could not be taken; the state is as it was before that step.
-BusyError: An object was used while another call on it was still going on. Nothing has changed.";
+StepError: A time step failed. The state is the one before that step.
+BusyError: An object was used while another call on it was still running. Nothing has changed.";
 
 /// What was given where something else was needed.
 #[derive(Debug)]
@@ -178,7 +178,7 @@ fn shortened(message: String) -> String {
 }
 
 impl Kind {
-    /// An argument that is not what it must be.
+    /// An invalid argument.
     pub fn error(self, field: impl Into<String>, message: String, value: Value) -> BorderError {
         let field = Some(field.into());
         BorderError {

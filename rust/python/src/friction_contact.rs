@@ -13,35 +13,37 @@ use crate::errors::{Kind, Result, Value};
 use crate::given_problem::{Delassus, coefficients, flat, with_hint};
 use crate::options::solver_options;
 
-/// How the contact solver ended.
+/// Result report of the contact solver.
 #[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
 #[derive(Clone)]
 pub struct SolverReport {
     /// One of "converged", "relaxed", "not_converged" and "budget_exhausted".
     ///
-    /// "relaxed": the convex relaxation is solved, which is not Coulomb's law. "budget_exhausted":
-    /// the work that `budget` allows is done, and the answer is the best one found.
+    /// "relaxed": the convex relaxation is solved, which differs from Coulomb's law.
+    /// "budget_exhausted": the `budget` is spent, and the best solution found is returned.
     status: &'static str,
     /// Whether Coulomb's law holds to the tolerance.
     is_converged: bool,
-    /// Iterations of the stage that answered.
+    /// Iterations of the stage that found the solution.
     iterations: usize,
-    /// Violation of Signorini's and Coulomb's laws by the returned impulses, relative to the data.
+    /// Violation of Signorini's and Coulomb's laws by the returned impulses, relative to the
+    /// problem data.
     residual: f64,
     /// Largest violation of Signorini's and Coulomb's laws at one contact, m/s.
     velocity_error: f64,
-    /// Name of the method that answered; never "auto".
+    /// Name of the method that found the solution; never "auto".
     solver: &'static str,
-    /// Name of the stage that answered; "at_rest" where q = 0 left nothing to do.
+    /// Name of the stage that found the solution; "at_rest" if q = 0, so that zero impulses solve
+    /// the problem.
     stage: &'static str,
-    /// Every stage that was tried, in order, with the reason for its end and its iterations.
+    /// All stages tried, in order, each with the reason why it ended and its iterations.
     ///
     /// Reasons are "converged", "max_iterations", "stalled", "budget_exhausted", "non_finite" and
     /// "relaxed".
     stages: Vec<(&'static str, &'static str, u32)>,
     /// Work done, in the unit of the argument `budget`.
     work: u64,
-    /// The law that the answer obeys, "coulomb" or "relaxed".
+    /// The friction law of the solution, "coulomb" or "relaxed".
     law: &'static str,
 }
 
@@ -96,42 +98,42 @@ pub struct FrictionContactSolution {
     impulses: Array,
     /// Velocities u = W p + q, (n_c, d), m/s, along the normal and the tangents.
     velocities: Array,
-    /// How the solver ended.
+    /// Report of the solver.
     report: SolverReport,
-    /// The residuals measured on the way, with the argument `history`.
+    /// Residuals during the iterations; empty without the argument `history`.
     ///
-    /// Each is a tuple of the stage, the iterations so far and the relative residual. "nsgs" and
-    /// "admm" measure every few iterations, the others at every step. Of "relaxed" it is the
-    /// residual of the relaxed law.
+    /// Each entry is a tuple of the stage, the number of iterations and the relative residual.
+    /// "nsgs" and "admm" measure it every few iterations, the other methods in every iteration. For
+    /// "relaxed" it is the residual of the relaxed law.
     history: Vec<(&'static str, usize, f64)>,
 }
 
 /// Solves the friction-contact problem K* contains W p + q + mu |u_T| n, orthogonal to p in K.
 ///
 /// Args:
-///     W: Delassus operator, (n_c d, n_c d), 1/kg, used as it is: it may be singular or
-///         unsymmetric. For many contacts one of SciPy's sparse arrays, or block rows
-///         `(indptr, indices, data)` of shapes (n_c + 1,), (n_blocks,), (n_blocks, d, d), each row
-///         ascending and with its diagonal block.
+///     W: Delassus operator, (n_c d, n_c d), 1/kg. It may be singular or unsymmetric. For many
+///         contacts, give a SciPy sparse array, or block rows `(indptr, indices, data)` of shapes
+///         (n_c + 1,), (n_blocks,), (n_blocks, d, d), with ascending columns and the diagonal block
+///         in each row.
 ///     q: Free velocity, (n_c d,), m/s, contact by contact: normal, tangents.
 ///     mu: Friction coefficients, (n_c,), or one for all contacts.
-///     tolerance: Largest relative residual of a converged answer; its velocities are right to
-///         max(tolerance, 1e-9) m/s as well.
+///     tolerance: Largest relative residual of a converged solution. Errors of its velocities are
+///         at most max(tolerance, 1e-9) m/s as well.
 ///     dimension: Components d of a contact, 2 or 3.
 ///     solver: "auto" tries cheap methods first and robust ones last; "nsgs", "newton", "proximal"
-///         and "admm" are single methods for Coulomb's law; "relaxed" solves its convex relaxation,
-///         another law, and never counts as converged.
+///         and "admm" are single methods for Coulomb's law; "relaxed" solves the convex relaxation,
+///         which is another law, and its status is never "converged".
 ///     max_iterations: Largest number of Newton steps, sweeps or ADMM iterations.
 ///     initial: Impulses from which the solver starts, (n_c d,), N s; zero by default.
-///     budget: Largest amount of work, counted and not timed: a unit is one multiplication and
-///         addition in a product with W. None allows 3e8 units, about 0.3 s, for up to 48
-///         contacts, 1.2e9 for up to 200, and more in proportion to their square beyond. What
-///         exceeds the budget is left undone, and the report says so.
-///     history: Whether the solution keeps the residuals measured on the way.
+///     budget: Largest amount of work, in operations rather than time: a unit is one multiplication
+///         and addition in a product with W. The default is 3e8 units, about 0.3 s, for up to 48
+///         contacts, 1.2e9 for up to 200, and proportional to the square of their number beyond.
+///         When the budget is spent, the solver stops with the status "budget_exhausted".
+///     history: Whether to record the residuals of the iterations.
 ///
 /// Returns:
-///     Impulses, velocities and the solver's report. Not converging is no error: see
-///     `report.status`.
+///     Impulses, velocities and the solver's report. If the solver does not converge, no exception
+///     is raised: check `report.status`.
 ///
 /// Raises:
 ///     ProblemError: An array has a wrong shape or an invalid entry.

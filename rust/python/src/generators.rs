@@ -25,7 +25,7 @@ pub fn generators(value: &Bound<'_, PyAny>) -> Result<Vec<Pcg64>> {
     Ok(view.rows().into_iter().map(generator).collect())
 }
 
-/// Seeds generators as `numpy.random.PCG64` does.
+/// Seeds random generators as `numpy.random.PCG64` does.
 ///
 /// Args:
 ///     seeds: Whole numbers from 0, of any size.
@@ -34,7 +34,7 @@ pub fn generators(value: &Bound<'_, PyAny>) -> Result<Vec<Pcg64>> {
 ///     (m, 4) uint64: high and low half of each state, high and low half of each increment.
 ///
 /// Raises:
-///     OptionError: A seed is no whole number from 0.
+///     OptionError: A seed is not a whole number from 0.
 #[pyfunction]
 pub fn seed_generators(seeds: &Bound<'_, PyAny>) -> Result<Array<u64>> {
     let what = "whole numbers from 0";
@@ -66,7 +66,7 @@ pub fn seed_generators(seeds: &Bound<'_, PyAny>) -> Result<Array<u64>> {
 ///
 /// Args:
 ///     generators: Generators, (m, 4) uint64.
-///     size: Numbers for each.
+///     size: Number of draws from each generator.
 ///
 /// Returns:
 ///     The numbers, (m, size), and the generators after the draws, (m, 4) uint64.

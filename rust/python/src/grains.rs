@@ -20,61 +20,63 @@ use crate::vessels::{Drum, Silo, Vessel};
 
 type Core = CoreSimulation<3>;
 
-/// Grains in space: free balls with friction, between walls or on a terrain.
+/// Grains in space: free balls with friction, contained by walls or a vessel, or on a terrain.
 ///
 /// World axes: x forward, y up, z to the right.
 ///
 /// Args:
 ///     radius: Radii of the balls, (n,), m.
-///     mass: Masses of the balls, (n,), kg; they are homogeneous.
+///     mass: Masses of the balls, which are homogeneous, (n,), kg.
 ///     position: Centres, (n, 3), m.
-///     kinematic: Balls whose velocity no force changes, (n,), such as grains glued to a rough
-///         floor, or a piston with the velocity that `set_state` gives it; none by default. They
-///         may overlap one another and walls.
+///     kinematic: Which balls have a prescribed velocity, (n,); none by default. Use it for grains
+///         glued to a rough floor, or for a piston with the velocity given to `set_state`. These
+///         balls may overlap each other and walls.
 ///     walls: A point of each wall and the normal to its free side, (m, 6), m; none by default.
-///     wall_velocity: Velocities of the walls, (m, 3), m/s; at rest by default. A wall is in its
-///         place at time 0.
+///     wall_velocity: Velocities of the walls, (m, 3), m/s; at rest by default. `walls` gives their
+///         places at time 0.
 ///     vessel: A `Drum` or a `Silo` around the balls; none by default.
 ///     terrain: A `Plane`, `SphereField`, `HeightField`, `TriangleMesh` or `Union`, or a list of
-///         them, below the balls; none by default. Where it knows no ground, balls fall. Balls
-///         have a vessel or a terrain, not both.
+///         them, below the balls; none by default. Balls fall where the ground is unknown. A vessel
+///         and a terrain cannot be combined.
 ///     friction: Coulomb's coefficient between balls.
 ///     wall_friction: Coulomb's coefficient of balls on walls, vessel and terrain.
-///     rolling_friction: Largest moment that resists the rolling of a ball on a ball, wall, vessel
-///         or terrain, over the normal force and the rolling radius: 1/r = 1/r_1 + 1/r_2 of two
-///         balls, the ball's own radius elsewhere. A ball rests on a slope up to this tangent.
-///     drilling_friction: The same for rotation about the contact's normal. Neither acts on a
-///         rover, or where Coulomb's coefficient is 0.
-///     cohesion: Attraction of bodies that touch, N: the pull that breaks their contact. The law of
-///         a contact is 0 <= u_N + gap/h, p_N + h cohesion >= 0, one of them 0; friction is bounded
-///         by friction (p_N + h cohesion).
+///     rolling_friction: Coefficient of rolling friction of balls: the largest resisting moment
+///         divided by the normal force and the rolling radius r. Between two balls 1/r = 1/r_1 +
+///         1/r_2; on a wall, vessel or terrain r is the ball's radius. A ball stays at rest on a
+///         slope whose tangent is at most this coefficient.
+///     drilling_friction: The same for rotation about the contact normal. Neither acts on a rover,
+///         nor if Coulomb's coefficient is 0.
+///     cohesion: Attractive force between bodies in contact, N: the pull that separates them. The
+///         contact law is 0 <= u_N + gap/h, p_N + h cohesion >= 0, one of them 0; the tangential
+///         impulse is at most friction (p_N + h cohesion).
 ///     cohesion_range: Gap up to which the attraction acts, m; 1% of the smallest radius by
 ///         default, at most 20%.
 ///     restitution: Newton's coefficient of all contacts, in [0, 1].
 ///     gravity: Gravity, (3,), m/s²; (0, -9.81, 0) by default.
 ///     time_step: Time step, s.
-///     tolerance: Largest relative residual of the contact problem. Its velocities are also right
-///         to 25 times that, in units of the root of gravity times the smallest radius; without
-///         gravity that of 9.81 m/s².
+///     tolerance: Largest relative residual of the contact problem. Errors of velocities are also
+///         at most 25 times this value, times the square root of gravity times the smallest radius;
+///         without gravity 9.81 m/s² is used.
 ///     max_iterations: Largest number of sweeps of the contact solver in a step.
-///     stabilisation: "projection" moves overlapping bodies apart, "push_out" lets them part by a
-///         fifth of their excessive overlap in each step; both may add energy by lifting those
-///         above. "none" leaves overlaps. By default "push_out", but "projection" with
-///         restitution or in a vessel: a step along the inside of a curve leads into it.
-///     penetration_tolerance: Overlap that stabilisation leaves alone, m; 0.5% of the smallest
+///     stabilisation: Treatment of overlaps: "projection" moves overlapping bodies apart,
+///         "push_out" removes a fifth of the excessive overlap in each step, "none" leaves it. The
+///         first two may add energy by lifting the bodies above. The default is "push_out", or
+///         "projection" with restitution or in a vessel, whose curved walls cause an overlap in
+///         every step.
+///     penetration_tolerance: Overlap that stabilisation does not correct, m; 0.5% of the smallest
 ///         radius by default.
-///     sleep: Whether balls at rest far from anything that moves are left out of the step.
+///     sleep: Whether to skip balls that are at rest and far from moving bodies.
 ///     sleep_speed: Speed below which a ball is at rest, m/s; 5e-4 by default.
-///     sleep_distance: Distance within which nothing may move for a ball to sleep, m; 0.2 by
-///         default.
-///     threads: Number of threads that solve the contact problem. The answer does not depend on
-///         it; below some thousands of balls a second one gains little.
+///     sleep_distance: A ball sleeps if no body within this distance moves, m; 0.2 by default.
+///     threads: Number of threads that solve the contact problem. The result does not depend on it.
+///         With fewer than some thousands of balls, a second thread gains little.
 ///
 /// Raises:
 ///     ModelError: A radius or mass is not finite and positive.
 ///     StateError: Positions have a wrong shape or an entry that is not finite, or balls, walls or
 ///         terrain overlap.
-///     TerrainError: A wall has no direction, or `terrain` or `vessel` is none.
+///     TerrainError: A wall has no direction, or `terrain` is not a terrain, or `vessel` is not a
+///         vessel.
 ///     OptionError: An option is out of its range, or both `terrain` and `vessel` are given.
 #[pyclass(module = "rover_gym.mechanics", extends = AnySimulation, frozen)]
 pub struct GrainSimulation {
@@ -148,14 +150,14 @@ impl GrainSimulation {
         Ok(balls::spins(inner.v(), n_balls(&inner)))
     }
 
-    /// Which balls are kinematic, (n,).
+    /// Which balls have a prescribed velocity, (n,).
     #[getter]
     fn kinematic(&self) -> Result<Array<bool>> {
         let inner = self.open()?;
         Ok(fresh(inner.soil().grains.kinematic()))
     }
 
-    /// Which balls sleep, (n,); kinematic ones always do.
+    /// Which balls sleep, (n,); True for balls with a prescribed velocity.
     #[getter]
     fn asleep(&self) -> Result<Array<bool>> {
         Ok(fresh(self.open()?.asleep()))
@@ -185,7 +187,7 @@ impl GrainSimulation {
         })))
     }
 
-    /// The options of contacts, gravity and solver, by the names of the arguments.
+    /// Options of contacts, gravity and solver, as keyword arguments.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let inner = self.open()?;
@@ -223,33 +225,33 @@ impl GrainSimulation {
         inner.set_state(&q, &v).map_err(|e| grain_error(&e))
     }
 
-    /// Takes balls out; the others keep their order.
+    /// Removes balls. The others keep their order.
     ///
     /// Args:
-    ///     which: Which balls go, (n,) truth values.
+    ///     which: Which balls to remove, (n,) booleans.
     ///
     /// Raises:
-    ///     ModelError: The number of truth values differs, or no ball would be left. Nothing has
-    ///         changed.
+    ///     ModelError: The number of booleans differs from that of the balls, or no ball would be
+    ///         left. Nothing has changed.
     fn remove(&self, which: &Bound<'_, PyAny>) -> Result<()> {
         let mut inner = self.open()?;
         let which = flags(which, Kind::Model, "which")?;
         inner.remove(&which).map_err(|e| grain_error(&e))
     }
 
-    /// Puts other balls in the place of those so far; time and options stay.
+    /// Replaces the balls. Time and options do not change.
     ///
-    /// Balls that were there keep their sleep and the impulses of their contacts, from which the
-    /// next step's solver starts. Overlaps are not refused: a run may have made them. Earlier
-    /// snapshots fit again once the same balls are back.
+    /// Balls that are kept stay asleep, and keep their contact impulses for the warm start of the
+    /// next step. Overlaps are allowed, because they can arise in a run. An earlier snapshot can be
+    /// restored once the simulation has the same balls again.
     ///
     /// Args:
-    ///     radius: Radii of all balls from here on, (n,), m.
+    ///     radius: Radii of the new set of balls, (n,), m.
     ///     mass: Their masses, (n,), kg.
     ///     position: Their centres, (n, 3), m.
-    ///     before: The number of each among the balls so far, (n,); -1 for one that was not there.
-    ///         Balls that stay keep their order.
-    ///     kinematic: Which of them are kinematic, (n,); none by default.
+    ///     before: Index of each ball in the present set, (n,); -1 for a new ball. The kept balls
+    ///         must be in their present order.
+    ///     kinematic: Which balls have a prescribed velocity, (n,); none by default.
     ///     velocity: Velocities of their centres, (n, 3), m/s; at rest by default.
     ///     spin: Their angular velocities, (n, 3), rad/s; at rest by default.
     ///
@@ -288,7 +290,7 @@ impl GrainSimulation {
 
     /// Momentum of the balls, (6,): along x, y, z, kg m/s, and about the origin, kg m²/s.
     ///
-    /// Kinematic balls do not count.
+    /// Balls with prescribed velocity are not included.
     fn momentum(&self) -> Result<Array> {
         let inner = self.open()?;
         let (linear, moment) = inner.soil().momentum(inner.q(), inner.v());
@@ -313,15 +315,15 @@ impl GrainSimulation {
     }
 }
 
-/// Balls in loose layers over a rectangle, without overlap: where a bed starts from.
+/// Initial state for a bed: balls in loose layers over a rectangle, without overlap.
 ///
-/// The radii are drawn evenly from their range.
+/// The radii are drawn uniformly from their range.
 ///
 /// Args:
 ///     count: Number of balls, at most 1 000 000.
 ///     radius_min: Smallest radius, m.
 ///     radius_max: Largest radius, m.
-///     mass: Mass of a ball of the mean radius, kg; the others' go with their volume.
+///     mass: Mass of a ball of the mean radius, kg; masses are proportional to volume.
 ///     width: Width of the rectangle along x, m.
 ///     depth: Width of the rectangle along z, m.
 ///     left: Smallest x, m.
@@ -333,7 +335,7 @@ impl GrainSimulation {
 ///     Radii, (n,), m, masses, (n,), kg, and centres, (n, 3), m.
 ///
 /// Raises:
-///     ModelError: A number is not finite or out of its range, the radii are the wrong way round,
+///     ModelError: A number is not finite or out of its range, `radius_max` is below `radius_min`,
 ///         or a ball does not fit.
 #[pyfunction]
 #[pyo3(signature = (count, **options),
@@ -377,7 +379,7 @@ fn sides(given: &Named<'_>) -> Result<[f64; 3]> {
 
 /// Places balls of given radii in loose layers over a rectangle, without overlap.
 ///
-/// Each has a place as wide as the largest ball, and they fill the layers in the order given.
+/// Each ball gets a place as wide as the largest ball. Layers are filled in the order of `radius`.
 ///
 /// Args:
 ///     radius: Radii, (n,), m.

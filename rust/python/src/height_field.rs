@@ -14,19 +14,19 @@ use crate::errors::{Kind, Result, Value};
 use crate::materials;
 use crate::terrain::Terrain;
 
-/// A map of heights as ground: two triangles a cell, solid below. Immutable.
+/// A height map as ground: two triangles in each cell, solid below. Immutable.
 ///
 /// Row j and column i stand at z = origin[1] + j spacing[1] and x = origin[0] + i spacing[0]. Each
-/// cell is cut along the diagonal from its corner (j, i) to (j + 1, i + 1). A height that is nan is
-/// no data: a rover that comes near it, or to the border of the map, ends the call with a
-/// `StepError` that names the place. Heights are kept in single precision. `HeightField.from_file`
-/// reads a map, `HeightField.fractal` makes one by a seed.
+/// cell is cut along the diagonal from its corner (j, i) to (j + 1, i + 1). A height of NaN means
+/// unknown ground. If a rover comes near unknown ground or the border of the map, the step raises a
+/// `StepError` that gives the place. Heights are stored in single precision.
+/// `HeightField.from_file` reads a map, `HeightField.fractal` generates one from a seed.
 ///
 /// Args:
-///     heights: Heights y, (n_z, n_x), m; nan for no data.
+///     heights: Heights y, (n_z, n_x), m; NaN where unknown.
 ///     spacing: Distance of columns and of rows, m: one number, or (dx, dz).
-///     origin: Place (x, z) of the first height, m; by default such that the map's middle is at
-///         the world's origin.
+///     origin: Place (x, z) of the first height, m. By default the middle of the map is at the
+///         world's origin.
 ///     material: Name of its material, for the laws of a `Simulation` by pair of materials.
 ///
 /// Raises:
@@ -108,7 +108,7 @@ impl HeightField {
         self.inner.material(0)
     }
 
-    /// Heights, (n_z, n_x) float32, m; nan for no data.
+    /// Heights, (n_z, n_x) float32, m; NaN where unknown.
     #[getter]
     fn grid(&self) -> Array<f32> {
         Array::shaped(self.inner.heights().to_vec(), &self.inner.shape())

@@ -49,14 +49,34 @@ mod union;
 mod vessels;
 
 use pyo3::prelude::*;
+use rover_core::scalar::Instructions;
+
+use errors::{Kind, Value};
+
+/// Environment variable with the instruction set that steps are to use.
+const INSTRUCTIONS: &str = "ROVER_GYM_INSTRUCTIONS";
+
+/// Uses the instruction set that the environment names, if it names one.
+fn choose_instructions() -> errors::Result<()> {
+    let Some(given) = std::env::var_os(INSTRUCTIONS) else {
+        return Ok(());
+    };
+    let name = given.to_string_lossy().into_owned();
+    Instructions::choose(&name).map_err(|error| {
+        let message = format!("{INSTRUCTIONS}: {error}");
+        Kind::Option.error(INSTRUCTIONS, message, Value::Text(name))
+    })
+}
 
 /// Adds everything to the compiled module.
 ///
 /// # Errors
-/// As Python's, where a name cannot be added.
+/// As Python's, where a name cannot be added; `OptionError` where the environment asks for
+/// instructions that this machine does not have.
 pub fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     errors::register(module)?;
+    choose_instructions()?;
     module.add_class::<model::RoverModel>()?;
     module.add_class::<motor::Motor>()?;
     module.add_class::<terrain::Terrain>()?;

@@ -9,7 +9,8 @@ use rover_core::simulation::{Linearisation as Core, LinearisationError};
 use crate::arrays::{Array, fresh_matrix};
 use crate::errors::{BorderError, Kind, Value, entry};
 
-/// Derivatives of a time step by state and command, as `Simulation.linearise` returns them.
+/// Derivatives of a time step with respect to state and command, returned by
+/// `Simulation.linearise`.
 ///
 /// `x_next = next_state + a @ (x - state) + b @ (u - command)` to first order. The state is
 /// x = (q, v) as `Simulation.q` and `Simulation.v` return them, the command is u = (wheel torques,
@@ -28,30 +29,32 @@ pub struct Linearisation {
     command: Array,
     /// State after the step, (nx,).
     next_state: Array,
-    /// Names of the solids that touch in the step, and of the joints at a stop, one a contact.
+    /// For each contact, the name of the solid, or of the joint that is at its stop.
     bodies: Vec<String>,
     /// Mode of each contact, "open", "stick" or "slip".
     ///
     /// An open contact transmits no impulse. A contact without friction is "slip" while closed.
     modes: Vec<&'static str>,
-    /// How far each contact is from another mode, (n,), m/s; rad/s at a joint's stop.
+    /// Distance of each contact from a change of its mode, (n,), m/s; rad/s at a joint's stop.
     ///
-    /// It is the normal velocity of an open contact. Of a closed one it is the smaller of its
-    /// normal impulse and, sticking, of mu p_N - |p_T|, both times the inverse effective mass along
-    /// the normal, or, slipping, of the sliding speed.
+    /// For an open contact it is the normal velocity. For a closed contact it is the smaller of two
+    /// values: the normal impulse times the inverse effective mass along the normal, and, if
+    /// sticking, mu p_N - |p_T| times the same factor, or, if slipping, the sliding speed.
     margins: Array,
-    /// Whether the step moves bodies out of penetration; the derivative contains it then.
+    /// Whether the step removes penetration. If so, the derivative includes this correction.
     is_projected: bool,
-    /// Whether nothing jumps within the tested changes of each entry of (x, u), (nx + nu,).
+    /// Whether each column of (a, b) is valid within the tested perturbation, (nx + nu,).
     ///
-    /// Two steps, ahead and back, have the same closed contacts in the same modes, are projected
-    /// and corrected by the energy audit as this step is, and agree with the column within 1%.
+    /// A column is valid if two perturbed steps, one in each direction, have the same closed
+    /// contacts in the same modes, the same projection and energy correction, and agree with the
+    /// column within 1%.
     holds: Array<bool>,
-    /// Difference of each column of (a, b) from that of its two tested steps, (nx + nu,).
+    /// Difference of each column of (a, b) from the difference quotient of its two perturbed steps,
+    /// (nx + nu,).
     ///
-    /// It is the largest difference of an entry, relative to the column's largest entry.
+    /// The largest difference of an entry, relative to the column's largest entry.
     errors: Array,
-    /// Whether every column holds.
+    /// Whether all columns are valid.
     is_smooth: bool,
 }
 

@@ -27,11 +27,10 @@ pub type Pair = (Array, Array);
 /// `RoverModel()` is the built-in six-wheel rover. The other constructors are `named`, `from_text`
 /// and `from_dict`, and those that read files: `from_file`, `from_urdf` and `from_mjcf`.
 ///
-/// Methods that take coordinates understand two sets of them, by the argument `coordinates`:
-/// "state", the `q` and `v` of `Simulation`, and "report", the Cardan angles of the 2010 report and
-/// their rates. They raise StateError where `q` or `qdot` has a wrong length or an entry that is
-/// not finite, OptionError where `coordinates` is neither of the two, and TerrainError where
-/// `terrain` is not a terrain.
+/// Methods that take coordinates have an argument `coordinates`: "state" for the `q` and `v` of
+/// `Simulation`, "report" for the Cardan angles of the 2010 report and their rates. They raise
+/// StateError if `q` or `qdot` has a wrong length or an entry that is not finite, OptionError if
+/// `coordinates` is neither of the two, and TerrainError if `terrain` is not a terrain.
 #[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
 #[derive(Clone)]
 pub struct RoverModel {
@@ -162,7 +161,7 @@ impl RoverModel {
     /// Reads a model from TOML text.
     ///
     /// Args:
-    ///     text: What a model file holds.
+    ///     text: Contents of a model file.
     ///
     /// Raises:
     ///     ModelError: The text does not describe a model.
@@ -175,7 +174,7 @@ impl RoverModel {
     /// Reads a model from nested dictionaries and lists.
     ///
     /// Args:
-    ///     description: What `to_dict` returns.
+    ///     description: A description as `to_dict` returns it.
     ///
     /// Raises:
     ///     ModelError: The dictionaries do not describe a model.
@@ -197,23 +196,23 @@ impl RoverModel {
         Self::_restore(&text)
     }
 
-    /// The description as TOML text, as `from_text` reads it.
+    /// The description as TOML text, for `from_text`.
     fn to_text(&self) -> Result<String> {
         Ok(self.inner.description().to_toml()?)
     }
 
-    /// The description as nested dictionaries and lists, as `from_dict` reads it.
+    /// The description as nested dictionaries and lists, for `from_dict`.
     fn to_dict<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
         Ok(py.import("json")?.call_method1("loads", (self.json()?,))?)
     }
 
-    /// The model of the gallery with this name.
+    /// Returns a model of the gallery by name.
     ///
     /// Args:
     ///     name: One of `names()`.
     ///
     /// Raises:
-    ///     ModelError: There is no such model; the message lists those that there are.
+    ///     ModelError: There is no such model; the message lists the available ones.
     #[staticmethod]
     fn named(name: &Bound<'_, PyAny>) -> Result<Self> {
         let name = text(name, Kind::Model, "name")?;
@@ -226,10 +225,10 @@ impl RoverModel {
         ModelDescription::names().to_vec()
     }
 
-    /// What the import of this model understood, assumed and left out.
+    /// What the importer read, assumed and left out of the source file.
     ///
-    /// A `rover_gym.models.ImportReport`; None for a model that was not imported, and for one that
-    /// was derived from an imported one.
+    /// A `rover_gym.models.ImportReport`. None for models that were not imported, and for models
+    /// derived from an imported one, for instance by `replace`.
     #[getter]
     fn import_report(&self, py: Python<'_>) -> Option<Py<PyAny>> {
         self.report.as_ref().map(|report| report.clone_ref(py))
@@ -243,27 +242,28 @@ impl RoverModel {
         }
     }
 
-    /// Returns a model that differs in what is given.
+    /// Returns a copy of the model with the given properties changed.
     ///
     /// Args:
-    ///     wheel_radius: Radius of all wheels, m: shape, inertia and contact change together.
-    ///     contact_radius: Radius at which the wheels touch the ground, m; shape and inertia stay
-    ///         as they are.
-    ///     wheel_stiffness: Normal stiffness of all wheels where they touch, N/m, 0 for rigid
-    ///         wheels, which have no damping either.
-    ///     wheel_damping: Normal damping beside the stiffness, N s/m.
-    ///     masses: Masses by name of the solid, or one for each solid, kg. Inertias scale with
-    ///         them.
+    ///     wheel_radius: Radius of all wheels, m. Shape, inertia and contact radius change
+    ///         together.
+    ///     contact_radius: Radius at which the wheels touch the ground, m. Shape and inertia do not
+    ///         change.
+    ///     wheel_stiffness: Normal contact stiffness of all wheels, N/m; 0 for rigid wheels, which
+    ///         have no damping either.
+    ///     wheel_damping: Normal contact damping of all wheels, N s/m.
+    ///     masses: Masses by name of the solid, or a list with one for each solid, kg. Inertias
+    ///         scale with them.
     ///     steering_stiffness: Stiffness of every steering controller, N m/rad.
     ///     steering_damping: Damping of every steering controller, N m s/rad.
     ///     wheel_torque_limit: Largest torque of every wheel, N m.
     ///     mass_scale: Factor of all masses and inertias.
-    ///     motor: The motor of all wheels: a `Motor`, its fields by name, or None for wheels that
-    ///         give their command at any speed. Left out, the motors stay.
+    ///     motor: The motor of all wheels: a `Motor`, a mapping of its fields, or None if the
+    ///         torque is to follow the command at any speed. By default the motors do not change.
     ///
     /// Raises:
-    ///     ModelError: A number is out of its range, a solid has no such name, or a wheel radius is
-    ///         given where a wheel's solid is no disc.
+    ///     ModelError: A number is out of range, there is no solid of a given name, or
+    ///         `wheel_radius` is given and the solid of a wheel is not a disc.
     #[pyo3(signature = (**changes), text_signature = "($self, *, wheel_radius=None, contact_radius=None, wheel_stiffness=None, wheel_damping=None, masses=None, steering_stiffness=None, steering_damping=None, \
         wheel_torque_limit=None, mass_scale=None, motor=...)")]
     fn replace(&self, py: Python<'_>, changes: Option<&Bound<'_, PyDict>>) -> Result<Self> {
@@ -289,13 +289,13 @@ impl RoverModel {
         Self::wrap(self.inner.changed(&changes))
     }
 
-    /// Returns the same machine with joints locked; their coordinates are gone.
+    /// Returns a copy of the model with joints locked. Their coordinates are removed.
     ///
     /// Args:
-    ///     joints: Names of joints, which are locked at 0, or a mapping of names to angles, rad.
+    ///     joints: Names of joints to lock at 0, or a mapping of names to angles, rad.
     ///
     /// Returns:
-    ///     The new model. The locks are kept in its files and dictionaries.
+    ///     The new model. Its files and dictionaries contain the locks.
     ///
     /// Raises:
     ///     ModelError: There is no such joint, or an angle is not finite.
@@ -368,10 +368,10 @@ impl RoverModel {
         self.inner.wheels().iter().map(|w| w.radius).collect()
     }
 
-    /// Radius of the place that the rover needs to turn on the spot, m.
+    /// Radius of the circle that the rover needs to turn on the spot, m.
     ///
-    /// It is the largest distance from the trunk's origin to a wheel's contact, joints at zero,
-    /// plus the wheel's radius and 0.1 m.
+    /// The largest distance from the trunk's origin to a wheel's contact point, with all joints at
+    /// zero, plus the wheel's radius and 0.1 m.
     #[getter]
     fn clear_radius(&self) -> f64 {
         clear_radius(&self.inner)
@@ -383,7 +383,7 @@ impl RoverModel {
         self.inner.wheels().iter().map(|w| w.torque_limit).collect()
     }
 
-    /// The motor of each wheel; None where the torque is the command at any speed.
+    /// The motor of each wheel; None for a wheel whose torque follows the command at any speed.
     #[getter]
     fn motors(&self) -> Vec<Option<Motor>> {
         self.inner
@@ -529,7 +529,7 @@ impl RoverModel {
         poses(q.py(), &self.inner, &at.kinematics)
     }
 
-    /// The distance of each wheel to the terrain.
+    /// Signed distance of each wheel from the terrain.
     ///
     /// Args:
     ///     q: Coordinates, (nq,).
@@ -551,11 +551,11 @@ impl RoverModel {
 
     /// The coordinates of the rover at rest on a terrain.
     ///
-    /// On a plane the joints are at zero, the trunk is upright along the normal with its origin
-    /// above the position, and the lowest wheel has gap zero. If that leaves wheels in the air,
-    /// pitch, roll and the joints that nothing drives bring them down, where this puts more wheels
-    /// on the ground. On any other terrain the same coordinates bring all wheels down to the ground
-    /// as far as they can. No wheel is in the ground.
+    /// On a plane, the joints are at zero, the trunk's y axis is along the normal, its origin is
+    /// above the position, and the lowest wheel touches the ground. If some wheels are then in the
+    /// air, pitch, roll and the passive joints are adjusted, provided that more wheels touch the
+    /// ground afterwards. On any other terrain, pitch, roll and the passive joints always bring as
+    /// many wheels to the ground as possible. No wheel penetrates the ground.
     ///
     /// Args:
     ///     terrain: A terrain, or a list of several; a plane must not be vertical.
@@ -566,8 +566,8 @@ impl RoverModel {
     ///     Coordinates of the state, (nq,).
     ///
     /// Raises:
-    ///     TerrainError: `terrain` is no terrain, or does not say what the ground is under the
-    ///         trunk or a wheel.
+    ///     TerrainError: `terrain` is not a terrain, or the ground under the trunk or a wheel is
+    ///         unknown.
     ///     StateError: A number is not finite, or the plane is vertical.
     fn resting_pose(
         &self,
@@ -609,7 +609,7 @@ impl RoverModel {
         Ok(fresh_rows(contacts.iter().map(point)))
     }
 
-    /// The contact Jacobian of each wheel: u = J v is the velocity of its contact point.
+    /// The contact Jacobian J of each wheel: J v is the velocity of its contact point.
     ///
     /// Args:
     ///     q: Coordinates, (nq,).

@@ -15,15 +15,16 @@ const WHAT: &str = "a Motor, a mapping of its fields, or None";
 
 /// The torque-speed line of a wheel's motor. Immutable.
 ///
-/// The torque is the command, but at most `stall_torque * (1 - speed / no_load_speed)` forwards and
-/// `stall_torque * (1 + speed / no_load_speed)` backwards, and at most `stall_torque` either way.
+/// The motor gives the commanded torque, limited to `stall_torque * (1 - speed / no_load_speed)`
+/// forwards and `stall_torque * (1 + speed / no_load_speed)` backwards, and at most `stall_torque`
+/// either way.
 ///
 /// Args:
-///     stall_torque: Torque of the line at rest, N m.
-///     no_load_speed: Speed at which the line reaches zero, rad/s. If infinite, the torque does not
-///         depend on the speed.
-///     regenerating: Whether the motor brakes when it is driven faster than `no_load_speed`, along
-///         the line and with at most the stall torque. Otherwise it turns freely there.
+///     stall_torque: Largest torque at standstill, N m.
+///     no_load_speed: Speed at which the available torque reaches zero, rad/s. If infinite, the
+///         limit does not depend on the speed.
+///     regenerating: Whether the motor brakes when it is driven faster than `no_load_speed`,
+///         following the same line up to the stall torque. Otherwise it turns freely there.
 ///
 /// Raises:
 ///     ModelError: `stall_torque` is not from 1e-9 to 1e9 N m, or `no_load_speed` is neither from
@@ -40,7 +41,7 @@ impl From<CoreMotor> for Motor {
     }
 }
 
-/// Reads what stands for a motor, or for none.
+/// Reads a motor, a mapping of its fields, or None.
 pub fn parse(given: &Bound<'_, PyAny>) -> Result<Option<CoreMotor>> {
     if given.is_none() {
         return Ok(None);
@@ -102,13 +103,13 @@ impl Motor {
         Ok(Self { inner })
     }
 
-    /// Torque of the line at rest, N m.
+    /// Largest torque at standstill, N m.
     #[getter]
     fn stall_torque(&self) -> f64 {
         self.inner.stall_torque
     }
 
-    /// Speed at which the line reaches zero, rad/s; may be infinite.
+    /// Speed at which the available torque reaches zero, rad/s; may be infinite.
     #[getter]
     fn no_load_speed(&self) -> f64 {
         self.inner.no_load_speed
@@ -120,7 +121,7 @@ impl Motor {
         self.inner.regenerating
     }
 
-    /// The torque that the motor gives under a command at a speed.
+    /// Motor torque for a command at a speed.
     ///
     /// Args:
     ///     command: Commanded torque, N m.

@@ -66,13 +66,13 @@ pub struct SolverWords {
     pub max_iterations: usize,
 }
 
-/// Options as they come in and as they are told.
+/// Options as arguments and as `settings` returns them.
 pub struct Options {
     pub step: StepOptions,
     words: SolverWords,
 }
 
-/// One option: its name, how it is read, and how it is told; it is not told where it is left out.
+/// One option: its name, how it is read, and how `settings` returns it, if it was given.
 struct Row {
     name: &'static str,
     read: fn(&mut Options, &Bound<'_, PyAny>) -> Result<()>,
@@ -145,7 +145,7 @@ const TABLE: [Row; 13] = [
 const OPTIONAL: [&str; 5] = ["materials", "time_step", "variant", "tolerance", "budget"];
 
 impl Options {
-    /// None given yet: those of `step`.
+    /// No options given: the defaults of `step`.
     pub fn of(step: StepOptions) -> Self {
         let words = SolverWords {
             solver: "auto".to_owned(),

@@ -13,26 +13,27 @@ use crate::arguments::{Named, at_least_one, count, finite, positive, refused};
 use crate::arrays::{Array, array, triple, two, vector};
 use crate::errors::{Kind, Result};
 
-/// Finds the cheapest of many paths of a rover over a height scan, by beam search.
+/// Beam search for the cheapest path of a rover over a height scan.
 ///
-/// `rover_gym.policy.ScanPolicy` drives by it, and `rover_gym.policy.PathCosts` says what a path
-/// costs. Poses are way ahead, way to the right, m, and turn to the left, rad.
+/// `rover_gym.policy.ScanPolicy` uses it; `rover_gym.policy.PathCosts` defines the cost of a path.
+/// A pose consists of the distance ahead, the distance to the right, m, and the turn to the left,
+/// rad.
 ///
 /// Args:
 ///     scan: Rows, columns and spacing, m, of the height scan.
-///     outline: The rover in the trunk's frame: `wheels` (n_wheels, 2) and `underside` (n, 2), x
-///         and z, m; `clearance` (n,) of the underside, m; `plane_fit` (3, n_wheels), level and
-///         slopes of the ground plane by the heights under the wheels; `x_c`, m, of the point that
-///         follows the path; `radius` of the wheels, m.
+///     outline: Geometry of the rover in the trunk's frame: `wheels` (n_wheels, 2) and `underside`
+///         (n, 2), x and z, m; `clearance` (n,) of the underside, m; `plane_fit` (3, n_wheels), the
+///         matrix from the heights under the wheels to height and slopes of the ground plane;
+///         `x_c`, x of the point that follows the path, m; `radius` of the wheels, m.
 ///     costs: The fields of `PathCosts`.
-///     first: The arcs that a path may begin with: `poses` (n, 4, 3), `direction` (n,), 1 or -1,
-///         and `commands` (n, 3), speed, curvature and sideways.
-///     further: Those that it may go on with: `poses` and `direction`.
+///     first: Arcs for the first segment of a path: `poses` (n, 4, 3), `direction` (n,), 1 or -1,
+///         and `commands` (n, 3), speed, curvature and sideways motion.
+///     further: Arcs for the following segments: `poses` and `direction`.
 ///     reach: The rover's reach, m.
 ///     arrival: Distance within which the goal is reached, m.
 ///
 /// Raises:
-///     OptionError: An argument is missing, no number, or of a wrong shape.
+///     OptionError: An argument is missing, not a number, or has a wrong shape.
 #[pyclass(module = "rover_gym.mechanics")]
 pub struct PathSearch {
     inner: Core,
@@ -192,19 +193,19 @@ impl PathSearch {
         })
     }
 
-    /// The first arc of the cheapest path.
+    /// Returns the first arc of the cheapest path.
     ///
     /// Args:
     ///     heights: `(rows * columns,)` heights of the scan, m.
     ///     goal: The goal ahead and to the right of the point that follows the path, m.
-    ///     command: `(3,)` the present command; its first entry is 0 at a start.
-    ///     boldness: Factor on the costs of belly, climb and lean.
-    ///     traps: `(n, 3)` poses where the rover got stuck.
-    ///     retreat: Direction of the first arc, 1 or -1, while the rover backs off; 0 for a free
-    ///         choice.
-    ///     extra: `(n,)` a further cost of each first arc, m; none by default.
-    ///     ways: `(rows * columns,)` way to the goal from each point of the scan, m; straight by
-    ///         default.
+    ///     command: `(3,)` the present command; its first entry is 0 if the rover starts to move.
+    ///     boldness: Factor on the costs of underside, climb and lean.
+    ///     traps: `(n, 3)` poses at which the rover got stuck.
+    ///     retreat: Required direction of the first arc, 1 or -1, while the rover backs off; 0 if
+    ///         both are allowed.
+    ///     extra: `(n,)` additional cost of each first arc, m; none by default.
+    ///     ways: `(rows * columns,)` cost-to-go from each point of the scan to the goal, m; the
+    ///         straight distance by default.
     ///
     /// Returns:
     ///     The index of the arc among the first arcs.
@@ -245,27 +246,28 @@ impl PathSearch {
         Ok(self.inner.best(&heights, &task))
     }
 
-    /// The way to a goal from every cell of a map (Dijkstra 1959).
+    /// Cost-to-go to a goal from every cell of a map (Dijkstra 1959).
     ///
-    /// The rover goes from a cell to one of its eight neighbours, headed for it. That costs the
-    /// distance and what the ground costs on a path: belly, climb and lean. A wheel over ground
-    /// that is not known stands as high as the others do; where all do, the distance is all.
+    /// The rover moves from a cell to one of its eight neighbours, with its heading towards it. The
+    /// cost is the distance plus the costs of underside, climb and lean. A wheel over unknown
+    /// ground gets the mean height of the other wheels; if the ground under all wheels is unknown,
+    /// the cost is the distance alone.
     ///
     /// Args:
-    ///     heights: (rows, columns) heights, m, nan where they are not known; from 3 to 2000 of
-    ///         each. Rows lie across, the first farthest ahead; columns lead to the right.
+    ///     heights: (rows, columns) heights, m, NaN where unknown; 3 to 2000 rows and columns. The
+    ///         first row is the farthest ahead; columns run from left to right.
     ///     spacing: Distance of rows and columns, m.
-    ///     goal: Row and column of the goal. One beyond the map is reached by the straight way from
-    ///         its border.
-    ///     boldness: Factor on the costs of belly, climb and lean.
-    ///     extra: (rows, columns) further price of a metre in each cell, at least 0; none by
+    ///     goal: Row and column of the goal. From the border to a goal outside the map, the
+    ///         straight distance counts.
+    ///     boldness: Factor on the costs of underside, climb and lean.
+    ///     extra: (rows, columns) additional cost per metre in each cell, at least 0; none by
     ///         default.
     ///
     /// Returns:
-    ///     (rows, columns) ways, in metres of level ground.
+    ///     (rows, columns) costs-to-go, in metres of level ground.
     ///
     /// Raises:
-    ///     OptionError: An argument has a wrong shape or an entry out of its range.
+    ///     OptionError: An argument has a wrong shape or an entry out of range.
     #[pyo3(signature = (heights, spacing, goal, boldness, extra = None))]
     fn ways(
         &mut self,
@@ -324,16 +326,17 @@ impl PathSearch {
         Ok(Array::shaped(found, &shape))
     }
 
-    /// What lies under the rover in poses.
+    /// Features of the ground under the rover at given poses.
     ///
     /// Args:
     ///     heights: `(rows * columns,)` heights of the scan, m.
     ///     poses: `(..., 3)` poses.
     ///
     /// Returns:
-    ///     (n, n_wheels + 3) for each pose the heights under the wheels over the mean of the
-    ///     present ones and the least gap under the rover, both over the wheels' radius; then the
-    ///     slopes ahead and to the right of the plane through the ground under the wheels.
+    ///     (n, n_wheels + 3), for each pose: the heights under the wheels minus the mean height
+    ///     under the wheels now, and the smallest gap under the rover, both divided by the wheel
+    ///     radius; then the slopes ahead and to the right of the plane fitted to the ground under
+    ///     the wheels.
     ///
     /// Raises:
     ///     OptionError: An argument has a wrong shape or an entry that is not finite.

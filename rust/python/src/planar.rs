@@ -22,7 +22,7 @@ const RULES: [(&str, ContactRule); 2] = [
     ("centre_height", ContactRule::CentreHeight),
 ];
 
-/// A planar machine on a ground: what the machines share. Made by the classes derived from it.
+/// Base class of planar machines on a ground. It cannot be instantiated.
 #[pyclass(module = "rover_gym.mechanics", extends = AnySimulation, subclass, frozen)]
 pub struct PlanarSimulation {
     inner: Arc<Shared<Core>>,
@@ -88,7 +88,7 @@ impl PlanarSimulation {
         self.ground.clone_ref(py)
     }
 
-    /// Coordinates, (nv,), x and y, m, then angles, rad, which turn to the left.
+    /// Coordinates, (nv,): x and y, m, then angles, rad, positive counterclockwise.
     #[getter]
     fn q(&self) -> Result<Array> {
         Ok(fresh(self.open()?.q()))
@@ -126,7 +126,7 @@ impl PlanarSimulation {
         Ok(self.parameters.bind(py).copy()?)
     }
 
-    /// The keyword arguments that make a simulation with the same options.
+    /// Keyword arguments for a simulation with the same options.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let inner = self.open()?;
@@ -137,7 +137,7 @@ impl PlanarSimulation {
         Ok(settings)
     }
 
-    /// Sets coordinates and rates; torques stay.
+    /// Sets coordinates and rates. Torques do not change.
     ///
     /// Time starts at 0, and the next step has no warm start.
     ///
@@ -157,7 +157,7 @@ impl PlanarSimulation {
         Ok(inner.set_state(&q, &v)?)
     }
 
-    /// Sets the driving torques; each saturates at its limit, where the machine has one.
+    /// Sets the driving torques; each saturates at its limit if the machine has one.
     ///
     /// Args:
     ///     torques: Torques between the body and each disc, (n_discs,), N m, positive forward.
@@ -187,7 +187,7 @@ impl PlanarSimulation {
         )))
     }
 
-    /// The friction-contact problem of the last step, of the last part of a split one.
+    /// The friction-contact problem of the last step; if the step was split, of its last part.
     ///
     /// Returns:
     ///     Delassus operator W, (2 n_c, 2 n_c), 1/kg; free velocity, (2 n_c,), m/s; friction

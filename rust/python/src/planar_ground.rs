@@ -33,9 +33,9 @@ pub fn quantity(kind: Kind, e: &QuantityError) -> BorderError {
     kind.error(e.field(), e.to_string(), Value::Number(e.value()))
 }
 
-/// Ground of a planar scene, of any kind: x forward, y up. Immutable.
+/// Base class of the grounds of planar scenes: x forward, y up. Immutable.
 ///
-/// `Line`, `Sine`, `Spline` and `Polyline` are its kinds.
+/// Its subclasses are `Line`, `Sine`, `Spline` and `Polyline`.
 #[pyclass(module = "rover_gym.mechanics", subclass, frozen)]
 pub struct PlanarGround(Arc<dyn Ground>);
 
@@ -88,7 +88,7 @@ fn points(x: &Bound<'_, PyAny>, y: &Bound<'_, PyAny>) -> Result<[Vec<f64>; 2]> {
 /// The ground y = slope x + offset of a planar scene.
 ///
 /// Args:
-///     slope: Tangent of the inclination.
+///     slope: Slope, rise over run.
 ///     offset: Height at x = 0, m.
 ///
 /// Raises:
@@ -108,7 +108,7 @@ impl Line {
         made!(CoreLine::new(slope, offset))
     }
 
-    /// Tangent of the inclination.
+    /// Slope, rise over run.
     #[getter]
     fn slope(&self) -> f64 {
         self.inner.slope()
@@ -199,9 +199,9 @@ impl Sine {
     }
 }
 
-/// The natural cubic spline through points: a ground with continuous curvature.
+/// A natural cubic spline through points: ground with continuous curvature.
 ///
-/// It goes on along its tangents beyond the first and the last point.
+/// Beyond the first and the last point it continues along its tangents.
 ///
 /// Args:
 ///     x: Places of the points, (n,), m, increasing.
@@ -244,9 +244,9 @@ impl Spline {
     }
 }
 
-/// Straight pieces between points, with corners: a ground of steps, ramps and kerbs.
+/// Straight segments between points: ground with steps, ramps and kerbs.
 ///
-/// Two points may stand above each other.
+/// Two points may have the same x, for a vertical step.
 ///
 /// Args:
 ///     x: Places of the points, (n,), m, not decreasing.

@@ -19,10 +19,11 @@ use crate::planar_ground::border;
 ///     ground: A `Line`, `Sine`, `Spline` or `Polyline`.
 ///     mass: Mass, kg.
 ///     radius: Radius, m.
-///     inertia: Inertia about the centre, kg m²; that of a homogeneous disc by default.
-///     **options: Options as of `Simulation`, from `gravity`, here (2,), to `warm_start`, and
-///         `contact`: "nearest", the disc touches where the ground is nearest to its centre, or
-///         "centre_height", the 2010 report's rule, by which the centre itself stops at the ground.
+///     inertia: Inertia about the centre, kg m²; the inertia of a homogeneous disc by default.
+///     **options: Options of `Simulation` from `gravity`, here (2,), to `warm_start`, and
+///         `contact`: "nearest", the contact is the point of the ground nearest to the disc's
+///         centre, or "centre_height", the rule of the 2010 report, by which the centre itself
+///         stops at the ground.
 ///
 /// Raises:
 ///     ModelError: `mass`, `radius` or `inertia` is not finite and positive.
@@ -75,7 +76,7 @@ impl BallSimulation {
 ///         default.
 ///     axle_b: Front axle relative to the body's mass centre, body axes, (2,), m; (0.4, 0) by
 ///         default.
-///     **options: Options as of `BallSimulation`.
+///     **options: Options of `BallSimulation`.
 ///
 /// Raises:
 ///     ModelError: A mass, radius or inertia is not finite and positive, or the wheels overlap.
@@ -110,7 +111,7 @@ fn one_or_two(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<[f64;
     Ok(pair(value, kind, field)?.into())
 }
 
-/// The rover of these keyword arguments, which are told in full in `parameters`.
+/// The rover of these keyword arguments. `parameters` receives all of them, defaults included.
 pub fn two_wheel_rover(given: &Named<'_>, parameters: &Bound<'_, PyDict>) -> Result<TwoWheelRover> {
     let given = given.of(Kind::Model);
     let both = |field: &str, usual: [f64; 2]| -> Result<[f64; 2]> {
@@ -150,26 +151,26 @@ pub fn two_wheel_rover(given: &Named<'_>, parameters: &Bound<'_, PyDict>) -> Res
     made.map_err(|e| border(Kind::Model, &e))
 }
 
-/// The six-wheel rover driven straight, in its plane of symmetry.
+/// The six-wheel rover driving straight ahead, as a planar machine in its plane of symmetry.
 ///
 /// Coordinates are x, y, m, theta, and the angle of each mirrored pair of joints, rad. Joints that
-/// do not turn about z are locked at 0. Only wheels touch the ground. A torque is that of each
-/// wheel of a pair.
+/// do not turn about z are locked at 0. Only wheels touch the ground. Each torque acts on both
+/// wheels of a pair.
 ///
 /// Args:
 ///     ground: A `Line`, `Sine`, `Spline` or `Polyline`.
-///     model: The machine, its own mirror image about the trunk's x-y plane; the built-in rover by
-///         default.
-///     **options: Options as of `BallSimulation`.
+///     model: The machine, which must be symmetric about the trunk's x-y plane; the built-in rover
+///         by default.
+///     **options: Options of `BallSimulation`.
 ///
 /// Raises:
-///     ModelError: The model is not its own mirror image.
+///     ModelError: The model is not symmetric.
 ///     TerrainError: `ground` is not a ground.
 ///     OptionError: An option is out of its range.
 ///     TypeError: An option is unknown.
 #[pyclass(module = "rover_gym.mechanics", extends = PlanarSimulation, frozen, get_all)]
 pub struct MirroredRoverSimulation {
-    /// Names of the joints that share each coordinate from the fourth on.
+    /// Names of the joints of each coordinate from the fourth on.
     joints: Vec<Vec<String>>,
     /// Names of the wheels of each disc.
     wheels: Vec<Vec<String>>,

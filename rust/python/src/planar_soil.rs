@@ -27,47 +27,46 @@ const USUAL: Usual = Usual {
     speed: 10.0,
 };
 
-/// A granular soil of disks, and a machine that drives on it.
+/// A planar granular soil of disks, with an optional machine that drives on it.
 ///
-/// The disks are free, with friction, between walls or on a ground.
+/// The disks move freely and touch with friction. Walls or a ground contain them.
 ///
 /// Args:
 ///     radius: Radii of the disks, (n,), m.
-///     mass: Masses of the disks, (n,), kg; they are homogeneous.
+///     mass: Masses of the disks, which are homogeneous, (n,), kg.
 ///     position: Centres, (n, 2), m, or centres and angles, (n, 3), m and rad.
-///     kinematic: Disks whose velocity no force changes, (n,), such as grains glued to a rough
-///         floor, or a piston with the velocity that `set_state` gives it; none by default. They
-///         may overlap one another and walls.
+///     kinematic: Which disks have a prescribed velocity, (n,); none by default. Use it for grains
+///         glued to a rough floor, or for a piston with the velocity given to `set_state`. These
+///         disks may overlap each other and walls.
 ///     walls: A point of each wall and the normal to its free side, (n, 4), m; none by default.
 ///     ground: A `Line`, `Sine`, `Spline` or `Polyline` below the disks; none by default.
 ///     rover: Keyword arguments of `TwoWheelRoverSimulation` that describe a rover, such as its
 ///         `parameters`; none by default.
-///     rig: Mass (kg) and radius (m) of a single wheel whose forward speed and turning rate no
-///         force changes; none by default.
+///     rig: Mass (kg) and radius (m) of a single wheel with prescribed forward speed and turning
+///         rate; none by default.
 ///     machine: Coordinates of the rover (x, y, theta, theta_A, theta_B) or of the rig (x, y, -,
 ///         theta, -), (5,), m and rad.
 ///     friction: Coulomb's coefficient between disks.
 ///     wall_friction: Coulomb's coefficient of disks on walls and ground.
 ///     wheel_friction: Coulomb's coefficient of wheels.
-///     rolling_friction: Largest moment that resists the rolling of a disk on a disk, wall or
-///         ground, over the normal force and the rolling radius: 1/r = 1/r_1 + 1/r_2 of two disks,
-///         the disk's own radius elsewhere. It does not act on wheels, or where Coulomb's
-///         coefficient is 0.
+///     rolling_friction: Coefficient of rolling friction of disks: the largest resisting moment
+///         divided by the normal force and the rolling radius r. Between two disks 1/r = 1/r_1 +
+///         1/r_2; on a wall or the ground r is the disk's radius. It does not act on wheels, nor if
+///         Coulomb's coefficient is 0.
 ///     restitution: Newton's coefficient of all contacts, in [0, 1].
 ///     gravity: Gravity, (2,), m/s²; (0, -9.81) by default.
 ///     time_step: Time step, s.
-///     tolerance: Largest relative residual of the contact problem. Its velocities are also right
-///         to ten times that in m/s, times the square root of gravity over 9.81 m/s².
+///     tolerance: Largest relative residual of the contact problem. Errors of velocities are also
+///         at most ten times this value in m/s, times the square root of gravity / 9.81 m/s².
 ///     max_iterations: Largest number of sweeps of the contact solver in a step.
-///     stabilisation: "projection" moves overlapping bodies apart, which may add energy by lifting
-///         those above; "none" leaves them. By default "none" without restitution and "projection"
-///         with it.
-///     penetration_tolerance: Overlap that projection leaves alone, m; 0.5% of the smallest radius
-///         by default.
-///     sleep: Whether disks at rest far from anything that moves are left out of the step.
+///     stabilisation: Treatment of overlaps: "projection" moves overlapping bodies apart, which may
+///         add energy by lifting those above; "none" leaves them. By default "projection" with
+///         restitution and "none" without.
+///     penetration_tolerance: Overlap that projection does not correct, m; 0.5% of the smallest
+///         radius by default.
+///     sleep: Whether to skip disks that are at rest and far from moving bodies.
 ///     sleep_speed: Speed below which a disk is at rest, m/s; 5e-4 by default.
-///     sleep_distance: Distance within which nothing may move for a disk to sleep, m; 0.2 by
-///         default.
+///     sleep_distance: A disk sleeps if no body within this distance moves, m; 0.2 by default.
 ///
 /// Raises:
 ///     ModelError: A radius or mass is not finite and positive, or the machine's data are invalid.
@@ -194,13 +193,13 @@ impl SoilSimulation {
         Ok(Self::disks(inner.v(), n_disks(&inner)))
     }
 
-    /// Which disks are kinematic, (n,).
+    /// Which disks have a prescribed velocity, (n,).
     #[getter]
     fn kinematic(&self) -> Result<Array<bool>> {
         Ok(fresh(self.open()?.soil().grains.kinematic()))
     }
 
-    /// Which disks sleep, (n,); kinematic ones always do.
+    /// Which disks sleep, (n,); True for disks with a prescribed velocity.
     #[getter]
     fn asleep(&self) -> Result<Array<bool>> {
         Ok(fresh(self.open()?.asleep()))
@@ -246,7 +245,7 @@ impl SoilSimulation {
         Ok(fresh(&self.open()?.command().torques))
     }
 
-    /// Force at the machine's centre along x and y, N.
+    /// External force at the machine's centre along x and y, N.
     #[getter]
     fn pull(&self) -> Result<(f64, f64)> {
         let inner = self.open()?;
@@ -254,7 +253,7 @@ impl SoilSimulation {
         Ok((pull.x, pull.y))
     }
 
-    /// The options of contacts, gravity and solver, by the names of the arguments.
+    /// Options of contacts, gravity and solver, as keyword arguments.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let inner = self.open()?;
@@ -270,7 +269,7 @@ impl SoilSimulation {
     /// Args:
     ///     position: Centres, (n, 2), m, or centres and angles, (n, 3), m and rad.
     ///     velocity: Rates, (n, 2), m/s, or (n, 3), m/s and rad/s; at rest by default.
-    ///     machine: Coordinates of the machine, (5,), m and rad; where it is by default.
+    ///     machine: Coordinates of the machine, (5,), m and rad; the present ones by default.
     ///     machine_rate: Rates of the machine's coordinates, (5,), m/s and rad/s; at rest by
     ///         default.
     ///
@@ -303,14 +302,14 @@ impl SoilSimulation {
         inner.set_state(&q, &v).map_err(|e| grain_error(&e))
     }
 
-    /// Takes disks out; the others keep their order.
+    /// Removes disks. The others keep their order.
     ///
     /// Args:
-    ///     which: Which disks go, (n,) truth values.
+    ///     which: Which disks to remove, (n,) booleans.
     ///
     /// Raises:
-    ///     ModelError: The number of truth values differs, or no disk would be left. Nothing has
-    ///         changed.
+    ///     ModelError: The number of booleans differs from that of the disks, or no disk would be
+    ///         left. Nothing has changed.
     fn remove(&self, which: &Bound<'_, PyAny>) -> Result<()> {
         let mut inner = self.open()?;
         let which = flags(which, Kind::Model, "which")?;
@@ -331,7 +330,7 @@ impl SoilSimulation {
             .map_err(|e| grain_error(&e))
     }
 
-    /// Sets the force at the machine's centre, such as that of a drawbar.
+    /// Sets an external force at the machine's centre, such as a drawbar load.
     ///
     /// Args:
     ///     pull: Force along x and y, (2,), N.
@@ -353,7 +352,7 @@ impl SoilSimulation {
 
     /// Momentum of the disks, (3,): along x and y, kg m/s, and about the origin, kg m²/s.
     ///
-    /// Kinematic disks do not count.
+    /// Disks with prescribed velocity are not included.
     fn momentum(&self) -> Result<Array> {
         Ok(fresh(&self.open()?.momentum()))
     }
@@ -380,16 +379,16 @@ impl SoilSimulation {
     }
 }
 
-/// Disks in loose rows over a width, without overlap: where a soil starts from.
+/// Initial state for a soil: disks in loose rows, without overlap.
 ///
-/// The radii are drawn evenly from their range. The defaults are the soil of the 2010 report: three
-/// layers of 74.
+/// The radii are drawn uniformly from their range. The defaults give the soil of the 2010 report:
+/// three layers of 74 disks.
 ///
 /// Args:
 ///     count: Number of disks, at most 1 000 000.
 ///     radius_min: Smallest radius, m.
 ///     radius_max: Largest radius, m.
-///     mass: Mass of a disk of the mean radius, kg; the others' go with their area.
+///     mass: Mass of a disk of the mean radius, kg; masses are proportional to area.
 ///     left: Left edge, m.
 ///     width: Width of the rows, m.
 ///     bottom: Height of the lower edge, m.
@@ -399,7 +398,7 @@ impl SoilSimulation {
 ///     Radii, (n,), m, masses, (n,), kg, and centres, (n, 2), m.
 ///
 /// Raises:
-///     ModelError: A number is not finite or out of its range, the radii are the wrong way round,
+///     ModelError: A number is not finite or out of its range, `radius_max` is below `radius_min`,
 ///         or a disk does not fit.
 #[pyfunction]
 #[pyo3(signature = (count = Given::MISSING, **options),

@@ -9,13 +9,13 @@ use crate::arrays::{Array, fresh, triple};
 use crate::errors::{Kind, Result, Value};
 use crate::terrain::Terrain;
 
-/// A plane as ground: the half-space `normal · x + offset >= 0` is free, the ground lies below.
+/// A plane as ground. The half-space `normal · x + offset >= 0` is free.
 ///
-/// A normal of unit length is taken as it is, so a plane's own `normal` and `offset` make the same
-/// plane to the bit.
+/// A normal of unit length is not normalised again, so the `normal` and `offset` of a plane
+/// reproduce the plane bit for bit.
 ///
 /// Args:
-///     normal: Direction out of the ground, (3,), of any length; straight up by default.
+///     normal: Normal out of the ground, (3,), of any length; straight up by default.
 ///     offset: Gap between the world's origin and the plane, m; flat ground at height y has the
 ///         offset -y.
 ///
@@ -55,7 +55,7 @@ impl Plane {
     ///     uphill: Direction of steepest ascent, rad: an angle about +y from +x.
     ///
     /// Raises:
-    ///     TerrainError: An angle is no finite number.
+    ///     TerrainError: An angle is not a finite number.
     #[staticmethod]
     fn tilted(slope: &Bound<'_, PyAny>, uphill: &Bound<'_, PyAny>) -> Result<Py<Self>> {
         let angle = number(slope, Kind::Terrain, "slope")?;

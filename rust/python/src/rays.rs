@@ -60,7 +60,7 @@ pub fn rays(
     Ok((rays, range))
 }
 
-/// Hits as arrays: infinite distances and nan where nothing is met.
+/// Hits as arrays: infinite distances and NaN normals for rays without a hit.
 pub fn met(hits: &[Option<Hit>]) -> Met {
     let distance = |hit: &Option<Hit>| hit.map_or(f64::INFINITY, |hit| hit.distance);
     let normal = |hit: &Option<Hit>| hit.map_or([f64::NAN; 3], |hit| hit.normal.into());

@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use rover_core::integrator::StepReport as CoreReport;
 use rover_core::multibody::Energy as CoreEnergy;
 
-/// How the steps of one call went: the worst of them, or their sum.
+/// Summary of the time steps of one call: sums or worst values over the steps.
 #[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct StepReport {
     inner: CoreReport,
@@ -32,64 +32,65 @@ pub struct StepReport {
     newton_iterations: usize,
     /// Largest relative residual of a step's contact problem, computed from its impulses.
     ///
-    /// Where the energy audit slowed a rebound (`restitution` above 0), it contains how far the
-    /// rebound then falls short of Newton's law. The status is the solver's.
+    /// If the energy audit slowed a rebound (`restitution` above 0), the residual includes the
+    /// difference from Newton's law. `status` describes the solver alone.
     #[pyo3(get)]
     residual: f64,
     /// Largest number of contacts in a step.
     #[pyo3(get)]
     n_contacts: usize,
-    /// Number of steps taken again.
+    /// Number of repeated steps.
     ///
-    /// A step is taken again when a motor reached its torque-speed line, when the energy audit asks
-    /// for implicit gyroscopic terms, or when Newton's law of restitution had no solution.
+    /// A step is repeated if a motor reached its torque-speed line, if the energy audit requires
+    /// implicit gyroscopic terms, or if Newton's law of restitution had no solution.
     #[pyo3(get)]
     retaken: usize,
-    /// Steps that the general step took, since the fast one does not take them.
+    /// Number of steps that used the general step instead of the fast one.
     ///
-    /// 0 of machines in the plane and of grains, which have no fast one.
-    /// `Simulation.fallback_reason` says whether a simulation has fast steps.
+    /// Always 0 for planar machines and grains, which have no fast step.
+    /// `Simulation.fallback_reason` tells whether a simulation has fast steps.
     #[pyo3(get)]
     fallbacks: usize,
-    /// Largest unexplained gain of energy in a step, relative to the kinetic energy.
-    ///
-    /// Unexplained is what exceeds the work of gravity and actuators.
+    /// Largest energy gain of a step beyond the work of gravity and actuators, relative to the
+    /// kinetic energy.
     #[pyo3(get)]
     energy_gain: f64,
-    /// Energy that the scheme would have gained and the audit removed, summed over the steps, J.
+    /// Spurious energy gain of the scheme that the audit removed, summed over the steps, J.
     #[pyo3(get)]
     energy_removed: f64,
-    /// Energy that friction and impacts took by their law, summed over the steps, J.
+    /// Energy dissipated by friction and impacts, summed over the steps, J.
     ///
-    /// Newton's law of restitution with friction can make it negative. A new contact that closes
-    /// faster than gravity explains counts as an impact.
+    /// It can be negative with Newton's law of restitution and friction. A new contact counts as an
+    /// impact if it closes faster than gravity explains.
     #[pyo3(get)]
     energy_dissipated: f64,
-    /// Energy that the scheme lost, summed over the steps, J; negative where it gained.
+    /// Numerical energy loss of the scheme, summed over the steps, J; negative if energy is gained.
     ///
     /// The change of the energy is the work of the actuators minus `energy_dissipated`,
     /// `energy_lost` and `energy_removed`, plus `energy_lifted` and `energy_released`.
-    /// `energy_lost` is therefore what no law explains: errors of the time step, and the work of
-    /// reactions in contacts that persist. In smooth motion it shrinks with the square of the step.
-    /// Always 0 with grains and planar soils, whose energy is not audited.
+    /// `energy_lost` therefore contains the errors of the time stepping and the work of reactions
+    /// in persistent contacts. In smooth motion it shrinks with the square of the time step. Always
+    /// 0 for grains and planar soils, whose energy is not audited.
     #[pyo3(get)]
     energy_lost: f64,
-    /// Energy gained by pushing bodies out of penetration, less the actuators' work, all steps, J.
+    /// Energy gained by removing penetration, without the actuators' work, summed over the steps,
+    /// J.
     #[pyo3(get)]
     energy_lifted: f64,
-    /// Energy released by yielding wheels, summed over the steps, J; negative where they stored it.
+    /// Energy released by elastic wheels, summed over the steps, J; negative if they stored energy.
     ///
-    /// Wheels yield where their model gives them a `stiffness`. Their springs are part of neither
-    /// the kinetic nor the potential energy. Besides what the springs give off, it holds the work
-    /// that the wheel's force does because it is constant over a step, which cancels where a wheel
-    /// comes to rest again.
+    /// Wheels are elastic if the model gives them a `stiffness`. The energy of their springs is
+    /// part of neither the kinetic nor the potential energy. The wheel's force is constant over a
+    /// step; the resulting error in its work is included, and cancels when a wheel comes to rest
+    /// again.
     #[pyo3(get)]
     energy_released: f64,
-    /// Number of independent sets of wheel loads that balance one another in the last step.
+    /// Degree of static indeterminacy of the wheel loads in the last step.
     ///
-    /// 0 means that equilibrium determines the loads. Otherwise they are one of many answers, and
-    /// micrometres decide which: a rigid chassis on four rigid wheels has one such set. Wheels with
-    /// a `stiffness` have none. Friction is not considered; 0 for other machines than rovers.
+    /// 0 means that equilibrium determines the loads. Otherwise many distributions of loads satisfy
+    /// equilibrium, and micrometres of height decide between them: a rigid chassis on four rigid
+    /// wheels has degree 1. Wheels with a `stiffness` always have 0. Friction is not considered. 0
+    /// for machines other than rovers.
     #[pyo3(get)]
     undetermined_loads: usize,
 }
@@ -136,10 +137,10 @@ impl StepReport {
 
 #[pymethods]
 impl StepReport {
-    /// The report of these steps and of further ones.
+    /// Combines this report with that of the following steps.
     ///
     /// Args:
-    ///     later: How the further ones went.
+    ///     later: Report of the following steps.
     fn followed_by(&self, later: &Self) -> Self {
         let mut inner = self.inner;
         inner.merge(&later.inner);

@@ -40,23 +40,22 @@ impl From<TogetherError> for BorderError {
     }
 }
 
-/// A rover among grains in space, stepped together.
+/// A rover and grains, stepped together with contact forces between them.
 ///
-/// Wheels, boxes and balls of the rover meet the grains with exact contact and friction, and forces
-/// go both ways within the step. The rover and the grains keep their own simulations, which have
-/// their states, commands, contacts and forces; only the steps are taken here, with the solver
-/// settings of the grains, θ = 1. Walls of the grains hold grains alone: what shall hold the rover
-/// too is a terrain of both.
+/// Wheels, boxes and balls of the rover touch the grains with contact and friction, solved together
+/// in each step. Rover and grains keep their own simulations, which hold states, commands, contacts
+/// and forces; this class only takes the steps, with the solver settings of the grains and θ = 1.
+/// The walls of the grains do not stop the rover: for that, give both the same terrain.
 ///
 /// Args:
-///     rover: The rover, with its model, terrain, friction and commands.
-///     grains: The balls, with the same time step and gravity.
+///     rover: The simulation of the rover, with its model, terrain, friction and commands.
+///     grains: The simulation of the balls, with the same time step and gravity.
 ///     wheel_friction: Coulomb's coefficient between the rover and grains.
 ///
 /// Raises:
 ///     OptionError: The time steps or gravities differ, or the coefficient is negative or not
 ///         finite.
-///     StateError: A part of the rover is in a grain.
+///     StateError: A part of the rover penetrates a grain.
 #[pyclass(module = "rover_gym.mechanics", extends = AnySimulation, frozen)]
 pub struct RoverGrainSimulation {
     pub together: Arc<Together>,
@@ -64,7 +63,7 @@ pub struct RoverGrainSimulation {
     grains: Py<GrainSimulation>,
 }
 
-/// A rover, grains, and what acts between them.
+/// A rover, grains and the contacts between them.
 pub struct Together {
     link: Shared<RoverInGrains>,
     pub rover: Arc<Shared<RoverSimulation>>,
@@ -168,13 +167,13 @@ impl RoverGrainSimulation {
         }))
     }
 
-    /// The rover's simulation. Its own `step` moves it without the grains.
+    /// The rover's simulation. Calling its own `step` moves it without the grains.
     #[getter]
     fn rover(&self, py: Python<'_>) -> Py<Simulation> {
         self.rover.clone_ref(py)
     }
 
-    /// The grains' simulation. Its own `step` moves them without the rover.
+    /// The grains' simulation. Calling its own `step` moves them without the rover.
     #[getter]
     fn grains(&self, py: Python<'_>) -> Py<GrainSimulation> {
         self.grains.clone_ref(py)
@@ -186,16 +185,16 @@ impl RoverGrainSimulation {
         Ok(self.together.link.open()?.friction())
     }
 
-    /// Gap of each wheel now to the nearest grain or the terrain, (n_wheels,), m.
+    /// Gap between each wheel and the nearest grain or the terrain now, (n_wheels,), m.
     ///
-    /// Positive when apart. A wheel without a grain within its radius has the gap to the terrain.
+    /// Positive when apart. Grains farther from a wheel than its radius are not considered.
     #[getter]
     fn wheel_gaps(&self) -> Result<Array> {
         let read = |link: &RoverInGrains, rover: &_, grains: &_| link.wheel_gaps(rover, grains);
         Ok(self.together.read(read)?.into())
     }
 
-    /// Deepest overlap now, m: of grains with anything, and of the rover with grains.
+    /// Deepest overlap of a grain with any body now, m.
     fn penetration(&self) -> Result<f64> {
         self.together.read(RoverInGrains::penetration)
     }

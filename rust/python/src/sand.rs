@@ -155,7 +155,8 @@ pub fn sand_to_dict<'py>(
     Ok(found)
 }
 
-/// One wheel on a bed of soil, driven at prescribed speeds and free to sink under its load.
+/// A single wheel on a bed of soil, with prescribed speeds and a vertical load under which it
+/// sinks.
 ///
 /// Args:
 ///     soil: A `rover_gym.sand.Soil`, or a mapping of its numbers.
@@ -164,7 +165,8 @@ pub fn sand_to_dict<'py>(
 ///     rounding: Radius of its edges, m.
 ///     grouser_height: Height of its grousers, m.
 ///     grousers: Number of its grousers.
-///     accuracy: Largest error of the forces by the number of points on the wheel.
+///     accuracy: Largest relative error of the forces that the discretisation of the wheel may
+///         cause.
 ///
 /// Raises:
 ///     TerrainError: A number of the soil is missing or out of its range.
@@ -259,13 +261,13 @@ impl WheelBed {
         self.bed.rules.n_points()
     }
 
-    /// Radius of the drum with the sand that its grousers hold, m.
+    /// Radius of the wheel including the sand held between its grousers, m.
     #[getter]
     fn drum(&self) -> f64 {
         self.bed.wheel.drum()
     }
 
-    /// Steady motion.
+    /// Forces and sinkage in steady motion.
     ///
     /// Args:
     ///     drives: Speed of travel (m/s), rate of the wheel (rad/s, positive forward), slip angle
@@ -273,7 +275,7 @@ impl WheelBed {
     ///
     /// Returns:
     ///     Sinkage (m), drawbar pull, force to the right and lift (N), and driving torque (N m) of
-    ///     each run, (n, 5); nan where the soil does not bear the load.
+    ///     each run, (n, 5); NaN if the soil cannot carry the load.
     ///
     /// Raises:
     ///     OptionError: `drives` has a wrong shape or an entry that is not finite.
@@ -309,7 +311,7 @@ impl WheelBed {
         Ok(fresh_rows(found.collect::<Vec<_>>()))
     }
 
-    /// A run from rest on the surface: the wheel is let down and driven.
+    /// Simulates a run: the wheel starts on the surface, sinks in and drives.
     ///
     /// Args:
     ///     drives: As for `steady`, one row for each step, (n, 5).

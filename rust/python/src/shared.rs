@@ -48,7 +48,7 @@ impl Watch {
         }
     }
 
-    /// Whether the call may go on: no, once a handler has raised, as that of Ctrl-C does.
+    /// Whether the call may continue: false once a signal handler has raised an exception.
     pub fn go_on(&mut self) -> bool {
         if self.raised.is_none() && Instant::now() >= self.next {
             // Nothing to attach to: the interpreter is shutting down.
@@ -63,7 +63,7 @@ impl Watch {
         Ok(self.raised.map_or(Ok(()), Err)?)
     }
 
-    /// The call's result, or what a handler raised.
+    /// The call's result, or the exception of a signal handler.
     pub fn result<T>(self, result: Result<T, impl Into<BorderError>>) -> Result<T> {
         self.raised()?;
         result.map_err(Into::into)

@@ -31,8 +31,8 @@ use crate::{terrain, union};
 
 /// A rover on a terrain, stepped through time.
 ///
-/// It starts at rest with all coordinates 0, with its steering held at 0 and every other joint
-/// free.
+/// It starts at rest with all coordinates 0. The steering joints are held at 0; all other joints
+/// are free.
 ///
 /// Args:
 ///     model: The machine; the built-in rover by default.
@@ -42,30 +42,31 @@ use crate::{terrain, union};
 ///     restitution: Newton's coefficient of every contact whose pair is not in `materials`, in
 ///         [0, 1].
 ///     materials: Friction and restitution by pair of materials, in any order, such as
-///         `{("wheel", "rock"): (0.5, 0.1)}`; a list of rows (name, name, friction, restitution)
-///         says the same. None by default.
+///         `{("wheel", "rock"): (0.5, 0.1)}`; or a list of rows (name, name, friction,
+///         restitution). None by default.
 ///     time_step: Time step, s, from 1e-9 to 1000; 0.005 by default.
-///     variant: "linearised" evaluates the forces once a step; "newton" solves for those at its
-///         end. "linearised" by default.
-///     theta: Weight of the end of the step in the time stepping, in [0.5, 1].
-///     forecast: A contact takes part in a step where gap + forecast * time_step * u_N <= 0, with
-///         u_N its normal velocity; in [0, 1].
+///     variant: "linearised" evaluates the forces once in each step; "newton" solves for the forces
+///         at its end. "linearised" by default.
+///     theta: Implicitness of the time stepping: weight of the end of the step, in [0.5, 1].
+///     forecast: A contact is active in a step if gap + forecast * time_step * u_N <= 0, with u_N
+///         its normal velocity; in [0, 1].
 ///     solver: Method for the contact problem, as in `solve_friction_contact`.
 ///     tolerance: Largest relative residual of the contact problem; 1e-12 by default.
 ///     max_iterations: Largest number of iterations of the contact solver in a step.
-///     budget: Largest amount of work of the contact solver in a step, counted and not timed, in
-///         the unit of `solve_friction_contact`; None grows with the number of contacts.
-///     stabilisation: What is done about penetration: "projection" moves the bodies out of it,
-///         "none" leaves it.
+///     budget: Largest amount of work of the contact solver in a step, in the unit of
+///         `solve_friction_contact` (operations, not time). By default it grows with the number of
+///         contacts.
+///     stabilisation: Treatment of penetration: "projection" moves overlapping bodies apart, "none"
+///         leaves them.
 ///     warm_start: Whether the contact solver starts from the last step's impulses.
-///     accuracy: Chooses `time_step`, `variant` and `tolerance`, which then cannot be given, as
-///         `accuracy_options` does: "fast", "balanced", "reference", or the error allowed on a path
-///         of 20 m on flat ground, m.
+///     accuracy: Chooses `time_step`, `variant` and `tolerance` by `accuracy_options`: "fast",
+///         "balanced", "reference", or the allowed error on a path of 20 m on flat ground, m. These
+///         three options cannot be given beside it.
 ///
 /// Raises:
 ///     ModelError: `model` is not a RoverModel.
 ///     TerrainError: `terrain` is not a terrain.
-///     OptionError: An option is out of its range, or is given beside `accuracy`.
+///     OptionError: An option is out of range, or must not be given beside `accuracy`.
 #[pyclass(module = "rover_gym.mechanics", extends = AnySimulation, frozen)]
 pub struct Simulation {
     pub inner: Arc<Shared<CoreSimulation>>,
@@ -86,7 +87,7 @@ fn names(joints: &Bound<'_, PyAny>) -> Result<Vec<String>> {
 }
 
 impl Simulation {
-    /// A simulation, and what it was made with.
+    /// A simulation and its constructor arguments.
     pub fn of(inner: CoreSimulation, origin: Origin) -> PyClassInitializer<Self> {
         let parts = (inner.model().clone(), inner.options().clone());
         Self::with(Arc::new(Shared::new(inner)), parts, origin)
@@ -179,15 +180,16 @@ impl Simulation {
         union::object(py, &self.origin.terrain)
     }
 
-    /// The sand under the wheels; None on firm ground.
+    /// Forces, sinkage and ruts of the wheels on sand; None on rigid ground.
     ///
     /// Returns:
     ///     Arrays by name. `force` (N) and `moment` about the wheel's centre (N m) of the sand on
     ///     each wheel in the last step, (n_wheels, 3), world frame; `sinkage` of each wheel's
-    ///     lowest point under the undisturbed surface, (n_wheels,), m, negative where it is clear;
-    ///     `absorbed`, energy that the sand has taken from each wheel, (n_wheels,), J; `slip`, rim
-    ///     slip of each wheel over the faster of rim and ground, (n_wheels,), 0 where it is clear;
-    ///     `ruts`, place x and z and depth of each cell that a wheel has pressed down, (n, 3), m.
+    ///     lowest point below the undisturbed surface, (n_wheels,), m, negative above it;
+    ///     `absorbed`, energy that the sand has dissipated under each wheel, (n_wheels,), J;
+    ///     `slip`, rim slip of each wheel relative to the faster of rim and ground speed,
+    ///     (n_wheels,), 0 without contact; `ruts`, x, z and depth of each cell that a wheel has
+    ///     compacted, (n, 3), m.
     ///
     /// Raises:
     ///     BusyError: Another thread is stepping this simulation.
@@ -222,7 +224,7 @@ impl Simulation {
         self.options.restitution
     }
 
-    /// Friction and restitution by pair of materials, as given.
+    /// Friction and restitution by pair of materials.
     #[getter]
     fn materials<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let laws = PyDict::new(py);
@@ -234,7 +236,7 @@ impl Simulation {
         Ok(laws)
     }
 
-    /// The keyword arguments that make a simulation with the same options.
+    /// Keyword arguments for a simulation with the same options.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let gravity = &self.options.gravity;
@@ -242,17 +244,18 @@ impl Simulation {
         settings(&gravity, &self.options, &self.origin.words)
     }
 
-    /// Rovers that a batch steps together in one register of this machine.
+    /// Number of rovers that a batch steps together in one SIMD register of this computer.
     ///
-    /// Either 8, 4 or 1, and always 1 if all steps are general: see `fallback_reason`.
+    /// Either 8, 4 or 1. Always 1 if the simulation uses the general step: see `fallback_reason`.
     #[getter]
     fn lanes(&self) -> Result<usize> {
         Ok(self.open()?.lanes())
     }
 
-    /// Why all steps are general, one rover at a time; None if they are fast, in lanes.
+    /// Reason why this simulation always uses the general step; None if it uses the fast one.
     ///
-    /// Of fast steps, `StepReport.fallbacks` counts those that had to be general after all.
+    /// The fast step handles several rovers per SIMD register. Single steps may still need the
+    /// general step; `StepReport.fallbacks` counts them.
     #[getter]
     fn fallback_reason(&self) -> Result<Option<String>> {
         Ok(self.open()?.fallback_reason().map(|why| why.to_string()))
@@ -275,7 +278,7 @@ impl Simulation {
         Ok(fresh(&self.open()?.state().v))
     }
 
-    /// Rotation matrix R_WB, (3, 3), from coordinates in the trunk to coordinates in the world.
+    /// Rotation matrix R_WB, (3, 3), from the trunk's frame to the world frame.
     #[getter]
     fn rotation(&self) -> Result<Array> {
         let R = self
@@ -318,7 +321,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// The state in the report's coordinates.
+    /// The state in the coordinates of the 2010 report.
     ///
     /// Returns:
     ///     The report's q, (nq,), and its rate, (nv,).
@@ -332,7 +335,7 @@ impl Simulation {
         Ok((q.into(), qdot.into()))
     }
 
-    /// Commanded torques, within the model's limits, (n_wheels,), N m, positive forward.
+    /// Commanded torques, limited by the model, (n_wheels,), N m, positive forward.
     #[getter]
     fn wheel_torques(&self) -> Result<Array> {
         Ok(fresh(self.open()?.wheel_torques()))
@@ -340,7 +343,7 @@ impl Simulation {
 
     /// Mean torques of the drives over the last step, (n_wheels,), N m, positive forward.
     ///
-    /// Each is the command within the line of the wheel's `Motor`; 0 before any step.
+    /// Each is the command after the limit of the wheel's `Motor`; 0 before the first step.
     #[getter]
     fn motor_torques(&self) -> Result<Array> {
         Ok(fresh(self.open()?.motor_torques()))
@@ -358,7 +361,8 @@ impl Simulation {
         Ok(self.open()?.set_wheel_torques(&torques)?)
     }
 
-    /// Steering set-points, (n_wheels,), rad; 0 for wheels whose steering is not held.
+    /// Steering set-points, (n_wheels,), rad; 0 for wheels whose steering joint is missing or
+    /// released.
     #[getter]
     fn steering(&self) -> Result<Array> {
         Ok(fresh(&self.open()?.steering()))
@@ -377,14 +381,14 @@ impl Simulation {
         Ok(self.open()?.set_steering(&set_points)?)
     }
 
-    /// Sets torques and steering together: both, or neither where either is refused.
+    /// Sets torques and steering together. If one of them is invalid, neither changes.
     ///
     /// Args:
-    ///     torques: As of `set_wheel_torques`, (n_wheels,), N m.
-    ///     set_points: As of `set_steering`, (n_wheels,), rad.
+    ///     torques: As for `set_wheel_torques`, (n_wheels,), N m.
+    ///     set_points: As for `set_steering`, (n_wheels,), rad.
     ///
     /// Raises:
-    ///     CommandError: As of these two methods. Nothing has changed.
+    ///     CommandError: As for these two methods. Nothing has changed.
     fn set_commands(
         &self,
         torques: &Bound<'_, PyAny>,
@@ -397,8 +401,8 @@ impl Simulation {
 
     /// Sets torques about the joint axes.
     ///
-    /// A joint with a drive of its own saturates at its limit and has its motor's line. At all
-    /// others the torques are added to the wheels' and have no limit.
+    /// At a joint with its own drive, the torque is limited by the drive and by its motor's
+    /// torque-speed line. At all other joints, wheels among them, it is added without limit.
     ///
     /// Args:
     ///     torques: Torques, (n_joints,), N m, in the order of `RoverModel.joint_names`.
@@ -415,13 +419,13 @@ impl Simulation {
     ///
     /// Args:
     ///     joints: Name of a joint, or names.
-    ///     set_points: Angles, one for each joint, rad; where they are now by default.
+    ///     set_points: Angles, one for each joint, rad; the present angles by default.
     ///     stiffness: Stiffness of the controllers, N m/rad; the model's by default.
     ///     damping: Damping of the controllers, N m s/rad; the model's by default.
     ///
     /// Raises:
     ///     CommandError: There is no such joint, the number of set-points differs, or a number is
-    ///         negative or not finite where it must not be. Nothing has changed.
+    ///         negative or not finite. Nothing has changed.
     #[pyo3(signature = (joints, set_points = None, *, stiffness = None, damping = None))]
     fn hold(
         &self,
@@ -455,7 +459,7 @@ impl Simulation {
         Ok(self.open()?.release(&names(joints)?)?)
     }
 
-    /// Holds all wheels where they are, as `hold` does, and sets their torques to 0.
+    /// Holds all wheels at their present angles, as `hold` does, and sets their torques to 0.
     fn brake(&self) -> Result<()> {
         self.open()?.brake();
         Ok(())
@@ -486,7 +490,7 @@ impl Simulation {
         Ok(fresh_rows(self.open()?.wheel_forces()))
     }
 
-    /// Mean normal force over the last step on all solids but the wheels, N.
+    /// Mean normal force over the last step on all solids except the wheels, N.
     ///
     /// It is large when the rover is high-centred.
     #[getter]
@@ -500,16 +504,16 @@ impl Simulation {
         Ok(self.open()?.deepest_overlap())
     }
 
-    /// Everything that a controller looks at, as one new row.
+    /// All quantities for a controller, as one new array.
     ///
     /// Args:
-    ///     target: The place (x, z) on the map that the entry `target` refers to, m; the origin by
+    ///     target: Place (x, z) of the target, to which the entry `target` refers, m; the origin by
     ///         default.
     ///     scan: Points of the height scan ahead and to the right of the trunk's origin in the
     ///         heading frame, (n, 2), m; none by default.
     ///
     /// Returns:
-    ///     The row, whose parts `reading_layout` names.
+    ///     The array; `reading_layout` gives the slice of each quantity.
     ///
     /// Raises:
     ///     OptionError: An argument has a wrong shape or an entry that is not finite.
@@ -530,7 +534,7 @@ impl Simulation {
         Ok(row.into())
     }
 
-    /// The place of each quantity in a reading.
+    /// The slice of each quantity in a reading.
     ///
     /// - `pose`: q, with the angles of the wheels wrapped to one turn
     /// - `body_velocity`: linear and angular velocity of the trunk in its own frame, m/s and rad/s
@@ -539,20 +543,22 @@ impl Simulation {
     /// - `wheel_contacts`: 1 where the wheel touches the ground, within 1 mm, else 0
     /// - `normal_forces`: mean over the last step, N
     /// - `tangential_forces`: mean over the last step, rolling and lateral for each wheel, N
-    /// - `ground_normal`: normal of the ground plane in the trunk's frame; 0 without one
-    /// - `target`: how far ahead of the trunk's origin and to its right the target is, and how far
-    ///   away, all horizontal, m
+    /// - `ground_normal`: normal of the ground plane in the trunk's frame; 0 without a plane
+    /// - `target`: distance of the target ahead of the trunk's origin, to its right, and in total,
+    ///   all horizontal, m
     /// - `cos_tilt`: cosine of the angle between the trunk's y axis and up
     /// - `speed`: horizontal speed of the trunk's origin, m/s
     /// - `trunk_force`: as the property, N
-    /// - `slip_ratio`: mean over the wheels in contact of slip over the faster of rim and ground
-    /// - `work`: work through the wheel motors in the last call of `step`, driving or braking, J
+    /// - `slip_ratio`: mean over the wheels in contact of the slip divided by the faster of rim and
+    ///   ground speed
+    /// - `work`: absolute work of the wheel motors in the last call of `step`, driving or braking,
+    ///   J
     /// - `positive_work`: the driving part of it, J
     /// - `time`: s
     /// - `solver`: of the last call of `step`: 1 if it did not converge, iterations, residual,
     ///   contacts
-    /// - `heights`: height of the ground at the points of the scan above the trunk's origin, m; nan
-    ///   where there is no ground
+    /// - `heights`: height of the ground at the points of the scan relative to the trunk's origin,
+    ///   m; NaN where there is no ground
     ///
     /// Args:
     ///     n_scan: Number of points of the height scan.
@@ -572,23 +578,26 @@ impl Simulation {
         slices(py, &ReadingLayout::new(&self.model, n_scan))
     }
 
-    /// Where rays meet the ground first, or the rover itself.
+    /// Finds the first point at which each ray hits the ground or the rover itself.
     ///
-    /// Of the rover its wheels, boxes and balls are seen, as they collide.
+    /// Of the rover, the collision shapes are hit: wheels, boxes and balls.
     ///
     /// Args:
-    ///     origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
-    ///     directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
-    ///     max_range: Distance to which they are followed, m; without end by default.
-    ///     parts: Whether the rover's own parts are met.
-    ///     without: Names of solids whose parts are not met, such as the one that carries a sensor.
+    ///     origins: Origins of the rays, world frame, (n, 3) or one (3,) for all, m.
+    ///     directions: Directions of the rays, world frame, (n, 3) or one (3,) for all, of any
+    ///         length.
+    ///     max_range: Largest distance, m; unlimited by default.
+    ///     parts: Whether rays hit the rover's own parts.
+    ///     without: Names of solids that rays pass through, such as the one that carries the
+    ///         sensor.
     ///
     /// Returns:
-    ///     Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
-    ///     world frame, (n, 3), nan where nothing is met.
+    ///     Distances, (n,), m, and the surface's unit normals at the hits, world frame, (n, 3). A
+    ///     ray without a hit has an infinite distance and a NaN normal.
     ///
     /// Raises:
-    ///     OptionError: As of `Plane.cast_rays`, or `without` names no solid of the model.
+    ///     OptionError: As for `Terrain.cast_rays`, or `without` contains a name that is not a
+    ///         solid of the model.
     #[pyo3(signature = (origins, directions, max_range = Given::MISSING, *, parts = Given::MISSING, without = None),
         text_signature = "($self, origins, directions, max_range=None, *, parts=False, without=())")]
     fn cast_rays(
@@ -649,7 +658,7 @@ impl Simulation {
         poses(py, &self.model, &self.open()?.kinematics())
     }
 
-    /// The friction-contact problem of the last step, of the last part of a split one.
+    /// The friction-contact problem of the last step; if the step was split, of its last part.
     ///
     /// Returns:
     ///     Delassus operator W, (3 n_c, 3 n_c), 1/kg; free velocity, (3 n_c,), m/s; friction
@@ -658,25 +667,26 @@ impl Simulation {
         Ok(problem(&*self.open()?))
     }
 
-    /// Derivatives of the next step by state and command. The simulation does not change.
+    /// Derivatives of the next step with respect to state and command. The simulation does not
+    /// change.
     ///
-    /// The step is the one after `set_state(q, v)`, without memory of earlier impulses. Its
-    /// contacts and their modes are held, and so are the branches of the motors; the limits of the
-    /// commands are left out. Where the modes change within `perturbation`, the step has no such
-    /// derivative, and `Linearisation.holds` says so.
+    /// The step is taken as after `set_state(q, v)`, without warm start. The active contacts, their
+    /// modes and the branches of the motors' lines are held constant; the limits of the commands
+    /// are not considered. If the modes change within `perturbation`, the derivative is not valid
+    /// and `Linearisation.holds` is False.
     ///
     /// Args:
     ///     perturbation: Change of each entry of (x, u) in the two steps that test its column, m,
     ///         rad, m/s or rad/s, and 1000 times as many N m; from 1e-9 to 1e-3, 1e-6 by default.
     ///
     /// Returns:
-    ///     A, B, the modes and how far they hold.
+    ///     The derivatives, the contact modes and their margins.
     ///
     /// Raises:
     ///     OptionError: `perturbation` is out of its range, or the variant is "newton".
     ///     StateError: A pitch is 90 degrees, where the coordinates are singular.
-    ///     StepError: A step could not be taken, or was taken in parts or not solved, so that it
-    ///         has no derivative.
+    ///     StepError: The step failed, was split, or did not converge, so that it has no
+    ///         derivative.
     #[pyo3(signature = (perturbation = Given::MISSING), text_signature = "($self, perturbation=1e-6)")]
     fn linearise(&self, py: Python<'_>, perturbation: Given<'_>) -> Result<Linearisation> {
         let perturbation = perturbation.number(1e-6, Kind::Option, "perturbation")?;
@@ -687,17 +697,17 @@ impl Simulation {
         Ok(Linearisation::new(&self.model, found))
     }
 
-    /// Measures where the time of a step goes, on a copy of this simulation.
+    /// Measures the computing time of each part of a step, on a copy of this simulation.
     ///
     /// Args:
     ///     n: Number of steps.
     ///
     /// Returns:
-    ///     Mean time a step of each part (`kinematics`, `mass_matrix`, `solve` and so on), µs.
+    ///     Mean time of each part (`kinematics`, `mass_matrix`, `solve` and so on) in a step, µs.
     ///
     /// Raises:
-    ///     StepError: A step could not be taken.
-    ///     OptionError: `n` is not a count.
+    ///     StepError: A step failed.
+    ///     OptionError: `n` is not a whole number from 0.
     #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1000)")]
     fn profile<'py>(&self, py: Python<'py>, n: Given<'_>) -> Result<Bound<'py, PyDict>> {
         let steps = n.count(1000, Kind::Option, "n")?;

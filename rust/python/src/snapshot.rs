@@ -53,7 +53,7 @@ kept_scene!(PlanarScene, Planar);
 kept_scene!(GrainBed<2>, Disks);
 kept_scene!(GrainBed<3>, Balls);
 
-/// Everything that a simulation needs to continue bit for bit. Picklable.
+/// Complete state of a simulation, from which it continues bit for bit. Picklable.
 #[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Snapshot(pub AnySnapshot);
 
@@ -99,16 +99,16 @@ impl Snapshot {
     /// Reads a snapshot.
     ///
     /// Args:
-    ///     data: What `to_bytes` returned.
+    ///     data: Bytes from `to_bytes`.
     ///
     /// Raises:
-    ///     StateError: The bytes are not those of a snapshot.
+    ///     StateError: The bytes are not a snapshot.
     #[staticmethod]
     fn from_bytes(data: &Bound<'_, PyAny>) -> Result<Self> {
         Ok(Self(read_bytes(data, "snapshot")?))
     }
 
-    /// The snapshot as bytes, as `from_bytes` reads them.
+    /// The snapshot as bytes, for `from_bytes`.
     fn to_bytes<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyBytes>> {
         Ok(PyBytes::new(py, &self.bytes()?))
     }

@@ -13,10 +13,11 @@ use crate::planar_ground::quantity;
 use crate::sand::{numbers_of, soil_of};
 use crate::terrain::Terrain;
 
-/// Ground of sand, into which wheels sink. To every other part of a machine its surface is rigid.
+/// Sand, into which wheels sink. All other parts of a machine touch its surface as rigid ground.
 ///
-/// The ruts belong to a simulation and are part of its snapshots. Rocks on sand are a `Union` of
-/// both. Steps on soft ground are general: `Simulation.fallback_reason` says so.
+/// The ruts belong to a simulation and are part of its snapshots. For rocks on sand, use a `Union`
+/// of both. On soft ground a simulation always uses the general step, see
+/// `Simulation.fallback_reason`.
 ///
 /// Args:
 ///     surface: The undisturbed surface: a `Plane`, `HeightField` or `TriangleMesh`.
@@ -24,7 +25,7 @@ use crate::terrain::Terrain;
 ///     rut_cell: Size of a cell of the map of ruts, from 0.001 to 1 m.
 ///
 /// Raises:
-///     TerrainError: The surface is no terrain, or a number of the soil is missing or out of its
+///     TerrainError: The surface is not a terrain, or a number of the soil is missing or out of
 ///         range.
 #[pyclass(module = "rover_gym.mechanics", frozen, extends = Terrain)]
 pub struct SoftGround {

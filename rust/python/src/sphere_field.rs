@@ -98,12 +98,12 @@ impl SphereField {
     ///     max_diameter: Largest diameter, m.
     ///     min_diameter: Smallest diameter, m; the number of rocks grows without bound as it
     ///         shrinks.
-    ///     burial: Fraction of its diameter that a rock is sunk into the ground, 0 to 0.5, or a
-    ///         range from which it is drawn for each rock; 0.5 by default.
-    ///     ground: What the rocks lie on; flat ground at height 0 by default. A plane is part of
-    ///         the field. Rocks on any other terrain are raised by its height, and the terrain is
-    ///         not part of the field: combine them as `Union([terrain, rocks])`.
-    ///     clear: Circles x, z, radius that no rock reaches into, (n, 3), m; none by default.
+    ///     burial: Buried fraction of each rock's diameter, 0 to 0.5, or a range from which it is
+    ///         drawn for each rock; 0.5 by default.
+    ///     ground: Ground under the rocks; flat at height 0 by default. A plane becomes part of the
+    ///         field. Any other terrain only sets the height of the rocks; combine both as
+    ///         `Union([terrain, rocks])`.
+    ///     clear: Circles x, z, radius to keep free of rocks, (n, 3), m; none by default.
     ///     material: Name of the rocks' material.
     ///
     /// Raises:

@@ -15,12 +15,12 @@ use crate::report::{Energy, StepReport};
 use crate::shared::{Open, Shared, Watch};
 use crate::snapshot::{KeptScene, Snapshot, other_kind, snapshot};
 
-/// What all simulations share. Made by the classes derived from it.
+/// Base class of all simulations. It cannot be instantiated.
 ///
-/// They are `Simulation`, `PlanarSimulation`, `SoilSimulation`, `GrainSimulation` and
+/// Its subclasses are `Simulation`, `PlanarSimulation`, `SoilSimulation`, `GrainSimulation` and
 /// `RoverGrainSimulation`.
 ///
-/// One call at a time: a call during another one, from another thread or a signal handler, raises
+/// Only one call may run at a time. A second call, from another thread or a signal handler, raises
 /// BusyError.
 #[pyclass(module = "rover_gym.mechanics", subclass, frozen)]
 pub struct AnySimulation(Arc<dyn Stepped>);
@@ -75,7 +75,7 @@ impl AnySimulation {
         Self(inner).into()
     }
 
-    /// A simulation as Python shows it: what it holds, unless it is in use, and its time.
+    /// The `repr` of a simulation: its contents, unless it is in use, and its time.
     pub fn shown(&self, class: &str, what: Result<String>) -> String {
         match (what, self.0.time()) {
             (Ok(what), Ok(time)) => format!("{class}({what}, time={time} s)"),
@@ -87,7 +87,8 @@ impl AnySimulation {
 
 #[pymethods]
 impl AnySimulation {
-    /// Time since the last call of `set_state`, s; of a rover among grains that of the grains.
+    /// Time since the last call of `set_state`, s. For a rover among grains, the time of the
+    /// grains.
     #[getter]
     pub fn time(&self) -> Result<f64> {
         self.0.time()
@@ -101,16 +102,16 @@ impl AnySimulation {
 
     /// Takes n steps.
     ///
-    /// Other threads run meanwhile. Ctrl-C, or whatever else a signal handler raises, ends the call
-    /// after a whole step, whose state stays. A contact solver that does not converge is no error:
-    /// the report says so.
+    /// Other Python threads run in the meantime. Ctrl-C, or another exception of a signal handler,
+    /// ends the call after the current step; the state is that after the step. If the contact
+    /// solver does not converge, no exception is raised: check the report's `status`.
     ///
     /// Args:
     ///     n: Number of steps.
     ///
     /// Raises:
-    ///     StepError: A step could not be taken; the state before it stays.
-    ///     OptionError: `n` is not a count.
+    ///     StepError: A step failed. The state is the one before that step.
+    ///     OptionError: `n` is not a whole number from 0.
     #[pyo3(signature = (n = Steps(1)), text_signature = "($self, n=1)")]
     fn step(&self, py: Python<'_>, n: Steps) -> Result<StepReport> {
         self.0.step(py, n.0)
@@ -121,19 +122,19 @@ impl AnySimulation {
         self.0.energy()
     }
 
-    /// Everything that is needed to continue bit for bit.
+    /// Returns the complete state, from which `restore` continues bit for bit.
     pub fn snapshot(&self) -> Result<Snapshot> {
         Ok(Snapshot(self.0.snapshot()?))
     }
 
-    /// Goes back to a snapshot.
+    /// Restores the state of a snapshot.
     ///
     /// Args:
     ///     snapshot: A snapshot of the same kind of simulation, with the same model or grains.
     ///
     /// Raises:
-    ///     StateError: The snapshot belongs to another simulation or is damaged. Nothing has
-    ///         changed.
+    ///     StateError: The snapshot is damaged, or belongs to a simulation with another model or
+    ///         other grains. Nothing has changed.
     pub fn restore(&self, snapshot: &Bound<'_, PyAny>) -> Result<()> {
         self.0.restore(&self::snapshot(snapshot)?.get().0)
     }

@@ -12,9 +12,10 @@ use crate::arrays::{Array, rows};
 use crate::errors::{Kind, Result};
 use crate::rays::{Met, met, rays};
 
-/// Ground of any kind. Immutable.
+/// Base class of all grounds. Immutable.
 ///
-/// `Plane`, `SphereField`, `HeightField`, `TriangleMesh` and `Union` are its kinds.
+/// Its subclasses are `Plane`, `SphereField`, `HeightField`, `TriangleMesh`, `SoftGround` and
+/// `Union`.
 #[pyclass(module = "rover_gym.mechanics", frozen, subclass)]
 pub struct Terrain {
     pub ground: DrawnGround,
@@ -59,7 +60,7 @@ impl Terrain {
     ///     points: Places (x, z), (m, 2), m.
     ///
     /// Returns:
-    ///     Heights y, (m,), m; nan where there is no ground or no data.
+    ///     Heights y, (m,), m; NaN if there is no ground or no data.
     ///
     /// Raises:
     ///     TerrainError: `points` has a wrong shape.
@@ -69,18 +70,19 @@ impl Terrain {
         Ok(points.iter().map(height).collect())
     }
 
-    /// Where rays meet the ground first.
+    /// Finds the first point at which each ray hits the ground.
     ///
-    /// A surface is met from either side. What depth cameras and laser scanners measure.
+    /// Surfaces are hit from both sides. Use it to simulate depth cameras and laser scanners.
     ///
     /// Args:
-    ///     origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
-    ///     directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
-    ///     max_range: Distance to which they are followed, m; without end by default.
+    ///     origins: Origins of the rays, world frame, (n, 3) or one (3,) for all, m.
+    ///     directions: Directions of the rays, world frame, (n, 3) or one (3,) for all, of any
+    ///         length.
+    ///     max_range: Largest distance, m; unlimited by default.
     ///
     /// Returns:
-    ///     Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
-    ///     world frame, (n, 3), nan where nothing is met.
+    ///     Distances, (n,), m, and the surface's unit normals at the hits, world frame, (n, 3). A
+    ///     ray without a hit has an infinite distance and a NaN normal.
     ///
     /// Raises:
     ///     OptionError: An array has a wrong shape or an entry that is not finite, a direction is

@@ -12,15 +12,14 @@ use crate::errors::{Kind, Result};
 use crate::materials;
 use crate::terrain::Terrain;
 
-/// A mesh of triangles as ground: rocks, or anything else that stands still. Immutable.
+/// A triangle mesh as fixed ground, for instance a rock. Immutable.
 ///
-/// Triangles turn counterclockwise, seen from outside. A closed mesh is solid; an open one is
-/// solid below.
+/// Corners are listed counterclockwise, seen from outside. A closed mesh is solid inside, an open
+/// one below.
 ///
-/// Corners at exactly equal positions are joined, so triangles may each bring their own three
-/// corners, as in an STL file. `triangles` then names the first of equal corners. Corners that
-/// differ by rounding are not joined: wheels catch on the seam between them.
-/// `TriangleMesh.from_file` reads a mesh.
+/// Corners at exactly equal positions are merged, so each triangle may have its own three corners,
+/// as in an STL file. Corners that differ by rounding are not merged, and wheels catch on the seam
+/// between them. `TriangleMesh.from_file` reads a mesh.
 ///
 /// Args:
 ///     vertices: Corners, (n, 3), m.
@@ -29,7 +28,7 @@ use crate::terrain::Terrain;
 ///
 /// Raises:
 ///     TerrainError: An array has a wrong shape, an entry is not finite, a triangle has no area or
-///         names a corner that is not there, or two triangles turn opposite ways.
+///         an index out of range, or neighbouring triangles have opposite orientations.
 #[pyclass(module = "rover_gym.mechanics", frozen, extends = Terrain)]
 pub struct TriangleMesh {
     pub inner: Arc<CoreMesh>,
@@ -98,7 +97,7 @@ impl TriangleMesh {
         fresh_rows(self.inner.triangles().iter().copied())
     }
 
-    /// Whether no triangle has a free border.
+    /// Whether the mesh is closed: no triangle has a free edge.
     #[getter]
     fn is_closed(&self) -> bool {
         self.inner.is_closed()

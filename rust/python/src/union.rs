@@ -28,16 +28,16 @@ pub fn object<'py>(py: Python<'py>, ground: &DrawnGround) -> Result<Bound<'py, P
     })
 }
 
-/// Several terrains as one ground: a map with rocks on it, say. Immutable.
+/// Several terrains combined, for instance a map with rocks on it. Immutable.
 ///
-/// A rover touches whatever of them it meets. Where a part has a plane, the ground is known
-/// everywhere; otherwise it is known where a height field knows it.
+/// A rover can touch each of them. With a plane the ground is known everywhere; otherwise it is
+/// known where a height field has data.
 ///
 /// Args:
 ///     parts: Terrains of any kind, at least one; at most one of them may have a plane.
 ///
 /// Raises:
-///     TerrainError: A part is no terrain, there is none, or two have a plane.
+///     TerrainError: A part is not a terrain, the list is empty, or two parts contain a plane.
 #[pyclass(module = "rover_gym.mechanics", frozen, extends = Terrain)]
 pub struct Union;
 

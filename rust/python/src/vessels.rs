@@ -13,13 +13,13 @@ use crate::planar_ground::quantity;
 
 const KIND: Kind = Kind::Terrain;
 
-/// A drum that turns about its axis, which lies along z, between two ends at rest.
+/// A drum that rotates about its axis along z, with two fixed ends.
 ///
 /// Args:
 ///     radius: Inner radius, m.
 ///     length: Distance between the ends, m.
 ///     rate: Angular velocity about +z, rad/s.
-///     centre: Its middle, (3,), m; the origin by default.
+///     centre: Centre of the drum, (3,), m; the origin by default.
 ///
 /// Raises:
 ///     TerrainError: A number is not finite, or the radius or length is not positive.
@@ -32,7 +32,7 @@ pub struct Drum {
     length: f64,
     /// Angular velocity about +z, rad/s.
     rate: f64,
-    /// Its middle, m.
+    /// Centre of the drum, m.
     centre: (f64, f64, f64),
 }
 
@@ -77,9 +77,9 @@ impl Drum {
     }
 }
 
-/// An upright tube, open above, perhaps on a flat floor with a round hole.
+/// A vertical tube, open at the top, with an optional flat floor with a round hole.
 ///
-/// Without a floor it has no end. What falls through the hole is free.
+/// Without a floor the tube has infinite length. Grains that fall through the hole leave the silo.
 ///
 /// Args:
 ///     radius: Inner radius, m.

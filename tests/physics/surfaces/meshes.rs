@@ -165,7 +165,7 @@ fn unions_number_their_pieces_and_take_one_plane() {
     let error = Union::new(vec![plane(), plane()]).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "parts[1]: a second plane; a union takes one at most"
+        "parts[1]: is a second plane; a union can have only one"
     );
     assert_eq!(Union::new(vec![]).unwrap_err().field(), "parts");
 }
@@ -178,7 +178,7 @@ fn bad_meshes_are_refused() {
         (refuse(&[]), "triangles: a mesh needs"),
         (
             refuse(&[[0, 1, 4]]),
-            "triangles[0]: names vertex 4, there are 4",
+            "triangles[0]: refers to vertex 4, but there are only 4 vertices",
         ),
         (refuse(&[[0, 2, 1], [0, 1, 1]]), "triangles[1]: has no area"),
         (

@@ -12,7 +12,7 @@ use crate::multibody::{ModelError, StateError};
 pub enum DrawError {
     /// The rover would stand in the ground or in a sphere.
     #[error(
-        "terrain: the rover stands {depth} m deep in the ground or in a sphere at its start, in the last of \
+        "terrain: the rover penetrates the ground or a sphere by {depth} m at its start, in the last of \
          {attempts} scenes"
     )]
     NoRoom {
@@ -51,7 +51,7 @@ pub enum Unsuitable {
     Placement(#[from] PlacementError),
     /// The ground under the goal is not known.
     #[error(
-        "goal: no ground is known at x = {x} m, z = {z} m: it is off the map or has no data there"
+        "goal: the ground at x = {x} m, z = {z} m is unknown: the place is outside the map or has no data"
     )]
     NoGoal {
         /// World, m.
@@ -61,7 +61,7 @@ pub enum Unsuitable {
     },
     /// No way leads to the goal.
     #[error(
-        "goal: no way leads from x = {} m, z = {} m to x = {} m, z = {} m on ground that rises by at most 30 degrees",
+        "goal: there is no path from x = {} m, z = {} m to x = {} m, z = {} m without slopes above 30 degrees",
         from[0], from[1], to[0], to[1]
     )]
     NoWay {

@@ -254,7 +254,7 @@ pub enum PlacementError {
     State(#[from] StateError),
     /// Nothing is known of the ground there.
     #[error(
-        "position: no ground is known at x = {x} m, z = {z} m: it is off the map or has no data there"
+        "position: the ground at x = {x} m, z = {z} m is unknown: the place is outside the map or has no data"
     )]
     NoGround {
         /// World, m.

@@ -50,7 +50,7 @@ pub enum EpisodeError {
     #[error("a rover is being stepped by another call")]
     Busy,
     /// A given state whose observation is not finite in float32.
-    #[error("q: must be observable in float32, with v and goal")]
+    #[error("q: with v and goal, must give an observation that is finite in float32")]
     NotObservable,
     /// Why no scene could be drawn.
     #[error(transparent)]

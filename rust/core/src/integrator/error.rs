@@ -65,7 +65,7 @@ pub enum StepError {
     },
     /// The machine came to where its terrain does not say what the ground is.
     #[error(
-        "terrain: no ground is known at x = {x} m, z = {z} m, which the machine reached at t = {time} s: it is off the map or has no data there; the state before the step was kept"
+        "terrain: the ground at x = {x} m, z = {z} m, which the machine reached at t = {time} s, is unknown: the place is outside the map or has no data; the state before the step was kept"
     )]
     NoGround {
         /// Time before the step, s.

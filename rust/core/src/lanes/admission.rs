@@ -13,7 +13,7 @@ pub enum FallbackReason {
     #[error(transparent)]
     Machine(#[from] Unsupported),
     /// The variant is not [`Variant::Linearised`].
-    #[error("the variant is Newton's")]
+    #[error("variant is \"newton\"")]
     Variant,
     /// Wheels sink into the ground.
     #[error("the ground is soft")]
@@ -25,10 +25,10 @@ pub enum FallbackReason {
     #[error("the restitution between two materials is not 0")]
     ElasticMaterials,
     /// The solver does not start from the last impulses.
-    #[error("the warm start is off")]
+    #[error("warm_start is off")]
     WarmStart,
     /// The solver's method is not [`Method::Auto`].
-    #[error("the solver's method is chosen, not automatic")]
+    #[error("solver is not \"auto\"")]
     Method,
 }
 

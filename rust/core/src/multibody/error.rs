@@ -71,7 +71,7 @@ pub enum ModelError {
     },
     /// A solid that is listed among those of another tree.
     #[error(
-        "{field}: the solids of one tree are listed together, and those under {name:?} have ended"
+        "{field}: the solids under {name:?} must be listed together, before those of the next tree"
     )]
     OtherTree {
         /// Path of the field.
@@ -81,7 +81,7 @@ pub enum ModelError {
     },
     /// A joint that follows one on another branch, or one that has no coordinate of its own.
     #[error(
-        "{field}: the joint {name:?} must have a coordinate of its own, and lie on the way to this one or hang on the same solid"
+        "{field}: the joint {name:?} must have a coordinate, and be an ancestor of this joint or hang on the same solid"
     )]
     CoupledApart {
         /// Path of the field.
@@ -141,7 +141,7 @@ pub enum ModelError {
     },
     /// Principal inertias that no mass distribution has.
     #[error(
-        "{field}: no body has the principal inertias {principal:?} (each must be positive and at most the sum of the others)"
+        "{field}: the principal inertias {principal:?} are not physical: each must be positive and at most the sum of the other two"
     )]
     ImpossibleInertia {
         /// Path of the field.
@@ -150,13 +150,13 @@ pub enum ModelError {
         principal: [f64; 3],
     },
     /// `collides` on something that is neither a box nor a ball.
-    #[error("{field}: only boxes and spheres can collide; a disc does as a wheel")]
+    #[error("{field}: only boxes and spheres can collide; for a disc, add a wheel")]
     CannotCollide {
         /// Path of the field.
         field: String,
     },
     /// The short form of one shape beside a list of shapes.
-    #[error("{field}: a solid with shapes has no {what} of its own; the shapes say it")]
+    #[error("{field}: a solid with shapes must not have its own {what}; the shapes define it")]
     NotWithShapes {
         /// Path of the field.
         field: String,
@@ -173,7 +173,7 @@ pub enum ModelError {
     },
     /// Masses of shapes that are together not the solid's, or leave nothing to the others.
     #[error(
-        "{field}: {value} kg contradicts the masses of its shapes, {sum} kg together; they are equal where every shape has one, else the solid's is larger"
+        "{field}: {value} kg contradicts the masses of its shapes, {sum} kg together: both must be equal if every shape has a mass, otherwise the mass of the solid must be larger"
     )]
     MassesContradict {
         /// Path of the field.
@@ -185,7 +185,7 @@ pub enum ModelError {
     },
     /// A disc among shapes that share a mass by volume.
     #[error(
-        "{field}: is missing; a disc has no volume by which it could share the mass with the other shapes"
+        "{field}: is missing; a disc has no volume, so its share of the mass of the solid must be given"
     )]
     NoVolume {
         /// Path of the field.
@@ -202,7 +202,7 @@ pub enum ModelError {
         value: f64,
     },
     /// More than a model may have.
-    #[error("{field}: at most {limit} {what}, are {count}")]
+    #[error("{field}: at most {limit} {what} are allowed, has {count}")]
     TooMany {
         /// Path of the field.
         field: &'static str,
@@ -223,7 +223,7 @@ pub enum ModelError {
     },
     /// A wheel of another radius than the disc that it is.
     #[error(
-        "{field}: {value} m contradicts the shape of {solid:?}, a disc of {shape} m; a wheel that touches the ground at another radius has a contact_radius"
+        "{field}: {value} m contradicts the shape of {solid:?}, a disc of {shape} m; for a wheel that touches the ground at another radius, give contact_radius"
     )]
     RadiusContradictsShape {
         /// Path of the field.
@@ -236,7 +236,7 @@ pub enum ModelError {
         shape: f64,
     },
     /// A wheel whose solid is no disc has no shape that a radius could change.
-    #[error("{field}: the shape of {solid:?} is no disc; give contact_radius instead")]
+    #[error("{field}: the shape of {solid:?} is not a disc; give contact_radius instead")]
     NotADisc {
         /// Path of the field.
         field: &'static str,

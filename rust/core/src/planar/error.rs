@@ -12,7 +12,7 @@ pub enum PlanarError {
     #[error(transparent)]
     Number(#[from] QuantityError),
     /// More points than a curve may have.
-    #[error("x: at most {limit} points, has {count}")]
+    #[error("x: at most {limit} points are allowed, has {count}")]
     TooManyPoints {
         /// How many there are.
         count: usize,
@@ -65,7 +65,7 @@ pub enum PlanarError {
     },
     /// A solid of a rover that has no mirror image, or turns out of the plane.
     #[error(
-        "model: {body} has no mirror image on the other side, or is turned out of the plane: no planar model"
+        "model: {body} has no mirror image on the other side, or is rotated out of the plane; a planar model needs this symmetry"
     )]
     NotMirrored {
         /// Its name.

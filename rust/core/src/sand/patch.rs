@@ -6,6 +6,7 @@
 //! A surface that recedes feels nothing. Of a ring, only the part of the arc under the surface that
 //! may push is integrated. Angles on it are `θ = 4 atan u`, so that sine and cosine are rational.
 
+#[cfg(target_arch = "x86_64")]
 use fearless_simd::{f64x4, f64x8};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
@@ -374,6 +375,9 @@ impl<'a> Frame<'a> {
         let is_under = depth.gt(zero) & elements.area.gt(zero);
         if is_under.any() {
             own.is_touching = true;
+            // What is not under counts for nothing, whatever lies beside it in a register.
+            let area = T::select(is_under, elements.area, zero);
+            let elements = Elements { area, ..elements };
             let depth = T::select(is_under, depth, zero);
             let ends = lanes(&group.end);
             let way = self.way(group.radius, ends, (cos, sin));

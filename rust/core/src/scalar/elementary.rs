@@ -12,9 +12,6 @@
 
 use super::lane::{Lane, LaneMask, MAX_LANES};
 
-/// `x + MAGIC − MAGIC` is the whole number nearest to x, ties to even, for `|x| < 2⁵¹`.
-const MAGIC: f64 = 6_755_399_441_055_744.0; // 1.5 · 2⁵²
-
 /// Largest angle (rad) that is reduced in lanes; up to here the parts of π/2 suffice.
 const FAR: f64 = 1e5;
 
@@ -114,8 +111,7 @@ fn is_far<T: Lane>(x: T) -> T::Mask {
 fn near_sin_cos<T: Lane>(x: T) -> (T, T) {
     let number = |value: f64| x.like(value);
     // x = n π/2 + r + low, with n whole and |r| ≤ π/4 (three parts)
-    let magic = number(MAGIC);
-    let n = (x * number(std::f64::consts::FRAC_2_PI) + magic) - magic;
+    let n = (x * number(std::f64::consts::FRAC_2_PI)).nearest_whole();
     let first = x - n * number(HALF_PI[0]); // exact
     let part = n * number(HALF_PI[1]); // exact
     let second = first - part;
@@ -139,7 +135,7 @@ fn near_sin_cos<T: Lane>(x: T) -> (T, T) {
     let c = w + (((one - w) - half_z) + (z * z * sum - r * low));
 
     // n = 4 m + quarter, with the quarter in −2..=2; 2 and −2 are the same
-    let quarter = n - ((n * number(0.25) + magic) - magic) * number(4.0);
+    let quarter = n - (n * number(0.25)).nearest_whole() * number(4.0);
     let (half, more) = (number(0.5), number(1.5));
     let odd = half.lt(quarter.abs()) & quarter.abs().lt(more);
     let (sin, cos) = (T::select(odd, c, s), T::select(odd, s, c));
@@ -157,8 +153,13 @@ fn far_lanes<T: Lane>(x: T, far: T::Mask, sin: T, cos: T) -> (T, T) {
         number.store(&mut lanes[..T::LANES]);
     }
     replace_far(far.bits(), &mut lanes);
-    let [_, sin, cos] = lanes.map(|lanes| T::load(x.token(), &lanes[..T::LANES]));
-    (sin, cos)
+    // The numbers as they were loaded do not vary; x may (`Dual`).
+    let [x_0, sin_0, cos_0] = lanes.map(|lanes| T::load(x.token(), &lanes[..T::LANES]));
+    let change = x - x_0;
+    (
+        T::select(far, sin_0 + cos_0 * change, sin),
+        T::select(far, cos_0 - sin_0 * change, cos),
+    )
 }
 
 /// `[x, sin x, cos x]` with the functions renewed in the lanes of `far`.
@@ -182,8 +183,7 @@ pub fn exp_m1<T: Lane>(x: T) -> T {
     let within = T::select(too_large, number(OVERFLOW), x);
     let within = T::select(x.lt(number(NOTHING_LEFT)), number(NOTHING_LEFT), within);
     // x = n ln 2 + r + low, with n whole and |r| ≤ ln 2/2
-    let magic = number(MAGIC);
-    let n = (within * number(std::f64::consts::LOG2_E) + magic) - magic;
+    let n = (within * number(std::f64::consts::LOG2_E)).nearest_whole();
     let high = within - n * number(LN_2[0]); // exact
     let part = n * number(LN_2[1]);
     let r = high - part;

@@ -3,8 +3,8 @@
 use std::sync::OnceLock;
 
 #[cfg(target_arch = "x86_64")]
-use fearless_simd::{Avx2, Avx512};
-use fearless_simd::{Level, Simd};
+use fearless_simd::{Avx2, Avx512, Level, Simd};
+use thiserror::Error;
 
 /// Instructions that a single rover's step is compiled for. Its bits do not depend on them.
 #[derive(Clone, Copy, Debug)]
@@ -58,39 +58,68 @@ pub enum Instructions {
     Avx512(Avx512),
 }
 
+/// Instructions that this process cannot use.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum InstructionsError {
+    /// No instruction set of this machine has the name.
+    #[error("{name:?} is no instruction set of this machine, which has {}", known.join(", "))]
+    Unknown {
+        /// The name.
+        name: String,
+        /// Names of those that it has.
+        known: Vec<&'static str>,
+    },
+    /// Steps were taken with others.
+    #[error("this process already uses {used}")]
+    InUse {
+        /// Their name.
+        used: &'static str,
+    },
+}
+
+/// What this process uses, once it is chosen or first asked for.
+static USED: OnceLock<Instructions> = OnceLock::new();
+
 impl Instructions {
-    /// Asks the processor once.
+    /// Those that this process uses: the widest of the machine, unless others were chosen.
     #[must_use]
     pub fn of_this_machine() -> Self {
-        static FOUND: OnceLock<Instructions> = OnceLock::new();
-        *FOUND.get_or_init(|| {
-            let level = Level::new();
-            #[cfg(target_arch = "x86_64")]
-            if let Some(token) = level.as_avx512() {
-                return Self::Avx512(token);
-            }
-            #[cfg(target_arch = "x86_64")]
-            if let Some(token) = level.as_avx2() {
-                return Self::Avx2(token);
-            }
-            let _ = level;
-            Self::Baseline
-        })
+        *USED.get_or_init(|| Self::all_of_this_machine()[0])
     }
 
-    /// This machine's best, and all that it could do with less.
+    /// Makes this process use others than the widest. Has to come before the first step.
+    ///
+    /// # Errors
+    /// The machine has none of that name, or the process already uses others.
+    pub fn choose(name: &str) -> Result<(), InstructionsError> {
+        let all = Self::all_of_this_machine();
+        let Some(chosen) = all.iter().find(|one| one.name() == name) else {
+            return Err(InstructionsError::Unknown {
+                name: name.to_owned(),
+                known: all.iter().map(|one| one.name()).collect(),
+            });
+        };
+        let used = USED.get_or_init(|| *chosen).name();
+        if used == name {
+            Ok(())
+        } else {
+            Err(InstructionsError::InUse { used })
+        }
+    }
+
+    /// All that this machine has, the widest first.
     #[must_use]
     pub fn all_of_this_machine() -> Vec<Self> {
-        let best = Self::of_this_machine();
-        let mut all = vec![best];
         #[cfg(target_arch = "x86_64")]
-        if let (Self::Avx512(_), Some(token)) = (best, Level::new().as_avx2()) {
-            all.push(Self::Avx2(token));
-        }
-        if best.lanes() > 1 {
-            all.push(Self::Baseline);
-        }
-        all
+        let wide = {
+            let level = Level::new();
+            let eight = level.as_avx512().map(Self::Avx512);
+            let four = level.as_avx2().map(Self::Avx2);
+            eight.into_iter().chain(four)
+        };
+        #[cfg(not(target_arch = "x86_64"))]
+        let wide = std::iter::empty();
+        wide.chain([Self::Baseline]).collect()
     }
 
     /// Rovers to a register.
@@ -115,5 +144,26 @@ impl Instructions {
             #[cfg(target_arch = "x86_64")]
             Self::Avx512(_) => "AVX-512",
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_used_stays() {
+        let used = Instructions::of_this_machine().name();
+        assert_eq!(Instructions::choose(used), Ok(()));
+        for other in &Instructions::all_of_this_machine()[1..] {
+            let refused = Instructions::choose(other.name());
+            assert_eq!(refused, Err(InstructionsError::InUse { used }));
+        }
+        let error = Instructions::choose("AVX").unwrap_err().to_string();
+        assert!(
+            error.starts_with("\"AVX\" is no instruction set"),
+            "{error}"
+        );
+        assert!(error.ends_with("baseline"), "{error}");
     }
 }

@@ -90,6 +90,14 @@ pub trait Lane:
     #[must_use]
     fn abs(self) -> Self;
 
+    /// The whole number nearest to a number of at most 2⁵¹, ties to even.
+    #[inline(always)]
+    #[must_use]
+    fn nearest_whole(self) -> Self {
+        let magic = self.like(NO_FRACTION);
+        (self + magic) - magic
+    }
+
     /// `2ⁿ` of a whole number `−1022 <= n <= 1023`.
     #[must_use]
     fn exp2_of_integer(self) -> Self;
@@ -155,6 +163,9 @@ pub trait Lane:
 
 /// Most lanes of any scalar.
 pub const MAX_LANES: usize = 8;
+
+/// Added to a number of at most 2⁵¹, it leaves no bits for a fraction.
+const NO_FRACTION: f64 = 6_755_399_441_055_744.0; // 1.5 · 2⁵²
 
 /// Added to a whole number n, it leaves the exponent field of 2ⁿ in the last bits of the sum.
 pub(super) const EXPONENT_IN_LAST_BITS: f64 = 6_755_399_441_056_767.0; // 1.5 · 2⁵² + 1023

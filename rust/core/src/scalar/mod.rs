@@ -4,6 +4,7 @@
 //! - [`instructions`]: what this machine can do, found at run time; `registers`: lanes in its
 //!   registers;
 //! - [`elementary`]: sine, cosine and exponential with the same bits everywhere;
+//! - [`dual`]: lanes with derivatives;
 //! - [`linear`]: vectors and matrices of three dimensions over lanes; `quaternion`: rotations.
 //!
 //! # One call
@@ -21,6 +22,7 @@
 //! No other chapter.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
+pub mod dual;
 pub mod elementary;
 pub mod instructions;
 pub mod lane;
@@ -28,6 +30,7 @@ pub mod linear;
 pub(crate) mod quaternion;
 mod registers;
 
-pub use instructions::{Instructions, Single};
+pub use dual::Dual;
+pub use instructions::{Instructions, InstructionsError, Single};
 pub use lane::{Lane, LaneMask, MAX_LANES};
 pub use linear::{Mat3, Vec3};

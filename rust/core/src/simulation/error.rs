@@ -112,9 +112,7 @@ pub enum BatchError {
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum SnapshotError {
     /// Taken from another model.
-    #[error(
-        "snapshot: belongs to another model than this simulation's (or to other locked joints)"
-    )]
+    #[error("snapshot: belongs to another model, or to other locked joints, than this simulation")]
     OtherModel,
     /// Not finite, or with contacts that the model cannot have.
     #[error("snapshot: its contents are damaged")]

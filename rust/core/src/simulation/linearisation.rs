@@ -75,7 +75,7 @@ pub enum LinearisationError {
     Step(#[from] StepError),
     /// The step is not one solution of the step's equations.
     #[error(
-        "the step was taken in parts, was not solved to its tolerance, or was limited: it has no \
+        "the step was split, was not solved to its tolerance, or was limited, so it has no \
          derivative with fixed contact modes"
     )]
     NotHeld,

@@ -38,7 +38,7 @@ pub enum TogetherError {
         grains: f64,
     },
     /// A part of the rover is in a grain.
-    #[error("position: {part} is {depth} m deep in ball {grain}")]
+    #[error("position: {part} penetrates ball {grain} by {depth} m")]
     Overlap {
         /// Its name.
         part: String,

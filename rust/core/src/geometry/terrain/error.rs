@@ -58,10 +58,10 @@ pub enum TerrainError {
         radii: usize,
     },
     /// Neither a sphere nor a plane.
-    #[error("centres: a field needs a sphere or a ground plane, has neither")]
+    #[error("centres: a field needs at least one sphere or a ground plane")]
     Empty,
     /// More spheres than a field may have.
-    #[error("centres: at most {limit} spheres, are {count}")]
+    #[error("centres: at most {limit} spheres are allowed, has {count}")]
     TooMany {
         /// How many there are, or would be.
         count: usize,
@@ -109,7 +109,9 @@ pub enum TerrainError {
     #[error("triangles: a mesh needs at least one")]
     NoTriangles,
     /// A triangle that names a vertex that is not there.
-    #[error("triangles[{index}]: names vertex {vertex}, there are {vertices}")]
+    #[error(
+        "triangles[{index}]: refers to vertex {vertex}, but there are only {vertices} vertices"
+    )]
     NoSuchVertex {
         /// Number of the triangle.
         index: usize,
@@ -127,7 +129,7 @@ pub enum TerrainError {
     /// An edge of three triangles, or of two that face opposite ways.
     #[error(
         "triangles[{index}]: its edge from vertex {from} to {to} belongs to another triangle in the \
-         same direction; a surface needs triangles that all turn counterclockwise, seen from outside"
+         same direction; all triangles must list their vertices counterclockwise, seen from outside"
     )]
     NotASurface {
         /// Number of the triangle.
@@ -141,19 +143,19 @@ pub enum TerrainError {
     #[error("parts: a union needs at least one terrain")]
     NoParts,
     /// More planes than one in a union.
-    #[error("parts[{index}]: a second plane; a union takes one at most")]
+    #[error("parts[{index}]: is a second plane; a union can have only one")]
     SecondPlane {
         /// Number of the part.
         index: usize,
     },
     /// More soft grounds than one in a union.
-    #[error("parts[{index}]: a second soft ground; a union takes one at most")]
+    #[error("parts[{index}]: is a second soft ground; a union can have only one")]
     SecondSand {
         /// Number of the part.
         index: usize,
     },
     /// More primitives than can be numbered.
-    #[error("parts: their pieces are more than can be numbered, 2^32")]
+    #[error("parts: there are too many pieces in total, at most 2^32 are allowed")]
     TooManyPieces,
     /// A number that describes a field of rocks, outside its range.
     #[error("{field}: must be {range}, is {value}")]

@@ -16,7 +16,7 @@ pub enum GrainError {
     #[error("radius: needs at least one entry")]
     Empty,
     /// More grains than there may be.
-    #[error("count: at most {limit} {noun}s, are {count}")]
+    #[error("count: at most {limit} {noun}s are allowed, is {count}")]
     TooMany {
         /// What they are called.
         noun: &'static str,
@@ -48,7 +48,7 @@ pub enum GrainError {
         value: f64,
     },
     /// A grain in a wall or in the ground.
-    #[error("position[{grain}]: reaches into {what}, the gap is {value} m")]
+    #[error("position[{grain}]: penetrates {what}, the gap is {value} m")]
     InWall {
         /// Which grain.
         grain: usize,
@@ -58,7 +58,7 @@ pub enum GrainError {
         value: f64,
     },
     /// A wheel in a grain, a wall or the ground.
-    #[error("machine: wheel {wheel} reaches into {what}, the gap is {value} m")]
+    #[error("machine: wheel {wheel} penetrates {what}, the gap is {value} m")]
     WheelIn {
         /// Which wheel.
         wheel: usize,
@@ -89,7 +89,9 @@ pub enum GrainError {
     #[error(transparent)]
     Cohesion(#[from] CohesionError),
     /// A grain that was not there, or not in this order.
-    #[error("before[{grain}]: must be the number of a ball, above the ones before it, is {value}")]
+    #[error(
+        "before[{grain}]: must be the index of a ball and larger than the entries before it, is {value}"
+    )]
     Before {
         /// Which grain.
         grain: usize,
@@ -97,7 +99,7 @@ pub enum GrainError {
         value: usize,
     },
     /// Where there is no machine, none can drive.
-    #[error("machine: the scene has none")]
+    #[error("machine: the scene has no machine")]
     NoMachine,
 }
 

@@ -1,8 +1,7 @@
-// The panel of a live drive: keys, gamepad and sliders become messages, states become text and curves. All text goes
-// into the page as text.
+// The page of a live drive: keys, stick, gamepad and sliders become messages, frames become pictures, states become text
+// and curves. All text goes into the page as text.
 "use strict";
 (() => {
-  const part = (name) => document.getElementById(name);
   const KEPT = 20; // s of curves
   const PERIOD = 100; // ms between two commands by hand; the drive forgets one after 1000
   const DEAD = 0.12; // of a gamepad's stick, which never rests at zero
@@ -13,6 +12,17 @@
   const CHOICES = ["driver", "ground", "model"];
   const SLIDERS = ["friction", "gravity", "difficulty", "goal_distance"];
 
+  const SCENE = 1; // kind of a binary message; others are frames
+  const HEAD = 16; // bytes
+
+  let stage;
+  try {
+    stage = new Stage();
+    stage.eye.preset = "chase";
+  } catch (error) {
+    part("message").textContent = `The scene cannot be drawn: ${error.message}`;
+    part("message").hidden = false;
+  }
   let socket = null;
   let state = null;
   let samples = [];
@@ -24,12 +34,18 @@
   const say = (message) => {
     if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
   };
-  const notice = (text) => { part("notice").textContent = text; };
+  const notice = (text) => stage?.say(text, 6);
   const throwRock = () => say({ do: "rock", radius: Number(part("radius").value) });
 
   const connect = () => {
     socket = new WebSocket(`ws://${location.host}/live`);
+    socket.binaryType = "arraybuffer";
+    socket.addEventListener("open", () => stage && socket.send('{"do":"watch"}'));
     socket.addEventListener("message", (event) => {
+      if (typeof event.data !== "string") {
+        receive(event.data);
+        return;
+      }
       const message = JSON.parse(event.data);
       if (message.choices) offer(message.choices);
       if (message.error) notice(message.error);
@@ -48,20 +64,57 @@
     samples = [];
   };
 
+  // --- pictures ---------------------------------------------------------------------------------------------------
+  let number = -1; // of the scene
+  let [before, now] = [null, null]; // the last two frames
+  const receive = (message) => {
+    const head = new DataView(message);
+    const [kind, scene, time] = [head.getUint32(0, true), head.getUint32(4, true), head.getFloat64(8, true)];
+    if (kind === SCENE) {
+      stage.setScene(openScene(new Uint8Array(message, HEAD)), number >= 0);
+      number = scene;
+      before = now = null;
+    } else if (scene === number) {
+      const frame = { ...wholeFrame(stage.scene.channels, new Uint8Array(message), HEAD), time, at: performance.now() };
+      before = now && time > now.time ? now : frame;
+      now = frame;
+      mark(frame);
+      const { ruts } = stage.view;
+      for (let at = HEAD + sizeOf(stage.scene.channels); ruts && at < message.byteLength; at += 8)
+        ruts.press(head.getUint32(at, true), head.getUint32(at + 4, true));
+    }
+  };
+  // Adds the feet of the wheels that bear something to their marks.
+  const mark = ({ forces }) => stage.scene.wheels.forEach((wheel, i) => {
+    const [x, y, z, fx, fy, fz] = [0, 1, 2, 3, 4, 5].map((c) => forces.value(i, c));
+    stage.view.overlays.bands?.add(i, x, Math.hypot(fx, fy, fz) > 0.01 ? y + 0.02 * wheel.radius : NaN, z);
+  });
+  // Between two control periods the poses are interpolated: the picture is one period behind and does not jerk.
+  let drawn = null;
+  const paint = (moment) => {
+    const still = state?.paused && now && performance.now() - now.at > 1000;
+    if (now && (!still || stage.stale)) {
+      const share = Math.min(1, (performance.now() - now.at) / (1000 * stage.scene.period));
+      const elapsed = drawn === null ? null : Math.min(0.25, (moment - drawn) / 1000);
+      stage.draw({ before, after: now, share, rate: 1 / stage.scene.period, k: 0, time: now.time }, elapsed);
+      drawn = moment;
+    }
+    requestAnimationFrame(paint);
+  };
+
   // --- driving by hand --------------------------------------------------------------------------------------------
   const typing = (event) => event.target.matches?.("select, input[type=number]");
   addEventListener("keydown", (event) => {
     const key = event.key.toLowerCase();
-    if (typing(event) || event.ctrlKey || event.metaKey || event.altKey || !(key in STEERS || key in ACTS)) return;
-    event.preventDefault();
-    event.stopImmediatePropagation(); // viser's client moves its camera by the same keys
+    if (typing(event) || event.ctrlKey || event.metaKey || event.altKey) return;
     if (key in STEERS) {
       if (!pressed.has(key)) { pressed.add(key); drive(); }
-    } else if (!event.repeat) ACTS[key]();
-  }, true);
-  addEventListener("keyup", (event) => {
-    if (pressed.delete(event.key.toLowerCase())) { event.stopImmediatePropagation(); drive(); }
-  }, true);
+    } else if (key in ACTS) {
+      if (!event.repeat) ACTS[key]();
+    } else if (!stage?.scene || !stage.key(event)) return;
+    event.preventDefault();
+  });
+  addEventListener("keyup", (event) => { if (pressed.delete(event.key.toLowerCase())) drive(); });
   addEventListener("blur", () => pressed.clear());
 
   let pad = null;
@@ -84,10 +137,34 @@
     return [beyond(trigger) || beyond(-(read.axes[1] ?? 0)), beyond(-(read.axes[0] ?? 0))];
   };
   const fromKeys = () => [...pressed].reduce(([a, b], key) => [a + STEERS[key][0], b + STEERS[key][1]], [0, 0]);
+  // The stick on a touch screen: up is forward, left turns left.
+  let pulled = [0, 0];
+  const stick = part("stick");
+  const pull = (event) => {
+    const box = stick.getBoundingClientRect();
+    const reach = 0.36 * box.width;
+    let [x, y] = [(event.clientX - box.x - box.width / 2) / reach, (event.clientY - box.y - box.height / 2) / reach];
+    const far = Math.max(1, Math.hypot(x, y));
+    [x, y] = [x / far, y / far];
+    pulled = [beyond(-y), beyond(-x)];
+    stick.firstChild.style.transform = `translate(${reach * x}px, ${reach * y}px)`;
+    drive();
+  };
+  const release = () => {
+    pulled = [0, 0];
+    stick.firstChild.style.transform = "";
+    drive();
+  };
+  stick.addEventListener("pointerdown", (event) => {
+    stick.setPointerCapture(event.pointerId);
+    pull(event);
+  });
+  stick.addEventListener("pointermove", (event) => { if (stick.hasPointerCapture(event.pointerId)) pull(event); });
+  for (const name of ["pointerup", "pointercancel"]) stick.addEventListener(name, release);
   const fromSliders = () => [Number(part("forward").value), Number(part("turn").value)];
   let moving = false;
   const drive = () => {
-    const [forward, turn] = [fromKeys(), fromPad(), fromSliders()].find(([a, b]) => a || b) ?? [0, 0];
+    const [forward, turn] = [fromKeys(), pulled, fromPad(), fromSliders()].find(([a, b]) => a || b) ?? [0, 0];
     const asked = forward !== 0 || turn !== 0;
     if (asked || moving) say({ do: "drive", forward: limited(forward), turn: limited(turn) });
     moving = asked;
@@ -139,8 +216,11 @@
     part("clock").textContent =
       `${now.time.toFixed(2)} s, ${now.speed?.toFixed(2)} m/s, goal ${now.distance?.toFixed(1)} m, ` +
       `lean ${now.tilt?.toFixed(0)}°, solver ${now.solver}, ${now.iterations} iterations, ${now.contacts} contacts. ${pace}`;
-    if (now.notices !== heard) notice(now.notice);
+    if (now.notices !== heard && now.notice) notice(now.notice);
     heard = now.notices;
+    part("speed").textContent = (now.speed ?? 0).toFixed(1);
+    part("slip").textContent = (100 * (now.slip ?? 0)).toFixed(0);
+    part("tilt").textContent = (now.tilt ?? 0).toFixed(0);
     part("pause").textContent = now.paused ? "go on" : "pause";
     part("record").textContent = now.recording ? `recording ${now.recording}` : "record";
     part("record").classList.toggle("on", now.recording !== "");
@@ -171,7 +251,7 @@
         take.textContent = "take the wheel";
         node.append("Another page is at the wheel. ", take);
       }
-      for (const control of document.querySelectorAll("#panel .row button, #panel input, #panel select")) {
+      for (const control of document.querySelectorAll("#panel .row button, #panel input, #panel select, #bar button:not(#dark, #help)")) {
         control.disabled = now.wheel === "elsewhere";
       }
     }
@@ -216,8 +296,9 @@
     const x = (time) => 42 + ((time - end + KEPT) / KEPT) * (width - 48);
     const y = (value) => 6 + (1 - Math.min(value, high) / high) * (height - 24);
     pen.font = "10px sans-serif";
-    pen.fillStyle = "#555";
-    pen.strokeStyle = "#e3e3e3";
+    const ink = getComputedStyle(document.documentElement);
+    pen.fillStyle = ink.getPropertyValue("--soft");
+    pen.strokeStyle = ink.getPropertyValue("--grid");
     pen.textAlign = "right";
     for (const value of [0, high / 2, high]) {
       pen.beginPath();
@@ -254,4 +335,5 @@
 
   label();
   connect();
+  if (stage) requestAnimationFrame(paint);
 })();

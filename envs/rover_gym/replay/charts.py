@@ -1,0 +1,78 @@
+"""The charts beside a run's picture: signals over the time of its samples."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+Array = npt.NDArray[np.float64]
+
+FOLLOW_TIME = 1.0  # s, window of the path that the eye follows: the eye does not shake with the machine
+
+LOAD_TIME = 0.2  # s, window of the loads: an impact lasts a step and says nothing of the weight carried
+
+
+def moving_mean(time: Array, values: Array, window: float) -> Array:
+    """Values `(n, m)` averaged over the samples within half of a window, s, without those that are not finite."""
+    half = 0.5 * window + 1e-6  # samples at the edge count, whatever their rounding
+    first = np.searchsorted(time, time - half, side="left")
+    last = np.searchsorted(time, time + half, side="right")
+    known = np.isfinite(values)
+    sums = np.vstack((np.zeros(values.shape[1]), np.cumsum(np.where(known, values, 0.0), axis=0)))
+    counts = np.vstack((np.zeros(values.shape[1]), np.cumsum(known, axis=0)))
+    with np.errstate(invalid="ignore"):
+        result: Array = (sums[last] - sums[first]) / (counts[last] - counts[first])
+    return result
+
+
+class Chart(NamedTuple):
+    """A chart of the panel.
+
+    `values` are (n, n_series); `digits` stand after the point; `series` are name and colour of each curve;
+    `window`, s, is how long a lone impact lasts in the values: it must not set the scale; `shown`: at once, or when it
+    is chosen.
+    """
+
+    title: str
+    unit: str
+    values: Array
+    digits: int
+    series: list[tuple[str, str]]
+    window: float = 0.0
+    shown: bool = True
+
+
+def load_chart(title: str, time: Array, loads: Array, digits: int, wheels: list[tuple[str, str]]) -> Chart:
+    """The wheels' loads `(n, n_wheels)`, N, as means over `LOAD_TIME`."""
+    smooth = moving_mean(time, loads, LOAD_TIME)
+    return Chart(f"{title}, mean over {LOAD_TIME:g} s", "N", smooth, digits, wheels, LOAD_TIME)
+
+
+def panel_contents(title: str, time: Array, charts: Iterable[Chart], facts: Iterable[str] = ()) -> dict[str, Any]:
+    """Contents of the panel: the run's title, lines about it, its times `(n,)`, s, and its charts."""
+    return {
+        "title": title,
+        "facts": list(facts),
+        "time": [round(float(one - time[0]), 4) for one in time],
+        "charts": [
+            {
+                "title": chart.title,
+                "unit": chart.unit,
+                "values": [_rounded(column, chart.digits) for column in chart.values.T],
+                "series": [{"name": name, "colour": colour} for name, colour in chart.series],
+                "window": chart.window,
+                "shown": chart.shown,
+            }
+            for chart in charts
+        ],
+    }
+
+
+def _rounded(values: Array, digits: int) -> list[float | None]:
+    """Values for JSON, which has neither nan nor infinity: unknown values leave gaps in the curve."""
+    return [round(float(value), digits) if np.isfinite(value) else None for value in values]

@@ -1,0 +1,265 @@
+"""Runs in the plane as scenes of the player: a ball or a two-wheel rover over its ground, and disks of a soil."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.mechanics import Polyline
+from rover_gym.rendering.appearance import (
+    AXLE_COLOUR,
+    GROUND_COLOUR,
+    GROUND_COLOUR_2,
+    HUB_COLOUR,
+    PLANAR_WHEEL_COLOURS,
+    ROCK_COLOUR,
+    TYRE_COLOUR,
+    Colour,
+    Part,
+    part_mesh,
+)
+from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, moving_mean, panel_contents
+from rover_gym.replay.page_scene import FrameChannel, PageScene
+
+if TYPE_CHECKING:
+    from rover_gym.planar.planar_run import PlanarRun
+    from rover_gym.soil.soil_run import SoilRun
+
+SAND_COLOURS: tuple[Colour, Colour] = (
+    (0.97, 0.90, 0.76),
+    (0.86, 0.75, 0.56),
+)  # of a disk's halves: they show its rotation
+CHAIN_COLOUR: Colour = (0.80, 0.0, 0.10)
+DEPTH = 1.0  # out-of-plane thickness of disks, in mean diameters
+CHAINS = 300  # strongest contacts drawn
+SOIL_SEEN = 1.8  # m of soil in view at most
+SKIRT = 1.04  # width of the picture, in widths of the bed
+SOIL_ASPECT = 1.2  # width over height of the picture
+FIELD_OF_VIEW = 0.35  # rad, vertical: narrow and far away, for little perspective
+
+SEEN = 9.0  # width of the picture, in diameters of the largest disc
+ASPECT = 1.5  # width over height of the picture
+LAND = 1.5  # picture widths of ground beyond the way
+TILE = 0.5  # m, length of the ground's squares
+THICK = 0.4  # of a disc along its axle, in its radii
+
+
+Array = npt.NDArray[np.float64]
+
+
+def planar_scene(run: PlanarRun, *, follow: bool) -> PageScene:
+    """A planar run as a scene."""
+    largest = float(run.radius.max())
+    distance = SEEN * largest / (ASPECT * np.tan(0.5 * FIELD_OF_VIEW))
+    scene = PageScene("planar", _view(0.0, 0.18 * distance, distance, ASPECT), largest)
+    _add_wheels(scene, run.discs, run.radius, THICK * run.radius, 0.25 * largest, 0.4 * largest)
+    scene.put_mesh(_ground(run))
+    centre = np.column_stack((_planar_eye(run, follow=follow), np.zeros(run.n_frames)))
+    scene.channels.append(FrameChannel.fine("centre", centre[:, None]))
+    scene.facts |= {"title": run.title, "front": True, "far": 20.0 * distance, "curves": _planar_curves(run)}
+    return scene
+
+
+def soil_scene(run: SoilRun, *, follow: bool) -> PageScene:
+    """A run on a soil as a scene."""
+    eye = _soil_eye(run, follow=follow)
+    distance = 0.5 * _seen(run) / (SOIL_ASPECT * np.tan(0.5 * FIELD_OF_VIEW))
+    scene = PageScene("soil", _view(float(eye[0, 1]), 0.1 * distance, distance, SOIL_ASPECT), 0.5 * _seen(run))
+    depth, radius = _depth(run), run.wheels[0, :, 2]
+    poses = np.concatenate((run.wheels[..., :2], run.wheel_angles[..., None]), axis=2)
+    _add_wheels(scene, poses, radius, np.full(len(radius), depth), 0.05, 0.8 * depth)
+    scene.put_mesh(_walls(run))
+    low, high = run.positions.min(axis=(0, 1)), run.positions.max(axis=(0, 1))
+    scene.channels += [
+        FrameChannel.fine("centre", np.column_stack((eye[:, 0], np.zeros((run.n_frames, 2))))[:, None]),
+        FrameChannel.within("disks", run.positions, low, high),
+        FrameChannel.fine("chains", _chains(run)),
+    ]
+    scene.arrays["radii"] = ("f4", run.radius)
+    scene.facts |= {"title": run.title, "flat": True, "far": 20.0 * distance, "chain": CHAIN_COLOUR}
+    scene.facts |= {"front": True, "sand": SAND_COLOURS, "curves": _soil_curves(run)}
+    return scene
+
+
+def _view(height: float, up: float, distance: float, aspect: float) -> dict[str, Any]:
+    eye, target = [0.0, height + up, distance], [0.0, height, 0.0]
+    return {"eye": eye, "target": target, "angle": FIELD_OF_VIEW, "aspect": aspect}
+
+
+def about_z(angles: Array) -> Array:
+    """(..., 4) unit quaternions x, y, z, w of rotations about z."""
+    zero = np.zeros_like(angles)
+    return np.stack((zero, zero, np.sin(0.5 * angles), np.cos(0.5 * angles)), axis=-1)
+
+
+def _depth(run: SoilRun) -> float:
+    return 2.0 * DEPTH * float(run.radius.mean())
+
+
+def _add_wheels(scene: PageScene, poses: Array, radius: Array, depth: Array, body: float, ahead: float) -> None:
+    """Wheels or a ball and, between the first and the last of several, the body, on moving frames.
+
+    Args:
+        scene: The scene.
+        poses: (n, n_wheels, 3) centres, m, and angles, rad.
+        radius: (n_wheels,) m.
+        depth: (n_wheels,) thickness, m.
+        body: Height of the body, m.
+        ahead: How far the body stands before the wheels, m.
+    """
+    for r, thick in zip(radius, depth, strict=True):
+        scene.put_mesh(wheel_meshes(float(r), float(thick)), scene.frames)
+        scene.frames += 1
+    if len(radius) > 1:
+        length = float(np.hypot(*(poses[0, -1, :2] - poses[0, 0, :2])))
+        beam = Part("", "box", (length, body, 0.02), (0.0, 0.0, ahead), np.eye(3), AXLE_COLOUR)
+        scene.put_mesh([surface_mesh(beam)], scene.frames)
+        scene.frames += 1
+        middle, along = poses[..., :2].mean(axis=1), poses[:, -1, :2] - poses[:, 0, :2]
+        bodies = np.column_stack((middle, np.arctan2(along[:, 1], along[:, 0])))
+        poses = np.concatenate((poses, bodies[:, None]), axis=1)
+    places = np.concatenate((poses[..., :2], np.zeros_like(poses[..., :1])), axis=2)
+    scene.channels += [FrameChannel.fine("places", places), FrameChannel.turns("turns", about_z(poses[..., 2]))]
+
+
+def _chains(run: SoilRun) -> Array:
+    """(n, n_chains, 5) ends x, y, x, y and width of the strongest contacts as bars, m."""
+    chains = run.force_chains[:, :CHAINS].copy()
+    loads = np.linalg.norm(run.wheel_forces[1:], axis=-1)
+    full = max(1e-9, float(np.median(loads, axis=0).max()) if loads.size else 0.0)
+    chains[..., 4] = np.minimum(1.0, np.sqrt(chains[..., 4] / full)) * float(run.radius.mean())
+    return chains
+
+
+def surface_mesh(part: Part) -> tuple[Colour, Array, npt.NDArray[np.int32]]:
+    """Colour, vertices (n, 3), m, and triangles of a part in its solid's frame."""
+    vertices, triangles = part_mesh(part, 48)
+    return part.colour, vertices @ part.rotation.T + np.array(part.position), triangles
+
+
+def wheel_meshes(radius: float, depth: float) -> list[tuple[Colour, Array, npt.NDArray[np.int32]]]:
+    """A tyre with three bars across it, about z."""
+    to_z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    parts = [
+        Part("", "cylinder", (radius, depth), (0.0, 0.0, 0.0), to_z, TYRE_COLOUR),
+        Part("", "cylinder", (0.9 * radius, 0.02), (0.0, 0.0, 0.5 * depth), to_z, HUB_COLOUR),
+    ]
+    for angle in np.pi / 3.0 * np.arange(3):
+        turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+        parts.append(Part("", "box", (1.8 * radius, 0.05 * radius, 0.02), (0.0, 0.0, 0.55 * depth), turn, TYRE_COLOUR))
+    return [surface_mesh(part) for part in parts]
+
+
+def _walls(run: SoilRun) -> list[tuple[Colour, Array, npt.NDArray[np.int32]]]:
+    """Slabs under floors, as wide as the soil, and beside upright walls, as high as the soil."""
+    x, y = run.positions[..., 0], run.positions[..., 1]
+    left, right = float((x - run.radius).min()), float((x + run.radius).max())
+    bottom, top = float((y - run.radius).min()), float((y + run.radius).max())
+    thick, depth = 0.03, 1.5 * _depth(run)
+    slabs = []
+    for px, py, nx, ny in run.walls:
+        length = float(np.hypot(nx, ny))
+        n = np.array([nx, ny]) / length
+        upright = abs(n[0]) > abs(n[1])
+        middle = np.array([0.5 * (left + right), 0.5 * (bottom + top)])
+        foot = middle - ((middle - [px, py]) @ n) * n - 0.5 * thick * n
+        reach = (top - bottom) if upright else (right - left) + 2.0 * thick
+        turn = np.array([[n[1], n[0], 0.0], [-n[0], n[1], 0.0], [0.0, 0.0, 1.0]])
+        colour = ROCK_COLOUR if upright else GROUND_COLOUR
+        slabs.append(
+            surface_mesh(Part("", "box", (reach, thick, depth), (float(foot[0]), float(foot[1]), 0.0), turn, colour))
+        )
+    return slabs
+
+
+def _seen(run: SoilRun) -> float:
+    """Width of the picture, m: the bed, or the rover's surroundings on a longer one."""
+    x = run.positions[0, :, 0]
+    return min(SOIL_SEEN, SKIRT * float(x.max() - x.min() + 2.0 * run.radius.max()))
+
+
+def _soil_eye(run: SoilRun, *, follow: bool) -> Array:
+    """(n, 2) centre of the picture: the rover's smoothed path, clamped so that soil fills the picture."""
+    x = run.positions[0, :, 0]
+    left, right = float(x.min()), float(x.max())
+    height = float(run.wheels[0, :, 1].mean()) if run.wheels.size else 0.0
+    middle = np.full(run.n_frames, 0.5 * (left + right))
+    seen = _seen(run)
+    if follow and run.wheels.size and right - left > seen:
+        middle = moving_mean(run.time, run.wheels[..., 0].mean(axis=1)[:, None], FOLLOW_TIME)[:, 0]
+        middle = np.clip(middle, left + 0.5 * seen, right - 0.5 * seen)
+    return np.column_stack((middle, np.full(run.n_frames, height)))
+
+
+def _soil_curves(run: SoilRun) -> dict[str, Any]:
+    """Contents of the panel."""
+    names = ("wheel",) if run.wheels.shape[1] == 1 else ("back wheel", "front wheel")
+    wheels = list(zip(names, PLANAR_WHEEL_COLOURS[: len(names)], strict=True))
+    charts = [
+        load_chart("wheel load", run.time, run.wheel_forces[..., 1], 1, wheels),
+        Chart("sinkage", "mm", 1e3 * run.sinkage, 2, wheels),
+        Chart("rim faster than rover", "mm/s", 1e3 * run.slip_speeds, 1, wheels),
+    ]
+    return panel_contents(run.title, run.time, charts)
+
+
+def _ground(run: PlanarRun) -> list[tuple[Colour, Array, npt.NDArray[np.int32]]]:
+    """The ground as a band in squares of two colours, and the cut through it that faces the eye."""
+    radius = float(run.radius.max())
+    land = LAND * SEEN * radius
+    x = run.discs[..., 0]
+    low, high = float(x.min()) - land, float(x.max()) + land
+    tile = TILE
+    while (high - low) / tile > 4000.0:
+        tile *= 2.0
+    places = (
+        np.arange(np.floor(low / tile), np.ceil(high / tile) + 1.0)[:, None] * tile + np.arange(0.0, 1.0, 0.125) * tile
+    )
+    corners = places.ravel()
+    if isinstance(run.ground, Polyline):
+        within = run.ground.x[(run.ground.x > low) & (run.ground.x < high)]
+        corners = np.sort(np.concatenate((corners, within - 1e-6, within)))
+    y = run.ground.height(corners)
+    front, back, deep = radius, -8.0 * radius, float(y.min()) - 2.0 * radius
+    n, k = len(corners), np.arange(len(corners) - 1)
+    vertices = np.vstack(
+        (
+            np.column_stack((corners, y, np.full(n, front))),
+            np.column_stack((corners, y, np.full(n, back))),
+            np.column_stack((corners, y, np.full(n, front))),
+            np.column_stack((corners, np.full(n, deep), np.full(n, front))),
+        )
+    )
+    top = np.stack((np.column_stack((k, k + 1, k + n)), np.column_stack((k + 1, k + n + 1, k + n))), axis=1)
+    cut = np.stack(
+        (
+            np.column_stack((k + 2 * n, k + 3 * n, k + 2 * n + 1)),
+            np.column_stack((k + 2 * n + 1, k + 3 * n, k + 3 * n + 1)),
+        ),
+        axis=1,
+    )
+    dark = np.floor(0.5 * (corners[1:] + corners[:-1]) / tile) % 2.0 == 1.0
+    light = np.concatenate((top[~dark].reshape(-1, 3),)).astype(np.int32)
+    shade = np.concatenate((top[dark].reshape(-1, 3), cut.reshape(-1, 3))).astype(np.int32)
+    return [(GROUND_COLOUR, vertices, light), (GROUND_COLOUR_2, vertices, shade)]
+
+
+def _planar_eye(run: PlanarRun, *, follow: bool) -> Array:
+    """(n, 2) centre of the picture: the machine's smoothed way, or the middle of all of it."""
+    middle = run.discs[..., :2].mean(axis=1)
+    if not follow:
+        return np.tile(0.5 * (middle.min(axis=0) + middle.max(axis=0)), (run.n_frames, 1))
+    return moving_mean(run.time, middle, FOLLOW_TIME)
+
+
+def _planar_curves(run: PlanarRun) -> dict[str, Any]:
+    """Contents of the panel."""
+    discs = list(zip(run.names, PLANAR_WHEEL_COLOURS[: len(run.names)], strict=True))
+    charts = [
+        load_chart("load", run.time, run.loads, 1, discs),
+        Chart("gap", "mm", 1e3 * run.trajectory["gaps"], 2, discs),
+        Chart("rim faster than machine", "mm/s", 1e3 * run.slip_speeds, 1, discs),
+    ]
+    return panel_contents(run.title, run.time, charts)

@@ -1,0 +1,196 @@
+"""A rover over its ground as a scene of the player, of a saved run or of a live drive."""
+
+from __future__ import annotations
+
+from itertools import cycle
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.ground import map_of, surfaces_of
+from rover_gym.mechanics import HeightField
+from rover_gym.record.channels import outcome_words
+from rover_gym.rendering.appearance import ROCK_COLOUR, WHEEL_COLOURS
+from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, moving_mean, panel_contents
+from rover_gym.replay.page_scene import FrameChannel, PageScene
+from rover_gym.replay.rotations import continuous, quaternions
+from rover_gym.replay.scenery import (
+    MOST_HEIGHTS,
+    coloured_meshes,
+    first_view,
+    goal_meshes,
+    ground_plane,
+    parts_by_solid,
+    spheres,
+    surroundings,
+    trunk_path,
+)
+from rover_gym.replay.wheel_marks import DrawnWheel, drawn_wheels, feet, marks, rut_edits, world_forces
+
+if TYPE_CHECKING:
+    from rover_gym.record.rover_run import RoverRun
+
+Array = npt.NDArray[np.float64]
+
+WHEEL_NAMES = {
+    "FL": "front left",
+    "FR": "front right",
+    "ML": "middle left",
+    "MR": "middle right",
+    "BL": "back left",
+    "BR": "back right",
+}
+LONGEST_FACT = 100
+HAZE = 90.0  # m, distance at which the ground has the colour of the sky
+PLANE = 400.0  # m, half of the edge of a plane
+ABOVE = 0.45  # of the rover's reach: so far above it the eye looks, and the horizon is in the picture
+GRAVITY = 9.81  # m/s², of runs that do not say it
+
+
+def add_rover(scene: PageScene, run: RoverRun) -> list[DrawnWheel]:
+    """Adds the solids of a run's rover, which become the next moving frames; returns its wheels."""
+    wheels = drawn_wheels(run.model)
+    for frame, parts in enumerate(parts_by_solid(run).values(), scene.frames):
+        scene.put_mesh(coloured_meshes(parts), frame, casts=True)
+    scene.frames += len(run.model.solid_names)
+    colours = cycle(WHEEL_COLOURS)
+    scene.facts["wheels"] = [
+        {"frame": wheel.frame, "radius": wheel.radius, "width": wheel.width, "colour": colour, "name": name}
+        for wheel, colour, name in zip(wheels, colours, run.model.wheel_names, strict=False)
+    ]
+    return wheels
+
+
+def add_ground(scene: PageScene, run: RoverRun) -> None:
+    """Adds the ground around a run's path, with its rocks and its goal."""
+    plane = ground_plane(run)
+    if plane is not None:
+        middle = trunk_path(run).mean(axis=0)
+        point = middle - (middle @ plane.normal + plane.offset) * plane.normal
+        scene.facts["plane"] = {"point": point.tolist(), "normal": plane.normal.tolist(), "half": PLANE}
+    low, high = surroundings(run)
+    for surface in surfaces_of(run.terrain):
+        if isinstance(surface, HeightField):
+            scene.put_map(*map_of(surface, low, high, MOST_HEIGHTS))
+        else:
+            scene.put_mesh([(ROCK_COLOUR, np.asarray(surface.vertices), surface.triangles.astype(np.int32))])
+    centres, radii = spheres(run)
+    scene.arrays["rocks"] = ("f4", np.column_stack((centres, radii)).ravel())
+    scene.put_mesh(goal_meshes(run), casts=True)
+
+
+def poses_of(positions: Array, rotations: Array) -> list[FrameChannel]:
+    """The channels of moving frames: positions (n, count, 3), m, and rotation matrices (n, count, 3, 3)."""
+    turns = continuous(quaternions(rotations))[..., [1, 2, 3, 0]]
+    return [FrameChannel.fine("places", positions), FrameChannel.turns("turns", turns)]
+
+
+def bare_scene(run: RoverRun) -> tuple[PageScene, list[DrawnWheel]]:
+    """A scene with rover and ground, before anything moves; and the wheels."""
+    view = first_view(run)
+    centre = trunk_path(run)[0]
+    seen = {
+        "eye": (view.eye - centre).tolist(),
+        "target": (view.target - centre + [0.0, ABOVE * run.model.clear_radius, 0.0]).tolist(),
+        "angle": view.field_of_view,
+    }
+    scene = PageScene("rover", seen, float(run.model.clear_radius))
+    scene.facts |= {"title": run.title, "rover": True, "shadow": True, "haze": HAZE, "far": 2.0 * PLANE}
+    wheels = add_rover(scene, run)
+    add_ground(scene, run)
+    return scene, wheels
+
+
+def rover_scene(run: RoverRun, *, follow: bool) -> PageScene:
+    """A rover's run as a scene; without `follow` the eye stays where it is."""
+    scene, wheels = bare_scene(run)
+    path = trunk_path(run)
+    centre = moving_mean(run.time, path, FOLLOW_TIME) if follow else np.tile(path[0], (run.n_frames, 1))
+    points, normals, across = feet(run, wheels)
+    forces = world_forces(run, normals, across)
+    share = run.model.mass * _gravity(run) / max(1, len(wheels))
+    scene.channels += [
+        *poses_of(run.positions, run.rotations),
+        FrameChannel.fine("centre", centre[:, None]),
+        FrameChannel.fine("forces", np.concatenate((points, np.clip(forces / share, -1e4, 1e4)), axis=2)),
+    ]
+    scene.arrays["trail"] = ("f4", marks(run, wheels, points).ravel())
+    ruts = rut_edits(run, wheels, points, across)
+    if ruts is not None:
+        rut_map, samples, cells, levels = ruts
+        scene.facts["ruts"] = rut_map.header()
+        scene.arrays |= {"rut-sample": ("u4", samples), "rut-cell": ("u4", cells), "rut-level": ("u1", levels)}
+    scene.facts |= {"events": _events(run), "curves": rover_curves(run)}
+    return scene
+
+
+def _gravity(run: RoverRun) -> float:
+    """Magnitude of gravity, m/s²."""
+    solver = run.trajectory.attributes.get("solver", {})
+    vector = solver.get("gravity") if isinstance(solver, dict) else None
+    return GRAVITY if vector is None else max(1e-3, float(np.linalg.norm(vector)))
+
+
+def facts(run: RoverRun) -> list[str]:
+    """What the run was, for the panel: its ground, seed, difficulty and outcome, as far as the file says them."""
+    attributes = run.trajectory.attributes
+    scene = attributes.get("scene", {})
+    terrain, seed, outcome = scene.get("terrain"), attributes.get("seed"), attributes.get("outcome")
+    rocks = scene.get("rocks")
+    difficulty = rocks.get("difficulty") if isinstance(rocks, dict) else None
+    slope = scene.get("slope")
+    told = [
+        f"scene: {terrain}" if isinstance(terrain, str) else None,
+        f"slope: {np.degrees(slope):.1f} degrees" if isinstance(slope, float) and slope else None,
+        f"seed: {seed}" if isinstance(seed, (int, np.integer)) else None,
+        f"difficulty: {difficulty:.2g}" if isinstance(difficulty, float) else None,
+        f"outcome: {outcome_words(str(outcome))}" if outcome is not None else None,
+    ]
+    return [fact[:LONGEST_FACT] for fact in told if fact is not None]
+
+
+def rover_curves(run: RoverRun) -> dict[str, Any]:
+    """Contents of the panel; the first charts are shown at once."""
+    data = run.trajectory
+    wheels = [
+        (WHEEL_NAMES.get(name, name), colour)
+        for name, colour in zip(run.model.wheel_names, cycle(WHEEL_COLOURS), strict=False)
+    ]
+    blue, orange = WHEEL_COLOURS[0], WHEEL_COLOURS[3]
+    charts = [
+        load_chart("wheel load", run.time, data["wheel_forces"][:, :, 0], 0, wheels),
+        Chart("wheel gap", "mm", 1e3 * data["wheel_gaps"], 2, wheels, shown=bool(np.any(data["wheel_gaps"] > 1e-3))),
+    ]
+    if "v" in data.data:
+        speed = np.linalg.norm(data["v"][:, [0, 2]], axis=1)
+        charts.append(Chart("speed", "m/s", speed[:, None], 3, [("speed", blue)]))
+    lean = np.degrees(data["q"][:, [3, 5]])
+    charts.append(Chart("attitude", "degrees", lean, 2, [("roll", blue), ("pitch", orange)], shown=False))
+    for name, title, unit, digits in (("slip_ratio", "slip", "1", 3), ("motor_energy", "work of the motors", "J", 1)):
+        if name in data.data:
+            charts.append(Chart(title, unit, data[name][:, None], digits, [(title, blue)], shown=False))
+    if "motor_torques" in data.data:
+        charts.append(Chart("motor torque", "N m", data["motor_torques"], 2, wheels, shown=False))
+    return panel_contents(run.title, run.time, charts, facts(run))
+
+
+def _events(run: RoverRun) -> list[dict[str, Any]]:
+    """What the timeline marks: wheels that leave the ground or hit hard, and the end."""
+    time = run.time - run.time[0]
+    data = run.trajectory.data
+    events: list[dict[str, Any]] = []
+    loads = data["wheel_forces"][:, :, 0]
+    share = run.model.mass * _gravity(run) / max(1, loads.shape[1])
+    for name, load in zip(run.model.wheel_names, loads.T, strict=False):
+        hard = load > 4.0 * share
+        begins = np.flatnonzero(hard & ~np.concatenate(([False], hard[:-1])))
+        words = WHEEL_NAMES.get(name, name)
+        events += [
+            {"time": round(float(time[k]), 3), "name": f"{words} wheel hits with {load[k]:.0f} N"} for k in begins
+        ]
+    events = sorted(events, key=lambda event: event["time"])[:200]
+    outcome = run.trajectory.attributes.get("outcome")
+    if outcome is not None:
+        events.append({"time": round(float(time[-1]), 3), "name": outcome_words(str(outcome))})
+    return events
