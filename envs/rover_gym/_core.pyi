@@ -629,8 +629,7 @@ class SoftGround(Terrain):
 
 @final
 class WheelBed:
-    """A single wheel on a bed of soil, with prescribed speeds and a vertical load under which it
-    sinks.
+    """A single wheel on a bed of soil, with prescribed speeds and vertical load.
 
     Args:
         soil: A `rover_gym.sand.Soil`, or a mapping of its numbers.
@@ -870,7 +869,7 @@ class TriangleMesh(Terrain):
         """Numbers of the corners of each triangle, (m, 3)."""
     @property
     def is_closed(self) -> bool:
-        """Whether the mesh is closed: no triangle has a free edge."""
+        """Whether the mesh is closed, so that no triangle has a free edge."""
     def __len__(self) -> int: ...
     def __getnewargs__(self) -> tuple[Any, ...]: ...
 
@@ -949,9 +948,7 @@ class StepReport:
         """
     @property
     def energy_gain(self) -> float:
-        """Largest energy gain of a step beyond the work of gravity and actuators, relative to the
-        kinetic energy.
-        """
+        """Largest energy gain of a step beyond the work done on it, relative to the kinetic energy."""
     @property
     def energy_removed(self) -> float:
         """Spurious energy gain of the scheme that the audit removed, summed over the steps, J."""
@@ -974,9 +971,7 @@ class StepReport:
         """
     @property
     def energy_lifted(self) -> float:
-        """Energy gained by removing penetration, without the actuators' work, summed over the steps,
-        J.
-        """
+        """Energy gained by removing penetration, less the actuators' work, sum of the steps, J."""
     @property
     def energy_released(self) -> float:
         """Energy released by elastic wheels, summed over the steps, J; negative if they stored energy.
@@ -1161,8 +1156,7 @@ class PathSearch:
 
 @final
 class Linearisation:
-    """Derivatives of a time step with respect to state and command, returned by
-    `Simulation.linearise`.
+    """Derivatives of a time step, returned by `Simulation.linearise`.
 
     `x_next = next_state + a @ (x - state) + b @ (u - command)` to first order. The state is
     x = (q, v) as `Simulation.q` and `Simulation.v` return them, the command is u = (wheel torques,
@@ -1209,7 +1203,8 @@ class Linearisation:
         """Whether the step removes penetration. If so, the derivative includes this correction."""
     @property
     def holds(self) -> npt.NDArray[np.bool_]:
-        """Whether each column of (a, b) is valid within the tested perturbation, (nx + nu,).
+        """Whether each column of (a, b) is valid within the tested perturbation, (nx + nu,); None
+        without `check`.
 
         A column is valid if two perturbed steps, one in each direction, have the same closed
         contacts in the same modes, the same projection and energy correction, and agree with the
@@ -1218,13 +1213,13 @@ class Linearisation:
     @property
     def errors(self) -> _Array:
         """Difference of each column of (a, b) from the difference quotient of its two perturbed steps,
-        (nx + nu,).
+        (nx + nu,); None without `check`.
 
         The largest difference of an entry, relative to the column's largest entry.
         """
     @property
     def is_smooth(self) -> bool:
-        """Whether all columns are valid."""
+        """Whether all columns are valid; None without `check`."""
 
 @final
 class Energy:
@@ -1273,9 +1268,7 @@ class AnySimulation:
 
     @property
     def time(self) -> float:
-        """Time since the last call of `set_state`, s. For a rover among grains, the time of the
-        grains.
-        """
+        """Time since the last call of `set_state`, s; among grains, the time of the grains."""
     @property
     def time_step(self) -> float:
         """Time step, s."""
@@ -1481,9 +1474,7 @@ class Simulation(AnySimulation):
         """
     @property
     def steering(self) -> _Array:
-        """Steering set-points, (n_wheels,), rad; 0 for wheels whose steering joint is missing or
-        released.
-        """
+        """Steering set-points, (n_wheels,), rad; 0 for wheels without steering or released ones."""
     def set_steering(self, set_points: npt.ArrayLike) -> None:
         """Sets the steering set-points, which an implicit PD controller holds with the model's gains.
 
@@ -1670,23 +1661,29 @@ class Simulation(AnySimulation):
             coefficients, (n_c,).
         """
     def linearise(self, perturbation: float = 1e-6) -> Linearisation:
-        """Derivatives of the next step with respect to state and command. The simulation does not
-        change.
+        """Derivatives of the next step with respect to state, command and parameters.
 
-        The step is taken as after `set_state(q, v)`, without warm start. The active contacts, their
-        modes and the branches of the motors' lines are held constant; the limits of the commands
-        are not considered. If the modes change within `perturbation`, the derivative is not valid
-        and `Linearisation.holds` is False.
+        The simulation does not change. The step is taken as after `set_state(q, v)`, without warm
+        start. The active contacts, their modes and the branches of the motors' lines are held
+        constant; the limits of the commands are not considered. Where the modes change, the
+        derivative is not valid; with `check`, `Linearisation.holds` is False there.
 
         Args:
-            perturbation: Change of each entry of (x, u) in the two steps that test its column, m,
-                rad, m/s or rad/s, and 1000 times as many N m; from 1e-9 to 1e-3, 1e-6 by default.
+            check: Whether to test each column of (A, B) by two real steps, which takes a hundred
+                times as long as the derivatives; False by default.
+            perturbation: Change of each entry of (x, u) in these steps, m, rad, m/s or rad/s, and
+                1000 times as many N m; from 1e-9 to 1e-3, 1e-6 by default.
+            parameters: Names of parameters for C: "friction", the common coefficient; "mass" and
+                "mass:<body>", a factor of mass and inertia of all bodies or of one;
+                "damping:<joint>", N m s/rad or N s/m; "contact_stiffness" and "contact_damping",
+                factors of those of wheels that yield. None by default.
 
         Returns:
             The derivatives, the contact modes and their margins.
 
         Raises:
-            OptionError: `perturbation` is out of its range, or the variant is "newton".
+            OptionError: `perturbation` is out of its range, a parameter does not exist, or the
+                variant is "newton".
             StateError: A pitch is 90 degrees, where the coordinates are singular.
             StepError: The step failed, was split, or did not converge, so that it has no
                 derivative.
@@ -1875,7 +1872,7 @@ class PlanarSimulation(AnySimulation):
         """The ground."""
     @property
     def q(self) -> _Array:
-        """Coordinates, (nv,): x and y, m, then angles, rad, positive counterclockwise."""
+        """Coordinates, (nv,), x and y, m, then angles, rad, positive counterclockwise."""
     @property
     def v(self) -> _Array:
         """Rates of the coordinates, (nv,), m/s and rad/s."""
@@ -2062,7 +2059,7 @@ class SimulationBatch:
         """Number of threads."""
     @property
     def instruction_set(self) -> Literal["AVX-512", "AVX2", "baseline"]:
-        """Instruction set of the processor: "AVX-512", "AVX2" or "baseline".
+        """Instruction set of the processor, "AVX-512", "AVX2" or "baseline".
 
         The widest that the processor has, unless the environment variable `ROVER_GYM_INSTRUCTIONS`
         names another. Results do not depend on it.
@@ -2434,8 +2431,9 @@ class EpisodeBatch:
     ) -> DrawnEpisodes:
         """Draws one episode from each generator, on the threads of this batch.
 
-        The rovers do not change. A scene is drawn again if the rover would penetrate the ground or a rock by more than 1 cm.
-        The given generators do not change: see `DrawnEpisodes.generators`.
+        The rovers do not change. A scene is drawn again if the rover would penetrate the ground or
+        a rock by more than 1 cm. The given generators do not change either:
+        `DrawnEpisodes.generators` has their states after the draws.
 
         Args:
             distribution: Distribution of the episodes.
@@ -2536,7 +2534,10 @@ class EpisodeBatch:
             index: Index of the rover.
 
         Returns:
-            Its row of each of `DrawnEpisodes.starts`, `rocks`, `rock_seeds` and `domains`.
+            The start (5 + 2 n,), with n goals: slope, direction of steepest ascent, x and z,
+            heading, x and z of each goal, rad and m; the rocks (3,), zeros if there are none:
+            difficulty, abundance, radius of the largest rock in wheel radii; the seed of the rocks;
+            and mass scale, friction, actuator gain and gravity scale (4,).
         """
     def terrain(self, index: int) -> Plane | SphereField:
         """The ground of one rover.
@@ -2819,7 +2820,7 @@ class GrainContacts:
 
     @property
     def bodies(self) -> npt.NDArray[np.int64]:
-        """Indices of both bodies, (n, 2): grains from 0, then wheels; -1 for a wall or the ground."""
+        """Indices of both bodies, (n, 2), grains from 0, then wheels; -1 for a wall or the ground."""
     @property
     def points(self) -> _Array:
         """Points of the first body's surface, (n, D), m."""
@@ -2843,9 +2844,7 @@ class GrainContacts:
         """
     @property
     def velocities(self) -> _Array:
-        """Velocities of the first body relative to the second after the step along n, t, b, (n, D),
-        m/s.
-        """
+        """Relative velocities of the first body after the step along n, t, b, (n, D), m/s."""
     @property
     def world_impulses(self) -> _Array:
         """Impulses on the first body along x, y, z, (n, D), N s."""
@@ -3239,9 +3238,7 @@ class SolverReport:
         """Iterations of the stage that found the solution."""
     @property
     def residual(self) -> float:
-        """Violation of Signorini's and Coulomb's laws by the returned impulses, relative to the
-        problem data.
-        """
+        """Violation of Signorini's and Coulomb's laws by the impulses, relative to the data."""
     @property
     def velocity_error(self) -> float:
         """Largest violation of Signorini's and Coulomb's laws at one contact, m/s."""
@@ -3265,9 +3262,7 @@ class SolverReport:
         "admm",
         "relaxed",
     ]:
-        """Name of the stage that found the solution; "at_rest" if q = 0, so that zero impulses solve
-        the problem.
-        """
+        """Name of the stage that found the solution; "at_rest" if q = 0 needed none."""
     @property
     def stages(self) -> list[tuple[str, str, int]]:
         """All stages tried, in order, each with the reason why it ended and its iterations.

@@ -127,6 +127,16 @@ rover("drive", "--terrain", "ground.stl", *BRIEFLY)
     "planning": """
 rover("drive", "--difficulty", "1", "--policy", "planner", "--time-limit", "0.5")
 """,
+    "jax": """
+import jax
+import numpy as np
+from rover_gym import Simulation
+from rover_gym.derivatives import jax_rollout
+
+drive = jax_rollout(Simulation())
+far = jax.grad(lambda commands: drive(jax.numpy.zeros(42).at[1].set(1.0), commands)[-1, 0])
+assert far(jax.numpy.zeros((2, 12))).shape == (2, 12)
+""",
     "models": """
 from rover_gym import RoverModel
 

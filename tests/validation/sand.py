@@ -134,7 +134,7 @@ def own_soils(cells: dict[str, str]) -> list[Soil]:
 def single_wheels(path: Path) -> list[str]:
     """Pull and torque of other wheels from their soils' own numbers, nothing fitted."""
     lines = [
-        "| wheel | slip | pull, N | law of this page | Bekker | torque / radius, N | law of this page | Bekker |",
+        "| wheel | slip | pull, N | resistive | Bekker | torque / radius, N | resistive | Bekker |",
         "|---|---|---|---|---|---|---|---|",
     ]
     groups: dict[str, list[npt.NDArray[np.float64]]] = {}
@@ -146,7 +146,8 @@ def single_wheels(path: Path) -> list[str]:
             drive = [0.1 * (1.0 - slip), 0.1 / radius, 0.0, float(cells["load_N"]), 9.81]
             found = np.array([wheel.on(soil).steady([drive])[0, [1, 4]] / (1.0, radius) for soil in own_soils(cells)])
             name = f"{cells['source']}, grousers {1e3 * height:.0f} mm"
-            groups.setdefault(name, []).append(np.abs(found[:, 0] - pull) / abs(pull))
+            for group in (name, f"{cells['source']}, all"):
+                groups.setdefault(group, []).append(np.abs(found[:, 0] - pull) / abs(pull))
             pulls, rims = (" | ".join(f"{value:.1f}" for value in values) for values in found.T)
             lines.append(f"| {name} | {slip} | {pull} | {pulls} | {rim:.1f} | {rims} |")
     for name, errors in groups.items():

@@ -61,6 +61,7 @@ SET_BY = {
 PLACED = (
     ("path", "run"),
     ("path", "recording"),
+    ("run", "recording"),
     ("path", "file"),
     ("model", "name"),
     ("policy", "policies"),
@@ -114,7 +115,7 @@ def check_file(option: str, path: Path | None) -> None:
     with _tried(option, path, path.parent):
         is_new = not path.exists()
         if not is_new and not stat.S_ISREG(path.stat().st_mode):
-            raise OSError(errno.EINVAL, "no regular file")
+            raise OSError(errno.EINVAL, "not a regular file")
         with path.open("ab"):
             pass
         if is_new:

@@ -112,11 +112,11 @@ class LiveLoop:
             CommandError: Too many commands wait, or the loop has stopped; this one is dropped.
         """
         if self._stopping.is_set():
-            refuse(CommandError, "command", command, "comes too late: the drive is over")
+            refuse(CommandError, "command", command, "was not executed: the drive is over")
         try:
             self._commands.put_nowait(command)
         except queue.Full:
-            refuse(CommandError, "command", command, f"comes too soon: {MOST_WAITING} commands wait")
+            refuse(CommandError, "command", command, f"was not executed: {MOST_WAITING} commands are waiting already")
         self._wake.set()
 
     def tell(self, notice: str) -> None:

@@ -119,7 +119,12 @@ class LiveServer:
             if self._at_wheel is None:
                 self._at_wheel = page
             if self._at_wheel is not page:
-                refuse(CommandError, "do", entries["do"], "is for the page at the wheel, and another one is")
+                refuse(
+                    CommandError,
+                    "do",
+                    entries["do"],
+                    "is allowed on the page in control only, and another page is in control",
+                )
             self._loop.send(command)
         except RoverGymError as error:
             return str(error)

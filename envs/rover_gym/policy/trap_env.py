@@ -62,9 +62,9 @@ class TrapBatch(RoverBatch):
         self.free_distance = number("free_distance", free_distance, above=0.0, at_most=100.0)
         given: dict[str, Any] = {**DEFAULTS, **arguments}
         if given["terrain"] == "plane":
-            refuse(OptionError, "terrain", given["terrain"], "has nothing to be stuck on")
+            refuse(OptionError, "terrain", given["terrain"], "has no obstacle on which a rover gets stuck")
         if given.get("waypoints", 1) != 1:
-            refuse(OptionError, "waypoints", given["waypoints"], "must be 1: the goal is to come free")
+            refuse(OptionError, "waypoints", given["waypoints"], "must be 1: the task is to get free")
         super().__init__(n, **given)
         quiet = {"stuck_time": HELD, "observation_noise": 0.0, "height_scan": False, "threads": 1}
         left_out = ("battery", "reward_terms", "render_mode", "max_episode_steps")
@@ -103,7 +103,9 @@ class TrapBatch(RoverBatch):
             if "q" in options.fixed or self._is_trapped():
                 break
         else:
-            refuse(TerrainError, "terrain", self.task.ground or DRIVES, f"none of {DRIVES} drives ended in a trap")
+            refuse(
+                TerrainError, "terrain", self.task.ground or DRIVES, f"the rover got stuck in none of {DRIVES} drives"
+            )
         normals = None
         if self.task.is_noisy:
             (normals,), (row,) = standard_normals(row[None], self.task.layout.size)
@@ -124,7 +126,7 @@ class TrapBatch(RoverBatch):
             normals=normals,
         )
         if episode is None:
-            refuse(StateError, "q", q, "must be observable in float32")
+            refuse(StateError, "q", q, "must give an observation that is finite in float32")
         return Trapped(trapped, episode, origin_of(replace(scene, start=start)), row)
 
     def _is_trapped(self) -> bool:

@@ -142,6 +142,19 @@ def part_mesh(part: Part, resolution: int = 24) -> tuple[npt.NDArray[np.float64]
     return _cylinder_mesh(radius, height, resolution)
 
 
+def pennant() -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int32]]:
+    """The goal's flag at the top of a pole at the origin: two cloths across one another, of which one always shows.
+
+    Returns:
+        Vertices (12, 3), m, and triangles (4, 3), both sides of each cloth.
+    """
+    tips = ((0.38, 1.25, 0.38), (0.38, 1.25, -0.38))
+    cloths = [np.array([(0.0, 1.48, 0.0), (0.0, 1.02, 0.0), tip]) for tip in tips for _ in range(2)]
+    sides = [np.array([0, 1, 2]) if k % 2 == 0 else np.array([0, 2, 1]) for k in range(len(cloths))]
+    faces = np.array([side + 3 * k for k, side in enumerate(sides)], dtype=np.int32)
+    return np.vstack(cloths), faces
+
+
 def sphere_mesh(rings: int = 8) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int32]]:
     """The unit sphere: vertices (n, 3), on it, and triangles, counter-clockwise seen from outside."""
     columns = 2 * rings

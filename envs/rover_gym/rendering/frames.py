@@ -126,7 +126,7 @@ class FrameRenderer(Picture):
         height: int = 480,
         camera: Camera = "follow",
         show_forces: bool = False,
-        antialiasing: bool = False,
+        antialiasing: bool = True,
         goal: Goal | None = None,
         goal_tolerance: float = 0.5,
     ) -> None:

@@ -286,8 +286,9 @@ impl EpisodeBatch {
 
     /// Draws one episode from each generator, on the threads of this batch.
     ///
-    /// The rovers do not change. A scene is drawn again if the rover would penetrate the ground or a rock by more than 1 cm.
-    /// The given generators do not change: see `DrawnEpisodes.generators`.
+    /// The rovers do not change. A scene is drawn again if the rover would penetrate the ground or
+    /// a rock by more than 1 cm. The given generators do not change either:
+    /// `DrawnEpisodes.generators` has their states after the draws.
     ///
     /// Args:
     ///     distribution: Distribution of the episodes.
@@ -468,7 +469,10 @@ impl EpisodeBatch {
     ///     index: Index of the rover.
     ///
     /// Returns:
-    ///     Its row of each of `DrawnEpisodes.starts`, `rocks`, `rock_seeds` and `domains`.
+    ///     The start (5 + 2 n,), with n goals: slope, direction of steepest ascent, x and z,
+    ///     heading, x and z of each goal, rad and m; the rocks (3,), zeros if there are none:
+    ///     difficulty, abundance, radius of the largest rock in wheel radii; the seed of the rocks;
+    ///     and mass scale, friction, actuator gain and gravity scale (4,).
     fn origin(&self, index: &Bound<'_, PyAny>) -> Result<(Array, Array, u64, Array)> {
         self.one(index, |held, i| {
             let (origin, episode) = (held.batch.origin(i)?, held.batch.episode(i)?);

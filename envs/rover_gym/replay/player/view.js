@@ -172,7 +172,7 @@ class View {
   }
 
   // Soil: two shades of squares, and grain. `weight` darkens what the vertices say.
-  ground(options = {}) {
+  ground(options = {}, steep = false) {
     const material = this.lit({ color: colourOf(this.scene.soil[0]), ...options });
     material.onBeforeCompile = (shader) => {
       Object.assign(shader.uniforms, {
@@ -194,6 +194,7 @@ class View {
           vec2 wide = max(fwidth(soilAt) / tile, 1e-4);
           vec2 side = clamp(edge / wide, -0.5, 0.5) * 2.0;
           float checks = 0.5 + 0.5 * side.x * side.y;
+          ${steep ? "if (abs(normalize(cross(dFdx(soilPlace), dFdy(soilPlace))).y) < 0.7) checks = 1.0;" : ""}
           float fine = texture2D(grain, soilAt * 0.9).r;
           float coarse = texture2D(grain, soilAt * 0.071 + 0.3).r;
           diffuseColor.rgb *= mix(vec3(1.0), other / diffuse, checks);
@@ -205,7 +206,7 @@ class View {
   }
 
   // A coloured surface on a moving frame, or on the world (frame -1).
-  addGroup({ frame, first, count, casts }) {
+  addGroup({ frame, first, count, role }) {
     const { vertices, colours, triangles } = this.scene.arrays;
     const used = triangles.subarray(first, first + count);
     const [places, paints] = [new Float32Array(3 * count), new Uint8Array(4 * count)];
@@ -216,8 +217,8 @@ class View {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(places, 3));
     geometry.setAttribute("color", new THREE.BufferAttribute(paints, 4, true));
-    const mesh = new THREE.Mesh(geometry, this.lit({ vertexColors: true }));
-    mesh.castShadow = casts;
+    const mesh = new THREE.Mesh(geometry, role === "soil" ? this.ground({ side: THREE.DoubleSide }, true) : this.lit({ vertexColors: true }));
+    mesh.castShadow = role === "solid";
     mesh.receiveShadow = true;
     (frame < 0 ? this.world : this.frames[frame]).add(mesh);
     return mesh;
