@@ -162,7 +162,7 @@ pub fn rows() -> Vec<(&'static str, &'static str, &'static str)> {
 }
 
 /// A value as Python has it.
-fn object<'py>(py: Python<'py>, value: Value) -> Result<Bound<'py, PyAny>> {
+fn object(py: Python<'_>, value: Value) -> Result<Bound<'_, PyAny>> {
     Ok(match value {
         Number(x) => x.into_pyobject(py)?.into_any(),
         Count(n) => n.into_pyobject(py)?.into_any(),
@@ -173,7 +173,7 @@ fn object<'py>(py: Python<'py>, value: Value) -> Result<Bound<'py, PyAny>> {
 }
 
 /// The values of an entry of all rovers as an array.
-fn column<'py>(py: Python<'py>, values: Vec<Value>) -> Result<Bound<'py, PyAny>> {
+fn column(py: Python<'_>, values: Vec<Value>) -> Result<Bound<'_, PyAny>> {
     macro_rules! array {
         ($kind:path) => {{
             let column = values.iter().map(|value| match value {
@@ -195,13 +195,16 @@ fn column<'py>(py: Python<'py>, values: Vec<Value>) -> Result<Bound<'py, PyAny>>
     })
 }
 
+/// Makes a value of Python from what an entry reads.
+type Take<'py, 'a> = dyn Fn(&dyn Fn(&Told<'_>) -> Value) -> Result<Bound<'py, PyAny>> + 'a;
+
 /// A dictionary of some entries, whose values a function takes from what they read.
 fn dictionary<'py>(
     py: Python<'py>,
     entries: &[Entry],
     settings: &Settings,
     mask: Option<&Bound<'py, PyAny>>,
-    take: &dyn Fn(&dyn Fn(&Told<'_>) -> Value) -> Result<Bound<'py, PyAny>>,
+    take: &Take<'py, '_>,
 ) -> Result<Bound<'py, PyDict>> {
     let out = PyDict::new(py);
     let put = |out: &Bound<'py, PyDict>, name: &str, value: Bound<'py, PyAny>| -> Result<()> {

@@ -249,15 +249,14 @@ impl EpisodeBatch {
             random,
         } = beginning;
         let rover = &mut self.rovers[index];
-        match Arc::get_mut(rover) {
-            Some(own) => (own.get_mut().unwrap_or_else(PoisonError::into_inner))
-                .begin(scene.placement)
-                .map_err(|error| BatchError::Options { index, error })?,
-            None => {
-                let begun = RoverSimulation::placed(scene.placement);
-                *rover = shared(begun.map_err(|error| BatchError::Options { index, error })?);
-            }
-        }
+        let begun = if let Some(own) = Arc::get_mut(rover) {
+            let own = own.get_mut().unwrap_or_else(PoisonError::into_inner);
+            own.begin(scene.placement)
+        } else {
+            // Whoever else holds it keeps the rover of the episode before.
+            RoverSimulation::placed(scene.placement).map(|begun| *rover = shared(begun))
+        };
+        begun.map_err(|error| BatchError::Options { index, error })?;
         self.errors[index] = None;
         let origin = Origin {
             start: scene.start,
