@@ -224,7 +224,8 @@ mod tests {
     fn is_derivative(f: impl Fn(Dual<f64>) -> Dual<f64>, x: f64) {
         let h = 1e-5;
         let ahead = |k: f64| f(varying(x + k * h)).value;
-        let difference = (8.0 * (ahead(1.0) - ahead(-1.0)) - (ahead(2.0) - ahead(-2.0))) / (12.0 * h);
+        let difference =
+            (8.0 * (ahead(1.0) - ahead(-1.0)) - (ahead(2.0) - ahead(-2.0))) / (12.0 * h);
         let found = f(varying(x)).slope;
         let error = (found - difference).abs() / found.abs().max(1.0);
         assert!(error < 1e-9, "at {x}: {found}, differences {difference}");
