@@ -1161,8 +1161,7 @@ class PathSearch:
 
 @final
 class Linearisation:
-    """Derivatives of a time step with respect to state and command, returned by
-    `Simulation.linearise`.
+    """Derivatives of a time step, returned by `Simulation.linearise`.
 
     `x_next = next_state + a @ (x - state) + b @ (u - command)` to first order. The state is
     x = (q, v) as `Simulation.q` and `Simulation.v` return them, the command is u = (wheel torques,
@@ -1209,7 +1208,8 @@ class Linearisation:
         """Whether the step removes penetration. If so, the derivative includes this correction."""
     @property
     def holds(self) -> npt.NDArray[np.bool_]:
-        """Whether each column of (a, b) is valid within the tested perturbation, (nx + nu,).
+        """Whether each column of (a, b) is valid within the tested perturbation, (nx + nu,); None
+        without `check`.
 
         A column is valid if two perturbed steps, one in each direction, have the same closed
         contacts in the same modes, the same projection and energy correction, and agree with the
@@ -1218,13 +1218,13 @@ class Linearisation:
     @property
     def errors(self) -> _Array:
         """Difference of each column of (a, b) from the difference quotient of its two perturbed steps,
-        (nx + nu,).
+        (nx + nu,); None without `check`.
 
         The largest difference of an entry, relative to the column's largest entry.
         """
     @property
     def is_smooth(self) -> bool:
-        """Whether all columns are valid."""
+        """Whether all columns are valid; None without `check`."""
 
 @final
 class Energy:
@@ -1670,23 +1670,29 @@ class Simulation(AnySimulation):
             coefficients, (n_c,).
         """
     def linearise(self, perturbation: float = 1e-6) -> Linearisation:
-        """Derivatives of the next step with respect to state and command. The simulation does not
-        change.
+        """Derivatives of the next step with respect to state, command and parameters.
 
-        The step is taken as after `set_state(q, v)`, without warm start. The active contacts, their
-        modes and the branches of the motors' lines are held constant; the limits of the commands
-        are not considered. If the modes change within `perturbation`, the derivative is not valid
-        and `Linearisation.holds` is False.
+        The simulation does not change. The step is taken as after `set_state(q, v)`, without warm
+        start. The active contacts, their modes and the branches of the motors' lines are held
+        constant; the limits of the commands are not considered. Where the modes change, the
+        derivative is not valid; with `check`, `Linearisation.holds` is False there.
 
         Args:
-            perturbation: Change of each entry of (x, u) in the two steps that test its column, m,
-                rad, m/s or rad/s, and 1000 times as many N m; from 1e-9 to 1e-3, 1e-6 by default.
+            check: Whether to test each column of (A, B) by two real steps, which takes a hundred
+                times as long as the derivatives; False by default.
+            perturbation: Change of each entry of (x, u) in these steps, m, rad, m/s or rad/s, and
+                1000 times as many N m; from 1e-9 to 1e-3, 1e-6 by default.
+            parameters: Names of parameters for C: "friction", the common coefficient; "mass" and
+                "mass:<body>", a factor of mass and inertia of all bodies or of one;
+                "damping:<joint>", N m s/rad or N s/m; "contact_stiffness" and "contact_damping",
+                factors of those of wheels that yield. None by default.
 
         Returns:
             The derivatives, the contact modes and their margins.
 
         Raises:
-            OptionError: `perturbation` is out of its range, or the variant is "newton".
+            OptionError: `perturbation` is out of its range, a parameter does not exist, or the
+                variant is "newton".
             StateError: A pitch is 90 degrees, where the coordinates are singular.
             StepError: The step failed, was split, or did not converge, so that it has no
                 derivative.
