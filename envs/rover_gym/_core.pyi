@@ -77,6 +77,7 @@ __all__: list[str] = [
     "SphereField",
     "Spline",
     "StateError",
+    "StepDerivatives",
     "StepError",
     "StepReport",
     "Terrain",
@@ -1178,6 +1179,9 @@ class Linearisation:
         Columns of wheels without a drive or without steering are 0.
         """
     @property
+    def c(self) -> _Array:
+        """Derivative of the next state by the parameters that were asked for, (nx, n_parameters)."""
+    @property
     def state(self) -> _Array:
         """State before the step, (nx,)."""
     @property
@@ -1207,24 +1211,40 @@ class Linearisation:
     def is_projected(self) -> bool:
         """Whether the step removes penetration. If so, the derivative includes this correction."""
     @property
-    def holds(self) -> npt.NDArray[np.bool_]:
-        """Whether each column of (a, b) is valid within the tested perturbation, (nx + nu,); None
-        without `check`.
+    def holds(self) -> npt.NDArray[np.bool_] | None:
+        """Whether each column of (a, b) is valid within the tested perturbation, (nx + nu,).
 
-        A column is valid if two perturbed steps, one in each direction, have the same closed
-        contacts in the same modes, the same projection and energy correction, and agree with the
-        column within 1%.
+        None without `check`. A column is valid if two perturbed steps, one in each direction, have
+        the same closed contacts in the same modes, the same projection and energy correction, and
+        agree with the column within 1%.
         """
     @property
-    def errors(self) -> _Array:
-        """Difference of each column of (a, b) from the difference quotient of its two perturbed steps,
-        (nx + nu,); None without `check`.
+    def errors(self) -> _Array | None:
+        """Difference of each column of (a, b) from that of its two perturbed steps, (nx + nu,).
 
-        The largest difference of an entry, relative to the column's largest entry.
+        None without `check`. The largest difference of an entry, relative to the column's largest
+        entry.
         """
     @property
-    def is_smooth(self) -> bool:
+    def is_smooth(self) -> bool | None:
         """Whether all columns are valid; None without `check`."""
+
+@final
+class StepDerivatives:
+    """Steps of trajectories with their derivatives, as `Simulation.differentiate` returns them."""
+
+    @property
+    def states(self) -> _Array:
+        """States, (n, steps + 1, nx)."""
+    @property
+    def a(self) -> _Array:
+        """Derivatives of each next state by the state, (n, steps, nx, nx)."""
+    @property
+    def b(self) -> _Array:
+        """By the command, (n, steps, nx, nu); zero for torques beyond their limit."""
+    @property
+    def c(self) -> _Array:
+        """By the parameters, (n, steps, nx, n_parameters)."""
 
 @final
 class Energy:
@@ -1669,7 +1689,9 @@ class Simulation(AnySimulation):
             Delassus operator W, (3 n_c, 3 n_c), 1/kg; free velocity, (3 n_c,), m/s; friction
             coefficients, (n_c,).
         """
-    def linearise(self, perturbation: float = 1e-6) -> Linearisation:
+    def linearise(
+        self, check: bool = False, perturbation: float = 1e-6, parameters: Sequence[str] | str = ()
+    ) -> Linearisation:
         """Derivatives of the next step with respect to state, command and parameters.
 
         The simulation does not change. The step is taken as after `set_state(q, v)`, without warm
@@ -1678,7 +1700,7 @@ class Simulation(AnySimulation):
         derivative is not valid; with `check`, `Linearisation.holds` is False there.
 
         Args:
-            check: Whether to test each column of (A, B) by two real steps, which takes a hundred
+            check: Whether to test each column of (A, B) by two real steps, which takes ten
                 times as long as the derivatives; False by default.
             perturbation: Change of each entry of (x, u) in these steps, m, rad, m/s or rad/s, and
                 1000 times as many N m; from 1e-9 to 1e-3, 1e-6 by default.
@@ -1696,6 +1718,37 @@ class Simulation(AnySimulation):
             StateError: A pitch is 90 degrees, where the coordinates are singular.
             StepError: The step failed, was split, or did not converge, so that it has no
                 derivative.
+        """
+    def differentiate(
+        self,
+        states: npt.ArrayLike,
+        commands: npt.ArrayLike,
+        parameters: Sequence[str] | str = (),
+        threads: int | None = None,
+    ) -> StepDerivatives:
+        """Takes steps from given states under given commands, with the derivatives of each.
+
+        The simulation does not change. Each step is taken as after `set_state`, without warm start,
+        so that it is a function of state, command and parameters, as in `linearise`. Torques
+        saturate at their limits. `rover_gym.derivatives` has products with these derivatives.
+
+        Args:
+            states: State (q, v) at the start of each trajectory, (n, nx) with nx = 2 nv.
+            commands: Wheel torques (N m) and steering set-points (rad) of each step,
+                (n, steps, nu) with nu = 2 n_wheels.
+            parameters: Names of parameters, as in `linearise`; none by default.
+            threads: Number of threads; one a core by default.
+
+        Returns:
+            States and derivatives.
+
+        Raises:
+            StateError: A state has a wrong shape or an entry that is not finite, or a pitch is 90
+                degrees.
+            CommandError: Commands have a wrong shape or an entry that is refused.
+            OptionError: A parameter does not exist, `threads` is out of its range, or the variant
+                is "newton".
+            StepError: A step failed, or has no derivative.
         """
     def profile(self, n: int = 1000) -> dict[str, float]:
         """Measures the computing time of each part of a step, on a copy of this simulation.
