@@ -630,8 +630,7 @@ class SoftGround(Terrain):
 
 @final
 class WheelBed:
-    """A single wheel on a bed of soil, with prescribed speeds and a vertical load under which it
-    sinks.
+    """A single wheel on a bed of soil, with prescribed speeds and vertical load.
 
     Args:
         soil: A `rover_gym.sand.Soil`, or a mapping of its numbers.
@@ -871,7 +870,7 @@ class TriangleMesh(Terrain):
         """Numbers of the corners of each triangle, (m, 3)."""
     @property
     def is_closed(self) -> bool:
-        """Whether the mesh is closed: no triangle has a free edge."""
+        """Whether the mesh is closed, so that no triangle has a free edge."""
     def __len__(self) -> int: ...
     def __getnewargs__(self) -> tuple[Any, ...]: ...
 
@@ -950,9 +949,7 @@ class StepReport:
         """
     @property
     def energy_gain(self) -> float:
-        """Largest energy gain of a step beyond the work of gravity and actuators, relative to the
-        kinetic energy.
-        """
+        """Largest energy gain of a step beyond the work done on it, relative to the kinetic energy."""
     @property
     def energy_removed(self) -> float:
         """Spurious energy gain of the scheme that the audit removed, summed over the steps, J."""
@@ -975,9 +972,7 @@ class StepReport:
         """
     @property
     def energy_lifted(self) -> float:
-        """Energy gained by removing penetration, without the actuators' work, summed over the steps,
-        J.
-        """
+        """Energy gained by removing penetration, less the actuators' work, sum of the steps, J."""
     @property
     def energy_released(self) -> float:
         """Energy released by elastic wheels, summed over the steps, J; negative if they stored energy.
@@ -1293,9 +1288,7 @@ class AnySimulation:
 
     @property
     def time(self) -> float:
-        """Time since the last call of `set_state`, s. For a rover among grains, the time of the
-        grains.
-        """
+        """Time since the last call of `set_state`, s; among grains, the time of the grains."""
     @property
     def time_step(self) -> float:
         """Time step, s."""
@@ -1501,9 +1494,7 @@ class Simulation(AnySimulation):
         """
     @property
     def steering(self) -> _Array:
-        """Steering set-points, (n_wheels,), rad; 0 for wheels whose steering joint is missing or
-        released.
-        """
+        """Steering set-points, (n_wheels,), rad; 0 for wheels without steering or released ones."""
     def set_steering(self, set_points: npt.ArrayLike) -> None:
         """Sets the steering set-points, which an implicit PD controller holds with the model's gains.
 
@@ -1934,7 +1925,7 @@ class PlanarSimulation(AnySimulation):
         """The ground."""
     @property
     def q(self) -> _Array:
-        """Coordinates, (nv,): x and y, m, then angles, rad, positive counterclockwise."""
+        """Coordinates, (nv,), x and y, m, then angles, rad, positive counterclockwise."""
     @property
     def v(self) -> _Array:
         """Rates of the coordinates, (nv,), m/s and rad/s."""
@@ -2121,7 +2112,7 @@ class SimulationBatch:
         """Number of threads."""
     @property
     def instruction_set(self) -> Literal["AVX-512", "AVX2", "baseline"]:
-        """Instruction set of the processor: "AVX-512", "AVX2" or "baseline".
+        """Instruction set of the processor, "AVX-512", "AVX2" or "baseline".
 
         The widest that the processor has, unless the environment variable `ROVER_GYM_INSTRUCTIONS`
         names another. Results do not depend on it.
@@ -2318,12 +2309,11 @@ class EpisodeRun:
         *,
         message: str | None = None,
     ) -> tuple[_Observation, float, bool, dict[str, Any]]:
-        """Advances the episode by a control period, given the reading at its end instead of a
-        simulation.
+        """Advances the episode by a control period, from a reading instead of a simulation.
 
         Args:
-            reading: A reading from `Simulation.reading`, with the goal as target and the scan of
-                the rules.
+            reading: A reading from `Simulation.reading` at the end of the period, with the goal as
+                target and the scan of the rules.
             action: As for `step`.
             normals: As for `step`.
             message: The message of the StepError, if a physics step failed.
@@ -2636,12 +2626,11 @@ class EpisodeBatch:
     def over(self) -> list[int]:
         """Sorted indices of the rovers whose episode is over and whose next has not begun."""
     def finals(self) -> dict[int, tuple[_Observation, dict[str, Any]]]:
-        """Last observation and info of the episodes that the last call of `step_on` with `same_step`
-        ended.
+        """Final observations and infos of episodes that ended in `step_on` with `same_step`.
 
         Returns:
-            A mapping from the index of each such rover, sorted, to the last observation (size,)
-            float32 and the last info. Empty after `step`.
+            A mapping from the index of each rover whose episode ended in the last call, sorted, to
+            the last observation (size,) float32 and the last info. Empty after `step`.
         """
     def infos(self) -> dict[str, Any]:
         """The infos of all rovers, each of its last control period or of its start.
@@ -2769,8 +2758,7 @@ class EpisodeBatch:
             index: Index of the rover.
         """
     def set_difficulty(self, index: int, difficulty: _Range | None) -> None:
-        """Sets the range of the rocks' difficulty for the next episodes that `step_on` starts with a
-        rover.
+        """Sets the range of the rocks' difficulty for a rover's next episodes in `step_on`.
 
         Args:
             index: Index of the rover.
@@ -3051,7 +3039,7 @@ class GrainContacts:
 
     @property
     def bodies(self) -> npt.NDArray[np.int64]:
-        """Indices of both bodies, (n, 2): grains from 0, then wheels; -1 for a wall or the ground."""
+        """Indices of both bodies, (n, 2), grains from 0, then wheels; -1 for a wall or the ground."""
     @property
     def points(self) -> _Array:
         """Points of the first body's surface, (n, D), m."""
@@ -3075,9 +3063,7 @@ class GrainContacts:
         """
     @property
     def velocities(self) -> _Array:
-        """Velocities of the first body relative to the second after the step along n, t, b, (n, D),
-        m/s.
-        """
+        """Relative velocities of the first body after the step along n, t, b, (n, D), m/s."""
     @property
     def world_impulses(self) -> _Array:
         """Impulses on the first body along x, y, z, (n, D), N s."""
@@ -3471,9 +3457,7 @@ class SolverReport:
         """Iterations of the stage that found the solution."""
     @property
     def residual(self) -> float:
-        """Violation of Signorini's and Coulomb's laws by the returned impulses, relative to the
-        problem data.
-        """
+        """Violation of Signorini's and Coulomb's laws by the impulses, relative to the data."""
     @property
     def velocity_error(self) -> float:
         """Largest violation of Signorini's and Coulomb's laws at one contact, m/s."""
@@ -3497,9 +3481,7 @@ class SolverReport:
         "admm",
         "relaxed",
     ]:
-        """Name of the stage that found the solution; "at_rest" if q = 0, so that zero impulses solve
-        the problem.
-        """
+        """Name of the stage that found the solution; "at_rest" if q = 0 needed none."""
     @property
     def stages(self) -> list[tuple[str, str, int]]:
         """All stages tried, in order, each with the reason why it ended and its iterations.

@@ -11,6 +11,7 @@ from rover_gym.mechanics import (
     HeightField,
     OptionError,
     Plane,
+    RoverGymError,
     RoverModel,
     Simulation,
     SphereField,
@@ -27,7 +28,9 @@ from rover_gym.sand import (
     fit_soil,
     named_soil,
     read_runs,
+    slip_on_slope,
     soil_names,
+    with_wide_wheels,
 )
 from rover_gym.sand.convert import convert_runs
 
@@ -151,6 +154,42 @@ def test_tables_are_converted_read_and_refused_by_line(tmp_path: Path) -> None:
         read_runs(tmp_path / "broken.csv", {"mine": WHEEL})
 
 
+def test_a_matlab_file_of_structs_is_converted_as_its_authors_store_runs(tmp_path: Path) -> None:
+    io = pytest.importorskip("scipy.io")
+    fields = [
+        ("beta", float),
+        ("Vry", float),
+        ("avg_Fx", float),
+        ("avg_Fy", float),
+        ("avg_Fz", float),
+        ("avg_Z", float),
+    ]
+    runs = np.array([(0.0, 8.0, 0.5, 1.0, -20.0, -10.0), (15.0, 12.0, -7.0, -2.0, -21.0, -12.0)], dtype=fields)
+    io.savemat(tmp_path / "all.mat", {"all_results": runs, "note": "synthetic"})
+    columns = [
+        "slip_angle_deg=beta",
+        "rim_speed_mm_s=Vry",
+        "speed_mm_s=10",
+        "drawbar_N=avg_Fy*-1",
+        "lateral_N=avg_Fx*-1",
+        "load_N=avg_Fz*-1",
+        "sinkage_mm=avg_Z*-1",
+    ]
+    assert convert_runs(tmp_path / "all.mat", tmp_path / "runs.csv", columns, "smooth") == 2
+    read = read_runs(tmp_path / "runs.csv", {"smooth": WHEEL})[0]
+    assert read.measured[1] == pytest.approx([2.0, 7.0, 0.012])
+    assert read.speed == pytest.approx([0.01, 0.01])
+    assert read.load == pytest.approx([20.0, 21.0])
+    with pytest.raises(OptionError, match="has no column 'v'; it has beta, Vry"):
+        convert_runs(tmp_path / "all.mat", tmp_path / "x.csv", [*columns[:2], "speed_mm_s=v", *columns[3:]], "smooth")
+    io.savemat(tmp_path / "two.mat", {"a": runs, "b": runs})
+    with pytest.raises(OptionError, match="must have one array of structs, has a, b"):
+        convert_runs(tmp_path / "two.mat", tmp_path / "x.csv", columns, "smooth")
+    (tmp_path / "text.mat").write_text("beta,v\n" * 40)
+    with pytest.raises(OptionError, match=r"text\.mat: is no MATLAB file"):
+        convert_runs(tmp_path / "text.mat", tmp_path / "x.csv", columns, "smooth")
+
+
 def wide_rover() -> RoverModel:
     description = RoverModel.named("open-rover").to_dict()
     for wheel in description["wheels"]:
@@ -218,3 +257,72 @@ def test_a_level_map_is_the_plane_and_a_tilted_one_a_slope() -> None:
             assert sand is not None
             found.append(sand["sinkage"])
         assert found[0] == pytest.approx(found[1], abs=3e-4)
+
+
+def driven(wheel: SingleWheel, soil: Soil, mass: float, gravity: float, rate: float) -> tuple[float, float, float]:
+    """Power, speed and sinkage of a wheel that turns at a rate and pulls a tenth of its weight."""
+    bed, (low, high) = wheel.on(soil), (0.0, rate * wheel.radius)
+    for _ in range(50):
+        speed = 0.5 * (low + high)
+        sinkage, pull, _, _, torque = bed.steady([[speed, rate, 0.0, mass * gravity, gravity]])[0].tolist()
+        low, high = (speed, high) if pull > 0.1 * mass * gravity else (low, speed)
+    return torque * rate, speed, sinkage
+
+
+@pytest.mark.parametrize("name", ["cmu-sand", "grc-1"])
+@pytest.mark.parametrize("grouser", [0.0, 0.05])
+@pytest.mark.parametrize(
+    ("q", "r", "s", "tolerance"),
+    [
+        # Gravity of the Moon and of Mars, and similar wheels, whose width grows as the radius: exact.
+        (1.62 / 9.81, 1.0, 1.0, 1e-9),
+        (1.0, 2.0, 8.0, 1e-9),
+        (0.379, 1.5, 1.5**3, 1e-9),
+        # Other widths: what the law neglects is the side walls.
+        (1.0, 1.0, 2.0, 2e-3),
+        (1.0, 1.5, 1.5**2, 2e-3),
+        (0.379, 0.7, 1.5, 2e-3),
+    ],
+)
+def test_power_and_speed_scale_with_load_size_and_gravity(
+    name: str, grouser: float, q: float, r: float, s: float, tolerance: float
+) -> None:
+    """Wheels in the same grains with equal dimensionless groups have equal dimensionless power and speed.
+
+        P/(m g √(g R)), V/√(g R) = f(m/(ρ b R²), ω √(R/g))
+
+    With g' = q g, R' = r R, m' = s m, b' = s b/r² and ω' = √(q/r) ω: P' = q^(3/2) r^(1/2) s P and V' = √(q r) V.
+    Source: Slonaker et al. 2017, Phys. Rev. E 95, 052901.
+    """
+    soil, (radius, width, mass, gravity, rate) = named_soil(name), (0.1, 0.08, 2.0, 9.81, 1.5)
+    count = 24 if grouser else 0
+    power, speed, sinkage = driven(SingleWheel(radius, width, grouser * radius, count), soil, mass, gravity, rate)
+    other = SingleWheel(r * radius, s * width / r**2, grouser * r * radius, count)
+    scaled = driven(other, soil, s * mass, q * gravity, math.sqrt(q / r) * rate)
+    expected = (q**1.5 * math.sqrt(r) * s * power, math.sqrt(q * r) * speed, r * sinkage)
+    assert scaled == pytest.approx(expected, rel=tolerance)
+
+
+def test_power_and_speed_of_wheels_that_are_not_similar_do_not_scale() -> None:
+    """Twice the load on the same wheel: the group m/(ρ b R²) is another one."""
+    soil, wheel = named_soil("cmu-sand"), SingleWheel(0.1, 0.08)
+    light, heavy = (driven(wheel, soil, mass, 9.81, 1.5) for mass in (2.0, 4.0))
+    assert heavy[0] > 1.02 * 2.0 * light[0]
+    assert heavy[1] < 0.98 * light[1]
+
+
+def test_a_rover_slips_more_the_steeper_and_the_looser_the_sand() -> None:
+    rover = with_wide_wheels(RoverModel.named("open-rover"))
+    assert {wheel["width"] for wheel in rover.to_dict()["wheels"]} == {0.075}
+    slips = {}
+    for name in ("cmu-sand", "grc-1"):
+        found = [slip_on_slope(rover, named_soil(name), math.radians(angle), seconds=3.0) for angle in (0.0, 8.0, 16.0)]
+        slips[name] = [slip for slip, _ in found]
+        assert slips[name] == sorted(slips[name])
+        assert -0.05 < slips[name][0] < 0.1
+        assert [sinkage for _, sinkage in found] == sorted(sinkage for _, sinkage in found)
+    assert slips["grc-1"][1] < slips["cmu-sand"][1]
+    with pytest.raises(OptionError, match="slope: must be from 0"):
+        slip_on_slope(rover, named_soil("grc-1"), -0.1)
+    with pytest.raises(RoverGymError, match="width: must be above 0"):
+        with_wide_wheels(rover, 0.0)

@@ -36,3 +36,11 @@ def test_a_rover_that_has_dug_itself_in_gets_free_and_climbs() -> None:
     assert (row["slope_deg"], row["policy"], row["reached"], row["episodes"]) == (5.0, "sand", 2, 2)
     assert 2.0 < row["time_s"] < 20.0
     assert 0.0 < row["slip"] < 1.0
+
+
+def test_rovers_drive_up_slopes_of_sand() -> None:
+    given = ("--rover", "open-rover", "--soil", "grc-1", "--slope", "0", "--slope", "12", "--json")
+    level, steep = json.loads(run("rovers", *given))["rovers"]
+    assert (level["rover"], level["soil"], steep["slope_deg"]) == ("open-rover", "grc-1", 12.0)
+    assert level["slip"] < 0.1 < steep["slip"] < 1.0
+    assert 1.0 < level["sinkage_mm"] < steep["sinkage_mm"]

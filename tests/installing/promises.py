@@ -36,7 +36,7 @@ PROMISES = {
 (episode,) = json.loads(rover("drive", "--json"))["episodes"]
 assert episode["success"], episode
 refused("record", *RECORDED)
-refused("render", "drive", "--video", "film.mp4")
+refused("render", "drive", "--no-record", "--video", "film.mp4")
 refused("models", "model", "show", "robot.urdf") if Path("robot.urdf").exists() else None
 
 import gymnasium as gym

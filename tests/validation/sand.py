@@ -113,27 +113,46 @@ def mgru3() -> list[str]:
     return lines
 
 
+def own_soils(cells: dict[str, str]) -> list[Soil]:
+    """The soil of a row from its own published numbers, in both laws."""
+    friction = math.tan(math.radians(float(cells["friction_angle_deg"])))
+    grains = named_soil("hit-simulant").having(density=float(cells["density_kg_m3"]), internal_friction=friction)
+    # The modulus for this wheel in one number, as one of the two parts may be negative.
+    width = float(cells["wheel_width_m"])
+    modulus = 1e3 * (float(cells["k_c_kN_per_m_n1"]) / width + float(cells["k_phi_kN_per_m_n2"]))
+    bekker = named_soil("hit-simulant-bekker").having(
+        cohesive_modulus=0.0,
+        frictional_modulus=modulus,
+        exponent=float(cells["n"]),
+        cohesion=1e3 * float(cells["cohesion_kPa"]),
+        internal_friction=friction,
+        shear_modulus=float(cells["shear_modulus_m"]),
+    )
+    return [grains, bekker]
+
+
 def single_wheels(path: Path) -> list[str]:
-    """Drawbar pull of other wheels from density and friction angle, nothing fitted."""
-    lines = ["| wheel | slip | pull measured, N | predicted, N | error |", "|---|---|---|---|---|"]
-    groups: dict[str, list[float]] = {}
+    """Pull and torque of other wheels from their soils' own numbers, nothing fitted."""
+    lines = [
+        "| wheel | slip | pull, N | resistive | Bekker | torque / radius, N | resistive | Bekker |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    groups: dict[str, list[npt.NDArray[np.float64]]] = {}
     with path.open(newline="", encoding="utf-8") as file:
         for cells in csv.DictReader(file):
-            soil = named_soil("hit-simulant").having(
-                density=float(cells["density_kg_m3"]),
-                internal_friction=math.tan(math.radians(float(cells["friction_angle_deg"]))),
-            )
             radius, height = float(cells["wheel_radius_m"]), float(cells["grouser_height_m"])
             wheel = SingleWheel(radius, float(cells["wheel_width_m"]), height, int(cells["grouser_count"]))
-            slip, pull = float(cells["slip"]), float(cells["drawbar_N"])
+            slip, pull, rim = float(cells["slip"]), float(cells["drawbar_N"]), float(cells["torque_Nm"]) / radius
             drive = [0.1 * (1.0 - slip), 0.1 / radius, 0.0, float(cells["load_N"]), 9.81]
-            predicted = float(wheel.on(soil).steady([drive])[0, 1])
-            error = abs(predicted - pull) / abs(pull)
+            found = np.array([wheel.on(soil).steady([drive])[0, [1, 4]] / (1.0, radius) for soil in own_soils(cells)])
             name = f"{cells['source']}, grousers {1e3 * height:.0f} mm"
-            groups.setdefault(name, []).append(error)
-            lines.append(f"| {name} | {slip} | {pull} | {predicted:.1f} | {100 * error:.0f}% |")
+            for group in (name, f"{cells['source']}, all"):
+                groups.setdefault(group, []).append(np.abs(found[:, 0] - pull) / abs(pull))
+            pulls, rims = (" | ".join(f"{value:.1f}" for value in values) for values in found.T)
+            lines.append(f"| {name} | {slip} | {pull} | {pulls} | {rim:.1f} | {rims} |")
     for name, errors in groups.items():
-        lines.append(f"| {name} | median | | | {100 * float(np.median(errors)):.0f}% |")
+        medians = " | ".join(f"{100.0 * value:.0f}%" for value in np.median(errors, axis=0))
+        lines.append(f"| {name} | median error | | {medians} | | | |")
     return lines
 
 

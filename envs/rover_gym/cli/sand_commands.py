@@ -1,4 +1,4 @@
-"""`rover sand soils|bed|slope|climb|convert`: soils by name, one wheel on a virtual test bed, and rovers on slopes."""
+"""`rover sand soils|bed|slope|rovers|climb|convert`: soils, one wheel on a virtual test bed, and rovers on slopes."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -11,9 +11,10 @@ from rich.table import Table
 
 from rover_gym.cli.console import AsJson, Results, plain_errors
 from rover_gym.mechanics import OptionError
+from rover_gym.models import open_model
 from rover_gym.policy import PDPolicy, Policy, SandGains, SandPolicy, drive_all
 from rover_gym.policy.dug_in import DugIn
-from rover_gym.sand import SingleWheel, climbed_slope, named_soil, soil_names
+from rover_gym.sand import SingleWheel, Soil, climbed_slope, named_soil, slip_on_slope, soil_names, with_wide_wheels
 from rover_gym.sand.convert import convert_runs
 from rover_gym.validation import number, refuse
 
@@ -114,15 +115,62 @@ def slope(
 
 @sand.command()
 @plain_errors
+def rovers(
+    *,
+    rover: Annotated[
+        list[str] | None, typer.Option(help="A name of the gallery, or a model's file; repeat it for several.")
+    ] = None,
+    soil: Annotated[list[str] | None, typer.Option(help="Name of a soil; repeat it for several.")] = None,
+    slope: Annotated[list[float] | None, typer.Option(help="Of the sand, degrees; repeat it for several.")] = None,
+    width: Annotated[float, typer.Option(help="Width of the wheels, in radii.")] = 1.0,
+    gravity: Gravity = EARTH,
+    as_json: AsJson = False,
+) -> None:
+    """Drive whole rovers straight uphill at a rim speed of 0.1 m/s: slip and mean sinkage.
+
+    The wheels get the width, and 24 grousers of a twentieth of the radius.
+    """
+    slopes = list(slope or (0.0, 5.0, 10.0, 15.0, 20.0))
+    rows = []
+    for name in rover or ("open-rover", "skid-steered", "four-steered"):
+        model = with_wide_wheels(open_model(name), width)
+        for soil_name in soil or ("cmu-sand", "grc-1"):
+            for angle in slopes:
+                slip, sinkage = slip_on_slope(model, named_soil(soil_name), math.radians(angle), gravity=gravity)
+                rows.append(
+                    {"rover": name, "soil": soil_name, "slope_deg": angle, "slip": slip, "sinkage_mm": 1e3 * sinkage}
+                )
+    _say("rovers", rows, as_json=as_json)
+
+
+def _changed(soil: str, others: Sequence[str]) -> Soil:
+    """A soil by its name with other numbers, each as NAME=NUMBER."""
+    numbers = {}
+    for text in others:
+        name, _, value = text.partition("=")
+        try:
+            numbers[name] = float(value)
+        except ValueError:
+            raise OptionError(f"with: must be NAME=NUMBER, is {text!r}") from None
+    return named_soil(soil).having(**numbers)
+
+
+@sand.command()
+@plain_errors
 def climb(
     *,
     soil: SoilName = "cmu-sand",
     slope: Annotated[list[float] | None, typer.Option(help="Of the sand, degrees; repeat it for several.")] = None,
     policy: Annotated[list[str] | None, typer.Option(help="'pd' or 'sand'; repeat it for both.")] = None,
-    episodes: Annotated[int, typer.Option(min=1, help="Of each slope and policy, seeds 0, 1, ...")] = 8,
+    episodes: Annotated[int, typer.Option(min=1, help="Of each slope and policy.")] = 8,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the first episode; the next ones count up.")] = 0,
     seconds: Annotated[float, typer.Option(help="Until an episode is given up, s.")] = 120.0,
     dig: Annotated[float, typer.Option(help="Time that all wheels spin first, so that the rover digs in, s.")] = 0.0,
     steepest: Annotated[float, typer.Option(help="Steepest way that 'sand' takes straight, degrees.")] = 14.0,
+    other: Annotated[
+        list[str] | None,
+        typer.Option("--with", help="Another number of the soil, such as density=1250; repeat it for several."),
+    ] = None,
     threads: Annotated[int, typer.Option(min=1, help="That step the rovers.")] = 1,
     as_json: AsJson = False,
 ) -> None:
@@ -132,6 +180,7 @@ def climb(
         inner = SandPolicy(env, SandGains(steepest=steepest)) if name == "sand" else PDPolicy(env)
         return DugIn(env, inner, dig) if dig > 0.0 else inner
 
+    ground = _changed(soil, other or ())
     names = list(policy or ("pd", "sand"))
     for name in names:
         if name not in ("pd", "sand"):
@@ -142,7 +191,7 @@ def climb(
         arguments = {
             "terrain": "sand",
             "difficulty": 0.0,
-            "soil": soil,
+            "soil": ground,
             "slope_deg": angle,
             "uphill_deg": aside,
             "heading_deg": 0.0,
@@ -152,7 +201,7 @@ def climb(
         for name in names:
             drives = drive_all(
                 partial(driver, name),
-                range(episodes),
+                range(seed, seed + episodes),
                 arguments=arguments,
                 num_envs=8,
                 threads=threads,
@@ -175,11 +224,19 @@ def climb(
 @sand.command()
 @plain_errors
 def convert(
-    source: Annotated[Path, typer.Argument(help="A CSV file of runs in other columns.", exists=True, dir_okay=False)],
+    source: Annotated[
+        Path,
+        typer.Argument(
+            help="Runs in other columns: a CSV file, or a .mat file with an array of structs.",
+            exists=True,
+            dir_okay=False,
+        ),
+    ],
     target: Annotated[Path, typer.Argument(help="The table to write.", dir_okay=False)],
     *,
     column: Annotated[
-        list[str], typer.Option(help="One column of the table, as NAME=COLUMN or NAME=COLUMN*FACTOR; repeat it.")
+        list[str],
+        typer.Option(help="One column of the table, as NAME=COLUMN, NAME=COLUMN*FACTOR or NAME=NUMBER; repeat it."),
     ],
     wheel: Annotated[str, typer.Option(help="Name of the wheel, for all rows.")] = "wheel",
 ) -> None:

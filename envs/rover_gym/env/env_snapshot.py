@@ -65,5 +65,5 @@ def check_random_state(generator: np.random.Generator, given: Mapping[str, Any])
         state = copy.deepcopy(dict(given))
         trial.state = state
     except (TypeError, ValueError, KeyError, AttributeError, OverflowError) as error:
-        refuse(StateError, "snapshot.random_state", given, f"is no state of {type(trial).__name__} ({error!r})")
+        refuse(StateError, "snapshot.random_state", given, f"is not a state of {type(trial).__name__} ({error!r})")
     return state

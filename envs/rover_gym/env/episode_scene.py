@@ -134,15 +134,19 @@ def check_reset_options(task: Task, options: Mapping[str, Any] | None, field: st
             fixed[name] = _place(f"{field}.{name}", given[name])
     if "goals" in given:
         if "goal" in given:
-            refuse(OptionError, f"{field}.goal", given["goal"], "must not come with goals, which hold it")
+            refuse(
+                OptionError, f"{field}.goal", given["goal"], "must not be given together with goals, which contain it"
+            )
         fixed["goal"], *fixed["further"] = _course(task, f"{field}.goals", given["goals"])
 
     if "v" in given and "q" not in given:
-        refuse(OptionError, f"{field}.v", given["v"], "must come with q")
+        refuse(OptionError, f"{field}.v", given["v"], "must be given together with q")
     if "q" in given:
         for name in ("position", "heading_deg"):
             if name in given:
-                refuse(OptionError, f"{field}.{name}", given[name], "must not come with q, which holds it")
+                refuse(
+                    OptionError, f"{field}.{name}", given[name], "must not be given together with q, which contains it"
+                )
         q = fixed["q"] = vector(f"{field}.q", given["q"], task.model.nq, error=StateError)
         fixed["position"], fixed["heading"] = (q[0], q[2]), q[4]
         if "v" in given:
@@ -170,7 +174,7 @@ def _course(task: Task, field: str, value: object) -> list[tuple[float, ...]]:
     if isinstance(value, np.ndarray) and value.ndim:
         value = list(value)
     if not isinstance(value, (list, tuple)) or len(value) != n:
-        refuse(OptionError, field, value, f"must be a list of {n} places (x, z), as many as waypoints")
+        refuse(OptionError, field, value, f"must be a list of {n} places (x, z), one for each waypoint")
     return [_place(f"{field}[{i}]", place) for i, place in enumerate(value)]
 
 

@@ -159,9 +159,16 @@ class RoverGrainsEnv(RoverEnv):
 
         for name in ("terrain", "difficulty", "rock_abundance", "max_rock_radius", "slope_deg", "hill_slope_deg"):
             if arguments.get(name) is not None:
-                refuse(OptionError, name, arguments.get(name), "is not for RoverGrainsEnv, whose ground is its pit")
+                refuse(
+                    OptionError, name, arguments.get(name), "is not available: the ground of RoverGrainsEnv is its pit"
+                )
         if arguments.get("height_scan") not in (None, False):
-            refuse(OptionError, "height_scan", arguments.get("height_scan"), "does not see grains, and is not offered")
+            refuse(
+                OptionError,
+                "height_scan",
+                arguments.get("height_scan"),
+                "is not available: a height scan does not see grains",
+            )
         if pit is None:
             pit = Pit()
         elif not isinstance(pit, Pit):

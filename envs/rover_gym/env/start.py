@@ -84,10 +84,10 @@ def slope_of(terrain: Terrain | None) -> tuple[float, float]:
     ground = None if terrain is None else plane_of(terrain)
     if ground is None:
         if isinstance(terrain, SphereField):
-            refuse(TerrainError, "terrain", terrain, "needs a ground plane to stand on")
+            refuse(TerrainError, "terrain", terrain, "needs a ground plane")
         return 0.0, 0.0
     if ground.normal[1] <= 0.0:
-        refuse(TerrainError, "terrain", terrain, "needs a ground plane to stand on, facing up")
+        refuse(TerrainError, "terrain", terrain, "needs a ground plane with an upward normal")
     x, y, z = ground.normal
     return float(atan2(math.sqrt(x * x + z * z), y)), float(atan2(z, -x))
 

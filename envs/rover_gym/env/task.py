@@ -221,7 +221,7 @@ def _start(given: Mapping[str, Any], ground: Terrain | None) -> StartDistributio
     if given["terrain"] in ("plane", "rocks", "sand"):
         return start
     if slope_deg is not None:
-        refuse(OptionError, "slope_deg", _as_given(slope_deg), "is the ground's own")
+        refuse(OptionError, "slope_deg", _as_given(slope_deg), "cannot be chosen: the ground defines its slope")
     slope, uphill = slope_of(ground)
     return replace(start, slope=(slope, slope), uphill=(uphill, uphill))
 
@@ -301,7 +301,7 @@ def _steering_limit(rover: RoverModel, steering: Steering, asked_deg: float | No
     """Set-point of a steering action of 1, rad, which must be within every steered wheel's limit; 0 without any."""
     if not steering.joints:
         if asked_deg is not None:
-            refuse(OptionError, "max_steering_deg", asked_deg, "needs wheels that steer")
+            refuse(OptionError, "max_steering_deg", asked_deg, "needs steerable wheels")
         return 0.0
     wheels = zip(rover.to_dict()["wheels"], steering.entries, strict=True)
     limit: float = min(wheel["steering_limit"] for wheel, entry in wheels if entry >= 0)

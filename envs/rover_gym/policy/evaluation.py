@@ -307,7 +307,7 @@ def summarise(policy: str, drives: Sequence[EvaluatedEpisode]) -> PolicySummary:
         OptionError: `drives` is empty.
     """
     if not drives:
-        refuse(OptionError, "drives", len(drives), "must hold an episode or more")
+        refuse(OptionError, "drives", len(drives), "must contain at least one episode")
     successes = sum(drive.success for drive in drives)
     counts = Counter(drive.end for drive in drives)
     return PolicySummary(

@@ -85,9 +85,9 @@ class RoverTrapEnv(RoverEnv):
         self.free_distance = number("free_distance", free_distance, above=0.0, at_most=100.0)
         given: dict[str, Any] = {**DEFAULTS, **arguments}
         if given["terrain"] == "plane":
-            refuse(OptionError, "terrain", given["terrain"], "has nothing to be stuck on")
+            refuse(OptionError, "terrain", given["terrain"], "has no obstacle on which a rover gets stuck")
         if given.get("waypoints", 1) != 1:
-            refuse(OptionError, "waypoints", given["waypoints"], "must be 1: the goal is to come free")
+            refuse(OptionError, "waypoints", given["waypoints"], "must be 1: the task is to get free")
         weights = check_reward_weights("reward_weights", given.pop("reward_weights", None) or {})
         self._weights = {name: weights[name] for name in ("progress", "success")}
         # The terms of this task take the place of those two, and the baseline drives without noise.
@@ -124,7 +124,9 @@ class RoverTrapEnv(RoverEnv):
             if "q" in options.fixed or self._drive(simulation, drawn.episode(0)):
                 break
         else:
-            refuse(TerrainError, "terrain", self.task.ground or DRIVES, f"none of {DRIVES} drives ended in a trap")
+            refuse(
+                TerrainError, "terrain", self.task.ground or DRIVES, f"the rover got stuck in none of {DRIVES} drives"
+            )
         normals = None
         if self.task.is_noisy:
             (normals,), (row,) = standard_normals(row[None], self.task.layout.size)
@@ -193,5 +195,5 @@ class RoverTrapEnv(RoverEnv):
             normals=normals,
         )
         if progress is None:
-            refuse(StateError, "q", q, "must be observable in float32")
+            refuse(StateError, "q", q, "must give an observation that is finite in float32")
         return RunningEpisode(replace(drawn, start=start), simulation, progress)

@@ -4,10 +4,9 @@ import contextlib
 import ctypes
 import importlib.util
 import math
-from collections.abc import Iterable, Sequence
-from functools import lru_cache
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -18,11 +17,9 @@ from vtkmodules.vtkCommonDataModel import vtkPolyData
 from vtkmodules.vtkFiltersSources import vtkArrowSource
 from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkRenderer, vtkRenderWindow
 
-from rover_gym.extras import require
 from rover_gym.ground import plane_of, sand_of, spheres_of, surfaces_of
 from rover_gym.mechanics import RoverModel, Simulation, Terrain
 from rover_gym.rendering import appearance as look
-from rover_gym.rendering.appearance import Array, Faces, actor_of, actor_with, level, mesh, set_points, set_pose
 from rover_gym.rendering.render_options import Camera, check_render_options
 from rover_gym.rendering.rut_actor import RutActor
 from rover_gym.rendering.scenery_actors import (
@@ -37,6 +34,7 @@ from rover_gym.rendering.scenery_actors import (
     sky,
     sun,
 )
+from rover_gym.rendering.vtk_actors import Array, Faces, actor_of, actor_with, level, mesh, set_points, set_pose
 
 FORCE_LENGTH = 0.45  # m, arrow length for a wheel's mean share of the weight
 
@@ -121,7 +119,7 @@ class FrameRenderer(Picture):
         height: int = 480,
         camera: Camera = "follow",
         show_forces: bool = False,
-        antialiasing: bool = False,
+        antialiasing: bool = True,
         goal: Goal | None = None,
         goal_tolerance: float = 0.5,
     ) -> None:
@@ -376,33 +374,6 @@ def _arrow_actor(data: vtkPolyData) -> vtkActor:
 def _up(gravity: Array) -> Array:
     magnitude = float(np.linalg.norm(gravity))
     return -gravity / magnitude if magnitude > 0.0 else np.array([0.0, 1.0, 0.0])
-
-
-Frame = npt.NDArray[np.uint8]
-
-SIZE = 0.045  # of the letters, in heights of the frame
-
-SMALLEST = 11  # pixels
-
-
-def captioned(frame: Frame, lines: Sequence[str]) -> Frame:
-    """A copy of a frame `(height, width, 3)` with lines of text in its upper left corner.
-
-    Raises:
-        MissingExtraError: Pillow is not installed.
-    """
-    image = require("PIL.Image", "render").fromarray(frame)
-    draw = require("PIL.ImageDraw", "render").Draw(image)
-    size = max(SMALLEST, round(SIZE * frame.shape[0]))
-    for i, line in enumerate(lines):
-        place = (0.5 * size, (0.4 + 1.25 * i) * size)
-        draw.text(place, line, font=_font(size), fill=(255, 255, 255), stroke_width=max(1, size // 16), stroke_fill=0)
-    return np.asarray(image, dtype=np.uint8)
-
-
-@lru_cache(maxsize=4)
-def _font(size: int) -> Any:
-    return require("PIL.ImageFont", "render").load_default(size)
 
 
 class BedRenderer(Picture):

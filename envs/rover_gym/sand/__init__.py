@@ -3,6 +3,7 @@
 from rover_gym.mechanics import SoftGround, WheelBed
 from rover_gym.sand.fit import FittedSoil, errors_of, fit_soil
 from rover_gym.sand.measurements import Runs, SingleWheel, read_runs
+from rover_gym.sand.rovers import slip_on_slope, with_wide_wheels
 from rover_gym.sand.slopes import climbed_slope
 from rover_gym.sand.soils import Soil, named_soil, soil_names
 
@@ -18,5 +19,7 @@ __all__ = [
     "fit_soil",
     "named_soil",
     "read_runs",
+    "slip_on_slope",
     "soil_names",
+    "with_wide_wheels",
 ]

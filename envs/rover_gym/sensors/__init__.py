@@ -1,4 +1,4 @@
-"""What the rover's instruments measure, as observations for policies and other programs (`docs/sensors.md`)."""
+"""Simulated sensors of the rover, as observations for policies and other programs (`docs/sensors.md`)."""
 
 from rover_gym.sensors.depth_camera import DepthCamera, LaserScanner
 from rover_gym.sensors.inertial_unit import InertialUnit

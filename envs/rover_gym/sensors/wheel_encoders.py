@@ -1,4 +1,4 @@
-"""What the joints and the trunk give without looking around: wheel encoders, motor sensors and the heading."""
+"""Proprioceptive sensors: wheel encoders, motor sensors and heading."""
 
 import math
 from dataclasses import dataclass
@@ -12,13 +12,13 @@ from rover_gym.validation import Range, whole
 
 @dataclass(frozen=True, kw_only=True)
 class WheelEncoders(Sensor):
-    """Angles that the wheels have turned, exact or counted in ticks, and their rates.
+    """Rotation angles of the wheels, exact or counted in ticks, and their rates.
 
     A reading is (2, n_wheels): the angles since the episode's start, rad, positive forward, and the rates, rad/s, which
-    are the difference of two samples over their interval. At the first sample the rates are the wheels' own.
+    are the difference of two samples over their interval. At the first sample the rates are exact.
 
     Args:
-        ticks: Ticks a turn of the wheel, such as 4096. None measures exactly.
+        ticks: Ticks per turn of the wheel, such as 4096. None measures exactly.
         gain: Angle measured over angle turned, or a range, drawn for each wheel: an error of the transmission.
     """
 

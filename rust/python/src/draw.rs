@@ -317,7 +317,7 @@ fn ground_distribution(given: &Named<'_>) -> Result<GroundDistribution> {
     if let Some(sand) = given.read("sand", sand_distribution)? {
         for (name, other) in [("ground", &ground), ("hills", &hills)] {
             if let Some(other) = other {
-                return Err(given.refused(other, name, "None beside sand"));
+                return Err(given.refused(other, name, "None if sand is given"));
             }
         }
         return Ok(GroundDistribution::Sand(sand));
@@ -332,7 +332,7 @@ fn ground_distribution(given: &Named<'_>) -> Result<GroundDistribution> {
             }
             _ => Err(given.refused(&hills, "hills", "a number from 0 to 10, or nan")),
         },
-        (Some(_), Some(hills)) => Err(given.refused(&hills, "hills", "None beside a ground")),
+        (Some(_), Some(hills)) => Err(given.refused(&hills, "hills", "None if a ground is given")),
     }
 }
 

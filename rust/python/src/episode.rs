@@ -304,12 +304,11 @@ impl EpisodeRun {
         inner.told(py, &observation, error.map(|e| e.to_string()))
     }
 
-    /// Advances the episode by a control period, given the reading at its end instead of a
-    /// simulation.
+    /// Advances the episode by a control period, from a reading instead of a simulation.
     ///
     /// Args:
-    ///     reading: A reading from `Simulation.reading`, with the goal as target and the scan of
-    ///         the rules.
+    ///     reading: A reading from `Simulation.reading` at the end of the period, with the goal as
+    ///         target and the scan of the rules.
     ///     action: As for `step`.
     ///     normals: As for `step`.
     ///     message: The message of the StepError, if a physics step failed.

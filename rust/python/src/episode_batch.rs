@@ -291,12 +291,11 @@ impl EpisodeBatch {
         Ok(self.0.open()?.batch.over())
     }
 
-    /// Last observation and info of the episodes that the last call of `step_on` with `same_step`
-    /// ended.
+    /// Final observations and infos of episodes that ended in `step_on` with `same_step`.
     ///
     /// Returns:
-    ///     A mapping from the index of each such rover, sorted, to the last observation (size,)
-    ///     float32 and the last info. Empty after `step`.
+    ///     A mapping from the index of each rover whose episode ended in the last call, sorted, to
+    ///     the last observation (size,) float32 and the last info. Empty after `step`.
     fn finals<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let held = self.0.open()?;
         let finals = PyDict::new(py);
@@ -537,8 +536,7 @@ impl EpisodeBatch {
         })
     }
 
-    /// Sets the range of the rocks' difficulty for the next episodes that `step_on` starts with a
-    /// rover.
+    /// Sets the range of the rocks' difficulty for a rover's next episodes in `step_on`.
     ///
     /// Args:
     ///     index: Index of the rover.

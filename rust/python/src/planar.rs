@@ -88,7 +88,7 @@ impl PlanarSimulation {
         self.ground.clone_ref(py)
     }
 
-    /// Coordinates, (nv,): x and y, m, then angles, rad, positive counterclockwise.
+    /// Coordinates, (nv,), x and y, m, then angles, rad, positive counterclockwise.
     #[getter]
     fn q(&self) -> Result<Array> {
         Ok(fresh(self.open()?.q()))

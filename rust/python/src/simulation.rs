@@ -344,8 +344,7 @@ impl Simulation {
         Ok(self.open()?.set_wheel_torques(&torques)?)
     }
 
-    /// Steering set-points, (n_wheels,), rad; 0 for wheels whose steering joint is missing or
-    /// released.
+    /// Steering set-points, (n_wheels,), rad; 0 for wheels without steering or released ones.
     #[getter]
     fn steering(&self) -> Result<Array> {
         Ok(fresh(&self.open()?.steering()))

@@ -87,8 +87,7 @@ impl AnySimulation {
 
 #[pymethods]
 impl AnySimulation {
-    /// Time since the last call of `set_state`, s. For a rover among grains, the time of the
-    /// grains.
+    /// Time since the last call of `set_state`, s; among grains, the time of the grains.
     #[getter]
     pub fn time(&self) -> Result<f64> {
         self.0.time()

@@ -28,7 +28,6 @@ class Stage {
     this.eye.start(scene, keep);
     this.offer();
     part("paint").hidden = !this.view.balls;
-    this.view.showSpheres(this.view.on.has("spheres"));
     this.stale = true;
   }
 
@@ -68,7 +67,7 @@ class Stage {
   toggle(name) {
     const { on } = this.view;
     if (!on.delete(name)) on.add(name);
-    if (name === "spheres") this.view.showSpheres(on.has(name));
+    if (name === "spheres") this.view.showSpheres();
     this.mark();
     this.stale = true;
   }

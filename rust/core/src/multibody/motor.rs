@@ -308,32 +308,6 @@ mod tests {
     }
 
     #[test]
-    fn a_hard_brake_finds_its_branch() {
-        // A free wheel of 0.15 kg m² that braking with all that the motor has would turn back four
-        // times as fast, in a step of 50 ms.
-        let motor = Motor {
-            stall_torque: 300.0,
-            no_load_speed: 0.5,
-            regenerating: true,
-        };
-        let (h, inertia, begin) = (0.05, 0.15, 20.0);
-        let mut line = MotorLine::new(Single::Baseline);
-        line.set_lane(0, Some(&motor), 0.0);
-        line.choose(begin);
-        let mut trials = 0;
-        loop {
-            let (at_rest, slope) = (line.at_rest(), line.damping());
-            let end = (inertia * begin + h * at_rest) / (inertia + h * slope);
-            if !line.revise(true, end) {
-                assert!((0.0..1.0).contains(&end), "{end}");
-                return;
-            }
-            trials += 1;
-            assert!(trials < 5);
-        }
-    }
-
-    #[test]
     fn the_torque_never_rises_with_the_speed() {
         for regenerating in [true, false] {
             let motor = Motor {
