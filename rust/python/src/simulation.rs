@@ -675,7 +675,7 @@ impl Simulation {
     /// derivative is not valid; with `check`, `Linearisation.holds` is False there.
     ///
     /// Args:
-    ///     check: Whether to test each column of (A, B) by two real steps, which takes a hundred
+    ///     check: Whether to test each column of (A, B) by two real steps, which takes ten
     ///         times as long as the derivatives; False by default.
     ///     perturbation: Change of each entry of (x, u) in these steps, m, rad, m/s or rad/s, and
     ///         1000 times as many N m; from 1e-9 to 1e-3, 1e-6 by default.
