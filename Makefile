@@ -20,7 +20,7 @@ TIER   ?= test# of the tests: quick, test or all
 SIDE_BY_SIDE = $(MAKE) --no-print-directory --jobs=2 --output-sync
 MODULE := $(or $(wildcard $(STAMPS)/release),$(STAMPS)/core)# as it is installed, or for development
 
-.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras docs bench chart stability torture validate validate-sand orders bits instructions profiles train train-rllib pins clean
+.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras docs bench chart stability torture film validate validate-sand orders bits instructions profiles train train-rllib pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -140,6 +140,11 @@ stability: $(STAMPS)/release $(STAMPS)/peers $(STAMPS)/debian-peers ## the scene
 
 torture: $(STAMPS)/test $(MODULE) ## tries to break everything: docs/tables/torture.md (5 minutes on two cores; TORTURE="--hours 2", or --regime NAME --case K)
 	PYTHONPATH=tests $(BIN)/python -m torture $(TORTURE)
+
+film: $(STAMPS)/test $(MODULE) ## the moving picture at the head of the manual, from a page in a browser: docs/pictures/rover.webp (some minutes)
+	$(BIN)/rover drive --difficulty 1 --policy scan --seed 11 --output runs/film
+	$(BIN)/rover replay runs/film/episode-11.h5 --no-open
+	PYTHONPATH=tests $(BIN)/python -m browser.film runs/film/episode-11.html docs/pictures/rover.webp --begin 0.6
 
 bits: $(STAMPS)/test $(MODULE) ## compare trajectories, bit by bit, with the committed hashes (BITS=--save commits new ones)
 	$(COMPARE).bits $(BITS)

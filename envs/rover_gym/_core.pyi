@@ -77,6 +77,7 @@ __all__: list[str] = [
     "SphereField",
     "Spline",
     "StateError",
+    "StepDerivatives",
     "StepError",
     "StepReport",
     "Terrain",
@@ -101,18 +102,18 @@ __all__: list[str] = [
 __version__: str
 
 class RoverGymError(Exception):
-    """Root of every error that rover-gym raises.
+    """Base class of all rover-gym errors.
 
     Attributes:
-        field: Name of the argument at fault, with the index of the entry; None where there is none.
-        value: What was given there, or None.
+        field: Name of the invalid argument, with the index of the entry; None if the error concerns no argument.
+        value: The value given, or None.
     """
 
     field: str | None
     value: object
 
 class ModelError(RoverGymError, ValueError):
-    """A model's description is unreadable or not physical."""
+    """The description of a model cannot be read or is not physical."""
 
 class StateError(RoverGymError, ValueError):
     """A state or a snapshot has a wrong shape or an entry that is not finite."""
@@ -121,7 +122,7 @@ class TerrainError(RoverGymError, ValueError):
     """A terrain's description is invalid."""
 
 class OptionError(RoverGymError, ValueError):
-    """An option or another argument is out of its range."""
+    """An option or another argument is invalid or out of range."""
 
 class CommandError(RoverGymError, ValueError):
     """A torque, a set-point or an action is invalid."""
@@ -130,24 +131,25 @@ class ProblemError(RoverGymError, ValueError):
     """A friction-contact problem has a wrong shape or an invalid entry."""
 
 class StepError(RoverGymError, RuntimeError):
-    """A time step could not be taken; the state is as it was before that step."""
+    """A time step failed. The state is the one before that step."""
 
 class BusyError(RoverGymError, RuntimeError):
-    """An object was used while another call on it was still going on. Nothing has changed."""
+    """An object was used while another call on it was still running. Nothing has changed."""
 
 @final
 class Motor:
     """The torque-speed line of a wheel's motor. Immutable.
 
-    The torque is the command, but at most `stall_torque * (1 - speed / no_load_speed)` forwards and
-    `stall_torque * (1 + speed / no_load_speed)` backwards, and at most `stall_torque` either way.
+    The motor gives the commanded torque, limited to `stall_torque * (1 - speed / no_load_speed)`
+    forwards and `stall_torque * (1 + speed / no_load_speed)` backwards, and at most `stall_torque`
+    either way.
 
     Args:
-        stall_torque: Torque of the line at rest, N m.
-        no_load_speed: Speed at which the line reaches zero, rad/s. If infinite, the torque does not
-            depend on the speed.
-        regenerating: Whether the motor brakes when it is driven faster than `no_load_speed`, along
-            the line and with at most the stall torque. Otherwise it turns freely there.
+        stall_torque: Largest torque at standstill, N m.
+        no_load_speed: Speed at which the available torque reaches zero, rad/s. If infinite, the
+            limit does not depend on the speed.
+        regenerating: Whether the motor brakes when it is driven faster than `no_load_speed`,
+            following the same line up to the stall torque. Otherwise it turns freely there.
 
     Raises:
         ModelError: `stall_torque` is not from 1e-9 to 1e9 N m, or `no_load_speed` is neither from
@@ -157,15 +159,15 @@ class Motor:
     def __new__(cls, stall_torque: float, no_load_speed: float, regenerating: bool = True) -> Motor: ...
     @property
     def stall_torque(self) -> float:
-        """Torque of the line at rest, N m."""
+        """Largest torque at standstill, N m."""
     @property
     def no_load_speed(self) -> float:
-        """Speed at which the line reaches zero, rad/s; may be infinite."""
+        """Speed at which the available torque reaches zero, rad/s; may be infinite."""
     @property
     def regenerating(self) -> bool:
         """Whether the motor brakes when it is driven faster than `no_load_speed`."""
     def torque(self, command: float, speed: float) -> float:
-        """The torque that the motor gives under a command at a speed.
+        """Motor torque for a command at a speed.
 
         Args:
             command: Commanded torque, N m.
@@ -188,11 +190,10 @@ class RoverModel:
     `RoverModel()` is the built-in six-wheel rover. The other constructors are `named`, `from_text`
     and `from_dict`, and those that read files: `from_file`, `from_urdf` and `from_mjcf`.
 
-    Methods that take coordinates understand two sets of them, by the argument `coordinates`:
-    "state", the `q` and `v` of `Simulation`, and "report", the Cardan angles of the 2010 report and
-    their rates. They raise StateError where `q` or `qdot` has a wrong length or an entry that is
-    not finite, OptionError where `coordinates` is neither of the two, and TerrainError where
-    `terrain` is not a terrain.
+    Methods that take coordinates have an argument `coordinates`: "state" for the `q` and `v` of
+    `Simulation`, "report" for the Cardan angles of the 2010 report and their rates. They raise
+    StateError if `q` or `qdot` has a wrong length or an entry that is not finite, OptionError if
+    `coordinates` is neither of the two, and TerrainError if `terrain` is not a terrain.
     """
 
     def __new__(cls) -> RoverModel: ...
@@ -202,7 +203,7 @@ class RoverModel:
         """Reads a model from TOML text.
 
         Args:
-            text: What a model file holds.
+            text: Contents of a model file.
 
         Raises:
             ModelError: The text does not describe a model.
@@ -212,25 +213,25 @@ class RoverModel:
         """Reads a model from nested dictionaries and lists.
 
         Args:
-            description: What `to_dict` returns.
+            description: A description as `to_dict` returns it.
 
         Raises:
             ModelError: The dictionaries do not describe a model.
         """
     to_file = model_files.to_file
     def to_text(self) -> str:
-        """The description as TOML text, as `from_text` reads it."""
+        """The description as TOML text, for `from_text`."""
     def to_dict(self) -> dict[str, Any]:
-        """The description as nested dictionaries and lists, as `from_dict` reads it."""
+        """The description as nested dictionaries and lists, for `from_dict`."""
     @staticmethod
     def named(name: str) -> RoverModel:
-        """The model of the gallery with this name.
+        """Returns a model of the gallery by name.
 
         Args:
             name: One of `names()`.
 
         Raises:
-            ModelError: There is no such model; the message lists those that there are.
+            ModelError: There is no such model; the message lists the available ones.
         """
     @staticmethod
     def names() -> list[str]:
@@ -239,10 +240,10 @@ class RoverModel:
     from_mjcf = staticmethod(model_files.from_mjcf)
     @property
     def import_report(self) -> Any:
-        """What the import of this model understood, assumed and left out.
+        """What the importer read, assumed and left out of the source file.
 
-        A `rover_gym.models.ImportReport`; None for a model that was not imported, and for one that
-        was derived from an imported one.
+        A `rover_gym.models.ImportReport`. None for models that were not imported, and for models
+        derived from an imported one, for instance by `replace`.
         """
     def _with_import_report(self, report: object) -> RoverModel: ...
     to_urdf = file_writing.write_urdf
@@ -261,36 +262,37 @@ class RoverModel:
         mass_scale: float | None = None,
         motor: Motor | Mapping[str, Any] | None = ...,
     ) -> RoverModel:
-        """Returns a model that differs in what is given.
+        """Returns a copy of the model with the given properties changed.
 
         Args:
-            wheel_radius: Radius of all wheels, m: shape, inertia and contact change together.
-            contact_radius: Radius at which the wheels touch the ground, m; shape and inertia stay
-                as they are.
-            wheel_stiffness: Normal stiffness of all wheels where they touch, N/m, 0 for rigid
-                wheels, which have no damping either.
-            wheel_damping: Normal damping beside the stiffness, N s/m.
-            masses: Masses by name of the solid, or one for each solid, kg. Inertias scale with
-                them.
+            wheel_radius: Radius of all wheels, m. Shape, inertia and contact radius change
+                together.
+            contact_radius: Radius at which the wheels touch the ground, m. Shape and inertia do not
+                change.
+            wheel_stiffness: Normal contact stiffness of all wheels, N/m; 0 for rigid wheels, which
+                have no damping either.
+            wheel_damping: Normal contact damping of all wheels, N s/m.
+            masses: Masses by name of the solid, or a list with one for each solid, kg. Inertias
+                scale with them.
             steering_stiffness: Stiffness of every steering controller, N m/rad.
             steering_damping: Damping of every steering controller, N m s/rad.
             wheel_torque_limit: Largest torque of every wheel, N m.
             mass_scale: Factor of all masses and inertias.
-            motor: The motor of all wheels: a `Motor`, its fields by name, or None for wheels that
-                give their command at any speed. Left out, the motors stay.
+            motor: The motor of all wheels: a `Motor`, a mapping of its fields, or None if the
+                torque is to follow the command at any speed. By default the motors do not change.
 
         Raises:
-            ModelError: A number is out of its range, a solid has no such name, or a wheel radius is
-                given where a wheel's solid is no disc.
+            ModelError: A number is out of range, there is no solid of a given name, or
+                `wheel_radius` is given and the solid of a wheel is not a disc.
         """
     def weld(self, joints: Mapping[str, float] | Sequence[str] | str) -> RoverModel:
-        """Returns the same machine with joints locked; their coordinates are gone.
+        """Returns a copy of the model with joints locked. Their coordinates are removed.
 
         Args:
-            joints: Names of joints, which are locked at 0, or a mapping of names to angles, rad.
+            joints: Names of joints to lock at 0, or a mapping of names to angles, rad.
 
         Returns:
-            The new model. The locks are kept in its files and dictionaries.
+            The new model. Its files and dictionaries contain the locks.
 
         Raises:
             ModelError: There is no such joint, or an angle is not finite.
@@ -324,17 +326,17 @@ class RoverModel:
         """Radius at which each wheel touches the ground, (n_wheels,), m."""
     @property
     def clear_radius(self) -> float:
-        """Radius of the place that the rover needs to turn on the spot, m.
+        """Radius of the circle that the rover needs to turn on the spot, m.
 
-        It is the largest distance from the trunk's origin to a wheel's contact, joints at zero,
-        plus the wheel's radius and 0.1 m.
+        The largest distance from the trunk's origin to a wheel's contact point, with all joints at
+        zero, plus the wheel's radius and 0.1 m.
         """
     @property
     def wheel_torque_limits(self) -> _Array:
         """Largest torque of each wheel, (n_wheels,), N m."""
     @property
     def motors(self) -> list[Motor | None]:
-        """The motor of each wheel; None where the torque is the command at any speed."""
+        """The motor of each wheel; None for a wheel whose torque follows the command at any speed."""
     @property
     def wheel_joint_indices(self) -> list[int]:
         """Index in q of each wheel's rotation; -1 where it is locked."""
@@ -416,7 +418,7 @@ class RoverModel:
             Origin (3,), m, and rotation matrix (3, 3) by name of the solid.
         """
     def wheel_gaps(self, q: npt.ArrayLike, terrain: Terrain | _Terrains, coordinates: _Coordinates = "state") -> _Array:
-        """The distance of each wheel to the terrain.
+        """Signed distance of each wheel from the terrain.
 
         Args:
             q: Coordinates, (nq,).
@@ -429,11 +431,11 @@ class RoverModel:
     def resting_pose(self, terrain: Terrain | _Terrains, position: Sequence[float], heading: float) -> _Array:
         """The coordinates of the rover at rest on a terrain.
 
-        On a plane the joints are at zero, the trunk is upright along the normal with its origin
-        above the position, and the lowest wheel has gap zero. If that leaves wheels in the air,
-        pitch, roll and the joints that nothing drives bring them down, where this puts more wheels
-        on the ground. On any other terrain the same coordinates bring all wheels down to the ground
-        as far as they can. No wheel is in the ground.
+        On a plane, the joints are at zero, the trunk's y axis is along the normal, its origin is
+        above the position, and the lowest wheel touches the ground. If some wheels are then in the
+        air, pitch, roll and the passive joints are adjusted, provided that more wheels touch the
+        ground afterwards. On any other terrain, pitch, roll and the passive joints always bring as
+        many wheels to the ground as possible. No wheel penetrates the ground.
 
         Args:
             terrain: A terrain, or a list of several; a plane must not be vertical.
@@ -444,8 +446,8 @@ class RoverModel:
             Coordinates of the state, (nq,).
 
         Raises:
-            TerrainError: `terrain` is no terrain, or does not say what the ground is under the
-                trunk or a wheel.
+            TerrainError: `terrain` is not a terrain, or the ground under the trunk or a wheel is
+                unknown.
             StateError: A number is not finite, or the plane is vertical.
         """
     def wheel_contact_points(
@@ -464,7 +466,7 @@ class RoverModel:
     def wheel_jacobians(
         self, q: npt.ArrayLike, terrain: Terrain | _Terrains, coordinates: _Coordinates = "state"
     ) -> _Array:
-        """The contact Jacobian of each wheel: u = J v is the velocity of its contact point.
+        """The contact Jacobian J of each wheel: J v is the velocity of its contact point.
 
         Args:
             q: Coordinates, (nq,).
@@ -506,9 +508,10 @@ class RoverModel:
 
 @disjoint_base
 class Terrain:
-    """Ground of any kind. Immutable.
+    """Base class of all grounds. Immutable.
 
-    `Plane`, `SphereField`, `HeightField`, `TriangleMesh` and `Union` are its kinds.
+    Its subclasses are `Plane`, `SphereField`, `HeightField`, `TriangleMesh`, `SoftGround` and
+    `Union`.
     """
 
     def heights(self, points: npt.ArrayLike) -> _Array:
@@ -518,7 +521,7 @@ class Terrain:
             points: Places (x, z), (m, 2), m.
 
         Returns:
-            Heights y, (m,), m; nan where there is no ground or no data.
+            Heights y, (m,), m; NaN if there is no ground or no data.
 
         Raises:
             TerrainError: `points` has a wrong shape.
@@ -526,18 +529,19 @@ class Terrain:
     def cast_rays(
         self, origins: npt.ArrayLike, directions: npt.ArrayLike, max_range: float | None = None
     ) -> tuple[_Array, _Array]:
-        """Where rays meet the ground first.
+        """Finds the first point at which each ray hits the ground.
 
-        A surface is met from either side. What depth cameras and laser scanners measure.
+        Surfaces are hit from both sides. Use it to simulate depth cameras and laser scanners.
 
         Args:
-            origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
-            directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
-            max_range: Distance to which they are followed, m; without end by default.
+            origins: Origins of the rays, world frame, (n, 3) or one (3,) for all, m.
+            directions: Directions of the rays, world frame, (n, 3) or one (3,) for all, of any
+                length.
+            max_range: Largest distance, m; unlimited by default.
 
         Returns:
-            Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
-            world frame, (n, 3), nan where nothing is met.
+            Distances, (n,), m, and the surface's unit normals at the hits, world frame, (n, 3). A
+            ray without a hit has an infinite distance and a NaN normal.
 
         Raises:
             OptionError: An array has a wrong shape or an entry that is not finite, a direction is
@@ -546,13 +550,13 @@ class Terrain:
 
 @final
 class Plane(Terrain):
-    """A plane as ground: the half-space `normal · x + offset >= 0` is free, the ground lies below.
+    """A plane as ground. The half-space `normal · x + offset >= 0` is free.
 
-    A normal of unit length is taken as it is, so a plane's own `normal` and `offset` make the same
-    plane to the bit.
+    A normal of unit length is not normalised again, so the `normal` and `offset` of a plane
+    reproduce the plane bit for bit.
 
     Args:
-        normal: Direction out of the ground, (3,), of any length; straight up by default.
+        normal: Normal out of the ground, (3,), of any length; straight up by default.
         offset: Gap between the world's origin and the plane, m; flat ground at height y has the
             offset -y.
 
@@ -577,7 +581,7 @@ class Plane(Terrain):
             uphill: Direction of steepest ascent, rad: an angle about +y from +x.
 
         Raises:
-            TerrainError: An angle is no finite number.
+            TerrainError: An angle is not a finite number.
         """
     def height(self, x: float, z: float) -> float:
         """The height of the plane at a place.
@@ -596,10 +600,11 @@ class Plane(Terrain):
 
 @final
 class SoftGround(Terrain):
-    """Ground of sand, into which wheels sink. To every other part of a machine its surface is rigid.
+    """Sand, into which wheels sink. All other parts of a machine touch its surface as rigid ground.
 
-    The ruts belong to a simulation and are part of its snapshots. Rocks on sand are a `Union` of
-    both. Steps on soft ground are general: `Simulation.fallback_reason` says so.
+    The ruts belong to a simulation and are part of its snapshots. For rocks on sand, use a `Union`
+    of both. On soft ground a simulation always uses the general step, see
+    `Simulation.fallback_reason`.
 
     Args:
         surface: The undisturbed surface: a `Plane`, `HeightField` or `TriangleMesh`.
@@ -607,7 +612,7 @@ class SoftGround(Terrain):
         rut_cell: Size of a cell of the map of ruts, from 0.001 to 1 m.
 
     Raises:
-        TerrainError: The surface is no terrain, or a number of the soil is missing or out of its
+        TerrainError: The surface is not a terrain, or a number of the soil is missing or out of
             range.
     """
 
@@ -625,7 +630,7 @@ class SoftGround(Terrain):
 
 @final
 class WheelBed:
-    """One wheel on a bed of soil, driven at prescribed speeds and free to sink under its load.
+    """A single wheel on a bed of soil, with prescribed speeds and vertical load.
 
     Args:
         soil: A `rover_gym.sand.Soil`, or a mapping of its numbers.
@@ -634,7 +639,8 @@ class WheelBed:
         rounding: Radius of its edges, m.
         grouser_height: Height of its grousers, m.
         grousers: Number of its grousers.
-        accuracy: Largest error of the forces by the number of points on the wheel.
+        accuracy: Largest relative error of the forces that the discretisation of the wheel may
+            cause.
 
     Raises:
         TerrainError: A number of the soil is missing or out of its range.
@@ -656,9 +662,9 @@ class WheelBed:
         """Points at which the stress is evaluated."""
     @property
     def drum(self) -> float:
-        """Radius of the drum with the sand that its grousers hold, m."""
+        """Radius of the wheel including the sand held between its grousers, m."""
     def steady(self, drives: npt.ArrayLike) -> _Array:
-        """Steady motion.
+        """Forces and sinkage in steady motion.
 
         Args:
             drives: Speed of travel (m/s), rate of the wheel (rad/s, positive forward), slip angle
@@ -666,7 +672,7 @@ class WheelBed:
 
         Returns:
             Sinkage (m), drawbar pull, force to the right and lift (N), and driving torque (N m) of
-            each run, (n, 5); nan where the soil does not bear the load.
+            each run, (n, 5); NaN if the soil cannot carry the load.
 
         Raises:
             OptionError: `drives` has a wrong shape or an entry that is not finite.
@@ -685,7 +691,7 @@ class WheelBed:
             OptionError: An argument has a wrong shape or is not finite.
         """
     def run(self, drives: npt.ArrayLike, mass: float, time_step: float) -> _Array:
-        """A run from rest on the surface: the wheel is let down and driven.
+        """Simulates a run: the wheel starts on the surface, sinks in and drives.
 
         Args:
             drives: As for `steady`, one row for each step, (n, 5).
@@ -751,12 +757,12 @@ class SphereField(Terrain):
             max_diameter: Largest diameter, m.
             min_diameter: Smallest diameter, m; the number of rocks grows without bound as it
                 shrinks.
-            burial: Fraction of its diameter that a rock is sunk into the ground, 0 to 0.5, or a
-                range from which it is drawn for each rock; 0.5 by default.
-            ground: What the rocks lie on; flat ground at height 0 by default. A plane is part of
-                the field. Rocks on any other terrain are raised by its height, and the terrain is
-                not part of the field: combine them as `Union([terrain, rocks])`.
-            clear: Circles x, z, radius that no rock reaches into, (n, 3), m; none by default.
+            burial: Buried fraction of each rock's diameter, 0 to 0.5, or a range from which it is
+                drawn for each rock; 0.5 by default.
+            ground: Ground under the rocks; flat at height 0 by default. A plane becomes part of the
+                field. Any other terrain only sets the height of the rocks; combine both as
+                `Union([terrain, rocks])`.
+            clear: Circles x, z, radius to keep free of rocks, (n, 3), m; none by default.
             material: Name of the rocks' material.
 
         Raises:
@@ -781,19 +787,19 @@ class SphereField(Terrain):
 
 @final
 class HeightField(Terrain):
-    """A map of heights as ground: two triangles a cell, solid below. Immutable.
+    """A height map as ground: two triangles in each cell, solid below. Immutable.
 
     Row j and column i stand at z = origin[1] + j spacing[1] and x = origin[0] + i spacing[0]. Each
-    cell is cut along the diagonal from its corner (j, i) to (j + 1, i + 1). A height that is nan is
-    no data: a rover that comes near it, or to the border of the map, ends the call with a
-    `StepError` that names the place. Heights are kept in single precision. `HeightField.from_file`
-    reads a map, `HeightField.fractal` makes one by a seed.
+    cell is cut along the diagonal from its corner (j, i) to (j + 1, i + 1). A height of NaN means
+    unknown ground. If a rover comes near unknown ground or the border of the map, the step raises a
+    `StepError` that gives the place. Heights are stored in single precision.
+    `HeightField.from_file` reads a map, `HeightField.fractal` generates one from a seed.
 
     Args:
-        heights: Heights y, (n_z, n_x), m; nan for no data.
+        heights: Heights y, (n_z, n_x), m; NaN where unknown.
         spacing: Distance of columns and of rows, m: one number, or (dx, dz).
-        origin: Place (x, z) of the first height, m; by default such that the map's middle is at
-            the world's origin.
+        origin: Place (x, z) of the first height, m. By default the middle of the map is at the
+            world's origin.
         material: Name of its material, for the laws of a `Simulation` by pair of materials.
 
     Raises:
@@ -815,7 +821,7 @@ class HeightField(Terrain):
         """Name of its material."""
     @property
     def grid(self) -> npt.NDArray[np.float32]:
-        """Heights, (n_z, n_x) float32, m; nan for no data."""
+        """Heights, (n_z, n_x) float32, m; NaN where unknown."""
     @property
     def shape(self) -> tuple[int, int]:
         """Number of rows and columns."""
@@ -832,15 +838,14 @@ class HeightField(Terrain):
 
 @final
 class TriangleMesh(Terrain):
-    """A mesh of triangles as ground: rocks, or anything else that stands still. Immutable.
+    """A triangle mesh as fixed ground, for instance a rock. Immutable.
 
-    Triangles turn counterclockwise, seen from outside. A closed mesh is solid; an open one is
-    solid below.
+    Corners are listed counterclockwise, seen from outside. A closed mesh is solid inside, an open
+    one below.
 
-    Corners at exactly equal positions are joined, so triangles may each bring their own three
-    corners, as in an STL file. `triangles` then names the first of equal corners. Corners that
-    differ by rounding are not joined: wheels catch on the seam between them.
-    `TriangleMesh.from_file` reads a mesh.
+    Corners at exactly equal positions are merged, so each triangle may have its own three corners,
+    as in an STL file. Corners that differ by rounding are not merged, and wheels catch on the seam
+    between them. `TriangleMesh.from_file` reads a mesh.
 
     Args:
         vertices: Corners, (n, 3), m.
@@ -849,7 +854,7 @@ class TriangleMesh(Terrain):
 
     Raises:
         TerrainError: An array has a wrong shape, an entry is not finite, a triangle has no area or
-            names a corner that is not there, or two triangles turn opposite ways.
+            an index out of range, or neighbouring triangles have opposite orientations.
     """
 
     def __new__(cls, vertices: npt.ArrayLike, triangles: npt.ArrayLike, material: str = "ground") -> TriangleMesh: ...
@@ -865,22 +870,22 @@ class TriangleMesh(Terrain):
         """Numbers of the corners of each triangle, (m, 3)."""
     @property
     def is_closed(self) -> bool:
-        """Whether no triangle has a free border."""
+        """Whether the mesh is closed, so that no triangle has a free edge."""
     def __len__(self) -> int: ...
     def __getnewargs__(self) -> tuple[Any, ...]: ...
 
 @final
 class Union(Terrain):
-    """Several terrains as one ground: a map with rocks on it, say. Immutable.
+    """Several terrains combined, for instance a map with rocks on it. Immutable.
 
-    A rover touches whatever of them it meets. Where a part has a plane, the ground is known
-    everywhere; otherwise it is known where a height field knows it.
+    A rover can touch each of them. With a plane the ground is known everywhere; otherwise it is
+    known where a height field has data.
 
     Args:
         parts: Terrains of any kind, at least one; at most one of them may have a plane.
 
     Raises:
-        TerrainError: A part is no terrain, there is none, or two have a plane.
+        TerrainError: A part is not a terrain, the list is empty, or two parts contain a plane.
     """
 
     def __new__(cls, parts: _Terrains) -> Union: ...
@@ -892,7 +897,7 @@ class Union(Terrain):
 
 @final
 class StepReport:
-    """How the steps of one call went: the worst of them, or their sum."""
+    """Summary of the time steps of one call: sums or worst values over the steps."""
 
     @property
     def status(self) -> Literal["converged", "not_converged"]:
@@ -922,97 +927,96 @@ class StepReport:
     def residual(self) -> float:
         """Largest relative residual of a step's contact problem, computed from its impulses.
 
-        Where the energy audit slowed a rebound (`restitution` above 0), it contains how far the
-        rebound then falls short of Newton's law. The status is the solver's.
+        If the energy audit slowed a rebound (`restitution` above 0), the residual includes the
+        difference from Newton's law. `status` describes the solver alone.
         """
     @property
     def n_contacts(self) -> int:
         """Largest number of contacts in a step."""
     @property
     def retaken(self) -> int:
-        """Number of steps taken again.
+        """Number of repeated steps.
 
-        A step is taken again when a motor reached its torque-speed line, when the energy audit asks
-        for implicit gyroscopic terms, or when Newton's law of restitution had no solution.
+        A step is repeated if a motor reached its torque-speed line, if the energy audit requires
+        implicit gyroscopic terms, or if Newton's law of restitution had no solution.
         """
     @property
     def fallbacks(self) -> int:
-        """Steps that the general step took, since the fast one does not take them.
+        """Number of steps that used the general step instead of the fast one.
 
-        0 of machines in the plane and of grains, which have no fast one.
-        `Simulation.fallback_reason` says whether a simulation has fast steps.
+        Always 0 for planar machines and grains, which have no fast step.
+        `Simulation.fallback_reason` tells whether a simulation has fast steps.
         """
     @property
     def energy_gain(self) -> float:
-        """Largest unexplained gain of energy in a step, relative to the kinetic energy.
-
-        Unexplained is what exceeds the work of gravity and actuators.
-        """
+        """Largest energy gain of a step beyond the work done on it, relative to the kinetic energy."""
     @property
     def energy_removed(self) -> float:
-        """Energy that the scheme would have gained and the audit removed, summed over the steps, J."""
+        """Spurious energy gain of the scheme that the audit removed, summed over the steps, J."""
     @property
     def energy_dissipated(self) -> float:
-        """Energy that friction and impacts took by their law, summed over the steps, J.
+        """Energy dissipated by friction and impacts, summed over the steps, J.
 
-        Newton's law of restitution with friction can make it negative. A new contact that closes
-        faster than gravity explains counts as an impact.
+        It can be negative with Newton's law of restitution and friction. A new contact counts as an
+        impact if it closes faster than gravity explains.
         """
     @property
     def energy_lost(self) -> float:
-        """Energy that the scheme lost, summed over the steps, J; negative where it gained.
+        """Numerical energy loss of the scheme, summed over the steps, J; negative if energy is gained.
 
         The change of the energy is the work of the actuators minus `energy_dissipated`,
         `energy_lost` and `energy_removed`, plus `energy_lifted` and `energy_released`.
-        `energy_lost` is therefore what no law explains: errors of the time step, and the work of
-        reactions in contacts that persist. In smooth motion it shrinks with the square of the step.
-        Always 0 with grains and planar soils, whose energy is not audited.
+        `energy_lost` therefore contains the errors of the time stepping and the work of reactions
+        in persistent contacts. In smooth motion it shrinks with the square of the time step. Always
+        0 for grains and planar soils, whose energy is not audited.
         """
     @property
     def energy_lifted(self) -> float:
-        """Energy gained by pushing bodies out of penetration, less the actuators' work, all steps, J."""
+        """Energy gained by removing penetration, less the actuators' work, sum of the steps, J."""
     @property
     def energy_released(self) -> float:
-        """Energy released by yielding wheels, summed over the steps, J; negative where they stored it.
+        """Energy released by elastic wheels, summed over the steps, J; negative if they stored energy.
 
-        Wheels yield where their model gives them a `stiffness`. Their springs are part of neither
-        the kinetic nor the potential energy. Besides what the springs give off, it holds the work
-        that the wheel's force does because it is constant over a step, which cancels where a wheel
-        comes to rest again.
+        Wheels are elastic if the model gives them a `stiffness`. The energy of their springs is
+        part of neither the kinetic nor the potential energy. The wheel's force is constant over a
+        step; the resulting error in its work is included, and cancels when a wheel comes to rest
+        again.
         """
     @property
     def undetermined_loads(self) -> int:
-        """Number of independent sets of wheel loads that balance one another in the last step.
+        """Degree of static indeterminacy of the wheel loads in the last step.
 
-        0 means that equilibrium determines the loads. Otherwise they are one of many answers, and
-        micrometres decide which: a rigid chassis on four rigid wheels has one such set. Wheels with
-        a `stiffness` have none. Friction is not considered; 0 for other machines than rovers.
+        0 means that equilibrium determines the loads. Otherwise many distributions of loads satisfy
+        equilibrium, and micrometres of height decide between them: a rigid chassis on four rigid
+        wheels has degree 1. Wheels with a `stiffness` always have 0. Friction is not considered. 0
+        for machines other than rovers.
         """
     def followed_by(self, later: StepReport) -> StepReport:
-        """The report of these steps and of further ones.
+        """Combines this report with that of the following steps.
 
         Args:
-            later: How the further ones went.
+            later: Report of the following steps.
         """
 
 @final
 class Contacts:
-    """The contacts of a rover's last step, as new arrays with one row a contact."""
+    """Contacts of a rover in the last step, as new arrays with one row for each contact."""
 
     @property
     def bodies(self) -> list[str]:
-        """Names of the solids that touch, and of the joints that are at a stop."""
+        """Name of the solid in each contact, or of the joint that is at its stop."""
     @property
     def kinds(self) -> list[str]:
-        """What touches in each contact, "wheel", "box" or "sphere"; "limit" for a joint's stop.
+        """Kind of each contact, "wheel", "box" or "sphere"; "limit" for a joint's stop.
 
-        The point of a stop is the origin of the solid that the joint carries, its normal is the
-        joint's axis that opens the gap. Along it, at a revolute joint, the gap is in rad, the
-        impulse in N m s and the velocity in rad/s; tangential entries are zero.
+        For a stop, the contact point is the origin of the solid that the joint carries, and the
+        normal is the joint's axis in the direction that opens the gap. At a revolute joint, gap,
+        impulse and velocity along the normal are in rad, N m s and rad/s. Tangential entries are
+        zero.
         """
     @property
     def wheels(self) -> npt.NDArray[np.int64]:
-        """Indices of the wheels that touch, (n,); -1 where it is another solid or a joint's stop."""
+        """Index of the wheel in each contact, (n,); -1 for another solid or a joint's stop."""
     @property
     def points(self) -> _Array:
         """Contact points, world frame, (n, 3), m."""
@@ -1024,12 +1028,12 @@ class Contacts:
         """
     @property
     def gaps(self) -> _Array:
-        """Gaps, (n,), m, at the configuration where the step evaluated the contacts."""
+        """Gaps, (n,), m, at the configuration in which the step detected the contacts."""
     @property
     def impulses(self) -> _Array:
         """Impulses of the step along n, t, b, (n, 3), N s.
 
-        Where the step was split, they are sums over its parts.
+        If the step was split, these are sums over its parts.
         """
     @property
     def velocities(self) -> _Array:
@@ -1038,26 +1042,27 @@ class Contacts:
 
 @final
 class PathSearch:
-    """Finds the cheapest of many paths of a rover over a height scan, by beam search.
+    """Beam search for the cheapest path of a rover over a height scan.
 
-    `rover_gym.policy.ScanPolicy` drives by it, and `rover_gym.policy.PathCosts` says what a path
-    costs. Poses are way ahead, way to the right, m, and turn to the left, rad.
+    `rover_gym.policy.ScanPolicy` uses it; `rover_gym.policy.PathCosts` defines the cost of a path.
+    A pose consists of the distance ahead, the distance to the right, m, and the turn to the left,
+    rad.
 
     Args:
         scan: Rows, columns and spacing, m, of the height scan.
-        outline: The rover in the trunk's frame: `wheels` (n_wheels, 2) and `underside` (n, 2), x
-            and z, m; `clearance` (n,) of the underside, m; `plane_fit` (3, n_wheels), level and
-            slopes of the ground plane by the heights under the wheels; `x_c`, m, of the point that
-            follows the path; `radius` of the wheels, m.
+        outline: Geometry of the rover in the trunk's frame: `wheels` (n_wheels, 2) and `underside`
+            (n, 2), x and z, m; `clearance` (n,) of the underside, m; `plane_fit` (3, n_wheels), the
+            matrix from the heights under the wheels to height and slopes of the ground plane;
+            `x_c`, x of the point that follows the path, m; `radius` of the wheels, m.
         costs: The fields of `PathCosts`.
-        first: The arcs that a path may begin with: `poses` (n, 4, 3), `direction` (n,), 1 or -1,
-            and `commands` (n, 3), speed, curvature and sideways.
-        further: Those that it may go on with: `poses` and `direction`.
+        first: Arcs for the first segment of a path: `poses` (n, 4, 3), `direction` (n,), 1 or -1,
+            and `commands` (n, 3), speed, curvature and sideways motion.
+        further: Arcs for the following segments: `poses` and `direction`.
         reach: The rover's reach, m.
         arrival: Distance within which the goal is reached, m.
 
     Raises:
-        OptionError: An argument is missing, no number, or of a wrong shape.
+        OptionError: An argument is missing, not a number, or has a wrong shape.
     """
 
     def __new__(
@@ -1082,19 +1087,19 @@ class PathSearch:
         extra: npt.ArrayLike | None = None,
         ways: npt.ArrayLike | None = None,
     ) -> int:
-        """The first arc of the cheapest path.
+        """Returns the first arc of the cheapest path.
 
         Args:
             heights: `(rows * columns,)` heights of the scan, m.
             goal: The goal ahead and to the right of the point that follows the path, m.
-            command: `(3,)` the present command; its first entry is 0 at a start.
-            boldness: Factor on the costs of belly, climb and lean.
-            traps: `(n, 3)` poses where the rover got stuck.
-            retreat: Direction of the first arc, 1 or -1, while the rover backs off; 0 for a free
-                choice.
-            extra: `(n,)` a further cost of each first arc, m; none by default.
-            ways: `(rows * columns,)` way to the goal from each point of the scan, m; straight by
-                default.
+            command: `(3,)` the present command; its first entry is 0 if the rover starts to move.
+            boldness: Factor on the costs of underside, climb and lean.
+            traps: `(n, 3)` poses at which the rover got stuck.
+            retreat: Required direction of the first arc, 1 or -1, while the rover backs off; 0 if
+                both are allowed.
+            extra: `(n,)` additional cost of each first arc, m; none by default.
+            ways: `(rows * columns,)` cost-to-go from each point of the scan to the goal, m; the
+                straight distance by default.
 
         Returns:
             The index of the arc among the first arcs.
@@ -1110,39 +1115,41 @@ class PathSearch:
         boldness: float,
         extra: npt.ArrayLike | None = None,
     ) -> npt.NDArray[np.float64]:
-        """The way to a goal from every cell of a map (Dijkstra 1959).
+        """Cost-to-go to a goal from every cell of a map (Dijkstra 1959).
 
-        The rover goes from a cell to one of its eight neighbours, headed for it. That costs the
-        distance and what the ground costs on a path: belly, climb and lean. A wheel over ground
-        that is not known stands as high as the others do; where all do, the distance is all.
+        The rover moves from a cell to one of its eight neighbours, with its heading towards it. The
+        cost is the distance plus the costs of underside, climb and lean. A wheel over unknown
+        ground gets the mean height of the other wheels; if the ground under all wheels is unknown,
+        the cost is the distance alone.
 
         Args:
-            heights: (rows, columns) heights, m, nan where they are not known; from 3 to 2000 of
-                each. Rows lie across, the first farthest ahead; columns lead to the right.
+            heights: (rows, columns) heights, m, NaN where unknown; 3 to 2000 rows and columns. The
+                first row is the farthest ahead; columns run from left to right.
             spacing: Distance of rows and columns, m.
-            goal: Row and column of the goal. One beyond the map is reached by the straight way from
-                its border.
-            boldness: Factor on the costs of belly, climb and lean.
-            extra: (rows, columns) further price of a metre in each cell, at least 0; none by
+            goal: Row and column of the goal. From the border to a goal outside the map, the
+                straight distance counts.
+            boldness: Factor on the costs of underside, climb and lean.
+            extra: (rows, columns) additional cost per metre in each cell, at least 0; none by
                 default.
 
         Returns:
-            (rows, columns) ways, in metres of level ground.
+            (rows, columns) costs-to-go, in metres of level ground.
 
         Raises:
-            OptionError: An argument has a wrong shape or an entry out of its range.
+            OptionError: An argument has a wrong shape or an entry out of range.
         """
     def under(self, heights: npt.ArrayLike, poses: npt.ArrayLike) -> npt.NDArray[np.float32]:
-        """What lies under the rover in poses.
+        """Features of the ground under the rover at given poses.
 
         Args:
             heights: `(rows * columns,)` heights of the scan, m.
             poses: `(..., 3)` poses.
 
         Returns:
-            (n, n_wheels + 3) for each pose the heights under the wheels over the mean of the
-            present ones and the least gap under the rover, both over the wheels' radius; then the
-            slopes ahead and to the right of the plane through the ground under the wheels.
+            (n, n_wheels + 3), for each pose: the heights under the wheels minus the mean height
+            under the wheels now, and the smallest gap under the rover, both divided by the wheel
+            radius; then the slopes ahead and to the right of the plane fitted to the ground under
+            the wheels.
 
         Raises:
             OptionError: An argument has a wrong shape or an entry that is not finite.
@@ -1150,7 +1157,7 @@ class PathSearch:
 
 @final
 class Linearisation:
-    """Derivatives of a time step by state and command, as `Simulation.linearise` returns them.
+    """Derivatives of a time step, returned by `Simulation.linearise`.
 
     `x_next = next_state + a @ (x - state) + b @ (u - command)` to first order. The state is
     x = (q, v) as `Simulation.q` and `Simulation.v` return them, the command is u = (wheel torques,
@@ -1167,6 +1174,9 @@ class Linearisation:
         Columns of wheels without a drive or without steering are 0.
         """
     @property
+    def c(self) -> _Array:
+        """Derivative of the next state by the parameters that were asked for, (nx, n_parameters)."""
+    @property
     def state(self) -> _Array:
         """State before the step, (nx,)."""
     @property
@@ -1177,7 +1187,7 @@ class Linearisation:
         """State after the step, (nx,)."""
     @property
     def bodies(self) -> list[str]:
-        """Names of the solids that touch in the step, and of the joints at a stop, one a contact."""
+        """For each contact, the name of the solid, or of the joint that is at its stop."""
     @property
     def modes(self) -> list[str]:
         """Mode of each contact, "open", "stick" or "slip".
@@ -1186,31 +1196,50 @@ class Linearisation:
         """
     @property
     def margins(self) -> _Array:
-        """How far each contact is from another mode, (n,), m/s; rad/s at a joint's stop.
+        """Distance of each contact from a change of its mode, (n,), m/s; rad/s at a joint's stop.
 
-        It is the normal velocity of an open contact. Of a closed one it is the smaller of its
-        normal impulse and, sticking, of mu p_N - |p_T|, both times the inverse effective mass along
-        the normal, or, slipping, of the sliding speed.
+        For an open contact it is the normal velocity. For a closed contact it is the smaller of two
+        values: the normal impulse times the inverse effective mass along the normal, and, if
+        sticking, mu p_N - |p_T| times the same factor, or, if slipping, the sliding speed.
         """
     @property
     def is_projected(self) -> bool:
-        """Whether the step moves bodies out of penetration; the derivative contains it then."""
+        """Whether the step removes penetration. If so, the derivative includes this correction."""
     @property
-    def holds(self) -> npt.NDArray[np.bool_]:
-        """Whether nothing jumps within the tested changes of each entry of (x, u), (nx + nu,).
+    def holds(self) -> npt.NDArray[np.bool_] | None:
+        """Whether each column of (a, b) is valid within the tested perturbation, (nx + nu,).
 
-        Two steps, ahead and back, have the same closed contacts in the same modes, are projected
-        and corrected by the energy audit as this step is, and agree with the column within 1%.
+        None without `check`. A column is valid if two perturbed steps, one in each direction, have
+        the same closed contacts in the same modes, the same projection and energy correction, and
+        agree with the column within 1%.
         """
     @property
-    def errors(self) -> _Array:
-        """Difference of each column of (a, b) from that of its two tested steps, (nx + nu,).
+    def errors(self) -> _Array | None:
+        """Difference of each column of (a, b) from that of its two perturbed steps, (nx + nu,).
 
-        It is the largest difference of an entry, relative to the column's largest entry.
+        None without `check`. The largest difference of an entry, relative to the column's largest
+        entry.
         """
     @property
-    def is_smooth(self) -> bool:
-        """Whether every column holds."""
+    def is_smooth(self) -> bool | None:
+        """Whether all columns are valid; None without `check`."""
+
+@final
+class StepDerivatives:
+    """Steps of trajectories with their derivatives, as `Simulation.differentiate` returns them."""
+
+    @property
+    def states(self) -> _Array:
+        """States, (n, steps + 1, nx)."""
+    @property
+    def a(self) -> _Array:
+        """Derivatives of each next state by the state, (n, steps, nx, nx)."""
+    @property
+    def b(self) -> _Array:
+        """By the command, (n, steps, nx, nu); zero for torques beyond their limit."""
+    @property
+    def c(self) -> _Array:
+        """By the parameters, (n, steps, nx, n_parameters)."""
 
 @final
 class Energy:
@@ -1228,76 +1257,76 @@ class Energy:
 
 @final
 class Snapshot:
-    """Everything that a simulation needs to continue bit for bit. Picklable."""
+    """Complete state of a simulation, from which it continues bit for bit. Picklable."""
 
     @staticmethod
     def from_bytes(data: bytes) -> Snapshot:
         """Reads a snapshot.
 
         Args:
-            data: What `to_bytes` returned.
+            data: Bytes from `to_bytes`.
 
         Raises:
-            StateError: The bytes are not those of a snapshot.
+            StateError: The bytes are not a snapshot.
         """
     def to_bytes(self) -> bytes:
-        """The snapshot as bytes, as `from_bytes` reads them."""
+        """The snapshot as bytes, for `from_bytes`."""
     def __reduce__(self) -> Any: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
 
 @disjoint_base
 class AnySimulation:
-    """What all simulations share. Made by the classes derived from it.
+    """Base class of all simulations. It cannot be instantiated.
 
-    They are `Simulation`, `PlanarSimulation`, `SoilSimulation`, `GrainSimulation` and
+    Its subclasses are `Simulation`, `PlanarSimulation`, `SoilSimulation`, `GrainSimulation` and
     `RoverGrainSimulation`.
 
-    One call at a time: a call during another one, from another thread or a signal handler, raises
+    Only one call may run at a time. A second call, from another thread or a signal handler, raises
     BusyError.
     """
 
     @property
     def time(self) -> float:
-        """Time since the last call of `set_state`, s; of a rover among grains that of the grains."""
+        """Time since the last call of `set_state`, s; among grains, the time of the grains."""
     @property
     def time_step(self) -> float:
         """Time step, s."""
     def step(self, n: int = 1) -> StepReport:
         """Takes n steps.
 
-        Other threads run meanwhile. Ctrl-C, or whatever else a signal handler raises, ends the call
-        after a whole step, whose state stays. A contact solver that does not converge is no error:
-        the report says so.
+        Other Python threads run in the meantime. Ctrl-C, or another exception of a signal handler,
+        ends the call after the current step; the state is that after the step. If the contact
+        solver does not converge, no exception is raised: check the report's `status`.
 
         Args:
             n: Number of steps.
 
         Raises:
-            StepError: A step could not be taken; the state before it stays.
-            OptionError: `n` is not a count.
+            StepError: A step failed. The state is the one before that step.
+            OptionError: `n` is not a whole number from 0.
         """
     def energy(self) -> Energy:
         """Kinetic and potential energy now."""
     def snapshot(self) -> Snapshot:
-        """Everything that is needed to continue bit for bit."""
+        """Returns the complete state, from which `restore` continues bit for bit."""
     def restore(self, snapshot: Snapshot) -> None:
-        """Goes back to a snapshot.
+        """Restores the state of a snapshot.
 
         Args:
             snapshot: A snapshot of the same kind of simulation, with the same model or grains.
 
         Raises:
-            StateError: The snapshot belongs to another simulation or is damaged. Nothing has
-                changed.
+            StateError: The snapshot is damaged, or belongs to a simulation with another model or
+                other grains. Nothing has changed.
         """
 
 @final
 class Simulation(AnySimulation):
     """A rover on a terrain, stepped through time.
 
-    It starts at rest with all coordinates 0, with its steering held at 0 and every other joint
-    free.
+    It starts at rest with all coordinates 0. The steering joints are held at 0; all other joints
+    are free.
 
     Args:
         model: The machine; the built-in rover by default.
@@ -1307,30 +1336,31 @@ class Simulation(AnySimulation):
         restitution: Newton's coefficient of every contact whose pair is not in `materials`, in
             [0, 1].
         materials: Friction and restitution by pair of materials, in any order, such as
-            `{("wheel", "rock"): (0.5, 0.1)}`; a list of rows (name, name, friction, restitution)
-            says the same. None by default.
+            `{("wheel", "rock"): (0.5, 0.1)}`; or a list of rows (name, name, friction,
+            restitution). None by default.
         time_step: Time step, s, from 1e-9 to 1000; 0.005 by default.
-        variant: "linearised" evaluates the forces once a step; "newton" solves for those at its
-            end. "linearised" by default.
-        theta: Weight of the end of the step in the time stepping, in [0.5, 1].
-        forecast: A contact takes part in a step where gap + forecast * time_step * u_N <= 0, with
-            u_N its normal velocity; in [0, 1].
+        variant: "linearised" evaluates the forces once in each step; "newton" solves for the forces
+            at its end. "linearised" by default.
+        theta: Implicitness of the time stepping: weight of the end of the step, in [0.5, 1].
+        forecast: A contact is active in a step if gap + forecast * time_step * u_N <= 0, with u_N
+            its normal velocity; in [0, 1].
         solver: Method for the contact problem, as in `solve_friction_contact`.
         tolerance: Largest relative residual of the contact problem; 1e-12 by default.
         max_iterations: Largest number of iterations of the contact solver in a step.
-        budget: Largest amount of work of the contact solver in a step, counted and not timed, in
-            the unit of `solve_friction_contact`; None grows with the number of contacts.
-        stabilisation: What is done about penetration: "projection" moves the bodies out of it,
-            "none" leaves it.
+        budget: Largest amount of work of the contact solver in a step, in the unit of
+            `solve_friction_contact` (operations, not time). By default it grows with the number of
+            contacts.
+        stabilisation: Treatment of penetration: "projection" moves overlapping bodies apart, "none"
+            leaves them.
         warm_start: Whether the contact solver starts from the last step's impulses.
-        accuracy: Chooses `time_step`, `variant` and `tolerance`, which then cannot be given, as
-            `accuracy_options` does: "fast", "balanced", "reference", or the error allowed on a path
-            of 20 m on flat ground, m.
+        accuracy: Chooses `time_step`, `variant` and `tolerance` by `accuracy_options`: "fast",
+            "balanced", "reference", or the allowed error on a path of 20 m on flat ground, m. These
+            three options cannot be given beside it.
 
     Raises:
         ModelError: `model` is not a RoverModel.
         TerrainError: `terrain` is not a terrain.
-        OptionError: An option is out of its range, or is given beside `accuracy`.
+        OptionError: An option is out of range, or must not be given beside `accuracy`.
     """
 
     def __new__(
@@ -1361,15 +1391,16 @@ class Simulation(AnySimulation):
     def terrain(self) -> Terrain:
         """The ground."""
     def sand(self) -> dict[str, _Array] | None:
-        """The sand under the wheels; None on firm ground.
+        """Forces, sinkage and ruts of the wheels on sand; None on rigid ground.
 
         Returns:
             Arrays by name. `force` (N) and `moment` about the wheel's centre (N m) of the sand on
             each wheel in the last step, (n_wheels, 3), world frame; `sinkage` of each wheel's
-            lowest point under the undisturbed surface, (n_wheels,), m, negative where it is clear;
-            `absorbed`, energy that the sand has taken from each wheel, (n_wheels,), J; `slip`, rim
-            slip of each wheel over the faster of rim and ground, (n_wheels,), 0 where it is clear;
-            `ruts`, place x and z and depth of each cell that a wheel has pressed down, (n, 3), m.
+            lowest point below the undisturbed surface, (n_wheels,), m, negative above it;
+            `absorbed`, energy that the sand has dissipated under each wheel, (n_wheels,), J;
+            `slip`, rim slip of each wheel relative to the faster of rim and ground speed,
+            (n_wheels,), 0 without contact; `ruts`, x, z and depth of each cell that a wheel has
+            compacted, (n, 3), m.
 
         Raises:
             BusyError: Another thread is stepping this simulation.
@@ -1385,21 +1416,22 @@ class Simulation(AnySimulation):
         """Newton's coefficient of every contact whose pair is not in `materials`."""
     @property
     def materials(self) -> dict[tuple[str, str], tuple[float, float]]:
-        """Friction and restitution by pair of materials, as given."""
+        """Friction and restitution by pair of materials."""
     @property
     def settings(self) -> dict[str, Any]:
-        """The keyword arguments that make a simulation with the same options."""
+        """Keyword arguments for a simulation with the same options."""
     @property
     def lanes(self) -> Literal[1, 4, 8]:
-        """Rovers that a batch steps together in one register of this machine.
+        """Number of rovers that a batch steps together in one SIMD register of this computer.
 
-        Either 8, 4 or 1, and always 1 if all steps are general: see `fallback_reason`.
+        Either 8, 4 or 1. Always 1 if the simulation uses the general step: see `fallback_reason`.
         """
     @property
     def fallback_reason(self) -> str | None:
-        """Why all steps are general, one rover at a time; None if they are fast, in lanes.
+        """Reason why this simulation always uses the general step; None if it uses the fast one.
 
-        Of fast steps, `StepReport.fallbacks` counts those that had to be general after all.
+        The fast step handles several rovers per SIMD register. Single steps may still need the
+        general step; `StepReport.fallbacks` counts them.
         """
     @property
     def q(self) -> _Array:
@@ -1415,7 +1447,7 @@ class Simulation(AnySimulation):
         """
     @property
     def rotation(self) -> _Array:
-        """Rotation matrix R_WB, (3, 3), from coordinates in the trunk to coordinates in the world."""
+        """Rotation matrix R_WB, (3, 3), from the trunk's frame to the world frame."""
     def set_state(
         self, q: npt.ArrayLike, qdot: npt.ArrayLike | None = None, *, coordinates: _Coordinates = "state"
     ) -> None:
@@ -1434,7 +1466,7 @@ class Simulation(AnySimulation):
             OptionError: `coordinates` is neither of the two.
         """
     def report_state(self) -> tuple[_Array, _Array]:
-        """The state in the report's coordinates.
+        """The state in the coordinates of the 2010 report.
 
         Returns:
             The report's q, (nq,), and its rate, (nv,).
@@ -1444,12 +1476,12 @@ class Simulation(AnySimulation):
         """
     @property
     def wheel_torques(self) -> _Array:
-        """Commanded torques, within the model's limits, (n_wheels,), N m, positive forward."""
+        """Commanded torques, limited by the model, (n_wheels,), N m, positive forward."""
     @property
     def motor_torques(self) -> _Array:
         """Mean torques of the drives over the last step, (n_wheels,), N m, positive forward.
 
-        Each is the command within the line of the wheel's `Motor`; 0 before any step.
+        Each is the command after the limit of the wheel's `Motor`; 0 before the first step.
         """
     def set_wheel_torques(self, torques: npt.ArrayLike) -> None:
         """Sets the driving torques; each saturates at its wheel's limit.
@@ -1462,7 +1494,7 @@ class Simulation(AnySimulation):
         """
     @property
     def steering(self) -> _Array:
-        """Steering set-points, (n_wheels,), rad; 0 for wheels whose steering is not held."""
+        """Steering set-points, (n_wheels,), rad; 0 for wheels without steering or released ones."""
     def set_steering(self, set_points: npt.ArrayLike) -> None:
         """Sets the steering set-points, which an implicit PD controller holds with the model's gains.
 
@@ -1474,20 +1506,20 @@ class Simulation(AnySimulation):
                 or one that is not 0 for a wheel that cannot be steered. Nothing has changed.
         """
     def set_commands(self, torques: npt.ArrayLike, set_points: npt.ArrayLike) -> None:
-        """Sets torques and steering together: both, or neither where either is refused.
+        """Sets torques and steering together. If one of them is invalid, neither changes.
 
         Args:
-            torques: As of `set_wheel_torques`, (n_wheels,), N m.
-            set_points: As of `set_steering`, (n_wheels,), rad.
+            torques: As for `set_wheel_torques`, (n_wheels,), N m.
+            set_points: As for `set_steering`, (n_wheels,), rad.
 
         Raises:
-            CommandError: As of these two methods. Nothing has changed.
+            CommandError: As for these two methods. Nothing has changed.
         """
     def set_joint_torques(self, torques: npt.ArrayLike) -> None:
         """Sets torques about the joint axes.
 
-        A joint with a drive of its own saturates at its limit and has its motor's line. At all
-        others the torques are added to the wheels' and have no limit.
+        At a joint with its own drive, the torque is limited by the drive and by its motor's
+        torque-speed line. At all other joints, wheels among them, it is added without limit.
 
         Args:
             torques: Torques, (n_joints,), N m, in the order of `RoverModel.joint_names`.
@@ -1507,13 +1539,13 @@ class Simulation(AnySimulation):
 
         Args:
             joints: Name of a joint, or names.
-            set_points: Angles, one for each joint, rad; where they are now by default.
+            set_points: Angles, one for each joint, rad; the present angles by default.
             stiffness: Stiffness of the controllers, N m/rad; the model's by default.
             damping: Damping of the controllers, N m s/rad; the model's by default.
 
         Raises:
             CommandError: There is no such joint, the number of set-points differs, or a number is
-                negative or not finite where it must not be. Nothing has changed.
+                negative or not finite. Nothing has changed.
         """
     def release(self, joints: str | Sequence[str]) -> None:
         """Releases joints that are held.
@@ -1525,7 +1557,7 @@ class Simulation(AnySimulation):
             CommandError: There is no such joint. Nothing has changed.
         """
     def brake(self) -> None:
-        """Holds all wheels where they are, as `hold` does, and sets their torques to 0."""
+        """Holds all wheels at their present angles, as `hold` does, and sets their torques to 0."""
     @property
     def contacts(self) -> Contacts:
         """The contacts of the last step."""
@@ -1540,7 +1572,7 @@ class Simulation(AnySimulation):
         """
     @property
     def trunk_force(self) -> float:
-        """Mean normal force over the last step on all solids but the wheels, N.
+        """Mean normal force over the last step on all solids except the wheels, N.
 
         It is large when the rover is high-centred.
         """
@@ -1548,22 +1580,22 @@ class Simulation(AnySimulation):
     def deepest_overlap(self) -> float:
         """Deepest overlap of a wheel or a box with the ground now, as a gap, m; 0 without overlap."""
     def reading(self, target: Sequence[float] | None = None, scan: npt.ArrayLike | None = None) -> _Array:
-        """Everything that a controller looks at, as one new row.
+        """All quantities for a controller, as one new array.
 
         Args:
-            target: The place (x, z) on the map that the entry `target` refers to, m; the origin by
+            target: Place (x, z) of the target, to which the entry `target` refers, m; the origin by
                 default.
             scan: Points of the height scan ahead and to the right of the trunk's origin in the
                 heading frame, (n, 2), m; none by default.
 
         Returns:
-            The row, whose parts `reading_layout` names.
+            The array; `reading_layout` gives the slice of each quantity.
 
         Raises:
             OptionError: An argument has a wrong shape or an entry that is not finite.
         """
     def reading_layout(self, n_scan: int = 0) -> dict[str, slice]:
-        """The place of each quantity in a reading.
+        """The slice of each quantity in a reading.
 
         - `pose`: q, with the angles of the wheels wrapped to one turn
         - `body_velocity`: linear and angular velocity of the trunk in its own frame, m/s and rad/s
@@ -1572,20 +1604,22 @@ class Simulation(AnySimulation):
         - `wheel_contacts`: 1 where the wheel touches the ground, within 1 mm, else 0
         - `normal_forces`: mean over the last step, N
         - `tangential_forces`: mean over the last step, rolling and lateral for each wheel, N
-        - `ground_normal`: normal of the ground plane in the trunk's frame; 0 without one
-        - `target`: how far ahead of the trunk's origin and to its right the target is, and how far
-          away, all horizontal, m
+        - `ground_normal`: normal of the ground plane in the trunk's frame; 0 without a plane
+        - `target`: distance of the target ahead of the trunk's origin, to its right, and in total,
+          all horizontal, m
         - `cos_tilt`: cosine of the angle between the trunk's y axis and up
         - `speed`: horizontal speed of the trunk's origin, m/s
         - `trunk_force`: as the property, N
-        - `slip_ratio`: mean over the wheels in contact of slip over the faster of rim and ground
-        - `work`: work through the wheel motors in the last call of `step`, driving or braking, J
+        - `slip_ratio`: mean over the wheels in contact of the slip divided by the faster of rim and
+          ground speed
+        - `work`: absolute work of the wheel motors in the last call of `step`, driving or braking,
+          J
         - `positive_work`: the driving part of it, J
         - `time`: s
         - `solver`: of the last call of `step`: 1 if it did not converge, iterations, residual,
           contacts
-        - `heights`: height of the ground at the points of the scan above the trunk's origin, m; nan
-          where there is no ground
+        - `heights`: height of the ground at the points of the scan relative to the trunk's origin,
+          m; NaN where there is no ground
 
         Args:
             n_scan: Number of points of the height scan.
@@ -1605,23 +1639,26 @@ class Simulation(AnySimulation):
         parts: bool = False,
         without: str | Sequence[str] = (),
     ) -> tuple[_Array, _Array]:
-        """Where rays meet the ground first, or the rover itself.
+        """Finds the first point at which each ray hits the ground or the rover itself.
 
-        Of the rover its wheels, boxes and balls are seen, as they collide.
+        Of the rover, the collision shapes are hit: wheels, boxes and balls.
 
         Args:
-            origins: Where the rays begin, world frame, (n, 3) or one (3,) for all, m.
-            directions: Where they go, world frame, (n, 3) or one (3,) for all, of any length.
-            max_range: Distance to which they are followed, m; without end by default.
-            parts: Whether the rover's own parts are met.
-            without: Names of solids whose parts are not met, such as the one that carries a sensor.
+            origins: Origins of the rays, world frame, (n, 3) or one (3,) for all, m.
+            directions: Directions of the rays, world frame, (n, 3) or one (3,) for all, of any
+                length.
+            max_range: Largest distance, m; unlimited by default.
+            parts: Whether rays hit the rover's own parts.
+            without: Names of solids that rays pass through, such as the one that carries the
+                sensor.
 
         Returns:
-            Distances, (n,), m, infinite where nothing is met, and the surface's unit normals there,
-            world frame, (n, 3), nan where nothing is met.
+            Distances, (n,), m, and the surface's unit normals at the hits, world frame, (n, 3). A
+            ray without a hit has an infinite distance and a NaN normal.
 
         Raises:
-            OptionError: As of `Plane.cast_rays`, or `without` names no solid of the model.
+            OptionError: As for `Terrain.cast_rays`, or `without` contains a name that is not a
+                solid of the model.
         """
     def momentum(self) -> tuple[_Array, _Array]:
         """Momentum of the rover.
@@ -1637,53 +1674,93 @@ class Simulation(AnySimulation):
     def poses(self) -> dict[str, tuple[_Array, _Array]]:
         """Origin (3,), m, and rotation matrix (3, 3) of every solid now, world frame, by name."""
     def last_problem(self) -> tuple[_Array, _Array, _Array]:
-        """The friction-contact problem of the last step, of the last part of a split one.
+        """The friction-contact problem of the last step; if the step was split, of its last part.
 
         Returns:
             Delassus operator W, (3 n_c, 3 n_c), 1/kg; free velocity, (3 n_c,), m/s; friction
             coefficients, (n_c,).
         """
-    def linearise(self, perturbation: float = 1e-6) -> Linearisation:
-        """Derivatives of the next step by state and command. The simulation does not change.
+    def linearise(
+        self, check: bool = False, perturbation: float = 1e-6, parameters: Sequence[str] | str = ()
+    ) -> Linearisation:
+        """Derivatives of the next step with respect to state, command and parameters.
 
-        The step is the one after `set_state(q, v)`, without memory of earlier impulses. Its
-        contacts and their modes are held, and so are the branches of the motors; the limits of the
-        commands are left out. Where the modes change within `perturbation`, the step has no such
-        derivative, and `Linearisation.holds` says so.
+        The simulation does not change. The step is taken as after `set_state(q, v)`, without warm
+        start. The active contacts, their modes and the branches of the motors' lines are held
+        constant; the limits of the commands are not considered. Where the modes change, the
+        derivative is not valid; with `check`, `Linearisation.holds` is False there.
 
         Args:
-            perturbation: Change of each entry of (x, u) in the two steps that test its column, m,
-                rad, m/s or rad/s, and 1000 times as many N m; from 1e-9 to 1e-3, 1e-6 by default.
+            check: Whether to test each column of (A, B) by two real steps, which takes ten
+                times as long as the derivatives; False by default.
+            perturbation: Change of each entry of (x, u) in these steps, m, rad, m/s or rad/s, and
+                1000 times as many N m; from 1e-9 to 1e-3, 1e-6 by default.
+            parameters: Names of parameters for C: "friction", the common coefficient; "mass" and
+                "mass:<body>", a factor of mass and inertia of all bodies or of one;
+                "damping:<joint>", N m s/rad or N s/m; "contact_stiffness" and "contact_damping",
+                factors of those of wheels that yield. None by default.
 
         Returns:
-            A, B, the modes and how far they hold.
+            The derivatives, the contact modes and their margins.
 
         Raises:
-            OptionError: `perturbation` is out of its range, or the variant is "newton".
+            OptionError: `perturbation` is out of its range, a parameter does not exist, or the
+                variant is "newton".
             StateError: A pitch is 90 degrees, where the coordinates are singular.
-            StepError: A step could not be taken, or was taken in parts or not solved, so that it
-                has no derivative.
+            StepError: The step failed, was split, or did not converge, so that it has no
+                derivative.
+        """
+    def differentiate(
+        self,
+        states: npt.ArrayLike,
+        commands: npt.ArrayLike,
+        parameters: Sequence[str] | str = (),
+        threads: int | None = None,
+    ) -> StepDerivatives:
+        """Takes steps from given states under given commands, with the derivatives of each.
+
+        The simulation does not change. Each step is taken as after `set_state`, without warm start,
+        so that it is a function of state, command and parameters, as in `linearise`. Torques
+        saturate at their limits. `rover_gym.derivatives` has products with these derivatives.
+
+        Args:
+            states: State (q, v) at the start of each trajectory, (n, nx) with nx = 2 nv.
+            commands: Wheel torques (N m) and steering set-points (rad) of each step,
+                (n, steps, nu) with nu = 2 n_wheels.
+            parameters: Names of parameters, as in `linearise`; none by default.
+            threads: Number of threads; one a core by default.
+
+        Returns:
+            States and derivatives.
+
+        Raises:
+            StateError: A state has a wrong shape or an entry that is not finite, or a pitch is 90
+                degrees.
+            CommandError: Commands have a wrong shape or an entry that is refused.
+            OptionError: A parameter does not exist, `threads` is out of its range, or the variant
+                is "newton".
+            StepError: A step failed, or has no derivative.
         """
     def profile(self, n: int = 1000) -> dict[str, float]:
-        """Measures where the time of a step goes, on a copy of this simulation.
+        """Measures the computing time of each part of a step, on a copy of this simulation.
 
         Args:
             n: Number of steps.
 
         Returns:
-            Mean time a step of each part (`kinematics`, `mass_matrix`, `solve` and so on), µs.
+            Mean time of each part (`kinematics`, `mass_matrix`, `solve` and so on) in a step, µs.
 
         Raises:
-            StepError: A step could not be taken.
-            OptionError: `n` is not a count.
+            StepError: A step failed.
+            OptionError: `n` is not a whole number from 0.
         """
     def __reduce__(self) -> Any: ...
 
 @disjoint_base
 class PlanarGround:
-    """Ground of a planar scene, of any kind: x forward, y up. Immutable.
+    """Base class of the grounds of planar scenes: x forward, y up. Immutable.
 
-    `Line`, `Sine`, `Spline` and `Polyline` are its kinds.
+    Its subclasses are `Line`, `Sine`, `Spline` and `Polyline`.
     """
 
     @overload
@@ -1707,7 +1784,7 @@ class Line(PlanarGround):
     """The ground y = slope x + offset of a planar scene.
 
     Args:
-        slope: Tangent of the inclination.
+        slope: Slope, rise over run.
         offset: Height at x = 0, m.
 
     Raises:
@@ -1717,7 +1794,7 @@ class Line(PlanarGround):
     def __new__(cls, slope: float = 0.0, offset: float = 0.0) -> Line: ...
     @property
     def slope(self) -> float:
-        """Tangent of the inclination."""
+        """Slope, rise over run."""
     @property
     def offset(self) -> float:
         """Height at x = 0, m."""
@@ -1755,9 +1832,9 @@ class Sine(PlanarGround):
 
 @final
 class Spline(PlanarGround):
-    """The natural cubic spline through points: a ground with continuous curvature.
+    """A natural cubic spline through points: ground with continuous curvature.
 
-    It goes on along its tangents beyond the first and the last point.
+    Beyond the first and the last point it continues along its tangents.
 
     Args:
         x: Places of the points, (n,), m, increasing.
@@ -1779,9 +1856,9 @@ class Spline(PlanarGround):
 
 @final
 class Polyline(PlanarGround):
-    """Straight pieces between points, with corners: a ground of steps, ramps and kerbs.
+    """Straight segments between points: ground with steps, ramps and kerbs.
 
-    Two points may stand above each other.
+    Two points may have the same x, for a vertical step.
 
     Args:
         x: Places of the points, (n,), m, not decreasing.
@@ -1814,11 +1891,11 @@ class Polyline(PlanarGround):
 
 @final
 class PlanarContacts:
-    """The contacts of a planar simulation's last step, as new arrays with one row a contact."""
+    """Contacts of a planar simulation in the last step, as new arrays with one row for each contact."""
 
     @property
     def discs(self) -> npt.NDArray[np.int64]:
-        """Indices of the discs that touch, (n,); 0 is the ball or wheel A, 1 wheel B."""
+        """Index of the disc in each contact, (n,); 0 is the ball or wheel A, 1 is wheel B."""
     @property
     def points(self) -> _Array:
         """Points of the ground, world frame, (n, 2), m."""
@@ -1832,7 +1909,7 @@ class PlanarContacts:
     def impulses(self) -> _Array:
         """Impulses of the step along normal and tangent, (n, 2), N s.
 
-        Where the step was split, they are sums over its parts.
+        If the step was split, these are sums over its parts.
         """
     @property
     def velocities(self) -> _Array:
@@ -1841,14 +1918,14 @@ class PlanarContacts:
 
 @disjoint_base
 class PlanarSimulation(AnySimulation):
-    """A planar machine on a ground: what the machines share. Made by the classes derived from it."""
+    """Base class of planar machines on a ground. It cannot be instantiated."""
 
     @property
     def ground(self) -> PlanarGround:
         """The ground."""
     @property
     def q(self) -> _Array:
-        """Coordinates, (nv,), x and y, m, then angles, rad, which turn to the left."""
+        """Coordinates, (nv,), x and y, m, then angles, rad, positive counterclockwise."""
     @property
     def v(self) -> _Array:
         """Rates of the coordinates, (nv,), m/s and rad/s."""
@@ -1866,9 +1943,9 @@ class PlanarSimulation(AnySimulation):
         """The keyword arguments that describe the machine."""
     @property
     def settings(self) -> dict[str, Any]:
-        """The keyword arguments that make a simulation with the same options."""
+        """Keyword arguments for a simulation with the same options."""
     def set_state(self, q: npt.ArrayLike, v: npt.ArrayLike | None = None) -> None:
-        """Sets coordinates and rates; torques stay.
+        """Sets coordinates and rates. Torques do not change.
 
         Time starts at 0, and the next step has no warm start.
 
@@ -1881,7 +1958,7 @@ class PlanarSimulation(AnySimulation):
                 changed.
         """
     def set_torques(self, torques: npt.ArrayLike) -> None:
-        """Sets the driving torques; each saturates at its limit, where the machine has one.
+        """Sets the driving torques; each saturates at its limit if the machine has one.
 
         Args:
             torques: Torques between the body and each disc, (n_discs,), N m, positive forward.
@@ -1895,7 +1972,7 @@ class PlanarSimulation(AnySimulation):
     def mass_matrix(self) -> _Array:
         """Mass matrix now, (nv, nv), in kg, kg m and kg m²."""
     def last_problem(self) -> tuple[_Array, _Array, _Array]:
-        """The friction-contact problem of the last step, of the last part of a split one.
+        """The friction-contact problem of the last step; if the step was split, of its last part.
 
         Returns:
             Delassus operator W, (2 n_c, 2 n_c), 1/kg; free velocity, (2 n_c,), m/s; friction
@@ -1911,10 +1988,11 @@ class BallSimulation(PlanarSimulation):
         ground: A `Line`, `Sine`, `Spline` or `Polyline`.
         mass: Mass, kg.
         radius: Radius, m.
-        inertia: Inertia about the centre, kg m²; that of a homogeneous disc by default.
-        **options: Options as of `Simulation`, from `gravity`, here (2,), to `warm_start`, and
-            `contact`: "nearest", the disc touches where the ground is nearest to its centre, or
-            "centre_height", the 2010 report's rule, by which the centre itself stops at the ground.
+        inertia: Inertia about the centre, kg m²; the inertia of a homogeneous disc by default.
+        **options: Options of `Simulation` from `gravity`, here (2,), to `warm_start`, and
+            `contact`: "nearest", the contact is the point of the ground nearest to the disc's
+            centre, or "centre_height", the rule of the 2010 report, by which the centre itself
+            stops at the ground.
 
     Raises:
         ModelError: `mass`, `radius` or `inertia` is not finite and positive.
@@ -1954,7 +2032,7 @@ class TwoWheelRoverSimulation(PlanarSimulation):
             default.
         axle_b: Front axle relative to the body's mass centre, body axes, (2,), m; (0.4, 0) by
             default.
-        **options: Options as of `BallSimulation`.
+        **options: Options of `BallSimulation`.
 
     Raises:
         ModelError: A mass, radius or inertia is not finite and positive, or the wheels overlap.
@@ -1979,20 +2057,20 @@ class TwoWheelRoverSimulation(PlanarSimulation):
 
 @final
 class MirroredRoverSimulation(PlanarSimulation):
-    """The six-wheel rover driven straight, in its plane of symmetry.
+    """The six-wheel rover driving straight ahead, as a planar machine in its plane of symmetry.
 
     Coordinates are x, y, m, theta, and the angle of each mirrored pair of joints, rad. Joints that
-    do not turn about z are locked at 0. Only wheels touch the ground. A torque is that of each
-    wheel of a pair.
+    do not turn about z are locked at 0. Only wheels touch the ground. Each torque acts on both
+    wheels of a pair.
 
     Args:
         ground: A `Line`, `Sine`, `Spline` or `Polyline`.
-        model: The machine, its own mirror image about the trunk's x-y plane; the built-in rover by
-            default.
-        **options: Options as of `BallSimulation`.
+        model: The machine, which must be symmetric about the trunk's x-y plane; the built-in rover
+            by default.
+        **options: Options of `BallSimulation`.
 
     Raises:
-        ModelError: The model is not its own mirror image.
+        ModelError: The model is not symmetric.
         TerrainError: `ground` is not a ground.
         OptionError: An option is out of its range.
         TypeError: An option is unknown.
@@ -2003,23 +2081,23 @@ class MirroredRoverSimulation(PlanarSimulation):
     ) -> MirroredRoverSimulation: ...
     @property
     def joints(self) -> list[list[str]]:
-        """Names of the joints that share each coordinate from the fourth on."""
+        """Names of the joints of each coordinate from the fourth on."""
     @property
     def wheels(self) -> list[list[str]]:
         """Names of the wheels of each disc."""
 
 @final
 class SimulationBatch:
-    """Many rovers stepped side by side on several threads, each bit for bit as it would be alone.
+    """Steps many rovers on several threads. Each gives the same bits as it would alone.
 
-    The batch copies the simulations. One call at a time: a call during another one raises
+    The batch copies the simulations. Only one call may run at a time; a second call raises
     BusyError.
 
     Args:
-        simulations: Simulations of models with equally many coordinates.
+        simulations: Simulations whose models have the same number of coordinates.
         scan: Points of the height scan ahead and to the right of the trunk's origin in the heading
             frame, (n, 2), m; none by default.
-        threads: Number of threads; one a core by default.
+        threads: Number of threads; one for each core by default.
 
     Raises:
         OptionError: There are no simulations or their models differ in size, `scan` has a wrong
@@ -2034,14 +2112,14 @@ class SimulationBatch:
         """Number of threads."""
     @property
     def instruction_set(self) -> Literal["AVX-512", "AVX2", "baseline"]:
-        """Either "AVX-512", "AVX2" or "baseline".
+        """Instruction set of the processor, "AVX-512", "AVX2" or "baseline".
 
         The widest that the processor has, unless the environment variable `ROVER_GYM_INSTRUCTIONS`
         names another. Results do not depend on it.
         """
     @property
     def reading_layout(self) -> dict[str, slice]:
-        """Place of each quantity in a row of readings; `Simulation.reading_layout` lists them."""
+        """The slice of each quantity in a row of readings; see `Simulation.reading_layout`."""
     def step(
         self,
         torques: npt.ArrayLike,
@@ -2052,33 +2130,34 @@ class SimulationBatch:
     ) -> tuple[_Array, dict[int, str]]:
         """Sets the commands of all rovers and takes n steps.
 
-        Ctrl-C ends the call after a whole step of each rover, which need not be the same one.
+        Ctrl-C ends the call after the current step of each rover. The rovers may then have taken
+        different numbers of steps.
 
         Args:
-            torques: Commands as of `Simulation.set_wheel_torques`, (n_rovers, n_wheels), N m.
-            set_points: Commands as of `Simulation.set_steering`, (n_rovers, n_wheels), rad.
+            torques: Commands for `Simulation.set_wheel_torques`, (n_rovers, n_wheels), N m.
+            set_points: Commands for `Simulation.set_steering`, (n_rovers, n_wheels), rad.
             n: Number of steps.
-            active: Which rovers move, (n_rovers,); all by default. The others stay as they are.
+            active: Which rovers move, (n_rovers,); all by default. The others do not change.
 
         Returns:
-            A row of readings for each rover, (n_rovers, size), and the message of the StepError of
-            each rover that could not take a step, by its index. The other rovers go on.
+            A row of readings for each rover, (n_rovers, size), and a mapping from the index of each
+            rover whose step failed to the message of its StepError. The other rovers continue.
 
         Raises:
-            CommandError: An array has a wrong shape or an entry that a rover refuses. No rover has
-                moved.
+            CommandError: An array has a wrong shape or an entry that is invalid for a rover. No
+                rover has moved.
             OptionError: `n` or `active` is invalid.
         """
     def readings(self) -> _Array:
         """The readings of all rovers now, (n_rovers, size)."""
     def replace(self, index: int, simulation: Simulation, target: Sequence[float] | None = None) -> None:
-        """Puts a copy of a simulation, with its own terrain, in the place of a rover.
+        """Replaces a rover by a copy of a simulation, with its terrain.
 
         Args:
             index: Index of the rover.
-            simulation: Its replacement, a model with equally many coordinates.
-            target: The place (x, z) on the map that its readings refer to, m; the origin by
-                default.
+            simulation: The new simulation, with the same number of coordinates.
+            target: Place (x, z) to which the entry `target` of its readings refers, m; the origin
+                by default.
 
         Raises:
             OptionError: There is no such rover, or an argument is invalid. Nothing has changed.
@@ -2096,39 +2175,40 @@ class SimulationBatch:
 
 @final
 class EpisodeRules:
-    """What all episodes of a driving task share.
+    """Rules of a driving task, which all its episodes share.
 
     Args:
         model: The machine.
         substeps: Physics steps of a control period.
         dt: Control period, s.
-        torque_limits: Torque of a torque action of 1, (n_wheels,), N m.
-        max_steering: Set-point of a steering action of 1, rad. Actions have an entry for each
-            steering joint, in the order of the wheels, after the torques; none if this is 0.
+        torque_limits: Torque for an action of 1, (n_wheels,), N m.
+        max_steering: Steering set-point for an action of 1, rad. After the torques, actions have an
+            entry for each steering joint, in the order of the wheels; none if this is 0.
         goal_tolerance: Distance within which the goal is reached, m.
         cos_max_tilt: Cosine of the tilt beyond which the rover has rolled over.
-        stuck_time: Time until a high-centred rover ends the episode, s.
-        weights: Weights of the reward, one for each of its terms.
-        scale: Value of an entry of 1 of the observation, (size,).
-        noise: Standard deviation of each entry's noise, (size,); no noise by default.
+        stuck_time: Time after which an episode with a high-centred rover ends, s.
+        weights: Weights of the terms of the reward, in the order of `terms`.
+        scale: Physical value that each entry of the observation is divided by, (size,).
+        noise: Standard deviation of the noise of each entry, (size,); no noise by default.
         scan: Points of the height scan ahead and to the right of the trunk's origin in the heading
             frame, (n, 2), m; none by default.
-        goals: Number of goals that are reached one after the other. The observation of several has
-            three entries more before the heights: the goal after the present one, ahead and to the
+        goals: Number of goals to reach in sequence. With more than one, the observation has three
+            further entries before the heights: the goal after the present one, ahead and to the
             right, m, and the number of goals still to reach.
-        battery: Work of the motors, driving or braking, after which the battery is empty and the
-            episode ends, J; none by default. The observation of a rover with a battery has one
-            entry more, after the time to high-centring: the fraction of its charge.
+        battery: Energy of the battery, J; none by default. The work of the motors, driving or
+            braking, discharges it, and the episode ends when it is empty. With a battery, the
+            observation has one further entry after the time to high-centring: the state of charge,
+            from 0 to 1.
 
     Raises:
         ModelError: `model` is not a RoverModel.
-        OptionError: A number is out of its range, a list has a wrong length, or the weights are not
-            those of the terms.
+        OptionError: A number is out of range, a list has a wrong length, or the number of weights
+            differs from that of the terms.
     """
 
     @property
     def terms(self) -> tuple[str, ...]:
-        """Names of the reward's terms, in the order of their sum."""
+        """Names of the terms of the reward, in the order in which they are summed."""
     def __new__(
         cls,
         model: RoverModel,
@@ -2151,9 +2231,9 @@ class EpisodeRules:
 
 @final
 class EpisodeRun:
-    """One episode of a driving task: what its simulation does not hold.
+    """State of an episode of a driving task, beside its simulation.
 
-    `begin` and `from_bytes` make one.
+    Create it by `begin` or `from_bytes`.
     """
 
     @staticmethod
@@ -2168,22 +2248,22 @@ class EpisodeRun:
         normals: npt.ArrayLike | None = None,
         further: npt.ArrayLike | None = None,
     ) -> EpisodeRun | None:
-        """The beginning of an episode.
+        """Begins an episode.
 
         Args:
-            rules: What all episodes of the task share.
-            simulation: The rover at its start.
+            rules: Rules of the task.
+            simulation: The rover at the start of the episode.
             goal: The goal (x, z), m.
-            domain: Properties of rover and world: mass_scale, friction, actuator_gain,
+            domain: Physical properties of the episode: mass_scale, friction, actuator_gain,
                 gravity_scale.
             trunk_load_limit: Force on the trunk beyond which the rover is high-centred, N.
             difficulty: Difficulty of the rocks.
-            normals: A standard normal number for each entry of the observation, (size,), where the
-                rules have noise.
+            normals: A standard normal number for each entry of the observation, (size,); needed if
+                the rules have noise.
             further: Goals after the first, (n, 2), x and z, m; none by default.
 
         Returns:
-            The episode; None if its observation is not finite in float32.
+            The episode; None if its first observation is not finite in float32.
 
         Raises:
             OptionError: An argument has a wrong shape or a number that is not finite, or the
@@ -2197,22 +2277,24 @@ class EpisodeRun:
         *,
         has_scan: bool = True,
     ) -> tuple[_Observation, float, bool, dict[str, Any]]:
-        """Gives the simulation an action for one control period.
+        """Applies an action for one control period.
 
-        Other threads run meanwhile. Ctrl-C, or whatever else a signal handler raises, ends the call
-        after a whole physics step, whose state stays; the episode then stays as before the call.
+        Other Python threads run in the meantime. Ctrl-C, or another exception of a signal handler,
+        ends the call after the current physics step. The simulation then has the state after that
+        step, the episode the state before the call.
 
         Args:
-            simulation: The rover of this episode, a `Simulation`, or a `RoverGrainSimulation` where
-                it drives among grains.
+            simulation: The rover of this episode: a `Simulation`, or a `RoverGrainSimulation` if it
+                drives among grains.
             action: Torques, then steering, within [-1, 1], (n_actions,).
-            normals: A standard normal number for each entry of the observation, (size,), where the
-                rules have noise.
-            has_scan: Whether the heights are taken. Without, only a period that ends the episode
-                takes them; otherwise the last ones stay until `complete`.
+            normals: A standard normal number for each entry of the observation, (size,); needed if
+                the rules have noise.
+            has_scan: Whether to update the height scan. If False, it is updated only when the
+                episode ends; otherwise the observation keeps the previous heights until `complete`
+                is called.
 
         Returns:
-            Observation (size,) float32, reward, whether the episode has ended, and info.
+            Observation (size,) float32, reward, whether the episode has terminated, and info.
 
         Raises:
             CommandError: The action has a wrong shape or an entry that is not finite or outside
@@ -2227,26 +2309,27 @@ class EpisodeRun:
         *,
         message: str | None = None,
     ) -> tuple[_Observation, float, bool, dict[str, Any]]:
-        """Goes on by a control period that ended with a reading, without a simulation.
+        """Advances the episode by a control period, from a reading instead of a simulation.
 
         Args:
-            reading: As of `Simulation.reading` with the goal as its target and the rules' scan.
-            action: As of `step`.
-            normals: As of `step`.
-            message: The message of the physics step that failed, if one did.
+            reading: A reading from `Simulation.reading` at the end of the period, with the goal as
+                target and the scan of the rules.
+            action: As for `step`.
+            normals: As for `step`.
+            message: The message of the StepError, if a physics step failed.
 
         Returns:
-            As `step`.
+            As for `step`.
 
         Raises:
-            CommandError: As `step`.
+            CommandError: As for `step`.
             OptionError: `reading` or `normals` has a wrong length.
         """
     def complete(self, simulation: Simulation) -> _Observation:
-        """Takes the heights that the last observation lacks, if it lacks any.
+        """Updates the height scan of the last observation, if `step` left it out.
 
         Args:
-            simulation: The rover of this episode, which has not moved since.
+            simulation: The rover of this episode, in the state of the last observation.
 
         Returns:
             The last observation, (size,) float32.
@@ -2259,9 +2342,9 @@ class EpisodeRun:
         """The last action, (n_actions,); zeros at the beginning."""
     @property
     def goal(self) -> _Range:
-        """The present goal (x, z), m; the last one where all are reached."""
+        """The present goal (x, z), m; the last one if all are reached."""
     def info(self) -> dict[str, Any]:
-        """The info of the last period, or of the beginning."""
+        """The info of the last control period, or of the start."""
     def changed(
         self,
         *,
@@ -2271,67 +2354,66 @@ class EpisodeRun:
         trunk_load_limit: float | None = None,
         seen: EpisodeRun | None = None,
     ) -> EpisodeRun:
-        """The same episode with other properties, another goal, or seen by other rules.
+        """Returns a copy of the episode with another goal, other properties, or other rules.
 
         Args:
-            goal: The first goal, (x, z), m; none counts as reached, and an episode that has ended
-                goes on.
+            goal: The first goal, (x, z), m. No goal then counts as reached, and a terminated
+                episode continues.
             distance: Horizontal distance to the present goal, m.
-            domain: Properties of rover and world, as of `begin`.
+            domain: Physical properties, as for `begin`.
             trunk_load_limit: Force on the trunk beyond which the rover is high-centred, N.
-            seen: An episode whose rules and observation are taken over.
+            seen: An episode whose rules and observation are copied.
 
         Raises:
             OptionError: An argument has a wrong shape or a number that is not finite, or does not
                 fit the rules.
         """
     def to_bytes(self) -> bytes:
-        """All that an episode holds, as `from_bytes` reads it."""
+        """The state of the episode as bytes, for `from_bytes`."""
     @staticmethod
     def from_bytes(rules: EpisodeRules, data: bytes) -> EpisodeRun:
-        """An episode that goes on.
+        """Restores an episode.
 
         Args:
-            rules: What all episodes of the task share.
-            data: What `to_bytes` returned.
+            rules: Rules of the task.
+            data: Bytes from `to_bytes`.
 
         Raises:
-            StateError: The bytes are not those of an episode.
+            StateError: The bytes are not an episode.
             OptionError: The episode does not fit the rules.
         """
     def __reduce__(self) -> Any: ...
 
 @final
 class EpisodeDistribution:
-    """What the episodes of a task are drawn from.
+    """Distribution of the episodes of a task.
 
-    Draws come from generators that are number for number NumPy's `PCG64`; a generator is given and
-    returned as four unsigned 64-bit numbers: high and low half of its state, high and low half of
-    its increment.
+    Random generators give the same numbers as NumPy's `PCG64`. A generator is four unsigned 64-bit
+    numbers: high and low half of its state, high and low half of its increment.
 
     Args:
-        rules: What all episodes share; rocks leave the goal clear within its tolerance.
-        simulation: The rover, before its masses are scaled, and the options of its steps.
+        rules: What all episodes share; rocks keep the goal's tolerance free.
+        simulation: A rover with unscaled masses, which also sets the options of the time stepping.
         start: Ranges (low, high) of `slope`, `uphill`, `heading`, `goal_distance`, `goal_bearing`
-            and `turn`, by name, rad and m. A goal after the first lies at a distance from
-            `goal_distance` from the one before it, in the direction of the last leg turned by
+            and `turn`, by name, rad and m. Each further goal lies at a distance drawn from
+            `goal_distance` from the previous goal, in the direction of the last leg, turned by
             `turn`.
         domain: Ranges of `mass_scale`, `friction`, `actuator_gain` and `gravity_scale`, by name.
-        trunk_load_limit: Force on the trunk beyond which the rover is high-centred, before masses
-            and gravity are scaled, N.
-        rocks: Range of `difficulty`, and `abundance` and `max_radius` or None, by name; None for no
-            rocks.
-        slope_by_difficulty: Whether the slope follows from the difficulty of the rocks.
-        ground: The ground of every episode, a terrain of any kind; None for a tilted plane.
-        hills: Fractal ground: root mean square of its slope, rise over run, or nan for one that
-            follows from the difficulty of the rocks; None for none. Not together with `ground`.
-        sand: Soft grounds, one of which is drawn, on a tilted plane with ripples by the difficulty
-            of the rocks; their surfaces do not count; None for none. Not together with the two
-            others.
+        trunk_load_limit: Force on the trunk beyond which the rover is high-centred, N, before
+            scaling by masses and gravity.
+        rocks: A mapping with the range of `difficulty`, and `abundance` and `max_radius`, each of
+            which may be None; None for no rocks.
+        slope_by_difficulty: Whether the difficulty of the rocks determines the slope.
+        ground: A terrain for all episodes; None for a tilted plane.
+        hills: Root mean square slope of fractal ground, rise over run, or NaN if the difficulty of
+            the rocks determines it; None for no fractal ground. Not together with `ground`.
+        sand: Soft grounds from which the soil of each episode is drawn; None for rigid ground. The
+            surface is a tilted plane with ripples that grow with the difficulty of the rocks; the
+            surfaces of the given grounds are not used. Not together with `ground` or `hills`.
 
     Raises:
-        OptionError: An argument is missing, no number, or out of its range.
-        TerrainError: `ground` is no terrain.
+        OptionError: An argument is missing, not a number, or out of range.
+        TerrainError: `ground` is not a terrain.
     """
 
     def __new__(
@@ -2356,23 +2438,24 @@ class EpisodeDistribution:
         difficulties: Sequence[_Range | None] | None = None,
         fixed: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
     ) -> DrawnEpisodes:
-        """Draws one episode from each generator; `EpisodeBatch.draw` does it on several threads.
+        """Draws one episode from each generator. `EpisodeBatch.draw` does the same on several threads.
 
-        A scene in which the rover would stand deeper than 1 cm in the ground or in a sphere is
-        drawn again. The given generators do not change: see `DrawnEpisodes.generators`.
+        A scene is drawn again if the rover would penetrate the ground or a rock by more than 1 cm.
+        The given generators do not change: see `DrawnEpisodes.generators`.
 
         Args:
             generators: Generators, (m, 4) uint64.
-            attempts: Most scenes drawn for a rover until it has room.
-            difficulties: For each generator a range (low, high) that replaces that of the rocks'
-                difficulty, or None; by default none.
-            fixed: Values that replace draws, which are made all the same, by name: `slope`,
-                `uphill`, `position` (x, z), `heading`, `goal` (x, z), `further` (n, 2) of the goals
-                after it, `difficulty`, `field_seed`, `q`, `v`; one mapping for all or a list of one
-                for each generator; none by default.
+            attempts: Largest number of scenes drawn for each episode.
+            difficulties: For each generator, None or a range (low, high) of the rocks' difficulty
+                that replaces the distribution's; None by default.
+            fixed: Values that replace drawn ones, by name; the random numbers are drawn
+                nevertheless: `slope`, `uphill`, `position` (x, z), `heading`, `goal` (x, z),
+                `further` (n, 2) of the goals after it, `difficulty`, `field_seed`, `q`, `v`; one
+                mapping for all, or a list with one for each generator; none by default.
 
         Raises:
-            TerrainError: A rover has no room in `attempts` scenes, or the ground refuses a number.
+            TerrainError: In all of the `attempts` scenes the rover penetrates the ground, or a
+                parameter of the ground is invalid.
             StateError: `q` or `v` has a wrong length or an entry that is not finite, or float32
                 cannot hold the observation.
             ModelError: A scaled mass is out of its range.
@@ -2386,33 +2469,33 @@ class DrawnEpisodes:
 
     @property
     def generators(self) -> _Rows:
-        """The generators after the draws, (m, 4) uint64."""
+        """States of the generators after the draws, (m, 4) uint64."""
     @property
     def observations(self) -> _Observation:
         """First observations, (m, size) float32."""
     @property
     def starts(self) -> _Array:
-        """Starts, (m, 5 + 2 n) with n goals, rad and m.
+        """Starts of the episodes, (m, 5 + 2 n) with n goals, rad and m.
 
         Slope, direction of steepest ascent, x and z of the start, heading, x and z of each goal.
         """
     @property
     def domains(self) -> _Array:
-        """Properties of rover and world, (m, 4).
+        """Physical properties, (m, 4).
 
-        Factor of the masses, friction, gain of the motors, factor of gravity.
+        Mass scale, friction, actuator gain, gravity scale.
         """
     @property
     def rocks(self) -> _Array:
         """Rocks, (m, 3); zeros where there are none.
 
-        Difficulty, abundance, radius of the largest in wheel radii.
+        Difficulty, abundance, radius of the largest rock in wheel radii.
         """
     @property
     def rock_seeds(self) -> _Rows:
         """Seeds of the rocks, (m,) uint64; zeros where there are none."""
     def episode(self, index: int) -> EpisodeRun:
-        """An episode, which has begun.
+        """An episode in its first state.
 
         Args:
             index: Number of the episode.
@@ -2430,7 +2513,7 @@ class DrawnEpisodes:
             OptionError: There is no such episode.
         """
     def plane(self, index: int) -> Plane:
-        """The plane of an episode, under rocks too; None where the ground has none.
+        """The plane of an episode, also under rocks; None if the ground has none.
 
         Args:
             index: Number of the episode.
@@ -2451,17 +2534,17 @@ class DrawnEpisodes:
 
 @final
 class EpisodeBatch:
-    """Many rovers with their episodes, each bit for bit as it would be alone.
+    """Steps many rovers and their episodes. Each gives the same bits as it would alone.
 
-    One call at a time: a call during another one raises BusyError. Methods that take the index of a
-    rover raise OptionError where there is no such rover, or where its episode has not begun.
+    Only one call may run at a time; a second call raises BusyError. Methods that take the index of
+    a rover raise OptionError if there is no such rover or if its episode has not begun.
 
     Args:
-        rules: What all episodes share.
-        simulation: A rover of the task; the batch begins with copies of it, without episodes.
+        rules: Rules of the task.
+        simulation: A rover of the task. The batch starts with copies of it, without episodes.
         n: Number of rovers.
         max_steps: Control periods until an episode is truncated; no limit by default.
-        threads: Number of threads; one a core by default.
+        threads: Number of threads; one for each core by default.
 
     Raises:
         OptionError: An argument is out of its range, or the model does not fit the rules.
@@ -2482,21 +2565,22 @@ class EpisodeBatch:
     def step(
         self, actions: object, active: npt.NDArray[np.bool_] | None = None, *, has_scan: bool = True
     ) -> tuple[_Observation, _Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_], list[int]]:
-        """Gives all rovers their actions for one control period.
+        """Applies the actions of all rovers for one control period.
 
-        Ctrl-C ends the call after a whole physics step of each rover, which need not be the same
-        one.
+        Ctrl-C ends the call after the current physics step of each rover. The rovers may then have
+        taken different numbers of steps.
 
         Args:
-            actions: As of `EpisodeRun.step`, (n_rovers, n_actions).
-            active: Which rovers move, (n_rovers,); all by default. The others stay as they are.
-            has_scan: Whether the heights are taken. Without, only episodes that end or reach the
-                time limit take them; the others keep the last ones.
+            actions: Actions as for `EpisodeRun.step`, (n_rovers, n_actions).
+            active: Which rovers move, (n_rovers,); all by default. The others do not change.
+            has_scan: Whether to update the height scans. If False, they are updated only in
+                episodes that terminate or reach the time limit; the others keep the previous
+                heights.
 
         Returns:
-            Observations (n_rovers, size) float32, rewards (n_rovers,), which episodes have ended,
-            which have reached the time limit, (n_rovers,), and the indices of all that have done
-            either. A rover that stays has the values of its last period.
+            Observations (n_rovers, size) float32, rewards (n_rovers,), which episodes are
+            terminated and which are truncated, (n_rovers,) each, and the indices of the rovers with
+            either. A rover that is not active keeps the values of its last period.
 
         Raises:
             CommandError: The actions have a wrong shape or an entry that is not finite or outside
@@ -2512,50 +2596,51 @@ class EpisodeBatch:
         attempts: int = 100,
         has_scan: bool = True,
     ) -> tuple[_Observation, _Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_], list[int]]:
-        """Gives all rovers their actions for one control period and begins the next episodes.
+        """Applies the actions of all rovers for one control period, and starts new episodes.
 
-        Those rovers begin anew whose episode is over; what they begin is drawn on the threads of
-        this batch from their own generators. Ctrl-C ends the call as it ends that of `step`.
+        A rover whose episode is over gets a new one, drawn from the rover's own generator on the
+        threads of this batch. Ctrl-C ends the call as in `step`.
 
         Args:
-            actions: As of `step`.
-            distribution: What the next episodes are drawn from.
-            same_step: Whether an episode is followed by the next in the step that ends it, see
-                `finals`. If not, the next one begins in the following step; its rover does not move
-                in that step and earns nothing.
-            attempts: As of `EpisodeDistribution.draw`.
-            has_scan: As of `step`.
+            actions: As for `step`.
+            distribution: Distribution of the next episodes.
+            same_step: Whether the next episode begins in the same step that ends the previous one
+                (see `finals`). Otherwise it begins in the following step, in which the rover does
+                not move and the reward is 0.
+            attempts: As for `EpisodeDistribution.draw`.
+            has_scan: As for `step`.
 
         Returns:
-            As of `step`. Where an episode has begun, the observation is its first; with `same_step`
-            all else is that of the episode that has ended. If an episode that is to follow in the
-            same step cannot be drawn, none begins, and the next call refuses it.
+            As for `step`. If an episode has begun, the observation is its first one; with
+            `same_step` the other values belong to the episode that has ended. If with `same_step`
+            the next episode cannot be drawn, none begins, and the next call raises the error.
 
         Raises:
-            CommandError: As of `step`.
+            CommandError: As for `step`.
             OptionError: An argument is invalid, or an episode has not begun. No rover has moved.
-            RoverGymError: As of `EpisodeDistribution.draw`, for the first rover that has one and
-                whose episode was over before this call. No rover has moved.
+            RoverGymError: The next episode of a rover whose episode was over before this call
+                cannot be drawn, see `EpisodeDistribution.draw`; the error of the first such rover.
+                No rover has moved.
         """
     @property
     def over(self) -> list[int]:
-        """Indices of the rovers whose episode is over and whose next has not begun, in order."""
+        """Sorted indices of the rovers whose episode is over and whose next has not begun."""
     def finals(self) -> dict[int, tuple[_Observation, dict[str, Any]]]:
-        """The episodes that the last call of `step_on` with `same_step` has ended.
+        """Final observations and infos of episodes that ended in `step_on` with `same_step`.
 
         Returns:
-            For each index of a rover, in order, the last observation (size,) float32 and the last
-            info. Empty after `step`.
+            A mapping from the index of each rover whose episode ended in the last call, sorted, to
+            the last observation (size,) float32 and the last info. Empty after `step`.
         """
     def infos(self) -> dict[str, Any]:
-        """The infos of all rovers, of their last periods or beginnings.
+        """The infos of all rovers, each of its last control period or of its start.
 
         Returns:
-            For each entry an array (n_rovers,), and under its name after an underscore the mask of
-            the rovers that have it: all.
+            For each entry an array (n_rovers,), and under its name with a leading underscore a mask
+            of the rovers that have the entry: all True.
         """
     def info(self, index: int) -> dict[str, Any]:
-        """The info of one rover, of its last period or beginning.
+        """The info of one rover, of its last control period or of its start.
 
         Args:
             index: Index of the rover.
@@ -2571,23 +2656,24 @@ class EpisodeBatch:
         difficulties: Sequence[_Range | None] | None = None,
         fixed: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
     ) -> DrawnEpisodes:
-        """Draws episodes on the threads of this batch; no rover changes.
+        """Draws episodes on the threads of this batch. The rovers do not change.
 
         Args:
-            distribution: What the episodes are drawn from.
+            distribution: Distribution of the episodes.
             generators: Generators, (m, 4) uint64.
-            attempts: As of `EpisodeDistribution.draw`, as the next two.
-            difficulties: See there.
-            fixed: See there.
+            attempts: As for `EpisodeDistribution.draw`.
+            difficulties: As for `EpisodeDistribution.draw`.
+            fixed: As for `EpisodeDistribution.draw`.
 
         Returns:
-            The episodes, the same for any number of threads.
+            The episodes. They do not depend on the number of threads.
 
         Raises:
-            RoverGymError: As of `EpisodeDistribution.draw`, for the first rover that has one.
+            RoverGymError: An episode cannot be drawn, see `EpisodeDistribution.draw`; the error of
+                the first such episode.
         """
     def begin(self, indices: Sequence[int], episodes: DrawnEpisodes) -> None:
-        """Begins drawn episodes.
+        """Starts drawn episodes.
 
         Args:
             indices: Indices of the rovers, one for each episode.
@@ -2607,19 +2693,19 @@ class EpisodeBatch:
         steps: int = 0,
         message: str | None = None,
     ) -> None:
-        """Puts copies of a rover in the middle of its episode in the places of others.
+        """Replaces rovers by copies of a rover in the middle of its episode.
 
-        With `simulation`, `episode`, `origin`, `steps` and `generators` of one rover the copies
-        continue it bit for bit.
+        With the `simulation`, `episode`, `origin`, `steps` and `generators` of one rover, the
+        copies continue bit for bit.
 
         Args:
-            indices: Indices of the rovers that it replaces.
+            indices: Indices of the rovers to replace.
             simulation: The rover.
             episode: Its episode, with the rules of the batch.
-            origin: Where and on what it began, as `origin` tells.
+            origin: Start and ground of the episode, as returned by `origin`.
             generator: Generator of the noise, (1, 4) uint64.
             steps: Control periods since the episode began.
-            message: Message of the physics step that failed, if that has ended the episode.
+            message: Message of the StepError, if one has ended the episode.
 
         Raises:
             OptionError: There is no such rover, or an argument does not fit. Nothing has changed.
@@ -2637,7 +2723,7 @@ class EpisodeBatch:
             index: Index of the rover.
         """
     def generators(self, indices: Sequence[int]) -> _Rows:
-        """The generators of rovers, from which their noise is drawn.
+        """The random generators of rovers, from which noise and next episodes are drawn.
 
         Args:
             indices: Indices of the rovers.
@@ -2657,29 +2743,29 @@ class EpisodeBatch:
                 wrong shape. Nothing has changed.
         """
     def origin(self, index: int) -> tuple[_Array, _Array, int, _Array]:
-        """Where and on what the episode of a rover has begun.
+        """Start and ground of a rover's episode.
 
         Args:
             index: Index of the rover.
 
         Returns:
-            Its rows of `DrawnEpisodes.starts`, `rocks`, `rock_seeds` and `domains`.
+            Its row of each of `DrawnEpisodes.starts`, `rocks`, `rock_seeds` and `domains`.
         """
     def difficulty(self, index: int) -> _Range | None:
-        """Range (low, high) of the rocks' difficulty in the next episodes of a rover, if any is set.
+        """Range (low, high) of the rocks' difficulty in the next episodes of a rover; None if not set.
 
         Args:
             index: Index of the rover.
         """
     def set_difficulty(self, index: int, difficulty: _Range | None) -> None:
-        """Sets the range of the rocks' difficulty in the episodes that `step_on` begins with a rover.
+        """Sets the range of the rocks' difficulty for a rover's next episodes in `step_on`.
 
         Args:
             index: Index of the rover.
-            difficulty: The range (low, high); None for that of the distribution.
+            difficulty: The range (low, high); None for the range of the distribution.
 
         Raises:
-            OptionError: There is no such rover, or `difficulty` is no range.
+            OptionError: There is no such rover, or `difficulty` is not a range.
         """
     def terrain(self, index: int) -> Plane | SphereField:
         """The ground of one rover.
@@ -2697,47 +2783,46 @@ class EpisodeBatch:
 
 @final
 class SoilSimulation(AnySimulation):
-    """A granular soil of disks, and a machine that drives on it.
+    """A planar granular soil of disks, with an optional machine that drives on it.
 
-    The disks are free, with friction, between walls or on a ground.
+    The disks move freely and touch with friction. Walls or a ground contain them.
 
     Args:
         radius: Radii of the disks, (n,), m.
-        mass: Masses of the disks, (n,), kg; they are homogeneous.
+        mass: Masses of the disks, which are homogeneous, (n,), kg.
         position: Centres, (n, 2), m, or centres and angles, (n, 3), m and rad.
-        kinematic: Disks whose velocity no force changes, (n,), such as grains glued to a rough
-            floor, or a piston with the velocity that `set_state` gives it; none by default. They
-            may overlap one another and walls.
+        kinematic: Which disks have a prescribed velocity, (n,); none by default. Use it for grains
+            glued to a rough floor, or for a piston with the velocity given to `set_state`. These
+            disks may overlap each other and walls.
         walls: A point of each wall and the normal to its free side, (n, 4), m; none by default.
         ground: A `Line`, `Sine`, `Spline` or `Polyline` below the disks; none by default.
         rover: Keyword arguments of `TwoWheelRoverSimulation` that describe a rover, such as its
             `parameters`; none by default.
-        rig: Mass (kg) and radius (m) of a single wheel whose forward speed and turning rate no
-            force changes; none by default.
+        rig: Mass (kg) and radius (m) of a single wheel with prescribed forward speed and turning
+            rate; none by default.
         machine: Coordinates of the rover (x, y, theta, theta_A, theta_B) or of the rig (x, y, -,
             theta, -), (5,), m and rad.
         friction: Coulomb's coefficient between disks.
         wall_friction: Coulomb's coefficient of disks on walls and ground.
         wheel_friction: Coulomb's coefficient of wheels.
-        rolling_friction: Largest moment that resists the rolling of a disk on a disk, wall or
-            ground, over the normal force and the rolling radius: 1/r = 1/r_1 + 1/r_2 of two disks,
-            the disk's own radius elsewhere. It does not act on wheels, or where Coulomb's
-            coefficient is 0.
+        rolling_friction: Coefficient of rolling friction of disks: the largest resisting moment
+            divided by the normal force and the rolling radius r. Between two disks 1/r = 1/r_1 +
+            1/r_2; on a wall or the ground r is the disk's radius. It does not act on wheels, nor if
+            Coulomb's coefficient is 0.
         restitution: Newton's coefficient of all contacts, in [0, 1].
         gravity: Gravity, (2,), m/s²; (0, -9.81) by default.
         time_step: Time step, s.
-        tolerance: Largest relative residual of the contact problem. Its velocities are also right
-            to ten times that in m/s, times the square root of gravity over 9.81 m/s².
+        tolerance: Largest relative residual of the contact problem. Errors of velocities are also
+            at most ten times this value in m/s, times the square root of gravity / 9.81 m/s².
         max_iterations: Largest number of sweeps of the contact solver in a step.
-        stabilisation: "projection" moves overlapping bodies apart, which may add energy by lifting
-            those above; "none" leaves them. By default "none" without restitution and "projection"
-            with it.
-        penetration_tolerance: Overlap that projection leaves alone, m; 0.5% of the smallest radius
-            by default.
-        sleep: Whether disks at rest far from anything that moves are left out of the step.
+        stabilisation: Treatment of overlaps: "projection" moves overlapping bodies apart, which may
+            add energy by lifting those above; "none" leaves them. By default "projection" with
+            restitution and "none" without.
+        penetration_tolerance: Overlap that projection does not correct, m; 0.5% of the smallest
+            radius by default.
+        sleep: Whether to skip disks that are at rest and far from moving bodies.
         sleep_speed: Speed below which a disk is at rest, m/s; 5e-4 by default.
-        sleep_distance: Distance within which nothing may move for a disk to sleep, m; 0.2 by
-            default.
+        sleep_distance: A disk sleeps if no body within this distance moves, m; 0.2 by default.
 
     Raises:
         ModelError: A radius or mass is not finite and positive, or the machine's data are invalid.
@@ -2788,10 +2873,10 @@ class SoilSimulation(AnySimulation):
         """Rates of `position`, (n, 3), m/s and rad/s."""
     @property
     def kinematic(self) -> npt.NDArray[np.bool_]:
-        """Which disks are kinematic, (n,)."""
+        """Which disks have a prescribed velocity, (n,)."""
     @property
     def asleep(self) -> npt.NDArray[np.bool_]:
-        """Which disks sleep, (n,); kinematic ones always do."""
+        """Which disks sleep, (n,); True for disks with a prescribed velocity."""
     @property
     def machine(self) -> npt.NDArray[np.float64]:
         """Coordinates of the machine, (5,), m and rad; empty without one."""
@@ -2809,10 +2894,10 @@ class SoilSimulation(AnySimulation):
         """Commanded torques of the rover's wheels, (2,), N m, positive forward; empty without a rover."""
     @property
     def pull(self) -> tuple[float, float]:
-        """Force at the machine's centre along x and y, N."""
+        """External force at the machine's centre along x and y, N."""
     @property
     def settings(self) -> dict[str, Any]:
-        """The options of contacts, gravity and solver, by the names of the arguments."""
+        """Options of contacts, gravity and solver, as keyword arguments."""
     def set_state(
         self,
         position: npt.ArrayLike,
@@ -2825,7 +2910,7 @@ class SoilSimulation(AnySimulation):
         Args:
             position: Centres, (n, 2), m, or centres and angles, (n, 3), m and rad.
             velocity: Rates, (n, 2), m/s, or (n, 3), m/s and rad/s; at rest by default.
-            machine: Coordinates of the machine, (5,), m and rad; where it is by default.
+            machine: Coordinates of the machine, (5,), m and rad; the present ones by default.
             machine_rate: Rates of the machine's coordinates, (5,), m/s and rad/s; at rest by
                 default.
 
@@ -2834,14 +2919,14 @@ class SoilSimulation(AnySimulation):
                 overlap. Nothing has changed.
         """
     def remove(self, which: npt.ArrayLike) -> None:
-        """Takes disks out; the others keep their order.
+        """Removes disks. The others keep their order.
 
         Args:
-            which: Which disks go, (n,) truth values.
+            which: Which disks to remove, (n,) booleans.
 
         Raises:
-            ModelError: The number of truth values differs, or no disk would be left. Nothing has
-                changed.
+            ModelError: The number of booleans differs from that of the disks, or no disk would be
+                left. Nothing has changed.
         """
     def set_torques(self, torques: npt.ArrayLike) -> None:
         """Sets the torques of the rover's wheels.
@@ -2853,7 +2938,7 @@ class SoilSimulation(AnySimulation):
             CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
         """
     def set_pull(self, pull: npt.ArrayLike) -> None:
-        """Sets the force at the machine's centre, such as that of a drawbar.
+        """Sets an external force at the machine's centre, such as a drawbar load.
 
         Args:
             pull: Force along x and y, (2,), N.
@@ -2867,7 +2952,7 @@ class SoilSimulation(AnySimulation):
     def momentum(self) -> npt.NDArray[np.float64]:
         """Momentum of the disks, (3,): along x and y, kg m/s, and about the origin, kg m²/s.
 
-        Kinematic disks do not count.
+        Disks with prescribed velocity are not included.
         """
     def impulse_on_wheels(self) -> npt.NDArray[np.float64]:
         """Sum of the last step's contact impulses on the wheels, along x and y, (2,), N s."""
@@ -2878,13 +2963,13 @@ class SoilSimulation(AnySimulation):
 
 @final
 class Drum:
-    """A drum that turns about its axis, which lies along z, between two ends at rest.
+    """A drum that rotates about its axis along z, with two fixed ends.
 
     Args:
         radius: Inner radius, m.
         length: Distance between the ends, m.
         rate: Angular velocity about +z, rad/s.
-        centre: Its middle, (3,), m; the origin by default.
+        centre: Centre of the drum, (3,), m; the origin by default.
 
     Raises:
         TerrainError: A number is not finite, or the radius or length is not positive.
@@ -2904,13 +2989,13 @@ class Drum:
         """Angular velocity about +z, rad/s."""
     @property
     def centre(self) -> tuple[float, float, float]:
-        """Its middle, m."""
+        """Centre of the drum, m."""
 
 @final
 class Silo:
-    """An upright tube, open above, perhaps on a flat floor with a round hole.
+    """A vertical tube, open at the top, with an optional flat floor with a round hole.
 
-    Without a floor it has no end. What falls through the hole is free.
+    Without a floor the tube has infinite length. Grains that fall through the hole leave the silo.
 
     Args:
         radius: Inner radius, m.
@@ -2946,15 +3031,15 @@ class Silo:
 
 @final
 class GrainContacts:
-    """The contacts of the last step of grains, as new arrays with one row a contact.
+    """Contacts of grains in the last step, as new arrays with one row for each contact.
 
-    Vectors have D entries: 2 of disks in the plane, 3 of balls in space. Contacts between sleeping
-    grains are left out.
+    Vectors have D entries: 2 for disks, 3 for balls. Contacts between sleeping grains are not
+    included.
     """
 
     @property
     def bodies(self) -> npt.NDArray[np.int64]:
-        """Numbers of both bodies, (n, 2), grains from 0, then wheels; -1 for a wall or the ground."""
+        """Indices of both bodies, (n, 2), grains from 0, then wheels; -1 for a wall or the ground."""
     @property
     def points(self) -> _Array:
         """Points of the first body's surface, (n, D), m."""
@@ -2974,11 +3059,11 @@ class GrainContacts:
     def impulses(self) -> _Array:
         """Impulses on the first body along n, t, b of `frames`, (n, D), N s.
 
-        Cohesion is part of the normal ones, which are negative where a contact bears tension.
+        Normal impulses include cohesion and are negative if a contact carries tension.
         """
     @property
     def velocities(self) -> _Array:
-        """Velocities of the first body against the second after the step along n, t, b, (n, D), m/s."""
+        """Relative velocities of the first body after the step along n, t, b, (n, D), m/s."""
     @property
     def world_impulses(self) -> _Array:
         """Impulses on the first body along x, y, z, (n, D), N s."""
@@ -2989,61 +3074,63 @@ class GrainContacts:
 
 @final
 class GrainSimulation(AnySimulation):
-    """Grains in space: free balls with friction, between walls or on a terrain.
+    """Grains in space: free balls with friction, contained by walls or a vessel, or on a terrain.
 
     World axes: x forward, y up, z to the right.
 
     Args:
         radius: Radii of the balls, (n,), m.
-        mass: Masses of the balls, (n,), kg; they are homogeneous.
+        mass: Masses of the balls, which are homogeneous, (n,), kg.
         position: Centres, (n, 3), m.
-        kinematic: Balls whose velocity no force changes, (n,), such as grains glued to a rough
-            floor, or a piston with the velocity that `set_state` gives it; none by default. They
-            may overlap one another and walls.
+        kinematic: Which balls have a prescribed velocity, (n,); none by default. Use it for grains
+            glued to a rough floor, or for a piston with the velocity given to `set_state`. These
+            balls may overlap each other and walls.
         walls: A point of each wall and the normal to its free side, (m, 6), m; none by default.
-        wall_velocity: Velocities of the walls, (m, 3), m/s; at rest by default. A wall is in its
-            place at time 0.
+        wall_velocity: Velocities of the walls, (m, 3), m/s; at rest by default. `walls` gives their
+            places at time 0.
         vessel: A `Drum` or a `Silo` around the balls; none by default.
         terrain: A `Plane`, `SphereField`, `HeightField`, `TriangleMesh` or `Union`, or a list of
-            them, below the balls; none by default. Where it knows no ground, balls fall. Balls
-            have a vessel or a terrain, not both.
+            them, below the balls; none by default. Balls fall where the ground is unknown. A vessel
+            and a terrain cannot be combined.
         friction: Coulomb's coefficient between balls.
         wall_friction: Coulomb's coefficient of balls on walls, vessel and terrain.
-        rolling_friction: Largest moment that resists the rolling of a ball on a ball, wall, vessel
-            or terrain, over the normal force and the rolling radius: 1/r = 1/r_1 + 1/r_2 of two
-            balls, the ball's own radius elsewhere. A ball rests on a slope up to this tangent.
-        drilling_friction: The same for rotation about the contact's normal. Neither acts on a
-            rover, or where Coulomb's coefficient is 0.
-        cohesion: Attraction of bodies that touch, N: the pull that breaks their contact. The law of
-            a contact is 0 <= u_N + gap/h, p_N + h cohesion >= 0, one of them 0; friction is bounded
-            by friction (p_N + h cohesion).
+        rolling_friction: Coefficient of rolling friction of balls: the largest resisting moment
+            divided by the normal force and the rolling radius r. Between two balls 1/r = 1/r_1 +
+            1/r_2; on a wall, vessel or terrain r is the ball's radius. A ball stays at rest on a
+            slope whose tangent is at most this coefficient.
+        drilling_friction: The same for rotation about the contact normal. Neither acts on a rover,
+            nor if Coulomb's coefficient is 0.
+        cohesion: Attractive force between bodies in contact, N: the pull that separates them. The
+            contact law is 0 <= u_N + gap/h, p_N + h cohesion >= 0, one of them 0; the tangential
+            impulse is at most friction (p_N + h cohesion).
         cohesion_range: Gap up to which the attraction acts, m; 1% of the smallest radius by
             default, at most 20%.
         restitution: Newton's coefficient of all contacts, in [0, 1].
         gravity: Gravity, (3,), m/s²; (0, -9.81, 0) by default.
         time_step: Time step, s.
-        tolerance: Largest relative residual of the contact problem. Its velocities are also right
-            to 25 times that, in units of the root of gravity times the smallest radius; without
-            gravity that of 9.81 m/s².
+        tolerance: Largest relative residual of the contact problem. Errors of velocities are also
+            at most 25 times this value, times the square root of gravity times the smallest radius;
+            without gravity 9.81 m/s² is used.
         max_iterations: Largest number of sweeps of the contact solver in a step.
-        stabilisation: "projection" moves overlapping bodies apart, "push_out" lets them part by a
-            fifth of their excessive overlap in each step; both may add energy by lifting those
-            above. "none" leaves overlaps. By default "push_out", but "projection" with
-            restitution or in a vessel: a step along the inside of a curve leads into it.
-        penetration_tolerance: Overlap that stabilisation leaves alone, m; 0.5% of the smallest
+        stabilisation: Treatment of overlaps: "projection" moves overlapping bodies apart,
+            "push_out" removes a fifth of the excessive overlap in each step, "none" leaves it. The
+            first two may add energy by lifting the bodies above. The default is "push_out", or
+            "projection" with restitution or in a vessel, whose curved walls cause an overlap in
+            every step.
+        penetration_tolerance: Overlap that stabilisation does not correct, m; 0.5% of the smallest
             radius by default.
-        sleep: Whether balls at rest far from anything that moves are left out of the step.
+        sleep: Whether to skip balls that are at rest and far from moving bodies.
         sleep_speed: Speed below which a ball is at rest, m/s; 5e-4 by default.
-        sleep_distance: Distance within which nothing may move for a ball to sleep, m; 0.2 by
-            default.
-        threads: Number of threads that solve the contact problem. The answer does not depend on
-            it; below some thousands of balls a second one gains little.
+        sleep_distance: A ball sleeps if no body within this distance moves, m; 0.2 by default.
+        threads: Number of threads that solve the contact problem. The result does not depend on it.
+            With fewer than some thousands of balls, a second thread gains little.
 
     Raises:
         ModelError: A radius or mass is not finite and positive.
         StateError: Positions have a wrong shape or an entry that is not finite, or balls, walls or
             terrain overlap.
-        TerrainError: A wall has no direction, or `terrain` or `vessel` is none.
+        TerrainError: A wall has no direction, or `terrain` is not a terrain, or `vessel` is not a
+            vessel.
         OptionError: An option is out of its range, or both `terrain` and `vessel` are given.
     """
 
@@ -3093,10 +3180,10 @@ class GrainSimulation(AnySimulation):
         """Angular velocities of the balls, world frame, (n, 3), rad/s."""
     @property
     def kinematic(self) -> npt.NDArray[np.bool_]:
-        """Which balls are kinematic, (n,)."""
+        """Which balls have a prescribed velocity, (n,)."""
     @property
     def asleep(self) -> npt.NDArray[np.bool_]:
-        """Which balls sleep, (n,); kinematic ones always do."""
+        """Which balls sleep, (n,); True for balls with a prescribed velocity."""
     @property
     def terrain(self) -> Terrain | None:
         """The terrain below the balls, or None."""
@@ -3108,7 +3195,7 @@ class GrainSimulation(AnySimulation):
         """A point of each wall now and the normal to its free side, (m, 6), m."""
     @property
     def settings(self) -> dict[str, Any]:
-        """The options of contacts, gravity and solver, by the names of the arguments."""
+        """Options of contacts, gravity and solver, as keyword arguments."""
     def set_state(
         self,
         position: npt.ArrayLike,
@@ -3127,14 +3214,14 @@ class GrainSimulation(AnySimulation):
                 overlap. Nothing has changed.
         """
     def remove(self, which: npt.ArrayLike) -> None:
-        """Takes balls out; the others keep their order.
+        """Removes balls. The others keep their order.
 
         Args:
-            which: Which balls go, (n,) truth values.
+            which: Which balls to remove, (n,) booleans.
 
         Raises:
-            ModelError: The number of truth values differs, or no ball would be left. Nothing has
-                changed.
+            ModelError: The number of booleans differs from that of the balls, or no ball would be
+                left. Nothing has changed.
         """
     def exchange(
         self,
@@ -3147,19 +3234,19 @@ class GrainSimulation(AnySimulation):
         velocity: npt.ArrayLike | None = None,
         spin: npt.ArrayLike | None = None,
     ) -> None:
-        """Puts other balls in the place of those so far; time and options stay.
+        """Replaces the balls. Time and options do not change.
 
-        Balls that were there keep their sleep and the impulses of their contacts, from which the
-        next step's solver starts. Overlaps are not refused: a run may have made them. Earlier
-        snapshots fit again once the same balls are back.
+        Balls that are kept stay asleep, and keep their contact impulses for the warm start of the
+        next step. Overlaps are allowed, because they can arise in a run. An earlier snapshot can be
+        restored once the simulation has the same balls again.
 
         Args:
-            radius: Radii of all balls from here on, (n,), m.
+            radius: Radii of the new set of balls, (n,), m.
             mass: Their masses, (n,), kg.
             position: Their centres, (n, 3), m.
-            before: The number of each among the balls so far, (n,); -1 for one that was not there.
-                Balls that stay keep their order.
-            kinematic: Which of them are kinematic, (n,); none by default.
+            before: Index of each ball in the present set, (n,); -1 for a new ball. The kept balls
+                must be in their present order.
+            kinematic: Which balls have a prescribed velocity, (n,); none by default.
             velocity: Velocities of their centres, (n, 3), m/s; at rest by default.
             spin: Their angular velocities, (n, 3), rad/s; at rest by default.
 
@@ -3175,7 +3262,7 @@ class GrainSimulation(AnySimulation):
     def momentum(self) -> _Array:
         """Momentum of the balls, (6,): along x, y, z, kg m/s, and about the origin, kg m²/s.
 
-        Kinematic balls do not count.
+        Balls with prescribed velocity are not included.
         """
     def penetration(self) -> float:
         """Deepest overlap now, m."""
@@ -3184,23 +3271,22 @@ class GrainSimulation(AnySimulation):
 
 @final
 class RoverGrainSimulation(AnySimulation):
-    """A rover among grains in space, stepped together.
+    """A rover and grains, stepped together with contact forces between them.
 
-    Wheels, boxes and balls of the rover meet the grains with exact contact and friction, and forces
-    go both ways within the step. The rover and the grains keep their own simulations, which have
-    their states, commands, contacts and forces; only the steps are taken here, with the solver
-    settings of the grains, θ = 1. Walls of the grains hold grains alone: what shall hold the rover
-    too is a terrain of both.
+    Wheels, boxes and balls of the rover touch the grains with contact and friction, solved together
+    in each step. Rover and grains keep their own simulations, which hold states, commands, contacts
+    and forces; this class only takes the steps, with the solver settings of the grains and θ = 1.
+    The walls of the grains do not stop the rover: for that, give both the same terrain.
 
     Args:
-        rover: The rover, with its model, terrain, friction and commands.
-        grains: The balls, with the same time step and gravity.
+        rover: The simulation of the rover, with its model, terrain, friction and commands.
+        grains: The simulation of the balls, with the same time step and gravity.
         wheel_friction: Coulomb's coefficient between the rover and grains.
 
     Raises:
         OptionError: The time steps or gravities differ, or the coefficient is negative or not
             finite.
-        StateError: A part of the rover is in a grain.
+        StateError: A part of the rover penetrates a grain.
     """
 
     def __new__(
@@ -3208,24 +3294,24 @@ class RoverGrainSimulation(AnySimulation):
     ) -> RoverGrainSimulation: ...
     @property
     def rover(self) -> Simulation:
-        """The rover's simulation. Its own `step` moves it without the grains."""
+        """The rover's simulation. Calling its own `step` moves it without the grains."""
     @property
     def grains(self) -> GrainSimulation:
-        """The grains' simulation. Its own `step` moves them without the rover."""
+        """The grains' simulation. Calling its own `step` moves them without the rover."""
     @property
     def wheel_friction(self) -> float:
         """Coulomb's coefficient between the rover and grains."""
     @property
     def wheel_gaps(self) -> npt.NDArray[np.float64]:
-        """Gap of each wheel now to the nearest grain or the terrain, (n_wheels,), m.
+        """Gap between each wheel and the nearest grain or the terrain now, (n_wheels,), m.
 
-        Positive when apart. A wheel without a grain within its radius has the gap to the terrain.
+        Positive when apart. Grains farther from a wheel than its radius are not considered.
         """
     def penetration(self) -> float:
-        """Deepest overlap now, m: of grains with anything, and of the rover with grains."""
+        """Deepest overlap of a grain with any body now, m."""
 
 def seed_generators(seeds: Sequence[int]) -> _Rows:
-    """Seeds generators as `numpy.random.PCG64` does.
+    """Seeds random generators as `numpy.random.PCG64` does.
 
     Args:
         seeds: Whole numbers from 0, of any size.
@@ -3234,7 +3320,7 @@ def seed_generators(seeds: Sequence[int]) -> _Rows:
         (m, 4) uint64: high and low half of each state, high and low half of each increment.
 
     Raises:
-        OptionError: A seed is no whole number from 0.
+        OptionError: A seed is not a whole number from 0.
     """
 
 def standard_normals(generators: _Rows, size: int) -> tuple[_Array, _Rows]:
@@ -3242,7 +3328,7 @@ def standard_normals(generators: _Rows, size: int) -> tuple[_Array, _Rows]:
 
     Args:
         generators: Generators, (m, 4) uint64.
-        size: Numbers for each.
+        size: Number of draws from each generator.
 
     Returns:
         The numbers, (m, size), and the generators after the draws, (m, 4) uint64.
@@ -3262,16 +3348,16 @@ def soil_packing(
     bottom: float = 0.0,
     seed: int = 0,
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Disks in loose rows over a width, without overlap: where a soil starts from.
+    """Initial state for a soil: disks in loose rows, without overlap.
 
-    The radii are drawn evenly from their range. The defaults are the soil of the 2010 report: three
-    layers of 74.
+    The radii are drawn uniformly from their range. The defaults give the soil of the 2010 report:
+    three layers of 74 disks.
 
     Args:
         count: Number of disks, at most 1 000 000.
         radius_min: Smallest radius, m.
         radius_max: Largest radius, m.
-        mass: Mass of a disk of the mean radius, kg; the others' go with their area.
+        mass: Mass of a disk of the mean radius, kg; masses are proportional to area.
         left: Left edge, m.
         width: Width of the rows, m.
         bottom: Height of the lower edge, m.
@@ -3281,7 +3367,7 @@ def soil_packing(
         Radii, (n,), m, masses, (n,), kg, and centres, (n, 2), m.
 
     Raises:
-        ModelError: A number is not finite or out of its range, the radii are the wrong way round,
+        ModelError: A number is not finite or out of its range, `radius_max` is below `radius_min`,
             or a disk does not fit.
     """
 
@@ -3298,15 +3384,15 @@ def ball_packing(
     bottom: float = 0.0,
     seed: int = 0,
 ) -> tuple[_Array, _Array, _Array]:
-    """Balls in loose layers over a rectangle, without overlap: where a bed starts from.
+    """Initial state for a bed: balls in loose layers over a rectangle, without overlap.
 
-    The radii are drawn evenly from their range.
+    The radii are drawn uniformly from their range.
 
     Args:
         count: Number of balls, at most 1 000 000.
         radius_min: Smallest radius, m.
         radius_max: Largest radius, m.
-        mass: Mass of a ball of the mean radius, kg; the others' go with their volume.
+        mass: Mass of a ball of the mean radius, kg; masses are proportional to volume.
         width: Width of the rectangle along x, m.
         depth: Width of the rectangle along z, m.
         left: Smallest x, m.
@@ -3318,7 +3404,7 @@ def ball_packing(
         Radii, (n,), m, masses, (n,), kg, and centres, (n, 3), m.
 
     Raises:
-        ModelError: A number is not finite or out of its range, the radii are the wrong way round,
+        ModelError: A number is not finite or out of its range, `radius_max` is below `radius_min`,
             or a ball does not fit.
     """
 
@@ -3334,7 +3420,7 @@ def arrange_balls(
 ) -> _Array:
     """Places balls of given radii in loose layers over a rectangle, without overlap.
 
-    Each has a place as wide as the largest ball, and they fill the layers in the order given.
+    Each ball gets a place as wide as the largest ball. Layers are filled in the order of `radius`.
 
     Args:
         radius: Radii, (n,), m.
@@ -3354,30 +3440,30 @@ def arrange_balls(
 
 @final
 class SolverReport:
-    """How the contact solver ended."""
+    """Result report of the contact solver."""
 
     @property
     def status(self) -> Literal["converged", "relaxed", "not_converged", "budget_exhausted"]:
         """One of "converged", "relaxed", "not_converged" and "budget_exhausted".
 
-        "relaxed": the convex relaxation is solved, which is not Coulomb's law. "budget_exhausted":
-        the work that `budget` allows is done, and the answer is the best one found.
+        "relaxed": the convex relaxation is solved, which differs from Coulomb's law.
+        "budget_exhausted": the `budget` is spent, and the best solution found is returned.
         """
     @property
     def is_converged(self) -> bool:
         """Whether Coulomb's law holds to the tolerance."""
     @property
     def iterations(self) -> int:
-        """Iterations of the stage that answered."""
+        """Iterations of the stage that found the solution."""
     @property
     def residual(self) -> float:
-        """Violation of Signorini's and Coulomb's laws by the returned impulses, relative to the data."""
+        """Violation of Signorini's and Coulomb's laws by the impulses, relative to the data."""
     @property
     def velocity_error(self) -> float:
         """Largest violation of Signorini's and Coulomb's laws at one contact, m/s."""
     @property
     def solver(self) -> str:
-        """Name of the method that answered; never "auto"."""
+        """Name of the method that found the solution; never "auto"."""
     @property
     def stage(
         self,
@@ -3395,10 +3481,10 @@ class SolverReport:
         "admm",
         "relaxed",
     ]:
-        """Name of the stage that answered; "at_rest" where q = 0 left nothing to do."""
+        """Name of the stage that found the solution; "at_rest" if q = 0 needed none."""
     @property
     def stages(self) -> list[tuple[str, str, int]]:
-        """Every stage that was tried, in order, with the reason for its end and its iterations.
+        """All stages tried, in order, each with the reason why it ended and its iterations.
 
         Reasons are "converged", "max_iterations", "stalled", "budget_exhausted", "non_finite" and
         "relaxed".
@@ -3408,7 +3494,7 @@ class SolverReport:
         """Work done, in the unit of the argument `budget`."""
     @property
     def law(self) -> Literal["coulomb", "relaxed"]:
-        """The law that the answer obeys, "coulomb" or "relaxed"."""
+        """The friction law of the solution, "coulomb" or "relaxed"."""
 
 @final
 class FrictionContactSolution:
@@ -3422,18 +3508,18 @@ class FrictionContactSolution:
         """Velocities u = W p + q, (n_c, d), m/s, along the normal and the tangents."""
     @property
     def report(self) -> SolverReport:
-        """How the solver ended."""
+        """Report of the solver."""
     @property
     def history(self) -> list[tuple[str, int, float]]:
-        """The residuals measured on the way, with the argument `history`.
+        """Residuals during the iterations; empty without the argument `history`.
 
-        Each is a tuple of the stage, the iterations so far and the relative residual. "nsgs" and
-        "admm" measure every few iterations, the others at every step. Of "relaxed" it is the
-        residual of the relaxed law.
+        Each entry is a tuple of the stage, the number of iterations and the relative residual.
+        "nsgs" and "admm" measure it every few iterations, the other methods in every iteration. For
+        "relaxed" it is the residual of the relaxed law.
         """
 
 def accuracy_options(accuracy: Literal["fast", "balanced", "reference"] | float) -> dict[str, Any]:
-    """The options of `Simulation` that an accuracy stands for.
+    """Options of `Simulation` for a given accuracy.
 
     Args:
         accuracy: "fast", "balanced" or "reference", or the error allowed on a path of 20 m on flat
@@ -3443,15 +3529,15 @@ def accuracy_options(accuracy: Literal["fast", "balanced", "reference"] | float)
         The keyword arguments `time_step` (s), `variant` and `tolerance`.
 
     Raises:
-        OptionError: The name is unknown, or the error is finer than any choice of options gives.
+        OptionError: The name is unknown, or no options reach the given error.
     """
 
 @overload
 def sin_cos(x: float) -> tuple[float, float]:
     """Sine and cosine of angles.
 
-    Unlike those of NumPy and of `math` they have the same bits on every machine. They are within
-    1 ulp; of what is not finite they are NaN.
+    Unlike the functions of NumPy and `math`, the results have the same bits on every computer. They
+    are accurate to 1 ulp. Infinite and NaN arguments give NaN.
 
     Args:
         x: An angle, or an array of any shape, rad.
@@ -3460,17 +3546,17 @@ def sin_cos(x: float) -> tuple[float, float]:
         Sine and cosine: two numbers, or two new arrays of the shape of x.
 
     Raises:
-        OptionError: x is no number and no array of numbers.
+        OptionError: x is neither a number nor an array of numbers.
     """
 
 @overload
 def sin_cos(x: npt.NDArray[Any]) -> tuple[_Array, _Array]: ...
 @overload
 def atan2(y: float, x: float) -> float:
-    """Angles of the points (x, y), in [-pi, pi].
+    """Polar angles of the points (x, y), in [-pi, pi].
 
-    Unlike those of NumPy and of `math` they have the same bits on every machine. They are within
-    1 ulp.
+    Unlike the functions of NumPy and `math`, the results have the same bits on every computer. They
+    are accurate to 1 ulp.
 
     Args:
         y: A number or an array of any shape.
@@ -3480,7 +3566,7 @@ def atan2(y: float, x: float) -> float:
         The angle, rad: a number, or a new array.
 
     Raises:
-        OptionError: An argument is no number and no array of numbers, or the shapes differ.
+        OptionError: An argument is neither a number nor an array of numbers, or the shapes differ.
     """
 
 @overload
@@ -3489,8 +3575,8 @@ def atan2(y: npt.NDArray[Any], x: npt.NDArray[Any]) -> _Array: ...
 def exp(x: float) -> float:
     """Exponentials.
 
-    Unlike those of NumPy and of `math` they have the same bits on every machine. They are within
-    1 ulp.
+    Unlike the functions of NumPy and `math`, the results have the same bits on every computer. They
+    are accurate to 1 ulp.
 
     Args:
         x: A number or an array of any shape.
@@ -3499,7 +3585,7 @@ def exp(x: float) -> float:
         The exponential: a number, or a new array of the shape of x.
 
     Raises:
-        OptionError: x is no number and no array of numbers.
+        OptionError: x is neither a number nor an array of numbers.
     """
 
 @overload
@@ -3520,29 +3606,29 @@ def solve_friction_contact(
     """Solves the friction-contact problem K* contains W p + q + mu |u_T| n, orthogonal to p in K.
 
     Args:
-        W: Delassus operator, (n_c d, n_c d), 1/kg, used as it is: it may be singular or
-            unsymmetric. For many contacts one of SciPy's sparse arrays, or block rows
-            `(indptr, indices, data)` of shapes (n_c + 1,), (n_blocks,), (n_blocks, d, d), each row
-            ascending and with its diagonal block.
+        W: Delassus operator, (n_c d, n_c d), 1/kg. It may be singular or unsymmetric. For many
+            contacts, give a SciPy sparse array, or block rows `(indptr, indices, data)` of shapes
+            (n_c + 1,), (n_blocks,), (n_blocks, d, d), with ascending columns and the diagonal block
+            in each row.
         q: Free velocity, (n_c d,), m/s, contact by contact: normal, tangents.
         mu: Friction coefficients, (n_c,), or one for all contacts.
-        tolerance: Largest relative residual of a converged answer; its velocities are right to
-            max(tolerance, 1e-9) m/s as well.
+        tolerance: Largest relative residual of a converged solution. Errors of its velocities are
+            at most max(tolerance, 1e-9) m/s as well.
         dimension: Components d of a contact, 2 or 3.
         solver: "auto" tries cheap methods first and robust ones last; "nsgs", "newton", "proximal"
-            and "admm" are single methods for Coulomb's law; "relaxed" solves its convex relaxation,
-            another law, and never counts as converged.
+            and "admm" are single methods for Coulomb's law; "relaxed" solves the convex relaxation,
+            which is another law, and its status is never "converged".
         max_iterations: Largest number of Newton steps, sweeps or ADMM iterations.
         initial: Impulses from which the solver starts, (n_c d,), N s; zero by default.
-        budget: Largest amount of work, counted and not timed: a unit is one multiplication and
-            addition in a product with W. None allows 3e8 units, about 0.3 s, for up to 48
-            contacts, 1.2e9 for up to 200, and more in proportion to their square beyond. What
-            exceeds the budget is left undone, and the report says so.
-        history: Whether the solution keeps the residuals measured on the way.
+        budget: Largest amount of work, in operations rather than time: a unit is one multiplication
+            and addition in a product with W. The default is 3e8 units, about 0.3 s, for up to 48
+            contacts, 1.2e9 for up to 200, and proportional to the square of their number beyond.
+            When the budget is spent, the solver stops with the status "budget_exhausted".
+        history: Whether to record the residuals of the iterations.
 
     Returns:
-        Impulses, velocities and the solver's report. Not converging is no error: see
-        `report.status`.
+        Impulses, velocities and the solver's report. If the solver does not converge, no exception
+        is raised: check `report.status`.
 
     Raises:
         ProblemError: An array has a wrong shape or an invalid entry.

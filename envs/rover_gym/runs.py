@@ -122,7 +122,7 @@ def open_run(path: str | Path, kind: type[Any] = Run) -> Any:
     """
     run = saved_run_of(read_trajectory(path), path)
     if not isinstance(run, kind):
-        refuse(RecordingError, "path", str(path), f"holds a {type(run).__name__}, no {kind.__name__}")
+        refuse(RecordingError, "path", str(path), f"contains a {type(run).__name__}, not a {kind.__name__}")
     return run
 
 

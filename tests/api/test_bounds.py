@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rover_gym import ModelError, Plane, RoverModel, SphereField, StepError, TerrainError
+from rover_gym import ModelError, RoverModel, SphereField, StepError, TerrainError
 from rover_gym.mechanics import SoilSimulation, soil_packing
 from rover_gym.planar import BallSimulation, Line, Polyline, Sine, Spline, TwoWheelRoverSimulation
 
@@ -184,31 +184,3 @@ def test_a_soil_flung_to_the_end_of_the_world_is_stepped_or_refused() -> None:
     sim.set_state([[0.0, 0.0, 0.0], [1e300, -1e300, 0.0]], [[1e300, 0.0, 0.0], [0.0, 0.0, 0.0]])
     with within(5.0), suppress(StepError):
         sim.step()
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [("name = 3", "rover"), ("name = 'x'\nsolids = []", "solids"), ("\0[[", "rover")],
-)
-def test_errors_of_a_model_file_name_the_path(tmp_path: Path, text: str, message: str) -> None:
-    path = tmp_path / "rover.toml"
-    path.write_text(text)
-    with pytest.raises(ModelError, match=message) as caught:
-        RoverModel.from_file(path)
-    assert str(path) in str(caught.value)
-
-
-def test_errors_of_other_files_name_the_path(tmp_path: Path) -> None:
-    path = tmp_path / "spheres.csv"
-    for content in (b"", b"\xff\xfe", b"x,y,z,radius\n0,0,0,-1\n", b"x,y,z,radius\n0,0,0,text\n"):
-        path.write_bytes(content)
-        with pytest.raises(TerrainError) as caught:
-            SphereField.from_file(path, Plane())
-        assert str(path) in str(caught.value)
-    for call in (SphereField.from_file, RoverModel.from_file, RoverModel().to_file):
-        nowhere = tmp_path / "no" / "such.file"
-        with pytest.raises(FileNotFoundError) as missing:
-            call(nowhere)
-        assert missing.value.filename == str(nowhere)
-    with pytest.raises(IsADirectoryError, match=str(tmp_path)):
-        RoverModel.from_file(tmp_path)

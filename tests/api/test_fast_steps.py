@@ -28,8 +28,8 @@ def test_the_rover_steps_in_lanes_welded_or_not(terrain: Plane | SphereField, we
     ("options", "reason"),
     [
         ({"restitution": 0.25}, "the restitution is 0.25, not 0"),
-        ({"variant": "newton"}, "variant is "newton""),
-        ({"solver": "newton"}, "solver is not "auto""),
+        ({"variant": "newton"}, 'variant is "newton"'),
+        ({"solver": "newton"}, 'solver is not "auto"'),
         ({"warm_start": False}, "warm_start is off"),
     ],
 )

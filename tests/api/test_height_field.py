@@ -199,7 +199,7 @@ def test_a_list_that_holds_no_terrain_is_refused() -> None:
         Simulation(terrain=[])
     with pytest.raises(TerrainError, match="terrain: must be a Plane"):
         Simulation(terrain=np.zeros((4, 4)))
-    with pytest.raises(TerrainError, match=r"parts\[1\]: a second plane"):
+    with pytest.raises(TerrainError, match=r"parts\[1\]: is a second plane"):
         Union([Plane(), Plane()])
 
 
@@ -284,7 +284,7 @@ def test_a_geotiff_of_several_bands_is_refused_unless_one_is_chosen(tmp_path: Pa
     with rasterio.open(path, "w", **profile, **place) as file:
         for band in (1, 2):
             file.write(np.full((2, 3), 10.0 * band, np.float32), band)
-    with pytest.raises(TerrainError, match=r"band: .*map\.tif has 2 bands: say which holds the heights") as caught:
+    with pytest.raises(TerrainError, match=r"band: .*map\.tif has 2 bands: give the number of the band") as caught:
         HeightField.from_file(path)
     assert caught.value.field == "band"
     for band in (1, 2):
@@ -434,7 +434,7 @@ def test_options_that_say_nothing_about_a_file_are_refused(
         HeightField.from_file(tmp_path / "map.npy", spacing=1.0, **options)
     assert caught.value.field == field
     (tmp_path / "map.png").write_bytes(a_png(3, 3))
-    with pytest.raises(TerrainError, match="height_range: must come without scale"):
+    with pytest.raises(TerrainError, match="height_range: cannot be combined with scale"):
         HeightField.from_file(tmp_path / "map.png", spacing=1.0, height_range=(0, 1), scale=2.0)
 
 

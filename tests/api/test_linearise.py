@@ -105,7 +105,7 @@ def difference_error(sim: Simulation, linear: Linearisation) -> np.ndarray:
 )
 def test_columns_that_hold_are_the_differences_of_real_steps(scene, modes, least):
     sim = scene()
-    linear = sim.linearise()
+    linear = sim.linearise(check=True)
     assert set(linear.modes) == modes
     assert linear.a.shape == (2 * NV, 2 * NV)
     assert linear.b.shape == (2 * NV, 12)
@@ -115,7 +115,7 @@ def test_columns_that_hold_are_the_differences_of_real_steps(scene, modes, least
 
 def test_a_projection_is_differentiated():
     sim = on_rocks("projection")
-    linear = sim.linearise()
+    linear = sim.linearise(check=True)
     assert linear.is_projected
     assert linear.holds.sum() >= 40
     assert difference_error(sim, linear).max() < 1e-6
@@ -123,7 +123,7 @@ def test_a_projection_is_differentiated():
 
 def test_it_says_where_modes_change():
     sim = rolling()
-    linear = sim.linearise()
+    linear = sim.linearise(check=True)
     held = dict(zip(sim.model.dof_names, linear.holds[:NV], strict=True))
     assert all(held[name] for name in ("x", "heading", "wheel_FL"))
     assert not held["steering_FL"]  # a steered wheel cannot stick beside the others
@@ -135,11 +135,11 @@ def test_it_says_where_modes_change():
     v[1] = -1.0
     q[1] = 0.35 + 0.5 * falling.time_step + 1e-7
     falling.set_state(q, v)
-    near = falling.linearise()
+    near = falling.linearise(check=True)
     assert near.modes == []
     assert not near.holds[1]
-    assert falling.linearise(perturbation=1e-8).holds[1]
-    assert flying().linearise().is_smooth
+    assert falling.linearise(check=True, perturbation=1e-8).holds[1]
+    assert flying().linearise(check=True).is_smooth
 
 
 def test_margins_say_how_far_the_next_mode_is():
@@ -152,7 +152,7 @@ def test_margins_say_how_far_the_next_mode_is():
 def test_the_simulation_is_left_as_it_was():
     sim = rolling()
     before, contacts = sim.snapshot(), sim.contacts.impulses
-    linear = sim.linearise()
+    linear = sim.linearise(check=True)
     assert sim.snapshot() == before
     np.testing.assert_array_equal(sim.contacts.impulses, contacts)
     np.testing.assert_array_equal(linear.state[NV:], sim.v)
@@ -167,7 +167,7 @@ def test_the_simulation_is_left_as_it_was():
 @pytest.mark.parametrize("given", [0.0, 1.0, -1e-6, np.nan, "small", True, None])
 def test_a_bad_perturbation_is_refused_by_name(given):
     with pytest.raises(OptionError, match="perturbation") as caught:
-        flying().linearise(given)
+        flying().linearise(check=True, perturbation=given)
     assert caught.value.field == "perturbation"
 
 
@@ -179,4 +179,4 @@ def test_what_cannot_be_linearised_is_refused():
     q[1], q[5] = 5.0, np.pi / 2
     sim.set_state(q)
     with pytest.raises(StateError, match="singular"):
-        sim.linearise()
+        sim.linearise(check=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rover_gym import CommandError, ModelError, OptionError, StateError, TerrainError
+from rover_gym import CommandError, ModelError, OptionError, RoverGymError, StateError, TerrainError
 from rover_gym.figures import draw_run
 from rover_gym.figures.grain_frames import draw_soil
 from rover_gym.mechanics import Snapshot
@@ -122,28 +122,22 @@ def test_grounds_tell_their_height_and_survive_pickling(ground: Line | Sine | Sp
     assert repr(again) == repr(ground)
 
 
-def test_a_pickled_simulation_and_a_snapshot_go_on_bit_for_bit() -> None:
+def test_a_pickled_simulation_has_the_same_parameters_and_snapshots_fit_their_machine_only() -> None:
     sim = BallSimulation(Sine(0.5, 4.0), radius=0.3, friction=0.5, restitution=0.4, contact="nearest")
-    sim.set_state([0.2, 2.0, 0.0])
-    sim.step(300)
-    snapshot = sim.snapshot()
-    assert type(snapshot).from_bytes(snapshot.to_bytes()) == snapshot
-    copy = pickle.loads(pickle.dumps(sim))  # noqa: S301 - our own
-    assert isinstance(copy, BallSimulation)
-    assert copy.settings == sim.settings
-    assert copy.parameters == sim.parameters
-    sim.step(300)
-    copy.step(300)
-    end = sim.q
-    assert (end == copy.q).all()
-    sim.restore(snapshot)
-    sim.step(300)
-    assert (sim.q == end).all()
     rover = TwoWheelRoverSimulation(Line())
+    for one in (sim, rover):
+        copy = pickle.loads(pickle.dumps(one))  # noqa: S301 - our own
+        assert type(copy) is type(one)
+        assert copy.settings == one.settings
+        assert copy.parameters == one.parameters
+    before = sim.snapshot()
+    for bad in ([0.0, 1.0], [0.0, math.nan, 0.0]):
+        with pytest.raises(StateError):
+            sim.set_state(bad)
+    assert sim.snapshot() == before
     with pytest.raises(StateError) as refused:
-        rover.restore(snapshot)
+        rover.restore(before)
     assert refused.value.field == "snapshot"
-    assert pickle.loads(pickle.dumps(rover)).parameters == rover.parameters  # noqa: S301 - our own
 
 
 def test_the_report_rule_lets_the_centre_sink_to_the_ground() -> None:
@@ -175,6 +169,7 @@ def test_the_last_problem_is_of_dimension_two() -> None:
         (lambda: Spline([0.0], [0.0]), TerrainError, "x"),
         (lambda: Polyline([0.0, -1.0], [0.0, 0.0]), TerrainError, "x[1]"),
         (lambda: Polyline.step(0.0, 0.0), TerrainError, "height"),
+        (lambda: Polyline([0.0, 0.0], [1.0, 1.0]), TerrainError, "y[1]"),
         (lambda: Sine(1.0, -2.0), TerrainError, "wavelength"),
         (lambda: Line(math.inf), TerrainError, "slope"),
         (lambda: BallSimulation("ground"), TerrainError, "ground"),  # type: ignore[arg-type]
@@ -191,6 +186,8 @@ def test_the_last_problem_is_of_dimension_two() -> None:
         (lambda: BallSimulation(Line()).set_state([0.0, 1.0]), StateError, "q"),
         (lambda: BallSimulation(Line()).set_state([0.0, math.nan, 0.0]), StateError, "q[1]"),
         (lambda: TwoWheelRoverSimulation(Line()).set_torques([1.0]), CommandError, "torques"),
+        (lambda: TwoWheelRoverSimulation(Line()).set_torques([0.0, math.inf]), CommandError, "torques[1]"),
+        (lambda: TwoWheelRoverSimulation(Line(), mass=math.nan), ModelError, "mass"),
         (lambda: BallSimulation(Line()).step(-1), OptionError, "n"),
     ],
 )
@@ -272,6 +269,7 @@ def test_two_disks_collide_as_the_closed_form_says() -> None:
 @pytest.mark.parametrize(
     ("change", "field"),
     [
+        ({"radius": [], "mass": [], "position": np.empty((0, 2))}, "radius"),
         ({"radius": [0.1, -0.1]}, "radius[1]"),
         ({"radius": [0.1, np.nan]}, "radius[1]"),
         ({"mass": [1.0]}, "mass"),
@@ -309,6 +307,8 @@ def test_packings_repeat_and_do_not_overlap() -> None:
     again = soil_packing(100, width=0.7, seed=3)
     np.testing.assert_array_equal(centres, again[2])
     assert not np.array_equal(centres, soil_packing(100, width=0.7, seed=4)[2])
+    assert (np.abs(centres[:, 0] - 0.35) <= 0.35 - radius).all()
+    assert (centres[:, 1] >= radius).all()
     apart = np.linalg.norm(centres[:, None] - centres[None], axis=2) - radius[:, None] - radius[None]
     assert apart[np.triu_indices(100, 1)].min() >= 0.0
     np.testing.assert_allclose(mass / radius**2, mass[0] / radius[0] ** 2)
@@ -374,7 +374,7 @@ def test_a_soil_without_a_machine_is_recorded_and_drawn(bed: Bed, tmp_path: Path
 def test_a_file_without_a_soil_is_refused(tmp_path: Path) -> None:
     sim = BallSimulation(Line())
     record_run(sim, 0.01, tmp_path / "ball.h5", None, title="a ball")
-    with pytest.raises(RecordingError, match="holds a PlanarRun, no SoilRun"):
+    with pytest.raises(RecordingError, match="contains a PlanarRun, not a SoilRun"):
         open_run(tmp_path / "ball.h5", SoilRun)
 
 
@@ -430,7 +430,7 @@ def test_a_curve_of_pull_against_slip_is_found_again() -> None:
     straight = fit_traction(trials(0.3 * slips - 0.1), first=0.3)
     assert straight.last_slope.value == pytest.approx(0.3)
     assert straight.scale.value > 2.0  # no limit within the slips
-    with pytest.raises(ValueError, match="four slips") as caught:
+    with pytest.raises(ValueError, match="four or more slips") as caught:
         fit_traction(trials(slips)[:3])
     assert getattr(caught.value, "field", None) == "pulls"
     with pytest.raises(ValueError, match="two slips") as caught:
@@ -446,27 +446,6 @@ def test_a_drive_tells_way_slip_and_sinkage(bed: Bed) -> None:
     assert 0.0 < drive.slip < 1.0
     assert -0.01 < drive.sinkage < 0.05
     assert np.isnan(drive_on_soil(bed, 0.0, run_in=0.02, duration=0.05).slip)  # it stands
-
-
-@pytest.mark.parametrize(
-    ("call", "field"),
-    [
-        (lambda _: settled_bed(0), "count"),
-        (lambda _: settled_bed(10, 2.5), "layers"),
-        (lambda _: settled_bed(10, settle=-1.0), "settle"),
-        (lambda bed: rover_on_soil(bed, start=0.5), "start"),
-        (lambda bed: rover_on_soil(bed, start=1.2), "start"),
-        (lambda bed: drawbar_pull(bed, 1.0), "slip"),
-        (lambda bed: drawbar_pull(bed, 0.1, rim_speed=0.0), "rim_speed"),
-        (lambda bed: drawbar_pull(bed, 0.1, distance=3.0), "distance"),
-        (lambda bed: drive_on_soil(bed, 50.0, duration=0.0), "duration"),
-        (lambda bed: drive_on_soil(bed, np.nan), "torques[0]"),
-    ],
-)
-def test_a_trial_that_cannot_be_is_refused_by_name(call: Callable[[Bed], object], field: str, bed: Bed) -> None:
-    with pytest.raises(ValueError, match=r".+") as caught:
-        call(bed)
-    assert getattr(caught.value, "field", None) == field
 
 
 def test_kinematic_disks_bear_and_move_as_they_are_told() -> None:
@@ -516,11 +495,20 @@ def test_removed_disks_leave_the_others_as_they_are() -> None:
     ("call", "field"),
     [
         (lambda _: settled_bed(10**11), "count"),
+        (lambda _: settled_bed(0), "count"),
         (lambda _: settled_bed(30, 2.5), "layers"),
+        (lambda _: settled_bed(10, settle=-1.0), "settle"),
         (lambda _: settled_bed(30, radius_min=0.0), "radius_min"),
         (lambda _: settled_bed(30, radius_min=0.02, radius_max=0.01), "radius_max"),
         (lambda _: settled_bed(30, settle=1e300), "settle"),
         (lambda bed: rover_on_soil(bed, start=np.nan), "start"),
+        (lambda bed: rover_on_soil(bed, start=0.5), "start"),
+        (lambda bed: rover_on_soil(bed, start=1.2), "start"),
+        (lambda bed: drawbar_pull(bed, 1.0), "slip"),
+        (lambda bed: drawbar_pull(bed, 0.1, rim_speed=0.0), "rim_speed"),
+        (lambda bed: drawbar_pull(bed, 0.1, distance=3.0), "distance"),
+        (lambda bed: drive_on_soil(bed, 50.0, duration=0.0), "duration"),
+        (lambda bed: drive_on_soil(bed, np.nan, start=0.61), "torques[0]"),
         (lambda bed: rover_on_soil(bed, rover=[1]), "rover"),
         (lambda bed: rover_on_soil(bed, rover={"wheel_radius": "big"}), "rover.wheel_radius[0]"),
         (lambda bed: rover_on_soil(bed, rover={"axle_a": 3.0}), "rover.axle_a"),
@@ -535,7 +523,7 @@ def test_removed_disks_leave_the_others_as_they_are() -> None:
 def test_soils_that_would_not_end_or_cannot_be_are_refused_by_name(
     call: Callable[[Bed], object], field: str, narrow_bed: Bed
 ) -> None:
-    with pytest.raises(OptionError) as caught:
+    with pytest.raises(RoverGymError) as caught:
         call(narrow_bed)
     assert str(caught.value.field).startswith(field)
     assert "np.float64" not in str(caught.value)

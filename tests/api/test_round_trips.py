@@ -216,8 +216,12 @@ def test_snapshots_of_other_masses_are_refused() -> None:
     rover = RoverModel()
     heavy = soil().mass.copy()
     heavy[3] *= 2.0
+    moved, turned = rover.to_dict(), rover.to_dict()
+    moved["solids"][2]["centre_of_mass"] = [0.0, 1e-9, 0.0]
+    turned["solids"][0]["inertia"] = [40.0, 60.0, 50.0, 0.0, 0.0, 0.0]
     cases: list[tuple[Any, Any]] = [
         (Simulation(rover), Simulation(rover.replace(masses={"trunk": 601.0}))),
+        *((Simulation(rover), Simulation(RoverModel.from_dict(other))) for other in (moved, turned)),
         (Simulation(rover), Simulation(rover.replace(wheel_radius=0.11))),
         (Simulation(rover), Simulation(rover.replace(contact_radius=0.11))),
         (Simulation(rover.weld({"front_axle": 0.1})), Simulation(rover.weld({"front_axle": 0.2}))),

@@ -96,6 +96,7 @@ def test_a_wheel_feels_the_nearest_of_ground_and_spheres():
     ("text", "message"),
     [
         ("", "header"),
+        (b"\xff\xfe", "."),
         ("x,y,z\n1,2,3\n", "header"),
         ("x,y,z,radius\n1,2,three,4\n", "table of numbers"),
         ("x,y,z,radius\n1,2,3,-4\n", "must be positive"),
@@ -104,9 +105,10 @@ def test_a_wheel_feels_the_nearest_of_ground_and_spheres():
 )
 def test_a_bad_file_is_a_terrain_error(tmp_path, text, message):
     path = tmp_path / "rocks.csv"
-    path.write_text(text)
-    with pytest.raises(rover_gym.TerrainError, match=message):
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(rover_gym.TerrainError, match=message) as caught:
         SphereField.from_file(path)
+    assert str(path) in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -118,6 +120,9 @@ def test_a_bad_file_is_a_terrain_error(tmp_path, text, message):
         ("burial", {"burial": 2.0}),
         ("burial", {"burial": (0.4, 0.2)}),
         ("area", {"area": (0.0, 0.0, 0.0, 1.0)}),
+        ("min_diameter", {"max_diameter": 0.01}),
+        ("ground", {"ground": Plane((1.0, 0.0, 0.0))}),
+        ("centres", {"area": (-5e5, -5e5, 5e5, 5e5)}),
         ("clear", {"clear": [(0.0, 1.0)]}),
     ],
 )
@@ -126,6 +131,22 @@ def test_bad_rocks_are_refused_by_field(field, arguments):
     with pytest.raises(rover_gym.TerrainError) as caught:
         SphereField.rocks(**given)
     assert caught.value.field == field
+
+
+@pytest.mark.parametrize(
+    ("centres", "radii", "message"),
+    [
+        ([[0, 0, 0]], [], "radii: needs one"),
+        ([[0, 0, 0]], [0.0], r"radii\[0\]: must be positive"),
+        ([[0, 0, 0]], [1e7], r"radii\[0\]: must be at most"),
+        ([[0, 0, 0], [0, np.nan, 0]], [1.0, 1.0], r"centres\[1\]: must be finite"),
+        ([[0, 0, 1e300]], [1.0], r"centres\[0\]: must be at most"),
+        (np.empty((0, 3)), [], "centres: a field needs"),
+    ],
+)
+def test_bad_spheres_are_refused(centres, radii, message):
+    with pytest.raises(rover_gym.TerrainError, match=message):
+        SphereField(centres, radii)
 
 
 def test_squeezed_wheels_take_few_iterations() -> None:

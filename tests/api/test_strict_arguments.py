@@ -99,6 +99,7 @@ OTHERS: list[tuple[str, Callable[[], Any]]] = [
     ("ground", lambda: SphereField([[0.0] * 3], [1.0], 3)),  # type: ignore[arg-type]
     ("variant", lambda: Simulation(variant=3)),  # type: ignore[arg-type]
     ("solver", lambda: Simulation(solver=3)),  # type: ignore[arg-type]
+    ("solver", lambda: solve_friction_contact(*one_contact, solver=3)),  # type: ignore[call-overload]
     ("stabilisation", lambda: Simulation(stabilisation=None)),  # type: ignore[arg-type]
     ("warm_start", lambda: Simulation(warm_start=1)),  # type: ignore[arg-type]
     ("coordinates", lambda: Simulation().set_state(np.zeros(21), coordinates=1)),  # type: ignore[arg-type]

@@ -20,7 +20,7 @@ from selenium.webdriver.common.by import By
 
 from rover_gym import HeightField, Plane, RoverModel, Simulation, SphereField, Terrain, Union
 from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_run
-from rover_gym.rendering.appearance import GROUND_COLOUR, TRUNK_COLOUR
+from rover_gym.rendering.appearance import GROUND_COLOUR, SKY_COLOUR, TRUNK_COLOUR
 from rover_gym.replay import write_page
 from rover_gym.replay.charts import LOAD_TIME, moving_mean
 from rover_gym.replay.rover_scene import WHEEL_NAMES
@@ -203,16 +203,17 @@ def test_the_scene_shows_rover_rocks_and_ground_the_right_way_up(shown: Shown[Ro
     height, width, _ = image.shape
     assert image.std(axis=(0, 1)).min() > 10.0  # not blank
     red, green, blue = np.moveaxis(image, -1, 0)
-    ground = (red - blue > 0.5 * 255 * (GROUND_COLOUR[0] - GROUND_COLOUR[2])) & (red > green)
+    warm = red - blue > 0.5 * 255 * (GROUND_COLOUR[0] - GROUND_COLOUR[2])
+    ground = warm & (red > green) & (blue < 0.5 * 255 * (GROUND_COLOUR[2] + SKY_COLOUR[2]))
     assert ground[height // 2 :].mean() > 0.5  # warm below
-    assert ground[: height // 12].mean() < 0.2  # sky above
+    assert ground[: height // 12].mean() < 0.5  # sky and haze above
     # Only the trunk is both light and grey; it is in the centre.
     light = (image.min(axis=-1) > 0.5 * 255 * min(TRUNK_COLOUR)) & (np.ptp(image, axis=-1) < 60.0)
     light[: height // 6] = False  # the sky
     rows, columns = np.nonzero(light)
     assert len(rows) > 0.005 * light.size
     assert abs(columns.mean() / width - 0.5) < 0.15
-    assert 0.25 < rows.mean() / height < 0.65
+    assert 0.25 < rows.mean() / height < 0.8
     # Its wheels and its shadow are dark, and below it.
     dark = image.max(axis=-1) < 90.0
     assert dark[round(rows.mean()) :].mean() > 0.005
@@ -232,7 +233,7 @@ def test_a_map_lies_under_the_rover_and_no_rock_floats_in_the_sky(tmp_path: Path
     red, _, blue = np.moveaxis(image, -1, 0)
     height = len(image)
     assert (red > blue + 20.0)[height // 2 :].mean() > 0.5  # the ground
-    assert (red > blue)[: height // 8].mean() < 0.02  # the sky; a fifth of it was rocks
+    assert (image.max(axis=-1) < 150.0)[: height // 8].mean() < 0.02  # the sky; a fifth of it was rocks
 
 
 def test_the_timeline_moves_the_rover(shown: Shown[RoverRun]) -> None:
@@ -322,11 +323,32 @@ def test_a_click_on_a_curve_goes_to_that_time(shown: Shown[RoverRun]) -> None:
 def test_it_plays(shown: Shown[RoverRun]) -> None:
     go_to(shown.browser, 0.2)
     # One button starts and stops, and a slow browser may not have stopped yet.
-    shown.browser.find_element(By.ID, "play").click()
+    play(shown.browser)
     if not moves(shown.browser, 20.0):
-        shown.browser.find_element(By.ID, "play").click()
+        play(shown.browser)
         assert moves(shown.browser, PATIENCE)
     go_to(shown.browser, 0.0)
+
+
+@pytest.mark.nightly("tests/browser/test_replay_page.py::test_the_timeline_moves_the_rover")
+def test_a_page_left_playing_holds_no_more_after_several_loops(shown: Shown[RoverRun]) -> None:
+    """The page before this one took longer for every loop."""
+    browser = shown.browser
+    held = "return document.querySelector('#root canvas').dataset.held;"
+    go_to(browser, 0.1)
+    before = browser.execute_script(held)
+    browser.execute_script("document.getElementById('speed').value = '4';")
+    play(browser)
+    for _ in range(3):
+        await_that(lambda: (slider(browser) or 0.0) > 1.2, "the second half")
+        await_that(lambda: (slider(browser) or 0.0) < 0.8, "the next loop")
+    assert browser.execute_script(held) == before
+    browser.execute_script("document.getElementById('speed').value = '1';")
+    go_to(browser, 0.0)
+
+
+def play(browser: webdriver.Chrome) -> None:
+    browser.execute_script("document.getElementById('play').click();")
 
 
 def moves(browser: webdriver.Chrome, patience: float) -> bool:
@@ -369,7 +391,7 @@ def test_a_soils_page_loads_alone_and_shows_rover_and_disks(soil_shown: Shown[So
     red, green, blue = np.moveaxis(picture(browser), -1, 0)
     assert ((blue > red + 60.0) & (green < blue)).mean() > 0.002  # the body, blue
     assert (np.maximum(red, np.maximum(green, blue)) < 70.0).mean() > 0.002  # the tyres, black
-    sand = (blue < 110.0) & (red > blue + 30.0) & (green - blue > 0.45 * (red - blue))  # yellow, darker than the sky
+    sand = (blue < 160.0) & (red > blue + 30.0) & (green - blue > 0.45 * (red - blue))  # yellow, darker than paper
     assert sand.mean() > 0.005
     assert np.nonzero(sand)[0].min() > 0.4 * sand.shape[0]  # below
 

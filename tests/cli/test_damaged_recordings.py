@@ -109,7 +109,7 @@ def test_a_second_writer_is_refused_and_the_run_is_whole(tmp_path: Path) -> None
 def test_a_run_that_is_being_recorded_says_so_to_its_reader(tmp_path: Path) -> None:
     with Recorder(tmp_path / "run.h5", [TIME]) as recorder:
         recorder.append({"time": 0})
-        assert "is being recorded" in refusal(tmp_path / "run.h5")
+        assert "is still being recorded" in refusal(tmp_path / "run.h5")
     assert len(read_trajectory(tmp_path / "run.h5")["time"]) == 1
 
 
@@ -131,7 +131,7 @@ def test_a_full_disk_ends_with_an_error_of_ours_and_keeps_what_was_written(tmp_p
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
 @pytest.mark.parametrize("place", ["/dev/full", "/dev/null", "."])
 def test_what_is_no_file_is_not_recorded_to(place: str) -> None:
-    with pytest.raises(OSError, match="no regular file"):
+    with pytest.raises(OSError, match="not a regular file"):
         Recorder(place, [TIME])
 
 
@@ -294,8 +294,8 @@ def test_attributes_that_cannot_be_read_are_refused(key: str, value: bytes, tmp_
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes")
 def test_a_pipe_is_refused_and_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "run.h5")
-    assert "no regular file" in refusal(tmp_path / "run.h5")
-    assert "no regular file" in refusal(tmp_path)
+    assert "not a regular file" in refusal(tmp_path / "run.h5")
+    assert "not a regular file" in refusal(tmp_path)
 
 
 def test_a_chunk_of_an_impossible_size_is_refused_unread(sound_run: Path, tmp_path: Path) -> None:
@@ -325,7 +325,7 @@ def test_a_changed_number_is_told_by_its_checksum(sound_run: Path, tmp_path: Pat
         ("q", np.zeros((25, 4)), "must have rows of shape"),
         ("q", np.full((25, 21), np.nan), "must be finite and within"),
         ("time", np.full(25, 1e300), "must be finite and within"),
-        ("time", np.arange(25.0)[::-1].copy(), "must not run backward"),
+        ("time", np.arange(25.0)[::-1].copy(), "must not decrease"),
         ("wheel_forces", np.zeros((25, 6)), "must have rows of shape"),
         ("slip_ratio", np.zeros((25, 6)), "must have rows of shape"),
     ],
@@ -367,6 +367,6 @@ def test_a_run_that_lasts_for_ages_is_filmed_at_once(sound_run: Path) -> None:
 
 
 def test_a_data_set_that_is_missing_is_named(sound_run: Path) -> None:
-    with pytest.raises(RecordingError, match="holds no such data set") as caught:
+    with pytest.raises(RecordingError, match="there is no such data set") as caught:
         read_trajectory(sound_run)["slip_ratio"]
     assert caught.value.field == "slip_ratio"

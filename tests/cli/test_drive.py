@@ -18,6 +18,14 @@ def rover(*arguments: str) -> Result:
     return CliRunner(env={"COLUMNS": "120", "NO_COLOR": "1"}).invoke(app, list(arguments))
 
 
+@pytest.fixture(autouse=True)
+def place(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder in which the command runs: it records under it."""
+    folder = tmp_path_factory.mktemp("place")
+    monkeypatch.chdir(folder)
+    return folder
+
+
 def test_an_episode_prints_its_summary() -> None:
     result = rover("drive", "--seed", "1")
     assert result.exit_code == 0, result.output

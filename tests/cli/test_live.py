@@ -91,7 +91,7 @@ def test_a_port_in_use_is_one_line() -> None:
         (("--friction", "-1"), "--friction: must be at least 0"),
         (("--gravity", "nan"), "--gravity: must be finite"),
         (("--model", "tank"), "model: must be a name"),
-        (("--host", "no.such.host.invalid"), "--host: must be a name or an address of this machine"),
+        (("--host", "no.such.host.invalid"), "--host: must be a name or an address of this computer"),
         (("--output", "/dev/null"), "--output: cannot be written"),
     ],
 )

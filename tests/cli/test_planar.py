@@ -268,7 +268,7 @@ def test_a_planar_run_read_back_is_the_simulations(tmp_path: Path) -> None:
     assert run.radius == pytest.approx([sim.parameters["radius"]])
     assert run.discs[-1, 0] == pytest.approx(sim.q)
     assert run.ground.height(0.7) == sim.ground.height(0.7)
-    with pytest.raises(RecordingError, match="holds a RoverRun, no PlanarRun"):
+    with pytest.raises(RecordingError, match="contains a RoverRun, not a PlanarRun"):
         open_run(write_episode(tmp_path), PlanarRun)
 
 

@@ -322,7 +322,8 @@ def test_what_was_not_recorded_is_left_out(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "reason"), [(b"no HDF5", "not HDF5"), (None, "No such file"), ("other", "is no rover-gym trajectory")]
+    ("content", "reason"),
+    [(b"no HDF5", "not an HDF5 file"), (None, "No such file"), ("other", "is not a rover-gym trajectory")],
 )
 def test_a_file_that_is_no_run_is_refused_by_name(content: bytes | str | None, reason: str, tmp_path: Path) -> None:
     path = tmp_path / "bad.h5"

@@ -135,7 +135,7 @@ def test_a_row_that_does_not_fit_is_refused_and_nothing_added(
 def test_another_hdf5_file_is_refused(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["time"] = [1.0]
-    with pytest.raises(RecordingError, match="is no rover-gym trajectory") as caught:
+    with pytest.raises(RecordingError, match="is not a rover-gym trajectory") as caught:
         read_trajectory(tmp_path / "other.h5")
     assert caught.value.field == "path"
     assert caught.value.value == str(tmp_path / "other.h5")
@@ -143,7 +143,7 @@ def test_another_hdf5_file_is_refused(tmp_path: Path) -> None:
 
 def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("no run", encoding="utf-8")
-    with pytest.raises(RecordingError, match="not HDF5"):
+    with pytest.raises(RecordingError, match="not an HDF5 file"):
         read_trajectory(tmp_path / "notes.txt")
     with pytest.raises(FileNotFoundError):
         read_trajectory(tmp_path / "nowhere.h5")

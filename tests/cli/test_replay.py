@@ -507,7 +507,7 @@ def test_a_title_with_dollars_is_no_formula(tmp_path: Path) -> None:
 def test_a_page_of_a_run_without_its_forces_names_them(tmp_path: Path) -> None:
     run = turning_run()
     del run.trajectory.data["wheel_forces"]
-    with pytest.raises(RecordingError, match="holds no such data set"):
+    with pytest.raises(RecordingError, match="there is no such data set"):
         write_page(run, tmp_path / "out.html")
 
 
@@ -542,7 +542,6 @@ def test_all_formats_are_written_and_named(recording: Path, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("arguments", "culprit"),
     [
-        ([], "--html, --vrml, --gltf or --film"),
         (["--vrml", "out.wrl", "--fps", "0"], "fps"),
         (["--vrml", "out.wrl", "--fps", "nan"], "fps"),
         (["--vrml", "taken/below/out.wrl"], "taken"),
@@ -562,7 +561,7 @@ def test_bad_input_is_one_line_that_names_the_culprit(
 
 def test_what_is_no_run_is_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("no run", encoding="utf-8")
-    for name, message in (("notes.txt", "is no rover-gym trajectory"), ("nowhere.h5", "nowhere.h5")):
+    for name, message in (("notes.txt", "is not a rover-gym trajectory"), ("nowhere.h5", "nowhere.h5")):
         result = rover("replay", tmp_path / name, "--vrml", tmp_path / "out.wrl")
         assert result.exit_code == 2
         assert len(result.stderr.splitlines()) == 1

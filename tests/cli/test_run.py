@@ -129,13 +129,13 @@ def test_a_run_without_rover_ground_or_samples_is_refused(tmp_path: Path) -> Non
 
     with Recorder(tmp_path / "a.h5", sampler.channels, {"title": "no model"}, terrain=sim.terrain) as recorder:
         recorder.append(sampler.row(sim))
-    assert "holds no rover" in refusal(tmp_path / "a.h5")
+    assert "contains no rover" in refusal(tmp_path / "a.h5")
     with Recorder(tmp_path / "b.h5", sampler.channels, describe(sim, "no ground")) as recorder:
         recorder.append(sampler.row(sim))
-    assert "holds no ground" in refusal(tmp_path / "b.h5")
+    assert "contains no ground" in refusal(tmp_path / "b.h5")
     with Recorder(tmp_path / "c.h5", sampler.channels, describe(sim, "no samples"), terrain=sim.terrain):
         pass
-    assert "holds no samples" in refusal(tmp_path / "c.h5")
+    assert "contains no samples" in refusal(tmp_path / "c.h5")
 
 
 FIGURES = (

@@ -104,7 +104,7 @@ def test_bad_input_is_one_line_and_leaves_nothing(options: list[str], message: s
 
 def test_a_data_set_is_not_replaced(tmp_path: Path) -> None:
     (tmp_path / "a-v0").mkdir()
-    with pytest.raises(OptionError, match="name: is the name of a data set in"):
+    with pytest.raises(OptionError, match="name: is already the name of a data set in"):
         write_dataset("a-v0", "Rover-v0", PDPolicy, [1], folder=tmp_path)
 
 

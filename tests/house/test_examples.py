@@ -12,12 +12,12 @@ ROOT = Path(__file__).parents[2]
 PAGES = (
     "README.md",
     "docs/accuracy.md",
+    "docs/derivatives.md",
     "docs/economy.md",
     "docs/exchange.md",
     "docs/first-steps.md",
     "docs/grains.md",
     "docs/identification.md",
-    "docs/linearise.md",
     "docs/models.md",
     "docs/planar.md",
     "docs/policies.md",
@@ -38,6 +38,7 @@ EXTRAS = {
     "from_mjcf": "mujoco",
     "scipy": "scipy",
     "stable_baselines3": "stable_baselines3",
+    "torch_rollout": "torch",
 }
 
 

@@ -4,21 +4,19 @@ import ast
 import re
 from pathlib import Path
 
+from .test_circles import COMMENTS_AND_STRINGS
+
 ROOT = Path(__file__).parents[2]
 
 #: Most lines of a function.
 LIMIT = 80
 
-RUST_COMMENTS_AND_STRINGS = re.compile(
-    r"""//[^\n]* | /\*.*?\*/ | b?r(?P<fence>\#*)".*?"(?P=fence) | "(?:\\.|[^"\\])*" | '(?:\\[^'\n]+|[^'\\\n])'""",
-    re.DOTALL | re.VERBOSE,
-)
 RUST_FUNCTIONS = re.compile(r"\bfn (\w+)")
 
 
 def rust_functions(text: str) -> dict[str, int]:
     """Lines of every function with a body, by name; the longest of several of one name."""
-    code = RUST_COMMENTS_AND_STRINGS.sub(lambda found: "\n" * found[0].count("\n"), text)
+    code = COMMENTS_AND_STRINGS.sub(lambda found: "\n" * found[0].count("\n"), text)
     lengths: dict[str, int] = {}
     for found in RUST_FUNCTIONS.finditer(code):
         depth = 0

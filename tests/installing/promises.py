@@ -36,7 +36,7 @@ PROMISES = {
 (episode,) = json.loads(rover("drive", "--json"))["episodes"]
 assert episode["success"], episode
 refused("record", *RECORDED)
-refused("render", "drive", "--video", "film.mp4")
+refused("render", "drive", "--no-record", "--video", "film.mp4")
 refused("models", "model", "show", "robot.urdf") if Path("robot.urdf").exists() else None
 
 import gymnasium as gym
@@ -126,6 +126,16 @@ rover("drive", "--terrain", "ground.stl", *BRIEFLY)
 """,
     "planning": """
 rover("drive", "--difficulty", "1", "--policy", "planner", "--time-limit", "0.5")
+""",
+    "jax": """
+import jax
+import numpy as np
+from rover_gym import Simulation
+from rover_gym.derivatives import jax_rollout
+
+drive = jax_rollout(Simulation())
+far = jax.grad(lambda commands: drive(jax.numpy.zeros(42).at[1].set(1.0), commands)[-1, 0])
+assert far(jax.numpy.zeros((2, 12))).shape == (2, 12)
 """,
     "models": """
 from rover_gym import RoverModel

@@ -121,7 +121,7 @@ def test_too_many_commands_and_late_ones_are_refused(tmp_path: Path) -> None:
     loop, clock = paused(tmp_path)
     for _ in range(MOST_WAITING):
         loop.send(Drive())
-    with pytest.raises(CommandError, match="1000 commands wait"):
+    with pytest.raises(CommandError, match="1000 commands are waiting"):
         loop.send(Drive())
     stepped(loop, clock, 1)
     loop.send(Drive())

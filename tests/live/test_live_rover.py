@@ -176,7 +176,7 @@ def test_what_cannot_be_is_refused_and_nothing_changes(
 
 def test_a_policy_that_is_not_there_for_a_ground_is_refused() -> None:
     rover = LiveRover(LiveScene(ground="hills"))
-    with pytest.raises(PolicyError, match="none was trained"):
+    with pytest.raises(PolicyError, match="no trained policy"):
         rover.change("driver", "trained")
     assert rover.scene.driver == "hand"
 

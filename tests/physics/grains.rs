@@ -10,7 +10,6 @@ use rover_core::integrator::{
 use rover_core::nalgebra::{SVector, Vector3};
 use rover_core::planar::Ball;
 use rover_core::problem::FrictionContactProblem;
-use rover_core::simulation::GrainSimulation;
 use rover_core::solver::SolverOptions;
 use rover_core::spatial::space::{axis, body_velocities};
 use rover_core::system::grains::{
@@ -527,16 +526,6 @@ fn balls_fall_in_a_box_and_rest_in_it_and_their_energy_never_grows() {
 }
 
 #[test]
-fn the_same_heap_falls_twice_in_equal_bits() {
-    let [first, second] = [(); 2].map(|()| {
-        let mut heap = bed(60);
-        heap.step(150);
-        (heap.q, heap.v)
-    });
-    assert_eq!(first, second);
-}
-
-#[test]
 fn balls_that_collide_in_free_space_keep_their_momentum() {
     let mut heap = bed(60);
     heap.scene.walls.clear();
@@ -660,51 +649,4 @@ fn packings_in_space_do_not_overlap_and_stay_in_their_box() {
     let refused = narrow.build().expect_err("no room");
     assert_eq!(refused.field(), "depth");
     assert!(refused.to_string().contains("ball"), "{refused}");
-}
-
-#[test]
-fn a_simulation_of_balls_continues_from_its_snapshot_bit_for_bit_and_lets_balls_be_taken() {
-    let Heap {
-        scene, options, q, ..
-    } = bed(60);
-    let mut balls = GrainSimulation::<3>::new(Arc::new(scene), options, None, q).expect("balls");
-    balls.step(200).expect("finite");
-    let snapshot = balls.snapshot();
-    balls.step(50).expect("finite");
-    let end = (balls.q().clone(), balls.v().to_vec());
-    balls.restore(&snapshot).expect("its own");
-    balls.step(50).expect("finite");
-    assert_eq!((balls.q().clone(), balls.v().to_vec()), end);
-    let marked: Vec<bool> = (0..60).map(|i| i % 3 == 0).collect();
-    balls.remove(&marked).expect("others are left");
-    let kept: Vec<f64> = (0..60)
-        .filter(|i| i % 3 != 0)
-        .flat_map(|i| end.0[3 * i..3 * i + 3].to_vec())
-        .collect();
-    assert_eq!(balls.q(), &kept);
-    assert!(balls.restore(&snapshot).is_err(), "of another bed");
-    balls.step(50).expect("finite");
-    assert!(balls.penetration() < 0.01 * balls.soil().grains.smallest());
-}
-
-#[test]
-fn balls_exchanged_for_the_same_continue_bit_for_bit() {
-    let Heap {
-        scene, options, q, ..
-    } = bed(60);
-    let sleep = Some(SleepOptions::default());
-    let scene = Arc::new(scene);
-    let mut balls = GrainSimulation::<3>::new(scene, options, sleep, q).expect("balls");
-    balls.step(200).expect("finite");
-    let mut other = balls.clone();
-    let grains = other.soil().grains.clone();
-    let (q, v) = (other.q().clone(), other.v().to_vec());
-    let same: Vec<_> = (0..60).map(Some).collect();
-    let short = other.exchange(grains.clone(), &q, &v, &same[1..]);
-    assert_eq!(short.expect_err("too few").field(), "before");
-    other.exchange(grains, &q, &v, &same).expect("the same");
-    let (one, two) = (balls.step(50), other.step(50));
-    assert_eq!(one, two);
-    assert_eq!((balls.q(), balls.v()), (other.q(), other.v()));
-    assert_eq!(balls.time().to_bits(), other.time().to_bits());
 }

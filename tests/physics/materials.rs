@@ -152,36 +152,3 @@ fn two_bodies_meet_by_the_law_of_their_materials() {
         "{a} {b}"
     );
 }
-
-#[test]
-fn pairs_are_checked_by_name() {
-    let refused = |laws: &[(&str, &str, f64, f64)]| {
-        let error = options(pairs(laws)).check().unwrap_err();
-        error.to_string()
-    };
-    let between = "between \"wheel\" and \"rock\" must be";
-    assert!(refused(&[("wheel", "rock", -1.0, 0.0)]).contains(&format!("friction {between}")));
-    assert!(refused(&[("wheel", "rock", f64::NAN, 0.0)]).contains("is NaN"));
-    assert!(refused(&[("wheel", "rock", 1.0, 1.5)]).contains(&format!("restitution {between}")));
-    let twice = [("wheel", "rock", 1.0, 0.0), ("rock", "wheel", 1.0, 0.0)];
-    assert!(refused(&twice).contains("given twice"));
-    assert!(refused(&[("", "rock", 1.0, 0.0)]).contains("1 to 100 characters"));
-
-    let laws = options(pairs(&[("wheel", "rock", 0.5, 0.0)]));
-    let rover = RoverSimulation::new(Arc::new(Model::rover()), Arc::new(Plane::ground()), laws);
-    assert_eq!(rover.unwrap().fallback_reason(), None);
-    let none = RoverSimulation::new(
-        Arc::new(Model::rover()),
-        Arc::new(Plane::ground()),
-        options(pairs(&[])),
-    );
-    assert_eq!(none.unwrap().fallback_reason(), None);
-}
-
-#[test]
-fn a_material_without_a_name_is_refused_where_it_stands() {
-    let mut rover = ModelDescription::rover();
-    rover.wheels[1].material = Some(String::new());
-    let error = Model::from_description(rover).unwrap_err();
-    assert_eq!(error.field(), "wheels[1].material", "{error}");
-}

@@ -11,7 +11,6 @@ mod free_flight;
 mod inclined_plane;
 mod orders;
 mod parked;
-mod reference_model;
 mod round_trips;
 mod stability;
 mod starts;

@@ -5,7 +5,7 @@ pub mod surface_scenes;
 
 mod completeness;
 mod convergence;
-mod falling;
+pub mod falling;
 mod first_touch;
 mod flat;
 mod maps;

@@ -6,9 +6,7 @@ use rover_core::geometry::{Drum, Floor, Silo, Support};
 use rover_core::integrator::StepOptions;
 use rover_core::nalgebra::Vector3;
 use rover_core::simulation::{GrainSimulation, soil_options};
-use rover_core::system::grains::{
-    Cohesion, GrainError, GrainFriction, GrainScene, Grains, Wall, arranged,
-};
+use rover_core::system::grains::{Cohesion, GrainFriction, GrainScene, Grains, Wall};
 
 const G: f64 = 9.81;
 const RADIUS: f64 = 0.1;
@@ -178,51 +176,4 @@ fn two_balls_that_cohere_move_as_one_and_keep_their_momentum() {
     let after = pair.soil().momentum(pair.q(), pair.v());
     assert!((before.0 - after.0).norm() < 1e-12);
     assert!((before.1 - after.1).norm() < 1e-3 * before.1.norm());
-}
-
-#[test]
-fn what_no_attraction_can_be_is_refused_by_name() {
-    for (force, range, field) in [
-        (-1.0, None, "cohesion"),
-        (f64::NAN, None, "cohesion"),
-        (1.0, Some(0.0), "cohesion_range"),
-        (1.0, Some(0.21 * RADIUS), "cohesion_range"),
-        (1.0, Some(f64::NAN), "cohesion_range"),
-    ] {
-        let refused = Cohesion::new(force, range, RADIUS).expect_err("no attraction");
-        assert_eq!(refused.field(), field);
-    }
-}
-
-#[test]
-fn balls_of_given_radii_are_arranged_without_overlap() {
-    let radius: Vec<f64> = (0..60).map(|i| 0.01 + 1e-4 * f64::from(i)).collect();
-    let sides = [0.2, f64::INFINITY, 0.1];
-    let q = arranged::<3>(&radius, [-0.1, 0.3, 0.0], sides, 7).expect("room");
-    let grains = Grains::<3>::new(radius.clone(), vec![1.0; 60]).expect("grains");
-    let around = [
-        Wall::left(-0.1),
-        Wall::right(0.1),
-        Wall::floor(0.3),
-        Wall::new(Vector3::zeros(), Vector3::z()).expect("a wall"),
-        Wall::new(Vector3::z() * 0.1, -Vector3::z()).expect("a wall"),
-    ];
-    let scene = GrainScene {
-        grains,
-        walls: around.to_vec(),
-        ground: None,
-        machine: None,
-        friction: GrainFriction::default(),
-    };
-    assert!(scene.penetration(&q, 0.0) <= 0.0);
-    assert_eq!(
-        q,
-        arranged::<3>(&radius, [-0.1, 0.3, 0.0], sides, 7).unwrap()
-    );
-    let narrow = [0.2, f64::INFINITY, 0.03];
-    let refused = arranged::<3>(&radius, [0.0; 3], narrow, 0).expect_err("too narrow");
-    assert!(matches!(
-        refused,
-        GrainError::TooNarrow { field: "depth", .. }
-    ));
 }

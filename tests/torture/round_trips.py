@@ -60,7 +60,7 @@ def models(random: Random, ledger: Ledger) -> None:
         model.to_file(path)
         ways = {
             "a file": RoverModel.from_file(path),
-            "a text": RoverModel.from_text(model.to_text()),
+            "a string": RoverModel.from_text(model.to_text()),
             "a dictionary": RoverModel.from_dict(model.to_dict()),
             "a pickle": _again(random, model),
         }

@@ -70,7 +70,7 @@ def test_drive_runs_the_trained_policy(tmp_path: Path) -> None:
 
 
 def test_a_policy_that_is_not_there_is_one_line(tmp_path: Path) -> None:
-    result = CliRunner().invoke(app, ["drive", "--policy", str(tmp_path)])
+    result = CliRunner().invoke(app, ["drive", "--no-record", "--policy", str(tmp_path)])
     assert result.exit_code == 2
     assert result.stderr.startswith("error: --policy: ")
 

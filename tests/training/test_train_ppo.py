@@ -214,7 +214,7 @@ def test_a_damaged_checkpoint_is_one_line(text: str, train: Script, tmp_path: Pa
     config = "plane"
     result = train("--config", config, "--output", tmp_path / "run", "--resume")
     assert result.exit_code == 2
-    assert result.stderr.startswith("error: --resume: names no checkpoint")
+    assert result.stderr.startswith("error: --resume: is not a checkpoint")
     assert len(result.stderr.splitlines()) == 1
 
 

@@ -30,7 +30,7 @@ def held(ledger: Ledger) -> None:
 
 
 @pytest.mark.nightly(
-    "tests/physics/planar/soil.rs::a_disk_on_a_slope_rolls_below_and_slides_above_three_times_the_friction"
+    "tests/physics/grains.rs::on_a_slope_a_disk_slides_above_three_times_the_friction_and_a_ball_above_three_and_a_half"
 )
 def test_columns_run_out_the_farther_the_taller_and_nearly_in_proportion() -> None:
     ledger = Ledger()
@@ -55,7 +55,7 @@ def test_disks_without_friction_pack_at_random_and_isostatically_those_with_fric
 
 
 @pytest.mark.nightly(
-    "tests/physics/planar/soil.rs::a_disk_on_a_slope_rolls_below_and_slides_above_three_times_the_friction"
+    "tests/physics/grains.rs::on_a_slope_a_disk_slides_above_three_times_the_friction_and_a_ball_above_three_and_a_half"
 )
 def test_a_slope_stays_the_steeper_the_more_friction() -> None:
     # A bed of so few disks is off by some four degrees: the mean of three.

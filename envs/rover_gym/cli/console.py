@@ -61,6 +61,7 @@ SET_BY = {
 PLACED = (
     ("path", "run"),
     ("path", "recording"),
+    ("run", "recording"),
     ("path", "file"),
     ("model", "name"),
     ("policy", "policies"),
@@ -114,7 +115,7 @@ def check_file(option: str, path: Path | None) -> None:
     with _tried(option, path, path.parent):
         is_new = not path.exists()
         if not is_new and not stat.S_ISREG(path.stat().st_mode):
-            raise OSError(errno.EINVAL, "no regular file")
+            raise OSError(errno.EINVAL, "not a regular file")
         with path.open("ab"):
             pass
         if is_new:
@@ -383,10 +384,11 @@ def plain(value: Any) -> Any:
 
 #: Commands that a newcomer can type in this order, with what they do.
 FIRST_STEPS = (
-    ("rover drive", "drive to a goal on flat ground, and tell how it went"),
-    ("rover drive --difficulty 1 --policy scan --output runs/first", "find a way among rocks, and keep the run"),
-    ("rover replay runs/first/episode-0.h5 --html runs/first/replay.html", "watch that run in the browser"),
-    ("rover plot runs/first/episode-0.h5", "look at its path, wheel loads, slip and energy"),
+    ("rover drive", "drive to a goal on flat ground, tell how it went, and keep the run"),
+    ("rover drive --difficulty 1 --policy scan", "find a way among rocks"),
+    ("rover replay", "watch the newest run in the browser"),
+    ("rover plot", "look at its path, wheel loads, slip and energy"),
+    ("rover live --terrain rocks", "drive by hand"),
 )
 
 

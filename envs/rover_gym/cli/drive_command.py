@@ -21,10 +21,10 @@ from rover_gym.cli.console import (
     AsJson,
     Results,
     check_file,
-    check_folder,
     plain_errors,
     progress_bar,
 )
+from rover_gym.cli.newest import recording_folder, say_how_to_watch
 from rover_gym.cli.options import (
     BUILT_IN,
     DRIVERS_HELP,
@@ -60,6 +60,7 @@ from rover_gym.record.rover_run import OF_EPISODES
 from rover_gym.validation import number, refuse
 
 CONTROL_PERIOD = 0.05  # s, of Rover-v0
+FOLDER = Path("runs/drive")  # of the recordings
 SHORTEST_STEP = 1e-5  # s: a shorter one makes no episode end
 
 
@@ -85,8 +86,9 @@ Seed = Annotated[
 ]
 Output = Annotated[
     Path | None,
-    typer.Option(file_okay=False, help="Folder for trajectories (HDF5) and summary.json. Default: save nothing."),
+    typer.Option(file_okay=False, help="Folder for trajectories (HDF5) and summary.json. Default: runs/drive."),
 ]
+Record = Annotated[bool, typer.Option("--record/--no-record", help="Record the episodes; needs the extra record.")]
 Video = Annotated[
     Path | None, typer.Option(dir_okay=False, metavar="FILE.mp4", help="Film the episodes one after the other.")
 ]
@@ -112,6 +114,7 @@ def drive(
     episodes: Episodes = 1,
     seed: Seed = 0,
     output: Output = None,
+    record: Record = True,
     video: Video = None,
     size: FilmSize = "640x480",
     camera: FilmCamera = "follow",
@@ -127,7 +130,7 @@ def drive(
     """
     _check_time_step(time_step)
     terrain = chosen_terrain(terrain, difficulty)
-    check_folder("output", output)
+    folder = recording_folder(output, FOLDER, wanted=record)
     check_file("video", video)
     angles = {"slope_deg": slope, "uphill_deg": uphill, "heading_deg": heading}
     scene = {"terrain": terrain, "friction": friction, "time_step": time_step}
@@ -145,7 +148,7 @@ def drive(
     warn_of_slope(slope, friction)
     title = f"{environment_title(terrain)} with {driver_title(policy)}"
     drives = _Drives(env, chosen.make(env), title, as_given, options)
-    drives.run(range(seed, seed + episodes), output, video)
+    drives.run(range(seed, seed + episodes), folder, video)
 
     summary = {
         "environment": environment_of(terrain),
@@ -157,12 +160,14 @@ def drive(
         said.add(**summary)
         if drives.results:
             said.show(_table(drives.results, title))
-        if output is not None:
-            drives.paths.append(output / "summary.json")
+        if folder is not None:
+            drives.paths.append(folder / "summary.json")
             drives.paths[-1].write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
         for path in [*drives.paths, *([] if video is None else [video])]:
             if path.exists():
                 said.path("written", path)
+        if folder is not None and not as_json and drives.paths[0].exists():
+            say_how_to_watch(drives.paths[0])
         if drives.interrupted:
             typer.echo(f"interrupted: {len(drives.results)} of {episodes} episodes are done", err=True)
             raise typer.Exit(INTERRUPTED)

@@ -1,5 +1,6 @@
 """`rover live`: a rover that is driven in real time in the browser."""
 
+import sys
 import webbrowser
 from pathlib import Path
 from typing import Annotated
@@ -58,7 +59,9 @@ def live(
         str, typer.Option(help="Address to listen at. The default refuses other machines; 0.0.0.0 lets them in.")
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="Port to listen at; 0 takes any that is free.")] = 8765,
-    show: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = True,
+    show: Annotated[
+        bool | None, typer.Option("--open/--no-open", help="Open the page. Default: where there is a terminal.")
+    ] = None,
 ) -> None:
     """Drive a rover in real time behind a page in the browser, by keyboard, gamepad, sliders or a policy.
 
@@ -95,7 +98,7 @@ def live(
     typer.echo(f"live: {server.address} (Ctrl-C ends the drive)")
     loop.start()
     try:
-        if show:
+        if sys.stdout.isatty() if show is None else show:
             webbrowser.open(server.address)
         while not loop.wait(LOOK):
             pass

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from rover_gym.cli.console import check_file, check_folder, plain_errors, progress_bar, say_path
+from rover_gym.cli.newest import newest_run, show_in_browser
 from rover_gym.cli.options import complete_recording
 from rover_gym.extras import require
 from rover_gym.grains.grain_run import GrainRun
@@ -17,18 +18,26 @@ from rover_gym.runs import open_run
 from rover_gym.soil.soil_run import SoilRun
 from rover_gym.validation import refuse
 
+OpenIt = Annotated[
+    bool | None, typer.Option("--open/--no-open", help="Open it in the browser. Default: where there is a terminal.")
+]
+
 
 @plain_errors
 def replay(
     *,
     run: Annotated[
-        Path,
+        Path | None,
         typer.Argument(
-            help="What `rover drive --output`, `rover report`, `rover planar` or `rover grains` saved.",
+            help="What `rover drive`, `rover report`, `rover planar` or `rover grains` saved, or a folder of such runs,"
+            " of which the newest is taken. Default: the newest in runs.",
             autocompletion=complete_recording,
         ),
-    ],
-    html: Annotated[Path | None, typer.Option(dir_okay=False, help="Page for the browser; needs no network.")] = None,
+    ] = None,
+    html: Annotated[
+        Path | None,
+        typer.Option(dir_okay=False, help="Page for the browser; needs no network. Default: beside the run."),
+    ] = None,
     vrml: Annotated[Path | None, typer.Option(dir_okay=False, help="VRML97 file, usually .wrl.")] = None,
     gltf: Annotated[Path | None, typer.Option(dir_okay=False, help="Binary glTF 2.0 file, usually .glb.")] = None,
     film: Annotated[
@@ -39,11 +48,13 @@ def replay(
     follow: Annotated[
         bool, typer.Option("--follow/--no-follow", help="Let the camera of the page follow the rover.")
     ] = True,
+    show: OpenIt = None,
 ) -> None:
     """Replay a saved run: as a page with a timeline and curves, and as animated 3D files for other programs."""
+    run = newest_run(run)
+    if not (html or vrml or gltf or film):
+        html = run.with_suffix(".html")
     wanted = {"html": html, "vrml": vrml, "gltf": gltf, "film": film}
-    if not any(wanted.values()):
-        raise OptionError("say what to write: --html, --vrml, --gltf or --film, with a file's name")
     saved = open_run(run)
     kind = _KINDS[type(saved)]
     if gltf is not None:
@@ -57,6 +68,7 @@ def replay(
     frames = saved.resample(fps)
     if html is not None:
         say_path("page", write_page(frames, html, follow=follow))
+        show_in_browser(html, wanted=show)
     if vrml is not None and isinstance(frames, RoverRun):
         say_path("VRML", write_vrml(frames, vrml))
     if gltf is not None and isinstance(frames, RoverRun):
@@ -84,18 +96,20 @@ _KINDS: dict[type, tuple[tuple[str, ...], str]] = {
 @plain_errors
 def plot(
     recording: Annotated[
-        Path,
+        Path | None,
         typer.Argument(
             metavar="RUN",
             autocompletion=complete_recording,
-            help="What `rover drive --output`, `rover report`, `rover planar` or `rover grains` saved.",
+            help="What `rover drive`, `rover report`, `rover planar` or `rover grains` saved, or a folder of such runs,"
+            " of which the newest is taken. Default: the newest in runs.",
         ),
-    ],
+    ] = None,
     output: Annotated[
         Path | None, typer.Option(file_okay=False, help="Folder to write into. Default: beside the run.")
     ] = None,
     file_format: Annotated[str, typer.Option("--format", help="'png', 'svg' or 'pdf'.")] = "png",
     overview: Annotated[bool, typer.Option("--overview/--no-overview", help="Add one page with all figures.")] = False,
+    show: OpenIt = None,
 ) -> None:
     """Draw a saved run over time: gaps, loads, slip, attitude, torques, energy and solver, and its path from above.
 
@@ -104,10 +118,13 @@ def plot(
     Of a run on a soil: speed, slip and sinkage; forces on the wheels; energy, contacts and overlap. Of balls in space
     also the ruts: the surface before and after, with sections along and across a track.
     """
+    recording = newest_run(recording)
     folder = recording.with_name(f"{recording.stem}-plots") if output is None else output
     run = open_run(recording)
     check_folder("output", folder)
     from rover_gym.figures import draw_run  # noqa: PLC0415 - slow to load, and a bad file is told at once
 
-    for path in draw_run(run, folder, file_format=file_format, with_overview=overview):
+    paths = draw_run(run, folder, file_format=file_format, with_overview=overview)
+    for path in paths:
         say_path("figure", path)
+    show_in_browser(paths[-1] if overview else paths[0], wanted=show)

@@ -83,7 +83,7 @@ def scene(
     rover = named_model(model) or RoverModel()
     ground: Terrain | None = named_ground(terrain, spacing, height_range)
     if slope and (ground is not None or terrain == "rug"):
-        refuse(OptionError, "slope", slope, "is the ground's own")
+        refuse(OptionError, "slope", slope, "cannot be chosen: the ground defines its slope")
     if ground is None:
         ground = _ground(terrain, rover, slope, seed)
         warn_of_slope(slope)

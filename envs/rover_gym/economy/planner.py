@@ -121,7 +121,7 @@ def _start(scene: Scene) -> Array:
     heading = number("heading", scene.heading)
     ground: Terrain | None = scene.terrain if surfaces_of(scene.terrain) else plane_of(scene.terrain)
     if ground is None or (isinstance(ground, Plane) and ground.normal[1] <= 0.0):
-        refuse(TerrainError, "terrain", scene.terrain, "has no plane to stand on: give a start")
+        refuse(TerrainError, "terrain", scene.terrain, "has no plane on which to place the rover: give a start")
     return model.resting_pose(ground, (0.0, 0.0), heading)
 
 
@@ -158,7 +158,7 @@ def _ground(scene: Scene) -> tuple[Terrain, Decision]:
         search = "spheres may be anywhere near the rover" if reach is None else "all spheres are within reach"
         return terrain, Decision("ground", f"{left} spheres in a ball tree", search)
     if left == 0:
-        refuse(OptionError, "reach", scene.reach, "leaves the rover without any ground")
+        refuse(OptionError, "reach", scene.reach, "is too small: no ground is left under the rover")
     kept = SphereField(centres[shown], radii[shown], plane, terrain.material)
     return kept, Decision("ground", f"{left} spheres in a ball tree", f"of {len(radii)} spheres {dropped}")
 
@@ -201,7 +201,7 @@ def _steering(scene: Scene, terrain: Terrain, start: Array) -> tuple[bool, Decis
     if scene.steered:
         return False, Decision("steering", held, "steering may be commanded")
     if np.any(angles):
-        refuse(OptionError, "steered", scene.steered, "the start has turned wheels, which no set-point keeps turned")
+        refuse(OptionError, "steered", scene.steered, "is False, but the wheels are turned at the start")
     if not isinstance(terrain, Plane):
         climbed = "sphere" if isinstance(terrain, SphereField) else "face"
         why = f"not commanded, but on {climbed}s the PD gives way enough to change which {climbed} a wheel climbs"

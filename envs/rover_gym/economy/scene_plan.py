@@ -77,7 +77,7 @@ def check_scene(scene: Scene) -> None:
     if not isinstance(scene, Scene):
         refuse(OptionError, "scene", scene, "must be a Scene")
     if not isinstance(scene.terrain, Terrain):
-        refuse(TerrainError, "terrain", scene.terrain, "must be a terrain; several make a Union")
+        refuse(TerrainError, "terrain", scene.terrain, "must be a terrain; combine several by Union")
     if not isinstance(scene.model, RoverModel):
         refuse(ModelError, "model", scene.model, "must be a RoverModel")
     for name in ("steered", "equal_torques", "held", "tumbles"):
@@ -254,7 +254,7 @@ class PlannedRover:
             return
         values = vector("steering", set_points, len(self.plan.scene.model.wheel_names), error=CommandError)
         if any(values):
-            refuse(CommandError, "steering", values, "the scene was planned without steering")
+            refuse(CommandError, "steering", values, "the scene was planned without steering, so it must be 0")
 
     def step(self, n: int = 1) -> StepReport:
         """Takes n steps.
@@ -273,5 +273,7 @@ class PlannedRover:
             ground = self.simulation.ground
             tilt = float(self.simulation.q[2]) - (math.atan(ground.slope) if isinstance(ground, Line) else 0.0)
             if abs(math.remainder(tilt, math.tau)) > LARGEST_TILT:
-                refuse(StepError, "pitch", tilt, "the trunk may touch the ground, which the planar model does not know")
+                refuse(
+                    StepError, "pitch", tilt, "the trunk may touch the ground, which the planar model does not include"
+                )
         return report

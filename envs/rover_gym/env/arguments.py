@@ -140,7 +140,7 @@ def check_terrain(field: str, value: object) -> str | Terrain:
             TerrainError,
             field,
             value,
-            f"unknown; known are {', '.join(TERRAINS)}, files of maps and meshes, and any terrain",
+            f"must be one of {', '.join(TERRAINS)}, the file of a map or a mesh, or a terrain",
         )
     terrain: Terrain = value
     return terrain
@@ -172,7 +172,7 @@ def check_gravity(field: str, value: object) -> tuple[float, ...]:
     gravity = vector(field, value, 3)
     magnitude = math.hypot(*gravity)
     if not magnitude > 0.0:
-        refuse(OptionError, field, value, "must not vanish: it says where up is")
+        refuse(OptionError, field, value, "must not be zero: it defines the direction of up")
     if not GRAVITIES[0] <= magnitude <= GRAVITIES[1]:
         refuse(OptionError, field, value, "must have a magnitude of {:g} to {:g} m/s2".format(*GRAVITIES))
     return gravity
@@ -188,7 +188,7 @@ def check_model(field: str, value: object) -> RoverModel:
         refuse(ModelError, f"{field}.wheels", [], "must have at least one wheel")
     indices = value.wheel_joint_indices
     if min(indices) < 0:
-        refuse(ModelError, f"{field}.wheel_joint_indices", indices, "must be joints that move")
+        refuse(ModelError, f"{field}.wheel_joint_indices", indices, "must be movable joints")
     return value
 
 

@@ -63,10 +63,13 @@ def check_reward_terms(field: str, value: object) -> dict[str, RewardTerm]:
         refuse(OptionError, field, value, "must be a function or a mapping from names to functions")
     for name, term in value.items():
         if not (isinstance(name, str) and name.isidentifier()):
-            refuse(OptionError, f"{field}.{shown(name)}", name, "must be named by an identifier")
+            refuse(OptionError, f"{field}.{shown(name)}", name, "must have an identifier as its name")
         if name in WEIGHTS:
             refuse(
-                OptionError, f"{field}.{name}", term, "is a term of the environment; reward_weights changes its weight"
+                OptionError,
+                f"{field}.{name}",
+                term,
+                "is already a term of the environment; change its weight by reward_weights",
             )
         if not callable(term):
             refuse(OptionError, f"{field}.{name}", term, "must be a function")

@@ -1,4 +1,4 @@
-"""The axes of what leaves: the simulator's own, or those of REP 103.
+"""Axes of exported data: the simulator's own, or those of REP 103.
 
 The simulator's world and its solids have x forward, y up and z to the right. In REP 103 x is forward, y to the left and
 z up. The attitude `R = Ry(heading) Rz(pitch) Rx(roll)` is then `Rz(heading) Ry(-pitch) Rx(roll)`: yaw, pitch and roll
@@ -19,7 +19,7 @@ MAP_FROM_WORLD = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
 def vector_components(axes: Axes) -> tuple[tuple[int, float], ...]:
-    """Of each component of a vector: which one of the simulator's it is, and its sign."""
+    """For each component of a vector, the index and sign of the simulator's component."""
     turn = MAP_FROM_WORLD if axes == "rep103" else np.eye(3)
     return tuple((i := int(np.flatnonzero(row)[0]), float(row[i])) for row in turn)
 

@@ -136,7 +136,7 @@ FORMAT = 2
 
 
 def scene_text(simulation: Simulation, variables: Sequence[UnitVariable]) -> tuple[str, str]:
-    """A simulation in its present state as JSON, and the token that tells it from others."""
+    """A simulation in its present state as JSON, and a token that identifies it."""
     scene = {
         "format": FORMAT,
         "model": simulation.model.to_text(),
@@ -205,15 +205,15 @@ class UnitVariable:
     """A variable of a unit.
 
     Attributes:
-        reference: The importer's number of it.
+        reference: Value reference of the importer.
         name: Its name.
-        causality: What it is to the importer.
-        channel: What it is to the unit, as `Channel` of `rust/fmu` names it.
+        causality: Causality of FMI.
+        channel: Quantity of the unit, as named in `Channel` of `rust/fmu`.
         index: Which entry of the channel.
         unit: SI unit, or "1".
         description: In words.
         start: Value at the start, of parameters and inputs.
-        sign: 1 or -1: of the variable, where that of the channel is positive.
+        sign: 1 or -1: sign of the variable relative to the channel.
     """
 
     reference: int
@@ -291,7 +291,7 @@ def _motion(simulation: Simulation, axes: Axes) -> Iterator[Row]:
 
 
 def _outputs(simulation: Simulation, axes: Axes) -> Iterator[Row]:
-    """Contacts, forces, readings and what the steps took."""
+    """Contacts, forces, readings and solver statistics."""
     model = simulation.model
     for i, name in enumerate(model.wheel_names):
         yield f"wheel_gap.{name}", "output", "wheel_gap", i, "m", "to the ground, negative where they overlap", None
@@ -341,7 +341,8 @@ def fmu_library() -> Path:
     """The library of this package's units.
 
     Raises:
-        OptionError: It has not been built, or there is none for this system; the message says how to build it.
+        OptionError: The library has not been built, or does not exist for this system; the message explains how to
+            build it.
     """
     ending, _ = ENDINGS.get(platform.system(), ENDINGS["Linux"])
     path = LIBRARIES / f"{IDENTIFIER}{ending}"
@@ -361,8 +362,8 @@ def write_fmu(
 ) -> Path:
     """Writes a simulation in its present state as an FMI 3.0 co-simulation unit for this system.
 
-    The unit begins in this state, with this command, and gives bit for bit what the simulation gives with the same
-    inputs and steps.
+    The unit starts in this state with this command. With the same inputs and steps it gives the same bits as the
+    simulation.
 
     Args:
         simulation: The simulation; it is not changed.
@@ -373,7 +374,7 @@ def write_fmu(
             world and trunk alike.
 
     Raises:
-        OptionError: The library has not been built, or `axes` is none of the two.
+        OptionError: The library has not been built, or `axes` is invalid.
         OSError: The file cannot be written.
     """
     if axes not in AXES:

@@ -1,7 +1,7 @@
-"""The messages of an MCAP log, in Foxglove's schemas; the IMU's in that of ROS 2, which Foxglove has none for.
+"""Messages of an MCAP log in Foxglove's schemas. The IMU uses the schema of ROS 2, because Foxglove has none.
 
-The simulator's world has y up. The frame `map` has z up, as viewers expect; `world` stands in it, and the solids in
-`world`.
+The simulator's world has y up. The frame `map` has z up, as viewers expect. `world` is a child of `map`, and the solids
+are children of `world`.
 
 A chunk of messages is followed by the records that end a file, and the next chunk overwrites them. Without enough space
 on the disk the file stays as the last commit left it.
@@ -182,7 +182,7 @@ def imu(nanoseconds: int, frame: str, rotation: Array, angular_velocity: Array, 
         frame: The frame of the two vectors.
         rotation: From that frame to the map, (3, 3).
         angular_velocity: rad/s, (3,).
-        acceleration: What an accelerometer feels: acceleration less gravity, m/s², (3,).
+        acceleration: Reading of an accelerometer: acceleration minus gravity, m/s², (3,).
     """
     w, x, y, z = quaternions(rotation)
     name = frame.encode() + b"\0"
@@ -218,12 +218,12 @@ def _paint(place: Any, colour: Colour) -> None:
     place.a = 1.0
 
 
-#: Bytes of messages that a kill may lose.
+#: Largest number of bytes lost if the process is killed.
 CHUNK = 1 << 16
 
 
 class McapFile:
-    """Messages on topics; without the file's index until it is closed.
+    """Writes messages to topics. The file has no index until it is closed.
 
     Args:
         path: The file to create, with its folder. An existing file is replaced unless it is being written.
@@ -242,7 +242,7 @@ class McapFile:
         try:
             self._disk = SteadyFile(self.path)
         except FileInUseError:
-            refuse(RecordingError, "path", str(self.path), "is in use: another writer writes it")
+            refuse(RecordingError, "path", str(self.path), "is in use by another writer")
         except OSError as error:
             raise OSError(error.errno, error.strerror, str(self.path)) from error
         self._release = weakref.finalize(self, self._disk.close)
@@ -255,7 +255,7 @@ class McapFile:
 
     @property
     def is_open(self) -> bool:
-        """Whether it takes messages."""
+        """Whether the file accepts messages."""
         return bool(self._release.alive)
 
     def schema(self, name: str, encoding: str, data: bytes) -> int:
@@ -277,14 +277,14 @@ class McapFile:
         self._add(topic, name, nanoseconds, message.SerializeToString())
 
     def add_channel(self, topic: str, name: str, encoding: str, schema: int) -> None:
-        """Opens a topic for messages of a schema; `encoding` is that of the messages.
+        """Opens a topic for messages of a schema; `encoding` is the messages' encoding.
 
         Raises:
-            RecordingError: The topic is open already, or the file is closed.
+            RecordingError: The topic is already open, or the file is closed.
         """
         self._must_be_open()
         if topic in self._channels:
-            refuse(RecordingError, "topic", topic, "is open already")
+            refuse(RecordingError, "topic", topic, "is already open")
         self._channels[topic] = (self._writer.register_channel(topic, encoding, schema), name)
 
     def write_bytes(self, topic: str, nanoseconds: int, data: bytes) -> None:
@@ -317,10 +317,10 @@ class McapFile:
         self._tried(self._writer.flush)
 
     def close(self) -> None:
-        """Writes what is left and the index; a second call does nothing.
+        """Writes the remaining messages and the index. A second call does nothing.
 
         Raises:
-            RecordingError: The disk is full; what was committed stays readable.
+            RecordingError: The disk is full; committed messages stay readable.
         """
         if self.is_open:
             self._must_be_open()
@@ -346,7 +346,7 @@ class McapFile:
         self._tried(lambda: self._writer.add_message(channel, nanoseconds, data, nanoseconds))
 
     def _tried(self, write: Any) -> None:
-        """Writes, and commits what has left the writer's memory."""
+        """Writes a message and commits full chunks."""
         try:
             write()
             place = self._disk.tell()
@@ -367,7 +367,7 @@ class McapFile:
 
     def _must_be_open(self) -> None:
         if not self.is_open:
-            refuse(RecordingError, "writer", str(self.path), "is closed: a log that is finished takes no more")
+            refuse(RecordingError, "writer", str(self.path), "is closed, so nothing more can be written")
         if os.getpid() != self._process:
             refuse(RecordingError, "writer", str(self.path), "belongs to the process that opened it")
 

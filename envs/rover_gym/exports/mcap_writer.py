@@ -1,4 +1,4 @@
-"""Writes a rover's run as MCAP, row by row, as `Recorder` writes HDF5: the log that robotics viewers open."""
+"""Writes a rover's run as MCAP, the log format of robotics viewers, row by row as `Recorder` writes HDF5."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
-#: Half of the piece of ground that is shown about the first row of a run whose way is not known, m.
+#: Half width of the ground shown around the first row if the way of a run is unknown, m.
 REACH = 15.0
 
 #: Rows' channels that become columns of `/wheels`: the channel, and the names of its columns.
@@ -49,9 +49,8 @@ LATEST = 1.8e10  # s after 1970: what nanoseconds of 64 bits hold
 class McapWriter:
     """Appends rows to an MCAP file; a context manager.
 
-    The file is complete after every commit, so that a process that is killed leaves a file that every reader opens: at
-    most the last 64 KiB of messages are lost, and none before `flush`. A full disk ends the log with an error, and the
-    file stays as it was committed. Topics:
+    The file is readable after every commit, also if the process is killed: at most the last 64 KiB of messages are
+    lost, and none before `flush`. A full disk ends the log with an error and leaves the file as committed. Topics:
 
     | topic | schema | content |
     |---|---|---|
@@ -176,9 +175,9 @@ class McapWriter:
             time: s.
             rotation: From the sensor's axes to the world, (3, 3).
             angular_velocity: In the sensor's axes, rad/s, (3,).
-            acceleration: Acceleration less gravity in the sensor's axes, m/s², (3,); at rest it points up.
-            frame: The sensor's frame. By default the trunk's: the sensor has the trunk's axes, and all is logged in
-                those of REP 103.
+            acceleration: Acceleration minus gravity in the sensor's axes, m/s², (3,); at rest it points up.
+            frame: The sensor's frame. By default the sensor has the trunk's axes, and the data are logged in the axes
+                of REP 103.
             topic: The topic.
 
         Raises:
@@ -208,7 +207,7 @@ class McapWriter:
 
         Args:
             time: s.
-            points: (n, 3), m; rows that are not finite, where a ray met nothing, are left out.
+            points: (n, 3), m; rows that are not finite, from rays without a hit, are left out.
             frame: The frame of the points: `world` or a solid's, y up. Those of a solid are logged in the axes of REP
                 103.
             topic: The topic.
@@ -254,10 +253,10 @@ class McapWriter:
         self._file.flush()
 
     def close(self) -> None:
-        """Writes what is left and the index; a second call does nothing.
+        """Writes the remaining messages and the index. A second call does nothing.
 
         Raises:
-            RecordingError: The disk is full; what was committed stays readable.
+            RecordingError: The disk is full; committed messages stay readable.
         """
         self._file.close()
 
@@ -291,7 +290,7 @@ class McapWriter:
         return round(seconds * 1e9)
 
     def _own_imu(self, time: float, rotation: Array, v: Array) -> None:
-        """What an ideal IMU at the trunk's origin says."""
+        """Reading of an ideal IMU at the trunk's origin."""
         before, self._last = self._last, (time, v[:3].copy())
         if before is None or not time > before[0]:
             return
@@ -366,7 +365,7 @@ def _finite(field: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> Array:
 
 
 def _plain(value: Any) -> Any:
-    """A number, or nested lists of them, for JSON; None for what is not finite."""
+    """A number, or nested lists of numbers, for JSON; None for values that are not finite."""
     if np.ndim(value):
         return [_plain(entry) for entry in value]
     return float(value) if np.isfinite(value) else None

@@ -21,9 +21,9 @@ from rover_gym.validation import checked, refuse, whole
 if TYPE_CHECKING:
     from rover_gym.policy.named_policy import Policy
 
-#: What a data set may be called.
+#: Allowed names of data sets.
 NAME = re.compile(r"(?:[A-Za-z][A-Za-z0-9_-]*/)*[A-Za-z][A-Za-z0-9_-]*-v\d+")
-#: The variable that tells Minari where its data sets are.
+#: Environment variable with Minari's folder of data sets.
 PLACE = "MINARI_DATASETS_PATH"
 
 
@@ -50,9 +50,9 @@ def write_dataset(
 ) -> Path:
     """Drives episodes and stores their observations, actions, rewards and ends.
 
-    The data set names the environment with its arguments, so that `dataset.recover_environment()` makes it again, and
-    every episode its seed (`dataset.storage.get_episode_metadata`): the actions, replayed from it, give the same
-    observations bit for bit. Each episode is on the disk once it is over.
+    The data set contains the environment's arguments, from which `dataset.recover_environment()` makes it again, and
+    the seed of every episode (`dataset.storage.get_episode_metadata`). Replaying the actions from the seed gives the
+    same observations bit for bit. Each episode is written to the disk when it is over.
 
     Args:
         name: Name of the data set, such as `rover/rocks-pd-v0`.
@@ -68,8 +68,8 @@ def write_dataset(
         The folder of the data set.
 
     Raises:
-        OptionError: The environment is none of this package, an argument has no text form, a seed is no whole number or
-            stands twice, or there is a data set of that name.
+        OptionError: The environment does not belong to this package, an argument cannot be stored as text, a seed is
+            not a whole number or is given twice, or the name is already used.
         MissingExtraError: Minari is not installed.
     """
     minari = require("minari", "data")
@@ -83,7 +83,7 @@ def write_dataset(
     with _datasets_in(folder) as place:
         target = place / name
         if target.exists():
-            refuse(OptionError, "name", name, f"is the name of a data set in {place}")
+            refuse(OptionError, "name", name, f"is already the name of a data set in {place}")
         env = gym.make(environment, **_plain(arguments or {}))
         policy, stored = make_policy(env), None
         for done, seed in enumerate(chosen, 1):
@@ -147,13 +147,15 @@ def _plain(arguments: Mapping[str, Any]) -> dict[str, Any]:
     """Arguments that a data set can store as text."""
     for name, value in arguments.items():
         if not isinstance(value, (bool, int, float, str, list, tuple, type(None))):
-            refuse(OptionError, f"arguments.{name}", value, "must be a number, a text, a flag or a list: it is stored")
+            refuse(
+                OptionError, f"arguments.{name}", value, "must be a number, a string, a boolean or a list to be stored"
+            )
     return dict(arguments)
 
 
 @contextmanager
 def _datasets_in(folder: str | Path | None) -> Iterator[Path]:
-    """Lets Minari work in a folder, which it takes from the environment's variables."""
+    """Sets Minari's folder, which Minari reads from an environment variable."""
     before = os.environ.get(PLACE)
     place = Path(folder or before or Path.home() / ".minari" / "datasets").resolve()
     os.environ[PLACE] = str(place)

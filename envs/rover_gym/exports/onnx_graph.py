@@ -1,4 +1,4 @@
-"""Multilayer perceptrons as ONNX graphs, built from their weights: no framework of training is needed."""
+"""Multilayer perceptrons as ONNX graphs, built from their weights without a training framework."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float32]
 
-#: What runtimes since 2022 read.
+#: Version that runtimes since 2022 read.
 OPSET, IR_VERSION = 17, 8
 
 
 @dataclass(frozen=True)
 class Perceptron:
-    """A perceptron with what stands before and after it.
+    """A perceptron with input normalisation and output scaling.
 
     `y = after(W_n f(... f(W_1 x' + b_1) ...) + b_n)` with `x' = clip((x - mean) / deviation)`.
 
@@ -33,10 +33,10 @@ class Perceptron:
         activation: f, an ONNX operator without attributes: "Tanh", "Relu", ...
         mean: (inputs,).
         deviation: (inputs,).
-        largest: Limit of the normalised inputs; None for none.
+        largest: Limit of the normalised inputs; None for no limit.
         squash: "Clip" or "Tanh", which bounds the outputs by 1.
         scale: (outputs,) factor of the squashed outputs.
-        offset: (outputs,) what is then added.
+        offset: (outputs,) offset added afterwards.
         low: (outputs,) lower limits at the end.
         high: (outputs,) upper limits at the end.
     """

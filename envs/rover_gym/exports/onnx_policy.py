@@ -19,7 +19,7 @@ from rover_gym.validation import checked, refuse
 if TYPE_CHECKING:
     from rover_gym.mechanics import RoverModel
 
-#: The file that tells a run of `RawPolicy.save`.
+#: The file that identifies a run of `RawPolicy.save`.
 RAW_FILE = "model.zip"
 
 
@@ -36,8 +36,8 @@ def write_onnx(policy: str | Path, path: str | Path, terrain: str = "plane", mod
     Args:
         policy: The policy.
         path: The file to write, with its folder.
-        terrain: Of which "trained" or "foresight" is meant.
-        model: The rover of which "foresight" is meant; the built-in one by default.
+        terrain: Ground of the policy "trained" or "foresight".
+        model: Rover of the policy "foresight"; the built-in one by default.
 
     Raises:
         PolicyError: There is no such policy, it has no network, or its files are damaged.
@@ -112,7 +112,7 @@ def forecast_network(network: Network) -> Perceptron:
 
 
 def _raw(folder: Path) -> Any:
-    """A policy of stable-baselines3: from the observation to the action, whole."""
+    """A complete policy of Stable-Baselines3, from the observation to the action."""
     try:
         from rover_gym.exports.onnx_raw import raw_network  # noqa: PLC0415 - torch is slow to load, and optional
         from rover_gym.learning.raw_policy import RawPolicy  # noqa: PLC0415

@@ -22,7 +22,7 @@ def raw_network(policy: RawPolicy) -> Perceptron:
     """The network of a policy on raw actions, with the normalisation of its observations.
 
     Raises:
-        PolicyError: It is neither PPO's nor SAC's, or has layers of other kinds.
+        PolicyError: It is not a policy of PPO or SAC, or has unknown kinds of layers.
     """
     networks: Any = policy.model.policy
     space: Any = policy.model.action_space

@@ -72,7 +72,11 @@ def rut_maps(figure: Sheet, run: GrainRun) -> None:
             axes.set(xlabel="x (m)")
         else:
             axes.set(ylabel="z (m)")
-        figure.colorbar(image, ax=axes, label=name, shrink=0.9)
+        axes.set_title(name, loc="left")
+        # A bar beside or over its map, of its length: the map's shape, not the panel's, sets both.
+        place = (0.0, -0.24, 1.0, 0.03) if is_wide else (1.015, 0.0, 0.012, 1.0)
+        bar = axes.inset_axes(place)
+        figure.colorbar(image, cax=bar, orientation="horizontal" if is_wide else "vertical")
     if run.model is not None:
         style = WheelStyle.of(run.model)
         for i, wheel in enumerate(style.names):

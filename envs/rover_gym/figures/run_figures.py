@@ -44,6 +44,8 @@ if TYPE_CHECKING:
 #: Minimum upper end of the load axis, N, for runs without weight.
 LEAST_LOAD = 1.0
 
+LIFTED = 1e-3  # m, gap of a wheel that has left the ground
+
 SET_POINT: dict[str, Any] = {"linestyle": (0, (1, 1.5)), "linewidth": 1.0}
 
 
@@ -252,10 +254,16 @@ def _has(*names: str) -> Callable[[RoverRun], bool]:
     return lambda run: set(names) <= run.trajectory.data.keys()
 
 
+def _leaves_the_ground(run: RoverRun) -> bool:
+    """Whether a wheel is lifted at some time: otherwise the gaps are an empty chart."""
+    gaps = run.trajectory.data.get("wheel_gaps")
+    return gaps is not None and bool(np.any(gaps > LIFTED))
+
+
 #: By file name.
 DRAWINGS = {
     "path": Drawing(path_from_above, 6.5, _has("q", "wheel_centres")),
-    "wheel-gaps": Drawing(wheel_gaps, 5.5, _has("wheel_gaps")),
+    "wheel-gaps": Drawing(wheel_gaps, 5.5, _leaves_the_ground),
     "wheel-loads": Drawing(wheel_loads, 6.0, _has("wheel_forces")),
     "slip": Drawing(slip, 6.5, _has("q", "v", "wheel_forces")),
     "attitude": Drawing(attitude, 6.0, _has("q", "v")),

@@ -89,7 +89,7 @@ def sieved_radii(count: int, diameters: npt.ArrayLike, passing: npt.ArrayLike, s
     openings = array("diameters", diameters, error=OptionError)
     shares = array("passing", passing, error=OptionError)
     if openings.ndim != 1 or len(openings) < 2 or not (np.isfinite(openings) & (openings > 0.0)).all():
-        refuse(OptionError, "diameters", diameters, "must be at least two positive lengths")
+        refuse(OptionError, "diameters", diameters, "must be two or more positive lengths")
     if (np.diff(openings) <= 0.0).any():
         refuse(OptionError, "diameters", diameters, "must increase")
     if shares.shape != openings.shape or not np.isfinite(shares).all() or (np.diff(shares) < 0.0).any():
@@ -182,7 +182,7 @@ def check_memory(field: str, count: int) -> None:
         OptionError: More than a million balls, or more than fit.
     """
     if count > MOST_BALLS:
-        refuse(OptionError, field, count, f"asks for more than {MOST_BALLS} balls")
+        refuse(OptionError, field, count, f"gives more than {MOST_BALLS} balls")
     needed = count * BYTES_PER_BALL
     free = os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else needed
     if needed > free:
@@ -242,7 +242,7 @@ def settled_balls(
     if radius is None:
         radii = even_radii(count, radius_min, radius_max, seed)
     elif radius_min is not None or radius_max is not None:
-        refuse(OptionError, "radius", radius, "replaces radius_min and radius_max")
+        refuse(OptionError, "radius", radius, "cannot be combined with radius_min and radius_max")
     else:
         radii = np.asarray(radius, dtype=float)
         if radii.shape != (count,) or not (np.isfinite(radii) & (radii > 0.0)).all():
@@ -269,7 +269,7 @@ def settle(sim: GrainSimulation) -> None:
     """
     g = float(np.linalg.norm(sim.settings["gravity"]))
     if g == 0.0:
-        refuse(OptionError, "gravity", sim.settings["gravity"], "must pull balls down, or they do not settle")
+        refuse(OptionError, "gravity", sim.settings["gravity"], "must point down, so that the balls settle")
     places = sim.position[:, 1]
     height = float((places + sim.radius).max() - (places - sim.radius).min())
     still = SETTLED * float(np.sqrt(2.0 * g * sim.radius.mean()))
@@ -361,7 +361,7 @@ def settled_track(
     along = math.ceil(length / tile - 1e-9)
     count = PACKING * tile * across * max(layers, 1.0) * 2.0 * mean / (4.0 / 3.0 * math.pi * mean**3)
     if not 1.0 <= count <= MOST_BALLS:
-        refuse(OptionError, "tile", tile, f"makes a tile of {count:.3g} balls, not 1 to {MOST_BALLS}")
+        refuse(OptionError, "tile", tile, f"gives a tile of {count:.3g} balls; 1 to {MOST_BALLS} are allowed")
     check_memory("length", along * round(count))
     sizes = {"radius_min": radius_min, "radius_max": radius_max}
     bed = settled_balls(round(count), tile, across, **sizes, density=density, seed=seed, **options)
@@ -370,7 +370,7 @@ def settled_track(
     else:
         kept = np.random.default_rng(seed).random(len(bed.radius)) < layers
     if not kept.any():
-        refuse(OptionError, "layers", layers, "leaves no ball")
+        refuse(OptionError, "layers", layers, "gives a bed without balls")
     bed = replace(bed, radius=bed.radius[kept], mass=bed.mass[kept], position=bed.position[kept])
     settled = bed.simulation(**options)
     settle(settled)

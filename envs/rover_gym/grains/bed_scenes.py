@@ -247,7 +247,7 @@ def drum(
     wall, length = number("wall", wall, above=0.0), number("length", length, above=0.0)
     places = _rows_in_drum(wall, length, (1.0 + SPREAD) * radius)
     if count > len(places):
-        refuse(OptionError, "count", count, f"balls do not fit into the drum, which takes {len(places)} in rows")
+        refuse(OptionError, "count", count, f"is too large: {len(places)} balls fit into the drum")
     radii = radius * np.random.default_rng(seed).uniform(1.0 - SPREAD, 1.0 + SPREAD, count)
     mass = 4.0 / 3.0 * np.pi * DENSITY * radii**3
     filled = GrainSimulation(radii, mass, places[:count], vessel=Drum(wall, length), **options)
@@ -297,7 +297,7 @@ def slopes(run: GrainRun) -> Array:
         run: Of a `drum`.
     """
     if run.vessel is None or run.vessel["kind"] != "drum":
-        refuse(OptionError, "run", run.title, "is not one of a drum")
+        refuse(OptionError, "run", run.title, "is not a run of a drum")
     inner = INNER * run.vessel["radius"]
     result = np.full(run.n_frames, np.nan)
     for k, places in enumerate(run.positions):

@@ -359,7 +359,7 @@ def grain_run_of(trajectory: Trajectory, path: str | Path) -> GrainRun:
         RecordingError: It is not a run of balls, or holds no samples.
     """
     if not is_grains(trajectory):
-        refuse(RecordingError, "path", str(path), "holds no balls in space: `rover grains` writes such runs")
+        refuse(RecordingError, "path", str(path), "contains no balls in space; `rover grains` records such runs")
     check_time(trajectory, path)
     scene = trajectory.attributes["scene"]
     radius, mass, kinematic = (_of_balls(trajectory, path, name) for name in ("radius", "mass", "kinematic"))

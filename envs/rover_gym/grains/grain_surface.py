@@ -94,7 +94,7 @@ def _corners(bounds: object) -> tuple[Array, Array]:
     """Least x and z and largest x and z of bounds, m."""
     least_x, least_z, largest_x, largest_z = vector("bounds", bounds, 4)
     if largest_x < least_x or largest_z < least_z:
-        refuse(OptionError, "bounds", bounds, "must be the least x and z, then the largest")
+        refuse(OptionError, "bounds", bounds, "must be x_min, z_min, x_max, z_max")
     return np.array([least_x, least_z]), np.array([largest_x, largest_z])
 
 
@@ -128,7 +128,7 @@ def surface_map(
     low, high = (flat.min(axis=0), flat.max(axis=0)) if bounds is None else _corners(bounds)
     n_x, n_z = (np.floor((high - low) / edge) + 1.0).tolist()
     if not n_x * n_z <= MOST_CELLS:
-        refuse(OptionError, "cell", edge, f"makes a map of more than {MOST_CELLS} cells")
+        refuse(OptionError, "cell", edge, f"gives a map of more than {MOST_CELLS} cells")
     heights = np.full((int(n_z), int(n_x)), -np.inf)
     near = np.round((flat - low) / edge).astype(np.int64)
     reach = int(np.ceil(float(radii.max()) / edge))

@@ -112,7 +112,9 @@ class MovingWindow:
         self._stride = number("stride", stride, above=0.0, at_most=0.5 * self._reach)
         self._freeze_speed = number("freeze_speed", freeze_speed, above=0.0)
         if grains.velocity[grains.kinematic].any():
-            refuse(OptionError, "grains", "a kinematic ball that moves", "must have kinematic balls at rest only")
+            refuse(
+                OptionError, "grains", "a moving ball with prescribed velocity", "must have zero prescribed velocities"
+            )
         self._both, self._rover, self._grains = both, rover, grains
         self._parts = Parts(rover.model)
         self._radius, self._mass, self._glued = radius, grains.mass, grains.kinematic

@@ -1,14 +1,14 @@
 """The results of an identification: estimates with their uncertainty, and profiles about the minimum.
 
-The derivative at the minimum does not tell all. Where no wheel slips, all larger frictions fit alike, although the
-smallest slip that noise makes has a derivative. And the sum of squares of a machine with contacts has kinks, at which
-its derivative understates the uncertainty, and more than one minimum. A profile holds one parameter elsewhere and fits
-the others.
+The derivative at the minimum is not sufficient. Without slip, all larger friction coefficients fit equally well,
+although noise produces apparent slip that has a derivative. With contacts, the sum of squares also has kinks, at which
+its derivative understates the uncertainty, and several minima. A profile therefore holds one parameter at another value
+and fits the others.
 
-If no noise is given, it is estimated from the residuals, which also hold what the simulation gets wrong: a fit in which
-the wheels hold while the recorded ones spin then takes its errors for noise. The rows themselves bound the noise from
-above: independent noise of standard deviation s gives third differences of standard deviation sqrt(20) s, and motion
-only adds to them.
+If no noise is given, it is estimated from the residuals. These also contain model errors: if the simulated wheels hold
+while the recorded ones spin, the errors would be taken for noise. The rows themselves give an upper bound of the noise:
+independent noise of standard deviation s gives third differences of standard deviation sqrt(20) s, and motion only adds
+to them.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ SMALLEST_PART = 0.05
 
 @dataclass(frozen=True)
 class Estimate:
-    """A parameter as a run tells it.
+    """Estimate of a parameter from a run.
 
     Attributes:
         name: Its name.
         unit: SI unit, "1" for a pure number.
-        value: The value; of what the run does not tell, where the search began or ended.
-        standard_error: Its standard error; infinite if the run does not tell it.
-        reason: Why the run does not tell it; empty if it does.
+        value: The value. If the parameter is not identified, the value at which the search started or ended.
+        standard_error: Its standard error; infinite if it is not identified.
+        reason: Why it is not identified; empty if it is.
     """
 
     name: str
@@ -53,7 +53,7 @@ class Estimate:
 
     @property
     def is_identified(self) -> bool:
-        """Whether the run tells the parameter."""
+        """Whether the run determines the parameter."""
         return not self.reason
 
     @property
@@ -65,26 +65,27 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Identification:
-    """What a recorded run tells of a rover and its ground.
+    """Result of an identification.
 
     Attributes:
         estimates: The parameters, in the order in which they were asked for.
-        covariance: (p, p) covariance of the estimates; NaN in rows and columns of what the run does not tell.
-        sensitivities: (p,) singular values of the derivative of the weighted residuals by the parameters over their
-            scales, falling: 1 / s is the standard deviation of a combination of the parameters in units of its scale.
+        covariance: (p, p) covariance of the estimates; NaN in rows and columns of parameters that are not identified.
+        sensitivities: (p,) singular values of the derivative of the weighted residuals with respect to the scaled
+            parameters, in descending order: 1 / s is the standard deviation of a combination of the parameters in units
+            of its scale.
         condition: The largest over the smallest of them; infinite if the residuals do not depend on a parameter.
         columns: Names of the (nq + nv) measured columns: coordinates, then velocities.
         deviations: (nq + nv,) standard deviation of the measurements of each column, given or estimated.
         times: Of each window, (rows,) the times of its rows, s.
         residuals: Of each window, (rows, nq + nv) simulated minus measured, m, rad, m/s and rad/s.
-        window_mean_squares: (n_windows,) mean square of each window's residuals over their deviations. One that is far
-            above 1 does not fit; it counts for less, by its inverse.
+        window_mean_squares: (n_windows,) mean square of each window's residuals over their deviations. A window far
+            above 1 does not fit; its weight is then the inverse.
         mean_square: Mean square of the weighted residuals over their degrees of freedom. About 1 if the model fits to
             within the noise; the covariance contains it as a factor.
         degrees_of_freedom: Number of residuals less that of estimated quantities.
         iterations: Number of iterations.
-        not_explained: What the simulation misses by more than noise explains, in words, the worst first; empty if there
-            is nothing, and if `noise` was given. Then no parameter is identified.
+        not_explained: Columns whose misfit exceeds the noise, in words, the worst first. If there are any, no parameter
+            is identified. Empty if `noise` was given.
     """
 
     estimates: tuple[Estimate, ...]
@@ -102,7 +103,7 @@ class Identification:
     not_explained: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
-        """The estimate of a name.
+        """The estimate of a parameter, by name.
 
         Raises:
             OptionError: There is none.
@@ -137,10 +138,10 @@ class Identification:
 
 @dataclass(frozen=True)
 class OpenCombination:
-    """A combination of parameters that a run does not tell.
+    """A combination of parameters that a run does not determine.
 
     Attributes:
-        members: Indices of the parameters that take part in it, the largest part first.
+        members: Indices of the parameters in it, the largest part first.
     """
 
     members: tuple[int, ...]
@@ -154,7 +155,7 @@ class OpenCombination:
 
 
 def open_combinations(jacobian: Array, scales: Array, variance: float) -> tuple[Array, list[OpenCombination]]:
-    """The sensitivities of a fit, and the combinations of parameters that the run does not tell.
+    """The sensitivities of a fit, and the combinations of parameters that the run does not determine.
 
     Args:
         jacobian: (m, p) derivative of the weighted residuals by the parameters.
@@ -177,22 +178,22 @@ ITERATIONS = 3
 #: variance by which a parameter's scale must be seen: half of what the largest standard error allows for.
 DISTANCE, LEAST_RISE = 2.0, 2.0
 
-#: A place that is better than the minimum by this, in units of the variance, is where the search goes on.
+#: The search continues from a point that is better than the minimum by this, in units of the variance.
 BETTER = 0.5
 
-#: Number of times that it goes on.
+#: Largest number of continuations.
 MOST_RESTARTS = 2
 
 
 @dataclass(frozen=True)
 class Surroundings:
-    """A minimum and what is around it.
+    """A minimum and the profiles around it.
 
     Attributes:
         solution: The minimum, the best that was found.
         variance: Variance of a weighted residual.
-        factors: (p,) how many times larger the standard errors are than the derivative says; at least 1.
-        flat: By the index of each parameter that the run does not tell, why.
+        factors: (p,) factors on the standard errors from the derivative; at least 1.
+        flat: For each parameter that is not identified, by its index, the reason.
     """
 
     solution: Solution
@@ -207,13 +208,13 @@ def variance_of(solution: Solution, n: int) -> float:
 
 
 def look_around(fit: WindowFit, solution: Solution, parameters: Sequence[Parameter], iterations: int) -> Surroundings:
-    """Holds each parameter at other values and fits the rest; goes on from where that is better.
+    """Holds each parameter at other values and fits the rest; continues from there if the fit is better.
 
     Args:
         fit: The fit, whose starting states are those of the solution.
         solution: Its minimum.
         parameters: Its parameters.
-        iterations: Largest number of iterations of a search that goes on.
+        iterations: Largest number of iterations of a continued search.
     """
     if variance_of(solution, len(parameters)) <= EXACT:  # no noise: nothing to compare a rise with
         return Surroundings(solution, EXACT, np.ones(len(parameters)), {})
@@ -261,7 +262,7 @@ FROM_MEDIAN = 1.4826
 
 
 def roughness(windows: Sequence[Window]) -> Array:
-    """(nq + nv,) standard deviations of noise that would make the rows of the windows as rough as they are."""
+    """(nq + nv,) standard deviations of noise that would explain the roughness of the rows."""
     differences = [np.diff(window.measured, n=3, axis=0) for window in windows]
     rows = np.concatenate(differences)
     if not len(rows):
@@ -271,7 +272,7 @@ def roughness(windows: Sequence[Window]) -> Array:
 
 
 def not_explained(windows: Sequence[Window], residuals: Array, least: Array) -> tuple[Array, Array]:
-    """How far a fit is from the rows, by columns, and how far noise may be.
+    """Misfit of the columns, and the bound that noise can explain.
 
     Args:
         windows: The windows, of n rows in all.

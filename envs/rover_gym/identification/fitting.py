@@ -1,4 +1,4 @@
-"""The least squares of an identification: parameters of all windows together, a starting state of each by itself."""
+"""Least squares of an identification, with common parameters and a starting state for each window."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ SHORTEST = 3
 
 @dataclass(frozen=True)
 class Window:
-    """A stretch of a run.
+    """A section of a run.
 
     Attributes:
         time: (n,) time of its rows, s.
@@ -39,7 +39,7 @@ class Window:
 def cut(run: RoverRun, window: float, time_step: float) -> list[Window]:
     """Cuts a run into windows that share no row.
 
-    The commands of a row are those under which the rover came to it from the row before.
+    The commands of a row acted from the previous row to this one.
 
     Args:
         run: The run.
@@ -53,7 +53,7 @@ def cut(run: RoverRun, window: float, time_step: float) -> list[Window]:
     window = number("window", window, above=0.0)
     for name in ("q", "v", "wheel_torques", "steering_set_points"):
         if name not in run.trajectory.data:
-            refuse(OptionError, "recording", name, "is no channel of this run, but needed")
+            refuse(OptionError, "recording", name, "is needed, but is not a channel of this run")
     time, data = run.time, run.trajectory.data
     for name in ("q", "v", "wheel_torques", "steering_set_points"):
         if not np.isfinite(data[name]).all():
@@ -72,7 +72,7 @@ def cut(run: RoverRun, window: float, time_step: float) -> list[Window]:
         if time[-1] < time[first] + window * (1.0 - 1e-9):
             break
         if last - first + 1 < SHORTEST:
-            refuse(OptionError, "window", window, f"must hold {SHORTEST} rows of the run, or more")
+            refuse(OptionError, "window", window, f"must contain at least {SHORTEST} rows of the run")
         rows, between = slice(first, last + 1), slice(first + 1, last + 1)
         windows.append(
             Window(
@@ -94,7 +94,7 @@ class Shooter:
 
     Args:
         nq: Number of coordinates.
-        wheels: Columns of the wheels' angles, which the batch tells up to whole turns.
+        wheels: Columns of the wheels' angles, which the batch returns up to whole turns.
     """
 
     def __init__(self, nq: int, wheels: npt.NDArray[np.int64]) -> None:
@@ -107,7 +107,7 @@ class Shooter:
 
         Args:
             window: The window.
-            rovers: (n,) simulations, whose states are overwritten; the same one may stand several times.
+            rovers: (n,) simulations, whose states are overwritten. The same one may occur several times.
             gains: (n,) factors on the wheel torques.
             states: (n, nq + nv) states at the window's first row.
 
@@ -164,22 +164,22 @@ DAMPINGS = (0.0, 1.0, 10.0, 100.0, 1e3, 1e4)
 #: Mean square of a window's weighted residuals above which its starting state is searched for among those of the
 #: differences, and the number of such moves: wheels that hold instead of slipping leave no derivative to follow.
 MISFIT, MOST_MOVES = 2.5, 6
-#: Places from which the starting state of a window that does not fit is searched anew, and iterations from each.
+#: Number of restarts for the starting state of a window that does not fit, and iterations of each.
 DRAWS, DRAW_ITERATIONS = 5, 8
 #: An iteration that lowers the sum of squares by less than this, in units of the variance of a residual, is the last
 #: one: a standard error changes it by one.
 SMALLEST_GAIN = 0.02
-#: A combination of parameters is told by a run if its standard deviation, the inverse of its sensitivity, is less than
-#: half of its scale. Less would not do: noise lets wheels that hold seem to slip for a step, which makes a friction
-#: that does not matter look measured.
+#: A run determines a combination of parameters if its standard deviation, the inverse of its sensitivity, is less than
+#: half of its scale. A weaker limit fails: noise makes wheels seem to slip for a step, and friction would appear to be
+#: measured.
 LEAST_SENSITIVITY = 2.0
-#: Nor is it told if its sensitivity is a smaller part than this of the largest one: differences of a simulation with
-#: contacts are not exact enough.
+#: Smallest sensitivity relative to the largest one: differences of simulations with contacts are not exact enough for
+#: less.
 SMALLEST_SENSITIVITY = 1e-4
 #: Mean square of a window's weighted residuals from which on it counts for less: a wheel that spins in one window and
 #: holds in its simulation says little until the parameters are nearly right, and would outweigh all other windows.
 TOLERATED = 9.0
-#: Largest change of a parameter in an iteration, as a part of its scale: what the run hardly tells stays near its
+#: Largest change of a parameter in an iteration, relative to its scale: weakly determined parameters stay near their
 #: start.
 LONGEST_STEP = 0.5
 #: Mean square of the weighted residuals at which a fit is exact.
@@ -210,14 +210,14 @@ class _Linear:
         return (1.0 + 1.0 / TOLERATED) / (1.0 + _loss_argument(self.residuals))
 
     def free_of_state(self, columns: Array) -> Array:
-        """What a starting state cannot explain of columns (m, ...)."""
+        """The part of columns (m, ...) that a change of the starting state cannot explain."""
         free: Array = columns - self.basis @ (self.basis.T @ columns)
         return free
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Where a fit ended.
+    """Result of a fit.
 
     Attributes:
         values: (p,) the parameters.
@@ -245,10 +245,10 @@ class WindowFit:
     """Fits parameters to windows by the method of Gauss and Newton with shortened steps.
 
     A window starts from a state that is measured with noise, so the state is estimated as well, from all rows of the
-    window. It is eliminated from the normal equations (variable projection), which leaves those of the parameters.
+    window. It is eliminated from the normal equations (variable projection), so that only the parameters remain.
 
     Args:
-        setup: What the run is simulated with, where the parameters do not change it.
+        setup: Simulation setup before the parameters change it.
         parameters: The parameters.
         windows: The windows.
     """
@@ -264,7 +264,7 @@ class WindowFit:
         self._states = [window.measured[0].copy() for window in windows]
 
     def hold(self, held: Mapping[int, float]) -> "WindowFit":
-        """The same fit with some parameters held at given values, by their indices, from the last starting states."""
+        """Returns a copy with some parameters, by index, held at given values."""
         setup = self._setup
         for i, value in held.items():
             setup = self._parameters[i].apply(setup, value)
@@ -274,7 +274,7 @@ class WindowFit:
         return fit
 
     def go_on_from(self, other: "WindowFit") -> None:
-        """Takes over the starting states of another fit of the same windows."""
+        """Copies the starting states of another fit of the same windows."""
         self._states = list(other._states)
 
     def restart(self, solution: Solution) -> bool:
@@ -320,7 +320,7 @@ class WindowFit:
         """Fits from given values and the last starting states.
 
         Args:
-            values: (p,) where the parameters begin.
+            values: (p,) start values of the parameters.
             deviations: (nq + nv,) standard deviations of the measurements, by which residuals are divided.
             iterations: Largest number of iterations.
             progress: Called with each iteration and the mean square of the weighted residuals.
@@ -397,7 +397,12 @@ class WindowFit:
         result = []
         for window, (_, rows) in zip(self._windows, shot, strict=True):
             if not np.isfinite(rows[0]).all():
-                refuse(OptionError, "recording", float(window.time[0]), "has a window that cannot be simulated, from s")
+                refuse(
+                    OptionError,
+                    "recording",
+                    float(window.time[0]),
+                    "has a window that cannot be simulated; it starts, in s, at",
+                )
             by_state = np.nan_to_num((rows[1 : n + 1] - rows[n + 1 : 2 * n + 1]).T / (2.0 * changes))
             by_parameters = np.nan_to_num((rows[2 * n + 1 :: 2] - rows[2 * n + 2 :: 2]).T / np.array(distances))
             result.append(_Linear(rows[0], by_state, by_parameters, np.linalg.qr(by_state)[0]))
@@ -408,7 +413,7 @@ class WindowFit:
     ) -> tuple[Array, list[Array], float]:
         """A part of a step of Gauss and Newton: parameters, starting states and the loss there.
 
-        Combinations of the parameters that the run does not tell stay as they are.
+        Combinations of the parameters that the run does not determine do not change.
         """
         jacobian = _reduced(linear, [one.by_parameters for one in linear]) * self._scales
         residuals = _reduced(linear, [one.residuals for one in linear])
@@ -445,7 +450,7 @@ class WindowFit:
 
 
 def is_told(sensitivities: Array) -> npt.NDArray[np.bool_]:
-    """(p,) which combinations of parameters a run tells, by their falling sensitivities."""
+    """(p,) which combinations of parameters a run determines, in the order of their sensitivities."""
     least = max(LEAST_SENSITIVITY, SMALLEST_SENSITIVITY * float(sensitivities.max(initial=0.0)))
     told: npt.NDArray[np.bool_] = sensitivities >= least
     return told
@@ -469,6 +474,6 @@ def _cost(linear: Sequence[_Linear]) -> float:
 
 
 def _reduced(linear: Sequence[_Linear], columns: Sequence[Array]) -> Array:
-    """What starting states cannot explain of columns of all windows, times the roots of the windows' weights."""
+    """The weighted part of the columns that changes of the starting states cannot explain."""
     parts = [np.sqrt(part.weight) * part.free_of_state(one) for part, one in zip(linear, columns, strict=True)]
     return np.concatenate(parts)

@@ -44,34 +44,34 @@ def identify(
 ) -> Identification:
     """Fits parameters of a simulation to a recorded run, with their uncertainty.
 
-    The run is cut into short windows, so that the simulation need not follow it for longer. Each is simulated under
-    the recorded commands from a state of its own, which is estimated together with the parameters, since it is measured
-    with noise. The commands of a row are those under which the rover came to it from the row before, as `rover drive`
-    records them. The sum of squares of simulated minus measured coordinates and velocities, over their standard
-    deviations, is minimised by the method of Gauss and Newton; derivatives are central differences of
-    simulations. A window that does not fit counts for less. The covariance is that of linear least squares at the
-    minimum; where the sum of squares rises more slowly than that says, standard errors are larger.
+    The run is cut into short windows, so that errors do not accumulate. Each window is simulated under the recorded
+    commands from its own starting state, which is noisy and thus estimated with the parameters. The commands of a row
+    acted from the previous row to this one, as `rover drive` records them. The residuals are simulated minus measured
+    coordinates and velocities, divided by their standard deviations. Their sum of squares is minimised by the
+    Gauss-Newton method with central differences. Windows that do not fit weigh less. The covariance is that of linear
+    least squares at the minimum; if the sum of squares rises more slowly, standard errors are enlarged.
 
     Args:
-        recording: The run, or its file. Its model, ground and settings are what does not change.
-        parameters: Each a name, or a `Parameter` of one's own. Names are "friction" (of all contacts without
-            materials), "restitution", "gravity_scale", "mass_scale" (of all masses and inertias), "payload" (added to
-            the first solid, kg), "actuator_gain" (on the wheel torques), "steering_stiffness", "steering_damping",
-            "stall_torque" and "no_load_speed".
-        model: The rover as it is believed to be; the recorded one by default.
+        recording: The run, or its file. It provides model, ground and settings.
+        parameters: Names or `Parameter` objects. Names are "friction" (of all contacts without materials),
+            "restitution", "gravity_scale", "mass_scale" (of all masses and inertias), "payload" (on the first solid,
+            kg), "actuator_gain" (on the wheel torques), "steering_stiffness", "steering_damping", "stall_torque" and
+            "no_load_speed".
+        model: The assumed model of the rover; the recorded one by default.
         settings: Keyword arguments of `Simulation` that replace the recorded ones, such as `{"friction": 0.7}`. The
-            search begins at the values of model and settings, and at factors of 1.
+            search starts from the values of model and settings, and from factors of 1.
         window: Length of a window, s.
-        max_windows: Largest number of windows; of more, as many are taken at equal distances.
+        max_windows: Largest number of windows. If there are more, windows at equal distances are chosen.
         noise: Standard deviations of the measured coordinates, "q", m and rad, and velocities, "v", m/s and rad/s. By
-            default estimated from the residuals. If the rows are too smooth for so much noise, nothing is identified.
+            default estimated from the residuals. If the rows are too smooth for the estimated noise, nothing is
+            identified.
         max_iterations: Largest number of iterations.
         progress: Called with the number of an iteration and the mean square of the weighted residuals.
 
     Raises:
         OptionError: An argument is out of range or a parameter unknown, or the run lacks a channel, is too short or
             cannot be simulated.
-        RecordingError: The file holds no run of a rover.
+        RecordingError: The file does not contain a run of a rover.
         RoverGymError: Model or settings do not fit the run.
     """
     run = recording if isinstance(recording, RoverRun) else read_run(recording)
@@ -115,7 +115,7 @@ def identify(
 def _free(
     fit: WindowFit, solution: Solution, parameters: Sequence[Parameter], held: Mapping[int, float], iterations: int
 ) -> tuple[list[int], WindowFit, Solution]:
-    """The indices of what is not held, its fit, and its minimum."""
+    """The indices of the free parameters, their fit and its minimum."""
     free = [i for i in range(len(parameters)) if i not in held]
     if not held:
         return free, fit, solution
@@ -133,7 +133,7 @@ def _inserted(values: Array, places: Sequence[int], entries: Array) -> Array:
 def _setup(run: RoverRun, model: RoverModel | None, settings: Mapping[str, Any] | None) -> Setup:
     recorded = run.trajectory.attributes.get("solver")
     if not isinstance(recorded, dict):
-        refuse(OptionError, "recording", "solver", "is no attribute of this run, but needed")
+        refuse(OptionError, "recording", "solver", "is needed, but is not an attribute of this run")
     if model is not None and not isinstance(model, RoverModel):
         refuse(OptionError, "model", model, "must be a RoverModel")
     if model is not None and model.dof_names != run.model.dof_names:
@@ -167,9 +167,9 @@ def _values(parameters: Sequence[Parameter]) -> Array:
 
 
 def _estimated_noise(solution: Solution, nq: int) -> Array:
-    """(nq + nv,) deviations by the median of the residuals, which windows that do not fit hardly move.
+    """(nq + nv,) deviations from the median of the residuals, which is robust against windows that do not fit.
 
-    Columns of one kind share theirs: place, attitude and joints, and the rates of each.
+    Columns of one kind have a common deviation: position, attitude and joints, and their rates.
     """
     rows = np.abs(solution.residuals.reshape(-1, solution.deviations.size))
     taken = np.sqrt(solution.residuals.size / max(solution.freedom, 1.0))
@@ -180,7 +180,7 @@ def _estimated_noise(solution: Solution, nq: int) -> Array:
 
 
 def _missed(windows: Sequence[Window], solution: Solution, model: RoverModel) -> tuple[str, ...]:
-    """What the simulation misses by more than noise explains, in words, the worst first."""
+    """Columns whose misfit exceeds the noise, in words, the worst first."""
     names = _columns(model)
     residuals = solution.residuals.reshape(-1, len(names))
     missed, bound = not_explained(windows, residuals, _first_deviations(None, model))

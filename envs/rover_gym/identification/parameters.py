@@ -1,4 +1,4 @@
-"""What can be identified: quantities of a simulation that a recorded run may tell."""
+"""Quantities that can be identified."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,7 +12,7 @@ from rover_gym.validation import number, refuse
 
 @dataclass(frozen=True)
 class Setup:
-    """What a run is simulated with.
+    """Setup of the simulation of a run.
 
     Attributes:
         model: The rover.
@@ -42,10 +42,10 @@ class Parameter:
     Attributes:
         name: Its name.
         unit: SI unit, "1" for a pure number.
-        start: Where the search begins, and the value of what the run does not tell.
+        start: Start value of the search.
         low: Least value.
         high: Largest value.
-        scale: A change that would matter; a standard error of more than half of it is no answer.
+        scale: A relevant change. If the standard error exceeds half of it, the parameter is not identified.
         apply: Returns a setup that has the given value.
     """
 
@@ -138,7 +138,7 @@ def _steering_damping(setup: Setup) -> Parameter:
 def _motor(setup: Setup, name: str) -> Motor:
     motors = setup.model.motors
     if not motors or motors[0] is None or any(motor != motors[0] for motor in motors):
-        refuse(OptionError, "parameters", name, "needs a rover whose wheels have one kind of motor")
+        refuse(OptionError, "parameters", name, "needs a rover with the same motor at all wheels")
     return motors[0]
 
 
@@ -153,7 +153,7 @@ def _no_load_speed(setup: Setup) -> Parameter:
 def _motor_line(setup: Setup, name: str, unit: str) -> Parameter:
     start = float(getattr(_motor(setup, name), name))
     if not np.isfinite(start):
-        refuse(OptionError, "parameters", name, "needs motors with a finite one to begin with")
+        refuse(OptionError, "parameters", name, "needs motors with a finite value to start from")
 
     def apply(setup: Setup, value: float) -> Setup:
         motor = _motor(setup, name)
@@ -167,7 +167,7 @@ def _motor_line(setup: Setup, name: str, unit: str) -> Parameter:
 def _factor(
     name: str, start: float, low: float, high: float, apply: Callable[[Setup, float], Setup], unit: str = "1"
 ) -> Parameter:
-    """A positive parameter whose bounds are factors of where it begins, and whose scale is half of that."""
+    """A positive parameter whose bounds are multiples of its start value, and whose scale is half of it."""
     base = start if start > 0.0 else 1.0
     return Parameter(name, unit, max(start, low * base), low * base, high * base, 0.5 * base, apply)
 
@@ -188,10 +188,10 @@ KNOWN: Mapping[str, Callable[[Setup], Parameter]] = {
 
 
 def chosen_parameters(given: Sequence[str | Parameter], setup: Setup) -> tuple[Parameter, ...]:
-    """The parameters of the given names, and those that are given themselves.
+    """Converts names to parameters, and keeps given parameters.
 
     Raises:
-        OptionError: There is none, a name is unknown or stands twice, or the rover does not have the quantity.
+        OptionError: The list is empty, a name is unknown or given twice, or the rover does not have the quantity.
     """
     if isinstance(given, (str, Parameter)) or not given:
         refuse(OptionError, "parameters", given, f"must be a list; known names are {', '.join(KNOWN)}")
@@ -201,6 +201,6 @@ def chosen_parameters(given: Sequence[str | Parameter], setup: Setup) -> tuple[P
             refuse(OptionError, "parameters", entry, f"unknown; known are {', '.join(KNOWN)}")
         parameter = entry if isinstance(entry, Parameter) else KNOWN[entry](setup)
         if parameter.name in [known.name for known in chosen]:
-            refuse(OptionError, "parameters", parameter.name, "stands twice")
+            refuse(OptionError, "parameters", parameter.name, "is given twice")
         chosen.append(parameter)
     return tuple(chosen)

@@ -141,7 +141,7 @@ def fit_forecast(
     """
     epochs, states = whole("epochs", epochs, at_least=1), int(tried.state.max()) + 1
     if states < 1 / CHECKED:
-        refuse(OptionError, "tried", states, f"must be arcs of {1 / CHECKED:.0f} states at least")
+        refuse(OptionError, "tried", states, f"must be arcs of at least {1 / CHECKED:.0f} states")
     torch.manual_seed(seed)
     learned = tried.state < states - max(1, round(CHECKED * states))
     mean = tried.features[learned].mean(axis=0)

@@ -77,7 +77,7 @@ def latest_checkpoint(folder: Path) -> Checkpoint:
     except (ValueError, LookupError, TypeError, RecursionError):
         is_named = False
     if not is_named:
-        refuse(OptionError, "resume", str(path), "names no checkpoint")
+        refuse(OptionError, "resume", str(path), "is not a checkpoint")
     return Checkpoint(latest["name"], hardest)
 
 

@@ -45,7 +45,7 @@ def read_seed(folder: Path) -> SeedResult:
         refuse(OptionError, "run", str(folder), f"has a damaged run.json ({error})")
     evaluations = read_evaluations(folder / "evaluations.csv")
     if not evaluations:
-        refuse(OptionError, "run", str(folder), "holds no evaluation")
+        refuse(OptionError, "run", str(folder), "contains no evaluation")
     best = evaluations[0]
     for evaluation in evaluations[1:]:
         best = evaluation if evaluation.is_better_than(best) else best

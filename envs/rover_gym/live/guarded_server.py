@@ -88,7 +88,7 @@ def _listen(host: str, port: int) -> socket.socket:
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, number, type=socket.SOCK_STREAM)[0]
     except (OSError, UnicodeError):
-        refuse(OptionError, "host", host, "must be a name or an address of this machine")
+        refuse(OptionError, "host", host, "must be a name or an address of this computer")
     listening = socket.socket(family, kind, protocol)
     try:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -99,9 +99,9 @@ def _listen(host: str, port: int) -> socket.socket:
         if error.errno == errno.EADDRINUSE:
             refuse(OptionError, "port", port, "is in use by another program; choose another one, or 0 for any")
         if error.errno == errno.EADDRNOTAVAIL:
-            refuse(OptionError, "host", host, "must be a name or an address of this machine")
+            refuse(OptionError, "host", host, "must be a name or an address of this computer")
         reason = error.strerror or str(error)
-        refuse(OptionError, "port", port, f"cannot be listened at ({reason})")
+        refuse(OptionError, "port", port, f"cannot be opened ({reason})")
     return listening
 
 

@@ -18,6 +18,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from rover_gym.extras import MissingExtraError
 from rover_gym.live.live_commands import (
     Change,
@@ -110,11 +112,11 @@ class LiveLoop:
             CommandError: Too many commands wait, or the loop has stopped; this one is dropped.
         """
         if self._stopping.is_set():
-            refuse(CommandError, "command", command, "comes too late: the drive is over")
+            refuse(CommandError, "command", command, "was not executed: the drive is over")
         try:
             self._commands.put_nowait(command)
         except queue.Full:
-            refuse(CommandError, "command", command, f"comes too soon: {MOST_WAITING} commands wait")
+            refuse(CommandError, "command", command, f"was not executed: {MOST_WAITING} commands are waiting already")
         self._wake.set()
 
     def tell(self, notice: str) -> None:
@@ -283,7 +285,7 @@ class LiveLoop:
         env, info = rover.env, rover.info
         simulation, solver = env.simulation, info["solver"]
         positions, rotations = poses_of(rover)
-        velocity, forces = simulation.v, simulation.wheel_forces
+        velocity, forces, sand = simulation.v, simulation.wheel_forces, simulation.sand()
         factor = math.nan
         if len(self._pace) > 1:
             (first, begin), (last, end) = self._pace[0], self._pace[-1]
@@ -303,6 +305,7 @@ class LiveLoop:
             heading=float(simulation.q[4]),
             speed=math.hypot(velocity[0], velocity[2]),
             wheel_forces=forces,
+            ruts=np.zeros((0, 3)) if sand is None else sand["ruts"],
             loads=forces[:, 0],
             slip=info["slip_ratio"],
             energy=info["energy"],

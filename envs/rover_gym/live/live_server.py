@@ -119,7 +119,12 @@ class LiveServer:
             if self._at_wheel is None:
                 self._at_wheel = page
             if self._at_wheel is not page:
-                refuse(CommandError, "do", entries["do"], "is for the page at the wheel, and another one is")
+                refuse(
+                    CommandError,
+                    "do",
+                    entries["do"],
+                    "is allowed on the page in control only, and another page is in control",
+                )
             self._loop.send(command)
         except RoverGymError as error:
             return str(error)
@@ -141,17 +146,19 @@ class LiveServer:
     async def _show(self, page: Any) -> None:
         """Sends the scene and its frames to a page; a page that is slow gets fewer."""
         closed = require("websockets.exceptions", "replay").ConnectionClosed
-        shown, last = -1, -1
+        shown, last, told = -1, -1, 0
         try:
             while True:
                 begin, state = time.perf_counter(), self._loop.state
                 if state.number != last and not self._is_dark and self._follow(state):
                     last, (number, frame) = state.number, self._seen
                     if self.view.number != shown:
-                        shown = self.view.number
+                        shown, told = self.view.number, 0
                         await page.send(self.view.scene)
                     if number == last:
-                        await page.send(frame)
+                        ruts = bytes(self.view.pressed[told:])
+                        told += len(ruts)
+                        await page.send(frame + ruts)
                 await asyncio.sleep(max(0.0, 0.5 * state.period - (time.perf_counter() - begin)))
         except closed:
             return

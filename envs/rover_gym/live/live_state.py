@@ -39,6 +39,7 @@ class LiveState:
         heading: Heading of the trunk, rad.
         speed: Horizontal speed of the trunk's origin, m/s.
         wheel_forces: `(n_wheels, 3)` force on each wheel along normal, rolling direction and their cross product, N.
+        ruts: `(n, 3)` place x and z and depth of each cell of sand that a wheel has pressed down, m.
         loads: `(n_wheels,)` normal force on each wheel, N.
         slip: Mean slip ratio of the wheels in contact.
         energy: Work of the wheel motors since the start, braking counted, J.
@@ -72,6 +73,7 @@ class LiveState:
     heading: float
     speed: float
     wheel_forces: Array
+    ruts: Array
     loads: Array
     slip: float
     energy: float

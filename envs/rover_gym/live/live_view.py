@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.ground import sand_of
 from rover_gym.mechanics import sin_cos
 from rover_gym.record.rover_run import RoverRun
 from rover_gym.record.trajectory import Trajectory
 from rover_gym.replay.page_scene import FrameChannel, PageScene
 from rover_gym.replay.rover_scene import bare_scene, poses_of
-from rover_gym.replay.wheel_marks import DrawnWheel, feet, world_forces
+from rover_gym.replay.wheel_marks import RUT_CELL, DrawnWheel, RutMap, feet, world_forces
 
 if TYPE_CHECKING:
     from rover_gym.live.live_state import LiveState
@@ -24,6 +25,9 @@ NEAR_EDGE = 8.0  # m from the edge of that ground, where it is laid anew
 #: What a binary message is: its kind, the number of its scene, and the simulated time, s.
 HEAD = struct.Struct("<IId")
 SCENE, FRAME = 1, 2
+#: A cell that a wheel presses down, after the frame's channels: its number and its level.
+RUT = np.dtype([("cell", "<u4"), ("level", "<u4")])
+DEEPEST = 0.25  # m, of a rut
 
 Array = npt.NDArray[np.float64]
 
@@ -34,10 +38,13 @@ class LiveView:
     Attributes:
         number: Number of the scene; another one is another ground or rover.
         scene: The scene as a message.
+        pressed: The cells of sand that became deeper, in order: cell and level of 255, each as `RUT` has them.
     """
 
     def __init__(self) -> None:
-        self.number, self.scene = 0, b""
+        self.number, self.scene, self.pressed = 0, b"", bytearray()
+        self._ruts: RutMap | None = None
+        self._drawn = 0
         self._world = -1
         self._middle: Array = np.zeros(3)
         self._wheels: list[DrawnWheel] = []
@@ -50,12 +57,21 @@ class LiveView:
         scene, self._wheels = bare_scene(_standing(state))
         scene.channels = self._channels(state)
         scene.facts |= {"period": state.period}
+        self._ruts, self._drawn, self.pressed = None, 0, bytearray()
+        if sand_of(state.terrain) is not None:
+            middle = state.positions[0][[0, 2]]
+            self._ruts = RutMap(middle - REACH, middle + REACH, RUT_CELL, DEEPEST)
+            scene.facts["ruts"] = self._ruts.header()
         self._world, self._middle = state.world, state.positions[0].copy()
         self.number += 1
         self.scene = HEAD.pack(SCENE, self.number, state.time) + scene.message()
 
     def frame(self, state: LiveState) -> bytes:
-        """A state as a frame of the scene."""
+        """A state as a frame of the scene; the cells that it presses down go to `pressed`."""
+        if self._ruts is not None and len(state.ruts) > self._drawn:
+            cells, levels = self._ruts.press(state.ruts[:, :2], state.ruts[:, 2])
+            self.pressed += np.array(list(zip(cells, levels, strict=True)), dtype=RUT).tobytes()
+            self._drawn = len(state.ruts)
         moved = PageScene("rover", {}, 1.0, channels=self._channels(state))
         return HEAD.pack(FRAME, self.number, state.time) + moved.whole()
 

@@ -1,4 +1,4 @@
-"""Maps and meshes of the ground: from files, and made by a seed.
+"""Maps and meshes of the ground: from files, or generated from a seed.
 
 These functions return arrays; `HeightField.from_file`, `HeightField.fractal`, `TriangleMesh.from_file` and
 `SphereField.from_file`, in `terrain_files`, make terrains of them.

@@ -1,4 +1,4 @@
-"""Rough ground made by a seed: a self-affine surface, craters and ripples.
+"""Generates rough ground from a seed: a self-affine surface, craters and ripples.
 
 The surface is the sum of waves with random phases whose power falls as `k^(-2H - 2)` with the wave number k: its
 heights differ over a distance d by about `d^H`, with H the Hurst exponent (Turcotte 1997, *Fractals and chaos in
@@ -64,7 +64,7 @@ def fractal_map(
     origin: tuple[float, float] | None = None,
     material: str = "ground",
 ) -> HeightField:
-    """Rough ground made by a seed: a self-affine surface, with craters and ripples on demand.
+    """Generates rough ground from a seed: a self-affine surface, optionally with craters and ripples.
 
     The power of a wave of k cycles a metre falls as k^(-2 hurst - 2) from `longest_wave` to two
     cells. Craters are bowls with a rim, a fifth as deep as wide; those as wide as D or wider
@@ -82,8 +82,7 @@ def fractal_map(
         ripple_height: Height of ripples from trough to crest, m; 0 by default.
         ripple_length: Their wavelength, m.
         seed: Seed of the random numbers; equal seeds give equal ground.
-        origin: Place (x, z) of the first height, m; by default such that the map's middle is
-            at the world's origin.
+        origin: Place (x, z) of the first height, m; by default the middle of the map is at the world's origin.
         material: Name of its material.
 
     Raises:
@@ -97,7 +96,7 @@ def fractal_map(
     exponent = number("hurst", hurst, above=0.0, at_most=1.0, error=TerrainError)
     counts = [extent[k] / step[k] for k in range(2)]
     if max(counts) > MOST_HEIGHTS or (counts[0] + 2) * (counts[1] + 2) > MOST_HEIGHTS:
-        refuse(TerrainError, "size", size, f"makes more than {MOST_HEIGHTS} heights")
+        refuse(TerrainError, "size", size, f"gives more than {MOST_HEIGHTS} heights")
     columns, rows = (max(2, math.floor(n + 0.5) + 1) for n in counts)
     longest = 0.5 * min(extent)
     if longest_wave is not None:
@@ -110,7 +109,7 @@ def fractal_map(
     smallest, largest = pair("crater_diameter", crater_diameter, above=0.0)
     number("crater_diameter", smallest, at_least=LEAST_DIAMETER, error=TerrainError)
     if largest < smallest:
-        refuse(TerrainError, "crater_diameter", crater_diameter, "must be the smallest and the largest")
+        refuse(TerrainError, "crater_diameter", crater_diameter, "must be a pair (smallest, largest)")
     if density > 0.0:
         _add_craters(random, heights, step, density, smallest, largest)
     ripple = number("ripple_height", ripple_height, at_least=0.0, error=TerrainError)
@@ -148,7 +147,7 @@ def _add_craters(
     area = (extent[0] + 2.0 * margin) * (extent[1] + 2.0 * margin)
     expected = density * (smallest**-2 - largest**-2) * area
     if not expected < MOST_CRATERS:
-        refuse(TerrainError, "craters", density, f"makes more than {MOST_CRATERS} craters")
+        refuse(TerrainError, "craters", density, f"gives more than {MOST_CRATERS} craters")
     count = int(random.poisson(expected))
     share = random.random(count)
     diameters = np.sort((smallest**-2 - share * (smallest**-2 - largest**-2)) ** -0.5)[::-1]

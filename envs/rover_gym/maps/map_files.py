@@ -1,7 +1,7 @@
 """Grounds from files: maps of heights (GeoTIFF, PNG, .npy) and meshes.
 
-A file's size is checked before it is read into memory, and every error names the file. Beside the numbers of the file
-there is never more than the map itself: they are converted some rows at a time, and in place where they are float32.
+The size of a file is checked before it is read into memory, and every error names the file. Memory holds the numbers of
+the file and the map, but no further copy: numbers are converted some rows at a time, and in place if they are float32.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class GroundFile:
         """The file at a path.
 
         Raises:
-            TerrainError: The path is none.
+            TerrainError: `path` is not a path.
             OSError: There is no file, or it may not be read.
         """
         try:
@@ -56,7 +56,7 @@ class GroundFile:
         return self.path.suffix.lower()
 
     def refuse(self, reason: str, value: object = None) -> NoReturn:
-        """Raises a `TerrainError` that names the file and what of it is wrong; the file itself if that is None."""
+        """Raises a `TerrainError` that names the file and carries the invalid value, or the path if it is None."""
         refuse(TerrainError, "path", str(self.path) if value is None else value, f"{self.path}: {reason}")
 
 
@@ -76,7 +76,7 @@ HIGHEST, CHUNK = 1e6, 2**18
 #: Memory in which GDAL keeps what it has read, MB.
 CACHE = 16
 
-#: Numbers of a GeoTIFF beyond this are no data: some mark it with the smallest number of their type and do not say so.
+#: Numbers of a GeoTIFF beyond this mean missing data, for files that mark it by an undeclared extreme number.
 NUMBERS_END = 1e30
 
 #: Range of the distance of columns and rows, m.
@@ -102,14 +102,14 @@ UNITS = {
 
 @dataclass(frozen=True)
 class _Numbers:
-    """The numbers of a file, of any type; what they mean is `factor` times a number plus `offset`.
+    """The numbers of a file, of any type. A height is `factor` times a number plus `offset`.
 
     Attributes:
         values: `(rows, columns)`.
-        missing: `(rows, columns)` bool, where there is no data; None if there is everywhere.
+        missing: `(rows, columns)` bool, True where data are missing; None if none are missing.
         factor: As above.
         offset: As above.
-        end: A larger meaning is no data.
+        end: Larger heights mean missing data.
     """
 
     values: npt.NDArray[Any]
@@ -125,7 +125,7 @@ class _Numbers:
         return (slice(first, min(first + step, rows)) for first in range(0, rows, step))
 
     def at(self, rows: slice) -> npt.NDArray[np.float64]:
-        """What the numbers of some rows mean; nan for no data."""
+        """Heights of some rows; NaN for missing data."""
         meaning = self.values[rows].astype(np.float64) * self.factor + self.offset
         if self.missing is not None:
             meaning[self.missing[rows]] = np.nan
@@ -133,12 +133,12 @@ class _Numbers:
         return meaning
 
     def lowest(self) -> float:
-        """The least meaning; nan if there is no data at all."""
+        """The lowest height; NaN if all data are missing."""
         return float(np.fmin.reduce([np.fmin.reduce(self.at(rows), axis=None) for rows in self.chunks()]))
 
 
 def _check_shape(file: GroundFile, shape: tuple[int, ...]) -> None:
-    """Refuses what is no map, and one that is too large to be read."""
+    """Rejects arrays that are not maps, and maps that are too large."""
     if len(shape) != 2 or min(shape) < 2:
         file.refuse(f"a map needs rows and columns, at least 2 x 2, the file has shape {shape}", shape)
     if shape[0] * shape[1] > MOST_HEIGHTS:
@@ -146,7 +146,7 @@ def _check_shape(file: GroundFile, shape: tuple[int, ...]) -> None:
 
 
 def _heights(file: GroundFile, numbers: _Numbers, scale: float = 1.0, datum: float = 0.0) -> Heights:
-    """The file's numbers as heights, m: `scale` times what they mean beyond `datum`."""
+    """Heights, m: `scale` times the difference of the file's heights from `datum`."""
     values = numbers.values
     reuses = values.dtype == np.float32 and values.flags.writeable
     heights = values if reuses else np.empty(values.shape, np.float32)
@@ -171,13 +171,13 @@ def read_map(
     datum: object = None,
     band: object = None,
 ) -> tuple[Heights, Pair, Pair]:
-    """Reads a map; the arguments are those of `HeightField.from_file`.
+    """Reads a map with the arguments of `HeightField.from_file`.
 
     Returns:
-        Heights `(n_z, n_x) float32` (m, nan for no data), spacing and origin (m).
+        Heights `(n_z, n_x) float32` (m, NaN where unknown), spacing and origin (m).
 
     Raises:
-        TerrainError: The file is no such map, or does not say enough.
+        TerrainError: The file is not a map, or a required argument is missing.
         OSError: The file cannot be read.
         MissingExtraError: The extra `maps` is not installed.
     """
@@ -199,7 +199,7 @@ def read_map(
         heights, own = _read_geotiff(file, band, factor, zero, knows_spacing=spacing is not None)
     step = spacing or own
     if step is None:
-        refuse(TerrainError, "spacing", spacing, f"must be given, {file.path} does not say it")
+        refuse(TerrainError, "spacing", spacing, f"must be given: {file.path} does not contain it")
     if not np.isfinite(heights).any():
         file.refuse("has no data at all")
     if origin is None:
@@ -209,17 +209,22 @@ def read_map(
 
 
 def _check_suited(file: GroundFile, *, height_range: object, scale: object, datum: object, band: object) -> None:
-    """Refuses arguments that say nothing about a file of this kind, or two things at once."""
+    """Rejects arguments that do not apply to this kind of file or contradict each other."""
     if height_range is not None and file.ending != ".png":
-        refuse(TerrainError, "height_range", height_range, f"is of PNG files only, not of {file.path}")
+        refuse(TerrainError, "height_range", height_range, f"is for PNG files only, not for {file.path}")
     if height_range is not None and (scale is not None or datum is not None):
-        refuse(TerrainError, "height_range", height_range, "must come without scale and datum, which say the same")
+        refuse(
+            TerrainError,
+            "height_range",
+            height_range,
+            "cannot be combined with scale and datum, which have the same meaning",
+        )
     if file.ending in (".npy", ".png") and band not in (None, 1):
-        refuse(TerrainError, "band", band, f"is of GeoTIFF files only, not of {file.path}")
+        refuse(TerrainError, "band", band, f"is for GeoTIFF files only, not for {file.path}")
 
 
 def _guarded(file: GroundFile, read: Callable[[], Any], *wrong: type[Exception]) -> Any:
-    """What a reader returns, its exceptions turned into ours."""
+    """Calls a reader and converts its exceptions to ours."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -263,10 +268,10 @@ def _read_png(file: GroundFile, height_range: object, scale: float | None, datum
 def _range(file: GroundFile, height_range: object) -> Pair:
     """Heights of black and white, m."""
     if height_range is None:
-        refuse(TerrainError, "height_range", None, f"must be given for {file.path}, or scale")
+        refuse(TerrainError, "height_range", None, f"must be given for {file.path}, unless scale is given")
     ends = list(height_range) if isinstance(height_range, Iterable) else []
     if len(ends) != 2:
-        refuse(TerrainError, "height_range", height_range, "must be the heights of black and white")
+        refuse(TerrainError, "height_range", height_range, "must be a pair (height of black, height of white)")
     low, high = (number(f"height_range[{k}]", x, error=TerrainError) for k, x in enumerate(ends))
     return low, high
 
@@ -274,7 +279,7 @@ def _range(file: GroundFile, height_range: object) -> Pair:
 def _read_geotiff(
     file: GroundFile, band: object, scale: float | None, datum: float | None, *, knows_spacing: bool
 ) -> tuple[Heights, Pair | None]:
-    """Heights, and the spacing that the file says unless the caller knows it."""
+    """Heights, and the spacing of the file unless the caller gives one."""
     rasterio = require("rasterio", "maps")
     index = None if band is None else number("band", band, at_least=1, error=TerrainError)
 
@@ -291,7 +296,7 @@ def _read_geotiff(
     wrong = (rasterio.errors.RasterioError, ValueError, MemoryError, OverflowError, UnicodeError)
     numbers, unit, transform, crs = _guarded(file, read, *wrong)
     if unit and unit.lower() not in UNITS and scale is None:
-        file.refuse(f"the unit of its heights, {unit!r}, is not known: give scale", unit)
+        file.refuse(f"the unit of its heights, {unit!r}, is unknown: give scale", unit)
     lowest = numbers.lowest()
     if np.isnan(lowest):
         file.refuse("has no data at all")
@@ -303,7 +308,12 @@ def _read_geotiff(
 def _index(file: GroundFile, count: int, band: float | None) -> int:
     """Index of the band that was asked for; the only one by default."""
     if band is None and count > 1:
-        refuse(TerrainError, "band", band, f"{file.path} has {count} bands: say which holds the heights, from 1")
+        refuse(
+            TerrainError,
+            "band",
+            band,
+            f"{file.path} has {count} bands: give the number of the band with the heights, from 1",
+        )
     index = 1.0 if band is None else band
     if index != int(index) or index > count:
         refuse(TerrainError, "band", band, f"must be a whole number, from 1 to {count} in {file.path}")
@@ -311,9 +321,9 @@ def _index(file: GroundFile, count: int, band: float | None) -> int:
 
 
 def _band(opened: Any, band: int) -> tuple[npt.NDArray[Any], npt.NDArray[np.bool_] | None]:
-    """The numbers of a band, and where there are none if some are missing; read some rows at a time, by whole blocks.
+    """The numbers of a band and a mask of missing ones, read some rows at a time, by whole blocks.
 
-    Of the whole band at once GDAL keeps a copy, and its mask another.
+    Reading the whole band at once would keep a copy in GDAL, and another one for its mask.
     """
     shape = opened.height, opened.width
     values = np.empty(shape, opened.dtypes[band - 1])
@@ -329,7 +339,7 @@ def _band(opened: Any, band: int) -> tuple[npt.NDArray[Any], npt.NDArray[np.bool
 
 
 def _spacing(file: GroundFile, transform: Any, crs: Any) -> Pair | None:
-    """Spacing that a GeoTIFF's transform says, m; None if it has none."""
+    """Spacing from a GeoTIFF's transform, m; None if it has none."""
     if transform.is_identity:
         return None
     if transform.b != 0.0 or transform.d != 0.0:
@@ -359,13 +369,13 @@ MESH_ENDINGS = (".obj", ".ply", ".stl", ".off", ".glb")
 def read_mesh(
     path: object, *, scale: object = 1.0, position: object = (0.0, 0.0, 0.0), up: object = "y"
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
-    """Reads a mesh; the arguments are those of `TriangleMesh.from_file`.
+    """Reads a mesh with the arguments of `TriangleMesh.from_file`.
 
     Returns:
         Vertices `(n, 3)`, m, and triangles `(m, 3)`.
 
     Raises:
-        TerrainError: The file holds no such mesh.
+        TerrainError: The file does not contain a valid mesh.
         OSError: The file cannot be read.
         MissingExtraError: The extra `maps` is not installed.
     """
@@ -407,10 +417,10 @@ def read_mesh(
 
 
 def _check_counts(file: GroundFile) -> None:
-    """Refuses a GLB that states more entries than it has bytes: those without data would be made, as zeros.
+    """Rejects a GLB that states more entries than it has bytes; they would be filled with zeros.
 
     Raises:
-        ValueError: It does, or it is no GLB.
+        ValueError: It does, or it is not a GLB.
     """
     with file.path.open("rb") as opened:
         _, _, _, length, _ = struct.unpack("<5I", opened.read(20))
@@ -460,7 +470,7 @@ def open_terrain(path: str | os.PathLike[str], **options: Any) -> HeightField | 
         **options: Those of `HeightField.from_file` or `TriangleMesh.from_file`.
 
     Raises:
-        TerrainError: The file is of another kind, is damaged, or does not say enough.
+        TerrainError: The file is of another kind or damaged, or a required argument is missing.
         OSError: The file cannot be read.
     """
     if not is_terrain_file(path):

@@ -1,7 +1,6 @@
-"""Grounds from files and by a seed: the constructors of terrains beside the compiled ones.
+"""Constructors of terrains from files.
 
-The compiled classes build terrains from arrays; reading files is Python, and the functions of this page become their
-methods.
+The compiled classes build terrains from arrays. These functions read files and become methods of the classes.
 """
 
 from __future__ import annotations
@@ -64,14 +63,13 @@ def height_field_from_file(
 ) -> HeightField:
     """Reads a map from a GeoTIFF, a PNG or a .npy file.
 
-    Columns run along x and rows along z; of a map with north up, x is east and z south. A
-    GeoTIFF brings its spacing, its unit and its mark for no data.
+    Columns run along x and rows along z; of a map with north up, x is east and z south. A GeoTIFF contains its spacing,
+    its unit and its marker for missing data.
 
     Args:
-        path: Path of the file; its ending tells the format.
+        path: Path of the file; its ending determines the format.
         spacing: Distance of columns and of rows, m; needed unless the file gives it.
-        origin: Place (x, z) of the first height, m; by default such that the map's middle is
-            at the world's origin.
+        origin: Place (x, z) of the first height, m; by default the middle of the map is at the world's origin.
         height_range: Of a PNG: heights of black and white, (2,), m.
         scale: Factor from the file's numbers to m; of a GeoTIFF by default its own.
         datum: Height of the file that becomes 0, in its own numbers; of a GeoTIFF by default
@@ -80,7 +78,7 @@ def height_field_from_file(
         material: Name of its material.
 
     Raises:
-        TerrainError: The file is no such map or does not say enough; the message names it.
+        TerrainError: The file is not a map, or a required argument is missing; the message gives the file.
         OSError: The file cannot be read.
         MissingExtraError: The extra `maps` is not installed.
     """
@@ -104,19 +102,19 @@ def triangle_mesh_from_file(
     up: str = "y",
     material: str = "ground",
 ) -> TriangleMesh:
-    """Reads a mesh from a file: OBJ, PLY, STL, GLB and what else `trimesh` reads.
+    """Reads a mesh from a file: OBJ, PLY, STL, GLB and other formats that `trimesh` reads.
 
-    Equal corners are joined, and triangles without an area are left out.
+    Equal corners are merged, and triangles without area are removed.
 
     Args:
-        path: Path of the file; its ending tells the format.
+        path: Path of the file; its ending determines the format.
         scale: Factor from the file's numbers to m.
         position: Place of the file's origin, (3,), m; the world's origin by default.
         up: Axis of the file that points up: "y" or "z".
         material: Name of its material.
 
     Raises:
-        TerrainError: The file holds no such mesh; the message names it.
+        TerrainError: The file does not contain a valid mesh; the message gives the file.
         OSError: The file cannot be read.
         MissingExtraError: The extra `maps` is not installed.
     """

@@ -1,6 +1,7 @@
-"""Models by name or file: URDF and MJCF in and out, and what a model is on level ground.
+"""Models by name or file: import and export of URDF and MJCF, and checks of a model on level ground.
 
-`RoverModel.from_file`, `from_urdf`, `from_mjcf`, `to_file`, `to_urdf` and `to_mjcf` stand here, in `model_files`.
+The module `model_files` implements `RoverModel.from_file`, `from_urdf`, `from_mjcf`, `to_file`, `to_urdf` and
+`to_mjcf`.
 """
 
 import rover_gym.models.model_files  # noqa: F401 - methods of RoverModel

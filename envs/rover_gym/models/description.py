@@ -13,13 +13,14 @@ from rover_gym.models.robot_tree import THIN_DISC, FileJoint, FileLink, FileShap
 from rover_gym.models.roles import WheelRole
 
 GRAVITY = 9.81
-#: Torque limit of a wheel where the file states none: this times its share of the weight times its radius.
+#: Torque limit of a wheel if the file has none, relative to its share of the weight times its radius.
 TORQUE_SHARE = 1.0
-#: Gains of a steering joint where the file has none, as those of the built-in rover: stiffness over the wheel's share
-#: of the weight times its radius, 1/rad, and damping over stiffness, s.
+#: Gains of a steering joint if the file has none, as for the built-in rover: stiffness relative to the wheel's share of
+#: the weight times its radius, 1/rad, and damping relative to stiffness, s.
 STEERING_STIFFNESS, STEERING_TIME = 10.0, 0.0133
 STEERING_LIMIT = 0.7  # rad, where the file states none
-#: What a wheel yields under its share of the weight, m, and its damping over its stiffness, s: critical for that share.
+#: Compression of a wheel under its share of the weight, m, and damping relative to stiffness, s: critical for that
+#: share.
 YIELD = 3e-5
 YIELDING_TIME = 2.0 * math.sqrt(YIELD / GRAVITY)
 #: Kinds of shapes that touch the ground; cylinders touch as wheels only.
@@ -29,7 +30,7 @@ UNLIMITED = 1e9  # N m, the torque limit of a motor for which the file states no
 
 @dataclass(frozen=True)
 class WheelOptions:
-    """What a user gives for all wheels and steering joints; None: as the file states, otherwise assumed.
+    """Options for all wheels and steering joints. None means the value of the file, or an assumed one.
 
     Attributes:
         torque_limit: Of a wheel, N m.
@@ -58,7 +59,7 @@ def describe(tree: RobotTree, roles: list[WheelRole], P: Array, options: WheelOp
         options: What the user gave.
 
     Raises:
-        ModelError: The file holds what has no place in a description.
+        ModelError: The file contains elements that a description cannot express.
     """
     if options.wheel_width is not None:
         roles = [replace(role, width=options.wheel_width) for role in roles]
@@ -160,7 +161,7 @@ def _add_control(
 def _steering_gains(
     tree: RobotTree, link: FileLink, steered: WheelRole, weight: float, options: WheelOptions
 ) -> tuple[float, float]:
-    """Stiffness, N m/rad, and damping, N m s/rad: as given, otherwise the file's, otherwise assumed."""
+    """Stiffness, N m/rad, and damping, N m s/rad: the given ones, or those of the file, or assumed ones."""
     stated_stiffness, stated_damping = link.joint.hold or (0.0, 0.0)
 
     def chosen(what: str, given: float | None, stated: float, usual: float, unit: str) -> float:
@@ -210,7 +211,8 @@ def _wheel(tree: RobotTree, role: WheelRole, A: Array, weight: float, options: W
 def _yielding(tree: RobotTree, role: WheelRole, weight: float, options: WheelOptions) -> dict[str, float]:
     """Stiffness, N/m, and damping, N s/m, where a wheel touches; stiffness 0 for a rigid wheel.
 
-    Without them the weight of a rigid chassis rests on three of its wheels, and micrometres decide on which.
+    Without compliance, the weight of a rigid chassis rests on three of its wheels, and micrometres of height decide
+    which.
     """
     stiffness = options.wheel_stiffness
     if stiffness is None:
@@ -245,7 +247,7 @@ def _shapes(tree: RobotTree, link: FileLink, A: Array, anchor: Array, role: Whee
 
 
 def _left_out(shape: FileShape, role: WheelRole | None) -> str | None:
-    """What of a shape is not simulated, in words, or None."""
+    """The properties of a shape that are not simulated, in words, or None."""
     if shape.collides and role is not None:
         rim = f"cylinder {role.width:g} m wide" if role.width else "thin disc"
         is_rim = shape.kind == "cylinder" and shape.size == (role.radius, role.width)
@@ -297,7 +299,9 @@ def _followed_first(tree: RobotTree) -> list[FileLink]:
             None,
         )
         if ready is None:
-            tree.refuse("mimic", [link.joint.name for link in waiting][:5], "these joints follow each other")
+            tree.refuse(
+                "mimic", [link.joint.name for link in waiting][:5], "these joints depend on each other in a circle"
+            )
         order.append(ready)
         waiting.remove(ready)
         placed.add(ready.name)

@@ -14,7 +14,7 @@ from rover_gym.models.import_report import Z_UP_TO_Y_UP, Array, quaternion, roll
 from rover_gym.models.robot_tree import THIN_DISC, FileShape, check_kinds, checked_path
 from rover_gym.validation import refuse
 
-#: Width of the cylinder that stands for a thin disc, as a share of its radius.
+#: Width of the cylinder that represents a thin disc, relative to its radius.
 DISC_WIDTH = 0.1
 
 _TO_FILE: Array = Z_UP_TO_Y_UP.T
@@ -168,7 +168,7 @@ def write_xml(root: ET.Element, path: object) -> None:
     """Writes an indented file.
 
     Raises:
-        ModelError: `path` is no path.
+        ModelError: `path` is not a path.
         OSError: The file cannot be written.
     """
     ET.indent(root)
@@ -261,7 +261,7 @@ def _add_geom(body: ET.Element, shape: FileShape) -> None:
 
 
 def _add_control(actuator: ET.Element, solid: WrittenSolid, wheel: dict[str, Any] | None, is_steering: bool) -> None:
-    """A motor for what is driven, a position servo for steering joints, which are held."""
+    """Adds a motor for a driven joint, a position servo for a steering joint."""
     drive = solid.source.get("drive") if solid.kind == "revolute" else None
     limit = wheel["torque_limit"] if wheel is not None else (drive or {}).get("torque_limit")
     if solid.kind == "revolute" and limit:
@@ -280,7 +280,7 @@ def _quaternion(R: Array) -> str:
     return text_of((w, *v))
 
 
-#: What URDF cannot express and `ignore` may name.
+#: Elements that URDF cannot express and that `ignore` may name.
 IGNORABLE = ("springs", "armature")
 
 FAST = 1e3  # rad/s, the velocity limit of a joint whose speed no motor limits: URDF wants one
@@ -296,12 +296,11 @@ def write_urdf(model: RoverModel, path: str | os.PathLike[str], *, ignore: Colle
     Args:
         model: The model.
         path: Path of the file.
-        ignore: Kinds of what the format cannot express and is left out all the same: "springs",
-            "armature".
+        ignore: Kinds of elements to leave out because the format cannot express them: "springs", "armature".
 
     Raises:
-        ModelError: The model has a spherical joint, several trees, or what the format cannot
-            express and `ignore` does not name.
+        ModelError: The model has a spherical joint or several trees, or contains elements that the format cannot
+            express and that are not in `ignore`.
         OSError: The file cannot be written.
     """
     ignore = check_kinds(ignore, IGNORABLE)
@@ -311,10 +310,10 @@ def write_urdf(model: RoverModel, path: str | os.PathLike[str], *, ignore: Colle
     solids = written_solids(model)
     roots = [solid for solid in solids if solid.parent is None]
     if len(roots) > 1:
-        roots[1].refuse("parent", None, "a URDF has one tree")
+        roots[1].refuse("parent", None, "a URDF file can contain only one tree")
     if roots[0].kind != "free":
         if any(solid.name == WORLD for solid in solids):
-            roots[0].refuse("name", WORLD, "this name is the world's in a URDF")
+            roots[0].refuse("name", WORLD, "this name is reserved for the world in URDF")
         ET.SubElement(robot, "link", name=WORLD)
     drives = {solid["name"]: (solid.get("drive") or {}).get("torque_limit") for solid in description["solids"]}
     for solid in solids:

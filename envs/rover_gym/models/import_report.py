@@ -1,4 +1,4 @@
-"""What an import understood, what it assumed, and what it left out.
+"""Import report: what was read, assumed and left out.
 
 URDF and MJCF have x forward, y left and z up; here x is forward, y up and z right. One rotation `P` converts them, and
 it applies to every frame: a link's frame becomes `R Pᵀ`, so every vector `r` of the file becomes `P r` and every
@@ -20,20 +20,20 @@ from rover_gym.validation import refuse
 
 
 class RobotFileWarning(UserWarning):
-    """A robot's file was read, and the model is probably not what its reader wants."""
+    """Warning that an imported model is probably not the intended one."""
 
 
 @dataclass(frozen=True)
 class ImportReport:
-    """What was read from a robot's file; `str` gives it as text.
+    """Report of the import of a robot file; `str` formats it as text.
 
     Attributes:
         path: The file.
-        assumed: What the file does not state and was chosen, with the value.
-        left_out: What the file holds and the model does not simulate.
-        solids: A row for each solid: name, joint, what carries it, mass (kg) and role.
-        warnings: What is probably not as the reader wants it, such as a robot without wheels. Each is also a Python
-            warning of the category `RobotFileWarning`.
+        assumed: Assumed values that the file does not state.
+        left_out: Elements of the file that the model does not simulate.
+        solids: A row for each solid: name, joint, parent, mass (kg) and role.
+        warnings: Probable problems, such as a robot without wheels. Each is also a Python warning of the category
+            `RobotFileWarning`.
     """
 
     path: str
@@ -95,10 +95,10 @@ SCHEME = "package://"
 
 
 def check_folders(value: object) -> tuple[Path, ...]:
-    """The folders that an argument `package_paths` names.
+    """Checks the folders of an argument `package_paths`.
 
     Raises:
-        ModelError: It is no collection of paths, or one of them is no folder.
+        ModelError: It is not a collection of paths, or one of them is not a folder.
     """
     if isinstance(value, (str, bytes, os.PathLike)) or not isinstance(value, Collection):
         refuse(ModelError, "package_paths", value, "must be a list of folders")
@@ -111,10 +111,10 @@ def check_folders(value: object) -> tuple[Path, ...]:
 
 
 def find_file(urdf: Path, name: str, folders: tuple[Path, ...]) -> tuple[Path, tuple[str, ...]]:
-    """The file that a URDF means, and where it was looked for if there is none.
+    """Finds a file that a URDF refers to, or returns the folders that were searched.
 
-    A package is looked for in the folders that the user gave, in those above the URDF, in those of `ROS_PACKAGE_PATH`
-    and in `share` of those of `AMENT_PREFIX_PATH`. A folder with the package's name is the package itself.
+    Packages are searched in the folders given by the user, in the folders above the URDF, in `ROS_PACKAGE_PATH`, and in
+    `share` under `AMENT_PREFIX_PATH`. A folder with the package's name is the package itself.
 
     Args:
         urdf: The file that names it.
@@ -140,7 +140,7 @@ def find_file(urdf: Path, name: str, folders: tuple[Path, ...]) -> tuple[Path, t
 
 
 def _from_environment() -> list[Path]:
-    """The folders of packages that ROS 1 and ROS 2 are told of."""
+    """The package folders of ROS 1 and ROS 2."""
     first = os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep)
     second = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
     return [Path(entry) for entry in first if entry] + [Path(entry, "share") for entry in second if entry]
@@ -168,7 +168,7 @@ _FORWARD = {
 
 
 def axes_of(forward: object) -> Array:
-    """The rotation (3, 3) from a file's axes, whose machine drives along `forward`, to those of this package.
+    """Rotation (3, 3) from the axes of a file with the driving direction `forward` to those of this package.
 
     Raises:
         ModelError: `forward` is not "x", "-x", "y" or "-y".

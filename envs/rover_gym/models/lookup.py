@@ -27,7 +27,7 @@ def open_model(name: object) -> RoverModel:
         The model.
 
     Raises:
-        ModelError: There is no such model, or the file is none.
+        ModelError: There is no such model, or the file does not contain a model.
         OSError: The file cannot be read.
     """
     if not isinstance(name, (str, os.PathLike)):
@@ -54,7 +54,7 @@ def read_robot(path: object, **options: Any) -> tuple[RoverModel, ImportReport]:
         **options: Those of `read_urdf` or `read_mjcf`.
 
     Returns:
-        The model and what was understood, assumed and left out.
+        The model and the import report.
 
     Raises:
         ModelError: The file is of another kind, or cannot be read as a robot.

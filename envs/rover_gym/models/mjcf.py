@@ -1,6 +1,7 @@
 """Reads an MJCF into a `RobotTree`. MuJoCo compiles it, so defaults, includes, angles and inertias are MuJoCo's.
 
-MuJoCo takes time with the square of the copies, and memory with the size of a height field, and neither can be ended.
+In MuJoCo, time grows with the square of the number of copies and memory with the size of height fields, and compilation
+cannot be interrupted. Large files are therefore rejected before.
 """
 
 from __future__ import annotations
@@ -78,13 +79,13 @@ MAX_FILES = 100
 
 
 def check_sizes(path: Path) -> dict[str, Path]:
-    """Refuses a file that would become enormous. A file that is no XML is left to MuJoCo, which says where.
+    """Rejects a file that would become enormous. A file that is not XML is left to MuJoCo, whose error gives the line.
 
     Args:
-        path: The file; what it includes is looked at too.
+        path: The file; included files are checked too.
 
     Returns:
-        The files that it includes, by the names that it gives them.
+        The included files, by the names in the file.
 
     Raises:
         ModelError: An element makes too many copies, or holds too many numbers.
@@ -128,7 +129,7 @@ def _check(file: Path, element: Any) -> None:
 
 
 def _product(element: Any, names: tuple[str, ...]) -> int:
-    """The product of the numbers in some attributes; what is no number counts as 1, and MuJoCo refuses it."""
+    """The product of the numbers in some attributes. Anything else counts as 1; MuJoCo rejects it later."""
     return math.prod(_whole(word) for name in names for word in element.get(name, "").split())
 
 
@@ -148,10 +149,10 @@ def read_mjcf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
 
     Args:
         path: The file.
-        ignore: Kinds of what changes the motion and is to be left out all the same.
+        ignore: Kinds of elements to leave out although they change the motion.
 
     Raises:
-        ModelError: MuJoCo refuses the file, or it holds what cannot be simulated.
+        ModelError: MuJoCo rejects the file, or it contains elements that are not supported.
         MissingExtraError: MuJoCo is not installed.
         OSError: The file cannot be read.
     """
@@ -220,7 +221,7 @@ class _Reader:
         self.joints: dict[int, FileJoint] = {}
 
     def check_numbers(self) -> None:
-        """Refuses masses, places and quaternions that are no numbers, which MuJoCo passes on from some files."""
+        """Rejects masses, positions and quaternions that are not finite, which MuJoCo accepts in some files."""
         m = self.model
         for kind, fields in (("body", ("mass", "inertia", "pos", "quat", "ipos", "iquat")), ("geom", ("pos", "quat"))):
             for field in fields:
@@ -235,7 +236,7 @@ class _Reader:
                     self.tree.refuse(at, rows[index].tolist(), "must be finite and, if a quaternion, not zero")
 
     def check_options(self) -> None:
-        """Refuses what acts on the whole scene and is not simulated."""
+        """Rejects global options that are not supported."""
         m = self.model
         option = m.opt
         if option.density != 0.0 or option.viscosity != 0.0:
@@ -243,16 +244,16 @@ class _Reader:
             self.tree.leave_out("fluid", "option.density", value, "forces of a fluid are not simulated")
         for count, where in ((m.nflex, "flex"), (m.nplugin, "plugin"), (m.nmocap, "mocap")):
             if count:
-                self.tree.refuse(where, int(count), "is not simulated")
+                self.tree.refuse(where, int(count), "is not supported")
         if np.any(m.body_gravcomp):
-            self.tree.refuse("body.gravcomp", float(m.body_gravcomp.max()), "gravity compensation is not simulated")
+            self.tree.refuse("body.gravcomp", float(m.body_gravcomp.max()), "gravity compensation is not supported")
         gravity = [float(x) for x in option.gravity]
         self.tree.left_out.append(f"option: gravity {gravity} and contact parameters, which a Simulation is given")
         if m.nsensor:
             self.tree.left_out.append(f"sensor: {m.nsensor} of them")
 
     def add_links(self) -> None:
-        """Adds the bodies that belong to a machine; what stands fixed to the world alone is scenery."""
+        """Adds the bodies of machines. Bodies that are fixed to the world are scenery and left out."""
         m = self.model
         moves = np.zeros(m.nbody, dtype=bool)
         for body in range(m.nbody - 1, 0, -1):
@@ -272,7 +273,7 @@ class _Reader:
             link.shapes = [self._shape(geom) for geom in range(first, first + int(m.body_geomnum[body]))]
             self.tree.links[link.name] = link
         if not self.tree.links:
-            self.tree.refuse("worldbody", self.model.nbody - 1, "has no body that moves")
+            self.tree.refuse("worldbody", self.model.nbody - 1, "has no movable body")
 
     def _chain(self, body: int) -> FileLink:
         """The link of a body; if it has several joints, adds one for each but the last, nearly without mass."""
@@ -292,7 +293,7 @@ class _Reader:
         return FileLink(self._body(body), parent, self._joint(body, first + count - 1), position, rotation)
 
     def add_couplings(self) -> None:
-        """Linear couplings of two joints are exact here; other equality constraints are refused."""
+        """Adds linear couplings of two joints, which are exact here. Rejects other equality constraints."""
         m, kinds = self.model, self.mujoco.mjtEq
         for eq in range(m.neq):
             if not m.eq_active0[eq]:
@@ -306,11 +307,11 @@ class _Reader:
                 continue
             joint = self.joints[first]
             if joint.follows is not None:
-                self.tree.refuse(where, joint.name, "this joint follows another already")
+                self.tree.refuse(where, joint.name, "this joint already depends on another joint")
             joint.follows = (self.joints[second].name, terms[1], terms[0])
 
     def check_tendons(self) -> None:
-        """Tendons that pull or stop are refused; others measure only."""
+        """Rejects tendons that exert forces; others only measure."""
         m = self.model
         for tendon in range(m.ntendon):
             if np.any(m.tendon_stiffness[tendon]) or np.any(m.tendon_damping[tendon]) or m.tendon_limited[tendon]:
@@ -318,7 +319,7 @@ class _Reader:
                 self.tree.leave_out("tendons", f"tendon[{name}]", name, "tendons are not simulated")
 
     def add_actuators(self) -> None:
-        """Motors become torque limits and position servos become gains; others are refused."""
+        """Converts motors to torque limits and position servos to gains. Rejects other actuators."""
         m, mj = self.model, self.mujoco
         joint_kinds = (int(mj.mjtTrn.mjTRN_JOINT), int(mj.mjtTrn.mjTRN_JOINTINPARENT))
         for actuator in range(m.nu):
@@ -360,7 +361,7 @@ class _Reader:
         at = f"joint[{name}]"
         if np.any(m.dof_frictionloss[dofs]):
             value = float(m.dof_frictionloss[dofs].max())
-            self.tree.leave_out("friction", f"{at}.frictionloss", value, "dry friction is not simulated")
+            self.tree.leave_out("friction", f"{at}.frictionloss", value, "dry friction is not supported")
         damping, armature = np.array(m.dof_damping[dofs]), np.array(m.dof_armature[dofs])
         stiffness = float(np.ravel(m.jnt_stiffness[index])[0])
         for field in ("dof_dampingpoly", "jnt_stiffnesspoly"):
@@ -374,7 +375,7 @@ class _Reader:
             if stiffness != 0.0:
                 self.tree.leave_out("springs", f"{at}.stiffness", stiffness, "springs of ball joints are not simulated")
             if m.jnt_limited[index]:
-                self.tree.refuse(f"{at}.range", m.jnt_range[index].tolist(), "a ball joint has no limits here")
+                self.tree.refuse(f"{at}.range", m.jnt_range[index].tolist(), "limits of ball joints are not supported")
             joint = FileJoint(name, "free" if n_dofs == 6 else "spherical", np.array(m.jnt_pos[index]))
             self.joints[index] = joint
             return joint

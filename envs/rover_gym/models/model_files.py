@@ -1,7 +1,7 @@
 """Files of models: the methods of `RoverModel` that read and write them.
 
-The compiled class builds a model from text and dictionaries; reading and writing files is Python, and the functions of
-this page become its methods.
+The compiled class builds a model from text and dictionaries. These functions read and write files and become methods of
+it.
 """
 
 from __future__ import annotations
@@ -71,34 +71,32 @@ def from_urdf(
     """Reads a URDF file.
 
     The file's axes (x forward, y left, z up) are converted to ours (x forward, y up, z right)
-    in every frame. `import_report` says what was understood, assumed and left out.
+    in every frame. `import_report` lists what was read, assumed and left out.
 
     Args:
         path: Path of the file.
-        wheels: Names of the wheels' links or joints, or their radii by name, m. None: found
-            from shapes and names. An empty list: none.
-        steering: Names of the steering links or joints, or those of each wheel by its name.
-            None: found from their axes. An empty list: none.
-        free_base: Whether the root moves freely; otherwise it is fixed to the world.
+        wheels: Names of the wheels' links or joints, or a mapping of names to radii, m. By default wheels are found
+            from shapes and names. An empty list means no wheels.
+        steering: Names of the steering links or joints, or a mapping from wheel names to them. By default they are
+            found from their axes. An empty list means no steering.
+        free_base: Whether the root link moves freely. Otherwise it is fixed to the world.
         forward: The file's axis along which the machine drives: "x", "-x", "y" or "-y".
         torque_limit: Largest torque of every wheel, N m; by default the file's.
         steering_stiffness: Stiffness of every steering controller, N m/rad.
         steering_damping: Damping of every steering controller, N m s/rad.
         steering_limit: Largest steering set-point, rad; by default the joint's stop.
-        wheel_width: Width of every wheel, m, 0 for thin discs, which cost less to simulate; by
-            default that of the cylinder that touches for it in the file, or 0.
-        wheel_stiffness: Normal stiffness of every wheel where it touches, N/m, 0 for rigid
-            wheels. By default a wheel yields 0.03 mm under its share of the weight, which
-            decides how the ground shares the weight among the wheels of a rigid chassis.
-        ignore: Kinds of what changes the motion and is left out all the same: "friction",
-            "actuators", "closed loops", "tendons", "springs", "fluid".
-        package_paths: Folders that are searched for the packages of `package://` names, before
-            those of the environment variables `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH` and
-            the folders above the file.
+        wheel_width: Width of every wheel, m; 0 for thin discs, which cost less to simulate. By default the width of the
+            wheel's collision cylinder in the file, or 0.
+        wheel_stiffness: Normal contact stiffness of every wheel, N/m; 0 for rigid wheels. By default a wheel is
+            compressed by 0.03 mm under its share of the weight, which determines the wheel loads of a rigid chassis.
+        ignore: Kinds of elements to leave out although they change the motion: "friction", "actuators", "closed loops",
+            "tendons", "springs", "fluid".
+        package_paths: Folders to search for `package://` names, before the folders above the file and those of the
+            environment variables `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`.
 
     Raises:
-        ModelError: The file is malformed, holds what cannot be simulated, or leaves open which
-            links are wheels; the message names file, element and value.
+        ModelError: The file is malformed, contains elements that are not supported, or does not determine the wheels.
+            The message gives file, element and value.
         ImportError: The extra `models` is not installed.
         OSError: The file cannot be read.
     """
@@ -122,32 +120,31 @@ def from_mjcf(
 ) -> RoverModel:
     """Reads an MJCF file, which MuJoCo compiles.
 
-    As `from_urdf`, but that the file says whether the base is free, and position servos become
-    gains of held joints.
+    As `from_urdf`, except that the file states whether the base is free, and position servos become gains of held
+    joints.
 
     Args:
         path: Path of the file.
-        wheels: Names of the wheels' bodies or joints, or their radii by name, m. None: found
-            from shapes and names. An empty list: none.
-        steering: Names of the steering bodies or joints, or those of each wheel by its name.
-            None: found from their axes. An empty list: none.
-        free_base: Whether the root moves freely. None: as in the file.
+        wheels: Names of the wheels' bodies or joints, or a mapping of names to radii, m. By default wheels are found
+            from shapes and names. An empty list means no wheels.
+        steering: Names of the steering bodies or joints, or a mapping from wheel names to them. By default they are
+            found from their axes. An empty list means no steering.
+        free_base: Whether the root body moves freely. By default as in the file.
         forward: The file's axis along which the machine drives: "x", "-x", "y" or "-y".
         torque_limit: Largest torque of every wheel, N m; by default the file's.
         steering_stiffness: Stiffness of every steering controller, N m/rad.
         steering_damping: Damping of every steering controller, N m s/rad.
         steering_limit: Largest steering set-point, rad; by default the joint's stop.
-        wheel_width: Width of every wheel, m, 0 for thin discs, which cost less to simulate; by
-            default that of the cylinder that touches for it in the file, or 0.
-        wheel_stiffness: Normal stiffness of every wheel where it touches, N/m, 0 for rigid
-            wheels. By default a wheel yields 0.03 mm under its share of the weight, which
-            decides how the ground shares the weight among the wheels of a rigid chassis.
-        ignore: Kinds of what changes the motion and is left out all the same: "friction",
-            "actuators", "closed loops", "tendons", "springs", "fluid".
+        wheel_width: Width of every wheel, m; 0 for thin discs, which cost less to simulate. By default the width of the
+            wheel's collision cylinder in the file, or 0.
+        wheel_stiffness: Normal contact stiffness of every wheel, N/m; 0 for rigid wheels. By default a wheel is
+            compressed by 0.03 mm under its share of the weight, which determines the wheel loads of a rigid chassis.
+        ignore: Kinds of elements to leave out although they change the motion: "friction", "actuators", "closed loops",
+            "tendons", "springs", "fluid".
 
     Raises:
-        ModelError: MuJoCo refuses the file, it holds what cannot be simulated, or it leaves
-            open which bodies are wheels.
+        ModelError: MuJoCo rejects the file, it contains elements that are not supported, or it does not determine the
+            wheels.
         ImportError: MuJoCo is not installed.
         OSError: The file cannot be read.
     """

@@ -33,13 +33,13 @@ SOLID = re.compile(r"(solids|wheels|tags)\[(\d+)\]")
 def read_urdf(
     path: object, *, free_base: bool = True, package_paths: Collection[str | os.PathLike[str]] = (), **options: Any
 ) -> tuple[RoverModel, ImportReport]:
-    """Reads a URDF; the arguments are those of `RoverModel.from_urdf`."""
+    """Reads a URDF with the arguments of `RoverModel.from_urdf`."""
     reader = functools.partial(read_urdf_tree, package_paths=check_folders(package_paths))
     return _read(reader, path, free_base, **options)
 
 
 def read_mjcf(path: object, *, free_base: bool | None = None, **options: Any) -> tuple[RoverModel, ImportReport]:
-    """Reads an MJCF; the arguments are those of `RoverModel.from_mjcf`."""
+    """Reads an MJCF with the arguments of `RoverModel.from_mjcf`."""
     return _read(read_mjcf_tree, path, free_base, **options)
 
 
@@ -71,7 +71,7 @@ def _read(
         if link.parent is None and free_base is not None and link.joint.kind in ("fixed", "free"):
             link.joint.kind = "free" if free_base else "fixed"
         elif link.parent is not None and link.joint.kind == "free":
-            tree.refuse(f"joint[{link.joint.name}]", "floating", "only a root can float freely")
+            tree.refuse(f"joint[{link.joint.name}]", "floating", "only a root link can have a floating joint")
     roles = find_wheels(tree, P.T @ (0.0, 1.0, 0.0), P.T @ (1.0, 0.0, 0.0), wheels, steering)
     turn_steering_axes_up(tree, {role.steering for role in roles if role.steering}, P)
     move_limits_to_followed_joints(tree)

@@ -1,15 +1,16 @@
-"""What a robot file describes, in the file's own axes: links, joints and shapes, before any decision about wheels.
+"""Contents of a robot file in the file's axes: links, joints and shapes, before wheels are chosen.
 
-A file may give a link no mass, or an inertia that no body has, and state the rest with a link that is fixed to it. Only
-the links of a rigid group together must be a body.
+A single link may have no mass or an impossible inertia, if other links are fixed to it. Only a whole rigid group must
+be a physical body.
 
-Two wheels of four that are turned by 3.14159 instead of pi stand micrometres apart, which decides how a rigid chassis
-on rigid ground shares its weight.
+Angles such as 3.14159 are replaced by the exact multiple of pi/2. Otherwise wheels differ in height by micrometres,
+which changes the wheel loads of a rigid chassis on rigid ground.
 
-Distant stops are none, steering turns to the left, and followed joints have the stops of those that follow.
+Distant stops are removed, steering axes point up so that positive angles turn left, and joints get the stops of the
+joints that depend on them.
 
-A link is a round solid if a cylinder, a sphere or a round mesh lies about its axis, and no other shape of it reaches
-much farther from the axis. A pole with a round hub at its hinge is none.
+A link is a round solid if it has a cylinder, a sphere or a round mesh about its axis and no other shape that extends
+much farther from the axis. A pole with a round hub at its hinge is not.
 """
 
 from __future__ import annotations
@@ -36,10 +37,10 @@ MAX_LINKS = 2000
 #: Largest file, bytes.
 MAX_BYTES = 16 << 20
 
-#: What would change the motion if it were left out, and is therefore refused unless `ignore` names it.
+#: Kinds of elements that change the motion. They are rejected unless `ignore` names them.
 IGNORABLE = ("friction", "actuators", "closed loops", "tendons", "springs", "fluid")
 
-#: How the name of a cylinder ends that stands for a wheel without width.
+#: Ending of the name of a cylinder that represents a wheel without width.
 THIN_DISC = "thin_disc"
 
 
@@ -145,10 +146,10 @@ class RobotTree:
         path: The file.
         name: Name of the robot.
         links: By name.
-        ignore: Kinds, of `IGNORABLE`, of what changes the motion and is left out all the same.
-        left_out: What the file holds and the model does not simulate.
-        assumed: What the file does not state and was chosen.
-        warnings: What is probably not as the user wants it.
+        ignore: Kinds of elements, of `IGNORABLE`, to leave out although they change the motion.
+        left_out: Elements of the file that the model does not simulate.
+        assumed: Assumed values that the file does not state.
+        warnings: Probable problems.
     """
 
     path: Path
@@ -164,7 +165,7 @@ class RobotTree:
         refuse_in(self.path, where, value, reason)
 
     def leave_out(self, kind: str, where: str, value: object, reason: str) -> None:
-        """Lists what changes the motion if `ignore` names its kind, and refuses it otherwise."""
+        """Lists an element as left out if its kind is in `ignore`, and rejects it otherwise."""
         if kind not in self.ignore:
             self.refuse(where, value, f'{reason}; ignore=["{kind}"] leaves it out')
         self.left_out.append(f"{where}: {reason} (left out as told)")
@@ -183,10 +184,10 @@ class RobotTree:
 
 
 def check_kinds(value: object, known: tuple[str, ...]) -> frozenset[str]:
-    """The kinds that an argument `ignore` names.
+    """Checks the kinds in an argument `ignore`.
 
     Raises:
-        ModelError: It is no collection of known kinds.
+        ModelError: It is not a collection of known kinds.
     """
     kinds = list(value) if isinstance(value, Collection) and not isinstance(value, str) else [None]
     if not all(isinstance(kind, str) and kind in known for kind in kinds):
@@ -203,10 +204,10 @@ def refuse_in(path: Path, where: str, value: object, reason: str) -> NoReturn:
 
 
 def checked_path(path: object) -> Path:
-    """The path that a user gave.
+    """Checks a path given by the user.
 
     Raises:
-        ModelError: It is no path.
+        ModelError: It is not a path.
     """
     if not isinstance(path, (str, os.PathLike)):
         refuse(ModelError, "path", path, "must be a path")
@@ -214,7 +215,7 @@ def checked_path(path: object) -> Path:
 
 
 def check_size(path: Path) -> None:
-    """Refuses a file of more than `MAX_BYTES` before it is read.
+    """Rejects a file of more than `MAX_BYTES` before it is read.
 
     Raises:
         ModelError: The file is too large.
@@ -226,7 +227,7 @@ def check_size(path: Path) -> None:
 
 
 def is_urdf(path: Path) -> bool:
-    """Whether a file's root is that of a URDF, as far as its beginning tells.
+    """Whether a file is a URDF, judged by its beginning.
 
     Raises:
         OSError: The file cannot be read.
@@ -242,13 +243,13 @@ LEAST_MASS = 1e-9
 
 
 def join_rigid_groups(tree: RobotTree, *, free_base: bool) -> None:
-    """Joins links that are no bodies to what they are fixed to. Their origins stay as named points.
+    """Joins links without a physical mass to the links they are fixed to. Their origins remain as named points.
 
-    A link that moves and is no body takes over the links that are fixed to it. If a root without mass has none and the
-    base is fixed to the world, its links hang on the world.
+    A moving link without a physical mass absorbs the links fixed to it. If a root without mass has none and the base is
+    fixed to the world, its children are attached to the world.
 
     Raises:
-        ModelError: A link that moves has no mass, and nothing with a mass is fixed to it.
+        ModelError: A moving link has no mass, and no link with mass is fixed to it.
     """
     for name in reversed(list(tree.links)):
         link = tree.links[name]
@@ -275,7 +276,7 @@ def join_rigid_groups(tree: RobotTree, *, free_base: bool) -> None:
 
 
 def _is_body(link: FileLink) -> bool:
-    """Whether mass and inertia of a link are those of a body, by the rule of a model's solids."""
+    """Whether mass and inertia of a link are physical, by the rules for solids of a model."""
     if not (link.mass >= LEAST_MASS and np.all(np.isfinite(link.inertia))):
         return False
     principal = np.linalg.eigvalsh((link.inertia + link.inertia.T) / 2.0)
@@ -329,13 +330,13 @@ EXACT = 1e-12
 
 
 def right_angle(word: str) -> tuple[float, str] | None:
-    """The multiple of pi/2 that a number means by its digits, rad, and its name.
+    """The multiple of pi/2 that a rounded number stands for, rad, and its name.
 
     Args:
         word: A finite number as it was written.
 
     Returns:
-        None if the number is none, rounded or cut to its own decimals, and if it has all digits already.
+        None if the number is not a rounded or truncated multiple, or has all digits already.
     """
     written = Decimal(word)
     exponent = written.as_tuple().exponent
@@ -358,12 +359,12 @@ def _name(count: int) -> str:
     return f"{factor}pi{'' if count % 2 == 0 else '/2'}"
 
 
-#: Stops this far away mean none, rad or m.
+#: Stops beyond this are treated as missing, rad or m.
 DISTANT = 1e6
 
 
 def drop_distant_limits(tree: RobotTree) -> None:
-    """Joints whose stops are both distant lose them; a single distant stop moves to `DISTANT`. Each is listed."""
+    """Removes pairs of distant stops and moves single ones to `DISTANT`. Each change is listed."""
     for link in tree.links.values():
         limits = link.joint.limits
         if limits is None or max(abs(limit) for limit in limits) <= DISTANT:
@@ -381,7 +382,7 @@ def drop_distant_limits(tree: RobotTree) -> None:
 
 
 def turn_steering_axes_up(tree: RobotTree, steering: set[str], P: Array) -> None:
-    """Reverses steering joints whose axis points down, so that a positive angle turns to the left everywhere.
+    """Reverses steering joints whose axis points down, so that positive angles always turn left.
 
     Args:
         tree: The robot.
@@ -408,10 +409,10 @@ def turn_steering_axes_up(tree: RobotTree, steering: set[str], P: Array) -> None
 
 
 def move_limits_to_followed_joints(tree: RobotTree) -> None:
-    """The stops of a joint that follows another become stops of the other.
+    """Converts the stops of dependent joints to stops of the joints that they depend on.
 
     Raises:
-        ModelError: The other joint does not move, or the stops of both exclude each other.
+        ModelError: The other joint does not move, or the stops of both contradict each other.
     """
     by_joint = {link.joint.name: link for link in tree.links.values()}
     for link in tree.links.values():
@@ -428,7 +429,7 @@ def move_limits_to_followed_joints(tree: RobotTree) -> None:
             followed.limits = (max(own[0], lower), min(own[1], upper))
             if not followed.limits[0] < followed.limits[1]:
                 tree.refuse(
-                    f"{at}", list(followed.limits), "its limits and those of the followed joint exclude each other"
+                    f"{at}", list(followed.limits), "its limits contradict those of the joint that it depends on"
                 )
         link.joint.limits = None
 
@@ -448,7 +449,7 @@ OUTLINE = 1.5
 
 @dataclass(frozen=True)
 class Outline:
-    """What a mesh is about an axis.
+    """Outline of a mesh about an axis.
 
     Attributes:
         radius: Largest distance of a vertex from the axis, m.
@@ -462,7 +463,7 @@ class Outline:
 
 
 def round_shape(link: FileLink) -> FileShape | None:
-    """The largest cylinder or sphere about a link's axis, of those that touch if there are any."""
+    """The largest cylinder or sphere about a link's axis, among collision shapes if there are any."""
     best: FileShape | None = None
     for shape in sorted(link.shapes, key=lambda shape: not shape.collides):
         if shape.kind not in ("cylinder", "sphere") or (best is not None and not shape.collides):
@@ -481,7 +482,7 @@ def along(link: FileLink, shape: FileShape) -> float:
 
 
 def width(link: FileLink) -> float:
-    """Width of the cylinder that touches for a wheel, m; 0 where it stands for a thin disc or there is none."""
+    """Width of a wheel's collision cylinder, m; 0 if it represents a thin disc or is missing."""
     shape = round_shape(link)
     if shape is None or shape.kind != "cylinder" or not shape.collides or shape.name.endswith(THIN_DISC):
         return 0.0
@@ -489,7 +490,7 @@ def width(link: FileLink) -> float:
 
 
 def mesh_outline(link: FileLink) -> tuple[Outline | None, str]:
-    """Outline of a link's mesh, of one that touches if there is any; or None, and what the link is instead."""
+    """Outline of a link's mesh, preferably a collision mesh; or None and the reason."""
     meshes = [shape for shape in link.shapes if shape.mesh is not None]
     if not meshes:
         return None, "has no cylinder or sphere about its axis"
@@ -511,7 +512,7 @@ def mesh_outline(link: FileLink) -> tuple[Outline | None, str]:
 
 
 def round_radius(link: FileLink) -> tuple[float | None, str]:
-    """Radius of the round solid that a link is, m; or None, and why it is none."""
+    """Radius of a link that is a round solid, m; or None and the reason."""
     shape = round_shape(link)
     if shape is not None:
         radius = shape.size[0]
@@ -555,7 +556,7 @@ def _farthest(link: FileLink, points: Array) -> float:
 
 
 def _points(link: FileLink, shape: FileShape) -> tuple[Array | None, str]:
-    """Vertices of a mesh (n, 3), m from the joint's anchor; or None, and why there are none."""
+    """Vertices of a mesh (n, 3), m, relative to the joint's anchor; or None and the reason."""
     points: Array
     if isinstance(shape.mesh, np.ndarray):
         points = shape.mesh

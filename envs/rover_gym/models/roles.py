@@ -1,8 +1,8 @@
-"""Which links are wheels, which joints steer them and how large they are: as told, otherwise from geometry and names.
+"""Finds the wheels, their steering joints and radii: as given by the user, otherwise from geometry and names.
 
 `wheel_search` finds the wheels. A wheel is steered by the nearest joint above it that turns about an upright axis and
-carries no other wheel. A wheel is a caster, without drive and steering, if its names say so. What is left open by this
-is refused, with the candidates.
+carries no other wheel. A wheel is a caster, without drive and steering, if its name indicates it. Ambiguous cases are
+rejected with the candidates.
 """
 
 from __future__ import annotations
@@ -60,11 +60,11 @@ def find_wheels(tree: RobotTree, up: Array, ahead: Array, wheels: Wheels, steeri
         tree: The robot.
         up: Unit vector upwards in the file's axes, (3,).
         ahead: Unit vector forward in the file's axes, (3,).
-        wheels: Names of the wheels' links or joints, or their radii by name, m. None: found. Empty: none.
-        steering: Names of the steering links or joints, or those by wheel. None: found. Empty: none.
+        wheels: Names of the wheels' links or joints, or radii by name, m. None to find them; empty for no wheels.
+        steering: Names of the steering links or joints, or a mapping by wheel. None to find them; empty for none.
 
     Raises:
-        ModelError: A name is unknown, a radius is neither given nor found, or more than one reading is possible.
+        ModelError: A name is unknown, a radius is neither given nor found, or the choice is ambiguous.
     """
     poses = tree.poses()
     left = np.cross(up, ahead)
@@ -98,7 +98,12 @@ def resolve(tree: RobotTree, field: str, name: object) -> str:
     found = next((link.name for link in tree.links.values() if link.joint.name == name), None)
     if found is None:
         known = ", ".join(name for name, link in tree.links.items() if link.joint.kind == "revolute")
-        refuse(ModelError, field, name, f"there is no such link or joint in {tree.path}; turning are {known or 'none'}")
+        refuse(
+            ModelError,
+            field,
+            name,
+            f"there is no such link or joint in {tree.path}; rotating joints: {known or 'none'}",
+        )
     return found
 
 
@@ -175,16 +180,18 @@ def _steering(tree: RobotTree, wheels: list[str], steering: Steering, upright: d
 
 
 def _check_is_held(tree: RobotTree, name: str, wheel: str) -> None:
-    """Refuses a pivot that may be a steering joint or a caster's: held or free are two motions."""
+    """Rejects a pivot that may belong to steering or to a caster: held and free joints move differently."""
     joint = tree.links[name].joint
     is_free = joint.limits is None and joint.hold is None and not joint.is_driven
     if is_free and not STEERS.search(f"{name} {joint.name}"):
         give = f"give steering=[{name!r}, ...] if it steers, steering=[] if it is a caster"
-        refuse(ModelError, "steering", None, f"{name} of {tree.path} turns freely above the wheel {wheel}: {give}")
+        refuse(
+            ModelError, "steering", None, f"{name} of {tree.path} can turn freely and carries the wheel {wheel}: {give}"
+        )
 
 
 def _is_caster(tree: RobotTree, wheel: str) -> bool:
-    """Whether the names of a wheel or of what carries it and nothing else say that it is a caster, without a drive."""
+    """Whether the name of a wheel, or of a link that carries only this wheel, indicates a caster without drive."""
     names = [wheel]
     for name in _above(tree, wheel):
         if len(tree.children(name)) > 1:

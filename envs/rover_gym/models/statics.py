@@ -11,8 +11,8 @@ the wheel drives with mu N, needs a push of W_i tan(a - phi) from the others, wh
 a = phi + atan(mu (W - W_i)/W_i) at most, and from 90 degrees on a wall. The load that moves backwards as the front
 rises is neglected. Source: the equilibrium of a wheel at an edge, as in Thomas and Vantsevich 2010.
 
-A wheel is a link that carries nothing else that moves and turns about a level axis. It is a round solid about that
-axis, and its joint has no stops; or its name says that it is a wheel.
+A wheel is a link that carries no moving link and rotates about a horizontal axis. It must be a round solid about that
+axis with a joint without stops, or have a name that indicates a wheel.
 """
 
 from __future__ import annotations
@@ -42,19 +42,20 @@ ALIGNED = 0.02
 
 @dataclass(frozen=True)
 class Statics:
-    """What a check of a model found; lengths in m, forces in N, angles in rad.
+    """Results of `check_statics`; lengths in m, forces in N, angles in rad.
 
     Attributes:
         loads: Normal force of the ground on each wheel, (n_wheels,).
-        undetermined_loads: Independent sets of wheel loads that balance one another, as
-            `StepReport.undetermined_loads` counts them; not 0: the loads above are one answer of many.
-        rest_speed: Largest velocity that was left when the loads were read, m/s and rad/s.
+        undetermined_loads: Degree of static indeterminacy, see `StepReport.undetermined_loads`. If it is not 0, the
+            loads are one of many possible distributions.
+        rest_speed: Largest remaining velocity when the loads were read, m/s and rad/s.
         attitude: Roll and pitch at rest.
         wheelbase: Distance between the foremost and the hindmost axle.
         track: Largest distance between two wheels of one axle.
-        clearance: Height of the lowest point that collides and is no wheel, infinite where nothing collides.
+        clearance: Height of the lowest collision point other than wheels; infinite if there is none.
         turning_centre: How the wheels can roll about one point, in words.
-        turning_radius: Smallest distance of that point from the middle, 0 on the spot, infinite where there is none.
+        turning_radius: Smallest distance of that point from the middle; 0 for turning on the spot, infinite without a
+            turning centre.
         step_height: Height of the step that the front wheels can climb.
         climbs_wall: Whether they could climb a wall.
         friction: The friction that was assumed.
@@ -83,7 +84,7 @@ def check_statics(model: RoverModel, *, friction: float = 0.7) -> Statics:
 
     Raises:
         ModelError: The model has no wheels or its base is not free.
-        OptionError: `friction` is no positive number.
+        OptionError: `friction` is not a positive number.
     """
     friction = number("friction", friction, above=0.0, at_most=10.0)
     if not model.wheel_names or model.dof_names[:1] != ["x"]:
@@ -200,7 +201,7 @@ NOT_NAMED = re.compile(r"steer|hub|mount|fork|knuckle|arm|axle|motor|caster_base
 #: Sine of the largest tilt of an axle from level.
 TILT = 0.1
 
-#: Two wheels stand on one ground if their lowest points differ by less than this share of the radius.
+#: Two wheels touch the same ground if the heights of their lowest points differ by less than this share of the radius.
 LEVEL = 0.5
 
 #: Most links of which a warning gives the reason.
@@ -210,9 +211,9 @@ Poses = dict[str, tuple[Array, Array]]
 
 
 def search_wheels(tree: RobotTree, poses: Poses, up: Array) -> list[str]:
-    """The links that are wheels by their names, or by their shapes where no name says so.
+    """Finds the wheels by their names, or by their shapes if no name indicates a wheel.
 
-    A robot in which none is found gets a warning with the reason for each link that might be one.
+    If none is found, a warning gives the reason for each candidate.
 
     Args:
         tree: The robot.
@@ -220,7 +221,7 @@ def search_wheels(tree: RobotTree, poses: Poses, up: Array) -> list[str]:
         up: Unit vector upwards in the file's axes, (3,).
 
     Raises:
-        ModelError: More than one reading is possible.
+        ModelError: The choice is ambiguous.
     """
     carriers = _moving_carriers(tree)
     reasons = {link.name: _why_not(link, poses, up, carriers) for link in tree.links.values()}
@@ -240,7 +241,7 @@ def search_wheels(tree: RobotTree, poses: Poses, up: Array) -> list[str]:
     doubtful = _on_the_same_ground(poses, up, round_ones, chosen)
     if doubtful:
         likely = f"{', '.join(doubtful)} may be wheels of {tree.path} like {', '.join(chosen)}"
-        refuse(ModelError, "wheels", None, f"{likely}: say which are")
+        refuse(ModelError, "wheels", None, f"{likely}: give their names")
     if not chosen:
         tree.warnings.append(_none_found(tree, carriers, reasons))
     return chosen
@@ -251,7 +252,7 @@ def _is_named(link: FileLink) -> bool:
 
 
 def _why_not(link: FileLink, poses: Poses, up: Array, carriers: dict[str, str]) -> str | None:
-    """Why the joint of a link is not that of a wheel; None if it may be."""
+    """The reason why a link's joint cannot carry a wheel; None if it can."""
     joint = link.joint
     if joint.kind != "revolute":
         return f"its joint is {joint.kind}"
@@ -268,7 +269,7 @@ def _why_not(link: FileLink, poses: Poses, up: Array, carriers: dict[str, str]) 
 
 
 def _on_the_same_ground(poses: Poses, up: Array, round_ones: dict[str, float], chosen: list[str]) -> list[str]:
-    """Round links that are not chosen and stand on the ground of those that are."""
+    """Round links that are not chosen but touch the same ground as the chosen ones."""
     lowest = {name: float(up @ poses[name][1]) - radius for name, radius in round_ones.items()}
     floor = min((lowest[name] for name in chosen if name in lowest), default=None)
     if floor is None:
@@ -291,17 +292,17 @@ def _none_found(tree: RobotTree, carriers: dict[str, str], reasons: dict[str, st
 
 
 def _refuse_fixed_wheels(tree: RobotTree, candidates: list[FileLink], chosen: list[str]) -> None:
-    """Refuses a wheel by its name that is fixed to a link that turns: only that link can be the wheel."""
+    """Rejects a link named as a wheel that is fixed to a rotating link: only the rotating link can be the wheel."""
     for carrier in candidates:
         for link in tree.children(carrier.name) if carrier.name not in chosen else ():
             is_round = any(shape.collides and shape.kind in ("cylinder", "sphere") for shape in link.shapes)
             if is_round and NAMED.search(link.name) and not NOT_NAMED.search(link.name):
                 reason = f"this wheel is fixed to {carrier.name}, which turns: join the two links in the file"
-                tree.refuse(f"link[{link.name}].joint", link.joint.kind, f"{reason}, or say which links are wheels")
+                tree.refuse(f"link[{link.name}].joint", link.joint.kind, f"{reason}, or give the links that are wheels")
 
 
 def _moving_carriers(tree: RobotTree) -> dict[str, str]:
-    """The links that carry something that moves, and what."""
+    """The links that carry moving links, with those links."""
     found: dict[str, str] = {}
     for link in reversed(list(tree.links.values())):
         if link.parent is not None and (link.joint.kind != "fixed" or link.name in found):

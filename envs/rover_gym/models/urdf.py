@@ -23,11 +23,11 @@ def read_urdf_tree(path: Path, *, ignore: Collection[str], package_paths: tuple[
 
     Args:
         path: The file.
-        ignore: Kinds of what changes the motion and is to be left out all the same.
-        package_paths: Folders that hold packages of ROS.
+        ignore: Kinds of elements to leave out although they change the motion.
+        package_paths: Folders with ROS packages.
 
     Raises:
-        ModelError: The file is malformed, contradicts itself or holds what cannot be simulated.
+        ModelError: The file is malformed, contradictory, or contains elements that are not supported.
         MissingExtraError: yourdfpy is not installed.
         OSError: The file cannot be read.
     """
@@ -141,7 +141,7 @@ def _joint(tree: RobotTree, source: Any) -> FileJoint:
         joint.damping = float(source.dynamics.damping or 0.0)
         friction = float(source.dynamics.friction or 0.0)
         if friction != 0.0:
-            tree.leave_out("friction", f"{at}.dynamics.friction", friction, "dry friction is not simulated")
+            tree.leave_out("friction", f"{at}.dynamics.friction", friction, "dry friction is not supported")
     if source.mimic is not None:
         ratio, offset = source.mimic.multiplier, source.mimic.offset
         joint.follows = (source.mimic.joint, 1.0 if ratio is None else ratio, offset or 0.0)

@@ -1,4 +1,4 @@
-"""What a URDF may hold: its elements and attributes, checked before anything is read from them.
+"""Elements and attributes that a URDF may contain, checked before reading.
 
 The tables follow the XML specification of ROS's package urdf.
 """
@@ -54,7 +54,7 @@ ATTRIBUTES: dict[str, dict[str, Any]] = {
     "transmission/joint": {"name!": str},
 }
 SHAPES = ("box", "cylinder", "sphere", "mesh")
-#: Elements whose content says nothing about the motion.
+#: Elements whose content does not affect the motion.
 APPEARANCE = ("material", "verbose", "contact_coefficients")
 #: Elements that their parent has at most once.
 ONCE = ("inertial", "origin", "mass", "inertia", "geometry", "parent", "child", "axis", "limit", "dynamics", "mimic")
@@ -68,13 +68,13 @@ REQUIRED = {
 
 @dataclass
 class CheckedUrdf:
-    """A URDF whose elements and attributes are what they must be.
+    """A URDF with valid elements and attributes.
 
     Attributes:
         path: The file.
-        root: Its root element, without what no URDF holds.
-        others: What no URDF holds, and how often.
-        assumed: What stands for something that the file does not state.
+        root: Its root element, without elements that do not belong to URDF.
+        others: Elements that do not belong to URDF, with their numbers.
+        assumed: Assumed values that the file does not state.
     """
 
     path: Path
@@ -83,7 +83,7 @@ class CheckedUrdf:
     assumed: list[str] = field(default_factory=list)
 
     def left_out(self) -> list[str]:
-        """What no URDF holds, with the number of times."""
+        """Elements that do not belong to URDF, with their numbers, as text."""
         return [f"{what}, {count} times" if count > 1 else what for what, count in self.others.items()]
 
 
@@ -91,7 +91,7 @@ def parse(path: Path) -> CheckedUrdf:
     """Reads and checks a file.
 
     Raises:
-        ModelError: The file is no URDF; the message names file, line, element and value.
+        ModelError: The file is not a URDF; the message gives file, line, element and value.
         MissingExtraError: lxml is not installed.
         OSError: The file cannot be read.
     """
@@ -120,7 +120,7 @@ def parse(path: Path) -> CheckedUrdf:
 
 
 def _check(checked: CheckedUrdf, element: Any, key: str, where: str) -> None:
-    """Checks an element and what it holds. `key` is its entry in `ATTRIBUTES`, `where` its place in the file."""
+    """Checks an element and its children. `key` is its entry in `ATTRIBUTES`, `where` its place in the file."""
     path, line = checked.path, f"line {element.sourceline}"
     spec = {name.rstrip("!"): kind for name, kind in ATTRIBUTES[key].items()}
     for name in element.attrib:
@@ -168,9 +168,9 @@ def _check(checked: CheckedUrdf, element: Any, key: str, where: str) -> None:
 
 
 def _without_substitutions(checked: CheckedUrdf, where: str, text: str) -> str:
-    """A value whose substitutions of ROS are made: `$(optenv NAME default)` by its default, `$(find package)` by a URI.
+    """Resolves ROS substitutions: `$(optenv NAME default)` to its default, `$(find package)` to a URI.
 
-    The environment is not read, so that a file means the same everywhere.
+    Environment variables are not read, so that a file has the same meaning everywhere.
     """
 
     def value(match: re.Match[str]) -> str:
@@ -190,7 +190,7 @@ def _without_substitutions(checked: CheckedUrdf, where: str, text: str) -> str:
 
 
 def _with_right_angles(checked: CheckedUrdf, where: str, text: str) -> str:
-    """Angles in which a multiple of pi/2 that was written with few digits has all of them; each is listed."""
+    """Replaces rounded multiples of pi/2 by exact ones. Each is listed."""
     words = text.split()
     for index, word in enumerate(words):
         angle = right_angle(word)

@@ -196,7 +196,7 @@ def planar_run_of(trajectory: Trajectory, path: str | Path) -> PlanarRun:
         RecordingError: It is not a planar run, or holds no samples.
     """
     if not is_planar(trajectory) or "centres" not in trajectory.data or "q" not in trajectory.data:
-        refuse(RecordingError, "path", str(path), "holds no planar machine: `rover planar` writes one")
+        refuse(RecordingError, "path", str(path), "contains no planar machine; `rover planar` records such runs")
     check_time(trajectory, path)
     scene = trajectory.attributes["scene"]
     discs = trajectory["centres"].shape[1] if trajectory["centres"].ndim == 3 else 0

@@ -1,7 +1,7 @@
 """Driving a rover by planning in the simulator itself (`docs/policies.md`).
 
-`FieldPlan` knows the way over a whole field, `Futures` drives copies of the rover by many sequences of commands, and
-`PlannerPolicy` chooses among them. `rover_gym.economy` plans simulations.
+`FieldPlan` computes the cost-to-go over a whole field, `Futures` simulates copies of the rover under many command
+sequences, and `PlannerPolicy` chooses among them. `rover_gym.economy` plans simulations.
 """
 
 from rover_gym.planning.field_plan import FieldPlan

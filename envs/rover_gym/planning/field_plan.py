@@ -1,10 +1,10 @@
-"""The way over a whole field: what it costs to reach the goal from anywhere.
+"""Cost-to-go over a whole field.
 
 The costs are those of Dijkstra's algorithm (Dijkstra 1959) on a grid, as `rover_gym.mechanics.PathSearch` computes
 them.
 
-The price of a place tells how badly the rover fits there: how high the ground stands under its trunk, over the mean of
-the ground about it, compared with the trunk's clearance. `PlannerPolicy` looks the end of each future up in it.
+The price of a place grows with the height of the ground under the trunk above the mean of its surroundings, relative to
+the trunk's clearance. `PlannerPolicy` uses the cost-to-go at the end of each simulated future.
 """
 
 from dataclasses import dataclass
@@ -128,7 +128,7 @@ class FieldPlan:
         begin = np.array(vector("start", start, 2))
         cell = np.clip(np.rint((begin - self.corner) / self.resolution), 0, np.array(self.cost.shape) - 1).astype(int)
         if not np.isfinite(self.cost[tuple(cell)]):
-            refuse(OptionError, "start", begin.tolist(), "has no way to the goal")
+            refuse(OptionError, "start", begin.tolist(), "has no path to the goal")
         cells = [cell]
         while self.cost[tuple(cell)] > 0.0:
             beside = np.clip(cell + NEIGHBOURS, 0, np.array(self.cost.shape) - 1)

@@ -53,8 +53,8 @@ class Futures:
         n: Number of copies.
         time_step: Largest physics step of the futures, s; the control period is divided into equal ones.
         threads: Threads that step them; None for one per core.
-        model: The rover of the futures; that of the episode by default. Another mass, for instance, is a mismatch.
-        friction: Friction of wheels and ground in the futures; that of the episode by default.
+        model: The rover of the futures; the episode's by default. Use another one to study model errors.
+        friction: Friction of wheels and ground in the futures; the episode's by default.
 
     Raises:
         OptionError: An argument is out of its range, or the model has other joints.
@@ -131,7 +131,7 @@ class Futures:
             time,
             reached,
             ~alive & ~reached,
-            np.asarray(told["energy"]) - self._env.episode.progress.info()["energy"],
+            np.asarray(told["energy"]) - self._env.progress.info()["energy"],
             np.asarray(told["tilt"]),
             seen[:, self._stuck].astype(np.float64),
         )

@@ -1,8 +1,8 @@
 """A policy that plans with the simulator itself: sampling-based model-predictive control of commands.
 
-Every `period` seconds it draws sequences of commands, drives a copy of the rover by each through `horizon` seconds, and
-looks up in a `FieldPlan` what the place at which each future ends still costs. The next round draws around the mean of
-the best tenth (cross-entropy method, Rubinstein 1999). The first command of the cheapest future is driven.
+Every `period` seconds it samples command sequences, simulates a copy of the rover under each for `horizon` seconds, and
+adds the cost-to-go of a `FieldPlan` at the end of each. The next round samples around the mean of the best tenth
+(cross-entropy method, Rubinstein 1999). The first command of the cheapest sequence is executed.
 """
 
 import math
@@ -53,7 +53,12 @@ class ScannedGround:
         reach = float(np.hypot(*(np.array(env.goal) - place))) + MARGIN
         cells = int(np.ceil(2.0 * reach / scan.spacing))
         if cells > MOST_CELLS:
-            refuse(OptionError, "height_scan", scan.spacing, f"gives a map of {cells} cells a side, over {MOST_CELLS}")
+            refuse(
+                OptionError,
+                "height_scan",
+                scan.spacing,
+                f"gives a map with {cells} cells on each side, at most {MOST_CELLS} are allowed",
+            )
         self._map = GroundMap(scan, MapOptions(cells=cells), 1.0)
         self._cells = np.zeros((cells, cells), np.float32)
         self._corner = np.zeros(2, np.int64)
@@ -119,21 +124,21 @@ class RawActions:
 
 @dataclass(frozen=True)
 class PlannerOptions:
-    """What `PlannerPolicy` samples and what a future costs.
+    """Sampling and costs of `PlannerPolicy`.
 
     Attributes:
-        samples: Futures of each planning.
-        iterations: Rounds of samples of each planning, each around the best of the round before.
+        samples: Sequences per round.
+        iterations: Rounds per planning, each around the best of the previous round.
         horizon: Length of a future, s.
         knot: How long a command of the sequence is held, s.
-        period: Time from one planning to the next, s.
+        period: Time between plannings, s.
         actions: What is sampled: "commands", or "raw" actions, wheel torques and steering set-points.
         spread: Standard deviations of the samples of speed, curvature and sideways direction, each within [-1, 1].
-        raw_spread: Those of wheel torques, over that at which a wheel pulls with its share of the weight, and of
-            steering set-points, over the steering limit.
-        energy_price: Metres of good ground that a joule is worth.
-        time_price: Metres of good ground that a second is worth.
-        failure_price: Metres of good ground that a failed episode is worth.
+        raw_spread: Standard deviations of wheel torques, relative to the torque at which a wheel pulls with its share
+            of the weight, and of steering set-points, relative to the steering limit.
+        energy_price: Cost of a joule, in metres of good ground.
+        time_price: Cost of a second, in metres of good ground.
+        failure_price: Cost of a failed episode, in metres of good ground.
         time_step: Largest physics step of the futures, s.
     """
 
@@ -168,20 +173,20 @@ class PlannerOptions:
 class PlannerPolicy:
     """Drives a `RoverEnv` by planning in copies of it; `predict` is stable-baselines3's.
 
-    It reads the environment's state and ground, which a rover does not know. Args for a mismatch on purpose (`model`,
-    `friction`, `terrain`) change the copies and not the environment.
+    It reads the environment's state and ground, which is privileged information. To study model errors, `model`,
+    `friction` and `terrain` change the copies and not the environment.
 
     Args:
         env: A `Rover-v0`, wrapped or not; not a vector.
-        options: What is sampled, and what a future costs.
+        options: Sampling and costs.
         limits: The values of a command of 1.
         seed: Of the samples.
         threads: Threads that step the futures; None for one per core.
         model: The rover of the futures, see `Futures`.
         friction: Of the futures, see `Futures`.
         terrain: The ground of the futures and of the field's plan; the episode's by default.
-        sees: "field" for all of the ground, or "scan" for what the height scans have shown so far; what they have not
-            is taken to be as high as the nearest place that they have.
+        sees: "field" for the whole ground, or "scan" for the ground covered by the height scans so far. Unseen ground
+            gets the height of the nearest seen place.
 
     Raises:
         OptionError: An argument is out of its range, or the environment has no height scan to see by.
@@ -204,7 +209,7 @@ class PlannerPolicy:
         if sees not in ("field", "scan"):
             refuse(OptionError, "sees", sees, "must be 'field' or 'scan'")
         if sees == "scan" and terrain is not None:
-            refuse(OptionError, "terrain", terrain, "must not be given to a planner that sees by scan")
+            refuse(OptionError, "terrain", terrain, "must not be given with sees='scan'")
         self.options = PlannerOptions() if options is None else options
         self._env: RoverEnv = find_rover_env(env)
         commands = CommandController(self._env, limits, guided=False)
@@ -248,7 +253,7 @@ class PlannerPolicy:
         episode_start: npt.NDArray[np.bool_] | None = None,  # noqa: ARG002 - the signature is stable-baselines3's
         deterministic: bool = True,  # noqa: ARG002 - as above
     ) -> tuple[npt.NDArray[np.float32], tuple[npt.NDArray[Any], ...] | None]:
-        """The action for an observation `(size,)` of the environment, which has not moved since.
+        """The action for the environment's last observation `(size,)`.
 
         A new episode is noticed by its start. `state` is returned unchanged.
 
@@ -257,7 +262,7 @@ class PlannerPolicy:
         """
         seen = array("observation", observation, error=StateError)
         if seen.ndim != 1:
-            refuse(StateError, "observation", seen.shape, "must be one of one environment")
+            refuse(StateError, "observation", seen.shape, "must be the observation of a single environment")
         check_observed(seen, self._env.task.layout.size)
         begins, due = self._env.start is not self._start, self._since % self._periods == 0
         if self._sees_scan and (begins or due):
@@ -273,7 +278,7 @@ class PlannerPolicy:
         return action[0], state
 
     def _look(self, seen: Array, begins: bool) -> None:
-        """Remembers what an observation shows of the ground."""
+        """Adds the height scan of an observation to the map."""
         if self._seen is None or begins:
             self._seen = ScannedGround(self._env)
         self._seen.see(seen)

@@ -4,8 +4,8 @@ The search keeps the cheapest paths of each length, apart from each other by pla
 costs, in metres of way,
 
     the way from its end to the goal, and the turn to face it
-    belly   where the underside comes closer to the ground than a margin, by how much, along the way
-    climb   what the wheels rise, each by itself, and more where one rises steeply
+    belly   how far the underside is closer to the ground than a margin, along the way
+    climb   the rise of each wheel, and more if it is steep
     lean    the square of the slope of the plane through the points under the wheels, along the way
     turns   a change of the command, a change of direction, an arc driven backward
     memory  how close it comes to places where the rover got stuck
@@ -33,8 +33,8 @@ class RoverOutline:
 
     Attributes:
         wheels: `(n_wheels, 2)` x and z of the wheels' centres, m.
-        underside: `(n, 2)` x and z of the cells over which a box or a sphere of the rover reaches, m. What carries a
-            wheel rises with it over a rock, and does not count within the wheel's radius.
+        underside: `(n, 2)` x and z of the cells over which a box or a sphere of the rover reaches, m. Solids that carry
+            a wheel rise with it over a rock and do not count within the wheel's radius.
         clearance: `(n,)` height of its lowest point in each cell over the ground that the wheels stand on, m.
     """
 
@@ -251,7 +251,7 @@ class ArcSearch:
     """Finds paths for a rover: `rover_gym.mechanics.PathSearch` with the rover's arcs and outline.
 
     Args:
-        first: The arcs that a path may begin with.
+        first: Arcs for the first segment of a path.
         further: Those that it may go on with.
         commands: `(len(first), 3)` the command of each first arc: speed, curvature, sideways.
         scan: The grid of the height scan.
@@ -260,7 +260,7 @@ class ArcSearch:
         reach: The rover's reach, m.
         radius: Its wheels' radius, m.
         arrival: Distance within which the goal is reached, m.
-        costs: What a path costs.
+        costs: Costs of a path.
     """
 
     def __init__(
@@ -361,6 +361,6 @@ def _plane_fit(x: Array, z: Array) -> Array:
     cofactors = np.stack((np.cross(b, c), np.cross(c, a), np.cross(a, b)))
     determinant = float((a * cofactors[0]).sum())
     if not determinant > 1e-9 * float(a[0] * b[1] * c[2]):
-        refuse(OptionError, "model", len(x), "must have wheels that do not stand in a line")
+        refuse(OptionError, "model", len(x), "must have wheels that are not all in one line")
     fit: Array = (cofactors.T[:, :, None] * columns / determinant).sum(axis=1)
     return fit

@@ -13,6 +13,7 @@ from gymnasium.vector import AutoresetMode, VectorWrapper
 from gymnasium.vector.utils import batch_space
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
+from rover_gym.env.batch import BatchSnapshot
 from rover_gym.env.observation import Array, Mask, Observations
 from rover_gym.env.play_keys import keys_to_action
 from rover_gym.env.rover_env import RoverEnv
@@ -22,7 +23,6 @@ from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimit
 from rover_gym.policy.features import Features
 from rover_gym.policy.pd_policy import find_rover_env
 from rover_gym.validation import array, known_keys, refuse, whole
-from rover_gym.vector.batch import BatchSnapshot
 from rover_gym.vector.vector_env import RoverVectorEnv
 
 #: Most steps that a command may be held; a few minutes.
@@ -307,7 +307,7 @@ REPEAT = 6
 #: Commands until truncation: as long as `Rover-v0`.
 MAX_COMMANDS = MAX_EPISODE_STEPS // REPEAT
 
-#: Arguments of `RoverCommand-v0` beside those of `Rover-v0`, with their defaults.
+#: Arguments of `RoverCommand-v0` in addition to those of `Rover-v0`, with their defaults.
 COMMAND_ARGUMENTS: Mapping[str, Any] = {"repeat": REPEAT, "guided": False, "pool": 1, **vars(CommandLimits())}
 
 
@@ -333,7 +333,7 @@ takes_command_arguments = partial(
 
 
 def _split(arguments: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The arguments that concern the commands, with their defaults, and those of the rover."""
+    """Splits arguments into those of the commands, with their defaults, and those of the rover."""
     own = {name: arguments.get(name, default) for name, default in COMMAND_ARGUMENTS.items()}
     return own, {name: value for name, value in arguments.items() if name not in own}
 
@@ -346,8 +346,8 @@ class RoverCommandEnv(DriveByCommand):
 
     ## Action
 
-    `Box(-1, 1, (3,), float32)`, held for `repeat` control periods, or until the episode ends. Entries beyond the box
-    count as its edge; numbers that are not finite are refused with `CommandError`, and nothing changes.
+    `Box(-1, 1, (3,), float32)`, held for `repeat` control periods, or until the episode ends. Entries outside the box
+    are clipped. If a number is not finite, a `CommandError` is raised and nothing changes.
 
     | index | meaning                                        | one stands for | unit |
     |-------|------------------------------------------------|----------------|------|

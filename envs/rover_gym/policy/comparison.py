@@ -30,7 +30,7 @@ from rover_gym.policy.policy_card import PolicyCard, PolicyError, find_policy, p
 from rover_gym.policy.scan_policy import ScanPolicy
 from rover_gym.policy.trained_policy import TrainedPolicy
 from rover_gym.record.channels import outcome_words
-from rover_gym.rendering.frames import captioned
+from rover_gym.rendering.caption import captioned
 from rover_gym.rendering.render_options import VideoWriter
 from rover_gym.validation import refuse
 
@@ -101,7 +101,7 @@ def drive_or_reuse(
     threads: int = 1,
     progress: Callable[[int], None] = lambda _done: None,
 ) -> list[EvaluatedEpisode]:
-    """Drives one episode a seed, or takes those in a file that an earlier call wrote, if nothing differs.
+    """Drives one episode per seed, or reuses the episodes of an earlier call if nothing has changed.
 
     Args:
         contender: Who drives.
@@ -134,7 +134,7 @@ def drive_or_reuse(
 
 
 def _digest(files: Sequence[Path]) -> str:
-    """SHA-256 of a policy's files and of what drives it: the package's policies and its compiled core."""
+    """SHA-256 of a policy's files, the package's policies and the compiled core."""
     package = Path(__file__).parents[1]
     digest = hashlib.sha256()
     for path in (*files, *sorted(package.glob("policy/*.py")), *sorted(package.glob("_core.*[!i]"))):
@@ -254,7 +254,7 @@ def film_episode(path: Path, make_policy: Callable[[Any], Policy], arguments: Ma
         MissingExtraError: The extra `render` is not installed.
         RoverGymError: An argument is out of range.
     """
-    rendering: dict[str, Any] = {"render_mode": "rgb_array", "render_options": {"antialiasing": True}}
+    rendering: dict[str, Any] = {"render_mode": "rgb_array", "render_options": {}}
     limit = round(MAX_EPISODE_STEPS * 0.05 * arguments.get("control_frequency", 20.0))
     env = gym.make("Rover-v0", max_episode_steps=limit, **arguments, **rendering)
     try:

@@ -11,7 +11,7 @@ from rover_gym.validation import number
 
 
 class DugIn:
-    """A policy that first spins all wheels, so that a rover on sand digs itself in, and then leaves it to another one.
+    """A policy that first digs the rover into sand by spinning all wheels, and then hands over to another policy.
 
     Args:
         env: A `Rover-v0`, wrapped or not, or a vector of them.

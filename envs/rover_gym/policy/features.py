@@ -1,9 +1,9 @@
-"""Features: the part of the observation that carries over to other places.
+"""Features: the part of the observation that does not depend on the place.
 
-Position on the map, heading and wheel angles say nothing about the ground ahead, so they are left out. The goal becomes
-a direction and a distance. The height scan becomes heights over the ground plane, so that rocks look alike on any
-slope. A fine scan is max-pooled: the highest point of each cell gives the height of a rock, which a coarse scan that
-hits its flank would miss.
+Position, heading and wheel angles contain no information about the ground ahead and are left out. The goal becomes a
+direction and a distance. The height scan becomes heights above the ground plane, so rocks look the same on any slope. A
+fine scan is max-pooled: the highest point of each cell gives the height of a rock, which a coarse scan that hits its
+flank would miss.
 """
 
 from typing import Any
@@ -60,7 +60,7 @@ class Features:
 
     @property
     def goal_entries(self) -> npt.NDArray[np.intp]:
-        """Entries of the features that say where the goal is."""
+        """Indices of the features of the goal."""
         n = len(self._taken)
         return np.array([n, n + 1, n + 2, n + 3, n + 6])  # those at n + 4 and n + 5 are the ground's slope
 

@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.env.observation import LARGEST, Array, Mask, Observations
+from rover_gym.env.observation import Array, Mask, Observations
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError, StateError, sin_cos
 from rover_gym.policy.command_env import (
@@ -25,31 +25,31 @@ RewardType = Literal["sparse", "dense"]
 
 REWARD_TYPES = ("sparse", "dense")
 
-#: Terminations that are no failure.
+#: Terminations that are not failures.
 _SOUND = ("", "goal")
 
 
 class GoalRewards:
-    """Goals that can be replaced, of n rovers: what is observed of them, and the rewards that follow.
+    """Replaceable goals of n rovers: their observations and rewards.
 
     Attributes:
         reward_type: "sparse" or "dense".
         goal_tolerance: Distance within which a goal is reached, m.
-        kept: Entries of the wrapped environment's observation that say nothing of the goal.
+        kept: Entries of the wrapped environment's observation without the goal.
         goal_space: The space of one rover's dictionaries.
     """
 
     def set_goals(
         self, rover: RoverEnv, n: int, reward_type: RewardType, shown: gym.spaces.Box, goal_entries: npt.ArrayLike
     ) -> None:
-        """Sets what goals are for.
+        """Sets the environment that the goals belong to.
 
         Args:
             rover: The environment, read once for the layout and the tolerance of goals.
             n: Number of rovers.
             reward_type: "sparse" or "dense".
-            shown: The space of what a rover observes otherwise.
-            goal_entries: Entries of it that say where the goal is.
+            shown: The space of a rover's other observations.
+            goal_entries: Entries of it that contain the goal.
 
         Raises:
             OptionError: The environment has a course of several goals, or `reward_type` is unknown.
@@ -63,7 +63,7 @@ class GoalRewards:
         self.kept = np.setdiff1d(np.arange(*shown.shape), goal_entries)
         self._achieved: Array = np.zeros((n, 2))
         self._heading = rover.observation_layout["q"].start + 4
-        goals = gym.spaces.Box(-LARGEST, LARGEST, (2,), np.float64)
+        goals = gym.spaces.Box(-np.inf, np.inf, (2,), np.float64)
         self.goal_space = gym.spaces.Dict(
             observation=gym.spaces.Box(
                 np.append(shown.low[self.kept], [-1.0, -1.0]).astype(np.float32),
@@ -78,7 +78,7 @@ class GoalRewards:
         """The dictionary of n rovers.
 
         Args:
-            shown: `(n, ...)` what is observed otherwise.
+            shown: `(n, ...)` the other observations.
             seen: `(n, size)` the environment's observations.
             places: `(n, nq)` coordinates of the rovers.
             goals: `(n, 2)` x and z of the goals, m.
@@ -131,12 +131,12 @@ class GoalRewards:
 
 
 class GoalObservation(GoalRewards, gym.Wrapper[GoalDict, Any, Any, Any]):
-    """Observations as Gymnasium-Robotics' `GoalEnv` has them, and rewards that follow from achieved and desired goal.
+    """Observations and rewards in the form of Gymnasium-Robotics' `GoalEnv`.
 
     An observation is a dictionary:
 
-    - `observation`: `(size,) float32`, what the wrapped environment observes without what it says of the goal, and the
-      cosine and sine of the heading, which turn a place on the map into a direction;
+    - `observation`: `(size,) float32`, the wrapped environment's observation without the goal, and the cosine and sine
+      of the heading, which relate places on the map to directions;
     - `achieved_goal`: `(2,) float64`, x and z of the trunk's origin on the map, m, without noise;
     - `desired_goal`: `(2,) float64`, x and z of the goal, m.
 
@@ -145,8 +145,8 @@ class GoalObservation(GoalRewards, gym.Wrapper[GoalDict, Any, Any, Any]):
     - `"sparse"`: 1 within `goal_tolerance` of the goal, else 0;
     - `"dense"`: `exp(-d)` with the distance d to the goal, m.
 
-    Neither is ever negative, so that an episode is not worth ending in failure. Both hold for relabelled goals too.
-    `info["reward_terms"]` is still the wrapped environment's.
+    Neither is ever negative, so ending an episode by a failure never increases the return. Both hold for relabelled
+    goals too. `info["reward_terms"]` is still the wrapped environment's.
 
     Args:
         env: A `Rover-v0` with one goal an episode, with or without a `DriveByCommand` around it.
@@ -282,7 +282,7 @@ class RoverGoalVectorEnv(GoalRewards, RoverCommandVectorEnv):
 
     def observe(self) -> GoalDict:
         """The dictionaries of all rovers."""
-        rovers = self.rovers.batch.rovers
+        rovers = self.rovers.envs
         places, goals = np.array([rover.simulation.q for rover in rovers]), np.array([rover.goal for rover in rovers])
         return self.observe_goals(self.held.observe(), self.held.seen, places, goals)
 

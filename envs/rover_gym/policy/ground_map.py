@@ -1,8 +1,8 @@
-"""The ground as a rover remembers it from its height scans, and the way over it.
+"""Map of the ground from a rover's height scans, with the cost-to-go over it.
 
-The map is a square of cells about the rover, as wide as the spacing of the scan. Each scan writes the heights that it
-shows, by linear interpolation; what no scan has shown is not known. The way to the goal from each cell is
-`PathSearch.ways`: it costs what `ScanPolicy`'s paths cost, and over ground that is not known the distance alone.
+The map is a square of cells about the rover, as wide as the spacing of the scan. Each scan updates the heights that it
+covers, by linear interpolation. `PathSearch.ways` gives the cost-to-go from each cell: it has the same terms as
+`ScanPolicy`'s paths, and over unseen ground only the distance.
 """
 
 from collections.abc import Sequence
@@ -23,19 +23,19 @@ Corner = npt.NDArray[np.int64]
 #: Most cells along a side.
 MOST_CELLS = 2000
 
-#: The map moves with the rover when that has left its middle by this share of its side.
+#: Distance of the rover from the map's middle, relative to the side, at which the map moves.
 LEFT = 0.125
 
 
 @dataclass(frozen=True)
 class MapOptions:
-    """How large the map is, and what the way over it costs.
+    """Size of the map and costs of the way over it.
 
     Attributes:
         cells: Cells along each side, as wide as the spacing of the scan.
         risk: Factor on the costs of belly, climb and lean, which a path may still avoid.
-        unknown: Further price of a metre over ground that is not known.
-        trap: Further price of a metre at a place where the rover got stuck.
+        unknown: Additional cost per metre over unseen ground.
+        trap: Additional cost per metre at a place where the rover got stuck.
         every: Decisions between two computations of the ways.
     """
 
@@ -128,7 +128,7 @@ class GroundMap:
         return _interpolated(ways, at[:, 0].clip(0.0, top), at[:, 1].clip(0.0, top))
 
     def _follow(self, cells: Cells, corner: Corner, place: Point) -> None:
-        """Moves the map where the rover has left its middle."""
+        """Moves the map if the rover has left its middle."""
         n = self.options.cells
         shift = np.rint(np.array(place) / self.cell).astype(np.int64) - n // 2 - corner
         if np.abs(shift).max() <= LEFT * n:

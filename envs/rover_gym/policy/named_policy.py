@@ -1,4 +1,4 @@
-"""The policies that have a name: the baseline, those for sand and among rocks, and the trained policies."""
+"""Policies by name: the baseline, the policies for sand and rocks, and trained policies."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from rover_gym.policy.sand_policy import SandPolicy
 from rover_gym.policy.scan_policy import ScanPolicy
 from rover_gym.policy.trained_policy import TrainedPolicy
 
-#: What the command line says about the names.
+#: Help text of the command line about the names.
 NAMES_HELP = (
     "'pd' for the baseline, 'sand' for the one that crawls on sand, 'scan' for the planner by hand, 'foresight' for "
     "that planner with a learned forecast, "
@@ -33,7 +33,7 @@ _TITLES = {
 
 
 def policy_title(policy: str) -> str:
-    """What a policy is, as a heading says it, by its name or folder."""
+    """Title of a policy, by its name or folder, for headings."""
     return _TITLES.get(policy, "a trained policy")
 
 
@@ -48,7 +48,7 @@ class Policy(Protocol):
 
 @dataclass(frozen=True)
 class NamedPolicy:
-    """A policy that is yet to be made for an environment.
+    """A policy to be made for an environment.
 
     Attributes:
         arguments: The arguments that its environment must be made with.

@@ -3,17 +3,16 @@
 It drives any rover: one whose wheels steer, all or some, and one that turns by skidding (`policy.turning`).
 
 The rover turns about a centre at `(x_c, -1/kappa)` in the trunk's (x, z), where `kappa` is the curvature, positive to
-the left. `x_c` is where the wheels that do not steer stand, and the middle of the wheelbase if all do or none does. A
-wheel at `(x, z)` then needs
+the left. `x_c` is the x of the wheels without steering, or the middle of the wheelbase if all or none steer. A wheel at
+`(x, z)` then needs
 
     steering  tan(delta) = kappa (x - x_c) / (1 + kappa z)
     speed     v_i = v sqrt((1 + kappa z)^2 + (kappa (x - x_c))^2)
 
-where `v` is the speed of the point `(x_c, 0)`. If nothing steers, the two sides run at different speeds and the wheels
-skid. They then turn the rover less than they would by rolling, about a centre farther out, so that they are asked for
-`WIDENING` times the curvature (Mandow et al. 2007).
-Each wheel of a side further pushes with the force `SCRUB` of its load against the sideways friction, and with one that
-brings the yaw rate to its wanted value.
+where `v` is the speed of the point `(x_c, 0)`. Without steering, the two sides run at different speeds and the wheels
+skid. The rover then turns less than with rolling wheels, about a centre farther out, so the commanded curvature is
+multiplied by `WIDENING` (Mandow et al. 2007). Each wheel also gets the force `SCRUB` times its load against sideways
+friction, and a force that controls the yaw rate.
 """
 
 import math
@@ -31,7 +30,7 @@ from rover_gym.policy.features import check_observed
 from rover_gym.policy.regulator import Regulator, WheelRegulator
 from rover_gym.validation import array, number, refuse
 
-#: Curvature that wheels which skid are asked for, over that of the path.
+#: Commanded curvature of a skidding rover relative to that of the path.
 WIDENING = 1.5
 
 #: Sideways friction that a rover overcomes when it turns by skidding, over its weight: more than flat ground needs,
@@ -58,7 +57,7 @@ class Turning:
     Attributes:
         x_c: x of that point in the trunk's frame, m.
         wheels: x and z of each wheel from that point, m.
-        steering: Which entry of an action steers which wheel.
+        steering: The steering entry of an action for each wheel.
         yaw_gain: Force of each wheel for the yaw rate that is missing, N s/rad: 0 unless the rover skids, positive on
             the right, negative on the left.
         scrub: Force of each wheel against the sideways friction of a left turn, N, with the same signs.
@@ -92,7 +91,7 @@ class Turning:
 
     @property
     def skids(self) -> bool:
-        """Whether nothing steers."""
+        """Whether the rover has no steering."""
         return not self.steering.joints
 
     def max_curvature(self, max_steering: float) -> float:
@@ -146,14 +145,14 @@ class PDGains:
 class PDPolicy:
     """Drives `Rover-v0` to its goal; stateless, with stable-baselines3's `predict`.
 
-    The policy compares four paths and takes the cheapest: forward or backward, a left or right turn at the largest
+    The policy compares four paths and takes the cheapest: forward or backward, with a left or right turn at the largest
     curvature, then straight. On this path it follows the circle through the goal (pure pursuit), within the largest
     curvature.
 
     Args:
         env: A `Rover-v0`, wrapped or not, or a vector of them. It is read once, for layout and rover constants.
         gains: The gains.
-        regulator: What turns rim speeds into torques; a `WheelRegulator` by default.
+        regulator: Converts rim speeds to torques; a `WheelRegulator` by default.
     """
 
     def __init__(self, env: Any, gains: PDGains | None = None, regulator: Regulator | None = None) -> None:

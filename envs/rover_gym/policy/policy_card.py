@@ -49,7 +49,7 @@ def read_bytes(path: Path, at_most: int) -> bytes:
     """Reads a whole file.
 
     Raises:
-        PolicyError: The file is no regular file, or larger than `at_most` bytes.
+        PolicyError: The file is not a regular file, or larger than `at_most` bytes.
         OSError: The file does not exist or may not be read.
     """
     status = path.stat()
@@ -290,7 +290,12 @@ def policy_folder(terrain: str) -> Path:
     """
     terrain = terrain_name(terrain)
     if terrain not in SHIPPED:
-        refuse(PolicyError, "policy", terrain, f"none was trained; there are some for {', '.join(SHIPPED)}")
+        refuse(
+            PolicyError,
+            "policy",
+            terrain,
+            f"no trained policy is included for it; there are policies for {', '.join(SHIPPED)}",
+        )
     return FOLDER / SHIPPED[terrain]
 
 
@@ -303,7 +308,7 @@ def forecast_folder(model: RoverModel | None = None, *, hills: bool = False) -> 
 def find_policy(policy: str, terrain: str) -> Path | None:
     """The folder of a policy: the shipped one for "trained", otherwise the given path; None for those without one.
 
-    Of the folder of a run of `rover train` it is the policy at its end.
+    For the folder of a run of `rover train`, the final policy.
 
     Raises:
         PolicyError: There is no such policy.
@@ -328,7 +333,7 @@ def policy_arguments(folder: Path) -> dict[str, Any]:
     """The arguments that a policy's environment must be made with.
 
     Raises:
-        PolicyError: The folder holds no valid policy.
+        PolicyError: The folder does not contain a valid policy.
         OSError: The file may not be read.
     """
     arguments = dict(PolicyCard.read(folder / "policy.json").environment)

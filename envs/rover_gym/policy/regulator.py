@@ -1,9 +1,9 @@
-"""The wheel regulator: the torque of each wheel for the rim speed that it should have.
+"""Wheel regulator: the torque of each wheel for a wanted rim speed.
 
-Two inertias act on a rim. While the wheel rolls, its torque moves its share of the rover; when it is in the air or
-slips, only the wheel itself, a tenth of that share or less. A gain for the rolling wheel makes the other one swing from
-one torque to its opposite. So the force at the rim, torque over radius, is that of the rolling wheel, kept within what
-moves the wheel alone to its speed. Counted in the direction of the missing rim speed,
+The inertia at a rim has two values. While the wheel rolls, its torque moves its share of the rover. In the air or
+slipping it moves only the wheel, a tenth of that share or less, and the gain for the rolling wheel would make it
+oscillate. The force at the rim, torque over radius, is therefore that of the rolling wheel, limited to the force that
+brings the wheel alone to its speed. In the direction of the missing rim speed,
 
     F = clip(F_roll, F_low, T + k (e + s))
 
@@ -15,16 +15,15 @@ moves the wheel alone to its speed. Counted in the direction of the missing rim 
     s = SLACK min(1, load / mean load)
 
 A wheel under the traction T has the wanted rim speed after one period if s is zero, as it is in the air. On the ground
-it may miss that by s, and in between the softer gain rules. Where a rock stops the rover, the traction follows the
-torque, so that each period pushes harder than the last until the wheels turn or the motors are at their limit. Close to
-the wanted speed such a push fades with e.
+it may differ by s, and within s the softer gain applies. If a rock stops the rover, the traction follows the torque, so
+the push grows every period until the wheels turn or the motors reach their limit. Close to the wanted speed the push
+decreases with e.
 
-The wheels of a rover that skids slip sideways whenever it turns, and share its load by chance. Their force is
-`feedforward + min(k, m / n / response) e`, not cut off.
+The wheels of a skid-steered rover slip sideways in every turn, and their loads vary randomly. Their force is
+`feedforward + min(k, m / n / response) e`, without limit.
 
-The observed traction is that of the last physics step, in which a wheel may just have struck a rock. It is taken for
-that of the period only as far as the torque of the period before could have balanced it with a rim that changed its
-speed by LEAP.
+The observed traction is that of the last physics step, in which a wheel may just have hit a rock. It is limited to the
+value that the previous torque could have balanced with a change of the rim speed by LEAP.
 """
 
 import math
@@ -44,7 +43,7 @@ SLACK = 0.5
 #: Largest change of a rim's speed in a control period that explains an observed traction, m/s.
 LEAP = 1.5
 
-#: A slack below this divides as this, m/s.
+#: Smallest slack as a divisor, m/s.
 TINY = 1e-9
 
 
@@ -60,7 +59,7 @@ class WheelRegulator:
 
     Args:
         rover: The environment, read once for the layout and the rover's constants.
-        response: Time constant of the rover's speed, s; a shorter one than the control period counts as this.
+        response: Time constant of the rover's speed, s; at least the control period.
     """
 
     def __init__(self, rover: RoverEnv, response: float) -> None:

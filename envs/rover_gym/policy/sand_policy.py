@@ -1,23 +1,23 @@
-"""A policy for sand: it crawls on evenly turning wheels, climbs in zigzags, and gets free by backing out of its ruts.
+"""A policy for sand: drives slowly at constant wheel speeds, climbs in zigzags, and backs out of its ruts if stuck.
 
-`PDPolicy` regulates the rover's speed. On sand that fails: a wheel that it drives hard spins and digs, and one that it
-brakes digs itself in. `SandPolicy` lets every rim turn slowly and evenly, whatever that needs. The force at a rim is
-that of the period before and what turns the wheel alone to its speed in a period,
+`PDPolicy` regulates the rover's speed. On sand this fails, because hard driven or braked wheels dig themselves in.
+`SandPolicy` keeps every rim at a slow constant speed. The force at a rim is the previous force plus the force that
+brings the wheel alone to its speed in one period,
 
     F = F_before + k (w - r)
 
 where w - r is the missing rim speed, m/s, and k the wheel's spin inertia at the rim over the control period. The sand
 damps it.
 
-Sand bears a wheel that climbs only up to some slope. Where the way to the goal is steeper than `steepest`, the rover
-goes at the angle gamma to the direction of steepest ascent, `cos(gamma) = tan(steepest) / tan(slope)`, on the side of
+Sand supports a climbing wheel only up to some slope. Where the way to the goal is steeper than `steepest`, the rover
+drives at the angle gamma to the direction of steepest ascent, `cos(gamma) = tan(steepest) / tan(slope)`, on the side of
 the goal, and changes sides once it can reach the goal on the other one (as a ship tacks). It steers by its course, not
-its heading, since it also slides downhill. It turns by driving backward: forward, a wheel that is steered uphill digs
-itself in. How steep a way sand bears depends on the sand: while a rover climbs more slowly than `slow`, its way becomes
-flatter, down to `flattest`.
+its heading, since it also slides downhill. It turns by driving backward, because a wheel that is steered uphill and
+driven forward digs itself in. How steep a path the sand supports depends on the sand: while the rover climbs more
+slowly than `slow`, its path becomes flatter, down to `flattest`.
 
-A rover whose trunk has hardly moved while its wheels turned is stuck. It drives back out of its ruts, whose sand is
-compacted, and goes on to one side of its way, the next time to the other.
+The rover is stuck if its trunk has hardly moved while its wheels turned. It then drives back in its ruts, whose sand is
+compacted, and continues beside its way, alternating the side.
 """
 
 import math
@@ -40,7 +40,7 @@ Array = npt.NDArray[np.float64]
 #: Distance of the point that the rover heads for, m.
 LOOK_AHEAD = 0.7
 
-#: Largest angle between course and heading that counts, rad, and the speed below which a course means nothing, m/s.
+#: Largest angle between course and heading that is used, rad, and smallest speed at which the course is defined, m/s.
 MOST_DRIFT, DRIFTING = 0.7, 0.02
 
 #: By this angle the course is flatter than it should be, rad: the rover slides downhill.
@@ -56,12 +56,12 @@ class SandGains:
 
     Attributes:
         speed: Rim speed on a straight path, m/s.
-        steepest: Steepest way that is taken straight, degrees.
-        flattest: Steepest way in sand that bears the rover badly, degrees.
-        slow: A rover in a zigzag that is slower in the mean than this part of `speed` takes a flatter way.
-        flatter: By how much, degrees a second.
-        turn: Height along the slope that a turn in a zigzag costs, m.
-        stuck: A rover that is slower in the mean than this part of `speed` is stuck.
+        steepest: Steepest slope that is climbed straight, degrees.
+        flattest: Steepest climb in sand that supports the rover badly, degrees.
+        slow: The path becomes flatter while the mean speed in a zigzag is below this share of `speed`.
+        flatter: Rate at which it becomes flatter, degrees per second.
+        turn: Height along the slope lost in a turn of a zigzag, m.
+        stuck: The rover is stuck if its mean speed is below this share of `speed`.
         memory: Time constant of that mean, s.
         back: Time that a rover that is stuck drives back, s.
         aside: Time that it then drives to the side of its way, s.
@@ -86,7 +86,7 @@ class SandGains:
 
 
 class RimServo:
-    """Turns wanted rim speeds into torques that hold them, in the place of `WheelRegulator`.
+    """Controls rim speeds in place of `WheelRegulator`.
 
     Args:
         rover: The environment, read once for the layout and the rover's constants.
@@ -141,7 +141,7 @@ class SandPolicy:
         """The action for an observation `(size,)`, or the actions `(n, n_actions)` for a batch `(n, size)`.
 
         The signature is stable-baselines3's. `state` is the memory that the last call returned, None at first;
-        `episode_start` says which rovers begin anew. `deterministic` is ignored.
+        `episode_start` marks the rovers whose episode begins. `deterministic` is ignored.
 
         Raises:
             StateError: The observation has a wrong shape or an entry that is not finite.

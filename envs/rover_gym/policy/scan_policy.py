@@ -1,4 +1,4 @@
-"""`ScanPolicy`: it takes the cheapest of many paths over the height scan, and backs off where it gets stuck."""
+"""`ScanPolicy`: plans the cheapest path over the height scan and backs off if it gets stuck."""
 
 import math
 from dataclasses import dataclass
@@ -66,7 +66,7 @@ class ScanMemory:
 
     @classmethod
     def of(cls, state: tuple[npt.NDArray[Any], ...] | None, n: int, cells: int = 0) -> "ScanMemory":
-        """A copy of the memory in a state that `predict` returned; that of n rovers at a start without one.
+        """A copy of the memory in a state from `predict`, or the memory of n rovers at a start.
 
         Maps have so many `cells` along each side.
 
@@ -93,7 +93,7 @@ class ScanMemory:
             return fresh
         shapes, expected = [np.shape(values) for values in state], [values.shape for values in fresh.state]
         if shapes != expected:
-            refuse(StateError, "state", shapes, f"must be what predict returned for {n} rovers")
+            refuse(StateError, "state", shapes, f"must be a state that predict returned for {n} rovers")
         return cls(*(values.copy() for values in state))
 
     @property
@@ -102,7 +102,7 @@ class ScanMemory:
         return tuple(vars(self).values())
 
     def forget(self, rovers: npt.NDArray[np.bool_]) -> None:
-        """Starts anew with the rovers marked in `rovers` `(n,)`."""
+        """Resets the memory of the rovers marked in `rovers` `(n,)`."""
         for values in vars(self).values():
             values[rovers] = 0
 
@@ -141,11 +141,11 @@ def scan_grid(rover: RoverEnv) -> HeightScan:
     """
     offsets = rover.task.scan
     if offsets is None:
-        refuse(OptionError, "height_scan", False, "must be given, as by ScanPolicy.arguments(), to plan over")
+        refuse(OptionError, "height_scan", False, "must be given, for instance by ScanPolicy.arguments()")
     columns = int(np.count_nonzero(offsets[:, 0] == offsets[0, 0]))
     rows = len(offsets) // columns
     if rows < 2 or columns < 2:
-        refuse(OptionError, "height_scan", (rows, columns), "must have two rows and columns at least")
+        refuse(OptionError, "height_scan", (rows, columns), "must have at least two rows and two columns")
     return HeightScan(rows, columns, float(offsets[0, 0] - offsets[columns, 0]))
 
 
@@ -161,7 +161,7 @@ SHARE_OF_TOP_SPEED = 0.9
 #: Way that counts as movement, and distance to the goal that counts as progress, over the rover's reach.
 PROGRESS = 0.15
 
-#: Distance of a trap ahead of the rover that is stuck, over the rover's reach.
+#: Distance of a trap ahead of a stuck rover, relative to the rover's reach.
 TRAP_AHEAD = 0.3
 
 #: Time without movement after which the rover pushes, s.
@@ -180,7 +180,7 @@ class ScanGains:
 
     Attributes:
         speed: Speed, m/s, where the motors reach it.
-        push: The same where a rock has stopped the rover: the torque grows with what is missing.
+        push: Commanded speed if a rock has stopped the rover, m/s: the torque grows with the missing speed.
         response: Time constant of the speed controller for the whole rover's mass, s.
         period: Time between decisions, s.
         patience: Time without movement until the rover backs off, s, for a rover that takes a second or less for its
@@ -207,20 +207,20 @@ class ScanGains:
 
 
 class ScanPolicy:
-    """Drives a rover with wheels to its goal over what its height scan shows; it has stable-baselines3's `predict`.
+    """Drives a rover to its goal by planning over the height scan; `predict` is that of Stable-Baselines3.
 
     Every 0.2 s it compares paths of four arcs, each 0.6 of the rover's reach long (`rover_gym.policy.arc_search`). The
-    model gives what passes over the ground: the wheels, and the underside of all that collides, which the plane through
-    the ground under the wheels carries. The first arc of the cheapest path becomes the command of `CommandController`.
+    model defines the wheels and the underside of all collision shapes, which moves with the plane through the ground
+    under the wheels. The first arc of the cheapest path becomes the command of `CommandController`.
 
     The policy backs off for a second or so
 
-    - where it has not moved for a second,
-    - where the trunk begins to carry the rover (the observation's `stuck`),
-    - where the cheapest path begins backward.
+    - if it has not moved for a second,
+    - if the trunk begins to carry the rover (the observation's `stuck`),
+    - if the cheapest path begins backward.
 
-    It remembers up to 12 such places and avoids them. Where a rock has stopped it, it pushes with most of its torque.
-    The longer it makes no progress, the farther it backs off and the more it risks. Success rates are in
+    It remembers up to 12 such places and avoids them. If a rock stops the rover, it pushes with most of its torque. The
+    longer it makes no progress, the farther it backs off and the more risk it takes. Success rates are in
     docs/policy-results.md.
 
     Example:
@@ -231,16 +231,17 @@ class ScanPolicy:
         env: A rover environment with a height scan, wrapped or not, or a vector of them. It is read once, for layout
             and rover constants.
         gains: Speed and times.
-        costs: What a path costs.
-        map: A map of what the scans have shown, which tells the way to the goal; None for the straight way.
+        costs: Costs of a path.
+        map: Options of a map of all scans, which gives the cost-to-go; None for the straight distance.
         forecast: A learned one-second prediction of each arc (`rover_gym.policy.arc_forecast`): the folder of a trained
             one, or True for the package's: one for the built-in rover on hills, one for it on other ground, one for
-            `open-rover`. The policy adds the costs of what is predicted, and drives an arc fast where that is cheaper.
-        foresight: What predicted outcomes cost.
+            `open-rover`. The policy adds the costs of the predicted outcomes, and drives an arc fast if that is
+            cheaper.
+        foresight: Costs of predicted outcomes.
 
     Attributes:
         gains: Speed and times.
-        arcs: The arcs that a path may begin with.
+        arcs: Arcs for the first segment of a path.
         commands: `(n_arcs, 3)` their commands, at a speed of 1.
         cruise: The first entry of a command at cruising speed, `cruise_speed` in m/s.
         push: The same where the policy pushes.
@@ -249,8 +250,8 @@ class ScanPolicy:
         forecast: The prediction; None without one.
 
     Raises:
-        OptionError: The environment has no height scan, or the rover's wheels stand in a line.
-        PolicyError: The folder holds no forecast, or one for another rover.
+        OptionError: The environment has no height scan, or all wheels are in one line.
+        PolicyError: The folder does not contain a forecast for this rover.
     """
 
     def __init__(
@@ -318,7 +319,7 @@ class ScanPolicy:
 
     @staticmethod
     def arguments(model: RoverModel | None = None) -> dict[str, Any]:
-        """The arguments of an environment that the policy sees enough in: a height scan that fits the rover's size.
+        """Arguments for an environment with a height scan that fits the rover's size.
 
         Args:
             model: The rover; None for the built-in one.
@@ -335,9 +336,9 @@ class ScanPolicy:
     ) -> tuple[npt.NDArray[np.float32], tuple[npt.NDArray[Any], ...]]:
         """The action for an observation `(size,)`, or the actions `(n, n_actions)` for a batch `(n, size)`.
 
-        A command is held for `gains.period` seconds. The returned state holds it and what the policy remembers: pass it
-        in with the next observation, and mark with `episode_start` `(n,)` where an episode begins. Without a state
-        every observation is that of a start.
+        A command is held for `gains.period` seconds. The returned state contains it and the policy's memory: pass it
+        with the next observation, and mark the start of episodes by `episode_start` `(n,)`. Without a state every
+        observation counts as a start.
 
         Raises:
             StateError: The observation has a wrong shape or an entry that is not finite.
@@ -421,7 +422,7 @@ class ScanPolicy:
         return slope, self._over_plane(row, slope)
 
     def _over_plane(self, row: Array, slope: list[float]) -> Array:
-        """The scan's heights over the ground plane, m: over it a slope costs nothing."""
+        """The scan's heights above the ground plane, m, so that a slope alone has no cost."""
         rise = slope[0] * self._offsets[:, 0] + slope[1] * self._offsets[:, 1]
         heights: Array = row[self._heights] * self._scale[self._heights] - rise
         return heights
@@ -473,7 +474,7 @@ def _limits(rover: RoverEnv, turning: Turning, gains: ScanGains) -> CommandLimit
 
 
 def _arcs(rover: RoverEnv, turning: Turning, limits: CommandLimits) -> tuple[Arcs, Arcs]:
-    """The arcs that a path may begin with, and go on with. Only a rover that steers all wheels drives sideways."""
+    """Arcs for the first and the following segments. Only a rover that steers all wheels drives sideways."""
     steered = [i for i, entry in enumerate(turning.steering.entries) if entry >= 0]
     side = math.radians(limits.sideways_deg) if len(steered) == len(turning.wheels) else 0.0
 

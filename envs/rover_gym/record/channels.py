@@ -117,7 +117,7 @@ class Channel:
 
 
 class Sampler:
-    """Steps a simulation from row to row, and reads the rows of its channels.
+    """Steps a simulation between rows, and reads the rows of its channels.
 
     Attributes:
         sim: The simulation.
@@ -126,7 +126,7 @@ class Sampler:
         residual: Largest residual since the last row.
         iterations: Iterations since the last row.
         energy: Kinetic and potential energy in the row.
-        rows_per_flush: Most rows that a kill may lose.
+        rows_per_flush: Largest number of rows lost if the process is killed.
     """
 
     channels: tuple[Channel, ...]
@@ -171,7 +171,7 @@ class Sampler:
         return converged
 
     def gather(self, report: Any) -> None:
-        """Adds what else a row says of its steps, from the report of each."""
+        """Accumulates further quantities of a row from the report of each step."""
 
     def read(self) -> dict[str, npt.ArrayLike]:
         """One row of `channels`: the current state, and what happened since the previous row."""
@@ -218,14 +218,14 @@ def origins(sim: Simulation, solids: Sequence[str]) -> npt.NDArray[np.float64]:
     return np.array([poses[solid][0] for solid in solids]).reshape(-1, 3)
 
 
-#: What every recording says of time, energy and the contact solver; the energy's zero differs.
+#: Channels of time, energy and the contact solver in every recording; the zero of the energy differs.
 TIME = Channel("time", "s", "time since the run's start", read="sim.time")
 RESIDUAL = Channel("solver_residual", "1", "largest residual of the contact solver since the last row", read="residual")
 ITERATIONS = Channel("solver_iterations", "1", "iterations of the contact solver since the last row", read="iterations")
 
 
 def energy_channels(whose: str, zero: str) -> tuple[Channel, Channel]:
-    """Kinetic energy, and potential energy with what its zero is."""
+    """Channels of kinetic and potential energy, with the zero of the potential energy."""
     return (
         Channel("kinetic_energy", "J", f"kinetic energy{whose}", read="energy.kinetic"),
         Channel("potential_energy", "J", f"potential energy, zero with {zero}", read="energy.potential"),
@@ -327,8 +327,8 @@ def row_count(duration: float, time_step: float, steps_per_row: int = 1) -> int:
         steps_per_row: Steps between rows.
 
     Raises:
-        OptionError: `duration` is no positive number, `steps_per_row` is no positive whole number, or there would be
-            more than `MOST_ROWS` rows.
+        OptionError: `duration` is not a positive number, `steps_per_row` is not a positive whole number, or there would
+            be more than `MOST_ROWS` rows.
     """
     seconds = number("duration", duration, above=0.0)
     per_row = number("steps_per_row", steps_per_row, at_least=1.0)

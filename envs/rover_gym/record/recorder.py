@@ -57,7 +57,7 @@ class Recorder:
         attributes: Metadata of the run, stored at the root: strings, numbers and arrays as they are, the rest as JSON;
             `describe` takes them from a simulation.
         terrain: The ground, stored in the group `terrain`; a replay needs it.
-        rows_per_flush: Most rows that a kill may lose.
+        rows_per_flush: Largest number of rows lost if the process is killed.
 
     Raises:
         RecordingError: A channel or an attribute cannot be stored, or the file is in use; it has not changed.
@@ -200,7 +200,7 @@ class Recorder:
 
     def _must_be_open(self) -> None:
         if not self._release.alive:
-            refuse(RecordingError, "recorder", str(self.path), "is closed: a run that is finished takes no more")
+            refuse(RecordingError, "recorder", str(self.path), "is closed, so nothing more can be written")
         if os.getpid() != self._process:
             refuse(RecordingError, "recorder", str(self.path), "belongs to the process that opened it")
 
@@ -234,7 +234,7 @@ def _new_file(path: Path) -> SteadyFile:
     try:
         return SteadyFile(path)
     except FileInUseError:
-        refuse(RecordingError, "path", str(path), "is in use: another recorder writes it, or someone reads it")
+        refuse(RecordingError, "path", str(path), "is in use by another recorder or a reader")
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error
 

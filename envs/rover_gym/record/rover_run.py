@@ -140,7 +140,7 @@ def read_run(path: str | Path) -> RoverRun:
     """Reads a run saved by `rover drive --output` or `rover report`, complete or not.
 
     Raises:
-        RecordingError: The file is no valid trajectory, or holds no samples, rover or ground.
+        RecordingError: The file is not a valid trajectory, or contains no samples, rover or ground.
         OSError: The file does not exist or cannot be read.
         MissingExtraError: h5py is not installed.
     """
@@ -155,9 +155,9 @@ def run_of(trajectory: Trajectory, path: str | Path) -> RoverRun:
     """
     scene = trajectory.attributes.get("scene")
     if "q" not in trajectory.data or not isinstance(scene, dict) or not isinstance(scene.get("model"), dict):
-        refuse(RecordingError, "path", str(path), "holds no rover: neither `q` nor `scene.model` may be missing")
+        refuse(RecordingError, "path", str(path), "contains no rover: `q` or `scene.model` is missing")
     if trajectory.terrain is None:
-        refuse(RecordingError, "path", str(path), "holds no ground: the group `terrain` is missing")
+        refuse(RecordingError, "path", str(path), "contains no ground: the group `terrain` is missing")
     check_time(trajectory, path)
     with sound(path, "scene.model"):
         model = RoverModel.from_dict(scene["model"])
@@ -186,12 +186,17 @@ def check_time(trajectory: Trajectory, path: str | Path) -> None:
         RecordingError: The trajectory has no samples, or its time is not finite, exceeds `LARGEST` or decreases.
     """
     if "time" not in trajectory.data or len(trajectory["time"]) == 0:
-        refuse(RecordingError, "path", str(path), "holds no samples: the run was killed before the first were written")
+        refuse(
+            RecordingError,
+            "path",
+            str(path),
+            "contains no samples: the run was stopped before the first ones were written",
+        )
     check_rows(trajectory, path, (TIME,), bounded=("time",))
     backward = np.flatnonzero(np.diff(trajectory["time"]) < 0.0)
     if len(backward):
         row = int(backward[0]) + 1
-        refuse(RecordingError, f"{path}: time[{row}]", float(trajectory["time"][row]), "must not run backward")
+        refuse(RecordingError, f"{path}: time[{row}]", float(trajectory["time"][row]), "must not decrease")
 
 
 def check_rows(

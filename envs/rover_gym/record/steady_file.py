@@ -58,12 +58,12 @@ class SteadyFile:
 
     Raises:
         FileInUseError: The file is locked; it has not changed.
-        OSError: The file cannot be created, or is no regular file.
+        OSError: The file cannot be created, or is not a regular file.
     """
 
     def __init__(self, path: Path) -> None:
         if path.exists() and not stat.S_ISREG(path.stat().st_mode):  # opening a pipe would wait for its reader
-            raise OSError(errno.EINVAL, "is no regular file")
+            raise OSError(errno.EINVAL, "is not a regular file")
         self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666)
         try:
             lock(self._descriptor)

@@ -1,4 +1,4 @@
-"""The ground of a recording: what the group `terrain` of a file holds.
+"""The ground of a recording, stored in the group `terrain`.
 
 Every data set is an array of float64, but for the heights of maps, which are float32 as they are in memory. The
 attribute `material` names the material of a surface; spheres have `materials`, one for each field, and `counts`, the
@@ -133,6 +133,6 @@ def _sphere_fields(centres: Stored, radii: npt.NDArray[np.float64], plane: Plane
         return [SphereField(centres.values, radii, plane)]
     ends = np.cumsum(counts)
     if len(names) != len(counts) or min(counts) < 0 or ends[-1] != len(radii):
-        raise ValueError("materials and counts do not suit the spheres")
+        raise ValueError("materials and counts do not match the spheres")
     fields = zip(np.split(centres.values, ends[:-1]), np.split(radii, ends[:-1]), names, strict=True)
     return [SphereField(c, r, None if k else plane, name) for k, (c, r, name) in enumerate(fields)]

@@ -68,7 +68,7 @@ class Trajectory:
             RecordingError: The run holds no data set of this name.
         """
         if name not in self.data:
-            refuse(RecordingError, name, sorted(self.data), "the run holds no such data set; it holds")
+            refuse(RecordingError, name, sorted(self.data), "there is no such data set in the run; it contains")
         return self.data[name]
 
     def at(self, rows: npt.NDArray[np.int64]) -> Trajectory:
@@ -127,13 +127,13 @@ class _Reader:
 
     def trajectory(self, file: h5py.File) -> Trajectory:
         if "format" not in file.attrs or "format_version" not in file.attrs:
-            refuse(RecordingError, "path", str(self._path), f"is no {FORMAT}")
+            refuse(RecordingError, "path", str(self._path), f"is not a {FORMAT}")
         version = self._attribute(file, "format_version")
         if version != FORMAT_VERSION:
             reason = f"is a {FORMAT} of version {version}, this rover-gym reads {FORMAT_VERSION}: record it again"
             refuse(RecordingError, "path", str(self._path), reason)
         if self._attribute(file, "format") != FORMAT:
-            refuse(RecordingError, "path", str(self._path), f"is no {FORMAT}")
+            refuse(RecordingError, "path", str(self._path), f"is not a {FORMAT}")
         sets, terrain = {}, None
         for name in file:
             item = self._item(file, name)
@@ -284,13 +284,13 @@ class _Reader:
 def check_bytes(path: Path) -> int:
     """Makes the checks that do not need HDF5, and returns the file's size."""
     if not stat.S_ISREG(path.stat().st_mode):  # `stat` raises for a missing file; opening a pipe would wait
-        refuse(RecordingError, "path", str(path), "is no regular file")
+        refuse(RecordingError, "path", str(path), "is not a regular file")
     with path.open("rb") as file:
         try:
             lock(file.fileno(), shared=True)
         except FileInUseError:
-            refuse(RecordingError, "path", str(path), "is being recorded: it can be read when the recorder is closed")
+            refuse(RecordingError, "path", str(path), "is still being recorded: close the recorder before reading it")
         begin = file.read(len(SIGNATURE))
     if begin != SIGNATURE:
-        refuse(RecordingError, "path", str(path), f"is no {FORMAT}: not HDF5")
+        refuse(RecordingError, "path", str(path), f"is not a {FORMAT}: not an HDF5 file")
     return path.stat().st_size

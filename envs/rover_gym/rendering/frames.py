@@ -4,10 +4,11 @@ import contextlib
 import ctypes
 import importlib.util
 import math
-from collections.abc import Iterable, Sequence
-from functools import lru_cache
+import os
+import weakref
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -18,11 +19,9 @@ from vtkmodules.vtkCommonDataModel import vtkPolyData
 from vtkmodules.vtkFiltersSources import vtkArrowSource
 from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkRenderer, vtkRenderWindow
 
-from rover_gym.extras import require
 from rover_gym.ground import plane_of, sand_of, spheres_of, surfaces_of
 from rover_gym.mechanics import RoverModel, Simulation, Terrain
 from rover_gym.rendering import appearance as look
-from rover_gym.rendering.appearance import Array, Faces, actor_of, actor_with, level, mesh, set_points, set_pose
 from rover_gym.rendering.render_options import Camera, check_render_options
 from rover_gym.rendering.rut_actor import RutActor
 from rover_gym.rendering.scenery_actors import (
@@ -37,6 +36,7 @@ from rover_gym.rendering.scenery_actors import (
     sky,
     sun,
 )
+from rover_gym.rendering.vtk_actors import Array, Faces, actor_of, actor_with, level, mesh, set_points, set_pose
 
 FORCE_LENGTH = 0.45  # m, arrow length for a wheel's mean share of the weight
 
@@ -66,8 +66,9 @@ class Picture:
     """
 
     def __init__(self, width: int, height: int) -> None:
-        self._size = width, height
+        self._size, self._process = (width, height), os.getpid()
         self._window = open_window(width, height)
+        _OPEN.add(self)
         self._scene = vtkRenderer()
         self._pixels = vtkUnsignedCharArray()
 
@@ -81,8 +82,12 @@ class Picture:
         return pixels.reshape(height, width, 3)[::-1].copy()  # VTK's first row is the bottom one
 
     def close(self) -> None:
-        """Frees the window and its memory; the renderer is unusable afterwards."""
-        self._window.Finalize()
+        """Frees the window and its memory; the renderer is unusable afterwards.
+
+        In a process forked from the one that opened the window, nothing is freed: see `_keep_windows`.
+        """
+        if self._process == os.getpid():
+            self._window.Finalize()
 
     def __enter__(self) -> Self:
         return self
@@ -121,7 +126,7 @@ class FrameRenderer(Picture):
         height: int = 480,
         camera: Camera = "follow",
         show_forces: bool = False,
-        antialiasing: bool = False,
+        antialiasing: bool = True,
         goal: Goal | None = None,
         goal_tolerance: float = 0.5,
     ) -> None:
@@ -298,6 +303,23 @@ class QuietLog:
         vtkLogger.SetStderrVerbosity(self._verbosity)
 
 
+#: All pictures that have not been collected.
+_OPEN: "weakref.WeakSet[Picture]" = weakref.WeakSet()
+
+
+def _keep_windows() -> None:
+    """Keeps the windows that a forked process has inherited from being destroyed there.
+
+    Destroying one waits for threads of the OpenGL library, which only the parent has.
+    """
+    for picture in _OPEN:
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(picture._window))
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_keep_windows)
+
+
 def open_window(width: int, height: int) -> vtkRenderWindow:
     """A window off screen.
 
@@ -376,33 +398,6 @@ def _arrow_actor(data: vtkPolyData) -> vtkActor:
 def _up(gravity: Array) -> Array:
     magnitude = float(np.linalg.norm(gravity))
     return -gravity / magnitude if magnitude > 0.0 else np.array([0.0, 1.0, 0.0])
-
-
-Frame = npt.NDArray[np.uint8]
-
-SIZE = 0.045  # of the letters, in heights of the frame
-
-SMALLEST = 11  # pixels
-
-
-def captioned(frame: Frame, lines: Sequence[str]) -> Frame:
-    """A copy of a frame `(height, width, 3)` with lines of text in its upper left corner.
-
-    Raises:
-        MissingExtraError: Pillow is not installed.
-    """
-    image = require("PIL.Image", "render").fromarray(frame)
-    draw = require("PIL.ImageDraw", "render").Draw(image)
-    size = max(SMALLEST, round(SIZE * frame.shape[0]))
-    for i, line in enumerate(lines):
-        place = (0.5 * size, (0.4 + 1.25 * i) * size)
-        draw.text(place, line, font=_font(size), fill=(255, 255, 255), stroke_width=max(1, size // 16), stroke_fill=0)
-    return np.asarray(image, dtype=np.uint8)
-
-
-@lru_cache(maxsize=4)
-def _font(size: int) -> Any:
-    return require("PIL.ImageFont", "render").load_default(size)
 
 
 class BedRenderer(Picture):

@@ -48,7 +48,7 @@ class RenderOptions:
     height: int = 480
     camera: Camera = "follow"
     show_forces: bool = False
-    antialiasing: bool = False
+    antialiasing: bool = True
 
 
 def check_render_options(field: str, given: Mapping[str, Any]) -> RenderOptions:

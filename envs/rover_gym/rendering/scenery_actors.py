@@ -5,17 +5,16 @@ import math
 import numpy as np
 import numpy.typing as npt
 from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
-from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkImageData, vtkPolyData
 from vtkmodules.vtkFiltersSources import vtkSphereSource
-from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkLight, vtkPolyDataMapper
+from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkLight, vtkPolyDataMapper, vtkTexture
 from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLSphereMapper
 
 from rover_gym.ground import heights_of, plane_of, triangles_of
 from rover_gym.mechanics import HeightField, Plane, Terrain, TriangleMesh
 from rover_gym.rendering import appearance as look
-from rover_gym.rendering.appearance import (
-    FIXED_BALL_COLOUR,
-    SAND_COLOUR,
+from rover_gym.rendering.appearance import FIXED_BALL_COLOUR, SAND_COLOUR
+from rover_gym.rendering.vtk_actors import (
     Array,
     actor_of,
     actor_with,
@@ -37,6 +36,9 @@ LIFT = 0.004  # m, offset of shadows above the ground and of the goal's ring abo
 TILE = 0.5  # m, of the checkered ground
 
 NEAR, FAR = 20.0, 160.0  # m, half edges of the checkered ground and of the ground beyond
+
+LEVEL = 0.7  # upward part of the normal of a mesh's faces that show tiles
+DARK = (0.75, 0.25)  # a place on a dark tile, in the picture of the tiles
 
 HAZE = 12.0, 60.0  # m, where the haze begins and where the ground has the horizon's colour
 
@@ -151,26 +153,56 @@ class SurfaceActor:
         self._place: tuple[float, ...] | None = None
         self._mapper = vtkPolyDataMapper()
         self.actor = actor_with(self._mapper)
+        if isinstance(surface, TriangleMesh):
+            self._mapper.SetInputData(_tiled(surface))
+            self._mapper.ScalarVisibilityOff()
+            self.actor.SetTexture(_tiles())
 
     def follow(self, position: Array) -> None:
-        """Draws the piece around a position anew when it has moved far."""
+        """Draws the piece of a height field around a position anew when it has moved far."""
         place = tuple(np.round(position[[0, 2]] / SURFACE_STEP).tolist())
-        if place == self._place:
+        if place == self._place or isinstance(self._surface, TriangleMesh):
             return
-        is_new = self._place is None
         self._place = place
-        if isinstance(self._surface, TriangleMesh) and not is_new:
-            return
         middle = SURFACE_STEP * np.array(place)
         low, high = middle - SURFACE_REACH, middle + SURFACE_REACH
         vertices, triangles = triangles_of(self._surface, low, high, MOST_HEIGHTS)
-        if isinstance(self._surface, TriangleMesh):
-            colours = np.broadcast_to(np.array(look.ROCK_COLOUR), vertices.shape)
-        else:
-            light, dark = np.array(look.GROUND_COLOUR), np.array(look.GROUND_COLOUR_2)
-            odd = np.floor(vertices[:, [0, 2]] / TILE).sum(axis=1) % 2.0 == 1.0
-            colours = np.where(odd[:, None], dark, light)
-        self._mapper.SetInputData(mesh(vertices, triangles, colours))
+        light, dark = np.array(look.GROUND_COLOUR), np.array(look.GROUND_COLOUR_2)
+        odd = np.floor(vertices[:, [0, 2]] / TILE).sum(axis=1) % 2.0 == 1.0
+        self._mapper.SetInputData(mesh(vertices, triangles, np.where(odd[:, None], dark, light)))
+
+
+def _tiled(surface: TriangleMesh) -> vtkPolyData:
+    """A mesh with places on the tiles, which its level faces show; the others have the colour of the dark ones."""
+    corners = np.asarray(surface.vertices)[surface.triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    vertices = corners.reshape(-1, 3)
+    data = mesh(vertices, np.arange(len(vertices)).reshape(-1, 3), np.ones_like(vertices), smooth=False)
+    across, along = vertices[:, 0] / (2.0 * TILE), vertices[:, 2] / (2.0 * TILE)
+    is_level = np.repeat(normals[:, 1] > LEVEL, 3)
+    places = np.where(is_level[:, None], np.column_stack((across, along)), np.array(DARK))
+    coordinates = numpy_to_vtk(places.astype(np.float32), deep=True)
+    data.GetPointData().SetTCoords(coordinates)
+    data.GetPointData().SetNormals(numpy_to_vtk(np.repeat(normals, 3, axis=0), deep=True))
+    return data
+
+
+def _tiles() -> vtkTexture:
+    """Two by two tiles, which repeat."""
+    n = 64
+    odd = (np.arange(n)[:, None] // (n // 2) + np.arange(n) // (n // 2)) % 2 == 1
+    picture = np.where(odd[..., None], np.array(look.GROUND_COLOUR_2), np.array(look.GROUND_COLOUR))
+    image = vtkImageData()
+    image.SetDimensions(n, n, 1)
+    pixels = np.round(255.0 * picture).astype(np.uint8).reshape(-1, 3)
+    image.GetPointData().SetScalars(numpy_to_vtk(pixels, deep=True))
+    texture = vtkTexture()
+    texture.SetInputData(image)
+    texture.RepeatOn()
+    texture.InterpolateOn()
+    texture.MipmapOn()
+    return texture
 
 
 class RockActors:
@@ -228,12 +260,13 @@ def flag(goal: Goal, tolerance: float, terrain: Terrain, ground: GroundActors | 
     pole = look.Part("", "cylinder", (0.022, 1.5), (0.0, 0.75, 0.0), np.eye(3), look.COLUMN_COLOUR)
     vertices, triangles = look.part_mesh(pole)
     vertices = vertices + pole.position
-    cloth = np.array([[0.0, 1.48, 0.0], [0.0, 1.02, 0.0], [0.38, 1.25, 0.38]])
-    n = len(vertices)
+    cloth, faces = look.pennant()
     surface = mesh(
-        foot + np.vstack((vertices, cloth, cloth)),
-        np.vstack((triangles, [[n, n + 1, n + 2], [n + 3, n + 5, n + 4]])),
-        np.vstack((np.broadcast_to(look.COLUMN_COLOUR, vertices.shape), np.broadcast_to(look.GOAL_COLOUR, (6, 3)))),
+        foot + np.vstack((vertices, cloth)),
+        np.vstack((triangles, faces + len(vertices))),
+        np.vstack(
+            (np.broadcast_to(look.COLUMN_COLOUR, vertices.shape), np.broadcast_to(look.GOAL_COLOUR, cloth.shape))
+        ),
     )
     standing = actor_of(surface)
     plane = plane_of(terrain)

@@ -53,12 +53,12 @@ def planar_scene(run: PlanarRun, *, follow: bool) -> PageScene:
     """A planar run as a scene."""
     largest = float(run.radius.max())
     distance = SEEN * largest / (ASPECT * np.tan(0.5 * FIELD_OF_VIEW))
-    scene = PageScene("planar", _view(0.0, 0.18 * distance, distance), largest)
+    scene = PageScene("planar", _view(0.0, 0.18 * distance, distance, ASPECT), largest)
     _add_wheels(scene, run.discs, run.radius, THICK * run.radius, 0.25 * largest, 0.4 * largest)
     scene.put_mesh(_ground(run))
     centre = np.column_stack((_planar_eye(run, follow=follow), np.zeros(run.n_frames)))
     scene.channels.append(FrameChannel.fine("centre", centre[:, None]))
-    scene.facts |= {"title": run.title, "far": 20.0 * distance, "curves": _planar_curves(run)}
+    scene.facts |= {"title": run.title, "front": True, "far": 20.0 * distance, "curves": _planar_curves(run)}
     return scene
 
 
@@ -66,7 +66,7 @@ def soil_scene(run: SoilRun, *, follow: bool) -> PageScene:
     """A run on a soil as a scene."""
     eye = _soil_eye(run, follow=follow)
     distance = 0.5 * _seen(run) / (SOIL_ASPECT * np.tan(0.5 * FIELD_OF_VIEW))
-    scene = PageScene("soil", _view(float(eye[0, 1]), 0.1 * distance, distance), 0.5 * _seen(run))
+    scene = PageScene("soil", _view(float(eye[0, 1]), 0.1 * distance, distance, SOIL_ASPECT), 0.5 * _seen(run))
     depth, radius = _depth(run), run.wheels[0, :, 2]
     poses = np.concatenate((run.wheels[..., :2], run.wheel_angles[..., None]), axis=2)
     _add_wheels(scene, poses, radius, np.full(len(radius), depth), 0.05, 0.8 * depth)
@@ -79,12 +79,13 @@ def soil_scene(run: SoilRun, *, follow: bool) -> PageScene:
     ]
     scene.arrays["radii"] = ("f4", run.radius)
     scene.facts |= {"title": run.title, "flat": True, "far": 20.0 * distance, "chain": CHAIN_COLOUR}
-    scene.facts |= {"sand": SAND_COLOURS, "curves": _soil_curves(run)}
+    scene.facts |= {"front": True, "sand": SAND_COLOURS, "curves": _soil_curves(run)}
     return scene
 
 
-def _view(height: float, up: float, distance: float) -> dict[str, Any]:
-    return {"eye": [0.0, height + up, distance], "target": [0.0, height, 0.0], "angle": FIELD_OF_VIEW}
+def _view(height: float, up: float, distance: float, aspect: float) -> dict[str, Any]:
+    eye, target = [0.0, height + up, distance], [0.0, height, 0.0]
+    return {"eye": eye, "target": target, "angle": FIELD_OF_VIEW, "aspect": aspect}
 
 
 def about_z(angles: Array) -> Array:

@@ -11,30 +11,21 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.ground import spheres_of, surfaces_of, triangles_of
+from rover_gym.ground import plane_of, spheres_of
 from rover_gym.rendering.appearance import (
     FIXED_BALL_COLOUR,
     GROUND_COLOUR,
-    GROUND_COLOUR_2,
     ROCK_COLOUR,
     SAND_COLOUR,
     WHEEL_COLOURS,
-    Colour,
-    sphere_mesh,
 )
 from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, moving_mean, panel_contents
 from rover_gym.replay.page_scene import FrameChannel, PageScene
 from rover_gym.replay.rotations import continuous, quaternions
-from rover_gym.replay.rover_scene import GRAVITY, add_rover
+from rover_gym.replay.rover_scene import GRAVITY, add_ground, add_rover, add_surfaces
 from rover_gym.replay.scenery import (
     MARGIN,
-    MOST_HEIGHTS,
-    Mesh,
     first_view,
-    ground_plane,
-    ground_tiles,
-    spheres,
-    surfaces,
     vessel_meshes,
     vessel_poses,
     wall_polygons,
@@ -43,7 +34,6 @@ from rover_gym.replay.scenery import (
 
 if TYPE_CHECKING:
     from rover_gym.grains.grain_run import GrainRun
-    from rover_gym.mechanics import Terrain
 
 Array = npt.NDArray[np.float64]
 
@@ -138,10 +128,15 @@ def grain_scene(run: GrainRun, *, follow: bool) -> PageScene:
     if rover is not None:
         add_rover(scene, rover)
         places, turns = rover.positions, continuous(quaternions(rover.rotations))[..., [1, 2, 3, 0]]
-    scene.put_mesh(_ground(run))
+    _add_ground(scene, run)
+    plane = floor_of(run)
+    if plane is not None:
+        scene.facts["plane"] = {"point": plane[0].tolist(), "normal": plane[1].tolist(), "half": 40.0 * reach}
+        scene.facts |= {"haze": 24.0 * reach, "tile": 0.5 if rover is not None else 0.25 * reach}
     of_walls = wall_polygons(run, GROUND_COLOUR, ROCK_COLOUR)
-    for frame, mesh in enumerate(of_walls, scene.frames):
-        scene.put_mesh([mesh], frame)
+    for i, mesh in enumerate(of_walls):
+        if plane is None or (i < run.walls.shape[1] and not _is_level(run, i, plane[0])):
+            scene.put_mesh([mesh], scene.frames + i)
     scene.put_mesh(vessel_meshes(run, ROCK_COLOUR, GROUND_COLOUR), scene.frames + len(of_walls))
     scene.frames += len(of_walls) + 1
     poses = np.concatenate((wall_poses(run), vessel_poses(run)[:, None]), axis=1)
@@ -161,6 +156,24 @@ def grain_scene(run: GrainRun, *, follow: bool) -> PageScene:
     return scene
 
 
+def floor_of(run: GrainRun) -> tuple[Array, Array] | None:
+    """A point, m, and the normal of the plane on which all stands: the ground's, or a level wall below all balls."""
+    if run.terrain is not None:
+        plane = plane_of(run.terrain)
+        return None if plane is None else (-plane.offset * plane.normal, plane.normal)
+    if run.vessel is not None:
+        return None
+    level = [wall for i, wall in enumerate(run.walls[0]) if _is_level(run, i, run.walls[0, i, :3])]
+    return (level[0][:3], np.array([0.0, 1.0, 0.0])) if level else None
+
+
+def _is_level(run: GrainRun, number: int, point: Array) -> bool:
+    """Whether a wall is level, at the height of a point, and stays there."""
+    wall = run.walls[:, number]
+    upright = wall[:, 4] / np.linalg.norm(wall[:, 3:], axis=1)
+    return bool(np.all(upright > 1.0 - 1e-9) and np.all(np.abs(wall[:, 1] - point[1]) < 1e-6))
+
+
 def start_extent(run: GrainRun) -> Array:
     """(3,) size of the balls' heap at the start, without the farthest of them, m."""
     first = run.positions_of(run.rows[:1])[0].astype(np.float64)
@@ -177,33 +190,12 @@ def _bounds(run: GrainRun) -> tuple[Array, Array]:
     return np.maximum(low, first.min(axis=0) - size), np.minimum(high, first.max(axis=0) + size)
 
 
-def _ground(run: GrainRun) -> list[Mesh]:
-    """The fixed ground about the rover's path, or under the balls."""
-    meshes: list[Mesh] = []
-    tiles = None if run.rover is None or ground_plane(run.rover) is None else ground_tiles(run.rover)
-    if tiles is not None:
-        vertices, light, dark = tiles
-        meshes += [(GROUND_COLOUR, vertices, light), (GROUND_COLOUR_2, vertices, dark)]
-    if run.terrain is None:
-        return meshes
-    pieces = surfaces(run.rover) if run.rover is not None else _surfaces_under_balls(run, run.terrain)
-    for vertices, faces in pieces:
-        meshes += [(colour, vertices, triangles) for colour, triangles in faces if len(triangles)]
-    centres, radii = spheres_of(run.terrain) if run.rover is None else spheres(run.rover)
-    ball, corners = sphere_mesh(10 if len(radii) < MANY else 5)
-    if len(radii):
-        vertices = (centres[:, None] + radii[:, None, None] * ball).reshape(-1, 3)
-        firsts = len(ball) * np.arange(len(radii), dtype=np.int32)
-        meshes.append((ROCK_COLOUR, vertices, (firsts[:, None, None] + corners).reshape(-1, 3)))
-    return meshes
-
-
-def _surfaces_under_balls(run: GrainRun, terrain: Terrain) -> list[tuple[Array, list[tuple[Colour, Faces]]]]:
-    """Height fields and meshes under the balls, each in one colour."""
-    places = run.positions_of(run.rows[:1])[0][:, [0, 2]].astype(np.float64)
-    low, high = places.min(axis=0) - MARGIN, places.max(axis=0) + MARGIN
-    pieces = []
-    for surface in surfaces_of(terrain):
-        vertices, faces = triangles_of(surface, low, high, MOST_HEIGHTS)
-        pieces.append((vertices, [(GROUND_COLOUR, faces.astype(np.int32))]))
-    return pieces
+def _add_ground(scene: PageScene, run: GrainRun) -> None:
+    """Adds the fixed ground about the rover's path, or under the balls."""
+    if run.rover is not None:
+        add_ground(scene, run.rover)
+    elif run.terrain is not None:
+        places = run.positions_of(run.rows[:1])[0][:, [0, 2]].astype(np.float64)
+        add_surfaces(scene, run.terrain, places.min(axis=0) - MARGIN, places.max(axis=0) + MARGIN)
+        centres, radii = spheres_of(run.terrain)
+        scene.arrays["rocks"] = ("f4", np.column_stack((centres, radii)).ravel())

@@ -26,7 +26,17 @@ if TYPE_CHECKING:
     from rover_gym.runs import SavedRun
 
 #: The player's scripts, in order; what plays comes last.
-SCRIPTS = ("three.min.js", "scene.js", "view.js", "grains.js", "overlays.js", "eye.js", "curves.js", "stage.js")
+SCRIPTS = (
+    "three.min.js",
+    "scene.js",
+    "view.js",
+    "ruts.js",
+    "grains.js",
+    "overlays.js",
+    "eye.js",
+    "curves.js",
+    "stage.js",
+)
 
 #: What makes the scene of each kind of run.
 SCENES: dict[type, Any] = {RoverRun: rover_scene, PlanarRun: planar_scene, SoilRun: soil_scene, GrainRun: grain_scene}

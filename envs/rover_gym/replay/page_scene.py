@@ -101,7 +101,8 @@ class PageScene:
         reach: Size of what is looked at, m: a camera and the shadow fit it.
         frames: Number of moving frames, the places and turns of the channels `places` and `turns`.
         facts: Further entries of the header.
-        groups: Coloured surfaces, each on a moving frame or, with -1, on the world, and whether it casts a shadow.
+        groups: Coloured surfaces, each on a moving frame or, with -1, on the world. "solid" ones cast a shadow, and
+            "soil" shows the ground's tiles on its level faces.
         channels: What moves.
         arrays: Static arrays by name, each with its type.
     """
@@ -111,15 +112,13 @@ class PageScene:
     reach: float
     frames: int = 0
     facts: dict[str, Any] = field(default_factory=dict)
-    groups: list[tuple[int, Mesh, bool]] = field(default_factory=list)
+    groups: list[tuple[int, Mesh, str]] = field(default_factory=list)
     channels: list[FrameChannel] = field(default_factory=list)
     arrays: dict[str, tuple[str, npt.ArrayLike]] = field(default_factory=dict)
 
-    def put_mesh(self, meshes: Iterable[Mesh], frame: int = -1, *, casts: bool = False) -> None:
-        """Adds surfaces to a moving frame, or to the world: they become one."""
-        given = [mesh for mesh in meshes if len(mesh[2])]
-        if given:
-            self.groups += [(frame, mesh, casts) for mesh in given]
+    def put_mesh(self, meshes: Iterable[Mesh], frame: int = -1, role: str = "") -> None:
+        """Adds surfaces to a moving frame, or to the world; `groups` says what roles there are."""
+        self.groups += [(frame, mesh, role) for mesh in meshes if len(mesh[2])]
 
     def put_map(self, x: Array, z: Array, heights: Array) -> None:
         """Adds a height map: columns x, rows z, m, and heights (n_z, n_x), nan where they are unknown."""
@@ -149,8 +148,8 @@ class PageScene:
     def _header(self, arrays: dict[str, Any]) -> dict[str, Any]:
         ends = np.cumsum([0, *(mesh[2].size for _, mesh, _ in self.groups)]).tolist()
         groups = [
-            {"frame": frame, "first": ends[i], "count": ends[i + 1] - ends[i], "casts": casts}
-            for i, (frame, _, casts) in enumerate(self.groups)
+            {"frame": frame, "first": ends[i], "count": ends[i + 1] - ends[i], "role": role}
+            for i, (frame, _, role) in enumerate(self.groups)
         ]
         usual = {
             "rover": False,
@@ -190,7 +189,7 @@ class PageScene:
         return b"".join(channel.differences(slice(0, 1)).tobytes() for channel in self.channels)
 
 
-def _packed(groups: list[tuple[int, Mesh, bool]]) -> dict[str, tuple[str, npt.ArrayLike]]:
+def _packed(groups: list[tuple[int, Mesh, str]]) -> dict[str, tuple[str, npt.ArrayLike]]:
     """Vertices, their colours, and triangles of all surfaces."""
     vertices, colours, triangles, n = [np.zeros((0, 3))], [np.zeros((0, 4))], [np.zeros((0, 3), dtype=np.int64)], 0
     for _, (colour, points, corners), _ in groups:

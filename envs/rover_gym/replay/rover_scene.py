@@ -11,7 +11,7 @@ import numpy.typing as npt
 from rover_gym.ground import map_of, surfaces_of
 from rover_gym.mechanics import HeightField
 from rover_gym.record.channels import outcome_words
-from rover_gym.rendering.appearance import ROCK_COLOUR, WHEEL_COLOURS
+from rover_gym.rendering.appearance import GROUND_COLOUR_2, WHEEL_COLOURS
 from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, moving_mean, panel_contents
 from rover_gym.replay.page_scene import FrameChannel, PageScene
 from rover_gym.replay.rotations import continuous, quaternions
@@ -26,9 +26,10 @@ from rover_gym.replay.scenery import (
     surroundings,
     trunk_path,
 )
-from rover_gym.replay.wheel_marks import DrawnWheel, drawn_wheels, feet, marks, world_forces
+from rover_gym.replay.wheel_marks import DrawnWheel, drawn_wheels, feet, marks, rut_edits, world_forces
 
 if TYPE_CHECKING:
+    from rover_gym.mechanics import Terrain
     from rover_gym.record.rover_run import RoverRun
 
 Array = npt.NDArray[np.float64]
@@ -44,6 +45,7 @@ WHEEL_NAMES = {
 LONGEST_FACT = 100
 HAZE = 90.0  # m, distance at which the ground has the colour of the sky
 PLANE = 400.0  # m, half of the edge of a plane
+ABOVE = 0.45  # of the rover's reach: so far above it the eye looks, and the horizon is in the picture
 GRAVITY = 9.81  # m/s², of runs that do not say it
 
 
@@ -51,7 +53,7 @@ def add_rover(scene: PageScene, run: RoverRun) -> list[DrawnWheel]:
     """Adds the solids of a run's rover, which become the next moving frames; returns its wheels."""
     wheels = drawn_wheels(run.model)
     for frame, parts in enumerate(parts_by_solid(run).values(), scene.frames):
-        scene.put_mesh(coloured_meshes(parts), frame, casts=True)
+        scene.put_mesh(coloured_meshes(parts), frame, "solid")
     scene.frames += len(run.model.solid_names)
     colours = cycle(WHEEL_COLOURS)
     scene.facts["wheels"] = [
@@ -68,15 +70,20 @@ def add_ground(scene: PageScene, run: RoverRun) -> None:
         middle = trunk_path(run).mean(axis=0)
         point = middle - (middle @ plane.normal + plane.offset) * plane.normal
         scene.facts["plane"] = {"point": point.tolist(), "normal": plane.normal.tolist(), "half": PLANE}
-    low, high = surroundings(run)
-    for surface in surfaces_of(run.terrain):
+    add_surfaces(scene, run.terrain, *surroundings(run))
+    centres, radii = spheres(run)
+    scene.arrays["rocks"] = ("f4", np.column_stack((centres, radii)).ravel())
+    scene.put_mesh(goal_meshes(run), role="solid")
+
+
+def add_surfaces(scene: PageScene, terrain: Terrain, low: Array, high: Array) -> None:
+    """Adds height fields, the pieces between the least and the largest x and z, m, and meshes."""
+    for surface in surfaces_of(terrain):
         if isinstance(surface, HeightField):
             scene.put_map(*map_of(surface, low, high, MOST_HEIGHTS))
         else:
-            scene.put_mesh([(ROCK_COLOUR, np.asarray(surface.vertices), surface.triangles.astype(np.int32))])
-    centres, radii = spheres(run)
-    scene.arrays["rocks"] = ("f4", np.column_stack((centres, radii)).ravel())
-    scene.put_mesh(goal_meshes(run), casts=True)
+            faces = surface.triangles.astype(np.int32)
+            scene.put_mesh([(GROUND_COLOUR_2, np.asarray(surface.vertices), faces)], role="soil")
 
 
 def poses_of(positions: Array, rotations: Array) -> list[FrameChannel]:
@@ -91,7 +98,7 @@ def bare_scene(run: RoverRun) -> tuple[PageScene, list[DrawnWheel]]:
     centre = trunk_path(run)[0]
     seen = {
         "eye": (view.eye - centre).tolist(),
-        "target": (view.target - centre).tolist(),
+        "target": (view.target - centre + [0.0, ABOVE * run.model.clear_radius, 0.0]).tolist(),
         "angle": view.field_of_view,
     }
     scene = PageScene("rover", seen, float(run.model.clear_radius))
@@ -115,6 +122,11 @@ def rover_scene(run: RoverRun, *, follow: bool) -> PageScene:
         FrameChannel.fine("forces", np.concatenate((points, np.clip(forces / share, -1e4, 1e4)), axis=2)),
     ]
     scene.arrays["trail"] = ("f4", marks(run, wheels, points).ravel())
+    ruts = rut_edits(run, wheels, points, across)
+    if ruts is not None:
+        rut_map, samples, cells, levels = ruts
+        scene.facts["ruts"] = rut_map.header()
+        scene.arrays |= {"rut-sample": ("u4", samples), "rut-cell": ("u4", cells), "rut-level": ("u1", levels)}
     scene.facts |= {"events": _events(run), "curves": rover_curves(run)}
     return scene
 

@@ -20,6 +20,7 @@ from rover_gym.rendering.appearance import (
     Colour,
     Part,
     part_mesh,
+    pennant,
     rover_parts,
 )
 from rover_gym.replay.rotations import quaternions
@@ -188,9 +189,8 @@ def goal_meshes(run: RoverRun) -> list[tuple[Colour, Array, Triangles]]:
     foot = np.array([x, y, z])
     pole = Part("", "cylinder", (0.022, FLAG_POLE), (x, y + FLAG_POLE / 2, z), np.eye(3), COLUMN_COLOUR)
     vertices, triangles = part_mesh(pole)
-    pennant = foot + np.array([[0.0, 1.48, 0.0], [0.0, 1.02, 0.0], [0.38, 1.25, 0.38]])
-    cloth = np.vstack((pennant, pennant)), np.array([[0, 1, 2], [3, 5, 4]], dtype=np.int32)
-    meshes = [(COLUMN_COLOUR, vertices + np.array(pole.position), triangles), (GOAL_COLOUR, *cloth)]
+    cloth, faces = pennant()
+    meshes = [(COLUMN_COLOUR, vertices + np.array(pole.position), triangles), (GOAL_COLOUR, foot + cloth, faces)]
     if run.goal_tolerance is not None:
         meshes.append((GOAL_COLOUR, *_ring(run, run.goal, run.goal_tolerance)))
     return meshes

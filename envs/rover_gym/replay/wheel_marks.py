@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.ground import heights_of, plane_of, spheres_of
+from rover_gym.ground import heights_of, plane_of, sand_of, spheres_of, surface_heights
 
 if TYPE_CHECKING:
     from rover_gym.mechanics import RoverModel, Terrain
@@ -18,6 +18,10 @@ Array = npt.NDArray[np.float64]
 REACH = 0.02  # m, over which the ground's slope is measured
 TOUCHING = 0.005  # m, gap up to which a wheel leaves a mark
 CHUNK = 2_000_000  # distances from wheels to rocks at a time
+TEXELS = 1024  # along an edge of the map of ruts, at most
+DEEPER = 0.001  # m by which a cell must be pressed down to be drawn anew
+RUT_CELL = 0.02  # m, of sand whose recording does not say it
+EDGE = 0.5  # m around the wheels' ways
 
 
 class DrawnWheel(NamedTuple):
@@ -105,3 +109,81 @@ def world_forces(run: RoverRun, normals: Array, across: Array) -> Array:
     axes = np.stack((normals, rolling, np.cross(rolling, normals)), axis=-2)
     result: Array = np.einsum("nwk,nwki->nwi", run.trajectory["wheel_forces"], axes)
     return result
+
+
+class RutMap:
+    """A map of ruts: which of its cells have which depth. Depths are levels, 255 of which are `deepest`.
+
+    Args:
+        low: Least x and z, m.
+        high: Largest x and z, m.
+        cell: Size of the sand's own cells, m: the map's are larger if there would be too many.
+        deepest: Largest depth, m.
+    """
+
+    def __init__(self, low: Array, high: Array, cell: float, deepest: float) -> None:
+        self.low, self.deepest = np.asarray(low, dtype=np.float64), deepest
+        self.cell = max(cell, float(np.max(high - self.low)) / TEXELS)
+        self.shape = tuple(int(n) for n in np.maximum(1, np.ceil((high - self.low) / self.cell)))
+        self.levels = np.zeros(self.shape[0] * self.shape[1], dtype=np.uint8)
+
+    def header(self) -> dict[str, object]:
+        """How a page reads the map."""
+        return {"low": self.low.tolist(), "size": list(self.shape), "cell": self.cell, "deepest": self.deepest}
+
+    def press(self, places: Array, depths: Array) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.uint8]]:
+        """Presses places (n, 2), x and z, down to depths (n,), m; returns cells that became deeper, and levels."""
+        steps = np.floor((places - self.low) / self.cell).astype(np.int64)
+        inside = ((steps >= 0) & (steps < self.shape)).all(axis=1)
+        cells = steps[inside, 1] * self.shape[0] + steps[inside, 0]
+        levels = np.clip(np.round(255.0 * depths[inside] / self.deepest), 0.0, 255.0).astype(np.uint8)
+        order = np.argsort(levels, kind="stable")  # of several in one cell, the deepest comes last and stays
+        pressed = dict(zip(cells[order].tolist(), levels[order].tolist(), strict=True))
+        found = np.array(list(pressed), dtype=np.int64)
+        wanted = np.array(list(pressed.values()), dtype=np.int64)
+        deeper = wanted >= self.levels[found].astype(np.int64) + max(1, round(255.0 * DEEPER / self.deepest))
+        self.levels[found[deeper]] = wanted[deeper]
+        return found[deeper], wanted[deeper].astype(np.uint8)
+
+
+def rut_edits(
+    run: RoverRun, wheels: list[DrawnWheel], points: Array, across: Array
+) -> tuple[RutMap, npt.NDArray[np.int64], npt.NDArray[np.int64], npt.NDArray[np.uint8]] | None:
+    """The ruts of a run on sand over time; None on firm ground.
+
+    A recording holds no ruts. They are what the wheels' rims have cut out of the surface.
+
+    Returns:
+        The map, and of each cell that becomes deeper the sample, the cell and the level, in order of the samples.
+    """
+    sand, scene = sand_of(run.terrain), run.trajectory.attributes.get("scene", {})
+    if sand is None and scene.get("terrain") != "sand":
+        return None
+    size = RUT_CELL if sand is None else sand.rut_cell
+    surface = surface_heights(run.terrain, points[..., [0, 2]].reshape(-1, 2)).reshape(points.shape[:2])
+    sinkage = np.nan_to_num(surface - points[..., 1])
+    reach = points[..., [0, 2]].reshape(-1, 2)
+    deepest = max(0.02, float(sinkage.max()))
+    rut_map = RutMap(reach.min(axis=0) - EDGE, reach.max(axis=0) + EDGE, size, deepest)
+    samples, cells, levels = [], [], []
+    for i, wheel in enumerate(wheels):
+        n_across = max(2, int(np.ceil(1.5 * wheel.width / rut_map.cell)))
+        n_along = max(3, int(np.ceil(2.0 * wheel.radius / rut_map.cell)))
+        grid_u, grid_v = np.meshgrid(
+            np.linspace(-0.5, 0.5, n_across) * wheel.width, np.linspace(-1.0, 1.0, n_along) * wheel.radius
+        )
+        u, v = grid_u.ravel(), grid_v.ravel()
+        for k in np.flatnonzero(sinkage[:, i] > DEEPER):
+            side = across[k, i, [0, 2]] / max(1e-9, float(np.linalg.norm(across[k, i, [0, 2]])))
+            depth = sinkage[k, i] - wheel.radius + np.sqrt(np.maximum(0.0, wheel.radius**2 - v**2))
+            cut = depth > DEEPER
+            at = points[k, i, [0, 2]] + np.outer(u[cut], side) + np.outer(v[cut], [side[1], -side[0]])
+            found, wanted = rut_map.press(at, depth[cut])
+            samples.append(np.full(len(found), k))
+            cells.append(found)
+            levels.append(wanted)
+    if not samples:
+        return rut_map, np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.uint8)
+    sample, cell, level = np.concatenate(samples), np.concatenate(cells), np.concatenate(levels)
+    order = np.lexsort((level, sample))
+    return rut_map, sample[order], cell[order], level[order]

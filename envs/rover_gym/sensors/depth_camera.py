@@ -1,4 +1,4 @@
-"""What looks around: the depth camera and the laser scanner."""
+"""Exteroceptive sensors: depth camera and laser scanner."""
 
 import math
 from dataclasses import dataclass, field
@@ -20,13 +20,13 @@ MAX_VIEW_DEG = 170.0
 class DepthCamera(Sensor):
     """A depth image of ground, rocks and rover, cast ray by ray in the core; it needs no renderer.
 
-    A reading is (height, width), m: for the middle of each pixel the distance along the optical axis, the mount's x
-    axis, of what is seen there. Rows go from top to bottom, columns from left to right. What is nearer than `min_range`
-    and what is lost reads 0, what is not seen within `max_range` reads `max_range`.
+    A reading is (height, width), m: for the centre of each pixel the depth along the optical axis, the mount's x axis.
+    Rows go from top to bottom, columns from left to right. Depths below `min_range` and lost pixels read 0; pixels
+    without a surface within `max_range` read `max_range`.
 
-    The error of a depth z by stereo or structured light grows with its square, with the standard deviation
-    `noise * z**2` (Khoshelham and Elberink 2012), where `noise` is that of the disparity over focal length times
-    base line.
+    The depth error of stereo or structured light grows with the square of the depth z: its standard deviation is `noise
+    * z**2` (Khoshelham and Elberink 2012), where `noise` is the standard deviation of the disparity divided by focal
+    length times baseline.
 
     Args:
         mount: Its pose; by default on the trunk, 0.6 m ahead and 0.4 m above its origin, 20 degrees down.
@@ -38,7 +38,7 @@ class DepthCamera(Sensor):
         noise: Standard deviation of a depth over its square, 1/m.
         gain: Depth measured over depth, or a range.
         dropout: Fraction of pixels that are lost in a sample, or a range.
-        sees_rover: Whether the rover's other solids are seen, as they collide.
+        sees_rover: Whether the collision shapes of the rover's other solids are seen.
     """
 
     name: str = "depth"
@@ -66,7 +66,7 @@ class DepthCamera(Sensor):
         self._keep_ranges("dropout", at_least=0.0, at_most=1.0)
 
     def check(self, model: RoverModel) -> None:
-        """Refuses a model without the mount's solid."""
+        """Rejects a model without the mount's solid."""
         self.mount.solid_of(model)
 
     def bounds(self, model: RoverModel) -> tuple[Array, Array]:  # noqa: ARG002 - of every model
@@ -91,7 +91,7 @@ class DepthCamera(Sensor):
         drawn: Values,
         generator: np.random.Generator,
     ) -> tuple[Array, Values]:
-        """Takes a picture."""
+        """Takes a depth image."""
         along = _directions(self.width, self.height, self.view_deg)
         stretch = np.sqrt((along**2).sum(axis=1))
         farthest = self.max_range * float(stretch.max())
@@ -118,7 +118,7 @@ def _directions(width: int, height: int, view_deg: float) -> Array:
 
 
 def lost(generator: np.random.Generator, fraction: float, shape: tuple[int, ...]) -> np.ndarray:
-    """A mask of entries that are lost at random; a fraction of 0 takes no random number."""
+    """A random mask of lost entries; a fraction of 0 draws no random number."""
     return generator.random(shape) < fraction if fraction > 0.0 else np.zeros(shape, np.bool_)
 
 
@@ -128,25 +128,25 @@ MAX_RAYS, MAX_RINGS = 36_000, 256
 
 @dataclass(frozen=True, kw_only=True)
 class LaserScanner(Sensor):
-    """Distances all around, cast ray by ray in the core.
+    """Distances in all directions, cast ray by ray in the core.
 
     A reading is (rings, rays), m: distances from the mount. Ring k rises by `elevations_deg[k]` over the mount's plane.
-    Its rays turn from `begin_deg` towards `end_deg`, positive to the left, and the last is one step short of it. What
-    is nearer than `min_range` and what is lost reads 0, what is not met within `max_range` reads `max_range`. All rays
-    of a scan are cast at one moment.
+    Its rays go from `begin_deg` to one step before `end_deg`, positive to the left. Distances below `min_range` and
+    lost rays read 0; rays without a hit within `max_range` read `max_range`. All rays of a scan are cast at the same
+    time.
 
     Args:
         mount: Its pose; by default on the trunk, 1 m above its origin.
         rays: Rays of a ring.
         begin_deg: Direction of the first ray, deg.
-        end_deg: Where a ring ends, deg; at most a turn further.
+        end_deg: End of a ring, deg; at most one turn further.
         elevations_deg: Of the rings, deg.
         min_range: Least distance, m.
         max_range: Greatest distance, m.
         noise: Standard deviation of a distance, m.
         bias: Constant error of an episode, m, or a range.
         dropout: Fraction of rays that are lost in a scan, or a range.
-        sees_rover: Whether the rover's other solids are met, as they collide.
+        sees_rover: Whether rays hit the collision shapes of the rover's other solids.
     """
 
     name: str = "scan"
@@ -182,7 +182,7 @@ class LaserScanner(Sensor):
         self._keep_ranges("dropout", at_least=0.0, at_most=1.0)
 
     def check(self, model: RoverModel) -> None:
-        """Refuses a model without the mount's solid."""
+        """Rejects a model without the mount's solid."""
         self.mount.solid_of(model)
 
     def bounds(self, model: RoverModel) -> tuple[Array, Array]:  # noqa: ARG002 - of every model

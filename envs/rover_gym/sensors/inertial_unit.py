@@ -6,18 +6,18 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rover_gym.mechanics import OptionError, RoverModel
-from rover_gym.sensors.sensor import LARGEST, Array, Moment, Mount, Sensor, Values, gaussian, uniform
+from rover_gym.sensors.sensor import Array, Moment, Mount, Sensor, Values, gaussian, uniform
 from rover_gym.validation import Range, refuse
 
 
 @dataclass(frozen=True, kw_only=True)
 class InertialUnit(Sensor):
-    """Specific force and angular velocity at a place of the trunk.
+    """Specific force and angular velocity at a point of the trunk.
 
     A reading is (6,), in the sensor's frame: the specific force, m/s², 9.81 upward at rest on the level, then the
-    angular velocity, rad/s. Both are means over the sampling interval, as an integrating unit gives them. Velocities
-    jump at an impact, where an acceleration has no value but the change of velocity has: with v and R, velocity and
-    attitude of the unit's place, at the samples before and now,
+    angular velocity, rad/s. Both are means over the sampling interval, as from an integrating unit, because the
+    acceleration is not defined at an impact, where velocities jump. With velocity v and attitude R of the unit at the
+    previous sample and now,
 
         f = R_midᵀ ((v_now - v_before) / dt - g),    w = log(R_beforeᵀ R_now) / dt,
 
@@ -57,7 +57,7 @@ class InertialUnit(Sensor):
         self._keep_ranges("accelerometer_bias", "accelerometer_gain", "gyroscope_bias", "gyroscope_gain")
 
     def check(self, model: RoverModel) -> None:
-        """Refuses a solid other than the trunk, whose velocity the state holds.
+        """Rejects a solid other than the trunk, whose velocity is part of the state.
 
         Raises:
             OptionError: The mount is not on the model's first solid.
@@ -69,7 +69,7 @@ class InertialUnit(Sensor):
 
     def bounds(self, model: RoverModel) -> tuple[Array, Array]:  # noqa: ARG002 - of every model
         """Unbounded, (6,)."""
-        most = np.full(6, LARGEST)
+        most = np.full(6, np.inf)
         return -most, most
 
     def draw(self, model: RoverModel, generator: np.random.Generator) -> Values:  # noqa: ARG002 - of every model
@@ -79,14 +79,14 @@ class InertialUnit(Sensor):
         return {"bias": bias, "gain": gain}
 
     def begin(self, moment: Moment) -> Values:
-        """Velocity and attitude at the start, and how far the bias has walked."""
+        """Velocity and attitude at the start, and the random walk of the bias."""
         velocity, rotation, _ = self._motion(moment)
         return {"velocity": velocity, "rotation": rotation, "walk": np.zeros(6)}
 
     def measure(
         self, moment: Moment, memory: Values, interval: float, drawn: Values, generator: np.random.Generator
     ) -> tuple[Array, Values]:
-        """Takes the means since the sample before."""
+        """Takes the means since the previous sample."""
         velocity, rotation, angular_velocity = self._motion(moment)
         gravity = moment.simulation.gravity
         walk = memory["walk"]
@@ -105,7 +105,7 @@ class InertialUnit(Sensor):
         return reading, {"velocity": velocity, "rotation": rotation, "walk": walk}
 
     def _motion(self, moment: Moment) -> tuple[Array, Array, Array]:
-        """Velocity of the unit's place, its attitude, and its angular velocity, world frame."""
+        """Velocity, attitude and angular velocity of the unit, world frame."""
         place, rotation = moment.frame(self.mount)
         angular_velocity = moment.v[3:6]
         velocity = moment.v[:3] + np.cross(angular_velocity, place - moment.q[:3])

@@ -1,4 +1,4 @@
-"""What all sensors have in common: a name, a rate, a latency, and properties that are drawn for each episode."""
+"""Base of all sensors: name, rate, latency, and properties that are drawn for each episode."""
 
 import math
 from abc import ABC, abstractmethod
@@ -77,12 +77,12 @@ class Mount:
 
 
 class Moment:
-    """The state of a simulation, computed where a sensor asks.
+    """The state of a simulation, computed on demand.
 
     Args:
-        simulation: The rover, which must not move while the moment is looked at.
+        simulation: The rover, which must not move while the object is used.
         time: Of the episode, s.
-        grains: Balls around it, which rays meet too.
+        grains: Balls around it, which rays hit too.
     """
 
     def __init__(self, simulation: Simulation, time: float, grains: GrainSimulation | None = None) -> None:
@@ -120,13 +120,13 @@ class Moment:
         return origin + rotation @ np.asarray(mount.position), rotation @ mount.rotation
 
     def distances(self, mount: Mount, directions: Array, max_range: float, *, sees_rover: bool) -> Array:
-        """Distances (n,), m, at which rays from a sensor meet something first; infinite where they meet nothing.
+        """Distances (n,), m, to the first hit of rays from a sensor; infinite without a hit.
 
         Args:
             mount: The sensor, whose solid is not seen.
             directions: In the sensor's frame, (n, 3).
-            max_range: Distance to which the rays are followed, m.
-            sees_rover: Whether they meet the rover's other solids.
+            max_range: Largest distance, m.
+            sees_rover: Whether rays hit the rover's other solids.
         """
         place, rotation = self.frame(mount)
         along = directions @ rotation.T
@@ -137,28 +137,26 @@ class Moment:
         return found
 
 
-#: What is drawn for an episode, or kept from one sample to the next, by name.
+#: Properties of an episode, or memory between samples, by name.
 Values: TypeAlias = Mapping[str, Array]
 
 #: Longest latency, s.
 MAX_LATENCY = 1e3
-
-#: Bounds of what has no bounds: the space holds every finite reading.
-LARGEST = float(np.finfo(np.float32).max)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sensor(ABC):
     """A sensor's configuration.
 
-    A property that may be a range is drawn uniformly from it at each reset, as the environment's own are; a number
-    fixes it and takes no random number.
+    To randomise a property, pass a range (low, high): each reset draws a value uniformly. A number fixes the property
+    and draws no random number.
 
     Args:
         name: Key of its readings in the observation.
-        rate: Samples a second, Hz: the control frequency over a whole number; None for one each control period.
-        latency: Age of the newest sample that is read, s, or a range. A reading changes at the end of a control period
-            only, so latencies act as if rounded up to whole periods.
+        rate: Samples per second, Hz: the control frequency divided by a whole number; None for one sample per control
+            period.
+        latency: Age of the newest sample that is read, s, or a range. Readings change only at the end of a control
+            period, so latencies are in effect rounded up to whole periods.
 
     Raises:
         OptionError: A value is out of its range; `field` names it.
@@ -193,7 +191,7 @@ class Sensor(ABC):
             number(name, getattr(self, name), above=above, at_least=at_least)
 
     def check(self, model: RoverModel) -> None:  # noqa: B027 - most sensors fit every model
-        """Refuses a model that the sensor does not fit.
+        """Rejects a model that does not fit the sensor.
 
         Raises:
             OptionError: The sensor names a solid that the model lacks, or that cannot carry it.
@@ -208,7 +206,7 @@ class Sensor(ABC):
         return {}
 
     def begin(self, moment: Moment) -> Values:  # noqa: ARG002 - most need nothing
-        """What the sensor keeps from one sample to the next, at the episode's start."""
+        """The sensor's memory at the start of an episode."""
         return {}
 
     @abstractmethod
@@ -219,18 +217,18 @@ class Sensor(ABC):
 
         Args:
             moment: The rover now.
-            memory: What `begin`, or this method at the sample before, has returned.
-            interval: Time since the sample before, s; 0 at the first.
-            drawn: What `draw` has drawn for the episode.
+            memory: Memory from `begin`, or from this method at the previous sample.
+            interval: Time since the previous sample, s; 0 at the first.
+            drawn: Properties that `draw` returned for the episode.
             generator: Of the noise.
 
         Returns:
-            The reading, and what to keep.
+            The reading and the new memory.
         """
 
 
 def uniform(generator: np.random.Generator, field: float | Range, size: int | tuple[int, ...] = ()) -> Array:
-    """Draws from a range, (low, high), uniformly; a range of one number takes no random number."""
+    """Draws from a range, (low, high), uniformly; a range of one number draws no random number."""
     low, high = field if isinstance(field, tuple) else (field, field)
     if low == high:
         return np.full(size, low)
@@ -238,5 +236,5 @@ def uniform(generator: np.random.Generator, field: float | Range, size: int | tu
 
 
 def gaussian(generator: np.random.Generator, deviation: float, size: int | tuple[int, ...]) -> Array:
-    """Draws from a normal distribution about 0; a deviation of 0 takes no random number."""
+    """Draws from a normal distribution about 0; a deviation of 0 draws no random number."""
     return generator.normal(0.0, deviation, size) if deviation > 0.0 else np.zeros(size)

@@ -3,7 +3,7 @@
 import copy
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium as gym
 import numpy as np
@@ -13,6 +13,7 @@ from gymnasium.utils import RecordConstructorArgs
 from gymnasium.vector import AutoresetMode, VectorWrapper
 from gymnasium.vector.utils import batch_space
 
+from rover_gym.env.batch import BatchSnapshot
 from rover_gym.env.env_snapshot import EnvSnapshot
 from rover_gym.env.generators import row_of
 from rover_gym.env.grains_env import RoverGrainsEnv
@@ -21,16 +22,15 @@ from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError, RoverModel, StateError
 from rover_gym.sensors.sensor import Array, Moment, Sensor, Values, uniform
 from rover_gym.validation import refuse
-from rover_gym.vector.batch import BatchSnapshot
 from rover_gym.vector.vector_env import RoverVectorEnv
 
-#: Key of the environment's own observation beside the sensors'.
+#: Key of the environment's own observation.
 STATE = "state"
 
 #: Distinguishes the sensors' random numbers from the environment's.
 STREAM = 0x5E45_0125
 
-#: Times closer than this are one, s.
+#: Times closer than this are equal, s.
 SAME_TIME = 1e-9
 
 Readings = dict[str, npt.NDArray[np.float32]]
@@ -42,11 +42,11 @@ class SensorState:
 
     Attributes:
         drawn: Its properties, drawn at the start.
-        latency: Age of what is read, s.
-        memory: What it keeps from one sample to the next.
+        latency: Age of the reading, s.
+        memory: Memory between samples.
         sampled: Time of the last sample, s.
-        waiting: Samples that are not yet old enough, with the times from which they are.
-        reading: What is read now.
+        waiting: Samples that are not yet due, with the times at which they are.
+        reading: The present reading.
     """
 
     drawn: Values
@@ -74,8 +74,8 @@ class SensorSuite:
         dt: Control period, s.
 
     Raises:
-        OptionError: There is no sensor, a name is taken, a rate does not fit the control period, or a sensor does not
-            fit the rover.
+        OptionError: The list is empty, a name is used twice, a rate does not fit the control period, or a sensor does
+            not fit the rover.
     """
 
     def __init__(self, sensors: Sequence[Sensor], model: RoverModel, dt: float) -> None:
@@ -86,7 +86,7 @@ class SensorSuite:
             if not isinstance(sensor, Sensor):
                 refuse(OptionError, f"sensors[{i}]", sensor, "must be a sensor of rover_gym.sensors")
             if sensor.name == STATE or sensor.name in self.sensors:
-                refuse(OptionError, f"sensors[{i}].name", sensor.name, "is taken")
+                refuse(OptionError, f"sensors[{i}].name", sensor.name, "is used by another sensor")
             self._check_rate(f"sensors[{i}].rate", sensor.rate, dt)
             sensor.check(model)
             self.sensors[sensor.name] = sensor
@@ -110,8 +110,8 @@ class SensorSuite:
 
         Args:
             moment: The rover at the start.
-            row: State of the environment's random generator, from which the sensors' own begins; it is not moved, so
-                that episodes are those without sensors.
+            row: State of the environment's random generator, which seeds the sensors' generator. It is not advanced, so
+                episodes are the same as without sensors.
         """
         generator = np.random.default_rng([STREAM, *row.tolist()])
         state = SuiteState(generator)
@@ -123,7 +123,7 @@ class SensorSuite:
         return state
 
     def advance(self, state: SuiteState, moment: Moment) -> None:
-        """Takes the samples that are due, and lets those be read that are old enough."""
+        """Takes the samples that are due, and updates the readings by latency."""
         for name, sensor in self.sensors.items():
             own = state.sensors[name]
             interval = moment.time - own.sampled
@@ -136,7 +136,7 @@ class SensorSuite:
                 own.reading = own.waiting.pop(0)[1]
 
     def readings(self, state: SuiteState) -> Readings:
-        """What is read now, by name."""
+        """The present readings, by name."""
         return {name: own.reading.astype(np.float32) for name, own in state.sensors.items()}
 
     def space(self, inner: gym.Space[Any]) -> gym.spaces.Dict:
@@ -144,10 +144,10 @@ class SensorSuite:
         return gym.spaces.Dict({STATE: inner, **self.spaces})
 
     def check_state(self, state: object) -> SuiteState:
-        """Checks that a state is one of these sensors, and returns a copy.
+        """Checks that a state belongs to these sensors, and returns a copy.
 
         Raises:
-            StateError: It is none.
+            StateError: It does not.
         """
         if not isinstance(state, SuiteState) or state.sensors.keys() != self.sensors.keys():
             refuse(StateError, "snapshot.sensors", state, f"must be of the sensors {', '.join(self.sensors)}")
@@ -168,7 +168,7 @@ class SensedSnapshot:
 
 
 class SensedRovers:
-    """What the wrappers of one rover and of a vector share: the sensors of n rovers, and their episodes' states.
+    """Common part of the wrappers of one rover and of a vector: the sensors of n rovers and their states.
 
     Attributes:
         suite: The sensors.
@@ -209,7 +209,7 @@ class SensedRovers:
         """Restores a snapshot of as many rovers with the same arguments and sensors, which continue bit for bit.
 
         Raises:
-            StateError: The value is no snapshot, is damaged, or comes from other arguments or sensors; nothing has
+            StateError: The value is not a snapshot, is damaged, or comes from other arguments or sensors. Nothing has
                 changed.
         """
         if not isinstance(snapshot, SensedSnapshot):
@@ -222,11 +222,17 @@ class SensedRovers:
         self._states[:] = states
 
 
+def moment_of(env: RoverEnv) -> Moment:
+    """A rover, for its sensors."""
+    simulation, mover = env.simulation, env.mover
+    return Moment(simulation, simulation.time, None if mover is None else mover.grains)
+
+
 class SensorObservation(SensedRovers, gym.Wrapper, RecordConstructorArgs):
     """Observations of a `Dict` space: the environment's own as `state`, and each sensor's reading by its name.
 
-    Readings are float32 in SI units, not scaled. They are those at the end of a step; their random numbers follow from
-    the environment's generator, so that a seed gives the same episode with sensors as without, and the same readings.
+    Readings are float32 in SI units, not scaled. They are taken at the end of a step. Their random numbers are derived
+    from the environment's generator, so a seed gives the same episode with and without sensors, and the same readings.
 
     Example:
         >>> env = SensorObservation(gym.make("Rover-v0"), [InertialUnit(gyroscope_noise=2e-4), DepthCamera()])
@@ -251,7 +257,7 @@ class SensorObservation(SensedRovers, gym.Wrapper, RecordConstructorArgs):
 
     @property
     def sensor_state(self) -> SuiteState:
-        """The sensors of the episode, with the properties that were drawn.
+        """The sensors of the episode with their drawn properties.
 
         Raises:
             ResetNeeded: The environment has not been reset.
@@ -259,7 +265,7 @@ class SensorObservation(SensedRovers, gym.Wrapper, RecordConstructorArgs):
         return self._state(0)
 
     def readings(self) -> Readings:
-        """What is read now, by sensor.
+        """The present readings, by sensor.
 
         Raises:
             ResetNeeded: The environment has not been reset.
@@ -269,33 +275,29 @@ class SensorObservation(SensedRovers, gym.Wrapper, RecordConstructorArgs):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Starts an episode, as the environment does, with the sensors' properties drawn anew."""
+        """Starts an episode of the environment and draws the sensors' properties."""
         observation, info = self.env.reset(seed=seed, options=options)
-        self._states[0] = self.suite.begin(self._moment(), row_of(self._rover.np_random))
+        self._states[0] = self.suite.begin(moment_of(self._rover), row_of(self._rover.np_random))
         return {STATE: observation, **self.readings()}, info
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Applies an action, as the environment does, then takes the samples that are due."""
         state = self.sensor_state
         observation, reward, terminated, truncated, info = self.env.step(action)
-        self.suite.advance(state, self._moment())
+        self.suite.advance(state, moment_of(self._rover))
         return {STATE: observation, **self.readings()}, float(reward), terminated, truncated, info
-
-    def _moment(self) -> Moment:
-        simulation, mover = self._rover.simulation, self._rover.episode.mover
-        return Moment(simulation, simulation.time, None if mover is None else mover.grains)
 
 
 class SensorVectorObservation(SensedRovers, VectorWrapper):
-    """Adds each rover's sensors to its observation, as `SensorObservation` does for one rover, and bit for bit alike.
+    """Adds each rover's sensors to its observation, bit for bit as `SensorObservation` does for one rover.
 
     Args:
         env: A `RoverVectorEnv`; wrappers go around this one.
         sensors: The sensors that each rover has, with different names.
 
     Raises:
-        OptionError: `env` is another environment or resets in the step that ends an episode, after which its last
-            readings could not be taken, or a sensor does not fit the rover.
+        OptionError: `env` is another environment or uses `SameStep` autoreset, which does not allow final readings, or
+            a sensor does not fit the rover.
     """
 
     def __init__(self, env: RoverVectorEnv, sensors: Sequence[Sensor]) -> None:
@@ -310,7 +312,7 @@ class SensorVectorObservation(SensedRovers, VectorWrapper):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
 
     def sensor_state(self, i: int) -> SuiteState:
-        """The sensors of rover i's episode, with the properties that were drawn.
+        """The sensors of rover i's episode with their drawn properties.
 
         Raises:
             ResetNeeded: The rover has not been reset.
@@ -333,7 +335,7 @@ class SensorVectorObservation(SensedRovers, VectorWrapper):
         observation, reward, terminated, truncated, infos = self._rovers.step(actions)
         for i, state in enumerate(states):
             if i not in begun:
-                self.suite.advance(state, self._moment(i))
+                self.suite.advance(state, moment_of(self._rovers.envs[i]))
         self._begin(sorted(begun))
         return self._with_readings(observation), reward, terminated, truncated, infos
 
@@ -346,17 +348,13 @@ class SensorVectorObservation(SensedRovers, VectorWrapper):
         chosen = list(chosen)
         rows = self._rovers.batch.generator_rows(chosen)
         for i, row in zip(chosen, rows, strict=True):
-            self._states[i] = self.suite.begin(self._moment(i), row)
-
-    def _moment(self, i: int) -> Moment:
-        simulation = self._rovers.batch.rovers[i].simulation
-        return Moment(simulation, simulation.time)
+            self._states[i] = self.suite.begin(moment_of(self._rovers.envs[i]), row)
 
 
 def make_rover(
     *, sensors: Sequence[Sensor] | None = None, make: Callable[..., gym.Env[Any, Any]] = RoverEnv, **arguments: Any
 ) -> gym.Env[Any, Any]:
-    """Makes a `RoverEnv`, with sensors a `SensorObservation` of it.
+    """Makes a `RoverEnv`, wrapped in `SensorObservation` if there are sensors.
 
     Args:
         sensors: The sensors; None for the environment as it is.
@@ -368,22 +366,38 @@ def make_rover(
 
 
 def make_rover_vector(
-    num_envs: int = 1, *, sensors: Sequence[Sensor] | None = None, **arguments: Any
+    num_envs: int = 1,
+    *,
+    sensors: Sequence[Sensor] | None = None,
+    make: Callable[..., RoverVectorEnv] = RoverVectorEnv,
+    **arguments: Any,
 ) -> gym.vector.VectorEnv[Any, Any, Any]:
-    """Makes a `RoverVectorEnv`, with sensors a `SensorVectorObservation` of it.
+    """Makes a `RoverVectorEnv`, wrapped in `SensorVectorObservation` if there are sensors.
 
     Args:
         num_envs: Number of rovers.
         sensors: The sensors that each rover has; None for the environment as it is.
-        **arguments: Arguments of `RoverVectorEnv`.
+        make: `RoverVectorEnv` or a subclass.
+        **arguments: Its arguments.
     """
-    env = RoverVectorEnv(num_envs, **arguments)
+    env = make(num_envs, **arguments)
     return env if sensors is None else SensorVectorObservation(env, sensors)
 
 
 def make_grains_rover(**arguments: Any) -> gym.Env[Any, Any]:
-    """Makes a `RoverGrainsEnv`, with `sensors` a `SensorObservation` of it: the sensors see the grains."""
+    """Makes a `RoverGrainsEnv`, wrapped in `SensorObservation` if there are sensors, which then see the grains."""
     return make_rover(make=RoverGrainsEnv, **arguments)
+
+
+class RoverGrainsVectorEnv(RoverVectorEnv):
+    """A vector of `RoverGrainsEnv` environments; see `RoverVectorEnv`. Their grains are stepped one after the other."""
+
+    env_class: ClassVar[type[RoverEnv]] = RoverGrainsEnv
+
+
+def make_grains_vector(num_envs: int = 1, **arguments: Any) -> gym.vector.VectorEnv[Any, Any, Any]:
+    """Makes a `RoverGrainsVectorEnv`, with `sensors` a `SensorVectorObservation` of it."""
+    return make_rover_vector(num_envs, make=RoverGrainsVectorEnv, **arguments)
 
 
 #: What Gymnasium asks of an entry point before it calls it.

@@ -1,4 +1,4 @@
-"""What the joints and the trunk give without looking around: wheel encoders, motor sensors and the heading."""
+"""Proprioceptive sensors: wheel encoders, motor sensors and heading."""
 
 import math
 from dataclasses import dataclass
@@ -6,19 +6,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from rover_gym.mechanics import RoverModel
-from rover_gym.sensors.sensor import LARGEST, Array, Moment, Sensor, Values, gaussian, uniform
+from rover_gym.sensors.sensor import Array, Moment, Sensor, Values, gaussian, uniform
 from rover_gym.validation import Range, whole
 
 
 @dataclass(frozen=True, kw_only=True)
 class WheelEncoders(Sensor):
-    """Angles that the wheels have turned, exact or counted in ticks, and their rates.
+    """Rotation angles of the wheels, exact or counted in ticks, and their rates.
 
     A reading is (2, n_wheels): the angles since the episode's start, rad, positive forward, and the rates, rad/s, which
-    are the difference of two samples over their interval. At the first sample the rates are the wheels' own.
+    are the difference of two samples over their interval. At the first sample the rates are exact.
 
     Args:
-        ticks: Ticks a turn of the wheel, such as 4096. None measures exactly.
+        ticks: Ticks per turn of the wheel, such as 4096. None measures exactly.
         gain: Angle measured over angle turned, or a range, drawn for each wheel: an error of the transmission.
     """
 
@@ -34,7 +34,7 @@ class WheelEncoders(Sensor):
 
     def bounds(self, model: RoverModel) -> tuple[Array, Array]:
         """Unbounded, (2, n_wheels)."""
-        most = np.full((2, len(model.wheel_names)), LARGEST)
+        most = np.full((2, len(model.wheel_names)), np.inf)
         return -most, most
 
     def draw(self, model: RoverModel, generator: np.random.Generator) -> Values:
@@ -99,7 +99,7 @@ class MotorSensors(Sensor):
 
     def bounds(self, model: RoverModel) -> tuple[Array, Array]:
         """Unbounded, (2, n_wheels)."""
-        most = np.full((2, len(model.wheel_names)), LARGEST)
+        most = np.full((2, len(model.wheel_names)), np.inf)
         return -most, most
 
     def draw(self, model: RoverModel, generator: np.random.Generator) -> Values:

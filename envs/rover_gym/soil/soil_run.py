@@ -219,7 +219,7 @@ def soil_run_of(trajectory: Trajectory, path: str | Path) -> SoilRun:
         RecordingError: It is not a soil run, or holds no samples.
     """
     if not is_soil(trajectory) or "force_chains" not in trajectory.data:
-        refuse(RecordingError, "path", str(path), "holds no soil: `rover planar soil` writes one")
+        refuse(RecordingError, "path", str(path), "contains no soil; `rover planar soil` records such runs")
     check_time(trajectory, path)
     scene = trajectory.attributes["scene"]
     with sound(path, "scene"):
@@ -228,10 +228,10 @@ def soil_run_of(trajectory: Trajectory, path: str | Path) -> SoilRun:
     if not len(radius) or not ((radius > 0.0) & (radius <= LARGEST)).all():
         refuse(RecordingError, f"{path}: scene.radius", len(radius), "must be a positive radius for each of the disks")
     if not (np.abs(walls) <= LARGEST).all() or not np.hypot(*walls[:, 2:].T).all():
-        refuse(RecordingError, f"{path}: scene.walls", len(walls), "must be points with normals, for each of the walls")
+        refuse(RecordingError, f"{path}: scene.walls", len(walls), "must be a point and a normal for each wall")
     wheels, machine = (trajectory[name].shape[1] if trajectory[name].ndim > 1 else 0 for name in ("wheels", "machine"))
     if wheels > 2 or machine < 3 * bool(wheels) + wheels:
-        refuse(RecordingError, f"{path}: wheels", wheels, "must be none, one or two, with their machine's coordinates")
+        refuse(RecordingError, f"{path}: wheels", wheels, "must be at most two, with the coordinates of their machine")
     chains = trajectory["force_chains"].shape[1] if trajectory["force_chains"].ndim == 3 else 0
     channels = soil_channels(len(radius), machine, wheels, chains)
     check_rows(trajectory, path, channels, bounded=("position", "wheels", "machine"), needed=True)

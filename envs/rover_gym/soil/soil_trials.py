@@ -105,7 +105,9 @@ def drive_on_soil(bed: Bed, torque: float, *, run_in: float = 0.5, duration: flo
             wheels = sim.wheels
             depths.append(surface - float((wheels[:, 1] - wheels[:, 2]).mean()))
     if not depths:
-        refuse(OptionError, "run_in", run_in, f"brings the rover to the end of the bed, {bed.width:.2f} m wide")
+        refuse(
+            OptionError, "run_in", run_in, f"is too large: the rover reaches the end of the bed, {bed.width:.2f} m long"
+        )
     moved = sim.machine - start
     rims = -float((sim.wheels[:, 2] * moved[3:]).mean())
     distance = float(moved[0])
@@ -158,7 +160,7 @@ def drawbar_pull(
     """
     slip, rim_speed = number("slip", slip), number("rim_speed", rim_speed, above=0.0)
     if slip >= 1.0:
-        refuse(OptionError, "slip", slip, "must be below 1: the wheel travels")
+        refuse(OptionError, "slip", slip, "must be below 1, because the wheel moves forward")
     run_in, distance = number("run_in", run_in, at_least=0.0), number("distance", distance, above=0.0)
     radius = number("radius", radius, above=0.0)
     start = CLEAR_OF_WALLS * radius
@@ -293,9 +295,11 @@ def fit_traction(pulls: Sequence[Sequence[Pull]], *, first: float = 0.5) -> Trac
     ratios = np.array([[trial.pull / trial.weight for trial in row] for row in pulls])
     last = slips >= first
     if len(set(slips)) < 4:
-        refuse(OptionError, "pulls", len(set(slips)), "must have four slips or more: the curve has three numbers")
+        refuse(
+            OptionError, "pulls", len(set(slips)), "must have four or more slips to fit the three numbers of the curve"
+        )
     if len(set(slips[last])) < 2:
-        refuse(OptionError, "first", first, "must leave two slips or more")
+        refuse(OptionError, "first", first, "must leave at least two slips")
     A, free_slip, K = _over_beds(lambda means: _fit(slips, means), ratios)
     (slope,) = _over_beds(lambda means: np.polyfit(slips[last], means[last], 1)[:1], ratios)
     means = ratios.mean(axis=1)

@@ -322,7 +322,7 @@ pub fn whole(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<u64> {
 /// A whole number of things.
 pub fn count(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<usize> {
     let n = whole(value, kind, field)?;
-    usize::try_from(n).map_err(|_| refused(value, kind, field, "smaller"))
+    usize::try_from(n).map_err(|_| refused(value, kind, field, "below 2^32"))
 }
 
 /// An index among `len` things.
@@ -356,14 +356,14 @@ pub fn flag(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<bool> {
 /// A text.
 pub fn text(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<String> {
     let found = value.extract::<String>();
-    found.map_err(|_| refused(value, kind, field, "a text"))
+    found.map_err(|_| refused(value, kind, field, "a string"))
 }
 
 /// Truth values (n,).
 pub fn flags(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Vec<bool>> {
     let entries = value
         .try_iter()
-        .map_err(|_| refused(value, kind, field, "truth values"))?;
+        .map_err(|_| refused(value, kind, field, "booleans"))?;
     entries
         .enumerate()
         .map(|(i, entry)| flag(&entry?, kind, &format!("{field}[{i}]")))

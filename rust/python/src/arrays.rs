@@ -108,6 +108,27 @@ pub fn at_most(value: &Bound<'_, PyAny>, n: usize, kind: Kind, field: &str) -> R
     }
 }
 
+/// Finite numbers of a shape that `fits`, row-major, with the shape; `what`: its name.
+pub fn shaped(
+    value: &Bound<'_, PyAny>,
+    kind: Kind,
+    (field, what): (&str, &str),
+    fits: impl Fn(&[usize]) -> bool,
+) -> Result<(Vec<f64>, Vec<usize>)> {
+    let any = array(value, kind, field)?;
+    let view = any.as_array();
+    if !fits(view.shape()) {
+        let message = format!("{field}: needs shape {what}, has {:?}", view.shape());
+        return Err(kind.error(field, message, Value::Count(view.ndim())));
+    }
+    let values: Vec<f64> = view.iter().copied().collect();
+    if let Some(x) = values.iter().find(|x| !x.is_finite()) {
+        let message = format!("{field}: must be finite, has {x}");
+        return Err(kind.error(field, message, Value::Number(*x)));
+    }
+    Ok((values, view.shape().to_vec()))
+}
+
 /// One number for both, or two.
 pub fn one_or_two(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<[f64; 2]> {
     if value.len().is_err() {

@@ -11,7 +11,7 @@ use crate::arrays::{Array, array};
 use crate::episode::{GivenSimulation, simulation};
 use crate::errors::{Kind, Result, Value};
 use crate::reading::{place, scan_points, slices};
-use crate::shared::{Shared, Watch};
+use crate::shared::{Open, Shared, Watch};
 use crate::simulation::{Origin, Simulation};
 
 /// Steps many rovers on several threads. Each gives the same bits as it would alone.
@@ -45,7 +45,7 @@ pub fn mask(value: &Bound<'_, PyAny>, n: usize) -> Result<Vec<bool>> {
     if active.len() == n {
         return Ok(active);
     }
-    let what = format!("{n} truth values");
+    let what = format!("{n} booleans");
     Err(refused(value, Kind::Option, "active", &what))
 }
 
@@ -92,7 +92,7 @@ impl SimulationBatch {
         Ok(self.0.open()?.inner.threads())
     }
 
-    /// Instruction set of the processor: "AVX-512", "AVX2" or "baseline".
+    /// Instruction set of the processor, "AVX-512", "AVX2" or "baseline".
     ///
     /// The widest that the processor has, unless the environment variable `ROVER_GYM_INSTRUCTIONS`
     /// names another. Results do not depend on it.

@@ -193,7 +193,7 @@ impl PlanarContacts {
 /// included.
 #[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
 pub struct GrainContacts {
-    /// Indices of both bodies, (n, 2): grains from 0, then wheels; -1 for a wall or the ground.
+    /// Indices of both bodies, (n, 2), grains from 0, then wheels; -1 for a wall or the ground.
     bodies: Array<i64>,
     /// Points of the first body's surface, (n, D), m.
     points: Array,
@@ -209,8 +209,7 @@ pub struct GrainContacts {
     ///
     /// Normal impulses include cohesion and are negative if a contact carries tension.
     impulses: Array,
-    /// Velocities of the first body relative to the second after the step along n, t, b, (n, D),
-    /// m/s.
+    /// Relative velocities of the first body after the step along n, t, b, (n, D), m/s.
     velocities: Array,
     /// Impulses on the first body along x, y, z, (n, D), N s.
     world_impulses: Array,

@@ -26,15 +26,13 @@ pub struct SolverReport {
     is_converged: bool,
     /// Iterations of the stage that found the solution.
     iterations: usize,
-    /// Violation of Signorini's and Coulomb's laws by the returned impulses, relative to the
-    /// problem data.
+    /// Violation of Signorini's and Coulomb's laws by the impulses, relative to the data.
     residual: f64,
     /// Largest violation of Signorini's and Coulomb's laws at one contact, m/s.
     velocity_error: f64,
     /// Name of the method that found the solution; never "auto".
     solver: &'static str,
-    /// Name of the stage that found the solution; "at_rest" if q = 0, so that zero impulses solve
-    /// the problem.
+    /// Name of the stage that found the solution; "at_rest" if q = 0 needed none.
     stage: &'static str,
     /// All stages tried, in order, each with the reason why it ended and its iterations.
     ///

@@ -91,6 +91,7 @@ pub fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<stepping::AnySimulation>()?;
     module.add_class::<simulation::Simulation>()?;
     module.add_class::<linearisation::Linearisation>()?;
+    module.add_class::<linearisation::StepDerivatives>()?;
     module.add_class::<batch::SimulationBatch>()?;
     module.add_class::<draw::EpisodeDistribution>()?;
     module.add_class::<draw::DrawnEpisodes>()?;

@@ -1,16 +1,18 @@
-//! `Linearisation`: the derivatives of a step.
+//! `Linearisation`: the derivatives of a step; `StepDerivatives`: those of many.
 
 use pyo3::prelude::*;
 use rover_core::contact::Part;
 use rover_core::integrator::ContactMode;
 use rover_core::multibody::Model;
-use rover_core::simulation::{Linearisation as Core, LinearisationError};
+use rover_core::simulation::{
+    Linearisation as Core, LinearisationError, StepParameter, Trajectory, TrajectoryError,
+};
 
-use crate::arrays::{Array, fresh_matrix};
-use crate::errors::{BorderError, Kind, Value, entry};
+use crate::arguments::texts;
+use crate::arrays::{Array, fresh, fresh_matrix};
+use crate::errors::{BorderError, Kind, Result, Value, entry};
 
-/// Derivatives of a time step with respect to state and command, returned by
-/// `Simulation.linearise`.
+/// Derivatives of a time step, returned by `Simulation.linearise`.
 ///
 /// `x_next = next_state + a @ (x - state) + b @ (u - command)` to first order. The state is
 /// x = (q, v) as `Simulation.q` and `Simulation.v` return them, the command is u = (wheel torques,
@@ -23,6 +25,8 @@ pub struct Linearisation {
     ///
     /// Columns of wheels without a drive or without steering are 0.
     b: Array,
+    /// Derivative of the next state by the parameters that were asked for, (nx, n_parameters).
+    c: Array,
     /// State before the step, (nx,).
     state: Array,
     /// Command of the step, (nu,).
@@ -45,17 +49,17 @@ pub struct Linearisation {
     is_projected: bool,
     /// Whether each column of (a, b) is valid within the tested perturbation, (nx + nu,).
     ///
-    /// A column is valid if two perturbed steps, one in each direction, have the same closed
-    /// contacts in the same modes, the same projection and energy correction, and agree with the
-    /// column within 1%.
-    holds: Array<bool>,
-    /// Difference of each column of (a, b) from the difference quotient of its two perturbed steps,
-    /// (nx + nu,).
+    /// None without `check`. A column is valid if two perturbed steps, one in each direction, have
+    /// the same closed contacts in the same modes, the same projection and energy correction, and
+    /// agree with the column within 1%.
+    holds: Option<Array<bool>>,
+    /// Difference of each column of (a, b) from that of its two perturbed steps, (nx + nu,).
     ///
-    /// The largest difference of an entry, relative to the column's largest entry.
-    errors: Array,
-    /// Whether all columns are valid.
-    is_smooth: bool,
+    /// None without `check`. The largest difference of an entry, relative to the column's largest
+    /// entry.
+    errors: Option<Array>,
+    /// Whether all columns are valid; None without `check`.
+    is_smooth: Option<bool>,
 }
 
 impl Linearisation {
@@ -66,9 +70,11 @@ impl Linearisation {
             ContactMode::Slip => "slip",
         };
         let name = |part: &Part| part.name(model).to_owned();
+        let check = inner.check;
         Self {
             a: fresh_matrix(&inner.a),
             b: fresh_matrix(&inner.b),
+            c: fresh_matrix(&inner.c),
             state: inner.state.into(),
             command: inner.command.into(),
             next_state: inner.next_state.into(),
@@ -76,9 +82,9 @@ impl Linearisation {
             modes: inner.modes.iter().map(word).collect(),
             margins: inner.margins.into(),
             is_projected: inner.is_projected,
-            is_smooth: inner.holds.iter().all(|holds| *holds),
-            holds: inner.holds.into(),
-            errors: inner.errors.into(),
+            is_smooth: (check.as_ref()).map(|check| check.holds.iter().all(|holds| *holds)),
+            holds: check.as_ref().map(|check| fresh(&check.holds)),
+            errors: check.map(|check| check.errors.into()),
         }
     }
 }
@@ -87,10 +93,11 @@ impl Linearisation {
 impl Linearisation {
     fn __repr__(&self) -> String {
         let (nx, nu, modes) = (self.state.len(), self.command.len(), &self.modes);
-        let broken = self.holds.values().iter().filter(|holds| !**holds).count();
-        format!(
-            "Linearisation(nx={nx}, nu={nu}, modes={modes:?}, columns that do not hold={broken})"
-        )
+        let checked = self.holds.as_ref().map_or_else(String::new, |holds| {
+            let broken = holds.values().iter().filter(|holds| !**holds).count();
+            format!(", columns that do not hold={broken}")
+        });
+        format!("Linearisation(nx={nx}, nu={nu}, modes={modes:?}{checked})")
     }
 }
 
@@ -107,8 +114,74 @@ impl From<LinearisationError> for BorderError {
             LinearisationError::Singular { index, pitch } => {
                 Kind::State.error(entry("q", Some(&index)), message, Value::Number(pitch))
             }
+            LinearisationError::State(e) => e.into(),
+            LinearisationError::Command(e) => e.into(),
             LinearisationError::Step(e) => e.into(),
             LinearisationError::NotHeld => Kind::Step.refusal(message, Value::Nothing),
         }
+    }
+}
+
+/// Parameters by their names.
+pub fn named_parameters(
+    model: &Model,
+    names: Option<&Bound<'_, PyAny>>,
+) -> Result<Vec<StepParameter>> {
+    let Some(names) = names else {
+        return Ok(Vec::new());
+    };
+    let names = texts(names, Kind::Option, "parameters")?;
+    let find = |(i, name): (usize, &String)| {
+        StepParameter::named(model, name).ok_or_else(|| {
+            let field = entry("parameters", Some(&i));
+            let known = StepParameter::names(model).join(", ");
+            let message = format!("{field}: no parameter is called {name:?}; there are {known}");
+            Kind::Option.error(field, message, Value::Text(name.clone()))
+        })
+    };
+    names.iter().enumerate().map(find).collect()
+}
+
+/// Steps of trajectories with their derivatives, as `Simulation.differentiate` returns them.
+#[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
+pub struct StepDerivatives {
+    /// States, (n, steps + 1, nx).
+    states: Array,
+    /// Derivatives of each next state by the state, (n, steps, nx, nx).
+    a: Array,
+    /// By the command, (n, steps, nx, nu); zero for torques beyond their limit.
+    b: Array,
+    /// By the parameters, (n, steps, nx, n_parameters).
+    c: Array,
+}
+
+impl StepDerivatives {
+    pub fn new(found: &[Trajectory], steps: usize, [nx, nu, np]: [usize; 3]) -> Self {
+        let n = found.len();
+        let all = |part: fn(&Trajectory) -> &Vec<f64>, shape: &[usize]| {
+            Array::shaped(found.iter().flat_map(part).copied().collect(), shape)
+        };
+        Self {
+            states: all(|one| &one.states, &[n, steps + 1, nx]),
+            a: all(|one| &one.a, &[n, steps, nx, nx]),
+            b: all(|one| &one.b, &[n, steps, nx, nu]),
+            c: all(|one| &one.c, &[n, steps, nx, np]),
+        }
+    }
+}
+
+#[pymethods]
+impl StepDerivatives {
+    fn __repr__(&self) -> String {
+        format!("StepDerivatives({} trajectories)", self.states.len())
+    }
+}
+
+/// The error of a trajectory, with its number and that of the step.
+pub fn of_trajectory((index, error): (usize, TrajectoryError)) -> BorderError {
+    let inner = BorderError::from(error.error);
+    BorderError {
+        message: format!("trajectory {index}, step {}: {}", error.step, inner.message),
+        ..inner
     }
 }

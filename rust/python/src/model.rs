@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyMapping};
+use pyo3::types::{PyDict, PyFloat, PyList, PyMapping};
 use rover_core::contact::{Contact, detection::wheel_contacts};
 use rover_core::draw::{DrawnGround, resting_on, resting_pose, rocks::clear_radius};
 use rover_core::multibody::chart::actuation_matrix;
@@ -151,6 +151,31 @@ pub fn poses<'py>(
     Ok(poses)
 }
 
+/// Field and value of the first number of a description that is not finite.
+fn not_finite<'py>(
+    value: &Bound<'py, PyAny>,
+    field: String,
+) -> Option<(String, Bound<'py, PyAny>)> {
+    if let Ok(number) = value.cast::<PyFloat>() {
+        return (!number.value().is_finite()).then(|| (field, value.clone()));
+    }
+    if let Ok(entries) = value.cast::<PyDict>() {
+        let dot = if field.is_empty() { "" } else { "." };
+        let mut entries = entries.iter();
+        return entries.find_map(|(name, entry)| not_finite(&entry, format!("{field}{dot}{name}")));
+    }
+    let mut entries = value.cast::<PyList>().ok()?.iter().enumerate();
+    entries.find_map(|(k, entry)| {
+        let is_number = entry.is_instance_of::<PyFloat>();
+        let place = if is_number {
+            String::new()
+        } else {
+            format!("[{k}]")
+        };
+        not_finite(&entry, format!("{field}{place}"))
+    })
+}
+
 #[pymethods]
 impl RoverModel {
     #[new]
@@ -193,6 +218,12 @@ impl RoverModel {
                 return Err(Kind::Model.error("text", message, Value::Nothing));
             }
         };
+        // JSON has no such numbers.
+        if text.contains("NaN") || text.contains("Infinity") {
+            if let Some((field, value)) = not_finite(description, String::new()) {
+                return Err(refused(&value, Kind::Model, &field, "finite"));
+            }
+        }
         Self::_restore(&text)
     }
 

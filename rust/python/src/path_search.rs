@@ -93,7 +93,12 @@ fn plane_fit(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<[Vec<f
     let found = array(value, kind, field)?;
     let view = found.as_array();
     let &[3, n] = view.shape() else {
-        return Err(refused(value, kind, field, "3 rows, an entry a wheel"));
+        return Err(refused(
+            value,
+            kind,
+            field,
+            "3 rows with an entry for each wheel",
+        ));
     };
     let flat: Vec<f64> = view.iter().copied().collect();
     Ok([0, 1, 2].map(|i| flat[i * n..(i + 1) * n].to_vec()))
@@ -169,7 +174,7 @@ impl PathSearch {
             let first = arcs(value, "first")?;
             if commands.len() != first.direction.len() {
                 let field = format!("{name}.commands");
-                return Err(refused(value, kind, &field, "a command an arc"));
+                return Err(refused(value, kind, &field, "a command for each arc"));
             }
             Ok((first, commands))
         })?;

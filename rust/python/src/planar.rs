@@ -14,7 +14,7 @@ use crate::contacts::PlanarContacts;
 use crate::errors::{BorderError, Kind, Result, Value};
 use crate::options::{Options, SolverWords, choice, name_of, settings};
 use crate::planar_ground::parse;
-use crate::shared::Shared;
+use crate::shared::{Open, Shared};
 use crate::stepping::{AnySimulation, Problem, problem};
 
 const RULES: [(&str, ContactRule); 2] = [
@@ -88,7 +88,7 @@ impl PlanarSimulation {
         self.ground.clone_ref(py)
     }
 
-    /// Coordinates, (nv,): x and y, m, then angles, rad, positive counterclockwise.
+    /// Coordinates, (nv,), x and y, m, then angles, rad, positive counterclockwise.
     #[getter]
     fn q(&self) -> Result<Array> {
         Ok(fresh(self.open()?.q()))

@@ -51,8 +51,7 @@ pub struct StepReport {
     /// `Simulation.fallback_reason` tells whether a simulation has fast steps.
     #[pyo3(get)]
     fallbacks: usize,
-    /// Largest energy gain of a step beyond the work of gravity and actuators, relative to the
-    /// kinetic energy.
+    /// Largest energy gain of a step beyond the work done on it, relative to the kinetic energy.
     #[pyo3(get)]
     energy_gain: f64,
     /// Spurious energy gain of the scheme that the audit removed, summed over the steps, J.
@@ -73,8 +72,7 @@ pub struct StepReport {
     /// 0 for grains and planar soils, whose energy is not audited.
     #[pyo3(get)]
     energy_lost: f64,
-    /// Energy gained by removing penetration, without the actuators' work, summed over the steps,
-    /// J.
+    /// Energy gained by removing penetration, less the actuators' work, sum of the steps, J.
     #[pyo3(get)]
     energy_lifted: f64,
     /// Energy released by elastic wheels, summed over the steps, J; negative if they stored energy.

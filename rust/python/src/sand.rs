@@ -155,8 +155,7 @@ pub fn sand_to_dict<'py>(
     Ok(found)
 }
 
-/// A single wheel on a bed of soil, with prescribed speeds and a vertical load under which it
-/// sinks.
+/// A single wheel on a bed of soil, with prescribed speeds and vertical load.
 ///
 /// Args:
 ///     soil: A `rover_gym.sand.Soil`, or a mapping of its numbers.

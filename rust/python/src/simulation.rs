@@ -10,22 +10,23 @@ use rover_core::multibody::{Model, coordinates};
 use rover_core::nalgebra::DMatrix;
 use rover_core::simulation::{
     ReadingLayout, ReadingRequest, ReadingScratch, RoverSimulation as CoreSimulation,
+    TrajectoryBatch,
 };
 use rover_core::solver::SolverOptions;
 use std::sync::{Arc, MutexGuard};
 
 use crate::accuracy;
-use crate::arguments::{Given, Named, number, texts};
-use crate::arrays::{Array, at_most, fresh, fresh_matrix, fresh_rows, vector};
+use crate::arguments::{Given, Named, at_least_one, number, texts};
+use crate::arrays::{Array, at_most, fresh, fresh_matrix, fresh_rows, shaped, vector};
 use crate::contacts::Contacts;
 use crate::errors::{BorderError, Kind, Result, Value};
-use crate::linearisation::Linearisation;
+use crate::linearisation::{Linearisation, StepDerivatives, named_parameters, of_trajectory};
 use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
 use crate::options::{Options, SolverWords, settings};
 use crate::rays::{Met, met, rays};
 use crate::reading::{place, scan_points, slices};
 use crate::sand::sand_to_dict;
-use crate::shared::{Shared, Watch};
+use crate::shared::{Open, Shared, Watch};
 use crate::stepping::{AnySimulation, Problem, problem};
 use crate::{terrain, union};
 
@@ -89,14 +90,32 @@ fn names(joints: &Bound<'_, PyAny>) -> Result<Vec<String>> {
 impl Simulation {
     /// A simulation and its constructor arguments.
     pub fn of(inner: CoreSimulation, origin: Origin) -> PyClassInitializer<Self> {
-        let (model, options) = (inner.model().clone(), inner.options().clone());
-        let inner = Arc::new(Shared::new(inner));
+        let parts = (inner.model().clone(), inner.options().clone());
+        Self::with(Arc::new(Shared::new(inner)), parts, origin)
+    }
+
+    fn with(
+        inner: Arc<Shared<CoreSimulation>>,
+        (model, options): (Arc<Model>, StepOptions),
+        origin: Origin,
+    ) -> PyClassInitializer<Self> {
         AnySimulation::base(inner.clone()).add_subclass(Self {
             inner,
             model,
             options,
             origin,
         })
+    }
+
+    /// A simulation that others hold, too.
+    pub fn lent(
+        inner: Arc<Shared<CoreSimulation>>,
+        origin: Origin,
+    ) -> Result<PyClassInitializer<Self>> {
+        let open = inner.open()?;
+        let parts = (open.model().clone(), open.options().clone());
+        drop(open);
+        Ok(Self::with(inner, parts, origin))
     }
 
     /// The simulation, for one call.
@@ -343,8 +362,7 @@ impl Simulation {
         Ok(self.open()?.set_wheel_torques(&torques)?)
     }
 
-    /// Steering set-points, (n_wheels,), rad; 0 for wheels whose steering joint is missing or
-    /// released.
+    /// Steering set-points, (n_wheels,), rad; 0 for wheels without steering or released ones.
     #[getter]
     fn steering(&self) -> Result<Array> {
         Ok(fresh(&self.open()?.steering()))
@@ -466,7 +484,7 @@ impl Simulation {
 
     /// Mean contact force on each wheel over the last step, (n_wheels, 3), N.
     ///
-    /// Along n, t, b of the wheel's contact frame.
+    /// Sums over its contacts, each along its own normal, rolling and lateral direction.
     #[getter]
     fn wheel_forces(&self) -> Result<Array> {
         Ok(fresh_rows(self.open()?.wheel_forces()))
@@ -649,34 +667,116 @@ impl Simulation {
         Ok(problem(&*self.open()?))
     }
 
-    /// Derivatives of the next step with respect to state and command. The simulation does not
-    /// change.
+    /// Derivatives of the next step with respect to state, command and parameters.
     ///
-    /// The step is taken as after `set_state(q, v)`, without warm start. The active contacts, their
-    /// modes and the branches of the motors' lines are held constant; the limits of the commands
-    /// are not considered. If the modes change within `perturbation`, the derivative is not valid
-    /// and `Linearisation.holds` is False.
+    /// The simulation does not change. The step is taken as after `set_state(q, v)`, without warm
+    /// start. The active contacts, their modes and the branches of the motors' lines are held
+    /// constant; the limits of the commands are not considered. Where the modes change, the
+    /// derivative is not valid; with `check`, `Linearisation.holds` is False there.
     ///
     /// Args:
-    ///     perturbation: Change of each entry of (x, u) in the two steps that test its column, m,
-    ///         rad, m/s or rad/s, and 1000 times as many N m; from 1e-9 to 1e-3, 1e-6 by default.
+    ///     check: Whether to test each column of (A, B) by two real steps, which takes ten
+    ///         times as long as the derivatives; False by default.
+    ///     perturbation: Change of each entry of (x, u) in these steps, m, rad, m/s or rad/s, and
+    ///         1000 times as many N m; from 1e-9 to 1e-3, 1e-6 by default.
+    ///     parameters: Names of parameters for C: "friction", the common coefficient; "mass" and
+    ///         "mass:<body>", a factor of mass and inertia of all bodies or of one;
+    ///         "damping:<joint>", N m s/rad or N s/m; "contact_stiffness" and "contact_damping",
+    ///         factors of those of wheels that yield. None by default.
     ///
     /// Returns:
     ///     The derivatives, the contact modes and their margins.
     ///
     /// Raises:
-    ///     OptionError: `perturbation` is out of its range, or the variant is "newton".
+    ///     OptionError: `perturbation` is out of its range, a parameter does not exist, or the
+    ///         variant is "newton".
     ///     StateError: A pitch is 90 degrees, where the coordinates are singular.
     ///     StepError: The step failed, was split, or did not converge, so that it has no
     ///         derivative.
-    #[pyo3(signature = (perturbation = Given::MISSING), text_signature = "($self, perturbation=1e-6)")]
-    fn linearise(&self, py: Python<'_>, perturbation: Given<'_>) -> Result<Linearisation> {
+    #[pyo3(
+        signature = (check = Given::MISSING, perturbation = Given::MISSING, parameters = None),
+        text_signature = "($self, check=False, perturbation=1e-6, parameters=())"
+    )]
+    fn linearise(
+        &self,
+        py: Python<'_>,
+        check: Given<'_>,
+        perturbation: Given<'_>,
+        parameters: Option<&Bound<'_, PyAny>>,
+    ) -> Result<Linearisation> {
+        let check = check.flag(false, Kind::Option, "check")?;
         let perturbation = perturbation.number(1e-6, Kind::Option, "perturbation")?;
+        let parameters = named_parameters(&self.model, parameters)?;
         let held = self.open()?;
         let inner = &*held;
-        let found = py.detach(|| inner.linearise(perturbation));
+        let perturbation = check.then_some(perturbation);
+        let found = py.detach(|| inner.linearise(&parameters, perturbation));
         let found = found?;
         Ok(Linearisation::new(&self.model, found))
+    }
+
+    /// Takes steps from given states under given commands, with the derivatives of each.
+    ///
+    /// The simulation does not change. Each step is taken as after `set_state`, without warm start,
+    /// so that it is a function of state, command and parameters, as in `linearise`. Torques
+    /// saturate at their limits. `rover_gym.derivatives` has products with these derivatives.
+    ///
+    /// Args:
+    ///     states: State (q, v) at the start of each trajectory, (n, nx) with nx = 2 nv.
+    ///     commands: Wheel torques (N m) and steering set-points (rad) of each step,
+    ///         (n, steps, nu) with nu = 2 n_wheels.
+    ///     parameters: Names of parameters, as in `linearise`; none by default.
+    ///     threads: Number of threads; one a core by default.
+    ///
+    /// Returns:
+    ///     States and derivatives.
+    ///
+    /// Raises:
+    ///     StateError: A state has a wrong shape or an entry that is not finite, or a pitch is 90
+    ///         degrees.
+    ///     CommandError: Commands have a wrong shape or an entry that is refused.
+    ///     OptionError: A parameter does not exist, `threads` is out of its range, or the variant
+    ///         is "newton".
+    ///     StepError: A step failed, or has no derivative.
+    #[pyo3(
+        signature = (states, commands, parameters = None, threads = None),
+        text_signature = "($self, states, commands, parameters=(), threads=None)"
+    )]
+    fn differentiate(
+        &self,
+        py: Python<'_>,
+        states: &Bound<'_, PyAny>,
+        commands: &Bound<'_, PyAny>,
+        parameters: Option<&Bound<'_, PyAny>>,
+        threads: Option<&Bound<'_, PyAny>>,
+    ) -> Result<StepDerivatives> {
+        let (nx, nu) = (2 * self.model.nv(), 2 * self.model.wheels().len());
+        let (states, shape) = shaped(states, Kind::State, ("states", "(n, nx)"), |s| {
+            s.len() == 2 && s[1] == nx
+        })?;
+        let n = shape[0];
+        let (commands, shape) = shaped(
+            commands,
+            Kind::Command,
+            ("commands", "(n, steps, nu)"),
+            |s| s.len() == 3 && s[0] == n && s[2] == nu,
+        )?;
+        let parameters = named_parameters(&self.model, parameters)?;
+        let threads = threads.map(|given| at_least_one(given, Kind::Option, "threads"));
+        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+        let threads = threads.transpose()?.unwrap_or_else(cores);
+        let (held, mut watch) = (self.open()?, Watch::new());
+        let inner = &*held;
+        let batch = TrajectoryBatch {
+            states: &states,
+            commands: &commands,
+            steps: shape[1],
+            parameters: &parameters,
+        };
+        let found = py.detach(|| batch.take(inner, threads, &mut || watch.go_on()));
+        let found = watch.result(found.map_err(of_trajectory))?;
+        let sizes = [nx, nu, parameters.len()];
+        Ok(StepDerivatives::new(&found, shape[1], sizes))
     }
 
     /// Measures the computing time of each part of a step, on a copy of this simulation.

@@ -12,7 +12,7 @@ use crate::arguments::count;
 use crate::arrays::{Array, fresh, fresh_matrix};
 use crate::errors::{Kind, Result};
 use crate::report::{Energy, StepReport};
-use crate::shared::{Shared, Watch};
+use crate::shared::{Open, Shared, Watch};
 use crate::snapshot::{KeptScene, Snapshot, other_kind, snapshot};
 
 /// Base class of all simulations. It cannot be instantiated.
@@ -87,8 +87,7 @@ impl AnySimulation {
 
 #[pymethods]
 impl AnySimulation {
-    /// Time since the last call of `set_state`, s. For a rover among grains, the time of the
-    /// grains.
+    /// Time since the last call of `set_state`, s; among grains, the time of the grains.
     #[getter]
     pub fn time(&self) -> Result<f64> {
         self.0.time()

@@ -97,7 +97,7 @@ impl TriangleMesh {
         fresh_rows(self.inner.triangles().iter().copied())
     }
 
-    /// Whether the mesh is closed: no triangle has a free edge.
+    /// Whether the mesh is closed, so that no triangle has a free edge.
     #[getter]
     fn is_closed(&self) -> bool {
         self.inner.is_closed()

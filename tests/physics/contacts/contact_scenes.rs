@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rover_core::contact::{Activation, Contact, PairSearch, detect_pairs};
 use rover_core::geometry::Plane;
-use rover_core::integrator::{StepOptions, Variant};
+use rover_core::integrator::Variant;
 use rover_core::multibody::{Configuration, Kinematics, Model, ModelDescription};
 use rover_core::simulation::RoverSimulation;
 
@@ -103,10 +103,7 @@ pub fn at_rest(model: Model, height: f64, joints: &[f64], variant: Variant) -> R
     let mut start = Configuration::zero(&model);
     start.position.y = height;
     start.joints.copy_from_slice(joints);
-    let options = StepOptions {
-        variant,
-        ..StepOptions::default()
-    };
+    let options = crate::stepping(variant, 0.005);
     let v = vec![0.0; model.nv()];
     let model = Arc::new(model);
     let mut simulation = RoverSimulation::new(model, Arc::new(Plane::ground()), options).unwrap();

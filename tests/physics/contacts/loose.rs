@@ -168,10 +168,7 @@ fn a_stack_of_blocks_stands() {
             ],
         );
         let v = vec![0.0; 18];
-        let options = StepOptions {
-            variant,
-            ..StepOptions::default()
-        };
+        let options = crate::stepping(variant, 0.005);
         let mut simulation = run(model, Arc::new(Plane::ground()), q, v, options);
         simulation.step(400).unwrap();
         let state = simulation.state();
@@ -267,10 +264,7 @@ fn two_rovers_drive_into_each_other_and_neither_passes() {
         );
         let mut v = vec![0.0; model.nv()];
         (v[0], v[21]) = (1.0, -1.0);
-        let options = StepOptions {
-            variant,
-            ..StepOptions::default()
-        };
+        let options = crate::stepping(variant, 0.005);
         let mut simulation = run(model, Arc::new(Plane::ground()), q, v, options);
         let mut before = simulation.energy();
         let mut met = 0;

@@ -2,11 +2,10 @@
 
 use rover_core::integrator::Variant;
 use rover_core::multibody::{
-    Configuration, CouplingDescription, JointKind, Kinematics, Model, ModelError, SolidDescription,
-    Spring,
+    Configuration, CouplingDescription, JointKind, Kinematics, SolidDescription, Spring,
 };
 
-use super::machines::{energy, machine, model, options, simulation, solid};
+use super::machines::{energy, model, options, simulation, solid};
 
 fn follows(joint: &str, ratio: f64, offset: f64) -> CouplingDescription {
     CouplingDescription {
@@ -110,43 +109,4 @@ fn a_telescope_is_one_mass() {
         "{found} {}",
         force / mass
     );
-}
-
-#[test]
-fn couplings_that_no_tree_has_are_refused() {
-    let chain = || {
-        vec![
-            solid("body", None, JointKind::Fixed),
-            solid("a", Some("body"), JointKind::Revolute),
-            solid("b", Some("a"), JointKind::Revolute),
-            solid("c", Some("body"), JointKind::Revolute),
-        ]
-    };
-    let refused = |solids| Model::from_description(machine(solids)).unwrap_err();
-    // On another branch, further from the root.
-    let mut solids = chain();
-    solids[3].coupled = Some(follows("b", 1.0, 0.0));
-    let error = refused(solids);
-    assert_eq!(error.field(), "solids[3].coupled.joint", "{error}");
-    assert!(matches!(error, ModelError::CoupledApart { .. }));
-    // A coupled joint cannot lead another.
-    let mut solids = chain();
-    solids[2].coupled = Some(follows("a", 1.0, 0.0));
-    solids.push(solid("d", Some("b"), JointKind::Revolute));
-    solids[4].coupled = Some(follows("b", 1.0, 0.0));
-    assert_eq!(refused(solids).field(), "solids[4].coupled.joint");
-    // A locked joint, an unknown joint, and a joint without a single coordinate.
-    let mut solids = chain();
-    solids[3].coupled = Some(follows("a", 1.0, 0.0));
-    let model = Model::from_description(machine(solids.clone())).unwrap();
-    let error = model.with_locked_joints(&[("a".into(), 0.1)]).unwrap_err();
-    assert_eq!(error.field(), "solids[3].coupled.joint");
-    for (leader, ratio, field) in [
-        ("nothing", 1.0, "solids[3].coupled.joint"),
-        ("body", 1.0, "solids[3].coupled.joint"),
-        ("a", f64::NAN, "solids[3].coupled.ratio"),
-    ] {
-        solids[3].coupled = Some(follows(leader, ratio, 0.0));
-        assert_eq!(refused(solids.clone()).field(), field);
-    }
 }

@@ -1,11 +1,9 @@
 //! Drives of joints other than wheels'.
 
 use rover_core::integrator::Variant;
-use rover_core::multibody::{
-    DriveDescription, JointKind, Model, ModelDescription, Motor, SolidDescription, WheelDescription,
-};
+use rover_core::multibody::{DriveDescription, JointKind, Motor, SolidDescription};
 
-use super::machines::{machine, model, options, simulation, solid};
+use super::machines::{model, options, simulation, solid};
 
 /// About y, so that gravity exerts no torque.
 const INERTIA: f64 = 0.25 * 0.1 * 0.1;
@@ -66,62 +64,4 @@ fn a_joint_runs_up_along_its_motors_line() {
         let snapshot = run.snapshot();
         run.restore(&snapshot).unwrap();
     }
-}
-
-#[test]
-fn drives_survive_both_formats_and_bad_ones_are_refused_by_field() {
-    let sound = machine(vec![
-        turret(Some(MOTOR)),
-        solid("slide", Some("turret"), JointKind::Prismatic),
-    ]);
-    let toml = ModelDescription::from_toml(&sound.to_toml().unwrap()).unwrap();
-    let json = ModelDescription::from_json(&sound.to_json().unwrap()).unwrap();
-    assert_eq!((&toml, &json), (&sound, &sound));
-    let refused = |spoil: fn(&mut ModelDescription), field: &str| {
-        let mut description = sound.clone();
-        spoil(&mut description);
-        let error = Model::from_description(description).unwrap_err();
-        assert_eq!(error.field(), field, "{error}");
-    };
-    let negative = |d: &mut ModelDescription| {
-        d.solids[0].drive = Some(DriveDescription {
-            torque_limit: -1.0,
-            motor: None,
-        });
-    };
-    refused(negative, "solids[0].drive.torque_limit");
-    let no_motor = |d: &mut ModelDescription| {
-        d.solids[0].drive = Some(DriveDescription {
-            torque_limit: 1.0,
-            motor: Some(Motor {
-                stall_torque: 0.0,
-                ..MOTOR
-            }),
-        });
-    };
-    refused(no_motor, "solids[0].drive.motor.stall_torque");
-    let of_a_slide = |d: &mut ModelDescription| d.solids[1].drive = d.solids[0].drive;
-    refused(of_a_slide, "solids[1].drive");
-    let of_a_wheel = |d: &mut ModelDescription| {
-        d.wheels.push(WheelDescription {
-            name: "W".into(),
-            solid: "turret".into(),
-            axle: [0.0, 1.0, 0.0],
-            radius: 0.1,
-            contact_radius: None,
-            width: None,
-            rounding: None,
-            grouser_height: None,
-            grousers: None,
-            stiffness: None,
-            damping: None,
-            material: None,
-            torque_limit: 1.0,
-            drive_sign: 1.0,
-            motor: None,
-            steering: None,
-            steering_limit: None,
-        });
-    };
-    refused(of_a_wheel, "solids[0].drive");
 }

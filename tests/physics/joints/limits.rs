@@ -7,12 +7,11 @@ use rover_core::contact::{ContactKey, Side};
 use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::{
-    Configuration, CouplingDescription, JointKind, Limits, Model, ModelDescription, Shape,
-    SolidDescription,
+    Configuration, JointKind, Limits, ModelDescription, Shape, SolidDescription,
 };
 use rover_core::simulation::RoverSimulation;
 
-use super::machines::{energy, machine, model, options, simulation, solid};
+use super::machines::{energy, model, options, simulation, solid};
 
 const VARIANTS: [Variant; 2] = [Variant::Linearised, Variant::Newton];
 const G: f64 = 9.81;
@@ -307,33 +306,4 @@ fn limits_survive_both_formats_and_a_lock() {
     assert_eq!(free.limited_joints(), [0]);
     let locked = free.with_locked_joints(&[("bob".into(), 0.1)]).unwrap();
     assert!(locked.limited_joints().is_empty());
-}
-
-#[test]
-fn bad_limits_are_refused_by_field() {
-    let sound = vec![
-        solid("body", None, JointKind::Free),
-        solid("arm", Some("body"), JointKind::Revolute),
-        solid("ball", Some("arm"), JointKind::Spherical),
-        solid("tool", Some("arm"), JointKind::Fixed),
-        solid("other", Some("body"), JointKind::Revolute),
-    ];
-    let refused = |solid: usize, lower, upper, field: &str| {
-        let mut solids = sound.clone();
-        solids[4].coupled = Some(CouplingDescription {
-            joint: "arm".into(),
-            ratio: 1.0,
-            offset: 0.0,
-        });
-        solids[solid].limits = Some(Limits { lower, upper });
-        let error = Model::from_description(machine(solids)).unwrap_err();
-        assert_eq!(error.field(), format!("solids[{solid}].{field}"), "{error}");
-    };
-    refused(1, 0.5, 0.5, "limits.lower");
-    refused(1, 0.5, -0.5, "limits.lower");
-    refused(1, f64::NAN, 0.5, "limits.lower");
-    refused(1, -0.5, f64::INFINITY, "limits.upper");
-    for solid in [0, 2, 3, 4] {
-        refused(solid, -0.5, 0.5, "limits");
-    }
 }

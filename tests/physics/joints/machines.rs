@@ -47,11 +47,7 @@ fn nothing() -> Arc<dyn Terrain> {
 }
 
 pub fn options(time_step: f64, variant: Variant) -> StepOptions {
-    StepOptions {
-        time_step,
-        variant,
-        ..StepOptions::default()
-    }
+    crate::stepping(variant, time_step)
 }
 
 pub fn simulation(model: Model, options: StepOptions) -> RoverSimulation {

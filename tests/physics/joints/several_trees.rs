@@ -6,11 +6,11 @@ use std::sync::Arc;
 use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::{
-    Configuration, JointKind, Model, ModelDescription, ModelError, SolidDescription, coordinates,
+    Configuration, JointKind, Model, ModelDescription, SolidDescription, coordinates,
 };
 use rover_core::simulation::RoverSimulation;
 
-use super::machines::{machine, menagerie, model, options, simulation, solid, somewhere};
+use super::machines::{menagerie, model, options, simulation, solid, somewhere};
 use crate::spheres::sphere_scenes::Random;
 
 /// The solids of a description under other names.
@@ -110,18 +110,6 @@ fn a_stone_lies_beside_a_rover() {
         .filter(|a| a.contact.body == 16)
         .count();
     assert_eq!(on_stone, 4);
-}
-
-#[test]
-fn trees_are_listed_one_after_the_other() {
-    let solids = vec![
-        solid("a", None, JointKind::Free),
-        solid("b", None, JointKind::Free),
-        solid("c", Some("a"), JointKind::Revolute),
-    ];
-    let error = Model::from_description(machine(solids)).unwrap_err();
-    assert_eq!(error.field(), "solids[2].parent");
-    assert!(matches!(error, ModelError::OtherTree { .. }), "{error}");
 }
 
 #[test]

@@ -5,11 +5,9 @@ use std::sync::Arc;
 use rover_core::integrator::{Stabilisation, StepOptions};
 use rover_core::nalgebra::{Vector2, Vector3};
 use rover_core::planar::{Line, PlanarWheel, TwoWheelRover};
-use rover_core::simulation::{SoilSetupError, SoilSimulation, soil_options};
+use rover_core::simulation::{SoilSimulation, soil_options};
 use rover_core::solver::Method;
-use rover_core::system::grains::{
-    GrainError, GrainFriction, GrainScene, Grains, Packing, SleepOptions, Wall,
-};
+use rover_core::system::grains::{GrainFriction, GrainScene, Grains, Packing, SleepOptions, Wall};
 
 fn box_of(width: f64) -> Vec<Wall<2>> {
     vec![Wall::floor(0.0), Wall::left(0.0), Wall::right(width)]
@@ -56,25 +54,6 @@ fn shake(soil: &mut SoilSimulation, speed: f64) {
         .collect();
     let q = soil.q().clone();
     soil.set_state(&q, &v).expect("a state");
-}
-
-#[test]
-fn equal_seeds_give_equal_packings_and_none_overlaps() {
-    for seed in 0..4 {
-        let packing = packing(300, 20, seed);
-        let (disks, q) = packing.build().expect("a packing");
-        assert_eq!(packing.build().expect("a packing").1, q);
-        let r = disks.radius();
-        for i in 0..300 {
-            for j in 0..i {
-                let apart = (q[3 * i] - q[3 * j]).hypot(q[3 * i + 1] - q[3 * j + 1]);
-                assert!(apart >= r[i] + r[j], "{i} {j}");
-            }
-            assert!(
-                q[3 * i] >= r[i] && q[3 * i] + r[i] <= packing.sides[0] && q[3 * i + 1] >= r[i]
-            );
-        }
-    }
 }
 
 #[test]
@@ -210,40 +189,6 @@ fn a_disk_falls_and_rests_within_a_rounding_of_the_floor() {
     soil.step(6).expect("finite");
     assert!(soil.v()[1].abs() < 1e-12);
     assert!((soil.q()[1] - 0.12).abs() < 1e-12, "{}", soil.q()[1]);
-}
-
-#[test]
-fn a_disk_on_a_slope_rolls_below_and_slides_above_three_times_the_friction() {
-    // Solid disk on a slope α: rolls with 2/3 g sin α iff tan α ≤ 3 μ, else
-    // slides with g (sin α − μ cos α).
-    for (mu, slope) in [(0.3, 0.5_f64), (0.1, 0.5)] {
-        let disks = Grains::new(vec![0.02], vec![0.5]).expect("a disk");
-        let options = soil_options(&disks);
-        let alpha = slope.atan();
-        let scene = GrainScene {
-            grains: disks,
-            walls: vec![],
-            ground: Some(Arc::new(Line::new(-slope, 0.0).expect("a line"))),
-            machine: None,
-            friction: GrainFriction {
-                walls: mu,
-                ..GrainFriction::default()
-            },
-        };
-        let q = vec![0.02 * alpha.sin(), 0.02 * alpha.cos(), 0.0];
-        let mut soil = SoilSimulation::new(Arc::new(scene), options, None, q).expect("a soil");
-        soil.step(500).expect("finite");
-        let speed = soil.v()[0].hypot(soil.v()[1]);
-        let expected = if slope <= 3.0 * mu {
-            2.0 / 3.0 * alpha.sin()
-        } else {
-            alpha.sin() - mu * alpha.cos()
-        };
-        assert!(
-            (speed - 0.5 * 9.81 * expected).abs() < 1e-3 * speed,
-            "{mu}: {speed}"
-        );
-    }
 }
 
 #[test]
@@ -460,48 +405,4 @@ fn the_rover_drives_over_the_original_soil() {
     soil.restore(&snapshot).expect("its own");
     soil.step(500).expect("finite");
     assert_eq!(*soil.q(), end, "a snapshot continues bit for bit");
-}
-
-#[test]
-fn what_cannot_be_is_refused() {
-    let made = |radius: &[f64], mass: &[f64]| Grains::new(radius.to_vec(), mass.to_vec());
-    assert_eq!(made(&[], &[]), Err(GrainError::Empty));
-    assert_eq!(
-        made(&[1.0, -1.0], &[1.0, 1.0])
-            .expect_err("negative")
-            .field(),
-        "radius[1]"
-    );
-    assert_eq!(
-        made(&[1.0], &[f64::NAN]).expect_err("NaN").field(),
-        "mass[0]"
-    );
-    assert_eq!(
-        made(&[1.0], &[1.0, 2.0]).expect_err("length").field(),
-        "mass"
-    );
-    let scene = Arc::new(GrainScene {
-        grains: made(&[0.1, 0.1], &[1.0, 1.0]).expect("disks"),
-        walls: vec![Wall::floor(0.0)],
-        ground: None,
-        machine: None,
-        friction: GrainFriction::default(),
-    });
-    let build = |q: &[f64]| {
-        SoilSimulation::new(scene.clone(), soil_options(&scene.grains), None, q.to_vec())
-    };
-    for (q, field) in [
-        ([0.0, 0.1, 0.0, 0.15, 0.1, 0.0], "position[1]"),
-        ([0.0, 0.05, 0.0, 0.5, 0.1, 0.0], "position[0]"),
-        ([0.0, 0.1, 0.0, f64::INFINITY, 0.1, 0.0], "position[1]"),
-    ] {
-        match build(&q) {
-            Err(SoilSetupError::Soil(error)) => assert_eq!(error.field(), field, "{error}"),
-            other => panic!("{field}: {other:?}"),
-        }
-    }
-    let mut soil = build(&[0.0, 0.1, 0.0, 0.5, 0.1, 0.0]).expect("a soil");
-    assert!(soil.set_state(&[0.0; 6], &[0.0; 6]).is_err());
-    assert!((soil.q()[3] - 0.5).abs() < 1e-15, "nothing has changed");
-    assert_eq!(soil.set_pull([1.0, 0.0]), Err(GrainError::NoMachine));
 }

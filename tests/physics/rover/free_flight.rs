@@ -24,13 +24,7 @@ fn tumbling(variant: Variant, time_step: f64, gravity: Vector3<f64>) -> RoverSim
         *rate = 1.5 * (k as f64).sin();
     }
     let mut simulation = simulation(Model::rover(), Plane::ground(), options, &q, &v);
-    let joints: Vec<String> = simulation
-        .model()
-        .bodies()
-        .iter()
-        .skip(1)
-        .map(|b| b.name.clone())
-        .collect();
+    let joints = crate::joints(&simulation);
     simulation.release(&joints).unwrap();
     simulation
 }

@@ -4,8 +4,6 @@ use nalgebra::Vector3;
 use rover_core::geometry::Plane;
 use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Model, ModelDescription};
-use rover_core::problem::{Dimension, FrictionContactProblem};
-use rover_core::solver::{SolverOptions, SolverWorkspace, solve};
 
 use super::scenes::{VARIANTS, at_rest, on_slope, simulation};
 
@@ -18,10 +16,7 @@ const SIDE: f64 = 9.81 * (600.0 * 62.0 / 204.0 + 120.0) / 2.0;
 fn loads_on_the_flat_are_the_closed_form() {
     assert!((FRONT - 1742.718).abs() < 1e-3 && (SIDE - 1483.041).abs() < 1e-3);
     for variant in VARIANTS {
-        let mut simulation = at_rest(StepOptions {
-            variant,
-            ..StepOptions::default()
-        });
+        let mut simulation = at_rest(crate::stepping(variant, 0.005));
         simulation.brake();
         for steps in [1, 1, 2000] {
             assert!(simulation.step(steps).unwrap().is_converged());
@@ -80,60 +75,6 @@ fn loads_of_a_step_in_parts_add_up_to_the_weight() {
             }
         }
     }
-}
-
-#[test]
-fn loads_do_not_depend_on_the_order_of_the_contacts() {
-    // W has rank 14 of 18 here: the motion does not determine the lateral forces of the wheels
-    // against each other.
-    let mut simulation = at_rest(StepOptions::default());
-    simulation.step(1).unwrap();
-    let (W, q, mu) = simulation.last_problem();
-    let mut order = [0_usize, 1, 2, 3, 4, 5];
-    let mut workspace = SolverWorkspace::default();
-    let mut count = 0;
-    // All permutations by Heap's method, written as a counter array.
-    let mut counters = [0_usize; 6];
-    let mut i = 0;
-    loop {
-        let index = |row: usize| 3 * order[row / 3] + row % 3;
-        let W_permuted: Vec<f64> = (0..18)
-            .flat_map(|r| (0..18).map(move |c| (r, c)))
-            .map(|(r, c)| W[18 * index(r) + index(c)])
-            .collect();
-        let q_permuted: Vec<f64> = (0..18).map(|r| q[index(r)]).collect();
-        let (mut p, mut u) = ([0.0; 18], [0.0; 18]);
-        let problem =
-            FrictionContactProblem::new(Dimension::Three, &W_permuted, &q_permuted, mu).unwrap();
-        let report = solve(
-            &problem,
-            &SolverOptions::default(),
-            &mut p,
-            &mut u,
-            &mut workspace,
-        );
-        assert!(report.is_converged());
-        for (place, &contact) in order.iter().enumerate() {
-            let load = p[3 * place] / 0.005;
-            let expected = if contact < 2 { FRONT } else { SIDE };
-            assert!(
-                (load - expected).abs() < 1e-6 * expected,
-                "{order:?}: contact {contact} carries {load}"
-            );
-        }
-        count += 1;
-        while i < 6 && counters[i] >= i {
-            counters[i] = 0;
-            i += 1;
-        }
-        if i == 6 {
-            break;
-        }
-        order.swap(if i % 2 == 0 { 0 } else { counters[i] }, i);
-        counters[i] += 1;
-        i = 0;
-    }
-    assert_eq!(count, 720);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
-use rover_core::multibody::{Model, ModelDescription, ModelError, TagDescription};
+use rover_core::multibody::{Model, ModelDescription};
 
 use super::scenes::simulation;
 
@@ -115,92 +115,4 @@ fn a_free_top_precesses_as_the_closed_form_says() {
         .attitude
         .angle_to(&(about_L * about_axis));
     assert!(error < 1e-5, "{error} rad");
-}
-
-fn tag(name: &str, solid: &str, x: f64) -> TagDescription {
-    TagDescription {
-        name: name.into(),
-        solid: solid.into(),
-        position: [x, 0.0, 0.0],
-    }
-}
-
-/// Invalid descriptions, and the field that each error must name.
-#[test]
-fn bad_descriptions_are_refused_by_field() {
-    type Spoil = fn(&mut ModelDescription);
-    let cases: [(&str, Spoil); 24] = [
-        ("tags[0].solid", |d| {
-            d.tags = vec![tag("point", "nothing", 0.0)];
-        }),
-        ("tags[1].name", |d| {
-            d.tags = vec![tag("point", "frame", 0.0), tag("front", "frame", 0.0)];
-        }),
-        ("solids", |d| d.solids.clear()),
-        ("solids[0].mass", |d| d.solids[0].mass = -1.0),
-        ("solids[1].mass", |d| d.solids[1].mass = 0.0),
-        ("solids[1].mass", |d| d.solids[1].mass = f64::NAN),
-        ("solids[1].parent", |d| d.solids[1].parent = None),
-        ("solids[1].parent", |d| {
-            d.solids[1].parent = Some("rear_left".into());
-        }),
-        ("solids[0].parent", |d| {
-            d.solids[0].parent = Some("front".into());
-        }),
-        ("solids[0].axis", |d| {
-            d.solids[0].axis = Some([1.0, 0.0, 0.0]);
-        }),
-        ("solids[2].name", |d| d.solids[2].name = "front".into()),
-        ("solids[1].axis", |d| d.solids[1].axis = Some([0.0; 3])),
-        ("solids[1].axis", |d| d.solids[1].axis = None),
-        ("solids[1].position", |d| {
-            d.solids[1].position = Some([f64::INFINITY, 0.0, 0.0]);
-        }),
-        ("solids[1].position", |d| d.solids[1].position = None),
-        ("solids[1].shape.radius", |d| {
-            d.solids[1].shape = Some(rover_core::multibody::Shape::Disc { radius: -0.1 });
-        }),
-        ("solids[1].inertia", |d| {
-            d.solids[1].inertia = Some([1.0, 1.0, 3.0, 0.0, 0.0, 0.0]);
-        }),
-        ("solids[1].inertia", |d| {
-            d.solids[1].inertia = Some([1.0, 1.0, 1.0, 5.0, 0.0, 0.0]);
-        }),
-        ("solids[1].collides", |d| d.solids[1].collides = true),
-        ("solids[1].hold.stiffness", |d| {
-            d.solids[1].hold = Some(rover_core::multibody::Hold {
-                stiffness: -1.0,
-                damping: 0.0,
-            });
-        }),
-        ("wheels[0].solid", |d| d.wheels[0].solid = "nothing".into()),
-        ("wheels[1].radius", |d| d.wheels[1].radius = 0.0),
-        ("wheels[1].drive_sign", |d| d.wheels[1].drive_sign = 0.5),
-        ("wheels[1].steering", |d| {
-            d.wheels[1].steering = Some("front".into());
-            d.wheels[1].steering_limit = Some(0.5);
-        }),
-    ];
-    for (field, spoil) in cases {
-        let mut description = cart();
-        spoil(&mut description);
-        let error = Model::from_description(description).unwrap_err();
-        assert_eq!(error.field(), field, "{error}");
-        assert!(error.to_string().contains(field), "{error}");
-    }
-    let unknown = Model::rover()
-        .with_locked_joints(&[("wheel_XX".into(), 0.0)])
-        .unwrap_err();
-    assert_eq!(
-        unknown,
-        ModelError::UnknownName {
-            field: "joints[0]".into(),
-            name: "wheel_XX".into()
-        }
-    );
-    assert!(
-        Model::rover()
-            .with_locked_joints(&[("wheel_FL".into(), f64::NAN)])
-            .is_err()
-    );
 }

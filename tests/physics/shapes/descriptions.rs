@@ -1,31 +1,13 @@
 //! Descriptions of shapes: round trips, models, and errors that name the field.
 
-use rover_core::multibody::{
-    MAX_SHAPES, Model, ModelDescription, ModelError, Shape, ShapeDescription,
-};
+use rover_core::multibody::{Model, ModelDescription, ModelError, Shape, ShapeDescription};
 use rover_core::nalgebra::{Rotation3, Vector3};
 
-use super::machines::{body, described};
+use super::machines::body;
 
 const TWO: &str = "shapes = [
     { kind = 'box', size = [0.5, 0.2, 0.3], position = [0.1, 0.0, 0.0], rotation = [0.3, 0.1, -0.2], collides = true },
     { kind = 'sphere', radius = 0.1, mass = 0.5, visible = false, collides = true }]";
-
-#[test]
-fn shapes_survive_both_formats() {
-    let model = body(3.0, TWO);
-    let description = model.description();
-    let toml = ModelDescription::from_toml(&description.to_toml().unwrap()).unwrap();
-    let json = ModelDescription::from_json(&description.to_json().unwrap()).unwrap();
-    assert_eq!(&toml, description);
-    assert_eq!(&json, description);
-    let again = Model::from_description(toml).unwrap();
-    assert_eq!(again.fingerprint(), model.fingerprint());
-    let [cuboid, ball] = &description.solids[0].shapes[..] else {
-        panic!("two shapes");
-    };
-    assert!(cuboid.visible && !ball.visible);
-}
 
 #[test]
 fn a_single_shape_is_written_as_before() {
@@ -127,84 +109,4 @@ fn of_several_shapes_the_wheels_disc_takes_another_radius() {
     let tilted = Model::from_description(without).unwrap();
     let refused = tilted.with_wheel_radius(0.4).unwrap_err();
     assert!(matches!(refused, ModelError::NotADisc { .. }), "{refused}");
-}
-
-/// Every invalid combination of shapes, and the field that the error must name.
-#[test]
-fn bad_shapes_are_refused_by_field() {
-    type Spoil = fn(&mut ModelDescription);
-    fn shape(d: &mut ModelDescription, k: usize) -> &mut ShapeDescription {
-        &mut d.solids[0].shapes[k]
-    }
-    let cases: [(&str, Spoil); 18] = [
-        ("solids[0].shape", |d| {
-            d.solids[0].shape = Some(Shape::Sphere { radius: 1.0 });
-        }),
-        ("solids[0].shape", |d| d.solids[0].shapes.clear()),
-        ("solids[0].collides", |d| d.solids[0].collides = true),
-        ("solids[0].collides", |d| {
-            d.solids[0].shapes.clear();
-            d.solids[0].inertia = Some([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
-            d.solids[0].collides = true;
-        }),
-        ("solids[0].shapes[1].radius", |d| {
-            shape(d, 1).shape = Shape::Sphere { radius: -0.1 };
-        }),
-        ("solids[0].shapes[0].size", |d| {
-            shape(d, 0).shape = Shape::Box {
-                size: [1.0, 0.0, 1.0],
-            };
-        }),
-        ("solids[0].shapes[1].height", |d| {
-            shape(d, 1).shape = Shape::Cylinder {
-                radius: 1.0,
-                height: f64::NAN,
-            };
-        }),
-        ("solids[0].shapes[1].position", |d| {
-            shape(d, 1).position = Some([0.0, 1e7, 0.0]);
-        }),
-        ("solids[0].shapes[0].rotation", |d| {
-            shape(d, 0).rotation = Some([0.0, f64::INFINITY, 0.0]);
-        }),
-        ("solids[0].shapes[1].mass", |d| {
-            shape(d, 1).mass = Some(0.0);
-        }),
-        ("solids[0].shapes[1].collides", |d| {
-            shape(d, 1).shape = Shape::Disc { radius: 0.1 };
-        }),
-        ("solids[0].shapes[0].collides", |d| {
-            shape(d, 0).shape = Shape::Cylinder {
-                radius: 0.1,
-                height: 0.1,
-            };
-        }),
-        ("solids[0].mass", |d| shape(d, 1).mass = Some(3.0)),
-        ("solids[0].mass", |d| shape(d, 0).mass = Some(2.0)),
-        ("solids[0].shapes[1].mass", |d| {
-            *shape(d, 1) = ShapeDescription {
-                shape: Shape::Disc { radius: 0.1 },
-                mass: None,
-                collides: false,
-                ..shape(d, 1).clone()
-            };
-        }),
-        ("solids[0].inertia", |d| {
-            d.solids[0].centre_of_mass = Some([0.0; 3]);
-        }),
-        ("solids[0].centre_of_mass", |d| {
-            d.solids[0].inertia = Some([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
-        }),
-        ("solids", |d| {
-            let one = d.solids[0].shapes[0].clone();
-            d.solids[0].shapes = vec![one; MAX_SHAPES + 1];
-        }),
-    ];
-    for (field, spoil) in cases {
-        let mut description = described(3.0, TWO);
-        spoil(&mut description);
-        let error = Model::from_description(description).unwrap_err();
-        assert_eq!(error.field(), field, "{error}");
-        assert!(error.to_string().contains(field), "{error}");
-    }
 }

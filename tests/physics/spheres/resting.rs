@@ -40,10 +40,7 @@ fn normal_forces(simulation: &RoverSimulation) -> Vec<(u32, f64)> {
 #[test]
 fn on_the_crest_of_one_sphere_it_carries_its_weight() {
     for variant in VARIANTS {
-        let options = StepOptions {
-            variant,
-            ..StepOptions::default()
-        };
+        let options = crate::stepping(variant, 0.005);
         let sphere = field(&[[0.0, 0.0, 0.0, 0.5]]);
         let start = Vector3::new(0.0, 0.5 + R, 0.0);
         let mut wheel = placed(lone_wheel(), sphere, options, start);
@@ -98,10 +95,7 @@ fn lying_on_three_spheres_each_carries_a_third() {
     // proportion to 1 : 1/√2 : 1/√2 of the distances.
     for variant in VARIANTS {
         for directions in [[0.0, 120.0, 240.0], [0.0, 135.0, 225.0]] {
-            let options = StepOptions {
-                variant,
-                ..StepOptions::default()
-            };
+            let options = crate::stepping(variant, 0.005);
             let places: Vec<Vector3<f64>> = directions
                 .iter()
                 .map(|d: &f64| {

@@ -169,32 +169,3 @@ fn unions_number_their_pieces_and_take_one_plane() {
     );
     assert_eq!(Union::new(vec![]).unwrap_err().field(), "parts");
 }
-
-#[test]
-fn bad_meshes_are_refused() {
-    let corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0]];
-    let refuse = |triangles: &[[usize; 3]]| TriangleMesh::new(&corners, triangles).unwrap_err();
-    let cases = [
-        (refuse(&[]), "triangles: a mesh needs"),
-        (
-            refuse(&[[0, 1, 4]]),
-            "triangles[0]: refers to vertex 4, but there are only 4 vertices",
-        ),
-        (refuse(&[[0, 2, 1], [0, 1, 1]]), "triangles[1]: has no area"),
-        (
-            refuse(&[[0, 2, 1], [0, 2, 3]]),
-            "triangles[1]: its edge from vertex 0 to 2",
-        ),
-    ];
-    for (error, begin) in cases {
-        assert!(error.to_string().starts_with(begin), "{error}");
-        assert!(begin.starts_with(error.field()), "{error}");
-    }
-    let broken = TriangleMesh::new(&[[0.0, f64::NAN, 0.0]], &[[0, 0, 0]]).unwrap_err();
-    assert!(
-        broken
-            .to_string()
-            .starts_with("vertices[0]: must be finite"),
-        "{broken}"
-    );
-}

@@ -61,10 +61,7 @@ fn the_loads_of_a_resting_rover_do_not_jump_with_its_lean() {
 #[test]
 fn a_cylinder_stands_on_two_points_without_rocking() {
     for variant in VARIANTS {
-        let options = StepOptions {
-            variant,
-            ..StepOptions::default()
-        };
+        let options = crate::stepping(variant, 0.005);
         let start = Vector3::new(0.0, WHEEL_RADIUS, 0.0);
         let mut wheel = placed(lone(0.08, 0.01), Plane::ground(), options.clone(), start);
         for _ in 0..20 {

@@ -104,7 +104,7 @@ def plate_test(
     grains = ground(bed, **options)
     steps = step_count("depth", way / speed, grains.time_step)
     if steps < samples:
-        refuse(OptionError, "samples", samples, f"must be at most the {steps} steps of the way")
+        refuse(OptionError, "samples", samples, f"must be at most {steps}, the number of steps")
     mass = float(bed.mass.sum())  # any: the press is driven
     machine = describe_disc(bed, radius, max(way, largest), mass)
     rig = Rig(bed, machine, {"press": top}, tool_friction=friction, **options)
@@ -185,7 +185,7 @@ def shear_test(
     grains = ground(bed, **options)
     steps = step_count("displacement", displacement / speed, grains.time_step)
     if steps < samples:
-        refuse(OptionError, "samples", samples, f"must be at most the {steps} steps of the way")
+        refuse(OptionError, "samples", samples, f"must be at most {steps}, the number of steps")
     area = np.pi * radius**2
     load = sigma * area
     machine = describe_disc(bed, radius, surface, load / fall(grains), vanes=vanes, vane_height=0.5 * largest)

@@ -116,7 +116,7 @@ def wheel_test(
     """
     for i, slip in enumerate(slips):
         if number(f"slips[{i}]", slip, at_least=-1.0) >= 1.0:
-            refuse(OptionError, f"slips[{i}]", slip, "must be below 1: the wheel travels")
+            refuse(OptionError, f"slips[{i}]", slip, "must be below 1, because the wheel moves forward")
     angle = number("slip_angle", slip_angle, at_least=-0.5 * math.pi, at_most=0.5 * math.pi)
     load, speed = number("load", load, above=0.0), number("speed", speed, above=0.0)
     radius, width = larger_than_grains("radius", radius, bed), larger_than_grains("width", width, bed)

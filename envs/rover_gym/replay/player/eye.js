@@ -37,7 +37,7 @@ class Eye {
     const { reach } = this.view.scene;
     const poses = {
       orbit: this.home,
-      chase: { distance: 3.4 * reach, azimuth: 0, elevation: 0.42 },
+      chase: { distance: 3.7 * reach, azimuth: 0, elevation: 0.36 },
       top: { distance: 6 * reach + (this.view.scene.rover ? 0 : this.home.distance), azimuth: 0, elevation: 1.55 },
       wheel: { distance: 1.1 * reach, azimuth: 0, elevation: 0.14 },
       mast: { distance: 1, azimuth: 0, elevation: 0.24 },
@@ -80,7 +80,7 @@ class Eye {
   target() {
     const { view } = this;
     if (this.preset === "wheel") return view.frames[view.scene.wheels[this.wheel].frame].position.clone();
-    if (this.preset === "chase") return view.centre.clone().addScaledVector(new THREE.Vector3(0, 1, 0), 0.25 * view.scene.reach);
+    if (this.preset === "chase") return view.centre.clone().addScaledVector(new THREE.Vector3(0, 1, 0), 0.4 * view.scene.reach);
     return new THREE.Vector3(...this.first.target).add(view.centre);
   }
 

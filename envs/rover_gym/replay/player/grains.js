@@ -2,9 +2,9 @@
 // places at two frames lie in its memory as 16-bit numbers, and it goes from one to the other.
 "use strict";
 
-const glsl = (uniforms) => `precision highp float; precision highp int; precision highp sampler2DShadow;
+const HEAD_GLSL = `precision highp float; precision highp int; precision highp sampler2DShadow;
 uniform mat4 viewMatrix, projectionMatrix;
-${uniforms}`;
+`;
 
 // A colour in light, as three.js lights the meshes: place and normal in the world.
 const BALL_LIGHT = (software) => `
@@ -39,7 +39,7 @@ void main() {
   vec3 to = centre / d;
   vec3 across = normalize(cross(to, vec3(0.0, 1.0, 0.001)));
   vec3 up = cross(across, to);
-  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
+  vec2 corner = vec2(gl_VertexID & 1, (gl_VertexID >> 1) & 1) * 2.0 - 1.0;
   float half_edge = d > 1.001 * r ? (d - r) * r / sqrt(d * d - r * r) : 0.0;
   ray = to * (d - r) + half_edge * (corner.x * across + corner.y * up);
   sphere = vec4(centre, r);
@@ -55,6 +55,12 @@ void main() {
   if (ball.w > 0.5) colour = still * (0.85 + 0.3 * ball.y);
   gl_Position = projectionMatrix * vec4(ray, 1.0);
 }`;
+
+const CONSERVATIVE = `#extension GL_EXT_conservative_depth : enable
+#ifdef GL_EXT_conservative_depth
+layout(depth_greater) out highp float gl_FragDepth;
+#endif
+`;
 
 const BALL_FRAGMENT = `
 flat in vec4 sphere;
@@ -111,29 +117,36 @@ void main() {
   pixel.rgb *= exp(-0.11 * hidden);
 }`;
 
-const raw = (uniforms, vertex, fragment, options = {}) =>
+// Shaders of our own; `before` is what must stand before everything else.
+const raw = (uniforms, vertex, fragment, { before = "", ...options } = {}) =>
   new THREE.RawShaderMaterial({
-    glslVersion: THREE.GLSL3, vertexShader: glsl("") + vertex, fragmentShader: glsl("") + fragment,
+    glslVersion: THREE.GLSL3, vertexShader: HEAD_GLSL + vertex, fragmentShader: before + HEAD_GLSL + fragment,
     uniforms: Object.fromEntries(Object.entries(uniforms).map(([name, value]) => [name, { value }])), ...options,
   });
 
-// Squares in instances, whose places at two frames are levels of a channel.
+// Numbers of each item, once for each corner of its square.
+const fourfold = (data, width, target) => {
+  for (let i = 0, k = 0; i < data.length; i += width)
+    for (let corner = 0; corner < 4; corner++) for (let c = 0; c < width; c++) target[k++] = data[i + c];
+};
+
+// Squares whose places at two frames are levels of a channel. Without a graphics card, an instance costs as much as a
+// drawing of its own: every square has four corners of its own.
 class Squares {
   constructor(view, name, material, fixed) {
-    this.view = view;
     this.name = name;
     this.material = material;
-    const { channels } = view.scene;
-    const channel = channels.find((one) => one.name === name);
-    this.geometry = new THREE.InstancedBufferGeometry();
-    this.geometry.instanceCount = channel.count;
-    this.geometry.setIndex([0, 1, 2, 2, 1, 3]);
+    const channel = view.scene.channels.find((one) => one.name === name);
+    this.geometry = new THREE.BufferGeometry();
+    const corners = new Uint32Array(6 * channel.count);
+    for (let i = 0; i < channel.count; i++) corners.set([0, 1, 2, 2, 1, 3].map((k) => 4 * i + k), 6 * i);
+    this.geometry.setIndex(new THREE.BufferAttribute(corners, 1));
     this.slots = ["before", "after"].map(() => {
-      const slot = new THREE.InstancedBufferAttribute(blank(channel), channel.width, true);
+      const slot = new THREE.BufferAttribute(new Uint16Array(4 * channel.count * channel.width), channel.width, true);
       slot.setUsage(THREE.DynamicDrawUsage);
       return slot;
     });
-    for (const [key, data, width] of fixed) this.geometry.setAttribute(key, new THREE.InstancedBufferAttribute(data, width));
+    this.setFixed(...fixed);
     this.mesh = new THREE.Mesh(this.geometry, material);
     this.mesh.frustumCulled = false;
     view.world.add(this.mesh);
@@ -143,14 +156,22 @@ class Squares {
     uniforms.extent.value = new THREE.Vector3(...step).multiplyScalar(65535);
   }
 
+  // What does not change.
+  setFixed(key, data, width) {
+    const corners = new Float32Array(4 * data.length);
+    fourfold(data, width, corners);
+    this.geometry.setAttribute(key, new THREE.BufferAttribute(corners, width));
+  }
+
   // Gives the graphics card the frames that it has not got.
   show(before, after, share) {
     const wanted = [before[this.name].data, after[this.name].data];
-    const held = this.slots.map(({ array }) => array);
+    const held = this.slots.map(({ levels }) => levels);
     if (held[1] === wanted[0] || held[0] === wanted[1]) this.slots.reverse();
     this.slots.forEach((slot, i) => {
-      if (slot.array === wanted[i]) return;
-      slot.array = wanted[i];
+      if (slot.levels === wanted[i]) return;
+      slot.levels = wanted[i];
+      fourfold(wanted[i], slot.itemSize, slot.array);
       slot.needsUpdate = true;
     });
     ["before", "after"].forEach((key, i) => this.geometry.setAttribute(key, this.slots[i]));
@@ -168,18 +189,18 @@ class Balls {
     const material = raw(
       { low: null, extent: null, sand: colourOf(sand[0]), still: colourOf(sand[1]), share: 0, rate: 0, paint: 0,
         light: new THREE.Matrix4(), shadow: null },
-      BALL_VERTEX, light + BALL_FRAGMENT, { side: THREE.DoubleSide },
+      BALL_VERTEX, light + BALL_FRAGMENT, { side: THREE.DoubleSide, before: CONSERVATIVE },
     );
-    this.squares = new Squares(view, "balls", material, [["ball", this.fixed, 4]]);
+    this.squares = new Squares(view, "balls", material, ["ball", this.fixed, 4]);
+    view.renderer.getContext().getExtension("EXT_conservative_depth");
     this.squares.mesh.onBeforeRender = () => {
       const { shadow } = view.sun;
       material.uniforms.light.value.copy(shadow.map ? shadow.matrix : new THREE.Matrix4().makeTranslation(9, 9, 9));
       material.uniforms.shadow.value = shadow.map?.depthTexture ?? null;
       material.uniformsNeedUpdate = true;
     };
-    const [near, far] = [null, null];
     this.screen = new THREE.Scene();
-    this.shade = raw({ picture: near, depths: far, planes: new THREE.Vector2(), reach: new THREE.Vector2(), radius },
+    this.shade = raw({ picture: null, depths: null, planes: new THREE.Vector2(), reach: new THREE.Vector2(), radius },
       SCREEN_VERTEX, SCREEN_FRAGMENT, { depthTest: false, depthWrite: false });
     const triangle = new THREE.BufferGeometry();
     triangle.setIndex([0, 1, 2]);
@@ -210,7 +231,7 @@ class Balls {
       const height = (levels[3 * i + 1] - least) / Math.max(1, most - least);
       this.fixed.set([radii[i], (i * 0.6180339887) % 1, height, fixed[i]], 4 * i);
     }
-    this.squares.geometry.attributes.ball.needsUpdate = true;
+    this.squares.setFixed("ball", this.fixed, 4);
   }
 
   // The picture goes into a texture with depths, and then to the screen with shade in the gaps.
@@ -244,7 +265,7 @@ out vec2 at;
 flat out float turn;
 void main() {
   vec3 pose = low + extent * mix(before, after, share);
-  at = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
+  at = vec2(gl_VertexID & 1, (gl_VertexID >> 1) & 1) * 2.0 - 1.0;
   turn = pose.z;
   gl_Position = projectionMatrix * viewMatrix * vec4(pose.xy + size * at, 0.0, 1.0);
 }`;
@@ -268,6 +289,6 @@ class Disks extends Squares {
       { low: null, extent: null, share: 0, pale: colourOf(sand[0]), sand: colourOf(sand[1]) },
       DISK_VERTEX, DISK_FRAGMENT, { side: THREE.DoubleSide },
     );
-    super(view, "disks", material, [["size", arrays.radii, 1]]);
+    super(view, "disks", material, ["size", arrays.radii, 1]);
   }
 }

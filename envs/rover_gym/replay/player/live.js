@@ -79,6 +79,9 @@
       before = now && time > now.time ? now : frame;
       now = frame;
       mark(frame);
+      const { ruts } = stage.view;
+      for (let at = HEAD + sizeOf(stage.scene.channels); ruts && at < message.byteLength; at += 8)
+        ruts.press(head.getUint32(at, true), head.getUint32(at + 4, true));
     }
   };
   // Adds the feet of the wheels that bear something to their marks.

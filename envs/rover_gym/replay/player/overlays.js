@@ -156,12 +156,12 @@ class Overlays {
   // The names of what may be switched here, each with its key.
   offers() {
     return [["marks", "m", this.bands], ["trails", "v", this.bands], ["forces", "f", this.arrows], ["loads", "l", this.arrows],
-      ["spheres", "k", this.view.rocks.length]].filter(([, , there]) => there).map(([name, key]) => [name, key]);
+      ["spheres", "k", this.view.rocks.children.length]].filter(([, , there]) => there).map(([name, key]) => [name, key]);
   }
 
   show({ before, after, share, k }) {
     const { on, scene } = this.view;
-    this.bands?.draw(this.live ? Infinity : k + 1, on.has("trails"), on.has("trails") || on.has("marks"), scene.wheels);
+    this.bands?.draw(this.live ? Infinity : k + 1, on.has("trails"), on.has("trails") || (on.has("marks") && !scene.ruts), scene.wheels);
     this.chains?.show(before.chains);
     if (!this.arrows) return;
     const value = (i, c) => before.forces.value(i, c, after.forces, share);
@@ -169,13 +169,19 @@ class Overlays {
       foot: new THREE.Vector3(value(i, 0), value(i, 1), value(i, 2)),
       vector: new THREE.Vector3(value(i, 3), value(i, 4), value(i, 5)),
     }));
-    const unit = ARROW * scene.reach;
-    this.arrows.draw(on.has("forces") ? forces.map(({ foot, vector }) => ({ foot, vector: vector.multiplyScalar(unit) })) : [], scene.reach);
-    this.tyres.forEach((meshes, i) => {
-      const load = on.has("loads") ? Math.min(1, forces[i].vector.length() / (on.has("forces") ? unit : 1) / 2) : null;
-      for (const { material } of meshes) {
-        material.emissive.setRGB(load === null ? 0 : load, load === null ? 0 : 0.35 * Math.sin(Math.PI * load), load === null ? 0 : 0.5 * (1 - load));
-      }
-    });
+    this.tyres.forEach((meshes, i) => this.colour(meshes, on.has("loads") ? 0.5 * forces[i].vector.length() : null));
+    for (const { vector } of forces) vector.multiplyScalar(ARROW * scene.reach);
+    this.arrows.draw(on.has("forces") ? forces : [], scene.reach);
+  }
+
+  // Colours a wheel by its load in mean shares, from blue at none over yellow to red at 2; null takes the colour away.
+  colour(meshes, load) {
+    const [cold, warm, hot] = [[0.1, 0.3, 0.8], [0.95, 0.8, 0.2], [0.9, 0.1, 0.1]];
+    const t = 2 * Math.min(1, load ?? 0);
+    const heat = [0, 1, 2].map((c) => (t < 1 ? (1 - t) * cold[c] + t * warm[c] : (2 - t) * warm[c] + (t - 1) * hot[c]));
+    for (const { material } of meshes) {
+      material.emissive.setRGB(...(load === null ? [0, 0, 0] : heat.map((value) => 0.75 * value)));
+      material.color.setScalar(load === null ? 1 : 0.25);
+    }
   }
 }

@@ -28,7 +28,6 @@ class Stage {
     this.eye.start(scene, keep);
     this.offer();
     part("paint").hidden = !this.view.balls;
-    this.view.showSpheres(this.view.on.has("spheres"));
     this.stale = true;
   }
 
@@ -68,7 +67,7 @@ class Stage {
   toggle(name) {
     const { on } = this.view;
     if (!on.delete(name)) on.add(name);
-    if (name === "spheres") this.view.showSpheres(on.has(name));
+    if (name === "spheres") this.view.showSpheres();
     this.mark();
     this.stale = true;
   }
@@ -105,6 +104,8 @@ class Stage {
     this.spent.push(performance.now() - begin);
     if (this.spent.length > 120) this.spent.shift();
     this.canvas.dataset.script = this.spent.slice().sort((a, b) => a - b)[this.spent.length >> 1].toFixed(2);
+    const { geometries, textures } = this.view.renderer.info.memory;
+    this.canvas.dataset.held = geometries + textures;
     this.canvas.dataset.drawn = Number(this.canvas.dataset.drawn || 0) + 1;
   }
 

@@ -4,7 +4,8 @@
 const SUN = new THREE.Vector3(-0.348, 0.795, 0.497); // towards it, in the world
 const NIGHT = { overhead: 0x10141c, horizon: 0x2a2c33 };
 const ROCK_KINDS = 3;
-const NEAR_ROCKS = 9; // m from the middle of the picture: farther rocks get fewer triangles
+const ROCK_CELL = 6; // m, edge of the squares whose rocks are drawn together
+const ROCK_DETAIL = [[0.06, 0], [0.2, 1], [Infinity, 2]]; // radius, m, and detail
 const TYRE_MARK = 0x3a2116;
 
 THREE.ColorManagement.enabled = false; // colours are drawn as they are written
@@ -20,9 +21,28 @@ const bumps = (x, y, z, seed) =>
   0.5 * Math.sin(2.3 * x + 1.7 * y + seed) * Math.cos(1.9 * y - 2.1 * z + 2 * seed) +
   0.3 * Math.sin(4.1 * z + 3.3 * x + 3 * seed) + 0.2 * Math.sin(6.7 * y - 5.2 * x + 5 * seed);
 
+// The unit sphere with shared corners: facets get their normals as they are drawn.
+const ball = (detail) => {
+  const loose = new THREE.IcosahedronGeometry(1, detail).attributes.position;
+  const [numbers, places, corners] = [new Map(), [], []];
+  for (let i = 0; i < loose.count; i++) {
+    const place = [loose.getX(i), loose.getY(i), loose.getZ(i)];
+    const key = place.map((value) => value.toFixed(4)).join();
+    if (!numbers.has(key)) {
+      numbers.set(key, numbers.size);
+      places.push(...place);
+    }
+    corners.push(numbers.get(key));
+  }
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.Float32BufferAttribute(places, 3));
+  geometry.setIndex(corners);
+  return geometry;
+};
+
 // A stone about the unit sphere: the simulated sphere, with facets and dents.
 const stone = (detail, seed) => {
-  const geometry = new THREE.IcosahedronGeometry(1, detail);
+  const geometry = ball(detail);
   const at = geometry.attributes.position;
   for (let i = 0; i < at.count; i++) {
     const [x, y, z] = [at.getX(i), at.getY(i), at.getZ(i)];
@@ -76,6 +96,7 @@ class View {
     this.renderer.shadowMap.type = this.software ? THREE.BasicShadowMap : THREE.PCFShadowMap;
     this.camera = new THREE.PerspectiveCamera(45, 1, 0.05, 500);
     this.soil = soilTexture();
+    this.shapes = {}; // of rocks
     this.dark = false;
     this.paint = 0;
     this.on = new Set(["marks"]);
@@ -86,9 +107,9 @@ class View {
     this.world?.traverse((node) => node.geometry?.dispose());
     this.scene = scene;
     this.world = new THREE.Scene();
-    this.floats = scene.kind === "soil" || scene.kind === "planar" ? false : true;
     this.addLight();
     this.addSky();
+    this.ruts = scene.ruts ? new Ruts(scene) : null;
     this.frames = Array.from({ length: scene.frames }, () => this.world.add(new THREE.Group()).children.at(-1));
     for (const group of scene.groups) this.addGroup(group);
     for (const map of scene.maps) this.addMap(map);
@@ -111,6 +132,10 @@ class View {
     sun.shadow.normalBias = 0.02 * reach;
     sun.shadow.radius = 1.5;
     this.world.add(sun, sun.target);
+    if (!this.scene.front) return;
+    const front = new THREE.DirectionalLight(0xffffff, 0.4 * Math.PI); // runs in the plane turn this way
+    front.position.set(0.3, 0.5, 1);
+    this.world.add(front);
   }
 
   addSky() {
@@ -147,13 +172,14 @@ class View {
   }
 
   // Soil: two shades of squares, and grain. `weight` darkens what the vertices say.
-  ground(options = {}) {
+  ground(options = {}, steep = false) {
     const material = this.lit({ color: colourOf(this.scene.soil[0]), ...options });
     material.onBeforeCompile = (shader) => {
       Object.assign(shader.uniforms, {
         grain: { value: this.soil },
         other: { value: colourOf(this.scene.soil[1]) },
         tile: { value: this.scene.tile },
+        ...this.ruts?.uniforms,
       });
       shader.vertexShader = shader.vertexShader
         .replace("#include <common>", "#include <common>\nvarying vec3 soilPlace;")
@@ -168,16 +194,19 @@ class View {
           vec2 wide = max(fwidth(soilAt) / tile, 1e-4);
           vec2 side = clamp(edge / wide, -0.5, 0.5) * 2.0;
           float checks = 0.5 + 0.5 * side.x * side.y;
+          ${steep ? "if (abs(normalize(cross(dFdx(soilPlace), dFdy(soilPlace))).y) < 0.7) checks = 1.0;" : ""}
           float fine = texture2D(grain, soilAt * 0.9).r;
           float coarse = texture2D(grain, soilAt * 0.071 + 0.3).r;
           diffuseColor.rgb *= mix(vec3(1.0), other / diffuse, checks);
-          diffuseColor.rgb *= 0.72 + 0.3 * fine + 0.26 * coarse;`);
+          diffuseColor.rgb *= 0.72 + 0.3 * fine + 0.26 * coarse;
+          ${this.ruts ? RUT_FRAGMENT : ""}`);
+      if (this.ruts) shader.fragmentShader = RUT_UNIFORMS + shader.fragmentShader;
     };
     return material;
   }
 
   // A coloured surface on a moving frame, or on the world (frame -1).
-  addGroup({ frame, first, count, casts }) {
+  addGroup({ frame, first, count, role }) {
     const { vertices, colours, triangles } = this.scene.arrays;
     const used = triangles.subarray(first, first + count);
     const [places, paints] = [new Float32Array(3 * count), new Uint8Array(4 * count)];
@@ -188,8 +217,8 @@ class View {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(places, 3));
     geometry.setAttribute("color", new THREE.BufferAttribute(paints, 4, true));
-    const mesh = new THREE.Mesh(geometry, this.lit({ vertexColors: true }));
-    mesh.castShadow = casts;
+    const mesh = new THREE.Mesh(geometry, role === "soil" ? this.ground({ side: THREE.DoubleSide }, true) : this.lit({ vertexColors: true }));
+    mesh.castShadow = role === "solid";
     mesh.receiveShadow = true;
     (frame < 0 ? this.world : this.frames[frame]).add(mesh);
     return mesh;
@@ -231,60 +260,59 @@ class View {
     this.world.add(mesh);
   }
 
-  // Rocks as stones over the spheres that are simulated, in instances by kind; far ones with fewer triangles.
+  // Rocks as stones over the spheres that are simulated, or as these spheres. Those of a square are one surface: without
+  // a graphics card, an instance costs as much as a drawing of its own.
   addRocks() {
     const { rocks } = this.scene.arrays;
-    this.rocks = [];
-    this.rocksAt = null;
-    if (!rocks?.length) return;
-    const n = rocks.length / 4;
-    const material = this.lit({ color: colourOf(this.scene.rock) });
-    const spheres = [new THREE.IcosahedronGeometry(1, 3), new THREE.IcosahedronGeometry(1, 1)];
-    for (let kind = 0; kind < ROCK_KINDS; kind++) {
-      const shapes = [stone(2, kind + 1), stone(n < 1000 ? 1 : 0, kind + 1)];
-      const mine = Array.from({ length: Math.ceil((n - kind) / ROCK_KINDS) }, (_, i) => ROCK_KINDS * i + kind);
-      const meshes = shapes.map((shape, level) => {
-        const mesh = new THREE.InstancedMesh(shape, material, Math.max(1, mine.length));
-        mesh.frustumCulled = false;
-        mesh.receiveShadow = level === 0;
-        mesh.castShadow = level === 0 && n < 1000;
-        this.world.add(mesh);
-        return mesh;
-      });
-      this.rocks.push({ mine, meshes, stones: shapes, spheres });
+    this.rocks = new THREE.Group();
+    this.world.add(this.rocks);
+    const cells = new Map();
+    for (let i = 0; 4 * i < (rocks?.length ?? 0); i++) {
+      const key = [rocks[4 * i], rocks[4 * i + 2]].map((at) => Math.floor(at / ROCK_CELL)).join();
+      if (!cells.has(key)) cells.set(key, []);
+      cells.get(key).push(i);
+    }
+    const material = this.lit({ vertexColors: true });
+    for (const numbers of cells.values()) {
+      const mesh = new THREE.Mesh(this.rockSurface(numbers), material);
+      mesh.castShadow = mesh.receiveShadow = true;
+      this.rocks.add(mesh);
     }
   }
 
-  // Sorts the rocks into near and far ones where the picture's middle has moved.
-  sortRocks(middle) {
-    if (!this.rocks.length || this.rocksAt?.distanceTo(middle) < 1) return;
-    this.rocksAt = middle.clone();
-    const { rocks } = this.scene.arrays;
-    const [matrix, turn, place, scale] = [new THREE.Matrix4(), new THREE.Quaternion(), new THREE.Vector3(), new THREE.Vector3()];
-    const shade = new THREE.Color();
-    for (const { mine, meshes } of this.rocks) {
-      const filled = [0, 0];
-      for (const i of mine) {
-        place.set(rocks[4 * i], rocks[4 * i + 1], rocks[4 * i + 2]);
-        const level = place.distanceTo(middle) < NEAR_ROCKS ? 0 : 1;
-        turn.set(scatter(i) - 0.5, scatter(i + 0.3) - 0.5, scatter(i + 0.5) - 0.5, scatter(i + 0.7) - 0.5).normalize();
-        const mesh = meshes[level];
-        mesh.setMatrixAt(filled[level], matrix.compose(place, turn, scale.setScalar(rocks[4 * i + 3])));
-        mesh.setColorAt(filled[level]++, shade.setScalar(0.82 + 0.3 * scatter(i + 0.9)));
+  rockSurface(numbers) {
+    const { scene: { arrays: { rocks }, rock } } = this;
+    const spheres = this.on.has("spheres");
+    const turn = new THREE.Quaternion();
+    const corner = new THREE.Vector3();
+    const [places, colours, corners] = [[], [], []];
+    for (const i of numbers) {
+      const [x, y, z, r] = rocks.subarray(4 * i, 4 * i + 4);
+      const detail = ROCK_DETAIL.find(([most]) => r < most)[1] + (spheres ? 1 : 0);
+      const shape = (this.shapes[`${detail} ${spheres || i % ROCK_KINDS}`] ??= spheres ? ball(detail) : stone(detail, (i % ROCK_KINDS) + 1));
+      turn.set(scatter(i) - 0.5, scatter(i + 0.3) - 0.5, scatter(i + 0.5) - 0.5, scatter(i + 0.7) - 0.5).normalize();
+      const first = places.length / 3;
+      const shade = 255 * (0.82 + 0.3 * scatter(i + 0.9));
+      for (let k = 0; k < shape.attributes.position.count; k++) {
+        corner.fromBufferAttribute(shape.attributes.position, k).applyQuaternion(turn);
+        places.push(x + r * corner.x, y + r * corner.y, z + r * corner.z);
+        colours.push(...rock.map((value) => Math.min(255, shade * value)));
       }
-      meshes.forEach((mesh, level) => {
-        mesh.count = filled[level];
-        mesh.instanceMatrix.needsUpdate = true;
-        mesh.instanceColor.needsUpdate = true;
-      });
+      for (const k of shape.index.array) corners.push(first + k);
     }
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.Float32BufferAttribute(places, 3));
+    geometry.setAttribute("color", new THREE.BufferAttribute(new Uint8Array(colours), 3, true));
+    geometry.setIndex(corners);
+    return geometry;
   }
 
-  // Shows rocks as the spheres that are simulated, or as stones.
-  showSpheres(on) {
-    for (const { meshes, stones, spheres } of this.rocks) {
-      meshes.forEach((mesh, level) => (mesh.geometry = on ? spheres[level] : stones[level]));
-    }
+  // Shows rocks as the spheres that are simulated, or as stones, as `on` says.
+  showSpheres() {
+    if (!this.rocks) return;
+    this.world.remove(this.rocks);
+    for (const mesh of this.rocks.children) mesh.geometry.dispose();
+    this.addRocks();
   }
 
   // Moves everything to where it is between two frames. `k`: number of the first; `rate`: frames a second there.
@@ -300,6 +328,7 @@ class View {
     this.centre = new THREE.Vector3(...[0, 1, 2].map((c) => before.centre.value(0, c, after.centre, share)));
     this.balls?.show(before, after, share, rate);
     this.disks?.show(before, after, share);
+    this.ruts?.show(k);
     this.overlays.show({ before, after, share, k, time });
   }
 
@@ -314,13 +343,14 @@ class View {
     }
     const { camera, sun } = this;
     camera.aspect = width / height;
+    const narrow = (this.scene.view.aspect ?? 1) / camera.aspect; // what is wanted beside the middle stays in a narrow picture
+    if (narrow > 1) camera.fov = (360 / Math.PI) * Math.atan(narrow * Math.tan((camera.fov * Math.PI) / 360));
     camera.updateProjectionMatrix();
     const about = this.scene.rover ? this.frames[0].position : middle;
     sun.target.position.copy(about);
     sun.position.copy(about).addScaledVector(SUN, 4 * this.scene.reach);
     this.dome.position.copy(camera.position);
     this.dome.scale.setScalar(0.9 * camera.far);
-    this.sortRocks(middle);
     if (this.balls) this.balls.render();
     else this.renderer.render(this.world, camera);
   }

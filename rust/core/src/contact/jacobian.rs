@@ -65,7 +65,7 @@ pub(crate) fn for_each_row(
 /// The bodies of a contact, the signs of their velocities in the relative one, and their paths. The
 /// base that carries both does not count.
 #[inline]
-fn sides<'a>(
+pub(crate) fn sides<'a>(
     mechanism: &'a Mechanism,
     contact: &Contact,
 ) -> impl Iterator<Item = (usize, f64, Path<'a>)> {

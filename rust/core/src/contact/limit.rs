@@ -43,7 +43,7 @@ impl ContactKey {
 
 /// Index of the joint's velocity and the gap rate per unit of it, if the contact is a stop.
 #[inline]
-pub(super) fn row(model: &Model, contact: &Contact) -> Option<(usize, f64)> {
+pub(crate) fn row(model: &Model, contact: &Contact) -> Option<(usize, f64)> {
     match contact.part {
         Part::Limit(joint, side) => Some((model.joint_velocity(joint), side.sign())),
         _ => None,

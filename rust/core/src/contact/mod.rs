@@ -8,7 +8,8 @@
 //! contacts enter the step.
 //! [`wheel_gaps`] measures how far the wheels are from the ground and nothing else,
 //! `box_clearance` how far a box is from a surface at least.
-//! [`relocation`] re-evaluates them in another configuration. `rows` has the rows of the contact
+//! [`relocation`] re-evaluates them in another configuration; `contact_slope` has their
+//! derivatives by the poses. `rows` has the rows of the contact
 //! Jacobian and the products with them, [`jacobian`] and [`delassus`] assemble the matrices.
 //!
 //! # One call
@@ -36,6 +37,7 @@
 pub mod activation;
 pub(crate) mod body_motion;
 pub(crate) mod box_clearance;
+pub(crate) mod contact_slope;
 pub mod delassus;
 pub mod detection;
 pub mod frame;

@@ -8,16 +8,15 @@
 //! slip    u_N = 0,    p_T + μ p_N t = 0,    t = u_T / |u_T|
 //! ```
 //!
-//! A change du⁰ of the velocity at held impulses is answered by dp, with `du = du⁰ + W dp`:
+//! A change du⁰ of the velocity at held impulses is answered by dp, with `du = du⁰ + W dp`, and so
+//! is a change dμ of the friction:
 //!
 //! ```text
-//! slip    dp_T + μ t dp_N + (μ p_N / |u_T|) (1 − t tᵀ) du_T = 0
+//! slip    dp_T + μ t dp_N + (μ p_N / |u_T|) (1 − t tᵀ) du_T + p_N t dμ = 0
 //! ```
 //!
 //! Redundant contacts make the system singular. Any of its solutions gives the same du, so that of
 //! an elimination with complete pivoting is taken, with zeros where there is no pivot.
-
-use nalgebra::DMatrix;
 
 /// What a contact does at the end of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,7 +42,7 @@ pub(crate) struct HeldLaw {
     d: usize,
     pub(crate) modes: Vec<ContactMode>,
     pub(crate) p: Vec<f64>,
-    u: Vec<f64>,
+    pub(super) u: Vec<f64>,
     mu: Vec<f64>,
     /// W_NN of each contact, 1/kg, by which impulses are compared with velocities.
     weight: Vec<f64>,
@@ -112,7 +111,10 @@ impl HeldLaw {
                 ContactMode::Slip => {
                     let t = self.direction(i);
                     let off = (1..self.d).map(|k| p[k] + self.mu[i] * p[0] * t[k - 1]);
-                    u[0].abs() + w * norm(&off.collect::<Vec<_>>())
+                    // A little velocity turns the direction of a slow slide.
+                    let (speed, friction) = (norm(&u[1..]), w * self.mu[i] * p[0]);
+                    let share = speed / (speed + friction).max(f64::MIN_POSITIVE);
+                    u[0].abs() + share * w * norm(&off.collect::<Vec<_>>())
                 }
             };
             worst = worst.max(violation);
@@ -128,19 +130,30 @@ impl HeldLaw {
         u[1..].iter().map(|x| scale * x).collect()
     }
 
-    /// The impulses' answer dp (d n_c, m) to changes du⁰ (d n_c, m) at held impulses.
-    pub(crate) fn respond(&self, W: &DMatrix<f64>, du: &DMatrix<f64>) -> DMatrix<f64> {
-        let size = self.p.len();
-        // law = of_u du + of_p dp
-        let mut of_u = DMatrix::<f64>::zeros(size, size);
-        let mut of_p = DMatrix::<f64>::zeros(size, size);
-        for (i, mode) in self.modes.iter().enumerate() {
-            let (first, w) = (self.d * i, self.weight[i]);
+    /// How the impulses answer changes. `W`: row-major. `is_common`: contacts whose friction is the
+    /// common coefficient.
+    pub(crate) fn answer(&self, W: &[f64], is_common: &[bool]) -> Answer {
+        let (d, size) = (self.d, self.p.len());
+        let width = 2 * size + 1;
+        // Rows of [law | −of_u | −of_mu] with law = of_u W + of_p.
+        let mut rows = vec![0.0; size * width];
+        for (i, (row, mode)) in rows
+            .chunks_exact_mut(d * width)
+            .zip(&self.modes)
+            .enumerate()
+        {
+            let (first, w) = (d * i, self.weight[i]);
+            let mut of_u = |k: usize, column: usize, x: f64| {
+                let row = &mut row[k * width..][..width];
+                for (own, w) in row.iter_mut().zip(&W[column * size..][..size]) {
+                    *own += x * w;
+                }
+                row[size + column] -= x;
+            };
             match mode {
-                ContactMode::Open => (0..self.d).for_each(|k| of_p[(first + k, first + k)] = w),
-                ContactMode::Stick => (0..self.d).for_each(|k| of_u[(first + k, first + k)] = 1.0),
+                ContactMode::Open => (0..d).for_each(|k| row[k * width + first + k] = w),
+                ContactMode::Stick => (0..d).for_each(|k| of_u(k, first + k, 1.0)),
                 ContactMode::Slip => {
-                    of_u[(first, first)] = 1.0;
                     let ((p, u), t) = (self.parts(i), self.direction(i));
                     let speed = norm(&u[1..]);
                     let stiffness = if speed > 0.0 {
@@ -148,73 +161,104 @@ impl HeldLaw {
                     } else {
                         0.0
                     };
-                    for k in 1..self.d {
-                        of_p[(first + k, first + k)] = w;
-                        of_p[(first + k, first)] = w * self.mu[i] * t[k - 1];
-                        for l in 1..self.d {
+                    of_u(0, first, 1.0);
+                    for k in 1..d {
+                        for l in 1..d {
                             let unit = f64::from(u8::from(k == l));
-                            let across = unit - t[k - 1] * t[l - 1];
-                            of_u[(first + k, first + l)] = stiffness * across;
+                            of_u(k, first + l, stiffness * (unit - t[k - 1] * t[l - 1]));
+                        }
+                    }
+                    for k in 1..d {
+                        let row = &mut row[k * width..][..width];
+                        row[first + k] += w;
+                        row[first] += w * self.mu[i] * t[k - 1];
+                        if is_common[i] {
+                            row[2 * size] = -w * p[0] * t[k - 1];
                         }
                     }
                 }
             }
         }
-        let law = product(&of_u, W) + of_p;
-        solve(law, -product(&of_u, du))
+        solve(size, rows)
     }
 }
 
-/// `A B`, by sums in a fixed order: the same bits on every machine.
-pub(crate) fn product(A: &DMatrix<f64>, B: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut out = DMatrix::zeros(A.nrows(), B.ncols());
-    for (mut column, b) in out.column_iter_mut().zip(B.column_iter()) {
-        for (a, b) in A.column_iter().zip(b.iter()) {
-            for (out, a) in column.iter_mut().zip(a.iter()) {
-                *out += a * b;
-            }
-        }
-    }
-    out
+/// `dp = of_u du⁰ + of_mu dμ`.
+#[derive(Clone, Debug)]
+pub(crate) struct Answer {
+    size: usize,
+    /// Rows of of_u with the entry of of_mu behind.
+    rows: Vec<f64>,
 }
 
-/// A solution of `A X = B` with A square, be it singular; B must then be in its range.
-fn solve(mut A: DMatrix<f64>, mut B: DMatrix<f64>) -> DMatrix<f64> {
-    let n = A.nrows();
+impl Answer {
+    /// The rows of of_u, each with its entry of of_mu.
+    pub(crate) fn rows(&self) -> impl Iterator<Item = (&[f64], f64)> {
+        let rows = self.rows.chunks_exact(self.size + 1);
+        rows.map(|row| (&row[..self.size], row[self.size]))
+    }
+}
+
+/// A solution X of `A X = B` with A square, be it singular; B must then be in its range. `rows`:
+/// those of [A | B].
+fn solve(n: usize, mut rows: Vec<f64>) -> Answer {
+    let width = rows.len().checked_div(n).unwrap_or(0);
     let mut order: Vec<usize> = (0..n).collect();
     let (mut rank, mut largest) = (0, 0.0_f64);
     for k in 0..n {
-        let rest = A.view((k, k), (n - k, n - k));
-        let (i, j) = rest.iamax_full();
-        let pivot = rest[(i, j)].abs();
+        let (mut pivot, mut at) = (0.0_f64, (k, k));
+        for i in k..n {
+            for (j, x) in rows[i * width..][..n].iter().enumerate().skip(k) {
+                if x.abs() > pivot {
+                    (pivot, at) = (x.abs(), (i, j));
+                }
+            }
+        }
         largest = largest.max(pivot);
         if pivot <= RANK * largest {
             break;
         }
-        A.swap_rows(k, k + i);
-        B.swap_rows(k, k + i);
-        A.swap_columns(k, k + j);
-        order.swap(k, k + j);
+        if at.0 != k {
+            let (above, below) = rows.split_at_mut(at.0 * width);
+            above[k * width..][..width].swap_with_slice(&mut below[..width]);
+        }
+        if at.1 != k {
+            rows.chunks_exact_mut(width)
+                .for_each(|row| row.swap(k, at.1));
+            order.swap(k, at.1);
+        }
         rank = k + 1;
-        for row in k + 1..n {
-            let factor = A[(row, k)] / A[(k, k)];
-            for column in k..n {
-                A[(row, column)] -= factor * A[(k, column)];
-            }
-            for column in 0..B.ncols() {
-                B[(row, column)] -= factor * B[(k, column)];
+        let (above, below) = rows.split_at_mut(rank * width);
+        let own = &above[k * width..][k..width];
+        for row in below.chunks_exact_mut(width) {
+            let row = &mut row[k..];
+            let factor = row[0] / own[0];
+            if factor != 0.0 {
+                for (x, own) in row.iter_mut().zip(own) {
+                    *x -= factor * own;
+                }
             }
         }
     }
-    let mut X = DMatrix::zeros(n, B.ncols());
-    for column in 0..B.ncols() {
-        for k in (0..rank).rev() {
-            let known = (k + 1..rank).map(|l| A[(k, l)] * X[(order[l], column)]);
-            let known: f64 = known.sum();
-            X[(order[k], column)] = (B[(k, column)] - known) / A[(k, k)];
+    let m = width - n.min(width);
+    let mut X = vec![0.0; n * m];
+    for k in (0..rank).rev() {
+        let row = &rows[k * width..][..width];
+        let mut sum = row[n..].to_vec();
+        for l in k + 1..rank {
+            let known = &X[order[l] * m..][..m];
+            for (sum, x) in sum.iter_mut().zip(known) {
+                *sum -= row[l] * x;
+            }
+        }
+        for (x, sum) in X[order[k] * m..][..m].iter_mut().zip(&sum) {
+            *x = sum / row[k];
         }
     }
-    X
+    Answer {
+        size: m.saturating_sub(1),
+        rows: X,
+    }
 }
 
 #[cfg(test)]
@@ -231,19 +275,32 @@ mod tests {
         let law = held([0.0, 2.0, 0.0], [1.0, -0.5, 0.0], 0.5);
         assert_eq!(law.modes, [ContactMode::Slip]);
         assert!(law.residual() < 1e-15);
-        let du = DMatrix::from_column_slice(3, 2, &[-1.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
-        let dp = law.respond(&DMatrix::identity(3, 3), &du);
-        // Pressed harder it brakes harder: dp = (1, −μ, 0).
-        assert!((dp[(0, 0)] - 1.0).abs() < 1e-14 && (dp[(1, 0)] + 0.5).abs() < 1e-14);
+        let unit = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+        let answer = law.answer(&unit, &[true]);
+        let rows: Vec<_> = answer.rows().collect();
+        let is = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-14, "{found}");
+        // Pressed harder it brakes harder: du_N = −1 gives dp = (1, −μ, 0).
+        is(-rows[0].0[0], 1.0);
+        is(-rows[1].0[0], -0.5);
         // Pushed across: dp_b = −k (1 + dp_b), k = μ p_N / |u_T| = ¼.
-        assert!((dp[(2, 1)] + 0.2).abs() < 1e-14);
+        is(rows[2].0[2], -0.2);
+        // Rougher ground brakes with p_N a unit of μ.
+        is(rows[1].1, -1.0);
     }
 
     #[test]
     fn a_singular_system_is_solved_where_it_can_be() {
-        let A = DMatrix::from_row_slice(3, 3, &[1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 2.0, 1.0]);
-        let B = DMatrix::from_column_slice(3, 1, &[3.0, 3.0, 4.0]);
-        assert!((product(&A, &solve(A.clone(), B.clone())) - B).amax() < 1e-15);
+        // Rows of [A | B] with A of rank 2.
+        let rows = [
+            [1.0, 1.0, 0.0, 3.0],
+            [1.0, 1.0, 0.0, 3.0],
+            [0.0, 2.0, 1.0, 4.0],
+        ];
+        let found = solve(3, rows.as_flattened().to_vec()).rows;
+        for [a, b, c, right] in rows {
+            let off = a * found[0] + b * found[1] + c * found[2] - right;
+            assert!(off.abs() < 1e-15, "{found:?}");
+        }
     }
 
     #[test]

@@ -132,19 +132,4 @@ mod tests {
         let energy = v.dot(&(M * &v));
         assert!((energy - rates.dot(&(own * &rates))).abs() < 1e-12 * energy);
     }
-
-    #[test]
-    fn every_driven_joint_has_a_column() {
-        let model = Model::rover();
-        let T = actuation_matrix(&model);
-        assert_eq!(T.shape(), (model.nv(), 12));
-        for (i, wheel) in model.wheels().iter().enumerate() {
-            assert_eq!(T.column(i).iter().filter(|x| **x != 0.0).count(), 1);
-            let is_steered = usize::from(wheel.steering.is_some());
-            assert_eq!(
-                T.column(6 + i).iter().filter(|x| **x != 0.0).count(),
-                is_steered
-            );
-        }
-    }
 }

@@ -149,6 +149,14 @@ pub(crate) fn angular_blocks(model: &Model) -> impl Iterator<Item = usize> + '_ 
     joints.filter_map(|(joint, k)| joint.first_angle().map(|at| k + at))
 }
 
+/// The world axes about which the three public angles of a rotation turn it, as columns.
+pub(crate) fn axes_of_angles([_, heading, pitch]: [f64; 3]) -> Matrix3<f64> {
+    let ((sin_h, cos_h), (sin_p, cos_p)) = (sin_cos(heading), sin_cos(pitch));
+    let of_roll = Vector3::new(cos_h * cos_p, sin_p, -sin_h * cos_p);
+    let of_pitch = Vector3::new(sin_h, 0.0, cos_h);
+    Matrix3::from_columns(&[of_roll, Vector3::y(), of_pitch])
+}
+
 /// A checked velocity (nv).
 ///
 /// # Errors

@@ -79,6 +79,29 @@ impl<T: Lane> Factor<T> {
         }
     }
 
+    /// Takes a machine's factor in every lane.
+    pub fn spread(&mut self, token: T::Token, other: &Factor<f64>) {
+        let each = |own: &mut [T], other: &[f64]| {
+            for (own, x) in own.iter_mut().zip(other) {
+                *own = T::splat(token, *x);
+            }
+        };
+        each(
+            self.rows.blocks.as_flattened_mut(),
+            other.rows.blocks.as_flattened(),
+        );
+        each(
+            self.rows.base.as_flattened_mut(),
+            other.rows.base.as_flattened(),
+        );
+        each(&mut self.rows.joints, &other.rows.joints);
+        each(
+            self.block_roots.as_flattened_mut(),
+            other.block_roots.as_flattened(),
+        );
+        each(&mut self.roots, &other.roots);
+    }
+
     /// Turns the entries of M into those of its factor.
     pub(super) fn update(&mut self, token: T::Token, mechanism: &Mechanism) -> T::Mask {
         let mut is_positive = T::mask(token, u32::MAX >> (32 - T::LANES));

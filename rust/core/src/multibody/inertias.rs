@@ -67,6 +67,24 @@ impl<T: Lane> Inertias<T> {
     }
 }
 
+impl<T: Lane> Inertias<T> {
+    /// Multiplies mass and moments of a body.
+    pub fn scale(&mut self, mechanism: &Mechanism, body: usize, factor: T) {
+        let own = &mut self.bodies[body];
+        let more = own.mass * (factor - factor.like(1.0));
+        for x in [
+            &mut own.mass,
+            &mut own.rest,
+            &mut own.first,
+            &mut own.second,
+        ] {
+            *x *= factor;
+        }
+        self.trees[mechanism.links[body].tree] += more;
+        self.mass += more;
+    }
+}
+
 impl<T: Lane> Inertia<T> {
     fn set_lane(&mut self, lane: usize, other: &Inertia<f64>) {
         self.mass.set(lane, other.mass);

@@ -7,7 +7,7 @@ use super::joint::{Joint, free};
 use super::mechanism::Mechanism;
 use super::state::Configuration;
 use crate::scalar::quaternion::normalised;
-use crate::scalar::{Lane, Vec3};
+use crate::scalar::{Dual, Lane, Vec3};
 
 /// A configuration a lane.
 #[derive(Clone, Debug)]
@@ -209,6 +209,43 @@ impl<T: Lane> LaneConfiguration<T> {
         }
         all
     }
+}
+
+impl<T: Lane> LaneConfiguration<Dual<T>> {
+    /// The velocity (nv) along which the configuration changes with the direction of its
+    /// derivatives.
+    #[inline(always)]
+    pub fn slope(&self, mechanism: &Mechanism, out: &mut [T]) {
+        for (j, own) in self.joints.iter().enumerate() {
+            out[mechanism.joints[j].velocity] = own.slope;
+        }
+        for (joint, k) in &mechanism.rotating {
+            let out = &mut out[*k..];
+            match joint {
+                Joint::Free(free) => {
+                    let (Vec3 { x, y, z }, attitude) = self.pose_at(free.pose);
+                    out[..3].copy_from_slice(&[x.slope, y.slope, z.slope]);
+                    out[3..6].copy_from_slice(&turning(&attitude));
+                }
+                Joint::Spherical(joint) => {
+                    out[..3].copy_from_slice(&turning(&self.rotation_at(joint.rotation)));
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+/// Angular velocity `2 q' q⁻¹` of a unit quaternion's derivative.
+#[inline(always)]
+fn turning<T: Lane>(q: &[Dual<T>; 4]) -> [T; 3] {
+    let [x, y, z, w] = *q;
+    let (value, slope) = (
+        Vec3::new(x.value, y.value, z.value),
+        Vec3::new(x.slope, y.slope, z.slope),
+    );
+    let half = slope * w.value + -(value * w.slope) + value.cross(slope);
+    [half.x, half.y, half.z].map(|x| x + x)
 }
 
 impl<T: Lane> JointCoordinates<T> for LaneConfiguration<T> {

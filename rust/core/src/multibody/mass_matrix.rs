@@ -214,6 +214,7 @@ impl<T: Lane> MassMatrix<T> {
     }
 
     /// Calls `entry(i, j, x)` for the entries of the lower triangle, `i >= j`.
+    #[inline(always)]
     fn for_each(&self, mechanism: &Mechanism, mut entry: impl FnMut(usize, usize, T)) {
         for (t, tree) in mechanism.trees.iter().enumerate() {
             let TreeSpan {
@@ -239,14 +240,19 @@ impl<T: Lane> MassMatrix<T> {
     }
 
     /// `M v` (nv).
+    #[inline(always)]
     pub fn times(&self, mechanism: &Mechanism, v: &[T], out: &mut [T]) {
         out.fill(T::splat(self.token, 0.0));
-        self.for_each(mechanism, |i, j, x| {
-            out[i] += x * v[j];
-            if i != j {
-                out[j] += x * v[i];
-            }
-        });
+        self.for_each(
+            mechanism,
+            #[inline(always)]
+            |i, j, x| {
+                out[i] += x * v[j];
+                if i != j {
+                    out[j] += x * v[i];
+                }
+            },
+        );
     }
 
     /// Lane `lane` as a full symmetric matrix (nv, nv).

@@ -159,6 +159,18 @@ impl<T: Lane> MotorLine<T> {
         self.active.set(lane, 0.0);
     }
 
+    /// Adds to the command; [`Self::choose`] follows if there is a motor.
+    #[inline(always)]
+    pub fn add_command(&mut self, change: T) {
+        let command = (self.command + change).min(self.stall).max(-self.stall);
+        self.command = command;
+        self.at_rest = command;
+        for (beyond, towards) in self.beyond.iter_mut().zip([command, -command]) {
+            let is_whole = self.stall.le(*beyond);
+            *beyond = T::select(is_whole, *beyond, towards.max(command.like(0.0)));
+        }
+    }
+
     /// Whether any lane has a motor.
     #[inline(always)]
     #[must_use]
@@ -293,32 +305,6 @@ mod tests {
         assert!(motor.torque(150.0, 33.0).abs() < 1e-12);
         assert!(motor.torque(0.0, 33.0).abs() < 1e-12);
         assert!((motor.torque(-150.0, 33.0) + 150.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_hard_brake_finds_its_branch() {
-        // A free wheel of 0.15 kg m² that braking with all that the motor has would turn back four
-        // times as fast, in a step of 50 ms.
-        let motor = Motor {
-            stall_torque: 300.0,
-            no_load_speed: 0.5,
-            regenerating: true,
-        };
-        let (h, inertia, begin) = (0.05, 0.15, 20.0);
-        let mut line = MotorLine::new(Single::Baseline);
-        line.set_lane(0, Some(&motor), 0.0);
-        line.choose(begin);
-        let mut trials = 0;
-        loop {
-            let (at_rest, slope) = (line.at_rest(), line.damping());
-            let end = (inertia * begin + h * at_rest) / (inertia + h * slope);
-            if !line.revise(true, end) {
-                assert!((0.0..1.0).contains(&end), "{end}");
-                return;
-            }
-            trials += 1;
-            assert!(trials < 5);
-        }
     }
 
     #[test]

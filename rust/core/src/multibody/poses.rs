@@ -120,6 +120,16 @@ impl<T: Lane> Poses<T> {
         }
     }
 
+    /// World position of the origin of a tree, m.
+    #[inline(always)]
+    #[must_use]
+    pub fn origin_of(&self, tree: usize) -> Vec3<T> {
+        match tree.checked_sub(1) {
+            None => self.origin,
+            Some(other) => self.other_origins[other],
+        }
+    }
+
     /// Turns the spinners, whose own rotation changes only their appearance; after
     /// [`Self::update`].
     ///

@@ -722,42 +722,4 @@ mod tests {
             assert!((nearest - 0.2).abs() < 1e-6, "{nearest}");
         }
     }
-
-    #[test]
-    fn grounds_too_rough_to_search_are_refused_by_field() {
-        let field = |made: Result<Sine, PlanarError>| made.expect_err("refused").field();
-        assert_eq!(field(Sine::new(0.01, 1e-6, 0.0, 0.0)), "wavelength");
-        assert_eq!(field(Sine::new(1e308, 1.0, 0.0, 0.0)), "amplitude");
-        assert_eq!(field(Sine::new(1.0, 1e-3, 0.0, 0.0)), "amplitude");
-        assert_eq!(field(Sine::new(1.0, 1.0, 1e300, 0.0)), "phase");
-        let many = vec![0.0; MAX_POINTS + 1];
-        let refused = Spline::new(&many, &[]).expect_err("refused");
-        assert_eq!(refused.field(), "x");
-    }
-
-    #[test]
-    fn data_that_is_no_function_is_refused() {
-        let refused = Spline::new(&[0.0, 1.0, 1.0], &[0.0; 3]).expect_err("refused");
-        assert_eq!(refused.field(), "x[2]");
-        let refused = Spline::new(&[0.0, 1.0], &[0.0, f64::NAN]).expect_err("refused");
-        assert_eq!(refused.field(), "y[1]");
-        assert_eq!(
-            Spline::new(&[0.0], &[0.0]).expect_err("refused").field(),
-            "x"
-        );
-        assert_eq!(
-            Spline::new(&[0.0, 1.0], &[0.0])
-                .expect_err("refused")
-                .field(),
-            "y"
-        );
-        assert_eq!(
-            Sine::new(1.0, 0.0, 0.0, 0.0).expect_err("refused").field(),
-            "wavelength"
-        );
-        assert_eq!(
-            Line::new(f64::INFINITY, 0.0).expect_err("refused").field(),
-            "slope"
-        );
-    }
 }

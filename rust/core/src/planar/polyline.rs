@@ -217,7 +217,6 @@ impl Support<2> for Polyline {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::planar::ground::MAX_FACING;
 
     fn all(ground: &Polyline, c: [f64; 2], reach: f64) -> Vec<Facing> {
         let mut out = Vec::new();
@@ -290,34 +289,5 @@ mod tests {
                 assert!((c - f.foot - f.n * f.distance).norm() < 1e-12);
             }
         }
-    }
-
-    /// A height query visited every point, and points that did not face a disc were removed one by
-    /// one: a million points took hours.
-    #[test]
-    fn a_million_points_cost_no_more_than_those_within_reach() {
-        let x: Vec<f64> = (0..1_000_000).map(|i| 1e-5 * f64::from(i)).collect();
-        let y: Vec<f64> = (0..1_000_000).map(|i| 1e-3 * f64::from(i % 2)).collect();
-        let ground = Polyline::new(&x, &y).expect("sound");
-        let sum: f64 = x.iter().step_by(10).map(|x| ground.height(*x)).sum();
-        assert!(sum.abs() < 1e-12);
-        let found = all(&ground, [5.0, 1.001], 10.0);
-        assert_eq!(found.len(), MAX_FACING);
-        assert!(
-            found
-                .iter()
-                .all(|f| (1.0..1.0 + 1e-6).contains(&f.distance))
-        );
-    }
-
-    #[test]
-    fn what_is_no_function_is_refused() {
-        let field = |x: &[f64], y: &[f64]| Polyline::new(x, y).expect_err("refused").field();
-        assert_eq!(field(&[0.0, 1.0, 0.5], &[0.0; 3]), "x[2]");
-        assert_eq!(field(&[0.0, 0.0], &[1.0, 1.0]), "y[1]");
-        assert_eq!(
-            Polyline::step(0.0, 0.0).expect_err("refused").field(),
-            "height"
-        );
     }
 }

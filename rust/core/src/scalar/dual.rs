@@ -224,7 +224,8 @@ mod tests {
     fn is_derivative(f: impl Fn(Dual<f64>) -> Dual<f64>, x: f64) {
         let h = 1e-5;
         let ahead = |k: f64| f(varying(x + k * h)).value;
-        let difference = (8.0 * (ahead(1.0) - ahead(-1.0)) - (ahead(2.0) - ahead(-2.0))) / (12.0 * h);
+        let difference =
+            (8.0 * (ahead(1.0) - ahead(-1.0)) - (ahead(2.0) - ahead(-2.0))) / (12.0 * h);
         let found = f(varying(x)).slope;
         let error = (found - difference).abs() / found.abs().max(1.0);
         assert!(error < 1e-9, "at {x}: {found}, differences {difference}");
@@ -248,7 +249,7 @@ mod tests {
             is_derivative(|x| sin_cos(x).1, x);
         }
         for x in [-30.0, -2.3, -0.2, 0.0, 0.4, 2.0] {
-            is_derivative(|x| exp_m1(x), x);
+            is_derivative(exp_m1, x);
         }
         let (sin, cos) = sin_cos(varying(3e5));
         assert!((sin.slope - cos.value).abs() + (cos.slope + sin.value).abs() < 1e-15);

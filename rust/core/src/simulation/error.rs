@@ -1,8 +1,9 @@
-//! Errors: commands and snapshots that are refused.
+//! Errors: commands and snapshots that are refused, steps without derivatives.
 
 use thiserror::Error;
 
-use crate::integrator::OptionsError;
+use crate::integrator::{OptionsError, StepError};
+use crate::multibody::StateError;
 use crate::pool::PoolError;
 
 /// A torque or set-point that is refused.
@@ -112,9 +113,7 @@ pub enum BatchError {
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum SnapshotError {
     /// Taken from another model.
-    #[error(
-        "snapshot: belongs to another model, or to other locked joints, than this simulation"
-    )]
+    #[error("snapshot: belongs to another model, or to other locked joints, than this simulation")]
     OtherModel,
     /// Not finite, or with contacts that the model cannot have.
     #[error("snapshot: its contents are damaged")]
@@ -125,4 +124,42 @@ impl From<PoolError> for BatchError {
     fn from(PoolError { count, reason }: PoolError) -> Self {
         Self::Threads { count, reason }
     }
+}
+
+/// A step that cannot be linearised.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum LinearisationError {
+    /// The scheme is implicit in the forces.
+    #[error("variant: only steps of the variant \"linearised\" can be linearised")]
+    Variant,
+    /// A perturbation outside its range.
+    #[error("perturbation: must be from 1e-9 to 1e-3, is {value}")]
+    Perturbation {
+        /// What was given.
+        value: f64,
+    },
+    /// The coordinates are singular.
+    #[error("q[{index}]: the coordinates are singular at a pitch of 90 degrees, is {pitch} rad")]
+    Singular {
+        /// Index of the angle.
+        index: usize,
+        /// rad.
+        pitch: f64,
+    },
+    /// A state that is none.
+    #[error(transparent)]
+    State(#[from] StateError),
+    /// A command that the rover refuses.
+    #[error(transparent)]
+    Command(#[from] CommandError),
+    /// A step failed.
+    #[error(transparent)]
+    Step(#[from] StepError),
+    /// The step is not one solution of the step's equations.
+    #[error(
+        "the step was taken in parts, was not solved to its tolerance, was limited, turns so fast \
+         that gyroscopic terms are implicit, or is in soft ground: it has no derivative with fixed \
+         contact modes"
+    )]
+    NotHeld,
 }

@@ -36,10 +36,13 @@
 //! [`crate::sand`], [`crate::geometry`], [`crate::contact`], [`crate::problem`],
 //! [`crate::solver`], [`crate::integrator`], [`crate::planar`], [`crate::system`],
 //! [`crate::lanes`].
+// Registers of other processors hold one rover: nothing there uses blocks of lanes.
+#![cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
 
 pub mod active_contact;
 pub mod any_snapshot;
 pub mod batch;
+pub mod differentiator;
 pub mod error;
 pub mod fallback;
 pub mod grains;
@@ -59,17 +62,19 @@ pub mod rover_rays;
 mod rover_sand;
 pub mod scene;
 pub mod state;
+pub mod step_parameter;
 pub mod stepping;
 pub mod turns;
 
 pub use active_contact::{ActiveContact, Components, LocatedContact};
 pub use any_snapshot::AnySnapshot;
 pub use batch::Batch;
-pub use error::{BatchError, CommandError, SnapshotError};
+pub use differentiator::{Differentiator, Trajectory, TrajectoryBatch, TrajectoryError};
+pub use error::{BatchError, CommandError, LinearisationError, SnapshotError};
 pub use grains::{
     BedCommand, BedMemory, GrainBed, GrainSimulation, SoilSetupError, SoilSimulation, soil_options,
 };
-pub use linearisation::{Linearisation, LinearisationError};
+pub use linearisation::{ColumnCheck, Linearisation};
 pub use planar::{PlanarScene, PlanarSimulation};
 pub use reading::{ReadingLayout, ReadingRequest, ReadingScratch, seen_from};
 pub use rover::{LastCall, Placement, RoverScene, RoverSimulation};
@@ -77,5 +82,6 @@ pub use rover_command::RoverCommand;
 pub use rover_in_grains::{RoverInGrains, TogetherError};
 pub use scene::{DenseOperator, QuickStep, Scene, SceneKey, SceneScratch, Snapshot, StepTaken};
 pub use state::State;
+pub use step_parameter::StepParameter;
 pub use stepping::Simulation;
-pub use turns::{Done, Turn};
+pub use turns::{Done, Turn, Workers};

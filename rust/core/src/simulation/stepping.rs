@@ -283,7 +283,7 @@ impl<S: Scene> Simulation<S> {
     }
 
     /// The scene's own way to take a step, if it has one.
-    fn quick_step(&mut self, probe: &mut dyn Probe) -> Option<StepReport> {
+    pub(super) fn quick_step(&mut self, probe: &mut dyn Probe) -> Option<StepReport> {
         let mut step = QuickStep {
             options: &self.options,
             state: &mut self.state,

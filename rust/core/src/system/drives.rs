@@ -104,6 +104,33 @@ impl<T: Lane> Drives<T> {
         }
     }
 
+    /// Adds to the command of a joint's drive, N m.
+    #[inline(always)]
+    pub fn add_command(&mut self, joint: usize, change: T) {
+        self.joints[joint].line.add_command(change);
+    }
+
+    /// Adds to the set-point of a joint's position control, rad or m, of which that control has the
+    /// `share` of the whole stiffness.
+    #[inline(always)]
+    pub fn add_set_point(&mut self, joint: usize, share: T, change: T) {
+        self.joints[joint].set_point += share * change;
+    }
+
+    /// Stiffness of a joint in all, N m/rad or N/m.
+    #[inline(always)]
+    #[must_use]
+    pub fn stiffness(&self, joint: usize) -> T {
+        self.joints[joint].stiffness
+    }
+
+    /// Adds to the damping of a joint, N m s/rad or N s/m.
+    #[inline(always)]
+    pub fn add_damping(&mut self, joint: usize, change: T) {
+        self.joints[joint].damping += change;
+        self.is_implicit[joint] = true;
+    }
+
     /// Notes which joints need implicit terms, and which have motors.
     pub fn finish_loading(&mut self) {
         self.motors.clear();

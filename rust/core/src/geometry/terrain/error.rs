@@ -109,7 +109,9 @@ pub enum TerrainError {
     #[error("triangles: a mesh needs at least one")]
     NoTriangles,
     /// A triangle that names a vertex that is not there.
-    #[error("triangles[{index}]: refers to vertex {vertex}, but there are only {vertices} vertices")]
+    #[error(
+        "triangles[{index}]: refers to vertex {vertex}, but there are only {vertices} vertices"
+    )]
     NoSuchVertex {
         /// Number of the triangle.
         index: usize,

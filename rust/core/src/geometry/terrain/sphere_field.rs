@@ -227,51 +227,8 @@ impl Terrain for SphereField {
 
 #[cfg(test)]
 mod tests {
-    use super::super::limits::MAX_SPHERES;
+
     use super::*;
-
-    #[test]
-    fn bad_fields_are_refused_by_field_and_index() {
-        let one = [[0.0; 3]];
-        let refused = |centres: &[[f64; 3]], radii: &[f64]| {
-            let error = SphereField::new(centres, radii, None).unwrap_err();
-            (error.field(), error.to_string())
-        };
-        let cases = [
-            (refused(&one, &[]), "radii"),
-            (refused(&one, &[-1.0]), "radii[0]: must be positive, is -1"),
-            (refused(&one, &[0.0]), "radii[0]: must be positive"),
-            (refused(&one, &[f64::NAN]), "radii[0]: must be finite"),
-            (refused(&one, &[1e7]), "radii[0]: must be at most"),
-            (
-                refused(&[[0.0; 3], [0.0, f64::NAN, 0.0]], &[1.0, 1.0]),
-                "centres[1]: must be finite",
-            ),
-            (
-                refused(&[[0.0, 0.0, 1e300]], &[1.0]),
-                "centres[0]: must be at most",
-            ),
-            (refused(&[], &[]), "centres: a field needs"),
-        ];
-        for ((field, message), begin) in cases {
-            assert!(message.starts_with(begin), "{message}");
-            assert!(begin.starts_with(field), "{field}");
-        }
-        let many = check_count(MAX_SPHERES + 1).unwrap_err();
-        assert_eq!(many.field(), "centres");
-        assert!(SphereField::new(&[], &[], Some(Plane::ground())).is_ok());
-    }
-
-    #[test]
-    fn the_rug_is_the_reports() {
-        let rug = SphereField::rug();
-        assert_eq!(rug.spheres().len(), 1250);
-        let spheres: Vec<_> = rug.spheres().copied().collect();
-        let last = spheres[1249];
-        assert!((last.centre - Vector3::new(29.4, 0.0, 14.4)).xz().norm() < 1e-12);
-        assert!((spheres[0].centre.y).abs() < 1e-15);
-        assert!(rug.ground().is_none());
-    }
 
     #[test]
     fn primitives_have_the_numbers_that_a_visit_gives() {

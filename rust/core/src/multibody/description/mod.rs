@@ -366,39 +366,3 @@ impl ModelDescription {
         })
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_rover_survives_both_formats() {
-        let rover = ModelDescription::rover();
-        assert_eq!(
-            ModelDescription::from_toml(&rover.to_toml().unwrap()).unwrap(),
-            rover
-        );
-        assert_eq!(
-            ModelDescription::from_json(&rover.to_json().unwrap()).unwrap(),
-            rover
-        );
-    }
-
-    #[test]
-    fn a_later_format_is_refused_as_such_even_where_it_has_fields_that_are_unknown() {
-        let text = "format = 2\nname = 'x'\nsolids = []\nlegs = 4";
-        let error = ModelDescription::from_toml(text).unwrap_err();
-        assert_eq!(error, ModelError::UnknownFormat { format: 2 });
-        let error = ModelDescription::from_json(r#"{"format": 7}"#).unwrap_err();
-        assert_eq!(error, ModelError::UnknownFormat { format: 7 });
-        let written = ModelDescription::rover().to_toml().unwrap();
-        assert!(written.starts_with("format = 1\n"));
-    }
-
-    #[test]
-    fn unknown_fields_are_refused_by_name() {
-        let error =
-            ModelDescription::from_toml("name = 'x'\nsolids = []\nwheles = []").unwrap_err();
-        assert!(error.to_string().contains("wheles"), "{error}");
-    }
-}

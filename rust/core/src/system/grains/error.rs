@@ -89,7 +89,9 @@ pub enum GrainError {
     #[error(transparent)]
     Cohesion(#[from] CohesionError),
     /// A grain that was not there, or not in this order.
-    #[error("before[{grain}]: must be the index of a ball and larger than the entries before it, is {value}")]
+    #[error(
+        "before[{grain}]: must be the index of a ball and larger than the entries before it, is {value}"
+    )]
     Before {
         /// Which grain.
         grain: usize,

@@ -1,0 +1,127 @@
+//! What varies in a lane.
+
+use super::held_tree::TangentScene;
+use super::scratch::Tangent;
+use crate::multibody::LaneConfiguration;
+use crate::scalar::{Dual, Lane};
+
+/// A direction in which a step is differentiated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Direction {
+    /// The configuration moves along these velocities, each with its rate.
+    Configuration([(usize, f64); 3]),
+    /// A velocity.
+    Velocity(usize),
+    /// The command of a joint's drive, times a sign.
+    Command(usize, f64),
+    /// The set-point of a held joint.
+    SetPoint(usize),
+    /// The common coefficient of friction.
+    Friction,
+    /// Mass and moments of a body, relative.
+    Mass(usize),
+    /// Mass and moments of all bodies, relative.
+    AllMasses,
+    /// The damping of a joint.
+    Damping(usize),
+    /// The stiffness of all contacts that yield, relative.
+    Stiffness,
+    /// Their damping, relative.
+    ContactDamping,
+}
+
+impl Direction {
+    fn is_of_inertias(self) -> bool {
+        matches!(self, Self::Mass(_) | Self::AllMasses)
+    }
+}
+
+/// 1 in one lane, times a rate.
+#[inline(always)]
+pub(super) fn unit<T: Lane>(token: T::Token, lane: usize, rate: f64) -> T {
+    let mut unit = T::splat(token, 0.0);
+    unit.set(lane, rate);
+    unit
+}
+
+impl<T: Lane> Tangent<T> {
+    /// Sets what varies, one direction a lane.
+    pub(super) fn seed(&mut self, scene: &TangentScene<'_>, directions: &[Direction]) {
+        let mechanism = scene.model.mechanism();
+        let token = self.token;
+        let zero = T::splat(token, 0.0);
+        for ((own, moved), v) in self.v.iter_mut().zip(&mut self.moved).zip(scene.start.v) {
+            *own = Dual::splat(token, *v);
+            *moved = Dual::constant(zero);
+        }
+        if std::mem::take(&mut self.varies_inertias) {
+            self.reset_inertias(scene);
+        }
+        self.drives.clone_from(&self.own_drives);
+        (self.d_mu, self.d_stiffness, self.d_damping) = (zero, zero, zero);
+        for (lane, direction) in directions.iter().enumerate() {
+            let one = unit::<T>(token, lane, 1.0);
+            let varying = Dual::new(zero, one);
+            match *direction {
+                Direction::Configuration(rates) => {
+                    for (k, rate) in rates {
+                        self.moved[k].slope += unit::<T>(token, lane, rate);
+                    }
+                }
+                Direction::Velocity(k) => self.v[k].slope += one,
+                Direction::Command(joint, sign) => {
+                    let change = Dual::new(zero, unit(token, lane, sign));
+                    self.drives.add_command(joint, change);
+                }
+                Direction::SetPoint(joint) => {
+                    if let Some(held) = &scene.command.held[joint]
+                        && held.stiffness > 0.0
+                    {
+                        let whole = self.drives.stiffness(joint);
+                        let share = Dual::splat(token, held.stiffness) / whole;
+                        self.drives.add_set_point(joint, share, varying);
+                    }
+                }
+                Direction::Friction => self.d_mu += one,
+                Direction::Mass(body) => {
+                    let factor = Dual::new(T::splat(token, 1.0), one);
+                    self.inertias.scale(mechanism, body, factor);
+                }
+                Direction::AllMasses => {
+                    let factor = Dual::new(T::splat(token, 1.0), one);
+                    for body in 0..scene.model.bodies().len() {
+                        self.inertias.scale(mechanism, body, factor);
+                    }
+                }
+                Direction::Damping(joint) => self.drives.add_damping(joint, varying),
+                Direction::Stiffness => self.d_stiffness += one,
+                Direction::ContactDamping => self.d_damping += one,
+            }
+            self.varies_inertias |= direction.is_of_inertias();
+        }
+        (self.start).set_moved(mechanism, &self.base, &self.moved, 1.0);
+    }
+
+    /// The inertias of the machine in all lanes.
+    pub(super) fn reset_inertias(&mut self, scene: &TangentScene<'_>) {
+        for lane in 0..T::LANES {
+            self.inertias.set_lane(lane, scene.model.inertias());
+        }
+    }
+
+    /// The machine at the start of the step in all lanes, without anything that varies.
+    pub(super) fn load(&mut self, scene: &TangentScene<'_>) {
+        let of = |q: &mut LaneConfiguration<Dual<T>>| {
+            for lane in 0..T::LANES {
+                q.set_lane(lane, scene.start.configuration);
+            }
+        };
+        of(&mut self.base);
+        for lane in 0..T::LANES {
+            (self.own_drives).set_lane(lane, scene.model.joints(), scene.command);
+        }
+        self.own_drives.finish_loading();
+        self.reset_inertias(scene);
+        self.varies_inertias = false;
+    }
+}

@@ -1,0 +1,82 @@
+//! What a step of a tree held, and how its contacts change with the poses.
+
+use crate::contact::contact_slope::ContactSlope;
+use crate::contact::{Contact, Opposite};
+use crate::geometry::Terrain;
+use crate::integrator::held_step::HeldStep;
+use crate::integrator::{MechanicalSystem, ScratchOf, Start, StepOptions};
+use crate::law::compliance::Compliance;
+use crate::multibody::{Configuration, Factor, Model};
+use crate::system::TreeSystem;
+use crate::system::command::Command;
+
+/// A step that was taken, as its derivatives need it.
+#[derive(Clone, Debug)]
+pub(crate) struct HeldTree {
+    pub(crate) step: HeldStep<Contact>,
+    /// One a contact.
+    pub(super) contacts: Vec<HeldContact>,
+    pub(super) factor: Factor<f64>,
+}
+
+/// What a contact is besides its place.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct HeldContact {
+    pub slope: ContactSlope,
+    pub restitution: f64,
+    /// Where it yields.
+    pub compliance: Option<Compliance>,
+    /// Index of the joint, of a stop.
+    pub joint: Option<usize>,
+}
+
+/// A step with its machine, from its start to the velocity at its end.
+#[derive(Clone, Copy)]
+pub(crate) struct TangentScene<'a> {
+    pub model: &'a Model,
+    pub command: &'a Command,
+    pub options: &'a StepOptions,
+    pub start: Start<'a, Configuration>,
+    pub v_end: &'a [f64],
+    pub held: &'a HeldTree,
+}
+
+impl TreeSystem<'_> {
+    /// What the step from `start` held that was just taken with the scratch `ws`, without memory.
+    /// None if it has no derivative: it was not solved, or not projected by the law.
+    pub(crate) fn hold(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Configuration>,
+        ws: &ScratchOf<Self>,
+    ) -> Option<HeldTree> {
+        let (model, terrain): (&Model, &dyn Terrain) = (self.model, self.terrain);
+        let is_common = |contact: &Contact| {
+            contact.key.opposite != Opposite::Stop
+                && (options.materials.is_empty()
+                    || (contact.between_materials(model, terrain, &options.materials)).is_none())
+        };
+        let step = HeldStep::of(&*self, options, ws, is_common)?;
+        let mut q = start.configuration.clone();
+        self.advance(&mut q, start.v, options.time_step);
+        self.place_end(&q);
+        let contacts = step.contacts.iter().enumerate().map(|(i, contact)| {
+            let joint = match contact.part {
+                crate::contact::Part::Limit(joint, _) => Some(joint),
+                _ => None,
+            };
+            let yields = step.yields.get(i).is_some_and(|yields| *yields);
+            HeldContact {
+                slope: ContactSlope::of(model, &self.parts.kinematics_end, terrain, contact),
+                restitution: self.normal_shift(options, contact, 1.0),
+                compliance: self.compliance(contact).filter(|_| yields),
+                joint,
+            }
+        });
+        Some(HeldTree {
+            contacts: contacts.collect(),
+            factor: self.parts.factor.clone(),
+            step,
+        })
+    }
+}

@@ -1,0 +1,407 @@
+//! One pass over a step, with as many directions as lanes.
+
+use super::direction::Direction;
+use super::held_tree::TangentScene;
+use super::scratch::{Correction, Tangent};
+use crate::integrator::held_step::SAME;
+use crate::integrator::mechanical_system::MOST_REVISIONS;
+use crate::multibody::Configuration;
+use crate::multibody::bias::bias;
+use crate::multibody::energy::energy;
+use crate::multibody::mechanism::Mechanism;
+use crate::scalar::{Dual, Lane, Vec3};
+
+/// Relative difference of velocities that is rounding.
+const ROUNDING: f64 = 1e-13;
+
+impl<T: Lane> Tangent<T> {
+    /// Calls `take` with the number of each direction and its derivatives of the configuration's
+    /// motion and of the velocity at the end (nv each). False if the step is not the one that the
+    /// held equations describe; `end` then is of no use.
+    pub(crate) fn differentiate(
+        &mut self,
+        scene: &TangentScene<'_>,
+        directions: &[Direction],
+        end: &mut Configuration,
+        mut take: impl FnMut(usize, &[f64], &[f64]),
+    ) -> bool {
+        let nv = scene.model.nv();
+        self.load(scene);
+        self.factor.spread(self.token, &scene.held.factor);
+        let mut columns = vec![vec![0.0; 2 * nv]; T::LANES];
+        let (mut motion, mut numbers) = (vec![T::splat(self.token, 0.0); nv], [0.0; 8]);
+        for (group, directions) in directions.chunks(T::LANES).enumerate() {
+            self.seed(scene, directions);
+            self.run(scene);
+            if group == 0 {
+                if !self.choose_correction(scene) {
+                    return false;
+                }
+            } else {
+                self.conclude(scene);
+            }
+            self.reached.slope(scene.model.mechanism(), &mut motion);
+            let slopes = self.v_end.iter().map(|v| v.slope);
+            for (k, slope) in motion.iter().copied().chain(slopes).enumerate() {
+                slope.store(&mut numbers[..T::LANES]);
+                for (column, x) in columns.iter_mut().zip(numbers) {
+                    column[k] = x;
+                }
+            }
+            for (lane, column) in columns[..directions.len()].iter().enumerate() {
+                let (motion, velocity) = column.split_at(nv);
+                take(group * T::LANES + lane, motion, velocity);
+            }
+        }
+        self.reached.to_lane(0, end);
+        true
+    }
+
+    /// From the start to the velocity before the energy audit.
+    fn run(&mut self, scene: &TangentScene<'_>) {
+        let (token, mechanism) = (self.token, scene.model.mechanism());
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.predict(scene),
+        );
+        (self.poses_middle).update(mechanism, &self.inertias, &self.middle);
+        (self.poses_end).update(mechanism, &self.inertias, &self.end);
+        (self.mass_matrix).update(mechanism, &self.inertias, &self.poses_middle);
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.drive(scene),
+        );
+        self.weigh(scene, true);
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.find_mean(scene),
+        );
+        self.weigh(scene, false);
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.find_velocity(scene),
+        );
+    }
+
+    #[inline(always)]
+    fn step(&self, scene: &TangentScene<'_>) -> (Dual<T>, Dual<T>) {
+        let number = |x: f64| Dual::splat(self.token, x);
+        (number(scene.options.time_step), number(scene.options.theta))
+    }
+
+    #[inline(always)]
+    fn predict(&mut self, scene: &TangentScene<'_>) {
+        let (h, theta) = (scene.options.time_step, scene.options.theta);
+        let mechanism = scene.model.mechanism();
+        (self.middle).set_moved(mechanism, &self.start, &self.v, (1.0 - theta) * h);
+        self.end.set_moved(mechanism, &self.start, &self.v, h);
+    }
+
+    /// Implicit terms, branches and torques of the drives.
+    #[inline(always)]
+    fn drive(&mut self, scene: &TangentScene<'_>) {
+        let step = self.step(scene);
+        let mechanism = scene.model.mechanism();
+        let (drives, mass_matrix) = (&mut self.drives, &mut self.mass_matrix);
+        drives.set_theta(mechanism, step, |k| mass_matrix.diagonal(mechanism, k));
+        drives.choose_branches(mechanism, &self.v);
+        if drives.has_motors() {
+            for (own, v) in self.v_end.iter_mut().zip(scene.v_end) {
+                *own = Dual::splat(self.token, *v);
+            }
+            let all = T::mask(self.token, u32::MAX >> (32 - T::LANES));
+            for _ in 0..MOST_REVISIONS {
+                drives.revise(mechanism, all, &self.v, &self.v_end);
+            }
+        }
+        drives.add_implicit(mechanism, step, |k, a| {
+            mass_matrix.add_to_diagonal(mechanism, k, a);
+        });
+        self.torque.fill(Dual::splat(self.token, 0.0));
+        let places = &self.start.joints;
+        drives.add_impulse(
+            mechanism,
+            step,
+            places,
+            [&self.v, &self.v],
+            &mut self.torque,
+        );
+    }
+
+    /// `y` = the bias at the velocity v, or at the mean velocity.
+    fn weigh(&mut self, scene: &TangentScene<'_>, at_start: bool) {
+        let v = if at_start { &self.v } else { &self.v_mean };
+        let [x, y, z] = scene.options.gravity.into();
+        bias(
+            scene.model.mechanism(),
+            &self.inertias,
+            &self.poses_middle,
+            v,
+            Vec3::splat(self.token, [x, y, z]),
+            &mut self.bias_scratch,
+            &mut self.y,
+        );
+    }
+
+    /// `y ← M̂⁻¹ y`, with the derivative by the residual.
+    #[inline(always)]
+    fn solve(&mut self, mechanism: &Mechanism) {
+        let [value, slope] = &mut self.solved;
+        for (value, y) in value.iter_mut().zip(&self.y) {
+            *value = y.value;
+        }
+        self.factor.half_solve(mechanism, value);
+        self.factor.half_solve_back(mechanism, value);
+        let solution = &mut self.moved;
+        for (own, value) in solution.iter_mut().zip(&*value) {
+            *own = Dual::constant(*value);
+        }
+        (self.mass_matrix).times(mechanism, solution, &mut self.product);
+        for ((slope, y), product) in slope.iter_mut().zip(&self.y).zip(&self.product) {
+            *slope = y.slope - product.slope;
+        }
+        self.factor.half_solve(mechanism, slope);
+        self.factor.half_solve_back(mechanism, slope);
+        for (y, (value, slope)) in self.y.iter_mut().zip(value.iter().zip(&*slope)) {
+            *y = Dual::new(*value, *slope);
+        }
+    }
+
+    /// `y = h (τ − bias)`.
+    #[inline(always)]
+    fn load_forces(&mut self, h: Dual<T>) {
+        for (y, torque) in self.y.iter_mut().zip(&self.torque) {
+            *y = *torque - h * *y;
+        }
+    }
+
+    #[inline(always)]
+    fn find_mean(&mut self, scene: &TangentScene<'_>) {
+        let (h, theta) = self.step(scene);
+        let share = h.like(1.0) - theta;
+        self.load_forces(h);
+        self.solve(scene.model.mechanism());
+        for ((mean, v), change) in self.v_mean.iter_mut().zip(&self.v).zip(&self.y) {
+            *mean = *v + share * *change;
+        }
+    }
+
+    /// The velocity at the end with the impulses' answer, and the projection's displacement.
+    #[inline(always)]
+    fn find_velocity(&mut self, scene: &TangentScene<'_>) {
+        let mechanism = scene.model.mechanism();
+        let (h, _) = self.step(scene);
+        let step = &scene.held.step;
+        self.load_forces(h);
+        self.place_contacts(scene);
+        for (i, p) in step.law.p.chunks_exact(3).enumerate() {
+            self.push(scene, i, [p[0], p[1], p[2]]);
+        }
+        self.solve(mechanism);
+        for ((end, v), change) in self.v_end.iter_mut().zip(&self.v).zip(&self.y) {
+            *end = *v + *change;
+        }
+        let size = step.law.p.len();
+        self.du.clear();
+        for i in 0..step.contacts.len() {
+            let du = self.velocity_of(scene, i);
+            self.du.extend_from_slice(&du);
+        }
+        self.dp.clear();
+        for (row, of_mu) in step.answer.rows() {
+            let sum = self.d_mu * self.d_mu.like(of_mu);
+            self.dp.push(along(row, &self.du, sum));
+        }
+        if size > 0 {
+            for (end, row) in self.v_end.iter_mut().zip(step.response.chunks_exact(size)) {
+                end.slope = along(row, &self.dp, end.slope);
+            }
+        }
+        self.displace(scene);
+    }
+
+    /// Derivative of a contact's shifted velocity at held impulses.
+    #[inline(always)]
+    fn velocity_of(&self, scene: &TangentScene<'_>, i: usize) -> [T; 3] {
+        let mut u = self.local(scene, i, &self.v_end);
+        let p = &scene.held.step.law.p[3 * i..];
+        if let Some(law) = self.yielding(scene, i) {
+            for k in 0..3 {
+                u[k] += law.shift[k] + law.diagonal * law.diagonal.like(p[k]);
+            }
+        } else {
+            let restitution = scene.held.contacts[i].restitution;
+            if restitution > 0.0 {
+                let before = self.local(scene, i, &self.v)[0];
+                u[0] += before.like(restitution) * before;
+            }
+        }
+        u.map(|u| u.slope)
+    }
+
+    /// The projection's displacement with its derivative. `y` is the change of the velocity at held
+    /// impulses.
+    #[inline(always)]
+    fn displace(&mut self, scene: &TangentScene<'_>) {
+        let zero = Dual::splat(self.token, 0.0);
+        let step = &scene.held.step;
+        let Some(projection) = &step.projection else {
+            return;
+        };
+        let size = step.law.p.len();
+        let share = self
+            .d_mu
+            .like(scene.options.theta * scene.options.time_step);
+        self.du.clear();
+        for (i, counts) in projection.counts.iter().enumerate() {
+            let mut gap = zero.slope;
+            if *counts {
+                gap = if let Some(law) = self.yielding(scene, i) {
+                    law.unexplained.slope
+                } else {
+                    let moved = self.local(scene, i, &self.y)[0].slope;
+                    let row = &step.W[3 * i * size..][..size];
+                    self.contacts[i].gap.slope + share * along(row, &self.dp, moved)
+                };
+            }
+            self.du.extend_from_slice(&[gap, zero.slope, zero.slope]);
+        }
+        self.y.fill(zero);
+        for (i, p) in projection.law.p.chunks_exact(3).enumerate() {
+            self.push(scene, i, [p[0], p[1], p[2]]);
+        }
+        self.solve(scene.model.mechanism());
+        for i in 0..step.contacts.len() {
+            let mut local = self.local(scene, i, &self.y);
+            if let Some(law) = self.yielding(scene, i) {
+                for (local, p) in local.iter_mut().zip(&projection.law.p[3 * i..]) {
+                    *local += law.diagonal * law.diagonal.like(*p);
+                }
+            }
+            for (du, local) in self.du[3 * i..].iter_mut().zip(local) {
+                *du += local.slope;
+            }
+        }
+        self.dp.clear();
+        for (row, of_mu) in projection.answer.rows() {
+            let sum = self.d_mu * self.d_mu.like(of_mu);
+            self.dp.push(along(row, &self.du, sum));
+        }
+        let rows = step.response.chunks_exact(size);
+        for ((own, y), row) in self.displacement.iter_mut().zip(&self.y).zip(rows) {
+            *own = Dual::new(y.value, along(row, &self.dp, y.slope));
+        }
+    }
+
+    /// Chooses how the audit corrected the velocity, and concludes. False if no correction leads to
+    /// the velocity at the end of the step.
+    fn choose_correction(&mut self, scene: &TangentScene<'_>) -> bool {
+        let fastest = scene.v_end.iter().fold(1e-3_f64, |m, v| m.max(v.abs()));
+        let kept = self.v_end.clone();
+        let mut best = (f64::INFINITY, Correction::None);
+        for correction in [Correction::None, Correction::Relative, Correction::Whole] {
+            self.correction = correction;
+            self.v_end.copy_from_slice(&kept);
+            self.conclude(scene);
+            let pairs = self.v_end.iter().zip(scene.v_end);
+            let off = pairs.fold(0.0_f64, |m, (a, b)| m.max((a.get(0) - b).abs()));
+            // The same to rounding: the simpler one.
+            if off < 0.5 * best.0 {
+                best = (off, correction);
+            }
+            if best.0 <= ROUNDING * fastest {
+                break;
+            }
+        }
+        if best.1 != self.correction {
+            self.correction = best.1;
+            self.v_end.copy_from_slice(&kept);
+            self.conclude(scene);
+        }
+        best.0 <= SAME * fastest
+    }
+
+    /// The state at the end, from the velocity before the audit.
+    fn conclude(&mut self, scene: &TangentScene<'_>) {
+        let token = self.token;
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || {
+                let (h, theta) = (scene.options.time_step, scene.options.theta);
+                let mechanism = scene.model.mechanism();
+                self.end
+                    .set_moved(mechanism, &self.middle, &self.v_end, theta * h);
+                self.end.normalise();
+            },
+        );
+        if self.correction != Correction::None {
+            self.correct(scene);
+        }
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || {
+                if scene.held.step.projection.is_some() {
+                    let mechanism = scene.model.mechanism();
+                    (self.reached).set_moved(mechanism, &self.end, &self.displacement, 1.0);
+                    self.reached.normalise();
+                } else {
+                    self.reached.clone_from(&self.end);
+                }
+            },
+        );
+    }
+
+    /// What the audit leaves of the velocity, see [`crate::integrator::energy_audit`].
+    fn correct(&mut self, scene: &TangentScene<'_>) {
+        let step = self.step(scene);
+        let mechanism = scene.model.mechanism();
+        let gravity = Vec3::splat(self.token, scene.options.gravity.into());
+        let scratch = &mut self.energy_scratch;
+        let (inertias, mass) = (&self.inertias, self.inertias.mass);
+        let before = energy(mechanism, inertias, &self.start, &self.v, gravity, scratch).0;
+        let (after, momentum) = energy(
+            mechanism,
+            inertias,
+            &self.end,
+            &self.v_end,
+            gravity,
+            scratch,
+        );
+        let places = &self.start.joints;
+        let work = (self.drives).work(mechanism, step, places, [&self.v, &self.v_end]);
+        let excess = (after.kinetic - before.kinetic) + (after.potential - before.potential) - work;
+        let (zero, one) = (mass.like(0.0), mass.like(1.0));
+        let is_relative = self.correction == Correction::Relative && scene.model.is_free();
+        let whole = if is_relative {
+            momentum.dot(momentum) / (mass + mass)
+        } else {
+            zero
+        };
+        let share = (one - excess / (after.kinetic - whole)).max(zero).sqrt();
+        let common = momentum * (one / mass);
+        let common = [common.x, common.y, common.z];
+        for (k, v) in self.v_end.iter_mut().enumerate() {
+            let common = if is_relative && k < 3 {
+                common[k]
+            } else {
+                zero
+            };
+            *v = common + share * (*v - common);
+        }
+    }
+}
+
+/// `sum + row · x`.
+#[inline(always)]
+fn along<T: Lane>(row: &[f64], x: &[T], mut sum: T) -> T {
+    for (a, x) in row.iter().zip(x) {
+        sum += x.like(*a) * *x;
+    }
+    sum
+}

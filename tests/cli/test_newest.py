@@ -1,0 +1,89 @@
+"""The commands hand on to one another: a drive is recorded, and replay and plot take the newest run."""
+
+import os
+import subprocess
+import sys
+import webbrowser
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from rover_gym.cli import app
+from rover_gym.cli.newest import newest_run
+from rover_gym.mechanics import OptionError
+
+DRIVE = ("drive", "--time-limit", "0.2")
+
+
+def rover(*arguments: str) -> Result:
+    return CliRunner(env={"COLUMNS": "120", "NO_COLOR": "1"}).invoke(app, list(arguments))
+
+
+@pytest.fixture(autouse=True)
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_a_drive_is_recorded_and_the_next_two_commands_need_no_name(place: Path) -> None:
+    driven = rover(*DRIVE)
+    assert driven.exit_code == 0, driven.output
+    assert driven.output.splitlines()[-1] == f"watch it: rover replay {Path('runs/drive/episode-0.h5')}"
+    assert rover("replay").exit_code == 0
+    assert (place / "runs" / "drive" / "episode-0.html").stat().st_size > 100_000
+    assert rover("plot").exit_code == 0
+    assert (place / "runs" / "drive" / "episode-0-plots" / "path.png").is_file()
+
+
+def test_the_command_starts_without_any_extra() -> None:
+    """Pages took the colours of the rover from a module that imports VTK: `rover` failed without it."""
+    extras = ("vtkmodules", "h5py", "matplotlib", "websockets", "pygltflib", "trimesh", "scipy", "PIL")
+    code = f"import sys; sys.modules.update(dict.fromkeys({extras!r})); import rover_gym.cli, rover_gym.live"
+    subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ})
+
+
+def test_a_drive_leaves_nothing_where_none_is_wanted(place: Path) -> None:
+    driven = rover(*DRIVE, "--no-record")
+    assert driven.exit_code == 0
+    assert "watch it" not in driven.output
+    assert list(place.iterdir()) == []
+
+
+def test_without_h5py_a_drive_is_driven_and_a_folder_refused(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    driven = rover(*DRIVE)
+    assert driven.exit_code == 0
+    assert driven.stderr == "not recorded: h5py is not installed: pip install 'rover-gym[record]'\n"
+    assert list(place.iterdir()) == []
+    assert rover(*DRIVE, "--output", "here").exit_code == 2
+
+
+def test_the_newest_run_of_a_folder_is_taken(place: Path) -> None:
+    for age, name in ((100, "a/old.h5"), (10, "b/new.h5"), (50, "middle.h5")):
+        path = place / "runs" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+        os.utime(path, (1e9 - age, 1e9 - age))
+    assert newest_run(None) == Path("runs/b/new.h5")
+    assert newest_run(place / "runs" / "a") == place / "runs" / "a" / "old.h5"
+    assert newest_run(Path("runs/middle.h5")) == Path("runs/middle.h5")
+
+
+def test_where_there_is_no_run_one_line_says_how_to_make_one() -> None:
+    with pytest.raises(OptionError):
+        newest_run(None)
+    for command in ("replay", "plot"):
+        told = rover(command)
+        assert told.exit_code == 2
+        assert told.stderr == "error: RUN: holds no recording: `rover drive` makes one, got 'runs'\n"
+
+
+def test_the_browser_opens_when_asked_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", opened.append)
+    assert rover(*DRIVE).exit_code == 0
+    assert rover("replay").exit_code == 0
+    assert opened == []  # the test is no terminal
+    assert rover("replay", "--open").exit_code == 0
+    assert opened == [Path("runs/drive/episode-0.html").resolve().as_uri()]
