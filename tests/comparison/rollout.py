@@ -57,11 +57,17 @@ class Row:
         name: In the table.
         model: The rover.
         ground: Makes the ground of a rover from a generator.
+        around: Largest distance along x and z from the origin at which a rover begins, m.
+        roll: Its roll there, rad.
+        bodies: Whether its boxes touch the ground in MuJoCo, too.
     """
 
     name: str
     model: RoverModel
     ground: Callable[[np.random.Generator], Any]
+    around: float = 3.0
+    roll: float = 0.0
+    bodies: bool = False
 
 
 def wide(width: float, rounding: float, **more: float) -> RoverModel:
@@ -89,6 +95,11 @@ def rocks(rng: np.random.Generator) -> SphereField:
     return SphereField(np.column_stack([places[:, 0], -depth, places[:, 1]]), radii, Plane())
 
 
+def one_rock(_: np.random.Generator) -> SphereField:
+    """A rock that lifts the trunk of the built-in rover off its wheels of 0.20 m."""
+    return SphereField([[0.0, -0.1, 0.0]], [0.5], Plane())
+
+
 def hills(spacing: float) -> Callable[[np.random.Generator], HeightField]:
     """Self-affine hills with cells of a size, m, one map for all rovers of a row."""
     made: list[HeightField] = []
@@ -102,7 +113,7 @@ def hills(spacing: float) -> Callable[[np.random.Generator], HeightField]:
 
 
 def rows(robots: list[Path]) -> Iterator[Row]:
-    """All rows of the table: the built-in rover by its wheels, the gallery, and files of robots."""
+    """All rows of the table: the built-in rover by its wheels, the gallery, rovers on their bodies, files of robots."""
     grounds = {"plane": plane, "rocks": rocks, "hills 0.25 m": hills(0.25), "hills 0.05 m": hills(0.05)}
     wheels = {
         "thin discs": wide(0.0, 0.0),
@@ -116,6 +127,9 @@ def rows(robots: list[Path]) -> Iterator[Row]:
     for name in ("mars-rover", "open-rover", "four-steered", "skid-steered"):
         for ground, make in grounds.items():
             yield Row(f"{name}, {ground}", RoverModel.named(name).replace(motor=None), make)
+    yield Row("rover, trunk on a rock", wheels["thin discs"], one_rock, around=0.1, bodies=True)
+    for ground in ("hills 0.25 m", "hills 0.05 m"):
+        yield Row(f"rover, on its back, {ground}", wheels["thin discs"], grounds[ground], roll=math.pi, bodies=True)
     for file in robots:
         read = RoverModel.from_urdf if file.suffix == ".urdf" else RoverModel.from_mjcf
         for ground, make in grounds.items():
@@ -126,8 +140,9 @@ def rover_at_rest(row: Row, rng: np.random.Generator) -> Simulation:
     """A rover somewhere on its ground, at rest, its wheels braked until the first command."""
     terrain = row.ground(rng)
     simulation = Simulation(row.model, terrain, time_step=TIME_STEP)
-    x, z = rng.uniform(-3.0, 3.0, 2)
+    x, z = rng.uniform(-row.around, row.around, 2)
     q = row.model.resting_pose(Plane(), (x, z), rng.uniform(-math.pi, math.pi))
+    q[3] += row.roll
     simulation.set_state(q)
     while simulation.deepest_overlap < -LIFT:
         q[1] += LIFT
@@ -160,10 +175,15 @@ def one_by_one(simulations: list[Simulation], reports: list[Any]) -> Player:
     return play
 
 
-def in_mujoco(simulations: list[Simulation], threads: int, states: dict[str, Array] | None = None) -> dict[str, Player]:
-    """MuJoCo's rollout of the same rovers, by setting; with their states, which a dictionary receives."""
+def in_mujoco(
+    simulations: list[Simulation], threads: int, states: dict[str, Array] | None = None, *, bodies: bool = False
+) -> dict[str, Player]:
+    """MuJoCo's rollout of the same rovers, by setting; with their states, which a dictionary receives.
+
+    `bodies`: whether boxes touch the ground.
+    """
     states = {} if states is None else states
-    models = [mujoco.MjModel.from_xml_string(text) for text in descriptions(simulations)]
+    models = [mujoco.MjModel.from_xml_string(text) for text in descriptions(simulations, bodies=bodies)]
     for model, one in zip(models, simulations, strict=True):
         terrain: Any = one.terrain
         if isinstance(terrain, HeightField):
@@ -198,12 +218,13 @@ def in_mujoco(simulations: list[Simulation], threads: int, states: dict[str, Arr
     return {name: player(name, *setting) for name, setting in MUJOCO.items()}
 
 
-def descriptions(simulations: list[Simulation]) -> list[str]:
+def descriptions(simulations: list[Simulation], *, bodies: bool = False) -> list[str]:
     """The rovers and their grounds as MJCF, z up. Only wheels touch the ground, thin discs as cylinders 4 mm wide.
 
-    A rollout wants equally large models: fields of fewer rocks get some far below.
+    With `bodies` boxes do so, too. A rollout wants equally large models: fields of fewer rocks get some far below.
     """
     machine = simulations[0].model
+    masks = {"contype": "2", "conaffinity": "1", "friction": "0.7 0 0", "condim": "3"}
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "rover.xml"
         machine.to_mjcf(file)
@@ -216,6 +237,9 @@ def descriptions(simulations: list[Simulation]) -> list[str]:
         ElementTree.SubElement(root, "option", timestep=repr(TIME_STEP), gravity="0 0 -9.81")
         for body in root.iter("body"):
             for geom in body.findall("geom"):
+                if bodies and geom.get("type") == "box":
+                    geom.attrib |= masks
+                    continue
                 is_rim = body.get("name") in wheels and geom.get("type") == "cylinder" and "contype" not in geom.keys()  # noqa: SIM118
                 if not is_rim:
                     body.remove(geom)
@@ -226,7 +250,7 @@ def descriptions(simulations: list[Simulation]) -> list[str]:
                 if (wheel.get("rounding") or 0.0) >= half:
                     geom.set("type", "ellipsoid")
                     geom.set("size", f"{radius!r} {radius!r} {half!r}")
-                geom.attrib |= {"contype": "2", "conaffinity": "1", "friction": "0.7 0 0", "condim": "3"}
+                geom.attrib |= masks
         for motor in root.iter("motor"):
             motor.attrib.pop("ctrlrange", None)
         for name, solid in limits.items():
@@ -294,7 +318,7 @@ def measure(row: Row, rovers: int, threads: int, seed: int, rounds: int = ROUNDS
     limits = np.array([torque] * n + turns)
     reports: list[Any] = []
     alone = simulations[: min(ALONE, rovers)]
-    beside = in_mujoco(simulations, threads)
+    beside = in_mujoco(simulations, threads, bodies=row.bodies)
     engines: dict[str, tuple[int, Player]] = {
         "batch": (rovers, together(SimulationBatch(simulations, threads=threads), n)),
         "alone": (len(alone), one_by_one(alone, reports)),

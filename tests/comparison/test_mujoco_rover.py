@@ -29,7 +29,10 @@ def test_mass_matrix_and_rest_are_ours() -> None:
     np.testing.assert_allclose(data.qpos[:3], simulation.q[:3], atol=2e-3)
 
 
-@pytest.mark.parametrize("name", ["rover, cylinders, rocks", "mars-rover, hills 0.25 m", "skid-steered, plane"])
+@pytest.mark.parametrize(
+    "name",
+    ["rover, cylinders, rocks", "mars-rover, hills 0.25 m", "skid-steered, plane", "rover, on its back, hills 0.25 m"],
+)
 def test_every_row_of_the_bench_has_its_rover_in_both_engines(name: str) -> None:
     from comparison import rollout  # noqa: PLC0415 - needs MuJoCo
 
@@ -39,7 +42,7 @@ def test_every_row_of_the_bench_has_its_rover_in_both_engines(name: str) -> None
     rng = np.random.default_rng(3)
     simulations = [rollout.rover_at_rest(row, rng) for _ in range(2)]
     n = len(row.model.to_dict()["wheels"])
-    theirs = rollout.in_mujoco(simulations, 1, states := {})
+    theirs = rollout.in_mujoco(simulations, 1, states := {}, bodies=row.bodies)
     commands = np.zeros((4, 2, 2 * n))
     theirs["elliptic"](commands)
     rollout.one_by_one(simulations, [])(commands)

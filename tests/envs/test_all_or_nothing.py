@@ -160,7 +160,7 @@ def state_of(env: RoverVectorEnv) -> list[Any]:
         [random_state(batch.generator(i)) for i in range(batch.n)],
         list(batch._seeds),
         batch.observation.tobytes(),
-        [rover.start for rover in batch.rovers],
+        [rover.start for rover in env.envs],
         batch.over,
     ]
 
@@ -341,7 +341,7 @@ def test_a_rover_whose_step_failed_begins_anew(mode: str) -> None:
             assert ended["termination"][1] == "step_failed"
             if mode == "Disabled":
                 env.reset(options={"reset_mask": only})
-    assert env.batch.rovers[1].simulation.time > 0.0
+    assert env.envs[1].simulation.time > 0.0
 
 
 def numbers_in(info: Any, path: str = "") -> dict[str, float]:

@@ -57,7 +57,7 @@ def test_policies_reach_the_goal_on_the_plane(name: str, kind: str) -> None:
     n_episodes = 10
     envs = RoverVectorEnv(n_episodes, model=MACHINES[name][1])
     observation, _ = envs.reset(seed=20)
-    baseline, controller = PDPolicy(envs), CommandController(envs.batch.prototype, guided=True)
+    baseline, controller = PDPolicy(envs), CommandController(envs.prototype, guided=True)
     reached = np.zeros(n_episodes, bool)
     for _ in range(600):
         if kind == "baseline":

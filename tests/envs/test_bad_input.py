@@ -390,7 +390,7 @@ def single_state(env: RoverEnv) -> Any:
 
 
 def vector_state(env: RoverVectorEnv) -> Any:
-    rovers = env.batch.rovers
+    rovers = env.envs
     states = [json.dumps(rover.np_random.bit_generator.state, default=str) for rover in rovers]
     return [rover.simulation.snapshot() for rover in rovers], [rover.start for rover in rovers], states
 

@@ -4,14 +4,12 @@ import itertools
 import math
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
 from rover_gym import OptionError, PDPolicy, RoverEnv
 from rover_gym.planning import PlannerOptions, PlannerPolicy
 from rover_gym.policy import drive_all, summarise
-from rover_gym.vector import RoverVectorEnv
 
 FORWARD = np.array([0.3] * 6 + [0.0] * 6, np.float32)
 
@@ -57,22 +55,6 @@ def test_without_a_battery_nothing_is_told_of_one() -> None:
     env = RoverEnv()
     assert "charge" not in env.observation_layout
     assert "charge" not in env.reset(seed=0)[1]
-
-
-def test_a_vector_ends_as_single_rovers_do() -> None:
-    envs: Any = gym.make_vec("RoverBattery-v0", 2, battery=300.0)
-    assert type(envs) is RoverVectorEnv
-    envs.reset(seed=0)
-    alone = gym.make("RoverBattery-v0", battery=300.0)
-    alone.reset(seed=1)
-    for _ in range(100):
-        *_, infos = envs.step(np.stack([FORWARD, FORWARD]))
-        *_, terminated, _, info = alone.step(FORWARD)
-        assert infos["charge"][1] == info["charge"]
-        assert infos["termination"][1] == info["termination"]
-        if terminated:
-            break
-    assert info["termination"] == "battery_empty"
 
 
 def test_evaluations_count_empty_batteries() -> None:
@@ -214,25 +196,6 @@ def test_bad_courses_are_refused(arguments: dict[str, Any], field: str) -> None:
     with pytest.raises(OptionError) as caught:
         RoverEnv(**arguments)
     assert caught.value.field == field
-
-
-def test_a_vector_reaches_goals_as_single_rovers_do() -> None:
-    envs: Any = gym.make_vec("RoverWaypoints-v0", 3, goal_distance=(0.6, 1.0), waypoints=3)
-    assert type(envs) is RoverVectorEnv
-    seen, infos = envs.reset(seed=0)
-    alone = gym.make("RoverWaypoints-v0", goal_distance=(0.6, 1.0), waypoints=3)
-    own, _ = alone.reset(seed=1)
-    policy = PDPolicy(envs)
-    reached = np.zeros(3, int)
-    for _ in range(60):
-        assert seen[1].tobytes() == own.tobytes()
-        actions = policy.predict(seen)[0]
-        seen, *_, infos = envs.step(actions)
-        own, *_, info = alone.step(actions[1])
-        assert info["waypoints_reached"] == infos["waypoints_reached"][1]
-        assert alone.unwrapped.goal == envs.get_attr("goal")[1]  # type: ignore[attr-defined]
-        reached = np.maximum(reached, infos["waypoints_reached"])
-    assert (reached >= 1).all()
 
 
 def test_the_planner_turns_to_the_next_goal() -> None:

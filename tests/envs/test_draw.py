@@ -13,11 +13,9 @@ import pytest
 from rover_gym import OptionError, Plane, RoverEnv
 from rover_gym.env.generators import fresh_seed, generator_at, row_of, seeded_rows
 from rover_gym.mechanics import (
-    CommandError,
     EpisodeBatch,
     EpisodeDistribution,
     Simulation,
-    TerrainError,
     seed_generators,
     standard_normals,
 )
@@ -126,116 +124,40 @@ def test_scenes_do_not_hang_on_the_number_of_threads(mode: str) -> None:
         env = RoverVectorEnv(7, threads=threads, autoreset_mode=mode, max_episode_steps=2, **ALL_DRAWN)
         seen = [env.reset(seed=0)[0]]
         seen += [env.step(np.full((7, 12), 0.2, np.float32))[0] for _ in range(5)]
-        fields = [rover.simulation.terrain.centres for rover in env.batch.rovers]
+        fields = [rover.simulation.terrain.centres for rover in env.envs]
         runs.append(b"".join(one.tobytes() for one in [*seen, *fields]))
     assert runs[0] == runs[1] == runs[2]
 
 
 def test_episodes_can_be_drawn_without_an_environment() -> None:
     task = RoverEnv(terrain="rocks").task
-    rows = seeded_rows([1, 2, 3])
-    alone = task.episodes.draw(rows, fixed={"difficulty": 0.2, "position": (1.0, 2.0)})
-    batch = EpisodeBatch(task.rules, Simulation(), 4, threads=2)
-    together = batch.draw(task.episodes, rows, fixed=[{"difficulty": 0.2, "position": (1.0, 2.0)}] * 3)
-    assert len(alone) == len(together) == 3
-    for name in ("generators", "observations", "starts", "domains", "rocks", "rock_seeds"):
-        np.testing.assert_array_equal(getattr(alone, name), getattr(together, name))
-    assert alone.rocks[:, 0].tolist() == [0.2] * 3
-    np.testing.assert_array_equal(alone.starts[:, 2:4], [[1.0, 2.0]] * 3)
-    batch.begin([3, 0, 1], alone)
-    assert batch.simulation(3).snapshot() == alone.simulation(0).snapshot()
-    np.testing.assert_array_equal(batch.terrain(0).centres, alone.terrain(1).centres)
-    np.testing.assert_array_equal(batch.terrain(0).ground.normal, alone.plane(1).normal)
-    np.testing.assert_array_equal(batch.generators([3, 1]), alone.generators[[0, 2]])
-    batch.set_generators([1], rows[:1])
-    np.testing.assert_array_equal(batch.generators([3, 1]), [alone.generators[0], rows[0]])
-    assert batch.info(1) == alone.episode(2).info()
-    assert batch.simulation(2).snapshot() == Simulation().snapshot()
-    before = batch.generators([0])
-    for call, given in ((batch.begin, alone), (batch.set_generators, rows)):
+    rows, fixed = seeded_rows([1, 2, 3]), {"difficulty": 0.2, "position": (1.0, 2.0)}
+    one, two = (EpisodeBatch(task.rules, Simulation(), 4, threads=threads) for threads in (1, 2))
+    drawn, again = one.draw(task.episodes, rows, fixed=fixed), two.draw(task.episodes, rows, fixed=[fixed] * 3)
+    assert len(drawn) == len(again) == 3
+    one.begin([3, 0, 1], drawn)
+    two.begin([3, 0, 1], again)
+    for i in (3, 0, 1):
+        assert one.simulation(i).snapshot() == two.simulation(i).snapshot()
+        np.testing.assert_array_equal(one.terrain(i).centres, two.terrain(i).centres)
+        start, rocks, _, _ = one.origin(i)
+        assert (rocks[0], *start[2:4]) == (0.2, 1.0, 2.0)
+    np.testing.assert_array_equal(one.generators([3, 1]), drawn.generators[[0, 2]])
+    np.testing.assert_array_equal(drawn.generators, again.generators)
+    one.set_generators([1], rows[:1])
+    np.testing.assert_array_equal(one.generators([3, 1]), [drawn.generators[0], rows[0]])
+    assert one.simulation(2).snapshot() == Simulation().snapshot()
+    before = one.generators([0])
+    for call, given in ((one.begin, drawn), (one.set_generators, rows)):
         for indices in ([0, 1], [0, 1, 4], [0, 1, -1], 3):
             with pytest.raises(OptionError, match=r"indices|index"):
                 call(indices, given)  # type: ignore[operator]
     other = EpisodeBatch(RoverEnv(goal_tolerance=0.7).task.rules, Simulation(), 3)
     with pytest.raises(OptionError, match="rules"):
-        other.begin([0, 1, 2], alone)
+        other.begin([0, 1, 2], drawn)
     with pytest.raises(OptionError, match="not begun"):
-        batch.set_generators([0, 2, 3], rows)
-    np.testing.assert_array_equal(batch.generators([0]), before)
-
-
-@pytest.mark.parametrize("same_step", [False, True])
-def test_a_step_that_begins_episodes_is_a_step_a_draw_and_a_beginning(same_step: bool) -> None:
-    task = RoverEnv(terrain="rocks", observation_noise=0.01).task
-    one, two = (EpisodeBatch(task.rules, Simulation(), 3, max_steps=2, threads=threads) for threads in (2, 1))
-    for batch in (one, two):
-        batch.begin(range(3), task.episodes.draw(seed_generators(range(3))))
-        batch.set_difficulty(1, (0.1, 0.2))
-
-    def begin_next(batch: EpisodeBatch) -> None:
-        over = batch.over
-        difficulties = [batch.difficulty(i) for i in over]
-        batch.begin(over, batch.draw(task.episodes, batch.generators(over), difficulties=difficulties))
-
-    actions = np.full((3, 12), 0.3, np.float32)
-    for period in range(5):
-        seen = one.step_on(actions, task.episodes, same_step=same_step)
-        starting = two.over
-        expected = two.step(actions, np.array([i not in starting for i in range(3)]))
-        finals = {i: (expected[0][i], two.info(i)) for i in expected[4]} if same_step else {}
-        if same_step or starting:
-            begin_next(two)
-        assert seen[0].tobytes() == two.observations().tobytes() == one.observations().tobytes()
-        if not starting:
-            assert [part.tobytes() for part in seen[1:4]] == [part.tobytes() for part in expected[1:4]]
-        else:
-            assert not any(part.any() for part in seen[1:4])
-        assert one.over == two.over == ([] if same_step or starting else seen[4])
-        assert sorted(one.finals()) == sorted(finals) == (seen[4] if same_step else [])
-        for i, (last, info) in one.finals().items():
-            assert (last.tobytes(), info) == (finals[i][0].tobytes(), finals[i][1])
-            assert info["time"] > 0.0
-        for i in range(3):
-            assert one.info(i) == two.info(i)
-            assert one.simulation(i).snapshot() == two.simulation(i).snapshot()
-            np.testing.assert_array_equal(one.terrain(i).centres, two.terrain(i).centres)
-            for ours, theirs in zip(one.origin(i), two.origin(i), strict=True):
-                np.testing.assert_array_equal(ours, theirs)
-        np.testing.assert_array_equal(one.generators(range(3)), two.generators(range(3)))
-        assert seen[4] == ([0, 1, 2] if period in ((1, 3) if same_step else (1, 4)) else [])
-    assert 0.1 <= one.origin(1)[1][0] <= 0.2
-    one.step(actions)
-    assert one.finals() == {}
-
-
-def test_what_a_step_that_begins_episodes_refuses() -> None:
-    task = RoverEnv().task
-    batch = EpisodeBatch(task.rules, Simulation(), 2, max_steps=1, threads=1)
-    good = np.zeros((2, 12))
-    with pytest.raises(OptionError, match="not begun"):
-        batch.step_on(good, task.episodes, same_step=False)
-    with pytest.raises(OptionError, match="not begun"):
-        batch.origin(0)
-    batch.begin([0, 1], task.episodes.draw(seed_generators([0, 1])))
-    batch.step_on(good, task.episodes, same_step=False)
-    before = batch.generators([0, 1])
-    refusals = [
-        (CommandError, lambda: batch.step_on(good + 2.0, task.episodes, same_step=False)),
-        (OptionError, lambda: batch.step_on(good, task, same_step=False)),  # type: ignore[arg-type]
-        (OptionError, lambda: batch.step_on(good, task.episodes, same_step=False, attempts=-1)),
-        (TerrainError, lambda: batch.step_on(good, task.episodes, same_step=False, attempts=0)),
-        (OptionError, lambda: batch.step_on(good, RoverEnv(stuck_time=9.0).task.episodes, same_step=False)),
-        (OptionError, lambda: batch.set_difficulty(2, (0.0, 1.0))),
-        (OptionError, lambda: batch.set_difficulty(0, (1.0, 0.0))),
-        (OptionError, lambda: batch.difficulty(2)),
-        (OptionError, lambda: batch.origin(-1)),
-    ]
-    for error, call in refusals:
-        with pytest.raises(error):
-            call()
-    assert batch.over == [0, 1]
-    assert batch.difficulty(0) is None
-    np.testing.assert_array_equal(batch.generators([0, 1]), before)
+        one.set_generators([0, 2, 3], rows)
+    np.testing.assert_array_equal(one.generators([0]), before)
 
 
 @pytest.mark.parametrize(
@@ -253,10 +175,10 @@ def test_what_a_step_that_begins_episodes_refuses() -> None:
     ],
 )
 def test_a_bad_request_for_episodes_is_refused_by_name(arguments: dict[str, Any], field: str) -> None:
-    episodes = RoverEnv().task.episodes
-    request = {"generators": seeded_rows([1, 2]), **arguments}
+    task = RoverEnv().task
+    request: dict[str, Any] = {"generators": seeded_rows([1, 2]), **arguments}
     with pytest.raises(ValueError, match=r"must|needs") as caught:
-        episodes.draw(**request)
+        EpisodeBatch(task.rules, Simulation(), 1).draw(task.episodes, **request)
     assert getattr(caught.value, "field") == field  # noqa: B009 - an attribute of the package's errors
 
 
@@ -267,7 +189,8 @@ def test_a_bad_distribution_is_refused_by_name() -> None:
         "domain": dict.fromkeys(("mass_scale", "friction", "actuator_gain", "gravity_scale"), (1.0, 1.0)),
         "trunk_load_limit": 50.0,
     }
-    assert len(EpisodeDistribution(rules, Simulation(), **good).draw(seed_generators([0]))) == 1
+    batch = EpisodeBatch(rules, Simulation(), 1)
+    assert len(batch.draw(EpisodeDistribution(rules, Simulation(), **good), seed_generators([0]))) == 1
     for change, field in (
         ({"start": {"slope": (0.0, 1.0)}}, "start.uphill"),
         ({"domain": 3}, "domain"),

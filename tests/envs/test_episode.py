@@ -292,24 +292,3 @@ def test_failed_step_terminates_openly(env: RoverEnv) -> None:
     assert info["reward_terms"]["failure"] == reward == -10.0
     assert reward == sum(info["reward_terms"].values())
     np.testing.assert_array_equal(observation, last)
-
-
-def test_message_of_a_failed_step_is_told(env: RoverEnv) -> None:
-    reading = env.simulation.reading(env.goal)
-    _, _, terminated, info = env.episode.progress.advance(
-        reading, action_of(0.1), message="the numbers have left the road"
-    )
-    assert terminated
-    assert info["solver"]["message"] == "the numbers have left the road"
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e300])
-def test_observation_that_is_not_finite_terminates_openly(env: RoverEnv, value: float) -> None:
-    last, *_ = env.step(action_of(0.1))
-    reading = env.simulation.reading(env.goal)
-    reading[env.simulation.reading_layout()["wheel_gaps"]] = value
-    observation, reward, terminated, info = env.episode.progress.advance(reading, action_of(0.1))
-    assert terminated
-    assert info["termination"] == "step_failed"
-    assert reward == info["reward_terms"]["failure"] == -10.0
-    np.testing.assert_array_equal(observation, last)

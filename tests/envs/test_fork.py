@@ -60,6 +60,37 @@ assert seen == {env.step(action)[0].tobytes()}
 """
 
 
+RENDERED = """
+import gc
+import os
+import warnings
+warnings.simplefilter("ignore", DeprecationWarning)
+from rover_gym import RoverEnv
+
+env = RoverEnv(render_mode="rgb_array")
+env.reset(seed=0)
+env.render()
+child = os.fork()
+if child == 0:
+    other = env
+    env.close()
+    del env, other
+    gc.collect()
+    os._exit(0)
+status = os.waitpid(child, 0)[1]
+assert os.waitstatus_to_exitcode(status) == 0
+assert env.render().any()
+"""
+
+
+def test_a_forked_process_that_collected_an_open_renderer_hung() -> None:
+    # Destroying the window waited for threads that only the parent had.
+    pytest.importorskip("vtkmodules", reason="the extra render is not installed")
+    command = [sys.executable, "-c", RENDERED]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 @pytest.mark.parametrize("script", [FORK, PROCESSES], ids=["os.fork", "multiprocessing"])
 def test_a_vector_environment_made_before_a_fork_hung_in_the_child(script: str) -> None:
     # The child waited for threads that only its parent had. They are made anew there.

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from rover_gym.env.batch import RoverBatch
 from rover_gym.mechanics import EpisodeBatch, OptionError, Plane
-from rover_gym.vector.batch import RoverBatch
 
 #: Bytes that a rover adds to the process, after steps and a second reset of all; the batch is larger than any noise.
 GROWTH = """

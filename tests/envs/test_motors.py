@@ -62,7 +62,7 @@ def test_no_step_is_worth_more_than_a_hundred_whatever_the_physics_did(control_f
     rng = np.random.default_rng(1)
     rewards = []
     for row in readings(env, rng, 300):
-        one = env.episode.progress.changed(distance=10.0 ** rng.uniform(-3.0, 36.0))
+        one = env.progress.changed(distance=10.0 ** rng.uniform(-3.0, 36.0))
         _, reward, _, info = one.advance(row, rng.choice([-1.0, 1.0], 12))
         assert sum(info["reward_terms"].values()) == pytest.approx(reward, abs=1e-12)
         rewards.append(reward)

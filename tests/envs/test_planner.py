@@ -69,7 +69,7 @@ def test_a_future_ends_where_the_rover_would() -> None:
     before = env.snapshot()
     for one, plan in zip(ends.place, commands, strict=True):
         env.restore(before)
-        seen = env.episode.progress.observation
+        seen = env.progress.observation
         for k in range(2 * hold):
             seen, *_ = env.step(controller.act(seen[None], plan[k // hold][None])[0])
         assert env.simulation.q[[0, 2]] == pytest.approx(one, abs=0.02)
@@ -91,7 +91,7 @@ def test_planning_leaves_the_environment_as_it_is() -> None:
     env = planar()
     policy = PlannerPolicy(env, PlannerOptions(samples=40, horizon=0.6, knot=0.3), threads=1)
     before = env.snapshot()
-    action, state = policy.predict(env.episode.progress.observation)
+    action, state = policy.predict(env.progress.observation)
     after = env.snapshot()
     assert state is None
     assert env.action_space.contains(action)
@@ -102,7 +102,7 @@ def test_planning_leaves_the_environment_as_it_is() -> None:
 def test_an_observation_that_is_none_is_refused_before_planning() -> None:
     env = planar()
     policy = PlannerPolicy(env, PlannerOptions(samples=40), threads=1)
-    seen = env.episode.progress.observation
+    seen = env.progress.observation
     for bad in (seen[:-1], np.stack((seen, seen)), np.where(np.arange(len(seen)) == 3, np.nan, seen)):
         with pytest.raises(StateError, match="observation"):
             policy.predict(bad)
@@ -144,7 +144,7 @@ def test_bad_options_are_refused_by_name(options: dict[str, object], field: str)
 def test_raw_actions_drive_to_the_goal() -> None:
     env = planar()
     policy = PlannerPolicy(env, PlannerOptions(samples=40, actions="raw", horizon=1.2), threads=1)
-    seen = env.episode.progress.observation
+    seen = env.progress.observation
     for _ in range(20):
         action, _ = policy.predict(seen)
         assert env.action_space.contains(action)
@@ -180,7 +180,7 @@ def test_a_planner_that_sees_by_scan_leaves_the_environment_as_it_is() -> None:
     env.reset(seed=0, options={"position": (0.0, 0.0), "goal": (5.0, 0.0)})
     policy = PlannerPolicy(env, PlannerOptions(samples=40, horizon=0.6, knot=0.3), threads=1, sees="scan")
     before = env.snapshot()
-    action, _ = policy.predict(env.episode.progress.observation)
+    action, _ = policy.predict(env.progress.observation)
     assert env.action_space.contains(action)
     assert env.snapshot().simulation == before.simulation
 

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from rover_gym import PDPolicy, RoverEnv
 from rover_gym.env import wheel_centres
+from rover_gym.env.batch import RoverBatch
 from rover_gym.policy import CommandController, CommandLimits
 from rover_gym.policy.regulator import SLACK, WheelRegulator
-from rover_gym.vector.batch import RoverBatch
 
 POLICY = PDPolicy(RoverEnv())
 
@@ -173,7 +173,7 @@ def regulated(policy: Any, seconds: float, **arguments: Any) -> tuple[float, flo
     batch = RoverBatch(n, threads=1, **arguments)
     for i in range(n):
         batch.reset(i, 3_200_000 + i)
-    act = policy(batch.prototype)
+    act = policy(RoverEnv.row(batch, 0))
     active, before = np.ones(n, np.bool_), np.zeros((n, 6))
     place = batch.task.layout["q"].start
     seen = batch.observation

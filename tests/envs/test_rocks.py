@@ -570,3 +570,24 @@ def test_what_does_not_fit_is_refused() -> None:
     for terrain in ("moon", 3, np.zeros((3, 3)), [Plane(), Plane()], []):
         with pytest.raises(TerrainError):
             RoverEnv(terrain=terrain)
+
+
+def test_the_normal_force_of_a_wheel_between_rocks_was_negative() -> None:
+    # A wheel's contacts were added in the frame of its first one: -8500 N in this drive.
+    envs = RoverVectorEnv(16, terrain="rocks", difficulty=2.0, goal_bearing_deg=0.0)
+    envs.reset(seed=0)
+    layout, rng, several = envs.prototype.observation_layout, np.random.default_rng(0), False
+    for _ in range(100):
+        actions = np.full((16, 12), 0.5, np.float32)
+        actions[:, 6:] = rng.uniform(-0.5, 0.5, (16, 6))
+        seen, _, _, _, _ = envs.step(actions)
+        assert layout.split(seen)["normal_force"].min() >= 0.0
+        for env in envs.envs:
+            simulation = env.simulation
+            contacts = simulation.contacts
+            own = contacts.wheels
+            sums = np.zeros_like(simulation.wheel_forces)
+            np.add.at(sums, own[own >= 0], contacts.impulses[own >= 0] / simulation.time_step)
+            np.testing.assert_allclose(simulation.wheel_forces, sums, rtol=1e-12, atol=1e-9)
+            several |= len(set(own[own >= 0])) < (own >= 0).sum()
+    assert several

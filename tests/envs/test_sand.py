@@ -72,19 +72,6 @@ def test_a_wheel_in_sand_is_observed_as_a_contact() -> None:
     assert len(sand["ruts"]) > 0
 
 
-def test_a_rover_alone_and_in_a_vector_has_the_same_bits() -> None:
-    arguments: dict[str, Any] = {"terrain": "sand", "difficulty": 0.5}
-    env, envs = RoverEnv(**arguments), RoverVectorEnv(2, **arguments)
-    alone, _ = env.reset(seed=4)
-    together, _ = envs.reset(seed=[3, 4])
-    rng = np.random.default_rng(1)
-    for _ in range(10):
-        np.testing.assert_array_equal(alone, together[1])
-        action = rng.uniform(-1.0, 1.0, env.action_space.shape).astype(np.float32)
-        alone, *_ = env.step(action)
-        together, *_ = envs.step(np.stack([-action, action]))
-
-
 def test_the_baseline_reaches_most_goals_straight_ahead_on_gentle_sand() -> None:
     """Not all: a wheel that its regulator brakes digs itself in."""
     n = 8

@@ -11,7 +11,7 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnvWrapper, VecMonitor, VecNormalize
 
-from rover_gym import CommandError, OptionError, PDPolicy, RoverEnv
+from rover_gym import OptionError, PDPolicy, RoverEnv
 from rover_gym.learning.build import CommandVecEnv
 from rover_gym.policy import CommandController, Features
 from rover_gym.vector.sb3 import RoverVecEnv
@@ -82,17 +82,6 @@ def test_terminal_observation_and_time_limit() -> None:
     assert infos[1]["is_success"] is False
 
 
-def test_rewards_and_observations_are_the_callers() -> None:
-    env = RoverVecEnv(2)
-    env.seed(0)
-    env.reset()
-    observation, reward, dones, _ = env.step(actions(2)[0])
-    assert (observation.dtype, reward.dtype, dones.dtype) == (np.float32, np.float32, np.bool_)
-    reward += 1.0
-    observation[:] = np.nan
-    assert np.isfinite(env.step(actions(2)[1])[0]).all()
-
-
 def test_seeds_and_options_are_used_once() -> None:
     env = RoverVecEnv(2, terrain="rocks")
     env.seed(3)
@@ -144,32 +133,6 @@ def test_attributes() -> None:
     with pytest.raises(AttributeError):
         env.set_attr("difficulty", 0.5)
     env.close()
-
-
-def test_bad_actions_move_nobody() -> None:
-    env, twin = RoverVecEnv(2), RoverVecEnv(2)
-    for each in (env, twin):
-        each.seed(0)
-        each.reset()
-    for bad in (np.full((2, 12), np.nan), np.full((2, 12), 2.0), np.zeros((3, 12))):
-        with pytest.raises(CommandError):
-            env.step(bad)
-    assert env.step(actions(2)[0])[0].tobytes() == twin.step(actions(2)[0])[0].tobytes()
-
-
-def test_a_rover_that_fails_fails_alone() -> None:
-    env = RoverVecEnv(2)
-    q, v = np.zeros(21), np.zeros(21)
-    q[1], v[3] = 0.5, 1e30
-    env.seed(0)
-    env.set_options([{}, {"q": q, "v": v}])
-    env.reset()
-    observation, reward, dones, infos = env.step(np.zeros((2, 12)))
-    assert dones.tolist() == [False, True]
-    assert infos[1]["termination"] == "step_failed"
-    assert reward[1] == -10.0
-    assert np.isfinite(observation).all()
-    assert np.isfinite(infos[1]["terminal_observation"]).all()
 
 
 def test_policies_of_the_package_drive_it() -> None:

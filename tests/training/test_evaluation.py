@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rover_gym import OptionError, PDPolicy
+from rover_gym.env.batch import RoverBatch
 from rover_gym.policy import (
     EvaluatedEpisode,
     PolicyCard,
@@ -23,7 +24,6 @@ from rover_gym.policy import (
     summarise,
     wilson_interval,
 )
-from rover_gym.vector.batch import RoverBatch
 
 
 def a_drive(seed: int, end: str, time: float = 1.0, distance: float = 1.0, energy: float = 1.0) -> EvaluatedEpisode:

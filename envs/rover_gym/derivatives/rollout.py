@@ -126,8 +126,8 @@ def rollout(
         start, driven = start[None], driven[None]
     names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
     found = simulation.differentiate(start, driven, names, threads)
-    arrays = (found.states, found.a, found.b, found.c)
-    return Rollout(*(array[0] if is_one else array for array in arrays), names)
+    one = 0 if is_one else slice(None)
+    return Rollout(found.states[one], found.a[one], found.b[one], found.c[one], names)
 
 
 def _times(matrices: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -18,14 +18,18 @@ class EnvSnapshot:
     """The state from which a `RoverEnv` continues bit for bit; picklable.
 
     It includes the outcome of the last control period, so that an episode that has ended stays ended, but not the step
-    count of a `TimeLimit` wrapper.
+    count of a `TimeLimit` wrapper. A row of a vector has the same snapshots.
 
     Attributes:
         simulation: The rover in the core.
         scene: What the episode was drawn as: ground, start, goals.
         progress: How far the episode has come, as `EpisodeRun.to_bytes` returns it.
         difficulty: The range that difficulties are drawn from; None without rocks.
-        random_state: State of the environment's random generators.
+        random_state: State of the environment's random generator.
+        steps: Control periods since the episode began.
+        seed: Seed of the random generator.
+        message: Of the physics step that failed in the last period, "" where none did.
+        terms: What the user's reward terms gave in the last period.
     """
 
     simulation: Snapshot
@@ -33,6 +37,21 @@ class EnvSnapshot:
     progress: bytes
     difficulty: Range | None
     random_state: Mapping[str, Any]
+    steps: int
+    seed: int
+    message: str
+    terms: Mapping[str, float]
+
+
+#: Parts of a snapshot by their types.
+_PARTS = {
+    "scene": EpisodeScene,
+    "progress": bytes,
+    "simulation": Snapshot,
+    "seed": int,
+    "message": str,
+    "terms": Mapping,
+}
 
 
 def check_snapshot(task: Task, snapshot: object) -> EpisodeRun:
@@ -43,10 +62,13 @@ def check_snapshot(task: Task, snapshot: object) -> EpisodeRun:
     """
     if not isinstance(snapshot, EnvSnapshot):
         refuse(StateError, "snapshot", snapshot, "must come from RoverEnv.snapshot()")
-    for name, kind in (("scene", EpisodeScene), ("progress", bytes), ("simulation", Snapshot)):
+    for name, kind in _PARTS.items():
         part = getattr(snapshot, name)
         if not isinstance(part, kind):
             refuse(StateError, f"snapshot.{name}", part, f"must be of the class {kind.__name__}")
+    if snapshot.terms.keys() != task.reward_terms.keys():
+        reason = f"must have the terms {', '.join(task.reward_terms) or 'of the environment alone'}"
+        refuse(StateError, "snapshot.terms", snapshot.terms, reason)
     try:
         return EpisodeRun.from_bytes(task.rules, snapshot.progress)
     except RoverGymError as error:

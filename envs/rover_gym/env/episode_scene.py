@@ -66,29 +66,21 @@ class ResetOptions:
     fixed: Mapping[str, Any] = field(default_factory=dict)
 
 
-def scene_of(task: Task, drawn: DrawnEpisodes, i: int) -> EpisodeScene:
-    """The scene of drawn episode i."""
-    rows = drawn.starts[i], drawn.rocks[i], drawn.rock_seeds[i], drawn.domains[i]
-    return scene_of_rows(task, *rows, drawn.terrain(i))
-
-
-def scene_of_rows(
-    task: Task, start: Array, rocks: Array, rock_seed: int, domain: Array, terrain: Terrain
-) -> EpisodeScene:
-    """The scene of an episode from rows of `DrawnEpisodes`: `starts`, `rocks`, `rock_seeds`, `domains`."""
+def scene_of(task: Task, start: Array, rocks: Array, rock_seed: int, domain: Array, terrain: Terrain) -> EpisodeScene:
+    """The scene of an episode from what `EpisodeBatch.origin` tells, and its terrain."""
     slope, uphill, x, z, heading, *places = start.tolist()
     goal, *further = zip(places[::2], places[1::2], strict=True)
     difficulty, abundance, max_radius = rocks.tolist()
     return EpisodeScene(
         start=Start(slope, uphill, (x, z), heading, goal, tuple(further)),
         terrain=terrain,
-        rocks=None if task.rocks is None else Rocks(difficulty, abundance, max_radius, int(rock_seed)),
+        rocks=Rocks(difficulty, abundance, max_radius, int(rock_seed)) if task.has_rocks else None,
         domain=Domain(*domain.tolist()),
     )
 
 
 def origin_of(scene: EpisodeScene) -> tuple[list[float], list[float], int, list[float]]:
-    """The rows of `DrawnEpisodes` that `scene_of_rows` makes a scene from: start, rocks, seed of the rocks, domain."""
+    """What `scene_of` makes a scene from: start, rocks, seed of the rocks, domain."""
     start, rocks = scene.start, scene.rocks
     places = [x for goal in start.goals for x in goal]
     row = [start.slope, start.uphill, *start.position, start.heading, *places]
@@ -101,7 +93,7 @@ def origin_of(scene: EpisodeScene) -> tuple[list[float], list[float], int, list[
 def check_difficulty(task: Task, difficulty: object, field: str = "difficulty") -> Range:
     """Checks a difficulty or a range of difficulties; the task must have rocks."""
     checked = span(field, difficulty, at_least=0.0, at_most=MAX_DIFFICULTY)
-    if task.rocks is None:
+    if not task.has_rocks:
         refuse(OptionError, field, difficulty, "needs terrain 'rocks', 'hills' or 'sand'")
     return checked
 
@@ -115,11 +107,11 @@ def check_reset_options(task: Task, options: Mapping[str, Any] | None, field: st
         difficulty = fixed["difficulty"] = number(
             f"{field}.difficulty", given["difficulty"], at_least=0.0, at_most=MAX_DIFFICULTY
         )
-        if task.rocks is None:
+        if not task.has_rocks:
             refuse(OptionError, f"{field}.difficulty", difficulty, "needs terrain 'rocks', 'hills' or 'sand'")
     if "field_seed" in given:
         seed = fixed["field_seed"] = whole(f"{field}.field_seed", given["field_seed"], at_most=FIELD_SEEDS - 1)
-        if task.rocks is None:
+        if not task.has_rocks:
             refuse(OptionError, f"{field}.field_seed", seed, "needs terrain 'rocks', 'hills' or 'sand'")
     if "slope_deg" in given:
         fixed["slope"] = math.radians(
@@ -151,7 +143,7 @@ def check_reset_options(task: Task, options: Mapping[str, Any] | None, field: st
         fixed["position"], fixed["heading"] = (q[0], q[2]), q[4]
         if "v" in given:
             fixed["v"] = vector(f"{field}.v", given["v"], task.model.nv, error=StateError)
-    if task.rocks is not None and "goal" in fixed:
+    if task.has_rocks and "goal" in fixed:
         name = "goals" if "goals" in given else "goal"
         for place in (fixed["goal"], *fixed.get("further", ())):
             if not math.dist(place, fixed.get("position", (0.0, 0.0))) <= MAX_GOAL_DISTANCE:
@@ -187,7 +179,7 @@ def draw_episodes(
     generators: Rows,
     difficulties: Sequence[Range | None],
     options: ResetOptions | Sequence[ResetOptions],
-    batch: EpisodeBatch | None = None,
+    batch: EpisodeBatch,
 ) -> DrawnEpisodes:
     """Draws the next episode of each generator, which keeps its state, and repeats each draw until the rover has room.
 
@@ -196,7 +188,7 @@ def draw_episodes(
         generators: `(m, 4)` random generators; the result's `generators` holds their states after the draws.
         difficulties: Range of each rover's rocks' difficulty; None for the task's own.
         options: The values that reset options fix, for all rovers or one per rover.
-        batch: The batch whose threads draw; None for the caller's alone.
+        batch: The batch whose threads draw.
 
     Raises:
         TerrainError: A rover would penetrate the ground or a sphere in each of `PLACING_ATTEMPTS` scenes.
@@ -204,6 +196,4 @@ def draw_episodes(
     """
     fixed = options.fixed if isinstance(options, ResetOptions) else [one.fixed for one in options]
     given = list(difficulties) if any(difficulties) else None
-    if batch is None:
-        return task.episodes.draw(generators, attempts=PLACING_ATTEMPTS, difficulties=given, fixed=fixed)
     return batch.draw(task.episodes, generators, attempts=PLACING_ATTEMPTS, difficulties=given, fixed=fixed)

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Unpack
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.arguments import RoverArguments
+from rover_gym.env.batch import Restored, RoverBatch
 from rover_gym.env.env_snapshot import EnvSnapshot
 from rover_gym.env.episode_scene import EpisodeScene, ResetOptions
-from rover_gym.env.rover_env import RoverEnv, RunningEpisode
+from rover_gym.env.generators import Rows, generator_at, row_of
+from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import (
+    DrawnEpisodes,
+    EpisodeBatch,
     GrainSimulation,
     OptionError,
     RoverGrainSimulation,
@@ -22,7 +27,7 @@ from rover_gym.mechanics import (
     Snapshot,
     StateError,
 )
-from rover_gym.validation import flag, number, refuse, span, whole
+from rover_gym.validation import Range, flag, number, refuse, span, whole
 
 if TYPE_CHECKING:
     from rover_gym.grains.pit import Pit, PitFill
@@ -60,36 +65,180 @@ class BedDraw:
     along_z: bool
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class GrainsEnvSnapshot(EnvSnapshot):
     """The state from which a `RoverGrainsEnv` continues bit for bit; picklable.
 
     Attributes:
         bed: The bed that was drawn.
-        grains: Rover and balls in the core.
+        grains: The balls in the core.
     """
 
     bed: BedDraw
     grains: Snapshot
 
 
-@dataclass(frozen=True, kw_only=True)
-class EpisodeAmongGrains(RunningEpisode):
-    """The running episode of a rover among grains.
+@dataclass(frozen=True)
+class DrawnInBeds:
+    """Drawn episodes, the bed of each, its grains, and the generators `(m, 4)` afterwards."""
+
+    episodes: DrawnEpisodes
+    beds: list[BedDraw]
+    grains: list[GrainSimulation]
+    rows: Rows
+
+
+class GrainsBatch(RoverBatch):
+    """Rovers that drive through pits of grains.
+
+    Args:
+        n: Number of rovers.
+        pit: As of `RoverGrainsEnv`, as the next six.
+        grain_radius: See there.
+        grain_density: See there.
+        grain_friction: See there.
+        grain_tolerance: See there.
+        n_beds: See there.
+        sleep: See there.
+        **arguments: Arguments of `RoverBatch`.
 
     Attributes:
-        mover: The rover among the grains.
-        bed: The bed of the episode.
+        beds: The beds of the episodes, which the core does not know.
     """
 
-    mover: RoverGrainSimulation
-    bed: BedDraw
+    not_kept = (*RoverBatch.not_kept, "_among", "beds")
 
-    @classmethod
-    def put(cls, rover: RunningEpisode, bed: BedDraw, grains: GrainSimulation) -> EpisodeAmongGrains:
-        """A rover's episode among the grains of a bed."""
-        mover = RoverGrainSimulation(rover.simulation, grains, wheel_friction=rover.simulation.friction)
-        return cls(scene=rover.scene, simulation=rover.simulation, progress=rover.progress, mover=mover, bed=bed)
+    def __init__(
+        self,
+        n: int,
+        *,
+        pit: Pit | None = None,
+        grain_radius: float | tuple[float, float] = (0.03, 0.04),
+        grain_density: float = 2600.0,
+        grain_friction: float = 0.5,
+        grain_tolerance: float = 1e-3,
+        n_beds: int = 2,
+        sleep: bool = True,
+        **arguments: Any,
+    ) -> None:
+        from rover_gym.grains.bed_scenes import with_wheel_width  # noqa: PLC0415 - other environments need no grains
+        from rover_gym.grains.pit import Pit  # noqa: PLC0415
+
+        for name in ("terrain", "difficulty", "rock_abundance", "max_rock_radius", "slope_deg", "hill_slope_deg"):
+            if arguments.get(name) is not None:
+                refuse(
+                    OptionError, name, arguments.get(name), "is not available: the ground of RoverGrainsEnv is its pit"
+                )
+        if arguments.get("height_scan") not in (None, False):
+            refuse(
+                OptionError,
+                "height_scan",
+                arguments.get("height_scan"),
+                "is not available: a height scan does not see grains",
+            )
+        if pit is None:
+            pit = Pit()
+        elif not isinstance(pit, Pit):
+            refuse(OptionError, "pit", pit, "must be a rover_gym.grains.Pit")
+        self.pit = pit
+        self.grain_radius = span("grain_radius", grain_radius, above=0.0)
+        self.grain_density = number("grain_density", grain_density, above=0.0)
+        self.grain_friction = number("grain_friction", grain_friction, at_least=0.0)
+        self.grain_tolerance = number("grain_tolerance", grain_tolerance, above=0.0, at_most=1.0)
+        self.n_beds = whole("n_beds", n_beds, at_least=1, at_most=MOST_BEDS, error=OptionError)
+        self.sleep = flag("sleep", sleep)
+        if arguments.get("model") is None:
+            arguments["model"] = with_wheel_width(RoverModel().replace(wheel_radius=WHEEL_RADIUS), WHEEL_WIDTH)
+        super().__init__(n, **{**DEFAULTS, **arguments, "terrain": pit.terrain})
+
+    def make_episodes(self) -> EpisodeBatch:
+        """The rovers in the core, without grains until their episodes begin."""
+        self._among: list[RoverGrainSimulation | None] = [None] * self.n
+        self.beds: list[BedDraw | None] = [None] * self.n
+        return super().make_episodes()
+
+    @property
+    def movers(self) -> list[RoverGrainSimulation | None]:
+        """Each rover among its grains."""
+        return self._among
+
+    def draw_rows(
+        self, rows: Rows, difficulties: Sequence[Range | None], fixed: ResetOptions | Sequence[ResetOptions]
+    ) -> DrawnInBeds:
+        """Draws episodes and their beds.
+
+        Raises:
+            StateError: As `RoverEnv.reset`, or a part of the rover is in a grain.
+            TerrainError: As `RoverEnv.reset`.
+        """
+        episodes = super().draw_rows(rows, difficulties, fixed)
+        drawn = DrawnInBeds(episodes, [], [], episodes.generators)
+        for k, row in enumerate(drawn.rows):
+            generator = generator_at(row)
+            number, along_x, along_z = generator.integers(0, (self.n_beds, 2, 2)).tolist()
+            drawn.rows[k] = row_of(generator)
+            bed, rover = BedDraw(number, bool(along_x), bool(along_z)), episodes.simulation(k)
+            drawn.beds.append(bed)
+            drawn.grains.append(self._grains(rover, bed))
+            _together(rover, drawn.grains[k])  # refuses a rover in a grain before anything changes
+        return drawn
+
+    def begin_drawn(self, chosen: Sequence[int], drawn: Any) -> None:
+        """Starts drawn episodes, each in its bed."""
+        super().begin_drawn(chosen, drawn.episodes)
+        self.episodes.set_generators(chosen, drawn.rows)
+        for i, bed, grains in zip(chosen, drawn.beds, drawn.grains, strict=True):
+            self.beds[i], self._among[i] = bed, _together(self.episodes.simulation(i), grains)
+
+    def _grains(self, rover: Simulation, bed: BedDraw) -> GrainSimulation:
+        """The grains of a bed, in the steps of a rover."""
+        fill = _settled(self.pit, self.grain_radius, self.grain_density, self.grain_friction, bed.number)
+        return fill.mirrored(along_x=bed.along_x, along_z=bed.along_z).simulation(
+            friction=self.grain_friction,
+            wall_friction=self.grain_friction,
+            gravity=rover.gravity,
+            time_step=rover.time_step,
+            tolerance=self.grain_tolerance,
+            sleep=self.sleep,
+            sleep_speed=SLEEP_SPEED,
+        )
+
+    def snapshot_of(self, i: int) -> GrainsEnvSnapshot:
+        """The state of rover i and its grains."""
+        known, among, bed = super().snapshot_of(i), self._among[i], self.beds[i]
+        assert among is not None and bed is not None  # noqa: S101, PT018 - `begin_drawn` has set them
+        return GrainsEnvSnapshot(**vars(known), bed=bed, grains=among.grains.snapshot())
+
+    def check_snapshot(self, snapshot: EnvSnapshot) -> Restored:
+        """Checks a snapshot of a rover and its grains.
+
+        Raises:
+            StateError: The snapshot is of an environment without grains or with other beds, or as of `RoverBatch`.
+        """
+        checked = super().check_snapshot(snapshot)
+        if not isinstance(snapshot, GrainsEnvSnapshot):
+            refuse(StateError, "snapshot", snapshot, "must come from RoverGrainsEnv.snapshot()")
+        if not snapshot.bed.number < self.n_beds:
+            refuse(StateError, "snapshot.bed", snapshot.bed, f"must be one of this environment's {self.n_beds} beds")
+        grains = self._grains(checked.simulation, snapshot.bed)
+        grains.restore(snapshot.grains)
+        return replace(checked, grains=grains)
+
+    def adopt(self, i: int, checked: Restored) -> None:
+        """Goes on from a checked snapshot."""
+        super().adopt(i, checked)
+        snapshot, rover = checked.snapshot, self.episodes.simulation(i)
+        assert isinstance(snapshot, GrainsEnvSnapshot)  # noqa: S101 - checked
+        # Together while the rover is far away: what runs may overlap more than what starts.
+        at, away = rover.snapshot(), np.zeros(self.task.model.nq)
+        away[1] = FAR
+        rover.set_state(away)
+        self.beds[i], self._among[i] = snapshot.bed, _together(rover, checked.grains)
+        rover.restore(at)
+
+
+def _together(rover: Simulation, grains: Any) -> RoverGrainSimulation:
+    return RoverGrainSimulation(rover, grains, wheel_friction=rover.friction)
 
 
 class RoverGrainsEnv(RoverEnv):
@@ -110,8 +259,7 @@ class RoverGrainsEnv(RoverEnv):
     ## Observation
 
     `wheel_gap` and `wheel_contact` count grains as ground. The forces of a wheel are sums over all grains and ground
-    that it touches; the contact's normal is the mean of their normals, weighted by their normal forces. There is no
-    height scan.
+    that it touches. There is no height scan.
 
     ## Start
 
@@ -154,84 +302,37 @@ class RoverGrainsEnv(RoverEnv):
         sleep: bool = True,
         **arguments: Unpack[RoverArguments],
     ) -> None:
-        from rover_gym.grains.bed_scenes import with_wheel_width  # noqa: PLC0415 - other environments need no grains
-        from rover_gym.grains.pit import Pit  # noqa: PLC0415
+        own = {name: value for name, value in locals().items() if name not in ("self", "arguments", "__class__")}
+        super().__init__(**own, **arguments)
 
-        for name in ("terrain", "difficulty", "rock_abundance", "max_rock_radius", "slope_deg", "hill_slope_deg"):
-            if arguments.get(name) is not None:
-                refuse(
-                    OptionError, name, arguments.get(name), "is not available: the ground of RoverGrainsEnv is its pit"
-                )
-        if arguments.get("height_scan") not in (None, False):
-            refuse(
-                OptionError,
-                "height_scan",
-                arguments.get("height_scan"),
-                "is not available: a height scan does not see grains",
-            )
-        if pit is None:
-            pit = Pit()
-        elif not isinstance(pit, Pit):
-            refuse(OptionError, "pit", pit, "must be a rover_gym.grains.Pit")
-        self.pit = pit
-        self.grain_radius = span("grain_radius", grain_radius, above=0.0)
-        self.grain_density = number("grain_density", grain_density, above=0.0)
-        self.grain_friction = number("grain_friction", grain_friction, at_least=0.0)
-        self.grain_tolerance = number("grain_tolerance", grain_tolerance, above=0.0, at_most=1.0)
-        self.n_beds = whole("n_beds", n_beds, at_least=1, at_most=MOST_BEDS, error=OptionError)
-        self.sleep = flag("sleep", sleep)
-        if arguments.get("model") is None:
-            arguments["model"] = with_wheel_width(RoverModel().replace(wheel_radius=WHEEL_RADIUS), WHEEL_WIDTH)
-        for name, value in DEFAULTS.items():
-            arguments.setdefault(name, value)  # type: ignore[misc] # names of arguments
-        arguments["terrain"] = pit.terrain
-        super().__init__(**arguments)
+    @classmethod
+    def make_batch(cls, n: int, **arguments: Any) -> GrainsBatch:
+        """A batch of rovers for environments of this class."""
+        return GrainsBatch(n, **arguments)
 
     @property
-    def episode(self) -> EpisodeAmongGrains:
-        """The running episode.
+    def grains(self) -> GrainSimulation:
+        """The grains of the episode; read them, but do not step them.
 
         Raises:
             ResetNeeded: The environment has not been reset.
         """
-        episode = super().episode
-        assert isinstance(episode, EpisodeAmongGrains)  # noqa: S101 - `draw_episode` and `resume_episode` make no other
-        return episode
-
-    @property
-    def grains(self) -> GrainSimulation:
-        """The grains of the episode; read them, but do not step them."""
-        return self.episode.mover.grains
+        self.batch.check_begun(self.i)
+        assert self.mover is not None  # noqa: S101 - the episode has begun
+        return self.mover.grains
 
     @property
     def bed(self) -> BedDraw:
-        """The bed of the episode as it was drawn."""
-        return self.episode.bed
-
-    def draw_episode(self, generator: np.random.Generator, options: ResetOptions) -> EpisodeAmongGrains:
-        """Draws an episode and its bed.
+        """The bed of the episode as it was drawn.
 
         Raises:
-            StateError: As `RoverEnv.reset`, or a part of the rover is in a grain.
-            TerrainError: As `RoverEnv.reset`.
+            ResetNeeded: The environment has not been reset.
         """
-        drawn = super().draw_episode(generator, options)
-        number, along_x, along_z = generator.integers(0, (self.n_beds, 2, 2)).tolist()
-        bed = BedDraw(number, bool(along_x), bool(along_z))
-        return EpisodeAmongGrains.put(drawn, bed, self._grains(drawn.simulation, bed))
-
-    def _grains(self, rover: Simulation, bed: BedDraw) -> GrainSimulation:
-        """The grains of a bed, in the steps of a rover."""
-        fill = _settled(self.pit, self.grain_radius, self.grain_density, self.grain_friction, bed.number)
-        return fill.mirrored(along_x=bed.along_x, along_z=bed.along_z).simulation(
-            friction=self.grain_friction,
-            wall_friction=self.grain_friction,
-            gravity=rover.gravity,
-            time_step=rover.time_step,
-            tolerance=self.grain_tolerance,
-            sleep=self.sleep,
-            sleep_speed=SLEEP_SPEED,
-        )
+        self.batch.check_begun(self.i)
+        assert isinstance(self.batch, GrainsBatch)  # noqa: S101 - `make_batch` makes no other
+        bed = self.batch.beds[self.i]
+        assert bed is not None  # noqa: S101 - the episode has begun
+        return bed
 
     def make_renderer(self, scene: EpisodeScene) -> FrameRenderer:
         """Creates a renderer with this environment's `render_options`; the caller must close it."""
@@ -254,31 +355,6 @@ class RoverGrainsEnv(RoverEnv):
                 self._renderer = self.make_renderer(scene)
             self._balls.place(self.grains.position)
         return super().render()
-
-    def snapshot(self) -> GrainsEnvSnapshot:
-        """Returns the state of the environment and of its random generator, for `restore`."""
-        return GrainsEnvSnapshot(**vars(super().snapshot()), bed=self.bed, grains=self.grains.snapshot())
-
-    def resume_episode(self, episode: RunningEpisode, snapshot: EnvSnapshot) -> EpisodeAmongGrains:
-        """The episode of a snapshot, with its grains.
-
-        Raises:
-            StateError: The snapshot is of an environment without grains or with other beds.
-        """
-        if not isinstance(snapshot, GrainsEnvSnapshot):
-            refuse(StateError, "snapshot", snapshot, "must come from RoverGrainsEnv.snapshot()")
-        if not snapshot.bed.number < self.n_beds:
-            refuse(StateError, "snapshot.bed", snapshot.bed, f"must be one of this environment's {self.n_beds} beds")
-        rover = episode.simulation
-        grains = self._grains(rover, snapshot.bed)
-        grains.restore(snapshot.grains)
-        # Together while the rover is far away: what runs may overlap more than what starts.
-        at, away = rover.snapshot(), np.zeros(self.model.nq)
-        away[1] = FAR
-        rover.set_state(away)
-        among = EpisodeAmongGrains.put(episode, snapshot.bed, grains)
-        rover.restore(at)
-        return among
 
 
 @functools.lru_cache(maxsize=8)

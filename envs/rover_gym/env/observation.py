@@ -6,6 +6,7 @@ with a fixed scale per entry, chosen so that the entries of a driving rover are 
 and a non-finite entry ends the episode.
 """
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -13,7 +14,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import RoverModel, StateError
+from rover_gym.mechanics import EpisodeRules, RoverModel, StateError
 from rover_gym.validation import array, refuse
 
 # Scales in m, rad/s and m. Forces are scaled by the mean wheel load, m g / n.
@@ -28,9 +29,6 @@ Array: TypeAlias = npt.NDArray[np.float64]
 Mask: TypeAlias = npt.NDArray[np.bool_]
 
 Observations: TypeAlias = npt.NDArray[np.float32]
-
-#: The largest finite entry.
-LARGEST = float(np.finfo(np.float32).max)
 
 
 @dataclass(frozen=True)
@@ -114,7 +112,7 @@ class ObservationLayout(Mapping[str, slice]):
     @property
     def unbounded(self) -> npt.NDArray[np.float64]:
         """(size,) 1 for entries without bounds, 0 for flags, fractions, unit vectors, distances and actions."""
-        return ((self.low <= -LARGEST) & (self.high >= LARGEST)).astype(np.float64)
+        return (np.isneginf(self.low) & np.isposinf(self.high)).astype(np.float64)
 
     def split(self, observation: npt.ArrayLike) -> dict[str, npt.NDArray[np.float64]]:
         """Splits observations into the fields' values in SI units, as new arrays `(..., field size)`.
@@ -185,7 +183,7 @@ class Declared:
     meaning: str
     scale: Callable[[LayoutInputs], float | list[float]] = lambda _: 1.0
     words: str = "1"
-    bounds: tuple[float, float] = (-LARGEST, LARGEST)
+    bounds: tuple[float, float] = (-math.inf, math.inf)
 
     def scales(self, inputs: LayoutInputs) -> tuple[float, ...]:
         """The scale of each entry."""
@@ -217,7 +215,9 @@ OBSERVATION = (
     ),
     Declared("wheel_gap", lambda n: n.wheels, "m", "distance of each wheel to ground and rocks", **_scaled(GAP_SCALE)),
     Declared("wheel_contact", lambda n: n.wheels, "", "1 where the gap is at most 1 mm, else 0", **_FLAG),
-    Declared("normal_force", lambda n: n.wheels, "N", "ground or rock on wheel, along the contact's normal", **_LOAD),
+    Declared(
+        "normal_force", lambda n: n.wheels, "N", "ground and rocks on wheel, along each contact's normal", **_LOAD
+    ),
     Declared(
         "tangential_force", lambda n: 2 * n.wheels, "N", "the same, rolling then lateral, wheel by wheel", **_LOAD
     ),
@@ -229,7 +229,7 @@ OBSERVATION = (
         "m",
         "horizontal distance from the trunk's origin to the goal",
         **_scaled(GOAL_SCALE),
-        bounds=(0.0, LARGEST),
+        bounds=(0.0, math.inf),
     ),
     Declared("previous_action", lambda n: n.actions, "", "the action before this observation, 0 at reset", **_UNIT),
     Declared("stuck", lambda _: 1, "", "fraction of the time to high-centring that has passed", **_FLAG),
@@ -256,23 +256,6 @@ OBSERVATION = (
         "m",
         "heights of ground and rocks over the trunk's origin, from the front, each row from the left",
     ),
-)
-
-#: The entries of an info, in order: name, unit and meaning. The core fills them in.
-INFO = (
-    ("time", "s", "since the reset"),
-    ("success", "", "whether the goal is reached"),
-    ("is_success", "", "the same, by the name that stable-baselines3 looks for"),
-    ("termination", "", 'how the episode has ended; "" while it runs'),
-    ("distance_to_goal", "m", "horizontal"),
-    ("energy", "J", "work of the wheel motors since the reset, braking counted"),
-    ("energy_positive", "J", "the same, driving only"),
-    ("slip_ratio", "", "mean over wheels in contact of rim slip over the faster of rim and ground, 0 to 2"),
-    ("tilt", "rad", "angle between the trunk and the vertical"),
-    ("difficulty", "", "of the rocks; 0 where none are drawn"),
-    ("domain", "", "the randomised properties, by argument"),
-    ("reward_terms", "", "the terms of the step's reward, by name"),
-    ("solver", "", "`status`, `iterations`, `residual`, `n_contacts`, `message`: the worst of the physics steps"),
 )
 
 
@@ -329,4 +312,7 @@ def observation_table() -> list[tuple[str, ...]]:
 
 def info_table() -> list[tuple[str, ...]]:
     """The rows of the card's table of infos."""
-    return [("key", "unit", "meaning"), *((f"`{name}`", unit, meaning) for name, unit, meaning in INFO)]
+    return [
+        ("key", "unit", "meaning"),
+        *((f"`{name}`", unit, meaning) for name, unit, meaning in EpisodeRules.info_rows()),
+    ]

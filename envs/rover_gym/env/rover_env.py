@@ -1,62 +1,33 @@
 """`Rover-v0`: drive a rover to a goal. The class docstring is the environment's card."""
 
-import copy
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from functools import partial
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any, Self, Unpack
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
-from gymnasium.error import ResetNeeded
 
-from rover_gym.env.arguments import RoverArguments, check_arguments, takes_arguments, with_tables
-from rover_gym.env.env_snapshot import EnvSnapshot, check_random_state, check_snapshot
-from rover_gym.env.episode_scene import (
-    EpisodeScene,
-    ResetOptions,
-    check_difficulty,
-    check_reset_options,
-    draw_episodes,
-    scene_of,
-)
-from rover_gym.env.episode_view import EpisodeView
-from rover_gym.env.generators import check_seed, row_of, seeded, set_row
+from rover_gym.env.arguments import RoverArguments, takes_arguments, with_tables
+from rover_gym.env.batch import RoverBatch
+from rover_gym.env.env_snapshot import EnvSnapshot
+from rover_gym.env.episode_scene import EpisodeScene
+from rover_gym.env.observation import ObservationLayout
 from rover_gym.env.play_keys import keys_to_action, pushed
-from rover_gym.env.reward_terms import earn, total
-from rover_gym.env.task import Task, make_task
-from rover_gym.mechanics import EpisodeRun, Plane, RoverGrainSimulation, Simulation, standard_normals
-from rover_gym.rendering.render_options import RENDER_MODES, RenderOptions
+from rover_gym.env.sand_ground import soil_of
+from rover_gym.env.start import Domain, Rocks, Start
+from rover_gym.env.task import Task, check_actions
+from rover_gym.mechanics import CommandError, EpisodeRun, RoverGrainSimulation, RoverModel, Simulation
+from rover_gym.rendering.render_options import RENDER_MODES
+from rover_gym.sand.soils import Soil
 from rover_gym.validation import Range
 
 if TYPE_CHECKING:
     from rover_gym.rendering import FrameRenderer
 
 
-NOT_RUNNING = "RoverEnv: call reset() first"
-#: Termination of an episode whose physics could not take a step.
-STEP_FAILED = "step_failed"
-
-
-@dataclass(frozen=True)
-class RunningEpisode:
-    """The running episode of an environment.
-
-    Attributes:
-        scene: What it was drawn as: ground, start, goals.
-        simulation: The rover.
-        progress: How far it has come.
-        mover: What a control period moves, where the rover is not alone; None for `simulation`.
-    """
-
-    scene: EpisodeScene
-    simulation: Simulation
-    progress: EpisodeRun
-    mover: RoverGrainSimulation | None = None
-
-
 @with_tables
-class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
+class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     """Drive a six-wheel, 21-dof rover with six motors and six steered wheels to a goal on the map.
 
     The world has x forward, y up and z to the right; heading is the angle about +y, positive to the
@@ -114,8 +85,8 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
     ## Observation
 
     `Box((91,), float32)`, each entry its value divided by a fixed scale; `observation_layout` names
-    the slices and converts the values back to SI units. Observations are never clipped. The bounds of
-    unbounded entries are float32's largest numbers: the space holds every finite observation and nothing else.
+    the slices and converts the values back to SI units. Observations are never clipped, and always finite. The
+    bounds of unbounded entries are infinite.
 
     {observation}
 
@@ -282,46 +253,84 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
     #: Render modes, and the frames of a second of film: the control frequency.
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 20}  # noqa: RUF012 - as Gymnasium declares it
 
+    _renderer: "FrameRenderer | None" = None
+
     @takes_arguments
     def __init__(self, **arguments: Unpack[RoverArguments]) -> None:
-        given = check_arguments(type(self).__name__, arguments)
-        self.task: Task = make_task(given)
-        self.observation_space = gym.spaces.Box(
-            self.observation_layout.low, self.observation_layout.high, dtype=np.float32
-        )
-        self.action_space = gym.spaces.Box(-1.0, 1.0, (self.task.n_actions,), np.float32)
-        self._idle = Simulation(self.model, Plane(), **self.task.simulation_options)
-        self._episode: RunningEpisode | None = None
-        self._difficulty: Range | None = None
+        self._join(self.make_batch(1, threads=1, alone=True, **arguments), 0)
+
+    @classmethod
+    def make_batch(cls, n: int, **arguments: Any) -> RoverBatch:
+        """A batch of rovers for environments of this class. A task of its own overrides this method."""
+        return RoverBatch(n, **arguments)
+
+    @classmethod
+    def row(cls, batch: RoverBatch, i: int) -> Self:
+        """Rover i of a batch of this class as an environment; its `reset` and `step` leave the others as they are."""
+        env = cls.__new__(cls)
+        env._join(batch, i)
+        return env
+
+    def _join(self, batch: RoverBatch, i: int) -> None:
+        self.batch, self.i = batch, i
+        self.observation_space, self.action_space = batch.observation_space, batch.action_space
         #: Whether a step takes the height scan. Without, observations keep the last heights until
         #: `complete_observation`, or until the episode ends by itself.
         self.has_scan = True
-
-        self.render_mode: str | None = given["render_mode"]
-        self.render_options: RenderOptions = given["render_options"] or RenderOptions()
-        fps = round(1.0 / self.dt, 9)
+        fps = round(1.0 / batch.task.dt, 9)
         self.metadata = {**type(self).metadata, "render_fps": int(fps) if fps.is_integer() else fps}
+
+    @property
+    def task(self) -> Task:
+        """The checked arguments."""
+        return self.batch.task
+
+    @property
+    def render_mode(self) -> str | None:  # type: ignore[override] # read-only here
+        """None, or "rgb_array"."""
+        return self.batch.render_mode
+
+    # What `gymnasium.Env` keeps here lives in the batch.
+    @property
+    def _np_random(self) -> np.random.Generator:
+        return self.batch.generator(self.i)
+
+    @_np_random.setter
+    def _np_random(self, value: np.random.Generator) -> None:
+        self.batch.set_generator(self.i, value)
+
+    @property
+    def _np_random_seed(self) -> int:
+        return self.batch.seed_of(self.i)
+
+    @_np_random_seed.setter
+    def _np_random_seed(self, value: int) -> None:
+        self.batch.set_seed(self.i, value)
 
     @property
     def simulation(self) -> Simulation:
         """The environment's simulation, replaced at each reset; read it, but do not step it."""
-        return self._idle if self._episode is None else self._episode.simulation
+        return self.batch.episodes.simulation(self.i)
 
     @property
-    def goal(self) -> tuple[float, float]:
-        """The episode's present goal (x, z), m."""
-        return self.episode.progress.goal
+    def mover(self) -> RoverGrainSimulation | None:
+        """What a control period moves, where the rover is not alone."""
+        movers = self.batch.movers
+        return None if movers is None else movers[self.i]
 
     @property
-    def episode(self) -> RunningEpisode:
-        """The running episode.
+    def progress(self) -> EpisodeRun:
+        """A copy of the running episode: how far it has come.
 
         Raises:
             ResetNeeded: The environment has not been reset.
         """
-        if self._episode is None:
-            raise ResetNeeded(NOT_RUNNING)
-        return self._episode
+        return self.batch.progress(self.i)
+
+    @property
+    def goal(self) -> tuple[float, float]:
+        """The episode's present goal (x, z), m."""
+        return self.progress.goal
 
     @property
     def scene(self) -> EpisodeScene:
@@ -330,7 +339,63 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
         Raises:
             ResetNeeded: The environment has not been reset.
         """
-        return self.episode.scene
+        return self.batch.scene(self.i)
+
+    @property
+    def model(self) -> RoverModel:
+        """The rover, before its masses are scaled."""
+        return self.task.model
+
+    @property
+    def gravity(self) -> tuple[float, ...]:
+        """Gravity before it is scaled, m/s2."""
+        return self.task.gravity
+
+    @property
+    def dt(self) -> float:
+        """Control period, s."""
+        return self.task.dt
+
+    @property
+    def goal_tolerance(self) -> float:
+        """Distance from a goal at which it is reached, m."""
+        return self.task.goal_tolerance
+
+    @property
+    def max_steering(self) -> float:
+        """Set-point of a steering action of 1, rad."""
+        return self.task.max_steering
+
+    @property
+    def observation_layout(self) -> ObservationLayout:
+        """The layout of the observation."""
+        return self.task.layout
+
+    @property
+    def start(self) -> Start:
+        """The episode's slope, pose and goal as they were drawn."""
+        return self.scene.start
+
+    @property
+    def rocks(self) -> Rocks | None:
+        """The episode's difficulty and rocks as they were drawn; None on the plane."""
+        return self.scene.rocks
+
+    @property
+    def soil(self) -> Soil | None:
+        """The soil of the episode's sand as it was drawn; None on firm ground."""
+        return soil_of(self.task.soils, self.simulation.terrain)
+
+    @property
+    def domain(self) -> Domain:
+        """The episode's properties of rover and world as they were drawn."""
+        return self.scene.domain
+
+    @property
+    def difficulty(self) -> float | None:
+        """The episode's difficulty; None on the plane."""
+        rocks = self.rocks
+        return None if rocks is None else rocks.difficulty
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -344,31 +409,8 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
             StateError: `q` or `v` has a wrong shape or an entry that is not finite, or its observation overflows float32.
             TerrainError: The rover would penetrate the ground or a sphere in each of 100 drawn scenes.
         """
-        checked = check_reset_options(self.task, options)
-        chosen = check_seed(seed)
-        generator, used = (self.np_random, self._np_random_seed) if chosen is None else seeded(chosen)
-        trial = copy.deepcopy(generator)
-        episode = self.draw_episode(trial, checked)
-        generator.bit_generator.state = trial.bit_generator.state
-        self._np_random, self._np_random_seed, self._episode = generator, used, episode
-        info = episode.progress.info()
-        info["reward_terms"] |= dict.fromkeys(self.task.reward_terms, 0.0)
-        return episode.progress.observation, info
-
-    def draw_episode(self, generator: np.random.Generator, options: ResetOptions) -> RunningEpisode:
-        """Draws an episode for `reset`, which starts it. A task that begins in another way overrides this method.
-
-        Args:
-            generator: A copy of the environment's random generator, which the environment then continues from.
-            options: The checked options of the reset.
-
-        Raises:
-            StateError: As `reset`.
-            TerrainError: As `reset`.
-        """
-        drawn = draw_episodes(self.task, row_of(generator)[None], [self._difficulty], options)
-        set_row(generator, drawn.generators[0])
-        return RunningEpisode(scene_of(self.task, drawn, 0), drawn.simulation(0), drawn.episode(0))
+        info = self.batch.reset(self.i, seed, self.batch.check_options(options))
+        return self.progress.observation, info
 
     def step(
         self, action: npt.NDArray[np.float32]
@@ -381,31 +423,20 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
             OptionError: A function of `reward_terms` fails; the period has been taken.
             ResetNeeded: The environment has not been reset.
         """
-        progress, mover = self.episode.progress, self.episode.mover or self.episode.simulation
-        before = progress.observation if self.task.reward_terms else None
-        if self.task.is_noisy:
-            normals, after = standard_normals(row_of(self.np_random)[None], self.task.layout.size)
-            result = progress.step(mover, action, normals[0], has_scan=self.has_scan)
-            set_row(self.np_random, after[0])
-        else:
-            result = progress.step(mover, action, has_scan=self.has_scan)
-        observation, reward, terminated, info = result
-        if before is not None:
-            reward += self._earn(before, action, observation, info)
-        return observation, reward, terminated, False, info
-
-    def _earn(
-        self,
-        before: npt.NDArray[np.float32],
-        action: npt.NDArray[np.float32],
-        after: npt.NDArray[np.float32],
-        info: dict[str, Any],
-    ) -> float:
-        """The user's terms of a control period, which are added to its info; returns their sum."""
-        task, counts = self.task, info["termination"] != STEP_FAILED
-        own = earn(task.reward_terms, task.layout, before, action, after, info, counts)
-        info["reward_terms"] |= {name: float(term) for name, term in own.items()}
-        return float(total(own.values()))
+        batch, i = self.batch, self.i
+        given: object = action
+        try:
+            if batch.n == 1 and isinstance(given, np.ndarray):
+                stepped = batch.step(given[None], has_scan=self.has_scan)
+            else:
+                actions = np.zeros((batch.n, batch.task.n_actions))
+                actions[i] = check_actions(given, actions[i].shape)
+                stepped = batch.step(actions, np.arange(batch.n) == i, has_scan=self.has_scan)
+        except CommandError:
+            check_actions(given, (batch.task.n_actions,))  # names the entry without the rover
+            raise
+        observation, reward, terminated, _, _ = stepped
+        return observation[i].copy(), float(reward[i]), bool(terminated[i]), False, batch.info(i)
 
     def complete_observation(self) -> npt.NDArray[np.float32]:
         """The last observation, with the heights that it lacks where `has_scan` was off; takes the scan if it must.
@@ -413,7 +444,7 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
         Raises:
             ResetNeeded: The environment has not been reset.
         """
-        return self.episode.progress.complete(self.simulation)
+        return self.batch.complete_observation(self.i)
 
     def get_keys_to_action(self) -> dict[str, npt.NDArray[np.float32]]:
         """Actions by keys held together, for `gymnasium.utils.play`: w and s push, a and d steer; "" is no key.
@@ -428,7 +459,7 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
         Raises:
             OptionError: The difficulty is not within 0 to 2, or there are no rocks; nothing has changed.
         """
-        self._difficulty = check_difficulty(self.task, difficulty)
+        self.batch.set_difficulty(self.i, difficulty)
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """Renders the present state as a frame, (height, width, 3) uint8; warns and returns None without a render mode.
@@ -440,23 +471,27 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
         if self.render_mode is None:
             gym.logger.warn('RoverEnv: render() needs render_mode="rgb_array" when the environment is made')
             return None
-        return self.frame()
+        scene = self.scene
+        if self._renderer is None:
+            self._renderer = self.make_renderer(scene)
+        self._renderer.set_scene(scene.terrain, goal=self.goal, goal_tolerance=self.goal_tolerance)
+        return self._renderer.render(self.simulation)
 
     def make_renderer(self, scene: EpisodeScene) -> "FrameRenderer":
         """Creates a renderer with this environment's `render_options`; the caller must close it."""
         from rover_gym.rendering import FrameRenderer  # noqa: PLC0415 - only rendering needs it
 
-        return FrameRenderer(self.model, scene.terrain, **asdict(self.render_options))
+        return FrameRenderer(self.model, scene.terrain, **asdict(self.batch.render_options))
+
+    def close(self) -> None:
+        """Frees the renderer, if there is one."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
 
     def snapshot(self) -> EnvSnapshot:
         """Returns the state of the environment and of its random generator, for `restore`."""
-        return EnvSnapshot(
-            scene=self.scene,
-            simulation=self.simulation.snapshot(),
-            progress=self.episode.progress.to_bytes(),
-            difficulty=self._difficulty,
-            random_state=copy.deepcopy(self.np_random.bit_generator.state),
-        )
+        return self.batch.snapshot_of(self.i)
 
     def restore(self, snapshot: EnvSnapshot) -> None:
         """Restores a snapshot of an environment with the same arguments, which then continues bit for bit.
@@ -465,15 +500,4 @@ class RoverEnv(EpisodeView, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
             StateError: The value is no snapshot, is damaged, or comes from an environment with other arguments; nothing
                 has changed.
         """
-        progress = check_snapshot(self.task, snapshot)
-        state = check_random_state(self.np_random, snapshot.random_state)
-        difficulty = None if snapshot.difficulty is None else check_difficulty(self.task, snapshot.difficulty)
-        simulation = self.task.simulate(snapshot.scene.terrain, snapshot.scene.domain)
-        simulation.restore(snapshot.simulation)
-        episode = self.resume_episode(RunningEpisode(snapshot.scene, simulation, progress), snapshot)
-        self.np_random.bit_generator.state = state
-        self._episode, self._difficulty = episode, difficulty
-
-    def resume_episode(self, episode: RunningEpisode, snapshot: EnvSnapshot) -> RunningEpisode:  # noqa: ARG002
-        """The episode of a snapshot for `restore`. A task whose snapshots hold more overrides this method."""
-        return episode
+        self.batch.restore_one(self.i, snapshot)

@@ -24,24 +24,9 @@ import numpy.typing as npt
 
 from rover_gym.ground import plane_of
 from rover_gym.mechanics import OptionError, Plane, RoverModel, SphereField, Terrain, TerrainError, atan2, sin_cos
-from rover_gym.validation import Range, number, refuse, vector
+from rover_gym.validation import number, refuse, vector
 
 Point: TypeAlias = tuple[float, float]
-
-
-@dataclass(frozen=True)
-class StartDistribution:
-    """Ranges that starts are drawn from uniformly; angles in rad, distances in m.
-
-    `turn` is the angle from one leg of a course to the next.
-    """
-
-    slope: Range
-    uphill: Range
-    heading: Range
-    goal_distance: Range
-    goal_bearing: Range
-    turn: Range
 
 
 @dataclass(frozen=True)
@@ -121,17 +106,6 @@ class Domain:
         return asdict(self)
 
 
-@dataclass(frozen=True)
-class DomainDistribution:
-    """Ranges that episodes draw from uniformly, and the standard deviation of the observation noise."""
-
-    mass_scale: Range
-    friction: Range
-    actuator_gain: Range
-    gravity_scale: Range
-    observation_noise: float
-
-
 #: The slip ratio is meaningless while both wheel and rim are slower than this, m/s; equals the core's `SLIP_SPEED`.
 SLIP_SPEED = 0.05
 
@@ -186,21 +160,6 @@ SPACINGS = (1e-3, 10.0)
 
 
 @dataclass(frozen=True)
-class RockDistribution:
-    """What rocks are drawn from.
-
-    Attributes:
-        difficulty: Range of difficulties.
-        abundance: Fraction of the ground that rocks cover; None: by the difficulty.
-        max_radius: Radius of the largest rocks, in wheel radii; None: by the difficulty.
-    """
-
-    difficulty: Range = (DEFAULT_DIFFICULTY, DEFAULT_DIFFICULTY)
-    abundance: float | None = None
-    max_radius: float | None = None
-
-
-@dataclass(frozen=True)
 class Rocks:
     """The rocks of one episode.
 
@@ -244,15 +203,6 @@ def scan_points(offsets: npt.NDArray[np.float64], position: Point, heading: floa
     s, c = sin_cos(heading)
     points: npt.NDArray[np.float64] = offsets @ np.array([[c, -s], [s, c]]) + position
     return points
-
-
-def rock_distribution(difficulty: Range | None, abundance: float | None, max_radius: float | None) -> RockDistribution:
-    """Builds the distribution from checked arguments; None takes the default."""
-    return RockDistribution(
-        difficulty=(DEFAULT_DIFFICULTY, DEFAULT_DIFFICULTY) if difficulty is None else difficulty,
-        abundance=abundance,
-        max_radius=max_radius,
-    )
 
 
 def check_scan(field: str, value: object) -> HeightScan | None:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,13 +12,10 @@ from rover_gym.env.observation import ObservationLayout, build_layout
 from rover_gym.env.reward_terms import WEIGHTS, RewardTerms
 from rover_gym.env.sand_ground import check_wheels_for_sand, sand_rover, soils_of
 from rover_gym.env.start import (
+    DEFAULT_DIFFICULTY,
     MAX_GOAL_DISTANCE,
     Domain,
-    DomainDistribution,
-    RockDistribution,
-    StartDistribution,
     Steering,
-    rock_distribution,
     slope_of,
 )
 from rover_gym.mechanics import (
@@ -55,13 +52,11 @@ class Task:
         steering: The steering entries of an action; none where nothing steers.
         n_actions: Entries of an action: a torque for each wheel, then a set-point for each joint that steers.
         ground: The given terrain, which is the ground of every episode; None without one.
-        rocks: Distribution of the rock fields; None without rocks.
+        has_rocks: Whether there are rocks.
         on_hills: Whether the ground is hills.
         soils: Soils that the sand is drawn from; none on firm ground.
-        slope_by_difficulty: Whether the rocks' difficulty sets the slope of the ground.
         scan: `(n, 2)` points of the height scan in the heading frame, m; None without one.
-        start: Distribution of the starts.
-        domain: Distribution of the randomised properties.
+        is_noisy: Whether observations have noise.
         goal_tolerance: Distance within which the goal is reached, m.
         n_further: Goals of the course after the first.
         gravity: Gravity before it is scaled, m/s2.
@@ -79,13 +74,11 @@ class Task:
     steering: Steering
     n_actions: int
     ground: Terrain | None
-    rocks: RockDistribution | None
+    has_rocks: bool
     on_hills: bool
     soils: tuple[Soil, ...]
-    slope_by_difficulty: bool
     scan: npt.NDArray[np.float64] | None
-    start: StartDistribution
-    domain: DomainDistribution
+    is_noisy: bool
     goal_tolerance: float
     n_further: int
     gravity: tuple[float, ...]
@@ -106,14 +99,11 @@ class Task:
             options["gravity"] = tuple(domain.gravity_scale * g for g in self.gravity)
         return Simulation(model, terrain, **options)
 
-    @property
-    def is_noisy(self) -> bool:
-        """Whether observations have noise."""
-        return self.domain.observation_noise > 0.0
 
-
-def make_task(given: Mapping[str, Any]) -> Task:
+def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> Task:
     """Builds the task from arguments that `check_arguments` has passed, and checks that they are consistent.
+
+    `free_distance`: distance from the start at which an episode ends, for rovers that are to come free, m.
 
     Raises:
         OptionError: Two arguments contradict each other, or the core refuses an option; `field` names one.
@@ -125,14 +115,13 @@ def make_task(given: Mapping[str, Any]) -> Task:
     soils = soils_of(terrain, given["soil"])
     sand = [SoftGround(Plane(), soil) for soil in soils] or None
     start = _start(given, ground)
-    properties = ("mass_scale", "friction", "actuator_gain", "gravity_scale", "observation_noise")
-    domain = DomainDistribution(**{name: given[name] for name in properties})
+    domain = {name: given[name] for name in ("mass_scale", "friction", "actuator_gain", "gravity_scale")}
     substeps = _substeps(given["control_frequency"], step)
     rover = _rover(given["model"], steered=given["steered"], on_sand=sand is not None)
     steering = Steering.of(rover)
     options = {
         "gravity": gravity,
-        "friction": domain.friction[0],
+        "friction": domain["friction"][0],
         "restitution": given["restitution"],
         "time_step": step,
         **(given["solver_options"] or {}),
@@ -149,16 +138,17 @@ def make_task(given: Mapping[str, Any]) -> Task:
         has_battery=given["battery"] is not None,
     )
     max_steering = _steering_limit(rover, steering, given["max_steering_deg"])
-    rules = _rules(given, rover, layout, substeps=substeps, max_steering=max_steering, scan=points)
-    slope_by_difficulty = given["slope_deg"] is None and terrain in ("rocks", "sand")
+    rules = _rules(
+        given, rover, layout, substeps=substeps, max_steering=max_steering, scan=points, free_distance=free_distance
+    )
     episodes = EpisodeDistribution(
         rules,
         simulation,
-        start=asdict(start),
-        domain=asdict(domain),
+        start=start,
+        domain=domain,
         trunk_load_limit=TRUNK_LOAD * (rover.mass * math.hypot(*gravity)),
-        rocks=None if rocks is None else asdict(rocks),
-        slope_by_difficulty=slope_by_difficulty,
+        rocks=rocks,
+        slope_by_difficulty=given["slope_deg"] is None and terrain in ("rocks", "sand"),
         ground=ground,
         hills=hills,
         sand=sand,
@@ -168,13 +158,11 @@ def make_task(given: Mapping[str, Any]) -> Task:
         steering=steering,
         n_actions=n_actions,
         ground=ground,
-        rocks=rocks,
+        has_rocks=rocks is not None,
         on_hills=hills is not None,
         soils=soils,
-        slope_by_difficulty=slope_by_difficulty,
         scan=points,
-        start=start,
-        domain=domain,
+        is_noisy=given["observation_noise"] > 0.0,
         goal_tolerance=given["goal_tolerance"],
         n_further=goals - 1,
         gravity=gravity,
@@ -189,14 +177,13 @@ def make_task(given: Mapping[str, Any]) -> Task:
     )
 
 
-def _rocks(given: Mapping[str, Any]) -> RockDistribution | None:
+def _rocks(given: Mapping[str, Any]) -> dict[str, Any] | None:
     """Distribution of the rock fields where there are any, whose course must lie within the field; None elsewhere."""
     if given["terrain"] not in ("rocks", "hills", "sand"):
         for name in ("difficulty", "rock_abundance", "max_rock_radius"):
             if given[name] is not None:
                 refuse(OptionError, name, _as_given(given[name]), "needs terrain 'rocks', 'hills' or 'sand'")
         return None
-    rocks = rock_distribution(given["difficulty"], given["rock_abundance"], given["max_rock_radius"])
     nearest, farthest = given["goal_distance"]
     distance = nearest if nearest == farthest else (nearest, farthest)
     span("goal_distance", distance, at_most=MAX_GOAL_DISTANCE)
@@ -204,26 +191,30 @@ def _rocks(given: Mapping[str, Any]) -> RockDistribution | None:
         reason = f"must give a course of at most {MAX_GOAL_DISTANCE:g} m with goal_distance up to {farthest:g} m"
         refuse(OptionError, "waypoints", given["waypoints"], reason)
     number("goal_tolerance", given["goal_tolerance"], at_most=MAX_GOAL_DISTANCE)
-    return rocks
+    return {
+        "difficulty": given["difficulty"] or (DEFAULT_DIFFICULTY, DEFAULT_DIFFICULTY),
+        "abundance": given["rock_abundance"],
+        "max_radius": given["max_rock_radius"],
+    }
 
 
-def _start(given: Mapping[str, Any], ground: Terrain | None) -> StartDistribution:
-    """Distribution of the starts; the slope of hills and of a given ground is their own."""
+def _start(given: Mapping[str, Any], ground: Terrain | None) -> dict[str, Range]:
+    """Distribution of the starts, rad and m; the slope of hills and of a given ground is their own."""
     slope_deg = given["slope_deg"]
-    start = StartDistribution(
-        slope=_radians((0.0, 0.0) if slope_deg is None else slope_deg),
-        uphill=_radians(given["uphill_deg"]),
-        heading=_radians(given["heading_deg"]),
-        goal_distance=given["goal_distance"],
-        goal_bearing=_radians(given["goal_bearing_deg"]),
-        turn=_radians(given["waypoint_turn_deg"]),
-    )
+    start = {
+        "slope": _radians((0.0, 0.0) if slope_deg is None else slope_deg),
+        "uphill": _radians(given["uphill_deg"]),
+        "heading": _radians(given["heading_deg"]),
+        "goal_distance": given["goal_distance"],
+        "goal_bearing": _radians(given["goal_bearing_deg"]),
+        "turn": _radians(given["waypoint_turn_deg"]),
+    }
     if given["terrain"] in ("plane", "rocks", "sand"):
         return start
     if slope_deg is not None:
         refuse(OptionError, "slope_deg", _as_given(slope_deg), "cannot be chosen: the ground defines its slope")
     slope, uphill = slope_of(ground)
-    return replace(start, slope=(slope, slope), uphill=(uphill, uphill))
+    return start | {"slope": (slope, slope), "uphill": (uphill, uphill)}
 
 
 def _rules(
@@ -234,6 +225,7 @@ def _rules(
     substeps: int,
     max_steering: float,
     scan: npt.NDArray[np.float64] | None,
+    free_distance: float | None,
 ) -> EpisodeRules:
     """What the core needs to run an episode."""
     noise = given["observation_noise"]
@@ -252,6 +244,7 @@ def _rules(
         scan=scan,
         goals=given["waypoints"],
         battery=given["battery"],
+        free_distance=free_distance,
     )
 
 

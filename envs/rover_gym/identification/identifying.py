@@ -45,19 +45,18 @@ def identify(
     """Fits parameters of a simulation to a recorded run, with their uncertainty.
 
     The run is cut into short windows, so that errors do not accumulate. Each window is simulated under the recorded
-    commands from its own starting state, which is noisy and therefore estimated together with the parameters. The
-    commands of a row acted from the previous row to this one, as `rover drive` records them. The residuals are
-    simulated minus measured coordinates and velocities, divided by their standard deviations. Their sum of squares is
-    minimised by the Gauss-Newton method with central differences. Windows that do not fit have a smaller weight. The
-    covariance is that of linear least squares at the minimum; if the sum of squares rises more slowly, the standard
-    errors are enlarged.
+    commands from its own starting state, which is noisy and thus estimated with the parameters. The commands of a row
+    acted from the previous row to this one, as `rover drive` records them. The residuals are simulated minus measured
+    coordinates and velocities, divided by their standard deviations. Their sum of squares is minimised by the
+    Gauss-Newton method with central differences. Windows that do not fit weigh less. The covariance is that of linear
+    least squares at the minimum; if the sum of squares rises more slowly, standard errors are enlarged.
 
     Args:
         recording: The run, or its file. It provides model, ground and settings.
-        parameters: Names, or your own `Parameter` objects. Names are "friction" (of all contacts without materials),
-            "restitution", "gravity_scale", "mass_scale" (of all masses and inertias), "payload" (added to the first
-            solid, kg), "actuator_gain" (on the wheel torques), "steering_stiffness", "steering_damping", "stall_torque"
-            and "no_load_speed".
+        parameters: Names or `Parameter` objects. Names are "friction" (of all contacts without materials),
+            "restitution", "gravity_scale", "mass_scale" (of all masses and inertias), "payload" (on the first solid,
+            kg), "actuator_gain" (on the wheel torques), "steering_stiffness", "steering_damping", "stall_torque" and
+            "no_load_speed".
         model: The assumed model of the rover; the recorded one by default.
         settings: Keyword arguments of `Simulation` that replace the recorded ones, such as `{"friction": 0.7}`. The
             search starts from the values of model and settings, and from factors of 1.

@@ -169,7 +169,7 @@ class LiveRover:
         if wheel.driver is None:
             action = self._hand.act(self.env.complete_observation()[None], np.array([[*command, 0.0]]))[0]
         elif wheel.seen is None:
-            action = self.env.episode.progress.previous_action.astype(np.float32)
+            action = self.env.progress.previous_action.astype(np.float32)
         else:
             action, state = wheel.driver.predict(wheel.seen, state)
         seen, _, terminated, _, self.info = self.env.step(action)
@@ -268,7 +268,7 @@ class LiveRover:
         env, now = self._environment(scene, policy), self.env.snapshot()
         env.reset(seed=scene.seed)
         fresh = env.snapshot()
-        progress = self.env.episode.progress.changed(seen=env.episode.progress)
+        progress = self.env.progress.changed(seen=env.progress)
         world, progress = _with_properties(env, now.scene, progress, scene.friction, scene.gravity)
         env.restore(replace(now, scene=world, progress=progress.to_bytes(), random_state=fresh.random_state))
         self._take(_Wheel(env, policy, None if policy is None else policy.make(env)))
@@ -284,7 +284,7 @@ class LiveRover:
     ) -> None:
         """Continues in a world with other properties, another goal or other rocks."""
         now = self.env.snapshot()
-        scene, progress = now.scene, self.env.episode.progress
+        scene, progress = now.scene, self.env.progress
         if friction is not None and gravity is not None:
             scene, progress = _with_properties(self.env, scene, progress, friction, gravity)
         if rocks is not None:

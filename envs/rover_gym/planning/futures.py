@@ -131,7 +131,7 @@ class Futures:
             time,
             reached,
             ~alive & ~reached,
-            np.asarray(told["energy"]) - self._env.episode.progress.info()["energy"],
+            np.asarray(told["energy"]) - self._env.progress.info()["energy"],
             np.asarray(told["tilt"]),
             seen[:, self._stuck].astype(np.float64),
         )

@@ -29,7 +29,7 @@ from rover_gym.policy.policy_card import Network, PolicyCard, PolicyError, find_
 from rover_gym.policy.sand_policy import SandGains, SandPolicy
 from rover_gym.policy.scan_policy import ScanGains, ScanPolicy
 from rover_gym.policy.trained_policy import TrainedPolicy
-from rover_gym.policy.trap_env import RoverTrapEnv
+from rover_gym.policy.trap_env import RoverTrapEnv, RoverTrapVectorEnv, TrapBatch
 
 __all__ = [
     "ENDS",
@@ -61,11 +61,13 @@ __all__ = [
     "RoverGoalEnv",
     "RoverGoalVectorEnv",
     "RoverTrapEnv",
+    "RoverTrapVectorEnv",
     "SandGains",
     "SandPolicy",
     "ScanGains",
     "ScanPolicy",
     "TrainedPolicy",
+    "TrapBatch",
     "drive_all",
     "find_policy",
     "mean_estimate",

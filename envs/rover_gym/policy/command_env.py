@@ -13,6 +13,7 @@ from gymnasium.vector import AutoresetMode, VectorWrapper
 from gymnasium.vector.utils import batch_space
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
+from rover_gym.env.batch import BatchSnapshot
 from rover_gym.env.observation import Array, Mask, Observations
 from rover_gym.env.play_keys import keys_to_action
 from rover_gym.env.rover_env import RoverEnv
@@ -22,7 +23,6 @@ from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimit
 from rover_gym.policy.features import Features
 from rover_gym.policy.pd_policy import find_rover_env
 from rover_gym.validation import array, known_keys, refuse, whole
-from rover_gym.vector.batch import BatchSnapshot
 from rover_gym.vector.vector_env import RoverVectorEnv
 
 #: Most steps that a command may be held; a few minutes.

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.arguments import terrain_name
+from rover_gym.env.batch import RoverBatch
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.start import MAX_DIFFICULTY
 from rover_gym.env.task import MAX_EPISODE_STEPS
@@ -19,7 +20,6 @@ from rover_gym.mechanics import OptionError
 from rover_gym.models.lookup import open_model
 from rover_gym.policy.named_policy import Policy, named_policy
 from rover_gym.validation import number, refuse, whole
-from rover_gym.vector.batch import RoverBatch
 
 DIFFICULTIES = (0.0, 0.25, 0.5, 0.75, 1.0)
 ENDS = ("goal", "time", "high_centred", "roll_over", "step_failed")
@@ -177,7 +177,7 @@ def drive_all(
     if n == 0:
         return []
     batch = RoverBatch(n, threads=threads, **arguments)
-    policy = make_policy(batch.prototype)
+    policy = make_policy(RoverEnv.row(batch, 0))
     hold: int = getattr(policy, "hold_periods", 1)
     limit = max_episode_steps or round(MAX_EPISODE_STEPS * 0.05 / batch.task.dt)
 

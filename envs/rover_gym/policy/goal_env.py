@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.env.observation import LARGEST, Array, Mask, Observations
+from rover_gym.env.observation import Array, Mask, Observations
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError, StateError, sin_cos
 from rover_gym.policy.command_env import (
@@ -63,7 +63,7 @@ class GoalRewards:
         self.kept = np.setdiff1d(np.arange(*shown.shape), goal_entries)
         self._achieved: Array = np.zeros((n, 2))
         self._heading = rover.observation_layout["q"].start + 4
-        goals = gym.spaces.Box(-LARGEST, LARGEST, (2,), np.float64)
+        goals = gym.spaces.Box(-np.inf, np.inf, (2,), np.float64)
         self.goal_space = gym.spaces.Dict(
             observation=gym.spaces.Box(
                 np.append(shown.low[self.kept], [-1.0, -1.0]).astype(np.float32),
@@ -282,7 +282,7 @@ class RoverGoalVectorEnv(GoalRewards, RoverCommandVectorEnv):
 
     def observe(self) -> GoalDict:
         """The dictionaries of all rovers."""
-        rovers = self.rovers.batch.rovers
+        rovers = self.rovers.envs
         places, goals = np.array([rover.simulation.q for rover in rovers]), np.array([rover.goal for rover in rovers])
         return self.observe_goals(self.held.observe(), self.held.seen, places, goals)
 

@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import Any, Unpack
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Unpack
 
 import numpy as np
-import numpy.typing as npt
 
-from rover_gym.env.arguments import RoverArguments, check_reward_weights, takes_arguments
-from rover_gym.env.episode_scene import EpisodeScene, ResetOptions, draw_episodes, scene_of
-from rover_gym.env.generators import row_of, set_row
-from rover_gym.env.rover_env import STEP_FAILED, RoverEnv, RunningEpisode
+from rover_gym.env.arguments import RoverArguments, takes_arguments
+from rover_gym.env.batch import Drawn, RoverBatch
+from rover_gym.env.episode_scene import ResetOptions, origin_of
+from rover_gym.env.generators import Rows
+from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.start import Start
-from rover_gym.env.task import TRUNK_LOAD
-from rover_gym.mechanics import EpisodeRun, OptionError, Simulation, StateError, TerrainError, standard_normals
+from rover_gym.env.task import TRUNK_LOAD, Task, make_task
+from rover_gym.mechanics import (
+    EpisodeRun,
+    OptionError,
+    Simulation,
+    StateError,
+    TerrainError,
+    standard_normals,
+)
 from rover_gym.policy.pd_policy import PDPolicy
-from rover_gym.validation import number, refuse
+from rover_gym.validation import Range, number, refuse
+from rover_gym.vector.vector_env import RoverVectorEnv
 
 #: Arguments of `RoverEnv` with another default.
 DEFAULTS: dict[str, Any] = {"terrain": "rocks", "difficulty": (1.0, 1.5), "stuck_time": 60.0}
@@ -28,8 +37,106 @@ HELD = 2.0
 LONGEST_DRIVE = 30.0
 #: Most drives until one ends in a trap.
 DRIVES = 100
-#: Termination of an episode whose rover has come free.
-FREE = "free"
+
+
+@dataclass(frozen=True)
+class Trapped:
+    """An episode that begins in a trap: the rover, its episode, what it was drawn as, and the generator afterwards."""
+
+    simulation: Simulation
+    episode: EpisodeRun
+    origin: tuple[list[float], list[float], int, list[float]]
+    row: Rows
+
+
+class TrapBatch(RoverBatch):
+    """Rovers that are stuck on rocks, where the PD baseline has driven them.
+
+    Args:
+        n: Number of rovers.
+        free_distance: Distance from the trap at which a rover is free, m.
+        **arguments: Arguments of `RoverBatch`.
+    """
+
+    def __init__(self, n: int, *, free_distance: float = 1.5, **arguments: Any) -> None:
+        self.free_distance = number("free_distance", free_distance, above=0.0, at_most=100.0)
+        given: dict[str, Any] = {**DEFAULTS, **arguments}
+        if given["terrain"] == "plane":
+            refuse(OptionError, "terrain", given["terrain"], "has no obstacle on which a rover gets stuck")
+        if given.get("waypoints", 1) != 1:
+            refuse(OptionError, "waypoints", given["waypoints"], "must be 1: the task is to get free")
+        super().__init__(n, **given)
+        quiet = {"stuck_time": HELD, "observation_noise": 0.0, "height_scan": False, "threads": 1}
+        left_out = ("battery", "reward_terms", "render_mode", "max_episode_steps")
+        #: The rover that the baseline drives into traps, without noise.
+        self._driven = RoverBatch(1, **(given | quiet | dict.fromkeys(left_out)))
+        self._driver = PDPolicy(RoverEnv.row(self._driven, 0))
+
+    def make_task(self, given: Mapping[str, Any]) -> Task:
+        """The task of checked arguments, which ends where the rover is free."""
+        return make_task(given, free_distance=self.free_distance)
+
+    def draw_rows(
+        self, rows: Rows, difficulties: Sequence[Range | None], fixed: ResetOptions | Sequence[ResetOptions]
+    ) -> list[Trapped]:
+        """Draws scenes for each rover until the baseline's drive in one ends in a trap.
+
+        Raises:
+            StateError: As `RoverEnv.reset`.
+            TerrainError: As `RoverEnv.reset`, or no drive ended in a trap.
+        """
+        options = [fixed] * len(rows) if isinstance(fixed, ResetOptions) else fixed
+        return [self._draw(*one) for one in zip(rows, difficulties, options, strict=True)]
+
+    def begin_drawn(self, chosen: Sequence[int], drawn: Any) -> None:
+        """Starts the episodes in their traps."""
+        for i, one in zip(chosen, drawn, strict=True):
+            self.episodes.resume([i], one.simulation, one.episode, one.origin, generator=one.row[None])
+
+    def _draw(self, row: Rows, difficulty: Range | None, options: ResetOptions) -> Trapped:
+        """The episode of one rover."""
+        driven = self._driven
+        for _ in range(DRIVES):
+            drawn = driven.draw_rows(row[None], [difficulty], options)
+            row = drawn.generators[0]
+            driven.begin(Drawn(drawn, [0], [0], set()))
+            if "q" in options.fixed or self._is_trapped():
+                break
+        else:
+            refuse(
+                TerrainError, "terrain", self.task.ground or DRIVES, f"the rover got stuck in none of {DRIVES} drives"
+            )
+        normals = None
+        if self.task.is_noisy:
+            (normals,), (row,) = standard_normals(row[None], self.task.layout.size)
+        scene, simulation = driven.scene(0), driven.episodes.simulation(0)
+        q = simulation.q
+        domain, old = scene.domain, scene.start
+        start = Start(old.slope, old.uphill, (float(q[0]), float(q[2])), float(q[4]), old.goal)
+        trapped = self.task.simulate(scene.terrain, domain)
+        trapped.set_state(q, simulation.v if "q" in options.fixed else None)
+        load = TRUNK_LOAD * self.task.model.mass * math.hypot(*self.task.gravity)
+        episode = EpisodeRun.begin(
+            self.task.rules,
+            trapped,
+            goal=start.goal,
+            domain=list(domain.as_info().values()),
+            trunk_load_limit=load * domain.mass_scale * domain.gravity_scale,
+            difficulty=scene.difficulty,
+            normals=normals,
+        )
+        if episode is None:
+            refuse(StateError, "q", q, "must give an observation that is finite in float32")
+        return Trapped(trapped, episode, origin_of(replace(scene, start=start)), row)
+
+    def _is_trapped(self) -> bool:
+        """Lets the baseline drive; whether that ends in a trap."""
+        seen = self._driven.observation
+        for _ in range(round(LONGEST_DRIVE / self.task.dt)):
+            seen, _, ended, _, _ = self._driven.step(np.asarray(self._driver.predict(seen[0])[0])[None])
+            if ended[0]:
+                return bool(self._driven.info(0)["termination"] == "high_centred")
+        return False
 
 
 class RoverTrapEnv(RoverEnv):
@@ -82,118 +189,21 @@ class RoverTrapEnv(RoverEnv):
 
     @takes_arguments
     def __init__(self, *, free_distance: float = 1.5, **arguments: Unpack[RoverArguments]) -> None:
-        self.free_distance = number("free_distance", free_distance, above=0.0, at_most=100.0)
-        given: dict[str, Any] = {**DEFAULTS, **arguments}
-        if given["terrain"] == "plane":
-            refuse(OptionError, "terrain", given["terrain"], "has no obstacle on which a rover gets stuck")
-        if given.get("waypoints", 1) != 1:
-            refuse(OptionError, "waypoints", given["waypoints"], "must be 1: the task is to get free")
-        weights = check_reward_weights("reward_weights", given.pop("reward_weights", None) or {})
-        self._weights = {name: weights[name] for name in ("progress", "success")}
-        # The terms of this task take the place of those two, and the baseline drives without noise.
-        super().__init__(**given, reward_weights={**weights, "progress": 0.0, "success": 0.0})
-        quiet = {"stuck_time": HELD, "observation_noise": 0.0, "height_scan": False}
-        driven = RoverEnv(**(given | quiet | dict.fromkeys(("battery", "reward_terms", "render_mode"))))
-        self._driven, self._driver = driven.task, PDPolicy(driven)
+        super().__init__(free_distance=free_distance, **arguments)  # type: ignore[call-arg] # for `make_batch`
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
-        """Starts an episode in a trap; a refused reset changes nothing.
-
-        Raises:
-            OptionError: As `RoverEnv.reset`.
-            StateError: As `RoverEnv.reset`.
-            TerrainError: As `RoverEnv.reset`, or no drive ended in a trap.
-        """
-        observation, info = super().reset(seed=seed, options=options)
-        return observation, info | {"distance_from_trap": 0.0}
-
-    def draw_episode(self, generator: np.random.Generator, options: ResetOptions) -> RunningEpisode:
-        """Draws scenes until the baseline's drive in one ends in a trap.
-
-        Raises:
-            StateError: As `RoverEnv.reset`.
-            TerrainError: As `RoverEnv.reset`, or no drive ended in a trap.
-        """
-        row = row_of(generator)
-        for _ in range(DRIVES):
-            drawn = draw_episodes(self._driven, row[None], [self._difficulty], options)
-            row = drawn.generators[0]
-            simulation = drawn.simulation(0)
-            if "q" in options.fixed or self._drive(simulation, drawn.episode(0)):
-                break
-        else:
-            refuse(
-                TerrainError, "terrain", self.task.ground or DRIVES, f"the rover got stuck in none of {DRIVES} drives"
-            )
-        normals = None
-        if self.task.is_noisy:
-            (normals,), (row,) = standard_normals(row[None], self.task.layout.size)
-        set_row(generator, row)
-        v = simulation.v if "q" in options.fixed else None
-        return self._trapped(scene_of(self.task, drawn, 0), simulation.q, v, normals)
-
-    def step(
-        self, action: npt.NDArray[np.float32]
-    ) -> tuple[npt.NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Applies an action for one control period.
-
-        Raises:
-            CommandError: As `RoverEnv.step`.
-            OptionError: As `RoverEnv.step`.
-            ResetNeeded: As `RoverEnv.step`.
-        """
-        before = self.distance_from_trap
-        observation, _, terminated, truncated, info = super().step(action)
-        now = before if info["termination"] == STEP_FAILED else self.distance_from_trap
-        is_free = now >= self.free_distance and info["termination"] in ("", "goal")
-        terms = info["reward_terms"]
-        terms["progress"] = self._weights["progress"] * (now - before)
-        terms["success"] = self._weights["success"] * (is_free or info["success"])
-        if is_free:
-            info["termination"], info["success"], info["is_success"] = FREE, True, True
-        info["distance_from_trap"] = now
-        return observation, float(sum(terms.values())), terminated or is_free, truncated, info
+    @classmethod
+    def make_batch(cls, n: int, **arguments: Any) -> TrapBatch:
+        """A batch of rovers for environments of this class."""
+        return TrapBatch(n, **arguments)
 
     @property
     def distance_from_trap(self) -> float:
         """Horizontal distance from where the episode started, m."""
-        x, z = self.start.position
-        q = self.simulation.q
-        return math.hypot(q[0] - x, q[2] - z)
+        distance: float = self.progress.info()["distance_from_trap"]
+        return distance
 
-    def _drive(self, simulation: Simulation, episode: EpisodeRun) -> bool:
-        """Lets the baseline drive; whether it ends in a trap."""
-        observation, ended = episode.observation, False
-        for _ in range(round(LONGEST_DRIVE / self.task.dt)):
-            observation, _, ended, info = episode.step(simulation, self._driver.predict(observation)[0])
-            if ended:
-                return bool(info["termination"] == "high_centred")
-        return False
 
-    def _trapped(
-        self,
-        drawn: EpisodeScene,
-        q: npt.NDArray[np.float64],
-        v: npt.NDArray[np.float64] | None,
-        normals: npt.NDArray[np.float64] | None,
-    ) -> RunningEpisode:
-        """The episode that begins in a trap."""
-        task, domain, old = self.task, drawn.domain, drawn.start
-        start = Start(old.slope, old.uphill, (float(q[0]), float(q[2])), float(q[4]), old.goal)
-        simulation = task.simulate(drawn.terrain, domain)
-        simulation.set_state(q, v)
-        load = TRUNK_LOAD * task.model.mass * math.hypot(*task.gravity)
-        progress = EpisodeRun.begin(
-            task.rules,
-            simulation,
-            goal=start.goal,
-            domain=list(domain.as_info().values()),
-            trunk_load_limit=load * domain.mass_scale * domain.gravity_scale,
-            difficulty=drawn.difficulty,
-            normals=normals,
-        )
-        if progress is None:
-            refuse(StateError, "q", q, "must give an observation that is finite in float32")
-        return RunningEpisode(replace(drawn, start=start), simulation, progress)
+class RoverTrapVectorEnv(RoverVectorEnv):
+    """A vector of `RoverTrapEnv` environments that the compiled core steps on several threads; see `RoverVectorEnv`."""
+
+    env_class: ClassVar[type[RoverEnv]] = RoverTrapEnv

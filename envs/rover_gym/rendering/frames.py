@@ -4,6 +4,8 @@ import contextlib
 import ctypes
 import importlib.util
 import math
+import os
+import weakref
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Self
@@ -64,8 +66,9 @@ class Picture:
     """
 
     def __init__(self, width: int, height: int) -> None:
-        self._size = width, height
+        self._size, self._process = (width, height), os.getpid()
         self._window = open_window(width, height)
+        _OPEN.add(self)
         self._scene = vtkRenderer()
         self._pixels = vtkUnsignedCharArray()
 
@@ -79,8 +82,12 @@ class Picture:
         return pixels.reshape(height, width, 3)[::-1].copy()  # VTK's first row is the bottom one
 
     def close(self) -> None:
-        """Frees the window and its memory; the renderer is unusable afterwards."""
-        self._window.Finalize()
+        """Frees the window and its memory; the renderer is unusable afterwards.
+
+        In a process forked from the one that opened the window, nothing is freed: see `_keep_windows`.
+        """
+        if self._process == os.getpid():
+            self._window.Finalize()
 
     def __enter__(self) -> Self:
         return self
@@ -294,6 +301,23 @@ class QuietLog:
 
     def __exit__(self, *_: object) -> None:
         vtkLogger.SetStderrVerbosity(self._verbosity)
+
+
+#: All pictures that have not been collected.
+_OPEN: "weakref.WeakSet[Picture]" = weakref.WeakSet()
+
+
+def _keep_windows() -> None:
+    """Keeps the windows that a forked process has inherited from being destroyed there.
+
+    Destroying one waits for threads of the OpenGL library, which only the parent has.
+    """
+    for picture in _OPEN:
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(picture._window))
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_keep_windows)
 
 
 def open_window(width: int, height: int) -> vtkRenderWindow:

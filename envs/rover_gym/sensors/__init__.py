@@ -4,10 +4,12 @@ from rover_gym.sensors.depth_camera import DepthCamera, LaserScanner
 from rover_gym.sensors.inertial_unit import InertialUnit
 from rover_gym.sensors.sensor import Mount, Sensor
 from rover_gym.sensors.sensor_suite import (
+    RoverGrainsVectorEnv,
     SensorObservation,
     SensorSuite,
     SensorVectorObservation,
     make_grains_rover,
+    make_grains_vector,
     make_rover,
     make_rover_vector,
 )
@@ -20,12 +22,14 @@ __all__ = [
     "LaserScanner",
     "MotorSensors",
     "Mount",
+    "RoverGrainsVectorEnv",
     "Sensor",
     "SensorObservation",
     "SensorSuite",
     "SensorVectorObservation",
     "WheelEncoders",
     "make_grains_rover",
+    "make_grains_vector",
     "make_rover",
     "make_rover_vector",
 ]

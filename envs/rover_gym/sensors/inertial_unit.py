@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rover_gym.mechanics import OptionError, RoverModel
-from rover_gym.sensors.sensor import LARGEST, Array, Moment, Mount, Sensor, Values, gaussian, uniform
+from rover_gym.sensors.sensor import Array, Moment, Mount, Sensor, Values, gaussian, uniform
 from rover_gym.validation import Range, refuse
 
 
@@ -69,7 +69,7 @@ class InertialUnit(Sensor):
 
     def bounds(self, model: RoverModel) -> tuple[Array, Array]:  # noqa: ARG002 - of every model
         """Unbounded, (6,)."""
-        most = np.full(6, LARGEST)
+        most = np.full(6, np.inf)
         return -most, most
 
     def draw(self, model: RoverModel, generator: np.random.Generator) -> Values:  # noqa: ARG002 - of every model

@@ -143,9 +143,6 @@ Values: TypeAlias = Mapping[str, Array]
 #: Longest latency, s.
 MAX_LATENCY = 1e3
 
-#: Bounds of unbounded readings: the space contains every finite reading.
-LARGEST = float(np.finfo(np.float32).max)
-
 
 @dataclass(frozen=True, kw_only=True)
 class Sensor(ABC):

@@ -3,7 +3,7 @@
 import copy
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium as gym
 import numpy as np
@@ -13,6 +13,7 @@ from gymnasium.utils import RecordConstructorArgs
 from gymnasium.vector import AutoresetMode, VectorWrapper
 from gymnasium.vector.utils import batch_space
 
+from rover_gym.env.batch import BatchSnapshot
 from rover_gym.env.env_snapshot import EnvSnapshot
 from rover_gym.env.generators import row_of
 from rover_gym.env.grains_env import RoverGrainsEnv
@@ -21,7 +22,6 @@ from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError, RoverModel, StateError
 from rover_gym.sensors.sensor import Array, Moment, Sensor, Values, uniform
 from rover_gym.validation import refuse
-from rover_gym.vector.batch import BatchSnapshot
 from rover_gym.vector.vector_env import RoverVectorEnv
 
 #: Key of the environment's own observation.
@@ -222,6 +222,12 @@ class SensedRovers:
         self._states[:] = states
 
 
+def moment_of(env: RoverEnv) -> Moment:
+    """A rover, for its sensors."""
+    simulation, mover = env.simulation, env.mover
+    return Moment(simulation, simulation.time, None if mover is None else mover.grains)
+
+
 class SensorObservation(SensedRovers, gym.Wrapper, RecordConstructorArgs):
     """Observations of a `Dict` space: the environment's own as `state`, and each sensor's reading by its name.
 
@@ -271,19 +277,15 @@ class SensorObservation(SensedRovers, gym.Wrapper, RecordConstructorArgs):
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Starts an episode of the environment and draws the sensors' properties."""
         observation, info = self.env.reset(seed=seed, options=options)
-        self._states[0] = self.suite.begin(self._moment(), row_of(self._rover.np_random))
+        self._states[0] = self.suite.begin(moment_of(self._rover), row_of(self._rover.np_random))
         return {STATE: observation, **self.readings()}, info
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Applies an action, as the environment does, then takes the samples that are due."""
         state = self.sensor_state
         observation, reward, terminated, truncated, info = self.env.step(action)
-        self.suite.advance(state, self._moment())
+        self.suite.advance(state, moment_of(self._rover))
         return {STATE: observation, **self.readings()}, float(reward), terminated, truncated, info
-
-    def _moment(self) -> Moment:
-        simulation, mover = self._rover.simulation, self._rover.episode.mover
-        return Moment(simulation, simulation.time, None if mover is None else mover.grains)
 
 
 class SensorVectorObservation(SensedRovers, VectorWrapper):
@@ -333,7 +335,7 @@ class SensorVectorObservation(SensedRovers, VectorWrapper):
         observation, reward, terminated, truncated, infos = self._rovers.step(actions)
         for i, state in enumerate(states):
             if i not in begun:
-                self.suite.advance(state, self._moment(i))
+                self.suite.advance(state, moment_of(self._rovers.envs[i]))
         self._begin(sorted(begun))
         return self._with_readings(observation), reward, terminated, truncated, infos
 
@@ -346,11 +348,7 @@ class SensorVectorObservation(SensedRovers, VectorWrapper):
         chosen = list(chosen)
         rows = self._rovers.batch.generator_rows(chosen)
         for i, row in zip(chosen, rows, strict=True):
-            self._states[i] = self.suite.begin(self._moment(i), row)
-
-    def _moment(self, i: int) -> Moment:
-        simulation = self._rovers.batch.rovers[i].simulation
-        return Moment(simulation, simulation.time)
+            self._states[i] = self.suite.begin(moment_of(self._rovers.envs[i]), row)
 
 
 def make_rover(
@@ -368,22 +366,38 @@ def make_rover(
 
 
 def make_rover_vector(
-    num_envs: int = 1, *, sensors: Sequence[Sensor] | None = None, **arguments: Any
+    num_envs: int = 1,
+    *,
+    sensors: Sequence[Sensor] | None = None,
+    make: Callable[..., RoverVectorEnv] = RoverVectorEnv,
+    **arguments: Any,
 ) -> gym.vector.VectorEnv[Any, Any, Any]:
     """Makes a `RoverVectorEnv`, wrapped in `SensorVectorObservation` if there are sensors.
 
     Args:
         num_envs: Number of rovers.
         sensors: The sensors that each rover has; None for the environment as it is.
-        **arguments: Arguments of `RoverVectorEnv`.
+        make: `RoverVectorEnv` or a subclass.
+        **arguments: Its arguments.
     """
-    env = RoverVectorEnv(num_envs, **arguments)
+    env = make(num_envs, **arguments)
     return env if sensors is None else SensorVectorObservation(env, sensors)
 
 
 def make_grains_rover(**arguments: Any) -> gym.Env[Any, Any]:
     """Makes a `RoverGrainsEnv`, wrapped in `SensorObservation` if there are sensors, which then see the grains."""
     return make_rover(make=RoverGrainsEnv, **arguments)
+
+
+class RoverGrainsVectorEnv(RoverVectorEnv):
+    """A vector of `RoverGrainsEnv` environments; see `RoverVectorEnv`. Their grains are stepped one after the other."""
+
+    env_class: ClassVar[type[RoverEnv]] = RoverGrainsEnv
+
+
+def make_grains_vector(num_envs: int = 1, **arguments: Any) -> gym.vector.VectorEnv[Any, Any, Any]:
+    """Makes a `RoverGrainsVectorEnv`, with `sensors` a `SensorVectorObservation` of it."""
+    return make_rover_vector(num_envs, make=RoverGrainsVectorEnv, **arguments)
 
 
 #: What Gymnasium asks of an entry point before it calls it.

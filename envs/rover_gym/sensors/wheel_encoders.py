@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rover_gym.mechanics import RoverModel
-from rover_gym.sensors.sensor import LARGEST, Array, Moment, Sensor, Values, gaussian, uniform
+from rover_gym.sensors.sensor import Array, Moment, Sensor, Values, gaussian, uniform
 from rover_gym.validation import Range, whole
 
 
@@ -34,7 +34,7 @@ class WheelEncoders(Sensor):
 
     def bounds(self, model: RoverModel) -> tuple[Array, Array]:
         """Unbounded, (2, n_wheels)."""
-        most = np.full((2, len(model.wheel_names)), LARGEST)
+        most = np.full((2, len(model.wheel_names)), np.inf)
         return -most, most
 
     def draw(self, model: RoverModel, generator: np.random.Generator) -> Values:
@@ -99,7 +99,7 @@ class MotorSensors(Sensor):
 
     def bounds(self, model: RoverModel) -> tuple[Array, Array]:
         """Unbounded, (2, n_wheels)."""
-        most = np.full((2, len(model.wheel_names)), LARGEST)
+        most = np.full((2, len(model.wheel_names)), np.inf)
         return -most, most
 
     def draw(self, model: RoverModel, generator: np.random.Generator) -> Values:

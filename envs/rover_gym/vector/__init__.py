@@ -4,12 +4,11 @@
 library.
 """
 
-from rover_gym.vector.batch import BatchRover, BatchSnapshot, RoverBatch
+from rover_gym.env.batch import BatchSnapshot, RoverBatch
 from rover_gym.vector.throughput import ExploringSpeed, VectorSpeed, measure_exploring, measure_speed
 from rover_gym.vector.vector_env import RoverVectorEnv
 
 __all__ = [
-    "BatchRover",
     "BatchSnapshot",
     "ExploringSpeed",
     "RoverBatch",

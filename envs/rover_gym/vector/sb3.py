@@ -15,21 +15,24 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
-from rover_gym.env.episode_view import EpisodeView
+from rover_gym.env.batch import BatchSnapshot, Drawn
 from rover_gym.env.generators import check_seed
-from rover_gym.env.observation import LARGEST
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
 from rover_gym.extras import MissingExtraError
 from rover_gym.mechanics import OptionError, StateError
 from rover_gym.validation import Range, refuse
-from rover_gym.vector.batch import BatchRover, BatchSnapshot, Drawn, RoverBatch
+from rover_gym.vector.vector_env import RoverVectorEnv
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
     from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 except ImportError as error:
     raise MissingExtraError("stable-baselines3", "train") from error
+
+
+#: Attributes that each `RoverEnv` has of its own.
+OWN_NAMES = ("batch", "i", "has_scan", "observation_space", "action_space")
 
 
 @dataclass(frozen=True)
@@ -77,17 +80,18 @@ class RoverVecEnv(VecEnv):
         max_episode_steps: int | None = MAX_EPISODE_STEPS,
         **arguments: Unpack[RoverArguments],
     ) -> None:
-        self.batch = RoverBatch(n_envs, threads=threads, max_episode_steps=max_episode_steps, **arguments)
+        #: The same rovers as a vector of Gymnasium.
+        self.rovers = RoverVectorEnv(n_envs, threads=threads, max_episode_steps=max_episode_steps, **arguments)
+        self.batch = self.rovers.batch
         #: Whether a step takes the height scan, see `RoverBatch.step`.
         self.has_scan = True
         self._actions: object = None
-        prototype = self.prototype
-        super().__init__(self.batch.n, prototype.observation_space, prototype.action_space)
+        super().__init__(self.batch.n, self.batch.observation_space, self.batch.action_space)
 
     @property
     def prototype(self) -> RoverEnv:
-        """An environment with the same arguments, never stepped, that gives layout, model and limits."""
-        return self.batch.prototype
+        """The first rover, which gives layout, model and limits."""
+        return self.rovers.prototype
 
     def reset(self) -> VecEnvObs:
         """Starts an episode of every rover with the seeds and options set for this reset.
@@ -146,20 +150,19 @@ class RoverVecEnv(VecEnv):
         if waiting := self.batch.over:
             check_actions(self._actions, (self.num_envs, self.batch.task.n_actions))
             self._begin(self.batch.draw(waiting))
-        observation, earned, terminated, timed_out, ended = self.batch.step_on(
-            self._actions, same_step=True, has_scan=self.has_scan
-        )
+        stepped, finals = self.batch.step_on(self._actions, same_step=True, has_scan=self.has_scan)
+        observation, earned, terminated, timed_out, ended = stepped
         dones = terminated | timed_out
         infos: list[dict[str, Any]] = [{"TimeLimit.truncated": False} for _ in range(self.num_envs)]
-        if ended:
-            for i, (seen, last) in self.batch.finals().items():
-                last["TimeLimit.truncated"] = bool(timed_out[i] and not terminated[i])
-                last["terminal_observation"] = seen
-                infos[i] = last
-            if not self.batch.over:
-                self._tell_resets(ended)
+        for i, (seen, last) in finals.items():
+            last["TimeLimit.truncated"] = bool(timed_out[i] and not terminated[i])
+            last["terminal_observation"] = seen
+            infos[i] = last
+        if not self.batch.over:
+            self._tell_resets(ended)
         # Only a rover that flies off at 1e37 m/s earns a reward out of float32's range.
-        reward = np.clip(earned, -LARGEST, LARGEST).astype(np.float32)
+        most = float(np.finfo(np.float32).max)
+        reward = np.clip(earned, -most, most).astype(np.float32)
         return observation, reward, dones, infos
 
     def _begin(self, drawn: Drawn) -> None:
@@ -193,21 +196,20 @@ class RoverVecEnv(VecEnv):
 
     def close(self) -> None:
         """Frees the renderers, if there are any."""
-        for rover in self.batch.rovers:
-            rover.close()
+        self.rovers.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """Reads an attribute of the rovers, or of `prototype` where the rovers lack it."""
-        return [self._find(rover, attr_name) for rover in self._chosen(indices)]
+        """Reads an attribute of the rovers, by its name in `RoverEnv`."""
+        return [getattr(rover, attr_name) for rover in self._chosen(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        """Sets an attribute of the rovers' views; attributes of `RoverEnv` are read-only.
+        """Sets an attribute of the rovers that `RoverEnv` does not have.
 
         Raises:
             AttributeError: `RoverEnv` has an attribute of this name.
         """
         for rover in self._chosen(indices):
-            if attr_name in vars(self.prototype) or hasattr(RoverEnv, attr_name) or hasattr(BatchRover, attr_name):
+            if attr_name in OWN_NAMES or hasattr(RoverEnv, attr_name):
                 raise AttributeError(f"{attr_name} of a rover cannot be set; env_method('set_difficulty', ...) can")
             setattr(rover, attr_name, value)
 
@@ -223,13 +225,7 @@ class RoverVecEnv(VecEnv):
 
     def get_images(self) -> Sequence[npt.NDArray[np.uint8] | None]:
         """One frame per rover with `render_mode="rgb_array"`; `render()` tiles them."""
-        return [rover.render() for rover in self.batch.rovers]
+        return self.rovers.render() or [None] * self.num_envs
 
-    def _chosen(self, indices: VecEnvIndices) -> list[BatchRover]:
-        return [self.batch.rovers[i] for i in self._get_indices(indices)]
-
-    def _find(self, rover: BatchRover, name: str) -> Any:
-        # hasattr would evaluate properties.
-        known = name in vars(rover) or any(name in vars(kind) for kind in (BatchRover, EpisodeView))
-        owner = rover if known else self.prototype
-        return getattr(owner, name)
+    def _chosen(self, indices: VecEnvIndices) -> list[RoverEnv]:
+        return [self.rovers.envs[i] for i in self._get_indices(indices)]

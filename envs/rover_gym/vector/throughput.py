@@ -17,10 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
+from rover_gym.env.batch import RoverBatch
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.start import tilted_plane
 from rover_gym.mechanics import Simulation, SimulationBatch
-from rover_gym.vector.batch import RoverBatch
 from rover_gym.vector.vector_env import RoverVectorEnv
 
 Ground = Literal["plane", "rocks"]
@@ -87,9 +87,9 @@ class _TimedEpisodes:
         self._inner = batch.episodes
         self.elapsed = 0.0
 
-    def step_on(self, *args: Any, **kwargs: Any) -> Any:
+    def step(self, *args: Any, **kwargs: Any) -> Any:
         start = time.perf_counter()
-        result = self._inner.step_on(*args, **kwargs)
+        result = self._inner.step(*args, **kwargs)
         self.elapsed += time.perf_counter() - start
         return result
 

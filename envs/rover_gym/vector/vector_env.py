@@ -1,7 +1,7 @@
 """`RoverVectorEnv`: the Gymnasium vector environment that `gymnasium.make_vec` creates."""
 
 from collections.abc import Sequence
-from typing import Any, Unpack
+from typing import Any, ClassVar, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -10,13 +10,14 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
+from rover_gym.env.batch import BatchSnapshot
 from rover_gym.env.episode_scene import ResetOptions
 from rover_gym.env.generators import spread_seeds
 from rover_gym.env.observation import Array, Mask, Observations
+from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
 from rover_gym.mechanics import OptionError
 from rover_gym.validation import Range, mapping, refuse
-from rover_gym.vector.batch import BatchSnapshot, RoverBatch
 
 _Info = dict[str, Any]
 
@@ -33,7 +34,14 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         max_episode_steps: Steps until truncation; None for no limit.
         autoreset_mode: `"NextStep"`, `"SameStep"` or `"Disabled"`, as Gymnasium defines them.
         **arguments: Arguments of `RoverEnv`.
+
+    Attributes:
+        batch: The rovers.
+        envs: Each rover as an environment.
     """
+
+    #: The class of one rover.
+    env_class: ClassVar[type[RoverEnv]] = RoverEnv
 
     @takes_arguments
     def __init__(
@@ -47,15 +55,22 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
     ) -> None:
         super().__init__()
         self.autoreset_mode = _check_mode(autoreset_mode)
-        self.batch = RoverBatch(num_envs, threads=threads, max_episode_steps=max_episode_steps, **arguments)
-        self.prototype = self.batch.prototype
+        self.batch = self.env_class.make_batch(
+            num_envs, threads=threads, max_episode_steps=max_episode_steps, **arguments
+        )
         self.num_envs = self.batch.n
+        self.envs = tuple(self.env_class.row(self.batch, i) for i in range(self.num_envs))
         self.metadata = {**self.prototype.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = self.prototype.render_mode
         self.single_observation_space = self.prototype.observation_space
         self.single_action_space = self.prototype.action_space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
+
+    @property
+    def prototype(self) -> RoverEnv:
+        """The first rover, which gives layout, model and limits."""
+        return self.envs[0]
 
     @property  # type: ignore[override] # as SyncVectorEnv's
     def np_random(self) -> tuple[np.random.Generator, ...]:
@@ -122,11 +137,10 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
             observation, reward, terminated, truncated, _ = self.batch.step(actions)
             return observation, reward, terminated, truncated, self.batch.infos()
         same_step = mode == AutoresetMode.SAME_STEP
-        observation, reward, terminated, truncated, over = self.batch.step_on(actions, same_step=same_step)
+        (observation, reward, terminated, truncated, _), finals = self.batch.step_on(actions, same_step=same_step)
         infos = self.batch.infos()
-        if same_step and over:
-            for i, (last, info) in self.batch.finals().items():
-                infos = self._add_info(infos, {"final_obs": last, "final_info": info}, i)
+        for i, (last, info) in finals.items():
+            infos = self._add_info(infos, {"final_obs": last, "final_info": info}, i)
         return observation, reward, terminated, truncated, infos
 
     def set_difficulties(self, difficulties: Sequence[float | Range | None]) -> None:
@@ -161,22 +175,23 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
         """One frame per rover with `render_mode="rgb_array"`; None without a render mode."""
-        frames = tuple(frame for rover in self.batch.rovers if (frame := rover.render()) is not None)
-        return frames or None
+        if self.render_mode is None:
+            return None
+        return tuple(frame for rover in self.envs if (frame := rover.render()) is not None)
 
     def close_extras(self, **kwargs: Any) -> None:  # noqa: ARG002 - Gymnasium's signature
         """Frees the renderers, if there are any."""
-        for rover in self.batch.rovers:
+        for rover in self.envs:
             rover.close()
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
         """Calls a method of every rover, such as `set_difficulty`, or reads an attribute."""
-        found = [getattr(rover, name) for rover in self.batch.rovers]
+        found = [getattr(rover, name) for rover in self.envs]
         return tuple(each(*args, **kwargs) if callable(each) else each for each in found)
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
         """Reads an attribute of every rover, by its name in `RoverEnv`."""
-        return tuple(getattr(rover, name) for rover in self.batch.rovers)
+        return tuple(getattr(rover, name) for rover in self.envs)
 
     def _check_options(self, given: _Info, chosen: Sequence[int]) -> ResetOptions | list[ResetOptions]:
         """The options of all chosen rovers, or of each."""

@@ -11,7 +11,7 @@ use crate::arrays::{Array, array};
 use crate::episode::{GivenSimulation, simulation};
 use crate::errors::{Kind, Result, Value};
 use crate::reading::{place, scan_points, slices};
-use crate::shared::{Shared, Watch};
+use crate::shared::{Open, Shared, Watch};
 use crate::simulation::{Origin, Simulation};
 
 /// Steps many rovers on several threads. Each gives the same bits as it would alone.

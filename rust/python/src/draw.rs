@@ -4,23 +4,21 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
 use rover_core::draw::{
     DomainDistribution, DrawnGround, Fixed, FixedStart, GroundDistribution, HillDistribution,
-    Order, Pcg64, Range, RockDistribution, RockDraw, SandDistribution, SceneDistribution,
-    StartDistribution,
+    Order, Pcg64, Range, RockDistribution, SandDistribution, SceneDistribution, StartDistribution,
 };
 use rover_core::episode::{Beginning, EpisodeBatch, EpisodeDistribution as CoreDistribution};
 use rover_core::simulation::RoverSimulation;
 
 use crate::arguments::{Named, below, number, refused, whole};
 use crate::arrays::{Array, fresh_rows, two, vector};
-use crate::episode::{EpisodeRun, GivenRules, GivenSimulation};
+use crate::episode::{GivenRules, GivenSimulation};
 use crate::errors::{Kind, Result};
 use crate::generators::generators;
 use crate::options::SolverWords;
-use crate::plane::Plane;
 use crate::reading::points;
 use crate::shared::Watch;
 use crate::simulation::{Origin, Simulation};
-use crate::{terrain, union};
+use crate::terrain;
 
 /// Distribution of the episodes of a task.
 ///
@@ -160,12 +158,12 @@ impl Request {
 }
 
 impl EpisodeDistribution {
-    /// Draws with the interpreter free for others, on the threads of a batch where one is given.
+    /// Draws on the threads of a batch, with the interpreter free for others.
     pub fn draw_on(
         &self,
         py: Python<'_>,
         request: &Request,
-        batch: Option<&mut EpisodeBatch>,
+        batch: &mut EpisodeBatch,
     ) -> Result<DrawnEpisodes> {
         let places = request.randoms.iter().zip(&request.difficulties);
         let orders: Vec<Order<'_>> = places
@@ -179,11 +177,9 @@ impl EpisodeDistribution {
             .collect();
         let mut watch = Watch::new();
         let drawn = py.detach(|| {
-            let go_on = &mut || watch.go_on();
-            match batch {
-                Some(batch) => batch.draw(&self.inner, &orders, request.attempts, go_on),
-                None => self.inner.draw(&orders, request.attempts, None, go_on),
-            }
+            batch.draw(&self.inner, &orders, request.attempts, &mut || {
+                watch.go_on()
+            })
         });
         Ok(DrawnEpisodes {
             drawn: watch.result(drawn)?.unwrap_or_default(),
@@ -253,39 +249,6 @@ impl EpisodeDistribution {
         })
     }
 
-    /// Draws one episode from each generator. `EpisodeBatch.draw` does the same on several threads.
-    ///
-    /// A scene is drawn again if the rover would penetrate the ground or a rock by more than 1 cm.
-    /// The given generators do not change: see `DrawnEpisodes.generators`.
-    ///
-    /// Args:
-    ///     generators: Generators, (m, 4) uint64.
-    ///     attempts: Largest number of scenes drawn for each episode.
-    ///     difficulties: For each generator, None or a range (low, high) of the rocks' difficulty
-    ///         that replaces the distribution's; None by default.
-    ///     fixed: Values that replace drawn ones, by name; the random numbers are drawn
-    ///         nevertheless: `slope`, `uphill`, `position` (x, z), `heading`, `goal` (x, z),
-    ///         `further` (n, 2) of the goals after it, `difficulty`, `field_seed`, `q`, `v`; one
-    ///         mapping for all, or a list with one for each generator; none by default.
-    ///
-    /// Raises:
-    ///     TerrainError: In all of the `attempts` scenes the rover penetrates the ground, or a
-    ///         parameter of the ground is invalid.
-    ///     StateError: `q` or `v` has a wrong length or an entry that is not finite, or float32
-    ///         cannot hold the observation.
-    ///     ModelError: A scaled mass is out of its range.
-    ///     OptionError: Any other argument is invalid.
-    #[pyo3(signature = (generators, **options),
-        text_signature = "($self, generators, *, attempts=100, difficulties=None, fixed=None)")]
-    fn draw(
-        &self,
-        generators: &Bound<'_, PyAny>,
-        options: Option<&Bound<'_, PyDict>>,
-    ) -> Result<DrawnEpisodes> {
-        let request = Request::parse(generators, options)?;
-        self.draw_on(generators.py(), &request, None)
-    }
-
     fn __getnewargs_ex__(&self, py: Python<'_>) -> ((GivenRules, Py<Simulation>), Py<PyDict>) {
         let ((rules, simulation), options) = &self.given;
         (
@@ -346,13 +309,6 @@ fn rock_distribution(given: &Bound<'_, PyAny>) -> Result<RockDistribution> {
 }
 
 impl DrawnEpisodes {
-    /// Rows of equal length.
-    fn table<T>(&self, row: impl Fn(&Beginning) -> Vec<T>) -> Array<T> {
-        let rows: Vec<Vec<T>> = self.drawn.iter().map(row).collect();
-        let shape = [rows.len(), rows.first().map_or(0, Vec::len)];
-        Array::shaped(rows.into_iter().flatten().collect(), &shape)
-    }
-
     fn at(&self, index: &Bound<'_, PyAny>) -> Result<&Beginning> {
         Ok(&self.drawn[below(index, self.drawn.len())?])
     }
@@ -364,80 +320,6 @@ impl DrawnEpisodes {
     #[getter]
     fn generators(&self) -> Array<u64> {
         fresh_rows(self.drawn.iter().map(|one| one.random.state().halves()))
-    }
-
-    /// First observations, (m, size) float32.
-    #[getter]
-    fn observations(&self) -> Array<f32> {
-        self.table(|one| one.episode.observation().to_vec())
-    }
-
-    /// Starts of the episodes, (m, 5 + 2 n) with n goals, rad and m.
-    ///
-    /// Slope, direction of steepest ascent, x and z of the start, heading, x and z of each goal.
-    #[getter]
-    fn starts(&self) -> Array {
-        self.table(|one| one.scene.start.row())
-    }
-
-    /// Physical properties, (m, 4).
-    ///
-    /// Mass scale, friction, actuator gain, gravity scale.
-    #[getter]
-    fn domains(&self) -> Array {
-        fresh_rows(self.drawn.iter().map(|one| one.scene.domain.row()))
-    }
-
-    /// Rocks, (m, 3); zeros where there are none.
-    ///
-    /// Difficulty, abundance, radius of the largest rock in wheel radii.
-    #[getter]
-    fn rocks(&self) -> Array {
-        fresh_rows(self.drawn.iter().map(|one| RockDraw::row(one.scene.rocks)))
-    }
-
-    /// Seeds of the rocks, (m,) uint64; zeros where there are none.
-    #[getter]
-    fn rock_seeds(&self) -> Array<u64> {
-        let seed = |one: &Beginning| one.scene.rocks.map_or(0, |rocks| rocks.seed);
-        self.drawn.iter().map(seed).collect()
-    }
-
-    /// An episode in its first state.
-    ///
-    /// Args:
-    ///     index: Number of the episode.
-    ///
-    /// Raises:
-    ///     OptionError: There is no such episode.
-    fn episode(&self, index: &Bound<'_, PyAny>) -> Result<EpisodeRun> {
-        Ok(EpisodeRun::of(self.at(index)?.episode.clone()))
-    }
-
-    /// The ground of an episode.
-    ///
-    /// Args:
-    ///     index: Number of the episode.
-    ///
-    /// Raises:
-    ///     OptionError: There is no such episode.
-    fn terrain<'py>(&self, index: &Bound<'py, PyAny>) -> Result<Bound<'py, PyAny>> {
-        union::object(index.py(), &self.at(index)?.scene.ground)
-    }
-
-    /// The plane of an episode, also under rocks; None if the ground has none.
-    ///
-    /// Args:
-    ///     index: Number of the episode.
-    ///
-    /// Raises:
-    ///     OptionError: There is no such episode.
-    fn plane(&self, index: &Bound<'_, PyAny>) -> Result<Option<Py<Plane>>> {
-        let terrain = &self.at(index)?.scene.placement.scene.terrain;
-        let plane = terrain
-            .ground()
-            .map(|plane| Py::new(index.py(), Plane::of(*plane)));
-        Ok(plane.transpose()?)
     }
 
     /// A new simulation of the rover at the start of an episode.

@@ -1,22 +1,23 @@
 //! `EpisodeBatch`: many rovers with their episodes, one call a control period.
 
+use std::sync::Arc;
+
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::draw::{DrawnGround, Pcg64, RockDraw, Start};
-use rover_core::episode::{
-    Autoreset, EpisodeBatch as CoreBatch, EpisodeError, Origin as Began, Stepped, Succession,
-};
+use rover_core::episode::{EpisodeBatch as CoreBatch, EpisodeError, Origin as Began, Stepped};
 
-use crate::arguments::{Given, Named, at_least_one, below, refused, text, whole};
+use crate::arguments::{Named, at_least_one, below, refused, text, whole};
 use crate::arrays::{Array, fresh, fresh_rows};
 use crate::batch::mask;
-use crate::draw::{DrawnEpisodes, EpisodeDistribution, Request, range};
+use crate::draw::{DrawnEpisodes, EpisodeDistribution, Request};
 use crate::episode::{EpisodeRun, GivenRules, GivenSimulation, actions};
 use crate::errors::{Kind, Result};
 use crate::generators::generators;
 use crate::infos::{Told, info, infos};
 use crate::options::SolverWords;
-use crate::shared::{Shared, Watch};
+use crate::rover_grains::{RoverGrainSimulation, Together};
+use crate::shared::{Open, Shared, Watch};
 use crate::simulation::{Origin, Simulation};
 use crate::union;
 
@@ -47,47 +48,14 @@ pub struct EpisodeBatch(Shared<Inner>);
 struct Inner {
     batch: CoreBatch,
     origins: Vec<Origin>,
+    /// Simulations that Python has asked for.
+    lent: Vec<Option<Py<Simulation>>>,
 }
 
 impl Inner {
     /// What the infos tell of a rover.
     fn told(&self, index: usize) -> Result<Told<'_>, EpisodeError> {
         Ok((self.batch.episode(index)?, self.batch.message(index)))
-    }
-
-    /// One step, by a function of the batch, the actions and the room for the observations; and the
-    /// rovers whose next episode has begun.
-    fn step(
-        &mut self,
-        actions: &Bound<'_, PyAny>,
-        take: impl FnOnce(
-            &mut CoreBatch,
-            &[f64],
-            &mut [f32],
-            &mut dyn FnMut() -> bool,
-        ) -> Result<Stepped, EpisodeError>
-        + Send,
-    ) -> Result<(Step, Vec<usize>)> {
-        let batch = &mut self.batch;
-        let (n, size) = (batch.rovers().len(), batch.rules().size());
-        let given = self::actions(actions, &[n, batch.rules().n_actions()])?;
-        let (mut rows, mut watch) = (vec![0.0; n * size], Watch::new());
-        let out = &mut rows[..];
-        let done = actions
-            .py()
-            .detach(|| take(batch, &given, out, &mut || watch.go_on()));
-        let Stepped {
-            rewards,
-            ended,
-            truncated,
-            over,
-            begun,
-        } = watch.result(done)?;
-        let rows = Array::shaped(rows, &[n, size]);
-        Ok((
-            (rows, rewards.into(), ended.into(), truncated.into(), over),
-            begun,
-        ))
     }
 
     /// Keeps the Python options of the simulation of an episode that has begun.
@@ -97,6 +65,7 @@ impl Inner {
             terrain: origin.ground.clone(),
             words: words.clone(),
         };
+        self.lent[index] = None;
         Ok(())
     }
 
@@ -143,6 +112,18 @@ fn distribution<'a, 'py>(
     given.cast().map_err(wrong)
 }
 
+/// The argument `among`: what links each rover of a batch with its grains.
+fn links(given: &Bound<'_, PyAny>, batch: &CoreBatch) -> Result<Vec<Arc<Together>>> {
+    let what = "a RoverGrainSimulation of each rover";
+    let refuse = || refused(given, Kind::Option, "among", what);
+    let found: Vec<Bound<'_, RoverGrainSimulation>> = given.extract().map_err(|_| refuse())?;
+    let links: Vec<_> = found.iter().map(|one| one.get().together.clone()).collect();
+    let rovers = batch.rovers();
+    let fits = links.len() == rovers.len()
+        && (links.iter().zip(rovers)).all(|(link, rover)| Arc::ptr_eq(&link.rover, rover));
+    fits.then_some(links).ok_or_else(refuse)
+}
+
 /// Start and ground of an episode, as `EpisodeBatch.origin` returns them.
 fn origin(given: &Bound<'_, PyAny>, ground: DrawnGround) -> Result<Began> {
     let what = "what `EpisodeBatch.origin` returns";
@@ -181,8 +162,11 @@ impl EpisodeBatch {
             threads.transpose()?,
         );
         let batch = CoreBatch::new(rules.0, &*one.open()?, n, max_steps, threads)?;
-        let origins = vec![one.origin().clone(); n];
-        Ok(Self(Shared::new(Inner { batch, origins })))
+        Ok(Self(Shared::new(Inner {
+            batch,
+            origins: vec![one.origin().clone(); n],
+            lent: (0..n).map(|_| None).collect(),
+        })))
     }
 
     /// Number of threads.
@@ -193,15 +177,18 @@ impl EpisodeBatch {
 
     /// Applies the actions of all rovers for one control period.
     ///
-    /// Ctrl-C ends the call after the current physics step of each rover. The rovers may then have
-    /// taken different numbers of steps.
+    /// Other Python threads run in the meantime. Ctrl-C, or another exception of a signal handler,
+    /// ends the call after the current physics step of each rover. The rovers may then have taken
+    /// different numbers of steps.
     ///
     /// Args:
-    ///     actions: Actions as for `EpisodeRun.step`, (n_rovers, n_actions).
+    ///     actions: Torques, then steering, within [-1, 1], (n_rovers, n_actions).
     ///     active: Which rovers move, (n_rovers,); all by default. The others do not change.
     ///     has_scan: Whether to update the height scans. If False, they are updated only in
     ///         episodes that terminate or reach the time limit; the others keep the previous
     ///         heights.
+    ///     among: A RoverGrainSimulation of each rover's `simulation`, if the rovers drive among
+    ///         grains; they are then stepped one after the other.
     ///
     /// Returns:
     ///     Observations (n_rovers, size) float32, rewards (n_rovers,), which episodes are
@@ -211,101 +198,57 @@ impl EpisodeBatch {
     /// Raises:
     ///     CommandError: The actions have a wrong shape or an entry that is not finite or outside
     ///         [-1, 1]. No rover has moved.
-    ///     OptionError: `active` is invalid, or an episode has not begun. No rover has moved.
-    #[pyo3(signature = (actions, active = None, *, has_scan = true))]
+    ///     OptionError: `active` or `among` is invalid, or an episode has not begun. No rover has
+    ///         moved.
+    #[pyo3(signature = (actions, active = None, *, has_scan = true, among = None))]
     fn step(
         &self,
+        py: Python<'_>,
         actions: &Bound<'_, PyAny>,
         active: Option<&Bound<'_, PyAny>>,
         has_scan: bool,
+        among: Option<&Bound<'_, PyAny>>,
     ) -> Result<Step> {
         let mut held = self.0.open()?;
-        let n = held.batch.rovers().len();
+        let batch = &mut held.batch;
+        let (n, size) = (batch.rovers().len(), batch.rules().size());
+        let given = self::actions(actions, &[n, batch.rules().n_actions()])?;
         let active = active.map(|given| mask(given, n)).transpose()?;
         let active = active.as_deref();
-        let (step, _) = held.step(actions, |batch, actions, out, go_on| {
-            batch.step_while(actions, active, has_scan, out, go_on)
-        })?;
-        Ok(step)
-    }
-
-    /// Applies the actions of all rovers for one control period, and starts new episodes.
-    ///
-    /// A rover whose episode is over gets a new one, drawn from the rover's own generator on the
-    /// threads of this batch. Ctrl-C ends the call as in `step`.
-    ///
-    /// Args:
-    ///     actions: As for `step`.
-    ///     distribution: Distribution of the next episodes.
-    ///     same_step: Whether the next episode begins in the same step that ends the previous one
-    ///         (see `finals`). Otherwise it begins in the following step, in which the rover does
-    ///         not move and the reward is 0.
-    ///     attempts: As for `EpisodeDistribution.draw`.
-    ///     has_scan: As for `step`.
-    ///
-    /// Returns:
-    ///     As for `step`. If an episode has begun, the observation is its first one; with
-    ///     `same_step` the other values belong to the episode that has ended. If with `same_step`
-    ///     the next episode cannot be drawn, none begins, and the next call raises the error.
-    ///
-    /// Raises:
-    ///     CommandError: As for `step`.
-    ///     OptionError: An argument is invalid, or an episode has not begun. No rover has moved.
-    ///     RoverGymError: The next episode of a rover whose episode was over before this call
-    ///         cannot be drawn, see `EpisodeDistribution.draw`; the error of the first such rover.
-    ///         No rover has moved.
-    #[pyo3(signature = (actions, distribution, *, same_step, attempts = Given::MISSING, has_scan = true),
-        text_signature = "($self, actions, distribution, *, same_step, attempts=100, has_scan=True)")]
-    fn step_on(
-        &self,
-        actions: &Bound<'_, PyAny>,
-        distribution: &Bound<'_, PyAny>,
-        same_step: bool,
-        attempts: Given<'_>,
-        has_scan: bool,
-    ) -> Result<Step> {
-        let distribution = self::distribution(distribution)?.get();
-        let autoreset = if same_step {
-            Autoreset::SameStep
-        } else {
-            Autoreset::NextStep
-        };
-        let succession = Succession {
-            distribution: &distribution.inner,
-            attempts: attempts.count(100, Kind::Option, "attempts")?,
-            autoreset,
-        };
-        let mut held = self.0.open()?;
-        let (step, begun) = held.step(actions, |batch, actions, out, go_on| {
-            batch.step_on(actions, &succession, has_scan, out, go_on)
-        })?;
-        for index in begun {
-            held.set_origin(index, &distribution.words)?;
-        }
-        Ok(step)
+        let among = among.map(|given| links(given, batch)).transpose()?;
+        let open = among
+            .as_ref()
+            .map(|links| links.iter().map(|link| link.open()).collect());
+        let mut open: Option<Vec<_>> = open.transpose()?;
+        let mut parts: Option<Vec<_>> = open.as_mut().map(|open| {
+            let parts = open
+                .iter_mut()
+                .map(|(link, grains)| (&mut **link, &mut **grains));
+            parts.collect()
+        });
+        let (mut rows, mut watch) = (vec![0.0; n * size], Watch::new());
+        let out = &mut rows[..];
+        let done = py.detach(|| match &mut parts {
+            None => batch.step_while(&given, active, has_scan, out, &mut || watch.go_on()),
+            Some(parts) => batch.step_among(&given, active, has_scan, out, &mut |i, rover, n| {
+                let (link, grains) = &mut parts[i];
+                link.step(rover, grains, n, &mut || watch.go_on()).map(drop)
+            }),
+        });
+        let Stepped {
+            rewards,
+            ended,
+            truncated,
+            over,
+        } = watch.result(done)?;
+        let rows = Array::shaped(rows, &[n, size]);
+        Ok((rows, rewards.into(), ended.into(), truncated.into(), over))
     }
 
     /// Sorted indices of the rovers whose episode is over and whose next has not begun.
     #[getter]
     fn over(&self) -> Result<Vec<usize>> {
         Ok(self.0.open()?.batch.over())
-    }
-
-    /// Final observations and infos of episodes that ended in `step_on` with `same_step`.
-    ///
-    /// Returns:
-    ///     A mapping from the index of each rover whose episode ended in the last call, sorted, to
-    ///     the last observation (size,) float32 and the last info. Empty after `step`.
-    fn finals<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
-        let held = self.0.open()?;
-        let finals = PyDict::new(py);
-        for one in held.batch.finals() {
-            let seen = fresh(one.episode.observation());
-            let message = one.error.as_ref().map(ToString::to_string);
-            let told = info(py, &(&one.episode, message))?;
-            finals.set_item(one.index, (seen, told))?;
-        }
-        Ok(finals)
     }
 
     /// The infos of all rovers, each of its last control period or of its start.
@@ -341,21 +284,33 @@ impl EpisodeBatch {
         Ok(Array::shaped(rows, &[n, size]))
     }
 
-    /// Draws episodes on the threads of this batch. The rovers do not change.
+    /// Draws one episode from each generator, on the threads of this batch.
+    ///
+    /// The rovers do not change. A scene is drawn again if the rover would penetrate the ground or
+    /// a rock by more than 1 cm. The given generators do not change either:
+    /// `DrawnEpisodes.generators` has their states after the draws.
     ///
     /// Args:
     ///     distribution: Distribution of the episodes.
     ///     generators: Generators, (m, 4) uint64.
-    ///     attempts: As for `EpisodeDistribution.draw`.
-    ///     difficulties: As for `EpisodeDistribution.draw`.
-    ///     fixed: As for `EpisodeDistribution.draw`.
+    ///     attempts: Largest number of scenes drawn for each episode.
+    ///     difficulties: For each generator, None or a range (low, high) of the rocks' difficulty
+    ///         that replaces the distribution's; None by default.
+    ///     fixed: Values that replace drawn ones, by name; the random numbers are drawn
+    ///         nevertheless: `slope`, `uphill`, `position` (x, z), `heading`, `goal` (x, z),
+    ///         `further` (n, 2) of the goals after it, `difficulty`, `field_seed`, `q`, `v`; one
+    ///         mapping for all, or a list with one for each generator; none by default.
     ///
     /// Returns:
     ///     The episodes. They do not depend on the number of threads.
     ///
     /// Raises:
-    ///     RoverGymError: An episode cannot be drawn, see `EpisodeDistribution.draw`; the error of
-    ///         the first such episode.
+    ///     TerrainError: In all of the `attempts` scenes the rover penetrates the ground, or a
+    ///         parameter of the ground is invalid.
+    ///     StateError: `q` or `v` has a wrong length or an entry that is not finite, or float32
+    ///         cannot hold the observation.
+    ///     ModelError: A scaled mass is out of its range.
+    ///     OptionError: Any other argument is invalid.
     #[pyo3(signature = (distribution, generators, **options),
         text_signature = "($self, distribution, generators, *, attempts=100, difficulties=None, fixed=None)")]
     fn draw(
@@ -367,7 +322,7 @@ impl EpisodeBatch {
         let distribution = self::distribution(distribution)?.get();
         let request = Request::parse(generators, options)?;
         let mut held = self.0.open()?;
-        distribution.draw_on(generators.py(), &request, Some(&mut held.batch))
+        distribution.draw_on(generators.py(), &request, &mut held.batch)
     }
 
     /// Starts drawn episodes.
@@ -422,7 +377,7 @@ impl EpisodeBatch {
     ) -> Result<()> {
         let one = simulation.0.get();
         let wrong = |_| refused(episode, Kind::Option, "episode", "an EpisodeRun");
-        let episode = episode.cast::<EpisodeRun>().map_err(wrong)?.get().copy()?;
+        let episode = episode.cast::<EpisodeRun>().map_err(wrong)?.get().copy();
         let origin = self::origin(origin, one.origin().terrain.clone())?;
         let given = Named::keywords(indices.py(), options)?;
         let random = given.need("generator", |value, kind, field| {
@@ -442,6 +397,7 @@ impl EpisodeBatch {
             held.batch
                 .resume(index, rover, whole, began, random, told)?;
             held.origins[index] = one.origin().clone();
+            held.lent[index] = None;
         }
         Ok(())
     }
@@ -513,7 +469,10 @@ impl EpisodeBatch {
     ///     index: Index of the rover.
     ///
     /// Returns:
-    ///     Its row of each of `DrawnEpisodes.starts`, `rocks`, `rock_seeds` and `domains`.
+    ///     The start (5 + 2 n,), with n goals: slope, direction of steepest ascent, x and z,
+    ///     heading, x and z of each goal, rad and m; the rocks (3,), zeros if there are none:
+    ///     difficulty, abundance, radius of the largest rock in wheel radii; the seed of the rocks;
+    ///     and mass scale, friction, actuator gain and gravity scale (4,).
     fn origin(&self, index: &Bound<'_, PyAny>) -> Result<(Array, Array, u64, Array)> {
         self.one(index, |held, i| {
             let (origin, episode) = (held.batch.origin(i)?, held.batch.episode(i)?);
@@ -523,35 +482,6 @@ impl EpisodeBatch {
                 origin.rocks.map_or(0, |rocks| rocks.seed),
                 fresh(&episode.setting().domain.row()),
             ))
-        })
-    }
-
-    /// Range (low, high) of the rocks' difficulty in the next episodes of a rover; None if not set.
-    ///
-    /// Args:
-    ///     index: Index of the rover.
-    fn difficulty(&self, index: &Bound<'_, PyAny>) -> Result<Option<(f64, f64)>> {
-        self.one(index, |held, i| {
-            Ok(held.batch.difficulty(i)?.map(Into::into))
-        })
-    }
-
-    /// Sets the range of the rocks' difficulty for a rover's next episodes in `step_on`.
-    ///
-    /// Args:
-    ///     index: Index of the rover.
-    ///     difficulty: The range (low, high); None for the range of the distribution.
-    ///
-    /// Raises:
-    ///     OptionError: There is no such rover, or `difficulty` is not a range.
-    fn set_difficulty(
-        &self,
-        index: &Bound<'_, PyAny>,
-        difficulty: Option<&Bound<'_, PyAny>>,
-    ) -> Result<()> {
-        let difficulty = difficulty.map(|given| range(given, Kind::Option, "difficulty"));
-        self.one(index, |held, i| {
-            Ok(held.batch.set_difficulty(i, difficulty.transpose()?)?)
         })
     }
 
@@ -565,16 +495,32 @@ impl EpisodeBatch {
         })
     }
 
-    /// A copy of one rover; stepping it does not move the rover.
+    /// The simulation of one rover, which moves with it until its next episode begins.
     ///
     /// Args:
     ///     index: Index of the rover.
     fn simulation(&self, index: &Bound<'_, PyAny>) -> Result<Py<Simulation>> {
+        let py = index.py();
         self.one(index, |held, i| {
+            if let Some(known) = &held.lent[i] {
+                return Ok(known.clone_ref(py));
+            }
             let rover = held.batch.rovers()[i].clone();
-            let copy = Simulation::of(rover, held.origins[i].clone());
-            Ok(Py::new(index.py(), copy)?)
+            let made = Py::new(py, Simulation::lent(rover, held.origins[i].clone())?)?;
+            held.lent[i] = Some(made.clone_ref(py));
+            Ok(made)
         })
+    }
+
+    /// Takes the heights that the last observation of one rover lacks, if it lacks any.
+    ///
+    /// Args:
+    ///     index: Index of the rover.
+    ///
+    /// Returns:
+    ///     The observation, (size,) float32.
+    fn complete(&self, index: &Bound<'_, PyAny>) -> Result<Array<f32>> {
+        self.one(index, |held, i| Ok(fresh(held.batch.complete(i)?)))
     }
 
     fn __len__(&self) -> Result<usize> {

@@ -9,6 +9,7 @@ use rover_core::episode::{Rules, Settings, TERMS, Weights};
 use crate::arguments::{Named, count, number, refused};
 use crate::arrays::{fresh, fresh_rows, vector};
 use crate::errors::{Kind, Result};
+use crate::infos;
 use crate::model::RoverModel;
 use crate::reading::scan_points;
 
@@ -36,6 +37,8 @@ use crate::reading::scan_points;
 ///         braking, discharges it, and the episode ends when it is empty. With a battery, the
 ///         observation has one further entry after the time to high-centring: the state of charge,
 ///         from 0 to 1.
+///     free_distance: Distance from the start at which the rover is free, m; none by default. The
+///         episode then ends, and progress is measured from the start.
 ///
 /// Raises:
 ///     ModelError: `model` is not a RoverModel.
@@ -72,7 +75,7 @@ fn weights(given: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Weights>
 impl EpisodeRules {
     #[new]
     #[pyo3(signature = (model, **settings),
-        text_signature = "(model, *, substeps, dt, torque_limits, max_steering, goal_tolerance, cos_max_tilt, stuck_time, weights, scale, noise=None, scan=None, goals=1, battery=None)")]
+        text_signature = "(model, *, substeps, dt, torque_limits, max_steering, goal_tolerance, cos_max_tilt, stuck_time, weights, scale, noise=None, scan=None, goals=1, battery=None, free_distance=None)")]
     fn new(model: &Bound<'_, PyAny>, settings: Option<&Bound<'_, PyDict>>) -> Result<Self> {
         let given = Named::keywords(model.py(), settings)?;
         let wrong = |_| refused(model, Kind::Model, "model", "a RoverModel");
@@ -91,6 +94,7 @@ impl EpisodeRules {
             scan: scan_points(given.some("scan")?.as_ref())?,
             goals: given.count("goals", 1)?,
             battery: given.maybe("battery")?,
+            free_distance: given.maybe("free_distance")?,
         };
         given.finish()?;
         Ok(Self::of(Arc::new(Rules::new(model.inner, settings)?)))
@@ -121,6 +125,7 @@ impl EpisodeRules {
         named.set_item("scan", fresh_rows(settings.scan.iter().copied()))?;
         named.set_item("goals", settings.goals)?;
         named.set_item("battery", settings.battery)?;
+        named.set_item("free_distance", settings.free_distance)?;
         let model = RoverModel::from(self.inner.model().clone());
         Ok(((model,), named))
     }
@@ -130,6 +135,12 @@ impl EpisodeRules {
     #[allow(clippy::unused_self)] // an attribute of the object
     fn terms<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyTuple>> {
         Ok(PyTuple::new(py, TERMS)?)
+    }
+
+    /// Name, unit and meaning of each entry of an info.
+    #[staticmethod]
+    fn info_rows() -> Vec<(&'static str, &'static str, &'static str)> {
+        infos::rows()
     }
 
     fn __repr__(&self) -> String {

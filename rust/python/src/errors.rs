@@ -78,6 +78,16 @@ pub struct BorderError {
     pub value: Value,
 }
 
+impl BorderError {
+    /// Another call on an object is going on.
+    pub fn busy() -> Self {
+        let message = "another call on this object is still going on, in another thread or under a \
+                       signal handler: give each thread an object of its own, or wait for the \
+                       call's end";
+        Kind::Busy.refusal(message.to_owned(), Value::Nothing)
+    }
+}
+
 static MADE: PyOnceLock<Vec<Py<PyType>>> = PyOnceLock::new();
 
 /// Makes the exception classes and adds them to the module.
@@ -384,6 +394,7 @@ impl From<EpisodeError> for BorderError {
             E::Length { field, actual, .. } => (Kind::Option, field, Value::Count(actual)),
             E::OutOfRange { field, value, .. } => (Kind::Option, field, Value::Number(value)),
             E::OtherRules => (Kind::Option, "episode", Value::Nothing),
+            E::Busy => return Self::busy(),
             E::NotBegun { index } => (Kind::Option, "index", Value::Count(index)),
             E::NotObservable => (Kind::State, "q", Value::Nothing),
             E::Draw(error) => return error.into(),

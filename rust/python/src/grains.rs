@@ -13,7 +13,7 @@ use crate::balls::{self, Balls, Packed};
 use crate::bed_arguments::{self, grain_error, setup_error};
 use crate::contacts::GrainContacts;
 use crate::errors::{BorderError, Kind, Result};
-use crate::shared::Shared;
+use crate::shared::{Open, Shared};
 use crate::stepping::AnySimulation;
 use crate::union;
 use crate::vessels::{Drum, Silo, Vessel};

@@ -1,10 +1,10 @@
-//! The infos of control periods: one rover's as a dictionary, a batch's as arrays with masks.
+//! The infos of control periods, declared once: one rover's as a dictionary, a batch's as arrays
+//! with masks, and the rows of the environment's card.
 
-use numpy::{Element, PyArray1};
-use pyo3::intern;
+use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
-use rover_core::episode::{Ending, Episode, TERMS};
+use rover_core::episode::{Episode, Settings, TERMS};
 
 use crate::errors::Result;
 
@@ -14,224 +14,242 @@ const STATUSES: [&str; 3] = ["converged", "not_converged", "failed"];
 /// An episode and the message of the physics step that failed in its last period.
 pub type Told<'a> = (&'a Episode, Option<String>);
 
-/// What an info says of the contact solver.
-struct Solver {
-    status: usize,
-    iterations: i64,
-    residual: f64,
-    n_contacts: i64,
+/// A value of an entry.
+enum Value {
+    Number(f64),
+    Count(i64),
+    Flag(bool),
+    Name(&'static str),
+    Text(String),
+}
+use Value::{Count, Flag, Name, Number, Text};
+
+/// Where the value of an entry comes from.
+enum Read {
+    One(fn(&Told<'_>) -> Value),
+    /// A dictionary.
+    Group(&'static [Entry]),
+    /// The terms of the reward.
+    Terms,
+}
+use Read::{Group, One, Terms};
+
+/// An entry of an info.
+struct Entry {
+    name: &'static str,
+    unit: &'static str,
+    meaning: &'static str,
+    /// Which tasks have it.
+    is_told: fn(&Settings) -> bool,
+    read: Read,
 }
 
-impl Solver {
-    #[allow(clippy::cast_possible_truncation)] // counts far below 2^52
-    fn of((episode, message): &Told<'_>) -> Self {
-        if message.is_some() {
-            return Self {
-                status: 2,
-                iterations: 0,
-                residual: f64::INFINITY,
-                n_contacts: 0,
-            };
-        }
-        let now = &episode.outcome().now;
-        Self {
-            status: usize::from(now.not_converged != 0.0),
-            iterations: now.iterations as i64,
-            residual: now.residual,
-            n_contacts: now.n_contacts as i64,
-        }
-    }
+/// Entries: name, unit, meaning, which tasks have them, and what they read.
+macro_rules! entries {
+    ($($name:literal [$unit:literal] $meaning:literal if $is_told:expr => $read:expr;)*) => {
+        &[$(Entry {
+            name: $name,
+            unit: $unit,
+            meaning: $meaning,
+            is_told: $is_told,
+            read: $read,
+        }),*]
+    };
+}
+
+fn always(_: &Settings) -> bool {
+    true
+}
+
+fn has_battery(settings: &Settings) -> bool {
+    settings.battery.is_some()
+}
+
+fn has_trap(settings: &Settings) -> bool {
+    settings.free_distance.is_some()
+}
+
+fn is_success(told: &Told<'_>) -> Value {
+    Flag(told.0.outcome().ending.is_success())
+}
+
+/// Goals that have been reached.
+#[allow(clippy::cast_possible_wrap)] // small numbers
+fn reached(told: &Told<'_>) -> i64 {
+    told.0.progress().reached as i64
+}
+
+/// A number of the solver's; what there is of a step that failed.
+fn solved(told: &Told<'_>, number: f64, failed: f64) -> f64 {
+    if told.1.is_some() { failed } else { number }
+}
+
+#[allow(clippy::cast_possible_truncation)] // counts far below 2^52
+fn solved_count(told: &Told<'_>, number: f64) -> Value {
+    Count(solved(told, number, 0.0) as i64)
+}
+
+/// Goals that remain.
+#[allow(clippy::cast_possible_wrap)] // small numbers
+fn remaining(told: &Told<'_>) -> Value {
+    Count(told.0.rules().settings().goals as i64 - reached(told))
 }
 
 /// Charge of the battery, J.
-fn charge(episode: &Episode) -> f64 {
-    let battery = episode.rules().settings().battery.unwrap_or(0.0);
-    (battery - episode.progress().energy).max(0.0)
+fn charge(told: &Told<'_>) -> Value {
+    let battery = told.0.rules().settings().battery.unwrap_or(0.0);
+    Number((battery - told.0.progress().energy).max(0.0))
 }
 
-/// Goals that have been reached, and those that remain.
-#[allow(clippy::cast_possible_wrap)] // small numbers
-fn waypoints(episode: &Episode) -> [i64; 2] {
-    let (reached, goals) = (episode.progress().reached, episode.rules().settings().goals);
-    [reached as i64, goals as i64 - reached as i64]
+fn status(told: &Told<'_>) -> Value {
+    let not_converged = usize::from(told.0.outcome().now.not_converged != 0.0);
+    Name(STATUSES[if told.1.is_some() { 2 } else { not_converged }])
+}
+
+const DOMAIN: &[Entry] = entries! {
+    "mass_scale" [""] "" if always => One(|t| Number(t.0.setting().domain.mass_scale));
+    "friction" [""] "" if always => One(|t| Number(t.0.setting().domain.friction));
+    "actuator_gain" [""] "" if always => One(|t| Number(t.0.setting().domain.actuator_gain));
+    "gravity_scale" [""] "" if always => One(|t| Number(t.0.setting().domain.gravity_scale));
+};
+
+const SOLVER: &[Entry] = entries! {
+    "status" [""] "" if always => One(status);
+    "iterations" [""] "" if always => One(|t| solved_count(t, t.0.outcome().now.iterations));
+    "residual" [""] "" if always =>
+        One(|t| Number(solved(t, t.0.outcome().now.residual, f64::INFINITY)));
+    "n_contacts" [""] "" if always => One(|t| solved_count(t, t.0.outcome().now.n_contacts));
+    "message" [""] "" if always => One(|t| Text(t.1.clone().unwrap_or_default()));
+};
+
+const ENTRIES: &[Entry] = entries! {
+    "time" ["s"] "since the reset" if always => One(|t| Number(t.0.outcome().now.time));
+    "success" [""] "whether the goal is reached" if always => One(is_success);
+    "is_success" [""] "the same, by the name that stable-baselines3 looks for" if always =>
+        One(is_success);
+    "termination" [""] "how the episode has ended; \"\" while it runs" if always =>
+        One(|t| Name(t.0.outcome().ending.name()));
+    "distance_to_goal" ["m"] "horizontal" if always => One(|t| Number(t.0.outcome().now.distance));
+    "energy" ["J"] "work of the wheel motors since the reset, braking counted" if always =>
+        One(|t| Number(t.0.outcome().energy));
+    "energy_positive" ["J"] "the same, driving only" if always =>
+        One(|t| Number(t.0.outcome().energy_positive));
+    "slip_ratio" [""]
+        "mean over wheels in contact of rim slip over the faster of rim and ground, 0 to 2"
+        if always => One(|t| Number(t.0.outcome().now.slip_ratio));
+    "tilt" ["rad"] "angle between the trunk and the vertical" if always =>
+        One(|t| Number(t.0.outcome().now.tilt()));
+    "difficulty" [""] "of the rocks; 0 where none are drawn" if always =>
+        One(|t| Number(t.0.setting().difficulty));
+    "domain" [""] "the randomised properties, by argument" if always => Group(DOMAIN);
+    "reward_terms" [""] "the terms of the step's reward, by name" if always => Terms;
+    "solver" [""]
+        "`status`, `iterations`, `residual`, `n_contacts`, `message`: the worst of the physics steps"
+        if always => Group(SOLVER);
+    "charge" ["J"] "" if has_battery => One(charge);
+    "waypoints_reached" [""] "" if Settings::has_course => One(|t| Count(reached(t)));
+    "waypoints_remaining" [""] "" if Settings::has_course => One(remaining);
+    "distance_remaining" ["m"] "" if Settings::has_course => One(|t| Number(t.0.way()));
+    "distance_from_trap" ["m"] "" if has_trap => One(|t| Number(t.0.progress().away));
+};
+
+/// Name, unit and meaning of the entries that all tasks have.
+pub fn rows() -> Vec<(&'static str, &'static str, &'static str)> {
+    let described = ENTRIES.iter().filter(|own| !own.meaning.is_empty());
+    described
+        .map(|own| (own.name, own.unit, own.meaning))
+        .collect()
+}
+
+/// A value as Python has it.
+fn object(py: Python<'_>, value: Value) -> Result<Bound<'_, PyAny>> {
+    Ok(match value {
+        Number(x) => x.into_pyobject(py)?.into_any(),
+        Count(n) => n.into_pyobject(py)?.into_any(),
+        Flag(is_so) => is_so.into_pyobject(py)?.to_owned().into_any(),
+        Name(name) => PyString::intern(py, name).into_any(),
+        Text(text) => text.into_pyobject(py)?.into_any(),
+    })
+}
+
+/// The values of an entry of all rovers as an array.
+fn column(py: Python<'_>, values: Vec<Value>) -> Result<Bound<'_, PyAny>> {
+    macro_rules! array {
+        ($kind:path) => {{
+            let column = values.iter().map(|value| match value {
+                $kind(own) => *own,
+                _ => unreachable!("invariant: an entry has values of one kind"),
+            });
+            PyArray1::from_slice(py, &column.collect::<Vec<_>>()).into_any()
+        }};
+    }
+    Ok(match values.first() {
+        Some(Number(_)) => array!(Number),
+        Some(Count(_)) => array!(Count),
+        Some(Flag(_)) => array!(Flag),
+        _ => {
+            let texts = values.into_iter().map(|value| object(py, value));
+            let texts = texts.map(|text| Ok(text?.unbind()));
+            PyArray1::from_slice(py, &texts.collect::<Result<Vec<_>>>()?).into_any()
+        }
+    })
+}
+
+/// Makes a value of Python from what an entry reads.
+type Take<'py, 'a> = dyn Fn(&dyn Fn(&Told<'_>) -> Value) -> Result<Bound<'py, PyAny>> + 'a;
+
+/// A dictionary of some entries, whose values a function takes from what they read.
+fn dictionary<'py>(
+    py: Python<'py>,
+    entries: &[Entry],
+    settings: &Settings,
+    mask: Option<&Bound<'py, PyAny>>,
+    take: &Take<'py, '_>,
+) -> Result<Bound<'py, PyDict>> {
+    let out = PyDict::new(py);
+    let put = |out: &Bound<'py, PyDict>, name: &str, value: Bound<'py, PyAny>| -> Result<()> {
+        out.set_item(PyString::intern(py, name), value)?;
+        if let Some(mask) = mask {
+            out.set_item(PyString::intern(py, &format!("_{name}")), mask)?;
+        }
+        Ok(())
+    };
+    for entry in entries.iter().filter(|entry| (entry.is_told)(settings)) {
+        let value = match &entry.read {
+            One(read) => take(read)?,
+            Group(parts) => dictionary(py, parts, settings, mask, take)?.into_any(),
+            Terms => {
+                let terms = PyDict::new(py);
+                for (i, name) in TERMS.iter().enumerate() {
+                    put(
+                        &terms,
+                        name,
+                        take(&|told| Number(told.0.outcome().terms[i]))?,
+                    )?;
+                }
+                terms.into_any()
+            }
+        };
+        put(&out, entry.name, value)?;
+    }
+    Ok(out)
 }
 
 /// The info of one rover.
 pub fn info<'py>(py: Python<'py>, told: &Told<'_>) -> Result<Bound<'py, PyDict>> {
-    let (episode, message) = told;
-    let (outcome, setting) = (episode.outcome(), episode.setting());
-    let is_success = outcome.ending == Ending::Goal;
-    let domain = PyDict::new(py);
-    domain.set_item(intern!(py, "mass_scale"), setting.domain.mass_scale)?;
-    domain.set_item(intern!(py, "friction"), setting.domain.friction)?;
-    domain.set_item(intern!(py, "actuator_gain"), setting.domain.actuator_gain)?;
-    domain.set_item(intern!(py, "gravity_scale"), setting.domain.gravity_scale)?;
-    let terms = PyDict::new(py);
-    for (name, term) in TERMS.iter().zip(outcome.terms) {
-        terms.set_item(PyString::intern(py, name), term)?;
-    }
-    let told_solver = Solver::of(told);
-    let solver = PyDict::new(py);
-    let status = PyString::intern(py, STATUSES[told_solver.status]);
-    solver.set_item(intern!(py, "status"), status)?;
-    solver.set_item(intern!(py, "iterations"), told_solver.iterations)?;
-    solver.set_item(intern!(py, "residual"), told_solver.residual)?;
-    solver.set_item(intern!(py, "n_contacts"), told_solver.n_contacts)?;
-    solver.set_item(intern!(py, "message"), message.as_deref().unwrap_or(""))?;
-    let info = PyDict::new(py);
-    info.set_item(intern!(py, "time"), outcome.now.time)?;
-    info.set_item(intern!(py, "success"), is_success)?;
-    info.set_item(intern!(py, "is_success"), is_success)?;
-    let termination = PyString::intern(py, outcome.ending.name());
-    info.set_item(intern!(py, "termination"), termination)?;
-    info.set_item(intern!(py, "distance_to_goal"), outcome.now.distance)?;
-    info.set_item(intern!(py, "energy"), outcome.energy)?;
-    info.set_item(intern!(py, "energy_positive"), outcome.energy_positive)?;
-    info.set_item(intern!(py, "slip_ratio"), outcome.now.slip_ratio)?;
-    info.set_item(intern!(py, "tilt"), outcome.now.tilt())?;
-    info.set_item(intern!(py, "difficulty"), setting.difficulty)?;
-    info.set_item(intern!(py, "domain"), domain)?;
-    info.set_item(intern!(py, "reward_terms"), terms)?;
-    info.set_item(intern!(py, "solver"), solver)?;
-    let settings = episode.rules().settings();
-    if settings.battery.is_some() {
-        info.set_item(intern!(py, "charge"), charge(episode))?;
-    }
-    if settings.has_course() {
-        let [reached, remaining] = waypoints(episode);
-        info.set_item(intern!(py, "waypoints_reached"), reached)?;
-        info.set_item(intern!(py, "waypoints_remaining"), remaining)?;
-        info.set_item(intern!(py, "distance_remaining"), episode.way())?;
-    }
-    Ok(info)
+    let settings = told.0.rules().settings();
+    dictionary(py, ENTRIES, settings, None, &|read| object(py, read(told)))
 }
 
-/// A dictionary of arrays with one entry a rover, each with the mask of those that have it: all.
-struct Columns<'py, 'a> {
-    py: Python<'py>,
-    told: &'a [Told<'a>],
-    everyone: &'a Bound<'py, PyArray1<bool>>,
-    out: Bound<'py, PyDict>,
-}
-
-impl<'py, 'a> Columns<'py, 'a> {
-    fn new(told: &'a [Told<'a>], everyone: &'a Bound<'py, PyArray1<bool>>) -> Self {
-        let py = everyone.py();
-        Self {
-            py,
-            told,
-            everyone,
-            out: PyDict::new(py),
-        }
-    }
-
-    /// Adds an array. `mask`: the name after an underscore.
-    fn add<T: Element>(
-        &self,
-        name: &Bound<'py, PyString>,
-        mask: &Bound<'py, PyString>,
-        of: impl Fn(&Told<'a>) -> T,
-    ) -> Result<()> {
-        let column: Vec<T> = self.told.iter().map(of).collect();
-        self.out
-            .set_item(name, PyArray1::from_slice(self.py, &column))?;
-        self.mask(mask)
-    }
-
-    /// Adds a dictionary of arrays.
-    fn nest(
-        &self,
-        name: &Bound<'py, PyString>,
-        mask: &Bound<'py, PyString>,
-        inner: &Self,
-    ) -> Result<()> {
-        self.out.set_item(name, &inner.out)?;
-        self.mask(mask)
-    }
-
-    fn mask(&self, name: &Bound<'py, PyString>) -> Result<()> {
-        Ok(self.out.set_item(name, self.everyone)?)
-    }
-}
-
-/// `$columns.add("name", "_name", of)` with both names interned.
-macro_rules! add {
-    ($columns:ident, $name:literal, $of:expr) => {
-        $columns.add(
-            intern!($columns.py, $name),
-            intern!($columns.py, concat!("_", $name)),
-            $of,
-        )?
-    };
-}
-
-/// The infos of all rovers of a batch.
+/// The infos of all rovers of a batch: for each entry an array, and the mask of those that have it,
+/// all.
 pub fn infos<'py>(py: Python<'py>, told: &[Told<'_>]) -> Result<Bound<'py, PyDict>> {
-    let text = |name: &str| PyString::intern(py, name).into_any().unbind();
-    let endings = Ending::ALL.map(|ending| text(ending.name()));
-    let statuses = STATUSES.map(text);
-    let empty = text("");
-
-    let everyone = PyArray1::from_slice(py, &vec![true; told.len()]);
-    let domain = Columns::new(told, &everyone);
-    add!(domain, "mass_scale", |t| t.0.setting().domain.mass_scale);
-    add!(domain, "friction", |t| t.0.setting().domain.friction);
-    add!(domain, "actuator_gain", |t| t
-        .0
-        .setting()
-        .domain
-        .actuator_gain);
-    add!(domain, "gravity_scale", |t| t
-        .0
-        .setting()
-        .domain
-        .gravity_scale);
-    let terms = Columns::new(told, &everyone);
-    for (i, name) in TERMS.iter().enumerate() {
-        let mask = PyString::intern(py, &format!("_{name}"));
-        let name = PyString::intern(py, name);
-        terms.add(&name, &mask, |t| t.0.outcome().terms[i])?;
-    }
-    let solver = Columns::new(told, &everyone);
-    add!(solver, "status", |t| statuses[Solver::of(t).status]
-        .clone_ref(py));
-    add!(solver, "iterations", |t| Solver::of(t).iterations);
-    add!(solver, "residual", |t| Solver::of(t).residual);
-    add!(solver, "n_contacts", |t| Solver::of(t).n_contacts);
-    add!(solver, "message", |t| match &t.1 {
-        Some(message) => PyString::new(py, message).into_any().unbind(),
-        None => empty.clone_ref(py),
-    });
-
-    let all = Columns::new(told, &everyone);
-    let is_success = |t: &Told<'_>| t.0.outcome().ending == Ending::Goal;
-    add!(all, "time", |t| t.0.outcome().now.time);
-    add!(all, "success", is_success);
-    add!(all, "is_success", is_success);
-    add!(all, "termination", |t| endings
-        [t.0.outcome().ending as usize]
-        .clone_ref(py));
-    add!(all, "distance_to_goal", |t| t.0.outcome().now.distance);
-    add!(all, "energy", |t| t.0.outcome().energy);
-    add!(all, "energy_positive", |t| t.0.outcome().energy_positive);
-    add!(all, "slip_ratio", |t| t.0.outcome().now.slip_ratio);
-    add!(all, "tilt", |t| t.0.outcome().now.tilt());
-    add!(all, "difficulty", |t| t.0.setting().difficulty);
-    all.nest(intern!(py, "domain"), intern!(py, "_domain"), &domain)?;
-    all.nest(
-        intern!(py, "reward_terms"),
-        intern!(py, "_reward_terms"),
-        &terms,
-    )?;
-    all.nest(intern!(py, "solver"), intern!(py, "_solver"), &solver)?;
-    let settings = told.first().map(|one| one.0.rules().settings());
-    if settings.is_some_and(|settings| settings.battery.is_some()) {
-        add!(all, "charge", |t| charge(t.0));
-    }
-    if settings.is_some_and(rover_core::episode::Settings::has_course) {
-        add!(all, "waypoints_reached", |t| waypoints(t.0)[0]);
-        add!(all, "waypoints_remaining", |t| waypoints(t.0)[1]);
-        add!(all, "distance_remaining", |t| t.0.way());
-    }
-    Ok(all.out)
+    let Some((first, _)) = told.first() else {
+        return Ok(PyDict::new(py));
+    };
+    let everyone = PyArray1::from_vec(py, vec![true; told.len()]).into_any();
+    let settings = first.rules().settings();
+    dictionary(py, ENTRIES, settings, Some(&everyone), &|read| {
+        column(py, told.iter().map(read).collect())
+    })
 }

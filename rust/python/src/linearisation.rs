@@ -47,17 +47,16 @@ pub struct Linearisation {
     margins: Array,
     /// Whether the step removes penetration. If so, the derivative includes this correction.
     is_projected: bool,
-    /// Whether each column of (a, b) is valid within the tested perturbation, (nx + nu,); None
-    /// without `check`.
+    /// Whether each column of (a, b) is valid within the tested perturbation, (nx + nu,).
     ///
-    /// A column is valid if two perturbed steps, one in each direction, have the same closed
-    /// contacts in the same modes, the same projection and energy correction, and agree with the
-    /// column within 1%.
+    /// None without `check`. A column is valid if two perturbed steps, one in each direction, have
+    /// the same closed contacts in the same modes, the same projection and energy correction, and
+    /// agree with the column within 1%.
     holds: Option<Array<bool>>,
-    /// Difference of each column of (a, b) from the difference quotient of its two perturbed steps,
-    /// (nx + nu,); None without `check`.
+    /// Difference of each column of (a, b) from that of its two perturbed steps, (nx + nu,).
     ///
-    /// The largest difference of an entry, relative to the column's largest entry.
+    /// None without `check`. The largest difference of an entry, relative to the column's largest
+    /// entry.
     errors: Option<Array>,
     /// Whether all columns are valid; None without `check`.
     is_smooth: Option<bool>,

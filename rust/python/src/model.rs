@@ -219,10 +219,10 @@ impl RoverModel {
             }
         };
         // JSON has no such numbers.
-        if text.contains("NaN") || text.contains("Infinity") {
-            if let Some((field, value)) = not_finite(description, String::new()) {
-                return Err(refused(&value, Kind::Model, &field, "finite"));
-            }
+        if (text.contains("NaN") || text.contains("Infinity"))
+            && let Some((field, value)) = not_finite(description, String::new())
+        {
+            return Err(refused(&value, Kind::Model, &field, "finite"));
         }
         Self::_restore(&text)
     }

@@ -14,7 +14,7 @@ use crate::contacts::PlanarContacts;
 use crate::errors::{BorderError, Kind, Result, Value};
 use crate::options::{Options, SolverWords, choice, name_of, settings};
 use crate::planar_ground::parse;
-use crate::shared::Shared;
+use crate::shared::{Open, Shared};
 use crate::stepping::{AnySimulation, Problem, problem};
 
 const RULES: [(&str, ContactRule); 2] = [

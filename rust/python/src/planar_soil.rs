@@ -17,7 +17,7 @@ use crate::errors::{BorderError, Kind, Result, Value};
 use crate::planar::pair;
 use crate::planar_ground::{border, parse};
 use crate::planar_machines::two_wheel_rover;
-use crate::shared::Shared;
+use crate::shared::{Open, Shared};
 use crate::stepping::AnySimulation;
 
 /// Of the steps of a soil: its velocities are right to ten times the tolerance, m/s.

@@ -1,9 +1,8 @@
 //! `RoverGrainSimulation`: a rover among balls.
 
-use std::sync::Arc;
+use std::sync::{Arc, MutexGuard};
 
 use pyo3::prelude::*;
-use rover_core::integrator::{StepError, StepReport as CoreReport};
 use rover_core::multibody::Energy as CoreEnergy;
 use rover_core::simulation::{
     AnySnapshot, GrainSimulation as Grains, RoverInGrains, RoverSimulation, TogetherError,
@@ -15,7 +14,7 @@ use crate::bed_arguments::grain_error;
 use crate::errors::{BorderError, Kind, Result, Value};
 use crate::grains::GrainSimulation;
 use crate::report::{Energy, StepReport};
-use crate::shared::{Shared, Watch};
+use crate::shared::{Open, Shared, Watch};
 use crate::simulation::Simulation;
 use crate::snapshot::other_kind;
 use crate::stepping::{AnySimulation, Stepped};
@@ -72,15 +71,9 @@ pub struct Together {
 }
 
 impl Together {
-    /// Takes n steps with both, as [`RoverInGrains::step`]; `rover`: its open simulation.
-    pub fn step_with(
-        &self,
-        rover: &mut RoverSimulation,
-        n: usize,
-        go_on: &mut dyn FnMut() -> bool,
-    ) -> Result<Result<CoreReport, StepError>, BorderError> {
-        let (mut link, mut grains) = (self.link.open()?, self.grains.open()?);
-        Ok(link.step(rover, &mut grains, n, go_on))
+    /// What acts between rover and grains, and the grains, for one call; the rover is opened apart.
+    pub fn open(&self) -> Result<(MutexGuard<'_, RoverInGrains>, MutexGuard<'_, Grains<3>>)> {
+        Ok((self.link.open()?, self.grains.open()?))
     }
 
     /// What is read of all three.
@@ -104,8 +97,10 @@ impl Stepped for Together {
 
     fn step(&self, py: Python<'_>, n: usize) -> Result<StepReport> {
         let mut rover = self.rover.open()?;
+        let (mut link, mut grains) = self.open()?;
         let (moving, mut watch) = (&mut *rover, Watch::new());
-        let report = py.detach(|| self.step_with(moving, n, &mut || watch.go_on()))?;
+        let (link, grains) = (&mut *link, &mut *grains);
+        let report = py.detach(|| link.step(moving, grains, n, &mut || watch.go_on()));
         Ok(watch.result(report)?.into())
     }
 

@@ -6,34 +6,30 @@ use std::time::{Duration, Instant};
 
 use pyo3::prelude::*;
 
-use crate::errors::{BorderError, Kind, Result, Value};
+use crate::errors::{BorderError, Result};
 
 /// How often a long call looks for signals.
 const LOOKING: Duration = Duration::from_millis(20);
 
+/// What several Python objects or threads may hold.
+pub type Shared<T> = Mutex<T>;
+
 /// One call at a time; a second one is refused, not kept waiting: it may
 /// come from a signal handler inside the first.
-pub struct Shared<T>(Mutex<T>);
-
-impl<T> Shared<T> {
-    pub fn new(inner: T) -> Self {
-        Self(Mutex::new(inner))
-    }
-
+pub trait Open<T> {
     /// The inside, for one call.
     ///
     /// # Errors
     /// Another call is going on.
-    pub fn open(&self) -> Result<MutexGuard<'_, T>, BorderError> {
-        match self.0.try_lock() {
+    fn open(&self) -> Result<MutexGuard<'_, T>, BorderError>;
+}
+
+impl<T> Open<T> for Shared<T> {
+    fn open(&self) -> Result<MutexGuard<'_, T>, BorderError> {
+        match self.try_lock() {
             Ok(inner) => Ok(inner),
             Err(TryLockError::Poisoned(inner)) => Ok(inner.into_inner()),
-            Err(TryLockError::WouldBlock) => {
-                let message = "another call on this object is still going on, in another thread or \
-                               under a signal handler: give each thread an object of its own, or wait \
-                               for the call's end";
-                Err(Kind::Busy.refusal(message.to_owned(), Value::Nothing))
-            }
+            Err(TryLockError::WouldBlock) => Err(BorderError::busy()),
         }
     }
 }

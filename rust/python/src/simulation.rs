@@ -26,7 +26,7 @@ use crate::options::{Options, SolverWords, settings};
 use crate::rays::{Met, met, rays};
 use crate::reading::{place, scan_points, slices};
 use crate::sand::sand_to_dict;
-use crate::shared::{Shared, Watch};
+use crate::shared::{Open, Shared, Watch};
 use crate::stepping::{AnySimulation, Problem, problem};
 use crate::{terrain, union};
 
@@ -90,14 +90,32 @@ fn names(joints: &Bound<'_, PyAny>) -> Result<Vec<String>> {
 impl Simulation {
     /// A simulation and its constructor arguments.
     pub fn of(inner: CoreSimulation, origin: Origin) -> PyClassInitializer<Self> {
-        let (model, options) = (inner.model().clone(), inner.options().clone());
-        let inner = Arc::new(Shared::new(inner));
+        let parts = (inner.model().clone(), inner.options().clone());
+        Self::with(Arc::new(Shared::new(inner)), parts, origin)
+    }
+
+    fn with(
+        inner: Arc<Shared<CoreSimulation>>,
+        (model, options): (Arc<Model>, StepOptions),
+        origin: Origin,
+    ) -> PyClassInitializer<Self> {
         AnySimulation::base(inner.clone()).add_subclass(Self {
             inner,
             model,
             options,
             origin,
         })
+    }
+
+    /// A simulation that others hold, too.
+    pub fn lent(
+        inner: Arc<Shared<CoreSimulation>>,
+        origin: Origin,
+    ) -> Result<PyClassInitializer<Self>> {
+        let open = inner.open()?;
+        let parts = (open.model().clone(), open.options().clone());
+        drop(open);
+        Ok(Self::with(inner, parts, origin))
     }
 
     /// The simulation, for one call.
@@ -466,7 +484,7 @@ impl Simulation {
 
     /// Mean contact force on each wheel over the last step, (n_wheels, 3), N.
     ///
-    /// Along n, t, b of the wheel's contact frame.
+    /// Sums over its contacts, each along its own normal, rolling and lateral direction.
     #[getter]
     fn wheel_forces(&self) -> Result<Array> {
         Ok(fresh_rows(self.open()?.wheel_forces()))
@@ -657,7 +675,7 @@ impl Simulation {
     /// derivative is not valid; with `check`, `Linearisation.holds` is False there.
     ///
     /// Args:
-    ///     check: Whether to test each column of (A, B) by two real steps, which takes a hundred
+    ///     check: Whether to test each column of (A, B) by two real steps, which takes ten
     ///         times as long as the derivatives; False by default.
     ///     perturbation: Change of each entry of (x, u) in these steps, m, rad, m/s or rad/s, and
     ///         1000 times as many N m; from 1e-9 to 1e-3, 1e-6 by default.

@@ -12,7 +12,7 @@ use crate::arguments::count;
 use crate::arrays::{Array, fresh, fresh_matrix};
 use crate::errors::{Kind, Result};
 use crate::report::{Energy, StepReport};
-use crate::shared::{Shared, Watch};
+use crate::shared::{Open, Shared, Watch};
 use crate::snapshot::{KeptScene, Snapshot, other_kind, snapshot};
 
 /// Base class of all simulations. It cannot be instantiated.

@@ -131,6 +131,42 @@ fn drive(instructions: Instructions, n: usize, torque: f64, seed: u64) {
     }
 }
 
+/// Rovers on cylinders among rocks, whose wheels lift and meet two things at once, so that the
+/// places of their contacts come and go.
+fn on_cylinders(n: usize, width: f64, numbers: &mut Random) -> Vec<RoverSimulation> {
+    let mut wide = ModelDescription::rover();
+    for wheel in &mut wide.wheels {
+        (wheel.width, wheel.contact_radius) = (Some(width), Some(0.2));
+    }
+    let model = Arc::new(Model::from_description(wide).unwrap());
+    (0..n).map(|_| rover(2, &model, numbers)).collect()
+}
+
+/// A thread steps rovers of two machines in turn, with the same lanes of its solver.
+#[test]
+fn rovers_of_one_machine_do_not_feel_those_of_another() {
+    let mut numbers = Random(3);
+    let mut teams = [0.15, 0.10].map(|width| on_cylinders(16, width, &mut numbers));
+    let mut batch = LaneBatch::new(Instructions::of_this_machine());
+    for _ in 0..6 {
+        for team in &mut teams {
+            for own in &mut *team {
+                command(own, 60.0, &mut numbers);
+            }
+            let mut alone = team.clone();
+            let mut errors: Vec<Option<StepError>> = vec![None; team.len()];
+            let mut entries: Vec<BatchRover<'_>> = (team.iter_mut().zip(&mut errors))
+                .map(|(rover, error)| BatchRover { rover, error })
+                .collect();
+            batch.advance(&mut entries, 10, &mut || true);
+            for (own, alone) in team.iter().zip(&mut alone) {
+                alone.step(10).unwrap();
+                assert_alike(own, alone);
+            }
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 6, ..ProptestConfig::default() })]
     #[test]

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, UnilateralContact};
 use rover_core::lanes::problem::{ContactProblem, MAX_DENSE, block};
-use rover_core::lanes::queue::{MAX_ITERATIONS, Queue, solve_all};
+use rover_core::lanes::queue::{MAX_ITERATIONS, Queue};
 use rover_core::multibody::{Configuration, Model};
 use rover_core::problem::{Dimension, FrictionContactProblem, evaluate};
 use rover_core::scalar::{Lane, Single};
@@ -93,14 +93,31 @@ fn rounding_of_velocities(W: &[f64], problem: &ContactProblem) -> f64 {
     n as f64 * f64::EPSILON * largest / speed
 }
 
+/// Solves all problems, side by side.
+fn solve_all<T: Lane>(token: T::Token, problems: &mut Vec<ContactProblem>) {
+    let n = problems.len();
+    problems.resize_with(n.next_multiple_of(T::LANES), ContactProblem::default);
+    let n_groups = problems.len() / T::LANES;
+    let mut queue = Queue::<T>::new(token);
+    queue.begin(n_groups);
+    for group in 0..n_groups {
+        queue.enter(group, problems, |_| true);
+    }
+    while queue
+        .next_group(problems, &SolverOptions::default())
+        .is_some()
+    {}
+    problems.truncate(n);
+}
+
 /// Each problem solved alone.
 fn solve_alone(problems: &[ContactProblem]) -> Vec<ContactProblem> {
-    let mut alone = problems.to_vec();
-    for problem in &mut alone {
-        let one = std::slice::from_mut(problem);
-        solve_all::<f64>(Single::best(), one, &SolverOptions::default());
-    }
-    alone
+    let solve = |problem: &ContactProblem| {
+        let mut alone = vec![problem.clone()];
+        solve_all::<f64>(Single::best(), &mut alone);
+        alone.remove(0)
+    };
+    problems.iter().map(solve).collect()
 }
 
 fn assert_same(found: &ContactProblem, alone: &ContactProblem) {
@@ -124,7 +141,7 @@ struct Solved<'a> {
 impl OverLanes for Solved<'_> {
     fn run<T: Lane>(&mut self, token: T::Token) {
         let mut found = self.problems.to_vec();
-        solve_all::<T>(token, &mut found, &SolverOptions::default());
+        solve_all::<T>(token, &mut found);
         self.found.push(found);
     }
 }
@@ -246,7 +263,7 @@ fn positions_are_solved_from_zero() {
         }
     }
     let mut found = problems.clone();
-    solve_all::<f64>(Single::best(), &mut found, &SolverOptions::default());
+    solve_all::<f64>(Single::best(), &mut found);
     for (found, start) in found.iter().zip(&problems) {
         assert_sound(found, start);
     }
@@ -309,7 +326,7 @@ fn what_is_not_finite_is_unsolved_and_harms_no_neighbour() {
     problems[5].p[2] = f64::NAN;
     let mut zero = sound[5].clone();
     zero.p.fill(0.0);
-    solve_all::<f64>(Single::best(), &mut problems, &SolverOptions::default());
+    solve_all::<f64>(Single::best(), &mut problems);
     assert_same(&problems[5], &solve_alone(&[zero])[0]);
 }
 
@@ -318,7 +335,7 @@ fn without_free_velocity_or_contacts_the_answer_is_zero() {
     let mut problems = drive(20.0, 20);
     problems[1].q.fill(0.0);
     problems[2].n_contacts = 0;
-    solve_all::<f64>(Single::best(), &mut problems, &SolverOptions::default());
+    solve_all::<f64>(Single::best(), &mut problems);
     for problem in &problems[1..3] {
         assert!(problem.is_solved && problem.iterations == 0);
         let n = problem.n_unknowns();

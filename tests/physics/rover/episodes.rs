@@ -9,7 +9,8 @@ use rover_core::draw::start::StartDistribution;
 use rover_core::draw::{Order, Pcg64};
 use rover_core::episode::running::Period;
 use rover_core::episode::{
-    Beginning, Ending, EpisodeBatch, EpisodeDistribution, EpisodeError, Rules, Settings, noise,
+    Beginning, Ending, EpisodeBatch, EpisodeDistribution, EpisodeError, Rules, Settings,
+    SharedRover, noise,
 };
 use rover_core::geometry::Plane;
 use rover_core::integrator::StepOptions;
@@ -34,6 +35,7 @@ fn settings() -> Settings {
         scan: SCAN.to_vec(),
         goals: 1,
         battery: None,
+        free_distance: None,
     }
 }
 
@@ -149,6 +151,36 @@ fn batch(model: &Arc<Model>, n: usize, threads: usize) -> EpisodeBatch {
     batch
 }
 
+#[test]
+fn a_reading_that_float32_cannot_hold_ends_the_episode() {
+    let model = model();
+    let begun = begin(&model, 0);
+    let rover = rover(&begun);
+    let mut reading = vec![0.0; rules(&model).places().size];
+    for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300] {
+        let mut episode = begun.episode.clone();
+        rover.read_state(episode.goal(), &mut ReadingScratch::default(), &mut reading);
+        reading[model.nv() + 6 + model.n_joints()] = value; // the first wheel's gap
+        let period = Period {
+            action: &action(0, 0),
+            heights: None,
+            normals: Some(&[0.0; SIZE]),
+            has_failed: false,
+        };
+        let (last, mut observation) = (episode.observation().to_vec(), [0.0; SIZE]);
+        episode.advance(&mut reading, &period, &mut observation);
+        let outcome = episode.outcome();
+        assert_eq!(outcome.ending, Ending::StepFailed);
+        assert_eq!(outcome.reward.to_bits(), outcome.terms[8].to_bits());
+        assert_eq!(bits(&observation), bits(&last));
+    }
+}
+
+fn times(batch: &EpisodeBatch) -> Vec<f64> {
+    let time = |rover: &SharedRover| rover.lock().unwrap().time();
+    batch.rovers().iter().map(time).collect()
+}
+
 fn actions(n: usize, period: usize) -> Vec<f64> {
     (0..n).flat_map(|i| action(i, period)).collect()
 }
@@ -209,7 +241,7 @@ fn what_is_refused_moves_no_rover() {
             ..
         }
     ));
-    assert!(batch.rovers().iter().all(|rover| rover.time() == 0.0));
+    assert!(times(&batch).iter().all(|&time| time == 0.0));
     let (rules, first) = (rules(&model), rover(&begin(&model, 0)));
     let mut unbegun = EpisodeBatch::new(rules, &first, n, None, Some(1)).unwrap();
     let refused = unbegun.step_while(&good, None, true, &mut rows, &mut || true);
@@ -225,9 +257,9 @@ fn a_rover_that_is_stopped_stops_after_a_whole_step() {
         batch
             .step_while(&actions(n, 0), None, true, &mut rows, &mut || false)
             .unwrap();
-        let steps = |rover: &RoverSimulation| rover.time() / rover.options().time_step;
-        assert!(batch.rovers().iter().all(|rover| steps(rover) < 5.5));
-        assert!(batch.rovers().iter().any(|rover| rover.time() == 0.0));
+        let first = batch.rovers()[0].lock().unwrap().options().time_step;
+        assert!(times(&batch).iter().all(|&time| time / first < 5.5));
+        assert!(times(&batch).contains(&0.0));
     }
 }
 

@@ -104,6 +104,8 @@ class Stage {
     this.spent.push(performance.now() - begin);
     if (this.spent.length > 120) this.spent.shift();
     this.canvas.dataset.script = this.spent.slice().sort((a, b) => a - b)[this.spent.length >> 1].toFixed(2);
+    const { geometries, textures } = this.view.renderer.info.memory;
+    this.canvas.dataset.held = geometries + textures;
     this.canvas.dataset.drawn = Number(this.canvas.dataset.drawn || 0) + 1;
   }
 

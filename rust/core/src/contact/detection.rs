@@ -526,16 +526,20 @@ fn visit_nearer(
     terrain: &dyn Terrain,
     visit: &mut impl FnMut(u32, &SurfacePoint),
 ) {
-    let (centre, radius) = (shape.centre(), shape.bound());
+    let radius = shape.bound();
     let mut gap = f64::INFINITY;
     let mut ways = WaysOut::default();
     let shallow = OverSurfaces::shallow(shape);
-    // A primitive that is not visited is further from the centre than `reach`, hence further
-    // from the wheel than reach − R.
     let is_surface = terrain.has_surface();
-    let mut ahead = if is_surface { CLOSE * radius } else { radius };
-    let mut reach = radius + ahead;
-    while reach < FAR {
+    let mut ahead = radius;
+    if is_surface {
+        // The ground under the wheel's lowest point is no nearer than the nearest.
+        let low = base + shape.support(&-Vector3::y());
+        let under = terrain.height(low.x, low.z).unwrap_or(low.y);
+        ahead = (1.01 * (low.y - under)).max(CLOSE * radius);
+    }
+    // A primitive that is not visited is further from the wheel than this.
+    while ahead < FAR {
         ways.clear();
         let mut take = |id: u32, point: &SurfacePoint| {
             if point.gap < gap {
@@ -543,29 +547,26 @@ fn visit_nearer(
                 visit(id, point);
             }
         };
-        terrain.visit_near(
-            &(base + centre),
-            reach,
-            &mut |id, primitive| match primitive {
-                Primitive::Plane(plane) => {
-                    take(id, &dispatch::lowest_on_plane(shape, plane, base));
-                }
-                Primitive::Sphere(sphere) => {
-                    take(id, &dispatch::point_on_sphere(shape, sphere, base));
-                }
-                piece => {
-                    let piece = (terrain, id, piece);
-                    visit_on_surface(shape, piece, base, f64::INFINITY, |point| {
-                        if is_lowest(point.feature) {
-                            ways.add(id, point, shallow);
-                            if point.gap >= -shallow {
-                                take(id, &on_surface(point));
-                            }
+        let around = Neighbourhood::new(shape, base, ahead);
+        terrain.visit_around(&around, &mut |id, primitive| match primitive {
+            Primitive::Plane(plane) => {
+                take(id, &dispatch::lowest_on_plane(shape, plane, base));
+            }
+            Primitive::Sphere(sphere) => {
+                take(id, &dispatch::point_on_sphere(shape, sphere, base));
+            }
+            piece => {
+                let piece = (terrain, id, piece);
+                visit_on_surface(shape, piece, base, f64::INFINITY, |point| {
+                    if is_lowest(point.feature) {
+                        ways.add(id, point, shallow);
+                        if point.gap >= -shallow {
+                            take(id, &on_surface(point));
                         }
-                    });
-                }
-            },
-        );
+                    }
+                });
+            }
+        });
         let part = OverSurfaces {
             shape,
             terrain,
@@ -574,15 +575,14 @@ fn visit_nearer(
         if let Some((id, point)) = ways.deepest(&part) {
             take(id, &on_surface(&point));
         }
-        if gap + radius <= reach {
+        if gap <= ahead {
             return;
         }
-        if is_surface {
-            ahead *= 2.0;
-            reach = radius + ahead;
+        ahead = if is_surface {
+            2.0 * ahead
         } else {
-            reach *= 2.0;
-        }
+            2.0 * ahead + radius
+        };
     }
 }
 

@@ -3,7 +3,7 @@
 //! A rover's commands, its steps, its reading and what its episode makes of them are one turn
 //! ([`crate::simulation::turns`]): no thread waits for another within a control period.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
 use super::action;
 use super::beginning::{Beginning, EpisodeDistribution};
@@ -11,29 +11,44 @@ use super::control_period::{ControlPeriod, Origin, PeriodSlot, Slot};
 use super::error::{EpisodeError, check_lengths};
 use super::rules::Rules;
 use super::running::Episode;
-use crate::draw::{Order, Pcg64, Range};
+use crate::draw::{Order, Pcg64};
 use crate::integrator::StepError;
-use crate::simulation::{Batch, BatchError, RoverSimulation};
+use crate::simulation::{BatchError, Done, ReadingScratch, RoverSimulation, Turn, Workers};
+
+/// A rover of a batch, which others may hold, too: they see it move until its next episode begins,
+/// with a rover of its own.
+pub type SharedRover = Arc<Mutex<RoverSimulation>>;
 
 /// Rovers with their episodes and the threads that step them.
 pub struct EpisodeBatch {
     rules: Arc<Rules>,
-    batch: Batch,
-    pub(super) slots: Vec<Option<Slot>>,
+    rovers: Vec<SharedRover>,
+    errors: Vec<Option<StepError>>,
+    workers: Workers,
+    scratch: ReadingScratch,
+    slots: Vec<Option<Slot>>,
     max_steps: Option<u64>,
-    difficulties: Vec<Option<Range>>,
-    pub(super) finals: Vec<Final>,
 }
 
-/// An episode that the last step has ended.
-#[derive(Clone, Debug)]
-pub struct Final {
-    /// Index of the rover.
-    pub index: usize,
-    /// The episode at its end.
-    pub episode: Episode,
-    /// The physics step that its rover could not take.
-    pub error: Option<StepError>,
+/// Takes steps with the rover of an index.
+pub type StepAmong<'a> =
+    dyn FnMut(usize, &mut RoverSimulation, usize) -> Result<(), StepError> + 'a;
+
+fn shared(rover: RoverSimulation) -> SharedRover {
+    Arc::new(Mutex::new(rover))
+}
+
+/// Opens all rovers.
+///
+/// # Errors
+/// `Busy`.
+fn open_all(rovers: &[SharedRover]) -> Result<Vec<MutexGuard<'_, RoverSimulation>>, EpisodeError> {
+    let open = rovers.iter().map(|rover| match rover.try_lock() {
+        Ok(rover) => Ok(rover),
+        Err(TryLockError::Poisoned(rover)) => Ok(rover.into_inner()),
+        Err(TryLockError::WouldBlock) => Err(EpisodeError::Busy),
+    });
+    open.collect()
 }
 
 /// How the rovers' control periods went: an entry for each rover, and lists of indices.
@@ -47,8 +62,6 @@ pub struct Stepped {
     pub truncated: Vec<bool>,
     /// Rovers whose episode is over, one way or the other.
     pub over: Vec<usize>,
-    /// Rovers whose next episode has begun in this step.
-    pub begun: Vec<usize>,
 }
 
 impl EpisodeBatch {
@@ -57,7 +70,7 @@ impl EpisodeBatch {
     /// `max_steps`: control periods until truncation; `threads`: None for one per core.
     ///
     /// # Errors
-    /// As [`Rules::check_model`] and [`Batch::new`].
+    /// As [`Rules::check_model`] and [`Workers::new`].
     pub fn new(
         rules: Arc<Rules>,
         rover: &RoverSimulation,
@@ -67,11 +80,12 @@ impl EpisodeBatch {
     ) -> Result<Self, EpisodeError> {
         rules.check_model(rover.model())?;
         Ok(Self {
-            batch: Batch::new(vec![rover.clone(); n], Vec::new(), threads)?,
+            rovers: (0..n).map(|_| shared(rover.clone())).collect(),
+            errors: vec![None; n],
+            workers: Workers::new(n, threads)?,
+            scratch: ReadingScratch::default(),
             slots: (0..n).map(|_| None).collect(),
             max_steps,
-            difficulties: vec![None; n],
-            finals: Vec::new(),
             rules,
         })
     }
@@ -84,26 +98,26 @@ impl EpisodeBatch {
 
     /// The rovers.
     #[must_use]
-    pub fn rovers(&self) -> &[RoverSimulation] {
-        self.batch.rovers()
+    pub fn rovers(&self) -> &[SharedRover] {
+        &self.rovers
     }
 
     /// Threads that step them.
     #[must_use]
     pub fn threads(&self) -> usize {
-        self.batch.threads()
+        self.workers.count()
     }
 
     /// Error of the last physics step of each rover.
     #[must_use]
     pub fn errors(&self) -> &[Option<StepError>] {
-        self.batch.errors()
+        &self.errors
     }
 
     /// Message of the physics step that failed in the last period of a rover, if one did.
     #[must_use]
     pub fn message(&self, index: usize) -> Option<String> {
-        let error = self.batch.errors()[index].as_ref();
+        let error = self.errors[index].as_ref();
         let slot = self.slots[index].as_ref();
         error
             .map(ToString::to_string)
@@ -148,30 +162,6 @@ impl EpisodeBatch {
         Ok(&self.slot(index)?.origin)
     }
 
-    /// Range that replaces that of the rocks' difficulty in the next episodes of a rover.
-    ///
-    /// # Errors
-    /// `NoSuchRover`.
-    pub fn difficulty(&self, index: usize) -> Result<Option<Range>, EpisodeError> {
-        let len = self.slots.len();
-        let found = self.difficulties.get(index);
-        Ok(*found.ok_or(BatchError::NoSuchRover { index, len })?)
-    }
-
-    /// Sets this range.
-    ///
-    /// # Errors
-    /// `NoSuchRover`.
-    pub fn set_difficulty(
-        &mut self,
-        index: usize,
-        difficulty: Option<Range>,
-    ) -> Result<(), EpisodeError> {
-        self.difficulty(index)?;
-        self.difficulties[index] = difficulty;
-        Ok(())
-    }
-
     /// Where the noise of a rover comes from.
     ///
     /// # Errors
@@ -193,10 +183,29 @@ impl EpisodeBatch {
     }
 
     fn slot(&self, index: usize) -> Result<&Slot, EpisodeError> {
+        self.check_index(index)?;
+        (self.slots[index].as_ref()).ok_or(EpisodeError::NotBegun { index })
+    }
+
+    fn check_index(&self, index: usize) -> Result<(), EpisodeError> {
         let len = self.slots.len();
-        let slot = self.slots.get(index);
-        let slot = slot.ok_or(BatchError::NoSuchRover { index, len })?;
-        slot.as_ref().ok_or(EpisodeError::NotBegun { index })
+        if index < len {
+            return Ok(());
+        }
+        Err(BatchError::NoSuchRover { index, len }.into())
+    }
+
+    /// The last observation of a rover (size), with the heights that it lacks.
+    ///
+    /// # Errors
+    /// `NoSuchRover`, `NotBegun`, `Busy`.
+    pub fn complete(&mut self, index: usize) -> Result<&[f32], EpisodeError> {
+        self.slot(index)?;
+        let open = open_all(&self.rovers[index..=index])?;
+        let slot = self.slots[index].as_mut();
+        let episode = &mut slot.ok_or(EpisodeError::NotBegun { index })?.episode;
+        episode.complete(&open[0]);
+        Ok(episode.observation())
     }
 
     /// Draws episodes on the threads of the batch, see [`EpisodeDistribution::draw`]. No rover
@@ -211,7 +220,7 @@ impl EpisodeBatch {
         attempts: usize,
         go_on: &mut dyn FnMut() -> bool,
     ) -> Result<Option<Vec<Beginning>>, EpisodeError> {
-        let pool = self.batch.pool()?;
+        let pool = self.workers.pool()?;
         distribution.draw(orders, attempts, pool, go_on)
     }
 
@@ -220,10 +229,7 @@ impl EpisodeBatch {
     /// # Errors
     /// `OtherRules`, `NoSuchRover`, or as [`Rules::check_model`].
     pub fn check(&self, index: usize, beginning: &Beginning) -> Result<(), EpisodeError> {
-        let len = self.slots.len();
-        if index >= len {
-            return Err(BatchError::NoSuchRover { index, len }.into());
-        }
+        self.check_index(index)?;
         if *beginning.episode.rules() != self.rules {
             return Err(EpisodeError::OtherRules);
         }
@@ -242,7 +248,16 @@ impl EpisodeBatch {
             episode,
             random,
         } = beginning;
-        self.batch.begin(index, scene.placement, scene.start.goal)?;
+        let rover = &mut self.rovers[index];
+        let begun = if let Some(own) = Arc::get_mut(rover) {
+            let own = own.get_mut().unwrap_or_else(PoisonError::into_inner);
+            own.begin(scene.placement)
+        } else {
+            // Whoever else holds it keeps the rover of the episode before.
+            RoverSimulation::placed(scene.placement).map(|begun| *rover = shared(begun))
+        };
+        begun.map_err(|error| BatchError::Options { index, error })?;
+        self.errors[index] = None;
         let origin = Origin {
             start: scene.start,
             rocks: scene.rocks,
@@ -258,8 +273,7 @@ impl EpisodeBatch {
     /// of the physics step that failed, if that has ended the episode.
     ///
     /// # Errors
-    /// `OtherRules`, `NoSuchRover`, `Differs`, or as [`Rules::check_model`]; nothing is changed
-    /// then.
+    /// `OtherRules`, `NoSuchRover`, or as [`Rules::check_model`]; nothing is changed then.
     pub fn resume(
         &mut self,
         index: usize,
@@ -273,7 +287,9 @@ impl EpisodeBatch {
             return Err(EpisodeError::OtherRules);
         }
         self.rules.check_model(rover.model())?;
-        self.batch.replace(index, rover, episode.goal())?;
+        self.check_index(index)?;
+        self.rovers[index] = shared(rover);
+        self.errors[index] = None;
         let mut slot = Slot::new(episode, origin, random);
         (slot.steps, slot.message) = (steps, message);
         self.slots[index] = Some(slot);
@@ -293,11 +309,11 @@ impl EpisodeBatch {
     ///
     /// `actions`: n × n_actions, row-major. `active`: rovers that move; the others keep state and
     /// observation. `has_scan`: whether the heights are taken; without, only episodes that end or
-    /// reach the time limit take them, and all others keep the last ones. `go_on`: as for
-    /// [`Batch::step_while`]; an episode whose rover was stopped goes on as after a whole period.
+    /// reach the time limit take them, and all others keep the last ones. `go_on`: once it returns
+    /// false, each rover stops after a whole step, and its episode goes on as after a whole period.
     ///
     /// # Errors
-    /// `Length`, `Action`, `NotBegun`, `Threads`; no rover has moved then.
+    /// `Length`, `Action`, `NotBegun`, `Busy`, `Threads`; no rover has moved then.
     ///
     /// # Panics
     /// If `observations` has a wrong length.
@@ -309,10 +325,50 @@ impl EpisodeBatch {
         observations: &mut [f32],
         go_on: &mut dyn FnMut() -> bool,
     ) -> Result<Stepped, EpisodeError> {
+        self.take_period(actions, active, has_scan, observations, None, go_on)
+    }
+
+    /// The same, one rover after the other, whose steps a function takes: rovers that move
+    /// together with something else. It is given the index of the rover, the rover, and how many
+    /// steps to take.
+    ///
+    /// # Errors
+    /// As [`Self::step_while`].
+    ///
+    /// # Panics
+    /// As [`Self::step_while`].
+    pub fn step_among(
+        &mut self,
+        actions: &[f64],
+        active: Option<&[bool]>,
+        has_scan: bool,
+        observations: &mut [f32],
+        step: &mut StepAmong<'_>,
+    ) -> Result<Stepped, EpisodeError> {
+        self.take_period(
+            actions,
+            active,
+            has_scan,
+            observations,
+            Some(step),
+            &mut || true,
+        )
+    }
+
+    fn take_period(
+        &mut self,
+        actions: &[f64],
+        active: Option<&[bool]>,
+        has_scan: bool,
+        observations: &mut [f32],
+        among: Option<&mut StepAmong<'_>>,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<Stepped, EpisodeError> {
         self.check_step(actions, active)?;
-        self.finals.clear();
         let (n, size) = (self.slots.len(), self.rules.size());
         assert_eq!(observations.len(), n * size, "one row a rover");
+        let mut open = open_all(&self.rovers)?;
+        let rovers: Vec<_> = open.iter_mut().map(|rover| &mut **rover).collect();
         let rows = observations.chunks_exact_mut(size);
         let actions = actions.chunks_exact(self.rules.n_actions());
         let slots = self.slots.iter_mut().flatten();
@@ -330,16 +386,31 @@ impl EpisodeBatch {
             max_steps: self.max_steps,
         };
         let substeps = self.rules.settings().substeps;
-        self.batch.take_turns(&mut places, substeps, &turn, go_on)?;
+        let rovers = rovers.into_iter().zip(&mut self.errors);
+        let slots = rovers.zip(&mut places);
+        match among {
+            None => self.workers.take_turns(slots, substeps, &turn, go_on)?,
+            Some(step) => {
+                for (index, ((rover, error), place)) in slots.enumerate() {
+                    let has_moved = turn.is_moving(place);
+                    if has_moved {
+                        turn.begin(rover, place);
+                        *error = step(index, rover, substeps).err();
+                    }
+                    let done = Done {
+                        has_moved,
+                        error: error.as_ref(),
+                    };
+                    turn.end(rover, done, place, &mut self.scratch);
+                }
+            }
+        }
+        drop(open);
         Ok(self.results())
     }
 
     /// Checks the arguments of a step, and that all episodes have begun.
-    pub(super) fn check_step(
-        &self,
-        actions: &[f64],
-        active: Option<&[bool]>,
-    ) -> Result<(), EpisodeError> {
+    fn check_step(&self, actions: &[f64], active: Option<&[bool]>) -> Result<(), EpisodeError> {
         let (n, width) = (self.slots.len(), self.rules.n_actions());
         let flags = active.map_or(n, <[bool]>::len);
         check_lengths([("action", actions.len(), n * width), ("active", flags, n)])?;
@@ -351,7 +422,7 @@ impl EpisodeBatch {
     }
 
     /// How the last control periods went.
-    pub(super) fn results(&self) -> Stepped {
+    fn results(&self) -> Stepped {
         let mut results = Stepped::default();
         for (i, slot) in self.slots.iter().flatten().enumerate() {
             let outcome = slot.episode.outcome();

@@ -18,17 +18,20 @@ pub enum Ending {
     StepFailed,
     /// The motors have used up the battery.
     BatteryEmpty,
+    /// The rover that was held has come free.
+    Free,
 }
 
 impl Ending {
     /// All, by their code.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::None,
         Self::Goal,
         Self::RollOver,
         Self::HighCentred,
         Self::StepFailed,
         Self::BatteryEmpty,
+        Self::Free,
     ];
 
     /// Its name; empty while the episode runs.
@@ -41,6 +44,7 @@ impl Ending {
             Self::HighCentred => "high_centred",
             Self::StepFailed => "step_failed",
             Self::BatteryEmpty => "battery_empty",
+            Self::Free => "free",
         }
     }
 
@@ -50,9 +54,15 @@ impl Ending {
         self != Self::None
     }
 
-    /// Whether it has ended in any other way than at the goal.
+    /// Whether it has ended at the goal, or free.
+    #[must_use]
+    pub fn is_success(self) -> bool {
+        matches!(self, Self::Goal | Self::Free)
+    }
+
+    /// Whether it has ended in any other way.
     #[must_use]
     pub fn is_failure(self) -> bool {
-        !matches!(self, Self::None | Self::Goal)
+        self.is_end() && !self.is_success()
     }
 }

@@ -46,6 +46,9 @@ pub enum EpisodeError {
         /// Which rover.
         index: usize,
     },
+    /// A rover that somebody else is stepping.
+    #[error("a rover is being stepped by another call")]
+    Busy,
     /// A given state whose observation is not finite in float32.
     #[error("q: with v and goal, must give an observation that is finite in float32")]
     NotObservable,

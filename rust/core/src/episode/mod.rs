@@ -10,8 +10,7 @@
 //! - [`rules`]: what all episodes of a task share; [`beginning`]: how one begins, in a scene that
 //!   is drawn ([`crate::draw`]); [`setting`]: what was drawn for it;
 //! - [`running`]: one episode and its control period;
-//! - [`batch`]: many rovers side by side, each with its episode; [`autoreset`]: a step in which the
-//!   next episodes begin, too.
+//! - [`batch`]: many rovers side by side, each with its episode.
 //!
 //! # One call
 //!
@@ -39,7 +38,6 @@
 //! [`crate::draw`].
 
 pub mod action;
-pub mod autoreset;
 pub mod batch;
 pub mod beginning;
 mod control_period;
@@ -55,8 +53,7 @@ pub mod rules;
 pub mod running;
 pub mod setting;
 
-pub use autoreset::{Autoreset, Succession};
-pub use batch::{EpisodeBatch, Final, Stepped};
+pub use batch::{EpisodeBatch, SharedRover, StepAmong, Stepped};
 pub use beginning::{Beginning, EpisodeDistribution};
 pub use control_period::Origin;
 pub use ending::Ending;

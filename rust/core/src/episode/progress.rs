@@ -22,12 +22,16 @@ pub struct Progress {
     pub stuck_time: f64,
     /// How many goals have been reached.
     pub reached: usize,
+    /// Where the episode began, (x, z), m.
+    pub start: [f64; 2],
+    /// Horizontal distance from there, m.
+    pub away: f64,
 }
 
 impl Progress {
-    /// At the beginning, at a distance (m) from the goal.
+    /// At the beginning at a place (x, z), at a distance from the goal, m.
     #[must_use]
-    pub fn begin(distance: f64, n_actions: usize) -> Self {
+    pub fn begin(start: [f64; 2], distance: f64, n_actions: usize) -> Self {
         Self {
             distance,
             previous_action: vec![0.0; n_actions],
@@ -35,6 +39,8 @@ impl Progress {
             energy_positive: 0.0,
             stuck_time: 0.0,
             reached: 0,
+            start,
+            away: 0.0,
         }
     }
 

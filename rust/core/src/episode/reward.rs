@@ -2,14 +2,14 @@
 //!
 //! | term | quantity |
 //! |---|---|
-//! | `progress` | approach to the goal, m |
+//! | `progress` | approach to the goal, or way from where the rover was held, m |
 //! | `time` | the period dt, s |
 //! | `energy` | work of the wheel motors, driving or braking, J |
 //! | `slip` | mean slip ratio of the wheels in contact, times dt |
 //! | `tilt` | `1 - cos(tilt)` of the trunk, times dt |
 //! | `torque_change` | mean square over the wheels of the change of the torque's action |
 //! | `steering_change` | the same over the steering joints, of the steering's |
-//! | `success` | 1 in the period that reaches the goal |
+//! | `success` | 1 in the period that reaches the goal or comes free |
 //! | `failure` | 1 in a period that ends in failure |
 //!
 //! The quantities are bounded, whatever the physics did, by [`MOST_PROGRESS`], [`MOST_WORK`],
@@ -96,7 +96,7 @@ pub fn terms(weights: &Weights, earned: &PeriodReward<'_>) -> [f64; N_TERMS] {
         tilt * within(1.0 - now.cos_tilt, MOST_RATIO) * dt,
         mean_change(torque_change, 0),
         mean_change(steering_change, 1),
-        success * one_if(earned.ending == Ending::Goal) + 0.0, // no negative zero
+        success * one_if(earned.ending.is_success()) + 0.0, // no negative zero
         failure * one_if(earned.ending.is_failure()) + 0.0,
     ];
     if earned.ending == Ending::StepFailed {

@@ -41,6 +41,9 @@ pub struct Settings {
     /// Work of the motors, driving or braking, after which the battery is empty, J; None without
     /// one.
     pub battery: Option<f64>,
+    /// Distance from where an episode began at which the rover is free: the episode ends, and
+    /// progress is measured from there; None where it is not held.
+    pub free_distance: Option<f64>,
 }
 
 impl Settings {
@@ -174,6 +177,7 @@ impl Rules {
         let numbers = [
             positive("dt", settings.dt),
             positive("battery", settings.battery.unwrap_or(1.0)),
+            positive("free_distance", settings.free_distance.unwrap_or(1.0)),
             (
                 "goals",
                 settings.goals as f64,
@@ -296,7 +300,7 @@ impl Rules {
     }
 
     /// The ending after a control period: a failed step takes precedence, then the goal, then
-    /// rolling over, high-centring and the battery.
+    /// rolling over, high-centring, the battery and coming free.
     #[must_use]
     pub fn ending(&self, now: &Quantities, progress: &Progress, has_failed: bool) -> Ending {
         let settings = &self.settings;
@@ -310,6 +314,8 @@ impl Rules {
             Ending::HighCentred
         } else if (settings.battery).is_some_and(|battery| progress.energy >= battery) {
             Ending::BatteryEmpty
+        } else if (settings.free_distance).is_some_and(|free| progress.away >= free) {
+            Ending::Free
         } else {
             Ending::None
         }

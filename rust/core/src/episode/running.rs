@@ -13,6 +13,7 @@ use super::quantities::Quantities;
 use super::reward::{PeriodReward, squared_changes, terms};
 use super::rules::Rules;
 use super::setting::Setting;
+use crate::scalar::elementary::hypot;
 use crate::simulation::{CommandError, ReadingScratch, RoverSimulation, seen_from};
 
 /// A control period seen from its end.
@@ -79,7 +80,7 @@ impl Episode {
         rover.read_state(setting.goal, &mut scratch, &mut reading);
         rover.read_heights(&rules.settings().scan, &mut heights);
         let now = Quantities::of(&reading[rules.places().scalars.clone()]);
-        let progress = Progress::begin(now.distance, rules.n_actions());
+        let progress = Progress::begin([reading[0], reading[2]], now.distance, rules.n_actions());
         let mut observation = vec![0.0; rules.size()];
         let known = (&setting, &progress);
         let is_finite = write_state(&rules, &reading, known, normals, &mut observation)
@@ -134,6 +135,9 @@ impl Episode {
             ("energy", progress.energy),
             ("energy_positive", progress.energy_positive),
             ("stuck_time", progress.stuck_time),
+            ("start", progress.start[0]),
+            ("start", progress.start[1]),
+            ("away", progress.away),
         ];
         let entries = (progress.previous_action.iter()).map(|&a| ("previous_action", a));
         let seen = observation.iter().map(|&x| ("observation", f64::from(x)));
@@ -243,7 +247,7 @@ impl Episode {
         if !is_readable {
             now.distance = self.progress.distance;
         }
-        let approach = self.progress.distance - now.distance;
+        let mut approach = self.progress.distance - now.distance;
         let changes = squared_changes(
             period.action,
             &self.progress.previous_action,
@@ -253,6 +257,11 @@ impl Episode {
         (self.progress).advance(period.action, &now, dt, self.setting.trunk_load_limit);
 
         if is_readable && !period.has_failed {
+            let ([x, z], before) = (self.progress.start, self.progress.away);
+            self.progress.away = hypot(reading[0] - x, reading[2] - z);
+            if rules.settings().free_distance.is_some() {
+                approach = self.progress.away - before;
+            }
             now.distance = reach(rules, &self.setting, &mut self.progress, reading);
         }
 

@@ -2,12 +2,12 @@
 //! with their stops.
 //!
 //! A wheel with one circle, a thin disc or a torus, has three slots: most touch the plane or a
-//! sphere, some both or two spheres. A wheel with two circles has four: one for each circle on the
-//! plane, and two for spheres. A slot is filled lane by lane; rovers that share it may touch
-//! different things there. Detection at the midpoint of the step and relocation to its end follow
-//! [`crate::contact`] and [`crate::geometry::query`]. With the unit normal n, the unit axle s and
-//! the rolling direction `t = n × s / |n × s|`, the lowest point of a circle over a plane lies
-//! along `t × s` from its centre.
+//! sphere, some both or two spheres. A wheel with two circles has four, of which each circle on the
+//! plane has its own and spheres take the free ones. A slot is filled lane by lane; rovers that
+//! share it may touch different things there. Detection at the midpoint of the step and relocation
+//! to its end follow [`crate::contact`] and [`crate::geometry::query`]. With the unit normal n, the
+//! unit axle s and the rolling direction `t = n × s / |n × s|`, the lowest point of a circle over a
+//! plane lies along `t × s` from its centre.
 //!
 //! What is rare is found lane by lane (`lane_detection`): a wheel that nearly lies flat, passes a
 //! sphere within the step, touches more things than it has slots, or an edge of a surface, and a
@@ -636,11 +636,7 @@ impl<T: Lane> Contacts<T> {
         let motion = half_way.norm();
         let wheel = &self.parts.wheels[w];
         let twist = self.twists[wheel.carrier];
-        // Those before are for the circles on the plane.
-        let mut slots = wheel.slots.clone();
-        if wheel.n_circles() > 1 {
-            slots.start += 2;
-        }
+        let slots = wheel.slots.clone();
         let mut fallbacks = T::mask(self.token, 0);
         for sphere in ground.near_wheel(w) {
             let offset = sphere.centre - sight.middle.origin - centre;

@@ -22,7 +22,7 @@ const DEFINITE: f64 = 1e-3;
 /// Where a solver gets its problems and leaves their answers.
 pub(super) trait ProblemSource {
     /// Index of the next problem.
-    fn next(&mut self, problems: &[ContactProblem]) -> Option<usize>;
+    fn next(&mut self) -> Option<usize>;
 
     /// A problem has ended.
     fn end(&mut self, index: usize);
@@ -213,7 +213,7 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
             let mut new = std::mem::take(&mut self.again);
             let mut idle = ((1_u32 << T::LANES) - 1) & !self.active & !new;
             while idle != 0 {
-                let Some(index) = line.next(problems) else {
+                let Some(index) = line.next() else {
                     break;
                 };
                 let lane = idle.trailing_zeros();

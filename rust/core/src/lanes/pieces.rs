@@ -148,7 +148,9 @@ impl<T: Lane> Pieces<T> {
             unknown &= unknown - 1;
             let terrain = surfaces[lane].as_deref();
             if !terrain.is_some_and(|terrain| self.search(lane, terrain, rim)) {
-                self.forget(lane);
+                if self.within.get(lane) > f64::NEG_INFINITY {
+                    self.forget(lane);
+                }
                 others |= 1 << lane;
             }
         }

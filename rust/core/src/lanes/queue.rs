@@ -21,42 +21,6 @@ pub use super::lane_solver::MAX_ITERATIONS;
 /// Contacts up to which the smaller system serves, that of a rover with six wheels on the plane.
 const FEW: usize = 6;
 
-/// Solves all problems, which have no factors. Up to the list's end each lane has one to work on.
-///
-/// A problem that takes too long, or goes in circles, is tried again from its start with another
-/// `α`. One that resists, or has numbers that are not finite, keeps its starting impulse.
-///
-/// # Panics
-/// If a problem has more contacts than fit.
-pub fn solve_all<T: Lane>(
-    token: T::Token,
-    problems: &mut [ContactProblem],
-    options: &SolverOptions,
-) {
-    let mut most = 0;
-    for problem in problems.iter_mut() {
-        problem.begin();
-        if !problem.is_solved {
-            most = most.max(problem.n_contacts);
-        }
-    }
-    let tolerances = squares::<T>(token, options);
-    if most > 0 {
-        T::vectorize(
-            token,
-            #[inline(always)]
-            || solve_some::<T, FEW>(token, problems, tolerances, 1),
-        );
-    }
-    if most > FEW {
-        T::vectorize(
-            token,
-            #[inline(always)]
-            || solve_some::<T, MAX_DENSE>(token, problems, tolerances, FEW + 1),
-        );
-    }
-}
-
 /// Squares of the tolerances.
 #[inline(always)]
 fn squares<T: Lane>(token: T::Token, options: &SolverOptions) -> [T; 2] {
@@ -91,50 +55,6 @@ impl ContactProblem {
             self.p[..n].fill(0.0);
         }
         self.has_start &= self.start[..n].iter().all(|x| x.is_finite());
-    }
-}
-
-/// Solves the problems of `least` to `C` contacts.
-#[inline(always)]
-fn solve_some<T: Lane, const C: usize>(
-    token: T::Token,
-    problems: &mut [ContactProblem],
-    tolerances: [T; 2],
-    least: usize,
-) {
-    let mut line = List {
-        at: 0,
-        least,
-        most: C,
-    };
-    DenseSolver::<T, C>::new(token).run(token, problems, tolerances, &mut line);
-}
-
-/// The problems of a list with `least` to `most` contacts that are to be solved.
-struct List {
-    at: usize,
-    least: usize,
-    most: usize,
-}
-
-impl ProblemSource for List {
-    #[inline(always)]
-    fn next(&mut self, problems: &[ContactProblem]) -> Option<usize> {
-        let rest = problems.get(self.at..)?;
-        let ahead = rest.iter().position(|problem| {
-            !problem.is_solved && (self.least..=self.most).contains(&problem.n_contacts)
-        })?;
-        let index = self.at + ahead;
-        self.at = index + 1;
-        Some(index)
-    }
-
-    #[inline(always)]
-    fn end(&mut self, _: usize) {}
-
-    #[inline(always)]
-    fn may_leave(&self, _: usize) -> bool {
-        false
     }
 }
 
@@ -190,7 +110,7 @@ struct Waiting<'a> {
 
 impl ProblemSource for Waiting<'_> {
     #[inline(always)]
-    fn next(&mut self, _: &[ContactProblem]) -> Option<usize> {
+    fn next(&mut self) -> Option<usize> {
         self.problems.pop_front()
     }
 
@@ -244,8 +164,12 @@ impl<T: Lane> Queue<T> {
         self.groups.ready.clear();
     }
 
-    /// Enters those problems of a group that `is_asked` names by their place in it. The answers are
-    /// as of [`solve_all`]; the others are left as they are.
+    /// Enters those problems of a group that `is_asked` names by their place in it; the others are
+    /// left as they are.
+    ///
+    /// A problem that takes too long, or goes in circles, is tried again from the impulses of the
+    /// last step with another `α`. One that resists, or has numbers that are not finite, keeps
+    /// those impulses.
     ///
     /// # Panics
     /// If a problem has more contacts than fit, or there are more groups than [`Self::begin`] said.
@@ -302,16 +226,6 @@ impl<T: Lane> Queue<T> {
             }
             self.work(problems, tolerances, kind, n_others);
         }
-    }
-
-    /// Solves problems, a whole number of groups.
-    pub fn solve_all(&mut self, problems: &mut [ContactProblem], options: &SolverOptions) {
-        let n = problems.len() / T::LANES;
-        self.begin(n);
-        for group in 0..n {
-            self.enter(group, problems, |_| true);
-        }
-        while self.next_group(problems, options).is_some() {}
     }
 
     /// Lets one of the solvers work; `n_others`: as of [`Waiting`].

@@ -40,6 +40,8 @@ pub(super) struct VelocitySystem<T: Lane, const C: usize> {
     /// Slots of each lane, and of any.
     slots: [u32; MAX_LANES],
     used: u32,
+    /// Places whose other data in each lane are those of another machine's problem.
+    stale: [u32; MAX_LANES],
     /// `Z` by slot; zero in lanes without a contact there.
     Z: Vec<Columns<T>>,
     q: [Triple<T>; C],
@@ -80,6 +82,9 @@ impl<T: Lane, const C: usize> VelocitySystem<T, C> {
     #[cold]
     fn adopt(&mut self, pattern: &Arc<Pattern>) {
         let zero = self.zero;
+        for (stale, slots) in self.stale.iter_mut().zip(self.slots) {
+            *stale |= slots;
+        }
         (self.slots, self.used) = ([0; MAX_LANES], 0);
         let columns = Columns::new(zero, pattern.stride() - BASE);
         (self.left, self.right) = (columns.clone(), columns.clone());
@@ -296,6 +301,7 @@ impl<T: Lane, const C: usize> Loaded<T, C> for VelocitySystem<T, C> {
             pattern: None,
             slots: [0; MAX_LANES],
             used: 0,
+            stale: [0; MAX_LANES],
             Z: Vec::new(),
             q: [[zero; 3]; C],
             diagonal: [[zero; 9]; C],
@@ -317,19 +323,19 @@ impl<T: Lane, const C: usize> Loaded<T, C> for VelocitySystem<T, C> {
         if let (false, Some(pattern)) = (is_own, &factored.pattern) {
             self.adopt(pattern);
         }
-        let changed = self.slots[lane] | factored.slots;
+        let stale = std::mem::take(&mut self.stale[lane]);
+        let changed = self.slots[lane] | factored.slots | stale;
         self.slots[lane] = factored.slots;
         self.used = self.slots.iter().fold(0, |all, own| all | own);
         for slot in Bits(changed) {
             let own = &mut self.Z[slot];
-            let m = pattern.joints(slot).len();
             let Some(contact) = Self::contact_at(problem, slot) else {
                 for c in 0..3 {
                     for k in 0..BASE {
                         own.base[c][k].set(lane, 0.0);
                     }
                 }
-                for own in own.joints[..m].iter_mut().flatten() {
+                for own in own.joints.iter_mut().flatten() {
                     own.set(lane, 0.0);
                 }
                 for own in &mut self.diagonal[slot] {
@@ -338,6 +344,7 @@ impl<T: Lane, const C: usize> Loaded<T, C> for VelocitySystem<T, C> {
                 self.softness[slot].set(lane, 0.0);
                 continue;
             };
+            let m = pattern.joints(slot).len();
             let z = &factored.Z[contact * pattern.stride()..][..BASE + m];
             for k in 0..BASE {
                 for c in 0..3 {

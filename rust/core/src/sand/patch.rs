@@ -26,9 +26,19 @@ pub struct WheelPose {
     pub axle: Vector3<f64>,
 }
 
-/// Heights of the surface over the plane of a [`Bed`] at a place, m: undisturbed, and as wheels
-/// have left it.
-pub type Relief<'a> = &'a dyn Fn(&Vector3<f64>) -> [f64; 2];
+/// The surface over the plane of a [`Bed`] at a place.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Heights {
+    /// Undisturbed, m.
+    pub virgin: f64,
+    /// As wheels have left it, m.
+    pub left: f64,
+    /// Gradient of `left` against `virgin`, world.
+    pub slope: Vector3<f64>,
+}
+
+/// Heights at a place in the world.
+pub type Relief<'a> = &'a dyn Fn(&Vector3<f64>) -> Heights;
 
 /// The surface of the sand near a wheel.
 #[derive(Clone, Copy)]
@@ -105,8 +115,8 @@ struct Frame<'a> {
 /// Sums of a reaction in the wheel's axes: wrench, and its derivative column by column.
 #[derive(Clone, Copy)]
 struct Sums {
-    wrench: [[f64; MAX_LANES]; 6],
-    slope: [[f64; MAX_LANES]; 36],
+    wrench: [f64; 6],
+    slope: [f64; 36],
     is_touching: bool,
 }
 
@@ -147,8 +157,8 @@ pub fn react_with(
         return reaction;
     }
     let mut sums = Sums {
-        wrench: [[0.0; MAX_LANES]; 6],
-        slope: [[0.0; MAX_LANES]; 36],
+        wrench: [0.0; 6],
+        slope: [0.0; 36],
         is_touching: false,
     };
     match instructions {
@@ -159,15 +169,14 @@ pub fn react_with(
         Instructions::Avx512(token) => frame.sum::<f64x8<_>>(token, &mut sums),
     }
     reaction.is_touching = sums.is_touching;
-    let total = |lanes: &[f64; MAX_LANES]| lanes.iter().sum::<f64>();
-    let of = |k: usize| Vector3::from_fn(|i, _| total(&sums.wrench[3 * k + i]));
+    let of = |k: usize| Vector3::from_fn(|i, _| sums.wrench[3 * k + i]);
     for k in 0..2 {
         let part = frame.axes * of(k);
         reaction.wrench.fixed_rows_mut::<3>(3 * k).copy_from(&part);
     }
     if want != Derivatives::Wrench {
         for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            let part = Matrix3::from_fn(|a, b| total(&sums.slope[6 * (3 * j + b) + 3 * i + a]));
+            let part = Matrix3::from_fn(|a, b| sums.slope[6 * (3 * j + b) + 3 * i + a]);
             let turned = frame.axes * part * frame.axes.transpose();
             let mut place = reaction.slope.fixed_view_mut::<3, 3>(3 * i, 3 * j);
             place.copy_from(&turned);
@@ -243,7 +252,6 @@ impl<'a> Frame<'a> {
             #[inline(always)]
             || {
                 for lanes in 0..MAX_LANES / T::LANES {
-                    let at = lanes * T::LANES..(lanes + 1) * T::LANES;
                     let zero = T::splat(token, 0.0);
                     let mut own = Own {
                         wrench: [zero; 6],
@@ -252,14 +260,16 @@ impl<'a> Frame<'a> {
                     };
                     self.visit_groups(
                         #[inline(always)]
-                        |group| self.add(group, (token, at.start), &mut own),
+                        |group| self.add(group, (token, lanes * T::LANES), &mut own),
                     );
                     sums.is_touching |= own.is_touching;
-                    for (out, own) in sums.wrench.iter_mut().zip(own.wrench) {
-                        own.store(&mut out[at.clone()]);
+                    for (total, own) in sums.wrench.iter_mut().zip(own.wrench) {
+                        add_lanes(total, own);
                     }
-                    for (out, own) in sums.slope.iter_mut().zip(own.slope) {
-                        own.store(&mut out[at.clone()]);
+                    if self.want != Derivatives::Wrench {
+                        for (total, own) in sums.slope.iter_mut().zip(own.slope) {
+                            add_lanes(total, own);
+                        }
                     }
                 }
             },
@@ -371,7 +381,7 @@ impl<'a> Frame<'a> {
             normal: Vec3::new(cos * radial, sin * radial, lanes(&group.axial)),
             area: lanes(&group.area) * per,
         };
-        let (depth, by_depth) = self.depth(elements.r);
+        let (depth, by_place) = self.depth(elements.r);
         let is_under = depth.gt(zero) & elements.area.gt(zero);
         if is_under.any() {
             own.is_touching = true;
@@ -381,7 +391,7 @@ impl<'a> Frame<'a> {
             let depth = T::select(is_under, depth, zero);
             let ends = lanes(&group.end);
             let way = self.way(group.radius, ends, (cos, sin));
-            self.add_pieces(group.skin, &elements, (depth, by_depth, way), own);
+            self.add_pieces(group.skin, &elements, (depth, by_place, way), own);
         }
     }
 
@@ -398,29 +408,31 @@ impl<'a> Frame<'a> {
         way
     }
 
-    /// Depth that counts of pieces at `r` from the centre, m, and its derivative by the depth.
+    /// Depth that counts of pieces at `r` from the centre, m, and its gradient.
     #[inline(always)]
-    fn depth<T: Lane>(&self, r: Vec3<T>) -> (T, T) {
+    fn depth<T: Lane>(&self, r: Vec3<T>) -> (T, Vec3<T>) {
         let number = |value: f64| r.x.like(value);
         let g = Vec3::splat(r.x.token(), self.g.into());
         let mut below = r.dot(g) - number(self.height);
-        let mut slope = number(1.0);
+        let mut gradient = g;
         let Some(relief) = self.bed.relief else {
-            return (below, slope);
+            return (below, gradient);
         };
+        let reload = self.soil.reload;
         for lane in 0..T::LANES {
             let place = self.pose.centre + self.axes * Vector3::from(r.get(lane));
-            let [virgin, left] = relief(&place);
+            let heights = relief(&place);
             let depth = below.get(lane);
-            let (virgin, left) = (depth + virgin, (depth + left) * self.soil.reload);
+            let (virgin, left) = (depth + heights.virgin, (depth + heights.left) * reload);
             if left < virgin {
                 below.set(lane, left);
-                slope.set(lane, self.soil.reload);
+                let steep = (self.g + self.axes.tr_mul(&heights.slope)) * reload;
+                gradient.set(lane, steep.into());
             } else {
                 below.set(lane, virgin);
             }
         }
-        (below, slope)
+        (below, gradient)
     }
 
     #[inline(always)]
@@ -428,7 +440,7 @@ impl<'a> Frame<'a> {
         &self,
         skin: Skin,
         elements: &Elements<T>,
-        (depth, by_depth, arc): (T, T, T),
+        (depth, by_place, arc): (T, Vec3<T>, T),
         own: &mut Own<T>,
     ) {
         let (r, area, token) = (elements.r, elements.area, depth.token());
@@ -451,11 +463,11 @@ impl<'a> Frame<'a> {
         };
         let fresh = area * depth.like(by_memory);
         let memory = stress.by_x.map(|column| column * fresh);
-        let sunk = stress.by_depth * (area * by_depth * depth.like(by_pose));
+        let sunk = stress.by_depth * (area * depth.like(by_pose));
         let [a, b, c] = [
-            memory[0] + sunk * g.x,
-            memory[1] + sunk * g.y,
-            memory[2] + sunk * g.z,
+            memory[0] + sunk * by_place.x,
+            memory[1] + sunk * by_place.y,
+            memory[2] + sunk * by_place.z,
         ];
         // Displacements by a rotation: e × r. The wheel may turn about its axle without a change
         // of depth.
@@ -563,6 +575,16 @@ struct Own<T> {
     wrench: [T; 6],
     slope: [T; 36],
     is_touching: bool,
+}
+
+/// Adds the lanes of a sum one after the other, in the same order for any number of lanes.
+#[inline(always)]
+fn add_lanes<T: Lane>(total: &mut f64, own: T) {
+    let mut lanes = [0.0; MAX_LANES];
+    own.store(&mut lanes[..T::LANES]);
+    for lane in &lanes[..T::LANES] {
+        *total += lane;
+    }
 }
 
 /// Adds a force at r and its moment.

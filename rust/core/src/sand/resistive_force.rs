@@ -129,11 +129,18 @@ pub fn traction<T: Lane>(
     let alpha = flowing.alpha;
     found.alpha = Vec3::select(share.is_felt, alpha * share.value, nothing);
     if wants_slope {
-        let units = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        for (column, unit) in found.slope.iter_mut().zip(units) {
-            let change = Vec3::splat(token, unit);
-            let turned = flowing.changed(seen.changed(change));
-            let slope = turned * share.value + alpha * share.changed(change);
+        // The direction has two ways to turn: in the plane of n and x, and out of it.
+        let inward = flowing.changed(seen.turn);
+        let outward = flowing.changed(seen.side) * share.value;
+        let by_inward = seen.by_inward * share.value;
+        let by_outward = seen.side * seen.by_outward;
+        let columns = [
+            [by_inward.x, by_outward.x, share.slope.x],
+            [by_inward.y, by_outward.y, share.slope.y],
+            [by_inward.z, by_outward.z, share.slope.z],
+        ];
+        for (column, [turn, side, size]) in found.slope.iter_mut().zip(columns) {
+            let slope = inward * turn + outward * side + alpha * size;
             *column = Vec3::select(share.is_felt, slope, nothing);
         }
     }
@@ -177,32 +184,24 @@ impl<T: Lane> Share<T> {
             is_felt: gate.gt(zero) & length.ge(number(TINY)),
         }
     }
-
-    #[inline(always)]
-    fn changed(&self, change: Vec3<T>) -> T {
-        self.slope.dot(change)
-    }
 }
 
 /// The direction that sand sees of a displacement: that along the surface counts at most k times
 /// that along the normal. Of a surface that recedes it is the limit of one that slides.
 struct Seen<T> {
     direction: Vec3<T>,
-    n: Vec3<T>,
-    x_t: Vec3<T>,
-    /// Unit vector along x_t.
-    along: Vec3<T>,
-    /// Part of x_t that counts, and its derivatives by p and |x_t|.
-    share: T,
-    by_p: T,
-    by_t: T,
-    /// `∂p/∂x_n`, and `∂p/∂|x_t|`.
-    p_by_n: T,
-    p_by_t: T,
-    per_size: T,
+    /// Unit vectors to which the direction turns: in the plane of n and x, and out of it.
+    turn: Vec3<T>,
+    side: Vec3<T>,
+    /// Derivatives of the angles by the displacement: a vector, and a factor of `side`.
+    by_inward: Vec3<T>,
+    by_outward: T,
 }
 
 impl<T: Lane> Seen<T> {
+    /// ```text
+    /// v̂ = (p n + s x_t)/√(p² + s² t²),    p = x_n + ψ t,    s = k p/√(k² p² + t²),    t = |x_t|
+    /// ```
     #[inline(always)]
     fn of(n: Vec3<T>, x: Vec3<T>, size: T, (surface, flow): (&Interface, &Flow)) -> Self {
         let number = |value: f64| n.x.like(value);
@@ -211,40 +210,46 @@ impl<T: Lane> Seen<T> {
         let x_n = x.dot(n);
         let x_t = x - n * x_n;
         let t = x_t.norm();
-        let along = x_t * (one / t.max(number(TINY)));
+        let mut along = x_t * (one / t.max(number(TINY)));
+        let has_no_side = t.lt(number(TINY));
+        if has_no_side.any() {
+            along = Vec3::select(has_no_side, perpendicular(n), along);
+        }
         let (p, least) = (x_n + psi * t, size * number(SLIDES));
         let is_ahead = p.gt(least);
         let p = T::select(is_ahead, p, least);
         let kp = k * p;
         let per_q = one / (kp * kp + t * t).sqrt();
         let share = kp * per_q;
-        let by_share = k * per_q * per_q * per_q * t;
         let counted = share * t;
         let per_size = one / (p * p + counted * counted).sqrt();
+        let [d_n, d_t] = [p * per_size, counted * per_size];
+        // Changes of p and of s t with x_n and with t.
+        let by_share = k * per_q * per_q * per_q * t;
+        let p_by_n = T::select(is_ahead, one, zero);
+        let p_by_t = T::select(is_ahead & t.ge(number(TINY)), psi, zero);
+        let counted_by_p = by_share * t * t;
+        let by_n = (d_n * counted_by_p - d_t) * p_by_n;
+        let by_t = d_n * (share + counted_by_p * p_by_t - by_share * p * t) - d_t * p_by_t;
         Self {
-            direction: (n * p + x_t * share) * per_size,
-            n,
-            x_t,
-            along,
-            share,
-            by_p: by_share * t,
-            by_t: -(by_share * p),
-            p_by_n: T::select(is_ahead, one, zero),
-            p_by_t: T::select(is_ahead, psi, zero),
-            per_size,
+            direction: n * d_n + along * d_t,
+            turn: along * d_n - n * d_t,
+            side: n.cross(along),
+            by_inward: (n * by_n + along * by_t) * per_size,
+            by_outward: share * per_size,
         }
     }
+}
 
-    /// Change of the direction with the displacement.
-    #[inline(always)]
-    fn changed(&self, change: Vec3<T>) -> Vec3<T> {
-        let (by_n, by_t) = (self.n.dot(change), self.along.dot(change));
-        let p = self.p_by_n * by_n + self.p_by_t * by_t;
-        let share = self.by_p * p + self.by_t * by_t;
-        let seen = self.n * p + (change - self.n * by_n) * self.share + self.x_t * share;
-        let d = self.direction;
-        (seen - d * d.dot(seen)) * self.per_size
-    }
+/// A unit vector perpendicular to another one.
+#[inline(always)]
+fn perpendicular<T: Lane>(n: Vec3<T>) -> Vec3<T> {
+    let token = n.x.token();
+    let z = Vec3::splat(token, [0.0, 0.0, 1.0]);
+    let x = Vec3::splat(token, [1.0, 0.0, 0.0]);
+    let other = Vec3::select(n.z.abs().lt(n.x.like(0.7)), z, x);
+    let across = n.cross(other);
+    across * (n.x.like(1.0) / across.norm())
 }
 
 /// α of a motion along a unit vector.

@@ -113,6 +113,35 @@ impl Window {
         self.depths.resize(self.size[0] * self.size[1], 0.0);
     }
 
+    /// Without the rows and columns at its edges in which nothing is deeper than the surface.
+    fn trimmed(mut self) -> Self {
+        let width = self.size[0].max(1);
+        let is_deep = |row: &[f64]| row.iter().any(|depth| *depth > 0.0);
+        let mut deep = (0..self.size[1]).filter(|k| is_deep(&self.depths[k * width..][..width]));
+        let Some(top) = deep.next() else {
+            return Self::default();
+        };
+        let rows = top..deep.next_back().unwrap_or(top) + 1;
+        let is_deep = |i: &usize| rows.clone().any(|k| self.depths[k * width + i] > 0.0);
+        let mut deep = (0..width).filter(is_deep);
+        let left = deep.next().unwrap_or(0);
+        let columns = left..deep.next_back().unwrap_or(left) + 1;
+        let n = columns.len();
+        for (to, k) in rows.clone().enumerate() {
+            let from = k * width;
+            let row = from + columns.start..from + columns.end;
+            self.depths.copy_within(row, to * n);
+        }
+        self.depths.truncate(n * rows.len());
+        let start = |first: i32, by: usize| first.saturating_add(i32::try_from(by).unwrap_or(0));
+        self.first = [
+            start(self.first[0], columns.start),
+            start(self.first[1], rows.start),
+        ];
+        self.size = [n, rows.len()];
+        self
+    }
+
     #[inline]
     fn index(&self, i: i32, k: i32) -> Option<usize> {
         let column = usize::try_from(i.wrapping_sub(self.first[0])).ok()?;
@@ -128,14 +157,36 @@ impl Window {
         })
     }
 
-    /// Depth at a place between the centres of its cells, m; none where it does not reach.
+    /// Depths at the four centres around a place, of the nearer row first, m; none where it does
+    /// not reach.
     #[inline]
-    fn depth(&self, (i, k): (i32, i32), (a, b): (f64, f64)) -> Option<f64> {
+    fn corners(&self, (i, k): (i32, i32)) -> Option<[f64; 4]> {
         let (near, last) = (self.index(i, k)?, self.index(i + 1, k + 1)?);
         let z = &self.depths;
-        let near = z[near] * (1.0 - a) + z[near + 1] * a;
-        let far = z[last - 1] * (1.0 - a) + z[last] * a;
-        Some(near * (1.0 - b) + far * b)
+        Some([z[near], z[near + 1], z[last - 1], z[last]])
+    }
+}
+
+/// Depth of a rut at a place, m, and its derivatives along x and z.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Rut {
+    /// m.
+    pub depth: f64,
+    /// Along x and along z.
+    pub slope: [f64; 2],
+}
+
+impl Rut {
+    /// Between the centres of four cells.
+    #[inline]
+    fn between([near, near_next, far, far_next]: [f64; 4], (a, b): (f64, f64), cell: f64) -> Self {
+        let (on_near, on_far) = (near_next - near, far_next - far);
+        let (near, far) = (near + a * on_near, far + a * on_far);
+        let along_x = on_near + b * (on_far - on_near);
+        Self {
+            depth: near + b * (far - near),
+            slope: [along_x / cell, (far - near) / cell],
+        }
     }
 }
 
@@ -227,22 +278,21 @@ impl RutMap {
     /// Depth at a place, m, on a grid with cells of this size, m.
     #[must_use]
     pub fn depth(&self, place: [f64; 2], cell: f64) -> f64 {
-        if self.tiles.is_empty() {
-            return 0.0;
-        }
-        let ((i, k), (a, b)) = between(place, cell);
-        let near = self.at([i, k]) * (1.0 - a) + self.at([i + 1, k]) * a;
-        let far = self.at([i, k + 1]) * (1.0 - a) + self.at([i + 1, k + 1]) * a;
-        near * (1.0 - b) + far * b
+        let (at, part) = between(place, cell);
+        Rut::between(self.corners(at), part, cell).depth
     }
 
-    /// [`Self::depth`] with a window read before.
+    fn corners(&self, (i, k): (i32, i32)) -> [f64; 4] {
+        [[i, k], [i + 1, k], [i, k + 1], [i + 1, k + 1]].map(|cell| self.at(cell))
+    }
+
+    /// The rut at a place, with a window read before.
     #[inline]
     #[must_use]
-    pub fn depth_in(&self, window: &Window, place: [f64; 2], cell: f64) -> f64 {
+    pub fn rut_in(&self, window: &Window, place: [f64; 2], cell: f64) -> Rut {
         let (at, part) = between(place, cell);
-        let depth = window.depth(at, part);
-        depth.unwrap_or_else(|| self.depth(place, cell))
+        let corners = window.corners(at);
+        Rut::between(corners.unwrap_or_else(|| self.corners(at)), part, cell)
     }
 
     /// Reads the depths within `reach` (m, along x and z) of a place into a window; whether there
@@ -253,20 +303,21 @@ impl RutMap {
         }
         let [columns, rows] = around(place, reach, cell);
         window.clear([columns.clone(), rows.clone()]);
-        let mut known: Option<((i32, i32), Option<&Tile>)> = None;
-        let (mut is_rutted, mut next) = (false, 0);
-        for k in rows {
-            for i in columns.clone() {
-                let (key, at) = tile_of([i, k]);
-                let tile = match known {
-                    Some((same, tile)) if same == key => tile,
-                    _ => self.tiles.get(&key),
-                };
-                known = Some((key, tile));
-                let depth = tile.map_or(0.0, |tile| tile[at]);
-                is_rutted |= depth > 0.0;
-                window.depths[next] = depth;
-                next += 1;
+        let (first, width) = (*columns.start(), window.size[0]);
+        let mut is_rutted = false;
+        for (k, row) in rows.zip(window.depths.chunks_exact_mut(width.max(1))) {
+            // The cells of a row that share a tile lie side by side in it.
+            let mut column = 0;
+            while column < width {
+                let offset = i32::try_from(column).unwrap_or(0);
+                let (tile, at) = tile_of([first + offset, k]);
+                let n = (SIDE - at % SIDE).min(width - column);
+                if let Some(tile) = self.tiles.get(&tile) {
+                    let depths = &tile[at..at + n];
+                    row[column..column + n].copy_from_slice(depths);
+                    is_rutted |= depths.iter().any(|depth| *depth > 0.0);
+                }
+                column += n;
             }
         }
         is_rutted
@@ -293,20 +344,25 @@ impl RutMap {
             let (a, b) = (&known[d], &wanted[d]);
             *a.start().min(b.start())..=*a.end().max(b.end())
         });
-        let mut now: Vec<(i32, i32, f64)> = Vec::new();
         let [columns, rows] = all;
-        for k in rows {
-            for i in columns.clone() {
-                let centre = [(f64::from(i) + 0.5) * cell, (f64::from(k) + 0.5) * cell];
+        let mut now = Window::default();
+        now.clear([columns.clone(), rows.clone()]);
+        let (width, mut left) = (now.size[0].max(1), Vec::new());
+        for (k, row) in rows.zip(now.depths.chunks_exact_mut(width)) {
+            let z = (f64::from(k) + 0.5) * cell;
+            for (i, now) in columns.clone().zip(row) {
                 let kept = before.index(i, k).map_or(0.0, |at| before.depths[at]);
-                match depth_at(centre) {
-                    Some(depth) if depth.max(kept) > 0.0 => now.push((i, k, depth.max(kept))),
-                    None if kept > 0.0 => self.deepen([i, k], kept),
-                    _ => {}
+                match depth_at([(f64::from(i) + 0.5) * cell, z]) {
+                    Some(depth) => *now = depth.max(kept),
+                    None if kept > 0.0 => left.push(([i, k], kept)),
+                    None => {}
                 }
             }
         }
-        self.under[wheel] = Window::of(&now);
+        for (place, depth) in left {
+            self.deepen(place, depth);
+        }
+        self.under[wheel] = now.trimmed();
     }
 }
 
@@ -351,8 +407,16 @@ mod tests {
             [0.5, 0.0],
             [0.7, 0.01],
         ] {
-            let found = ruts.depth_in(&window, place, 0.01);
-            assert!((found - ruts.depth(place, 0.01)).abs() < 1e-15);
+            let found = ruts.rut_in(&window, place, 0.01);
+            assert!((found.depth - ruts.depth(place, 0.01)).abs() < 1e-15);
+            for (d, slope) in found.slope.into_iter().enumerate() {
+                let depth_at = |step: f64| {
+                    let mut at = place;
+                    at[d] += step;
+                    ruts.depth(at, 0.01)
+                };
+                assert!((slope - (depth_at(1e-6) - depth_at(-1e-6)) / 2e-6).abs() < 1e-6);
+            }
         }
         assert!(!ruts.read([0.5, 0.2], [0.03; 2], 0.01, &mut window));
     }

@@ -3,15 +3,12 @@
 //! Rovers share models and terrains and nothing else. They never wait for each other, and their
 //! motion depends neither on the number of rovers nor on the number of threads.
 
-use rayon::ThreadPool;
-
 use super::error::BatchError;
 use super::reading::{ReadingLayout, ReadingRequest, ReadingScratch};
-use super::rover::{Placement, RoverSimulation};
-use super::turns::{Done, Turn, Worker, take_turns};
+use super::rover::RoverSimulation;
+use super::turns::{Done, Turn, Workers};
 use crate::integrator::StepError;
 use crate::multibody::Model;
-use crate::pool::Pool;
 
 /// Rovers with the threads that step them.
 pub struct Batch {
@@ -20,10 +17,7 @@ pub struct Batch {
     scan: Vec<[f64; 2]>,
     layout: ReadingLayout,
     errors: Vec<Option<StepError>>,
-    /// The threads besides the caller's; None if it does all the work.
-    pool: Option<Pool>,
-    /// One for each thread.
-    workers: Vec<Worker>,
+    workers: Workers,
 }
 
 impl Batch {
@@ -43,16 +37,10 @@ impl Batch {
             return Err(BatchError::Empty);
         };
         let layout = ReadingLayout::new(first.model(), scan.len());
-        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-        // More threads than rovers would have nothing to do.
-        let threads = threads.unwrap_or_else(cores).clamp(1, rovers.len());
         let batch = Self {
             errors: vec![None; rovers.len()],
             targets: vec![[0.0; 2]; rovers.len()],
-            pool: (threads > 1)
-                .then(|| Pool::start(threads - 1))
-                .transpose()?,
-            workers: (0..threads).map(|_| Worker::default()).collect(),
+            workers: Workers::new(rovers.len(), threads)?,
             rovers,
             scan,
             layout,
@@ -84,7 +72,7 @@ impl Batch {
     /// Threads that step them.
     #[must_use]
     pub fn threads(&self) -> usize {
-        self.workers.len()
+        self.workers.count()
     }
 
     /// Layout of the rows of readings.
@@ -113,41 +101,6 @@ impl Batch {
         self.targets[index] = target;
         self.errors[index] = None;
         Ok(())
-    }
-
-    /// Lets a rover begin anew, see [`RoverSimulation::begin`]; `target` (x, z, m) is the target of
-    /// its readings.
-    ///
-    /// # Errors
-    /// `NoSuchRover`, `Differs`, `Options`; nothing is changed then.
-    ///
-    /// # Panics
-    /// If the sizes of the state do not fit the model.
-    pub fn begin(
-        &mut self,
-        index: usize,
-        placement: Placement,
-        target: [f64; 2],
-    ) -> Result<(), BatchError> {
-        let len = self.rovers.len();
-        if index >= len {
-            return Err(BatchError::NoSuchRover { index, len });
-        }
-        self.fits(index, &placement.scene.model)?;
-        let begun = self.rovers[index].begin(placement);
-        begun.map_err(|error| BatchError::Options { index, error })?;
-        self.targets[index] = target;
-        self.errors[index] = None;
-        Ok(())
-    }
-
-    /// The threads that help the caller's, for other work on the rovers; none where that one does
-    /// all the work.
-    ///
-    /// # Errors
-    /// `Threads`, as [`Self::step`].
-    pub fn pool(&mut self) -> Result<Option<&ThreadPool>, BatchError> {
-        Ok(self.pool.as_mut().map(Pool::of_this_process).transpose()?)
     }
 
     /// Gives every rover its commands, takes `n` steps and writes the readings (n_rovers × size of
@@ -198,7 +151,7 @@ impl Batch {
             assert_eq!(active.len(), self.rovers.len(), "one flag a rover");
         }
         let is_active = |index: usize| active.is_none_or(|active| active[index]);
-        let pool = self.pool.as_mut().map(Pool::of_this_process).transpose()?;
+        self.workers.pool()?;
         give_commands(&mut self.rovers, torques, set_points, is_active)?;
         let places = rows.chunks_exact_mut(width).zip(&self.targets).enumerate();
         let mut places: Vec<_> = places
@@ -211,31 +164,7 @@ impl Batch {
         let turn = ReadingTurn { scan: &self.scan };
         let rovers = self.rovers.iter_mut().zip(&mut self.errors);
         let slots = rovers.zip(&mut places);
-        take_turns(slots, n, &turn, &mut self.workers, pool, go_on);
-        Ok(())
-    }
-
-    /// Gives every rover its turn of `n` steps with its place in `places`; `go_on` as for
-    /// [`Self::step_while`].
-    ///
-    /// # Errors
-    /// `Threads`, as [`Self::step`]. No rover has moved then.
-    ///
-    /// # Panics
-    /// If there are not as many places as rovers.
-    pub fn take_turns<P: Send>(
-        &mut self,
-        places: &mut [P],
-        n: usize,
-        turn: &impl Turn<P>,
-        go_on: &mut dyn FnMut() -> bool,
-    ) -> Result<(), BatchError> {
-        assert_eq!(places.len(), self.rovers.len(), "one place a rover");
-        let pool = self.pool.as_mut().map(Pool::of_this_process).transpose()?;
-        let rovers = self.rovers.iter_mut().zip(&mut self.errors);
-        let slots = rovers.zip(places);
-        take_turns(slots, n, turn, &mut self.workers, pool, go_on);
-        Ok(())
+        self.workers.take_turns(slots, n, &turn, go_on)
     }
 
     /// Writes the current readings, without a step.

@@ -204,16 +204,14 @@ impl<T: Lane> Lanes<T> {
         }
         let n_slots = self.slots.len().next_multiple_of(T::LANES);
         self.slots.resize(n_slots, None);
-        if !self
-            .machine
-            .as_ref()
-            .is_some_and(|own| Arc::ptr_eq(own, &machine))
-        {
-            self.machine = Some(Arc::clone(&machine));
+        let is_own = |own: &Arc<Machine>| Arc::ptr_eq(own, &machine) || **own == *machine;
+        if !self.machine.as_ref().is_some_and(is_own) {
+            self.machine = None;
             self.blocks.clear();
         }
+        let own = self.machine.get_or_insert(machine);
         while self.blocks.len() < n_slots / T::LANES {
-            self.blocks.push(Block::new(self.token, &machine));
+            self.blocks.push(Block::new(self.token, own));
         }
         if self.problems.len() < n_slots {
             self.problems.resize_with(n_slots, ContactProblem::default);

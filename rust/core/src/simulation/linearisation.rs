@@ -65,7 +65,7 @@ impl RoverSimulation {
     /// Derivatives of the next step by state, command and `parameters`; nothing changes.
     ///
     /// `perturbation`: size of the changes of a check by real steps, m, rad, m/s, rad/s; 1000 times
-    /// as many N m. None without a check, which takes a hundred times as long as the rest.
+    /// as many N m. None without a check, which takes ten times as long as the rest.
     ///
     /// # Errors
     /// See [`LinearisationError`].

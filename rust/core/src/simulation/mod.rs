@@ -84,4 +84,4 @@ pub use scene::{DenseOperator, QuickStep, Scene, SceneKey, SceneScratch, Snapsho
 pub use state::State;
 pub use step_parameter::StepParameter;
 pub use stepping::Simulation;
-pub use turns::{Done, Turn};
+pub use turns::{Done, Turn, Workers};

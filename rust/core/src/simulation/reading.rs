@@ -5,7 +5,6 @@ use std::ops::Range;
 use nalgebra::Vector3;
 
 use super::rover::RoverSimulation;
-use super::rover_contacts::WheelForces;
 use super::rover_sand::{SLIP_SPEED, WheelContactInSand};
 use crate::contact::{Part, WheelGaps};
 use crate::geometry::Terrain;
@@ -146,7 +145,7 @@ impl Row<'_> {
 #[derive(Debug, Default)]
 pub struct ReadingScratch {
     gaps: WheelGaps,
-    forces: WheelForces,
+    forces: Vec<[f64; 3]>,
     /// Room for the numbers of a reader.
     pub numbers: Vec<f64>,
 }
@@ -224,9 +223,8 @@ impl RoverSimulation {
         for (touch, gap) in touch.iter_mut().zip(gaps) {
             *touch = f64::from(u8::from(*gap <= CONTACT_GAP));
         }
-        scratch.forces.sum(self);
-        scratch.forces.add_sand(&in_sand);
-        let forces = &scratch.forces.along;
+        self.sum_wheel_forces(&in_sand, &mut scratch.forces);
+        let forces = &scratch.forces;
         row.put(forces.iter().map(|force| force[0]));
         row.put(forces.iter().flat_map(|force| [force[1], force[2]]));
         let normal = ground_normal(&**self.terrain(), x, z).unwrap_or_default();

@@ -11,10 +11,12 @@ use std::time::Duration;
 
 use rayon::ThreadPool;
 
+use super::error::BatchError;
 use super::lane_batch::{BatchRover, LaneBatch};
 use super::reading::ReadingScratch;
 use super::rover::RoverSimulation;
 use crate::integrator::StepError;
+use crate::pool::Pool;
 use crate::scalar::{Instructions, MAX_LANES};
 
 /// Interval at which the calling thread asks whether to continue while others still step.
@@ -48,7 +50,7 @@ pub struct Done<'a> {
 }
 
 /// A rover with its data.
-pub(super) type Slot<'a, P> = (
+pub type Slot<'a, P> = (
     (&'a mut RoverSimulation, &'a mut Option<StepError>),
     &'a mut P,
 );
@@ -58,7 +60,7 @@ pub(super) type Slot<'a, P> = (
 const GROUP: usize = 32;
 
 /// What a thread needs for the turns of its rovers. Holds no state between calls.
-pub(super) struct Worker {
+struct Worker {
     batch: LaneBatch,
     reading: ReadingScratch,
 }
@@ -72,11 +74,68 @@ impl Default for Worker {
     }
 }
 
+/// The threads that step rovers.
+pub struct Workers {
+    /// Those besides the caller's; None if it does all the work.
+    pool: Option<Pool>,
+    /// One for each thread.
+    workers: Vec<Worker>,
+}
+
+impl Workers {
+    /// For a number of rovers; `threads`: None for one per core.
+    ///
+    /// # Errors
+    /// `Threads`.
+    pub fn new(n_rovers: usize, threads: Option<usize>) -> Result<Self, BatchError> {
+        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+        // More threads than rovers would have nothing to do.
+        let threads = threads.unwrap_or_else(cores).clamp(1, n_rovers.max(1));
+        let pool = (threads > 1).then(|| Pool::start(threads - 1));
+        Ok(Self {
+            pool: pool.transpose()?,
+            workers: (0..threads).map(|_| Worker::default()).collect(),
+        })
+    }
+
+    /// How many there are.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.workers.len()
+    }
+
+    /// The threads that help the caller's, for other work on the rovers; none where that one does
+    /// all the work.
+    ///
+    /// # Errors
+    /// `Threads`: in a process forked from the one that made them, they could not be started anew.
+    pub fn pool(&mut self) -> Result<Option<&ThreadPool>, BatchError> {
+        Ok(self.pool.as_mut().map(Pool::of_this_process).transpose()?)
+    }
+
+    /// Gives every rover its turn of `n` steps. Once `go_on` returns false, each rover stops after
+    /// a whole step.
+    ///
+    /// # Errors
+    /// As [`Self::pool`]. No rover has moved then.
+    pub fn take_turns<'a, P: Send + 'a>(
+        &mut self,
+        slots: impl ExactSizeIterator<Item = Slot<'a, P>> + Send,
+        n: usize,
+        turn: &impl Turn<P>,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<(), BatchError> {
+        let pool = self.pool.as_mut().map(Pool::of_this_process).transpose()?;
+        take_turns(slots, n, turn, &mut self.workers, pool, go_on);
+        Ok(())
+    }
+}
+
 /// Gives every rover its turn of `n` steps.
 ///
 /// `workers`: one for each thread, at least one; `pool`: the threads besides the calling one. Once
 /// `go_on` returns false, each rover stops after a whole step.
-pub(super) fn take_turns<'a, P: Send + 'a>(
+fn take_turns<'a, P: Send + 'a>(
     slots: impl ExactSizeIterator<Item = Slot<'a, P>> + Send,
     n: usize,
     turn: &impl Turn<P>,

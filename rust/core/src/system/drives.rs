@@ -119,6 +119,7 @@ impl<T: Lane> Drives<T> {
 
     /// Stiffness of a joint in all, N m/rad or N/m.
     #[inline(always)]
+    #[must_use]
     pub fn stiffness(&self, joint: usize) -> T {
         self.joints[joint].stiffness
     }

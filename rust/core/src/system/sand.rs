@@ -152,11 +152,9 @@ impl SandContact {
     }
 
     /// `M += h Σ Jᵀ C J`.
-    pub(crate) fn add_to_mass(&self, model: &Model, h: f64, mass: &mut MassMatrix<f64>) {
-        for patch in self.patches.iter().filter(|patch| patch.is_touching) {
-            mass.add_quadratic(model.mechanism(), &patch.path, |i, j| {
-                h * patch.columns[i].dot(&(patch.tangent * patch.columns[j]))
-            });
+    pub(crate) fn add_to_mass(&mut self, model: &Model, h: f64, mass: &mut MassMatrix<f64>) {
+        for patch in self.patches.iter_mut().filter(|patch| patch.is_touching) {
+            patch.add_to_mass(model, h, mass);
         }
     }
 

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use crate::geometry::{SoftLayer, Tangent};
-use crate::multibody::{Factor, Kinematics, Model};
-use crate::sand::patch::Relief;
+use crate::multibody::{Factor, Kinematics, MassMatrix, Model};
+use crate::sand::patch::{Heights, Relief};
+use crate::sand::ruts::Rut;
 use crate::sand::{
     Bed, Derivatives, Memory, Reaction, Rules, RutMap, SandWheel, Twist, WheelInSand, WheelPose,
     Window, react,
@@ -27,6 +28,9 @@ const LOCALLY_SETTLED: f64 = 5e-2;
 /// Most evaluations of the force in a wheel's own problem. With 12 a twentieth of the steps under
 /// torques that jump was repeated until the limit, and the mean step took twice as many.
 const MOST_EVALUATIONS: usize = 30;
+
+/// Part of the gain of a linear problem that a step must bring.
+const LEAST_GAIN: f64 = 1e-2;
 
 /// Factor by which a step that does not bring it nearer is shortened.
 const SHORTER: f64 = 0.5;
@@ -85,8 +89,9 @@ pub(super) struct Patch {
     pub(super) at: Vector6<f64>,
     pub(super) force: Vector6<f64>,
     pub(super) tangent: Matrix6<f64>,
-    /// Columns along the path, for its compliance.
+    /// Columns along the path, for its compliance, and the products of the tangent with them.
     rows: Vec<[f64; 6]>,
+    stiff: Vec<Vector6<f64>>,
     /// Whether the force is to be evaluated at the velocity before the step.
     pub(super) is_stale: bool,
     /// Twist and force of the last linearisation in this step.
@@ -111,6 +116,7 @@ impl Patch {
             body,
             columns: vec![Vector6::zeros(); path.len()],
             rows: vec![[0.0; 6]; path.len()],
+            stiff: vec![Vector6::zeros(); path.len()],
             path,
             pose: WheelPose {
                 centre: Vector3::zeros(),
@@ -273,7 +279,7 @@ impl Patch {
                 let found = self.evaluate(step, place, &(best.at - way * share));
                 let left = residual(&found);
                 evaluations += 1;
-                if length(&left) < (1.0 - 0.1 * share) * length(&rest) {
+                if length(&left) < (1.0 - LEAST_GAIN * share) * length(&rest) {
                     (best, rest) = (found, left);
                     break;
                 }
@@ -306,6 +312,16 @@ impl Patch {
             }
         }
         self.last = Some((self.at, self.force));
+    }
+
+    /// `M += h Jᵀ C J`.
+    pub(super) fn add_to_mass(&mut self, model: &Model, h: f64, mass: &mut MassMatrix<f64>) {
+        for (stiff, column) in self.stiff.iter_mut().zip(&self.columns) {
+            *stiff = self.tangent * column * h;
+        }
+        mass.add_quadratic(model.mechanism(), &self.path, |i, j| {
+            self.columns[i].dot(&self.stiff[j])
+        });
     }
 
     /// The linearised force at a twist.
@@ -360,11 +376,15 @@ impl Patch {
                 height.map_or(0.0, |y| plane + n.y * (y - x.y))
             };
             let rut = if is_rutted {
-                place.ruts.depth_in(&self.window, [x.x, x.z], cell)
+                place.ruts.rut_in(&self.window, [x.x, x.z], cell)
             } else {
-                0.0
+                Rut::default()
             };
-            [over, over - n.y * rut]
+            Heights {
+                virgin: over,
+                left: over - n.y * rut.depth,
+                slope: Vector3::new(rut.slope[0], 0.0, rut.slope[1]) * -n.y,
+            }
         };
         let relief: Option<Relief<'_>> = if tangent.is_exact && !is_rutted {
             None

@@ -83,7 +83,7 @@ impl TreeSystem<'_> {
         let mass_matrix = &mut parts.mass_matrix;
         let add = |k, a| mass_matrix.add_to_diagonal(mechanism, k, a);
         (parts.drives).add_implicit(mechanism, step(options), add);
-        if let Some(sand) = &parts.sand {
+        if let Some(sand) = &mut parts.sand {
             sand.add_to_mass(self.model, options.time_step, mass_matrix);
         }
         mass_matrix.factorise(mechanism, &mut parts.factor)

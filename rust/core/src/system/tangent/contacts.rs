@@ -123,7 +123,7 @@ impl<T: Lane> Tangent<T> {
         let trees = [contact.body, body].map(|body| model.bodies()[body].tree);
         if trees[0] != trees[1] {
             let [own, other] = trees.map(|tree| self.poses_end.origin_of(tree));
-            place.x = place.x + (own - other);
+            place.x += own - other;
         }
         place
     }

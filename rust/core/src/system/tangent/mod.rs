@@ -14,7 +14,7 @@
 //! The projection of the position is differentiated in the same way, then the position and what
 //! the energy audit left of the velocity.
 //!
-//! Source: Le Lidec et al. 2024, *End-to-end and highly-efficient differentiable simulation for
+//! Source: Lidec et al. 2024, *End-to-end and highly-efficient differentiable simulation for
 //! robotics* (Simple), arXiv 2409.07107, for the residuals by the recursive Newton–Euler algorithm.
 //!
 //! - `direction`: what varies; `held_tree`: what a step held; `contacts`: their places and

@@ -7,7 +7,8 @@
 
 use nalgebra::Vector3;
 
-use super::neighbourhood::{OFF, ROUNDING};
+use super::neighbourhood::ROUNDING;
+use super::wheel::OFF;
 use super::{Half, HeightField, narrow};
 use crate::geometry::shape::Disc;
 use crate::geometry::terrain::surface::{Edge, LEAN, Wall};
@@ -99,6 +100,18 @@ impl HeightField {
             }
         }
         Some(ahead)
+    }
+
+    /// Distance of a cell from a disc's plane, m; `rises`: of its corners over the first, m.
+    fn beside(&self, disc: &Disc, from: &Vector3<f64>, rises: [f64; 4]) -> f64 {
+        let (s, [dx, dz]) = (&disc.axle, self.spacing);
+        let (x, z) = (s.x * dx, s.z * dz);
+        let (mut nearest, mut furthest) = (f64::INFINITY, f64::NEG_INFINITY);
+        for (level, rise) in [0.0, x, z, x + z].into_iter().zip(rises) {
+            let place = level + s.y * rise - s.dot(from);
+            (nearest, furthest) = (nearest.min(place), furthest.max(place));
+        }
+        nearest.max(-furthest).max(0.0)
     }
 
     fn visit_cell_ahead(

@@ -9,11 +9,16 @@
 //! `u ≥ v` (u, v: shares of the cell along x and z), 1 the other face, 2 the edge along x, 3 that
 //! along z, 4 the diagonal, 5 the vertex. Faces are computed when they are needed, so the map costs
 //! four bytes a height, and a hundredth of that for the bounds of tiles.
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 mod ahead;
+mod cells;
 mod neighbourhood;
 mod pieces;
+mod planes;
 mod terrain;
+mod under_wheel;
+mod wheel;
 
 use std::sync::Arc;
 
@@ -225,17 +230,10 @@ impl HeightField {
     /// Visits the corners (column, row) of the cells that a ball of radius `reach` (m) about
     /// `centre` (world, m) may touch, from above or from within the ground.
     #[inline]
-    pub fn visit_cells(&self, centre: &Vector3<f64>, reach: f64, visit: impl FnMut(usize, usize)) {
-        self.visit_cells_above(centre, reach, f64::NEG_INFINITY, visit);
-    }
-
-    /// The same without cells below the height `floor`, m.
-    #[inline]
-    fn visit_cells_above(
+    pub fn visit_cells(
         &self,
         centre: &Vector3<f64>,
         reach: f64,
-        floor: f64,
         mut visit: impl FnMut(usize, usize),
     ) {
         let Some([columns, rows]) = self.cells_within(centre, [reach; 2]) else {
@@ -255,7 +253,7 @@ impl HeightField {
             if rest < 0.0 {
                 f64::INFINITY
             } else {
-                floor.max(centre.y - rest.sqrt())
+                centre.y - rest.sqrt()
             }
         };
         self.tiles.visit(
@@ -294,11 +292,16 @@ impl HeightField {
 
     /// Height of a corner, m; nan where there is none.
     #[inline]
-    fn corner(&self, [i, j]: Place) -> f64 {
+    fn corner(&self, place: Place) -> f64 {
+        f64::from(self.height_at(place))
+    }
+
+    #[inline]
+    fn height_at(&self, [i, j]: Place) -> f32 {
         let at = |k: isize, n: usize| usize::try_from(k).ok().filter(|&k| k < n);
         match (at(i, self.columns), at(j, self.rows)) {
-            (Some(i), Some(j)) => f64::from(self.heights[j * self.columns + i]),
-            _ => f64::NAN,
+            (Some(i), Some(j)) => self.heights[j * self.columns + i],
+            _ => f32::NAN,
         }
     }
 

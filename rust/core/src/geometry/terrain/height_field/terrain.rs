@@ -1,7 +1,5 @@
 //! The height field as a terrain.
 
-use std::cell::Cell;
-
 use nalgebra::Vector3;
 
 use super::{Half, HeightField, PIECES, index, narrow, number};
@@ -77,35 +75,23 @@ impl Terrain for HeightField {
     }
 
     fn furthest(&self, n: &Vector3<f64>, centre: &Vector3<f64>, radius: f64) -> f64 {
+        const SIDE_BY_SIDE: usize = 8;
         let [columns, rows] = self.span(centre, radius);
-        let start = n.x * self.origin[0] + n.z * self.origin[1];
         let [along, across] = [n.x * self.spacing[0], n.z * self.spacing[1]];
-        let level = |i: usize, j: usize| start + along * i as f64 + across * j as f64;
-        let furthest = Cell::new(f64::NEG_INFINITY);
-        self.tiles.visit(
-            columns,
-            rows,
-            |tile| {
-                let [w, h] = tile.size.map(|size| size as f64);
-                let rise = (along * w).max(0.0) + (across * h).max(0.0);
-                let [i, j] = tile.first;
-                level(i, j) + rise + n.y * f64::from(tile.highest) > furthest.get()
-            },
-            |[i, j]| {
-                let at = j * self.columns + i;
-                let here = level(i, j);
-                let corners = [
-                    (0, 0.0),
-                    (1, along),
-                    (self.columns, across),
-                    (self.columns + 1, along + across),
-                ];
-                let own =
-                    corners.map(|(k, rise)| here + rise + n.y * f64::from(self.heights[at + k]));
-                furthest.set(own.into_iter().fold(furthest.get(), f64::max));
-            },
-        );
-        furthest.get()
+        let mut furthest = [f64::NEG_INFINITY; SIDE_BY_SIDE];
+        for j in rows[0]..=rows[1] + 1 {
+            let row = &self.heights[j * self.columns..][columns[0]..=columns[1] + 1];
+            let start = n.x * self.origin[0] + n.z * self.origin[1] + across * j as f64;
+            for (k, heights) in row.chunks(SIDE_BY_SIDE).enumerate() {
+                let first = start + along * (columns[0] + k * SIDE_BY_SIDE) as f64;
+                let places = furthest.iter_mut().zip(heights).enumerate();
+                for (i, (furthest, height)) in places {
+                    let own = first + along * i as f64 + n.y * f64::from(*height);
+                    *furthest = if own > *furthest { own } else { *furthest };
+                }
+            }
+        }
+        furthest.into_iter().fold(f64::NEG_INFINITY, f64::max)
     }
 
     fn coverage(&self, centre: &Vector3<f64>, radius: f64) -> Coverage {
