@@ -150,7 +150,11 @@ pub fn report_scene(
 pub fn check_drive(variant: Variant, h: f64) -> (Vector3<f64>, f64, StepReport) {
     let mut q = [0.0; 21];
     q[1] = 0.50;
-    let options = crate::stepping(variant, h);
+    let options = StepOptions {
+        variant,
+        time_step: h,
+        ..StepOptions::default()
+    };
     let mut simulation = simulation(check_machine(), Plane::ground(), options, &q, &[0.0; 21]);
     let mut report = simulation.step(count(2.0, h)).unwrap();
     let start = simulation.state().configuration.position;
