@@ -83,7 +83,10 @@ def public_names() -> Iterator[tuple[str, Any]]:
                 inherited = {one for base in bases for one in {**vars(base), **vars(base).get("__annotations__", {})}}
                 for member in {**vars(thing), **vars(thing).get("__annotations__", {})}:
                     if not member.startswith("_") and member not in inherited:
-                        yield f"{full}.{member}", inspect.getattr_static(thing, member, None)
+                        is_data = member in vars(thing).get(
+                            "__annotations__", {}
+                        )  # a class as a value has no words here
+                        yield f"{full}.{member}", None if is_data else inspect.getattr_static(thing, member, None)
 
 
 def letters(text: str) -> str:

@@ -9,6 +9,7 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from pages import held
 from typer.testing import CliRunner
 
 from rover_gym.cli import app
@@ -252,8 +253,7 @@ def test_a_planar_run_is_plotted_and_replayed(command: str, tmp_path: Path) -> N
     assert drawn == {*PLANAR_DRAWINGS, "overview"}
     page = tmp_path / "page.html"
     assert runner.invoke(app, ["replay", str(recording), "--html", str(page)]).exit_code == 0
-    curves = page.read_text(encoding="utf-8").partition('id="curves">')[2].partition("</script>")[0]
-    charts = json.loads(curves)["charts"]
+    charts = held(page).head["curves"]["charts"]
     assert [chart["unit"] for chart in charts] == ["N", "mm", "mm/s"]
     refused = runner.invoke(app, ["replay", str(recording), "--gltf", str(tmp_path / "run.glb")])
     assert refused.exit_code == 2

@@ -13,8 +13,6 @@ from rover_gym.env.reward_terms import WEIGHTS
 Array = npt.NDArray[np.float64]
 
 FULL = np.array([1.0] * 6 + [0.0] * 6, np.float32)
-#: What no step exceeds.
-MOST = 100.0
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -42,33 +40,6 @@ def test_without_motors_the_torque_is_the_command_at_any_speed() -> None:
         env.step(FULL)
     assert (drive_signs(env.model) * env.simulation.v[env.model.wheel_joint_indices] > 60.0).all()
     np.testing.assert_allclose(env.simulation.motor_torques, env.simulation.wheel_torques, rtol=1e-12)
-
-
-def readings(env: RoverEnv, rng: np.random.Generator, n: int) -> Array:
-    """Readings with numbers of any size where the reward looks, from nothing to what float32 holds."""
-    rows = np.tile(env.simulation.reading(env.goal), (n, 1))
-    places = env.simulation.reading_layout()
-    for name in ("target", "slip_ratio", "work", "positive_work", "speed", "trunk_force", "cos_tilt"):
-        size = rng.uniform(-3.0, 36.0, (n, places[name].stop - places[name].start))
-        rows[:, places[name]] = rng.choice([-1.0, 1.0], size.shape) * 10.0**size
-    return rows
-
-
-@pytest.mark.parametrize("control_frequency", [20.0, 0.05])
-def test_no_step_is_worth_more_than_a_hundred_whatever_the_physics_did(control_frequency: float) -> None:
-    # Returns of -8e12 after an energy that blew up: one such step drowned all that had been learnt.
-    env = RoverEnv(control_frequency=control_frequency)
-    env.reset(seed=0)
-    rng = np.random.default_rng(1)
-    rewards = []
-    for row in readings(env, rng, 300):
-        one = env.progress.changed(distance=10.0 ** rng.uniform(-3.0, 36.0))
-        _, reward, _, info = one.advance(row, rng.choice([-1.0, 1.0], 12))
-        assert sum(info["reward_terms"].values()) == pytest.approx(reward, abs=1e-12)
-        rewards.append(reward)
-    assert np.isfinite(rewards).all()
-    assert np.abs(rewards).max() <= MOST
-    assert np.abs(rewards).max() > 20.0, "the bounds were reached"
 
 
 def test_a_fast_step_is_far_from_the_bounds() -> None:

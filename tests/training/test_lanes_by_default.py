@@ -17,7 +17,7 @@ TRAINING = Path(rover_gym.__file__).parents[2] / "training"
 @pytest.mark.parametrize("name", [name for name, known in ENVIRONMENTS.items() if known.vector_entry_point])
 def test_make_vec_makes_the_vector_of_the_core(name: str) -> None:
     envs = gym.make_vec(name, 64).unwrapped
-    assert type(envs) is RoverVectorEnv
+    assert isinstance(envs, RoverVectorEnv)
     assert envs.batch.episodes.threads == len(os.sched_getaffinity(0))
     assert envs.prototype.simulation.fallback_reason is None
 

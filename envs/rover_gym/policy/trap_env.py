@@ -206,4 +206,5 @@ class RoverTrapEnv(RoverEnv):
 class RoverTrapVectorEnv(RoverVectorEnv):
     """A vector of `RoverTrapEnv` environments that the compiled core steps on several threads; see `RoverVectorEnv`."""
 
+    #: The class of one rover.
     env_class: ClassVar[type[RoverEnv]] = RoverTrapEnv

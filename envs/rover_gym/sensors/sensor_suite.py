@@ -392,6 +392,7 @@ def make_grains_rover(**arguments: Any) -> gym.Env[Any, Any]:
 class RoverGrainsVectorEnv(RoverVectorEnv):
     """A vector of `RoverGrainsEnv` environments; see `RoverVectorEnv`. Their grains are stepped one after the other."""
 
+    #: The class of one rover.
     env_class: ClassVar[type[RoverEnv]] = RoverGrainsEnv
 
 

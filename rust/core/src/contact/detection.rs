@@ -531,6 +531,7 @@ fn visit_nearer(
     let mut ways = WaysOut::default();
     let shallow = OverSurfaces::shallow(shape);
     let is_surface = terrain.has_surface();
+    let is_soft = terrain.soft().is_some();
     let mut ahead = radius;
     if is_surface {
         // The ground under the wheel's lowest point is no nearer than the nearest.
@@ -547,8 +548,7 @@ fn visit_nearer(
                 visit(id, point);
             }
         };
-        let around = Neighbourhood::new(shape, base, ahead);
-        terrain.visit_around(&around, &mut |id, primitive| match primitive {
+        let mut look = |id: u32, primitive: &Primitive| match primitive {
             Primitive::Plane(plane) => {
                 take(id, &dispatch::lowest_on_plane(shape, plane, base));
             }
@@ -566,7 +566,13 @@ fn visit_nearer(
                     }
                 });
             }
-        });
+        };
+        if is_soft {
+            // A wheel's neighbourhood leaves out the sand that it sinks into.
+            terrain.visit_near(&(base + shape.centre()), radius + ahead, &mut look);
+        } else {
+            terrain.visit_around(&Neighbourhood::new(shape, base, ahead), &mut look);
+        }
         let part = OverSurfaces {
             shape,
             terrain,
