@@ -2,7 +2,7 @@
 //!
 //! The state is x = (q, v) in public coordinates, the command u = (wheel torques, steering
 //! set-points). A step is that of [`RoverSimulation::set_state`] followed by one step: it does not
-//! depend on steps before it. [`crate::system::tangent`] differentiates it, eight directions at a
+//! depend on steps before it. `crate::system::tangent` differentiates it, eight directions at a
 //! time where the machine has such registers; the bits are the same with four and with one.
 
 use std::ops::Range;
