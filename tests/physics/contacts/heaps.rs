@@ -36,6 +36,8 @@ fn every_step_of_125_boxes_is_solved() {
 }
 
 /// 22 400 steps; with 3e8 units for up to 100 contacts six of them are not solved.
+/// Ignored because it takes 88 s: `make test-all` runs it, and the test named below, which runs
+/// always, fails for the same defect.
 #[test]
 #[ignore = "tests/physics/contacts/heaps.rs::every_step_of_27_boxes_is_solved_until_they_lie"]
 fn every_step_of_fifty_heaps_is_solved() {
