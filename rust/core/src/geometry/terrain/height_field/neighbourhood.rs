@@ -270,7 +270,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(200))]
+        #![proptest_config(ProptestConfig::with_cases(400))]
         /// A search around a part finds all pieces that it touches, of all that are near.
         #[test]
         fn no_piece_is_left_out_that_a_part_touches(
@@ -278,17 +278,20 @@ mod tests {
             steepness in 0.0..1.0_f64,
             spacing in prop::sample::select(vec![0.05, 0.25]),
             turn in [-0.5..0.5, -3.2..3.2, -0.5..0.5_f64],
+            lean in prop::sample::select(vec![1.0, 1.0, 6.0]),
             (x, z, height) in (-0.1..0.1, -0.1..0.1, -0.02..0.03_f64),
-            reach in 0.0..2e-3_f64,
+            // Within a step, and in a search for the nearest ground.
+            reach in prop_oneof![0.0..2e-3_f64, 0.0..0.4_f64],
         ) {
             #[allow(clippy::cast_possible_truncation)] // a map is single
             let heights = heights.iter().map(|h: &f64| (h * 0.5 * steepness * spacing) as f32);
             let origin = [-10.0 * spacing; 2];
             let field = HeightField::new(heights.collect(), [21, 21], [spacing; 2], origin).unwrap();
-            for shape in shapes(turn) {
+            for shape in shapes([turn[0] * lean, turn[1], turn[2] * lean]) {
                 let low = shape.support(&-Vector3::y());
                 let under = field.height(x + low.x, z + low.z).unwrap();
-                let base = Vector3::new(x, under + height - low.y, z);
+                let above = under + height + 0.8 * reach;
+                let base = Vector3::new(x, above - low.y, z);
                 let part = Neighbourhood::new(&shape, &base, reach);
                 let mut visited = Vec::new();
                 field.visit_around(&part, &mut |id, _| visited.push(id));

@@ -18,9 +18,9 @@ use crate::scalar::{Lane, Vec3};
 const GENTLE: f64 = 2.0;
 pub(super) const OFF: f64 = 1.75;
 
-/// How deep a disc must be to touch a piece beside it, in the distance between them: walls that
-/// lean move the point by less than [`OFF`] depths, and an edge has points beyond its ends that are
-/// less than one depth away.
+/// How deep a disc must be to touch a piece beside it, or how far above, in the distance between
+/// them: walls that lean move the point by less than [`OFF`] gaps, and an edge has points beyond
+/// its ends that are less than one gap away.
 const SHARE: f64 = 0.5;
 
 /// Sine of the angle up to which an axle is level enough: a vertex that pierces the face of the
@@ -164,7 +164,8 @@ impl Wheel<'_> {
             like.like(self.disc.radius),
         );
         let beside = (beside - like.like(self.rounding)).max(zero);
-        let least = like.like(self.reach() + ROUNDING) - like.like(SHARE) * beside;
+        let (reach, depth) = (like.like(self.reach() + ROUNDING), like.like(SHARE) * beside);
+        let least = T::select(depth.le(reach), reach, like.like(ROUNDING) - depth);
         let never = zero.lt(zero);
         let mut circle = Circle {
             lows: [from; 4],
