@@ -77,11 +77,15 @@ stub: $(STAMPS)/test $(STAMPS)/core ## write the compiled module's docstrings in
 	$(BIN)/python rust/python/stub.py
 	$(BIN)/ruff format --quiet envs/rover_gym/_core.pyi
 
+# Properties are tried on the same cases in every fast run, and on new ones in a run of all tests.
+SAME_CASES = $(if $(filter all,$(TIER)),,PROPTEST_RNG_SEED=1)
+SAME_DRAWS = $(if $(filter all,$(TIER)),,--hypothesis-seed=1)
+
 test-rust: $(STAMPS)/core ## the Rust tests only (of tier all with checks of arithmetic)
-	$(if $(filter all,$(TIER)),CARGO_PROFILE_DEV_DEBUG_ASSERTIONS=true CARGO_PROFILE_DEV_OVERFLOW_CHECKS=true) $(CARGO) test --workspace --tests --locked --quiet -- $(if $(filter all,$(TIER)),--include-ignored)
+	$(if $(filter all,$(TIER)),CARGO_PROFILE_DEV_DEBUG_ASSERTIONS=true CARGO_PROFILE_DEV_OVERFLOW_CHECKS=true) $(SAME_CASES) $(CARGO) test --workspace --tests --locked --quiet -- $(if $(filter all,$(TIER)),--include-ignored)
 
 test-python: $(STAMPS)/test $(STAMPS)/core $(STAMPS)/fmu $(STAMPS)/debian-demo $(STAMPS)/debian-test ## the Python tests only, and the longest ten
-	$(BIN)/pytest --numprocesses auto --tier $(TIER) --durations 10
+	$(BIN)/pytest --numprocesses auto --tier $(TIER) --durations 10 $(SAME_DRAWS)
 
 same-bits: $(STAMPS)/test $(MODULE) ## compare the bits of the development build and of the build that is shipped with the committed ones
 	$(MAKE) --no-print-directory $(STAMPS)/core
