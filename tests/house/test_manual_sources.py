@@ -85,3 +85,24 @@ def test_every_command_and_option_has_its_row(extension: Callable[[str], ModuleT
         shown = [one for one in command.params if not getattr(one, "hidden", False)]
         names = [one.opts[0] if one.opts[0].startswith("-") else one.metavar or one.opts[0] for one in shown]
         assert [name for name in names if not any(name in row for row in rows)] == []
+
+
+PAGES = [*(path for path in DOCS.rglob("*.md") if "_generated" not in path.parts), *DOCS.parent.glob("*.md")]
+
+FILE = re.compile(r"`((?:\.github|docs|envs|packaging|rust|tests|training)/[\w./-]+)`")
+
+
+def test_a_page_names_files_that_exist() -> None:
+    """A page went on naming a test file that had been merged into another."""
+    named = [(page.name, name) for page in PAGES for name in FILE.findall(page.read_text(encoding="utf-8"))]
+    assert len(named) > 50
+    assert not [
+        (page, name) for page, name in named if not re.search("NAME|FILE", name) and not (DOCS.parent / name).exists()
+    ]
+
+
+def test_the_rule_of_a_table_has_a_line_of_its_own() -> None:
+    """A table was printed as running text, since its rule stood at the end of its header."""
+    assert [
+        page.name for page in PAGES if re.search(r"^\|.*[^|\s-].*\|---", page.read_text(encoding="utf-8"), re.M)
+    ] == []
