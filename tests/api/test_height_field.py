@@ -265,7 +265,7 @@ def test_a_geotiff_brings_spacing_unit_and_holes(tmp_path: Path) -> None:
     np.testing.assert_allclose(field.grid, [[0.0, 3.0, np.nan], [1.0, 4.0, 10.0]])
     assert HeightField.from_file(save(), datum=1000.0, scale=0.5).grid[1, 2] == 5.0
     angles = save(crs="EPSG:4326")
-    with pytest.raises(TerrainError, match="its places are angles") as caught:
+    with pytest.raises(TerrainError, match="its coordinates are angles") as caught:
         HeightField.from_file(angles)
     assert str(angles) in str(caught.value)
     assert HeightField.from_file(angles, spacing=5.0).spacing == (5.0, 5.0)

@@ -141,7 +141,7 @@ def test_a_run_that_tells_only_a_quotient_says_so(rolling: RoverRun) -> None:
     """While wheels hold, a heavier rover with stronger motors moves in the same way."""
     fit = identify(with_noise(rolling, 2), ["mass_scale", "actuator_gain"], window=0.4, **BELIEVED)
     for name, other in (("mass_scale", "actuator_gain"), ("actuator_gain", "mass_scale")):
-        assert fit[name].reason == f"the run tells only a combination of it and {other}"
+        assert fit[name].reason == f"the run determines only a combination of it and {other}"
     assert fit["mass_scale"].value / fit["actuator_gain"].value == pytest.approx(1.2, rel=0.01)
 
 

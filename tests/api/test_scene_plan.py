@@ -222,7 +222,7 @@ def test_a_rover_that_leaves_the_reach_it_was_planned_with_says_so() -> None:
     rover = plan(straight(reach=0.5)).rover()
     rover.set_wheel_torques(np.full(6, 30.0))
     rover.step(100)
-    with pytest.raises(StepError, match="left the reach") as left:
+    with pytest.raises(StepError, match="left the planned reach") as left:
         rover.step(400)
     assert left.value.field == "reach"
 

@@ -87,7 +87,7 @@ def test_what_cannot_be_simulated_is_refused(tmp_path, monkeypatch, what):
 def test_what_is_ignored_by_word_is_listed(tmp_path):
     text = CART.replace('name="slide"', 'name="slide" frictionloss="0.2"')
     model = RoverModel.from_mjcf(write(tmp_path, text, "cart.xml"), ignore=["friction"])
-    assert any("left out as told" in entry for entry in model.import_report.left_out)
+    assert any("left out because of" in entry for entry in model.import_report.left_out)
 
 
 def test_a_linear_coupling_becomes_exact(tmp_path):
@@ -223,7 +223,7 @@ def test_several_joints_of_one_body_are_a_chain_with_mujocos_mass_matrix(tmp_pat
     assert model.solid_names == ["torso_rootx", "torso_rootz", "torso_torso_joint3", "torso", "leg"]
     listed = [entry for entry in model.import_report.assumed if "between two joints of one body" in entry]
     assert listed == [
-        "1e-09 kg, as it stands between two joints of one body: link torso_rootx, link torso_rootz, link torso_torso_joint3"
+        "1e-09 kg, because it is between two joints of one body: link torso_rootx, link torso_rootz, link torso_torso_joint3"
     ]
     theirs = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(theirs)

@@ -62,7 +62,7 @@ def test_a_robot_without_wheels_is_warned_of_with_the_reason_for_each_link(tmp_p
     [
         ("continuous", "0 0 1", "", "drum its axis rises by 90 degrees"),
         ("revolute", "0 1 0", '<limit lower="-1" upper="1" effort="1" velocity="1"/>', "drum its joint has stops at -1 and 1 rad"),
-        ("fixed", "0 1 0", "", "nothing at the end of a branch turns"),
+        ("fixed", "0 1 0", "", "no link at the end of a branch turns"),
     ],
 )  # fmt: skip
 def test_the_reason_says_what_the_joint_lacks(tmp_path, kind, axis, more, reason):

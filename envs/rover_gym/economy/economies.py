@@ -50,7 +50,7 @@ def measure_economies(
 ) -> list[Economy]:
     """Drives a plan's scene straight, with and without each economy that applies.
 
-    The drives run in turn, `repeats` times, and the least CPU time of each counts, so that other load on the machine
+    The drives alternate, `repeats` times, and the least CPU time of each counts. Other load on the machine then
     affects them alike.
 
     Args:

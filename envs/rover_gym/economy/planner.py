@@ -121,7 +121,7 @@ def _start(scene: Scene) -> Array:
     heading = number("heading", scene.heading)
     ground: Terrain | None = scene.terrain if surfaces_of(scene.terrain) else plane_of(scene.terrain)
     if ground is None or (isinstance(ground, Plane) and ground.normal[1] <= 0.0):
-        refuse(TerrainError, "terrain", scene.terrain, "has no plane on which to place the rover: give a start")
+        refuse(TerrainError, "terrain", scene.terrain, "has no plane to place the rover on: give a start")
     return model.resting_pose(ground, (0.0, 0.0), heading)
 
 
@@ -212,7 +212,7 @@ def _steering(scene: Scene, terrain: Terrain, start: Array) -> tuple[bool, Decis
     if _steering_offset(scene.model) > _STRAIGHT:
         why = "not commanded, but the wheels touch beside their steering axes and turn"
         return False, Decision("steering", held, why)
-    why = "never commanded, and every wheel touches on its steering axis, so nothing else turns it"
+    why = "never commanded, and every wheel touches on its steering axis, so contact forces do not turn it"
     return True, Decision("steering", f"{len(joints)} joints welded at zero", why, WELD_ERROR)
 
 
@@ -273,14 +273,16 @@ def _obstacle(scene: Scene, terrain: Terrain, start: Array, *, steers: bool) -> 
 
 def _steps(simulation: Simulation, kind: Kind) -> Decision:
     if kind == "planar":
-        return Decision("steps", "general, one rover at a time", "the planar image has steps of its own, without lanes")
+        return Decision(
+            "steps", "general, one rover at a time", "the planar image has its own step, one machine at a time"
+        )
     if (why := simulation.fallback_reason) is not None:
         return Decision("steps", "general, one rover at a time", why)
     register = "one rover to a register" if simulation.lanes == 1 else f"{simulation.lanes} rovers to a register"
     return Decision(
         "steps",
         f"fast: in lanes, {register} ({SimulationBatch([simulation]).instruction_set})",
-        "a machine on fixed ground, inelastic; `report.fallbacks` counts steps that are general after all",
+        "an inelastic machine on fixed ground; `report.fallbacks` counts steps that the general step took",
     )
 
 
@@ -305,6 +307,6 @@ def _batch(terrain: Terrain, *, welded: bool) -> Decision:
 def _variant(scene: Scene, chosen: dict[str, Any], *, calm: bool) -> tuple[str, Decision]:
     if scene.tumbles:
         return "newton", Decision("scheme", "Newton", "keeps angular momentum in free flight to rounding")
-    why = "Newton pays in free flight: on the ground it moves the path by less than the step's own error"
+    why = "Newton is of use in free flight; on the ground it changes the path by less than the error of the step"
     error = LINEARISED_ERROR * chosen["time_step"] ** 2 if calm else None
     return "linearised", Decision("scheme", "linearised", why, error)

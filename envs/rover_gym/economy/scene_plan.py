@@ -77,7 +77,7 @@ def check_scene(scene: Scene) -> None:
     if not isinstance(scene, Scene):
         refuse(OptionError, "scene", scene, "must be a Scene")
     if not isinstance(scene.terrain, Terrain):
-        refuse(TerrainError, "terrain", scene.terrain, "must be a terrain; combine several by Union")
+        refuse(TerrainError, "terrain", scene.terrain, "must be a terrain; combine several with Union")
     if not isinstance(scene.model, RoverModel):
         refuse(ModelError, "model", scene.model, "must be a RoverModel")
     for name in ("steered", "equal_torques", "held", "tumbles"):
@@ -268,7 +268,7 @@ class PlannedRover:
         if reach is not None:
             way = self.q[[0, 2]] - self.plan.start[[0, 2]]
             if (distance := float(np.hypot(*way))) > reach:
-                refuse(StepError, "reach", distance, f"the rover has left the reach of {reach:g} m it was planned with")
+                refuse(StepError, "reach", distance, f"the rover has left the planned reach of {reach:g} m")
         if isinstance(self.simulation, MirroredRoverSimulation):
             ground = self.simulation.ground
             tilt = float(self.simulation.q[2]) - (math.atan(ground.slope) if isinstance(ground, Line) else 0.0)

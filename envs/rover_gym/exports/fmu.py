@@ -300,14 +300,14 @@ def _outputs(simulation: Simulation, axes: Axes) -> Iterator[Row]:
             what = "mean contact force of the last time step"
             yield f"wheel_force.{name}.{side}", "output", "wheel_force", 3 * i + k, "N", what, None
     for i, name in enumerate(model.wheel_names):
-        what = "mean torque that the drive gave in the last time step, positive forward"
+        what = "mean torque delivered by the drive in the last time step, positive forward"
         yield f"motor_torque.{name}", "output", "motor_torque", i, "N.m", what, None
     for i, name in enumerate(("specific_force", "angular_velocity")):
         what = "mean over the last communication step, at the trunk's origin, in its frame"
         for axis, (k, sign) in zip("xyz", vector_components(axes), strict=True):
             yield f"imu.{name}.{axis}", "output", "inertial", 3 * i + k, ("m/s2", "rad/s")[i], what, None, sign
     for name, unit, what in (
-        ("trunk_force", "N", "mean normal force of the last time step on all that is no wheel"),
+        ("trunk_force", "N", "mean normal force of the last time step on all solids other than wheels"),
         ("kinetic_energy", "J", "of the whole rover"),
         ("potential_energy", "J", "zero with all mass centres at the world's origin"),
         ("contacts", "1", "most contacts of a time step in the last communication step"),

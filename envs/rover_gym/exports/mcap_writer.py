@@ -313,7 +313,7 @@ class McapWriter:
         self._file.write_bytes(topic, stamp, json.dumps(content, allow_nan=False).encode())
 
     def _scene(self, stamp: int, q: Array) -> Any:
-        """The rover's shapes in its solids' frames, and the ground about the way in the world."""
+        """The rover's shapes in its solids' frames, and the ground near the path, world."""
         way = self._way
         if way is None:
             way = q[[0, 2]] + REACH * np.array([[-1.0, -1.0], [1.0, 1.0]])

@@ -151,7 +151,7 @@ class OpenCombination:
         others = [parameters[i].name for i in self.members if i != one]
         if not others:
             return "the run does not depend on it by more than the noise"
-        return f"the run tells only a combination of it and {' and '.join(others)}"
+        return f"the run determines only a combination of it and {' and '.join(others)}"
 
 
 def open_combinations(jacobian: Array, scales: Array, variance: float) -> tuple[Array, list[OpenCombination]]:

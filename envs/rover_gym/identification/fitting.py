@@ -401,7 +401,7 @@ class WindowFit:
                     OptionError,
                     "recording",
                     float(window.time[0]),
-                    "has a window that cannot be simulated; it starts, in s, at",
+                    "has a window that cannot be simulated, which starts at (s)",
                 )
             by_state = np.nan_to_num((rows[1 : n + 1] - rows[n + 1 : 2 * n + 1]).T / (2.0 * changes))
             by_parameters = np.nan_to_num((rows[2 * n + 1 :: 2] - rows[2 * n + 2 :: 2]).T / np.array(distances))

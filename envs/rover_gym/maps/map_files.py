@@ -155,7 +155,9 @@ def _heights(file: GroundFile, numbers: _Numbers, scale: float = 1.0, datum: flo
         wrong = ~(np.abs(metres) <= HIGHEST) & ~np.isnan(metres)
         if wrong.any():
             row, column = (int(k) for k in np.argwhere(wrong)[0])
-            reason = f"height [{rows.start + row}, {column}] must be at most {HIGHEST:g} m in size or nan for no data"
+            reason = (
+                f"height [{rows.start + row}, {column}] must be at most {HIGHEST:g} m in magnitude, or nan for no data"
+            )
             file.refuse(reason, float(metres[row, column]))
         heights[rows] = metres
     return heights
@@ -233,7 +235,7 @@ def _guarded(file: GroundFile, read: Callable[[], Any], *wrong: type[Exception])
         raise
     except wrong as error:
         why = (str(error).splitlines() or [type(error).__name__])[0]
-        file.refuse(f"is damaged or no {file.ending} file ({why})")
+        file.refuse(f"is damaged or not a {file.ending} file ({why})")
 
 
 def _read_npy(file: GroundFile, scale: float | None, datum: float | None) -> Heights:
@@ -345,14 +347,14 @@ def _spacing(file: GroundFile, transform: Any, crs: Any) -> Pair | None:
     if transform.b != 0.0 or transform.d != 0.0:
         file.refuse("its rows and columns do not run east and south: warp the map first")
     if crs is not None and crs.is_geographic:
-        file.refuse("its places are angles: project the map to metres, or give spacing")
+        file.refuse("its coordinates are angles: project the map to metres, or give spacing")
     if transform.a <= 0.0 or transform.e >= 0.0:
         file.refuse("its columns must run east and its rows south: warp the map first")
     metres = crs.linear_units_factor[1] if crs is not None and crs.is_projected else 1.0
     step = float(transform.a * metres), float(-transform.e * metres)
     for value in step:
         if not SPACINGS[0] <= value <= SPACINGS[1]:
-            file.refuse("the distance of its columns and rows must be from {:g} to {:g} m".format(*SPACINGS), value)
+            file.refuse("the spacing of its columns and rows must be from {:g} to {:g} m".format(*SPACINGS), value)
     return step
 
 
@@ -407,7 +409,7 @@ def read_mesh(
         k = int(np.flatnonzero(bad)[0])
         file.refuse(f"vertex {k} is not finite", vertices[k].tolist())
     if triangles.size and (triangles.min() < 0 or triangles.max() >= len(vertices)):
-        file.refuse("a triangle names a vertex that is not there")
+        file.refuse("a triangle refers to a vertex that does not exist")
     placed = _turned(vertices, str(up)) * factor + shift
     far = (np.abs(placed) > FARTHEST).any(axis=1)
     if far.any():

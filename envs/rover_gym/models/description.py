@@ -38,7 +38,7 @@ class WheelOptions:
         steering_damping: N m s/rad.
         steering_limit: rad.
         wheel_width: Of a wheel, m.
-        wheel_stiffness: Of a wheel where it touches, N/m; 0: rigid.
+        wheel_stiffness: Contact stiffness of a wheel, N/m; 0: rigid.
     """
 
     torque_limit: float | None = None
@@ -53,7 +53,7 @@ def describe(tree: RobotTree, roles: list[WheelRole], P: Array, options: WheelOp
     """The description of a robot.
 
     Args:
-        tree: The robot, links without mass joined and joints as `joint_conventions` wants them.
+        tree: The robot after `join_rigid_groups`, with converted stops and steering axes.
         roles: Its wheels.
         P: Rotation from the file's axes to those of this package, (3, 3).
         options: What the user gave.
@@ -218,7 +218,7 @@ def _yielding(tree: RobotTree, role: WheelRole, weight: float, options: WheelOpt
     if stiffness is None:
         stiffness = float(f"{weight / YIELD:.2g}")
         tree.assumed.append(
-            f"wheel {role.link}: stiffness {stiffness:g} N/m where it touches, by which it yields {1e3 * YIELD:g} mm "
+            f"wheel {role.link}: stiffness {stiffness:g} N/m, by which it yields {1e3 * YIELD:g} mm "
             "under its share of the weight, and critical damping"
         )
     if stiffness == 0.0:
@@ -227,7 +227,7 @@ def _yielding(tree: RobotTree, role: WheelRole, weight: float, options: WheelOpt
 
 
 def _shapes(tree: RobotTree, link: FileLink, A: Array, anchor: Array, role: WheelRole | None) -> list[dict[str, Any]]:
-    """The shapes of a link. Boxes and spheres touch, cylinders are drawn; a wheel touches by disc and width alone."""
+    """The shapes of a link. Boxes and spheres collide, cylinders are drawn; wheels collide as discs with a width."""
     found: list[dict[str, Any]] = []
     is_drawn = any(shape.visible and shape.mesh is None for shape in link.shapes)
     for shape in link.shapes:
@@ -300,7 +300,7 @@ def _followed_first(tree: RobotTree) -> list[FileLink]:
         )
         if ready is None:
             tree.refuse(
-                "mimic", [link.joint.name for link in waiting][:5], "these joints depend on each other in a circle"
+                "mimic", [link.joint.name for link in waiting][:5], "these joints depend on one another in a cycle"
             )
         order.append(ready)
         waiting.remove(ready)

@@ -60,10 +60,10 @@ class WrittenSolid:
             self.kind = "fixed"
 
     def shapes(self, wheel: dict[str, Any] | None) -> list[FileShape]:
-        """Its shapes as boxes, cylinders and spheres. A wheel's disc becomes the cylinder that touches for it.
+        """Its shapes as boxes, cylinders and spheres. A wheel's disc becomes its collision cylinder.
 
         Args:
-            wheel: The description of the wheel that it is, or None.
+            wheel: The description of the wheel if the solid is one, or None.
         """
         sources = list(self.source.get("shapes") or ())
         if (shape := self.source.get("shape")) is not None:
@@ -146,7 +146,7 @@ def _mass_properties(solid: dict[str, Any]) -> tuple[Array, Array]:
 
 
 def _content(shape: dict[str, Any]) -> float:
-    """Volume of a shape, m³; of a disc the square of its radius, since discs share by area."""
+    """Volume of a shape, m³; for a disc its squared radius, because discs share mass by area."""
     match shape["kind"]:
         case "box":
             return float(np.prod(shape["size"]))

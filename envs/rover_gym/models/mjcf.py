@@ -1,7 +1,7 @@
 """Reads an MJCF into a `RobotTree`. MuJoCo compiles it, so defaults, includes, angles and inertias are MuJoCo's.
 
 In MuJoCo, time grows with the square of the number of copies and memory with the size of height fields, and compilation
-cannot be interrupted. Large files are therefore rejected before.
+cannot be interrupted. Files that are too large are therefore rejected before compilation.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from rover_gym.models.robot_tree import (
 
 
 def complete_right_angles(mujoco: Any, spec: Any) -> list[str]:
-    """Completes the digits of such angles in the orientations of bodies, frames, shapes and inertias.
+    """Replaces rounded right angles by exact ones in the orientations of bodies, frames, shapes and inertias.
 
     Args:
         mujoco: The module.
@@ -79,7 +79,9 @@ MAX_FILES = 100
 
 
 def check_sizes(path: Path) -> dict[str, Path]:
-    """Rejects a file that would become enormous. A file that is not XML is left to MuJoCo, whose error gives the line.
+    """Rejects a file whose compiled model would be too large.
+
+    A file that is not XML is left to MuJoCo, whose error gives the line.
 
     Args:
         path: The file; included files are checked too.
@@ -114,7 +116,7 @@ def check_sizes(path: Path) -> dict[str, Path]:
 
 
 def _check(file: Path, element: Any) -> None:
-    """Refuses one element, with the copies that those around it make of it."""
+    """Checks the size of one element, including the copies that its parents make."""
     where = f"line {element.sourceline}, {element.tag}"
     if element.tag in NUMBERS:
         names = NUMBERS[element.tag]
@@ -194,7 +196,7 @@ def read_mjcf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
 
 
 def _specification(mujoco: Any, path: Path, included: Mapping[str, Path]) -> Any:
-    """The file before it is compiled. By its name MuJoCo would take it only if that ends in .xml."""
+    """The file before it is compiled, read as text because MuJoCo accepts only names that end in .xml."""
     files = {name: file.read_bytes() for name, file in included.items() if file.is_file()}
     spec = mujoco.MjSpec.from_string(path.read_bytes().decode("utf-8"), include=files)
     spec.modelfiledir = str(path.parent)
@@ -202,7 +204,7 @@ def _specification(mujoco: Any, path: Path, included: Mapping[str, Path]) -> Any
 
 
 def _refuse_encoding(path: Path, error: UnicodeDecodeError) -> NoReturn:
-    """Refuses a file with names that are not UTF-8; names the line, unless an included file has it."""
+    """Refuses a file with names that are not UTF-8. The error gives the line, unless it is in an included file."""
     reason = "holds a name that is not UTF-8 text: save the file as UTF-8"
     for number, line in enumerate(path.read_bytes().splitlines(), 1):
         text = line.decode("utf-8", "backslashreplace").strip()
@@ -213,7 +215,7 @@ def _refuse_encoding(path: Path, error: UnicodeDecodeError) -> NoReturn:
 
 
 class _Reader:
-    """One compiled model on its way into a tree."""
+    """Converts one compiled model to a tree."""
 
     def __init__(self, mujoco: Any, model: Any, path: Path, ignore: Collection[str]) -> None:
         self.mujoco, self.model = mujoco, model
@@ -261,7 +263,7 @@ class _Reader:
             moves[m.body_parentid[body]] |= moves[body]
         scenery = [self._body(b) for b in range(1, m.nbody) if m.body_rootid[b] == b and not moves[b]]
         if scenery or m.body_geomnum[0]:
-            self.tree.left_out.append(f"what stands on the world: {', '.join(scenery) or 'shapes of the worldbody'}")
+            self.tree.left_out.append(f"fixed to the world: {', '.join(scenery) or 'shapes of the worldbody'}")
         for body in range(1, m.nbody):
             if not moves[m.body_rootid[body]]:
                 continue
@@ -276,7 +278,7 @@ class _Reader:
             self.tree.refuse("worldbody", self.model.nbody - 1, "has no movable body")
 
     def _chain(self, body: int) -> FileLink:
-        """The link of a body; if it has several joints, adds one for each but the last, nearly without mass."""
+        """The link of a body; if it has several joints, adds a nearly massless link for each but the last."""
         m = self.model
         parent = self._body(int(m.body_parentid[body])) if m.body_parentid[body] else None
         position, rotation = np.array(m.body_pos[body]), from_quaternion(m.body_quat[body])
@@ -288,7 +290,7 @@ class _Reader:
                 name += "_"
             between = FileLink(name, parent, joint, position, rotation, BETWEEN, inertia=BETWEEN * np.eye(3))
             self.tree.links[name] = between
-            self.tree.assumed.append(f"link {name}: {BETWEEN:g} kg, as it stands between two joints of one body")
+            self.tree.assumed.append(f"link {name}: {BETWEEN:g} kg, because it is between two joints of one body")
             parent, position, rotation = name, np.zeros(3), np.eye(3)
         return FileLink(self._body(body), parent, self._joint(body, first + count - 1), position, rotation)
 

@@ -168,7 +168,7 @@ class RobotTree:
         """Lists an element as left out if its kind is in `ignore`, and rejects it otherwise."""
         if kind not in self.ignore:
             self.refuse(where, value, f'{reason}; ignore=["{kind}"] leaves it out')
-        self.left_out.append(f"{where}: {reason} (left out as told)")
+        self.left_out.append(f"{where}: {reason} (left out because of `ignore`)")
 
     def children(self, name: str) -> list[FileLink]:
         """The links that a link carries."""
@@ -271,7 +271,7 @@ def join_rigid_groups(tree: RobotTree, *, free_base: bool) -> None:
     for link in tree.links.values():
         if link.mass == 0.0:
             hint = ", or the base must be fixed: free_base=False" if link.parent is None else ""
-            reason = "a link that moves, or what is fixed to it, must have a mass"
+            reason = "a moving link, or a link fixed to it, must have a mass"
             tree.refuse(f"link[{link.name}].mass", link.mass, f"{reason}{hint}")
 
 
@@ -285,7 +285,8 @@ def _is_body(link: FileLink) -> bool:
 
 def _join(tree: RobotTree, link: FileLink, other: FileLink) -> None:
     if link.mass > 0.0:
-        tree.assumed.append(f"link[{link.name}]: joined with {other.name}, since one of the two is no body by itself")
+        reason = "because one of them alone has no physical mass and inertia"
+        tree.assumed.append(f"link[{link.name}]: joined with {other.name}, {reason}")
     R, p = link.rotation, link.position
     other.inertia = other.inertia + R @ link.inertia @ R.T  # a file may state an inertia without a mass
     if link.mass > 0.0:
@@ -311,7 +312,7 @@ def _hang_on_world(tree: RobotTree, root: FileLink, children: list[FileLink]) ->
         child.parent = None
         child.position = root.position + root.rotation @ child.position
         child.rotation = root.rotation @ child.rotation
-    tree.left_out.append(f"link[{root.name}]: has no mass; what it carries hangs on the world")
+    tree.left_out.append(f"link[{root.name}]: has no mass; its children are attached to the world")
     del tree.links[root.name]
 
 

@@ -287,7 +287,7 @@ def _none_found(tree: RobotTree, carriers: dict[str, str], reasons: dict[str, st
     listed = [f"{link.name} {reasons[link.name]}" for link in candidates[:SHOWN_LINKS]]
     if len(candidates) > SHOWN_LINKS:
         listed.append(f"and {len(candidates) - SHOWN_LINKS} others")
-    why = "; ".join(listed) or "nothing at the end of a branch turns"
+    why = "; ".join(listed) or "no link at the end of a branch turns"
     return f"{tree.path}: no wheel was found ({why}). Give wheels=[...] with the wheels' names, or wheels=[] for none"
 
 

@@ -88,7 +88,7 @@ def _check_names(path: Path, robot: Any) -> None:
             refuse_in(path, f"joint[{joint.name}].mimic.joint", joint.mimic.joint, "there is no such joint")
     roots = known - carried
     if len(roots) != 1:
-        reason = "the links stand in a circle" if not roots else "one link must carry all others; these have no joint"
+        reason = "the links form a cycle" if not roots else "one link must carry all others; these have no joint"
         refuse_in(path, "robot", sorted(roots) or names[:5], reason)
 
 
@@ -102,7 +102,7 @@ def _parents_first(path: Path, links: dict[str, Any], carriers: dict[str, Any]) 
         order.append(waiting.pop(0))
         waiting = [*below.get(order[-1], []), *waiting]
     if len(order) < len(links):
-        refuse_in(path, "robot", sorted(set(links) - set(order))[:5], "these links carry each other in a circle")
+        refuse_in(path, "robot", sorted(set(links) - set(order))[:5], "these links form a cycle")
     return order
 
 
@@ -129,7 +129,7 @@ def _joint(tree: RobotTree, source: Any) -> FileJoint:
         joint.limits = (source.limit.lower or 0.0, source.limit.upper or 0.0)
         if joint.limits == (0.0, 0.0):
             joint.limits = None
-            means = "0 and 0, as exporters write for none: it moves without stops. To hold it, make it fixed"
+            means = "0 and 0, which exporters write for no limits: it moves without stops. To hold it, make it fixed"
             tree.warnings.append(f"{tree.path}: {at}: its limits are {means}")
         elif not joint.limits[0] < joint.limits[1]:
             tree.refuse(f"{at}.limit", list(joint.limits), "the lower limit must be below the upper one")

@@ -40,7 +40,7 @@ SIGNATURE = b"\x89HDF\r\n\x1a\n"  # first bytes of an HDF5 file
 
 
 class RecordingError(RoverGymError, ValueError):
-    """A file is no valid trajectory of this format, lacks the requested data, or cannot be written."""
+    """Error of a file that is not a valid trajectory of this format, lacks the requested data, or cannot be written."""
 
 
 def import_h5py() -> Any:
@@ -138,7 +138,7 @@ class Sampler:
         self.clear()
 
     def describe(self, title: str | None, scene: Mapping[str, Any], seed: int | str | None) -> dict[str, Any]:
-        """The attributes of a recording, taken from the simulation at its start; None: as is usual."""
+        """The attributes of a recording, taken from the simulation at its start; None for those of `describe`."""
         return describe(self.sim, title or "a rover", scene, seed="none" if seed is None else seed)
 
     @property

@@ -260,6 +260,6 @@ def _checked_channels(channels: Sequence[Channel]) -> tuple[Channel, ...]:
         refuse(RecordingError, "channels", names, "must not be empty")
     for i, name in enumerate(names):
         if not name or "/" in name or "\0" in name or name in (".", TERRAIN, FRAMES) or name in names[:i]:
-            reason = f"must be names of their own, without / and neither {TERRAIN!r} nor {FRAMES!r}"
+            reason = f"must be different names, without / and neither {TERRAIN!r} nor {FRAMES!r}"
             refuse(RecordingError, "channels", name, reason)
     return result

@@ -159,7 +159,7 @@ class HeadingSensor(Sensor):
         drawn: Values,
         generator: np.random.Generator,
     ) -> tuple[Array, Values]:
-        """Looks at the sky."""
+        """Measures the heading."""
         ahead = moment.simulation.rotation[:, 0]
         error = float(drawn["bias_deg"]) + float(gaussian(generator, self.noise_deg, 1)[0])
         heading = math.atan2(-ahead[2], ahead[0]) + math.radians(error)

@@ -86,7 +86,7 @@ def settled_bed(
 ) -> Bed:
     """Settles disks in a box under gravity.
 
-    Nearly monodisperse disks, the default, keep the rows they fell in; radii from 13 to 19.5 mm do not.
+    Nearly monodisperse disks, the default, settle in rows; radii from 13 to 19.5 mm do not.
 
     Args:
         count: Number of disks.
