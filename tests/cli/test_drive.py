@@ -7,15 +7,10 @@ from pathlib import Path
 import imageio_ffmpeg
 import numpy as np
 import pytest
-from typer.testing import CliRunner, Result
+from commands import output_of, rover
 
-from rover_gym.cli import app
 from rover_gym.policy.comparison import ENDING
 from rover_gym.record import read_run, read_trajectory
-
-
-def rover(*arguments: str) -> Result:
-    return CliRunner(env={"COLUMNS": "120", "NO_COLOR": "1"}).invoke(app, list(arguments))
 
 
 @pytest.fixture(autouse=True)
@@ -27,56 +22,51 @@ def place(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPa
 
 
 def test_an_episode_prints_its_summary() -> None:
-    result = rover("drive", "--seed", "1")
-    assert result.exit_code == 0, result.output
+    output = output_of("drive", "--seed", "1")
     for word in ("success", "distance", "time", "energy", "slip", "real-time factor", "yes"):
-        assert word in result.output
+        assert word in output
 
 
 def test_a_given_goal_is_driven_to_and_the_trajectory_ends_there(tmp_path: Path) -> None:
-    result = rover("drive", "--heading", "0", "--goal", "6", "-1", "--output", str(tmp_path))
-    assert result.exit_code == 0, result.output
+    output = output_of("drive", "--heading", "0", "--goal", "6", "-1", "--output", tmp_path)
     trajectory = read_trajectory(tmp_path / "episode-0.h5")
     assert np.hypot(trajectory["q"][-1, 0] - 6.0, trajectory["q"][-1, 2] + 1.0) <= 0.5
     assert trajectory.attributes["complete"]
     assert trajectory.attributes["scene"]["goal"] == [6.0, -1.0]
     assert np.all(np.diff(trajectory["time"]) > 0.0)
     for path in (tmp_path / "episode-0.h5", tmp_path / "summary.json"):
-        assert str(path) in result.output.replace("\n", "")
+        assert str(path) in output.replace("\n", "")
 
 
 def test_several_episodes_are_saved_with_their_mean(tmp_path: Path) -> None:
-    result = rover("drive", "--episodes", "2", "--seed", "5", "--slope", "10", "--output", str(tmp_path))
-    assert result.exit_code == 0, result.output
+    output = output_of("drive", "--episodes", "2", "--seed", "5", "--slope", "10", "--output", tmp_path)
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert [episode["seed"] for episode in summary["episodes"]] == [5, 6]
     assert summary["arguments"]["slope_deg"] == 10.0
-    assert "mean" in result.output
+    assert "mean" in output
     assert (tmp_path / "episode-5.h5").exists()
     assert (tmp_path / "episode-6.h5").exists()
 
 
 def test_the_same_seed_drives_the_same_way(tmp_path: Path) -> None:
     for run in ("a", "b"):
-        assert rover("drive", "--seed", "3", "--output", str(tmp_path / run)).exit_code == 0
+        assert rover("drive", "--seed", "3", "--output", tmp_path / run).exit_code == 0
     a, b = (read_trajectory(tmp_path / run / "episode-3.h5") for run in ("a", "b"))
     assert np.array_equal(a["q"], b["q"])
 
 
 def test_rocks_are_driven_over_and_recorded(tmp_path: Path) -> None:
     arguments = ("--terrain", "rocks", "--difficulty", "0.5", "--time-limit", "2", "--output", str(tmp_path))
-    result = rover("drive", *arguments)
-    assert result.exit_code == 0, result.output
+    output_of("drive", *arguments)
     scene = read_trajectory(tmp_path / "episode-0.h5").attributes["scene"]
     assert scene["terrain"] == "rocks"
     assert scene["rocks"]["difficulty"] == 0.5
 
 
 def test_a_short_time_limit_ends_the_episode_without_success() -> None:
-    result = rover("drive", "--time-limit", "1")
-    assert result.exit_code == 0, result.output
-    assert "no: time" in result.output
-    assert "1.00 s" in result.output
+    output = output_of("drive", "--time-limit", "1")
+    assert "no: time" in output
+    assert "1.00 s" in output
 
 
 @pytest.mark.parametrize(
@@ -104,7 +94,7 @@ def test_bad_input_is_one_line_that_names_the_culprit(arguments: list[str], culp
 
 def test_output_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("a file, not a folder", encoding="utf-8")
-    result = rover("drive", "--output", str(tmp_path / "taken" / "below"))
+    result = rover("drive", "--output", tmp_path / "taken" / "below")
     assert result.exit_code == 2
     assert len(result.stderr.splitlines()) == 1
 
@@ -118,9 +108,8 @@ def test_version_and_help() -> None:
 def test_episodes_are_filmed(tmp_path: Path) -> None:
     path = tmp_path / "films" / "rocks.mp4"
     arguments = ("--terrain", "rocks", "--time-limit", "0.3", "--episodes", "2", "--video", str(path))
-    result = rover("drive", *arguments)
-    assert result.exit_code == 0, result.output
-    assert str(path) in result.output.replace("\n", "")
+    output = output_of("drive", *arguments)
+    assert str(path) in output.replace("\n", "")
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
     assert frames == 2 * (7 + ENDING)  # the start, six steps and the outcome each
     assert seconds == pytest.approx(frames / 20, abs=0.06)
@@ -128,9 +117,8 @@ def test_episodes_are_filmed(tmp_path: Path) -> None:
 
 def test_the_planner_by_hand_drives_too(tmp_path: Path) -> None:
     arguments = ("--policy", "scan", "--terrain", "rocks", "--difficulty", "1", "--time-limit", "2")
-    result = rover("drive", *arguments, "--model", "mars-rover", "--output", str(tmp_path))
-    assert result.exit_code == 0, result.output
-    assert "the scan planner" in result.output
+    output = output_of("drive", *arguments, "--model", "mars-rover", "--output", tmp_path)
+    assert "the scan planner" in output
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert summary["arguments"]["height_scan"] == [48, 40, 0.18]
 
@@ -165,31 +153,26 @@ def last_frame(path: Path, width: int = 320, height: int = 180) -> np.ndarray:
     ],
 )
 def test_a_film_that_cannot_be_is_refused(options: tuple[str, ...], message: str, tmp_path: Path) -> None:
-    result = rover("drive", "--video", str(tmp_path / "film.mp4"), *options)
+    result = rover("drive", "--video", tmp_path / "film.mp4", *options)
     assert result.exit_code == 2
     assert result.stderr.startswith(f"error: {message}")
 
 
 def test_the_recording_says_outcome_and_goal(tmp_path: Path) -> None:
-    assert rover("drive", "--time-limit", "0.2", "--output", str(tmp_path)).exit_code == 0
+    assert rover("drive", "--time-limit", "0.2", "--output", tmp_path).exit_code == 0
     run = read_run(tmp_path / "episode-0.h5")
     assert run.trajectory.attributes["outcome"] == "time"
     assert run.goal_tolerance == 0.5
 
 
-def baseline(*arguments: str) -> Result:
-    return CliRunner(env={"COLUMNS": "160", "NO_COLOR": "1"}).invoke(app, list(arguments))
-
-
 def test_the_table_has_a_row_a_difficulty() -> None:
-    result = baseline("baseline", "--episodes", "1", "--difficulty", "0", "--difficulty", "0.25")
-    assert result.exit_code == 0, result.output
+    output = output_of("baseline", "--episodes", "1", "--difficulty", "0", "--difficulty", "0.25")
     for word in ("success", "95% interval", "time", "energy", "other ends", "0.25"):
-        assert word in result.output
+        assert word in output
 
 
 def test_json_says_the_same_twice() -> None:
-    runs = [baseline("baseline", "--episodes", "2", "--difficulty", "0.5", "--seed", "3", "--json") for _ in range(2)]
+    runs = [rover("baseline", "--episodes", "2", "--difficulty", "0.5", "--seed", "3", "--json") for _ in range(2)]
     assert runs[0].stdout == runs[1].stdout
     report = json.loads(runs[0].stdout)
     assert report["seed"] == 3
@@ -201,7 +184,7 @@ def test_json_says_the_same_twice() -> None:
 
 
 def test_a_difficulty_out_of_range_is_one_line() -> None:
-    result = baseline("baseline", "--episodes", "1", "--difficulty", "2.1")
+    result = rover("baseline", "--episodes", "1", "--difficulty", "2.1")
     assert result.exit_code == 2
     assert result.stderr.startswith("error: ")
     assert len(result.stderr.splitlines()) == 1
@@ -209,12 +192,10 @@ def test_a_difficulty_out_of_range_is_one_line() -> None:
 
 
 def test_a_trained_policy_can_be_measured_too() -> None:
-    result = baseline("baseline", "--episodes", "1", "--difficulty", "0.25", "--policy", "trained")
-    assert result.exit_code == 0, result.output
-    assert "with a trained policy" in result.output
+    output = output_of("baseline", "--episodes", "1", "--difficulty", "0.25", "--policy", "trained")
+    assert "with a trained policy" in output
 
 
 def test_the_planner_by_hand_can_be_measured_too() -> None:
-    result = baseline("baseline", "--episodes", "1", "--difficulty", "1.25", "--policy", "scan")
-    assert result.exit_code == 0, result.output
-    assert "the scan planner" in result.output
+    output = output_of("baseline", "--episodes", "1", "--difficulty", "1.25", "--policy", "scan")
+    assert "the scan planner" in output

@@ -8,20 +8,13 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 from balls import MovingBalls, RoverOnMovingBalls
+from commands import output_of, rover
 from matplotlib.image import imread
-from typer.testing import CliRunner
 
-from rover_gym.cli import app
 from rover_gym.figures.grain_frames import draw_grains
 from rover_gym.figures.grain_run_figures import GRAIN_DRAWINGS, slip_of_wheels
 from rover_gym.rendering.appearance import SAND_COLOUR
 from rover_gym.runs import open_run, record_run
-
-
-def rover(*arguments: str) -> str:
-    result = CliRunner().invoke(app, list(arguments))
-    assert result.exit_code == 0, result.output
-    return result.output
 
 
 @pytest.mark.parametrize(
@@ -37,7 +30,7 @@ def rover(*arguments: str) -> str:
     ],
 )
 def test_a_run_is_recorded_and_its_result_told(command: str, options: list[str], said: str, tmp_path: Path) -> None:
-    output = rover("grains", command, *options, "--time-step", "0.002", "--duration", "0.1", "--output", str(tmp_path))
+    output = output_of("grains", command, *options, "--time-step", "0.002", "--duration", "0.1", "--output", tmp_path)
     assert said in output
     assert "rows not converged" in output
     run = open_run(tmp_path / f"{command}.h5")
@@ -67,7 +60,7 @@ def test_a_run_is_recorded_and_its_result_told(command: str, options: list[str],
     ],
 )
 def test_bad_options_end_with_one_line(command: str, options: list[str], field: str, tmp_path: Path) -> None:
-    result = CliRunner().invoke(app, ["grains", command, *options, "--output", str(tmp_path)])
+    result = rover("grains", command, *options, "--output", tmp_path)
     assert result.exit_code == 2
     assert f"error: {field}" in result.output
     assert not list(tmp_path.iterdir())
@@ -84,7 +77,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 @pytest.mark.parametrize("name", ["rover", "bed"])
 def test_a_run_is_plotted(name: str, runs: dict[str, Path], tmp_path: Path) -> None:
-    output = rover("plot", str(runs[name]), "--output", str(tmp_path))
+    output = output_of("plot", runs[name], "--output", tmp_path)
     of_wheels = {"wheel-forces", "sinkage-and-slip"}
     expected = set(GRAIN_DRAWINGS) - (set() if name == "rover" else of_wheels)
     assert {path.stem for path in tmp_path.glob("*.png")} == expected
@@ -101,7 +94,7 @@ def test_the_slip_of_rolling_wheels_is_small(runs: dict[str, Path]) -> None:
 @pytest.mark.parametrize("name", ["rover", "bed"])
 def test_a_run_is_filmed(name: str, runs: dict[str, Path], tmp_path: Path) -> None:
     film = tmp_path / "run.mp4"
-    rover("replay", str(runs[name]), "--film", str(film), "--fps", "5")
+    output_of("replay", runs[name], "--film", film, "--fps", "5")
     command = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(film), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
     pixels = subprocess.run(command, capture_output=True, check=True).stdout
     frames = np.frombuffer(pixels, np.uint8).astype(int).reshape(-1, 540, 960, 3)
@@ -118,9 +111,9 @@ def test_a_frame_shows_sand(runs: dict[str, Path], tmp_path: Path) -> None:
 
 def test_a_run_is_replayed_as_a_page_and_not_as_other_files(runs: dict[str, Path], tmp_path: Path) -> None:
     page = tmp_path / "run.html"
-    assert f"page: {page}" in rover("replay", str(runs["bed"]), "--html", str(page))
+    assert f"page: {page}" in output_of("replay", runs["bed"], "--html", page)
     assert 40_000 < page.stat().st_size < 2_000_000
-    refused = CliRunner().invoke(app, ["replay", str(runs["bed"]), "--gltf", str(tmp_path / "run.glb")])
+    refused = rover("replay", runs["bed"], "--gltf", tmp_path / "run.glb")
     assert refused.exit_code == 2
     assert "error: --gltf" in refused.output
 
@@ -153,9 +146,8 @@ STRESSES = ["--normal-stress", "1000", "--normal-stress", "3000"]
 def test_a_test_writes_its_tables(
     command: str, options: list[str], tables: list[str], rows: int, said: str, tmp_path: Path
 ) -> None:
-    result = CliRunner().invoke(app, ["grains", command, *BED, *options, "--output", str(tmp_path)])
-    assert result.exit_code == 0, result.output
-    assert said in result.output
+    output = output_of("grains", command, *BED, *options, "--output", tmp_path)
+    assert said in output
     for table in tables:
         with (tmp_path / table).open(encoding="utf-8") as file:
             assert len(list(csv.DictReader(file))) == rows
@@ -170,7 +162,7 @@ def test_a_test_writes_its_tables(
     ],
 )
 def test_bad_options_are_told_in_one_line(command: str, options: list[str], said: str, tmp_path: Path) -> None:
-    result = CliRunner().invoke(app, ["grains", command, *BED, *options, "--output", str(tmp_path)])
+    result = rover("grains", command, *BED, *options, "--output", tmp_path)
     assert result.exit_code == 2
     assert said in result.output
     assert not list(tmp_path.iterdir())

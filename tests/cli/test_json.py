@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
+from commands import rover
 
-from rover_gym.cli import app
 from rover_gym.cli.console import plain
 
 BALLS = "--balls 60 --width 0.12 --time-step 0.004 --duration 0.05"
@@ -37,8 +36,7 @@ TABLES = {
 
 
 def told(command: str, folder: Path) -> dict[str, Any]:
-    runner = CliRunner(env={"COLUMNS": "80", "NO_COLOR": "1"})
-    result = runner.invoke(app, [*shlex.split(command.format(to=folder)), "--json"])
+    result = rover(*shlex.split(command.format(to=folder)), "--json", COLUMNS="80")
     assert result.exit_code == 0, result.output
     assert result.stderr == ""
     report = json.loads(result.stdout, parse_constant=pytest.fail)
@@ -62,8 +60,7 @@ def test_a_drives_object_is_its_summary(tmp_path: Path) -> None:
 
 
 def test_an_imported_model_is_one_object(tmp_path: Path) -> None:
-    runner = CliRunner()
-    assert runner.invoke(app, ["model", "show", "skid-steered"]).exit_code == 0
+    assert rover("model", "show", "skid-steered").exit_code == 0
     from rover_gym import RoverModel  # noqa: PLC0415 - beside what it is for
 
     pytest.importorskip("yourdfpy")

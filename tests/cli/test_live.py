@@ -7,13 +7,13 @@ import socket
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 from urllib.request import urlopen
 
+import commands
 import pytest
-from typer.testing import CliRunner, Result
 
-from rover_gym.cli import app
 from rover_gym.record import read_run
 
 client = pytest.importorskip("websockets.sync.client")
@@ -21,8 +21,7 @@ client = pytest.importorskip("websockets.sync.client")
 RUN = "from rover_gym.cli import main; main()"
 
 
-def rover(*arguments: str) -> Result:
-    return CliRunner(env={"COLUMNS": "160", "NO_COLOR": "1"}).invoke(app, ["live", *arguments])
+rover = partial(commands.rover, "live")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is another thing there")
@@ -76,7 +75,7 @@ def test_it_serves_its_page_and_keeps_the_recording_when_it_is_ended(tmp_path: P
 
 def test_a_port_in_use_is_one_line() -> None:
     with socket.create_server(("127.0.0.1", 0)) as busy:
-        result = rover("--no-open", "--port", str(busy.getsockname()[1]))
+        result = rover("--no-open", "--port", busy.getsockname()[1])
     assert result.exit_code == 2
     assert result.stderr.startswith("error: --port: is in use by another program")
     assert len(result.stderr.splitlines()) == 1

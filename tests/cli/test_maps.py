@@ -7,17 +7,12 @@ import h5py
 import numpy as np
 import pygltflib
 import pytest
-from typer.testing import CliRunner, Result
+from commands import output_of, rover
 
 from rover_gym import HeightField, Plane, RoverEnv, RoverModel, Simulation, SphereField, TriangleMesh, Union
-from rover_gym.cli import app
 from rover_gym.ground import parts_of, surfaces_of, triangles_of
 from rover_gym.record import Channel, Recorder, RecordingError, RoverSampler, describe, read_run, read_trajectory
 from rover_gym.replay.scenery import first_view, goal_parts, spheres, surfaces
-
-
-def rover(*arguments: str) -> Result:
-    return CliRunner(env={"COLUMNS": "160", "NO_COLOR": "1"}).invoke(app, list(arguments))
 
 
 @pytest.fixture(scope="module")
@@ -27,8 +22,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     np.save(folder / "map.npy", HeightField.fractal(40.0, 0.5, 0.05, seed=2).grid)
     place = ("--start", "-3", "2", "--goal", "5", "1", "--heading", "0")
     drive = ("drive", "--terrain", str(folder / "map.npy"), "--spacing", "0.5", "--model", "four-steered", *place)
-    result = rover(*drive, "--time-limit", "2", "--output", str(folder / "run"))
-    assert result.exit_code == 0, result.output
+    output_of(*drive, "--time-limit", "2", "--output", folder / "run")
     return folder
 
 
@@ -47,11 +41,10 @@ def test_a_drive_on_a_map_is_recorded_with_its_ground(folder: Path) -> None:
 
 def test_it_is_plotted_and_replayed(folder: Path) -> None:
     recording = str(folder / "run" / "episode-0.h5")
-    assert rover("plot", recording, "--output", str(folder / "plots")).exit_code == 0
+    assert rover("plot", recording, "--output", folder / "plots").exit_code == 0
     assert (folder / "plots" / "path.png").stat().st_size > 10_000
     for kind, name in (("--gltf", "run.glb"), ("--vrml", "run.wrl"), ("--html", "run.html")):
-        result = rover("replay", recording, kind, str(folder / name))
-        assert result.exit_code == 0, result.output
+        output_of("replay", recording, kind, folder / name)
     nodes = [node.name for node in pygltflib.GLTF2().load(str(folder / "run.glb")).nodes]
     assert "surface_0" in nodes
     assert "IndexedFaceSet" in (folder / "run.wrl").read_text(encoding="utf-8")
@@ -73,8 +66,7 @@ def test_a_drive_off_the_map_is_recorded_plotted_and_replayed(tmp_path: Path) ->
     assert info["termination"] == "step_failed"
     assert "is unknown: the place is outside the map" in solver["message"]
     for command in (("plot", "--output", "plots"), ("replay", "--vrml", "run.wrl")):
-        result = rover(command[0], str(tmp_path / "run.h5"), command[1], str(tmp_path / command[2]))
-        assert result.exit_code == 0, result.output
+        output_of(command[0], tmp_path / "run.h5", command[1], tmp_path / command[2])
     assert (tmp_path / "plots" / "contact-solver.png").stat().st_size > 10_000
 
 

@@ -1,19 +1,17 @@
 """`rover model import|show|check`."""
 
 import re
+from functools import partial
 from pathlib import Path
 
+import commands
 import pytest
 from models.robot_files import rover as robot_text
 from models.robot_files import write
-from typer.testing import CliRunner, Result
 
 from rover_gym import RoverModel
-from rover_gym.cli import app
 
-
-def rover(*arguments: str) -> Result:
-    return CliRunner(env={"COLUMNS": "200", "NO_COLOR": "1"}).invoke(app, ["model", *arguments])
+rover = partial(commands.rover, "model")
 
 
 @pytest.mark.parametrize("name", RoverModel.names())
@@ -34,27 +32,25 @@ def test_an_import_writes_the_model_and_its_picture(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     file = write(tmp_path, robot_text())
     output = tmp_path / "models" / "small.toml"
-    result = rover("import", str(file), "--output", str(output))
+    result = rover("import", file, "--output", output)
     assert result.exit_code == 0, result.output
     for what in ("chassis", "steers left_wheel", "assumed: ", "not simulated: ", "follows left_rocker by -1"):
         assert what in result.output
     assert RoverModel.from_file(output) == RoverModel.from_urdf(file)
     assert output.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
-    given = rover(
-        "import", str(file), "--output", str(output), "--wheel", "left_wheel=0.3", "--wheel", "right_drive=0.25"
-    )
+    given = rover("import", file, "--output", output, "--wheel", "left_wheel=0.3", "--wheel", "right_drive=0.25")
     assert given.exit_code == 0, given.output
     assert RoverModel.from_file(output).wheel_radii.tolist() == [0.3, 0.25]
-    bare = rover("import", str(file), "--output", str(output), "--wheel", "none", "--steering", "none", "--fixed-base")
+    bare = rover("import", file, "--output", output, "--wheel", "none", "--steering", "none", "--fixed-base")
     assert bare.exit_code == 0, bare.output
     assert RoverModel.from_file(output).wheel_names == []
-    thin = rover("import", str(file), "--output", str(output), "--wheel-width", "0")
+    thin = rover("import", file, "--output", output, "--wheel-width", "0")
     assert thin.exit_code == 0, thin.output
     assert "width" not in RoverModel.from_file(output).to_dict()["wheels"][0]
-    wrong = rover("import", str(file), "--output", str(output), "--wheel", "mast_tail")
+    wrong = rover("import", file, "--output", output, "--wheel", "mast_tail")
     assert wrong.exit_code == 2
     assert wrong.stderr.startswith("error: --wheel: there is no such link")
-    shown = rover("show", str(output), "--picture", str(tmp_path / "small.svg"))
+    shown = rover("show", output, "--picture", tmp_path / "small.svg")
     assert shown.exit_code == 0, shown.output
     assert (tmp_path / "small.svg").stat().st_size > 1000
 
@@ -73,7 +69,7 @@ def test_a_robot_without_wheels_is_warned_of(tmp_path: Path) -> None:
     for arguments in (("import", str(file), "--output", str(output)), ("check", str(file)), ("show", str(file))):
         result = rover(*arguments)
         assert re.search(reason, result.stderr), result.output
-    silent = rover("import", str(file), "--output", str(output), "--wheel", "none")
+    silent = rover("import", file, "--output", output, "--wheel", "none")
     assert "warning" not in silent.stderr
 
 
@@ -106,8 +102,8 @@ def test_a_model_without_wheels_stands_on_nothing(tmp_path: Path) -> None:
     ball = {"name": "arm", "joint": "fixed", "position": [0, 0, 0], "mass": 1.0}
     arm = {"name": "arm", "solids": [ball | {"shape": {"kind": "sphere", "radius": 0.1}}]}
     RoverModel.from_dict(arm).to_file(tmp_path / "arm.toml")
-    assert rover("show", str(tmp_path / "arm.toml")).exit_code == 0
-    result = rover("check", str(tmp_path / "arm.toml"))
+    assert rover("show", tmp_path / "arm.toml").exit_code == 0
+    result = rover("check", tmp_path / "arm.toml")
     assert result.exit_code == 2
     assert "wheels" in result.stderr
 
@@ -116,8 +112,8 @@ def test_a_refused_import_recommends_options_of_the_command(tmp_path: Path) -> N
     pytest.importorskip("yourdfpy")
     pytest.importorskip("matplotlib")
     rough = robot_text().replace("<limit", '<dynamics friction="0.1"/><limit', 1)
-    result = rover("import", str(write(tmp_path, rough)), "--output", str(tmp_path / "out.toml"))
+    result = rover("import", write(tmp_path, rough), "--output", tmp_path / "out.toml")
     assert result.exit_code == 2
     assert '--ignore "friction" leaves it out' in result.stderr
-    told = rover("import", str(write(tmp_path, rough)), "--output", str(tmp_path / "out.toml"), "--ignore", "friction")
+    told = rover("import", write(tmp_path, rough), "--output", tmp_path / "out.toml", "--ignore", "friction")
     assert told.exit_code == 0, told.output

@@ -14,8 +14,9 @@ from typing import Any, NoReturn
 
 import numpy as np
 import pytest
+from commands import output_of, rover
 from typer.main import get_command
-from typer.testing import CliRunner, Result
+from typer.testing import Result
 
 import rover_gym.policy.evaluation
 from rover_gym import OptionError
@@ -26,10 +27,6 @@ from rover_gym.record import read_trajectory
 from rover_gym.validation import refuse
 
 NO_FILE = "cannot be written"
-
-
-def rover(*arguments: str, **environment: str) -> Result:
-    return CliRunner(env={"COLUMNS": "160", "NO_COLOR": "1", **environment}).invoke(app, list(arguments))
 
 
 def one_line(result: Result, code: int = 2) -> str:
@@ -58,7 +55,7 @@ def test_an_error_that_nobody_foresaw_is_one_line_too(error: Exception, monkeypa
 def test_bytes_of_a_name_that_are_no_text_are_printed(tmp_path: Path) -> None:
     """The message itself raised UnicodeEncodeError."""
     name = os.fsdecode(bytes(tmp_path / "run-") + b"\xff.h5")
-    assert "run-\\udcff.h5" in one_line(rover("replay", name, "--vrml", str(tmp_path / "a.wrl")))
+    assert "run-\\udcff.h5" in one_line(rover("replay", name, "--vrml", tmp_path / "a.wrl"))
 
 
 @pytest.mark.parametrize(
@@ -120,7 +117,7 @@ def test_a_place_that_cannot_be_written_is_told_before_driving(
     monkeypatch.setattr(drive_command, "run_episode", raising(AssertionError("it drove")))
     (tmp_path / "taken").write_text("a file", encoding="utf-8")
     for name in ("taken/below/film.mp4", "taken" if option == "--output" else "."):
-        result = rover("drive", option, str(tmp_path / name))
+        result = rover("drive", option, tmp_path / name)
         assert result.exit_code == 2
         assert option in result.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
@@ -129,21 +126,21 @@ def test_a_place_that_cannot_be_written_is_told_before_driving(
 def test_a_film_of_another_kind_is_refused_before_driving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(drive_command, "run_episode", raising(AssertionError("it drove")))
     assert "--video: must be a file's name that ends in .mp4" in one_line(
-        rover("drive", "--video", str(tmp_path / "film.txt"))
+        rover("drive", "--video", tmp_path / "film.txt")
     )
 
 
 @pytest.mark.parametrize("option", ["--html", "--vrml", "--gltf"])
 def test_a_replay_is_not_made_for_a_place_that_cannot_be_written(option: str, tmp_path: Path) -> None:
-    assert rover("drive", "--time-limit", "0.1", "--output", str(tmp_path)).exit_code == 0
+    assert rover("drive", "--time-limit", "0.1", "--output", tmp_path).exit_code == 0
     run, taken = tmp_path / "episode-0.h5", tmp_path / "taken"
     taken.write_text("a file", encoding="utf-8")
-    line = one_line(rover("replay", str(run), "--vrml", str(tmp_path / "first.wrl"), option, str(taken / "run.out")))
+    line = one_line(rover("replay", run, "--vrml", tmp_path / "first.wrl", option, taken / "run.out"))
     assert f"{option}: {NO_FILE}" in line
     assert not (tmp_path / "first.wrl").exists()
-    assert "would replace the run itself" in one_line(rover("replay", str(run), option, str(run)))
+    assert "would replace the run itself" in one_line(rover("replay", run, option, run))
     assert len(read_trajectory(run)["time"]) == 3
-    assert f"--output: {NO_FILE}" in one_line(rover("plot", str(run), "--output", str(taken / "plots")))
+    assert f"--output: {NO_FILE}" in one_line(rover("plot", run, "--output", taken / "plots"))
 
 
 def test_an_interrupted_drive_keeps_and_prints_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -163,7 +160,7 @@ def test_an_interrupted_drive_keeps_and_prints_what_is_done(tmp_path: Path, monk
 
     monkeypatch.setattr(drive_command, "run_episode", interrupted)
     video = tmp_path / "film.mp4"
-    result = rover("drive", "--episodes", "3", "--time-limit", "0.5", "--output", str(tmp_path), "--video", str(video))
+    result = rover("drive", "--episodes", "3", "--time-limit", "0.5", "--output", tmp_path, "--video", video)
     assert one_line(result, 130) == "interrupted: 1 of 3 episodes are done\n"
     assert "no: time" in result.stdout
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
@@ -238,10 +235,6 @@ def test_numbers_print_as_numbers() -> None:
 SHORT = ("--time-limit", "0.2")
 
 
-def said(*arguments: str) -> Result:
-    return CliRunner(env={"COLUMNS": "160", "NO_COLOR": "1"}).invoke(app, list(arguments))
-
-
 def commands(group: Any, path: tuple[str, ...] = ()) -> dict[tuple[str, ...], Any]:
     """Every command by the words that call it."""
     found: dict[tuple[str, ...], Any] = {}
@@ -255,7 +248,7 @@ COMMANDS = commands(get_command(app))
 
 @pytest.mark.parametrize("path", COMMANDS, ids=" ".join)
 def test_help_calls_rocks_rocks(path: tuple[str, ...]) -> None:
-    text = said(*path, "--help").output
+    text = rover(*path, "--help").output
     assert "sphere_field" not in text
     assert "sphere field" not in text
 
@@ -280,19 +273,18 @@ def test_a_command_that_prints_a_table_takes_json() -> None:
     ],
 )
 def test_the_title_names_the_environment_that_drove(arguments: tuple[str, ...], title: str, tmp_path: Path) -> None:
-    result = said("drive", *arguments, *SHORT, "--output", str(tmp_path))
-    assert result.exit_code == 0, result.output
-    assert title in result.output
+    output = output_of("drive", *arguments, *SHORT, "--output", tmp_path)
+    assert title in output
     assert read_trajectory(tmp_path / "episode-0.h5").attributes["title"] == f"an episode of {title}"
 
 
 def test_the_title_names_the_file_of_the_ground(tmp_path: Path) -> None:
     (tmp_path / "hill.npy").write_bytes(b"")
-    assert "hill.npy" in said("drive", "--terrain", str(tmp_path / "hill.npy")).stderr
+    assert "hill.npy" in rover("drive", "--terrain", tmp_path / "hill.npy").stderr
 
 
 def test_a_difficulty_means_rocks_and_no_plane() -> None:
-    refused = said("drive", "--terrain", "plane", "--difficulty", "1")
+    refused = rover("drive", "--terrain", "plane", "--difficulty", "1")
     assert refused.exit_code == 2
     assert refused.stderr == "error: --difficulty: needs terrain 'rocks', 'hills' or 'sand', got 1.0\n"
 
@@ -301,7 +293,7 @@ def test_a_policy_is_a_runs_folder_or_the_policy_in_it_or_a_shipped_name(tmp_pat
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "policy").symlink_to(policy_folder("rocks"))
     told = [
-        said("drive", "--policy", policy, "--difficulty", "1", *SHORT, "--json").stdout.replace(policy, "POLICY")
+        rover("drive", "--policy", policy, "--difficulty", "1", *SHORT, "--json").stdout.replace(policy, "POLICY")
         for policy in (str(tmp_path / "run"), str(tmp_path / "run" / "policy"), "trained")
     ]
     speeds = r'"real_time_factor": .*'
@@ -319,7 +311,7 @@ def test_a_policy_is_a_runs_folder_or_the_policy_in_it_or_a_shipped_name(tmp_pat
     ],
 )
 def test_a_slope_beyond_the_friction_angle_is_told(arguments: tuple[str, ...], tmp_path: Path) -> None:
-    result = said(*arguments, *(("--output", str(tmp_path)) if arguments[0] != "scene" else ()))
+    result = rover(*arguments, *(("--output", str(tmp_path)) if arguments[0] != "scene" else ()))
     assert result.exit_code == 0, result.output
     slope = arguments[arguments.index("--slope") + 1]
     (line,) = result.stderr.splitlines()
@@ -329,7 +321,7 @@ def test_a_slope_beyond_the_friction_angle_is_told(arguments: tuple[str, ...], t
 
 
 def test_a_slope_below_the_friction_angle_is_no_matter() -> None:
-    assert said("drive", "--slope", "34", *SHORT).stderr == ""
+    assert rover("drive", "--slope", "34", *SHORT).stderr == ""
 
 
 @pytest.mark.parametrize(
@@ -355,18 +347,17 @@ def test_an_error_names_what_the_user_typed(
 ) -> None:
     """`--sinkage` was answered with `--depth`, and `evaluate nope` with `policy`."""
     monkeypatch.chdir(tmp_path)
-    result = said(*shlex.split(arguments.format(here=__file__)))
+    result = rover(*shlex.split(arguments.format(here=__file__)))
     assert result.exit_code == 2
     assert result.stderr.startswith(f"error: {begin}"), result.stderr
 
 
 def test_rover_alone_says_what_to_try_first() -> None:
-    result = said()
-    assert result.exit_code == 0
+    output = output_of()
     for command, _ in FIRST_STEPS:
-        assert command in result.output
+        assert command in output
     for word in ("rover --help", "rover --install-completion"):
-        assert word in result.output
+        assert word in output
 
 
 @pytest.mark.takes_long("runs the first commands that a user sees")
@@ -375,8 +366,7 @@ def test_the_first_steps_run_in_their_order(tmp_path: Path, monkeypatch: pytest.
     commands = [command for command, _ in FIRST_STEPS]
     assert commands.pop() == "rover live --terrain rocks"  # serves until it is stopped: see tests/live
     for command in commands:
-        result = said(*shlex.split(command)[1:])
-        assert result.exit_code == 0, result.output
+        output_of(*shlex.split(command)[1:])
     (page,) = Path("runs").rglob("*.html")
     assert page.stat().st_size > 100_000
     assert list(Path("runs").rglob("*.png"))

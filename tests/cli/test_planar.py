@@ -8,11 +8,10 @@ from pathlib import Path
 import imageio_ffmpeg
 import numpy as np
 import pytest
+from commands import output_of, rover
 from matplotlib.figure import Figure
 from pages import held
-from typer.testing import CliRunner
 
-from rover_gym.cli import app
 from rover_gym.figures.chapter_3 import draw_chapter_3
 from rover_gym.figures.drawing import KINDS
 from rover_gym.figures.planar_drawing import PLANAR_DRAWINGS, path_over_ground
@@ -50,8 +49,7 @@ def is_png(path: Path) -> bool:
 )
 def test_a_run_is_recorded_and_drawn(command: str, options: list[str], tmp_path: Path) -> None:
     arguments = ["planar", command, *options, "--duration", "1", "--output", str(tmp_path)]
-    result = CliRunner().invoke(app, arguments)
-    assert result.exit_code == 0, result.output
+    output_of(*arguments)
     run = read_trajectory(tmp_path / f"{command}.h5")
     assert run.attributes["complete"]
     assert run.attributes["unconverged_rows"] == 0
@@ -65,8 +63,7 @@ def test_a_table_of_points_is_a_ground(tmp_path: Path) -> None:
     np.savetxt(table, np.stack((np.arange(-3.0, 8.0), 0.1 * np.cos(np.arange(-3.0, 8.0))), axis=1))
     output = str(tmp_path)
     options = ["--ground", "table", "--table", str(table), "--duration", "0.5", "--output", output]
-    result = CliRunner().invoke(app, ["planar", "ball", *options])
-    assert result.exit_code == 0, result.output
+    output_of("planar", "ball", *options)
     assert read_trajectory(tmp_path / "ball.h5").attributes["scene"]["ground"]["kind"] == "spline"
 
 
@@ -80,7 +77,7 @@ def test_a_table_of_points_is_a_ground(tmp_path: Path) -> None:
     ],
 )
 def test_bad_options_end_with_one_line(options: list[str], field: str, tmp_path: Path) -> None:
-    result = CliRunner().invoke(app, ["planar", "ball", *options, "--output", str(tmp_path)])
+    result = rover("planar", "ball", *options, "--output", tmp_path)
     assert result.exit_code == 2
     assert f"error: {field}" in result.output
     assert not (tmp_path / "ball.h5").exists()
@@ -92,9 +89,8 @@ SMALL = ["--disks", "100", "--layers", "2"]
 @pytest.mark.nightly("tests/cli/test_planar.py::test_a_crossing_ends_where_the_soil_does")
 def test_a_crossing_is_recorded_drawn_filmed_and_replayed(tmp_path: Path) -> None:
     options = [*SMALL, "--duration", "0.2", "--output", str(tmp_path)]
-    result = CliRunner().invoke(app, ["planar", "soil", *options])
-    assert result.exit_code == 0, result.output
-    assert "distance" in result.output
+    output = output_of("planar", "soil", *options)
+    assert "distance" in output
     run = open_run(tmp_path / "soil.h5")
     assert run.trajectory.attributes["complete"]
     assert run.n_frames == 11
@@ -118,10 +114,9 @@ def test_a_crossing_is_recorded_drawn_filmed_and_replayed(tmp_path: Path) -> Non
     assert (np.abs(frames[0] - frames[-1]) > 60).mean() > 0.001  # it moves
 
     page = tmp_path / "soil.html"
-    replay = CliRunner().invoke(app, ["replay", str(tmp_path / "soil.h5"), "--html", str(page)])
-    assert replay.exit_code == 0, replay.output
+    output_of("replay", tmp_path / "soil.h5", "--html", page)
     assert page.stat().st_size > 500_000
-    refused = CliRunner().invoke(app, ["replay", str(tmp_path / "soil.h5"), "--gltf", str(tmp_path / "soil.glb")])
+    refused = rover("replay", tmp_path / "soil.h5", "--gltf", tmp_path / "soil.glb")
     assert refused.exit_code == 2
     assert "error: --gltf" in refused.output
 
@@ -129,7 +124,7 @@ def test_a_crossing_is_recorded_drawn_filmed_and_replayed(tmp_path: Path) -> Non
 @pytest.mark.nightly("tests/cli/test_planar.py::test_a_planar_run_is_plotted_and_replayed")
 def test_a_run_on_a_soil_is_plotted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     options = [*SMALL, "--duration", "0.2", "--no-video", "--output", str(tmp_path)]
-    assert CliRunner().invoke(app, ["planar", "soil", *options]).exit_code == 0
+    assert rover("planar", "soil", *options).exit_code == 0
     run = open_run(tmp_path / "soil.h5")
     figures = {name: Figure() for name in SOIL_DRAWINGS}
     for name, drawing in SOIL_DRAWINGS.items():
@@ -149,20 +144,18 @@ def test_a_run_on_a_soil_is_plotted(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert 0.0 < ratios.mean() < 100.0
 
     monkeypatch.setitem(KINDS, SoilRun, ({"driving": SOIL_DRAWINGS["driving"]}, 1))
-    result = CliRunner().invoke(app, ["plot", str(tmp_path / "soil.h5"), "--overview"])
-    assert result.exit_code == 0, result.output
+    output_of("plot", tmp_path / "soil.h5", "--overview")
     files = sorted((tmp_path / "soil-plots").iterdir())
     assert [file.name for file in files] == ["driving.png", "overview.png"]
     assert all(is_png(file) for file in files)
-    refused = CliRunner().invoke(app, ["plot", str(tmp_path / "soil.h5"), "--format", "bmp"])
+    refused = rover("plot", tmp_path / "soil.h5", "--format", "bmp")
     assert refused.exit_code == 2
     assert "error: --format" in refused.output
 
 
 def test_a_crossing_ends_where_the_soil_does(tmp_path: Path) -> None:
     options = ["--disks", "90", "--layers", "2", "--duration", "5", "--torque", "90", "--no-video"]
-    result = CliRunner().invoke(app, ["planar", "soil", *options, "--gravity", "0.61", "--output", str(tmp_path)])
-    assert result.exit_code == 0, result.output
+    output_of("planar", "soil", *options, "--gravity", "0.61", "--output", tmp_path)
     assert open_run(tmp_path / "soil.h5").time[-1] < 5.0
 
 
@@ -171,8 +164,7 @@ def test_a_sweep_is_drawn_and_its_numbers_kept(tmp_path: Path, monkeypatch: pyte
     for name, values in (("TORQUES", (50.0,)), ("SLIPS", (0.0, 0.2, 0.5, 0.7)), ("LOADS", (10.0,))):
         monkeypatch.setattr(f"rover_gym.cli.soil_command.{name}", values)
     options = [*SMALL, "--sweep", "--seeds", "1", "--pull-disks", "190", "--pull-layers", "3"]
-    result = CliRunner().invoke(app, ["planar", "soil", *options, "--output", str(tmp_path)])
-    assert result.exit_code == 0, result.output
+    output = output_of("planar", "soil", *options, "--output", tmp_path)
     numbers = json.loads((tmp_path / "soil-curves.json").read_text())
     assert [row[0]["torque"] for row in numbers["drives"]] == [50.0]
     pulls = [row[0] for row in numbers["pulls"]["10.0"]]
@@ -181,7 +173,7 @@ def test_a_sweep_is_drawn_and_its_numbers_kept(tmp_path: Path, monkeypatch: pyte
     fit = numbers["fits"]["10.0"]
     ratio = [pull["pull"] / pull["weight"] for pull in pulls]
     assert fit["last_slope"] == {"value": pytest.approx((ratio[3] - ratio[2]) / 0.2), "error": None}
-    assert "slope from s = 0.5 on" in result.output
+    assert "slope from s = 0.5 on" in output
     assert is_png(tmp_path / "soil-curves.png")
 
 
@@ -200,7 +192,7 @@ def test_a_sweep_is_drawn_and_its_numbers_kept(tmp_path: Path, monkeypatch: pyte
 )
 def test_a_soil_that_cannot_be_ends_with_one_line(options: list[str], message: str, tmp_path: Path) -> None:
     arguments = ["planar", "soil", *SMALL, *options, "--output", str(tmp_path)]
-    result = CliRunner().invoke(app, arguments, env={"COLUMNS": "200", "NO_COLOR": "1"})
+    result = rover(*arguments)
     assert result.exit_code == 2
     assert message in result.output
     assert not any(tmp_path.iterdir())
@@ -232,8 +224,7 @@ def test_chapter_3_is_redrawn(tmp_path: Path) -> None:
 
 def test_a_default_run_ends_where_its_subject_ends(tmp_path: Path) -> None:
     """A step of 5 cm was drawn on an axis of 70 m."""
-    result = CliRunner().invoke(app, ["planar", "rover", "--ground", "step", "--output", str(tmp_path)])
-    assert result.exit_code == 0, result.output
+    output_of("planar", "rover", "--ground", "step", "--output", tmp_path)
     run = open_run(tmp_path / "rover.h5")
     assert 6.0 <= run.discs[-1, :, 0].mean() < 6.1
     figure = Figure()
@@ -244,18 +235,16 @@ def test_a_default_run_ends_where_its_subject_ends(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("command", [pytest.param("ball", marks=NIGHTLY_BALL), "rover"])
 def test_a_planar_run_is_plotted_and_replayed(command: str, tmp_path: Path) -> None:
-    runner = CliRunner()
-    assert runner.invoke(app, ["planar", command, "--duration", "0.5", "--output", str(tmp_path)]).exit_code == 0
+    assert rover("planar", command, "--duration", "0.5", "--output", str(tmp_path)).exit_code == 0
     recording = tmp_path / f"{command}.h5"
-    plots = runner.invoke(app, ["plot", str(recording), "--overview", "--output", str(tmp_path / "plots")])
-    assert plots.exit_code == 0, plots.output
+    output_of("plot", str(recording), "--overview", "--output", str(tmp_path / "plots"))
     drawn = {path.stem for path in (tmp_path / "plots").iterdir()}
     assert drawn == {*PLANAR_DRAWINGS, "overview"}
     page = tmp_path / "page.html"
-    assert runner.invoke(app, ["replay", str(recording), "--html", str(page)]).exit_code == 0
+    assert rover("replay", str(recording), "--html", str(page)).exit_code == 0
     charts = held(page).head["curves"]["charts"]
     assert [chart["unit"] for chart in charts] == ["N", "mm", "mm/s"]
-    refused = runner.invoke(app, ["replay", str(recording), "--gltf", str(tmp_path / "run.glb")])
+    refused = rover("replay", str(recording), "--gltf", str(tmp_path / "run.glb"))
     assert refused.exit_code == 2
     assert "is replayed as a page, with --html" in refused.output
 
@@ -273,5 +262,5 @@ def test_a_planar_run_read_back_is_the_simulations(tmp_path: Path) -> None:
 
 
 def write_episode(folder: Path) -> Path:
-    assert CliRunner().invoke(app, ["drive", "--time-limit", "0.1", "--output", str(folder)]).exit_code == 0
+    assert rover("drive", "--time-limit", "0.1", "--output", folder).exit_code == 0
     return folder / "episode-0.h5"

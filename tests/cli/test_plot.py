@@ -11,14 +11,13 @@ import h5py
 import matplotlib as mpl
 import numpy as np
 import pytest
+from commands import output_of, rover
 from machines import MACHINES
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
-from typer.testing import CliRunner, Result
 
 from rover_gym import OptionError, Plane, RoverModel, Simulation, SphereField
-from rover_gym.cli import app
 from rover_gym.extras import MissingExtraError
 from rover_gym.figures import draw_run
 from rover_gym.figures.derived_signals import contact_velocities, motor_work, slip_ratios, smooth
@@ -52,18 +51,14 @@ os.kill(os.getpid(), signal.SIGKILL)
 """
 
 
-def rover(*arguments: str) -> Result:
-    return CliRunner(env={"COLUMNS": "120", "NO_COLOR": "1"}).invoke(app, list(arguments))
-
-
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A short run of each kind."""
     folder = tmp_path_factory.mktemp("runs")
     common = ("--time-limit", "2", "--seed", "1", "--output")
-    assert rover("drive", *common, str(folder / "flat")).exit_code == 0
+    assert rover("drive", *common, folder / "flat").exit_code == 0
     rocks = ("--terrain", "rocks", "--difficulty", "1")
-    assert rover("drive", *rocks, *common, str(folder / "rocks")).exit_code == 0
+    assert rover("drive", *rocks, *common, folder / "rocks").exit_code == 0
     inclined_plane.run(folder / "section_6_1.h5", duration=3.5)
     sphere_rug.run(folder / "rug.h5", duration=4.0)
     return {
@@ -98,11 +93,10 @@ def curves(axes: Axes) -> dict[str, np.ndarray]:
 
 @pytest.mark.takes_long("draws every figure that there is")
 def test_a_run_gives_a_file_per_figure(recordings: dict[str, Path], tmp_path: Path) -> None:
-    result = rover("plot", str(recordings["rocks"]), "--output", str(tmp_path))
-    assert result.exit_code == 0, result.output
+    output = output_of("plot", recordings["rocks"], "--output", tmp_path)
     for name in DRAWINGS:
         assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
-        assert f"figure: {tmp_path / name}.png" in result.output
+        assert f"figure: {tmp_path / name}.png" in output
     assert len(list(tmp_path.iterdir())) == len(DRAWINGS)
 
 
@@ -112,8 +106,7 @@ def test_without_a_folder_the_figures_lie_beside_the_run(
 ) -> None:
     few = {name: DRAWINGS[name] for name in ("path", "wheel-loads", "energy")}  # drawing takes half a second each
     monkeypatch.setitem(FIGURES, RoverRun, (few, 2))
-    result = rover("plot", str(recordings["rug"]), "--format", "svg", "--overview")
-    assert result.exit_code == 0, result.output
+    output_of("plot", recordings["rug"], "--format", "svg", "--overview")
     files = sorted(recordings["rug"].with_name("rug-plots").iterdir())
     assert [file.name for file in files] == sorted(f"{name}.svg" for name in (*few, "overview"))
     assert all("<svg" in file.read_text(encoding="utf-8")[:1000] for file in files)
@@ -332,7 +325,7 @@ def test_a_file_that_is_no_run_is_refused_by_name(content: bytes | str | None, r
     elif content is not None:
         with h5py.File(path, "w") as file:
             file["x"] = 1.0
-    result = rover("plot", str(path))
+    result = rover("plot", path)
     assert result.exit_code == 2
     assert len(result.stderr.splitlines()) == 1
     assert str(path) in result.stderr
@@ -341,7 +334,7 @@ def test_a_file_that_is_no_run_is_refused_by_name(content: bytes | str | None, r
 
 
 def test_an_unknown_format_is_refused_before_anything_is_written(recordings: dict[str, Path], tmp_path: Path) -> None:
-    result = rover("plot", str(recordings["flat"]), "--format", "bmp", "--output", str(tmp_path / "plots"))
+    result = rover("plot", recordings["flat"], "--format", "bmp", "--output", tmp_path / "plots")
     assert result.exit_code == 2
     assert result.stderr == "error: --format: must be one of png, svg, pdf, got 'bmp'\n"
     assert not (tmp_path / "plots").exists()
@@ -356,7 +349,7 @@ def test_without_matplotlib_the_error_names_the_extra(
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(MissingExtraError, match=r"rover-gym\[demo\]"):
         draw_run(read_run(recordings["flat"]), tmp_path / "plots")
-    result = rover("plot", str(recordings["flat"]), "--output", str(tmp_path / "plots"))
+    result = rover("plot", recordings["flat"], "--output", tmp_path / "plots")
     assert result.exit_code == 2
     assert "pip install 'rover-gym[demo]'" in result.stderr
     assert len(result.stderr.splitlines()) == 1

@@ -12,11 +12,10 @@ import numpy as np
 import pygltflib
 import pytest
 import trimesh
+from commands import output_of, rover
 from pages import held
-from typer.testing import CliRunner, Result
 
 from rover_gym import Plane, RoverModel, SphereField
-from rover_gym.cli import app
 from rover_gym.figures import draw_run
 from rover_gym.record import RecordingError, RoverRun, Trajectory, read_run
 from rover_gym.rendering.appearance import rover_parts, sphere_mesh
@@ -514,10 +513,6 @@ def test_a_page_of_a_run_without_its_forces_names_them(tmp_path: Path) -> None:
 # --- The command
 
 
-def rover(*arguments: str | Path) -> Result:
-    return CliRunner(env={"COLUMNS": "120", "NO_COLOR": "1"}).invoke(app, [str(argument) for argument in arguments])
-
-
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     folder = tmp_path_factory.mktemp("drive")
@@ -527,10 +522,11 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 def test_all_formats_are_written_and_named(recording: Path, tmp_path: Path) -> None:
     targets = [tmp_path / name for name in ("a.html", "a.wrl", "a.glb")]
-    result = rover("replay", recording, "--html", targets[0], "--vrml", targets[1], "--gltf", targets[2], "--fps", "10")
-    assert result.exit_code == 0, result.output
+    output = output_of(
+        "replay", recording, "--html", targets[0], "--vrml", targets[1], "--gltf", targets[2], "--fps", "10"
+    )
     for target in targets:
-        assert f"{target}" in result.output.replace("\n", "")
+        assert f"{target}" in output.replace("\n", "")
     assert held(targets[0]).head["time"] == pytest.approx(np.linspace(0.0, 1.0, 11))
     vrml = Vrml(targets[1].read_text(encoding="utf-8"))
     assert len(vrml.named["trunk_place"].fields["key"]) == 11
@@ -582,13 +578,11 @@ def test_a_missing_package_is_named_with_its_extra(
 
 
 def test_the_panel_says_scene_seed_difficulty_and_outcome(tmp_path: Path) -> None:
-    from typer.testing import CliRunner  # noqa: PLC0415 - for this test alone
 
-    from rover_gym.cli import app  # noqa: PLC0415 - as above
     from rover_gym.record import read_run  # noqa: PLC0415 - as above
 
     drive = ["drive", "--difficulty", "0.5", "--slope", "3", "--seed", "4", "--time-limit", "0.2"]
-    assert CliRunner().invoke(app, [*drive, "--output", str(tmp_path)]).exit_code == 0
+    assert rover(*drive, "--output", tmp_path).exit_code == 0
     told = ["scene: rocks", "slope: 3.0 degrees", "seed: 4", "difficulty: 0.5", "outcome: ran out of time"]
     assert facts(read_run(tmp_path / "episode-4.h5")) == told
     assert facts(turning_run()) == []

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import output_of, rover
 from typer.testing import CliRunner
 
 from rover_gym import OptionError, Plane, RoverModel, Simulation, SphereField
@@ -96,8 +97,7 @@ def test_a_killed_run_is_read_back_as_far_as_it_came(tmp_path: Path) -> None:
     sim.step(50)
     trunk = run.model.solid_names.index("trunk")
     assert run.positions[-1, trunk] == pytest.approx(sim.poses()["trunk"][0], abs=1e-12)
-    result = CliRunner().invoke(app, ["replay", str(path), "--vrml", str(tmp_path / "killed.wrl"), "--fps", "1000"])
-    assert result.exit_code == 0, result.output
+    output_of("replay", path, "--vrml", tmp_path / "killed.wrl", "--fps", "1000")
     place = (tmp_path / "killed.wrl").read_text(encoding="utf-8").partition("DEF trunk_place")[2].partition("\n")[0]
     keys, _, values = place.partition("keyValue")
     assert len(keys.partition("key [")[2].strip("] ").split()) == 50
@@ -152,8 +152,7 @@ FIGURES = (
 
 @pytest.mark.nightly("tests/cli/test_run.py::test_the_run_lands_where_siconos_does")
 def test_the_scene_is_recorded_and_drawn(tmp_path: Path) -> None:
-    result = CliRunner().invoke(app, ["report", "--figures", "--duration", "12", "--output", str(tmp_path)])
-    assert result.exit_code == 0, result.output
+    output = output_of("report", "--figures", "--duration", "12", "--output", tmp_path)
     trajectory = read_trajectory(tmp_path / "trajectory.h5")
     assert trajectory.attributes["complete"]
     assert trajectory.attributes["solver"]["gravity"] == list(GRAVITY)
@@ -164,8 +163,8 @@ def test_the_scene_is_recorded_and_drawn(tmp_path: Path) -> None:
         width, height = struct.unpack(">II", head[16:24])
         assert width >= 1200
         assert height >= 600
-        assert name in result.output
-    assert "from Siconos" in result.output
+        assert name in output
+    assert "from Siconos" in output
 
 
 def test_the_run_lands_where_siconos_does(tmp_path: Path) -> None:
@@ -211,7 +210,7 @@ def test_gaps_on_the_rug_are_those_of_points_on_the_rim() -> None:
 
 def test_without_matplotlib_the_error_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    result = CliRunner().invoke(app, ["report", "--figures", "--duration", "0.1", "--output", str(tmp_path)])
+    result = rover("report", "--figures", "--duration", "0.1", "--output", tmp_path)
     assert result.exit_code == 2
     assert "pip install 'rover-gym[demo]'" in result.stderr
     assert len(result.stderr.splitlines()) == 1

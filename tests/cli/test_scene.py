@@ -1,15 +1,12 @@
 """`rover scene`: tables and JSON."""
 
 import json
+from functools import partial
 
+import commands
 import pytest
-from typer.testing import CliRunner, Result
 
-from rover_gym.cli import app
-
-
-def rover(*arguments: str) -> Result:
-    return CliRunner(env={"COLUMNS": "200", "NO_COLOR": "1"}).invoke(app, ["scene", *arguments])
+rover = partial(commands.rover, "scene")
 
 
 def test_one_line_says_what_is_built() -> None:

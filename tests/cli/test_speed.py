@@ -3,15 +3,13 @@
 import json
 
 import pytest
-from typer.testing import CliRunner
-
-from rover_gym.cli import app
+from commands import output_of, rover
 
 
 @pytest.mark.parametrize("terrain", ["plane", "rocks"])
 def test_json_adds_up(terrain: str) -> None:
     options = ["--num-envs", "3", "--threads", "2", "--rounds", "2", "--terrain", terrain, "--json"]
-    result = CliRunner().invoke(app, ["speed", *options])
+    result = rover("speed", *options)
     assert result.exit_code == 0, result.output
     whole = json.loads(result.stdout)
     assert whole["machine"]["cores"] > 0
@@ -31,8 +29,7 @@ def test_json_adds_up(terrain: str) -> None:
 
 
 def test_the_text_names_what_it_tells() -> None:
-    result = CliRunner().invoke(app, ["speed", "--num-envs", "2", "--rounds", "1"])
-    assert result.exit_code == 0, result.output
+    output = output_of("speed", "--num-envs", "2", "--rounds", "1")
     for words in (
         "rover-steps/s",
         "simulated s/s",
@@ -41,9 +38,9 @@ def test_the_text_names_what_it_tells() -> None:
         "inside the physics",
         "over SyncVectorEnv",
     ):
-        assert words in result.output
+        assert words in output
 
 
 def test_bad_numbers_are_refused() -> None:
-    assert CliRunner().invoke(app, ["speed", "--num-envs", "0"]).exit_code == 2
-    assert CliRunner().invoke(app, ["speed", "--torque", "-1"]).exit_code == 2
+    assert rover("speed", "--num-envs", "0").exit_code == 2
+    assert rover("speed", "--torque", "-1").exit_code == 2

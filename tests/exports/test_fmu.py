@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from commands import output_of, rover
 
 from rover_gym import HeightField, OptionError, Plane, RoverModel, Simulation, SphereField, Terrain, TriangleMesh, Union
-from rover_gym.cli import app
 from rover_gym.exports import fmu as units
 from rover_gym.exports import write_fmu
 from rover_gym.exports.fmu import unit_variables
@@ -230,7 +229,7 @@ def test_a_unit_in_the_axes_of_rep_103_turns_every_vector_and_pose(tmp_path: Pat
 def test_axes_that_are_unknown_are_refused(tmp_path: Path) -> None:
     with pytest.raises(OptionError, match="axes: must be one of world, rep103"):
         write_fmu(simulation_on(Plane()), tmp_path / "a.fmu", axes="ned")  # type: ignore[arg-type]
-    result = CliRunner().invoke(app, ["export", "fmu", "-o", str(tmp_path / "a.fmu"), "--axes", "ned"])
+    result = rover("export", "fmu", "-o", tmp_path / "a.fmu", "--axes", "ned")
     assert result.exit_code == 2
     assert not (tmp_path / "a.fmu").exists()
 
@@ -487,7 +486,7 @@ def test_without_the_library_the_command_says_how_to_build_it(tmp_path: Path, mo
     monkeypatch.setattr(units, "LIBRARIES", tmp_path)
     with pytest.raises(OptionError, match=r"library: is not built: .*cargo build --release --locked -p rover-fmu"):
         write_fmu(Simulation(RoverModel()), tmp_path / "a.fmu")
-    result = CliRunner().invoke(app, ["export", "fmu", "-o", str(tmp_path / "a.fmu")])
+    result = rover("export", "fmu", "-o", tmp_path / "a.fmu")
     assert result.exit_code == 2
     assert "cargo build" in result.stderr
     assert not (tmp_path / "a.fmu").exists()
@@ -495,8 +494,7 @@ def test_without_the_library_the_command_says_how_to_build_it(tmp_path: Path, mo
 
 def test_the_command_writes_an_episodes_start(tmp_path: Path) -> None:
     options = ["--terrain", "sphere_field", "--difficulty", "0.5", "--seed", "3", "--friction", "0.6"]
-    result = CliRunner().invoke(app, ["export", "fmu", "-o", str(tmp_path / "a.fmu"), *options])
-    assert result.exit_code == 0, result.output
+    output_of("export", "fmu", "-o", tmp_path / "a.fmu", *options)
     assert validate_fmu(str(tmp_path / "a.fmu")) == []
     description = read_model_description(str(tmp_path / "a.fmu"))
     assert {one.name: one.start for one in description.modelVariables}["friction"] == "0.6"

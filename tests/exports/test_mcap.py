@@ -13,10 +13,9 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from commands import output_of, rover
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField
-from rover_gym.cli import app
 from rover_gym.record import Recorder, RecordingError, RoverSampler, describe, read_run
 
 pytest.importorskip("mcap.reader")
@@ -302,10 +301,9 @@ def test_a_log_has_one_writer_and_one_end(tmp_path: Path) -> None:
 
 def test_the_command_writes_beside_the_run(tmp_path: Path) -> None:
     path = quick_run(tmp_path / "run.h5", n=3)
-    result = CliRunner().invoke(app, ["export", "mcap", str(path)])
-    assert result.exit_code == 0, result.output
+    output_of("export", "mcap", path)
     assert len(read(tmp_path / "run.mcap")["/tf"]) == 3
-    result = CliRunner().invoke(app, ["export", "mcap", str(path), "-o", str(path)])
+    result = rover("export", "mcap", path, "-o", path)
     assert result.exit_code == 2
     assert "--output: would replace the run itself" in result.stderr
     assert read_run(path).n_frames == 3

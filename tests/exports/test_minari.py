@@ -1,16 +1,16 @@
 """Minari data sets load, and their actions replay to the same observations bit for bit."""
 
 import os
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import commands
 import gymnasium as gym
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from rover_gym import OptionError, PDPolicy
-from rover_gym.cli import app
 from rover_gym.registration import ENVIRONMENTS
 
 pytest.importorskip("minari")
@@ -50,13 +50,12 @@ def replayed(episode: Any, seed: int, env: gym.Env[Any, Any]) -> None:
     assert terminated or truncated
 
 
-def rover(*arguments: str) -> Any:
-    return CliRunner(env={"COLUMNS": "160"}).invoke(app, ["dataset", *arguments])
+rover = partial(commands.rover, "dataset")
 
 
 def test_a_policys_episodes_replay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     options = ["--environment", "RoverRocks-v0", "--difficulty", "0.3", "--episodes", "2", "--seed", "7"]
-    result = rover("rover/rocks-pd-v0", *options, "--folder", str(tmp_path))
+    result = rover("rover/rocks-pd-v0", *options, "--folder", tmp_path)
     assert result.exit_code == 0, result.output
     data = load(tmp_path, "rover/rocks-pd-v0", monkeypatch)
     assert data.total_episodes == 2
@@ -73,7 +72,7 @@ def test_random_actions_drive_any_environment(
     environment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     result = rover(
-        "any-v1", "--environment", environment, "--policy", "random", "--episodes", "1", "--folder", str(tmp_path)
+        "any-v1", "--environment", environment, "--policy", "random", "--episodes", "1", "--folder", tmp_path
     )
     assert result.exit_code == 0, result.output
     data = load(tmp_path, "any-v1", monkeypatch)
@@ -95,7 +94,7 @@ def test_random_actions_drive_any_environment(
     ],
 )
 def test_bad_input_is_one_line_and_leaves_nothing(options: list[str], message: str, tmp_path: Path) -> None:
-    result = rover(*options, "--episodes", "1", "--folder", str(tmp_path))
+    result = rover(*options, "--episodes", "1", "--folder", tmp_path)
     assert result.exit_code == 2
     assert message in result.stderr
     assert len(result.stderr.splitlines()) == 1

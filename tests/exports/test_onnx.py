@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from commands import output_of, rover
 
-from rover_gym.cli import app
 from rover_gym.models import open_model
 from rover_gym.policy import Network, PolicyError, TrainedPolicy, policy_arguments, policy_folder
 from rover_gym.policy.arc_forecast import OUTPUTS
@@ -83,16 +82,15 @@ def test_the_forecast_gives_the_same_outcomes(rover: str | None, terrain: str) -
 def test_what_has_no_network_is_refused(policy: str, tmp_path: Path) -> None:
     with pytest.raises(PolicyError):
         onnx_policy(policy)
-    result = CliRunner().invoke(app, ["export", "onnx", policy, "-o", str(tmp_path / "a.onnx")])
+    result = rover("export", "onnx", policy, "-o", tmp_path / "a.onnx")
     assert result.exit_code == 2
     assert len(result.stderr.splitlines()) == 1
     assert not (tmp_path / "a.onnx").exists()
 
 
 def test_the_command_writes_a_file_that_the_checker_accepts(tmp_path: Path) -> None:
-    for rover in ("rover", "open-rover"):
-        path = tmp_path / rover / "a.onnx"
-        result = CliRunner().invoke(app, ["export", "onnx", "foresight", "--model", rover, "-o", str(path)])
-        assert result.exit_code == 0, result.output
+    for model in ("rover", "open-rover"):
+        path = tmp_path / model / "a.onnx"
+        output_of("export", "onnx", "foresight", "--model", model, "-o", path)
         onnx.checker.check_model(str(path), full_check=True)
     assert (tmp_path / "rover" / "a.onnx").read_bytes() != (tmp_path / "open-rover" / "a.onnx").read_bytes()

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner, Result
+from commands import output_of, rover
+from typer.testing import Result
 
 from rover_gym import PDPolicy
-from rover_gym.cli import app
 
 pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
 
@@ -32,10 +32,6 @@ TINY: dict[str, Any] = {
     "evaluation": {"every": 256, "episodes": 3},
     "checkpoint_every": 256,
 }
-
-
-def rover(*arguments: Any) -> Result:
-    return CliRunner(env={"COLUMNS": "200", "NO_COLOR": "1"}).invoke(app, [str(entry) for entry in arguments])
 
 
 @pytest.fixture(scope="module")
@@ -135,8 +131,7 @@ def test_a_training_that_goes_on_keeps_the_best_policy(config: Path, tmp_path: P
     # Other fields: their figures cannot be compared, so the next evaluation is the best.
     changed = tmp_path / "changed.yaml"
     changed.write_text(yaml.safe_dump(TINY | {"evaluation": {"every": 256, "episodes": 2}}), encoding="utf-8")
-    result = rover("train", changed, "--output", run, "--no-progress", "--resume", "--steps", 768)
-    assert result.exit_code == 0, result.output
+    output_of("train", changed, "--output", run, "--no-progress", "--resume", "--steps", 768)
     assert PolicyCard.read(path).source["decisions"] == 768
 
 
@@ -144,8 +139,7 @@ def test_a_training_that_goes_on_keeps_the_best_policy(config: Path, tmp_path: P
 def test_a_second_call_with_resume_finishes_the_seeds_that_are_missing(config: Path, tmp_path: Path) -> None:
     arguments = ("train", config, "--output", tmp_path, "--no-progress", "--steps", 256)
     assert rover(*arguments, "--seeds", 1, "--seeds", 2).exit_code == 0
-    result = rover(*arguments, "--resume", "--seeds", 1, 2, 4)
-    assert result.exit_code == 0, result.output
+    output_of(*arguments, "--resume", "--seeds", 1, 2, 4)
     reports = [json.loads((tmp_path / f"tiny-seed{seed}" / "run.json").read_text("utf-8")) for seed in (1, 2, 4)]
     assert [report["resumed_from"] for report in reports] == [256, 256, 0]
     assert [report["decisions"] for report in reports] == [256, 256, 256]
@@ -193,8 +187,7 @@ def test_each_evaluation_films_its_first_fields(config: Path, monkeypatch: pytes
         films.append((path.relative_to(tmp_path).as_posix(), seed))
 
     monkeypatch.setattr("rover_gym.learning.training_evaluation.film_episode", film)
-    result = rover("train", config, "--output", tmp_path / "run", "--no-progress", "--films", 2)
-    assert result.exit_code == 0, result.output
+    output_of("train", config, "--output", tmp_path / "run", "--no-progress", "--films", 2)
     assert films == [
         (f"run/films/{decisions:09d}-seed{seed}.mp4", seed)
         for decisions in (256, 512)

@@ -5,10 +5,9 @@ import math
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
+from commands import output_of, rover
 
 from rover_gym import OptionError, PDPolicy
-from rover_gym.cli import app
 from rover_gym.policy import TrainedPolicy, drive_all, policy_arguments, policy_folder
 
 # Neither trained on nor part of the evaluation that was written down.
@@ -60,9 +59,8 @@ def test_a_policy_comes_with_what_it_was_made_of_and_is_small(terrain: str) -> N
 
 def test_drive_runs_the_trained_policy(tmp_path: Path) -> None:
     arguments = ["drive", "--policy", "trained", "--terrain", "rocks", "--difficulty", "0.3", "--seed", "1"]
-    result = CliRunner().invoke(app, [*arguments, "--output", str(tmp_path)])
-    assert result.exit_code == 0, result.output
-    assert "trained policy" in result.output
+    output = output_of(*arguments, "--output", tmp_path)
+    assert "trained policy" in output
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert summary["policy"] == "trained"
     assert summary["episodes"][0]["success"]
@@ -70,7 +68,7 @@ def test_drive_runs_the_trained_policy(tmp_path: Path) -> None:
 
 
 def test_a_policy_that_is_not_there_is_one_line(tmp_path: Path) -> None:
-    result = CliRunner().invoke(app, ["drive", "--no-record", "--policy", str(tmp_path)])
+    result = rover("drive", "--no-record", "--policy", tmp_path)
     assert result.exit_code == 2
     assert result.stderr.startswith("error: --policy: ")
 

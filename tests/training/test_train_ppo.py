@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from typer.testing import CliRunner
+from commands import output_of
 
 pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
 
@@ -18,7 +18,6 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
-from rover_gym.cli import app
 from rover_gym.learning.build import build_env
 from rover_gym.learning.training_config import environment_arguments, read_config
 from rover_gym.policy import Network, TrainedPolicy, drive_all, summarise, wilson_interval
@@ -277,8 +276,7 @@ def test_a_policy_for_another_rover_trains_drives_and_is_replayed(
     drive = ["drive", "--policy", policy, "--model", "skid-steered", "--time-limit", 1, "--output", tmp_path / "drive"]
     replay = ["replay", tmp_path / "drive" / "episode-0.h5", "--vrml", tmp_path / "run.wrl"]
     for command in (drive, replay):
-        result = CliRunner().invoke(app, [str(entry) for entry in command])
-        assert result.exit_code == 0, result.output
+        output_of(*command)
     assert read_run(tmp_path / "drive" / "episode-0.h5").model.name == "skid-steered"
 
 
