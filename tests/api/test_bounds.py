@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from rover_gym import ModelError, RoverModel, SphereField, StepError, TerrainError
 from rover_gym.mechanics import SoilSimulation, soil_packing
@@ -70,9 +71,8 @@ def test_a_chain_of_a_thousand_solids_is_built_at_once() -> None:
 def test_too_many_wheels_or_tags_are_refused(key: str) -> None:
     description = RoverModel().to_dict()
     description[key] = [description[key][0] | {"name": f"x{i}"} for i in range(1001)]
-    with pytest.raises(ModelError, match="at most 1000") as caught:
+    with refused(ModelError, key, "at most 1000"):
         RoverModel.from_dict(description)
-    assert caught.value.field == key
 
 
 @pytest.mark.parametrize("text", ["a = " + "[" * 100_000, "a = " + "{a=" * 100_000, "[" * 100_000, "a." * 100_000])

@@ -4,6 +4,7 @@ import copy
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from rover_gym import CommandError, OptionError, RoverModel, Simulation, StateError
 from rover_gym.derivatives import Rollout, jax_rollout, rollout, torch_rollout
@@ -249,9 +250,8 @@ def test_bad_input_is_refused_by_name():
         rollout(sim, start * np.nan, commands)
     with pytest.raises(CommandError, match=r"commands: needs shape \(n, steps, nu\)"):
         rollout(sim, start, commands[:, :5])
-    with pytest.raises(OptionError, match='no parameter is called "colour"') as caught:
+    with refused(OptionError, "parameters[1]", 'no parameter is called "colour"'):
         rollout(sim, start, commands, ("friction", "colour"))
-    assert caught.value.field == "parameters[1]"
     with pytest.raises(OptionError, match="threads"):
         rollout(sim, start, commands, threads=0)
     found = rollout(sim, start, commands)

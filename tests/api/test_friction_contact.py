@@ -5,6 +5,7 @@ import pytest
 import scipy.sparse
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import refused
 
 import rover_gym
 from rover_gym import solve_friction_contact
@@ -61,9 +62,8 @@ def test_the_relaxed_law_says_that_it_is_another_law():
     # It parts with mu |u_T|: p = 1.6 (1, -0.5), u = (0.6, 1.2).
     np.testing.assert_allclose(answer.velocities, [[0.6, 1.2, 0.0]], atol=1e-7)
     assert answer.report.velocity_error > 0.1
-    with pytest.raises(rover_gym.OptionError) as caught:
+    with refused(rover_gym.OptionError, "solver"):
         rover_gym.Simulation(solver="relaxed")
-    assert caught.value.field == "solver"
 
 
 def test_the_last_problem_is_that_of_the_velocities_where_the_position_was_projected():
@@ -108,9 +108,8 @@ def test_a_warm_start_is_taken(sim):
     ],
 )
 def test_a_bad_problem_is_refused_by_field(field, arguments):
-    with pytest.raises(rover_gym.ProblemError) as caught:
+    with refused(rover_gym.ProblemError, field):
         rover_gym.solve_friction_contact(*arguments)
-    assert caught.value.field == field
 
 
 def test_bad_options_are_refused_by_field():
@@ -122,12 +121,10 @@ def test_bad_options_are_refused_by_field():
         ("solver", {"solver": "lemke"}),
         ("max_iterations", {"max_iterations": 0}),
     ]:
-        with pytest.raises(rover_gym.OptionError) as caught:
+        with refused(rover_gym.OptionError, field):
             rover_gym.solve_friction_contact(*problem, **options)
-        assert caught.value.field == field
-    with pytest.raises(rover_gym.ProblemError) as caught:
+    with refused(rover_gym.ProblemError, "initial"):
         rover_gym.solve_friction_contact(*problem, initial=[np.nan, 0.0, 0.0])
-    assert caught.value.field == "initial"
 
 
 def test_a_rover_with_enormous_friction_gains_no_energy():
@@ -250,9 +247,8 @@ def test_a_contact_without_entries_is_named():
 
 @pytest.mark.parametrize("shape", [(3, 6), (4, 4), (7, 7)])
 def test_a_sparse_array_that_is_no_operator_is_refused(shape):
-    with pytest.raises(rover_gym.ProblemError, match=r"W: must be square with 3 rows a contact") as error:
+    with refused(rover_gym.ProblemError, "W", r"W: must be square with 3 rows a contact"):
         solve_friction_contact(scipy.sparse.csr_array(np.ones(shape)), np.ones(shape[1]), 0.5)
-    assert error.value.field == "W"
 
 
 @settings(max_examples=30, deadline=None)
@@ -267,9 +263,8 @@ def test_one_mu_stands_for_all(mu, n, dimension):
 @pytest.mark.parametrize("mu", [0.5, [0.5, 0.5]])
 def test_a_problem_in_the_plane_is_told_so(mu):
     W, q, _ = chain(2, 2)
-    with pytest.raises(rover_gym.ProblemError, match="dimension=2") as error:
+    with refused(rover_gym.ProblemError, "q", "dimension=2"):
         solve_friction_contact(W, q, mu)
-    assert error.value.field == "q"
     assert solve_friction_contact(W, q, mu, dimension=2).report.is_converged
 
 

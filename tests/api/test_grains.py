@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from rover_gym import OptionError, Plane, RoverGymError, RoverModel, SphereField
 from rover_gym.grains import (
@@ -145,9 +146,8 @@ def test_cohesion_shows_in_the_impulses() -> None:
 )
 def test_what_cannot_be_is_refused_by_name(change: dict[str, Any], field: str) -> None:
     given: dict[str, Any] = {"radius": [0.1], "mass": [2.0], "position": [[0.0, 0.1, 0.0]], **change}
-    with pytest.raises(RoverGymError, match=r".") as caught:
+    with refused(RoverGymError, field):
         GrainSimulation(given.pop("radius"), given.pop("mass"), given.pop("position"), **given)
-    assert caught.value.field == field
 
 
 def test_a_refused_state_changes_nothing() -> None:
@@ -300,9 +300,8 @@ def test_mirrored_tiles_nearly_stay_at_rest(bed: BallBed) -> None:
     ],
 )
 def test_beds_that_cannot_be_are_refused_by_name(call: Callable[[BallBed], object], field: str, bed: BallBed) -> None:
-    with pytest.raises(OptionError) as caught:
+    with refused(OptionError, field):
         call(bed)
-    assert caught.value.field == field
 
 
 def test_memory_is_told_before_it_is_taken(bed: BallBed, monkeypatch: pytest.MonkeyPatch) -> None:

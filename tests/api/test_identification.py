@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from refusals import refused
 
 from rover_gym import OptionError, RoverGymError, RoverModel, Simulation
 from rover_gym.identification import Identification, Parameter, identify
@@ -214,9 +215,8 @@ def with_rows(run: RoverRun, name: str, rows: npt.ArrayLike) -> RoverRun:
     ],
 )
 def test_wrong_arguments_are_named(rolling: RoverRun, arguments: dict[str, Any], field: str) -> None:
-    with pytest.raises(RoverGymError) as caught:
+    with refused(RoverGymError, field):
         identify(rolling, **{"parameters": ["friction"], **arguments})
-    assert caught.value.field == field
 
 
 def test_what_a_recording_lacks_is_named(rolling: RoverRun) -> None:
@@ -228,9 +228,8 @@ def test_what_a_recording_lacks_is_named(rolling: RoverRun) -> None:
         "recording.time[4]": with_rows(rolling, "time", [*rolling.time[:4], *(rolling.time[4:] + 0.001)]),
     }
     for field, run in cases.items():
-        with pytest.raises(OptionError) as caught:
+        with refused(OptionError, field):
             identify(run, ["friction"])
-        assert caught.value.field == field
 
 
 @pytest.mark.parametrize(
@@ -244,9 +243,8 @@ def test_what_a_recording_lacks_is_named(rolling: RoverRun) -> None:
 )
 def test_a_parameter_that_cannot_be_is_refused(change: dict[str, float], field: str) -> None:
     given = {"start": 0.5, "low": 0.0, "high": 1.0, "scale": 0.1, **change}
-    with pytest.raises(OptionError) as caught:
+    with refused(OptionError, field):
         Parameter("mine", "1", apply=lambda setup, _value: setup, **given)
-    assert caught.value.field == field
 
 
 def test_a_rover_without_motors_has_none_to_identify(rolling: RoverRun) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from rover_gym.mechanics import (
     HeightField,
@@ -90,10 +91,9 @@ def test_a_snapshot_continues_with_materials() -> None:
     ],
 )
 def test_bad_laws_are_refused_by_name(given: Any, message: str) -> None:
-    with pytest.raises(OptionError) as caught:
+    with refused(OptionError, "materials") as caught:
         Simulation(materials=given)
     assert message in str(caught.value)
-    assert caught.value.field == "materials"
 
 
 def test_terrains_name_their_material() -> None:
@@ -137,9 +137,8 @@ def test_cylinders_yield_by_a_hair_unless_they_are_said_to_be_rigid() -> None:
     ("fields", "path"), [({"width": -1.0}, "width"), ({"width": 0.1, "rounding": 0.2}, "rounding")]
 )
 def test_bad_widths_are_refused_by_name(fields: dict[str, float], path: str) -> None:
-    with pytest.raises(ModelError) as caught:
+    with refused(ModelError, f"wheels[0].{path}"):
         wide(**fields)
-    assert caught.value.field == f"wheels[0].{path}"
 
 
 SLOPES = (0.13, 0.21)

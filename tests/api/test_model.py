@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refused
 
 import rover_gym
 from rover_gym.mechanics import Plane, RoverModel
@@ -107,9 +108,8 @@ def test_another_wheel_radius_is_another_wheel():
     assert both.wheel_radii[0] == 0.26
     assert both.to_dict()["wheels"][0]["radius"] == 0.25
     contradiction = corrupted(lambda d: d["wheels"][2].update(radius=0.3))
-    with pytest.raises(rover_gym.ModelError, match="contact_radius") as caught:
+    with refused(rover_gym.ModelError, "wheels[2].radius", "contact_radius"):
         rover_gym.RoverModel.from_dict(contradiction)
-    assert caught.value.field == "wheels[2].radius"
     stated = corrupted(lambda d: d["solids"][wheel - 5].update(inertia=[0.08, 0.08, 0.16, 0.0, 0.0, 0.0]))
     larger = rover_gym.RoverModel.from_dict(stated).replace(wheel_radius=0.2).to_dict()
     assert larger["solids"][wheel - 5]["inertia"] == pytest.approx([0.32, 0.32, 0.64, 0.0, 0.0, 0.0])
@@ -134,9 +134,8 @@ def test_the_reports_coordinates_are_singular_at_a_right_angle_and_say_so():
     smallest = np.linalg.eigvalsh(model.mass_matrix(q, coordinates="report"))[0]
     assert abs(smallest) < 1e-9
     assert np.linalg.eigvalsh(model.mass_matrix(q, coordinates="state"))[0] > 1e-3
-    with pytest.raises(rover_gym.StateError) as caught:
+    with refused(rover_gym.StateError, "q[4]"):
         model.to_report(q, np.zeros(21))
-    assert caught.value.field == "q[4]"
 
 
 def test_actuation_pushes_wheels_forward_and_steering_to_the_left():
@@ -213,9 +212,8 @@ def test_a_binary_file_and_a_missing_one(tmp_path):
     ],
 )
 def test_a_bad_state_is_refused_by_field(field, call):
-    with pytest.raises(rover_gym.StateError) as caught:
+    with refused(rover_gym.StateError, field):
         call(rover_gym.RoverModel())
-    assert caught.value.field == field
 
 
 @pytest.mark.parametrize(
@@ -226,9 +224,8 @@ def test_a_bad_state_is_refused_by_field(field, call):
     ],
 )
 def test_a_bad_option_is_refused_by_field(field, call):
-    with pytest.raises(rover_gym.OptionError) as caught:
+    with refused(rover_gym.OptionError, field):
         call(rover_gym.RoverModel())
-    assert caught.value.field == field
 
 
 def test_unknown_joints_and_masses_are_refused():

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from refusals import refused
 
 from rover_gym import ModelError, Motor, Plane, RoverModel, Simulation, StateError
 
@@ -191,7 +192,6 @@ def test_motors_survive_every_form_of_a_model(motor: Motor | None, tmp_path: Pat
     ],
 )
 def test_a_motor_that_is_none_is_refused_by_name(field: str, make: Callable[[], Any]) -> None:
-    with pytest.raises(ModelError) as caught:
+    with refused(ModelError, field) as caught:
         make()
-    assert caught.value.field == field
     assert str(caught.value).startswith(f"{field}:")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from rover_gym import CommandError, ModelError, OptionError, RoverGymError, StateError, TerrainError
 from rover_gym.figures import draw_run
@@ -135,9 +136,8 @@ def test_a_pickled_simulation_has_the_same_parameters_and_snapshots_fit_their_ma
         with pytest.raises(StateError):
             sim.set_state(bad)
     assert sim.snapshot() == before
-    with pytest.raises(StateError) as refused:
+    with refused(StateError, "snapshot"):
         rover.restore(before)
-    assert refused.value.field == "snapshot"
 
 
 def test_the_report_rule_lets_the_centre_sink_to_the_ground() -> None:
@@ -192,11 +192,10 @@ def test_the_last_problem_is_of_dimension_two() -> None:
     ],
 )
 def test_bad_input_is_refused_by_field(make, error, field) -> None:  # type: ignore[no-untyped-def]
-    with pytest.raises(error) as refused:
+    with refused(error, field) as caught:
         make()
-    assert refused.value.field == field
-    assert refused.value.value is not None
-    assert field.split("[")[0].split("_")[0] in str(refused.value)
+    assert caught.value.value is not None
+    assert field.split("[")[0].split("_")[0] in str(caught.value)
 
 
 def test_an_unknown_option_is_a_type_error() -> None:
@@ -286,9 +285,8 @@ def test_two_disks_collide_as_the_closed_form_says() -> None:
 )
 def test_what_cannot_be_is_refused_by_name(change: dict[str, object], field: str) -> None:
     good: dict[str, object] = {"radius": [0.1, 0.1], "mass": [1.0, 2.0], "position": [[0.0, 0.1], [0.3, 0.1]]}
-    with pytest.raises(ValueError, match=r".+") as caught:
+    with refused(ValueError, field):
         SoilSimulation(**{**good, "ground": Line(), **change})  # type: ignore[arg-type]
-    assert getattr(caught.value, "field", None) == field
 
 
 def test_a_refused_state_changes_nothing() -> None:
@@ -430,12 +428,10 @@ def test_a_curve_of_pull_against_slip_is_found_again() -> None:
     straight = fit_traction(trials(0.3 * slips - 0.1), first=0.3)
     assert straight.last_slope.value == pytest.approx(0.3)
     assert straight.scale.value > 2.0  # no limit within the slips
-    with pytest.raises(ValueError, match="four or more slips") as caught:
+    with refused(ValueError, "pulls", "four or more slips"):
         fit_traction(trials(slips)[:3])
-    assert getattr(caught.value, "field", None) == "pulls"
-    with pytest.raises(ValueError, match="two slips") as caught:
+    with refused(ValueError, "first", "two slips"):
         fit_traction(trials(slips), first=0.8)
-    assert getattr(caught.value, "field", None) == "first"
 
 
 def test_a_drive_tells_way_slip_and_sinkage(bed: Bed) -> None:
@@ -464,9 +460,8 @@ def test_kinematic_disks_bear_and_move_as_they_are_told() -> None:
     np.testing.assert_allclose(sim.position[:2, 1], -0.02, rtol=1e-9)
     np.testing.assert_allclose(sim.position[2, 1], 0.1 * np.sqrt(3.0) - 0.02, atol=1e-6)
     np.testing.assert_allclose(sim.momentum(), [0.0, -0.2, 0.0], atol=1e-6)
-    with pytest.raises(ValueError, match="kinematic") as caught:
+    with refused(ValueError, "kinematic", "kinematic"):
         SoilSimulation([0.1], [1.0], [[0.0, 0.0]], kinematic=[True, False])
-    assert getattr(caught.value, "field", None) == "kinematic"
 
 
 def test_removed_disks_leave_the_others_as_they_are() -> None:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from rover_gym.mechanics import (
     HeightField,
@@ -91,17 +92,15 @@ def test_a_simulation_sees_its_ground_and_its_own_parts_if_asked() -> None:
 )
 def test_bad_rays_are_refused(origins: Any, directions: Any, field: str) -> None:
     for ground in (*GROUNDS.values(), Plane(), Simulation()):
-        with pytest.raises(OptionError) as caught:
+        with refused(OptionError, field) as caught:
             ground.cast_rays(origins, directions)
-        assert caught.value.field == field
         assert str(caught.value).startswith(field.partition("[")[0])
 
 
 @pytest.mark.parametrize("reach", [0.0, -1.0, math.nan, "far"])
 def test_a_range_is_positive(reach: Any) -> None:
-    with pytest.raises(OptionError) as caught:
+    with refused(OptionError, "max_range"):
         Plane().cast_rays([0.0, 1.0, 0.0], DOWN, reach)
-    assert caught.value.field == "max_range"
 
 
 def test_no_rays_meet_nothing() -> None:

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from refusals import refused
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField, StateError, StepError
 from rover_gym.mechanics import Snapshot, SoilSimulation, soil_packing
@@ -235,18 +236,16 @@ def test_snapshots_of_other_masses_are_refused() -> None:
     for one, other in cases:
         other.step(3)
         before = other.snapshot().to_bytes()
-        with pytest.raises(StateError, match="another model") as caught:
+        with refused(StateError, "snapshot", "another model"):
             other.restore(one.snapshot())
-        assert caught.value.field == "snapshot"
         assert other.snapshot().to_bytes() == before
 
 
 def test_snapshots_of_another_kind_are_refused() -> None:
     sims = [Simulation(), BallSimulation(Line()), soil()]
     for one, other in itertools.permutations(sims, 2):
-        with pytest.raises(StateError, match="another kind") as caught:
+        with refused(StateError, "snapshot", "another kind"):
             one.restore(other.snapshot())
-        assert caught.value.field == "snapshot"
 
 
 @pytest.mark.parametrize("sim", [Simulation(), BallSimulation(Line()), soil()])
@@ -254,15 +253,13 @@ def test_bytes_that_are_no_snapshot_are_refused(sim: Any) -> None:
     data = sim.snapshot().to_bytes()
     sim.restore(Snapshot.from_bytes(data))
     for damaged in (data + b"\0", data + data, data[:-1], b"", b"\xff" * 40):
-        with pytest.raises(StateError, match="damaged") as caught:
+        with refused(StateError, "snapshot", "damaged"):
             Snapshot.from_bytes(damaged)
-        assert caught.value.field == "snapshot"
     for other in (3, "text", None):
         with pytest.raises(StateError):
             Snapshot.from_bytes(other)
-        with pytest.raises(StateError) as caught:
+        with refused(StateError, "snapshot"):
             sim.restore(other)
-        assert caught.value.field == "snapshot"
 
 
 def test_a_quaternion_that_is_no_rotation_is_refused() -> None:

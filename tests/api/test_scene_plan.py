@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 import pytest
+from refusals import refused
 
 from rover_gym import (
     CommandError,
@@ -198,9 +199,8 @@ def test_a_planar_rover_that_tips_over_says_so() -> None:
     start[1] += 2.0
     rover = replace(made, start=start).rover()
     rover.set_wheel_torques(np.full(6, 150.0))  # in the air, the motors turn the trunk
-    with pytest.raises(StepError, match="planar model does not include") as tilt:
+    with refused(StepError, "pitch", "planar model does not include"):
         tuple(rover.step(10) for _ in range(40))
-    assert tilt.value.field == "pitch"
 
 
 def test_spheres_that_cannot_be_met_are_left_out() -> None:
@@ -225,9 +225,8 @@ def test_a_rover_that_leaves_the_reach_it_was_planned_with_says_so() -> None:
     rover = plan(straight(reach=0.5)).rover()
     rover.set_wheel_torques(np.full(6, 30.0))
     rover.step(100)
-    with pytest.raises(StepError, match="left the planned reach") as left:
+    with refused(StepError, "reach", "left the planned reach"):
         rover.step(400)
-    assert left.value.field == "reach"
 
 
 def test_newton_is_built_where_it_pays() -> None:
@@ -257,17 +256,15 @@ def test_a_scene_that_cannot_be_is_refused(
     if error is None:
         assert plan(scene, accuracy).kind == "full"  # type: ignore[arg-type]
         return
-    with pytest.raises(error) as refused:
+    with refused(error, field):
         plan(scene, accuracy)  # type: ignore[arg-type]
-    assert refused.value.field == field  # type: ignore[attr-defined]
 
 
 def test_turned_wheels_at_the_start_contradict_a_scene_without_steering() -> None:
     start = np.zeros(21)
     start[7] = 0.1
-    with pytest.raises(OptionError, match="wheels are turned at the start") as refused:
+    with refused(OptionError, "steered", "wheels are turned at the start"):
         plan(straight(start=start))
-    assert refused.value.field == "steered"
 
 
 def test_a_rover_that_is_not_its_mirror_image_is_no_planar_one() -> None:

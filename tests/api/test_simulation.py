@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refused
 
 import rover_gym
 from rover_gym import BusyError, RoverGymError, Simulation, SphereField
@@ -164,21 +165,18 @@ def test_a_profile_names_the_parts_and_leaves_the_simulation_alone(sim):
     ],
 )
 def test_a_bad_option_is_refused_by_field(field, options):
-    with pytest.raises(rover_gym.OptionError) as caught:
+    with refused(rover_gym.OptionError, field) as caught:
         rover_gym.Simulation(**options)
-    assert caught.value.field == field
     assert isinstance(caught.value, rover_gym.RoverGymError)
 
 
 def test_a_bad_terrain_is_refused():
     with pytest.raises(rover_gym.TerrainError, match="terrain"):
         rover_gym.Simulation(None, "swamp")
-    with pytest.raises(rover_gym.TerrainError) as caught:
+    with refused(rover_gym.TerrainError, "normal"):
         rover_gym.Plane((0.0, 0.0, 0.0))
-    assert caught.value.field == "normal"
-    with pytest.raises(rover_gym.TerrainError) as caught:
+    with refused(rover_gym.TerrainError, "offset"):
         rover_gym.Plane(offset=np.nan)
-    assert caught.value.field == "offset"
     with pytest.raises(rover_gym.TerrainError):
         rover_gym.Plane((1.0, 0.0, 0.0)).height(0.0, 0.0)
 
@@ -205,9 +203,8 @@ def test_a_bad_terrain_is_refused():
 def test_bad_input_is_refused_by_field_before_anything_changes(sim, error, field, call):
     drive(sim, 20)
     before = sim.snapshot()
-    with pytest.raises(error) as caught:
+    with refused(error, field):
         call(sim)
-    assert caught.value.field == field
     assert sim.snapshot() == before
 
 
@@ -275,9 +272,10 @@ def test_a_joint_at_its_stop_is_among_the_contacts():
 def test_limits_that_exclude_each_other_are_refused():
     description = rover_gym.RoverModel().to_dict()
     description["solids"][1]["limits"] = {"lower": 0.2, "upper": 0.1}
-    with pytest.raises(rover_gym.ModelError, match=r"must be below the upper limit 0\.1, is 0\.2") as caught:
+    with refused(
+        rover_gym.ModelError, "solids[1].limits.lower", r"must be below the upper limit 0\.1, is 0\.2"
+    ) as caught:
         rover_gym.RoverModel.from_dict(description)
-    assert caught.value.field == "solids[1].limits.lower"
     assert caught.value.value == 0.2
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from refusals import refused
 
 from rover_gym import RoverModel, Simulation
 from rover_gym.record import Channel, Recorder, RecordingError, RoverSampler, describe, read_run, read_trajectory
@@ -149,9 +150,8 @@ def test_nothing_is_appended_after_close(tmp_path: Path) -> None:
     recorder.close()
     recorder.close()  # twice is once
     for call in (lambda: recorder.append({"time": 1}), recorder.flush, lambda: recorder.note(wall_time=1.0)):
-        with pytest.raises(RecordingError, match="is closed") as caught:
+        with refused(RecordingError, "recorder", "is closed"):
             call()
-        assert caught.value.field == "recorder"
     trajectory = read_trajectory(tmp_path / "run.h5")
     assert len(trajectory["time"]) == 1
     assert trajectory.attributes["complete"]
@@ -367,6 +367,5 @@ def test_a_run_that_lasts_for_ages_is_filmed_at_once(sound_run: Path) -> None:
 
 
 def test_a_data_set_that_is_missing_is_named(sound_run: Path) -> None:
-    with pytest.raises(RecordingError, match="there is no such data set") as caught:
+    with refused(RecordingError, "slip_ratio", "there is no such data set"):
         read_trajectory(sound_run)["slip_ratio"]
-    assert caught.value.field == "slip_ratio"

@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from refusals import refused
 
 import rover_gym
 from comparison.peers.base import Variant
@@ -49,14 +50,12 @@ def test_a_simulation_takes_what_the_options_say() -> None:
 
 @pytest.mark.parametrize("option", [{"time_step": 0.01}, {"variant": "newton"}, {"tolerance": 1e-6}])
 def test_what_accuracy_chooses_cannot_be_given_beside_it(option: dict[str, object]) -> None:
-    with pytest.raises(rover_gym.OptionError) as caught:
+    with refused(rover_gym.OptionError, next(iter(option))):
         rover_gym.Simulation(accuracy="fast", **option)  # type: ignore[arg-type]
-    assert caught.value.field == next(iter(option))
 
 
 @pytest.mark.parametrize("accuracy", ["best", 0.0, -1.0, 1e-6, math.nan, [0.01]])
 def test_an_accuracy_that_cannot_be_had_is_refused(accuracy: object) -> None:
     for ask in (rover_gym.accuracy_options, lambda value: rover_gym.Simulation(accuracy=value)):
-        with pytest.raises(rover_gym.OptionError) as caught:
+        with refused(rover_gym.OptionError, "accuracy"):
             ask(accuracy)  # type: ignore[arg-type]
-        assert caught.value.field == "accuracy"

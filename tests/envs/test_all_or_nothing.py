@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
+from refusals import refused
 
 from rover_gym import (
     CommandError,
@@ -118,11 +119,10 @@ def test_a_scene_without_room_is_drawn_again() -> None:
 
 
 def test_a_scene_without_room_is_refused_after_a_stated_number_of_draws(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(TerrainError) as caught:
+    with refused(TerrainError, "terrain") as caught:
         RoverEnv(terrain=BLOCKED).reset(seed=0)
     assert episode_scene.PLACING_ATTEMPTS == 100
     assert "100 scenes" in str(caught.value)
-    assert caught.value.field == "terrain"
     assert caught.value.value > 0.01
     assert "100 scenes" in " ".join((RoverEnv.__doc__ or "").split())
     # A scene takes five numbers of the generator; the third one turns it to where there is room.
@@ -306,9 +306,8 @@ def test_restore_had_moved_the_rover_before_it_refused_the_random_state(
     snapshot = env.snapshot()
     for one in (env, twin):
         one.step(FORWARD)
-    with pytest.raises(RoverGymError) as caught:
+    with refused(RoverGymError, field) as caught:
         env.restore(damaged(snapshot))
-    assert caught.value.field == field
     assert isinstance(caught.value, StateError) == (field != "difficulty")
     assert env.snapshot().simulation == twin.snapshot().simulation
     assert random_state(env.np_random) == random_state(twin.np_random)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from machines import MACHINES, axle, machine
+from refusals import refused
 
 from rover_gym import ModelError, PDPolicy, RoverEnv, RoverModel
 from rover_gym.policy import CommandController
@@ -91,10 +92,8 @@ def test_another_rover_refuses_a_snapshot() -> None:
 
 def test_wheels_that_cannot_turn_are_refused() -> None:
     described = machine("none", []).to_dict()
-    with pytest.raises(ModelError) as caught:
+    with refused(ModelError, "model.wheels"):
         RoverEnv(model=RoverModel.from_dict(described))
-    assert caught.value.field == "model.wheels"
     model = MACHINES["skid"][1]
-    with pytest.raises(ModelError) as caught:
+    with refused(ModelError, "model.wheel_joint_indices"):
         RoverEnv(model=model.weld(["wheel_FL"]))
-    assert caught.value.field == "model.wheel_joint_indices"

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from rover_gym import OptionError, PDPolicy, RoverEnv
 from rover_gym.planning import PlannerOptions, PlannerPolicy
@@ -163,9 +164,8 @@ def test_goals_are_fixed_by_options() -> None:
         ({"goals": [(2.0, 0.0), (2.0, 2.0), (math.inf, 2.0)]}, "options.goals[2][0]"),
         ({"goals": goals, "goal": (2.0, 0.0)}, "options.goal"),
     ):
-        with pytest.raises(OptionError) as caught:
+        with refused(OptionError, field):
             env.reset(options=options)
-        assert caught.value.field == field
     assert env.snapshot().simulation == before
 
 
@@ -193,9 +193,8 @@ def test_goals_within_the_tolerance_are_all_reached_at_once() -> None:
     ],
 )
 def test_bad_courses_are_refused(arguments: dict[str, Any], field: str) -> None:
-    with pytest.raises(OptionError) as caught:
+    with refused(OptionError, field):
         RoverEnv(**arguments)
-    assert caught.value.field == field
 
 
 def test_the_planner_turns_to_the_next_goal() -> None:

@@ -19,6 +19,7 @@ from gymnasium.utils.env_checker import check_env, data_equivalence
 from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker, TimeLimit
 from machines import MACHINES
+from refusals import refused
 
 from rover_gym import HeightField, OptionError, RoverEnv, RoverGymError
 from rover_gym.env import ARGUMENTS
@@ -129,17 +130,15 @@ def test_every_argument_passes_its_own_check(name: str) -> None:
     argument = ARGUMENTS[name]
     if argument.default is not None:
         argument.check(name, argument.default)
-    with pytest.raises(RoverGymError) as caught:
+    with refused(RoverGymError, name) as caught:
         argument.check(name, {1, 2})
-    assert caught.value.field == name
     assert caught.value.value == {1, 2}
     for bound, step in (("at_least", -1.0), ("at_most", 1.0)):
         edge = getattr(argument.check, bound, None)
         if edge is not None:
             argument.check(name, edge)
-            with pytest.raises(OptionError) as caught:
+            with refused(OptionError, name):
                 argument.check(name, np.nextafter(edge, edge + step))
-            assert caught.value.field == name
             assert shortest(edge) in str(argument.check)
 
 

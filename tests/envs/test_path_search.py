@@ -8,6 +8,7 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 import pytest
+from refusals import refused
 
 from rover_gym import Plane, SphereField, StateError
 from rover_gym.env import RoverEnv
@@ -406,9 +407,8 @@ def test_what_is_wrong_is_named() -> None:
         ("arrival", {"arrival": np.nan}),
     ]
     for field, change in wrong:
-        with pytest.raises(OptionError, match=field) as refused:
+        with refused(OptionError, field, field):
             PathSearch(**(given | change))
-        assert refused.value.field == field
 
 
 def test_a_far_away_pose_lies_on_the_median() -> None:

@@ -9,6 +9,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import data_equivalence
+from refusals import refused
 
 from rover_gym import CommandError, OptionError, RoverEnv
 from rover_gym.env.reward_terms import WEIGHTS
@@ -148,9 +149,8 @@ def test_one_function_has_its_own_name() -> None:
     ],
 )
 def test_what_is_no_term_is_refused(given: Any, field: str) -> None:
-    with pytest.raises(OptionError) as caught:
+    with refused(OptionError, field):
         RoverEnv(reward_terms=given)
-    assert caught.value.field == field
 
 
 def broken(before: Any, action: Any, after: Any, info: Any) -> float:  # noqa: ARG001
@@ -171,9 +171,8 @@ def test_a_term_that_fails_is_named(term: Any, words: str) -> None:
     env.reset(seed=0)
     envs.reset(seed=0)
     for step in (lambda: env.step(forward(1, 0)[0]), lambda: envs.step(forward(2, 0))):
-        with pytest.raises(OptionError, match=words) as caught:
+        with refused(OptionError, "reward_terms.mine", words):
             step()
-        assert caught.value.field == "reward_terms.mine"
     assert env.simulation.time > 0.0, "the period has been taken"
 
 
@@ -406,9 +405,8 @@ def rules(**changed: Any) -> EpisodeRules:
 )
 def test_bad_rules_are_refused(changed: dict[str, Any], field: str) -> None:
     rules()
-    with pytest.raises(OptionError) as caught:
+    with refused(OptionError, field):
         rules(**changed)
-    assert caught.value.field == field
 
 
 def test_what_does_not_fit_a_batch_is_refused() -> None:

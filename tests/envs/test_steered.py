@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from rover_gym import CommandError, OptionError, RoverEnv, RoverModel
 from rover_gym.vector import RoverVectorEnv
@@ -64,9 +65,8 @@ def test_a_model_whose_steering_is_locked_does_not_steer() -> None:
 
 
 def test_what_needs_steering_is_refused() -> None:
-    with pytest.raises(OptionError, match="max_steering_deg") as caught:
+    with refused(OptionError, "max_steering_deg", "max_steering_deg"):
         RoverEnv(steered=False, max_steering_deg=10.0)
-    assert caught.value.field == "max_steering_deg"
     env = RoverEnv(steered=False)
     env.reset(seed=0)
     for actions in (np.zeros(12), np.full(6, 1.5)):

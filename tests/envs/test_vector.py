@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from equal_bits import bits
 from gymnasium.error import ResetNeeded
+from refusals import refused
 
 from rover_gym import OptionError, RoverEnv, StateError
 from rover_gym.mechanics import EpisodeRun
@@ -142,9 +143,8 @@ def test_a_field_is_drawn_by_its_seed_alone(name: str, level: dict[str, float]) 
 def test_bad_options_of_a_rover_are_refused_for_all(rovers: Any, field: str) -> None:
     env = native("RoverRocks-v0", 2)
     before, _ = env.reset(seed=0)
-    with pytest.raises(OptionError) as caught:
+    with refused(OptionError, field):
         env.reset(seed=1, options={"rovers": rovers})
-    assert caught.value.field == field
     assert env.batch.observation.tobytes() == before.tobytes()
     assert env.np_random_seed == (0, 1)
 
@@ -157,9 +157,8 @@ def test_difficulties_are_set_by_the_rover() -> None:
     assert (first[0], first[2]) == (0.1, 0.5)
     assert 0.4 <= first[1] <= 0.5
     for bad, field in (([0.1, 0.2], "difficulties"), (0.3, "difficulties"), ([0.1, 0.2, 3.0], "difficulties[2]")):
-        with pytest.raises(OptionError) as caught:
+        with refused(OptionError, field):
             env.set_difficulties(bad)
-        assert caught.value.field == field
     for action in actions(3, steps=LIMIT):
         env.step(action)
     assert env.get_attr("difficulty")[0] == 0.1
@@ -409,9 +408,8 @@ def test_a_damaged_snapshot_is_refused_and_nothing_changes(damage: Any, field: s
     snapshot = envs.snapshot()
     envs.step(drawn_actions(1)[0])
     before = bits(envs.batch.infos()), envs.batch.observation.tobytes()
-    with pytest.raises(StateError) as caught:
+    with refused(StateError, field):
         envs.restore(damage(snapshot))
-    assert caught.value.field == field
     assert (bits(envs.batch.infos()), envs.batch.observation.tobytes()) == before
 
 

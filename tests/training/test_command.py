@@ -7,6 +7,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+from refusals import refused
 
 from rover_gym import CommandError, OptionError, PDPolicy, Plane, RoverEnv, SphereField, StateError
 from rover_gym.policy import (
@@ -113,9 +114,8 @@ def test_a_slope_shows_no_rocks_and_a_rock_shows_its_height() -> None:
 
 
 def test_pool_must_divide_the_scan() -> None:
-    with pytest.raises(OptionError) as caught:
+    with refused(OptionError, "pool"):
         Features(RoverEnv(height_scan=(5, 4, 0.2)), pool=2)
-    assert caught.value.field == "pool"
 
 
 def test_a_policy_is_saved_and_read_back(tmp_path: Path) -> None:
@@ -163,16 +163,14 @@ def test_a_command_holds_as_long_as_it_says() -> None:
 
 @pytest.mark.parametrize("bad", [np.zeros(3, np.float32), np.full(91, np.nan, np.float32)])
 def test_a_policy_refuses_what_is_no_observation(bad: np.ndarray[Any, Any]) -> None:
-    with pytest.raises(StateError) as caught:
+    with refused(StateError, "observation"):
         TrainedPolicy.untrained(ROVER, CARD).predict(bad)
-    assert caught.value.field == "observation"
 
 
 def test_a_policy_refuses_an_environment_that_it_was_not_made_for() -> None:
     policy = TrainedPolicy.untrained(ROVER, CARD)
-    with pytest.raises(OptionError) as caught:
+    with refused(OptionError, "policy"):
         TrainedPolicy(RoverEnv(height_scan=True), policy._network, CARD)
-    assert caught.value.field == "policy"
 
 
 def test_the_wrapper_sums_the_rewards_of_the_steps_it_holds() -> None:
@@ -218,9 +216,8 @@ def test_a_vector_of_commanded_rovers_refuses_what_it_cannot_do() -> None:
         (gym.make_vec("Rover-v0", 2, autoreset_mode="Disabled"), "env.autoreset_mode"),
     ):
         made: Any = env
-        with pytest.raises(OptionError) as caught:
+        with refused(OptionError, field):
             CommandVectorEnv(made)
-        assert caught.value.field == field
     envs = CommandVectorEnv(gym.make_vec("Rover-v0", 2))
     envs.reset(seed=0)
     before = envs.step(np.zeros((2, 3)))[0]
