@@ -13,6 +13,7 @@ from rover_gym.env.reward_terms import WEIGHTS, RewardTerms
 from rover_gym.env.sand_ground import check_wheels_for_sand, sand_rover, soils_of
 from rover_gym.env.start import (
     DEFAULT_DIFFICULTY,
+    FIELD_MARGINS,
     MAX_GOAL_DISTANCE,
     Domain,
     Steering,
@@ -245,6 +246,7 @@ def _rules(
         goals=given["waypoints"],
         battery=given["battery"],
         free_distance=free_distance,
+        field_margin=FIELD_MARGINS.get(given["terrain"]) if isinstance(given["terrain"], str) else None,
     )
 
 
