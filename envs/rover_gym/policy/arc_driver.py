@@ -107,7 +107,6 @@ class ArcDriver:
         layout, model = rover.observation_layout, rover.model
         self._layout, self._scale, self._shape = layout, layout.scale, SCAN[:2]
         self._offsets = rover.task.scan
-        self._radius = float(model.wheel_radii.max())
         self._level = -float(model.resting_pose(Plane(), (0.0, 0.0), 0.0)[1])
         self._rover = _measures(rover, plan)
         self._wheels = _Wheels(rover, plan.cruise_speed)
@@ -172,7 +171,11 @@ class ArcDriver:
         slope = ground_slope(layout, rows)
         rise = slope[:, :1] * self._offsets[:, 0] + slope[:, 1:] * self._offsets[:, 1]
         heights = rows[:, layout["height_scan"]] * self._scale[layout["height_scan"]] - rise - self._level
-        scan = (heights / self._radius).clip(-LARGEST, LARGEST).reshape(n, *self._shape)
+        heights = (heights / plan.radius).clip(-LARGEST, LARGEST)
+        beyond = plan.beyond_field(rows, memory.start)
+        if beyond is not None:
+            heights[beyond] = LARGEST
+        scan = heights.reshape(n, *self._shape)
 
         q, velocity = layout["q"].start, layout["velocity"].start
         speeds = rows[:, velocity : velocity + 6] / ([plan.cruise_speed] * 3 + [1.0] * 3)
@@ -241,7 +244,7 @@ def _measures(rover: RoverEnv, plan: ScanPolicy) -> Array:
     weight = model.mass * math.hypot(*rover.gravity)
     limits, controller = plan.controller.limits, plan.controller
     pull = float((model.wheel_torque_limits / model.wheel_radii).sum()) / weight
-    radius = float(model.wheel_radii.max())
+    radius = plan.radius
     return np.array(
         [
             float(np.ptp(centres[:, 0])) / reach,

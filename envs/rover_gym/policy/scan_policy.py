@@ -47,6 +47,7 @@ class ScanMemory:
         corner: `(n, 2)` where its first cell lies, in cells.
         ways: `(n, cells, cells)` the way to the goal from each cell, m, when it was last computed.
         ways_corner: `(n, 2)` where the first cell lay then.
+        start: `(n, 2)` place of the start, m.
     """
 
     command: Array
@@ -63,6 +64,7 @@ class ScanMemory:
     corner: Counts
     ways: npt.NDArray[np.float32]
     ways_corner: Counts
+    start: Array
 
     @classmethod
     def of(cls, state: tuple[npt.NDArray[Any], ...] | None, n: int, cells: int = 0) -> "ScanMemory":
@@ -88,6 +90,7 @@ class ScanMemory:
             corner=np.zeros((n, 2), np.int64),
             ways=np.zeros((n, cells, cells), np.float32),
             ways_corner=np.zeros((n, 2), np.int64),
+            start=np.zeros((n, 2)),
         )
         if state is None:
             return fresh
@@ -112,6 +115,8 @@ class ScanMemory:
         It has moved, or made progress, if that is more than `least` m.
         """
         begins = self.age[i] == 0
+        if begins:
+            self.start[i] = place
         self.still[i] += period
         self.fruitless[i] += period
         if begins or math.dist(place, self.anchor[i].tolist()) > least:
@@ -166,6 +171,9 @@ TRAP_AHEAD = 0.3
 
 #: Time without movement after which the rover pushes, s.
 PUSH_AFTER = 0.3
+
+#: Height of a fence at the field's edge, in wheel radii: the policy does not drive through it.
+FENCE = 8.0
 
 #: Fraction of the time to high-centring after which the rover backs off.
 HIGH = 0.05
@@ -279,6 +287,8 @@ class ScanPolicy:
         turning = Turning.of(model, model.mass * math.hypot(*rover.gravity))
         limits = _limits(rover, turning, self.gains)
         outline = RoverOutline.of(model, scan.spacing)
+        self.radius = float(model.wheel_radii.max())
+        self._margin = None if rover.task.n_further else rover.task.field_margin
         self.clearance = float(outline.clearance.min(initial=math.inf))
         self._x_c, self.reach = turning.x_c, _reach(model)
         # Times are meant for a rover that takes at most a second for its own reach.
@@ -298,7 +308,7 @@ class ScanPolicy:
             outline=outline,
             x_c=turning.x_c,
             reach=self.reach,
-            radius=float(model.wheel_radii.max()),
+            radius=self.radius,
             arrival=0.6 * rover.task.goal_tolerance,
             costs=PathCosts() if costs is None else costs,
         )
@@ -387,6 +397,9 @@ class ScanPolicy:
         sine, cosine = sin_cos(heading)
         ahead, right, turned = (memory.known_traps(i) - [x, z, heading]).T
         heights = self._over_plane(row, slope)
+        beyond = self.beyond_field(row[None], memory.start[i : i + 1])
+        if beyond is not None:
+            heights[beyond[0]] = FENCE * self.radius
         boldness = self._boldness(memory.fruitless[i])
         extra, fast = self._outlook(row, slope, heights, boldness)
         task = SearchTask(
@@ -401,6 +414,31 @@ class ScanPolicy:
         arc = self.search.best(heights, task)
         is_high = row[self._stuck] > HIGH
         return arc, bool(memory.still[i] > PUSH_AFTER * self.pace or is_high or fast[arc])
+
+    def beyond_field(self, rows: Array, starts: Array) -> npt.NDArray[np.bool_] | None:
+        """`(n, points)` whether points of the scan lie beyond the edge of the field; None where it has none.
+
+        Args:
+            rows: `(n, size)` observations.
+            starts: `(n, 2)` where the episodes began, m.
+        """
+        if self._margin is None:
+            return None
+        places, headings = rows[:, [self._q, self._q + 2]], rows[:, self._q + 4, None]
+        goals = rows[:, self._goal] * self._scale[self._goal]
+        sine, cosine = sin_cos(headings)
+        turn = np.concatenate((cosine, -sine), axis=1), np.concatenate((sine, cosine), axis=1)
+        goals = places + goals[:, :1] * turn[0] + goals[:, 1:] * turn[1]
+        low, high = np.minimum(starts, goals) - self._margin, np.maximum(starts, goals) + self._margin
+        beyond = np.zeros((len(rows), len(self._offsets)), np.bool_)
+        for k in (0, 1):
+            at = (
+                places[:, k, None]
+                + self._offsets[:, 0] * turn[0][:, k, None]
+                + self._offsets[:, 1] * turn[1][:, k, None]
+            )
+            beyond |= (at < low[:, k, None]) | (at > high[:, k, None])
+        return beyond
 
     def begin_arc(self, row: Array, command: Array, memory: ScanMemory, i: int) -> None:
         """Rover i begins to drive by a command: if it leads backward of its own accord, it backs off for a while."""
