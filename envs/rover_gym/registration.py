@@ -7,6 +7,7 @@ from typing import Any
 import gymnasium as gym
 
 from rover_gym.env.task import MAX_EPISODE_STEPS
+from rover_gym.policy.arcs_env import MAX_ARCS
 from rover_gym.policy.command_env import MAX_COMMANDS
 
 
@@ -42,6 +43,9 @@ ENVIRONMENTS: Mapping[str, Registration] = {
     "RoverBattery-v0": _rover({"terrain": "rocks", "goal_distance": (10.0, 14.0), "battery": 7000.0}),
     "RoverCommand-v0": Registration(
         "rover_gym.policy:RoverCommandEnv", "rover_gym.policy:RoverCommandVectorEnv", MAX_COMMANDS
+    ),
+    "RoverArcs-v0": Registration(
+        "rover_gym.policy:RoverArcsEnv", "rover_gym.policy:RoverArcsVectorEnv", MAX_ARCS, {"terrain": "rocks"}
     ),
     "RoverGoal-v0": Registration("rover_gym.policy:RoverGoalEnv", "rover_gym.policy:RoverGoalVectorEnv", MAX_COMMANDS),
     "RoverTrap-v0": Registration(

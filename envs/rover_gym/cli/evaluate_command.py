@@ -194,7 +194,13 @@ def _show(bar: Progress, task: TaskID, episodes: int, done: int) -> None:
     bar.update(task, completed=done, state=f"{done} of {episodes}")
 
 
-CAUSES = {"time": "time limit", "high_centred": "high centred", "roll_over": "roll over", "step_failed": "step failed"}
+CAUSES = {
+    "time": "time limit",
+    "high_centred": "high centred",
+    "roll_over": "roll over",
+    "left_field": "left the field",
+    "step_failed": "step failed",
+}
 
 
 @plain_errors

@@ -155,6 +155,8 @@ MAX_ABUNDANCE = 0.5
 ROCK_RADII = (0.3, 10.0)
 #: Largest distance from start to goal, m, which limits the size of the field.
 MAX_GOAL_DISTANCE = 100.0
+#: How far rocks and hills reach beyond the rectangle that start and goals span, m: there the episode ends.
+FIELD_MARGINS = {"rocks": 4.0, "hills": 25.0}
 #: Range of a height scan's spacing, m.
 SPACINGS = (1e-3, 10.0)
 

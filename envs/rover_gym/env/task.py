@@ -13,6 +13,7 @@ from rover_gym.env.reward_terms import WEIGHTS, RewardTerms
 from rover_gym.env.sand_ground import check_wheels_for_sand, sand_rover, soils_of
 from rover_gym.env.start import (
     DEFAULT_DIFFICULTY,
+    FIELD_MARGINS,
     MAX_GOAL_DISTANCE,
     Domain,
     Steering,
@@ -59,6 +60,7 @@ class Task:
         is_noisy: Whether observations have noise.
         goal_tolerance: Distance within which the goal is reached, m.
         n_further: Goals of the course after the first.
+        field_margin: How far the field reaches beyond the rectangle of start and goals, m; None without an edge.
         gravity: Gravity before it is scaled, m/s2.
         substeps: Physics steps per control period.
         dt: Control period, s.
@@ -81,6 +83,7 @@ class Task:
     is_noisy: bool
     goal_tolerance: float
     n_further: int
+    field_margin: float | None
     gravity: tuple[float, ...]
     substeps: int
     dt: float
@@ -138,8 +141,16 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
         has_battery=given["battery"] is not None,
     )
     max_steering = _steering_limit(rover, steering, given["max_steering_deg"])
+    field_margin = FIELD_MARGINS.get(terrain) if isinstance(terrain, str) else None
     rules = _rules(
-        given, rover, layout, substeps=substeps, max_steering=max_steering, scan=points, free_distance=free_distance
+        given,
+        rover,
+        layout,
+        substeps=substeps,
+        max_steering=max_steering,
+        scan=points,
+        free_distance=free_distance,
+        field_margin=field_margin,
     )
     episodes = EpisodeDistribution(
         rules,
@@ -165,6 +176,7 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
         is_noisy=given["observation_noise"] > 0.0,
         goal_tolerance=given["goal_tolerance"],
         n_further=goals - 1,
+        field_margin=field_margin,
         gravity=gravity,
         substeps=substeps,
         dt=substeps * step,
@@ -226,6 +238,7 @@ def _rules(
     max_steering: float,
     scan: npt.NDArray[np.float64] | None,
     free_distance: float | None,
+    field_margin: float | None,
 ) -> EpisodeRules:
     """What the core needs to run an episode."""
     noise = given["observation_noise"]
@@ -245,6 +258,7 @@ def _rules(
         goals=given["waypoints"],
         battery=given["battery"],
         free_distance=free_distance,
+        field_margin=field_margin,
     )
 
 

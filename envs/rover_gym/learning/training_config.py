@@ -162,7 +162,7 @@ class TrainingConfig:
 
     def to_yaml(self) -> str:
         """The configuration as YAML, in the form that `read_config` reads."""
-        text: str = yaml.safe_dump(_plain(asdict(self)), sort_keys=False)
+        text: str = yaml.safe_dump(plain(asdict(self)), sort_keys=False)
         return text
 
 
@@ -199,10 +199,10 @@ def read_config(path: str | Path) -> TrainingConfig:
 
 def parse_config(given: object) -> TrainingConfig:
     """Builds the configuration from parsed YAML."""
-    return _build(TrainingConfig, given, "")
+    return build(TrainingConfig, given, "")
 
 
-def _build(cls: type[T], given: object, prefix: str) -> T:
+def build(cls: type[T], given: object, prefix: str) -> T:
     """Builds a dataclass from a mapping."""
     if not isinstance(given, Mapping):
         refuse(OptionError, prefix.rstrip(".") or "config", given, "must be a mapping")
@@ -224,10 +224,14 @@ def _value(kind: Any, given: object, name: str) -> Any:
     if isinstance(kind, types.UnionType):  # X | None
         return None if given is None else _value(get_args(kind)[0], given, name)
     if dataclasses.is_dataclass(kind):
-        return _build(kind, given, f"{name}.")  # type: ignore[arg-type]
+        return build(kind, given, f"{name}.")  # type: ignore[arg-type]
     if kind is bool:
         if not isinstance(given, bool):
             refuse(OptionError, name, given, "must be true or false")
+        return given
+    if kind is str:
+        if not isinstance(given, str):
+            refuse(OptionError, name, given, "must be a text")
         return given
     if kind is int:
         whole = number(name, given)
@@ -253,12 +257,12 @@ def _as_float(given: object) -> object:
         return given
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Converts tuples to lists, for YAML."""
     if isinstance(value, Mapping):
-        return {key: _plain(entry) for key, entry in value.items()}
+        return {key: plain(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(entry) for entry in value]
+        return [plain(entry) for entry in value]
     return value
 
 

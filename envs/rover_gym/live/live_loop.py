@@ -53,6 +53,7 @@ MEASURED = 2.0
 #: What the user is told where a drive has ended.
 ENDINGS = {
     "roll_over": "the rover has rolled over",
+    "left_field": "the rover has left the field",
     "high_centred": "the rover is high-centred: its trunk carries it",
     "step_failed": "the physics could not take a step",
     "battery_empty": "the battery is empty",

@@ -277,6 +277,35 @@ class PlannerPolicy:
         action = self._controller.act(seen[None].astype(np.float32), self._sequence[:1])
         return action[0], state
 
+    def plan(self, observation: npt.NDArray[np.floating[Any]]) -> tuple[float, float, float]:
+        """Plans anew from the environment's last observation `(size,)`.
+
+        Returns:
+            The first command: speed, m/s, curvature, 1/m, and direction of travel off the trunk's x axis, rad.
+
+        Raises:
+            OptionError: Raw actions are planned.
+        """
+        controller = self._controller
+        if isinstance(controller, RawActions):
+            refuse(OptionError, "actions", "raw", "must be 'commands' to plan a command")
+        begins = self._env.start is not self._start
+        if self._sees_scan:
+            self._look(np.asarray(observation, np.float64), begins)
+        if begins:
+            self._begin()
+        elif self._env.goal != self._goal or self._sees_scan:
+            self._aim()
+        self._plan()
+        self._since = self._periods
+        speed, curvature, sideways = self._sequence[0].tolist()
+        limits = controller.limits
+        return (
+            speed * limits.speed,
+            curvature * limits.curvature,
+            sideways * math.radians(limits.sideways_deg),
+        )
+
     def _look(self, seen: Array, begins: bool) -> None:
         """Adds the height scan of an observation to the map."""
         if self._seen is None or begins:

@@ -2,6 +2,7 @@
 
 from rover_gym.policy.arc_forecast import FORECAST_FILE, ForesightCosts
 from rover_gym.policy.arc_search import PathCosts
+from rover_gym.policy.arcs_env import RoverArcsEnv, RoverArcsVectorEnv
 from rover_gym.policy.command import CommandController, CommandLimits
 from rover_gym.policy.command_env import CommandVectorEnv, DriveByCommand, RoverCommandEnv, RoverCommandVectorEnv
 from rover_gym.policy.evaluation import (
@@ -56,6 +57,8 @@ __all__ = [
     "PolicyCard",
     "PolicyError",
     "PolicySummary",
+    "RoverArcsEnv",
+    "RoverArcsVectorEnv",
     "RoverCommandEnv",
     "RoverCommandVectorEnv",
     "RoverGoalEnv",

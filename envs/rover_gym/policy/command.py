@@ -92,6 +92,7 @@ class CommandController:
         self._steering = np.array([q + i for i in turning.steering.joints], dtype=np.intp)
         self._skids = turning.skids
         self._widening = WIDENING if turning.skids else 1.0
+        self.steers_sideways = bool(turning.steering.joints) and min(turning.steering.entries) >= 0
         self._yaw_rate = velocity + YAW
         self._yaw_gain, self._scrub = np.array(turning.yaw_gain), np.array(turning.scrub)
         self._x, self._z = np.array(turning.wheels).T

@@ -22,7 +22,7 @@ from rover_gym.policy.named_policy import Policy, named_policy
 from rover_gym.validation import number, refuse, whole
 
 DIFFICULTIES = (0.0, 0.25, 0.5, 0.75, 1.0)
-ENDS = ("goal", "time", "high_centred", "roll_over", "step_failed")
+ENDS = ("goal", "time", "high_centred", "roll_over", "left_field", "step_failed")
 
 
 @dataclass(frozen=True)

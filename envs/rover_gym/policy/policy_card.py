@@ -120,7 +120,7 @@ class Network:
             PolicyError: The file holds arrays of other names, shapes or types, or numbers out of range.
             OSError: The file does not exist or may not be read.
         """
-        arrays = _read_arrays(path)
+        arrays = read_arrays(path)
         n = sum(name.startswith("weight_") for name in arrays)
         expected = {"mean", "deviation", *(f"{kind}_{i}" for kind in ("weight", "bias") for i in range(n))}
         if n == 0 or arrays.keys() != expected:
@@ -151,8 +151,13 @@ class Network:
         )
 
 
-def _read_arrays(path: Path) -> dict[str, Array]:
-    """Reads the float32 arrays of an archive, whose sizes are checked before decompression."""
+def read_arrays(path: Path, kind: type[np.floating[Any]] = np.float32) -> dict[str, Array]:
+    """Reads an archive's arrays of a kind as float32. Their sizes are checked before decompression.
+
+    Raises:
+        PolicyError: The file is no such archive, or too large.
+        OSError: The file does not exist or may not be read.
+    """
     data = read_bytes(path, LARGEST_NETWORK)
     arrays: dict[str, Array] = {}
     with intact(path), zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -167,20 +172,20 @@ def _read_arrays(path: Path) -> dict[str, Array]:
             name = member.filename.removesuffix(".npy")
             if name in arrays or name == member.filename or member.compress_type not in PACKINGS:
                 refuse_field(path, "arrays", member.filename, "must be arrays of their own names, as NumPy packs them")
-            arrays[name] = _read_array(path, name, archive.read(member))
+            arrays[name] = _read_array(path, name, archive.read(member), np.dtype(kind))
     return arrays
 
 
-def _read_array(path: Path, name: str, data: bytes) -> Array:
+def _read_array(path: Path, name: str, data: bytes, expected: np.dtype[Any]) -> Array:
     stream = io.BytesIO(data)
     version = np.lib.format.read_magic(stream)
     if version != (1, 0):
         refuse_field(path, name, version, "must be an array of NumPy's format (1, 0)")
     shape, fortran, kind = np.lib.format.read_array_header_1_0(stream)
-    if kind != np.float32 or fortran or len(shape) not in (1, 2):
-        refuse_field(path, name, f"{kind} {shape}", "must be float32, of one or two dimensions, row by row")
+    if kind != expected or fortran or not 1 <= len(shape) <= 4:
+        refuse_field(path, name, f"{kind} {shape}", f"must be {expected}, of one to four dimensions, row by row")
     body = data[stream.tell() :]
-    if any(n < 0 for n in shape) or len(body) != 4 * math.prod(shape):
+    if any(n < 0 for n in shape) or len(body) != expected.itemsize * math.prod(shape):
         refuse_field(path, name, shape, f"must have the shape of its {len(body)} bytes")
     return np.frombuffer(body, dtype=kind).astype(np.float32).reshape(shape)
 

@@ -47,6 +47,7 @@ class ScanMemory:
         corner: `(n, 2)` where its first cell lies, in cells.
         ways: `(n, cells, cells)` the way to the goal from each cell, m, when it was last computed.
         ways_corner: `(n, 2)` where the first cell lay then.
+        start: `(n, 2)` place of the start, m.
     """
 
     command: Array
@@ -63,6 +64,7 @@ class ScanMemory:
     corner: Counts
     ways: npt.NDArray[np.float32]
     ways_corner: Counts
+    start: Array
 
     @classmethod
     def of(cls, state: tuple[npt.NDArray[Any], ...] | None, n: int, cells: int = 0) -> "ScanMemory":
@@ -88,6 +90,7 @@ class ScanMemory:
             corner=np.zeros((n, 2), np.int64),
             ways=np.zeros((n, cells, cells), np.float32),
             ways_corner=np.zeros((n, 2), np.int64),
+            start=np.zeros((n, 2)),
         )
         if state is None:
             return fresh
@@ -112,6 +115,8 @@ class ScanMemory:
         It has moved, or made progress, if that is more than `least` m.
         """
         begins = self.age[i] == 0
+        if begins:
+            self.start[i] = place
         self.still[i] += period
         self.fruitless[i] += period
         if begins or math.dist(place, self.anchor[i].tolist()) > least:
@@ -166,6 +171,9 @@ TRAP_AHEAD = 0.3
 
 #: Time without movement after which the rover pushes, s.
 PUSH_AFTER = 0.3
+
+#: Height of a fence at the field's edge, in wheel radii: the policy does not drive through it.
+FENCE = 8.0
 
 #: Fraction of the time to high-centring after which the rover backs off.
 HIGH = 0.05
@@ -279,10 +287,13 @@ class ScanPolicy:
         turning = Turning.of(model, model.mass * math.hypot(*rover.gravity))
         limits = _limits(rover, turning, self.gains)
         outline = RoverOutline.of(model, scan.spacing)
-        self._x_c, self._reach = turning.x_c, _reach(model)
+        self.radius = float(model.wheel_radii.max())
+        self._margin = None if rover.task.n_further else rover.task.field_margin
+        self.clearance = float(outline.clearance.min(initial=math.inf))
+        self._x_c, self.reach = turning.x_c, _reach(model)
         # Times are meant for a rover that takes at most a second for its own reach.
         speed = min(self.gains.speed, SHARE_OF_TOP_SPEED * _top_speed(model))
-        self._pace = max(1.0, self._reach / speed)
+        self.pace = max(1.0, self.reach / speed)
         self.cruise_speed = speed
         self.cruise, self.push = speed / limits.speed, self.gains.push / limits.speed
         first, further = _arcs(rover, turning, limits)
@@ -296,12 +307,12 @@ class ScanPolicy:
             scan=scan,
             outline=outline,
             x_c=turning.x_c,
-            reach=self._reach,
-            radius=float(model.wheel_radii.max()),
+            reach=self.reach,
+            radius=self.radius,
             arrival=0.6 * rover.task.goal_tolerance,
             costs=PathCosts() if costs is None else costs,
         )
-        self._map = None if map is None else GroundMap(scan, map, TRAP_AHEAD * self._reach)
+        self._map = None if map is None else GroundMap(scan, map, TRAP_AHEAD * self.reach)
         self._cells = 0 if map is None else map.cells
         self._caution, self.foresight = 1.0, ForesightCosts() if foresight is None else foresight
         self.forecast: ArcForecast | None = None
@@ -314,8 +325,8 @@ class ScanPolicy:
             self.forecast = ArcForecast(features, Network.read(folder / FORECAST_FILE))
             self._caution = self.foresight.caution
         self.controller = CommandController(rover, limits, guided=False)
-        self._repeat = max(1, round(self.gains.period / rover.dt))
-        self._period = self._repeat * rover.dt
+        self.hold_periods = hold_periods(self.gains.period, rover.dt)
+        self._period = self.hold_periods * rover.dt
 
     @staticmethod
     def arguments(model: RoverModel | None = None) -> dict[str, Any]:
@@ -349,7 +360,7 @@ class ScanPolicy:
         memory = ScanMemory.of(state, len(rows), self._cells)
         if episode_start is not None:
             memory.forget(np.broadcast_to(episode_start, (len(rows),)))
-        due = np.flatnonzero(memory.age % self._repeat == 0)
+        due = np.flatnonzero(memory.age % self.hold_periods == 0)
         if len(due):
             slopes = ground_slope(self._layout, rows[due])
             for i, slope in zip(due.tolist(), slopes.tolist(), strict=True):
@@ -360,17 +371,35 @@ class ScanPolicy:
 
     def _decide(self, row: Array, slope: list[float], memory: ScanMemory, i: int) -> Array:
         """The command for one observation, scaled as the environment returns it; updates what is remembered."""
-        gains, pace = self.gains, self._pace
+        self.notice(row, memory, i)
+        arc, pushes = self.choose(row, slope, memory, i)
+        command: Array = self.commands[arc] * [self.push if pushes else self.cruise, 1.0, 1.0]
+        self.begin_arc(row, command, memory, i)
+        return command
+
+    def notice(self, row: Array, memory: ScanMemory, i: int) -> None:
+        """Counts the times of rover i up to an observation, and backs off if it has not moved for too long."""
         x, z, heading = (float(row[self._q + k]) for k in (0, 2, 4))
         goal = row[self._goal] * self._scale[self._goal]
-        memory.notice((x, z), math.hypot(*goal), self._period, PROGRESS * self._reach, i)
+        memory.notice((x, z), math.hypot(*goal), self._period, PROGRESS * self.reach, i)
         is_high = row[self._stuck] > HIGH
-        patience = HIGH_PATIENCE if is_high else gains.patience * pace
+        patience = HIGH_PATIENCE if is_high else self.gains.patience * self.pace
         if memory.age[i] > 0 and (memory.still[i] > patience or (is_high and memory.retreat[i] == 0.0)):
             self._back_off(memory, i, x, z, heading)
+
+    def choose(self, row: Array, slope: list[float], memory: ScanMemory, i: int) -> tuple[int, bool]:
+        """The first arc of the cheapest path from an observation of rover i, and whether to push on it.
+
+        What is remembered changes only by the map, where there is one.
+        """
+        x, z, heading = (float(row[self._q + k]) for k in (0, 2, 4))
+        goal = row[self._goal] * self._scale[self._goal]
         sine, cosine = sin_cos(heading)
         ahead, right, turned = (memory.known_traps(i) - [x, z, heading]).T
         heights = self._over_plane(row, slope)
+        beyond = self.beyond_field(row[None], memory.start[i : i + 1])
+        if beyond is not None:
+            heights[beyond[0]] = FENCE * self.radius
         boldness = self._boldness(memory.fruitless[i])
         extra, fast = self._outlook(row, slope, heights, boldness)
         task = SearchTask(
@@ -383,12 +412,40 @@ class ScanPolicy:
             ways=self._ways(row, slope, memory, i),
         )
         arc = self.search.best(heights, task)
-        command: Array = self.commands[arc]
-        if command[0] < 0.0 and not task.retreat:
+        is_high = row[self._stuck] > HIGH
+        return arc, bool(memory.still[i] > PUSH_AFTER * self.pace or is_high or fast[arc])
+
+    def beyond_field(self, rows: Array, starts: Array) -> npt.NDArray[np.bool_] | None:
+        """`(n, points)` whether points of the scan lie beyond the edge of the field; None where it has none.
+
+        Args:
+            rows: `(n, size)` observations.
+            starts: `(n, 2)` where the episodes began, m.
+        """
+        if self._margin is None:
+            return None
+        places, headings = rows[:, [self._q, self._q + 2]], rows[:, self._q + 4, None]
+        goals = rows[:, self._goal] * self._scale[self._goal]
+        sine, cosine = sin_cos(headings)
+        turn = np.concatenate((cosine, -sine), axis=1), np.concatenate((sine, cosine), axis=1)
+        goals = places + goals[:, :1] * turn[0] + goals[:, 1:] * turn[1]
+        low, high = np.minimum(starts, goals) - self._margin, np.maximum(starts, goals) + self._margin
+        beyond = np.zeros((len(rows), len(self._offsets)), np.bool_)
+        for k in (0, 1):
+            at = (
+                places[:, k, None]
+                + self._offsets[:, 0] * turn[0][:, k, None]
+                + self._offsets[:, 1] * turn[1][:, k, None]
+            )
+            beyond |= (at < low[:, k, None]) | (at > high[:, k, None])
+        return beyond
+
+    def begin_arc(self, row: Array, command: Array, memory: ScanMemory, i: int) -> None:
+        """Rover i begins to drive by a command: if it leads backward of its own accord, it backs off for a while."""
+        if command[0] < 0.0 and memory.retreat[i] == 0.0:
+            x, z, heading = (float(row[self._q + k]) for k in (0, 2, 4))
             memory.command[i, 0] = 1.0  # the way not to go
             self._back_off(memory, i, x, z, heading)
-        pushes = memory.still[i] > PUSH_AFTER * pace or is_high or fast[arc]
-        return command * [self.push if pushes else self.cruise, 1.0, 1.0]
 
     def _ways(self, row: Array, slope: list[float], memory: ScanMemory, i: int) -> Array | None:
         """The way to the goal from each point of the scan over the remembered map, m, which then holds the scan."""
@@ -400,7 +457,7 @@ class ScanPolicy:
             self._map.begin(cells, corner, (x, z))
         heights = row[self._heights] * self._scale[self._heights] + y
         self._map.remember(cells, corner, heights, (x, z), heading)
-        if memory.age[i] // self._repeat % self._map.options.every == 0:
+        if memory.age[i] // self.hold_periods % self._map.options.every == 0:
             ahead, right = (row[self._goal] * self._scale[self._goal]).tolist()
             sine, cosine = sin_cos(heading)
             memory.ways[i] = self._map.ways(
@@ -429,7 +486,7 @@ class ScanPolicy:
 
     def _boldness(self, fruitless: float) -> float:
         """Factor on the cost of risks after a time without progress, s."""
-        halvings = fruitless / (self.gains.courage * self._pace)
+        halvings = fruitless / (self.gains.courage * self.pace)
         return max(self.gains.least, float(exp(-math.log(2.0) * halvings)))
 
     def _outlook(
@@ -445,10 +502,15 @@ class ScanPolicy:
         """Remembers a trap where the rover was about to go, and that it shall drive the other way for a while."""
         direction = -1.0 if memory.command[i, 0] < 0.0 else 1.0
         sine, cosine = sin_cos(heading)
-        ahead = TRAP_AHEAD * self._reach * direction
-        longer = 1.0 + memory.fruitless[i] / (self.gains.insistence * self._pace)
-        trap, time = (x + ahead * cosine, z - ahead * sine, heading), self.gains.retreat * self._pace * longer
+        ahead = TRAP_AHEAD * self.reach * direction
+        longer = 1.0 + memory.fruitless[i] / (self.gains.insistence * self.pace)
+        trap, time = (x + ahead * cosine, z - ahead * sine, heading), self.gains.retreat * self.pace * longer
         memory.back_off(trap, -direction, time, i)
+
+
+def hold_periods(period: float, dt: float) -> int:
+    """Control periods of dt, s, between decisions."""
+    return max(1, round(period / dt))
 
 
 def _reach(model: RoverModel) -> float:

@@ -402,6 +402,7 @@ WORDS = {
     "goal": "reached the goal",
     "time": "ran out of time",
     "roll_over": "rolled over",
+    "left_field": "left the field",
     "high_centred": "got stuck on its belly",
     "battery": "emptied its battery",
     "step_failed": "could not be simulated further",

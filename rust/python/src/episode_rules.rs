@@ -39,6 +39,8 @@ use crate::reading::scan_points;
 ///         from 0 to 1.
 ///     free_distance: Distance from the start at which the rover is free, m; none by default. The
 ///         episode then ends, and progress is measured from the start.
+///     field_margin: How far the field reaches beyond the rectangle of start and goals, m: an episode
+///         ends where the trunk's origin leaves it. No edge by default.
 ///
 /// Raises:
 ///     ModelError: `model` is not a RoverModel.
@@ -75,7 +77,7 @@ fn weights(given: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Weights>
 impl EpisodeRules {
     #[new]
     #[pyo3(signature = (model, **settings),
-        text_signature = "(model, *, substeps, dt, torque_limits, max_steering, goal_tolerance, cos_max_tilt, stuck_time, weights, scale, noise=None, scan=None, goals=1, battery=None, free_distance=None)")]
+        text_signature = "(model, *, substeps, dt, torque_limits, max_steering, goal_tolerance, cos_max_tilt, stuck_time, weights, scale, noise=None, scan=None, goals=1, battery=None, free_distance=None, field_margin=None)")]
     fn new(model: &Bound<'_, PyAny>, settings: Option<&Bound<'_, PyDict>>) -> Result<Self> {
         let given = Named::keywords(model.py(), settings)?;
         let wrong = |_| refused(model, Kind::Model, "model", "a RoverModel");
@@ -95,6 +97,7 @@ impl EpisodeRules {
             goals: given.count("goals", 1)?,
             battery: given.maybe("battery")?,
             free_distance: given.maybe("free_distance")?,
+            field_margin: given.maybe("field_margin")?,
         };
         given.finish()?;
         Ok(Self::of(Arc::new(Rules::new(model.inner, settings)?)))
@@ -126,6 +129,7 @@ impl EpisodeRules {
         named.set_item("goals", settings.goals)?;
         named.set_item("battery", settings.battery)?;
         named.set_item("free_distance", settings.free_distance)?;
+        named.set_item("field_margin", settings.field_margin)?;
         let model = RoverModel::from(self.inner.model().clone());
         Ok(((model,), named))
     }

@@ -36,6 +36,7 @@ fn settings() -> Settings {
         goals: 1,
         battery: None,
         free_distance: None,
+        field_margin: None,
     }
 }
 

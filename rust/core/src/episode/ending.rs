@@ -20,11 +20,13 @@ pub enum Ending {
     BatteryEmpty,
     /// The rover that was held has come free.
     Free,
+    /// The trunk's origin has left the field.
+    LeftField,
 }
 
 impl Ending {
     /// All, by their code.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::None,
         Self::Goal,
         Self::RollOver,
@@ -32,6 +34,7 @@ impl Ending {
         Self::StepFailed,
         Self::BatteryEmpty,
         Self::Free,
+        Self::LeftField,
     ];
 
     /// Its name; empty while the episode runs.
@@ -45,6 +48,7 @@ impl Ending {
             Self::StepFailed => "step_failed",
             Self::BatteryEmpty => "battery_empty",
             Self::Free => "free",
+            Self::LeftField => "left_field",
         }
     }
 

@@ -26,6 +26,8 @@ pub struct Progress {
     pub start: [f64; 2],
     /// Horizontal distance from there, m.
     pub away: f64,
+    /// Distance outside the rectangle of start and goals, the larger of those along x and z, m.
+    pub outside: f64,
 }
 
 impl Progress {
@@ -41,6 +43,7 @@ impl Progress {
             reached: 0,
             start,
             away: 0.0,
+            outside: 0.0,
         }
     }
 

@@ -44,6 +44,8 @@ pub struct Settings {
     /// Distance from where an episode began at which the rover is free: the episode ends, and
     /// progress is measured from there; None where it is not held.
     pub free_distance: Option<f64>,
+    /// How far the field reaches beyond the rectangle of start and goals, m; None without an edge.
+    pub field_margin: Option<f64>,
 }
 
 impl Settings {
@@ -178,6 +180,7 @@ impl Rules {
             positive("dt", settings.dt),
             positive("battery", settings.battery.unwrap_or(1.0)),
             positive("free_distance", settings.free_distance.unwrap_or(1.0)),
+            positive("field_margin", settings.field_margin.unwrap_or(1.0)),
             (
                 "goals",
                 settings.goals as f64,
@@ -300,7 +303,7 @@ impl Rules {
     }
 
     /// The ending after a control period: a failed step takes precedence, then the goal, then
-    /// rolling over, high-centring, the battery and coming free.
+    /// rolling over, high-centring, the battery, coming free and leaving the field.
     #[must_use]
     pub fn ending(&self, now: &Quantities, progress: &Progress, has_failed: bool) -> Ending {
         let settings = &self.settings;
@@ -316,6 +319,8 @@ impl Rules {
             Ending::BatteryEmpty
         } else if (settings.free_distance).is_some_and(|free| progress.away >= free) {
             Ending::Free
+        } else if (settings.field_margin).is_some_and(|margin| progress.outside > margin) {
+            Ending::LeftField
         } else {
             Ending::None
         }

@@ -138,6 +138,7 @@ impl Episode {
             ("start", progress.start[0]),
             ("start", progress.start[1]),
             ("away", progress.away),
+            ("outside", progress.outside),
         ];
         let entries = (progress.previous_action.iter()).map(|&a| ("previous_action", a));
         let seen = observation.iter().map(|&x| ("observation", f64::from(x)));
@@ -259,6 +260,8 @@ impl Episode {
         if is_readable && !period.has_failed {
             let ([x, z], before) = (self.progress.start, self.progress.away);
             self.progress.away = hypot(reading[0] - x, reading[2] - z);
+            let place = [reading[0], reading[2]];
+            self.progress.outside = self.setting.outside([x, z], place);
             if rules.settings().free_distance.is_some() {
                 approach = self.progress.away - before;
             }

@@ -31,6 +31,19 @@ impl Setting {
         }
     }
 
+    /// How far a place lies outside the rectangle that the start and all goals span, along x or z,
+    /// whichever is more, m; 0 within.
+    #[must_use]
+    pub fn outside(&self, start: [f64; 2], place: [f64; 2]) -> f64 {
+        let beyond = [0, 1].map(|k| {
+            let goals = || self.further.iter().map(|goal| goal[k]);
+            let low = goals().fold(start[k].min(self.goal[k]), f64::min);
+            let high = goals().fold(start[k].max(self.goal[k]), f64::max);
+            (low - place[k]).max(place[k] - high)
+        });
+        beyond[0].max(beyond[1]).max(0.0)
+    }
+
     /// Way from the goal of a number to the last, leg by leg, m.
     #[must_use]
     pub fn way_from(&self, number: usize) -> f64 {
