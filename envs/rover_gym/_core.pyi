@@ -2188,8 +2188,10 @@ class EpisodeRules:
         cos_max_tilt: Cosine of the tilt beyond which the rover has rolled over.
         stuck_time: Time after which an episode with a high-centred rover ends, s.
         weights: Weights of the terms of the reward, in the order of `terms`.
-        scale: Physical value that each entry of the observation is divided by, (size,).
-        noise: Standard deviation of the noise of each entry, (size,); no noise by default.
+        gravity: Magnitude of gravity, m/s2. Forces in observations are divided by the mean weight
+            on a wheel.
+        noise: Standard deviation of the noise of observed entries without bounds; no noise by
+            default.
         scan: Points of the height scan ahead and to the right of the trunk's origin in the heading
             frame, (n, 2), m; none by default.
         goals: Number of goals to reach in sequence. With more than one, the observation has three
@@ -2207,6 +2209,17 @@ class EpisodeRules:
         OptionError: A number is out of range, a list has a wrong length, or the number of weights
             differs from that of the terms.
     """
+
+    def observation(self) -> list[tuple[str, int, int, str, tuple[float, ...], float, float, str]]:
+        """The fields of an observation, in order.
+
+        Returns:
+            Name, first entry, size, unit, scale (size,), lower and upper bound of scaled entries,
+            and meaning of each field.
+        """
+    @staticmethod
+    def observation_rows() -> list[tuple[int, int, str, str, str, str]]:
+        """First entry, size, name, meaning, unit and scale of the built-in rover's observed fields."""
 
     @staticmethod
     def info_rows() -> list[tuple[str, str, str]]:
@@ -2226,8 +2239,8 @@ class EpisodeRules:
         cos_max_tilt: float,
         stuck_time: float,
         weights: Mapping[str, float],
-        scale: npt.ArrayLike,
-        noise: npt.ArrayLike | None = None,
+        gravity: float,
+        noise: float = 0.0,
         scan: npt.ArrayLike | None = None,
         goals: int = 1,
         battery: float | None = None,

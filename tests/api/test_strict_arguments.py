@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from torture.hostile import NO_NUMBERS
+from torture.hostile import NO_NUMBERS, throw
 
 import rover_gym
 from rover_gym import (
@@ -23,13 +23,23 @@ from rover_gym import (
     RoverModel,
     Simulation,
     SphereField,
+    StepError,
+    TriangleMesh,
     _core,
     accuracy_options,
     mechanics,
     solve_friction_contact,
 )
 from rover_gym.mechanics import SoilSimulation, soil_packing
-from rover_gym.planar import BallSimulation, Line, MirroredRoverSimulation, Polyline, Sine, TwoWheelRoverSimulation
+from rover_gym.planar import (
+    BallSimulation,
+    Line,
+    MirroredRoverSimulation,
+    Polyline,
+    Sine,
+    Spline,
+    TwoWheelRoverSimulation,
+)
 
 rocks = (0.1, (-5.0, -5.0, 5.0, 5.0), 0)
 
@@ -37,71 +47,127 @@ one_contact = (np.eye(3), [-1.0, 0.0, 0.0], [0.5])
 
 one_disk = ([0.1], [1.0], [[0.0, 0.0]])
 
+#: Calls with arguments that are sound. Each argument is replaced by every hostile value.
+CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
+    "Plane": (Plane, {"normal": (0.0, 1.0, 0.0), "offset": 0.0}),
+    "SphereField": (SphereField, {"centres": [[0.0, 0.0, 0.0]], "radii": [1.0], "ground": None}),
+    "SphereField.rocks": (
+        SphereField.rocks,
+        {
+            "abundance": 0.05,
+            "area": (0.0, 0.0, 2.0, 2.0),
+            "seed": 1,
+            "max_diameter": 0.5,
+            "min_diameter": 0.1,
+            "burial": 0.5,
+            "clear": [[0.0, 0.0, 0.5]],
+        },
+    ),
+    "HeightField": (
+        HeightField,
+        {"heights": np.zeros((9, 9)), "spacing": 0.5, "origin": (-2.0, -2.0), "material": "ground"},
+    ),
+    "HeightField.fractal": (
+        HeightField.fractal,
+        {
+            "size": 6.0,
+            "spacing": 0.5,
+            "roughness": 0.05,
+            "hurst": 0.7,
+            "longest_wave": 3.0,
+            "craters": 0.1,
+            "crater_diameter": (0.5, 2.0),
+            "ripple_height": 0.05,
+            "ripple_length": 1.0,
+            "origin": (-3.0, -3.0),
+        },
+    ),
+    "TriangleMesh": (
+        TriangleMesh,
+        {"vertices": [[-3.0, 0.0, -3.0], [3.0, 0.0, -3.0], [0.0, 0.0, 3.0]], "triangles": [[0, 2, 1]], "material": "a"},
+    ),
+    "Simulation": (
+        Simulation,
+        {
+            "model": None,
+            "terrain": None,
+            "gravity": (0.0, -9.81, 0.0),
+            "friction": 0.7,
+            "restitution": 0.0,
+            "time_step": 0.005,
+            "variant": "linearised",
+            "theta": 0.5,
+            "forecast": 0.5,
+            "solver": "auto",
+            "tolerance": 1e-12,
+            "max_iterations": 100,
+            "stabilisation": "projection",
+            "warm_start": True,
+        },
+    ),
+    "RoverModel.replace": (
+        RoverModel().replace,
+        {
+            "wheel_radius": 0.1,
+            "masses": {"trunk": 600.0},
+            "steering_stiffness": 1500.0,
+            "steering_damping": 20.0,
+            "wheel_torque_limit": 150.0,
+            "mass_scale": 1.0,
+        },
+    ),
+    "Sine": (Sine, {"amplitude": 0.1, "wavelength": 3.0, "phase": 0.0, "offset": 0.0}),
+    "Line": (Line, {"slope": 0.1, "offset": 0.0}),
+    "Spline": (Spline, {"x": [0.0, 1.0, 2.0], "y": [0.0, 0.1, 0.0]}),
+    "Polyline": (Polyline, {"x": [0.0, 1.0, 2.0], "y": [0.0, 0.1, 0.0]}),
+    "BallSimulation": (
+        BallSimulation,
+        {"ground": Line(), "mass": 3.0, "radius": 1.5, "inertia": 1.0, "time_step": 5e-3},
+    ),
+    "soil_packing": (soil_packing, {"count": 12, "radius_min": 0.016, "radius_max": 0.0165, "mass": 0.7, "width": 0.5}),
+    "solve_friction_contact": (
+        solve_friction_contact,
+        {
+            "W": np.eye(3),
+            "q": [-1.0, 0.1, 0.0],
+            "mu": [0.5],
+            "tolerance": 1e-8,
+            "dimension": 3,
+            "solver": "auto",
+            "max_iterations": 100,
+            "initial": [0.0] * 3,
+        },
+    ),
+}
+
 NUMBERS: list[tuple[str, Callable[[Any], Any]]] = [
-    ("friction", lambda x: Simulation(friction=x)),
-    ("restitution", lambda x: Simulation(restitution=x)),
-    ("time_step", lambda x: Simulation(time_step=x)),
-    ("theta", lambda x: Simulation(theta=x)),
-    ("forecast", lambda x: Simulation(forecast=x)),
-    ("tolerance", lambda x: Simulation(tolerance=x)),
     ("stiffness", lambda x: Simulation().hold("front_axle", stiffness=x)),
     ("damping", lambda x: Simulation().hold("front_axle", damping=x)),
-    ("offset", lambda x: Plane(offset=x)),
     ("x", lambda x: Plane().height(x, 0.0)),
-    ("abundance", lambda x: SphereField.rocks(x, *rocks[1:])),
-    ("max_diameter", lambda x: SphereField.rocks(*rocks, max_diameter=x)),
-    ("min_diameter", lambda x: SphereField.rocks(*rocks, min_diameter=x)),
-    ("wheel_radius", lambda x: RoverModel().replace(wheel_radius=x)),
     ("contact_radius", lambda x: RoverModel().replace(contact_radius=x)),
     ("wheel_stiffness", lambda x: RoverModel().replace(wheel_stiffness=x)),
     ("wheel_damping", lambda x: RoverModel().replace(wheel_damping=x)),
-    ("mass_scale", lambda x: RoverModel().replace(mass_scale=x)),
-    ("wheel_torque_limit", lambda x: RoverModel().replace(wheel_torque_limit=x)),
-    ("steering_stiffness", lambda x: RoverModel().replace(steering_stiffness=x)),
     ("masses[trunk]", lambda x: RoverModel().replace(masses={"trunk": x})),
     ("joints[front_axle]", lambda x: RoverModel().weld({"front_axle": x})),
-    ("slope", lambda x: Line(slope=x)),
-    ("amplitude", lambda x: Sine(x, 1.0)),
-    ("wavelength", lambda x: Sine(1.0, x)),
-    ("phase", lambda x: Sine(1.0, 1.0, phase=x)),
     ("height", lambda x: Polyline.step(0.0, x)),
-    ("mass", lambda x: BallSimulation(Line(), mass=x)),
     ("inertia", lambda x: TwoWheelRoverSimulation(Line(), inertia=x)),
-    ("time_step", lambda x: BallSimulation(Line(), time_step=x)),
     ("friction", lambda x: TwoWheelRoverSimulation(Line(), friction=x)),
-    ("radius_min", lambda x: soil_packing(radius_min=x)),
-    ("width", lambda x: soil_packing(width=x)),
     ("wall_friction", lambda x: SoilSimulation(*one_disk, wall_friction=x)),
     ("rolling_friction", lambda x: SoilSimulation(*one_disk, rolling_friction=x)),
     ("sleep_distance", lambda x: SoilSimulation(*one_disk, sleep_distance=x)),
-    ("tolerance", lambda x: solve_friction_contact(*one_contact, x)),
 ]
 
 COUNTS: list[tuple[str, Callable[[Any], Any]]] = [
-    ("max_iterations", lambda n: Simulation(max_iterations=n)),
-    ("dimension", lambda n: solve_friction_contact(*one_contact, dimension=n)),
-    ("max_iterations", lambda n: solve_friction_contact(*one_contact, max_iterations=n)),
     ("budget", lambda n: solve_friction_contact(*one_contact, budget=n)),
     ("budget", lambda n: Simulation(budget=n)),
     ("n", lambda n: Simulation().step(n)),
     ("n", lambda n: Simulation().profile(n)),
     ("n", lambda n: BallSimulation(Line()).step(n)),
     ("n", lambda n: SoilSimulation(*one_disk).step(n)),
-    ("seed", lambda n: SphereField.rocks(0.1, rocks[1], n)),
-    ("count", soil_packing),
-    ("seed", lambda n: soil_packing(seed=n)),
 ]
 
 OTHERS: list[tuple[str, Callable[[], Any]]] = [
-    ("model", lambda: Simulation(3)),  # type: ignore[arg-type]
     ("model", lambda: MirroredRoverSimulation(Line(), model="rover")),  # type: ignore[arg-type]
-    ("terrain", lambda: Simulation(terrain=3)),  # type: ignore[arg-type]
-    ("ground", lambda: SphereField([[0.0] * 3], [1.0], 3)),  # type: ignore[arg-type]
-    ("variant", lambda: Simulation(variant=3)),  # type: ignore[arg-type]
-    ("solver", lambda: Simulation(solver=3)),  # type: ignore[arg-type]
-    ("solver", lambda: solve_friction_contact(*one_contact, solver=3)),  # type: ignore[call-overload]
-    ("stabilisation", lambda: Simulation(stabilisation=None)),  # type: ignore[arg-type]
-    ("warm_start", lambda: Simulation(warm_start=1)),  # type: ignore[arg-type]
     ("coordinates", lambda: Simulation().set_state(np.zeros(21), coordinates=1)),  # type: ignore[arg-type]
     ("coordinates", lambda: RoverModel().tags(np.zeros(21), 1)),  # type: ignore[arg-type]
     ("joints", lambda: Simulation().hold(3)),  # type: ignore[arg-type]
@@ -111,7 +177,6 @@ OTHERS: list[tuple[str, Callable[[], Any]]] = [
     ("path", lambda: RoverModel().to_file(3)),
     ("path", lambda: SphereField.from_file(3)),  # type: ignore[arg-type]
     ("text", lambda: RoverModel.from_text(3)),  # type: ignore[arg-type]
-    ("area", lambda: SphereField.rocks(0.1, (0.0, 1.0), 0)),
     ("burial", lambda: SphereField.rocks(*rocks, burial=(0.1, 0.2, 0.3))),  # type: ignore[arg-type]
     ("kinematic[0]", lambda: SoilSimulation(*one_disk, kinematic=[1.0])),  # type: ignore[list-item]
     ("which", lambda: SoilSimulation(*one_disk).remove(3)),  # type: ignore[arg-type]
@@ -125,9 +190,7 @@ OTHERS: list[tuple[str, Callable[[], Any]]] = [
 VECTORS: list[tuple[str, Callable[[Any], Any]]] = [
     ("q", lambda x: Simulation().set_state(x)),
     ("torques", lambda x: Simulation().set_wheel_torques(x)),
-    ("gravity", lambda x: Simulation(gravity=x)),
     ("normal", Plane),
-    ("radii", lambda x: SphereField(np.zeros((3, 3)), x)),
     ("masses", lambda x: RoverModel().replace(masses=x)),
     ("x", lambda x: Polyline(x, [0.0, 1.0, 2.0])),
 ]
@@ -170,6 +233,44 @@ def refused(field: str, call: Callable[[], Any]) -> None:
     assert getattr(caught.value, "field", None) == field, caught.value
     assert field.split("[", maxsplit=1)[0] in str(caught.value)
     assert len(str(caught.value)) < 400
+
+
+#: Fields by which an argument is refused, beside those of the call's arguments.
+OTHER_FIELDS = {
+    "RoverModel.replace": ("solids", "wheels"),
+    "Simulation": ("parts",),
+    "soil_packing": ("radius",),
+    "HeightField.fractal": ("heights",),
+}
+
+
+def step(made: Any) -> None:
+    """What was accepted must work: what is ground carries a machine, what is a machine moves, or says why not."""
+    if isinstance(made, RoverModel):
+        made = Simulation(made)
+    elif isinstance(made, Plane | SphereField | HeightField | TriangleMesh):
+        made = Simulation(terrain=made)
+    elif isinstance(made, Line | Sine | Spline | Polyline):
+        made = BallSimulation(made)
+    if isinstance(made, Simulation | BallSimulation):
+        try:
+            made.step(3)
+        except StepError:
+            return
+        assert np.isfinite(made.q).all()
+        assert np.isfinite(made.v).all()
+
+
+@pytest.mark.parametrize(("name", "argument"), [(name, one) for name, (_, given) in CALLS.items() for one in given])
+def test_hostile_values_are_refused_by_name_or_work(name: str, argument: str) -> None:
+    call, sound = CALLS[name]
+    usual = sound[argument]
+    never = NO_NUMBERS if isinstance(usual, float) else NO_COUNTS if type(usual) is int else ()
+
+    def use(value: Any) -> None:
+        step(call(**sound | {argument: value}))
+
+    assert throw(use, *sound, *OTHER_FIELDS.get(name, ()), never=never) > 10
 
 
 @pytest.mark.parametrize(("field", "call", "values"), WALK)

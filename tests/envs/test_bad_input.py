@@ -1,6 +1,6 @@
 """Bad input that depends on more than one value: which entry of it, or what it contradicts, is named.
 
-Values of a wrong kind or range are refused in `test_nonsense.py`, for every argument; ends of ranges in `test_card.py`.
+Ends of ranges are in `test_card.py`, what the core refuses in `test_strict_arguments.py`.
 
 Each argument, option and method that takes a value gets every value of the table. If a field accepts one, a reset and
 some steps must give finite numbers. Any other exception, and any warning, fails the test.
@@ -19,7 +19,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from refusals import refused
-from torture.hostile import NO_NUMBERS, hostile_values
+from torture.hostile import NO_NUMBERS, throw
 
 from rover_gym import (
     CommandError,
@@ -30,7 +30,6 @@ from rover_gym import (
     RoverGymError,
     RoverModel,
     StateError,
-    StepError,
     TerrainError,
 )
 from rover_gym.economy import Scene, plan
@@ -177,39 +176,6 @@ def test_span_is_ordered_or_refused(value: Any) -> None:
     except OptionError:
         return
     assert -math.inf < low <= high < math.inf
-
-
-NAN, INF = float("nan"), float("inf")
-
-
-def throw(
-    use: Callable[[Any], object],
-    *fields: str,
-    error: type[RoverGymError] = RoverGymError,
-    never: Iterable[Any] = (),
-) -> int:
-    """Uses each hostile value, and those that are never accepted.
-
-    Returns how many were refused, each by one of these fields or an entry of it.
-    """
-    refused = 0
-    for value, may_pass in [*((value, True) for value in hostile_values()), *((value, False) for value in never)]:
-        caught = None
-        try:
-            use(value)
-        except RoverGymError as refusal:
-            caught = refusal
-        if caught is None:
-            assert may_pass, value
-            continue
-        assert isinstance(caught, error)
-        assert isinstance(caught, ValueError | StepError)
-        assert caught.field
-        assert not fields or any(f"{caught.field}[".startswith((f"{name}[", f"{name}.")) for name in fields), caught
-        assert caught.field.split("[", maxsplit=1)[0] in str(caught)
-        assert len(str(caught)) < 2000
-        refused += 1
-    return refused
 
 
 def drive(env: RoverEnv) -> None:

@@ -383,7 +383,7 @@ def rules(**changed: Any) -> EpisodeRules:
         "cos_max_tilt": 0.5,
         "stuck_time": 2.0,
         "weights": dict(WEIGHTS),
-        "scale": env.observation_layout.scale,
+        "gravity": 9.81,
     }
     return EpisodeRules(env.model, **{**given, **changed})
 
@@ -397,9 +397,9 @@ def rules(**changed: Any) -> EpisodeRules:
         ({"torque_limits": [1.0] * 5}, "torque_limits"),
         ({"weights": {}}, "weights"),
         ({"weights": {**WEIGHTS, "time": math.inf}}, "weights"),
-        ({"scale": [1.0]}, "scale"),
-        ({"noise": [1.0]}, "noise"),
-        ({"scan": [[0.0, 1.0]]}, "scale"),
+        ({"gravity": 0.0}, "gravity"),
+        ({"noise": -1.0}, "noise"),
+        ({"scan": [0.0, 1.0]}, "scan"),
         ({"stuck_time": -1.0}, "stuck_time"),
     ],
 )

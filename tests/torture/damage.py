@@ -1,9 +1,8 @@
-"""Damaged files and nonsensical arguments: refused with an error of ours, or sound."""
+"""Damaged files: refused with an error of ours, or sound."""
 
 from __future__ import annotations
 
 import importlib.util
-import json
 import re
 import tempfile
 import warnings
@@ -24,17 +23,15 @@ from rover_gym import (
     SphereField,
     StepError,
     TriangleMesh,
-    solve_friction_contact,
 )
 from rover_gym.mechanics import Snapshot
 from rover_gym.models import RobotFileWarning
-from rover_gym.planar import BallSimulation, Line, Polyline, Sine, Spline, TwoWheelRoverSimulation
+from rover_gym.planar import BallSimulation, Sine
 from rover_gym.policy import PolicyError, TrainedPolicy
 from rover_gym.policy.policy_card import FOLDER
 from rover_gym.record import Recorder, RecordingError, RoverSampler, describe, read_run
 from rover_gym.runs import open_run
 from rover_gym.soil import SoilRun, SoilSimulation, soil_packing
-from torture.hostile import NUMBERS, TEXTS, THINGS
 from torture.ledger import Bounds, Ledger, Regime
 from torture.mutate import (
     mutate_bytes,
@@ -292,214 +289,6 @@ def rocks(random: Random, ledger: Ledger) -> None:
                 use(ledger, "a damaged field", sim)
 
 
-#: Callables with arguments that are sound; one of them is replaced.
-CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
-    "Plane": (Plane, {"normal": (0.0, 1.0, 0.0), "offset": 0.0}),
-    "SphereField": (SphereField, {"centres": [[0.0, 0.0, 0.0]], "radii": [1.0], "ground": None}),
-    "SphereField.rocks": (
-        SphereField.rocks,
-        {
-            "abundance": 0.05,
-            "area": (0.0, 0.0, 2.0, 2.0),
-            "seed": 1,
-            "max_diameter": 0.5,
-            "min_diameter": 0.1,
-            "burial": 0.5,
-            "clear": [[0.0, 0.0, 0.5]],
-        },
-    ),
-    "HeightField": (
-        HeightField,
-        {"heights": np.zeros((9, 9)), "spacing": 0.5, "origin": (-2.0, -2.0), "material": "ground"},
-    ),
-    "HeightField.fractal": (
-        HeightField.fractal,
-        {
-            "size": 6.0,
-            "spacing": 0.5,
-            "roughness": 0.05,
-            "hurst": 0.7,
-            "longest_wave": 3.0,
-            "craters": 0.1,
-            "crater_diameter": (0.5, 2.0),
-            "ripple_height": 0.05,
-            "ripple_length": 1.0,
-            "seed": 1,
-            "origin": (-3.0, -3.0),
-        },
-    ),
-    "TriangleMesh": (
-        TriangleMesh,
-        {
-            "vertices": [[-3.0, 0.0, -3.0], [3.0, 0.0, -3.0], [0.0, 0.0, 3.0]],
-            "triangles": [[0, 2, 1]],
-            "material": "rock",
-        },
-    ),
-    "Simulation": (
-        Simulation,
-        {
-            "model": None,
-            "terrain": None,
-            "gravity": (0.0, -9.81, 0.0),
-            "friction": 0.7,
-            "restitution": 0.0,
-            "time_step": 0.005,
-            "variant": "linearised",
-            "theta": 0.5,
-            "forecast": 0.5,
-            "solver": "auto",
-            "tolerance": 1e-12,
-            "max_iterations": 100,
-            "stabilisation": "projection",
-            "warm_start": True,
-        },
-    ),
-    "RoverModel.replace": (
-        RoverModel().replace,
-        {
-            "wheel_radius": 0.1,
-            "masses": {"trunk": 600.0},
-            "steering_stiffness": 1500.0,
-            "steering_damping": 20.0,
-            "wheel_torque_limit": 150.0,
-            "mass_scale": 1.0,
-        },
-    ),
-    "RoverEnv": (
-        RoverEnv,
-        {
-            "terrain": "rocks",
-            "difficulty": 0.5,
-            "rock_abundance": 0.1,
-            "max_rock_radius": 1.0,
-            "height_scan": (3, 3, 0.25),
-            "slope_deg": 5.0,
-            "uphill_deg": 0.0,
-            "heading_deg": 0.0,
-            "goal_distance": 5.0,
-            "goal_bearing_deg": 0.0,
-            "goal_tolerance": 0.5,
-            "max_steering_deg": 30.0,
-            "max_tilt_deg": 60.0,
-            "stuck_time": 2.0,
-            "friction": (0.5, 0.9),
-            "restitution": 0.0,
-            "gravity": (0.0, -9.81, 0.0),
-            "mass_scale": 1.0,
-            "actuator_gain": 1.0,
-            "gravity_scale": 1.0,
-            "observation_noise": 0.0,
-            "control_frequency": 20.0,
-            "time_step": 0.005,
-            "solver_options": {"theta": 0.5},
-            "reward_weights": {"time": -0.05},
-        },
-    ),
-    "Sine": (Sine, {"amplitude": 0.1, "wavelength": 3.0, "phase": 0.0, "offset": 0.0}),
-    "Line": (Line, {"slope": 0.1, "offset": 0.0}),
-    "Spline": (Spline, {"x": [0.0, 1.0, 2.0], "y": [0.0, 0.1, 0.0]}),
-    "Polyline": (Polyline, {"x": [0.0, 1.0, 2.0], "y": [0.0, 0.1, 0.0]}),
-    "BallSimulation": (
-        BallSimulation,
-        {"ground": Line(), "mass": 3.0, "radius": 1.5, "inertia": 1.0, "time_step": 5e-3},
-    ),
-    "TwoWheelRoverSimulation": (
-        TwoWheelRoverSimulation,
-        {"ground": Line(), "mass": 130.0, "wheel_mass": 5.0, "wheel_radius": (0.2, 0.2), "axle_a": (-0.4, 0.0)},
-    ),
-    "soil_packing": (soil_packing, {"count": 12, "radius_min": 0.016, "radius_max": 0.0165, "mass": 0.7, "width": 0.5}),
-    "solve_friction_contact": (
-        solve_friction_contact,
-        {
-            "W": np.eye(3),
-            "q": [-1.0, 0.1, 0.0],
-            "mu": [0.5],
-            "tolerance": 1e-8,
-            "dimension": 3,
-            "solver": "auto",
-            "max_iterations": 100,
-            "initial": [0.0] * 3,
-        },
-    ),
-}
-
-
-def nonsense(random: Random) -> Any:
-    """A value that hardly any argument takes."""
-    kinds = (THINGS, NUMBERS, NUMBERS, TEXTS)
-    chosen = kinds[random.integers(len(kinds))]
-    return chosen[random.integers(len(chosen))]
-
-
-def arguments(random: Random, ledger: Ledger) -> None:
-    """One argument of a call replaced by nonsense; simulations that are made all the same are stepped."""
-    names = sorted(CALLS)
-    for _ in range(15):
-        name = names[random.integers(len(names))]
-        call, sound = CALLS[name]
-        replaced = sorted(sound)[random.integers(len(sound))]
-        value = nonsense(random)
-        what = f"{name}({replaced}={shown(repr(value), 60)})"
-        given = sound | {replaced: value}
-        made = attempt(ledger, what, lambda call=call, given=given: call(**given))
-        if made is None:
-            continue
-        _use_all(ledger, what, made)
-
-
-def _use_all(ledger: Ledger, what: str, made: Any) -> None:
-    """Steps what can be stepped, stands a machine on what is ground, resets what is an environment."""
-    if isinstance(made, Simulation | BallSimulation | TwoWheelRoverSimulation):
-        use(ledger, what, made)
-    elif isinstance(made, Plane | SphereField | HeightField | TriangleMesh):
-        attempt(ledger, what, lambda: use(ledger, what, Simulation(terrain=made)))
-    elif isinstance(made, RoverEnv):
-        attempt(ledger, what, lambda: made.reset(seed=1))
-    elif isinstance(made, Line | Sine | Spline | Polyline):
-        attempt(ledger, what, lambda: use(ledger, what, BallSimulation(made)))
-
-
-def commands(random: Random, ledger: Ledger) -> None:
-    """Commands, states and options that are nonsense: refused ones change nothing."""
-    sim, env = _moving(), RoverEnv()
-    env.reset(seed=1)
-    calls: dict[str, Callable[[Any], Any]] = {
-        "set_wheel_torques": sim.set_wheel_torques,
-        "set_steering": sim.set_steering,
-        "set_joint_torques": sim.set_joint_torques,
-        "set_state": sim.set_state,
-        "hold": sim.hold,
-        "release": sim.release,
-        "restore": sim.restore,
-        "env.step": env.step,
-        "env.reset(seed)": lambda value: env.reset(seed=value),
-        "env.reset(options)": lambda value: env.reset(options=value),
-        "env.restore": env.restore,
-    }
-    keys = ("slope_deg", "heading_deg", "position", "goal", "q", "v", "uphill_deg")
-    for _ in range(15):
-        name = sorted(calls)[random.integers(len(calls))]
-        value = nonsense(random)
-        if name == "env.reset(options)" and random.uniform() < 0.8:
-            value = {str(random.choice(keys)): value}
-        before = sim.snapshot().to_bytes(), _digest(env)
-        what = f"{name}({shown(repr(value), 60)})"
-        refused = ledger.refused
-        attempt(ledger, what, lambda call=calls[name], value=value: call(value))
-        if ledger.refused > refused and (sim.snapshot().to_bytes(), _digest(env)) != before:
-            ledger.find(f"{what} was refused and changed something")
-    use(ledger, "after nonsensical commands", sim)
-
-
-def _digest(env: RoverEnv) -> str:
-    """All that an environment's refused call must not change."""
-    snapshot = env.snapshot()
-    return json.dumps(
-        [snapshot.simulation.to_bytes().hex(), repr(snapshot.scene.start), snapshot.random_state], default=str
-    )
-
-
 INPUTS = Bounds(not_converged=1.0, refused=1.0, slowest=2.0)
 
 REGIMES = [
@@ -509,6 +298,4 @@ REGIMES = [
     Regime("damaged robot files", robots, 20, INPUTS),
     Regime("damaged snapshots", snapshots, 20, INPUTS),
     Regime("damaged rock fields", rocks, 10, INPUTS),
-    Regime("nonsensical arguments", arguments, 60, INPUTS),
-    Regime("nonsensical commands", commands, 30, INPUTS),
 ]

@@ -1,6 +1,6 @@
 """Values that no argument, or hardly any, should accept: one table for the suite and the campaign.
 
-The campaign draws from `NUMBERS`, `TEXTS` and `THINGS`; the suite gives every argument all of `hostile_values()`.
+The campaign draws from `NUMBERS` and `TEXTS`; the suite gives every argument all of `hostile_values()`.
 """
 
 from __future__ import annotations
@@ -8,10 +8,12 @@ from __future__ import annotations
 import datetime
 import decimal
 import fractions
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import numpy as np
+
+from rover_gym import RoverGymError, StepError
 
 #: Text that means something to whoever prints, interprets or opens it without escaping.
 TEXTS = (
@@ -120,3 +122,33 @@ def hostile_values() -> list[Any]:
         *(fractions.Fraction(10**400), decimal.Decimal("sNaN"), decimal.Decimal("1e400")),
         *(np.longdouble("1e4000"), np.float16("nan"), NotImplemented, Ellipsis),
     ]
+
+
+def throw(
+    use: Callable[[Any], object],
+    *fields: str,
+    error: type[RoverGymError] = RoverGymError,
+    never: Iterable[Any] = (),
+) -> int:
+    """Uses each hostile value, and those that are never accepted.
+
+    Returns how many were refused, each by one of these fields or an entry of it.
+    """
+    refused = 0
+    for value, may_pass in [*((value, True) for value in hostile_values()), *((value, False) for value in never)]:
+        caught = None
+        try:
+            use(value)
+        except RoverGymError as refusal:
+            caught = refusal
+        if caught is None:
+            assert may_pass, value
+            continue
+        assert isinstance(caught, error)
+        assert isinstance(caught, ValueError | StepError)
+        assert caught.field
+        assert not fields or any(f"{caught.field}[".startswith((f"{name}[", f"{name}.")) for name in fields), caught
+        assert caught.field.split("[", maxsplit=1)[0] in str(caught)
+        assert len(str(caught)) < 2000
+        refused += 1
+    return refused

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.env.observation import ObservationLayout, build_layout
+from rover_gym.env.observation import ObservationLayout
 from rover_gym.env.reward_terms import WEIGHTS, RewardTerms
 from rover_gym.env.sand_ground import check_wheels_for_sand, sand_rover, soils_of
 from rover_gym.env.start import (
@@ -131,21 +131,11 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
     }
     simulation = Simulation(rover, Plane(), **options)  # the core validates the simulation options
     points = None if given["height_scan"] is None else given["height_scan"].offsets
-    goals, n_actions = given["waypoints"], len(rover.wheel_names) + len(steering.joints)
-    layout = build_layout(
-        rover,
-        math.hypot(*gravity),
-        0 if points is None else len(points),
-        n_actions,
-        n_goals=goals,
-        has_battery=given["battery"] is not None,
-    )
     max_steering = _steering_limit(rover, steering, given["max_steering_deg"])
     field_margin = FIELD_MARGINS.get(terrain) if isinstance(terrain, str) else None
     rules = _rules(
         given,
         rover,
-        layout,
         substeps=substeps,
         max_steering=max_steering,
         scan=points,
@@ -167,7 +157,7 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
     return Task(
         model=rover,
         steering=steering,
-        n_actions=n_actions,
+        n_actions=len(rover.wheel_names) + len(steering.joints),
         ground=ground,
         has_rocks=rocks is not None,
         on_hills=hills is not None,
@@ -175,14 +165,14 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
         scan=points,
         is_noisy=given["observation_noise"] > 0.0,
         goal_tolerance=given["goal_tolerance"],
-        n_further=goals - 1,
+        n_further=given["waypoints"] - 1,
         field_margin=field_margin,
         gravity=gravity,
         substeps=substeps,
         dt=substeps * step,
         simulation_options=options,
         max_steering=max_steering,
-        layout=layout,
+        layout=ObservationLayout(rules),
         reward_terms=given["reward_terms"] or {},
         rules=rules,
         episodes=episodes,
@@ -232,7 +222,6 @@ def _start(given: Mapping[str, Any], ground: Terrain | None) -> dict[str, Range]
 def _rules(
     given: Mapping[str, Any],
     rover: RoverModel,
-    layout: ObservationLayout,
     *,
     substeps: int,
     max_steering: float,
@@ -241,7 +230,6 @@ def _rules(
     field_margin: float | None,
 ) -> EpisodeRules:
     """What the core needs to run an episode."""
-    noise = given["observation_noise"]
     return EpisodeRules(
         rover,
         substeps=substeps,
@@ -252,8 +240,8 @@ def _rules(
         cos_max_tilt=float(sin_cos(math.radians(given["max_tilt_deg"]))[1]),
         stuck_time=given["stuck_time"],
         weights=dict(WEIGHTS) if given["reward_weights"] is None else given["reward_weights"],
-        scale=layout.scale,
-        noise=noise * layout.unbounded if noise > 0.0 else None,
+        gravity=math.hypot(*given["gravity"]),
+        noise=given["observation_noise"],
         scan=scan,
         goals=given["waypoints"],
         battery=given["battery"],

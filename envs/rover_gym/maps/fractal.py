@@ -24,6 +24,9 @@ Pair: TypeAlias = tuple[float, float]
 MOST_HEIGHTS = 4 * 10**7
 MOST_CRATERS = 10**6
 
+#: Largest height and smallest length of ripples, m.
+MOST_RIPPLE, LEAST_RIPPLE = 1e6, 1e-3
+
 #: Smallest diameter of a crater, m.
 LEAST_DIAMETER = 1e-3
 
@@ -112,8 +115,8 @@ def fractal_map(
         refuse(TerrainError, "crater_diameter", crater_diameter, "must be a pair (smallest, largest)")
     if density > 0.0:
         _add_craters(random, heights, step, density, smallest, largest)
-    ripple = number("ripple_height", ripple_height, at_least=0.0, error=TerrainError)
-    length = number("ripple_length", ripple_length, above=0.0, error=TerrainError)
+    ripple = number("ripple_height", ripple_height, at_least=0.0, at_most=MOST_RIPPLE, error=TerrainError)
+    length = number("ripple_length", ripple_length, at_least=LEAST_RIPPLE, error=TerrainError)
     if ripple > 0.0:
         phase = 2.0 * np.pi * (np.arange(columns) * step[0] / length + random.random())
         heights += 0.5 * ripple * np.sin(phase + 0.5 * np.sin(phase))

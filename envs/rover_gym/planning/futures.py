@@ -78,7 +78,7 @@ class Futures:
         options = dict(task.simulation_options, time_step=env.dt / substeps, **SOLVER)
         self._task = replace(task, model=task.model if model is None else model, simulation_options=options)
         (rover,), settings = task.rules.__getnewargs_ex__()
-        self._rules = EpisodeRules(rover, **(settings | {"substeps": substeps, "noise": None}))
+        self._rules = EpisodeRules(rover, **(settings | {"substeps": substeps, "noise": 0.0}))
         self._batch = EpisodeBatch(self._rules, self._simulation(env.simulation.terrain), self.n, threads=threads)
         q = task.layout["q"]
         self._stuck = task.layout["stuck"].start

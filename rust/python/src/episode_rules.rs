@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyTuple};
+use rover_core::episode::observation::{Field, Sizes, fields};
 use rover_core::episode::{Rules, Settings, TERMS, Weights};
+use rover_core::multibody::Model;
 
 use crate::arguments::{Named, count, number, refused};
 use crate::arrays::{fresh, fresh_rows, vector};
@@ -26,8 +28,10 @@ use crate::reading::scan_points;
 ///     cos_max_tilt: Cosine of the tilt beyond which the rover has rolled over.
 ///     stuck_time: Time after which an episode with a high-centred rover ends, s.
 ///     weights: Weights of the terms of the reward, in the order of `terms`.
-///     scale: Physical value that each entry of the observation is divided by, (size,).
-///     noise: Standard deviation of the noise of each entry, (size,); no noise by default.
+///     gravity: Magnitude of gravity, m/s2. Forces in observations are divided by the mean weight
+///         on a wheel.
+///     noise: Standard deviation of the noise of observed entries without bounds; no noise by
+///         default.
 ///     scan: Points of the height scan ahead and to the right of the trunk's origin in the heading
 ///         frame, (n, 2), m; none by default.
 ///     goals: Number of goals to reach in sequence. With more than one, the observation has three
@@ -77,7 +81,7 @@ fn weights(given: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Weights>
 impl EpisodeRules {
     #[new]
     #[pyo3(signature = (model, **settings),
-        text_signature = "(model, *, substeps, dt, torque_limits, max_steering, goal_tolerance, cos_max_tilt, stuck_time, weights, scale, noise=None, scan=None, goals=1, battery=None, free_distance=None, field_margin=None)")]
+        text_signature = "(model, *, substeps, dt, torque_limits, max_steering, goal_tolerance, cos_max_tilt, stuck_time, weights, gravity, noise=0.0, scan=None, goals=1, battery=None, free_distance=None, field_margin=None)")]
     fn new(model: &Bound<'_, PyAny>, settings: Option<&Bound<'_, PyDict>>) -> Result<Self> {
         let given = Named::keywords(model.py(), settings)?;
         let wrong = |_| refused(model, Kind::Model, "model", "a RoverModel");
@@ -91,8 +95,8 @@ impl EpisodeRules {
             cos_max_tilt: given.need("cos_max_tilt", number)?,
             stuck_time: given.need("stuck_time", number)?,
             weights: given.need("weights", weights)?,
-            scale: given.need("scale", vector)?,
-            noise: given.read("noise", vector)?.unwrap_or_default(),
+            gravity: given.need("gravity", number)?,
+            noise: given.maybe("noise")?.unwrap_or_default(),
             scan: scan_points(given.some("scan")?.as_ref())?,
             goals: given.count("goals", 1)?,
             battery: given.maybe("battery")?,
@@ -121,10 +125,8 @@ impl EpisodeRules {
             weights.set_item(name, weight)?;
         }
         named.set_item("weights", weights)?;
-        named.set_item("scale", fresh(&settings.scale))?;
-        if self.inner.is_noisy() {
-            named.set_item("noise", fresh(&settings.noise))?;
-        }
+        named.set_item("gravity", settings.gravity)?;
+        named.set_item("noise", settings.noise)?;
         named.set_item("scan", fresh_rows(settings.scan.iter().copied()))?;
         named.set_item("goals", settings.goals)?;
         named.set_item("battery", settings.battery)?;
@@ -139,6 +141,77 @@ impl EpisodeRules {
     #[allow(clippy::unused_self)] // an attribute of the object
     fn terms<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyTuple>> {
         Ok(PyTuple::new(py, TERMS)?)
+    }
+
+    /// The fields of an observation, in order.
+    ///
+    /// Returns:
+    ///     Name, first entry, size, unit, scale (size,), lower and upper bound of scaled entries,
+    ///     and meaning of each field.
+    fn observation<'py>(&self, py: Python<'py>) -> Result<Vec<Bound<'py, PyTuple>>> {
+        let fields = self.inner.observation().into_iter();
+        fields
+            .map(
+                |Field {
+                     channel,
+                     entries,
+                     scale,
+                 }| {
+                    let [low, high] = channel.bounds;
+                    let (start, size) = (entries.start, entries.len());
+                    let scale = PyTuple::new(py, scale)?;
+                    let row = (
+                        channel.name,
+                        start,
+                        size,
+                        channel.unit,
+                        scale,
+                        low,
+                        high,
+                        channel.meaning,
+                    );
+                    Ok(row.into_pyobject(py)?)
+                },
+            )
+            .collect()
+    }
+
+    /// First entry, size, name, meaning, unit and scale of the built-in rover's observed fields.
+    #[staticmethod]
+    fn observation_rows() -> Vec<(
+        usize,
+        usize,
+        &'static str,
+        &'static str,
+        &'static str,
+        String,
+    )> {
+        let sizes = Sizes {
+            model: &Model::rover(),
+            actions: 12,
+            goals: 1,
+            has_battery: false,
+            points: 0,
+            gravity: 9.81,
+        };
+        let rows = fields(&sizes).into_iter().map(
+            |Field {
+                 channel: own,
+                 entries,
+                 ..
+             }| {
+                let (start, size) = (entries.start, entries.len());
+                (
+                    start,
+                    size,
+                    own.name,
+                    own.meaning,
+                    own.unit,
+                    own.scale.words(),
+                )
+            },
+        );
+        rows.collect()
     }
 
     /// Name, unit and meaning of each entry of an info.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::ending::Ending;
 use super::error::{EpisodeError, check_lengths};
+use super::observation::{Field, Sizes, fields};
 use super::progress::Progress;
 use super::quantities::Quantities;
 use super::reward::Weights;
@@ -30,10 +31,10 @@ pub struct Settings {
     pub stuck_time: f64,
     /// Weights of the reward's terms, in the order of [`super::TERMS`].
     pub weights: Weights,
-    /// Value of an entry of 1 of the observation (size).
-    pub scale: Vec<f64>,
-    /// Standard deviation of each entry's noise (size); empty without noise.
-    pub noise: Vec<f64>,
+    /// Magnitude of gravity, m/s²: observed forces are divided by the mean weight on a wheel.
+    pub gravity: f64,
+    /// Standard deviation of the noise of entries without bounds; 0 without noise.
+    pub noise: f64,
     /// Points of the height scan, as of [`crate::simulation::ReadingRequest`].
     pub scan: Vec<[f64; 2]>,
     /// Goals that an episode reaches one after the other, at least one.
@@ -49,13 +50,6 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Entries of an observation after the previous action and before the heights: see
-    /// [`super::observation`].
-    #[must_use]
-    pub fn n_marks(&self) -> usize {
-        1 + usize::from(self.battery.is_some()) + if self.has_course() { 3 } else { 0 }
-    }
-
     /// Whether there is more than one goal.
     #[must_use]
     pub fn has_course(&self) -> bool {
@@ -80,6 +74,7 @@ pub struct Rules {
     model: Arc<Model>,
     settings: Settings,
     inverse_scale: Vec<f64>,
+    noise: Vec<f64>,
     places: ReadingIndices,
     sizes: [usize; 3],
     steering: Steering,
@@ -145,6 +140,9 @@ impl Rules {
     ///
     /// # Errors
     /// `Length`, `OutOfRange`.
+    ///
+    /// # Panics
+    /// If an observation were not a reading, the action and the rest, in this order.
     pub fn new(model: Arc<Model>, settings: Settings) -> Result<Self, EpisodeError> {
         let layout = ReadingLayout::new(&model, 0);
         let place = |name: &str| {
@@ -165,13 +163,7 @@ impl Rules {
             Steering::none(&model)
         };
         let n_actions = n_wheels + steering.n_entries;
-        let size = shared + n_actions + settings.n_marks() + settings.scan.len();
-        let noise = settings.noise.len();
-        check_lengths([
-            ("torque_limits", settings.torque_limits.len(), n_wheels),
-            ("scale", settings.scale.len(), size),
-            ("noise", noise, if noise == 0 { 0 } else { size }),
-        ])?;
+        check_lengths([("torque_limits", settings.torque_limits.len(), n_wheels)])?;
         let positive = |field, value: f64| (field, value, value > 0.0, "a finite number above 0");
         let not_negative =
             |field, value: f64| (field, value, value >= 0.0, "a finite number from 0");
@@ -187,6 +179,8 @@ impl Rules {
                 settings.goals == 1 || settings.has_course() && model.trees()[0].is_free,
                 "at least 1, and 1 for a machine on a fixed base",
             ),
+            positive("gravity", settings.gravity),
+            not_negative("noise", settings.noise),
             not_negative("max_steering", settings.max_steering),
             not_negative("goal_tolerance", settings.goal_tolerance),
             any("cos_max_tilt", settings.cos_max_tilt),
@@ -195,8 +189,6 @@ impl Rules {
         let lists = (settings.torque_limits.iter())
             .map(|&x| not_negative("torque_limits", x))
             .chain(settings.weights.iter().map(|&x| any("weights", x)))
-            .chain(settings.scale.iter().map(|&x| positive("scale", x)))
-            .chain(settings.noise.iter().map(|&x| not_negative("noise", x)))
             .chain(settings.scan.iter().flatten().map(|&x| any("scan", x)));
         for (field, value, is_within, range) in numbers.into_iter().chain(lists) {
             if !(is_within && value.is_finite()) {
@@ -207,13 +199,42 @@ impl Rules {
                 });
             }
         }
-        Ok(Self {
-            inverse_scale: settings.scale.iter().map(|scale| 1.0 / scale).collect(),
+        let mut rules = Self {
+            inverse_scale: Vec::new(),
+            noise: Vec::new(),
             sizes: sizes(&model),
             model,
             settings,
             places,
             steering,
+        };
+        for field in rules.observation() {
+            let first = match field.channel.name {
+                "previous_action" => shared,
+                "stuck" => shared + n_actions,
+                _ => field.entries.start,
+            };
+            assert_eq!(field.entries.start, first, "a reading, then the action");
+            let inverse = field.scale.iter().map(|scale| 1.0 / scale);
+            rules.inverse_scale.extend(inverse);
+            if rules.settings.noise > 0.0 {
+                let deviation = rules.settings.noise * f64::from(field.channel.is_measured());
+                rules.noise.extend(field.entries.map(|_| deviation));
+            }
+        }
+        Ok(rules)
+    }
+
+    /// The fields of an observation.
+    #[must_use]
+    pub fn observation(&self) -> Vec<Field> {
+        fields(&Sizes {
+            model: &self.model,
+            actions: self.n_actions(),
+            goals: self.settings.goals,
+            has_battery: self.settings.battery.is_some(),
+            points: self.settings.scan.len(),
+            gravity: self.settings.gravity,
         })
     }
 
@@ -287,7 +308,7 @@ impl Rules {
     /// Entries of an observation.
     #[must_use]
     pub fn size(&self) -> usize {
-        self.settings.scale.len()
+        self.inverse_scale.len()
     }
 
     /// Entries of an observation before the heights.
@@ -341,12 +362,12 @@ impl Rules {
     /// Standard deviation of each entry's noise (size); empty without noise.
     #[must_use]
     pub fn noise(&self) -> &[f64] {
-        &self.settings.noise
+        &self.noise
     }
 
     /// Whether observations have noise.
     #[must_use]
     pub fn is_noisy(&self) -> bool {
-        !self.settings.noise.is_empty()
+        !self.noise.is_empty()
     }
 }
