@@ -7,5 +7,6 @@ mod derivatives;
 mod descriptions;
 mod drives;
 mod limits;
+mod loops;
 mod machines;
 mod several_trees;

@@ -55,6 +55,7 @@ pub mod joint;
 pub mod kinematics;
 pub mod landmarks;
 pub mod lane_configuration;
+pub mod loops;
 pub mod mass_matrix;
 pub mod mechanism;
 pub mod model;
@@ -65,8 +66,8 @@ pub mod state;
 
 pub use chart::Chart;
 pub use description::{
-    CouplingDescription, DriveDescription, FORMAT, Hold, JointKind, Limits, MAX_SHAPES, MAX_SOLIDS,
-    MassProperties, ModelDescription, Shape, ShapeDescription, SolidDescription, Spring,
+    CouplingDescription, DriveDescription, FORMAT, Hold, JointKind, Limits, LoopDescription, LoopKind, MAX_SHAPES,
+    MAX_SOLIDS, MassProperties, ModelDescription, Shape, ShapeDescription, SolidDescription, Spring,
     TagDescription, WheelDescription,
 };
 pub use energy::{Energy, EnergyScratch};
@@ -76,6 +77,7 @@ pub use inertias::Inertias;
 pub use joint::{Joint, JointAxis, JointModel, Motion, Pose};
 pub use kinematics::Kinematics;
 pub use lane_configuration::LaneConfiguration;
+pub use loops::{Loop, LoopGap};
 pub use mass_matrix::MassMatrix;
 pub use mechanism::Mechanism;
 pub(crate) use model::fingerprint;

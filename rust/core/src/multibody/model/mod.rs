@@ -6,6 +6,7 @@
 
 mod body;
 mod build;
+pub(crate) mod close;
 mod edit;
 mod links;
 mod parts;
@@ -26,6 +27,7 @@ use super::description::{Hold, ModelDescription};
 use super::error::ModelError;
 use super::inertias::Inertias;
 use super::joint::Joint;
+use super::loops::Loop;
 pub use super::mechanism::BASE;
 use super::mechanism::{Mechanism, Mover};
 
@@ -51,6 +53,7 @@ pub struct Model {
     armatures: Vec<(usize, f64)>,
     /// Indices of the joints with stops.
     limited: Vec<usize>,
+    loops: Vec<Loop>,
     has_slides: bool,
     mass: f64,
     fingerprint: u64,
@@ -136,6 +139,19 @@ impl Model {
         let couplings = (self.mechanism.links.iter()).filter_map(|link| link.joint.coupling());
         let coupled: f64 = couplings.map(|coupling| coupling.ratio.abs()).sum();
         linear + turning * reach * (1.0 + coupled)
+    }
+
+    /// Its closed loops, in description order; none for a tree.
+    #[inline]
+    #[must_use]
+    pub fn loops(&self) -> &[Loop] {
+        &self.loops
+    }
+
+    /// Whether one of its loops ties it to the world.
+    #[must_use]
+    pub fn holds_the_world(&self) -> bool {
+        self.loops.iter().any(Loop::holds_the_world)
     }
 
     /// Frames of all solids, in description order.
