@@ -1,6 +1,7 @@
 //! The catalogue of joints: every kind against a formula or an independent computation.
 #![allow(clippy::unwrap_used)]
 
+mod bar_differential;
 mod closed_forms;
 mod coupling;
 mod derivatives;

@@ -329,12 +329,7 @@ pub trait MechanicalSystem {
 
     /// Makes a configuration and a velocity at the end of a step obey the closed loops; p: the
     /// step's impulses. Returns the widest gap that is left, m or rad.
-    fn close_end(
-        &mut self,
-        _p: &[f64],
-        _q: &mut Self::Configuration,
-        _v: &mut [f64],
-    ) -> f64 {
+    fn close_end(&mut self, _p: &[f64], _q: &mut Self::Configuration, _v: &mut [f64]) -> f64 {
         0.0
     }
 

@@ -279,7 +279,8 @@ pub struct LastCall {
 }
 
 impl RoverSimulation {
-    /// At rest in the zero configuration; steering joints held at zero, all others free.
+    /// At rest in the zero configuration, with all loops closed; steering joints held at zero, all
+    /// others free.
     ///
     /// # Errors
     /// An option out of its range.
@@ -288,8 +289,14 @@ impl RoverSimulation {
         terrain: Arc<dyn Terrain>,
         options: StepOptions,
     ) -> Result<Self, OptionsError> {
-        let configuration = Configuration::zero(&model);
-        Self::of(RoverScene::new(model, terrain), configuration, options)
+        let (configuration, v) = (Configuration::zero(&model), vec![0.0; model.nv()]);
+        let mut made = Self::of(
+            RoverScene::new(model, terrain),
+            configuration.clone(),
+            options,
+        )?;
+        made.place_closed(configuration, v);
+        Ok(made)
     }
 
     /// As [`Self::new`], then [`Self::begin`].
@@ -349,9 +356,8 @@ impl RoverSimulation {
         &self.scene.terrain
     }
 
-    /// Sets configuration and velocity, as checked by
-    /// [`crate::multibody::coordinates`]; time 0, warm start forgotten. Closed loops are closed, and
-    /// the velocity loses what would open them.
+    /// Sets configuration and velocity, as checked by [`crate::multibody::coordinates`]; time 0,
+    /// warm start forgotten. Loops are closed, and the velocity loses what would open them.
     ///
     /// # Panics
     /// If the sizes do not fit the model.

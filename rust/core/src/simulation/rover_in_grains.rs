@@ -69,8 +69,8 @@ impl RoverInGrains {
     ///
     /// # Errors
     /// Another time step or gravity of the two, a part of the rover deeper in a grain than
-    /// [`OVERLAP`] of the smallest radius, a rover with closed loops, a coefficient that is negative
-    /// or not finite.
+    /// [`OVERLAP`] of the smallest radius, a rover with closed loops, a coefficient that is
+    /// negative or not finite.
     pub fn new(
         rover: &RoverSimulation,
         bed: &GrainSimulation<3>,

@@ -1,7 +1,8 @@
 //! Closed loops of a tree in a step: M̂⁻¹ without the motions that would open a loop.
 //!
-//! With the loops' rows A and `M̂ = Fᵀ F`, factor coordinates `y = F Δv` change the rate of the gaps
-//! by `G y`, `G = A F⁻¹`. An orthonormal basis Q of the rows of G turns M̂⁻¹ into its projection
+//! With the loops' rows A and `M̂ = Fᵀ F`, factor coordinates `y = F Δv` change the rate of the
+//! gaps by `G y`, `G = A F⁻¹`. An orthonormal basis Q of the rows of G turns M̂⁻¹ into its
+//! projection
 //!
 //! ```text
 //! M̂⁻¹ − M̂⁻¹ Aᵀ (A M̂⁻¹ Aᵀ)⁻¹ A M̂⁻¹ = F⁻¹ (1 − Qᵀ Q) F⁻ᵀ,     W = Zᵀ Z − Bᵀ B,   B = Q Z
@@ -17,15 +18,13 @@
 //! out: their part outside the span is below [`DEPENDENT`] of the loop's longest row. Their
 //! reactions count as zero.
 //!
-//! Source: Gear, Leimkuhler and Gupta 1985, for constraints on both levels; Featherstone 2008,
-//! ch. 8, for loops closed on a tree.
+//! Source: Gear et al. 1985, for constraints on both levels; Featherstone 2008, ch. 8, for loops
+//! closed on a tree.
 
 use crate::contact::ContactSystem;
 use crate::integrator::report::MOST_OPEN;
 use crate::multibody::error::StateError;
-use crate::multibody::{
-    Configuration, Factor, Kinematics, LoopGap, MassMatrix, Mechanism, Model,
-};
+use crate::multibody::{Configuration, Factor, Kinematics, LoopGap, MassMatrix, Mechanism, Model};
 use crate::scalar::Single;
 
 /// Part of a row outside the span of earlier rows, relative to the longest of its loop, below which
@@ -89,7 +88,8 @@ impl Basis {
             let rows = first..first + closure.n_rows();
             let begin = self.Q.len();
             // The rows of the loop first: their length is the measure of each.
-            self.Q.extend_from_slice(&self.rows[rows.start * nv..rows.end * nv]);
+            self.Q
+                .extend_from_slice(&self.rows[rows.start * nv..rows.end * nv]);
             let mut longest = 0.0_f64;
             for row in self.Q[begin..].chunks_exact_mut(nv) {
                 factor.half_solve(model.mechanism(), row);
@@ -164,7 +164,9 @@ impl Basis {
     /// `A v` of the kept rows, as an iterator.
     fn rates<'a>(&'a self, v: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
         let nv = v.len();
-        self.kept.iter().map(move |&i| dot(&self.rows[i * nv..(i + 1) * nv], v))
+        self.kept
+            .iter()
+            .map(move |&i| dot(&self.rows[i * nv..(i + 1) * nv], v))
     }
 
     /// `y += Qᵀ z`.
@@ -336,7 +338,9 @@ impl Loops {
         for iteration in 0.. {
             self.kinematics.update_for_step(model, q);
             (self.end).update(model, &self.kinematics, &q.joints, factor);
-            let gap = model.widest_gap(&self.end.gaps).map_or(0.0, |gap| gap.value);
+            let gap = model
+                .widest_gap(&self.end.gaps)
+                .map_or(0.0, |gap| gap.value);
             let is_stuck = gap >= 0.5 * last && gap < MOST_OPEN;
             if gap <= TIGHT || is_stuck || iteration == most || gap.is_nan() {
                 return gap;
@@ -386,7 +390,9 @@ fn factor_of(model: &Model, kinematics: &Kinematics) -> Option<Factor<f64>> {
     let mut mass_matrix = MassMatrix::new(token, mechanism);
     mass_matrix.update(mechanism, model.inertias(), kinematics.poses());
     let mut factor = Factor::new(token, mechanism);
-    mass_matrix.factorise(mechanism, &mut factor).then_some(factor)
+    mass_matrix
+        .factorise(mechanism, &mut factor)
+        .then_some(factor)
 }
 
 /// The loop that is open farthest in a configuration; none of a tree.
@@ -433,11 +439,13 @@ pub fn closed(
         loops.project_velocity(model, &factor, v);
     }
     match widest_gap(model, &q) {
-        Some(gap) if gap.value.is_nan() || gap.value > MOST_OPEN => Err(StateError::LoopStaysOpen {
-            name: model.loops()[gap.index].name.clone(),
-            gap: gap.value,
-            unit: gap.unit,
-        }),
+        Some(gap) if gap.value.is_nan() || gap.value > MOST_OPEN => {
+            Err(StateError::LoopStaysOpen {
+                name: model.loops()[gap.index].name.clone(),
+                gap: gap.value,
+                unit: gap.unit,
+            })
+        }
         _ => Ok(q),
     }
 }

@@ -4,8 +4,8 @@
 //!   [scratch](tree_scratch); [`drives`]: torques, motors, held joints, springs and dampers,
 //!   implicit with [`fitted_theta`]; `extent`: how far a step turns and displaces it;
 //!   `momentum_balance`: the balance of the Newton variant; [`gyroscopic`]: when gyroscopic terms
-//!   are implicit, and how; [`loops`]: its closed loops; `sand`, `sand_patch`: its wheels in sand; `tangent`: derivatives of a
-//!   step;
+//!   are implicit, and how; [`loops`]: its closed loops; `sand`, `sand_patch`: its wheels in sand;
+//!   `tangent`: derivatives of a step;
 //! - [`planar`]: a planar machine on a ground, with its matrices;
 //! - [`grains`]: thousands of free disks or balls, and a planar machine among them;
 //! - [`among_grains`]: a tree among balls.

@@ -21,7 +21,10 @@ pub(super) fn check_loops(
                 name: closure.name.clone(),
             });
         }
-        let ends = [("solid", Some(&closure.solid)), ("other", closure.other.as_ref())];
+        let ends = [
+            ("solid", Some(&closure.solid)),
+            ("other", closure.other.as_ref()),
+        ];
         for (what, name) in ends {
             let Some(name) = name else { continue };
             let Some(&solid) = solids.get(name.as_str()) else {
@@ -52,14 +55,15 @@ pub(super) fn check_loops(
 }
 
 /// Checks the numbers of a loop; `at` gives the path of its fields.
-fn check_fields(
-    closure: &LoopDescription,
-    at: impl Fn(&str) -> String,
-) -> Result<(), ModelError> {
+fn check_fields(closure: &LoopDescription, at: impl Fn(&str) -> String) -> Result<(), ModelError> {
     let is_joint = closure.kind == LoopKind::Joint;
     for (is_given, what, is_allowed) in [
         (closure.position.is_some(), "position", !is_joint),
-        (closure.other_position.is_some(), "other_position", !is_joint),
+        (
+            closure.other_position.is_some(),
+            "other_position",
+            !is_joint,
+        ),
         (
             closure.other_rotation.is_some(),
             "other_rotation",
@@ -81,10 +85,19 @@ fn check_fields(
         &closure.other_position.unwrap_or_default(),
     )?;
     for angle in closure.other_rotation.iter().flatten() {
-        in_range(&at("other_rotation"), *angle, 1e3, "at most 1e3 rad either way")?;
+        in_range(
+            &at("other_rotation"),
+            *angle,
+            1e3,
+            "at most 1e3 rad either way",
+        )?;
     }
     let terms = closure.polynomial.as_deref().unwrap_or(&[0.0]);
-    let most = if closure.other.is_some() { MAX_TERMS } else { 1 };
+    let most = if closure.other.is_some() {
+        MAX_TERMS
+    } else {
+        1
+    };
     if terms.is_empty() || terms.len() > most {
         return Err(ModelError::OutOfRange {
             field: at("polynomial"),

@@ -6,7 +6,8 @@
 
 mod body;
 mod build;
-pub(crate) mod close;
+mod close;
+pub(in crate::multibody) mod closed_loop;
 mod edit;
 mod links;
 mod parts;
@@ -17,6 +18,7 @@ mod tree;
 use nalgebra::Vector3;
 
 pub use body::Body;
+pub use closed_loop::{BodyPose, Loop, LoopGap};
 pub use edit::Changes;
 pub use parts::{CollisionBox, CollisionSphere, Frame, Wheel};
 pub use properties::{JointProperties, Passive};
@@ -27,7 +29,6 @@ use super::description::{Hold, ModelDescription};
 use super::error::ModelError;
 use super::inertias::Inertias;
 use super::joint::Joint;
-use super::loops::Loop;
 pub use super::mechanism::BASE;
 use super::mechanism::{Mechanism, Mover};
 
