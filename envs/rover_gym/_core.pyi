@@ -310,6 +310,29 @@ class RoverModel:
     def mass(self) -> float:
         """Total mass, kg."""
     @property
+    def loops(self) -> list[dict[str, Any]]:
+        """Closed loops: a dictionary for each with `name`, `kind`, `solid`, `other`, its number of
+        equations `rows`, and of these the number `redundant`.
+
+        An equation is redundant if it follows from those of the joints and of earlier loops with all
+        joints at zero. Redundant equations are left out.
+        """
+    def close_loops(self, q: npt.ArrayLike, v: npt.ArrayLike | None = None) -> tuple[_Array, _Array]:
+        """Closes the loops: the nearest state, in the sense that heavy parts move least.
+
+        Args:
+            q: Coordinates as `Simulation.q`, (nq,).
+            v: Velocity as `Simulation.v`, (nv,); at rest by default.
+
+        Returns:
+            Coordinates that close all loops, (nq,), and the velocity without the part that would
+            open them, (nv,). Without loops, `q` and `v`.
+
+        Raises:
+            StateError: An array has a wrong length or an entry that is not finite, or no coordinates
+                near these close the loops.
+        """
+    @property
     def dof_names(self) -> list[str]:
         """Names of the coordinates, x, y, z, roll, heading, pitch, then the joints."""
     @property
@@ -934,6 +957,12 @@ class StepReport:
     def n_contacts(self) -> int:
         """Largest number of contacts in a step."""
     @property
+    def loop_gap(self) -> float:
+        """Widest gap of a closed loop at the end of a step, m or rad; 0 without loops.
+
+        Above 1e-6 the status is "not_converged".
+        """
+    @property
     def retaken(self) -> int:
         """Number of repeated steps.
 
@@ -1460,8 +1489,11 @@ class Simulation(AnySimulation):
             qdot: Velocity in the same coordinates, (nv,); at rest by default.
             coordinates: "state", as `q` and `v` return them, or "report".
 
+        The velocity loses the part that would open a closed loop, as in an impact.
+
         Raises:
-            StateError: An array has a wrong length or an entry that is not finite. Nothing has
+            StateError: An array has a wrong length or an entry that is not finite, or a closed loop
+                is open by more than 1e-6 m or rad; `RoverModel.close_loops` closes it. Nothing has
                 changed.
             OptionError: `coordinates` is neither of the two.
         """
@@ -1482,6 +1514,14 @@ class Simulation(AnySimulation):
         """Mean torques of the drives over the last step, (n_wheels,), N m, positive forward.
 
         Each is the command after the limit of the wheel's `Motor`; 0 before the first step.
+        """
+    @property
+    def loop_forces(self) -> dict[str, _Array]:
+        """Mean reactions of the closed loops over the last step, by name.
+
+        Of a connection the force on its first solid, (3,), N, in world axes; of a weld the force and
+        the moment about the common point, (6,), N and N m; of a joint its force or torque, (1,).
+        The second solid feels the opposite. Reactions of redundant equations count as 0.
         """
     def set_wheel_torques(self, torques: npt.ArrayLike) -> None:
         """Sets the driving torques; each saturates at its wheel's limit.

@@ -60,8 +60,11 @@ REFUSED = {
     "friction": ('name="slide"', 'name="slide" frictionloss="0.2"', r'joint\[slide\]\.frictionloss.*0\.2'),
     "a velocity servo": ("<position joint", '<velocity kv="2" joint="slide"/><position joint', r"actuator\["),
     "a muscle": ("<position joint", '<muscle joint="slide" lengthrange="0 1"/><position joint', r"actuator\["),
-    "a weld": ("<!--more-->", '<equality><weld body1="arm" body2="wheel_left"/></equality>', r"equality\[0\]"),
-    "a curve": ("<!--more-->", '<equality><joint joint1="elbow" joint2="slide" polycoef="0 1 2 0 0"/></equality>', r"equality\[0\]"),
+    "a coupling of tendons": (
+        "<!--more-->",
+        '<tendon><fixed name="t"><joint joint="slide" coef="1"/></fixed></tendon><equality><tendon tendon1="t"/></equality>',
+        r"equality\[0\]",
+    ),
     "a tendon": ("<!--more-->", '<tendon><fixed name="t" stiffness="3"><joint joint="slide" coef="1"/></fixed></tendon>', r"tendon\[t\]"),
     "air": ("<compiler", '<option density="1.2"/><compiler', "option.density"),
     "no gravity": ('name="arm"', 'name="arm" gravcomp="1"', "gravcomp"),

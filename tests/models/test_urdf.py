@@ -207,7 +207,6 @@ REFUSED = {
     "no axis": ('(left_pivot.*?<axis) xyz="0 1 0"', r'\1 xyz="0 0 0"', r"joint\[left_pivot\]\.axis.*direction"),
     "limits that cross": ('lower="-0.6" upper="0.5"', 'lower="0.6" upper="0.5"', r"joint\[left_pivot\]\.limit"),
     "an unknown leader": ('mimic joint="left_pivot"', 'mimic joint="pivot"', r"mimic\.joint.*'pivot'"),
-    "a leader elsewhere": ('mimic joint="left_pivot"', 'mimic joint="left_drive"', r"link\[right_rocker\]\.coupled\.joint"),
     "a loop": ("</robot>", LOOP + "</robot>", r"joint\[second\]\.child.*closed loop"),
     "two roots": ("</robot>", body("island") + "</robot>", "'chassis', 'island'"),
     "macros": ("<robot name", '<robot xmlns:xacro="http://x" name', "xacro"),

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from rover_gym.models.import_report import Z_UP_TO_Y_UP, Array, rotation_vector, turn_z_to
+from rover_gym.models.loop_description import describe_loops
 from rover_gym.models.robot_tree import THIN_DISC, FileJoint, FileLink, FileShape, RobotTree
 from rover_gym.models.roles import WheelRole
 
@@ -83,6 +84,8 @@ def describe(tree: RobotTree, roles: list[WheelRole], P: Array, options: WheelOp
     description["wheels"] = [_wheel(tree, role, axes[role.link], weight, options) for role in roles]
     if tags:
         description["tags"] = tags
+    if loops := describe_loops(tree, anchors, axes, P):
+        description["loops"] = loops
     return description
 
 

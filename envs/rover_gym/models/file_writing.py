@@ -183,8 +183,9 @@ def write_mjcf(model: RoverModel, path: str | os.PathLike[str]) -> None:
     """Writes an MJCF file, for MuJoCo: x forward, y left, z up.
 
     Wheels are written as cylinders, of which a thin disc is a tenth of its radius wide and
-    named so, their drives as motors, held steering as position servos, and coupled joints as
-    equality constraints, which MuJoCo satisfies approximately.
+    named so, their drives as motors, held steering as position servos, and coupled joints and
+    loops as equality constraints, which MuJoCo satisfies approximately. Loops are connected at
+    sites, named as the loop and its end.
 
     Args:
         model: The model.
@@ -200,19 +201,38 @@ def write_mjcf(model: RoverModel, path: str | os.PathLike[str]) -> None:
     ET.SubElement(root, "compiler", angle="radian", autolimits="true", balanceinertia="false")
     world = ET.SubElement(root, "worldbody")
     equality, actuator = ET.SubElement(root, "equality"), ET.SubElement(root, "actuator")
-    bodies: dict[str, ET.Element] = {}
+    bodies: dict[str | None, ET.Element] = {None: world}
     for solid in written_solids(model):
-        above = world if solid.parent is None else bodies[solid.parent]
-        bodies[solid.name] = _body(above, solid, wheels.get(solid.name))
+        bodies[solid.name] = _body(bodies[solid.parent], solid, wheels.get(solid.name))
         _add_control(actuator, solid, wheels.get(solid.name), solid.name in steering)
         coupled = solid.source.get("coupled")
         if coupled is not None:
             terms = text_of((coupled.get("offset", 0.0), coupled["ratio"], 0.0, 0.0, 0.0))
             ET.SubElement(equality, "joint", joint1=solid.name, joint2=coupled["joint"], polycoef=terms)
+    for loop in description.get("loops") or ():
+        _add_equality(equality, loop, bodies)
     for tag in description.get("tags") or ():
         x, y, z = tag["position"]
         ET.SubElement(bodies[tag["solid"]], "site", name=tag["name"], pos=text_of((x, -z, y)))
     write_xml(root, path)
+
+
+def _add_equality(equality: ET.Element, loop: dict[str, Any], bodies: dict[str | None, ET.Element]) -> None:
+    """Adds a loop, with a site at each end of one between bodies."""
+    other = loop.get("other")
+    if loop["kind"] == "joint":
+        terms = loop.get("polynomial") or ([0.0, 1.0] if other else [0.0])
+        entries = {"name": loop["name"], "joint1": loop["solid"]} | ({"joint2": other} if other else {})
+        entries["polycoef"] = text_of([*terms, 0.0, 0.0, 0.0, 0.0][:5])
+        ET.SubElement(equality, "joint", entries)
+        return
+    turn = _TO_FILE @ rotation_matrix(np.array(loop.get("other_rotation") or (0.0, 0.0, 0.0))) @ _TO_FILE.T
+    ends = ((loop["solid"], loop["position"], np.eye(3)), (other, loop["other_position"], turn))
+    for index, (body, (x, y, z), R) in enumerate(ends, 1):
+        site = {"name": f"{loop['name']}_{index}", "pos": text_of((x, -z, y)), "quat": _quaternion(R)}
+        ET.SubElement(bodies[body], "site", site)
+    sites = {f"site{index}": f"{loop['name']}_{index}" for index in (1, 2)}
+    ET.SubElement(equality, loop["kind"], name=loop["name"], **sites)
 
 
 def _body(above: ET.Element, solid: WrittenSolid, wheel: dict[str, Any] | None) -> ET.Element:
@@ -281,7 +301,7 @@ def _quaternion(R: Array) -> str:
 
 
 #: Elements that URDF cannot express and that `ignore` may name.
-IGNORABLE = ("springs", "armature")
+IGNORABLE = ("springs", "armature", "closed loops")
 
 FAST = 1e3  # rad/s, the velocity limit of a joint whose speed no motor limits: URDF wants one
 
@@ -296,7 +316,8 @@ def write_urdf(model: RoverModel, path: str | os.PathLike[str], *, ignore: Colle
     Args:
         model: The model.
         path: Path of the file.
-        ignore: Kinds of elements to leave out because the format cannot express them: "springs", "armature".
+        ignore: Kinds of elements to leave out because the format cannot express them: "springs", "armature",
+            "closed loops".
 
     Raises:
         ModelError: The model has a spherical joint or several trees, or contains elements that the format cannot
@@ -306,6 +327,9 @@ def write_urdf(model: RoverModel, path: str | os.PathLike[str], *, ignore: Colle
     ignore = check_kinds(ignore, IGNORABLE)
     description = model.to_dict()
     wheels = {wheel["solid"]: wheel for wheel in description["wheels"]}
+    for loop in description.get("loops") or () if "closed loops" not in ignore else ():
+        reason = 'URDF has no closed loops; to_mjcf has, or ignore=["closed loops"]'
+        refuse(ModelError, f"loops[{loop['name']}]", loop["kind"], reason)
     robot = ET.Element("robot", name=description["name"] or "robot")
     solids = written_solids(model)
     roots = [solid for solid in solids if solid.parent is None]

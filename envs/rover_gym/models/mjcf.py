@@ -14,7 +14,8 @@ from typing import Any, NoReturn
 import numpy as np
 
 from rover_gym.extras import require
-from rover_gym.models.import_report import from_quaternion
+from rover_gym.models.import_report import Array, from_quaternion
+from rover_gym.models.loops import FileLoop, LoopEnd
 from rover_gym.models.robot_tree import (
     MAX_LINKS,
     FileJoint,
@@ -189,7 +190,7 @@ def read_mjcf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
     reader.check_numbers()
     reader.check_options()
     reader.add_links()
-    reader.add_couplings()
+    reader.add_equalities()
     reader.check_tendons()
     reader.add_actuators()
     return reader.tree
@@ -294,23 +295,66 @@ class _Reader:
             parent, position, rotation = name, np.zeros(3), np.eye(3)
         return FileLink(self._body(body), parent, self._joint(body, first + count - 1), position, rotation)
 
-    def add_couplings(self) -> None:
-        """Adds linear couplings of two joints, which are exact here. Rejects other equality constraints."""
+    def add_equalities(self) -> None:
+        """Adds couplings of joints, connections and welds. Rejects other equality constraints."""
         m, kinds = self.model, self.mujoco.mjtEq
         for eq in range(m.neq):
             if not m.eq_active0[eq]:
                 continue
-            where = f"equality[{eq}]"
-            first, second = int(m.eq_obj1id[eq]), int(m.eq_obj2id[eq])
-            terms = [float(x) for x in m.eq_data[eq, :5]]
-            if m.eq_type[eq] != kinds.mjEQ_JOINT or second < 0 or any(terms[2:]):
-                reason = "only linear couplings of two joints are simulated"
-                self.tree.leave_out("closed loops", where, kinds(int(m.eq_type[eq])).name, reason)
-                continue
-            joint = self.joints[first]
-            if joint.follows is not None:
-                self.tree.refuse(where, joint.name, "this joint already depends on another joint")
+            kind = int(m.eq_type[eq])
+            name = self.mujoco.mj_id2name(m, self.mujoco.mjtObj.mjOBJ_EQUALITY, eq) or f"equality{eq}"
+            if kind == kinds.mjEQ_JOINT:
+                self._add_coupling(eq, name)
+            elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
+                is_weld = kind == kinds.mjEQ_WELD
+                ends = self._ends(eq, is_weld=is_weld)
+                self.tree.loops.append(FileLoop(name, "weld" if is_weld else "connect", ends))
+            else:
+                reason = "of equality constraints only connect, weld and joint are simulated"
+                self.tree.leave_out("closed loops", f"equality[{eq}]", kinds(kind).name, reason)
+        if self.tree.loops:
+            self.tree.left_out.append("equality: solref and solimp, since loops are rigid here")
+
+    def _add_coupling(self, eq: int, name: str) -> None:
+        m = self.model
+        first, second = int(m.eq_obj1id[eq]), int(m.eq_obj2id[eq])
+        terms = [float(x) for x in m.eq_data[eq, :5]]
+        joint = self.joints[first]
+        if second >= 0 and joint.follows is None and not any(terms[2:]):
             joint.follows = (self.joints[second].name, terms[1], terms[0])
+            return
+        other = self.joints[second].name if second >= 0 else None
+        while len(terms) > 1 and (other is None or terms[-1] == 0.0):
+            terms.pop()
+        self.tree.loops.append(FileLoop(name, "joint", (), (joint.name, other), tuple(terms)))
+
+    def _ends(self, eq: int, *, is_weld: bool) -> tuple[LoopEnd, LoopEnd]:
+        """Both ends of a connection or a weld, with the common point and axes in the frames of the bodies."""
+        m, mj = self.model, self.mujoco
+        first, second = int(m.eq_obj1id[eq]), int(m.eq_obj2id[eq])
+        data = np.array(m.eq_data[eq])
+        if int(m.eq_objtype[eq]) == mj.mjtObj.mjOBJ_SITE:
+            return self._end_at_site(first), self._end_at_site(second)
+        # MuJoCo lists a weld's point in the second body before that in the first.
+        points = (data[3:6], data[:3]) if is_weld else (data[:3], data[3:6])
+        turn = from_quaternion(data[6:10]) if is_weld else np.eye(3)
+        return self._end(first, points[0], turn), self._end(second, points[1], np.eye(3))
+
+    def _end_at_site(self, site: int) -> LoopEnd:
+        m = self.model
+        return self._end(int(m.site_bodyid[site]), m.site_pos[site], from_quaternion(m.site_quat[site]))
+
+    def _end(self, body: int, point: Array, axes: Array) -> LoopEnd:
+        """An end on a body; one that stands on the world is the world's."""
+        m = self.model
+        end = LoopEnd(self._body(body), np.array(point), np.array(axes))
+        while body and self._body(body) not in self.tree.links:
+            R, p = from_quaternion(m.body_quat[body]), np.array(m.body_pos[body])
+            body = int(m.body_parentid[body])
+            end.carried_by(self._body(body), R, p)
+        if not body:
+            end.link = None
+        return end
 
     def check_tendons(self) -> None:
         """Rejects tendons that exert forces; others only measure."""

@@ -12,6 +12,7 @@ from typing import Any
 from rover_gym.mechanics import ModelError, RoverModel
 from rover_gym.models.description import WheelOptions, describe
 from rover_gym.models.import_report import ImportReport, RobotFileWarning, axes_of, check_folders, solid_rows, together
+from rover_gym.models.loop_description import close_distant_couplings
 from rover_gym.models.mjcf import read_mjcf_tree
 from rover_gym.models.robot_tree import (
     IGNORABLE,
@@ -27,7 +28,7 @@ from rover_gym.models.roles import Steering, Wheels, find_wheels
 from rover_gym.models.urdf import read_urdf_tree
 from rover_gym.validation import number, refuse
 
-SOLID = re.compile(r"(solids|wheels|tags)\[(\d+)\]")
+SOLID = re.compile(r"(solids|wheels|tags|loops)\[(\d+)\]")
 
 
 def read_urdf(
@@ -74,12 +75,17 @@ def _read(
             tree.refuse(f"joint[{link.joint.name}]", "floating", "only a root link can have a floating joint")
     roles = find_wheels(tree, P.T @ (0.0, 1.0, 0.0), P.T @ (1.0, 0.0, 0.0), wheels, steering)
     turn_steering_axes_up(tree, {role.steering for role in roles if role.steering}, P)
+    close_distant_couplings(tree)
     move_limits_to_followed_joints(tree)
     description = describe(tree, roles, P, options)
     try:
         model = RoverModel.from_dict(description)
     except ModelError as error:
         raise _by_name(tree, description, error) from None
+    for loop in model.loops:
+        if loop["redundant"]:
+            rows = f"{loop['redundant']} of its {loop['rows']} equations"
+            tree.assumed.append(f"loop {loop['name']}: {rows} follow from other constraints and are left out")
     for warning in tree.warnings:
         warnings.warn(warning, RobotFileWarning, stacklevel=frames)
     lists = together(tree.assumed), together(tree.left_out), solid_rows(model), tuple(tree.warnings)

@@ -29,6 +29,7 @@ import numpy as np
 from rover_gym.extras import MissingExtraError, require
 from rover_gym.mechanics import ModelError
 from rover_gym.models.import_report import Array, turn_z_to
+from rover_gym.models.loops import FileLoop, move_ends
 from rover_gym.validation import refuse, shown
 
 #: Most links of a file: a model has at most 1000 solids, and links without mass are joined to others.
@@ -150,6 +151,7 @@ class RobotTree:
         left_out: Elements of the file that the model does not simulate.
         assumed: Assumed values that the file does not state.
         warnings: Probable problems.
+        loops: Constraints that close loops.
     """
 
     path: Path
@@ -159,6 +161,7 @@ class RobotTree:
     left_out: list[str] = field(default_factory=list)
     assumed: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    loops: list[FileLoop] = field(default_factory=list)
 
     def refuse(self, where: str, value: object, reason: str) -> NoReturn:
         """Raises a `ModelError` that names the file, the element and the value."""
@@ -301,6 +304,7 @@ def _join(tree: RobotTree, link: FileLink, other: FileLink) -> None:
         other.shapes.append(shape)
     other.points.append((link.name, p))
     other.points += [(name, p + R @ point) for name, point in link.points]
+    move_ends(tree.loops, link.name, other.name, R, p)
     for child in tree.children(link.name):
         child.parent = other.name
         child.position, child.rotation = p + R @ child.position, R @ child.rotation
@@ -308,6 +312,7 @@ def _join(tree: RobotTree, link: FileLink, other: FileLink) -> None:
 
 
 def _hang_on_world(tree: RobotTree, root: FileLink, children: list[FileLink]) -> None:
+    move_ends(tree.loops, root.name, None, root.rotation, root.position)
     for child in children:
         child.parent = None
         child.position = root.position + root.rotation @ child.position
@@ -406,6 +411,8 @@ def turn_steering_axes_up(tree: RobotTree, steering: set[str], P: Array) -> None
             if other.joint.follows is not None and other.joint.follows[0] == joint.name:
                 followed, ratio, offset = other.joint.follows
                 other.joint.follows = (followed, -ratio, offset)
+        for loop in tree.loops:
+            loop.reverse(joint.name)
         tree.assumed.append(f"steering {name}: its axis points down and is reversed: positive turns to the left")
 
 

@@ -250,6 +250,9 @@ impl From<StateError> for BorderError {
             StateError::SingularCardan { index, heading } => {
                 ("q", Some(index), Value::Number(*heading))
             }
+            StateError::LoopOpen { gap, .. } | StateError::LoopStaysOpen { gap, .. } => {
+                ("q", None, Value::Number(*gap))
+            }
         };
         Kind::State.of(&e, entry(field, index), value)
     }

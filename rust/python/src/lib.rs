@@ -22,6 +22,7 @@ mod grains;
 mod height_field;
 mod infos;
 mod linearisation;
+mod loops;
 mod materials;
 mod model;
 mod motor;

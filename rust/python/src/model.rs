@@ -16,6 +16,7 @@ use rover_core::nalgebra::{DMatrix, DVector, Vector3};
 use crate::arguments::{Named, number, refused, text, texts};
 use crate::arrays::{Array, fresh, fresh_matrix, fresh_rows, triple, two, vector};
 use crate::errors::{Kind, Result, Value};
+use crate::loops;
 use crate::motor::{self, Motor};
 use crate::terrain::parse;
 
@@ -362,6 +363,38 @@ impl RoverModel {
     #[getter]
     fn mass(&self) -> f64 {
         self.inner.mass()
+    }
+
+    /// Closed loops, a dictionary for each.
+    ///
+    /// It has `name`, `kind`, `solid`, `other`, the number `rows` of equations, and of these the
+    /// number `redundant`. An equation is redundant if, with all joints at zero, it follows from
+    /// the joints and from earlier loops. Redundant equations are left out.
+    #[getter]
+    fn loops<'py>(&self, py: Python<'py>) -> Result<Vec<Bound<'py, PyDict>>> {
+        loops::list(py, &self.inner)
+    }
+
+    /// Closes the loops: the nearest state, in the sense that heavy parts move least.
+    ///
+    /// Args:
+    ///     q: Coordinates as `Simulation.q`, (nq,).
+    ///     v: Velocity as `Simulation.v`, (nv,); at rest by default.
+    ///
+    /// Returns:
+    ///     Coordinates that close all loops, (nq,), and the velocity without the part that would
+    ///     open them, (nv,). Without loops, `q` and `v`.
+    ///
+    /// Raises:
+    ///     StateError: An array has a wrong length or an entry that is not finite, or no
+    ///         coordinates near these close the loops.
+    #[pyo3(signature = (q, v = None))]
+    fn close_loops(&self, q: &Bound<'_, PyAny>, v: Option<&Bound<'_, PyAny>>) -> Result<Pair> {
+        let q = vector(q, Kind::State, "q")?;
+        let rest = || Ok(vec![0.0; self.inner.nv()]);
+        let v = v.map_or_else(rest, |v| vector(v, Kind::State, "v"))?;
+        let mut v = coordinates::checked_velocity(&self.inner, &v)?;
+        loops::closed(&self.inner, &q, &mut v)
     }
 
     /// Names of the coordinates, x, y, z, roll, heading, pitch, then the joints.

@@ -39,6 +39,11 @@ pub struct StepReport {
     /// Largest number of contacts in a step.
     #[pyo3(get)]
     n_contacts: usize,
+    /// Widest gap of a closed loop at the end of a step, m or rad; 0 without loops.
+    ///
+    /// Above 1e-6 the status is "not_converged".
+    #[pyo3(get)]
+    loop_gap: f64,
     /// Number of repeated steps.
     ///
     /// A step is repeated if a motor reached its torque-speed line, if the energy audit requires
@@ -109,6 +114,7 @@ impl From<CoreReport> for StepReport {
             newton_iterations: inner.newton_iterations,
             residual: inner.residual,
             n_contacts: inner.n_contacts,
+            loop_gap: inner.loop_gap,
             retaken: inner.retaken,
             fallbacks: inner.fallbacks,
             energy_gain: inner.energy_gain,

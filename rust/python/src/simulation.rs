@@ -13,6 +13,7 @@ use rover_core::simulation::{
     TrajectoryBatch,
 };
 use rover_core::solver::SolverOptions;
+use rover_core::system::loops::check_closed;
 use std::sync::{Arc, MutexGuard};
 
 use crate::accuracy;
@@ -301,8 +302,11 @@ impl Simulation {
     ///     qdot: Velocity in the same coordinates, (nv,); at rest by default.
     ///     coordinates: "state", as `q` and `v` return them, or "report".
     ///
+    /// The velocity loses the part that would open a closed loop, as in an impact.
+    ///
     /// Raises:
-    ///     StateError: An array has a wrong length or an entry that is not finite. Nothing has
+    ///     StateError: An array has a wrong length or an entry that is not finite, or a closed loop
+    ///         is open by more than 1e-6 m or rad; `RoverModel.close_loops` closes it. Nothing has
     ///         changed.
     ///     OptionError: `coordinates` is neither of the two.
     #[pyo3(signature = (q, qdot = None, *, coordinates = Coordinates::STATE), text_signature = "($self, q, qdot=None, *, coordinates='state')")]
@@ -315,6 +319,7 @@ impl Simulation {
         let chart = coordinates.chart();
         let q = vector(q, Kind::State, "q")?;
         let configuration = chart.configuration(&self.model, &q)?;
+        check_closed(&self.model, &configuration)?;
         let rest = || Ok(vec![0.0; self.model.nv()]);
         let qdot = qdot.map_or_else(rest, |v| vector(v, Kind::State, "qdot"))?;
         let v = chart.velocity(&self.model, &q, &qdot)?;
@@ -348,6 +353,17 @@ impl Simulation {
     #[getter]
     fn motor_torques(&self) -> Result<Array> {
         Ok(fresh(self.open()?.motor_torques()))
+    }
+
+    /// Mean reactions of the closed loops over the last step, by name.
+    ///
+    /// Of a connection the force on its first solid, (3,), N, in world axes; of a weld the force
+    /// and the moment about the common point, (6,), N and N m; of a joint its force or torque,
+    /// (1,). The second solid feels the opposite. Reactions of redundant equations count as 0.
+    #[getter]
+    fn loop_forces<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
+        let forces = self.open()?.loop_forces();
+        crate::loops::forces(py, &self.model, &forces)
     }
 
     /// Sets the driving torques; each saturates at its wheel's limit.

@@ -34,6 +34,7 @@ pub fn machine(solids: Vec<SolidDescription>) -> ModelDescription {
         solids,
         wheels: Vec::new(),
         tags: Vec::new(),
+        loops: Vec::new(),
     }
 }
 

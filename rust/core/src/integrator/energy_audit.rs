@@ -225,6 +225,7 @@ impl Audit {
                 *gap -= back * (theta * u[0] + (1.0 - theta) * before[0]);
             }
             system.set_moved(start.configuration, &ws.v_mean, share * h, &mut ws.end);
+            system.close_end(&ws.p, &mut ws.end, &mut ws.v);
             system.normalise(&mut ws.end);
         }
     }

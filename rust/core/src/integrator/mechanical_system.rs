@@ -12,7 +12,8 @@
 //! place_middle(q_m), place_end(q̃) → detect → relocate      the contacts, measured at q̃
 //! update_mass_matrix → factorise                           M̂(q_m) = Fᵀ F
 //! assemble                                                 H, Z = F⁻ᵀ H, W = Zᵀ Z at q̃
-//! load, half_solve, local, problem, add_impulses, half_solve_back
+//! load, half_solve, close_velocity, local, problem, add_impulses, half_solve_back
+//! close_end                                                closed loops, at the end of the step
 //! ```
 //!
 //! Vectors between `half_solve` and `half_solve_back` are in *factor coordinates* `y = F v`. In
@@ -310,6 +311,27 @@ pub trait MechanicalSystem {
 
     /// `y = F⁻ᵀ impulse`, in place: an impulse (nv) into factor coordinates.
     fn half_solve(&self, impulse: &mut [f64]);
+
+    /// Changes `y` so that the step from `v_begin` to `v + F⁻¹ y` obeys the system's closed loops.
+    /// [`Self::add_impulses`] keeps that. By default there are none.
+    fn close_velocity(
+        &mut self,
+        _options: &StepOptions,
+        _v_begin: &[f64],
+        _v: &[f64],
+        _y: &mut [f64],
+    ) {
+    }
+
+    /// `out +=` the generalized impulse (nv) of the loops after the last
+    /// [`Self::close_velocity`], with the contacts' impulses p (d n_c, or none).
+    fn add_loop_impulse(&mut self, _p: &[f64], _out: &mut [f64]) {}
+
+    /// Makes a configuration and a velocity at the end of a step obey the closed loops; p: the
+    /// step's impulses. Returns the widest gap that is left, m or rad.
+    fn close_end(&mut self, _p: &[f64], _q: &mut Self::Configuration, _v: &mut [f64]) -> f64 {
+        0.0
+    }
 
     /// `Δv = F⁻¹ y`, in place: factor coordinates (nv) into a change of the velocity.
     fn half_solve_back(&self, y: &mut [f64]);

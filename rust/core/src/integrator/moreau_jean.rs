@@ -38,7 +38,7 @@ use super::report::StepReport;
 use super::scheme::{Integrator, StateMut};
 use super::scratch::{Scratch, ScratchOf};
 use super::step_contacts::{
-    activation, add_correction, assemble_contacts, find_impacts, is_persistent, place,
+    activation, add_correction, assemble_contacts, close_end, find_impacts, is_persistent, place,
     solve_contacts,
 };
 use super::warm_start::WarmStart;
@@ -264,8 +264,9 @@ fn attempt<S: MechanicalSystem>(
         load_explicitly(system, options, start, warm_start, ws);
     }
     probe.end(Phase::Bias);
-    let report = solve_contacts(system, options, ws, true, probe);
+    let mut report = solve_contacts(system, options, start.v, ws, true, probe);
     place(system, options, ws);
+    close_end(system, ws, &mut report);
     Some(report)
 }
 
@@ -283,6 +284,7 @@ pub(super) fn load_explicitly<S: MechanicalSystem>(
         system.load(options, start, &ws.v_mean, &mut ws.impulse);
         ws.half_solve(|impulse| system.half_solve(impulse));
         if !is_last {
+            system.close_velocity(options, start.v, start.v, &mut ws.y);
             // Impulses of an impact do not predict those of this step: v_m would be far off, and
             // the bias is quadratic in it.
             if is_persistent(options, warm_start, &ws.contacts) {
@@ -315,6 +317,9 @@ pub(super) fn load_implicitly<S: MechanicalSystem>(
     for pass in 0..GYROSCOPIC_PASSES {
         system.load_gyroscopic(options, start, &ws.v_mean, &ws.forecast, &mut ws.y);
         if pass + 1 < GYROSCOPIC_PASSES {
+            system.close_velocity(options, start.v, start.v, &mut ws.y);
+            let forecast = if is_persistent { &ws.p[..] } else { &[] };
+            system.add_loop_impulse(forecast, &mut ws.forecast);
             if is_persistent {
                 system.add_impulses(&ws.p, &mut ws.y);
             }
@@ -345,6 +350,7 @@ pub(super) fn finish<S: MechanicalSystem>(
     } = state;
     let d = S::DIMENSION.components();
     if position_projection::project(system, options, ws, &mut report) {
+        close_end(system, ws, &mut report);
         system.normalise(&mut ws.end);
         let start = Start {
             configuration: &*configuration,

@@ -29,7 +29,8 @@ use super::report::{StepReport, StepStatus};
 use super::scheme::{Integrator, StateMut};
 use super::scratch::ScratchOf;
 use super::step_contacts::{
-    activation, add_correction, assemble_contacts, excuse_deflection, find_impacts, solve_contacts,
+    activation, add_correction, assemble_contacts, close_end, excuse_deflection, find_impacts,
+    solve_contacts,
 };
 use super::warm_start::WarmStart;
 
@@ -71,6 +72,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
         let (mut report, is_settled) = settle(system, options, start, warm_start, ws, probe);
         let verdict = if is_settled {
             move_to_the_end(system, options, start, ws);
+            close_end(system, ws, &mut report);
             let audit = Audit {
                 before,
                 is_last: false,
@@ -244,7 +246,7 @@ fn iterate<S: MechanicalSystem>(
         ws.p.copy_from_slice(&ws.p_last);
     }
     probe.end(Phase::Delassus);
-    let solved = solve_contacts(system, options, ws, iteration == 0, probe);
+    let solved = solve_contacts(system, options, start.v, ws, iteration == 0, probe);
     ws.p_last.clone_from(&ws.p);
     probe.end(Phase::Update);
     Some(solved)

@@ -8,10 +8,13 @@ pub enum StepStatus {
     /// They were.
     #[default]
     Converged,
-    /// The contact solver or Newton's iteration stopped above its tolerance; the state is the best
-    /// one found.
+    /// The contact solver or Newton's iteration stopped above its tolerance, or a loop stayed open;
+    /// the state is the best one found.
     NotConverged,
 }
+
+/// Gap of a closed loop at the end of a step above which the step has not converged, m or rad.
+pub(crate) const MOST_OPEN: f64 = 1e-6;
 
 /// Report of a step, or of the worst of several.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -34,6 +37,8 @@ pub struct StepReport {
     /// Largest natural-map residual, recomputed from the impulses; where the energy audit slowed a
     /// rebound, that violation of the law of restitution too. The status is the solver's.
     pub residual: f64,
+    /// Widest gap of a closed loop at the end of a step, m or rad; 0 without loops.
+    pub loop_gap: f64,
     /// Most contacts in a step.
     pub n_contacts: usize,
     /// Repeated steps: a motor changed its branch, the energy audit required it, or Newton's law of
@@ -84,6 +89,14 @@ impl StepReport {
         }
     }
 
+    /// Enters the widest gap of the loops, m or rad.
+    pub(super) fn enter_loops(&mut self, gap: f64) {
+        self.loop_gap = self.loop_gap.max(gap);
+        if gap.is_nan() || gap > MOST_OPEN {
+            self.status = StepStatus::NotConverged;
+        }
+    }
+
     /// Enters the balance of a step, J: what the contacts' law dissipated, what the audit removed,
     /// what contacts that yield released, and the final excess of the energy's change over that and
     /// the work of the actuators.
@@ -112,6 +125,7 @@ impl StepReport {
         self.pivots += later.pivots;
         self.newton_iterations += later.newton_iterations;
         self.residual = self.residual.max(later.residual);
+        self.loop_gap = self.loop_gap.max(later.loop_gap);
         self.n_contacts = self.n_contacts.max(later.n_contacts);
         self.retaken += later.retaken;
         self.fallbacks += later.fallbacks;

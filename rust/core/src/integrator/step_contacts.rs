@@ -267,11 +267,12 @@ pub(super) fn add_correction<S: MechanicalSystem>(
 /// two slopes cannot leave both. If the solver finds none, the impact is taken as inelastic. That
 /// problem always has a solution, since rest is admissible on ground at rest.
 ///
-/// Starts from `ws.p`. `is_from_start`: `ws.v` is still the velocity before
-/// the step, whose local velocity is known.
+/// Starts from `ws.p`. `v_begin`: the velocity before the step. `is_from_start`: `ws.v` is still
+/// that velocity, whose local velocity is known.
 pub(super) fn solve_contacts<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
+    v_begin: &[f64],
     ws: &mut ScratchOf<S>,
     is_from_start: bool,
     probe: &mut dyn Probe,
@@ -282,6 +283,7 @@ pub(super) fn solve_contacts<S: MechanicalSystem>(
         n_contacts: n,
         ..StepReport::default()
     };
+    system.close_velocity(options, v_begin, &ws.v, &mut ws.y);
     if n > 0 {
         system.local(&ws.y, &mut ws.q_free);
         if is_from_start {
@@ -374,6 +376,16 @@ pub(super) fn place<S: MechanicalSystem>(system: &S, options: &StepOptions, ws: 
     };
     ws.gap_end.extend(ws.contacts.iter().zip(local).map(moved));
     excuse_deflection(ws);
+}
+
+/// Closes the loops at the end of the step, `ws.end` and `ws.v`.
+pub(super) fn close_end<S: MechanicalSystem>(
+    system: &mut S,
+    ws: &mut ScratchOf<S>,
+    report: &mut StepReport,
+) {
+    let gap = system.close_end(&ws.p, &mut ws.end, &mut ws.v);
+    report.enter_loops(gap);
 }
 
 /// Where contacts yield, leaves in `ws.gap_end` only the penetration that no elastic force

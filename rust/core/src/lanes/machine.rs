@@ -28,6 +28,9 @@ pub enum Unsupported {
     /// It has several trees, or its root is fixed.
     #[error("the machine is not one tree on a free base")]
     NotOneFreeTree,
+    /// Loops are closed.
+    #[error("the machine has closed loops")]
+    ClosedLoops,
     /// Its wheels and stops can have more contacts than a problem.
     #[error("wheels with a width and stops can have {0} contacts, more than {MAX_CONTACTS}")]
     TooManyContacts(usize),
@@ -226,6 +229,9 @@ impl WheelDisc {
 fn check(model: &Model) -> Result<(), Unsupported> {
     if !model.is_free_tree() {
         return Err(Unsupported::NotOneFreeTree);
+    }
+    if !model.loops().is_empty() {
+        return Err(Unsupported::ClosedLoops);
     }
     let wheels: Vec<WheelDisc> = model.wheels().iter().map(WheelDisc::of).collect();
     let has_lines = wheels.iter().any(|wheel| wheel.n_circles() > 1);

@@ -69,6 +69,40 @@ pub enum ModelError {
         /// Kind of the joint.
         joint: &'static str,
     },
+    /// A field that only another kind of loop may have.
+    #[error("{field}: a loop of kind \"{kind}\" has no {what}")]
+    NotForLoop {
+        /// Path of the field.
+        field: String,
+        /// The field's name.
+        what: &'static str,
+        /// Kind of the loop.
+        kind: &'static str,
+    },
+    /// A loop whose ends do not move relative to each other.
+    #[error("{field}: both ends of the loop {name:?} are on one rigid body")]
+    LoopInOneBody {
+        /// Path of the loop.
+        field: String,
+        /// Its name.
+        name: String,
+    },
+    /// A loop that is open where it should be closed.
+    #[error(
+        "{field}: the loop {name:?} does not close at the zero of all joints, the gap is {gap} {unit}; without {without} it closes there"
+    )]
+    LoopOpen {
+        /// Path of the loop.
+        field: String,
+        /// Its name.
+        name: String,
+        /// What is left, m or rad.
+        gap: f64,
+        /// Its unit.
+        unit: &'static str,
+        /// The fields that say where it closes.
+        without: &'static str,
+    },
     /// A solid that is listed among those of another tree.
     #[error(
         "{field}: the solids under {name:?} must be listed together, before those of the next tree"
@@ -267,6 +301,9 @@ impl ModelError {
             | Self::UnknownName { field, .. }
             | Self::Missing { field }
             | Self::NotForJoint { field, .. }
+            | Self::NotForLoop { field, .. }
+            | Self::LoopInOneBody { field, .. }
+            | Self::LoopOpen { field, .. }
             | Self::OtherTree { field, .. }
             | Self::CoupledApart { field, .. }
             | Self::NotFinite { field, .. }
@@ -325,6 +362,28 @@ pub enum StateError {
         index: usize,
         /// What was given.
         value: f64,
+    },
+    /// A configuration in which a loop is open.
+    #[error(
+        "q: the loop {name:?} is open by {gap} {unit}; RoverModel.close_loops(q) gives the nearest coordinates that close it"
+    )]
+    LoopOpen {
+        /// Its name.
+        name: String,
+        /// What is left, m or rad.
+        gap: f64,
+        /// Its unit.
+        unit: &'static str,
+    },
+    /// Loops that no configuration near the given one closes.
+    #[error("q: no coordinates near these close the loop {name:?}, {gap} {unit} are left")]
+    LoopStaysOpen {
+        /// The loop with the largest gap.
+        name: String,
+        /// What is left, m or rad.
+        gap: f64,
+        /// Its unit.
+        unit: &'static str,
     },
     /// The report's angles cannot express a rate there.
     #[error(

@@ -55,6 +55,7 @@ pub mod joint;
 pub mod kinematics;
 pub mod landmarks;
 pub mod lane_configuration;
+pub mod loops;
 pub mod mass_matrix;
 pub mod mechanism;
 pub mod model;
@@ -65,9 +66,9 @@ pub mod state;
 
 pub use chart::Chart;
 pub use description::{
-    CouplingDescription, DriveDescription, FORMAT, Hold, JointKind, Limits, MAX_SHAPES, MAX_SOLIDS,
-    MassProperties, ModelDescription, Shape, ShapeDescription, SolidDescription, Spring,
-    TagDescription, WheelDescription,
+    CouplingDescription, DriveDescription, FORMAT, Hold, JointKind, Limits, LoopDescription,
+    LoopKind, MAX_SHAPES, MAX_SOLIDS, MassProperties, ModelDescription, Shape, ShapeDescription,
+    SolidDescription, Spring, TagDescription, WheelDescription,
 };
 pub use energy::{Energy, EnergyScratch};
 pub use error::{ModelError, StateError};
@@ -80,8 +81,8 @@ pub use mass_matrix::MassMatrix;
 pub use mechanism::Mechanism;
 pub(crate) use model::fingerprint;
 pub use model::{
-    BASE, Body, Changes, CollisionBox, CollisionSphere, Frame, JointProperties, Model, Passive,
-    Tree, Wheel,
+    BASE, Body, BodyPose, Changes, CollisionBox, CollisionSphere, Frame, JointProperties, Loop,
+    LoopGap, Model, Passive, Tree, Wheel,
 };
 pub use momentum::Momentum;
 pub use motor::{Motor, MotorLine};

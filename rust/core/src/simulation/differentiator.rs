@@ -96,7 +96,7 @@ impl Differentiator {
     /// Of a simulation with its command, for this machine's instructions.
     ///
     /// # Errors
-    /// `Variant`.
+    /// `Variant`, `ClosedLoops`.
     pub fn new(of: &RoverSimulation) -> Result<Self, LinearisationError> {
         Self::with(of, Instructions::of_this_machine())
     }
@@ -104,13 +104,16 @@ impl Differentiator {
     /// The same for other instructions.
     ///
     /// # Errors
-    /// `Variant`.
+    /// `Variant`, `ClosedLoops`.
     pub fn with(
         of: &RoverSimulation,
         instructions: Instructions,
     ) -> Result<Self, LinearisationError> {
         if of.options.variant != Variant::Linearised {
             return Err(LinearisationError::Variant);
+        }
+        if !of.model().loops().is_empty() {
+            return Err(LinearisationError::ClosedLoops);
         }
         Ok(Self {
             sim: of.clone(),

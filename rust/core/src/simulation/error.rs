@@ -132,6 +132,9 @@ pub enum LinearisationError {
     /// The scheme is implicit in the forces.
     #[error("variant: only steps of the variant \"linearised\" can be linearised")]
     Variant,
+    /// Loops are closed.
+    #[error("model: steps of a machine with closed loops have no derivatives yet")]
+    ClosedLoops,
     /// A perturbation outside its range.
     #[error("perturbation: must be from 1e-9 to 1e-3, is {value}")]
     Perturbation {

@@ -18,7 +18,7 @@ use crate::integrator::{OptionsError, Probe, StepOptions, StepReport};
 use crate::lanes::machine::{Machine, Unsupported};
 use crate::multibody::{Configuration, Energy, Kinematics, Model, Momentum, momentum};
 use crate::sand::SandState;
-use crate::system::{TreeScratch, TreeSystem};
+use crate::system::{TreeScratch, TreeSystem, loops};
 
 /// A machine on a terrain, both shared.
 #[derive(Clone)]
@@ -279,7 +279,8 @@ pub struct LastCall {
 }
 
 impl RoverSimulation {
-    /// At rest in the zero configuration; steering joints held at zero, all others free.
+    /// At rest in the zero configuration, with all loops closed; steering joints held at zero, all
+    /// others free.
     ///
     /// # Errors
     /// An option out of its range.
@@ -288,8 +289,14 @@ impl RoverSimulation {
         terrain: Arc<dyn Terrain>,
         options: StepOptions,
     ) -> Result<Self, OptionsError> {
-        let configuration = Configuration::zero(&model);
-        Self::of(RoverScene::new(model, terrain), configuration, options)
+        let (configuration, v) = (Configuration::zero(&model), vec![0.0; model.nv()]);
+        let mut made = Self::of(
+            RoverScene::new(model, terrain),
+            configuration.clone(),
+            options,
+        )?;
+        made.place_closed(configuration, v);
+        Ok(made)
     }
 
     /// As [`Self::new`], then [`Self::begin`].
@@ -311,7 +318,7 @@ impl RoverSimulation {
             "invariant: a configuration of this model"
         );
         let mut made = Self::of(scene, configuration.clone(), options)?;
-        made.place(configuration, v);
+        made.place_closed(configuration, v);
         Ok(made)
     }
 
@@ -349,8 +356,8 @@ impl RoverSimulation {
         &self.scene.terrain
     }
 
-    /// Sets configuration and velocity, as checked by
-    /// [`crate::multibody::coordinates`]; time 0, warm start forgotten.
+    /// Sets configuration and velocity, as checked by [`crate::multibody::coordinates`]; time 0,
+    /// warm start forgotten. Loops are closed, and the velocity loses what would open them.
     ///
     /// # Panics
     /// If the sizes do not fit the model.
@@ -359,14 +366,20 @@ impl RoverSimulation {
             configuration.is_of(self.model()),
             "invariant: a configuration of this model"
         );
-        self.place(configuration, v);
+        self.place_closed(configuration, v);
+    }
+
+    /// Sets a state that obeys the closed loops. Loops that stay open are in the step's report.
+    fn place_closed(&mut self, configuration: Configuration, mut v: Vec<f64>) {
+        let closed = loops::closed(self.model(), &configuration, &mut v);
+        self.place(closed.unwrap_or(configuration), v);
     }
 
     fn restart(&mut self, placement: Placement) {
         self.command = placement.scene.command();
         self.scene = placement.scene;
         self.options = placement.options;
-        self.place(placement.configuration, placement.v);
+        self.place_closed(placement.configuration, placement.v);
     }
 
     /// Results of the last call of [`Self::step`].
@@ -388,6 +401,15 @@ impl RoverSimulation {
     #[must_use]
     pub fn motor_torques(&self) -> &[f64] {
         &self.memory.wheel_torque
+    }
+
+    /// Mean reactions of the rows of the loops in the last step (n_loop_rows), N and N m: along and
+    /// about the world's axes on the first end of each loop.
+    #[must_use]
+    pub fn loop_forces(&self) -> Vec<f64> {
+        let h = self.options.time_step;
+        let impulses = self.parts.tree.loop_impulses().iter();
+        impulses.map(|impulse| impulse / h).collect()
     }
 
     /// The sand under the wheels; none on firm ground.

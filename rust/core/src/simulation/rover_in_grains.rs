@@ -47,6 +47,9 @@ pub enum TogetherError {
         /// m.
         depth: f64,
     },
+    /// The rover has closed loops, which are not solved together with grains.
+    #[error("rover: its model has closed loops, which are not simulated among grains")]
+    ClosedLoops,
     /// μ.
     #[error(transparent)]
     Friction(#[from] GrainError),
@@ -66,7 +69,8 @@ impl RoverInGrains {
     ///
     /// # Errors
     /// Another time step or gravity of the two, a part of the rover deeper in a grain than
-    /// [`OVERLAP`] of the smallest radius, a coefficient that is negative or not finite.
+    /// [`OVERLAP`] of the smallest radius, a rover with closed loops, a coefficient that is
+    /// negative or not finite.
     pub fn new(
         rover: &RoverSimulation,
         bed: &GrainSimulation<3>,
@@ -91,6 +95,9 @@ impl RoverInGrains {
                     grains: theirs,
                 });
             }
+        }
+        if !rover.model().loops().is_empty() {
+            return Err(TogetherError::ClosedLoops);
         }
         check_apart(rover, bed)?;
         let q = (bed.q().clone(), rover.q().clone());

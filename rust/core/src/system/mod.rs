@@ -4,8 +4,8 @@
 //!   [scratch](tree_scratch); [`drives`]: torques, motors, held joints, springs and dampers,
 //!   implicit with [`fitted_theta`]; `extent`: how far a step turns and displaces it;
 //!   `momentum_balance`: the balance of the Newton variant; [`gyroscopic`]: when gyroscopic terms
-//!   are implicit, and how; `sand`, `sand_patch`: its wheels in sand; `tangent`: derivatives of a
-//!   step;
+//!   are implicit, and how; [`loops`]: its closed loops; `sand`, `sand_patch`: its wheels in sand;
+//!   `tangent`: derivatives of a step;
 //! - [`planar`]: a planar machine on a ground, with its matrices;
 //! - [`grains`]: thousands of free disks or balls, and a planar machine among them;
 //! - [`among_grains`]: a tree among balls.
@@ -20,6 +20,7 @@
 //! detect, relocate          ──► TreeSystem                      contact
 //! update_mass_matrix        ──► mass matrix, Drives θ_j         multibody::MassMatrix; sand
 //! factorise                 ──► M̂ with Drives and sand          multibody::Factor
+//! close_velocity, close_end ──► Loops                           multibody::loops
 //! load                      ──► bias, Drives, sand              multibody::bias
 //! load_gyroscopic           ──► GyroscopicScratch               multibody::coriolis
 //! assemble, local, ...      ──► ContactSystem                   contact
@@ -40,6 +41,7 @@ pub(crate) mod extent;
 pub mod fitted_theta;
 pub mod grains;
 pub mod gyroscopic;
+pub mod loops;
 mod momentum_balance;
 pub mod planar;
 mod planar_matrices;

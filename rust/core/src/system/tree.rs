@@ -89,6 +89,20 @@ impl TreeSystem<'_> {
         mass_matrix.factorise(mechanism, &mut parts.factor)
     }
 
+    /// Begins the loops of the step, with the factor of M̂.
+    fn begin_loops(&mut self) {
+        let TreeScratch {
+            loops,
+            kinematics,
+            joints_middle,
+            factor,
+            ..
+        } = &mut *self.parts;
+        if let Some(loops) = loops {
+            loops.begin(self.model, kinematics, joints_middle, factor);
+        }
+    }
+
     /// Adds the impulse of the drives and of the sand to `y`, for a step that ends with the iterate
     /// `v_end`.
     #[inline]
@@ -272,6 +286,7 @@ impl MechanicalSystem for TreeSystem<'_> {
     #[inline]
     fn factorise(&mut self, options: &StepOptions) -> bool {
         if self.factor_implicit(options) {
+            self.begin_loops();
             return true;
         }
         // Tangents of sand whose sizes differ too much leave no factor.
@@ -282,7 +297,9 @@ impl MechanicalSystem for TreeSystem<'_> {
         sand.drop_tangents();
         let (mechanism, inertias) = (self.model.mechanism(), self.model.inertias());
         (parts.mass_matrix).update(mechanism, inertias, parts.kinematics.poses());
-        self.factor_implicit(options)
+        let is_positive = self.factor_implicit(options);
+        self.begin_loops();
+        is_positive
     }
 
     fn multiply_mass(&self, v: &[f64], out: &mut [f64]) {
@@ -318,7 +335,7 @@ impl MechanicalSystem for TreeSystem<'_> {
     }
 
     fn conserves_momenta(&self) -> bool {
-        self.model.is_free_tree()
+        self.model.is_free_tree() && self.model.loops().is_empty()
     }
 
     fn load_gyroscopic(
@@ -388,8 +405,8 @@ impl MechanicalSystem for TreeSystem<'_> {
         Some(MechanicalEnergy {
             kinetic: energy.kinetic,
             potential: energy.potential,
-            // A tree on a fixed base passes momentum on to the world.
-            momentum: if self.model.is_free() {
+            // A tree on a fixed base, or tied to the world, passes momentum on to it.
+            momentum: if self.model.is_free() && !self.model.holds_the_world() {
                 momentum.into()
             } else {
                 Vector3::zeros()
@@ -481,6 +498,9 @@ impl MechanicalSystem for TreeSystem<'_> {
             v,
         );
         u.copy_from_slice(&parts.system.u);
+        if let Some(loops) = &mut parts.loops {
+            loops.project_operator(self.model, &mut parts.system);
+        }
     }
 
     #[inline]
@@ -502,6 +522,28 @@ impl MechanicalSystem for TreeSystem<'_> {
     #[inline]
     fn add_impulses(&self, p: &[f64], y: &mut [f64]) {
         self.parts.system.add_impulses(self.model, p, y);
+        if let Some(loops) = &self.parts.loops {
+            loops.answer(p, y);
+        }
+    }
+
+    #[inline]
+    fn close_velocity(&mut self, options: &StepOptions, v_begin: &[f64], v: &[f64], y: &mut [f64]) {
+        if let Some(loops) = &mut self.parts.loops {
+            loops.close(options.theta, v_begin, v, y);
+        }
+    }
+
+    fn add_loop_impulse(&mut self, p: &[f64], out: &mut [f64]) {
+        if let Some(loops) = &mut self.parts.loops {
+            loops.add_generalized_impulse(p, out);
+        }
+    }
+
+    #[inline]
+    fn close_end(&mut self, p: &[f64], q: &mut Configuration, v: &mut [f64]) -> f64 {
+        let TreeScratch { loops, factor, .. } = &mut *self.parts;
+        (loops.as_mut()).map_or(0.0, |loops| loops.end(self.model, factor, p, q, v))
     }
 
     #[inline]

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::drives::Drives;
 use super::gyroscopic::GyroscopicScratch;
+use super::loops::Loops;
 use super::momentum_balance::MomentumBalance;
 use super::sand::SandContact;
 use super::sand_patch::SandScene;
@@ -34,12 +35,14 @@ pub struct TreeScratch {
     /// Found by the last detection, x and z, m.
     pub(super) unknown_ground: Option<[f64; 2]>,
     /// Joint coordinates at the midpoint and at the end of the step (n_joints); empty if no joint
-    /// has a stop.
+    /// has a stop and there is no loop.
     pub(super) joints_middle: Vec<f64>,
     pub(super) joints_end: Vec<f64>,
     pub(super) system: ContactSystem,
     /// Of a machine on soft ground.
     pub(super) sand: Option<Box<SandContact>>,
+    /// Of a machine with closed loops.
+    pub(super) loops: Option<Box<Loops>>,
 }
 
 impl TreeScratch {
@@ -47,7 +50,7 @@ impl TreeScratch {
     #[must_use]
     pub fn new(model: &Model, n: usize) -> Self {
         let (token, mechanism) = (Single::best(), model.mechanism());
-        let limited = if model.limited_joints().is_empty() {
+        let limited = if model.limited_joints().is_empty() && model.loops().is_empty() {
             Vec::new()
         } else {
             vec![0.0; model.n_joints()]
@@ -70,6 +73,7 @@ impl TreeScratch {
             joints_end: limited,
             system: ContactSystem::with_capacity(model, n),
             sand: None,
+            loops: Loops::of(model),
         }
     }
 
@@ -130,6 +134,12 @@ impl TreeScratch {
         self.kinematics_end.set_origin(0, origin.into());
     }
 
+    /// Impulses of the rows of the loops in the last step, N s and N m s; empty without loops.
+    #[must_use]
+    pub fn loop_impulses(&self) -> &[f64] {
+        self.loops.as_ref().map_or(&[], |loops| loops.impulses())
+    }
+
     /// Delassus operator of the last step, row-major, 1/kg.
     #[must_use]
     pub fn operator(&self) -> &[f64] {
@@ -179,7 +189,7 @@ impl TreeScratch {
     }
 }
 
-/// Copies the joint coordinates; `kept` is empty if no joint has a stop.
+/// Copies the joint coordinates; `kept` is empty if nothing reads them.
 #[inline]
 fn keep(kept: &mut [f64], joints: &[f64]) {
     for (kept, q) in kept.iter_mut().zip(joints) {

@@ -2,6 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
+use super::check_loops::check_loops;
 use super::check_shapes::check_shapes;
 use super::check_values::{
     direction, finite, in_range, length, material, moderate, not_negative, place, positive,
@@ -21,6 +22,7 @@ pub(in crate::multibody) fn check(description: &ModelDescription) -> Result<(), 
         ("solids", "solids", description.solids.len(), MAX_SOLIDS),
         ("wheels", "wheels", description.wheels.len(), MAX_SOLIDS),
         ("tags", "tags", description.tags.len(), MAX_SOLIDS),
+        ("loops", "loops", description.loops.len(), MAX_SOLIDS),
         ("solids", "shapes", n_shapes, MAX_SHAPES),
     ] {
         if count > limit {
@@ -46,7 +48,8 @@ pub(in crate::multibody) fn check(description: &ModelDescription) -> Result<(), 
     }
     check_trees(description)?;
     check_wheels(description, &solids)?;
-    check_tags(description, &solids)
+    check_tags(description, &solids)?;
+    check_loops(description, &solids)
 }
 
 /// Checks the joint of a solid. `before`: the solids listed before it.

@@ -5,8 +5,10 @@
 use serde::{Deserialize, Serialize};
 
 pub(super) mod check;
+pub(super) mod check_loops;
 mod check_shapes;
 pub(super) mod check_values;
+pub mod closure;
 mod gallery;
 pub mod joint;
 mod masses;
@@ -15,6 +17,7 @@ mod yielding;
 
 use super::error::ModelError;
 use super::motor::Motor;
+pub use closure::{LoopDescription, LoopKind};
 pub use joint::{CouplingDescription, DriveDescription, Hold, JointKind, Limits, Spring};
 pub use masses::MassProperties;
 pub use shape::{Shape, ShapeDescription};
@@ -47,6 +50,9 @@ pub struct ModelDescription {
     /// Named points.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tags: Vec<TagDescription>,
+    /// Constraints that close kinematic loops.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub loops: Vec<LoopDescription>,
     /// Whether parts of one tree collide with each other, except across a joint. Parts of two trees
     /// always collide.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -319,6 +325,7 @@ impl ModelDescription {
             solids: Vec::new(),
             wheels: Vec::new(),
             tags: Vec::new(),
+            loops: Vec::new(),
             self_contact: false,
         })
     }

@@ -68,7 +68,12 @@ impl Model {
         })?;
         let wheels = wheels(&description.wheels, &index_of, &frames, &bodies);
         let carriers = (boxes.iter().map(|x| x.body)).chain(spheres.iter().map(|x| x.body));
-        mark_spinners(&mut bodies, &wheels, carriers);
+        let looped = description.loops.iter().flat_map(|closure| {
+            let ends = [Some(&closure.solid), closure.other.as_ref()];
+            let frame = |name: &String| Some(frames[*index_of.get(name.as_str())?].body);
+            ends.into_iter().flatten().filter_map(frame)
+        });
+        mark_spinners(&mut bodies, &wheels, carriers.chain(looped));
         let trees: Vec<Tree> = (0..n_trees).map(|t| tree(t, &bodies, &paths)).collect();
         for joint in &mut joints {
             joint.velocity = bodies[joint.body].velocity;
@@ -87,7 +92,7 @@ impl Model {
             .collect();
         let has_slides = bodies.iter().any(|body| body.joint.slides());
         let text = description.to_json().unwrap_or_default();
-        Ok(Self {
+        let mut model = Self {
             mass: bodies.iter().map(|b| b.mass).sum(),
             fingerprint: fingerprint(text.bytes()),
             has_slides,
@@ -106,7 +111,10 @@ impl Model {
             spheres,
             common,
             body_of_velocity: paths.body_of_velocity,
-        })
+            loops: Vec::new(),
+        };
+        model.build_loops()?;
+        Ok(model)
     }
 }
 

@@ -6,6 +6,8 @@
 
 mod body;
 mod build;
+mod close;
+pub(in crate::multibody) mod closed_loop;
 mod edit;
 mod links;
 mod parts;
@@ -16,6 +18,7 @@ mod tree;
 use nalgebra::Vector3;
 
 pub use body::Body;
+pub use closed_loop::{BodyPose, Loop, LoopGap};
 pub use edit::Changes;
 pub use parts::{CollisionBox, CollisionSphere, Frame, Wheel};
 pub use properties::{JointProperties, Passive};
@@ -51,6 +54,7 @@ pub struct Model {
     armatures: Vec<(usize, f64)>,
     /// Indices of the joints with stops.
     limited: Vec<usize>,
+    loops: Vec<Loop>,
     has_slides: bool,
     mass: f64,
     fingerprint: u64,
@@ -136,6 +140,19 @@ impl Model {
         let couplings = (self.mechanism.links.iter()).filter_map(|link| link.joint.coupling());
         let coupled: f64 = couplings.map(|coupling| coupling.ratio.abs()).sum();
         linear + turning * reach * (1.0 + coupled)
+    }
+
+    /// Its closed loops, in description order; none for a tree.
+    #[inline]
+    #[must_use]
+    pub fn loops(&self) -> &[Loop] {
+        &self.loops
+    }
+
+    /// Whether one of its loops ties it to the world.
+    #[must_use]
+    pub fn holds_the_world(&self) -> bool {
+        self.loops.iter().any(Loop::holds_the_world)
     }
 
     /// Frames of all solids, in description order.

@@ -164,7 +164,10 @@ impl Wheel<'_> {
             like.like(self.disc.radius),
         );
         let beside = (beside - like.like(self.rounding)).max(zero);
-        let (reach, depth) = (like.like(self.reach() + ROUNDING), like.like(SHARE) * beside);
+        let (reach, depth) = (
+            like.like(self.reach() + ROUNDING),
+            like.like(SHARE) * beside,
+        );
         let least = T::select(depth.le(reach), reach, like.like(ROUNDING) - depth);
         let never = zero.lt(zero);
         let mut circle = Circle {

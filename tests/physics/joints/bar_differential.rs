@@ -1,0 +1,114 @@
+//! A rocker-bogie whose differential is a bar with two rods, beside one whose rockers are coupled.
+
+use rover_core::draw::start::resting_pose;
+use rover_core::geometry::{Plane, SphereField};
+use rover_core::integrator::Variant;
+use rover_core::multibody::{
+    JointKind, LoopDescription, LoopKind, Model, ModelDescription, SolidDescription, coordinates,
+};
+use rover_core::simulation::RoverSimulation;
+use std::sync::Arc;
+
+use super::machines::{options, solid};
+
+/// Height of the bar over the pivots of the rockers and length of its arms, m.
+const HEIGHT: f64 = 0.1;
+const ARM: f64 = 0.12;
+
+/// Length of the rods, m.
+const ROD: f64 = 0.15;
+
+fn light(mut solid: SolidDescription) -> SolidDescription {
+    solid.mass = 1e-3;
+    solid.inertia = Some([1e-6, 1e-6, 1e-6, 0.0, 0.0, 0.0]);
+    solid
+}
+
+/// The open-source rover with a bar on the body that turns about the vertical, and a rod from either
+/// end of it to the rocker below: forward on the left, backward on the right, so that one side is
+/// the other turned by half a turn.
+fn with_a_bar() -> ModelDescription {
+    let mut rover = ModelDescription::named("open-rover").unwrap();
+    let rockers = ["left_rocker", "right_rocker"];
+    for rocker in rover
+        .solids
+        .iter_mut()
+        .filter(|s| rockers.contains(&s.name.as_str()))
+    {
+        rocker.coupled = None;
+    }
+    let mut bar = light(solid("bar", Some("trunk"), JointKind::Revolute));
+    bar.axis = Some([0.0, 1.0, 0.0]);
+    bar.position = Some([0.0, -0.03 + HEIGHT, 0.0]);
+    rover.solids.push(bar);
+    for (side, rocker, sign) in [("left", rockers[0], -1.0), ("right", rockers[1], 1.0)] {
+        let mut rod = light(solid(
+            &format!("{side}_rod"),
+            Some("bar"),
+            JointKind::Spherical,
+        ));
+        rod.position = Some([0.0, 0.0, sign * ARM]);
+        rover.solids.push(rod);
+        rover.loops.push(LoopDescription {
+            name: format!("{side}_joint"),
+            kind: LoopKind::Connect,
+            solid: format!("{side}_rod"),
+            other: Some(rocker.into()),
+            position: Some([-sign * ROD, 0.0, 0.0]),
+            other_position: Some([-sign * ROD, HEIGHT, 0.0]),
+            other_rotation: None,
+            polynomial: None,
+        });
+    }
+    rover
+}
+
+fn on_stones(description: ModelDescription, variant: Variant) -> RoverSimulation {
+    let model = Arc::new(Model::from_description(description).unwrap());
+    let flat = || Plane::new([0.0, 1.0, 0.0], 0.0).unwrap();
+    let q = resting_pose(&model, &flat(), [0.0, 0.0], 0.0).unwrap();
+    let centres = [[0.6, -0.12, -0.2], [1.1, -0.13, 0.2], [1.6, -0.1, -0.15]];
+    let stones = SphereField::new(&centres, &[0.16; 3], Some(flat())).unwrap();
+    let mut run = RoverSimulation::new(model, Arc::new(stones), options(5e-3, variant)).unwrap();
+    let q = coordinates::from_public(run.model(), &q).unwrap();
+    let nv = run.model().nv();
+    run.set_state(q, vec![0.0; nv]);
+    let torques = vec![0.9; run.model().wheels().len()];
+    run.set_wheel_torques(&torques).unwrap();
+    run
+}
+
+fn joint(run: &RoverSimulation, name: &str) -> f64 {
+    run.q().joints[run.model().joint_index(name).unwrap()]
+}
+
+/// Both climb the stones in the same way; the bar and its rods weigh 3 g.
+#[test]
+fn a_bar_differential_drives_as_coupled_rockers() {
+    for variant in [Variant::Linearised, Variant::Newton] {
+        let mut bar = on_stones(with_a_bar(), variant);
+        let mut coupled = on_stones(ModelDescription::named("open-rover").unwrap(), variant);
+        if variant == Variant::Linearised {
+            let reason = bar.fallback_reason().unwrap().to_string();
+            assert_eq!(reason, "the machine has closed loops");
+        }
+        let mut steepest = 0.0_f64;
+        let mut farthest = 0.0_f64;
+        for _ in 0..400 {
+            let report = bar.step(1).unwrap();
+            assert!(
+                report.is_converged() && report.loop_gap < 1e-12,
+                "{variant:?} {report:?}"
+            );
+            coupled.step(1).unwrap();
+            let [left, right] = ["left_rocker", "right_rocker"].map(|name| joint(&bar, name));
+            assert!((left + right).abs() < 1e-11, "{variant:?}: {left} {right}");
+            steepest = steepest.max(left.abs());
+            farthest = farthest.max((left - joint(&coupled, "left_rocker")).abs());
+        }
+        let way = (bar.q().position - coupled.q().position).norm();
+        assert!(steepest > 0.03, "{variant:?}: {steepest}");
+        assert!(farthest < 1e-5, "{variant:?}: {farthest}");
+        assert!(way < 1e-5, "{variant:?}: {way}");
+    }
+}
