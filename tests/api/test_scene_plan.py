@@ -23,7 +23,6 @@ from rover_gym import (
 )
 from rover_gym.economy import Scene, ScenePlan, measure_economies, plan
 from rover_gym.economy.scene_plan import Accuracy
-from rover_gym.env import resting_pose, tilted_plane
 from rover_gym.mechanics import SimulationBatch
 from rover_gym.planar import MirroredRoverSimulation
 
@@ -65,8 +64,8 @@ def test_a_scene_that_excludes_nothing_gets_the_whole_model() -> None:
         ({"steered": True, "equal_torques": True}, "full"),
         ({"steered": False, "equal_torques": True, "held": True}, "welded"),
         ({"steered": False, "equal_torques": True, "tumbles": True}, "welded"),
-        ({"steered": False, "equal_torques": True, "terrain": tilted_plane(0.1, 0.5)}, "welded"),
-        ({"steered": False, "equal_torques": True, "terrain": tilted_plane(0.1, 0.5), "heading": 0.5}, "planar"),
+        ({"steered": False, "equal_torques": True, "terrain": Plane.tilted(0.1, 0.5)}, "welded"),
+        ({"steered": False, "equal_torques": True, "terrain": Plane.tilted(0.1, 0.5), "heading": 0.5}, "planar"),
         ({"steered": False, "equal_torques": True, "terrain": SphereField.rocks(0.1, (-3, -3, 3, 3), 1)}, "full"),
     ],
 )
@@ -102,7 +101,7 @@ def test_a_rover_that_cannot_steer_is_not_said_to() -> None:
 
 
 def test_nothing_is_welded_where_wheels_may_turn_by_themselves() -> None:
-    start = resting_pose(RoverModel(), Plane(), (2.0, 1.0), 0.3)
+    start = RoverModel().resting_pose(Plane(), (2.0, 1.0), 0.3)
     assert plan(straight(start=start)).kind == "planar"
     dropped = start.copy()
     dropped[1] += 0.01
@@ -155,7 +154,7 @@ def test_a_plan_says_what_a_batch_leaves_out() -> None:
 def test_a_straight_drive_is_the_full_models_within_the_stated_error(
     slope: float, planar: bool, accuracy: Accuracy, most: float
 ) -> None:
-    made = plan(straight(tilted_plane(math.radians(slope), 0.0)), accuracy, planar=planar)
+    made = plan(straight(Plane.tilted(math.radians(slope), 0.0)), accuracy, planar=planar)
     assert made.kind == ("planar" if planar else "welded")
     ours, whole = path(made), path(full(made))
     assert np.linalg.norm(whole[-1, :3] - whole[0, :3]) > 1.0
@@ -164,7 +163,7 @@ def test_a_straight_drive_is_the_full_models_within_the_stated_error(
 
 
 def test_the_planar_image_is_put_where_the_full_rover_is_on_a_diagonal() -> None:
-    scene = straight(tilted_plane(0.1, -0.7), heading=-0.7)
+    scene = straight(Plane.tilted(0.1, -0.7), heading=-0.7)
     planar, welded = plan(scene), plan(scene, planar=False)
     assert (planar.kind, welded.kind) == ("planar", "welded")
     ours, whole = path(planar, duration=5.0, torque=25.0), path(welded, duration=5.0, torque=25.0)

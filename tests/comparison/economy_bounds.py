@@ -13,7 +13,6 @@ from rich.console import Console
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField
 from rover_gym.economy import Scene, measure_economies, plan
-from rover_gym.env import resting_pose, tilted_plane
 
 Array = npt.NDArray[np.float64]
 SLOPES = (0.0, 5.0, -10.0, -20.0)  # degrees, along the heading
@@ -28,7 +27,7 @@ def planes(accuracy: str) -> dict[str, float]:
     worst: dict[str, float] = {}
     cases = [(slope, 0.0) for slope in SLOPES] + list(ACROSS)
     for (slope, heading), torque in itertools.product(cases, TORQUES):
-        plane = tilted_plane(math.radians(slope), 0.0)
+        plane = Plane.tilted(math.radians(slope), 0.0)
         scene = Scene(plane, heading=math.radians(heading), steered=False, equal_torques=True)
         for economy in measure_economies(plan(scene, accuracy), torque=torque, repeats=1):  # type: ignore[arg-type]
             worst[economy.name] = max(worst.get(economy.name, 0.0), economy.error)
@@ -70,7 +69,7 @@ def rocks(console: Console) -> None:
     for seed in SEEDS:
         clear = np.array([(0.0, 0.0, 4.5)])
         field = SphereField.rocks(0.1, (-4.0, -4.0, 26.0, 4.0), seed, max_diameter=0.2, ground=Plane(), clear=clear)
-        q = resting_pose(model, Plane(), (0.0, 0.0), 0.0)
+        q = model.resting_pose(Plane(), (0.0, 0.0), 0.0)
         runs = {
             "": _simulation(model, field, q),
             "steering welded": _simulation(_welded(model), field, q),

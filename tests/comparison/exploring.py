@@ -20,7 +20,6 @@ import numpy as np
 from comparison.peers.base import contact_radius
 from comparison.scene import Array, Phase, RoverScene
 from rover_gym import Plane, RoverModel, Simulation, SphereField
-from rover_gym.env.start import resting_pose
 
 FILE = Path(__file__).with_name("exploring.json")
 SEEDS = range(1, 9)
@@ -108,7 +107,7 @@ def _record(seed: int) -> dict[str, Any]:
     ground = Plane(normal)
     spheres = np.round(np.column_stack([terrain.centres, terrain.radii]), 4)
     halfway = tuple(float(x) for x in 0.5 * (np.array(start.position) + np.array(env.goal)))
-    q = resting_pose(env.model, ground, halfway, start.heading)
+    q = env.model.resting_pose(ground, halfway, start.heading)
     simulation = Simulation(env.model, SphereField(spheres[:, :3], spheres[:, 3], ground), time_step=0.001)
     simulation.set_state(q)
     while simulation.deepest_overlap < 0.0:

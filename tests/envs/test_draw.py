@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rover_gym import OptionError, Plane, RoverEnv
-from rover_gym.env.generators import fresh_seed, generator_at, row_of, seeded_rows
+from rover_gym.env.generators import fresh_seed, generator_at, row_of
 from rover_gym.mechanics import (
     EpisodeBatch,
     EpisodeDistribution,
@@ -131,7 +131,7 @@ def test_scenes_do_not_hang_on_the_number_of_threads(mode: str) -> None:
 
 def test_episodes_can_be_drawn_without_an_environment() -> None:
     task = RoverEnv(terrain="rocks").task
-    rows, fixed = seeded_rows([1, 2, 3]), {"difficulty": 0.2, "position": (1.0, 2.0)}
+    rows, fixed = seed_generators([1, 2, 3]), {"difficulty": 0.2, "position": (1.0, 2.0)}
     one, two = (EpisodeBatch(task.rules, Simulation(), 4, threads=threads) for threads in (1, 2))
     drawn, again = one.draw(task.episodes, rows, fixed=fixed), two.draw(task.episodes, rows, fixed=[fixed] * 3)
     assert len(drawn) == len(again) == 3
@@ -176,7 +176,7 @@ def test_episodes_can_be_drawn_without_an_environment() -> None:
 )
 def test_a_bad_request_for_episodes_is_refused_by_name(arguments: dict[str, Any], field: str) -> None:
     task = RoverEnv().task
-    request: dict[str, Any] = {"generators": seeded_rows([1, 2]), **arguments}
+    request: dict[str, Any] = {"generators": seed_generators([1, 2]), **arguments}
     with pytest.raises(ValueError, match=r"must|needs") as caught:
         EpisodeBatch(task.rules, Simulation(), 1).draw(task.episodes, **request)
     assert getattr(caught.value, "field") == field  # noqa: B009 - an attribute of the package's errors

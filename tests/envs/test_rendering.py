@@ -23,7 +23,6 @@ from refusals import refused
 
 import rover_gym
 from rover_gym import OptionError, Plane, RoverEnv, RoverModel, Simulation, SphereField
-from rover_gym.env import resting_pose, tilted_plane
 from rover_gym.env.sand_ground import sand_rover
 from rover_gym.extras import MissingExtraError
 from rover_gym.mechanics import ModelError
@@ -63,7 +62,7 @@ def parked(model: RoverModel, terrain: Plane | SphereField, *, heading: float = 
     plane = terrain if isinstance(terrain, Plane) else terrain.ground
     assert plane is not None
     simulation = Simulation(model, terrain)
-    simulation.set_state(resting_pose(model, plane, (0.0, 0.0), heading))
+    simulation.set_state(model.resting_pose(plane, (0.0, 0.0), heading))
     return simulation
 
 
@@ -206,7 +205,7 @@ def test_forces_are_drawn_on_request_and_grow_with_the_load(
     seen = {}
     for gravity in (9.81, 3.72):
         simulation = Simulation(model, plane, gravity=(0.0, -gravity, 0.0))
-        simulation.set_state(resting_pose(model, plane, (0.0, 0.0), 0.0))
+        simulation.set_state(model.resting_pose(plane, (0.0, 0.0), 0.0))
         simulation.brake()
         simulation.step(40)
         for show in (False, True):
@@ -219,7 +218,7 @@ def test_forces_are_drawn_on_request_and_grow_with_the_load(
 
 
 def test_the_arrows_of_a_parked_rover_carry_its_weight(model: RoverModel) -> None:
-    plane = tilted_plane(np.radians(10.0), 0.5)
+    plane = Plane.tilted(np.radians(10.0), 0.5)
     simulation = parked(model, plane, heading=0.3)
     assert [array.shape for array in contact_forces(simulation)] == [(0, 3), (0, 3)], "no step, no contact"
     simulation.brake()
@@ -253,7 +252,7 @@ def test_ruts_lie_on_the_surface_and_are_darker_where_they_are_deep() -> None:
     square = np.stack(np.meshgrid(np.arange(10), np.arange(10)), axis=-1).reshape(-1, 2)
     places = (np.vstack((square, square + np.array([30, -4]))) + 0.5) * 0.02
     depths = np.repeat([0.01, 0.04], 100)
-    slope = tilted_plane(0.2, 0.0)
+    slope = Plane.tilted(0.2, 0.0)
     vertices, faces, colours = rut_mesh(np.column_stack((places, depths)), 0.02, slope)
     middles = vertices[faces].mean(axis=1)
     np.testing.assert_allclose(middles[:, [0, 2]], places, atol=1e-12)
@@ -293,7 +292,7 @@ def test_tracks_in_sand_are_seen_behind_the_rover() -> None:
 def test_a_slope_is_seen(model: RoverModel, renderer: Callable[..., FrameRenderer]) -> None:
     """Facing across the slope the horizon of the ground leans as the ground does."""
     slope = np.radians(15.0)
-    plane = tilted_plane(slope, np.pi / 2)  # uphill to the left of x
+    plane = Plane.tilted(slope, np.pi / 2)  # uphill to the left of x
     frame = renderer(plane, camera=((-4.0, 1.5, 0.0), (0.0, 1.2, 0.0)), width=320, height=240).render(
         parked(model, plane)
     )

@@ -17,8 +17,7 @@ import numpy as np
 import numpy._core._multiarray_umath as numpy_core
 import pytest
 
-from rover_gym.env.start import tilted_plane
-from rover_gym.mechanics import SphereField
+from rover_gym.mechanics import Plane, SphereField
 from rover_gym.policy.command_env import DriveByCommand
 from rover_gym.policy.pd_policy import PDPolicy, find_rover_env
 
@@ -59,7 +58,7 @@ def drive(env: gym.Env[Any, Any], seed: int, act: Callable[[Any], Any]) -> list[
 def drives() -> dict[str, list[str]]:
     """Digests of drives on three grounds, at random, by the PD policy and by random commands."""
     found = {}
-    field = SphereField([[2.0, 0.1, 0.5], [-1.5, 0.0, -0.6]], [0.2, 0.3], tilted_plane(0.1, 2.0))
+    field = SphereField([[2.0, 0.1, 0.5], [-1.5, 0.0, -0.6]], [0.2, 0.3], Plane.tilted(0.1, 2.0))
     environments = {
         "plane": gym.make("Rover-v0", slope_deg=(2.0, 10.0), observation_noise=0.01),
         "rocks": gym.make("RoverRocks-v0", slope_deg=(2.0, 10.0)),

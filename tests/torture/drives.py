@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField
-from rover_gym.env import resting_pose, tilted_plane
 from torture.audit import Array, Audit
 from torture.ledger import Bounds, Ledger, Regime
 
@@ -29,7 +28,7 @@ def variant(random: Random) -> str:
 
 def tilted(random: Random, steepest: float) -> Plane:
     """A plane through the origin with a slope up to so many degrees."""
-    return tilted_plane(np.radians(random.uniform(0.0, steepest)), random.uniform(-np.pi, np.pi))
+    return Plane.tilted(np.radians(random.uniform(0.0, steepest)), random.uniform(-np.pi, np.pi))
 
 
 def rocks(random: Random, ground: Plane | None = None) -> SphereField:
@@ -106,7 +105,7 @@ def drive(random: Random, audit: Audit, periods: int, steps: int, *, torque: flo
 def standing(random: Random, terrain: Plane, **options: Any) -> Simulation:
     """A rover that rests on a plane."""
     sim = Simulation(options.pop("model", MODEL), terrain, **options)
-    sim.set_state(resting_pose(sim.model, terrain, (0.0, 0.0), random.uniform(-np.pi, np.pi)))
+    sim.set_state(sim.model.resting_pose(terrain, (0.0, 0.0), random.uniform(-np.pi, np.pi)))
     return sim
 
 

@@ -26,7 +26,6 @@ from rover_gym.cli.options import (
 from rover_gym.economy.economies import Economy, measure_economies
 from rover_gym.economy.planner import plan
 from rover_gym.economy.scene_plan import Accuracy, Scene, ScenePlan
-from rover_gym.env.start import tilted_plane
 from rover_gym.mechanics import OptionError, Plane, RoverModel, SphereField, Terrain
 from rover_gym.reproduction import sphere_rug
 from rover_gym.validation import number, refuse
@@ -138,7 +137,7 @@ def _accuracy(text: str) -> Accuracy:
 def _ground(terrain: str, model: RoverModel, slope: float, seed: int) -> Plane | SphereField:
     """The ground of a name."""
     steepness = math.radians(number("slope", slope, at_least=-60.0, at_most=60.0))
-    plane = tilted_plane(steepness, 0.0) if steepness else Plane()
+    plane = Plane.tilted(steepness, 0.0) if steepness else Plane()
     if terrain == "plane":
         return plane
     if terrain == "rocks":

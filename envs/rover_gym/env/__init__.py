@@ -6,7 +6,7 @@ from rover_gym.env.grains_env import BedDraw, GrainsEnvSnapshot, RoverGrainsEnv
 from rover_gym.env.observation import ObservationField, ObservationLayout
 from rover_gym.env.reward_terms import RewardTerm
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.env.start import Domain, HeightScan, Rocks, Start, drive_signs, resting_pose, tilted_plane, wheel_centres
+from rover_gym.env.start import Domain, HeightScan, Rocks, Start, drive_signs, wheel_centres
 from rover_gym.env.task import Task
 
 __all__ = [
@@ -27,7 +27,5 @@ __all__ = [
     "Start",
     "Task",
     "drive_signs",
-    "resting_pose",
-    "tilted_plane",
     "wheel_centres",
 ]

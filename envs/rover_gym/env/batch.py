@@ -32,7 +32,6 @@ from rover_gym.env.generators import (
     fresh_seed,
     generator_at,
     row_of,
-    seeded_rows,
     set_row,
 )
 from rover_gym.env.observation import Array, Mask, Observations
@@ -49,6 +48,7 @@ from rover_gym.mechanics import (
     RoverGymError,
     Simulation,
     StateError,
+    seed_generators,
 )
 from rover_gym.rendering.render_options import RenderOptions
 from rover_gym.validation import Range, refuse, whole
@@ -227,7 +227,7 @@ class RoverBatch:
         kept = [k for k, seed in enumerate(given) if seed is None]
         rows[kept] = self.generator_rows([chosen[k] for k in kept])
         anew = [k for k, seed in enumerate(given) if seed is not None]
-        rows[anew] = seeded_rows([seed for seed in given if seed is not None])
+        rows[anew] = seed_generators([seed for seed in given if seed is not None])
         used = [self.seed_of(i) if seed is None else seed for i, seed in zip(chosen, given, strict=True)]
         difficulties = [self._difficulties[i] for i in chosen]
         fixed = ResetOptions() if options is None else options
@@ -584,7 +584,7 @@ class RoverBatch:
         """Seeds those of the chosen generators that have no seed yet."""
         unseeded = [i for i in chosen if self._seeds[i] is None]
         seeds = [fresh_seed() for _ in unseeded]
-        self._generators[unseeded] = seeded_rows(seeds)
+        self._generators[unseeded] = seed_generators(seeds)
         for i, seed in zip(unseeded, seeds, strict=True):
             self._seeds[i] = seed
 

@@ -1,25 +1,17 @@
 """Random generators: NumPy's `Generator` over `PCG64`, and the rows of numbers that the core draws from.
 
 A row is (4,) uint64: high and low half of the state, high and low half of the increment.
-
-Gymnasium looks an action up for the keys that are held together, so that each of the sixteen combinations has its own;
-the empty one is the action without a key.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from gymnasium.utils import seeding
 
-from rover_gym.mechanics import OptionError, seed_generators
+from rover_gym.mechanics import OptionError
 from rover_gym.validation import refuse, whole
-
-if TYPE_CHECKING:
-    pass
-
 
 Rows: TypeAlias = npt.NDArray[np.uint64]
 
@@ -45,20 +37,10 @@ def spread_seeds(seed: object, n: int) -> list[int | None]:
     return [None if first is None else first + i for i in range(n)]
 
 
-def seeded(seed: int | None) -> tuple[np.random.Generator, int]:
-    """A random generator made from a checked seed as `gymnasium.Env.reset` makes it, and the seed used."""
-    return seeding.np_random(seed)
-
-
 def fresh_seed() -> int:
     """A seed from the operating system, as NumPy's `SeedSequence` takes one."""
     entropy: int = np.random.SeedSequence().entropy  # type: ignore[assignment] # one number where none was given
     return entropy
-
-
-def seeded_rows(seeds: list[int]) -> Rows:
-    """(m, 4) rows of the generators that `seeded` makes."""
-    return seed_generators(seeds)
 
 
 def row_of(generator: np.random.Generator) -> Rows:

@@ -55,11 +55,6 @@ class Start:
         return (self.goal, *self.further)
 
 
-def tilted_plane(slope: float, uphill: float) -> Plane:
-    """The plane through the origin that rises by `slope` in the direction `uphill`, both rad."""
-    return Plane.tilted(slope, uphill)
-
-
 def slope_of(terrain: Terrain | None) -> tuple[float, float]:
     """Slope and direction of steepest ascent of a terrain's plane, rad; zero where it has none.
 
@@ -75,14 +70,6 @@ def slope_of(terrain: Terrain | None) -> tuple[float, float]:
         refuse(TerrainError, "terrain", terrain, "needs a ground plane with an upward normal")
     x, y, z = ground.normal
     return float(atan2(math.sqrt(x * x + z * z), y)), float(atan2(z, -x))
-
-
-def resting_pose(model: RoverModel, plane: Plane, position: Point, heading: float) -> npt.NDArray[np.float64]:
-    """`(nq,)` coordinates of the rover resting on the plane, the trunk's origin above `position`.
-
-    The trunk is upright along the normal and joints are at zero, unless another pose puts more wheels on the ground.
-    """
-    return model.resting_pose(plane, position, heading)
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,7 @@ import numpy.typing as npt
 from rover_gym.env.arguments import RoverArguments, takes_arguments
 from rover_gym.env.batch import RoverBatch
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.env.start import tilted_plane
-from rover_gym.mechanics import Simulation, SimulationBatch
+from rover_gym.mechanics import Plane, Simulation, SimulationBatch
 from rover_gym.vector.vector_env import RoverVectorEnv
 
 Ground = Literal["plane", "rocks"]
@@ -246,7 +245,7 @@ def _rover(env: RoverEnv, seed: int) -> Simulation:
     """A rover at rest on the ground of an episode, its wheels braked until the first command."""
     env.reset(seed=seed)
     terrain, start = env.simulation.terrain, env.start
-    place, plane = start.position, tilted_plane(start.slope, start.uphill)
+    place, plane = start.position, Plane.tilted(start.slope, start.uphill)
     if env.rocks is not None:
         place = (0.5 * (place[0] + env.goal[0]), 0.5 * (place[1] + env.goal[1]))
     q = env.model.resting_pose(plane, place, start.heading)
