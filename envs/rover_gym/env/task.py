@@ -132,7 +132,6 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
     simulation = Simulation(rover, Plane(), **options)  # the core validates the simulation options
     points = None if given["height_scan"] is None else given["height_scan"].offsets
     max_steering = _steering_limit(rover, steering, given["max_steering_deg"])
-<<<<<<< HEAD
     field_margin = FIELD_MARGINS.get(terrain) if isinstance(terrain, str) else None
     rules = _rules(
         given,
@@ -143,9 +142,6 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
         free_distance=free_distance,
         field_margin=field_margin,
     )
-=======
-    rules = _rules(given, rover, substeps=substeps, max_steering=max_steering, scan=points, free_distance=free_distance)
->>>>>>> work-house
     episodes = EpisodeDistribution(
         rules,
         simulation,
