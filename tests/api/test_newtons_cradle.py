@@ -1,4 +1,4 @@
-"""Three equal balls in a row, the first of which strikes: what Newton's law of restitution makes of a cradle."""
+"""Newton's law of restitution in a cradle of three equal balls, and contacts without gravity."""
 
 import numpy as np
 import pytest
@@ -75,7 +75,7 @@ def glide(ground, gravity: float, time_step: float) -> tuple[np.ndarray, np.ndar
 
 @pytest.mark.parametrize("gravity", [0.0, 1.62])
 def test_over_waves_the_path_is_that_under_gravity(gravity: float) -> None:
-    """How near a contact must be to stay closed is measured by gravity, which presses nothing here."""
+    """The distance at which a contact counts as closed depends on gravity, which does not press here."""
     differences = []
     for time_step in (0.002, 0.0005):
         (path, loads), (expected, borne) = (glide(waves(), g, time_step) for g in (gravity, EARTH))

@@ -1,7 +1,7 @@
 """`SphereField`: arrays, files, rocks, heights, bad input.
 
-Six wheels brace against the ground up to the friction limit and slip at 1e-11 m/s. Solved badly, one step in nine takes
-more than 100 iterations, the worst 1134, and 8 steps in 7000 miss 1e-12.
+Six wheels brace against the ground up to the friction limit and slip at 1e-11 m/s. With an unsuitable solver, one step
+in nine takes more than 100 iterations (at most 1134), and 8 of 7000 steps do not reach 1e-12.
 """
 
 import pickle

@@ -52,7 +52,7 @@ def test_it_is_plotted_and_replayed(folder: Path) -> None:
 
 @pytest.mark.nightly("tests/cli/test_maps.py::test_it_is_plotted_and_replayed")
 def test_a_drive_off_the_map_is_recorded_plotted_and_replayed(tmp_path: Path) -> None:
-    """Its last step has no residual, and the axes of the figure had no end."""
+    """Its last step has no residual, and the figure had infinite axes."""
     env = RoverEnv(terrain=HeightField(np.zeros((21, 21)), 0.5), goal_distance=(2.0, 3.0))
     env.reset(seed=0)
     sampler, info = RoverSampler(env.model), {"termination": ""}
@@ -153,7 +153,7 @@ def test_damaged_materials_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_flat_map_is_not_taken_for_a_trap(tmp_path: Path) -> None:
-    """Flat maps shrink by more than the reader of a recording takes a file for sound."""
+    """Flat maps compress better than the reader allows for an undamaged file."""
     flat = HeightField(np.zeros((2000, 2000)), 0.5)
     with Recorder(tmp_path / "flat.h5", [Channel("time", "s", "time")], terrain=flat, rows_per_flush=1) as tape:
         tape.append({"time": 0.0})

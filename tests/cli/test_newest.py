@@ -30,7 +30,7 @@ def test_a_drive_is_recorded_and_the_next_two_commands_need_no_name(place: Path)
 
 
 def test_the_command_starts_without_any_extra() -> None:
-    """Pages took the colours of the rover from a module that imports VTK: `rover` failed without it."""
+    """The replay page took the rover's colours from a module that imports VTK, so `rover` failed without VTK."""
     extras = ("vtkmodules", "h5py", "matplotlib", "websockets", "pygltflib", "trimesh", "scipy", "PIL")
     code = f"import sys; sys.modules.update(dict.fromkeys({extras!r})); import rover_gym.cli, rover_gym.live"
     subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ})

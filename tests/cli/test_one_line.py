@@ -53,7 +53,7 @@ def test_an_error_that_nobody_foresaw_is_one_line_too(error: Exception, monkeypa
 
 
 def test_bytes_of_a_name_that_are_no_text_are_printed(tmp_path: Path) -> None:
-    """The message itself raised UnicodeEncodeError."""
+    """Printing the message raised UnicodeEncodeError."""
     name = os.fsdecode(bytes(tmp_path / "run-") + b"\xff.h5")
     assert "run-\\udcff.h5" in error_of("replay", name, "--vrml", tmp_path / "a.wrl")
 

@@ -446,7 +446,7 @@ def renamed_run(title: str) -> RoverRun:
 
 
 def test_names_and_titles_reach_vrml_escaped(tmp_path: Path) -> None:
-    """A solid's name went into the file as it was, and could add nodes and scripts."""
+    """A solid's name was written unescaped and could add nodes and scripts."""
     run = renamed_run('a "} Script { url "x\n')
     text = write_vrml(run, tmp_path / "out.wrl").read_text(encoding="utf-8")
     assert "Evil Script" not in text
@@ -487,7 +487,7 @@ def test_names_become_identifiers_that_are_their_own() -> None:
 
 
 def test_a_run_over_thousands_of_kilometres_has_a_ground_of_few_squares() -> None:
-    """A square of half a metre each, they took all memory."""
+    """The ground was drawn in squares of half a metre, which exhausted the memory."""
     run = turning_run(Plane())
     run.trajectory["q"][-1, :3] = 5e8
     tiles = ground_tiles(run)
@@ -497,7 +497,7 @@ def test_a_run_over_thousands_of_kilometres_has_a_ground_of_few_squares() -> Non
 
 
 def test_a_title_with_dollars_is_no_formula(tmp_path: Path) -> None:
-    """The gaps of this run are infinite besides, and its rover has no weight: neither ended an axis."""
+    """The run also has infinite gaps and a weightless rover; both must give finite axes."""
     run = replace(turning_run(), title=r"$\frac{")
     weightless = replace(run.trajectory, attributes={"solver": {"gravity": [0.0, 0.0, 0.0]}})
     assert len(draw_run(replace(run, trajectory=weightless), tmp_path)) >= 2

@@ -387,7 +387,7 @@ def test_ten_minutes_of_driving_over_rocks() -> None:
 
 
 def test_the_class_of_their_field_is_another_name_of_the_terrain() -> None:
-    """Files of trainings hold it."""
+    """Saved training configurations use the old name."""
     two = [RoverEnv(terrain=name) for name in ("rocks", "sphere_field")]
     first, second = (env.reset(seed=1)[0] for env in two)
     assert np.array_equal(first, second)

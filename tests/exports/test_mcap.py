@@ -107,7 +107,7 @@ def rep_103(vector: Any) -> Any:
 
 
 def test_frames_have_x_forward_and_z_up(tmp_path: Path) -> None:
-    """Frames of solids had y up, which programs of ROS take for left: REP 103 has z up."""
+    """Frames of solids had y up. ROS programs expect REP 103, where y is left and z up."""
     model = RoverModel()
     sim = Simulation(model)
     sim.set_state(model.resting_pose(sim.terrain, (0.0, 0.0), 0.0))
