@@ -1,8 +1,8 @@
 """Bad input of the environment is refused by field, and a refused call changes nothing.
 
 Each argument, option and method that takes a value gets every value of a table of hostile values. If a field accepts
-one, a reset and some steps must give finite numbers. Any other exception, and any warning, fails the test. Further tests
-have values that contradict one another. `test_card.py` tests the ends of ranges.
+one, a reset and some steps must give finite numbers. Any other exception, and any warning, fails the test.
+Further tests have values that contradict one another. `test_card.py` tests the ends of ranges.
 """
 
 import inspect
