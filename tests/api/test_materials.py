@@ -1,7 +1,5 @@
 """Friction and restitution by pair of materials, and wheels with a width, from Python."""
 
-from __future__ import annotations
-
 import json
 import math
 import pickle

@@ -1,7 +1,5 @@
 """Damaged files and nonsensical arguments: refused with an error of ours, or sound."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import re

@@ -5,8 +5,6 @@ random and loose); Silbert 2010, *Jamming of frictional spheres and random loose
 from 6 without friction towards 4).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from validation.balls import DIAMETER, box, loose, settle
