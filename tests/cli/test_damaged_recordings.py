@@ -355,7 +355,7 @@ def test_a_rover_or_a_ground_that_is_none_is_a_recording_error(sound_run: Path, 
     path.write_bytes(sound_run.read_bytes())
     with h5py.File(path, "r+") as file:
         file["terrain/plane_normal"][...] = 0.0
-    with pytest.raises(RecordingError, match="is no ground"):
+    with pytest.raises(RecordingError, match="is not a valid ground"):
         read_run(path)
 
 

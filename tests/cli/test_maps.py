@@ -148,7 +148,7 @@ def test_damaged_materials_are_refused(tmp_path: Path) -> None:
             tape.append(sampler.row(simulation, residual=0.0, iterations=0))
         with h5py.File(path, "r+") as file:
             file["terrain"][name].attrs[key] = value
-        with pytest.raises(RecordingError, match=r"damaged\.h5: terrain: is no ground"):
+        with pytest.raises(RecordingError, match=r"damaged\.h5: terrain: is not a valid ground"):
             read_run(path)
 
 
