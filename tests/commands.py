@@ -19,3 +19,13 @@ def output_of(*arguments: Any) -> str:
     result = rover(*arguments)
     assert result.exit_code == 0, result.output
     return result.output
+
+
+def error_of(*arguments: Any) -> str:
+    """The one line with which a command is refused."""
+    result = rover(*arguments)
+    assert result.exit_code == 2, result.output
+    assert result.stderr.startswith("error: ")
+    assert len(result.stderr.splitlines()) == 1
+    assert "Traceback" not in result.output
+    return result.stderr

@@ -20,7 +20,7 @@ from rover_gym.planar import BallSimulation, Line, Polyline, Sine, Spline, TwoWh
 
 @contextmanager
 def within(seconds: float) -> Iterator[None]:
-    """Far more than the call takes on a busy machine, far less than it took."""
+    """A time limit far above a normal call, far below an unbounded one."""
     begin = time.perf_counter()
     yield
     assert time.perf_counter() - begin < seconds
@@ -174,7 +174,7 @@ def test_fields_of_too_many_spheres_are_refused(field: str, make: Any) -> None:
 
 
 def test_an_abundance_that_vanishes_gives_no_rocks() -> None:
-    """Its decay overflowed, and the number of rocks was none."""
+    """The decay overflowed, and the field had no rocks."""
     for abundance in (5e-324, 1e-300, 0.0):
         assert len(SphereField.rocks(abundance, (0.0, 0.0, 10.0, 10.0), 0)) == 0
 

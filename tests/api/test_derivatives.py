@@ -63,7 +63,7 @@ def test_a_trajectory_is_one_of_real_steps(scene):
     [(flying, 20, 1e-7), (sliding, 20, 1e-6), (on_rocks, 3, 1e-6), (held_on_a_slope, 20, 1e-6)],
 )
 def test_a_jvp_by_commands_and_velocity_is_a_difference(scene, steps, tolerance):
-    """Among rocks three steps, until the contact problem has several solutions."""
+    """Three steps among rocks: after more, the contact problem has several solutions."""
     sim = scene()
     start, commands = state_of(sim), commands_of(sim, steps)
     pushed = np.zeros_like(commands)

@@ -67,7 +67,7 @@ def test_the_relaxed_law_says_that_it_is_another_law():
 
 
 def test_the_last_problem_is_that_of_the_velocities_where_the_position_was_projected():
-    """It was that of the projection, whose q are gaps in metres."""
+    """`last_problem` returned the problem of the projection, whose q are gaps in metres."""
     sim = rover_gym.Simulation(warm_start=False)  # not by the fast step
     q = sim.q
     q[1] = 0.5
@@ -200,7 +200,7 @@ def test_numbers_at_the_end_of_their_range_neither_panic_nor_lie(W, q, mu, solve
 
 
 def chain(n, dimension, seed=0):
-    """Contacts that feel their neighbours only: W (dense), q, mu."""
+    """Contacts that are coupled with their neighbours only: W (dense), q, mu."""
     rng = np.random.default_rng(seed)
     W = np.zeros((n * dimension, n * dimension))
     for i in range(n - 1):

@@ -48,7 +48,7 @@ def a_run(
 
 
 def with_noise(run: RoverRun, seed: int) -> RoverRun:
-    """The run as it is measured."""
+    """The run with measurement noise."""
     random = np.random.default_rng(seed)
     data = dict(run.trajectory.data)
     for name, deviation in NOISE.items():
@@ -155,7 +155,7 @@ def test_without_noise_the_parameters_are_exact(slipping: RoverRun) -> None:
 
 @pytest.mark.takes_long("a fit is some hundred simulations")
 def test_a_fit_that_noise_does_not_explain_identifies_nothing(slipping: RoverRun, fits: Fits) -> None:
-    """Wheels spun that held in the simulation. Their errors passed for noise, and the start came back with 0.0004."""
+    """Wheels spun in the run and held in the simulation; the misfit passed for noise (standard error 0.0004)."""
     believed = BELIEVED | {"settings": {"friction": 0.9}}
     run = with_noise(slipping, 3)
     fit = identify(run, ["mass_scale"], window=0.4, max_windows=2, **believed)

@@ -1,7 +1,5 @@
 """Friction and restitution by pair of materials, and wheels with a width, from Python."""
 
-from __future__ import annotations
-
 import json
 import math
 import pickle
@@ -195,7 +193,7 @@ def test_a_map_that_is_a_tilted_plane_is_the_plane(name: str) -> None:
 
 
 def test_rigid_wheels_on_four_points_depend_on_micrometres() -> None:
-    """What the stiffness mends: if this fails, rigid wheels have learned the same."""
+    """The problem that the stiffness solves. If this fails, rigid wheels no longer need it."""
     ends = [driven(rigid("four-steered"), ground, 0.005) for ground in (SLOPE, tilted_map())]
     assert distance(*ends) > 0.1
 
@@ -226,7 +224,7 @@ def test_the_loads_do_not_depend_on_the_step(name: str) -> None:
 
 
 def test_wide_wheels_converge() -> None:
-    """Two contacts a wheel, as an import has them: 0.3 to 0.7 m between 5 and 1 ms with rigid wheels."""
+    """Two contacts per wheel, as after an import. With rigid wheels, paths at 5 and 1 ms end 0.3 to 0.7 m apart."""
     for name in FOUR:
         ends = [driven(yielding(name), SLOPE, step, seed=3) for step in (0.01, 0.005, 0.001)]
         coarse, fine = distance(ends[0], ends[2]), distance(ends[1], ends[2])
@@ -250,7 +248,7 @@ def braced(stiffness: float) -> RoverModel:
 
 
 def test_a_rigid_body_on_two_bogies_turns_alike_at_every_step() -> None:
-    """JPL's Open Source Rover: at 5 ms 15 mm from Drake's path, at 0.2 ms 0.45 m with a wheel at 0 N."""
+    """JPL's Open Source Rover ended 15 mm from Drake's path at 5 ms, and 0.45 m at 0.2 ms with one wheel unloaded."""
     ends, loads = [], []
     for step in (0.02, 0.005, 0.001):
         sim = Simulation(braced(1e7), time_step=step)
@@ -380,7 +378,7 @@ def test_the_report_says_when_loads_are_undetermined() -> None:
 
 
 def test_a_step_that_is_split_counts_the_loads_of_its_last_part() -> None:
-    """Its list of contacts is longer than its last problem where a part met another rock than the next."""
+    """The list of contacts is longer than the last problem if two parts of the step touched different rocks."""
     draw = np.random.default_rng(0)
     n = 300
     centres = np.column_stack((draw.uniform(-2.0, 6.0, n), np.full(n, -0.06), draw.uniform(-1.0, 1.0, n)))

@@ -76,7 +76,7 @@ def test_both_coordinates_tell_one_motion(reference):
 
 
 def test_what_the_simulation_says_is_what_the_model_takes():
-    """`mass_matrix(sim.q)` read the state's coordinates as the report's: entries wrong by 90 without a word."""
+    """`mass_matrix(sim.q)` read the state's coordinates as the report's: entries were silently wrong by 90."""
     model = rover_gym.RoverModel()
     sim = rover_gym.Simulation(model)
     q = np.zeros(21)
@@ -94,7 +94,7 @@ def test_what_the_simulation_says_is_what_the_model_takes():
 
 
 def test_another_wheel_radius_is_another_wheel():
-    """`wheel_radius` kept the inertia of a disc of 0.10 m: which of both is meant is now said in the argument."""
+    """`wheel_radius` kept the inertia of a disc of 0.10 m; an argument now selects the inertia."""
     model = rover_gym.RoverModel()
     wheel = model.wheel_joint_indices[0]
     inertia = [m.mass_matrix(np.zeros(21))[wheel, wheel] for m in (model, model.replace(wheel_radius=0.25))]

@@ -1,4 +1,4 @@
-"""Three equal balls in a row, the first of which strikes: what Newton's law of restitution makes of a cradle."""
+"""Newton's law of restitution in a cradle of three equal balls, and contacts without gravity."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from rover_gym.mechanics import HeightField, Plane, RoverModel, Simulation
 RADIUS = 0.1
 
 
-def struck(gap: float, restitution: float = 1.0) -> np.ndarray:
+def struck(gap: float, restitution: float) -> np.ndarray:
     """Velocities along x after the first ball came with 1 m/s."""
     solid = {"joint": "free", "mass": 1.0, "shape": {"kind": "sphere", "radius": RADIUS}, "collides": True}
     cradle = RoverModel.from_dict({"format": 1, "name": "cradle", "solids": [solid | {"name": name} for name in "abc"]})
@@ -23,17 +23,14 @@ def struck(gap: float, restitution: float = 1.0) -> np.ndarray:
     return np.asarray(sim.v[along])
 
 
-def test_a_cradle_without_gaps_gives_one_and_two_thirds() -> None:
-    """Both contacts keep their law at once, u+ = -e u-: the first separates at 1 m/s, the second not at all."""
-    assert struck(0.0) == pytest.approx([-1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0], abs=1e-9)
-
-
-def test_a_cradle_with_a_gap_passes_the_velocity_on() -> None:
-    assert struck(0.005) == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
-
-
-def test_a_cradle_without_restitution_moves_as_one() -> None:
-    assert struck(0.0, restitution=0.0) == pytest.approx([1.0 / 3.0] * 3, abs=1e-9)
+@pytest.mark.parametrize(
+    ("gap", "restitution", "velocities"),
+    [(0.0, 1.0, (-1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0)), (0.005, 1.0, (0.0, 0.0, 1.0)), (0.0, 0.0, (1.0 / 3.0,) * 3)],
+    ids=["touching", "with gaps", "inelastic"],
+)
+def test_a_cradle_obeys_newtons_law(gap: float, restitution: float, velocities: tuple[float, ...]) -> None:
+    """Touching balls keep the law at both contacts at once, u+ = -e u-; with gaps they collide in turn."""
+    assert struck(gap, restitution) == pytest.approx(velocities, abs=1e-9)
 
 
 #: Of the ball, kg, its radius, m, and its speed along the ground, m/s.
@@ -75,7 +72,7 @@ def glide(ground, gravity: float, time_step: float) -> tuple[np.ndarray, np.ndar
 
 @pytest.mark.parametrize("gravity", [0.0, 1.62])
 def test_over_waves_the_path_is_that_under_gravity(gravity: float) -> None:
-    """How near a contact must be to stay closed is measured by gravity, which presses nothing here."""
+    """The distance at which a contact counts as closed depends on gravity, which does not press here."""
     differences = []
     for time_step in (0.002, 0.0005):
         (path, loads), (expected, borne) = (glide(waves(), g, time_step) for g in (gravity, EARTH))

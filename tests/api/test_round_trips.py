@@ -281,7 +281,7 @@ def test_a_quaternion_that_is_no_rotation_is_refused() -> None:
 @given(st.data())
 @settings(max_examples=60, deadline=None)
 def test_a_snapshot_with_damaged_bytes_is_refused_or_goes_on(data: st.DataObject) -> None:
-    """Snapshots on a damaged sine hung: a place a million kilometres down was searched wave by wave."""
+    """Snapshots on a damaged sine hung: the search went wave by wave from a million kilometres below the ground."""
     for sim in [TwoWheelRoverSimulation(Sine(0.05, 2.0)), driven(Simulation()), soil()]:
         sim.step(3)
         damaged = bytearray(sim.snapshot().to_bytes())

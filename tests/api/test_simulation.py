@@ -292,7 +292,7 @@ def boxes_on_each_other(**options):
 
 
 def test_a_step_that_its_budget_ended_says_so():
-    """The story: a step had a quarter of a fixed budget, took no other, and only said "not_converged"."""
+    """A step had a quarter of a fixed budget, ignored `budget=`, and reported only "not_converged"."""
     solved = boxes_on_each_other().step(20)
     assert solved.is_converged
     assert not solved.budget_exhausted

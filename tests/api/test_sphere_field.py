@@ -1,7 +1,7 @@
 """`SphereField`: arrays, files, rocks, heights, bad input.
 
-Six wheels brace against the ground up to the friction limit and slip at 1e-11 m/s. Solved badly, one step in nine takes
-more than 100 iterations, the worst 1134, and 8 steps in 7000 miss 1e-12.
+Six wheels brace against the ground up to the friction limit and slip at 1e-11 m/s. With an unsuitable solver, one step
+in nine takes more than 100 iterations (at most 1134), and 8 of 7000 steps do not reach 1e-12.
 """
 
 import pickle
@@ -116,6 +116,7 @@ def test_a_bad_file_is_a_terrain_error(tmp_path, text, message):
     ("field", "arguments"),
     [
         ("abundance", {"abundance": 0.9}),
+        ("abundance", {"abundance": -0.1}),
         ("abundance", {"abundance": np.nan}),
         ("max_diameter", {"max_diameter": -1.0}),
         ("burial", {"burial": 2.0}),
@@ -137,7 +138,10 @@ def test_bad_rocks_are_refused_by_field(field, arguments):
     ("centres", "radii", "message"),
     [
         ([[0, 0, 0]], [], "radii: needs one"),
+        ([[0, 0]], [1.0], "centres: "),
         ([[0, 0, 0]], [0.0], r"radii\[0\]: must be positive"),
+        ([[0, 0, 0]], [-1.0], r"radii\[0\]: must be positive"),
+        ([[0, 0, 0]], [np.nan], r"radii\[0\]: must be "),
         ([[0, 0, 0]], [1e7], r"radii\[0\]: must be at most"),
         ([[0, 0, 0], [0, np.nan, 0]], [1.0, 1.0], r"centres\[1\]: must be finite"),
         ([[0, 0, 1e300]], [1.0], r"centres\[0\]: must be at most"),

@@ -170,7 +170,7 @@ def test_it_plays_and_the_wheel_of_the_mouse_zooms(shown: Shown[GrainRun]) -> No
 
 @pytest.mark.nightly("tests/browser/test_grain_page.py::test_the_page_holds_the_places_of_every_sample")
 def test_twenty_thousand_balls_cost_the_script_little(tmp_path: Path) -> None:
-    """60 pictures a second leave 17 ms for each; of 50 000 balls a new sample may take 3, and time goes with balls."""
+    """Of the 17 ms of a frame at 60 Hz, a new sample of 50 000 balls may take 3 ms, and fewer balls in proportion."""
     record_run(MovingBalls((50, 10, 40), 0.01, 0.5), 0.4, tmp_path / "run.h5")
     page = write_page(open_run(tmp_path / "run.h5"), tmp_path / "replay.html")
     with opened(page, tmp_path / "profile") as browser:

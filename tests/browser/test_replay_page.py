@@ -221,7 +221,7 @@ def test_the_scene_shows_rover_rocks_and_ground_the_right_way_up(shown: Shown[Ro
 
 @pytest.mark.nightly("tests/browser/test_replay_page.py::test_the_scene_shows_rover_rocks_and_ground_the_right_way_up")
 def test_a_map_lies_under_the_rover_and_no_rock_floats_in_the_sky(tmp_path: Path) -> None:
-    """Rocks beyond the piece of the map that is shown stood in the air."""
+    """Rocks outside the displayed part of the map floated in the air."""
     field = HeightField.fractal(60.0, 0.25, 0.1, hurst=0.8, craters=0.02, crater_diameter=(1.0, 4.0), seed=3)
     rocks = SphereField.rocks(0.05, field.bounds, 1, ground=field, clear=[[0.0, 0.0, 1.5]])
     page = write_page(drive(tmp_path / "run.h5", Union([field, rocks])), tmp_path / "replay.html")
@@ -332,7 +332,7 @@ def test_it_plays(shown: Shown[RoverRun]) -> None:
 
 @pytest.mark.nightly("tests/browser/test_replay_page.py::test_the_timeline_moves_the_rover")
 def test_a_page_left_playing_holds_no_more_after_several_loops(shown: Shown[RoverRun]) -> None:
-    """The page before this one took longer for every loop."""
+    """The page slowed down with every loop."""
     browser = shown.browser
     held = "return document.querySelector('#root canvas').dataset.held;"
     go_to(browser, 0.1)

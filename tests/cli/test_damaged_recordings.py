@@ -299,7 +299,7 @@ def test_a_pipe_is_refused_and_not_waited_for(tmp_path: Path) -> None:
 
 
 def test_a_chunk_of_an_impossible_size_is_refused_unread(sound_run: Path, tmp_path: Path) -> None:
-    """HDF5 looked for the checksum of a chunk of three bytes, and the process ended there."""
+    """HDF5 read the checksum of a chunk of three bytes, and the process crashed."""
     data = sound_run.read_bytes()
     with h5py.File(sound_run) as file:
         place, size = (getattr(file["q"].id.get_chunk_info(0), name) for name in ("byte_offset", "size"))
@@ -355,12 +355,12 @@ def test_a_rover_or_a_ground_that_is_none_is_a_recording_error(sound_run: Path, 
     path.write_bytes(sound_run.read_bytes())
     with h5py.File(path, "r+") as file:
         file["terrain/plane_normal"][...] = 0.0
-    with pytest.raises(RecordingError, match="is no ground"):
+    with pytest.raises(RecordingError, match="is not a valid ground"):
         read_run(path)
 
 
 def test_a_run_that_lasts_for_ages_is_filmed_at_once(sound_run: Path) -> None:
-    """Every frame's time was listed: two samples a thousand million seconds apart took all memory."""
+    """The times of all frames were listed, so two samples 1e9 s apart exhausted the memory."""
     run = read_run(sound_run)
     run.trajectory.data["time"][-1] = 1e9
     assert run.resample(1e6).n_frames == run.n_frames

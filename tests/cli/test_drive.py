@@ -7,7 +7,7 @@ from pathlib import Path
 import imageio_ffmpeg
 import numpy as np
 import pytest
-from commands import output_of, rover
+from commands import error_of, output_of, rover
 
 from rover_gym.policy.comparison import ENDING
 from rover_gym.record import read_run, read_trajectory
@@ -84,19 +84,12 @@ def test_a_short_time_limit_ends_the_episode_without_success() -> None:
     ],
 )
 def test_bad_input_is_one_line_that_names_the_culprit(arguments: list[str], culprit: str) -> None:
-    result = rover("drive", *arguments)
-    assert result.exit_code == 2
-    assert result.stderr.startswith("error: ")
-    assert len(result.stderr.splitlines()) == 1
-    assert culprit in result.stderr
-    assert "Traceback" not in result.output
+    assert culprit in error_of("drive", *arguments)
 
 
 def test_output_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("a file, not a folder", encoding="utf-8")
-    result = rover("drive", "--output", tmp_path / "taken" / "below")
-    assert result.exit_code == 2
-    assert len(result.stderr.splitlines()) == 1
+    error_of("drive", "--output", tmp_path / "taken" / "below")
 
 
 def test_version_and_help() -> None:
@@ -108,8 +101,7 @@ def test_version_and_help() -> None:
 def test_episodes_are_filmed(tmp_path: Path) -> None:
     path = tmp_path / "films" / "rocks.mp4"
     arguments = ("--terrain", "rocks", "--time-limit", "0.3", "--episodes", "2", "--video", str(path))
-    output = output_of("drive", *arguments)
-    assert str(path) in output.replace("\n", "")
+    assert str(path) in output_of("drive", *arguments).replace("\n", "")
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
     assert frames == 2 * (7 + ENDING)  # the start, six steps and the outcome each
     assert seconds == pytest.approx(frames / 20, abs=0.06)
@@ -117,8 +109,7 @@ def test_episodes_are_filmed(tmp_path: Path) -> None:
 
 def test_the_planner_by_hand_drives_too(tmp_path: Path) -> None:
     arguments = ("--policy", "scan", "--terrain", "rocks", "--difficulty", "1", "--time-limit", "2")
-    output = output_of("drive", *arguments, "--model", "mars-rover", "--output", tmp_path)
-    assert "the scan planner" in output
+    assert "the scan planner" in output_of("drive", *arguments, "--model", "mars-rover", "--output", tmp_path)
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert summary["arguments"]["height_scan"] == [48, 40, 0.18]
 
@@ -153,9 +144,7 @@ def last_frame(path: Path, width: int = 320, height: int = 180) -> np.ndarray:
     ],
 )
 def test_a_film_that_cannot_be_is_refused(options: tuple[str, ...], message: str, tmp_path: Path) -> None:
-    result = rover("drive", "--video", tmp_path / "film.mp4", *options)
-    assert result.exit_code == 2
-    assert result.stderr.startswith(f"error: {message}")
+    assert error_of("drive", "--video", tmp_path / "film.mp4", *options).startswith(f"error: {message}")
 
 
 def test_the_recording_says_outcome_and_goal(tmp_path: Path) -> None:
@@ -184,11 +173,7 @@ def test_json_says_the_same_twice() -> None:
 
 
 def test_a_difficulty_out_of_range_is_one_line() -> None:
-    result = rover("baseline", "--episodes", "1", "--difficulty", "2.1")
-    assert result.exit_code == 2
-    assert result.stderr.startswith("error: ")
-    assert len(result.stderr.splitlines()) == 1
-    assert "difficulty" in result.stderr
+    assert "difficulty" in error_of("baseline", "--episodes", "1", "--difficulty", "2.1")
 
 
 def test_a_trained_policy_can_be_measured_too() -> None:
@@ -197,5 +182,4 @@ def test_a_trained_policy_can_be_measured_too() -> None:
 
 
 def test_the_planner_by_hand_can_be_measured_too() -> None:
-    output = output_of("baseline", "--episodes", "1", "--difficulty", "1.25", "--policy", "scan")
-    assert "the scan planner" in output
+    assert "the scan planner" in output_of("baseline", "--episodes", "1", "--difficulty", "1.25", "--policy", "scan")

@@ -56,7 +56,7 @@ def test_an_import_writes_the_model_and_its_picture(tmp_path: Path) -> None:
 
 
 def test_a_robot_without_wheels_is_warned_of(tmp_path: Path) -> None:
-    """A robot came in with 0 wheels and exit status 0, and nothing said so."""
+    """A robot was imported with 0 wheels, exit status 0 and no warning."""
     pytest.importorskip("yourdfpy")
     text = (
         robot_text()

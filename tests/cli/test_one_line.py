@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 import pytest
-from commands import output_of, rover
+from commands import error_of, output_of, rover
 from typer.main import get_command
 from typer.testing import Result
 
@@ -29,7 +29,7 @@ from rover_gym.validation import refuse
 NO_FILE = "cannot be written"
 
 
-def one_line(result: Result, code: int = 2) -> str:
+def one_line(result: Result, code: int) -> str:
     assert result.exit_code == code, result.output
     assert len(result.stderr.splitlines()) == 1
     assert "Traceback" not in result.output
@@ -53,9 +53,9 @@ def test_an_error_that_nobody_foresaw_is_one_line_too(error: Exception, monkeypa
 
 
 def test_bytes_of_a_name_that_are_no_text_are_printed(tmp_path: Path) -> None:
-    """The message itself raised UnicodeEncodeError."""
+    """Printing the message raised UnicodeEncodeError."""
     name = os.fsdecode(bytes(tmp_path / "run-") + b"\xff.h5")
-    assert "run-\\udcff.h5" in one_line(rover("replay", name, "--vrml", tmp_path / "a.wrl"))
+    assert "run-\\udcff.h5" in error_of("replay", name, "--vrml", tmp_path / "a.wrl")
 
 
 @pytest.mark.parametrize(
@@ -81,7 +81,7 @@ def test_bytes_of_a_name_that_are_no_text_are_printed(tmp_path: Path) -> None:
 def test_a_message_names_the_option_that_the_user_can_set(arguments: list[str], message: str, tmp_path: Path) -> None:
     """`--time-step` was answered with `control_frequency`, `--disks` with `start`."""
     output = ["--output", str(tmp_path / "runs")] if arguments[0] in ("drive", "planar", "report") else []
-    line = one_line(rover(*arguments, *output))
+    line = error_of(*arguments, *output)
     assert message in line
     assert "np.float64" not in line
     assert not (tmp_path / "runs").exists()
@@ -125,9 +125,8 @@ def test_a_place_that_cannot_be_written_is_told_before_driving(
 
 def test_a_film_of_another_kind_is_refused_before_driving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(drive_command, "run_episode", raising(AssertionError("it drove")))
-    assert "--video: must be a file's name that ends in .mp4" in one_line(
-        rover("drive", "--video", tmp_path / "film.txt")
-    )
+    error = error_of("drive", "--video", tmp_path / "film.txt")
+    assert "--video: must be a file's name that ends in .mp4" in error
 
 
 @pytest.mark.parametrize("option", ["--html", "--vrml", "--gltf"])
@@ -135,12 +134,12 @@ def test_a_replay_is_not_made_for_a_place_that_cannot_be_written(option: str, tm
     assert rover("drive", "--time-limit", "0.1", "--output", tmp_path).exit_code == 0
     run, taken = tmp_path / "episode-0.h5", tmp_path / "taken"
     taken.write_text("a file", encoding="utf-8")
-    line = one_line(rover("replay", run, "--vrml", tmp_path / "first.wrl", option, taken / "run.out"))
+    line = error_of("replay", run, "--vrml", tmp_path / "first.wrl", option, taken / "run.out")
     assert f"{option}: {NO_FILE}" in line
     assert not (tmp_path / "first.wrl").exists()
-    assert "would replace the run itself" in one_line(rover("replay", run, option, run))
+    assert "would replace the run itself" in error_of("replay", run, option, run)
     assert len(read_trajectory(run)["time"]) == 3
-    assert f"--output: {NO_FILE}" in one_line(rover("plot", run, "--output", taken / "plots"))
+    assert f"--output: {NO_FILE}" in error_of("plot", run, "--output", taken / "plots")
 
 
 def test_an_interrupted_drive_keeps_and_prints_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -273,8 +272,7 @@ def test_a_command_that_prints_a_table_takes_json() -> None:
     ],
 )
 def test_the_title_names_the_environment_that_drove(arguments: tuple[str, ...], title: str, tmp_path: Path) -> None:
-    output = output_of("drive", *arguments, *SHORT, "--output", tmp_path)
-    assert title in output
+    assert title in output_of("drive", *arguments, *SHORT, "--output", tmp_path)
     assert read_trajectory(tmp_path / "episode-0.h5").attributes["title"] == f"an episode of {title}"
 
 
@@ -284,9 +282,8 @@ def test_the_title_names_the_file_of_the_ground(tmp_path: Path) -> None:
 
 
 def test_a_difficulty_means_rocks_and_no_plane() -> None:
-    refused = rover("drive", "--terrain", "plane", "--difficulty", "1")
-    assert refused.exit_code == 2
-    assert refused.stderr == "error: --difficulty: needs terrain 'rocks', 'hills' or 'sand', got 1.0\n"
+    error = error_of("drive", "--terrain", "plane", "--difficulty", "1")
+    assert error == "error: --difficulty: needs terrain 'rocks', 'hills' or 'sand', got 1.0\n"
 
 
 def test_a_policy_is_a_runs_folder_or_the_policy_in_it_or_a_shipped_name(tmp_path: Path) -> None:
@@ -347,9 +344,8 @@ def test_an_error_names_what_the_user_typed(
 ) -> None:
     """`--sinkage` was answered with `--depth`, and `evaluate nope` with `policy`."""
     monkeypatch.chdir(tmp_path)
-    result = rover(*shlex.split(arguments.format(here=__file__)))
-    assert result.exit_code == 2
-    assert result.stderr.startswith(f"error: {begin}"), result.stderr
+    error = error_of(*shlex.split(arguments.format(here=__file__)))
+    assert error.startswith(f"error: {begin}"), error
 
 
 def test_rover_alone_says_what_to_try_first() -> None:

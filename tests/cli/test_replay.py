@@ -12,7 +12,7 @@ import numpy as np
 import pygltflib
 import pytest
 import trimesh
-from commands import output_of, rover
+from commands import error_of, output_of, rover
 from pages import held
 
 from rover_gym import Plane, RoverModel, SphereField
@@ -446,7 +446,7 @@ def renamed_run(title: str) -> RoverRun:
 
 
 def test_names_and_titles_reach_vrml_escaped(tmp_path: Path) -> None:
-    """A solid's name went into the file as it was, and could add nodes and scripts."""
+    """A solid's name was written unescaped and could add nodes and scripts."""
     run = renamed_run('a "} Script { url "x\n')
     text = write_vrml(run, tmp_path / "out.wrl").read_text(encoding="utf-8")
     assert "Evil Script" not in text
@@ -487,7 +487,7 @@ def test_names_become_identifiers_that_are_their_own() -> None:
 
 
 def test_a_run_over_thousands_of_kilometres_has_a_ground_of_few_squares() -> None:
-    """A square of half a metre each, they took all memory."""
+    """The ground was drawn in squares of half a metre, which exhausted the memory."""
     run = turning_run(Plane())
     run.trajectory["q"][-1, :3] = 5e8
     tiles = ground_tiles(run)
@@ -497,7 +497,7 @@ def test_a_run_over_thousands_of_kilometres_has_a_ground_of_few_squares() -> Non
 
 
 def test_a_title_with_dollars_is_no_formula(tmp_path: Path) -> None:
-    """The gaps of this run are infinite besides, and its rover has no weight: neither ended an axis."""
+    """The run also has infinite gaps and a weightless rover; both must give finite axes."""
     run = replace(turning_run(), title=r"$\frac{")
     weightless = replace(run.trajectory, attributes={"solver": {"gravity": [0.0, 0.0, 0.0]}})
     assert len(draw_run(replace(run, trajectory=weightless), tmp_path)) >= 2
@@ -548,29 +548,22 @@ def test_bad_input_is_one_line_that_names_the_culprit(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "taken").write_text("a file, not a folder", encoding="utf-8")
-    result = rover("replay", recording, *arguments)
-    assert result.exit_code == 2
-    assert len(result.stderr.splitlines()) == 1
-    assert culprit in result.stderr
+    assert culprit in error_of("replay", recording, *arguments)
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
 
 
 def test_what_is_no_run_is_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("no run", encoding="utf-8")
     for name, message in (("notes.txt", "is not a rover-gym trajectory"), ("nowhere.h5", "nowhere.h5")):
-        result = rover("replay", tmp_path / name, "--vrml", tmp_path / "out.wrl")
-        assert result.exit_code == 2
-        assert len(result.stderr.splitlines()) == 1
-        assert message in result.stderr
+        assert message in error_of("replay", tmp_path / name, "--vrml", tmp_path / "out.wrl")
 
 
 def test_a_missing_package_is_named_with_its_extra(
     recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pygltflib", None)
-    result = rover("replay", recording, "--vrml", tmp_path / "out.wrl", "--gltf", tmp_path / "out")
-    assert result.exit_code == 2
-    assert result.stderr == "error: pygltflib is not installed: pip install 'rover-gym[replay]'\n"
+    error = error_of("replay", recording, "--vrml", tmp_path / "out.wrl", "--gltf", tmp_path / "out")
+    assert error == "error: pygltflib is not installed: pip install 'rover-gym[replay]'\n"
     assert list(tmp_path.iterdir()) == []
 
 

@@ -13,8 +13,6 @@ mu and dimension); their folder is given by --problems or ROVER_GYM_CONTACT_PROB
 families alone are used.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import platform

@@ -1,11 +1,13 @@
 """Rovers of other builds in the environment: actions, observation, policies and batches follow the model."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from machines import MACHINES, axle, machine
 from refusals import refused
 
-from rover_gym import ModelError, PDPolicy, RoverEnv, RoverModel
+from rover_gym import ModelError, PDPolicy, RoverEnv, RoverModel, StateError
 from rover_gym.policy import CommandController
 from rover_gym.policy.pd_policy import Turning
 from rover_gym.vector import RoverVectorEnv
@@ -83,11 +85,16 @@ def test_axles_meet_in_the_turning_centre_of_the_wheels_that_do_not_steer() -> N
     assert policy.steering_angles(policy.max_curvature)[0] == pytest.approx(env.max_steering)
 
 
-def test_another_rover_refuses_a_snapshot() -> None:
-    env = RoverEnv(model=axle())
+@pytest.mark.parametrize(
+    ("of", "into"),
+    [({"model": axle()}, {"model": MACHINES["all"][1]}), ({"steered": False}, {})],
+    ids=["model", "steered"],
+)
+def test_another_rover_refuses_a_snapshot(of: dict[str, Any], into: dict[str, Any]) -> None:
+    env = RoverEnv(**of)
     env.reset(seed=1)
-    with pytest.raises(ValueError, match="arguments"):
-        RoverEnv(model=MACHINES["all"][1]).restore(env.snapshot())
+    with pytest.raises(StateError, match="arguments"):
+        RoverEnv(**into).restore(env.snapshot())
 
 
 def test_wheels_that_cannot_turn_are_refused() -> None:

@@ -1,4 +1,4 @@
-"""What `Rover-v0` hands out and takes, beyond what `test_registered.py` checks for every environment."""
+"""What `Rover-v0` hands out and takes, beyond what `test_card.py` checks for every environment."""
 
 import copy
 import subprocess

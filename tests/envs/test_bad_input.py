@@ -1,9 +1,8 @@
-"""Bad input that depends on more than one value: which entry of it, or what it contradicts, is named.
+"""Bad input of the environment is refused by field, and a refused call changes nothing.
 
-Ends of ranges are in `test_card.py`, what the core refuses in `test_strict_arguments.py`.
-
-Each argument, option and method that takes a value gets every value of the table. If a field accepts one, a reset and
-some steps must give finite numbers. Any other exception, and any warning, fails the test.
+Each argument, option and method that takes a value gets every value of a table of hostile values. If a field accepts
+one, a reset and some steps must give finite numbers. Any other exception, and any warning, fails the test.
+Further tests have values that contradict one another. `test_card.py` tests the ends of ranges.
 """
 
 import inspect

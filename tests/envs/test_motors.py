@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from rover_gym import RoverEnv, RoverModel
+from rover_gym import RoverEnv
 from rover_gym.env import drive_signs
 from rover_gym.env.reward_terms import WEIGHTS
 
@@ -31,15 +31,6 @@ def test_full_throttle_on_flat_ground_ends_at_the_motors_speed(seed: int) -> Non
     assert 29.0 < fastest < 31.0, "rad/s"
     assert math.isfinite(env.simulation.energy().total)
     assert info["energy"] < 1e5, "J, most of them from the start"
-
-
-def test_without_motors_the_torque_is_the_command_at_any_speed() -> None:
-    env = RoverEnv(model=RoverModel().replace(motor=None), goal_distance=300.0)
-    env.reset(seed=0)
-    for _ in range(60):
-        env.step(FULL)
-    assert (drive_signs(env.model) * env.simulation.v[env.model.wheel_joint_indices] > 60.0).all()
-    np.testing.assert_allclose(env.simulation.motor_torques, env.simulation.wheel_torques, rtol=1e-12)
 
 
 def test_a_fast_step_is_far_from_the_bounds() -> None:

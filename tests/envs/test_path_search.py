@@ -306,7 +306,7 @@ def test_straight_ways_lead_where_no_ways_do() -> None:
 
 
 def test_ways_lead_round_a_wall() -> None:
-    """The goal is straight ahead; the ways say that it is reached to the left only."""
+    """The goal is straight ahead behind a wall; the cost-to-go leads round it to the left."""
     search, _, _ = searches(PathCosts())
     ways = 5.0 + SCAN.offsets[:, 1]
     task = SearchTask((4.0, 0.0), np.zeros(3), 1.0, np.zeros((0, 3)), 0.0)
@@ -348,7 +348,7 @@ def test_the_way_over_a_map_is_the_distance_where_nothing_is_in_it() -> None:
 
 
 def test_ways_by_price_alone_are_the_cheapest_of_all() -> None:
-    """Bellman and Ford's relaxation of every cell finds the same, and nothing leads through what is closed."""
+    """The Bellman-Ford algorithm finds the same costs, and no path crosses closed cells."""
     rng = np.random.default_rng(3)
     price = 1.0 + rng.exponential(size=(12, 9))
     price[rng.random(price.shape) < 0.25] = np.inf

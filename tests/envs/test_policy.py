@@ -203,7 +203,7 @@ def baseline(env: RoverEnv) -> Any:
 @pytest.mark.parametrize("policy", [commanded, baseline])
 @pytest.mark.parametrize("gravity", [1.0, 0.38])
 def test_torques_do_not_swing_among_rocks(policy: Any, gravity: float) -> None:
-    """Wheels in the air swung between full torques in half of their periods, and in a quarter at 0.38 of gravity."""
+    """The torques of wheels in the air alternated between the limits in half of the periods (a quarter at 0.38 g)."""
     flips, _ = regulated(policy, 8.0, terrain="rocks", difficulty=1.0, gravity_scale=gravity)
     assert flips < 0.001
 
@@ -211,7 +211,7 @@ def test_torques_do_not_swing_among_rocks(policy: Any, gravity: float) -> None:
 @pytest.mark.parametrize("policy", [commanded, baseline])
 @pytest.mark.parametrize("arguments", [{"gravity_scale": 0.38}, {"gravity": (0.0, -3.73, 0.0)}])
 def test_little_gravity_costs_no_energy_on_the_flat(policy: Any, arguments: dict[str, Any]) -> None:
-    """Wheels that slipped swung here too, and took 830 J/m on average."""
+    """The torques of slipping wheels also alternated, which cost 830 J/m on average."""
     flips, energy = regulated(policy, 14.0, **arguments)
     assert flips == 0.0
     assert energy < 200.0

@@ -140,11 +140,6 @@ def test_bad_difficulties_change_nothing(difficulty: Any, field: str) -> None:
     assert env.reset(seed=0)[1]["difficulty"] == 0.3
 
 
-def test_the_plane_has_no_difficulty() -> None:
-    with refused(OptionError, "difficulty"):
-        RoverEnv().set_difficulty(0.5)
-
-
 def test_snapshots_keep_domain_and_difficulty() -> None:
     env = RoverEnv(terrain="rocks", observation_noise=0.01, **RANGES)
     env.reset(seed=1)

@@ -1,7 +1,5 @@
 """Frames show what the simulation does, headless, and the usual wrappers make videos of them."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import re

@@ -179,7 +179,7 @@ def test_it_turns_to_go_round_a_rock_that_it_cannot_pass() -> None:
 
 
 def test_it_backs_out_of_a_dead_end() -> None:
-    """Rocks on three sides: whoever only drives ahead stays inside."""
+    """Rocks on three sides: a policy that only drives ahead stays inside."""
     wall = [(2.6, 0.0, 0.45 * k) for k in range(-3, 4)]
     wall += [(2.6 - 0.45 * k, 0.0, side * 1.35) for k in range(3) for side in (-1, 1)]
     env = RoverEnv(terrain=SphereField(wall, [0.3] * len(wall), Plane()), heading_deg=0.0, **ARGUMENTS)
@@ -232,7 +232,7 @@ def test_a_smaller_scan_will_do() -> None:
 
 
 def constant(size: int, outputs: Any) -> Network:
-    """A network that foretells the same whatever it sees."""
+    """A network whose prediction does not depend on its input."""
     return Network(
         mean=np.zeros(size, np.float32),
         deviation=np.ones(size, np.float32),
@@ -268,7 +268,7 @@ def foreseen_by(policy: ScanPolicy, row: Any) -> Outcomes:
 
 
 def test_the_shipped_forecast_knows_what_holds_the_trunk() -> None:
-    """It foretells less way and a held trunk over a rock that is higher than the clearance, not over a low one."""
+    """Only over a rock higher than the clearance does it predict less progress and a high-centred rover."""
     foreseen = []
     for radius in (0.1, 0.26):
         env, row = in_front_of_a_rock(radius)
@@ -299,7 +299,7 @@ def test_the_small_rover_has_a_forecast_of_its_own() -> None:
     ],
 )
 def test_rover_and_ground_choose_the_forecast(terrain: str, rover: str, folder: str) -> None:
-    """By itself the policy foresees what it does with that forecast by name, and not what it does with another."""
+    """By default the policy selects the forecast of its rover and ground."""
     model = open_model(rover)
     env = RoverEnv(terrain=terrain, model=model, **ScanPolicy.arguments(model))
     row = env.reset(seed=2)[0].astype(np.float64)
@@ -311,7 +311,7 @@ def test_rover_and_ground_choose_the_forecast(terrain: str, rover: str, folder: 
 
 
 def test_what_is_foreseen_costs_in_proportion_to_the_way(tmp_path: Path) -> None:
-    """A slower rover's costs are smaller, as the ways that it compares are shorter."""
+    """Costs scale with the length of the arcs, which is shorter for a slower rover."""
     for model in (RoverModel(), open_model("open-rover")):
         env = RoverEnv(terrain="plane", model=model, **ScanPolicy.arguments(model))
         row = env.reset(seed=1)[0].astype(np.float64)
@@ -324,7 +324,7 @@ def test_what_is_foreseen_costs_in_proportion_to_the_way(tmp_path: Path) -> None
 
 
 def test_costs_of_what_is_foreseen_choose_arc_and_speed(tmp_path: Path) -> None:
-    """A forecast by which only fast arcs get on makes the rover drive fast; one without differences changes nothing."""
+    """If a forecast predicts progress only at high speed, the rover drives fast; a uniform forecast changes nothing."""
     env, row = in_front_of_a_rock(0.1)
     size = ArcFeatures(env, ScanPolicy(env)).size + 1
     calm = constant(size, [1.0, 0.0, 0.0])

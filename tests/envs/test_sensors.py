@@ -146,7 +146,7 @@ def test_snapshots_carry_the_sensors() -> None:
 
 
 def test_encoders_are_exact_by_default() -> None:
-    """The defaults are said to be ideal, and encoders counted 4096 ticks a turn."""
+    """The documentation calls the defaults ideal, but encoders counted 4096 ticks a turn."""
     env = SensorObservation(RoverEnv(), [WheelEncoders()])
     env.reset(seed=3)
     start = env.unwrapped.simulation.q

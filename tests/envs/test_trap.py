@@ -339,7 +339,7 @@ def test_hindsight_replay_learns_from_it_without_complaint() -> None:
 
 
 def test_a_policy_of_commands_may_look_at_the_goal() -> None:
-    """The dictionary is enough to drive by: pure pursuit from heading and goals alone arrives."""
+    """The dictionary is sufficient for driving: pure pursuit from heading and goals reaches the goal."""
     env = gym.make("RoverGoal-v0", repeat=2, curvature=0.75)
     seen, info = env.reset(seed=0, options={"heading_deg": 30.0, "goal": (3.0, 1.0)})
     for _ in range(100):

@@ -327,7 +327,7 @@ def test_one_rover_of_a_snapshot_goes_on_alone() -> None:
 
 
 def test_an_episode_keeps_its_end_through_a_pickle() -> None:
-    """The copy of an episode that had ended ran on: only its progress was kept."""
+    """A copy of an ended episode continued, because the copy did not include the end."""
     env = RoverEnv(goal_distance=0.6, goal_bearing_deg=0.0, goal_tolerance=0.59)
     env.reset(seed=0)
     for _ in range(200):

@@ -84,7 +84,7 @@ def test_the_reading_finds_marks() -> None:
 
 
 def test_every_file_of_the_quick_tier_is_there() -> None:
-    """Two files had been merged into others, and the quick tier left their tests out without a word."""
+    """Two files had been merged into others, and the quick tier silently omitted their tests."""
     conftest = tree_of(ROOT / "tests" / "conftest.py")
     (quick,) = [node.value for node in conftest.body if ast.unparse(node).startswith("QUICK = ")]
     missing = [name for name in ast.literal_eval(quick) if not (ROOT / "tests" / name).is_file()]

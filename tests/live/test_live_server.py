@@ -144,7 +144,7 @@ def test_other_pages_are_refused(served: Served, origin: str) -> None:
 
 @pytest.mark.parametrize("host", ["example.org", "example.org:80", "[", "127.0.0.1.example.org"])
 def test_a_name_of_a_site_that_leads_here_is_refused(served: Served, host: str) -> None:
-    """A site may have its own name lead to this address, so that the browser takes our page for one of its own."""
+    """DNS rebinding: a site may resolve its name to this address, so that the browser treats our page as its own."""
     assert served.get("/", host).status == 421
 
 

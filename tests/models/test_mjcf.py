@@ -156,7 +156,7 @@ def test_a_written_rover_drives_forward_in_mujoco(tmp_path):
     ],
 )
 def test_few_words_that_become_enormous_are_refused_before_they_do(inside, message, tmp_path):
-    """MuJoCo took minutes for the first, and asked for 40 GB for the third."""
+    """MuJoCo took minutes for the first and 40 GB for the third."""
     for included in (False, True):
         text = f"<mujoco>{inside}</mujoco>"
         if included:

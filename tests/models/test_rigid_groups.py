@@ -76,7 +76,7 @@ def expected_inertia(text):
 
 @pytest.mark.parametrize("what", FILES)
 def test_links_that_only_together_are_a_body_come_in(tmp_path, what):
-    """ANYmal, HyQ, TALOS and TIAGo were refused, which Pinocchio takes: each link had to be a body by itself."""
+    """ANYmal, HyQ, TALOS and TIAGo were refused, which Pinocchio accepts, because each link had to be a physical body on its own."""
     model, report = read_urdf(write(tmp_path, FILES[what]), wheels=[])
     mass, inertia = expected_inertia(FILES[what])
     assert model.mass == pytest.approx(10.0 + mass)

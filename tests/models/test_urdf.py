@@ -387,7 +387,7 @@ def with_pivot_limits(lower, upper):
     ],
 )
 def test_limits_far_away_mean_none(tmp_path, lower, upper, limits, listed):
-    """TIAGo's wheels have limits of 1e16 and were refused: there is no digit left between two angles out there."""
+    """TIAGo's wheels have limits of 1e16 and were refused: neighbouring floating-point numbers are 2 rad apart there."""
     model = RoverModel.from_urdf(write(tmp_path, with_pivot_limits(lower, upper)))
     solids = {solid["name"]: solid for solid in model.to_dict()["solids"]}
     assert solids["left_rocker"].get("limits") == limits

@@ -31,7 +31,7 @@ def mesh_rover(folder, shape):
 
 
 def test_round_meshes_without_names_are_wheels(tmp_path):
-    """Two robots of other people came in without wheels: only cylinders and spheres were looked at."""
+    """Two public robots were imported without wheels, because only cylinders and spheres were examined."""
     model = RoverModel.from_urdf(mesh_rover(tmp_path, "disc"))
     assert model.wheel_names == list(NAMES.values())
     assert model.wheel_radii == pytest.approx([0.15] * 3, rel=1e-6)
@@ -39,7 +39,7 @@ def test_round_meshes_without_names_are_wheels(tmp_path):
 
 
 def test_a_robot_without_wheels_is_warned_of_with_the_reason_for_each_link(tmp_path):
-    """A robot came in with 0 wheels and exit status 0, and nothing said so."""
+    """A robot was imported with 0 wheels, exit status 0 and no warning."""
     path = mesh_rover(tmp_path, "box")
     with pytest.warns(RobotFileWarning, match="no wheel was found") as caught:
         model = RoverModel.from_urdf(path)
@@ -93,7 +93,7 @@ HUB = '<geom type="cylinder" fromto="0 -0.03 0 0 0.03 0" size="0.021" mass="0.1"
     ],
 )
 def test_a_pendulums_pole_and_a_fingers_spinner_are_no_wheels(tmp_path, rest):
-    """They have a round hub about their hinge, and came in as wheels of the hub's radius."""
+    """They have a round hub about their hinge, and were imported as wheels of the hub's radius."""
     pytest.importorskip("mujoco")
     with pytest.warns(RobotFileWarning, match=r"pole reaches 0\.\d+ m from its axis, beyond its round shape"):
         model = RoverModel.from_mjcf(write(tmp_path, pole(HUB + rest), "pole.xml"))

@@ -14,8 +14,6 @@ Wheels that yield store energy that the public interface does not show. What the
 the steps, taken again, and what they gave since the start of a case must not exceed what they took.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

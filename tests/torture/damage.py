@@ -1,7 +1,5 @@
 """Damaged files: refused with an error of ours, or sound."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 import tempfile

@@ -1,7 +1,5 @@
 """The rover on ground of every kind: driven, dropped, thrown, buried."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Faults around the program: killed, a full disk, a second writer, fork, signals, and threads that must go on."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

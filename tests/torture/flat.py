@@ -1,7 +1,5 @@
 """The planar machines and the soil."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

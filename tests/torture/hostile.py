@@ -3,8 +3,6 @@
 The campaign draws from `NUMBERS` and `TEXTS`; the suite gives every argument all of `hostile_values()`.
 """
 
-from __future__ import annotations
-
 import datetime
 import decimal
 import fractions

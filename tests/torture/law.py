@@ -1,7 +1,5 @@
 """The contact solver alone, on problems of every scale; what it calls converged is checked by the law itself."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The environments under every kind of action: what a learner meets."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

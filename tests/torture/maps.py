@@ -1,7 +1,5 @@
 """Maps and meshes as ground: damaged ones are refused with an error of ours, others are driven on by any rover."""
 
-from __future__ import annotations
-
 import importlib.util
 import io
 from functools import cache

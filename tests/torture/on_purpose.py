@@ -1,7 +1,5 @@
 """Regimes that break on purpose, so that a test can see that the campaign notices."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import time

@@ -1,7 +1,5 @@
 """Cases in worker processes, so that a hang, an abort or a segmentation fault is a finding and not the end."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import resource

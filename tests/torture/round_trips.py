@@ -1,7 +1,5 @@
 """What goes through a pickle, a copy, a snapshot or a file comes back to the bit, and goes on as it would have."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import tempfile

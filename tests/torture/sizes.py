@@ -1,7 +1,5 @@
 """Sizes and places that took all memory, aborted or hung: refused, or done in time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path

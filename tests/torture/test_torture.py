@@ -1,7 +1,5 @@
 """A short round of `make torture`, and that it notices what it must."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -25,7 +25,7 @@ def policy(tmp_path: Path) -> Path:
 def test_episodes_are_reused_until_the_policy_or_the_arguments_change(
     policy: Path, evaluate: Callable[..., Any], tmp_path: Path
 ) -> None:
-    """A cached result was taken although the policy had been trained anew."""
+    """A cached result was used although the policy had been retrained."""
     output = tmp_path / "evaluation"
 
     def evaluated(*arguments: Any) -> tuple[str, str]:

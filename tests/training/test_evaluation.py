@@ -109,7 +109,7 @@ def test_an_episode_is_cut_at_its_limit() -> None:
     ],
 )
 def test_what_cannot_be_evaluated_is_refused_by_name(call: Callable[[], object], field: str) -> None:
-    """Some divided by zero, and some returned nothing without a word."""
+    """Some raised ZeroDivisionError, and some silently returned nothing."""
     with refused(OptionError, field):
         call()
 

@@ -5,7 +5,7 @@ import math
 from pathlib import Path
 
 import pytest
-from commands import output_of, rover
+from commands import error_of, output_of
 from refusals import refused
 
 from rover_gym import OptionError, PDPolicy
@@ -60,8 +60,7 @@ def test_a_policy_comes_with_what_it_was_made_of_and_is_small(terrain: str) -> N
 
 def test_drive_runs_the_trained_policy(tmp_path: Path) -> None:
     arguments = ["drive", "--policy", "trained", "--terrain", "rocks", "--difficulty", "0.3", "--seed", "1"]
-    output = output_of(*arguments, "--output", tmp_path)
-    assert "trained policy" in output
+    assert "trained policy" in output_of(*arguments, "--output", tmp_path)
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert summary["policy"] == "trained"
     assert summary["episodes"][0]["success"]
@@ -69,9 +68,7 @@ def test_drive_runs_the_trained_policy(tmp_path: Path) -> None:
 
 
 def test_a_policy_that_is_not_there_is_one_line(tmp_path: Path) -> None:
-    result = rover("drive", "--no-record", "--policy", tmp_path)
-    assert result.exit_code == 2
-    assert result.stderr.startswith("error: --policy: ")
+    assert error_of("drive", "--no-record", "--policy", tmp_path).startswith("error: --policy: ")
 
 
 def test_no_policy_was_trained_for_other_ground() -> None:

@@ -156,7 +156,7 @@ def test_a_stopped_training_goes_on(run: Path, train: Script, tmp_path: Path) ->
 
 @pytest.mark.takes_long("trains, stops and goes on")
 def test_a_training_goes_on_with_the_hyperparameters_that_are_given(run: Path, train: Script, tmp_path: Path) -> None:
-    """It wrote the new configuration and trained with the old one."""
+    """Resuming wrote the new configuration and trained with the old one."""
     folder = tmp_path / "run"
     shutil.copytree(run, folder)
     config = yaml.safe_load((folder / "config.yaml").read_text(encoding="utf-8"))

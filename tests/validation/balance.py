@@ -1,7 +1,5 @@
 """Runs that test momentum and energy balance: a cloud colliding in free space, and disks bouncing in a box."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from validation.samples import DIAMETER, RADIUS, loose

@@ -1,7 +1,5 @@
 """Energy, momentum and Froude's similarity of balls."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ Source: Lube et al. 2004, *Axisymmetric collapses of granular columns*, J. Fluid
 175-199: (R - R0)/R0 = 1.24 a below a = 1.7 and 1.6 a^(1/2) above, a = H0/R0.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

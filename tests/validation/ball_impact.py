@@ -5,8 +5,6 @@ Source: Uehara et al. 2003, *Low-speed impact craters in loose granular media*, 
 from the release to the deepest point, rho_g the density of a grain's material times the packing fraction.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ Source: Janssen 1895: the bottom bears the mass m (1 - exp(-M/m)) of a filling M
 tube is wide, m = 1 / (4 f K), f the wall's friction over its pressure and K the wall's over the vertical pressure.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from rover_gym.mechanics import Silo

@@ -5,12 +5,10 @@ random and loose); Silbert 2010, *Jamming of frictional spheres and random loose
 from 6 without friction towards 4).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from validation.balls import DIAMETER, box, loose, settle
-from validation.watch import Ledger
+from validation.watch import Ledger, means_by
 
 FRICTIONS = (0.0, 0.1, 0.3, 1.0)
 POINTS = 40_000
@@ -53,12 +51,7 @@ def bed(count: int, friction: float, seed: int, ledger: Ledger, *, diameters: fl
 def measure(ledger: Ledger) -> dict[str, object]:
     """Three beds for every friction."""
     poured = [bed(900, friction, seed, ledger) for friction in FRICTIONS for seed in range(3)]
-    means = []
-    for friction in FRICTIONS:
-        runs = [run for run in poured if run["friction"] == friction]
-        row: dict[str, float] = {"friction": friction}
-        for name in ("fraction", "coordination"):
-            values = np.array([run[name] for run in runs])
-            row |= {name: float(values.mean()), f"{name}_error": float(values.std(ddof=1) / np.sqrt(len(values)))}
-        means.append(row)
+    means = means_by(
+        poured, "friction", FRICTIONS, {"fraction": "fraction_error", "coordination": "coordination_error"}
+    )
     return {"poured": poured, "means": means}

@@ -1,7 +1,5 @@
 """Angle of repose of balls: the slope that remains after one wall of a bed on a rough floor is removed."""
 
-from __future__ import annotations
-
 import sys
 from typing import Any
 

@@ -4,8 +4,6 @@ Source: Beverloo et al. 1961, *The flow of granular solids through orifices*, Ch
 260-269: W = C rho_b sqrt(g) (D - k d)^(5/2), C about 0.58, k about 1.4, rho_b the bulk density.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ Source: Staron and Hinch 2005, *Study of the collapse of granular columns using 
 simulation*, J. Fluid Mech. 545, 1-27.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Reference values of the measurements, one row each."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Discharge rate of disks through an orifice in a silo's floor."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

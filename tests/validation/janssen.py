@@ -1,7 +1,5 @@
 """Janssen effect: a silo's bottom carries less than the weight of the filling; the walls carry the rest."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from validation.samples import DIAMETER, Array, glued_row, loose, settle, sides

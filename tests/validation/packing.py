@@ -1,7 +1,5 @@
 """Packing fraction and coordination number of a settled bed."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What accuracy each size of balls costs: a plate test in one box on beds of ever smaller balls."""
 
-from __future__ import annotations
-
 import time
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Parallel runs on all cores."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial

@@ -1,7 +1,5 @@
 """Angle of repose: the slope that remains after one wall of a bed on a rough floor is removed and disks run off."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

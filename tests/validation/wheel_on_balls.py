@@ -4,8 +4,6 @@ Wheel, load, density and the angle of repose are those of the measurements; fric
 nothing is fitted to the wheel's forces. Two sizes of balls are extrapolated to none, linearly in the radius.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 import os

@@ -108,7 +108,7 @@ ModelName = Annotated[
 TerrainName = Annotated[
     str | None,
     typer.Option(
-        help="The ground: 'plane', 'rocks', 'hills', or the file of a map or a mesh. "
+        help="The ground: 'plane', 'rocks', 'hills', 'sand', or the file of a map or a mesh. "
         "Default: the plane; with a difficulty, rocks.",
         autocompletion=complete_terrain,
     ),

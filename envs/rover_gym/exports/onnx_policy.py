@@ -67,7 +67,7 @@ def onnx_policy(policy: str | Path, terrain: str = "plane", model: RoverModel | 
             "kind": "forecast",
             "features": "rover_gym.policy.arc_forecast.ArcFeatures, and whether the arc is driven fast",
             "outcomes": "way along the arc over the way at cruising speed; share of the time that ends an episode for"
-            " which the trunk has been held; likelihood that the episode has failed",
+            " which the trunk has been held; probability that the episode has failed",
         }
         return onnx_model(
             forecast_network(Network.read(folder / FORECAST_FILE)), "forecast", "features", "outcomes", facts

@@ -83,7 +83,7 @@ def read_trajectory(path: str | Path) -> Trajectory:
     takes more than `LARGEST_EXPANSION` times the size of the file.
 
     Raises:
-        RecordingError: The file is no valid trajectory of this format and version, or is being recorded.
+        RecordingError: The file is not a valid trajectory of this format and version, or is being recorded.
         OSError: The file does not exist or may not be read.
         MissingExtraError: h5py is not installed.
     """
@@ -253,7 +253,7 @@ class _Reader:
                 if "\\u" in value:
                     json.dumps(result, ensure_ascii=False).encode()  # refuse lone surrogates
             except (ValueError, RecursionError) as error:
-                refuse_field(self._path, key, value[:40], f"is no JSON ({error}), beginning with")
+                refuse_field(self._path, key, value[:40], f"is not JSON ({error}), beginning with")
             if isinstance(result, dict) or key not in OBJECTS:
                 return result
         if key in OBJECTS:
@@ -275,7 +275,7 @@ class _Reader:
             if len(parts) > 1:
                 return Union(parts)
         except (RoverGymError, ValueError, TypeError, KeyError, IndexError) as error:
-            refuse_field(self._path, TERRAIN, sorted(given), f"is no ground ({error}), from")
+            refuse_field(self._path, TERRAIN, sorted(given), f"is not a valid ground ({error}), from")
         if not parts:
             refuse_field(self._path, TERRAIN, sorted(given), "holds neither a plane nor spheres nor a surface")
         return parts[0]

@@ -102,7 +102,7 @@ class SensorSuite:
             return
         periods = 1.0 / (rate * dt)
         if round(periods) < 1 or abs(periods - round(periods)) > 1e-6 * periods:
-            reason = f"must be the control frequency, {1.0 / dt:g} Hz, or a whole part of it"
+            reason = f"must be the control frequency, {1.0 / dt:g} Hz, or that divided by a whole number"
             refuse(OptionError, field, rate, reason)
 
     def begin(self, moment: Moment, row: npt.NDArray[np.uint64]) -> SuiteState:
