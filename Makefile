@@ -123,7 +123,7 @@ bench: $(STAMPS)/release ## time a step and tell where the time goes, MuJoCo's b
 
 train: $(STAMPS)/test $(STAMPS)/release ## train a policy for the rocks (about half an hour of one core) and compare it with the baseline, under runs/
 	$(BIN)/python training/train_ppo.py --config rocks --seed 1
-	$(BIN)/python training/evaluate.py runs/train/rocks-seed1 --difficulty 1
+	$(BIN)/python training/evaluate.py runs/train/rocks-seed1 pd scan --difficulty 1
 
 train-rllib: ## train Rover-v0 on a local Ray with 2 workers; Ray wants a virtual environment of its own
 	@$(MAKE) --no-print-directory VENV=$(VENV)-rllib $(VENV)-rllib/stamps/ray

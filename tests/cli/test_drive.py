@@ -75,7 +75,7 @@ def test_rocks_are_driven_over_and_recorded(tmp_path: Path) -> None:
 def test_a_short_time_limit_ends_the_episode_without_success() -> None:
     result = rover("drive", "--time-limit", "1")
     assert result.exit_code == 0, result.output
-    assert "no: time" in result.output
+    assert "no: ran out of time" in result.output
     assert "1.00 s" in result.output
 
 
@@ -117,7 +117,7 @@ def test_version_and_help() -> None:
 
 def test_episodes_are_filmed(tmp_path: Path) -> None:
     path = tmp_path / "films" / "rocks.mp4"
-    arguments = ("--terrain", "rocks", "--time-limit", "0.3", "--episodes", "2", "--video", str(path))
+    arguments = ("--terrain", "rocks", "--time-limit", "0.3", "--episodes", "2", "--film", str(path))
     result = rover("drive", *arguments)
     assert result.exit_code == 0, result.output
     assert str(path) in result.output.replace("\n", "")
@@ -130,7 +130,7 @@ def test_the_planner_by_hand_drives_too(tmp_path: Path) -> None:
     arguments = ("--policy", "scan", "--terrain", "rocks", "--difficulty", "1", "--time-limit", "2")
     result = rover("drive", *arguments, "--model", "mars-rover", "--output", str(tmp_path))
     assert result.exit_code == 0, result.output
-    assert "the scan planner" in result.output
+    assert "the search on the height scan" in result.output
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert summary["arguments"]["height_scan"] == [48, 40, 0.18]
 
@@ -139,7 +139,7 @@ def test_a_film_has_the_size_and_the_camera_that_are_asked_for(tmp_path: Path) -
     frames = {}
     for name, options in {"plain": (), "other": ("--camera", "top", "--forces", "--no-antialiasing")}.items():
         path = tmp_path / f"{name}.mp4"
-        arguments = ("drive", "--time-limit", "0.2", "--video", str(path), "--size", "320x180", *options)
+        arguments = ("drive", "--time-limit", "0.2", "--film", str(path), "--size", "320x180", *options)
         assert rover(*arguments).exit_code == 0
         frames[name] = last_frame(path)
         assert frames[name].shape == (180, 320, 3)
@@ -165,7 +165,7 @@ def last_frame(path: Path, width: int = 320, height: int = 180) -> np.ndarray:
     ],
 )
 def test_a_film_that_cannot_be_is_refused(options: tuple[str, ...], message: str, tmp_path: Path) -> None:
-    result = rover("drive", "--video", str(tmp_path / "film.mp4"), *options)
+    result = rover("drive", "--film", str(tmp_path / "film.mp4"), *options)
     assert result.exit_code == 2
     assert result.stderr.startswith(f"error: {message}")
 
@@ -177,44 +177,53 @@ def test_the_recording_says_outcome_and_goal(tmp_path: Path) -> None:
     assert run.goal_tolerance == 0.5
 
 
-def baseline(*arguments: str) -> Result:
-    return CliRunner(env={"COLUMNS": "160", "NO_COLOR": "1"}).invoke(app, list(arguments))
+def evaluate(folder: Path, *arguments: str) -> Result:
+    given = ["evaluate", *arguments, "--output", str(folder)]
+    return CliRunner(env={"COLUMNS": "160", "NO_COLOR": "1"}).invoke(app, given)
 
 
-def test_the_table_has_a_row_a_difficulty() -> None:
-    result = baseline("baseline", "--episodes", "1", "--difficulty", "0", "--difficulty", "0.25")
+def test_the_table_has_a_row_a_difficulty(tmp_path: Path) -> None:
+    result = evaluate(tmp_path, "--episodes", "1", "--difficulty", "0", "--difficulty", "0.25")
     assert result.exit_code == 0, result.output
-    for word in ("success", "95% interval", "time", "energy", "other ends", "0.25"):
+    for word in ("difficulty", "success", "95% interval", "time", "energy", "other ends", "0.25"):
         assert word in result.output
+    assert "|" not in result.output  # a table, not Markdown
+    assert "| pd | 0.25 | " in (tmp_path / "evaluation.md").read_text(encoding="utf-8")
 
 
-def test_json_says_the_same_twice() -> None:
-    runs = [baseline("baseline", "--episodes", "2", "--difficulty", "0.5", "--seed", "3", "--json") for _ in range(2)]
-    assert runs[0].stdout == runs[1].stdout
-    report = json.loads(runs[0].stdout)
+def test_json_says_the_same_twice(tmp_path: Path) -> None:
+    given = ("--episodes", "2", "--difficulty", "0.5", "--seed", "3", "--json")
+    reports = [json.loads(evaluate(tmp_path / name, *given).stdout) for name in "ab"]
+    for report in reports:
+        del report["written"]
+    report = reports[0]
+    assert report == reports[1]
     assert report["seed"] == 3
+    assert report["environment"]["difficulty"] == 0.5
     (row,) = report["rows"]
-    assert row["difficulty"] == 0.5
+    assert row["policy"] == "pd"
     assert row["episodes"] == sum(row["ends"].values()) == 2
-    low, high = row["interval"]
-    assert 0.0 <= low <= row["success_rate"] <= high <= 1.0
+    low, high = row["success"]["interval"]
+    assert 0.0 <= low <= row["success"]["value"] <= high <= 1.0
 
 
-def test_a_difficulty_out_of_range_is_one_line() -> None:
-    result = baseline("baseline", "--episodes", "1", "--difficulty", "2.1")
+def test_a_difficulty_out_of_range_is_one_line(tmp_path: Path) -> None:
+    result = evaluate(tmp_path, "--episodes", "1", "--difficulty", "2.1")
     assert result.exit_code == 2
-    assert result.stderr.startswith("error: ")
+    assert result.stderr.startswith("error: --difficulty")
     assert len(result.stderr.splitlines()) == 1
-    assert "difficulty" in result.stderr
 
 
-def test_a_trained_policy_can_be_measured_too() -> None:
-    result = baseline("baseline", "--episodes", "1", "--difficulty", "0.25", "--policy", "trained")
+def test_policies_of_the_package_are_compared_by_name(tmp_path: Path) -> None:
+    result = evaluate(tmp_path, "scan", "trained", "pd", "--episodes", "1", "--difficulty", "0.25", "--json")
     assert result.exit_code == 0, result.output
-    assert "with a trained policy" in result.output
+    rows = [row["policy"] for row in json.loads(result.stdout)["rows"]]
+    assert rows == ["scan", "pd", "guide alone", "trained"]
 
 
-def test_the_planner_by_hand_can_be_measured_too() -> None:
-    result = baseline("baseline", "--episodes", "1", "--difficulty", "1.25", "--policy", "scan")
-    assert result.exit_code == 0, result.output
-    assert "the scan planner" in result.output
+def test_a_policy_that_is_named_twice_or_unknown_is_one_line(tmp_path: Path) -> None:
+    for names, word in ((("pd", "pd"), "must be named once"), (("planner",), "POLICIES: must be 'pd'")):
+        result = evaluate(tmp_path, *names, "--episodes", "1")
+        assert result.exit_code == 2
+        assert word in result.stderr
+        assert len(result.stderr.splitlines()) == 1

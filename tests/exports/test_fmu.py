@@ -230,7 +230,7 @@ def test_a_unit_in_the_axes_of_rep_103_turns_every_vector_and_pose(tmp_path: Pat
 def test_axes_that_are_unknown_are_refused(tmp_path: Path) -> None:
     with pytest.raises(OptionError, match="axes: must be one of world, rep103"):
         write_fmu(simulation_on(Plane()), tmp_path / "a.fmu", axes="ned")  # type: ignore[arg-type]
-    result = CliRunner().invoke(app, ["export", "fmu", "-o", str(tmp_path / "a.fmu"), "--axes", "ned"])
+    result = CliRunner().invoke(app, ["export", "fmu", "--output", str(tmp_path / "a.fmu"), "--axes", "ned"])
     assert result.exit_code == 2
     assert not (tmp_path / "a.fmu").exists()
 
@@ -487,7 +487,7 @@ def test_without_the_library_the_command_says_how_to_build_it(tmp_path: Path, mo
     monkeypatch.setattr(units, "LIBRARIES", tmp_path)
     with pytest.raises(OptionError, match=r"library: is not built: .*cargo build --release --locked -p rover-fmu"):
         write_fmu(Simulation(RoverModel()), tmp_path / "a.fmu")
-    result = CliRunner().invoke(app, ["export", "fmu", "-o", str(tmp_path / "a.fmu")])
+    result = CliRunner().invoke(app, ["export", "fmu", "--output", str(tmp_path / "a.fmu")])
     assert result.exit_code == 2
     assert "cargo build" in result.stderr
     assert not (tmp_path / "a.fmu").exists()
@@ -495,7 +495,7 @@ def test_without_the_library_the_command_says_how_to_build_it(tmp_path: Path, mo
 
 def test_the_command_writes_an_episodes_start(tmp_path: Path) -> None:
     options = ["--terrain", "sphere_field", "--difficulty", "0.5", "--seed", "3", "--friction", "0.6"]
-    result = CliRunner().invoke(app, ["export", "fmu", "-o", str(tmp_path / "a.fmu"), *options])
+    result = CliRunner().invoke(app, ["export", "fmu", "--output", str(tmp_path / "a.fmu"), *options])
     assert result.exit_code == 0, result.output
     assert validate_fmu(str(tmp_path / "a.fmu")) == []
     description = read_model_description(str(tmp_path / "a.fmu"))

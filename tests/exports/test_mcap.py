@@ -305,7 +305,7 @@ def test_the_command_writes_beside_the_run(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["export", "mcap", str(path)])
     assert result.exit_code == 0, result.output
     assert len(read(tmp_path / "run.mcap")["/tf"]) == 3
-    result = CliRunner().invoke(app, ["export", "mcap", str(path), "-o", str(path)])
+    result = CliRunner().invoke(app, ["export", "mcap", str(path), "--output", str(path)])
     assert result.exit_code == 2
     assert "--output: would replace the run itself" in result.stderr
     assert read_run(path).n_frames == 3

@@ -83,7 +83,7 @@ def test_the_forecast_gives_the_same_outcomes(rover: str | None, terrain: str) -
 def test_what_has_no_network_is_refused(policy: str, tmp_path: Path) -> None:
     with pytest.raises(PolicyError):
         onnx_policy(policy)
-    result = CliRunner().invoke(app, ["export", "onnx", policy, "-o", str(tmp_path / "a.onnx")])
+    result = CliRunner().invoke(app, ["export", "onnx", policy, "--output", str(tmp_path / "a.onnx")])
     assert result.exit_code == 2
     assert len(result.stderr.splitlines()) == 1
     assert not (tmp_path / "a.onnx").exists()
@@ -92,7 +92,7 @@ def test_what_has_no_network_is_refused(policy: str, tmp_path: Path) -> None:
 def test_the_command_writes_a_file_that_the_checker_accepts(tmp_path: Path) -> None:
     for rover in ("rover", "open-rover"):
         path = tmp_path / rover / "a.onnx"
-        result = CliRunner().invoke(app, ["export", "onnx", "foresight", "--model", rover, "-o", str(path)])
+        result = CliRunner().invoke(app, ["export", "onnx", "foresight", "--model", rover, "--output", str(path)])
         assert result.exit_code == 0, result.output
         onnx.checker.check_model(str(path), full_check=True)
     assert (tmp_path / "rover" / "a.onnx").read_bytes() != (tmp_path / "open-rover" / "a.onnx").read_bytes()

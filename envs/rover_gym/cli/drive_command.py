@@ -16,7 +16,6 @@ from rich.table import Table
 
 from rover_gym.cli.console import (
     INTERRUPTED,
-    LARGEST_SEED,
     MOST_EPISODES,
     AsJson,
     Results,
@@ -54,7 +53,7 @@ from rover_gym.mechanics import OptionError
 from rover_gym.policy.comparison import EpisodeFilm
 from rover_gym.policy.evaluation import Episode, run_episode
 from rover_gym.policy.named_policy import Policy
-from rover_gym.record.channels import Channel, RoverSampler, describe
+from rover_gym.record.channels import Channel, RoverSampler, describe, outcome_words
 from rover_gym.record.recorder import Recorder
 from rover_gym.record.rover_run import OF_EPISODES
 from rover_gym.validation import number, refuse
@@ -81,15 +80,13 @@ Friction = Annotated[float, typer.Option(help="Friction coefficient.")]
 TimeStep = Annotated[float, typer.Option(help="Time step of the physics, s.")]
 TimeLimit = Annotated[float, typer.Option(min=CONTROL_PERIOD, max=1e6, help="Time limit of an episode, s.")]
 Episodes = Annotated[int, typer.Option(min=1, max=MOST_EPISODES, help="Number of episodes.")]
-Seed = Annotated[
-    int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the first episode; the others count up from it.")
-]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of the first episode; the others count up from it.")]
 Output = Annotated[
     Path | None,
     typer.Option(file_okay=False, help="Folder for trajectories (HDF5) and summary.json. Default: runs/drive."),
 ]
-Record = Annotated[bool, typer.Option("--record/--no-record", help="Record the episodes; needs the extra record.")]
-Video = Annotated[
+Record = Annotated[bool, typer.Option("--record/--no-record", help="Record the episodes.")]
+Film = Annotated[
     Path | None, typer.Option(dir_okay=False, metavar="FILE.mp4", help="Film the episodes one after the other.")
 ]
 
@@ -115,14 +112,14 @@ def drive(
     seed: Seed = 0,
     output: Output = None,
     record: Record = True,
-    video: Video = None,
+    film: Film = None,
     size: FilmSize = "640x480",
     camera: FilmCamera = "follow",
     forces: FilmForces = False,
     antialiasing: FilmAntialiasing = True,
     as_json: AsJson = False,
 ) -> None:
-    """Drive a rover to its goal with the PD baseline or another policy and print the results of the episodes.
+    """Drive a rover to its goal, record the drive and tell how it went.
 
     The environment is Rover-v0, among rocks RoverRocks-v0, on hills RoverHills-v0.
 
@@ -131,7 +128,7 @@ def drive(
     _check_time_step(time_step)
     terrain = chosen_terrain(terrain, difficulty)
     folder = recording_folder(output, FOLDER, wanted=record)
-    check_file("video", video)
+    check_file("film", film)
     angles = {"slope_deg": slope, "uphill_deg": uphill, "heading_deg": heading}
     scene = {"terrain": terrain, "friction": friction, "time_step": time_step}
     scene |= _given({"difficulty": difficulty, **angles})
@@ -141,14 +138,14 @@ def drive(
     chosen = named_driver(policy, terrain, rover)
     as_given = {**scene, **named, **chosen.arguments}
     arguments = {**scene, **_given({"model": rover, "terrain": ground}), **chosen.arguments}
-    if video is not None:
-        film = film_options(size, camera, forces=forces, antialiasing=antialiasing)
-        arguments |= {"render_mode": "rgb_array", "render_options": film}
+    if film is not None:
+        look = film_options(size, camera, forces=forces, antialiasing=antialiasing)
+        arguments |= {"render_mode": "rgb_array", "render_options": look}
     env = gym.make(environment_of(terrain), max_episode_steps=round(time_limit / CONTROL_PERIOD), **arguments)
     warn_of_slope(slope, friction)
     title = f"{environment_title(terrain)} with {driver_title(policy)}"
     drives = _Drives(env, chosen.make(env), title, as_given, options)
-    drives.run(range(seed, seed + episodes), folder, video)
+    drives.run(range(seed, seed + episodes), folder, film)
 
     summary = {
         "environment": environment_of(terrain),
@@ -163,7 +160,7 @@ def drive(
         if folder is not None:
             drives.paths.append(folder / "summary.json")
             drives.paths[-1].write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-        for path in [*drives.paths, *([] if video is None else [video])]:
+        for path in [*drives.paths, *([] if film is None else [film])]:
             if path.exists():
                 said.path("written", path)
         if folder is not None and not as_json and drives.paths[0].exists():
@@ -211,22 +208,22 @@ class _Drives:
     paths: list[Path] = field(default_factory=list)
     interrupted: bool = False
 
-    def run(self, seeds: Sequence[int], output: Path | None, video: Path | None) -> None:
+    def run(self, seeds: Sequence[int], output: Path | None, film: Path | None) -> None:
         """Drives an episode per seed, records it if there is a folder, and closes the environment."""
         with progress_bar() as bar, ExitStack() as stack:
             stack.callback(self.env.close)
-            film = None
-            if video is not None:
-                film = stack.enter_context(EpisodeFilm(video, self.env.metadata["render_fps"], self.title))
+            reel = None
+            if film is not None:
+                reel = stack.enter_context(EpisodeFilm(film, self.env.metadata["render_fps"], self.title))
             try:
                 for seed in seeds:
                     path = None if output is None else output / f"episode-{seed}.h5"
                     self.paths += [path] if path else []
-                    self.results.append(self._episode(seed, path, bar, film))
+                    self.results.append(self._episode(seed, path, bar, reel))
             except KeyboardInterrupt:
                 self.interrupted = True
 
-    def _episode(self, seed: int, path: Path | None, bar: Progress, film: EpisodeFilm | None) -> Episode:
+    def _episode(self, seed: int, path: Path | None, bar: Progress, reel: EpisodeFilm | None) -> Episode:
         """Drives one episode, recorded if there is a path, filmed if there is a film."""
         task = bar.add_task(f"seed {seed}", total=None, state="")
         with ExitStack() as stack:
@@ -240,12 +237,12 @@ class _Drives:
                         tape = _Tape(path, rover, self.title, seed, self.arguments)
                         stack.enter_context(tape.recorder)
                     tape.append(rover, info)
-                if film is not None:
-                    film.show(rover, seed, info["time"])
+                if reel is not None:
+                    reel.show(rover, seed, info["time"])
 
             episode = run_episode(self.env, self.policy, seed, options=self.options, on_step=on_step)
-            if film is not None:
-                film.end(episode)
+            if reel is not None:
+                reel.end(episode)
             if tape is not None:
                 tape.recorder.note(outcome=episode.end)
         bar.remove_task(task)
@@ -293,7 +290,7 @@ def _table(results: Sequence[Episode], title: str) -> Table:
     for episode in results:
         table.add_row(
             str(episode.seed),
-            "yes" if episode.success else f"no: {episode.end}",
+            "yes" if episode.success else f"no: {outcome_words(episode.end)}",
             f"{episode.distance:.2f} m",
             f"{episode.time:.2f} s",
             f"{episode.energy:.0f} J",
