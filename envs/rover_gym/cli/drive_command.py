@@ -47,15 +47,13 @@ from rover_gym.cli.options import (
     named_model,
     warn_of_slope,
 )
-from rover_gym.env.reward_terms import WEIGHTS
+from rover_gym.cli.tape import Tape, Watched
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.comparison import EpisodeFilm
 from rover_gym.policy.evaluation import Episode, run_episode
-from rover_gym.policy.named_policy import Policy
-from rover_gym.record.channels import Channel, RoverSampler, describe, outcome_words
-from rover_gym.record.recorder import Recorder
-from rover_gym.record.rover_run import OF_EPISODES
+from rover_gym.record.channels import outcome_words
+from rover_gym.replay.sights import SENSORS
 from rover_gym.validation import number, refuse
 
 CONTROL_PERIOD = 0.05  # s, of Rover-v0
@@ -86,6 +84,12 @@ Output = Annotated[
     typer.Option(file_okay=False, help="Folder for trajectories (HDF5) and summary.json. Default: runs/drive."),
 ]
 Record = Annotated[bool, typer.Option("--record/--no-record", help="Record the episodes.")]
+Sensors = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Record a sensor, too: 'laser' or 'depth'; repeat it for both.", autocompletion=lambda: list(SENSORS)
+    ),
+]
 Film = Annotated[
     Path | None, typer.Option(dir_okay=False, metavar="FILE.mp4", help="Film the episodes one after the other.")
 ]
@@ -112,6 +116,7 @@ def drive(
     seed: Seed = 0,
     output: Output = None,
     record: Record = True,
+    sensor: Sensors = None,
     film: Film = None,
     size: FilmSize = "640x480",
     camera: FilmCamera = "follow",
@@ -126,6 +131,9 @@ def drive(
     Ctrl-C ends the drive: finished episodes are printed, and what was recorded and filmed is kept.
     """
     _check_time_step(time_step)
+    for name in sensor or ():
+        if name not in SENSORS:
+            refuse(OptionError, "sensor", name, f"must be one of {', '.join(SENSORS)}")
     terrain = chosen_terrain(terrain, difficulty)
     folder = recording_folder(output, FOLDER, wanted=record)
     check_file("film", film)
@@ -144,7 +152,7 @@ def drive(
     env = gym.make(environment_of(terrain), max_episode_steps=round(time_limit / CONTROL_PERIOD), **arguments)
     warn_of_slope(slope, friction)
     title = f"{environment_title(terrain)} with {driver_title(policy)}"
-    drives = _Drives(env, chosen.make(env), title, as_given, options)
+    drives = _Drives(env, Watched(chosen.make(env)), title, as_given, options, list(dict.fromkeys(sensor or ())))
     drives.run(range(seed, seed + episodes), folder, film)
 
     summary = {
@@ -191,6 +199,7 @@ class _Drives:
     Attributes:
         env: The environment.
         policy: The policy that drives.
+        sensors: Names of sensors that are recorded, too.
         title: Title of results, recordings and film.
         arguments: Arguments of the environment, for the recordings.
         options: Options of each reset.
@@ -200,10 +209,11 @@ class _Drives:
     """
 
     env: gym.Env[Any, Any]
-    policy: Policy
+    policy: Watched
     title: str
     arguments: Mapping[str, Any]
     options: Mapping[str, Any]
+    sensors: Sequence[str] = ()
     results: list[Episode] = field(default_factory=list)
     paths: list[Path] = field(default_factory=list)
     interrupted: bool = False
@@ -227,14 +237,15 @@ class _Drives:
         """Drives one episode, recorded if there is a path, filmed if there is a film."""
         task = bar.add_task(f"seed {seed}", total=None, state="")
         with ExitStack() as stack:
-            tape: _Tape | None = None
+            tape: Tape | None = None
+            self.policy.begin()
 
             def on_step(rover: RoverEnv, info: Mapping[str, Any]) -> None:
                 nonlocal tape
                 bar.update(task, state=f"{info['time']:.1f} s, {info['distance_to_goal']:.1f} m to go")
                 if path is not None:
                     if tape is None:  # after the reset, when the start is known
-                        tape = _Tape(path, rover, self.title, seed, self.arguments)
+                        tape = Tape(path, rover, self.title, seed, self.arguments, self.policy, self.sensors)
                         stack.enter_context(tape.recorder)
                     tape.append(rover, info)
                 if reel is not None:
@@ -247,40 +258,6 @@ class _Drives:
                 tape.recorder.note(outcome=episode.end)
         bar.remove_task(task)
         return episode
-
-
-class _Tape:
-    """Records an episode: the simulation and the environment's signals."""
-
-    def __init__(self, path: Path, rover: RoverEnv, title: str, seed: int, arguments: Mapping[str, Any]) -> None:
-        self._sampler = RoverSampler(rover.model)
-        channels = (
-            *self._sampler.channels,
-            *OF_EPISODES,
-            Channel("reward_terms", "1", "terms of the step's reward", (len(WEIGHTS),), tuple(WEIGHTS)),
-        )
-        scene = {**arguments, **asdict(rover.start), **_rocks(rover), "control_period": rover.dt}
-        scene["goal_tolerance"] = rover.goal_tolerance
-        attributes = describe(rover.simulation, f"an episode of {title}", scene, seed=seed)
-        self.recorder = Recorder(path, channels, attributes, terrain=rover.simulation.terrain)
-
-    def append(self, rover: RoverEnv, info: Mapping[str, Any]) -> None:
-        """Adds the environment's current state."""
-        solver = info["solver"]
-        self.recorder.append(
-            {
-                **self._sampler.row(rover.simulation, residual=solver["residual"], iterations=solver["iterations"]),
-                "distance_to_goal": info["distance_to_goal"],
-                "slip_ratio": info["slip_ratio"],
-                "motor_energy": info["energy"],
-                "reward_terms": [info["reward_terms"][name] for name in WEIGHTS],
-            }
-        )
-
-
-def _rocks(rover: RoverEnv) -> dict[str, Any]:
-    """Arguments of `SphereField.rocks`, for a scene's description."""
-    return {} if rover.rocks is None else {"rocks": asdict(rover.rocks)}
 
 
 def _table(results: Sequence[Episode], title: str) -> Table:

@@ -12,7 +12,7 @@ from rover_gym.extras import require
 from rover_gym.grains.grain_run import GrainRun
 from rover_gym.mechanics import OptionError
 from rover_gym.planar.planar_run import PlanarRun
-from rover_gym.record.rover_run import RoverRun
+from rover_gym.record.rover_run import RoverRun, read_run
 from rover_gym.replay import write_gltf, write_page, write_vrml
 from rover_gym.runs import open_run
 from rover_gym.soil.soil_run import SoilRun
@@ -40,6 +40,13 @@ def replay(
         Path | None,
         typer.Option(dir_okay=False, help="Film of a run of `rover grains`, .mp4; needs no browser."),
     ] = None,
+    ghost: Annotated[
+        Path | None,
+        typer.Option(
+            help="Another run of a rover, to compare with: it drives along, and its curves are dashed.",
+            autocompletion=complete_recording,
+        ),
+    ] = None,
     fps: Annotated[float, typer.Option(help="Frames per second, at most as many as were recorded.")] = 25.0,
     follow: Annotated[
         bool, typer.Option("--follow/--no-follow", help="Let the camera of the page follow the rover.")
@@ -63,7 +70,8 @@ def replay(
             refuse(OptionError, option, str(path), kind[1])
     frames = saved.resample(fps)
     if html is not None:
-        say_path("page", write_page(frames, html, follow=follow))
+        beside = None if ghost is None else read_run(newest_run(ghost)).resample(fps)
+        say_path("page", write_page(frames, html, follow=follow, ghost=beside))
         show_in_browser(html, wanted=show)
     if vrml is not None and isinstance(frames, RoverRun):
         say_path("VRML", write_vrml(frames, vrml))
