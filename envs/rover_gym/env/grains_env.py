@@ -352,8 +352,9 @@ class RoverGrainsEnv(RoverEnv):
         if self.render_mode is not None:
             scene = self.scene
             if self._renderer is None:
-                self._renderer = self.make_renderer(scene)
+                self._renderer, self._drawn_scene = self.make_renderer(scene), None
             self._balls.place(self.grains.position)
+            self._renderer.shade(np.column_stack((self.grains.position, self.grains.radius)))
         return super().render()
 
 

@@ -299,10 +299,12 @@ class View {
     for (const i of numbers) {
       const [x, y, z, r] = rocks.subarray(4 * i, 4 * i + 4);
       const detail = ROCK_DETAIL.find(([most]) => r < most)[1] + (spheres ? 1 : 0);
-      const shape = (this.shapes[`${detail} ${spheres || i % ROCK_KINDS}`] ??= spheres ? ball(detail) : stone(detail, (i % ROCK_KINDS) + 1));
-      turn.set(scatter(i) - 0.5, scatter(i + 0.3) - 0.5, scatter(i + 0.5) - 0.5, scatter(i + 0.7) - 0.5).normalize();
+      const at = 1.7 * x + 0.3 * y + 2.9 * z; // the place alone says which stone lies here: frames of films have the same
+      const kind = Math.floor(ROCK_KINDS * scatter(at)) + 1;
+      const shape = (this.shapes[`${detail} ${spheres || kind}`] ??= spheres ? ball(detail) : stone(detail, kind));
+      turn.set(scatter(at + 0.1) - 0.5, scatter(at + 0.3) - 0.5, scatter(at + 0.5) - 0.5, scatter(at + 0.7) - 0.5).normalize();
       const first = places.length / 3;
-      const shade = 255 * (0.82 + 0.3 * scatter(i + 0.9));
+      const shade = 255 * (0.82 + 0.3 * scatter(at + 0.9));
       for (let k = 0; k < shape.attributes.position.count; k++) {
         corner.fromBufferAttribute(shape.attributes.position, k).applyQuaternion(turn);
         places.push(x + r * corner.x, y + r * corner.y, z + r * corner.z);
