@@ -31,6 +31,7 @@ from rover_gym.rendering import appearance as look
 from rover_gym.rendering.appearance import Part, part_mesh, rover_parts
 from rover_gym.rendering.frames import contact_forces
 from rover_gym.rendering.rut_actor import rut_mesh
+from rover_gym.rendering.scenery_actors import BallsActor
 from rover_gym.replay.page import player_file
 from rover_gym.sand import SoftGround, named_soil
 
@@ -331,6 +332,24 @@ def test_a_rover_casts_its_shadow_on_hills_too(model: RoverModel) -> None:
         middle = np.array([SIZE["height"], SIZE["width"]]) / 2.0
         assert columns.mean() > middle[1]
         assert rows.mean() < middle[0]
+
+
+def test_balls_under_a_rover_lie_in_its_shadow(model: RoverModel) -> None:
+    """The frames of beds of balls had no shadow: it lay under the balls."""
+    places = np.array([[0.0, 0.05, -0.2], [6.0, 0.05, 0.0], [-6.0, 0.05, 3.0]])
+    balls = BallsActor(np.full(3, 0.05))
+    balls.place(places)
+    for terrain in (Plane(), HeightField(np.zeros((41, 41)), spacing=0.5, origin=(-10.0, -10.0))):
+        simulation = Simulation(model, terrain)
+        simulation.set_state(model.resting_pose(terrain, (0.0, 0.0), 0.0))
+        with FrameRenderer(model, terrain, **SIZE) as camera:
+            camera.shade(balls)
+            camera.render(simulation)
+            assert camera._shadow is not None
+            bright = camera._shadow.brightness(places)
+            assert bright[0] == pytest.approx(look.SHADOW, abs=0.01)
+            assert bright[1:] == pytest.approx(1.0)
+            assert not any(flat.GetVisibility() for flat in camera._shadows.values())
 
 
 def test_stones_are_the_same_in_frames_and_on_pages() -> None:

@@ -340,7 +340,7 @@ class RoverGrainsEnv(RoverEnv):
 
         renderer = super().make_renderer(scene)
         self._balls = BallsActor(self.grains.radius)
-        renderer.add(self._balls.actor)
+        renderer.shade(self._balls)
         self._drawn = self.bed.number
         return renderer
 
@@ -354,7 +354,6 @@ class RoverGrainsEnv(RoverEnv):
             if self._renderer is None:
                 self._renderer, self._drawn_scene = self.make_renderer(scene), None
             self._balls.place(self.grains.position)
-            self._renderer.shade(np.column_stack((self.grains.position, self.grains.radius)))
         return super().render()
 
 

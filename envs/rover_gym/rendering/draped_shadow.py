@@ -22,13 +22,11 @@ class DrapedShadow:
 
     Attributes:
         actor: What VTK draws.
-        balls: (n, 4) places and radii of balls that it falls on, too, m.
     """
 
     def __init__(self, model: RoverModel, terrain: Terrain) -> None:
         self._terrain, self._lift = terrain, LIFT * float(model.clear_radius)
         self._parts = [(part, look.part_mesh(part, 12)[0]) for part in look.rover_parts(model)]
-        self.balls: Array = np.zeros((0, 4))
         self._mapper = vtkPolyDataMapper()
         self._mapper.ScalarVisibilityOff()
         self.actor = actor_with(self._mapper, lit=False)
@@ -54,11 +52,12 @@ class DrapedShadow:
         low, high = everywhere.min(axis=0), everywhere.max(axis=0)
         margin = 0.05 * float((high - low).max())
         low, size = low - margin, float((high - low).max()) + 2.0 * margin
-        self._paint([PIXELS * (points - low) / size for points in flat])
+        self._place = low, size, low_end
+        self._cover = self._paint([PIXELS * (points - low) / size for points in flat])
         grid = np.linspace(0.0, 1.0, CELLS + 1)
         # The light comes aslant: ground above the lowest wheel lies in the way of what falls farther on.
         places = low + size * np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
-        heights = self._heights(places, size / CELLS)
+        heights = heights_of(self._terrain, places)
         known = np.isfinite(heights)
         vertices = np.column_stack((places[:, 0], np.where(known, heights, low_end) + self._lift, places[:, 1]))
         i, k = (index.ravel() for index in np.meshgrid(np.arange(CELLS), np.arange(CELLS)))
@@ -75,30 +74,29 @@ class DrapedShadow:
         flat: Array = points[:, [0, 2]] - np.outer((points[:, 1] - height) / SUN[1], SUN[[0, 2]])
         return flat
 
-    def _heights(self, places: Array, cell: float) -> Array:
-        """Heights of ground and balls at places (n, 2), m."""
-        heights = heights_of(self._terrain, places)
-        if len(self.balls):
-            low = places.min(axis=0) - 0.5 * cell
-            steps = np.floor((self.balls[:, [0, 2]] - low) / cell).astype(np.int64)
-            inside = ((steps >= 0) & (steps <= CELLS)).all(axis=1)
-            rows = steps[inside, 1] * (CELLS + 1) + steps[inside, 0]
-            np.fmax.at(heights, rows, self.balls[inside, 1] + self.balls[inside, 3])
-        return heights
+    def brightness(self, points: Array) -> Array:
+        """(n,) how bright what lies at points (n, 3), m, is: 1 in the Sun, less in the shadow."""
+        low, size, height = self._place
+        steps = np.floor(PIXELS * (self._along_the_light(points, height) - low) / size).astype(np.int64)
+        inside = ((steps >= 0) & (steps < PIXELS)).all(axis=1)
+        result = np.ones(len(points))
+        result[inside] -= (1.0 - SHADOW) * self._cover[steps[inside, 1], steps[inside, 0]]
+        return result
 
-    def _paint(self, bodies: list[Array]) -> None:
-        """Paints the outlines of convex bodies (n, 2), in pixels."""
+    def _paint(self, bodies: list[Array]) -> Array:
+        """Paints the outlines of convex bodies (n, 2), in pixels; returns how much of each pixel they cover."""
         picture = Image.new("L", (PIXELS, PIXELS))
         pen = ImageDraw.Draw(picture)
         for body in bodies:
             corners = _hull(body)
             if len(corners) > 2:
                 pen.polygon([tuple(corner) for corner in corners], fill=255)
-        soft = np.asarray(picture.filter(ImageFilter.GaussianBlur(1.2)), dtype=np.float64)
+        soft = np.asarray(picture.filter(ImageFilter.GaussianBlur(1.2)), dtype=np.float64) / 255.0
         pixels = np.zeros((PIXELS * PIXELS, 4), np.uint8)
-        pixels[:, 3] = np.round((1.0 - SHADOW) * soft).ravel().astype(np.uint8)
+        pixels[:, 3] = np.round(255.0 * (1.0 - SHADOW) * soft).ravel().astype(np.uint8)
         self._image.GetPointData().SetScalars(numpy_to_vtk(pixels, deep=True))
         self._image.Modified()
+        return soft
 
 
 def _hull(points: Array) -> list[list[float]]:

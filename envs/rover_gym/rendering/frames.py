@@ -27,6 +27,7 @@ from rover_gym.rendering.render_options import Camera, check_render_options
 from rover_gym.rendering.rut_actor import RutActor
 from rover_gym.rendering.scenery_actors import (
     FAR,
+    BallsActor,
     Goal,
     GroundActors,
     RockActors,
@@ -167,6 +168,7 @@ class FrameRenderer(Picture):
         self._terrain: Terrain | None = None
         self._goal: tuple[Goal | None, float] = (None, 0.0)
         self._stage: list[vtkActor] = []
+        self._balls: BallsActor | None = None
         self.set_scene(terrain, goal=goal, goal_tolerance=goal_tolerance)
 
     def set_scene(self, terrain: Terrain, *, goal: Goal | None = None, goal_tolerance: float = 0.5) -> None:
@@ -184,7 +186,7 @@ class FrameRenderer(Picture):
         self._shadows: dict[str, vtkActor] = {}
         sand = sand_of(terrain)
         self._ruts = None if sand is None else RutActor(sand)
-        self._shadow = None if plane is not None else DrapedShadow(self._model, terrain)
+        self._shadow = DrapedShadow(self._model, terrain) if plane is None or self._balls is not None else None
         self._marks = None if sand is not None else TyreMarks(self._model, terrain)
         self._stage = [surface.actor for surface in self._surfaces]
         self._stage += [] if self._ruts is None else [self._ruts.actor]
@@ -192,6 +194,8 @@ class FrameRenderer(Picture):
         if self._ground is not None:
             self._shadows = {solid: shadow_of(actor, self._ground) for solid, actor in self._solids.items()}
             self._stage += [self._ground.actor, *self._shadows.values()]
+        for flat in self._shadows.values() if self._shadow is not None else ():
+            flat.VisibilityOff()
         self._stage += [] if self._shadow is None else [self._shadow.actor]
         self._stage += [] if self._marks is None else [self._marks.actor]
         if goal is not None:
@@ -204,10 +208,16 @@ class FrameRenderer(Picture):
         """Adds what stays when the scene changes, such as the balls of a bed or its walls; their owner moves them."""
         self._scene.AddActor(actor)
 
-    def shade(self, balls: Array) -> None:
-        """Lets the rover's shadow fall on balls on ground that is no plane, too: (n, 4) places and radii, m."""
-        if self._shadow is not None:
-            self._shadow.balls = balls
+    def shade(self, balls: BallsActor) -> None:
+        """Adds balls, which the rover's shadow falls on; their owner moves them."""
+        self._balls = balls
+        self._scene.AddActor(balls.actor)
+        if self._shadow is None and self._terrain is not None:
+            self._shadow = DrapedShadow(self._model, self._terrain)
+            self._stage.append(self._shadow.actor)
+            self._scene.AddActor(self._shadow.actor)
+        for flat in self._shadows.values():  # it would lie under the balls
+            flat.VisibilityOff()
 
     def render(self, simulation: Simulation) -> npt.NDArray[np.uint8]:
         """The simulation's current state as an image (height, width, 3) uint8, top row first."""
@@ -231,6 +241,8 @@ class FrameRenderer(Picture):
         pose, poses = np.eye(4), simulation.poses()
         if self._shadow is not None:
             self._shadow.follow(poses)
+            if self._balls is not None:
+                self._balls.darken(self._shadow.brightness(self._balls.position))
         if self._marks is not None:
             self._marks.follow(poses, simulation.time)
         for solid, (origin, rotation) in poses.items():

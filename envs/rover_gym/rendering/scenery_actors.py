@@ -317,6 +317,7 @@ class BallsActor:
 
     Attributes:
         actor: What VTK draws.
+        position: (n, 3) m.
     """
 
     def __init__(self, radius: npt.ArrayLike, kinematic: npt.ArrayLike | None = None) -> None:
@@ -339,9 +340,15 @@ class BallsActor:
         self.actor = actor_with(mapper)
         self.place(np.zeros((len(radii), 3)))
 
+    def darken(self, brightness: Array) -> None:
+        """Gives each ball (n,) a share of its light, 1 for all of it."""
+        set_colours(self._points, brightness[:, None] * self._colours)
+        self._points.Modified()
+
     def place(self, position: Array | npt.NDArray[np.float32]) -> None:
         """Moves the balls to (n, 3), m."""
-        set_points(self._points, np.asarray(position, dtype=np.float64))
+        self.position = np.asarray(position, dtype=np.float64)
+        set_points(self._points, self.position)
         set_colours(self._points, self._colours)
         self._points.GetPointData().AddArray(self._sizes)
         self._points.Modified()
