@@ -20,7 +20,7 @@ TIER   ?= test# of the tests: quick, test or all
 SIDE_BY_SIDE = $(MAKE) --no-print-directory --jobs=2 --output-sync
 MODULE := $(or $(wildcard $(STAMPS)/release),$(STAMPS)/core)# as it is installed, or for development
 
-.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras docs bench chart stability torture film validate validate-sand orders bits instructions profiles train train-rllib pins clean
+.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras docs bench chart stability torture film pace validate validate-sand orders bits instructions profiles train train-rllib pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -87,7 +87,10 @@ test-rust: $(STAMPS)/core ## the Rust tests only (of tier all with checks of ari
 test-python: $(STAMPS)/test $(STAMPS)/core $(STAMPS)/fmu $(STAMPS)/debian-demo $(STAMPS)/debian-test ## the Python tests only, and the longest ten
 	$(BIN)/pytest --numprocesses auto --tier $(TIER) --durations 10 $(SAME_DRAWS)
 
-same-bits: $(STAMPS)/test $(MODULE) ## compare the bits of the development build and of the build that is shipped with the committed ones
+same-pace: $(STAMPS)/test $(MODULE) ## how many pictures a second a page of the player draws without a graphics card
+	PYTHONPATH=tests $(BIN)/python -m browser.pace
+
+bits: $(STAMPS)/test $(MODULE) ## compare the bits of the development build and of the build that is shipped with the committed ones
 	$(MAKE) --no-print-directory $(STAMPS)/core
 	$(MAKE) --no-print-directory bits
 	$(MAKE) --no-print-directory $(STAMPS)/release
@@ -123,7 +126,7 @@ bench: $(STAMPS)/release ## time a step and tell where the time goes, MuJoCo's b
 
 train: $(STAMPS)/test $(STAMPS)/release ## train a policy for the rocks (about half an hour of one core) and compare it with the baseline, under runs/
 	$(BIN)/python training/train_ppo.py --config rocks --seed 1
-	$(BIN)/python training/evaluate.py runs/train/rocks-seed1 --difficulty 1
+	$(BIN)/python training/evaluate.py runs/train/rocks-seed1 pd scan --difficulty 1
 
 train-rllib: ## train Rover-v0 on a local Ray with 2 workers; Ray wants a virtual environment of its own
 	@$(MAKE) --no-print-directory VENV=$(VENV)-rllib $(VENV)-rllib/stamps/ray

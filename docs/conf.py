@@ -1,6 +1,6 @@
 """Sphinx configuration.
 
-Some pages are made from the code itself: the cards of the environments, the command line, the table of public names.
+Some pages are made from the code itself: cards of the environments, command line, public names, gallery.
 """
 
 import sys
@@ -11,7 +11,7 @@ from sphinx.application import Sphinx
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
-from extensions import cards, command_line, public_names, rooms  # noqa: E402 - they are found beside this file
+from extensions import cards, command_line, gallery, public_names, rooms  # noqa: E402 - they are found beside this file
 from extensions.compiled import use_stub  # noqa: E402
 
 from rover_gym import __version__  # noqa: E402
@@ -28,10 +28,12 @@ extensions = [
     "extensions.contents",
     "extensions.docstrings",
 ]
-exclude_patterns = ["_build", "_generated/names.md", "_generated/other-rooms.md", "extensions"]
+exclude_patterns = ["_build", "_generated/names.md", "_generated/other-rooms.md", "_generated/pages", "extensions"]
 html_theme = "furo"
 html_title = f"rover-gym {release}"
 html_static_path = ["_static"]
+html_extra_path = ["_generated/pages"]  # the gallery's page of the player
+(HERE / "_generated" / "pages").mkdir(parents=True, exist_ok=True)
 html_css_files = ["manual.css"]
 default_role = "literal"  # docstrings write `code` as Markdown does
 nitpicky = False
@@ -48,7 +50,7 @@ autodoc_default_options = {"members": True, "undoc-members": True}
 
 def _write_generated(_app: Sphinx) -> None:
     folder = HERE / "_generated"
-    folder.mkdir(exist_ok=True)
+    gallery.write_gallery(folder / "gallery", folder / "pages")
     pages = {
         **cards.pages(),
         "command-line.md": command_line.page(),

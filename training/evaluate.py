@@ -1,6 +1,6 @@
-"""Compares trained policies with the PD baseline and the scan planner on the same seeded episodes: `rover evaluate`.
+"""Compares policies on the same seeded episodes: `rover evaluate`.
 
-python training/evaluate.py runs/train/rocks-seed1 runs/train/rocks-seed2 --difficulty 1 --output runs/evaluation
+python training/evaluate.py runs/train/rocks-seed1 pd scan --difficulty 1 --output runs/evaluation
 """
 
 import typer

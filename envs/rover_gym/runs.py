@@ -83,7 +83,6 @@ def record_run(
     Raises:
         OptionError: `duration` or `fps` is not positive, or the run has too many rows.
         RecordingError: The file is in use, or the disk is full.
-        MissingExtraError: h5py is not installed.
         StepError: A step failed; the rows before it are on disk.
     """
     sampler = sampler_of(sim)
@@ -118,7 +117,6 @@ def open_run(path: str | Path, kind: type[Any] = Run) -> Any:
     Raises:
         RecordingError: The file is not a trajectory, holds no samples, or is a run of another kind.
         OSError: The file does not exist or cannot be read.
-        MissingExtraError: h5py is not installed.
     """
     run = saved_run_of(read_trajectory(path), path)
     if not isinstance(run, kind):

@@ -9,13 +9,16 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
 import pytest
 from browser.manual_pages import DOCS, build, printed
-from browser.test_replay_page import start_browser
+from browser.test_replay_page import await_that, start_browser
+from PIL import Image
 from selenium import webdriver
 
 import rover_gym
 from rover_gym import _core, mechanics
+from rover_gym.registration import ENVIRONMENTS
 
 pytestmark = pytest.mark.timeout(1200)
 
@@ -165,3 +168,19 @@ def test_the_start_page_has_four_ways_in(manual: Path, browser: webdriver.Chrome
     )
     assert len(links) == len(list((DOCS / "tutorials").glob("*.md"))) == 4
     assert all(width > 0 and Path(link.removeprefix("file://")).is_file() for link, width in links)
+
+
+def test_the_gallery_shows_every_environment_and_a_page_that_draws(manual: Path, browser: webdriver.Chrome) -> None:
+    browser.get((manual / "gallery.html").as_uri())
+    shown = browser.execute_script("return [...document.querySelectorAll('article img')].map((one) => one.src);")
+    for name in ENVIRONMENTS:
+        (place,) = [address for address in shown if address.endswith(f"/{name.lower()}.webp")]
+        image = np.asarray(Image.open(manual / place.rpartition("/html/")[2]))
+        assert image.std(axis=(0, 1)).min() > 10.0
+    assert sum(path.stat().st_size for path in (manual / "_images").glob("rover*-v0.webp")) < 300_000
+    frame = browser.find_element("css selector", "iframe.player")
+    browser.execute_script("arguments[0].loading = 'eager'; arguments[0].scrollIntoView();", frame)
+    browser.switch_to.frame(frame)
+    drawn = "return Number(document.querySelector('#root canvas')?.dataset.drawn || 0);"
+    await_that(lambda: browser.execute_script(drawn) > 2, "the page in the gallery")
+    browser.switch_to.default_content()

@@ -65,7 +65,7 @@ def test_rocks_are_driven_over_and_recorded(tmp_path: Path) -> None:
 
 def test_a_short_time_limit_ends_the_episode_without_success() -> None:
     output = output_of("drive", "--time-limit", "1")
-    assert "no: time" in output
+    assert "no: ran out of time" in output
     assert "1.00 s" in output
 
 
@@ -100,7 +100,7 @@ def test_version_and_help() -> None:
 
 def test_episodes_are_filmed(tmp_path: Path) -> None:
     path = tmp_path / "films" / "rocks.mp4"
-    arguments = ("--terrain", "rocks", "--time-limit", "0.3", "--episodes", "2", "--video", str(path))
+    arguments = ("--terrain", "rocks", "--time-limit", "0.3", "--episodes", "2", "--film", str(path))
     assert str(path) in output_of("drive", *arguments).replace("\n", "")
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
     assert frames == 2 * (7 + ENDING)  # the start, six steps and the outcome each
@@ -109,7 +109,8 @@ def test_episodes_are_filmed(tmp_path: Path) -> None:
 
 def test_the_planner_by_hand_drives_too(tmp_path: Path) -> None:
     arguments = ("--policy", "scan", "--terrain", "rocks", "--difficulty", "1", "--time-limit", "2")
-    assert "the scan planner" in output_of("drive", *arguments, "--model", "mars-rover", "--output", tmp_path)
+    output = output_of("drive", *arguments, "--model", "mars-rover", "--output", tmp_path)
+    assert "the search on the height scan" in output
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert summary["arguments"]["height_scan"] == [48, 40, 0.18]
 
@@ -118,7 +119,7 @@ def test_a_film_has_the_size_and_the_camera_that_are_asked_for(tmp_path: Path) -
     frames = {}
     for name, options in {"plain": (), "other": ("--camera", "top", "--forces", "--no-antialiasing")}.items():
         path = tmp_path / f"{name}.mp4"
-        arguments = ("drive", "--time-limit", "0.2", "--video", str(path), "--size", "320x180", *options)
+        arguments = ("drive", "--time-limit", "0.2", "--film", str(path), "--size", "320x180", *options)
         assert rover(*arguments).exit_code == 0
         frames[name] = last_frame(path)
         assert frames[name].shape == (180, 320, 3)
@@ -144,7 +145,7 @@ def last_frame(path: Path, width: int = 320, height: int = 180) -> np.ndarray:
     ],
 )
 def test_a_film_that_cannot_be_is_refused(options: tuple[str, ...], message: str, tmp_path: Path) -> None:
-    assert error_of("drive", "--video", tmp_path / "film.mp4", *options).startswith(f"error: {message}")
+    assert error_of("drive", "--film", tmp_path / "film.mp4", *options).startswith(f"error: {message}")
 
 
 def test_the_recording_says_outcome_and_goal(tmp_path: Path) -> None:
@@ -154,32 +155,43 @@ def test_the_recording_says_outcome_and_goal(tmp_path: Path) -> None:
     assert run.goal_tolerance == 0.5
 
 
-def test_the_table_has_a_row_a_difficulty() -> None:
-    output = output_of("baseline", "--episodes", "1", "--difficulty", "0", "--difficulty", "0.25")
-    for word in ("success", "95% interval", "time", "energy", "other ends", "0.25"):
+def test_the_table_has_a_row_a_difficulty(tmp_path: Path) -> None:
+    given = ("--episodes", "1", "--difficulty", "0", "--difficulty", "0.25", "--output", tmp_path)
+    output = output_of("evaluate", *given)
+    for word in ("difficulty", "success", "95% interval", "time", "energy", "other ends", "0.25"):
         assert word in output
+    assert "|" not in output  # a table, not Markdown
+    assert "| pd | 0.25 | " in (tmp_path / "evaluation.md").read_text(encoding="utf-8")
 
 
-def test_json_says_the_same_twice() -> None:
-    runs = [rover("baseline", "--episodes", "2", "--difficulty", "0.5", "--seed", "3", "--json") for _ in range(2)]
-    assert runs[0].stdout == runs[1].stdout
-    report = json.loads(runs[0].stdout)
+def test_json_says_the_same_twice(tmp_path: Path) -> None:
+    given = ("--episodes", "2", "--difficulty", "0.5", "--seed", "3", "--json", "--output")
+    reports = [json.loads(rover("evaluate", *given, tmp_path / name).stdout) for name in "ab"]
+    for report in reports:
+        del report["written"]
+    report = reports[0]
+    assert report == reports[1]
     assert report["seed"] == 3
+    assert report["environment"]["difficulty"] == 0.5
     (row,) = report["rows"]
-    assert row["difficulty"] == 0.5
+    assert row["policy"] == "pd"
     assert row["episodes"] == sum(row["ends"].values()) == 2
-    low, high = row["interval"]
-    assert 0.0 <= low <= row["success_rate"] <= high <= 1.0
+    low, high = row["success"]["interval"]
+    assert 0.0 <= low <= row["success"]["value"] <= high <= 1.0
 
 
-def test_a_difficulty_out_of_range_is_one_line() -> None:
-    assert "difficulty" in error_of("baseline", "--episodes", "1", "--difficulty", "2.1")
+def test_a_difficulty_out_of_range_is_one_line(tmp_path: Path) -> None:
+    error = error_of("evaluate", "--episodes", "1", "--difficulty", "2.1", "--output", tmp_path)
+    assert error.startswith("error: --difficulty")
 
 
-def test_a_trained_policy_can_be_measured_too() -> None:
-    output = output_of("baseline", "--episodes", "1", "--difficulty", "0.25", "--policy", "trained")
-    assert "with a trained policy" in output
+def test_policies_of_the_package_are_compared_by_name(tmp_path: Path) -> None:
+    given = ("--episodes", "1", "--difficulty", "0.25", "--json", "--output", tmp_path)
+    output = output_of("evaluate", "scan", "trained", "pd", *given)
+    rows = [row["policy"] for row in json.loads(output)["rows"]]
+    assert rows == ["scan", "pd", "guide alone", "trained"]
 
 
-def test_the_planner_by_hand_can_be_measured_too() -> None:
-    assert "the scan planner" in output_of("baseline", "--episodes", "1", "--difficulty", "1.25", "--policy", "scan")
+def test_a_policy_that_is_named_twice_or_unknown_is_one_line(tmp_path: Path) -> None:
+    for names, word in ((("pd", "pd"), "must be named once"), (("planner",), "POLICIES: must be 'pd'")):
+        assert word in error_of("evaluate", *names, "--episodes", "1", "--output", tmp_path)

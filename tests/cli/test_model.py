@@ -1,4 +1,4 @@
-"""`rover model import|show|check`."""
+"""`rover model list|import|show|check`."""
 
 import re
 from functools import partial
@@ -24,6 +24,12 @@ def test_every_model_of_the_gallery_is_shown_and_checked(name: str) -> None:
     assert checked.exit_code == 0, checked.output
     for what in ("load", "wheelbase", "clearance", "turning centre", "step that it can climb at friction 0.7"):
         assert what in checked.output
+
+
+def test_the_gallery_is_listed() -> None:
+    shown = rover("list")
+    assert shown.exit_code == 0, shown.output
+    assert [line.split()[0] for line in shown.stdout.splitlines()[3:] if line.strip()] == list(RoverModel.names())
 
 
 @pytest.mark.takes_long("imports and draws; the only test of the picture")

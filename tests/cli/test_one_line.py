@@ -18,7 +18,7 @@ from commands import error_of, output_of, rover
 from typer.main import get_command
 from typer.testing import Result
 
-import rover_gym.policy.evaluation
+import rover_gym.policy.comparison
 from rover_gym import OptionError
 from rover_gym.cli import app, drive_command
 from rover_gym.cli.console import FIRST_STEPS
@@ -65,7 +65,7 @@ def test_bytes_of_a_name_that_are_no_text_are_printed(tmp_path: Path) -> None:
         (["drive", "--time-step", "1e-300"], "--time-step: must be at least 1e-05, got 1e-300"),
         (["drive", "--slope", "1" + 400 * "0"], "--slope: must be finite, got inf"),
         (["drive", "--heading", "inf"], "--heading: must be finite"),
-        (["baseline", "--difficulty", "nan"], "--difficulty: must be finite"),
+        (["evaluate", "--difficulty", "nan"], "--difficulty: must be finite"),
         (["planar", "ball", "--slope", "90"], "--slope: must be at most 89, got 90.0"),
         (["planar", "ball", "--ground", "table", "--table", "/dev/zero"], "--table: must be a regular file"),
         (["planar", "rover", "--time-step", "1e-9"], "makes more than 10000000 rows"),
@@ -94,7 +94,7 @@ def test_a_message_names_the_option_that_the_user_can_set(arguments: list[str], 
         ["drive", "--seed", "1" + 400 * "0"],
         ["drive", "--episodes", "1" + 30 * "0"],
         ["drive", "--episodes", "0"],
-        ["baseline", "--episodes", "1" + 30 * "0"],
+        ["evaluate", "--episodes", "1" + 30 * "0"],
         ["planar", "soil", "--seed", "-1"],
         ["scene", "--seed", "1" + 30 * "0"],
         ["speed", "--num-envs", "1000000000"],
@@ -110,7 +110,7 @@ def test_numbers_beyond_reason_are_refused_before_the_work(arguments: list[str])
     assert arguments[-2] in result.stderr
 
 
-@pytest.mark.parametrize("option", ["--video", "--output"])
+@pytest.mark.parametrize("option", ["--film", "--output"])
 def test_a_place_that_cannot_be_written_is_told_before_driving(
     option: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -125,8 +125,8 @@ def test_a_place_that_cannot_be_written_is_told_before_driving(
 
 def test_a_film_of_another_kind_is_refused_before_driving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(drive_command, "run_episode", raising(AssertionError("it drove")))
-    error = error_of("drive", "--video", tmp_path / "film.txt")
-    assert "--video: must be a file's name that ends in .mp4" in error
+    error = error_of("drive", "--film", tmp_path / "film.txt")
+    assert "--film: must be a file's name that ends in .mp4" in error
 
 
 @pytest.mark.parametrize("option", ["--html", "--vrml", "--gltf"])
@@ -159,9 +159,9 @@ def test_an_interrupted_drive_keeps_and_prints_what_is_done(tmp_path: Path, monk
 
     monkeypatch.setattr(drive_command, "run_episode", interrupted)
     video = tmp_path / "film.mp4"
-    result = rover("drive", "--episodes", "3", "--time-limit", "0.5", "--output", tmp_path, "--video", video)
+    result = rover("drive", "--episodes", "3", "--time-limit", "0.5", "--output", tmp_path, "--film", video)
     assert one_line(result, 130) == "interrupted: 1 of 3 episodes are done\n"
-    assert "no: time" in result.stdout
+    assert "no: ran out of time" in result.stdout
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert [episode["seed"] for episode in summary["episodes"]] == [0]
     assert len(read_trajectory(tmp_path / "episode-0.h5")["time"]) == 11
@@ -171,20 +171,61 @@ def test_an_interrupted_drive_keeps_and_prints_what_is_done(tmp_path: Path, monk
     assert video.stat().st_size > 0
 
 
-def test_an_interrupted_baseline_prints_what_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
-    drive, driven = rover_gym.policy.evaluation.run_episode, []
+def test_an_interrupted_evaluation_prints_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drive, driven = rover_gym.policy.comparison.drive_all, []
 
     def interrupted(*args: Any, **kwargs: Any) -> Any:
-        if len(driven) == 3:
+        if len(driven) == 2:
             raise KeyboardInterrupt
         driven.append(1)
         return drive(*args, **kwargs)
 
-    monkeypatch.setattr(rover_gym.policy.evaluation, "run_episode", interrupted)
+    monkeypatch.setattr(rover_gym.policy.comparison, "drive_all", interrupted)
     options = ["--episodes", "2", "--difficulty", "0", "--difficulty", "0.25", "--difficulty", "0.5"]
-    result = rover("baseline", *options, "--json")
-    assert one_line(result, 130) == "interrupted: 3 of 6 episodes are done\n"
-    assert [(row["difficulty"], row["episodes"]) for row in json.loads(result.stdout)["rows"]] == [(0.0, 2), (0.25, 1)]
+    result = rover("evaluate", *options, "--output", str(tmp_path), "--json")
+    assert one_line(result, 130) == "interrupted: 2 of 3 rows are done\n"
+    assert [row["difficulty"] for row in json.loads(result.stdout)["rows"]] == [0.0, 0.25]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["drive", "--nope"], "No such option: --nope"),
+        (["drive", "--video", "a.mp4"], "No such option: --video"),
+        (["nope"], "No such command 'nope'."),
+        (["drive", "--seed", "many"], "Invalid value for '--seed'"),
+        (["drive", "--seed", "-1"], "Invalid value for '--seed'"),
+        (["export", "fmu"], "Missing option '--output'"),
+        (["replay", "a", "b"], "unexpected extra argument"),
+    ],
+)
+def test_wrong_usage_is_one_line_that_names_the_help(arguments: list[str], message: str) -> None:
+    """Eight lines with a frame came."""
+    line = one_line(rover(*arguments))
+    assert message in line
+    assert line.endswith(" -h)\n")
+
+
+def test_every_command_is_listed_and_one_word_has_one_meaning() -> None:
+    """Films had five spellings, a help text had ranges of nineteen digits, and `baseline` evaluated."""
+    program = get_command(app)
+    listed = rover().stdout
+    words: dict[str, set[str]] = {}
+
+    def check(command: Any, path: str) -> None:
+        assert command.name in listed, path
+        for name, below in getattr(command, "commands", {}).items():
+            check(below, f"{path} {name}")
+        for parameter in command.params:
+            for option in parameter.opts:
+                words.setdefault(option, set()).add(path)
+
+    check(program, "rover")
+    assert not {"--video", "--folder", "--planner", "-o"} & words.keys()
+    assert len(words["--film"]) >= 10
+    assert len(words["--output"]) > 20
+    for path in words["--seed"]:
+        assert "9223372036854775807" not in rover(*path.split()[1:], "-h").stdout
 
 
 @pytest.mark.nightly("tests/cli/test_one_line.py::test_an_interrupted_drive_keeps_and_prints_what_is_done")
@@ -267,7 +308,7 @@ def test_a_command_that_prints_a_table_takes_json() -> None:
     [
         ((), "Rover-v0 with the PD baseline"),
         (("--difficulty", "0.5"), "RoverRocks-v0 with the PD baseline"),
-        (("--terrain", "rocks", "--policy", "scan"), "RoverRocks-v0 with the scan planner"),
+        (("--terrain", "rocks", "--policy", "scan"), "RoverRocks-v0 with the search on the height scan"),
         (("--terrain", "hills"), "RoverHills-v0 with the PD baseline"),
     ],
 )
@@ -325,7 +366,6 @@ def test_a_slope_below_the_friction_angle_is_no_matter() -> None:
     ("arguments", "begin"),
     [
         ("evaluate nope", "POLICIES: must be 'pd'"),
-        ("evaluate pd", "POLICIES: must be the folder"),
         ("model show nope", "FILE_OR_NAME: must be a name"),
         ("model import README.md", "FILE: must end in"),
         ("train nope", "CONFIG: must be a YAML file"),
@@ -352,7 +392,7 @@ def test_rover_alone_says_what_to_try_first() -> None:
     output = output_of()
     for command, _ in FIRST_STEPS:
         assert command in output
-    for word in ("rover --help", "rover --install-completion"):
+    for word in ("rover COMMAND -h", "rover --install-completion", *get_command(app).commands):
         assert word in output
 
 

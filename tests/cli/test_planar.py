@@ -118,7 +118,7 @@ def test_a_crossing_is_recorded_drawn_filmed_and_replayed(tmp_path: Path) -> Non
 
 @pytest.mark.nightly("tests/cli/test_planar.py::test_a_planar_run_is_plotted_and_replayed")
 def test_a_run_on_a_soil_is_plotted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    options = [*SMALL, "--duration", "0.2", "--no-video", "--output", str(tmp_path)]
+    options = [*SMALL, "--duration", "0.2", "--no-film", "--output", str(tmp_path)]
     assert rover("planar", "soil", *options).exit_code == 0
     run = open_run(tmp_path / "soil.h5")
     figures = {name: Figure() for name in SOIL_DRAWINGS}
@@ -147,7 +147,7 @@ def test_a_run_on_a_soil_is_plotted(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_a_crossing_ends_where_the_soil_does(tmp_path: Path) -> None:
-    options = ["--disks", "90", "--layers", "2", "--duration", "5", "--torque", "90", "--no-video"]
+    options = ["--disks", "90", "--layers", "2", "--duration", "5", "--torque", "90", "--no-film"]
     output_of("planar", "soil", *options, "--gravity", "0.61", "--output", tmp_path)
     assert open_run(tmp_path / "soil.h5").time[-1] < 5.0
 

@@ -11,7 +11,6 @@ import pytest
 from refusals import refused
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField
-from rover_gym.extras import MissingExtraError
 from rover_gym.record import Channel, Recorder, RecordingError, RoverSampler, read_trajectory
 from rover_gym.record.steady_file import SteadyFile
 
@@ -186,9 +185,3 @@ def test_the_ground_comes_back_and_describes_itself(terrain: Plane | SphereField
         for data in file["terrain"].values():
             assert data.attrs["unit"]
             assert data.attrs["description"]
-
-
-def test_without_h5py_the_error_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "h5py", None)
-    with pytest.raises(MissingExtraError, match=r"pip install 'rover-gym\[record\]'"):
-        Recorder(tmp_path / "run.h5", [TIME])

@@ -20,7 +20,7 @@ from gymnasium.wrappers import RecordVideo
 from refusals import refused
 
 import rover_gym
-from rover_gym import OptionError, Plane, RoverEnv, RoverModel, Simulation, SphereField
+from rover_gym import HeightField, OptionError, Plane, RoverEnv, RoverModel, Simulation, SphereField
 from rover_gym.env.sand_ground import sand_rover
 from rover_gym.extras import MissingExtraError
 from rover_gym.mechanics import ModelError
@@ -29,6 +29,8 @@ from rover_gym.rendering import appearance as look
 from rover_gym.rendering.appearance import Part, part_mesh, rover_parts
 from rover_gym.rendering.frames import contact_forces
 from rover_gym.rendering.rut_actor import rut_mesh
+from rover_gym.rendering.scenery_actors import BallsActor
+from rover_gym.replay.page import player_file
 from rover_gym.sand import SoftGround, named_soil
 
 Frame = npt.NDArray[np.uint8]
@@ -285,6 +287,112 @@ def test_tracks_in_sand_are_seen_behind_the_rover() -> None:
     height, middle = SIZE["height"], SIZE["height"] // 2
     assert changed[middle + 5 :].sum() > 20, "no track behind the rover"
     assert not changed[: height // 3].any(), "the ground ahead is untouched"
+
+
+def test_wheels_leave_marks_that_a_new_state_takes_away(
+    model: RoverModel, renderer: Callable[..., FrameRenderer]
+) -> None:
+    camera, simulation = renderer(Plane(), camera=((0.0, 9.0, 0.1), (0.0, 0.0, 0.0))), parked(model, Plane())
+    bare = camera.render(moved(simulation, x=2.0))
+    moved(simulation, x=-2.0)
+    simulation.set_wheel_torques(np.full(6, 60.0))
+    while simulation.q[0] < 2.0:
+        simulation.step(10)
+        driven = camera.render(simulation)
+    behind = (bare.astype(int) - driven.astype(int)).min(axis=2) > 8  # darker
+    columns = np.flatnonzero(behind.any(axis=0))
+    assert behind.sum() > 60
+    assert np.ptp(columns) > 0.2 * SIZE["width"]
+    again = camera.render(moved(simulation, x=-simulation.q[0] + 2.0, y=0.0))
+    other = camera.render(moved(simulation, x=0.2))  # at the same time elsewhere: it was set there
+    assert changed(again, other) > 0
+    assert changed(other, camera.render(simulation)) == 0
+    assert camera._marks is not None
+    assert not camera._marks.actor.GetVisibility()
+
+
+def test_a_rover_casts_its_shadow_on_hills_too(model: RoverModel) -> None:
+    """On maps, sand and beds of balls the rover stood on nothing."""
+    field = HeightField.fractal(20.0, 0.1, 0.05, seed=2)
+    level = HeightField(np.zeros((41, 41)), spacing=0.5, origin=(-10.0, -10.0))
+    for terrain in (field, level):
+        simulation = Simulation(model, terrain)
+        simulation.set_state(model.resting_pose(terrain, (0.0, 0.0), 0.0))
+        options = {"camera": ((0.0, 9.0, 0.1), (0.0, 0.0, 0.0)), **SIZE}
+        with FrameRenderer(model, terrain, **options) as camera:
+            with_shadow = camera.render(simulation)
+            assert camera._shadow is not None
+            camera._shadow.actor.VisibilityOff()
+            dark = (camera.render(simulation).astype(int) - with_shadow).min(axis=2) > 15
+        rows, columns = np.nonzero(dark)
+        assert len(rows) > 100
+        # From above, x to the right: the Sun stands behind to the right, the shadow falls ahead to the left.
+        middle = np.array([SIZE["height"], SIZE["width"]]) / 2.0
+        assert columns.mean() > middle[1]
+        assert rows.mean() < middle[0]
+
+
+def test_balls_under_a_rover_lie_in_its_shadow(model: RoverModel) -> None:
+    """The frames of beds of balls had no shadow: it lay under the balls."""
+    places = np.array([[0.0, 0.05, -0.2], [6.0, 0.05, 0.0], [-6.0, 0.05, 3.0]])
+    balls = BallsActor(np.full(3, 0.05))
+    balls.place(places)
+    for terrain in (Plane(), HeightField(np.zeros((41, 41)), spacing=0.5, origin=(-10.0, -10.0))):
+        simulation = Simulation(model, terrain)
+        simulation.set_state(model.resting_pose(terrain, (0.0, 0.0), 0.0))
+        with FrameRenderer(model, terrain, **SIZE) as camera:
+            camera.shade(balls)
+            camera.render(simulation)
+            assert camera._shadow is not None
+            bright = camera._shadow.brightness(places)
+            assert bright[0] == pytest.approx(look.SHADOW, abs=0.01)
+            assert bright[1:] == pytest.approx(1.0)
+            assert not any(flat.GetVisibility() for flat in camera._shadows.values())
+
+
+def test_stones_are_the_same_in_frames_and_on_pages() -> None:
+    """The page has its own copy of three formulas; here they are read from it and compared."""
+    script = player_file("view.js")
+    sun = re.search(r"SUN = new THREE.Vector3\(([^)]+)\)", script)
+    assert sun is not None
+    assert [float(one) for one in sun.group(1).split(",")] == pytest.approx(look.SUN, abs=5e-4)
+    for formula in (
+        "Math.sin(12.9898 * n + 78.233) * 43758.5453",
+        "0.5 * Math.sin(2.3 * x + 1.7 * y + seed) * Math.cos(1.9 * y - 2.1 * z + 2 * seed)",
+        "0.3 * Math.sin(4.1 * z + 3.3 * x + 3 * seed) + 0.2 * Math.sin(6.7 * y - 5.2 * x + 5 * seed)",
+        "0.98 + 0.1 * bumps(x, y, z, seed)",
+        "1.7 * x + 0.3 * y + 2.9 * z",
+        "scatter(at + 0.1) - 0.5, scatter(at + 0.3) - 0.5, scatter(at + 0.5) - 0.5, scatter(at + 0.7) - 0.5",
+        f"ROCK_KINDS = {look.STONES}",
+    ):
+        assert formula in script
+    centres = np.random.default_rng(0).uniform(-20.0, 20.0, (500, 3))
+    kinds, turns, shades = look.stones_of(centres)
+    assert set(kinds.tolist()) == set(range(look.STONES))
+    assert np.linalg.norm(turns, axis=1) == pytest.approx(1.0)
+    assert 0.82 <= shades.min() < shades.max() <= 1.12
+    vertices, triangles = look.stone_mesh(2, 1)
+    assert len(triangles) == 20 * 9
+    assert len(vertices) == 10 * 9 + 2  # closed: Euler's formula
+    radii = np.linalg.norm(vertices, axis=1)
+    assert 0.85 < radii.min() < 0.95 < radii.max() < 1.1
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    assert (np.einsum("ni,ni->n", np.cross(b - a, c - a), a) > 0.0).all()  # all faces look outward
+
+
+def test_a_small_rover_fills_the_frame_as_the_large_one_does() -> None:
+    """Rovers of sand and of the gallery were specks."""
+    shares = []
+    for name in ("rover", "open-rover"):
+        each = RoverModel.named(name)
+        simulation = Simulation(each, Plane())
+        simulation.set_state(each.resting_pose(Plane(), (0.0, 0.0), 0.0))
+        with FrameRenderer(each, Plane(), **SIZE) as camera:
+            frame = camera.render(simulation)
+            for actor in camera._solids.values():
+                actor.VisibilityOff()
+            shares.append(changed(frame, camera.render(simulation)) / frame[..., 0].size)
+    assert shares[1] > 0.4 * shares[0]
 
 
 def test_a_slope_is_seen(model: RoverModel, renderer: Callable[..., FrameRenderer]) -> None:

@@ -28,7 +28,7 @@ from rover_gym import (
 from rover_gym.env import HeightScan
 from rover_gym.env.start import scan_points
 from rover_gym.ground import heights_of, plane_of, surfaces_of
-from rover_gym.policy import measure_baseline
+from rover_gym.policy import drive_all, summarise
 from rover_gym.policy.evaluation import ENDS
 from rover_gym.vector import RoverVectorEnv
 
@@ -284,15 +284,19 @@ def test_the_plane_knows_no_difficulty(env: RoverEnv) -> None:
 
 def test_baseline_reaches_its_goal_where_it_is_easy_and_not_always_where_it_is_hard(whole: bool) -> None:
     episodes = 20 if whole else 8
-    easy, hard = measure_baseline((0.0, 1.0), episodes=episodes, seed=1000)
-    assert easy.success_rate >= 0.95
-    assert hard.success_rate <= 0.9
+    seeds = range(1000, 1000 + episodes)
+    easy, hard = (
+        summarise("pd", drive_all(PDPolicy, seeds, arguments={"terrain": "rocks", "difficulty": level}))
+        for level in (0.0, 1.0)
+    )
+    assert easy.success.value >= 0.95
+    assert hard.success.value <= 0.9
     for row in (easy, hard):
         assert sum(row.ends.values()) == row.episodes == episodes
         assert list(row.ends) == list(ENDS)
         assert row.ends["goal"] == row.successes
         assert row.ends["step_failed"] == 0
-    assert hard.energy_per_metre > easy.energy_per_metre
+    assert hard.energy_per_metre.value > easy.energy_per_metre.value
 
 
 def one_sphere(x: float, z: float = 0.0, slope: float = 0.0) -> SphereField:

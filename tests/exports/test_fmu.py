@@ -229,7 +229,7 @@ def test_a_unit_in_the_axes_of_rep_103_turns_every_vector_and_pose(tmp_path: Pat
 def test_axes_that_are_unknown_are_refused(tmp_path: Path) -> None:
     with pytest.raises(OptionError, match="axes: must be one of world, rep103"):
         write_fmu(simulation_on(Plane()), tmp_path / "a.fmu", axes="ned")  # type: ignore[arg-type]
-    error_of("export", "fmu", "-o", tmp_path / "a.fmu", "--axes", "ned")
+    error_of("export", "fmu", "--output", tmp_path / "a.fmu", "--axes", "ned")
     assert not (tmp_path / "a.fmu").exists()
 
 
@@ -485,13 +485,13 @@ def test_without_the_library_the_command_says_how_to_build_it(tmp_path: Path, mo
     monkeypatch.setattr(units, "LIBRARIES", tmp_path)
     with pytest.raises(OptionError, match=r"library: is not built: .*cargo build --release --locked -p rover-fmu"):
         write_fmu(Simulation(RoverModel()), tmp_path / "a.fmu")
-    assert "cargo build" in error_of("export", "fmu", "-o", tmp_path / "a.fmu")
+    assert "cargo build" in error_of("export", "fmu", "--output", tmp_path / "a.fmu")
     assert not (tmp_path / "a.fmu").exists()
 
 
 def test_the_command_writes_an_episodes_start(tmp_path: Path) -> None:
     options = ["--terrain", "sphere_field", "--difficulty", "0.5", "--seed", "3", "--friction", "0.6"]
-    output_of("export", "fmu", "-o", tmp_path / "a.fmu", *options)
+    output_of("export", "fmu", "--output", tmp_path / "a.fmu", *options)
     assert validate_fmu(str(tmp_path / "a.fmu")) == []
     description = read_model_description(str(tmp_path / "a.fmu"))
     assert {one.name: one.start for one in description.modelVariables}["friction"] == "0.6"

@@ -303,5 +303,5 @@ def test_the_command_writes_beside_the_run(tmp_path: Path) -> None:
     path = quick_run(tmp_path / "run.h5", n=3)
     output_of("export", "mcap", path)
     assert len(read(tmp_path / "run.mcap")["/tf"]) == 3
-    assert "--output: would replace the run itself" in error_of("export", "mcap", path, "-o", path)
+    assert "--output: would replace the run itself" in error_of("export", "mcap", path, "--output", path)
     assert read_run(path).n_frames == 3

@@ -55,7 +55,7 @@ rover = partial(commands.rover, "dataset")
 
 def test_a_policys_episodes_replay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     options = ["--environment", "RoverRocks-v0", "--difficulty", "0.3", "--episodes", "2", "--seed", "7"]
-    result = rover("rover/rocks-pd-v0", *options, "--folder", tmp_path)
+    result = rover("rover/rocks-pd-v0", *options, "--output", tmp_path)
     assert result.exit_code == 0, result.output
     data = load(tmp_path, "rover/rocks-pd-v0", monkeypatch)
     assert data.total_episodes == 2
@@ -72,7 +72,7 @@ def test_random_actions_drive_any_environment(
     environment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     result = rover(
-        "any-v1", "--environment", environment, "--policy", "random", "--episodes", "1", "--folder", tmp_path
+        "any-v1", "--environment", environment, "--policy", "random", "--episodes", "1", "--output", tmp_path
     )
     assert result.exit_code == 0, result.output
     data = load(tmp_path, "any-v1", monkeypatch)
@@ -94,7 +94,7 @@ def test_random_actions_drive_any_environment(
     ],
 )
 def test_bad_input_is_one_line_and_leaves_nothing(options: list[str], message: str, tmp_path: Path) -> None:
-    result = rover(*options, "--episodes", "1", "--folder", tmp_path)
+    result = rover(*options, "--episodes", "1", "--output", tmp_path)
     assert result.exit_code == 2
     assert message in result.stderr
     assert len(result.stderr.splitlines()) == 1

@@ -82,13 +82,13 @@ def test_the_forecast_gives_the_same_outcomes(rover: str | None, terrain: str) -
 def test_what_has_no_network_is_refused(policy: str, tmp_path: Path) -> None:
     with pytest.raises(PolicyError):
         onnx_policy(policy)
-    error_of("export", "onnx", policy, "-o", tmp_path / "a.onnx")
+    error_of("export", "onnx", policy, "--output", tmp_path / "a.onnx")
     assert not (tmp_path / "a.onnx").exists()
 
 
 def test_the_command_writes_a_file_that_the_checker_accepts(tmp_path: Path) -> None:
     for model in ("rover", "open-rover"):
         path = tmp_path / model / "a.onnx"
-        output_of("export", "onnx", "foresight", "--model", model, "-o", path)
+        output_of("export", "onnx", "foresight", "--model", model, "--output", path)
         onnx.checker.check_model(str(path), full_check=True)
     assert (tmp_path / "rover" / "a.onnx").read_bytes() != (tmp_path / "open-rover" / "a.onnx").read_bytes()

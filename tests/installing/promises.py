@@ -35,8 +35,16 @@ PROMISES = {
     "": """
 (episode,) = json.loads(rover("drive", "--json"))["episodes"]
 assert episode["success"], episode
-refused("record", *RECORDED)
-refused("render", "drive", "--no-record", "--video", "film.mp4")
+rover(*RECORDED)
+from rover_gym.record import read_run
+
+assert read_run("run/episode-0.h5").n_frames == 11
+rover("replay", "run/episode-0.h5", "--html", "page.html")
+assert Path("page.html").stat().st_size > 100_000
+refused("replay", "live")
+refused("demo", "plot", "run/episode-0.h5")
+rover("grains", "collapse", "--balls", "60", "--tube", "0.03", "--duration", "0.05", "--output", "grains")
+refused("render", "drive", "--no-record", "--film", "film.mp4")
 refused("models", "model", "show", "robot.urdf") if Path("robot.urdf").exists() else None
 
 import gymnasium as gym
@@ -52,15 +60,6 @@ assert envs.step(envs.action_space.sample())[1].shape == (3,)
 for driver in ("trained", "scan", "foresight"):
     rover("drive", "--difficulty", "1", "--policy", driver, "--time-limit", "1")
 """,
-    "record": """
-rover(*RECORDED)
-from rover_gym.record import read_run
-
-assert read_run("run/episode-0.h5").n_frames == 11
-refused("replay", "replay", "run/episode-0.h5", "--html", "page.html")
-refused("demo", "plot", "run/episode-0.h5")
-rover("grains", "collapse", "--balls", "60", "--tube", "0.03", "--duration", "0.05", "--output", "grains")
-""",
     "replay": """
 rover(*RECORDED)
 rover("replay", "run/episode-0.h5", "--html", "page.html", "--vrml", "run.wrl", "--gltf", "run.glb")
@@ -71,7 +70,7 @@ rover("grains", "collapse", "--balls", "60", "--tube", "0.03", "--duration", "0.
 rover("replay", "grains/collapse.h5", "--html", "grains.html")
 """,
     "render": """
-rover("drive", "--time-limit", "0.3", "--difficulty", "1", "--video", "film.mp4")
+rover("drive", "--time-limit", "0.3", "--difficulty", "1", "--film", "film.mp4")
 assert Path("film.mp4").stat().st_size > 1000
 
 import gymnasium as gym
@@ -88,7 +87,7 @@ assert list(Path("films").glob("*.mp4"))
 import pygame
 """,
     "demo": """
-rover(*RECORDED, "--video", "film.mp4")
+rover(*RECORDED, "--film", "film.mp4")
 rover("plot", "run/episode-0.h5", "--output", "plots")
 assert len(list(Path("plots").glob("*.png"))) == 8
 rover("replay", "run/episode-0.h5", "--html", "page.html")
@@ -149,29 +148,36 @@ for name in ("robot.urdf", "robot.xml"):
     rover("drive", "--model", "read.toml", "--time-limit", "0.2")
 """,
     "data": """
-rover("dataset", "rover/random-v0", "--policy", "random", "--episodes", "1", "--folder", "sets")
+rover("dataset", "rover/random-v0", "--policy", "random", "--episodes", "1", "--output", "sets")
 assert list(Path("sets/rover/random-v0").rglob("*.hdf5"))
 """,
     "onnx": """
-rover("export", "onnx", "trained", "-o", "plane.onnx")
-rover("export", "onnx", "foresight", "-o", "forecast.onnx")
+rover("export", "onnx", "trained", "--output", "plane.onnx")
+rover("export", "onnx", "foresight", "--output", "forecast.onnx")
 import onnx
 
 onnx.checker.check_model("plane.onnx", full_check=True)
 """,
     "logs": """
 rover(*RECORDED)
-rover("export", "mcap", "run/episode-0.h5", "-o", "run.mcap")
+rover("export", "mcap", "run/episode-0.h5", "--output", "run.mcap")
 (log,) = Path(".").rglob("*.mcap")
 from mcap.reader import make_reader
 
 with log.open("rb") as stream:
     assert make_reader(stream).get_summary().statistics.message_count > 10
 """,
+    "all": """
+rover(*RECORDED, "--film", "film.mp4")
+rover("plot", "run/episode-0.h5", "--output", "plots")
+rover("export", "mcap", "run/episode-0.h5")
+rover("export", "onnx", "trained", "--output", "plane.onnx")
+import jax, lxml, minari, mujoco, rasterio, stable_baselines3, websockets
+""",
     "train": """
 rover("train", "plane", "--steps", "2000", "--no-progress", "--output", "run")
 rover("drive", "--policy", "run", "--time-limit", "0.2")
-rover("evaluate", "run", "--terrain", "plane", "--episodes", "2", "--no-planner", "--output", "evaluation")
+rover("evaluate", "run", "pd", "--terrain", "plane", "--episodes", "2", "--output", "evaluation")
 """,
 }
 

@@ -221,13 +221,15 @@ def test_a_page_that_watches_gets_the_scene_once_and_then_frames(served: Served)
     length = int.from_bytes(first[HEAD.size : HEAD.size + 4], "little")
     head = json.loads(first[HEAD.size + 4 : HEAD.size + 4 + length])
     size = sum(channel["count"] * channel["width"] * channel["bytes"] for channel in head["channels"])
-    assert [channel["name"] for channel in head["channels"]] == ["places", "turns", "centre", "forces"]
+    moving = ["places", "turns", "centre", "forces", "normals", "mass", "friction", "laser", "depth"]
+    assert [channel["name"] for channel in head["channels"]] == moving
+    assert set(head["missing"]) == {"scan", "plan"}
     assert len(frames) > 10
     assert {len(frame) for frame in frames} == {HEAD.size + size}
     assert {HEAD.unpack(frame[: HEAD.size])[:2] for frame in frames} == {(FRAME, 1)}
     times = [HEAD.unpack(frame[: HEAD.size])[2] for frame in frames]
     assert times == sorted(times)
-    assert size < 1000
+    assert size < 4000
 
 
 def test_another_ground_is_another_scene(served: Served) -> None:

@@ -29,9 +29,9 @@ def test_episodes_are_reused_until_the_policy_or_the_arguments_change(
     output = tmp_path / "evaluation"
 
     def evaluated(*arguments: Any) -> tuple[str, str]:
-        result = evaluate(policy, "--terrain", "plane", "--episodes", 1, "--output", output, *arguments)
+        result = evaluate(policy, "pd", "--terrain", "plane", "--episodes", 1, "--output", output, *arguments)
         assert result.exit_code == 0, result.output
-        mine, baseline = (output / f"episodes-{name}.json" for name in ("mine", "PD-baseline"))
+        mine, baseline = (output / f"episodes-{name}.json" for name in ("mine", "pd"))
         found = mine.read_text(encoding="utf-8"), baseline.read_text(encoding="utf-8")
         for path, text in zip((mine, baseline), found, strict=True):  # marks what is reused
             path.write_text(text + " ", encoding="utf-8")

@@ -17,7 +17,6 @@ from rover_gym.policy import (
     TrainedPolicy,
     drive_all,
     mean_estimate,
-    measure_baseline,
     policy_arguments,
     policy_folder,
     ratio_estimate,
@@ -103,9 +102,6 @@ def test_an_episode_is_cut_at_its_limit() -> None:
         (lambda: summarise("nobody", []), "drives"),
         (lambda: wilson_interval(0, 0), "n"),
         (lambda: wilson_interval(3, 2), "successes"),
-        (lambda: measure_baseline(episodes=0), "episodes"),
-        (lambda: measure_baseline(seed=-1), "seed"),
-        (lambda: measure_baseline([math.nan]), "difficulty"),
     ],
 )
 def test_what_cannot_be_evaluated_is_refused_by_name(call: Callable[[], object], field: str) -> None:

@@ -231,11 +231,11 @@ def test_the_curriculum_rises_with_success(run: Path) -> None:
 
 def test_an_evaluation_names_policies_and_baseline(run: Path, evaluate: Script, tmp_path: Path) -> None:
     terrain = "rocks" if "rocks" in run.parent.name else "plane"
-    result = evaluate(run, "--terrain", terrain, "--episodes", 2, "--output", tmp_path)
+    result = evaluate(run, "pd", "scan", "--terrain", terrain, "--episodes", 2, "--output", tmp_path)
     assert result.exit_code == 0, result.output
     report = json.loads((tmp_path / "evaluation.json").read_text(encoding="utf-8"))
     guides = ["guide alone"] if terrain == "rocks" else []
-    expected = ["PD baseline", "scan planner", *guides, "run"]
+    expected = ["pd", "scan", *guides, "run"]
     assert [row["policy"] for row in report["rows"]] == expected
     for row in report["rows"]:
         assert sum(row["ends"].values()) == row["episodes"] == 2
@@ -266,7 +266,7 @@ def test_a_policy_for_another_rover_trains_drives_and_is_replayed(
     assert card["source"]["model"] == "skid-steered"
 
     ground = ("--terrain", "plane", "--model", "skid-steered")
-    result = evaluate(policy, *ground, "--episodes", 2, "--output", tmp_path / "evaluation")
+    result = evaluate(policy, "pd", *ground, "--episodes", 2, "--output", tmp_path / "evaluation")
     assert result.exit_code == 0, result.output
     assert enjoy(policy, *ground, "--seed", 5).exit_code == 0
     result = evaluate(policy, "--terrain", "plane", "--episodes", 1, "--output", tmp_path / "wrong")

@@ -7,7 +7,7 @@ import typer
 
 from rover_gym.cli.console import DEBUG, one_line, say_first_steps
 from rover_gym.cli.drive_command import drive
-from rover_gym.cli.evaluate_command import baseline, evaluate
+from rover_gym.cli.evaluate_command import evaluate
 from rover_gym.cli.export_command import dataset, export
 from rover_gym.cli.grains_command import grains, pit, track
 from rover_gym.cli.grains_command import rover as rover_on_bed
@@ -21,32 +21,37 @@ from rover_gym.cli.sand_commands import sand
 from rover_gym.cli.scene_command import scene
 from rover_gym.cli.speed_command import speed
 from rover_gym.cli.train_command import ManySeeds, train
+from rover_gym.cli.usage import PlainUsage
 from rover_gym.mechanics import __version__
 
 app = typer.Typer(
+    cls=PlainUsage,
     help="Drive a six-wheel Mars rover in a nonsmooth simulator.",
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     epilog=f"Errors are one line; with {DEBUG}=1 in the environment they tell where they came from.",
 )
-app.command()(drive)
-app.command()(baseline)
-app.command(cls=ManySeeds)(train)
-app.command()(evaluate)
-app.command()(report)
-app.command()(plot)
-app.command()(replay)
-app.command()(live)
-app.command()(scene)
-app.add_typer(model, name="model")
-app.add_typer(planar, name="planar")
+
+DRIVE = "Drive and watch"
+POLICIES = "Policies"
+WORLDS = "Rovers and grounds"
+EXCHANGE = "Other programs"
+
+for _command in (drive, live, replay, plot):
+    app.command(rich_help_panel=DRIVE)(_command)
+app.command(rich_help_panel=POLICIES)(evaluate)
+app.command(rich_help_panel=POLICIES, cls=ManySeeds)(train)
+app.command(rich_help_panel=POLICIES)(speed)
+app.add_typer(model, name="model", rich_help_panel=WORLDS)
+app.command(rich_help_panel=WORLDS)(scene)
+app.add_typer(sand, name="sand", rich_help_panel=WORLDS)
 for _command in (rover_on_bed, track, pit, plate, shear, wheel):
     grains.command()(_command)
-app.add_typer(grains, name="grains")
-app.add_typer(sand, name="sand")
-app.add_typer(export, name="export")
-app.command()(dataset)
-app.command()(speed)
+app.add_typer(grains, name="grains", rich_help_panel=WORLDS)
+app.add_typer(planar, name="planar", rich_help_panel=WORLDS)
+app.command(rich_help_panel=WORLDS)(report)
+app.add_typer(export, name="export", rich_help_panel=EXCHANGE)
+app.command(rich_help_panel=EXCHANGE)(dataset)
 
 
 def _print_version(wanted: bool) -> None:
@@ -64,7 +69,7 @@ def rover(
 ) -> None:
     """Drive a six-wheel Mars rover in a nonsmooth simulator."""
     if context.invoked_subcommand is None:
-        say_first_steps()
+        say_first_steps(context.command)
 
 
 def main() -> None:

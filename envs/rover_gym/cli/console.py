@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn, ParamSpec, TextIO, T
 
 import numpy as np
 import typer
+from rich.box import SIMPLE_HEAD
 from rich.console import Console, RenderableType
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
@@ -75,7 +76,7 @@ MENDABLE, UNFORESEEN, INTERRUPTED = 2, 1, 130  # exit codes
 
 LONGEST_LINE = 600
 
-LARGEST_SEED = 2**63 - 1
+LARGEST_NUMBER = 2**63 - 1  # of a whole number that an option takes
 
 MOST_EPISODES = 1_000_000
 
@@ -157,7 +158,8 @@ def plain_errors(command: Callable[P, R]) -> Callable[P, R]:
     """Turns every error of a command into one line on standard error and an exit code.
 
     The exit code is 2 for errors that the user can fix, 1 for unexpected ones, and 130 for an interruption. Numbers
-    that are not finite are refused here, for all options. An error that names an argument names its option instead.
+    that are not finite or too large are refused here, for all options. An error that names an
+    argument names its option instead.
     """
     parameters = inspect.signature(command).parameters
     options = {name: _as_typed(name, parameter) for name, parameter in parameters.items()}
@@ -170,7 +172,7 @@ def plain_errors(command: Callable[P, R]) -> Callable[P, R]:
     def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
         with one_line(options), _plain_warnings():
             for name, value in kwargs.items():
-                _check_finite(name, value)
+                _check_number(name, value)
             return command(*args, **kwargs)
 
     return guarded
@@ -254,14 +256,29 @@ def _printable(text: str) -> str:
     return text.encode("utf-8", "backslashreplace").decode()
 
 
-def _check_finite(name: str, value: object) -> None:
+def _check_number(name: str, value: object) -> None:
+    """Refuses numbers that are not finite, and whole ones that do not fit into 64 bits."""
     entries = value if isinstance(value, (list, tuple)) else (value,)
     for entry in entries:
         if isinstance(entry, float) and not math.isfinite(entry):
             refuse(OptionError, name, entry, "must be finite")
+        if isinstance(entry, int) and not -LARGEST_NUMBER <= entry <= LARGEST_NUMBER:
+            refuse(OptionError, name, entry, f"must be at most {LARGEST_NUMBER}")
 
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON on standard output, and nothing else.")]
+
+
+def plain_table(rows: Sequence[Sequence[str]]) -> Table:
+    """A table whose first row are its headings; what begins with a digit in a column is set to the right."""
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    for i, heading in enumerate(rows[0]):
+        numbers = [row[i] for row in rows[1:] if row[i]]
+        is_number = bool(numbers) and all(text[0] in "0123456789-" for text in numbers)
+        table.add_column(heading, justify="right" if is_number else "left")
+    for row in rows[1:]:
+        table.add_row(*row)
+    return table
 
 
 @dataclass(frozen=True)
@@ -312,7 +329,15 @@ class Results:
     def show(self, what: RenderableType) -> None:
         """Prints a table or a line for people."""
         if not self.as_json:
-            console().print(what, markup=False) if isinstance(what, str) else console().print(what)
+            screen = console()
+            if isinstance(what, str):
+                screen.print(what, markup=False)
+            else:
+                if not screen.is_terminal:  # a file or a program has no edge
+                    screen.width = max(
+                        screen.width, screen.measure(what, options=screen.options.update(max_width=400)).maximum
+                    )
+                screen.print(what)
 
     def table(self, title: str, rows: Sequence[Row], part: str | None = None) -> None:
         """Prints results line by line, or adds them to the JSON object, where `part` names an object within it."""
@@ -392,10 +417,17 @@ FIRST_STEPS = (
 )
 
 
-def say_first_steps() -> None:
-    """Prints the first steps, and where to go on."""
+def say_first_steps(program: Any) -> None:
+    """Prints the first steps and all commands of the program, a line each."""
     typer.echo(f"rover-gym {__version__}: a six-wheel Mars rover in a nonsmooth simulator\n\nTry first:\n")
     for command, meaning in FIRST_STEPS:
-        typer.echo(f"  {command}\n      {meaning}\n")
-    typer.echo("Recording, replay and plots need the extra demo: pip install 'rover-gym[demo]'.")
-    typer.echo("All commands: rover --help. Completion by the Tab key: rover --install-completion.")
+        typer.echo(f"  {command}\n      {meaning}")
+    panels: dict[str, list[str]] = {}
+    for name, command in program.commands.items():
+        summary = (command.help or "").split("\n\n")[0].split(":")[0].rstrip(".")
+        below = ", ".join(getattr(command, "commands", {}))
+        line = f"  {name:<9} {summary}" + (f": {below}" if below else "")
+        panels.setdefault(command.rich_help_panel, []).append(line)
+    for panel, lines in panels.items():
+        typer.echo("\n".join(["", f"{panel}:", *lines]))
+    typer.echo("\nOptions of a command: rover COMMAND -h. Completion by the Tab key: rover --install-completion.")

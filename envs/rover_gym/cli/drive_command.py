@@ -16,7 +16,6 @@ from rich.table import Table
 
 from rover_gym.cli.console import (
     INTERRUPTED,
-    LARGEST_SEED,
     MOST_EPISODES,
     AsJson,
     Results,
@@ -48,15 +47,13 @@ from rover_gym.cli.options import (
     named_model,
     warn_of_slope,
 )
-from rover_gym.env.reward_terms import WEIGHTS
+from rover_gym.cli.tape import Tape, Watched
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.comparison import EpisodeFilm
 from rover_gym.policy.evaluation import Episode, run_episode
-from rover_gym.policy.named_policy import Policy
-from rover_gym.record.channels import Channel, RoverSampler, describe
-from rover_gym.record.recorder import Recorder
-from rover_gym.record.rover_run import OF_EPISODES
+from rover_gym.record.channels import outcome_words
+from rover_gym.replay.sights import SENSORS
 from rover_gym.validation import number, refuse
 
 CONTROL_PERIOD = 0.05  # s, of Rover-v0
@@ -81,15 +78,19 @@ Friction = Annotated[float, typer.Option(help="Friction coefficient.")]
 TimeStep = Annotated[float, typer.Option(help="Time step of the physics, s.")]
 TimeLimit = Annotated[float, typer.Option(min=CONTROL_PERIOD, max=1e6, help="Time limit of an episode, s.")]
 Episodes = Annotated[int, typer.Option(min=1, max=MOST_EPISODES, help="Number of episodes.")]
-Seed = Annotated[
-    int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the first episode; the others count up from it.")
-]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of the first episode; the others count up from it.")]
 Output = Annotated[
     Path | None,
     typer.Option(file_okay=False, help="Folder for trajectories (HDF5) and summary.json. Default: runs/drive."),
 ]
-Record = Annotated[bool, typer.Option("--record/--no-record", help="Record the episodes; needs the extra record.")]
-Video = Annotated[
+Record = Annotated[bool, typer.Option("--record/--no-record", help="Record the episodes.")]
+Sensors = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Record a sensor, too: 'laser' or 'depth'; repeat it for both.", autocompletion=lambda: list(SENSORS)
+    ),
+]
+Film = Annotated[
     Path | None, typer.Option(dir_okay=False, metavar="FILE.mp4", help="Film the episodes one after the other.")
 ]
 
@@ -115,23 +116,27 @@ def drive(
     seed: Seed = 0,
     output: Output = None,
     record: Record = True,
-    video: Video = None,
+    sensor: Sensors = None,
+    film: Film = None,
     size: FilmSize = "640x480",
     camera: FilmCamera = "follow",
     forces: FilmForces = False,
     antialiasing: FilmAntialiasing = True,
     as_json: AsJson = False,
 ) -> None:
-    """Drive a rover to its goal with the PD baseline or another policy and print the results of the episodes.
+    """Drive a rover to its goal, record the drive and tell how it went.
 
     The environment is Rover-v0, among rocks RoverRocks-v0, on hills RoverHills-v0.
 
     Ctrl-C ends the drive: finished episodes are printed, and what was recorded and filmed is kept.
     """
     _check_time_step(time_step)
+    for name in sensor or ():
+        if name not in SENSORS:
+            refuse(OptionError, "sensor", name, f"must be one of {', '.join(SENSORS)}")
     terrain = chosen_terrain(terrain, difficulty)
     folder = recording_folder(output, FOLDER, wanted=record)
-    check_file("video", video)
+    check_file("film", film)
     angles = {"slope_deg": slope, "uphill_deg": uphill, "heading_deg": heading}
     scene = {"terrain": terrain, "friction": friction, "time_step": time_step}
     scene |= _given({"difficulty": difficulty, **angles})
@@ -141,14 +146,14 @@ def drive(
     chosen = named_driver(policy, terrain, rover)
     as_given = {**scene, **named, **chosen.arguments}
     arguments = {**scene, **_given({"model": rover, "terrain": ground}), **chosen.arguments}
-    if video is not None:
-        film = film_options(size, camera, forces=forces, antialiasing=antialiasing)
-        arguments |= {"render_mode": "rgb_array", "render_options": film}
+    if film is not None:
+        look = film_options(size, camera, forces=forces, antialiasing=antialiasing)
+        arguments |= {"render_mode": "rgb_array", "render_options": look}
     env = gym.make(environment_of(terrain), max_episode_steps=round(time_limit / CONTROL_PERIOD), **arguments)
     warn_of_slope(slope, friction)
     title = f"{environment_title(terrain)} with {driver_title(policy)}"
-    drives = _Drives(env, chosen.make(env), title, as_given, options)
-    drives.run(range(seed, seed + episodes), folder, video)
+    drives = _Drives(env, Watched(chosen.make(env)), title, as_given, options, list(dict.fromkeys(sensor or ())))
+    drives.run(range(seed, seed + episodes), folder, film)
 
     summary = {
         "environment": environment_of(terrain),
@@ -163,7 +168,7 @@ def drive(
         if folder is not None:
             drives.paths.append(folder / "summary.json")
             drives.paths[-1].write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-        for path in [*drives.paths, *([] if video is None else [video])]:
+        for path in [*drives.paths, *([] if film is None else [film])]:
             if path.exists():
                 said.path("written", path)
         if folder is not None and not as_json and drives.paths[0].exists():
@@ -194,6 +199,7 @@ class _Drives:
     Attributes:
         env: The environment.
         policy: The policy that drives.
+        sensors: Names of sensors that are recorded, too.
         title: Title of results, recordings and film.
         arguments: Arguments of the environment, for the recordings.
         options: Options of each reset.
@@ -203,87 +209,55 @@ class _Drives:
     """
 
     env: gym.Env[Any, Any]
-    policy: Policy
+    policy: Watched
     title: str
     arguments: Mapping[str, Any]
     options: Mapping[str, Any]
+    sensors: Sequence[str] = ()
     results: list[Episode] = field(default_factory=list)
     paths: list[Path] = field(default_factory=list)
     interrupted: bool = False
 
-    def run(self, seeds: Sequence[int], output: Path | None, video: Path | None) -> None:
+    def run(self, seeds: Sequence[int], output: Path | None, film: Path | None) -> None:
         """Drives an episode per seed, records it if there is a folder, and closes the environment."""
         with progress_bar() as bar, ExitStack() as stack:
             stack.callback(self.env.close)
-            film = None
-            if video is not None:
-                film = stack.enter_context(EpisodeFilm(video, self.env.metadata["render_fps"], self.title))
+            reel = None
+            if film is not None:
+                reel = stack.enter_context(EpisodeFilm(film, self.env.metadata["render_fps"], self.title))
             try:
                 for seed in seeds:
                     path = None if output is None else output / f"episode-{seed}.h5"
                     self.paths += [path] if path else []
-                    self.results.append(self._episode(seed, path, bar, film))
+                    self.results.append(self._episode(seed, path, bar, reel))
             except KeyboardInterrupt:
                 self.interrupted = True
 
-    def _episode(self, seed: int, path: Path | None, bar: Progress, film: EpisodeFilm | None) -> Episode:
+    def _episode(self, seed: int, path: Path | None, bar: Progress, reel: EpisodeFilm | None) -> Episode:
         """Drives one episode, recorded if there is a path, filmed if there is a film."""
         task = bar.add_task(f"seed {seed}", total=None, state="")
         with ExitStack() as stack:
-            tape: _Tape | None = None
+            tape: Tape | None = None
+            self.policy.begin()
 
             def on_step(rover: RoverEnv, info: Mapping[str, Any]) -> None:
                 nonlocal tape
                 bar.update(task, state=f"{info['time']:.1f} s, {info['distance_to_goal']:.1f} m to go")
                 if path is not None:
                     if tape is None:  # after the reset, when the start is known
-                        tape = _Tape(path, rover, self.title, seed, self.arguments)
+                        tape = Tape(path, rover, self.title, seed, self.arguments, self.policy, self.sensors)
                         stack.enter_context(tape.recorder)
                     tape.append(rover, info)
-                if film is not None:
-                    film.show(rover, seed, info["time"])
+                if reel is not None:
+                    reel.show(rover, seed, info["time"])
 
             episode = run_episode(self.env, self.policy, seed, options=self.options, on_step=on_step)
-            if film is not None:
-                film.end(episode)
+            if reel is not None:
+                reel.end(episode)
             if tape is not None:
                 tape.recorder.note(outcome=episode.end)
         bar.remove_task(task)
         return episode
-
-
-class _Tape:
-    """Records an episode: the simulation and the environment's signals."""
-
-    def __init__(self, path: Path, rover: RoverEnv, title: str, seed: int, arguments: Mapping[str, Any]) -> None:
-        self._sampler = RoverSampler(rover.model)
-        channels = (
-            *self._sampler.channels,
-            *OF_EPISODES,
-            Channel("reward_terms", "1", "terms of the step's reward", (len(WEIGHTS),), tuple(WEIGHTS)),
-        )
-        scene = {**arguments, **asdict(rover.start), **_rocks(rover), "control_period": rover.dt}
-        scene["goal_tolerance"] = rover.goal_tolerance
-        attributes = describe(rover.simulation, f"an episode of {title}", scene, seed=seed)
-        self.recorder = Recorder(path, channels, attributes, terrain=rover.simulation.terrain)
-
-    def append(self, rover: RoverEnv, info: Mapping[str, Any]) -> None:
-        """Adds the environment's current state."""
-        solver = info["solver"]
-        self.recorder.append(
-            {
-                **self._sampler.row(rover.simulation, residual=solver["residual"], iterations=solver["iterations"]),
-                "distance_to_goal": info["distance_to_goal"],
-                "slip_ratio": info["slip_ratio"],
-                "motor_energy": info["energy"],
-                "reward_terms": [info["reward_terms"][name] for name in WEIGHTS],
-            }
-        )
-
-
-def _rocks(rover: RoverEnv) -> dict[str, Any]:
-    """Arguments of `SphereField.rocks`, for a scene's description."""
-    return {} if rover.rocks is None else {"rocks": asdict(rover.rocks)}
 
 
 def _table(results: Sequence[Episode], title: str) -> Table:
@@ -293,7 +267,7 @@ def _table(results: Sequence[Episode], title: str) -> Table:
     for episode in results:
         table.add_row(
             str(episode.seed),
-            "yes" if episode.success else f"no: {episode.end}",
+            "yes" if episode.success else f"no: {outcome_words(episode.end)}",
             f"{episode.distance:.2f} m",
             f"{episode.time:.2f} s",
             f"{episode.energy:.0f} J",

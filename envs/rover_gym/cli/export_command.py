@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import gymnasium as gym
 import typer
 
-from rover_gym.cli.console import LARGEST_SEED, MOST_EPISODES, check_file, plain_errors, progress_bar, say_path
+from rover_gym.cli.console import MOST_EPISODES, check_file, plain_errors, progress_bar, say_path
 from rover_gym.cli.options import (
     BUILT_IN,
     DRIVERS_HELP,
@@ -38,16 +38,16 @@ from rover_gym.record.rover_run import read_run
 from rover_gym.registration import ENVIRONMENTS
 from rover_gym.validation import refuse
 
-export = typer.Typer(help="Runs and policies in the formats of other programs.", no_args_is_help=True)
+export = typer.Typer(help="Runs, policies and rovers in other formats.", no_args_is_help=True)
 
 
 @export.command()
 @plain_errors
 def mcap(
     *,
-    run: Annotated[Path, typer.Argument(help="What `rover drive --output` or `rover report` saved.")],
+    run: Annotated[Path, typer.Argument(help="What `rover drive` or `rover report` saved.")],
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", dir_okay=False, help="File to write; beside the run by default.")
+        Path | None, typer.Option(dir_okay=False, help="File to write; beside the run by default.")
     ] = None,
     images: Annotated[bool, typer.Option("--images", help="Also render images (extra render).")] = False,
     fps: Annotated[float, typer.Option(help="Images a second.")] = FPS,
@@ -75,7 +75,7 @@ def onnx(
             help="'trained' or 'foresight' for the package's, or the folder of a policy, a forecast or a raw run."
         ),
     ],
-    output: Annotated[Path, typer.Option("--output", "-o", dir_okay=False, help="File to write.")],
+    output: Annotated[Path, typer.Option(dir_okay=False, help="File to write.")],
     terrain: Annotated[str, typer.Option(help="Of 'trained': 'plane' or 'rocks'; of 'foresight': 'hills'.")] = "plane",
     model: Annotated[str, typer.Option(help="Of 'foresight': the rover, a name of the gallery or a file.")] = BUILT_IN,
 ) -> None:
@@ -89,7 +89,7 @@ def onnx(
 @plain_errors
 def fmu(
     *,
-    output: Annotated[Path, typer.Option("--output", "-o", dir_okay=False, help="File to write, usually .fmu.")],
+    output: Annotated[Path, typer.Option(dir_okay=False, help="File to write, usually .fmu.")],
     terrain: TerrainName = None,
     spacing: Spacing = None,
     height_range: HeightRange = None,
@@ -102,7 +102,7 @@ def fmu(
     start: Start = None,
     friction: Annotated[float, typer.Option(help="Friction coefficient.")] = FRICTION,
     time_step: Annotated[float, typer.Option(help="Time step of the physics, s.")] = 0.005,
-    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of ground and start.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of ground and start.")] = 0,
     axes: Annotated[
         str, typer.Option(help="Of vectors and poses: 'world' (y up) or 'rep103' (x forward, y left, z up).")
     ] = "world",
@@ -142,14 +142,14 @@ def dataset(
     model: ModelName = BUILT_IN,
     difficulty: Annotated[float | None, typer.Option(help="Difficulty of the rocks, from 0 to 2.")] = None,
     episodes: Annotated[int, typer.Option(min=1, max=MOST_EPISODES, help="Number of episodes.")] = 10,
-    seed: Annotated[
-        int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the first episode; the others count up from it.")
-    ] = 0,
-    folder: Annotated[
-        Path | None, typer.Option(file_okay=False, help="Where data sets are. Default: Minari's own place.")
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the first episode; the others count up from it.")] = 0,
+    output: Annotated[
+        Path | None, typer.Option(file_okay=False, help="Folder of the data sets. Default: Minari's own place.")
     ] = None,
 ) -> None:
-    """Drive episodes and write them as a Minari data set, which its actions replay bit for bit.
+    """Drive episodes and write them as a Minari data set.
+
+    Its actions replay them bit for bit.
 
     Ctrl-C keeps the episodes that are done.
     """
@@ -172,7 +172,7 @@ def dataset(
             make,
             range(seed, seed + episodes),
             arguments=arguments,
-            folder=folder,
+            folder=output,
             policy_name="random actions" if policy == RANDOM else driver_title(policy),
             progress=lambda done: bar.update(task, completed=done),
         )

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 grains = typer.Typer(
-    help="Balls in space: a column that collapses, a silo, a drum, a sphere that strikes a bed, a rover on beds.",
+    help="Balls in space: beds, vessels, tools and rovers.",
     no_args_is_help=True,
 )
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rover_gym.cli.console import LARGEST_SEED, AsJson, Results, Row, check_folder, row, status
+from rover_gym.cli.console import AsJson, Results, Row, check_folder, row, status
 
 if TYPE_CHECKING:
     from rover_gym.grains.grain_run import GrainRun, Recordable
@@ -21,7 +21,7 @@ Friction = Annotated[float, typer.Option(help="Friction coefficient between ball
 Gravity = Annotated[float, typer.Option(min=1e-3, max=1e3, help="Gravity, m/s^2.")]
 TimeStep = Annotated[float, typer.Option(help="Time step, s.")]
 Tolerance = Annotated[float, typer.Option(help="Largest relative residual of the contact solver.")]
-Seed = Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the balls' radii and places.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of the balls' radii and places.")]
 Output = Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)]
 
 
@@ -40,7 +40,7 @@ class BallScene:
     seed: Seed = 0
     duration: Annotated[float, typer.Option(min=0.01, max=1000.0, help="Time to simulate, s.")] = 1.0
     fps: Annotated[float, typer.Option(help="Samples recorded per second.")] = 25.0
-    film: Annotated[bool, typer.Option("--film/--no-film", help="Write a video beside the recording.")] = False
+    film: Annotated[bool, typer.Option("--film/--no-film", help="Write a film beside the recording.")] = False
     output: Output = FOLDER
     as_json: AsJson = False
 

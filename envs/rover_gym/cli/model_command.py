@@ -1,4 +1,4 @@
-"""`rover model import|show|check`: models from files of other programs, and what they are."""
+"""`rover model list|import|show|check`: models from files of other programs, and what they are."""
 
 import math
 import re
@@ -10,7 +10,7 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from rover_gym.cli.console import AsJson, Results, check_file, plain_errors
+from rover_gym.cli.console import AsJson, Results, check_file, plain_errors, plain_table
 from rover_gym.cli.options import complete_model
 from rover_gym.extras import MissingExtraError, require
 from rover_gym.figures.model_drawing import write_model_picture
@@ -19,7 +19,7 @@ from rover_gym.mechanics import ModelError, OptionError, RoverModel
 from rover_gym.models import ImportReport, Statics, check_statics, open_model, read_robot, solid_rows
 from rover_gym.validation import refuse
 
-model = typer.Typer(help="Models: read URDF and MJCF, show and check any model.", no_args_is_help=True)
+model = typer.Typer(help="Rover models.", no_args_is_help=True)
 
 Named = Annotated[
     str,
@@ -103,6 +103,21 @@ def import_model(
             results.path("picture", write_model_picture(read, picture))
         except MissingExtraError as error:
             typer.echo(f"no picture: {error}", err=True)
+
+
+@model.command("list")
+@plain_errors
+def list_models(*, as_json: AsJson = False) -> None:
+    """List the models of the gallery."""
+    found = [
+        {"name": name, "mass": one.mass, "dofs": one.nv, "wheels": len(one.wheel_names)}
+        for name in RoverModel.names()
+        for one in [RoverModel.named(name)]
+    ]
+    with Results(as_json=as_json) as results:
+        results.add(models=found)
+        rows = [(str(one["name"]), f"{one['mass']:.4g} kg", str(one["dofs"]), str(one["wheels"])) for one in found]
+        results.show(plain_table([("name", "mass", "degrees of freedom", "wheels"), *rows]))
 
 
 @model.command()

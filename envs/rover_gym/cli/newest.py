@@ -7,9 +7,7 @@ from pathlib import Path
 import typer
 
 from rover_gym.cli.console import check_folder
-from rover_gym.extras import MissingExtraError
 from rover_gym.mechanics import OptionError
-from rover_gym.record.channels import import_h5py
 from rover_gym.validation import refuse
 
 RUNS = Path("runs")
@@ -18,7 +16,7 @@ RUNS = Path("runs")
 def recording_folder(output: Path | None, usual: Path, *, wanted: bool) -> Path | None:
     """The folder that a command records into, which exists; None where it records nothing.
 
-    Without a folder that the user named, a missing h5py or a folder that cannot be written is no error: it is said.
+    Without a folder that the user named, one that cannot be written is no error: it is said.
 
     Args:
         output: The folder that the user named.
@@ -28,10 +26,8 @@ def recording_folder(output: Path | None, usual: Path, *, wanted: bool) -> Path 
     if not wanted:
         return None
     try:
-        if output is None:
-            import_h5py()
         check_folder("output", output or usual)
-    except (MissingExtraError, OptionError, OSError) as error:
+    except (OptionError, OSError) as error:
         if output is not None:
             raise
         typer.echo(f"not recorded: {error}", err=True)

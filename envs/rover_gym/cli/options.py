@@ -124,6 +124,10 @@ HeightRange = Annotated[
 
 Start = Annotated[tuple[float, float] | None, typer.Option(metavar="X Z", help="Start on the map, m. Default: 0 0.")]
 
+OpenIt = Annotated[
+    bool | None, typer.Option("--open/--no-open", help="Open it in the browser. Default: where there is a terminal.")
+]
+
 BUILT_IN = "rover"
 
 #: Friction coefficient of wheel and ground where no option sets it.

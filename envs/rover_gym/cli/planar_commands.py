@@ -26,9 +26,7 @@ from rover_gym.mechanics import (
 from rover_gym.planar.planar_run import PlanarRun
 from rover_gym.validation import number, refuse
 
-planar = typer.Typer(
-    help="Planar systems of the report's chapter 3: a ball, a two-wheel rover, granular soil.", no_args_is_help=True
-)
+planar = typer.Typer(help="Planar systems: a ball, a two-wheel rover, soil of disks.", no_args_is_help=True)
 
 
 STEEPEST = 89.0  # degrees: an upright line is no ground

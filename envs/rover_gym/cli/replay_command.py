@@ -7,20 +7,16 @@ import typer
 
 from rover_gym.cli.console import check_file, check_folder, plain_errors, progress_bar, say_path
 from rover_gym.cli.newest import newest_run, show_in_browser
-from rover_gym.cli.options import complete_recording
+from rover_gym.cli.options import OpenIt, complete_recording
 from rover_gym.extras import require
 from rover_gym.grains.grain_run import GrainRun
 from rover_gym.mechanics import OptionError
 from rover_gym.planar.planar_run import PlanarRun
-from rover_gym.record.rover_run import RoverRun
+from rover_gym.record.rover_run import RoverRun, read_run
 from rover_gym.replay import write_gltf, write_page, write_vrml
 from rover_gym.runs import open_run
 from rover_gym.soil.soil_run import SoilRun
 from rover_gym.validation import refuse
-
-OpenIt = Annotated[
-    bool | None, typer.Option("--open/--no-open", help="Open it in the browser. Default: where there is a terminal.")
-]
 
 
 @plain_errors
@@ -42,7 +38,14 @@ def replay(
     gltf: Annotated[Path | None, typer.Option(dir_okay=False, help="Binary glTF 2.0 file, usually .glb.")] = None,
     film: Annotated[
         Path | None,
-        typer.Option(dir_okay=False, help="Video of a run of `rover grains`, .mp4; needs no browser."),
+        typer.Option(dir_okay=False, help="Film of a run of `rover grains`, .mp4; needs no browser."),
+    ] = None,
+    ghost: Annotated[
+        Path | None,
+        typer.Option(
+            help="Another run of a rover, to compare with: it drives along, and its curves are dashed.",
+            autocompletion=complete_recording,
+        ),
     ] = None,
     fps: Annotated[float, typer.Option(help="Frames per second, at most as many as were recorded.")] = 25.0,
     follow: Annotated[
@@ -50,7 +53,7 @@ def replay(
     ] = True,
     show: OpenIt = None,
 ) -> None:
-    """Replay a saved run: as a page with a timeline and curves, and as animated 3D files for other programs."""
+    """Replay a saved run in the browser, or write it as a page, a film or a 3D file."""
     run = newest_run(run)
     if not (html or vrml or gltf or film):
         html = run.with_suffix(".html")
@@ -67,7 +70,8 @@ def replay(
             refuse(OptionError, option, str(path), kind[1])
     frames = saved.resample(fps)
     if html is not None:
-        say_path("page", write_page(frames, html, follow=follow))
+        beside = None if ghost is None else read_run(newest_run(ghost)).resample(fps)
+        say_path("page", write_page(frames, html, follow=follow, ghost=beside))
         show_in_browser(html, wanted=show)
     if vrml is not None and isinstance(frames, RoverRun):
         say_path("VRML", write_vrml(frames, vrml))
@@ -85,7 +89,7 @@ def replay(
 _KINDS: dict[type, tuple[tuple[str, ...], str]] = {
     RoverRun: (
         ("html", "vrml", "gltf"),
-        "only runs of `rover grains` are filmed here: `rover drive --video` films a drive",
+        "only runs of `rover grains` are filmed here: `rover drive --film` films a drive",
     ),
     PlanarRun: (("html",), "a ball or a two-wheel rover is replayed as a page, with --html"),
     SoilRun: (("html",), "a run on a soil is replayed as a page, with --html"),
@@ -111,7 +115,9 @@ def plot(
     overview: Annotated[bool, typer.Option("--overview/--no-overview", help="Add one page with all figures.")] = False,
     show: OpenIt = None,
 ) -> None:
-    """Draw a saved run over time: gaps, loads, slip, attitude, torques, energy and solver, and its path from above.
+    """Draw a saved run over time and its path from above.
+
+    Of a rover: gaps, loads, slip, attitude, torques, energy and solver.
 
     Of a ball or a two-wheel rover: the path over the ground, speed, loads, gaps, energy.
 

@@ -26,7 +26,9 @@ def report(
     output: Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)] = Path("runs/report"),
     as_json: AsJson = False,
 ) -> None:
-    """Drop the rover on the report's inclined plane and on its rug of spheres, drive it with turned front wheels.
+    """Simulate sections 6.1 and 6.2 of the report of 2010 again.
+
+    The rover is dropped on an inclined plane and on a rug of spheres, and drives with turned front wheels.
 
     The trajectories are HDF5 files that describe themselves. The last lines of the first table compare with
     Siconos 4.4, which ran the same scene.

@@ -18,7 +18,7 @@ from rover_gym.sand import SingleWheel, Soil, climbed_slope, named_soil, slip_on
 from rover_gym.sand.convert import convert_runs
 from rover_gym.validation import number, refuse
 
-sand = typer.Typer(help="Wheels on sand: soils by name, and a virtual test bed for one wheel.", no_args_is_help=True)
+sand = typer.Typer(help="Wheels and rovers on sand, and soils by name.", no_args_is_help=True)
 
 EARTH = 9.81  # m/s^2
 

@@ -11,7 +11,7 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from rover_gym.cli.console import LARGEST_SEED, AsJson, Results, plain_errors, progress_bar
+from rover_gym.cli.console import AsJson, Results, plain_errors, progress_bar
 from rover_gym.cli.options import (
     BUILT_IN,
     HeightRange,
@@ -60,7 +60,7 @@ def scene(
     held: Annotated[bool, typer.Option("--held", help="Wheels may be braked and joints held.")] = False,
     tumbles: Annotated[bool, typer.Option("--tumbles", help="The rover may turn over in free flight.")] = False,
     reach: Annotated[float | None, typer.Option(help="The rover stays within this distance of its start, m.")] = None,
-    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the rocks.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the rocks.")] = 1,
     accuracy: Annotated[
         str, typer.Option(help="'fast', 'balanced', 'reference', or the error allowed on 20 m of flat ground, m.")
     ] = "balanced",
@@ -73,7 +73,7 @@ def scene(
     duration: Annotated[float, typer.Option(min=0.1, max=600.0, help="Duration of the measured drive, s.")] = 10.0,
     as_json: AsJson = False,
 ) -> None:
-    """Print what is built for a scene: model, ground, scheme, solver and step, each with its reason.
+    """Print what is built for a scene: model, ground, scheme, solver and step, and why.
 
     What is not known never to happen is built: steering is welded only with --straight, and so on. Without --explain
     and --measure one line is printed.

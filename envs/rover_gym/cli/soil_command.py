@@ -13,7 +13,6 @@ from rich.table import Table
 
 from rover_gym.cli.console import (
     INTERRUPTED,
-    LARGEST_SEED,
     AsJson,
     Results,
     check_folder,
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
     from rover_gym.soil.soil_trials import Traction
 
 EARTH = 9.81  # m/s^2
-FRAMES = 25.0  # of the video, a second at EARTH
+FRAMES = 25.0  # of the film, a second at EARTH
 END = 0.02  # m between front wheel and wall at which a crossing ends
 
 #: Width of a bed on which the rover, and the pulling wheel on its way, have room, m.
@@ -73,11 +72,9 @@ def soil(
     ] = None,
     seed: Annotated[
         int,
-        typer.Option(
-            min=0, max=LARGEST_SEED - 100, help="Seed of the disks' radii and positions; in a sweep, the first seed."
-        ),
+        typer.Option(min=0, help="Seed of the disks' radii and positions; in a sweep, the first seed."),
     ] = 0,
-    video: Annotated[bool, typer.Option(help="Write a video, soil.mp4.")] = True,
+    film: Annotated[bool, typer.Option("--film/--no-film", help="Write a film, soil.mp4.")] = True,
     sweep: Annotated[
         bool,
         typer.Option(
@@ -107,7 +104,7 @@ def soil(
             _sweep(results, disks or 444, layers, pull_disks, pull_layers, beds, wheel_friction, options, output)
         else:
             seconds = 4.0 * slowness if duration is None else duration
-            _cross(results, disks or 222, layers, torque, seconds, seed, wheel_friction, options, output, video=video)
+            _cross(results, disks or 222, layers, torque, seconds, seed, wheel_friction, options, output, film=film)
 
 
 def _cross(
@@ -121,7 +118,7 @@ def _cross(
     options: dict[str, Any],
     output: Path,
     *,
-    video: bool,
+    film: bool,
 ) -> None:
     from rover_gym.figures.grain_frames import draw_soil, film_soil  # noqa: PLC0415 - matplotlib is slow to load
     from rover_gym.soil.bed import (  # noqa: PLC0415
@@ -163,10 +160,10 @@ def _cross(
     )
     results.path("trajectory", path)
     results.path("figure", draw_soil(run, output / "soil.png", row=run.n_frames // 2))
-    if video:
-        with status("drawing the video"):
-            film = film_soil(run.resample(rate), output / "soil.mp4", frames_per_second=round(FRAMES))
-        results.path("video", film)
+    if film:
+        with status("drawing the film"):
+            written = film_soil(run.resample(rate), output / "soil.mp4", frames_per_second=round(FRAMES))
+        results.path("film", written)
 
 
 def _check_width(option: str, disks: int, layers: int, needed: float, radius_max: float = 0.0165) -> None:

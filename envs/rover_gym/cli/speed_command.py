@@ -36,7 +36,7 @@ def speed(
     rounds: Annotated[int, typer.Option(min=1, max=1_000_000, help="Steps of each environment that are timed.")] = 200,
     as_json: AsJson = False,
 ) -> None:
-    """Step a batch of exploring rovers and its environment, and print how fast."""
+    """Measure how many rovers this machine simulates."""
     grounds = list(SpeedTerrain) if terrain is None else [terrain]
     exploring_rounds = -(-rounds // _STEPS_A_ROUND)
     told: dict[str, tuple[ExploringSpeed, VectorSpeed]] = {}

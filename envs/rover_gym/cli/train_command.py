@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from rover_gym.cli.console import AsJson, Results, check_folder, plain_errors
+from rover_gym.cli.console import AsJson, Results, check_folder, plain_errors, plain_table
 from rover_gym.extras import require
 
 LARGEST = 498  # the largest seed: the fields of all seeds stay below the evaluations'
@@ -66,9 +66,11 @@ def train(
     show: Annotated[bool, typer.Option("--show", help="Print the configuration as YAML and end.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Train a policy for Rover-v0 with stable-baselines3's PPO and print its figures.
+    """Train a policy by reinforcement learning.
 
-    Needs the extra `train`. Checkpoints, TensorBoard's log (`tensorboard --logdir runs/train`), evaluations, the policy
+    The method is stable-baselines3's PPO. Needs the extra `train`.
+
+    Checkpoints, TensorBoard's log (`tensorboard --logdir runs/train`), evaluations, the policy
     at the end (`policy`) and the one that did best in the evaluations (`best`) are in the run's folder. Several seeds
     end with a table: mean over the seeds with its 95% interval.
     """
@@ -110,7 +112,7 @@ def train(
         results.add(seeds=done)
         if not is_alone:
             stem = parent / f"{path.stem}-seeds"
-            say(write_seeds(done, stem))
+            results.show(plain_table(write_seeds(done, stem)))
             for ending in ("md", "json"):
                 results.path("written", stem.with_name(f"{stem.name}.{ending}"))
 

@@ -340,7 +340,7 @@ class RoverGrainsEnv(RoverEnv):
 
         renderer = super().make_renderer(scene)
         self._balls = BallsActor(self.grains.radius)
-        renderer.add(self._balls.actor)
+        renderer.shade(self._balls)
         self._drawn = self.bed.number
         return renderer
 
@@ -352,7 +352,7 @@ class RoverGrainsEnv(RoverEnv):
         if self.render_mode is not None:
             scene = self.scene
             if self._renderer is None:
-                self._renderer = self.make_renderer(scene)
+                self._renderer, self._drawn_scene = self.make_renderer(scene), None
             self._balls.place(self.grains.position)
         return super().render()
 

@@ -254,6 +254,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 20}  # noqa: RUF012 - as Gymnasium declares it
 
     _renderer: "FrameRenderer | None" = None
+    _drawn_scene: tuple[list[Any], tuple[float, float]] | None = None
 
     @takes_arguments
     def __init__(self, **arguments: Unpack[RoverArguments]) -> None:
@@ -473,8 +474,13 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
             return None
         scene = self.scene
         if self._renderer is None:
-            self._renderer = self.make_renderer(scene)
-        self._renderer.set_scene(scene.terrain, goal=self.goal, goal_tolerance=self.goal_tolerance)
+            self._renderer, self._drawn_scene = self.make_renderer(scene), None
+        drawn = [
+            entry.tolist() if isinstance(entry, np.ndarray) else entry for entry in self.batch.episodes.origin(self.i)
+        ]
+        if self._drawn_scene != (drawn, self.goal):
+            self._drawn_scene = drawn, self.goal
+            self._renderer.set_scene(scene.terrain, goal=self.goal, goal_tolerance=self.goal_tolerance)
         return self._renderer.render(self.simulation)
 
     def make_renderer(self, scene: EpisodeScene) -> "FrameRenderer":

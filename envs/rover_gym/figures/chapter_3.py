@@ -31,7 +31,7 @@ def draw_chapter_3(folder: str | Path) -> list[Path]:
     """Runs both examples, records them and draws figures 3.2 to 3.5 as PNG files; returns their paths.
 
     Raises:
-        MissingExtraError: matplotlib or h5py is not installed.
+        MissingExtraError: matplotlib is not installed.
     """
     folder = Path(folder)
     runs: dict[str, tuple[Trajectory, Trajectory]] = {}

@@ -86,7 +86,8 @@ class GrainFilm:
             self._renderer: Any = BedRenderer(actors, width=width, height=height)
             return
         self._renderer = FrameRenderer(run.rover.model, run.rover.terrain, width=width, height=height)
-        for actor in actors:
+        self._renderer.shade(self._balls)
+        for actor in self._walls:
             self._renderer.add(actor)
 
     def frame(self, row: int) -> npt.NDArray[np.uint8]:

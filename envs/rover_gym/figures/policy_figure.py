@@ -4,8 +4,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from rover_gym.extras import require
-from rover_gym.policy.comparison import BASELINE, GUIDE, PLANNER
+from rover_gym.policy.comparison import GUIDE
 from rover_gym.policy.evaluation import IntervalEstimate, PolicySummary
+from rover_gym.policy.named_policy import NAMES
 
 
 def draw_policies(rows: Sequence[PolicySummary], path: Path) -> None:
@@ -32,10 +33,11 @@ def draw_policies(rows: Sequence[PolicySummary], path: Path) -> None:
         for place, row in zip(places, rows, strict=True):
             estimate = quantity(row)
             low, high = estimate.interval
-            colour = "tab:grey" if row.policy in (BASELINE, PLANNER, GUIDE) else "tab:blue"
+            colour = "tab:grey" if row.policy in (*NAMES[:-1], GUIDE) else "tab:blue"
             axis.plot([factor * low, factor * high], [place, place], color=colour, linewidth=3, alpha=0.5)
             axis.plot([factor * estimate.value], [place], "o", color=colour)
         axis.set_xlabel(label)
         axis.grid(axis="x", alpha=0.3)
-    axes[0].set_yticks(places, [row.policy for row in rows])
+    names = [row.policy if row.difficulty is None else f"{row.policy}, {row.difficulty:g}" for row in rows]
+    axes[0].set_yticks(places, names)
     figure.savefig(path, dpi=110)

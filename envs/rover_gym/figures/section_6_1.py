@@ -46,7 +46,7 @@ def draw_section_6_1(recording: str | Path, folder: str | Path) -> list[Path]:
     """Draws the report's figures 6.2 to 6.5, and our path beside Siconos', as PNG files and returns their paths.
 
     Raises:
-        MissingExtraError: matplotlib or h5py is not installed.
+        MissingExtraError: matplotlib is not installed.
     """
     drawings = {
         "figure-6.2-wheel-traces": _traces,
@@ -63,7 +63,7 @@ def draw_section_6_2(recording: str | Path, folder: str | Path) -> list[Path]:
     """Draws the figures of the run over the rug as PNG files into the folder and returns their paths.
 
     Raises:
-        MissingExtraError: matplotlib or h5py is not installed.
+        MissingExtraError: matplotlib is not installed.
     """
     drawings = {
         "section-6.2-wheel-traces": wheel_traces,

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from rover_gym.learning.training_evaluation import TrainingEvaluation, read_evaluations
 from rover_gym.mechanics import OptionError
+from rover_gym.policy.comparison import in_markdown
 from rover_gym.policy.evaluation import IntervalEstimate
 from rover_gym.validation import refuse, whole
 
@@ -92,8 +93,12 @@ def _within(t: float, freedom: int) -> float:
     return 2.0 / math.pi * (angle + sine * total) if odd else sine * total
 
 
-def write_seeds(results: Sequence[SeedResult], stem: Path) -> str:
-    """Writes the summary of several seeds as JSON and Markdown, `stem` with these endings, and returns the table."""
+def write_seeds(results: Sequence[SeedResult], stem: Path) -> list[tuple[str, ...]]:
+    """Writes the summary of several seeds as JSON and Markdown, `stem` with these endings.
+
+    Returns:
+        The rows of the table, the headings first.
+    """
     quantities: dict[str, Callable[[SeedResult], float]] = {
         "success": lambda result: result.last.success,
         "best_success": lambda result: result.best.success,
@@ -109,12 +114,14 @@ def write_seeds(results: Sequence[SeedResult], stem: Path) -> str:
     text = json.dumps(report, indent=2) + "\n"
     stem.with_name(f"{stem.name}.json").write_text(text, encoding="utf-8")
     table = _table(results, means)
-    stem.with_name(f"{stem.name}.md").write_text(table + "\n", encoding="utf-8")
+    stem.with_name(f"{stem.name}.md").write_text(in_markdown(table) + "\n", encoding="utf-8")
     return table
 
 
-def _table(results: Sequence[SeedResult], means: dict[str, IntervalEstimate]) -> str:
-    lines = ["| run | success at the end | best success | at decisions | energy, J/m | CPU time, s |", "|" + "---|" * 6]
+def _table(results: Sequence[SeedResult], means: dict[str, IntervalEstimate]) -> list[tuple[str, ...]]:
+    lines: list[tuple[str, ...]] = [
+        ("run", "success at the end", "best success", "at decisions", "energy, J/m", "CPU time, s")
+    ]
     for result in results:
         last, best = result.last, result.best
         cells = (
@@ -125,7 +132,7 @@ def _table(results: Sequence[SeedResult], means: dict[str, IntervalEstimate]) ->
             f"{last.energy_per_metre:.0f}",
             f"{result.cpu_seconds:.0f}",
         )
-        lines.append(f"| {' | '.join(cells)} |")
+        lines.append(cells)
     cells = (
         f"mean of {len(results)} seeds",
         _cell(means["success"], 100.0, ".1f", "%"),
@@ -134,8 +141,8 @@ def _table(results: Sequence[SeedResult], means: dict[str, IntervalEstimate]) ->
         _cell(means["energy_per_metre"], 1.0, ".0f"),
         _cell(means["cpu_seconds"], 1.0, ".0f"),
     )
-    lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
+    lines.append(cells)
+    return lines
 
 
 def _cell(estimate: IntervalEstimate, factor: float, form: str, unit: str = "") -> str:

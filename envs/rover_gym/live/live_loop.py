@@ -36,6 +36,7 @@ from rover_gym.live.live_recording import LiveRecording
 from rover_gym.live.live_scene import BY_HAND
 from rover_gym.live.live_state import LiveState, Past, poses_of
 from rover_gym.mechanics import CommandError, RoverGymError
+from rover_gym.replay.sights import sights_now
 from rover_gym.validation import checked, refuse
 
 if TYPE_CHECKING:
@@ -306,6 +307,8 @@ class LiveLoop:
             heading=float(simulation.q[4]),
             speed=math.hypot(velocity[0], velocity[2]),
             wheel_forces=forces,
+            mass_centre=simulation.centre_of_mass(),
+            sights=sights_now(env, rover.driver, rover.driver_state),
             ruts=np.zeros((0, 3)) if sand is None else sand["ruts"],
             loads=forces[:, 0],
             slip=info["slip_ratio"],

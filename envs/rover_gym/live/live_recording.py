@@ -40,7 +40,7 @@ class LiveRecording:
     Raises:
         RecordingError: The file cannot be recorded to.
         OSError: The file cannot be created.
-        MissingExtraError: h5py is not installed, or what writes MCAP.
+        MissingExtraError: What writes MCAP is not installed.
     """
 
     def __init__(self, folder: Path, rover: LiveRover, *, mcap: bool = False) -> None:

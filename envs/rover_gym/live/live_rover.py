@@ -136,6 +136,16 @@ class LiveRover:
         return self._wheel.env
 
     @property
+    def driver(self) -> Policy | None:
+        """Who drives; None by hand."""
+        return self._wheel.driver
+
+    @property
+    def driver_state(self) -> Any:
+        """What the driver carries from one prediction to the next."""
+        return self._wheel.state
+
+    @property
     def time(self) -> float:
         """Simulated time since the start, s."""
         return self.env.simulation.time

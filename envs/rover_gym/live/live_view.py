@@ -48,15 +48,19 @@ class LiveView:
         self._world = -1
         self._middle: Array = np.zeros(3)
         self._wheels: list[DrawnWheel] = []
+        self._shape: list[tuple[str, tuple[int, ...]]] = []
 
     def follow(self, state: LiveState) -> None:
         """Builds the scene of a state, if it is another one or the rover has come near its edge."""
         away = np.abs(state.positions[0] - self._middle).max()
-        if state.world == self._world and away <= REACH - NEAR_EDGE:
+        shape = [(channel.name, channel.values.shape) for channel in state.sights.channels()]
+        if state.world == self._world and away <= REACH - NEAR_EDGE and shape == self._shape:
             return
+        self._shape = shape
         scene, self._wheels = bare_scene(_standing(state))
         scene.channels = self._channels(state)
         scene.facts |= {"period": state.period}
+        state.sights.describe(scene, state.model)
         self._ruts, self._drawn, self.pressed = None, 0, bytearray()
         if sand_of(state.terrain) is not None:
             middle = state.positions[0][[0, 2]]
@@ -84,6 +88,10 @@ class LiveView:
             *poses_of(run.positions, run.rotations),
             FrameChannel.fine("centre", run.positions[:, :1]),
             FrameChannel.fine("forces", np.concatenate((points, forces), axis=2)),
+            FrameChannel.turns("normals", normals),
+            FrameChannel.fine("mass", state.mass_centre[None, None]),
+            FrameChannel.fine("friction", np.full((1, 1, 1), state.scene.friction)),
+            *state.sights.channels(),
         ]
 
 

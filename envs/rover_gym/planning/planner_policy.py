@@ -23,7 +23,7 @@ from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimit
 from rover_gym.policy.features import check_observed
 from rover_gym.policy.ground_map import MOST_CELLS, GroundMap, MapOptions
 from rover_gym.policy.pd_policy import find_rover_env
-from rover_gym.policy.scan_policy import scan_grid
+from rover_gym.policy.scan_policy import PLAN_POINTS, scan_grid
 from rover_gym.validation import array, number, refuse, vector, whole
 
 Array = npt.NDArray[np.float64]
@@ -277,7 +277,7 @@ class PlannerPolicy:
         action = self._controller.act(seen[None].astype(np.float32), self._sequence[:1])
         return action[0], state
 
-    def plan(self, observation: npt.NDArray[np.floating[Any]]) -> tuple[float, float, float]:
+    def plan_command(self, observation: npt.NDArray[np.floating[Any]]) -> tuple[float, float, float]:
         """Plans anew from the environment's last observation `(size,)`.
 
         Returns:
@@ -305,6 +305,22 @@ class PlannerPolicy:
             curvature * limits.curvature,
             sideways * math.radians(limits.sideways_deg),
         )
+
+    def plan(self, state: tuple[npt.NDArray[Any], ...] | None = None) -> Array | None:  # noqa: ARG002 - as `predict`
+        """`(points, 2)` the path of the commands to come, ahead and to the right of the trunk, m; None of raw actions.
+
+        The path is that of wheels that do not slip.
+        """
+        if isinstance(self._controller, RawActions) or self._field is None:
+            return None
+        limits, dt = self._controller.limits, self._env.dt
+        done = (self._since - 1) % self._periods
+        speed, turning, aside = np.repeat(self._sequence, self._hold, axis=0)[done:].T
+        steps = dt * limits.speed * speed
+        heading = np.cumsum(limits.curvature * turning * steps) + math.radians(limits.sideways_deg) * aside
+        way = np.cumsum(np.stack((steps * np.cos(heading), -steps * np.sin(heading)), axis=1), axis=0)
+        chosen = np.linspace(0, len(way) - 1, PLAN_POINTS - 1).round().astype(int)
+        return np.concatenate((np.zeros((1, 2)), way[chosen]))
 
     def _look(self, seen: Array, begins: bool) -> None:
         """Adds the height scan of an observation to the map."""

@@ -7,15 +7,12 @@ from rover_gym.policy.command import CommandController, CommandLimits
 from rover_gym.policy.command_env import CommandVectorEnv, DriveByCommand, RoverCommandEnv, RoverCommandVectorEnv
 from rover_gym.policy.evaluation import (
     ENDS,
-    BaselineInterrupt,
-    BaselineRow,
     Episode,
     EvaluatedEpisode,
     IntervalEstimate,
     PolicySummary,
     drive_all,
     mean_estimate,
-    measure_baseline,
     ratio_estimate,
     run_episode,
     summarise,
@@ -35,8 +32,6 @@ from rover_gym.policy.trap_env import RoverTrapEnv, RoverTrapVectorEnv, TrapBatc
 __all__ = [
     "ENDS",
     "FORECAST_FILE",
-    "BaselineInterrupt",
-    "BaselineRow",
     "CommandController",
     "CommandLimits",
     "CommandVectorEnv",
@@ -74,7 +69,6 @@ __all__ = [
     "drive_all",
     "find_policy",
     "mean_estimate",
-    "measure_baseline",
     "named_policy",
     "policy_arguments",
     "policy_folder",

@@ -162,7 +162,7 @@ class RoverArcsEnv(gym.Wrapper[ArcObservation, np.int64, Observations, Observati
 
 def planned_arc(teacher: CommandPlanner, seen: Observations, driver: ArcDriver) -> int:
     """The arc nearest to what a planner in the simulator would do now."""
-    limits, wanted = driver.controller.limits, teacher.plan(seen)
+    limits, wanted = driver.controller.limits, teacher.plan_command(seen)
     speed, curvature, sideways = wanted
     direction = -1.0 if speed < 0.0 else 1.0
     pushes = abs(speed) > 0.5 * (driver.planner.cruise_speed + driver.planner.push * limits.speed)

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS
 from rover_gym.mechanics import RoverModel
+from rover_gym.policy.arc_forecast import FORECAST_FILE
 from rover_gym.policy.evaluation import (
     Episode,
     EvaluatedEpisode,
@@ -25,19 +26,19 @@ from rover_gym.policy.evaluation import (
     drive_all,
     run_episode,
 )
-from rover_gym.policy.named_policy import Policy
-from rover_gym.policy.policy_card import PolicyCard, PolicyError, find_policy, policy_arguments
-from rover_gym.policy.scan_policy import ScanPolicy
+from rover_gym.policy.named_policy import NAMES, Policy, named_policy
+from rover_gym.policy.policy_card import PolicyCard, find_policy, is_there
 from rover_gym.policy.trained_policy import TrainedPolicy
 from rover_gym.record.channels import outcome_words
 from rover_gym.rendering.caption import captioned
 from rover_gym.rendering.render_options import VideoWriter
-from rover_gym.validation import refuse
 
-COLUMNS = ("policy", "success", "95% interval", "time to goal, s", "energy, J/m", "slip", "tilt, °", "other ends")
+#: The package's own policies, and the files of one without their endings.
+POLICIES = Path(__file__).parents[1] / "data" / "policies"
+FILES = ("policy", "forecast")
 
-#: Policies without a training, by their rows' names.
-BASELINE, PLANNER, GUIDE = "PD baseline", "scan planner", "guide alone"
+#: Name of the row of a policy's guide without the policy.
+GUIDE = "guide alone"
 
 
 @dataclass(frozen=True)
@@ -56,35 +57,33 @@ class Contender:
     arguments: Mapping[str, Any] = field(default_factory=dict)
     files: tuple[Path, ...] = ()
 
+    @property
+    def is_trained(self) -> bool:
+        """Whether it is a policy of `rover train`."""
+        return self.name != GUIDE and any(path.name == "policy.json" for path in self.files)
 
-def trained_contender(policy: str, terrain: str) -> Contender:
-    """A trained policy: the folder of one, the folder of a run, or "trained" for the one shipped for a terrain.
+
+def named_contender(policy: str, terrain: str, model: RoverModel | None = None) -> Contender:
+    """A policy by its name or folder, as `named_policy` takes it.
 
     Raises:
         PolicyError: There is none.
         OSError: Its files may not be read.
     """
-    folder = find_policy(policy, terrain)
-    if folder is None:
-        refuse(PolicyError, "policies", policy, "must be the folder of a trained policy or 'trained'")
-    name = policy if policy == "trained" else Path(policy).name
-    files = (folder / "policy.npz", folder / "policy.json")
-    return Contender(name, partial(_load, folder), policy_arguments(folder), files)
-
-
-def planner_contender(model: RoverModel | None) -> Contender:
-    """The scan planner, with the height scan that it needs for a rover."""
-    return Contender(PLANNER, ScanPolicy, ScanPolicy.arguments(model))
+    chosen = named_policy(policy, terrain, model)
+    if policy == "foresight":
+        files = sorted(POLICIES.glob("foresight*/*"))
+    else:
+        folder = find_policy(policy, terrain) if not is_there(Path(policy) / FORECAST_FILE) else Path(policy)
+        files = [] if folder is None else [path for path in sorted(folder.iterdir()) if path.stem in FILES]
+    return Contender(policy if policy in NAMES else Path(policy).name, chosen.make, chosen.arguments, tuple(files))
 
 
 def guide_contender(trained: Contender) -> Contender | None:
     """The guide whose commands a trained policy offsets, alone; None if it has no guide."""
-    card = PolicyCard.read(trained.files[1])
-    return Contender(GUIDE, partial(_untrained, card), trained.arguments, trained.files[1:]) if card.guided else None
-
-
-def _load(folder: Path, env: Any) -> Policy:
-    return TrainedPolicy.load(env, folder)
+    (path,) = (path for path in trained.files if path.name == "policy.json")
+    card = PolicyCard.read(path)
+    return Contender(GUIDE, partial(_untrained, card), trained.arguments, (path,)) if card.guided else None
 
 
 def _untrained(card: PolicyCard, env: Any) -> Policy:
@@ -151,31 +150,40 @@ def _kept(path: Path, key: Any) -> list[EvaluatedEpisode] | None:
         return None
 
 
-def comparison_table(rows: Sequence[PolicySummary]) -> str:
-    """The figures of policies as a table in Markdown."""
-    lines = ["| " + " | ".join(COLUMNS) + " |", "|" + "---|" * len(COLUMNS)]
+def comparison_table(rows: Sequence[PolicySummary]) -> list[tuple[str, ...]]:
+    """The figures of policies as the rows of a table, the headings first."""
+    heads = ("policy", "difficulty", "success", "95% interval", "time to goal, s", "energy, J/m", "slip", "tilt, °")
+    table = [(*heads, "other ends")]
     for row in rows:
         low, high = row.success.interval
-        others = ", ".join(f"{end.replace('_', ' ')} {n}" for end, n in row.ends.items() if n and end != "goal")
-        cells = (
-            row.policy,
-            f"{row.successes} of {row.episodes}, {row.success.value:.1%}",
-            f"{100.0 * low:.1f} to {high:.1%}",
-            _cell(row.time, ".1f"),
-            _cell(row.energy_per_metre, ".0f"),
-            _cell(row.slip, ".3f"),
-            _cell(row.tilt, ".2f"),
-            others,
+        table.append(
+            (
+                row.policy,
+                "" if row.difficulty is None else f"{row.difficulty:g}",
+                f"{row.successes} of {row.episodes}, {row.success.value:.1%}",
+                f"{100.0 * low:.1f} to {high:.1%}",
+                _cell(row.time, ".1f"),
+                _cell(row.energy_per_metre, ".0f"),
+                _cell(row.slip, ".3f"),
+                _cell(row.tilt, ".2f"),
+                ", ".join(f"{n} {outcome_words(end)}" for end, n in row.ends.items() if n and end != "goal"),
+            )
         )
-        lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+    kept = [i for i in range(len(table[0])) if i != 1 or any(row[1] for row in table[1:])]
+    return [tuple(row[i] for i in kept) for row in table]
+
+
+def in_markdown(table: Sequence[Sequence[str]]) -> str:
+    """A table, whose first row are its headings, in Markdown."""
+    lines = ["| " + " | ".join(row) + " |" for row in table]
+    return "\n".join([lines[0], "|" + "---|" * len(table[0]), *lines[1:]])
 
 
 def _cell(estimate: IntervalEstimate, form: str) -> str:
     if math.isnan(estimate.value):
         return "-"
     half = 0.5 * (estimate.interval[1] - estimate.interval[0])
-    return f"{estimate.value:{form}} ± {half:{form}}"
+    return f"{estimate.value:{form}}" if math.isnan(half) else f"{estimate.value:{form}} ± {half:{form}}"
 
 
 def comparison_report(rows: Sequence[PolicySummary], arguments: Mapping[str, Any], seeds: range) -> dict[str, Any]:

@@ -19,16 +19,19 @@ from rover_gym.policy.trained_policy import TrainedPolicy
 
 #: Help text of the command line about the names.
 NAMES_HELP = (
-    "'pd' for the baseline, 'sand' for the one that crawls on sand, 'scan' for the planner by hand, 'foresight' for "
-    "that planner with a learned forecast, "
+    "'pd' for the baseline, 'sand' for the one that crawls on sand, 'scan' for the search on the height scan, "
+    "'foresight' for the same with a learned prediction, "
     "'trained' for the trained policy of the package, or the folder of a run, a trained policy or a forecast."
 )
+
+#: Policies without a folder.
+NAMES = ("pd", "sand", "scan", "foresight", "trained")
 
 _TITLES = {
     "pd": "the PD baseline",
     "sand": "the crawler on sand",
-    "scan": "the scan planner",
-    "foresight": "the planner with foresight",
+    "scan": "the search on the height scan",
+    "foresight": "the search with foresight",
 }
 
 

@@ -24,6 +24,9 @@ Array = npt.NDArray[np.float64]
 
 Counts = npt.NDArray[np.int64]
 
+#: Points of a planned path.
+PLAN_POINTS = 13
+
 #: Traps that are remembered; a further one replaces the oldest.
 TRAPS = 12
 
@@ -312,6 +315,7 @@ class ScanPolicy:
             arrival=0.6 * rover.task.goal_tolerance,
             costs=PathCosts() if costs is None else costs,
         )
+        self._ahead = (PathCosts() if costs is None else costs).length * self.reach
         self._map = None if map is None else GroundMap(scan, map, TRAP_AHEAD * self.reach)
         self._cells = 0 if map is None else map.cells
         self._caution, self.foresight = 1.0, ForesightCosts() if foresight is None else foresight
@@ -368,6 +372,31 @@ class ScanPolicy:
         actions = self.controller.act(rows, memory.command)
         memory.age += 1
         return (actions[0] if given.ndim == 1 else actions), memory.state
+
+    def choices(self) -> Array:
+        """`(n, points, 2)` the first arcs that it chooses from, ahead and to the right of the trunk, m."""
+        return self._drawn(self.arcs)
+
+    def plan(self, state: tuple[npt.NDArray[Any], ...] | None) -> Array | None:
+        """`(points, 2)` the arc that a state of one rover follows, ahead and to the right of the trunk, m."""
+        if state is None:
+            return None
+        speed, curvature, sideways = ScanMemory.of(state, 1, self._cells).command[0].tolist()
+        limits = self.controller.limits
+        arc = Arcs(
+            np.array([limits.curvature * curvature]),
+            np.array([math.radians(limits.sideways_deg) * sideways]),
+            np.array([math.copysign(1.0, speed)]),
+        )
+        drawn: Array = self._drawn(arc)[0]
+        return drawn
+
+    def _drawn(self, arcs: Arcs) -> Array:
+        """`(n, points, 2)` points of arcs, from where they begin."""
+        ways = arcs.poses(self._ahead, PLAN_POINTS - 1)[..., :2]
+        points: Array = np.concatenate((np.zeros((len(arcs), 1, 2)), ways), axis=1)
+        points[..., 0] += self._x_c
+        return points
 
     def _decide(self, row: Array, slope: list[float], memory: ScanMemory, i: int) -> Array:
         """The command for one observation, scaled as the environment returns it; updates what is remembered."""

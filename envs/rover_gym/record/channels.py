@@ -17,7 +17,6 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.extras import require
 from rover_gym.mechanics import OptionError, RoverGymError, RoverModel, Simulation, __version__
 from rover_gym.validation import checked, number, refuse
 
@@ -41,15 +40,6 @@ SIGNATURE = b"\x89HDF\r\n\x1a\n"  # first bytes of an HDF5 file
 
 class RecordingError(RoverGymError, ValueError):
     """Error of a file that is not a valid trajectory of this format, lacks the requested data, or cannot be written."""
-
-
-def import_h5py() -> Any:
-    """Imports the module h5py.
-
-    Raises:
-        MissingExtraError: h5py is not installed.
-    """
-    return require("h5py", "record")
 
 
 def refuse_field(path: str | Path, field: str, value: object, reason: str) -> NoReturn:
@@ -370,8 +360,10 @@ def describe(
 def write_attribute(item: Any, key: str, value: Any) -> None:
     """Stores an attribute; text is stored as UTF-8 of fixed length."""
     if isinstance(value, str):
+        import h5py  # noqa: PLC0415 - slow to load
+
         text = value.encode()
-        item.attrs.create(key, text, dtype=import_h5py().string_dtype("utf-8", max(1, len(text))))
+        item.attrs.create(key, text, dtype=h5py.string_dtype("utf-8", max(1, len(text))))
     else:
         item.attrs[key] = value
 
@@ -386,8 +378,10 @@ def write_description(data: h5py.Dataset, unit: str, description: str, columns: 
 
 def write_texts(item: Any, key: str, texts: Sequence[str]) -> None:
     """Stores several texts in an attribute."""
+    import h5py  # noqa: PLC0415 - slow to load
+
     encoded = [text.encode() for text in texts]
-    item.attrs.create(key, encoded, dtype=import_h5py().string_dtype("utf-8", max(1, *map(len, encoded))))
+    item.attrs.create(key, encoded, dtype=h5py.string_dtype("utf-8", max(1, *map(len, encoded))))
 
 
 def _to_plain(value: Any) -> Any:

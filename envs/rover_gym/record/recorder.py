@@ -26,7 +26,6 @@ from rover_gym.record.channels import (
     Channel,
     RecordingError,
     file_path,
-    import_h5py,
     storable,
     versions,
     write_attribute,
@@ -62,7 +61,6 @@ class Recorder:
     Raises:
         RecordingError: A channel or an attribute cannot be stored, or the file is in use; it has not changed.
         OSError: The file cannot be created.
-        MissingExtraError: h5py is not installed.
     """
 
     @checked(
@@ -79,7 +77,8 @@ class Recorder:
         terrain: Terrain | None = None,
         rows_per_flush: int = 200,
     ) -> None:
-        hdf5 = import_h5py()
+        import h5py  # noqa: PLC0415 - slow to load
+
         self.path = file_path(path)
         self._rows_per_flush = whole(
             "rows_per_flush", rows_per_flush, at_least=1, at_most=1_000_000, error=RecordingError
@@ -94,7 +93,7 @@ class Recorder:
         self._process = os.getpid()
         self._disk = _new_file(self.path)
         with uninterrupted():
-            self._file: h5py.File = hdf5.File(self._disk, "w", libver=(LIBRARY, LIBRARY))
+            self._file: h5py.File = h5py.File(self._disk, "w", libver=(LIBRARY, LIBRARY))
             # Close the file before the interpreter exits; later, HDF5 would call Python objects that no longer exist.
             self._release = weakref.finalize(self, _release, self._file, self._disk)
             try:

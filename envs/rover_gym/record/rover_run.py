@@ -142,7 +142,6 @@ def read_run(path: str | Path) -> RoverRun:
     Raises:
         RecordingError: The file is not a valid trajectory, or contains no samples, rover or ground.
         OSError: The file does not exist or cannot be read.
-        MissingExtraError: h5py is not installed.
     """
     return run_of(read_trajectory(path), path)
 

@@ -23,7 +23,6 @@ from rover_gym.record.channels import (
     TERRAIN,
     RecordingError,
     file_path,
-    import_h5py,
     refuse_field,
     sound,
 )
@@ -85,9 +84,9 @@ def read_trajectory(path: str | Path) -> Trajectory:
     Raises:
         RecordingError: The file is not a valid trajectory of this format and version, or is being recorded.
         OSError: The file does not exist or may not be read.
-        MissingExtraError: h5py is not installed.
     """
-    h5py = import_h5py()
+    import h5py  # noqa: PLC0415 - slow to load
+
     path = file_path(path)
     size = check_bytes(path)
     with sound(path), h5py.File(path, "r") as file:
@@ -109,9 +108,9 @@ def read_frames(path: str | Path, name: str, rows: npt.ArrayLike | None = None) 
         RecordingError: The file holds no such data set or is damaged, a row is out of range, or the rows take more
             than `MOST_BYTES`.
         OSError: The file does not exist or may not be read.
-        MissingExtraError: h5py is not installed.
     """
-    h5py = import_h5py()
+    import h5py  # noqa: PLC0415 - slow to load
+
     path = file_path(path)
     size = check_bytes(path)
     with sound(path), h5py.File(path, "r") as file:

@@ -23,6 +23,13 @@ Colour: TypeAlias = tuple[float, float, float]
 
 Vector: TypeAlias = tuple[float, float, float]
 
+#: Direction to the Sun, fixed: x forward, y up, z right. Frames, films and pages share it.
+SUN = np.array([-0.35, 0.80, 0.50]) / np.linalg.norm([0.35, 0.80, 0.50])
+
+SHADOW = 0.55  # brightness of shadowed ground
+
+HAZE = 27.0, 90.0  # m, where the haze begins and where the ground has the horizon's colour
+
 #: Colours, red, green, blue from 0 to 1: warm ground, cool rover.
 GROUND_COLOUR: Colour = (0.72, 0.45, 0.30)
 
@@ -168,6 +175,72 @@ def sphere_mesh(rings: int = 8) -> tuple[npt.NDArray[np.float64], npt.NDArray[np
     triangles = np.concatenate((np.stack((a, a + 1, b + 1), axis=1), np.stack((a, b + 1, b), axis=1)))
     proper = np.concatenate((i != 0, i != rings - 1))  # at the poles one of a square's two triangles is degenerate
     return vertices.reshape(-1, 3), triangles[proper].astype(np.int32)
+
+
+#: Kinds of stones: a rock of the ground has one of them, turned at random.
+STONES = 3
+
+
+def scatter(n: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Numbers from 0 to 1 that look random and are the same in frames and on pages."""
+    x = np.sin(12.9898 * np.asarray(n, dtype=np.float64) + 78.233) * 43758.5453
+    return np.asarray(x - np.floor(x))
+
+
+def stone_mesh(detail: int, seed: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+    """A stone about the unit sphere, with facets and dents: vertices (n, 3) and triangles (m, 3).
+
+    Args:
+        detail: Each edge of an icosahedron is split into `detail + 1` parts.
+        seed: Its kind, from 1 on.
+    """
+    golden = (1.0 + 5.0**0.5) / 2.0
+    corners = np.array([(-1, golden, 0), (1, golden, 0), (-1, -golden, 0), (1, -golden, 0)], dtype=np.float64)
+    corners = np.concatenate((corners, corners[:, [2, 0, 1]], corners[:, [1, 2, 0]]))
+    distance = np.linalg.norm(corners[:, None] - corners, axis=2)
+    near = (distance > 0.0) & (distance < 2.1)
+    faces = [
+        (a, b, c)
+        for a in range(12)
+        for b in range(a + 1, 12)
+        for c in range(b + 1, 12)
+        if near[a, b] and near[b, c] and near[a, c]
+    ]
+    parts, triangles = detail + 1, []
+    for a, b, c in faces:
+        p, q, r = corners[[a, b, c]]
+        if np.dot(np.cross(q - p, r - p), p) < 0.0:
+            q, r = r, q
+
+        def at(i: int, k: int, p: Any = p, q: Any = q, r: Any = r) -> npt.NDArray[np.float64]:
+            place: npt.NDArray[np.float64] = p + (q - p) * i / parts + (r - p) * k / parts
+            return place / np.linalg.norm(place)
+
+        for i in range(parts):
+            for k in range(parts - i):
+                triangles.append((at(i, k), at(i + 1, k), at(i, k + 1)))
+                if i + k + 1 < parts:
+                    triangles.append((at(i + 1, k), at(i + 1, k + 1), at(i, k + 1)))
+    loose = np.array(triangles).reshape(-1, 3)
+    _, first, numbers = np.unique(np.round(loose, 4) + 0.0, axis=0, return_index=True, return_inverse=True)
+    vertices = loose[first]
+    x, y, z = vertices.T
+    bumps = 0.5 * np.sin(2.3 * x + 1.7 * y + seed) * np.cos(1.9 * y - 2.1 * z + 2 * seed)
+    bumps += 0.3 * np.sin(4.1 * z + 3.3 * x + 3 * seed) + 0.2 * np.sin(6.7 * y - 5.2 * x + 5 * seed)
+    return (0.98 + 0.1 * bumps)[:, None] * vertices, numbers.reshape(-1, 3)
+
+
+def stones_of(
+    centres: npt.NDArray[np.float64],
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Which stone stands over each sphere at (n, 3), m: kind (n,), quaternion (n, 4), w first, and shade (n,).
+
+    It depends on the place alone, so that frames and pages show the same stones.
+    """
+    key = centres.astype(np.float32).astype(np.float64) @ np.array([1.7, 0.3, 2.9])
+    turns = np.column_stack([scatter(key + part) - 0.5 for part in (0.7, 0.1, 0.3, 0.5)])
+    turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+    return np.floor(STONES * scatter(key)).astype(np.int64), turns, 0.82 + 0.3 * scatter(key + 0.9)
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,10 +22,12 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkRenderer,
 from rover_gym.ground import plane_of, sand_of, spheres_of, surfaces_of
 from rover_gym.mechanics import RoverModel, Simulation, Terrain
 from rover_gym.rendering import appearance as look
+from rover_gym.rendering.draped_shadow import DrapedShadow
 from rover_gym.rendering.render_options import Camera, check_render_options
 from rover_gym.rendering.rut_actor import RutActor
 from rover_gym.rendering.scenery_actors import (
     FAR,
+    BallsActor,
     Goal,
     GroundActors,
     RockActors,
@@ -36,9 +38,12 @@ from rover_gym.rendering.scenery_actors import (
     sky,
     sun,
 )
+from rover_gym.rendering.tyre_marks import TyreMarks
 from rover_gym.rendering.vtk_actors import Array, Faces, actor_of, actor_with, level, mesh, set_points, set_pose
 
 FORCE_LENGTH = 0.45  # m, arrow length for a wheel's mean share of the weight
+
+FITTED = 1.078  # m, the reach of the rover that the places of eye and target below fit; others scale them
 
 VIEW_ANGLE = 34.0  # degrees, vertical
 
@@ -138,6 +143,7 @@ class FrameRenderer(Picture):
             "antialiasing": antialiasing,
         }
         self.options = check_render_options("", options)
+        self._model, self._fit = model, float(model.clear_radius) / FITTED
         self._wheel_mass = model.mass / len(model.wheel_radii)
         super().__init__(self.options.width, self.options.height)
         self._scene.SetUseFXAA(self.options.antialiasing)
@@ -149,7 +155,7 @@ class FrameRenderer(Picture):
         for renderer in (self._scene, self._overlay):
             renderer.AutomaticLightCreationOff()
             renderer.AddLight(sun(0.85))
-            renderer.AddLight(headlight(0.25))
+            renderer.AddLight(headlight(0.1))
             self._window.AddRenderer(renderer)
         self._sky = sky()
         self._scene.AddActor(self._sky)
@@ -162,6 +168,7 @@ class FrameRenderer(Picture):
         self._terrain: Terrain | None = None
         self._goal: tuple[Goal | None, float] = (None, 0.0)
         self._stage: list[vtkActor] = []
+        self._balls: BallsActor | None = None
         self.set_scene(terrain, goal=goal, goal_tolerance=goal_tolerance)
 
     def set_scene(self, terrain: Terrain, *, goal: Goal | None = None, goal_tolerance: float = 0.5) -> None:
@@ -179,12 +186,18 @@ class FrameRenderer(Picture):
         self._shadows: dict[str, vtkActor] = {}
         sand = sand_of(terrain)
         self._ruts = None if sand is None else RutActor(sand)
+        self._shadow = DrapedShadow(self._model, terrain) if plane is None or self._balls is not None else None
+        self._marks = None if sand is not None else TyreMarks(self._model, terrain)
         self._stage = [surface.actor for surface in self._surfaces]
         self._stage += [] if self._ruts is None else [self._ruts.actor]
         self._stage += [] if self._rocks is None else self._rocks.actors
         if self._ground is not None:
             self._shadows = {solid: shadow_of(actor, self._ground) for solid, actor in self._solids.items()}
             self._stage += [self._ground.actor, *self._shadows.values()]
+        for flat in self._shadows.values() if self._shadow is not None else ():
+            flat.VisibilityOff()
+        self._stage += [] if self._shadow is None else [self._shadow.actor]
+        self._stage += [] if self._marks is None else [self._marks.actor]
         if goal is not None:
             self._stage += flag(goal, goal_tolerance, terrain, self._ground)
         for actor in self._stage:
@@ -194,6 +207,17 @@ class FrameRenderer(Picture):
     def add(self, actor: vtkActor) -> None:
         """Adds what stays when the scene changes, such as the balls of a bed or its walls; their owner moves them."""
         self._scene.AddActor(actor)
+
+    def shade(self, balls: BallsActor) -> None:
+        """Adds balls, which the rover's shadow falls on; their owner moves them."""
+        self._balls = balls
+        self._scene.AddActor(balls.actor)
+        if self._shadow is None and self._terrain is not None:
+            self._shadow = DrapedShadow(self._model, self._terrain)
+            self._stage.append(self._shadow.actor)
+            self._scene.AddActor(self._shadow.actor)
+        for flat in self._shadows.values():  # it would lie under the balls
+            flat.VisibilityOff()
 
     def render(self, simulation: Simulation) -> npt.NDArray[np.uint8]:
         """The simulation's current state as an image (height, width, 3) uint8, top row first."""
@@ -214,8 +238,14 @@ class FrameRenderer(Picture):
         return self._shot()
 
     def _place_rover(self, simulation: Simulation) -> None:
-        pose = np.eye(4)
-        for solid, (origin, rotation) in simulation.poses().items():
+        pose, poses = np.eye(4), simulation.poses()
+        if self._shadow is not None:
+            self._shadow.follow(poses)
+            if self._balls is not None:
+                self._balls.darken(self._shadow.brightness(self._balls.position))
+        if self._marks is not None:
+            self._marks.follow(poses, simulation.time)
+        for solid, (origin, rotation) in poses.items():
             if solid in self._solids:
                 pose[:3, :3], pose[:3, 3] = rotation, origin
                 set_pose(self._solids[solid], pose)
@@ -237,21 +267,21 @@ class FrameRenderer(Picture):
         if not isinstance(self.options.camera, str):
             eye, target = (np.array(point) for point in self.options.camera)
         elif self.options.camera == "top":
-            eye, target = position + TOP_HEIGHT * up, position
+            eye, target = position + self._fit * TOP_HEIGHT * up, position
             view_up = level(np.array([1.0, 0.0, 0.0]), up)
         else:
             centre, heading = self._follow(simulation, position, up)
             ahead = level(np.array([np.cos(heading), 0.0, -np.sin(heading)]), up)
             frame = np.array([ahead, up, np.cross(ahead, up)])
             side = self.options.camera == "side"
-            eye = self._above_ground(centre + (SIDE_EYE if side else FOLLOW_EYE) @ frame, up)
-            target = centre + (SIDE_TARGET if side else FOLLOW_TARGET) @ frame
+            eye = self._above_ground(centre + self._fit * (SIDE_EYE if side else FOLLOW_EYE) @ frame, up)
+            target = centre + self._fit * (SIDE_TARGET if side else FOLLOW_TARGET) @ frame
         camera = self._scene.GetActiveCamera()
         camera.SetViewAngle(VIEW_ANGLE)
         camera.SetPosition(*eye)
         camera.SetFocalPoint(*target)
         camera.SetViewUp(*view_up)
-        camera.SetClippingRange(0.1, 2.5 * FAR)
+        camera.SetClippingRange(0.1 * min(1.0, self._fit), 2.5 * FAR)
         # The sky stays level around the eye, so that slopes are visible against it.
         ahead = level(np.array([1.0, 0.0, 0.0]), up)
         dome = np.eye(4)
@@ -280,7 +310,7 @@ class FrameRenderer(Picture):
         if self._plane is None:
             return eye
         n = self._plane.normal
-        missing = EYE_HEIGHT - (float(n @ eye) + self._plane.offset)
+        missing = self._fit * EYE_HEIGHT - (float(n @ eye) + self._plane.offset)
         return eye + max(missing, 0.0) / max(float(n @ up), 0.2) * up
 
 

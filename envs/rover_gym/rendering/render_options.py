@@ -128,7 +128,7 @@ class VideoWriter:
             raise MissingExtraError("imageio-ffmpeg", "render") from error
         self.path = Path(path)
         if self.path.suffix.lower() != ".mp4":
-            refuse(OptionError, "video", str(path), "must be a file's name that ends in .mp4")
+            refuse(OptionError, "film", str(path), "must be a file's name that ends in .mp4")
         self._fps = fps
         self._write_frames: Any = imageio_ffmpeg.write_frames
         self._writer: Generator[None, npt.NDArray[np.uint8] | None, None] | None = None

@@ -6,7 +6,8 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 from rover_gym.ground import heights_of
 from rover_gym.mechanics import SoftGround, Terrain
 from rover_gym.rendering import appearance as look
-from rover_gym.rendering.scenery_actors import LIFT, SUN
+from rover_gym.rendering.appearance import SUN
+from rover_gym.rendering.scenery_actors import LIFT
 from rover_gym.rendering.vtk_actors import Array, Faces, actor_with, mesh
 
 DARKEST = 0.5  # brightness at the bottom of a rut as deep as it is wide

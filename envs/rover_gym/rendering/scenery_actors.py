@@ -6,14 +6,13 @@ import numpy as np
 import numpy.typing as npt
 from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkImageData, vtkPolyData
-from vtkmodules.vtkFiltersSources import vtkSphereSource
 from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkLight, vtkPolyDataMapper, vtkTexture
 from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLSphereMapper
 
 from rover_gym.ground import heights_of, plane_of, triangles_of
 from rover_gym.mechanics import HeightField, Plane, Terrain, TriangleMesh
 from rover_gym.rendering import appearance as look
-from rover_gym.rendering.appearance import FIXED_BALL_COLOUR, SAND_COLOUR
+from rover_gym.rendering.appearance import FIXED_BALL_COLOUR, HAZE, SAND_COLOUR, SHADOW, SUN
 from rover_gym.rendering.vtk_actors import (
     Array,
     actor_of,
@@ -26,11 +25,6 @@ from rover_gym.rendering.vtk_actors import (
     set_pose,
 )
 
-# Direction to the sun, fixed: x forward, y up, z right.
-SUN = np.array([-0.35, 0.80, 0.50]) / math.sqrt(0.35**2 + 0.80**2 + 0.50**2)
-
-SHADOW = 0.55  # brightness of shadowed ground
-
 LIFT = 0.004  # m, offset of shadows above the ground and of the goal's ring above shadows, against flicker
 
 TILE = 0.5  # m, of the checkered ground
@@ -40,11 +34,12 @@ NEAR, FAR = 20.0, 160.0  # m, half edges of the checkered ground and of the grou
 LEVEL = 0.7  # upward part of the normal of a mesh's faces that show tiles
 DARK = (0.75, 0.25)  # a place on a dark tile, in the picture of the tiles
 
-HAZE = 12.0, 60.0  # m, where the haze begins and where the ground has the horizon's colour
+# The number of facets of a stone depends on its size in the picture, since most of a frame's time goes into facets:
+# (within this many radii of the rover, but at most so many m; detail; with a shadow).
+STONE_RANGES = ((40.0, 6.0, 2, True), (250.0, 12.0, 1, True), (math.inf, math.inf, 0, False))
 
-# The number of facets of a sphere depends on its size in the picture, since most of a frame's time goes into facets:
-# (within this many radii of the rover, but at most so many m; facets around; with a shadow).
-SPHERE_RANGES = ((40.0, 4.0, 18, True), (250.0, 12.0, 8, True), (math.inf, math.inf, 6, False))
+# Light from above and all around, and from the Sun, as on pages.
+AROUND, FROM_SUN = 0.52, 0.54
 
 Goal = tuple[float, float]
 
@@ -102,7 +97,7 @@ class GroundActors:
         self.flatten = np.eye(4)
         self.flatten[:3, :3] -= np.outer(SUN, n) / across
         self.flatten[:3, 3] = -(plane.offset - LIFT) / across * SUN
-        self.actor = self._draw(brightness=0.45 + 0.55 * across / float(SUN[1]))
+        self.actor = self._draw(brightness=AROUND + FROM_SUN * across / float(SUN[1]))
 
     def follow(self, position: Array) -> None:
         """Moves the mesh towards a position by whole pairs of tiles, so that the checkers stay fixed in the world."""
@@ -135,7 +130,6 @@ class GroundActors:
         colours = mean + np.clip(1.0 - distance / NEAR, 0.0, 1.0) * (colours - mean)
         colours *= brightness  # lit here, once, since haze is drawn unlit
         haze = np.clip((distance - HAZE[0]) / (HAZE[1] - HAZE[0]), 0.0, 1.0)
-        haze = haze * haze * (3.0 - 2.0 * haze)
         colours += haze * (np.array(look.SKY_COLOUR) - colours)
         vertices = flat @ self._along.T + self._foot
         return actor_of(mesh(vertices, faces, colours, smooth=False), lit=False)
@@ -206,7 +200,7 @@ def _tiles() -> vtkTexture:
 
 
 class RockActors:
-    """All spheres of a terrain, `(n, 3)` and `(n,)`, finer near the rover, with their shadows on the ground.
+    """Stones over all spheres of a terrain, `(n, 3)` and `(n,)`, finer near the rover, with shadows on the ground.
 
     Attributes:
         actors: What VTK draws.
@@ -214,33 +208,34 @@ class RockActors:
 
     def __init__(self, centres: Array, radii: Array, ground: GroundActors | None) -> None:
         self._centres, self._radii = centres, radii
-        # Each rock has its own shade: the golden ratio spreads the shades evenly.
-        shade = 0.86 + 0.28 * (np.arange(len(self._radii)) * 0.6180339887 % 1.0)
+        self._kinds, self._turns, shade = look.stones_of(centres)
         self._colours = shade[:, None] * np.array(look.ROCK_COLOUR)
         self._place: tuple[float, ...] | None = None
-        self._sets = [vtkPolyData() for _ in SPHERE_RANGES]
+        self._sets = [vtkPolyData() for _ in STONE_RANGES]
         self.actors: list[vtkActor] = []
-        for points, (_, _, facets, shadowed) in zip(self._sets, SPHERE_RANGES, strict=True):
-            self.actors.append(actor_with(_spheres(points, facets, coloured=True)))
+        for points, (_, _, detail, shadowed) in zip(self._sets, STONE_RANGES, strict=True):
+            self.actors.append(actor_with(_stones(points, detail, coloured=True)))
+            self.actors[-1].GetProperty().SetInterpolationToFlat()
             if shadowed and ground is not None:
-                self.actors.append(_shadow(actor_with(_spheres(points, min(facets, 10), coloured=False)), ground))
+                self.actors.append(_shadow(actor_with(_stones(points, min(detail, 1), coloured=False)), ground))
 
     def follow(self, position: Array) -> None:
-        """Sorts the spheres into levels of detail by their distance from a position."""
+        """Sorts the stones into levels of detail by their distance from a position."""
         place = tuple(np.round(position).tolist())
         if place == self._place:
             return
         self._place = place
         distance = np.linalg.norm(self._centres - place, axis=1) - self._radii
         left = np.full(len(distance), True)
-        for points, (radii_away, reach, _, _) in zip(self._sets, SPHERE_RANGES, strict=True):
+        for points, (radii_away, reach, _, _) in zip(self._sets, STONE_RANGES, strict=True):
             chosen = left & (distance <= np.minimum(radii_away * self._radii, reach))
             left &= ~chosen
             set_points(points, self._centres[chosen])
             set_colours(points, self._colours[chosen])
-            radii = numpy_to_vtk(self._radii[chosen], deep=True)
-            radii.SetName("radius")
-            points.GetPointData().AddArray(radii)
+            for name, values in (("radius", self._radii), ("kind", self._kinds), ("turn", self._turns)):
+                array = numpy_to_vtk(np.ascontiguousarray(values[chosen]), deep=True)
+                array.SetName(name)
+                points.GetPointData().AddArray(array)
             points.Modified()
 
 
@@ -287,14 +282,20 @@ def _ring(centre: Array, radius: float, plane: Plane) -> vtkActor:
     return actor_of(mesh(np.vstack((outer, inner)), lattice(1, around), colours, smooth=False), lit=False)
 
 
-def _spheres(points: vtkPolyData, facets: int, *, coloured: bool) -> vtkGlyph3DMapper:
-    sphere = vtkSphereSource(radius=1.0, theta_resolution=facets, phi_resolution=facets)
+def _stones(points: vtkPolyData, detail: int, *, coloured: bool) -> vtkGlyph3DMapper:
     mapper = vtkGlyph3DMapper()
     mapper.SetInputData(points)
-    mapper.SetSourceConnection(sphere.GetOutputPort())
+    for kind in range(look.STONES):
+        vertices, triangles = look.stone_mesh(detail, kind + 1)
+        stone = mesh(vertices, triangles, np.ones_like(vertices), smooth=False)
+        stone.GetPointData().SetScalars(None)
+        mapper.SetSourceData(kind, stone)
+    mapper.SourceIndexingOn()
+    mapper.SetSourceIndexArray("kind")
     mapper.SetScaleArray("radius")
     mapper.SetScaleModeToScaleByMagnitude()
-    mapper.OrientOff()
+    mapper.SetOrientationArray("turn")
+    mapper.SetOrientationModeToQuaternion()
     mapper.SetScalarVisibility(coloured)
     return mapper
 
@@ -316,6 +317,7 @@ class BallsActor:
 
     Attributes:
         actor: What VTK draws.
+        position: (n, 3) m.
     """
 
     def __init__(self, radius: npt.ArrayLike, kinematic: npt.ArrayLike | None = None) -> None:
@@ -338,9 +340,15 @@ class BallsActor:
         self.actor = actor_with(mapper)
         self.place(np.zeros((len(radii), 3)))
 
+    def darken(self, brightness: Array) -> None:
+        """Gives each ball (n,) a share of its light, 1 for all of it."""
+        set_colours(self._points, brightness[:, None] * self._colours)
+        self._points.Modified()
+
     def place(self, position: Array | npt.NDArray[np.float32]) -> None:
         """Moves the balls to (n, 3), m."""
-        set_points(self._points, np.asarray(position, dtype=np.float64))
+        self.position = np.asarray(position, dtype=np.float64)
+        set_points(self._points, self.position)
         set_colours(self._points, self._colours)
         self._points.GetPointData().AddArray(self._sizes)
         self._points.Modified()

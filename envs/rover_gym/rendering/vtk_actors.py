@@ -88,8 +88,8 @@ def actor_with(mapper: vtkMapper, *, lit: bool = True) -> vtkActor:
     actor = vtkActor()
     actor.SetMapper(mapper)
     surface = actor.GetProperty()
-    surface.SetAmbient(0.45)
-    surface.SetDiffuse(0.66)
+    surface.SetAmbient(0.52 if lit else 1.0)
+    surface.SetDiffuse(0.74 if lit else 0.0)
     surface.SetInterpolationToGouraud()
     surface.SetLighting(lit)
     return actor

@@ -73,6 +73,23 @@ def panel_contents(title: str, time: Array, charts: Iterable[Chart], facts: Iter
     }
 
 
+def with_ghost(panel: dict[str, Any], ghost: dict[str, Any]) -> dict[str, Any]:
+    """The panel of a run with the curves of another, which are dashed, over the first one's times."""
+    others = {chart["title"]: chart for chart in ghost["charts"]}
+    last = ghost["time"][-1]
+    for chart in panel["charts"]:
+        other = others.get(chart["title"])
+        if other is None:
+            continue
+        for values, series in zip(other["values"], other["series"], strict=True):
+            known = [value if value is not None else np.nan for value in values]
+            at = np.interp(panel["time"], ghost["time"], np.asarray(known, dtype=np.float64))
+            at[np.asarray(panel["time"]) > last + 1e-9] = np.nan
+            chart["values"].append(_rounded(at, 4))
+            chart["series"].append({**series, "name": f"{series['name']}, ghost", "ghost": True})
+    return {**panel, "facts": [*panel["facts"], f"ghost, dashed: {ghost['title']}"]}
+
+
 def _rounded(values: Array, digits: int) -> list[float | None]:
     """Values for JSON, which has neither nan nor infinity: unknown values leave gaps in the curve."""
     return [round(float(value), digits) if np.isfinite(value) else None for value in values]

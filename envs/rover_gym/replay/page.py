@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rover_gym.grains.grain_run import GrainRun
+from rover_gym.mechanics import OptionError
 from rover_gym.planar.planar_run import PlanarRun
 from rover_gym.record.rover_run import RoverRun
 from rover_gym.replay.flat_scene import planar_scene, soil_scene
@@ -18,7 +19,7 @@ from rover_gym.replay.grain_scene import grain_scene
 from rover_gym.replay.page_scene import SAMPLES
 from rover_gym.replay.rover_scene import rover_scene
 from rover_gym.soil.soil_run import SoilRun
-from rover_gym.validation import checked
+from rover_gym.validation import checked, refuse
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -32,6 +33,7 @@ SCRIPTS = (
     "view.js",
     "ruts.js",
     "grains.js",
+    "sights.js",
     "overlays.js",
     "eye.js",
     "curves.js",
@@ -42,8 +44,8 @@ SCRIPTS = (
 SCENES: dict[type, Any] = {RoverRun: rover_scene, PlanarRun: planar_scene, SoilRun: soil_scene, GrainRun: grain_scene}
 
 
-@checked(run=("RoverRun", "PlanarRun", "SoilRun", "GrainRun"), path=Path, follow=bool)
-def write_page(run: SavedRun, path: str | Path, *, follow: bool = True) -> Path:
+@checked(run=("RoverRun", "PlanarRun", "SoilRun", "GrainRun"), path=Path, follow=bool, ghost=("RoverRun", None))
+def write_page(run: SavedRun, path: str | Path, *, follow: bool = True, ghost: RoverRun | None = None) -> Path:
     """Writes a run as a single browser page: the scene with a timeline and, beside it, curves.
 
     Args:
@@ -51,12 +53,17 @@ def write_page(run: SavedRun, path: str | Path, *, follow: bool = True) -> Path:
         path: The file to write, usually `.html`. Its folder is created.
         follow: Whether the eye follows what moves; otherwise the ground stays fixed. A soil is followed where it is
             wider than the picture.
+        ghost: Another run of a rover, which drives beside a rover's run, translucent and with dashed curves.
 
     Raises:
+        OptionError: A ghost is given beside a run of something else than a rover.
         RecordingError: The recording is damaged.
         OSError: The file cannot be written.
     """
-    scene = SCENES[type(run)](run, follow=follow)
+    if ghost is not None and not isinstance(run, RoverRun):
+        refuse(OptionError, "ghost", ghost, "can only drive beside a rover's run")
+    more = {} if ghost is None else {"ghost": ghost}
+    scene = SCENES[type(run)](run, follow=follow, **more)
     scene.facts |= {
         "time": [round(float(time - run.time[0]), 6) for time in run.time],
         "samples": SAMPLES,

@@ -12,7 +12,7 @@ from rover_gym.ground import map_of, surfaces_of
 from rover_gym.mechanics import HeightField
 from rover_gym.record.channels import outcome_words
 from rover_gym.rendering.appearance import GROUND_COLOUR_2, WHEEL_COLOURS
-from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, moving_mean, panel_contents
+from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, moving_mean, panel_contents, with_ghost
 from rover_gym.replay.page_scene import FrameChannel, PageScene
 from rover_gym.replay.rotations import continuous, quaternions
 from rover_gym.replay.scenery import (
@@ -26,9 +26,12 @@ from rover_gym.replay.scenery import (
     surroundings,
     trunk_path,
 )
+from rover_gym.replay.sights import recorded_sights
 from rover_gym.replay.wheel_marks import DrawnWheel, drawn_wheels, feet, marks, rut_edits, world_forces
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from rover_gym.mechanics import Terrain
     from rover_gym.record.rover_run import RoverRun
 
@@ -46,6 +49,7 @@ LONGEST_FACT = 100
 HAZE = 90.0  # m, distance at which the ground has the colour of the sky
 PLANE = 400.0  # m, half of the edge of a plane
 ABOVE = 0.45  # of the rover's reach: so far above it the eye looks, and the horizon is in the picture
+GHOST_COLOUR = (0.55, 0.72, 1.0)
 GRAVITY = 9.81  # m/s², of runs that do not say it
 
 
@@ -108,26 +112,63 @@ def bare_scene(run: RoverRun) -> tuple[PageScene, list[DrawnWheel]]:
     return scene, wheels
 
 
-def rover_scene(run: RoverRun, *, follow: bool) -> PageScene:
-    """A rover's run as a scene; without `follow` the eye stays where it is."""
+def mass_channel(places: Array) -> FrameChannel:
+    """Mass centres (n, 3), m."""
+    return FrameChannel.fine("mass", places[:, None])
+
+
+def add_ghost(scene: PageScene, run: RoverRun, ghost: RoverRun) -> tuple[Array, Array]:
+    """Adds the rover of another run, translucent; returns its poses at the first run's times.
+
+    A ghost whose run is shorter stays where it ended.
+    """
+    for frame, parts in enumerate(parts_by_solid(ghost).values(), scene.frames):
+        meshes = coloured_meshes(parts)
+        scene.put_mesh([(GHOST_COLOUR, points, corners) for _, points, corners in meshes], frame, "ghost")
+    scene.frames += len(ghost.model.solid_names)
+    times = ghost.time - ghost.time[0]
+    rows = np.searchsorted(times, run.time - run.time[0] - 1e-9).clip(0, ghost.n_frames - 1)
+    scene.facts["curves"] = with_ghost(rover_curves(run), rover_curves(ghost))
+    return ghost.positions[rows], ghost.rotations[rows]
+
+
+def rover_scene(run: RoverRun, *, follow: bool, ghost: RoverRun | None = None) -> PageScene:
+    """A rover's run as a scene; without `follow` the eye stays where it is. A second run is shown as a ghost."""
     scene, wheels = bare_scene(run)
     path = trunk_path(run)
     centre = moving_mean(run.time, path, FOLLOW_TIME) if follow else np.tile(path[0], (run.n_frames, 1))
     points, normals, across = feet(run, wheels)
     forces = world_forces(run, normals, across)
     share = run.model.mass * _gravity(run) / max(1, len(wheels))
+    positions, rotations = run.positions, run.rotations
+    scene.facts["curves"] = rover_curves(run)
+    if ghost is not None:
+        places, turns = add_ghost(scene, run, ghost)
+        positions, rotations = np.concatenate((positions, places), 1), np.concatenate((rotations, turns), 1)
     scene.channels += [
-        *poses_of(run.positions, run.rotations),
+        *poses_of(positions, rotations),
         FrameChannel.fine("centre", centre[:, None]),
         FrameChannel.fine("forces", np.concatenate((points, np.clip(forces / share, -1e4, 1e4)), axis=2)),
+        FrameChannel.turns("normals", normals),
     ]
+    attributes = run.trajectory.attributes
+    sights = recorded_sights(run.trajectory.data, attributes.get("scene", {}), run.terrain)
+    if (friction := _friction(attributes)) is None:
+        sights.missing["cones"] = "this run does not say its friction"
+    else:
+        scene.facts["friction"] = friction
+    if "q" in run.trajectory.data:
+        centres = [run.model.tags(q)["centre_of_mass"] for q in run.trajectory["q"]]
+        scene.channels.append(mass_channel(np.array(centres)))
+    scene.channels += sights.channels()
+    sights.describe(scene, run.model)
     scene.arrays["trail"] = ("f4", marks(run, wheels, points).ravel())
     ruts = rut_edits(run, wheels, points, across)
     if ruts is not None:
         rut_map, samples, cells, levels = ruts
         scene.facts["ruts"] = rut_map.header()
         scene.arrays |= {"rut-sample": ("u4", samples), "rut-cell": ("u4", cells), "rut-level": ("u1", levels)}
-    scene.facts |= {"events": _events(run), "curves": rover_curves(run)}
+    scene.facts["events"] = _events(run)
     return scene
 
 
@@ -136,6 +177,16 @@ def _gravity(run: RoverRun) -> float:
     solver = run.trajectory.attributes.get("solver", {})
     vector = solver.get("gravity") if isinstance(solver, dict) else None
     return GRAVITY if vector is None else max(1e-3, float(np.linalg.norm(vector)))
+
+
+def _friction(attributes: Mapping[str, Any]) -> float | None:
+    """The friction coefficient of wheels and ground, as far as a run says it."""
+    for part in ("scene", "solver"):
+        told = attributes.get(part)
+        value = told.get("friction") if isinstance(told, dict) else None
+        if isinstance(value, (int, float)) and 0.0 <= value < np.inf:
+            return float(value)
+    return None
 
 
 def facts(run: RoverRun) -> list[str]:

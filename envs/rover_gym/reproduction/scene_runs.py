@@ -192,7 +192,6 @@ class ReportScene:
 
         Raises:
             OptionError: An option is out of range.
-            MissingExtraError: h5py is not installed.
             StepError: A step failed; the rows before it are on disk.
         """
         sim = self.simulation(time_step, **options)

@@ -90,7 +90,8 @@ class Curves {
       add(svg, "text", { x: this.x(time), y: BOX.height - BOX.bottom + 12, "text-anchor": "middle" }, short(time));
     }
     add(svg, "text", { x: BOX.width / 2, y: BOX.height - 4, "text-anchor": "middle" }, "time (s)");
-    chart.values.forEach((values, k) => add(svg, "path", { class: "curve", stroke: chart.series[k].colour, d: this.path(values, y) }));
+    chart.values.forEach((values, k) => add(svg, "path", { class: chart.series[k].ghost ? "curve ghost" : "curve",
+      stroke: chart.series[k].colour, d: this.path(values, y) }));
     if (peak > high) {
       const at = { class: "peak", x: BOX.width - BOX.right - 2, y: BOX.top + 10, "text-anchor": "end" };
       add(svg, "text", at, `cut off, peak ${Number(peak.toPrecision(3))} ${chart.unit}`);
@@ -122,8 +123,8 @@ class Curves {
 
   legend(place, chart) {
     const legend = add(place, "div", { class: "legend" });
-    return chart.series.map(({ name, colour }) => {
-      const entry = add(legend, "span");
+    return chart.series.map(({ name, colour, ghost }) => {
+      const entry = add(legend, "span", ghost ? { class: "ghost" } : {});
       add(entry, "i").style.background = colour;
       add(entry, "span", {}, `${name} `);
       return add(entry, "span");

@@ -6,17 +6,14 @@ const HEAD_GLSL = `precision highp float; precision highp int; precision highp s
 uniform mat4 viewMatrix, projectionMatrix;
 `;
 
-// A colour in light, as three.js lights the meshes: place and normal in the world.
-const BALL_LIGHT = (software) => `
+// How much of the Sun a place in the world sees: of each point of a ball or, without a graphics card, of the ball.
+const BALL_SHADOW = (software) => `
 uniform mat4 light; // from the world into the shadow's picture
 uniform highp ${software ? "sampler2D" : "sampler2DShadow"} shadow;
-const vec3 sun = vec3(${SUN.toArray().join(",")});
-vec3 lit(vec3 colour, vec3 place, vec3 normal) {
+float sunlit(vec3 place) {
   vec3 s = (light * vec4(place, 1.0)).xyz - vec3(0.0, 0.0, 2e-3);
   bool outside = any(lessThan(s, vec3(0.0))) || any(greaterThan(s, vec3(1.0)));
-  float seen = outside ? 1.0 : ${software ? "step(s.z, texture(shadow, s.xy).r)" : "texture(shadow, s)"};
-  vec3 sky = mix(vec3(0.26, 0.21, 0.18), vec3(0.52, 0.53, 0.57), 0.5 + 0.5 * normal.y);
-  return colour * (sky + vec3(0.68, 0.64, 0.58) * max(dot(normal, sun), 0.0) * seen);
+  return outside ? 1.0 : ${software ? "step(s.z, texture(shadow, s.xy).r)" : "texture(shadow, s)"};
 }`;
 
 // A ball is a square that touches its sphere where it is nearest to the eye, so every point of it lies behind.
@@ -28,13 +25,16 @@ uniform float share, rate;
 uniform int paint;
 flat out vec4 sphere;
 flat out vec3 colour;
+flat out float seen;
 out vec3 ray;
 vec3 heat(float t) {
   vec3 slow = vec3(0.24, 0.30, 0.46), middle = vec3(0.93, 0.76, 0.36), fast = vec3(0.80, 0.13, 0.16);
   return t < 0.5 ? mix(slow, middle, 2.0 * t) : mix(middle, fast, 2.0 * t - 1.0);
 }
 void main() {
-  vec3 centre = (viewMatrix * vec4(low + extent * mix(before, after, share), 1.0)).xyz;
+  vec3 place = low + extent * mix(before, after, share);
+  vec3 centre = (viewMatrix * vec4(place, 1.0)).xyz;
+  seen = SEEN;
   float d = length(centre), r = ball.x;
   vec3 to = centre / d;
   vec3 across = normalize(cross(to, vec3(0.0, 1.0, 0.001)));
@@ -62,9 +62,12 @@ layout(depth_greater) out highp float gl_FragDepth;
 #endif
 `;
 
+// In light as three.js lights the meshes.
 const BALL_FRAGMENT = `
+uniform vec3 sun, up; // of the world, as the eye sees them
 flat in vec4 sphere;
 flat in vec3 colour;
+flat in float seen;
 in vec3 ray;
 out vec4 pixel;
 void main() {
@@ -74,9 +77,9 @@ void main() {
   float rest = sphere.w * sphere.w - dot(aside, aside);
   if (rest < 0.0) discard;
   vec3 hit = to * (along - sqrt(rest));
-  vec3 normal = transpose(mat3(viewMatrix)) * (hit - sphere.xyz) / sphere.w;
-  vec3 place = transpose(mat3(viewMatrix)) * (hit - viewMatrix[3].xyz);
-  pixel = vec4(lit(colour, place, normal), 1.0);
+  vec3 normal = (hit - sphere.xyz) / sphere.w;
+  vec3 sky = mix(vec3(0.26, 0.21, 0.18), vec3(0.52, 0.53, 0.57), 0.5 + 0.5 * dot(normal, up));
+  pixel = vec4(colour * (sky + vec3(0.68, 0.64, 0.58) * max(dot(normal, sun), 0.0) * SEEN), 1.0);
   gl_FragDepth = 0.5 + 0.5 * (projectionMatrix[2][2] * hit.z + projectionMatrix[3][2]) / -hit.z;
 }`;
 
@@ -89,7 +92,7 @@ void main() {
 
 // A pixel is darker the more of the pixels about it lie before it: near ones for edges, farther ones for hollows.
 // Opposite pixels count together, so that a plane seen at a slant has no shade; what is far before it does not count.
-const SCREEN_FRAGMENT = `
+const SCREEN_FRAGMENT = (software) => `
 uniform highp sampler2D picture, depths;
 uniform vec2 planes, reach; // of the projection; least reach, and a radius of a ball, both in pixels at distance 1
 uniform float radius;
@@ -106,15 +109,15 @@ void main() {
   for (int ring = 0; ring < 2; ring++) {
     float wide = ring == 0 ? reach.x : clamp(4.0 * reach.y / here, 3.0 * reach.x, 40.0 * reach.x);
     float depth = max(ring == 0 ? radius : 3.0 * radius, 1.5 * wide * here * radius / reach.y);
-    for (int i = 0; i < 4; i++) {
-      float a = 0.7854 * float(i) + 0.3927 * float(ring);
+    for (int i = 0; i < ${software ? 3 : 4}; i++) { // pairs of pixels
+      float a = ${software ? 1.0472 : 0.7854} * float(i) + ${software ? 0.5236 : 0.3927} * float(ring);
       vec2 aside = wide * vec2(cos(a), sin(a)) / size;
       vec2 before = (here - vec2(away(at + aside), away(at - aside))) / depth;
       vec2 counts = clamp(before, -1.0, 1.0) / (1.0 + 6.0 * max(abs(before) - 1.0, 0.0));
       hidden += (ring == 0 ? 1.0 : 0.7) * max(0.0, counts.x + counts.y);
     }
   }
-  pixel.rgb *= exp(-0.11 * hidden);
+  pixel.rgb *= exp(-${software ? 0.147 : 0.11} * hidden);
 }`;
 
 // Shaders of our own; `before` is what must stand before everything else.
@@ -185,11 +188,15 @@ class Balls {
     const { arrays, sand, radius } = view.scene;
     this.radius = radius;
     this.fixed = new Float32Array(4 * arrays.radii.length);
-    const light = BALL_LIGHT(view.software);
+    const { software } = view;
+    const shadow = BALL_SHADOW(software);
+    const vertex = software ? shadow + BALL_VERTEX.replace("SEEN", "sunlit(place + ball.x * vec3(0.0, 1.0, 0.0))") : BALL_VERTEX.replace("SEEN", "1.0");
+    const point = "sunlit(transpose(mat3(viewMatrix)) * (hit - viewMatrix[3].xyz))";
+    const fragment = software ? BALL_FRAGMENT.replace("SEEN", "seen") : shadow + BALL_FRAGMENT.replace("SEEN", point);
     const material = raw(
       { low: null, extent: null, sand: colourOf(sand[0]), still: colourOf(sand[1]), share: 0, rate: 0, paint: 0,
-        light: new THREE.Matrix4(), shadow: null },
-      BALL_VERTEX, light + BALL_FRAGMENT, { side: THREE.DoubleSide, before: CONSERVATIVE },
+        light: new THREE.Matrix4(), shadow: null, sun: new THREE.Vector3(), up: new THREE.Vector3() },
+      vertex, fragment, { side: THREE.DoubleSide, before: CONSERVATIVE },
     );
     this.squares = new Squares(view, "balls", material, ["ball", this.fixed, 4]);
     view.renderer.getContext().getExtension("EXT_conservative_depth");
@@ -197,11 +204,13 @@ class Balls {
       const { shadow } = view.sun;
       material.uniforms.light.value.copy(shadow.map ? shadow.matrix : new THREE.Matrix4().makeTranslation(9, 9, 9));
       material.uniforms.shadow.value = shadow.map?.depthTexture ?? null;
+      material.uniforms.sun.value.copy(SUN).transformDirection(view.camera.matrixWorldInverse);
+      material.uniforms.up.value.set(0, 1, 0).transformDirection(view.camera.matrixWorldInverse);
       material.uniformsNeedUpdate = true;
     };
     this.screen = new THREE.Scene();
     this.shade = raw({ picture: null, depths: null, planes: new THREE.Vector2(), reach: new THREE.Vector2(), radius },
-      SCREEN_VERTEX, SCREEN_FRAGMENT, { depthTest: false, depthWrite: false });
+      SCREEN_VERTEX, SCREEN_FRAGMENT(software), { depthTest: false, depthWrite: false });
     const triangle = new THREE.BufferGeometry();
     triangle.setIndex([0, 1, 2]);
     const sheet = new THREE.Mesh(triangle, this.shade);

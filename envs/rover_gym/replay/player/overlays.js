@@ -150,13 +150,18 @@ class Overlays {
     }
     this.arrows = channel("forces") ? new Arrows(view, n, colourOf(scene.force)) : null;
     this.chains = channel("chains") ? new Chains(view, channel("chains")) : null;
+    this.sights = new Sights(view);
     this.tyres = scene.wheels.map(({ frame }) => (frame === undefined ? [] : view.frames[frame].children));
   }
 
-  // The names of what may be switched here, each with its key.
+  // What may be switched here: name, key, and why there is nothing to show, which is "" where there is something. A scene
+  // without a rover names only what it has.
   offers() {
-    return [["marks", "m", this.bands], ["trails", "v", this.bands], ["forces", "f", this.arrows], ["loads", "l", this.arrows],
-      ["spheres", "k", this.view.rocks.children.length]].filter(([, , there]) => there).map(([name, key]) => [name, key]);
+    const { scene, rocks } = this.view;
+    const all = [["marks", "m", this.bands], ["trails", "v", this.bands], ["forces", "f", this.arrows], ...this.sights.offers(),
+      ["loads", "l", this.arrows], ["slope", "h", scene.rover && !this.view.balls], ["spheres", "k", rocks.children.length]];
+    const reason = (name) => scene.missing?.[name] ?? (name === "spheres" ? "no rocks lie here" : "this run does not hold it");
+    return all.filter(([, , there]) => there || scene.rover).map(([name, key, there]) => [name, key, there ? "" : reason(name)]);
   }
 
   show({ before, after, share, k }) {
@@ -169,6 +174,10 @@ class Overlays {
       foot: new THREE.Vector3(value(i, 0), value(i, 1), value(i, 2)),
       vector: new THREE.Vector3(value(i, 3), value(i, 4), value(i, 5)),
     }));
+    const axis = (i, c) => before.normals?.value(i, c, after.normals, share) ?? (c === 1 ? 1 : 0);
+    const contacts = forces.map(({ foot, vector }, i) =>
+      ({ foot, force: vector.clone(), normal: new THREE.Vector3(axis(i, 0), axis(i, 1), axis(i, 2)).normalize() }));
+    this.sights.show({ before, after, share }, contacts);
     this.tyres.forEach((meshes, i) => this.colour(meshes, on.has("loads") ? 0.5 * forces[i].vector.length() : null));
     for (const { vector } of forces) vector.multiplyScalar(ARROW * scene.reach);
     this.arrows.draw(on.has("forces") ? forces : [], scene.reach);

@@ -36,16 +36,17 @@ class Stage {
     const presets = this.eye.presets();
     part("presets").replaceChildren(...presets.map((name, i) => this.button(name, String(i + 1), () => this.choose(name))));
     part("overlays").replaceChildren(
-      ...this.view.overlays.offers().map(([name, key]) => this.button(name, key, () => this.toggle(name))));
+      ...this.view.overlays.offers().map(([name, key, reason]) => this.button(name, key, () => this.toggle(name), reason)));
     this.mark();
   }
 
-  button(name, key, act) {
+  button(name, key, act, reason = "") {
     const button = document.createElement("button");
     button.type = "button";
     button.textContent = name;
     button.dataset.name = name;
-    button.title = `key ${key}`;
+    button.title = reason || `key ${key}`;
+    button.disabled = reason !== "";
     button.addEventListener("click", () => {
       act();
       button.blur();
@@ -55,7 +56,8 @@ class Stage {
 
   mark() {
     for (const button of part("presets").children) button.classList.toggle("on", button.dataset.name === this.eye.preset);
-    for (const button of part("overlays").children) button.classList.toggle("on", this.view.on.has(button.dataset.name));
+    for (const button of part("overlays").children) button.classList.toggle("on", !button.disabled && this.view.on.has(button.dataset.name));
+    this.view.slope.value = this.view.on.has("slope") ? 1 : 0;
   }
 
   choose(preset) {
@@ -68,6 +70,7 @@ class Stage {
     const { on } = this.view;
     if (!on.delete(name)) on.add(name);
     if (name === "spheres") this.view.showSpheres();
+    if (name === "slope" && on.has(name)) this.say("slope: green is level, yellow 15 degrees, red 30 and more");
     this.mark();
     this.stale = true;
   }
@@ -88,7 +91,8 @@ class Stage {
     else {
       const offer = this.view.overlays?.offers().find(([, key]) => key === event.key.toLowerCase());
       if (!offer) return false;
-      this.toggle(offer[0]);
+      if (offer[2]) this.say(`${offer[0]}: ${offer[2]}`);
+      else this.toggle(offer[0]);
     }
     return true;
   }

@@ -100,6 +100,7 @@ class View {
     this.dark = false;
     this.paint = 0;
     this.on = new Set(["marks"]);
+    this.slope = { value: 0 }; // of the ground: 1 shows it as colours
   }
 
   // Shows another scene.
@@ -179,6 +180,7 @@ class View {
         grain: { value: this.soil },
         other: { value: colourOf(this.scene.soil[1]) },
         tile: { value: this.scene.tile },
+        slopes: this.slope,
         ...this.ruts?.uniforms,
       });
       shader.vertexShader = shader.vertexShader
@@ -187,7 +189,7 @@ class View {
           "#include <project_vertex>\nsoilPlace = (modelMatrix * vec4(transformed, 1.0)).xyz;");
       shader.fragmentShader = shader.fragmentShader
         .replace("#include <common>",
-          "#include <common>\nvarying vec3 soilPlace; uniform sampler2D grain; uniform vec3 other; uniform float tile;")
+          "#include <common>\nvarying vec3 soilPlace; uniform sampler2D grain; uniform vec3 other; uniform float tile, slopes;")
         .replace("#include <color_fragment>", `#include <color_fragment>
           vec2 soilAt = soilPlace.xz;
           vec2 edge = abs(fract(0.5 * soilAt / tile + 0.25) - 0.5) * 2.0 - 0.5; // signed, changes at every line
@@ -199,7 +201,13 @@ class View {
           float coarse = texture2D(grain, soilAt * 0.071 + 0.3).r;
           diffuseColor.rgb *= mix(vec3(1.0), other / diffuse, checks);
           diffuseColor.rgb *= 0.72 + 0.3 * fine + 0.26 * coarse;
-          ${this.ruts ? RUT_FRAGMENT : ""}`);
+          ${this.ruts ? RUT_FRAGMENT : ""}
+          if (slopes > 0.5) { // 0 to 30 degrees
+            float slope = clamp(acos(abs(normalize(cross(dFdx(soilPlace), dFdy(soilPlace))).y)) / 0.5236, 0.0, 1.0);
+            vec3 heat = slope < 0.5 ? mix(vec3(0.16, 0.5, 0.3), vec3(0.9, 0.8, 0.2), 2.0 * slope)
+              : mix(vec3(0.9, 0.8, 0.2), vec3(0.85, 0.12, 0.1), 2.0 * slope - 1.0);
+            diffuseColor.rgb = heat * (0.8 + 0.2 * fine);
+          }`);
       if (this.ruts) shader.fragmentShader = RUT_UNIFORMS + shader.fragmentShader;
     };
     return material;
@@ -217,7 +225,9 @@ class View {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(places, 3));
     geometry.setAttribute("color", new THREE.BufferAttribute(paints, 4, true));
-    const mesh = new THREE.Mesh(geometry, role === "soil" ? this.ground({ side: THREE.DoubleSide }, true) : this.lit({ vertexColors: true }));
+    const material = role === "soil" ? this.ground({ side: THREE.DoubleSide }, true) : this.lit({ vertexColors: true });
+    if (role === "ghost") Object.assign(material, { transparent: true, opacity: 0.45, depthWrite: false });
+    const mesh = new THREE.Mesh(geometry, material);
     mesh.castShadow = role === "solid";
     mesh.receiveShadow = true;
     (frame < 0 ? this.world : this.frames[frame]).add(mesh);
@@ -289,10 +299,12 @@ class View {
     for (const i of numbers) {
       const [x, y, z, r] = rocks.subarray(4 * i, 4 * i + 4);
       const detail = ROCK_DETAIL.find(([most]) => r < most)[1] + (spheres ? 1 : 0);
-      const shape = (this.shapes[`${detail} ${spheres || i % ROCK_KINDS}`] ??= spheres ? ball(detail) : stone(detail, (i % ROCK_KINDS) + 1));
-      turn.set(scatter(i) - 0.5, scatter(i + 0.3) - 0.5, scatter(i + 0.5) - 0.5, scatter(i + 0.7) - 0.5).normalize();
+      const at = 1.7 * x + 0.3 * y + 2.9 * z; // the place alone says which stone lies here: frames of films have the same
+      const kind = Math.floor(ROCK_KINDS * scatter(at)) + 1;
+      const shape = (this.shapes[`${detail} ${spheres || kind}`] ??= spheres ? ball(detail) : stone(detail, kind));
+      turn.set(scatter(at + 0.1) - 0.5, scatter(at + 0.3) - 0.5, scatter(at + 0.5) - 0.5, scatter(at + 0.7) - 0.5).normalize();
       const first = places.length / 3;
-      const shade = 255 * (0.82 + 0.3 * scatter(i + 0.9));
+      const shade = 255 * (0.82 + 0.3 * scatter(at + 0.9));
       for (let k = 0; k < shape.attributes.position.count; k++) {
         corner.fromBufferAttribute(shape.attributes.position, k).applyQuaternion(turn);
         places.push(x + r * corner.x, y + r * corner.y, z + r * corner.z);

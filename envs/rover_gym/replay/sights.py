@@ -1,0 +1,159 @@
+"""What a rover sees and intends, for the player's overlays: height scan, laser, depth camera and planned path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.env.start import check_scan, scan_points
+from rover_gym.ground import heights_of
+from rover_gym.policy.scan_policy import PLAN_POINTS
+from rover_gym.replay.page_scene import FrameChannel
+from rover_gym.sensors import DepthCamera, LaserScanner, Mount
+from rover_gym.sensors.sensor import Moment
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from rover_gym.env.rover_env import RoverEnv
+    from rover_gym.mechanics import RoverModel, Simulation, Terrain
+    from rover_gym.policy.named_policy import Policy
+    from rover_gym.replay.page_scene import PageScene
+
+Array = npt.NDArray[np.float64]
+
+#: The sensors that a drive may carry, by the names of their channels.
+SENSORS = ("laser", "depth")
+
+#: A policy's channel: its path ahead and to the right of the trunk, m.
+PATH = "plan_path"
+
+NO_SENSOR = "this run has no {}: record with `rover drive --sensor {}`"
+NO_PLAN = "this run's driver told no path: drive with `--policy scan`, `foresight` or `planner`"
+NO_LIVE_PLAN = "this driver tells no path: choose scan, foresight or planner"
+NO_LIVE_SCAN = "this driver has no height scan: choose scan or foresight"
+NO_SCAN = "this run has no height scan: drive with `--policy scan`, or set `height_scan`"
+
+
+def sensor_of(name: str, model: RoverModel) -> LaserScanner | DepthCamera:
+    """The sensor of a name, mounted as high on a rover as its size asks for."""
+    reach = float(model.clear_radius)
+    if name == "laser":
+        mount = Mount(position=(0.0, 0.6 * reach, 0.0))
+        return LaserScanner(
+            name=name, mount=mount, rays=120, elevations_deg=(-14.0, -7.0), max_range=8.0 * reach, sees_rover=False
+        )
+    mount = Mount(position=(0.4 * reach, 0.6 * reach, 0.0), pitch_deg=-25.0)
+    return DepthCamera(name=name, mount=mount, width=32, height=24, max_range=6.0 * reach, sees_rover=False)
+
+
+def distances(name: str, simulation: Simulation) -> Array:
+    """What a sensor of `sensor_of` measures now, (n,), m."""
+    sensor = sensor_of(name, simulation.model)
+    generator = np.random.default_rng(0)  # without noise it draws nothing
+    moment = Moment(simulation, simulation.time)
+    reading, _ = sensor.measure(moment, {}, 0.0, sensor.draw(simulation.model, generator), generator)
+    return np.asarray(reading, dtype=np.float64).ravel()
+
+
+@dataclass
+class Sights:
+    """What there is to show of n samples.
+
+    Attributes:
+        scan: (n_points, 2) the height scan's points, ahead and to the right of the trunk, m.
+        heights: (n, n_points) heights of the ground at its points, m; nan where it is unknown.
+        readings: (n, n_rays) distances by sensor, m.
+        path: (n, n_points, 2) the planned path, ahead and to the right of the trunk, m; nan without.
+        arcs: (n_arcs, n_points, 2) what the planner chooses from, in the same frame.
+        missing: Why an overlay has nothing to show, by its name.
+    """
+
+    scan: Array | None = None
+    heights: Array | None = None
+    readings: dict[str, Array] = field(default_factory=dict)
+    path: Array | None = None
+    arcs: Array | None = None
+    missing: dict[str, str] = field(default_factory=dict)
+
+    def channels(self) -> list[FrameChannel]:
+        """The channels of a scene's frames."""
+        found = []
+        if self.heights is not None:
+            found.append(FrameChannel.fine("scan", np.nan_to_num(self.heights, nan=-1e5)[..., None]))
+        for name, values in self.readings.items():
+            found.append(FrameChannel.within(name, values[..., None], np.zeros(1), np.full(1, 65.535)))
+        if self.path is not None:
+            found.append(FrameChannel.fine("path", np.nan_to_num(self.path, nan=-1e5)))
+        return found
+
+    def describe(self, scene: PageScene, model: RoverModel) -> None:
+        """Adds what does not change: grid, rays and arcs, and why something is missing."""
+        scene.facts["missing"] = self.missing
+        if self.heights is not None and self.scan is not None:
+            scene.arrays["scan-grid"] = ("f4", self.scan.ravel())
+        for name in self.readings:
+            sensor = sensor_of(name, model)
+            along = sensor.directions.reshape(-1, 3) @ sensor.mount.rotation.T
+            scene.arrays[f"{name}-rays"] = ("f4", along.ravel())
+            scene.facts[name] = {"origin": list(sensor.mount.position), "range": sensor.max_range}
+        if self.arcs is not None:
+            scene.arrays["arcs"] = ("f4", self.arcs.ravel())
+            scene.facts["arcs"] = self.arcs.shape[1]
+
+
+def sights_now(env: RoverEnv, driver: Policy | None, state: Any) -> Sights:
+    """What a rover sees now, and what its driver intends; None is driven by hand."""
+    simulation = env.simulation
+    sights = Sights(scan=env.task.scan)
+    if sights.scan is None:
+        sights.missing["scan"] = NO_LIVE_SCAN
+    else:
+        sights.heights = scan_heights(sights.scan, simulation.terrain, simulation.q[None])
+    sights.readings = {name: distances(name, simulation)[None] for name in SENSORS}
+    if driver is None or not hasattr(driver, "plan"):
+        sights.missing["plan"] = NO_LIVE_PLAN
+    else:
+        path = driver.plan(state)
+        sights.path = np.full((1, PLAN_POINTS, 2), np.nan) if path is None else path[None]
+        choices = getattr(driver, "choices", None)
+        sights.arcs = None if choices is None else choices()
+    return sights
+
+
+def scan_heights(scan: Array, terrain: Terrain, q: Array) -> Array:
+    """(n, n_points) heights, m, of the ground at a scan's points for coordinates (n, nq); nan where it is unknown."""
+    places = [scan_points(scan, (float(row[0]), float(row[2])), float(row[4])) for row in q]
+    return heights_of(terrain, np.concatenate(places)).reshape(len(q), -1)
+
+
+def recorded_sights(data: Mapping[str, Array], scene: Mapping[str, Any], terrain: Terrain) -> Sights:
+    """What a recording holds.
+
+    Args:
+        data: Its channels.
+        scene: Its scene, as `rover drive` describes it.
+        terrain: Its ground.
+    """
+    sights = Sights()
+    given = scene.get("height_scan")
+    scan = check_scan("height_scan", tuple(given) if isinstance(given, list) else given)
+    if scan is None or "q" not in data:
+        sights.missing["scan"] = NO_SCAN
+    else:
+        sights.scan, sights.heights = scan.offsets, scan_heights(scan.offsets, terrain, data["q"])
+    for name in SENSORS:
+        if name in data:
+            sights.readings[name] = data[name]
+        else:
+            sights.missing[name] = NO_SENSOR.format(name, name)
+    if PATH in data:
+        sights.path = data[PATH].reshape(len(data[PATH]), -1, 2)
+        if isinstance(scene.get("arcs"), list):
+            sights.arcs = np.asarray(scene["arcs"], dtype=np.float64)
+    else:
+        sights.missing["plan"] = NO_PLAN
+    return sights

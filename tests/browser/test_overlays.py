@@ -1,0 +1,108 @@
+"""Overlays of the player in a real browser: a key each, greyed with a reason where a run holds nothing, and a ghost."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from browser.test_replay_page import Shown, await_that, go_to, opened, picture
+from selenium import webdriver
+from selenium.webdriver.common.by import By
+from typer.testing import CliRunner
+
+from rover_gym.cli import app
+from rover_gym.record import RoverRun, read_run
+from rover_gym.replay import write_page
+from rover_gym.replay.page import player_file
+
+KEYS = {
+    "trails": "v",
+    "forces": "f",
+    "cones": "c",
+    "mass": "g",
+    "plan": "p",
+    "scan": "x",
+    "laser": "z",
+    "depth": "b",
+    "loads": "l",
+    "slope": "h",
+    "spheres": "k",
+}
+
+
+def drive(folder: Path, *arguments: str) -> RoverRun:
+    given = ["drive", "--time-limit", "1.5", "--seed", "11", "--output", str(folder), *arguments]
+    result = CliRunner().invoke(app, given)
+    assert result.exit_code == 0, result.output
+    return read_run(folder / "episode-11.h5").resample(10.0)
+
+
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown[RoverRun]]:
+    folder = tmp_path_factory.mktemp("overlays")
+    sees = ("--sensor", "laser", "--sensor", "depth")
+    run = drive(folder / "run", "--difficulty", "1", "--policy", "scan", *sees)
+    page = write_page(run, folder / "replay.html")
+    with opened(page, folder / "profile") as browser:
+        go_to(browser, 1.0)
+        yield Shown(browser, run, page)
+
+
+def press(browser: webdriver.Chrome, key: str) -> None:
+    browser.execute_script(
+        "document.body.dispatchEvent(new KeyboardEvent('keydown', {key: arguments[0], bubbles: true}));", key
+    )
+
+
+def drawn(browser: webdriver.Chrome) -> int:
+    (canvas,) = browser.find_elements(By.CSS_SELECTOR, "#root canvas[data-engine]")
+    return int(canvas.get_attribute("data-drawn") or 0)
+
+
+def after(browser: webdriver.Chrome, key: str) -> np.ndarray:
+    """The picture after a key."""
+    before = drawn(browser)
+    press(browser, key)
+    await_that(lambda: drawn(browser) > before, f"a picture after {key}")
+    return picture(browser)
+
+
+@pytest.mark.parametrize("name", KEYS)
+def test_a_key_shows_an_overlay_and_takes_it_away(name: str, shown: Shown[RoverRun]) -> None:
+    bare = picture(shown.browser)
+    with_it = after(shown.browser, KEYS[name])
+    without = after(shown.browser, KEYS[name])
+    changed = (np.abs(with_it - bare).max(axis=-1) > 20.0).sum()
+    assert changed > 50
+    assert (np.abs(without - bare).max(axis=-1) > 20.0).sum() < 0.2 * changed
+
+
+def test_the_help_names_the_key_of_every_overlay(shown: Shown[RoverRun]) -> None:
+    """And so does that of the live page, in capitals."""
+    buttons = shown.browser.find_elements(By.CSS_SELECTOR, "#overlays button")
+    assert {button.get_attribute("data-name") for button in buttons} == {"marks", *KEYS}
+    assert all(button.is_enabled() for button in buttons)
+    told = [node.get_attribute("textContent") for node in shown.browser.find_elements(By.CSS_SELECTOR, "#keys kbd")]
+    assert set(KEYS.values()) <= set(told)
+    live = player_file("live.html")
+    assert all(f"<kbd>{key.upper()}</kbd>" in live for key in KEYS.values())
+
+
+def test_what_a_run_does_not_hold_is_grey_and_says_why_and_a_ghost_drives_along(tmp_path: Path) -> None:
+    run = drive(tmp_path / "run")
+    ghost = drive(tmp_path / "ghost", "--friction", "0.3", "--goal", "2", "2")
+    page = write_page(run, tmp_path / "replay.html", ghost=ghost)
+    with opened(page, tmp_path / "profile") as browser:
+        go_to(browser, 1.4)
+        grey = {}
+        for button in browser.find_elements(By.CSS_SELECTOR, "#overlays button"):
+            if not button.is_enabled():
+                grey[button.get_attribute("data-name")] = button.get_attribute("title")
+        assert grey.keys() == {"plan", "scan", "laser", "depth", "spheres"}
+        assert all("run" in reason or "rocks" in reason for reason in grey.values())
+        press(browser, "z")
+        message = browser.find_element(By.ID, "message")
+        await_that(lambda: "--sensor laser" in (message.text or ""), "the reason")
+        dashed = browser.find_elements(By.CSS_SELECTOR, "#panel path.ghost")
+        assert len(dashed) == len(browser.find_elements(By.CSS_SELECTOR, "#panel path.curve:not(.ghost)")) > 0
+        assert [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"] == []

@@ -1,0 +1,138 @@
+"""What `rover drive` records of what a rover sees and intends, and the overlays that a page makes of it."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from rover_gym import Plane
+from rover_gym.cli import app
+from rover_gym.ground import heights_of
+from rover_gym.policy import ScanPolicy
+from rover_gym.record import RoverRun, read_run
+from rover_gym.replay.rover_scene import rover_scene
+from rover_gym.replay.sights import NO_PLAN, NO_SCAN, sensor_of
+
+
+def rover(*arguments: str) -> Result:
+    return CliRunner(env={"COLUMNS": "160", "NO_COLOR": "1"}).invoke(app, list(arguments))
+
+
+def driven(folder: Path, *arguments: str) -> RoverRun:
+    result = rover("drive", "--time-limit", "1", "--seed", "3", "--output", str(folder), *arguments)
+    assert result.exit_code == 0, result.output
+    return read_run(folder / "episode-3.h5")
+
+
+def test_a_laser_over_a_plane_measures_what_its_height_and_angle_say(tmp_path: Path) -> None:
+    run = driven(tmp_path, "--sensor", "laser", "--sensor", "depth", "--heading", "0")
+    sensor = sensor_of("laser", run.model)
+    along = sensor.directions.reshape(-1, 3)
+    assert isinstance(run.terrain, Plane)
+    for row in (0, 10, 20):
+        turn = run.rotations[row, 0]
+        height = (run.positions[row, 0] + turn @ np.array(sensor.mount.position))[1]
+        down = -(along @ turn.T)[:, 1]
+        expected = np.where(down > 0.0, height / np.maximum(down, 1e-9), math.inf)
+        seen = expected < sensor.max_range - 1e-6
+        assert seen.sum() > 100
+        assert run.trajectory["laser"][row][seen] == pytest.approx(expected[seen], rel=1e-6)
+    camera = sensor_of("depth", run.model)
+    points = (camera.directions.reshape(-1, 3) * run.trajectory["depth"][10][:, None]) @ camera.mount.rotation.T
+    places = (points + camera.mount.position) @ run.rotations[10, 0].T + run.positions[10, 0]
+    seen = run.trajectory["depth"][10] < camera.max_range
+    assert seen.sum() > 100
+    assert np.abs(places[seen, 1]).max() < 1e-6  # all of them lie on the ground
+
+
+def test_the_scans_points_lie_on_the_ground_and_the_plan_is_one_of_the_arcs(tmp_path: Path) -> None:
+    run = driven(tmp_path, "--difficulty", "0.5", "--policy", "scan")
+    scene = run.trajectory.attributes["scene"]
+    path = run.trajectory["plan_path"].reshape(run.n_frames, -1, 2)
+    assert np.isnan(path[0]).all()  # nothing is planned before the first step
+    arcs = np.array(scene["arcs"])
+    assert arcs.shape[1:] == path.shape[1:]
+    for row in (1, 10, 20):
+        assert np.abs(arcs - path[row]).max(axis=(1, 2)).min() < 2e-4
+    page = rover_scene(run, follow=True)
+    channels = {channel.name: channel.values for channel in page.channels}
+    grid = np.reshape(page.arrays["scan-grid"][1], (-1, 2))
+    assert channels["scan"].shape == (run.n_frames, len(grid), 1)
+    q = run.trajectory["q"][10]
+    sine, cosine = math.sin(q[4]), math.cos(q[4])
+    x, z = q[0] + cosine * grid[:, 0] + sine * grid[:, 1], q[2] - sine * grid[:, 0] + cosine * grid[:, 1]
+    assert channels["scan"][10, :, 0] == pytest.approx(heights_of(run.terrain, np.column_stack((x, z))))
+    assert page.facts["missing"].keys() == {"laser", "depth"}
+    assert page.facts["friction"] == 0.7
+    levels = np.array([channel.levels(slice(10, 11)) for channel in page.channels if channel.name == "mass"])
+    (mass,) = (channel for channel in page.channels if channel.name == "mass")
+    assert levels.reshape(3) * mass.step + mass.low == pytest.approx(run.model.tags(q)["centre_of_mass"], abs=1e-4)
+
+
+@pytest.mark.takes_long("the planner drives a second")
+def test_the_planner_with_futures_tells_a_path_that_leads_on(tmp_path: Path) -> None:
+    pytest.importorskip("scipy")
+    run = driven(tmp_path, "--difficulty", "0.5", "--policy", "planner")
+    path = run.trajectory["plan_path"].reshape(run.n_frames, -1, 2)
+    assert np.isfinite(path[1:]).all()
+    assert np.abs(np.linalg.norm(path[1:, -1], axis=1)).max() > 0.5
+    assert "arcs" not in run.trajectory.attributes["scene"]
+
+
+def test_what_a_run_does_not_hold_has_a_reason(tmp_path: Path) -> None:
+    run = driven(tmp_path)
+    missing = rover_scene(run, follow=True).facts["missing"]
+    assert missing["plan"] == NO_PLAN
+    assert missing["scan"] == NO_SCAN
+    assert missing["laser"] == "this run has no laser: record with `rover drive --sensor laser`"
+    assert "depth" in missing
+
+
+def test_an_unknown_sensor_is_refused_before_driving(tmp_path: Path) -> None:
+    result = rover("drive", "--sensor", "sonar", "--output", str(tmp_path / "run"))
+    assert result.exit_code == 2
+    assert result.stderr.startswith("error: --sensor: must be one of laser, depth")
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_ghost_drives_along_and_stays_where_it_ended(tmp_path: Path) -> None:
+    first = driven(tmp_path / "a", "--difficulty", "0.5")
+    other = rover("drive", "--time-limit", "0.5", "--seed", "4", "--output", str(tmp_path / "b"))
+    assert other.exit_code == 0
+    ghost = read_run(tmp_path / "b" / "episode-4.h5")
+    scene = rover_scene(first, follow=True, ghost=ghost)
+    n = len(first.model.solid_names)
+    (places,) = (channel.values for channel in scene.channels if channel.name == "places")
+    assert places.shape == (first.n_frames, 2 * n, 3)
+    assert places[5, n:] == pytest.approx(ghost.positions[5])
+    assert places[-1, n:] == pytest.approx(ghost.positions[-1])
+    chart = scene.facts["curves"]["charts"][2]
+    assert [series.get("ghost", False) for series in chart["series"]] == [False, True]
+    assert chart["values"][1][5] is not None
+    assert chart["values"][1][-1] is None  # it was over by then
+    page = tmp_path / "page.html"
+    given = [str(tmp_path / "a"), "--ghost", str(tmp_path / "b"), "--html", str(page), "--no-open"]
+    assert rover("replay", *given).exit_code == 0
+    assert page.stat().st_size > 100_000
+
+
+def test_a_ghost_beside_something_else_is_refused(tmp_path: Path) -> None:
+    assert rover("planar", "ball", "--duration", "0.1", "--output", str(tmp_path)).exit_code == 0
+    driven(tmp_path / "rover")
+    result = rover("replay", str(tmp_path / "ball.h5"), "--ghost", str(tmp_path / "rover"), "--no-open")
+    assert result.exit_code == 2
+    assert result.stderr.startswith("error: --ghost: can only drive beside a rover's run")
+
+
+def test_the_arcs_of_a_policy_begin_at_the_middle_of_its_wheelbase_and_fan_out() -> None:
+    import gymnasium as gym  # noqa: PLC0415 - of this test alone
+
+    env = gym.make("RoverRocks-v0", **ScanPolicy.arguments())
+    arcs = ScanPolicy(env).choices()
+    env.close()
+    assert np.ptp(arcs[:, 0], axis=0) == pytest.approx(0.0)
+    assert np.ptp(arcs[:, -1, 1]) > 0.5  # m
+    assert json.dumps(arcs.tolist())
