@@ -7,6 +7,7 @@ mod coupling;
 mod derivatives;
 mod descriptions;
 mod drives;
+mod friction;
 mod limits;
 mod loops;
 mod machines;

@@ -135,6 +135,9 @@ pub enum LinearisationError {
     /// Loops are closed.
     #[error("model: steps of a machine with closed loops have no derivatives yet")]
     ClosedLoops,
+    /// Joints have dry friction.
+    #[error("model: steps of a machine with dry friction in its joints have no derivatives yet")]
+    JointFriction,
     /// A perturbation outside its range.
     #[error("perturbation: must be from 1e-9 to 1e-3, is {value}")]
     Perturbation {

@@ -13,7 +13,7 @@ use super::sand_patch::SandScene;
 use super::tree_scratch::TreeScratch;
 use crate::contact::{
     Activation, Contact, ContactKey, Opposite, detect, detect_limits, detect_pairs,
-    generalized_impulse, relocate, relocate_limit,
+    generalized_impulse, joint_friction, list_friction, relocate, relocate_limit,
 };
 use crate::geometry::Terrain;
 use crate::integrator::mechanical_system::MOST_REVISIONS;
@@ -213,6 +213,7 @@ impl MechanicalSystem for TreeSystem<'_> {
         } = &mut *self.parts;
         detect_pairs(self.model, kinematics, v, &activation, pairs, out);
         detect_limits(self.model, kinematics, joints_middle, v, &activation, out);
+        list_friction(self.model, kinematics, out);
     }
 
     fn unknown_ground(&self) -> Option<[f64; 2]> {
@@ -239,6 +240,7 @@ impl MechanicalSystem for TreeSystem<'_> {
     #[inline]
     fn friction_coefficient(&self, options: &StepOptions, contact: &Contact) -> f64 {
         match contact.key.opposite {
+            Opposite::Stop if joint_friction::joint_of(contact).is_some() => 1.0,
             Opposite::Stop => 0.0,
             Opposite::Ground(_) | Opposite::Part(_) | Opposite::Grain(_) => {
                 let of_pair = self.between_materials(options, contact);
@@ -249,6 +251,10 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn normal_shift(&self, options: &StepOptions, contact: &Contact, u_N_before: f64) -> f64 {
+        if let Some(joint) = joint_friction::joint_of(contact) {
+            let most = options.time_step * self.model.joints()[joint].passive.friction;
+            return -most * self.parts.friction_entry(joint);
+        }
         let of_pair = self.between_materials(options, contact);
         rebound(of_pair.map_or(options.restitution, |[_, e]| e), u_N_before)
     }
@@ -498,6 +504,7 @@ impl MechanicalSystem for TreeSystem<'_> {
             v,
         );
         u.copy_from_slice(&parts.system.u);
+        parts.note_friction(contacts);
         if let Some(loops) = &mut parts.loops {
             loops.project_operator(self.model, &mut parts.system);
         }
