@@ -12,3 +12,4 @@ mod limits;
 mod loops;
 mod machines;
 mod several_trees;
+mod wrenches;

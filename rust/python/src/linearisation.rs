@@ -108,6 +108,7 @@ impl From<LinearisationError> for BorderError {
             LinearisationError::Variant => {
                 Kind::Option.error("variant", message, Value::Text("newton".to_owned()))
             }
+            LinearisationError::Wrench => Kind::Command.refusal(message, Value::Nothing),
             LinearisationError::ClosedLoops | LinearisationError::JointFriction => {
                 Kind::Option.error("model", message, Value::Nothing)
             }

@@ -4,12 +4,11 @@
 //! |f| ≤ τ_f,     f = −τ_f sign q̇  where  q̇ ≠ 0
 //! ```
 //!
-//! It is an entry of the contact list, like a stop ([`super::limit`]), and solved together with all
-//! contacts: a joint sticks at zero velocity exactly, and no step is short enough to need a slope of
-//! the law there. Its row t of H is 1 at the joint's velocity. Its normal row is zero, with a
-//! diagonal w of W and a free velocity `−w τ_f h`, so that `0 ≤ u_N ⊥ p_N ≥ 0` gives the normal
-//! impulse `p_N = τ_f h`; with μ = 1 Coulomb's law is the law above. The row b is zero, too, and its
-//! diagonal that of t.
+//! It is an entry of the contact list, like a stop ([`super::limit`]), and solved together with
+//! all contacts: a joint sticks at zero velocity exactly. Its row t of H is 1 at the joint's
+//! velocity. Its normal row is zero, with a diagonal w of W and a free velocity `−w τ_f h`, so that
+//! `0 ≤ u_N ⊥ p_N ≥ 0` gives the normal impulse `p_N = τ_f h`; with μ = 1 Coulomb's law is the law
+//! above. The row b is zero, too, and its diagonal that of t.
 
 use nalgebra::Vector3;
 

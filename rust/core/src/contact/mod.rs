@@ -3,9 +3,9 @@
 //!
 //! A contact ([`pair`]) connects a part of a body to the ground or to a part of another body.
 //! [`detection`] finds contacts with the ground, [`pair_detection`] contacts between bodies, and
-//! [`limit`] joints at their stops; [`joint_friction`] is the dry friction of joints. The broad phase selects candidates, [`crate::geometry::query`]
-//! computes gaps and normals of a machine with its `body_motion`, and [`activation`] decides which
-//! contacts enter the step.
+//! [`limit`] joints at their stops; [`joint_friction`] is the dry friction of joints. The broad
+//! phase selects candidates, [`crate::geometry::query`] computes gaps and normals of a machine with
+//! its `body_motion`, and [`activation`] decides which contacts enter the step.
 //! [`wheel_gaps`] measures how far the wheels are from the ground and nothing else,
 //! `box_clearance` how far a box is from a surface at least.
 //! [`relocation`] re-evaluates them in another configuration; `contact_slope` has their

@@ -24,8 +24,8 @@ pub enum Opposite {
     Part(u16),
     /// A grain, by its number.
     Grain(u32),
-    /// None: a joint's stop ([`super::limit`]) and its dry friction ([`super::joint_friction`]) have
-    /// no shape.
+    /// None: a joint's stop ([`super::limit`]) and its dry friction ([`super::joint_friction`])
+    /// have no shape.
     Stop,
 }
 

@@ -117,6 +117,9 @@ impl TreeSystem<'_> {
         let velocities = [start.v, v_end];
         (self.parts.drives).add_impulse(mechanism, step(options), places, velocities, y);
         self.parts.add_sand(options.time_step, v_end, y);
+        for (y, force) in y.iter_mut().zip(&self.parts.applied) {
+            *y += options.time_step * force;
+        }
     }
 
     /// `y = h (τ − b)` with the bias b at a velocity, and the forces of joints and sand at the
@@ -279,6 +282,7 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn update_mass_matrix(&mut self, options: &StepOptions) {
+        self.parts.apply(self.model, &self.command.wrenches);
         if let Some((sand, place, _)) = self.sand() {
             sand.linearise(place, options);
         }
@@ -431,7 +435,12 @@ impl MechanicalSystem for TreeSystem<'_> {
             (self.sand()).map_or(0.0, |(sand, place, _)| sand.work(place, start.v, v_end));
         let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
         let velocities = [start.v, v_end];
-        of_sand + (self.parts.drives).work(mechanism, step(options), places, velocities)
+        let applied = self.parts.applied.iter().zip(start.v.iter().zip(v_end));
+        let power = applied
+            .map(|(force, (v, end))| force * (options.theta * end + (1.0 - options.theta) * v));
+        let of_wrenches = options.time_step * power.sum::<f64>();
+        let of_drives = (self.parts.drives).work(mechanism, step(options), places, velocities);
+        of_sand + of_wrenches + of_drives
     }
 
     fn work_of_displacement(
@@ -443,7 +452,10 @@ impl MechanicalSystem for TreeSystem<'_> {
     ) -> f64 {
         let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
         let motion = [start.v, v_end, displacement];
-        (self.parts.drives).work_of_displacement(mechanism, step(options), places, motion)
+        let applied = self.parts.applied.iter().zip(displacement);
+        let of_wrenches = applied.map(|(force, way)| force * way).sum::<f64>();
+        of_wrenches
+            + (self.parts.drives).work_of_displacement(mechanism, step(options), places, motion)
     }
 
     #[inline]

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::command::Wrench;
 use super::drives::Drives;
 use super::gyroscopic::GyroscopicScratch;
 use super::loops::Loops;
@@ -32,6 +33,8 @@ pub struct TreeScratch {
     pub(super) energy: EnergyScratch<f64>,
     pub(super) gyroscopic: GyroscopicScratch,
     pub(super) force: Vec<f64>,
+    /// Generalized force of the wrenches at the midpoint (nv); empty without any.
+    pub(super) applied: Vec<f64>,
     pub(super) pairs: PairSearch,
     /// Found by the last detection, x and z, m.
     pub(super) unknown_ground: Option<[f64; 2]>,
@@ -70,6 +73,7 @@ impl TreeScratch {
             energy: EnergyScratch::new(token, mechanism),
             gyroscopic: GyroscopicScratch::default(),
             force: vec![0.0; model.nv()],
+            applied: Vec::new(),
             pairs: PairSearch::new(model),
             unknown_ground: None,
             joints_middle: limited.clone(),
@@ -176,6 +180,18 @@ impl TreeScratch {
             kinematics,
         };
         Some((sand.as_mut()?, place, factor))
+    }
+
+    /// Computes the generalized force of wrenches at the midpoint.
+    pub(super) fn apply(&mut self, model: &Model, wrenches: &[Wrench]) {
+        self.applied.clear();
+        if wrenches.is_empty() {
+            return;
+        }
+        self.applied.resize(model.nv(), 0.0);
+        for wrench in wrenches {
+            wrench.add_force(model, &self.kinematics, &mut self.applied);
+        }
     }
 
     /// Keeps W's entries of the joints with dry friction, once W is assembled.

@@ -23,9 +23,10 @@ pub struct JointProperties {
     pub is_passive: bool,
 }
 
-/// Spring, damper, rotor and dry friction:
-/// `τ = −stiffness (q − rest) − damping q̇ − armature q̈ − f`, with `f = friction sign q̇` in motion and
-/// `|f| ≤ friction` at rest.
+/// Spring, damper, rotor and dry friction.
+///
+/// `τ = −stiffness (q − rest) − damping q̇ − armature q̈ − f`; in motion `f = friction sign q̇`, at
+/// rest `|f| ≤ friction`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Passive {
     /// N m/rad or N/m.
