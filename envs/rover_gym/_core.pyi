@@ -311,11 +311,11 @@ class RoverModel:
         """Total mass, kg."""
     @property
     def loops(self) -> list[dict[str, Any]]:
-        """Closed loops: a dictionary for each with `name`, `kind`, `solid`, `other`, its number of
-        equations `rows`, and of these the number `redundant`.
+        """Closed loops, a dictionary for each.
 
-        An equation is redundant if it follows from those of the joints and of earlier loops with all
-        joints at zero. Redundant equations are left out.
+        It has `name`, `kind`, `solid`, `other`, the number `rows` of equations, and of these the
+        number `redundant`. An equation is redundant if, with all joints at zero, it follows from
+        the joints and from earlier loops. Redundant equations are left out.
         """
     def close_loops(self, q: npt.ArrayLike, v: npt.ArrayLike | None = None) -> tuple[_Array, _Array]:
         """Closes the loops: the nearest state, in the sense that heavy parts move least.
@@ -329,8 +329,8 @@ class RoverModel:
             open them, (nv,). Without loops, `q` and `v`.
 
         Raises:
-            StateError: An array has a wrong length or an entry that is not finite, or no coordinates
-                near these close the loops.
+            StateError: An array has a wrong length or an entry that is not finite, or no
+                coordinates near these close the loops.
         """
     @property
     def dof_names(self) -> list[str]:
@@ -1036,12 +1036,14 @@ class Contacts:
         """Name of the solid in each contact, or of the joint that is at its stop."""
     @property
     def kinds(self) -> list[str]:
-        """Kind of each contact, "wheel", "box" or "sphere"; "limit" for a joint's stop.
+        """Kind of each contact, "wheel", "box" or "sphere"; "limit" for a joint's stop, "friction" for
+        the dry friction of a joint.
 
         For a stop, the contact point is the origin of the solid that the joint carries, and the
         normal is the joint's axis in the direction that opens the gap. At a revolute joint, gap,
         impulse and velocity along the normal are in rad, N m s and rad/s. Tangential entries are
-        zero.
+        zero. For dry friction, the entry along n of the impulse is its largest value, and the entry
+        along t its value, positive if it accelerates the joint.
         """
     @property
     def wheels(self) -> npt.NDArray[np.int64]:
@@ -1519,9 +1521,9 @@ class Simulation(AnySimulation):
     def loop_forces(self) -> dict[str, _Array]:
         """Mean reactions of the closed loops over the last step, by name.
 
-        Of a connection the force on its first solid, (3,), N, in world axes; of a weld the force and
-        the moment about the common point, (6,), N and N m; of a joint its force or torque, (1,).
-        The second solid feels the opposite. Reactions of redundant equations count as 0.
+        Of a connection the force on its first solid, (3,), N, in world axes; of a weld the force
+        and the moment about the common point, (6,), N and N m; of a joint its force or torque,
+        (1,). The second solid feels the opposite. Reactions of redundant equations count as 0.
         """
     def set_wheel_torques(self, torques: npt.ArrayLike) -> None:
         """Sets the driving torques; each saturates at its wheel's limit.
@@ -1567,6 +1569,31 @@ class Simulation(AnySimulation):
         Raises:
             CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
         """
+    def apply_wrench(
+        self,
+        solid: str,
+        force: npt.ArrayLike | None = None,
+        moment: npt.ArrayLike | None = None,
+        *,
+        point: npt.ArrayLike | None = None,
+    ) -> None:
+        """Applies a force and a moment to a solid in all further steps.
+
+        Replaces the last wrench on this solid; one without force and moment removes it. Steps under
+        a wrench are general ones. A reset removes all wrenches, `set_state` keeps them.
+
+        Args:
+            solid: Name of the solid.
+            force: Force in world axes, (3,), N; zero by default.
+            moment: Moment in world axes, (3,), N m; zero by default.
+            point: Where the force acts in the solid's frame, (3,), m; its origin by default.
+
+        Raises:
+            CommandError: There is no such solid, or an array has a wrong length or an entry that is
+                not finite. Nothing has changed.
+        """
+    def clear_wrenches(self) -> None:
+        """Removes all wrenches."""
     def hold(
         self,
         joints: str | Sequence[str],

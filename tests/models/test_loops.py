@@ -193,3 +193,11 @@ def test_derivatives_are_refused(tmp_path):
     run = Simulation(model)
     with pytest.raises(OptionError, match="closed loops have no derivatives"):
         run.linearise()
+
+
+@pytest.mark.parametrize("what", EQUALITIES)
+def test_a_loop_is_left_out_by_word(tmp_path, what):
+    path = write(tmp_path, linkage(what), "linkage.xml")
+    model = RoverModel.from_mjcf(path, wheels=[], ignore=["closed loops"])
+    assert model.loops == []
+    assert any("left out as told" in entry for entry in model.import_report.left_out)

@@ -57,7 +57,7 @@ def test_joints_drives_and_gains_are_the_files(tmp_path):
 
 
 REFUSED = {
-    "friction": ('name="slide"', 'name="slide" frictionloss="0.2"', r'joint\[slide\]\.frictionloss.*0\.2'),
+    "friction of a ball joint": ('<joint name="slide" type="slide" axis="1 0 0"/>', '<joint name="slide" type="ball" frictionloss="0.2"/>', r'joint\[slide\]\.frictionloss.*0\.2'),
     "a velocity servo": ("<position joint", '<velocity kv="2" joint="slide"/><position joint', r"actuator\["),
     "a muscle": ("<position joint", '<muscle joint="slide" lengthrange="0 1"/><position joint', r"actuator\["),
     "a coupling of tendons": (

@@ -155,16 +155,26 @@ def test_a_wheel_of_a_mesh_has_the_meshs_radius(tmp_path):
         RoverModel.from_urdf(path)
 
 
-def test_dry_friction_is_refused_unless_it_is_left_out_by_word(tmp_path):
+def test_dry_friction_is_read_or_left_out_by_word(tmp_path):
     path = write(tmp_path, changed(rover(), LIMIT, LIMIT + '<dynamics damping="0.5" friction="0.1"/>'))
-    with pytest.raises(ModelError, match=r'left_pivot.*friction.*ignore=\["friction"\].*0\.1'):
-        RoverModel.from_urdf(path)
+
+    def friction(model):
+        return {solid["name"]: solid.get("friction") for solid in model.to_dict()["solids"]}["left_rocker"]
+
+    model = RoverModel.from_urdf(path)
+    assert friction(model) == 0.1
+    model.to_urdf(tmp_path / "again.urdf")
+    assert friction(RoverModel.from_urdf(tmp_path / "again.urdf")) == 0.1
     model = RoverModel.from_urdf(path, ignore=["friction"])
-    assert any("friction" in entry for entry in model.import_report.left_out)
+    assert friction(model) is None
     assert next(s for s in model.to_dict()["solids"] if s["name"] == "left_rocker")["damping"] == 0.5
     for wrong in ("friction", ["rust"], [[]], 3):
         with pytest.raises(ModelError, match="ignore"):
             RoverModel.from_urdf(path, ignore=wrong)
+    assert any("friction" in entry for entry in model.import_report.left_out)
+    write(tmp_path, changed(rover(), LIMIT, LIMIT + '<dynamics friction="-0.1"/>'))
+    with pytest.raises(ModelError, match=r"left_pivot.*friction: must be finite and not negative, got -0\.1"):
+        RoverModel.from_urdf(path)
 
 
 def test_what_is_not_simulated_is_listed(tmp_path):

@@ -121,6 +121,8 @@ def _add_passive(tree: RobotTree, joint: FileJoint, solid: dict[str, Any]) -> No
         solid["limits"] = {"lower": float(joint.limits[0]), "upper": float(joint.limits[1])}
     if joint.damping != 0.0:
         solid["damping"] = float(joint.damping)
+    if joint.friction != 0.0:
+        solid["friction"] = float(joint.friction)
     if joint.armature != 0.0:
         solid["armature"] = float(joint.armature)
     if joint.stiffness != 0.0:

@@ -245,9 +245,9 @@ def _body(above: ET.Element, solid: WrittenSolid, wheel: dict[str, Any] | None) 
         joint = {"name": solid.name, "type": JOINTS[solid.kind]}
         if solid.kind != "spherical":
             joint["axis"] = text_of(solid.axis)
-            for field in ("damping", "armature"):
+            for field, name in (("damping", "damping"), ("armature", "armature"), ("friction", "frictionloss")):
                 if source.get(field):
-                    joint[field] = text_of(source[field])
+                    joint[name] = text_of(source[field])
             if (spring := source.get("spring")) is not None:
                 joint |= {"stiffness": text_of(spring["stiffness"]), "springref": text_of(spring.get("rest", 0.0))}
             if (limits := source.get("limits")) is not None:
@@ -420,8 +420,9 @@ def _joint(solid: WrittenSolid, wheel: dict[str, Any] | None, drive: float | Non
     if limits is not None:
         limit |= {"lower": text_of(limits["lower"]), "upper": text_of(limits["upper"])}
     ET.SubElement(joint, "limit", limit)
-    if source.get("damping"):
-        ET.SubElement(joint, "dynamics", damping=text_of(source["damping"]), friction="0")
+    if source.get("damping") or source.get("friction"):
+        dynamics = {field: text_of(source.get(field) or 0.0) for field in ("damping", "friction")}
+        ET.SubElement(joint, "dynamics", dynamics)
     if coupled is not None:
         entries = {"multiplier": text_of(coupled["ratio"]), "offset": text_of(coupled.get("offset", 0.0))}
         ET.SubElement(joint, "mimic", {"joint": coupled["joint"], **entries})

@@ -24,7 +24,8 @@ def close_distant_couplings(tree: RobotTree) -> None:
             or _carrier(tree, followed) == _carrier(tree, link.name)
         ):
             continue
-        tree.loops.append(FileLoop(link.joint.name, "joint", (), (link.joint.name, name), (offset, ratio)))
+        loop = FileLoop(link.joint.name, "joint", (), (link.joint.name, name), (offset, ratio))
+        tree.close(f"joint[{link.joint.name}].mimic", loop)
         link.joint.follows = None
 
 

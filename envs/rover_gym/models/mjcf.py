@@ -244,12 +244,16 @@ class _Reader:
         option = m.opt
         if option.density != 0.0 or option.viscosity != 0.0:
             value = [float(option.density), float(option.viscosity)]
-            self.tree.leave_out("fluid", "option.density", value, "forces of a fluid are not simulated")
+            self.tree.leave_out(
+                "fluid", "option.density", value, "forces of a fluid are not simulated", row="option density"
+            )
         for count, where in ((m.nflex, "flex"), (m.nplugin, "plugin"), (m.nmocap, "mocap")):
             if count:
-                self.tree.refuse(where, int(count), "is not supported")
+                self.tree.refuse(where, int(count), "is not supported", row=where)
         if np.any(m.body_gravcomp):
-            self.tree.refuse("body.gravcomp", float(m.body_gravcomp.max()), "gravity compensation is not supported")
+            self.tree.refuse(
+                "body.gravcomp", float(m.body_gravcomp.max()), "gravity compensation is not supported", row="gravcomp"
+            )
         gravity = [float(x) for x in option.gravity]
         self.tree.left_out.append(f"option: gravity {gravity} and contact parameters, which a Simulation is given")
         if m.nsensor:
@@ -308,10 +312,10 @@ class _Reader:
             elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
                 is_weld = kind == kinds.mjEQ_WELD
                 ends = self._ends(eq, is_weld=is_weld)
-                self.tree.loops.append(FileLoop(name, "weld" if is_weld else "connect", ends))
+                self.tree.close(f"equality[{eq}]", FileLoop(name, "weld" if is_weld else "connect", ends))
             else:
                 reason = "of equality constraints only connect, weld and joint are simulated"
-                self.tree.leave_out("closed loops", f"equality[{eq}]", kinds(kind).name, reason)
+                self.tree.leave_out("closed loops", f"equality[{eq}]", kinds(kind).name, reason, row="equality tendon")
         if self.tree.loops:
             self.tree.left_out.append("equality: solref and solimp, since loops are rigid here")
 
@@ -326,7 +330,7 @@ class _Reader:
         other = self.joints[second].name if second >= 0 else None
         while len(terms) > 1 and (other is None or terms[-1] == 0.0):
             terms.pop()
-        self.tree.loops.append(FileLoop(name, "joint", (), (joint.name, other), tuple(terms)))
+        self.tree.close(f"equality[{eq}]", FileLoop(name, "joint", (), (joint.name, other), tuple(terms)))
 
     def _ends(self, eq: int, *, is_weld: bool) -> tuple[LoopEnd, LoopEnd]:
         """Both ends of a connection or a weld, with the common point and axes in the frames of the bodies."""
@@ -362,7 +366,7 @@ class _Reader:
         for tendon in range(m.ntendon):
             if np.any(m.tendon_stiffness[tendon]) or np.any(m.tendon_damping[tendon]) or m.tendon_limited[tendon]:
                 name = self._name(self.mujoco.mjtObj.mjOBJ_TENDON, tendon)
-                self.tree.leave_out("tendons", f"tendon[{name}]", name, "tendons are not simulated")
+                self.tree.leave_out("tendons", f"tendon[{name}]", name, "tendons are not simulated", row="tendon")
 
     def add_actuators(self) -> None:
         """Converts motors to torque limits and position servos to gains. Rejects other actuators."""
@@ -376,7 +380,9 @@ class _Reader:
             is_plain = is_plain and m.actuator_gaintype[actuator] == mj.mjtGain.mjGAIN_FIXED
             is_plain = is_plain and not np.any(getattr(m, "actuator_dampingpoly", np.zeros((m.nu, 1)))[actuator])
             if int(m.actuator_trntype[actuator]) not in joint_kinds or not is_plain or target not in self.joints:
-                self.tree.leave_out("actuators", where, name, "only motors and position servos of joints are simulated")
+                self.tree.leave_out(
+                    "actuators", where, name, "only motors and position servos of joints are simulated", row="actuator"
+                )
                 continue
             joint, gear = self.joints[target], float(m.actuator_gear[actuator, 0])
             gain, bias = float(m.actuator_gainprm[actuator, 0]), [float(x) for x in m.actuator_biasprm[actuator, :3]]
@@ -391,7 +397,9 @@ class _Reader:
             elif m.actuator_biastype[actuator] == mj.mjtBias.mjBIAS_AFFINE and bias[0] == 0.0 and bias[1] == -gain:
                 joint.hold = (gain * gear**2, -bias[2] * gear**2)
             else:
-                self.tree.leave_out("actuators", where, [gain, *bias], "only motors and position servos are simulated")
+                self.tree.leave_out(
+                    "actuators", where, [gain, *bias], "only motors and position servos are simulated", row="actuator"
+                )
 
     def _joint(self, body: int, index: int) -> FileJoint:
         """A joint of a body; fixed if it has none."""
@@ -405,23 +413,40 @@ class _Reader:
         n_dofs = {kinds.mjJNT_FREE: 6, kinds.mjJNT_BALL: 3}.get(kind, 1)
         dofs = slice(dof, dof + n_dofs)
         at = f"joint[{name}]"
-        if np.any(m.dof_frictionloss[dofs]):
-            value = float(m.dof_frictionloss[dofs].max())
-            self.tree.leave_out("friction", f"{at}.frictionloss", value, "dry friction is not supported")
+        friction = float(m.dof_frictionloss[dofs].max())
+        if friction != 0.0 and n_dofs > 1:
+            reason = "dry friction of free and ball joints is not simulated"
+            self.tree.leave_out("friction", f"{at}.frictionloss", friction, reason, row="joint frictionloss")
+        elif friction != 0.0 and "friction" in self.tree.ignore:
+            self.tree.left_out.append(f"{at}.frictionloss: {friction:g} (left out as told)")
+            friction = 0.0
         damping, armature = np.array(m.dof_damping[dofs]), np.array(m.dof_armature[dofs])
         stiffness = float(np.ravel(m.jnt_stiffness[index])[0])
         for field in ("dof_dampingpoly", "jnt_stiffnesspoly"):
             if np.any(getattr(m, field, np.zeros((m.nv + 1, 1)))[dof if "dof" in field else index]):
-                self.tree.leave_out("springs", f"{at}.{field[4:]}", None, "springs and dampers must be linear")
+                self.tree.leave_out(
+                    "springs", f"{at}.{field[4:]}", None, "springs and dampers must be linear", row="joint stiffness"
+                )
         if n_dofs > 1:
             if np.any(damping) or np.any(armature):
                 values = [float(damping.max()), float(armature.max())]
                 reason = "damping and armature of free and ball joints are not simulated"
-                self.tree.leave_out("friction", at, values, reason)
+                self.tree.leave_out("friction", at, values, reason, row="joint damping")
             if stiffness != 0.0:
-                self.tree.leave_out("springs", f"{at}.stiffness", stiffness, "springs of ball joints are not simulated")
+                self.tree.leave_out(
+                    "springs",
+                    f"{at}.stiffness",
+                    stiffness,
+                    "springs of ball joints are not simulated",
+                    row="joint stiffness",
+                )
             if m.jnt_limited[index]:
-                self.tree.refuse(f"{at}.range", m.jnt_range[index].tolist(), "limits of ball joints are not supported")
+                self.tree.refuse(
+                    f"{at}.range",
+                    m.jnt_range[index].tolist(),
+                    "limits of ball joints are not supported",
+                    row="joint range",
+                )
             joint = FileJoint(name, "free" if n_dofs == 6 else "spherical", np.array(m.jnt_pos[index]))
             self.joints[index] = joint
             return joint
@@ -432,6 +457,7 @@ class _Reader:
             np.array(m.jnt_pos[index]),
             np.array(m.jnt_axis[index]),
             damping=float(damping[0]),
+            friction=friction,
             armature=float(armature[0]),
             stiffness=stiffness,
             rest=float(m.qpos_spring[m.jnt_qposadr[index]]) - zero,

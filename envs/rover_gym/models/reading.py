@@ -72,7 +72,12 @@ def _read(
         if link.parent is None and free_base is not None and link.joint.kind in ("fixed", "free"):
             link.joint.kind = "free" if free_base else "fixed"
         elif link.parent is not None and link.joint.kind == "free":
-            tree.refuse(f"joint[{link.joint.name}]", "floating", "only a root link can have a floating joint")
+            tree.refuse(
+                f"joint[{link.joint.name}]",
+                "floating",
+                "only a root link can have a floating joint",
+                row="joint floating",
+            )
     roles = find_wheels(tree, P.T @ (0.0, 1.0, 0.0), P.T @ (1.0, 0.0, 0.0), wheels, steering)
     turn_steering_axes_up(tree, {role.steering for role in roles if role.steering}, P)
     close_distant_couplings(tree)

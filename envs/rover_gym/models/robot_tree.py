@@ -86,6 +86,7 @@ class FileJoint:
         axis: Unit axis in the link's frame (3,).
         limits: Stops, rad or m.
         damping: Viscous damping, N m s/rad or N s/m.
+        friction: Dry friction, N m or N.
         armature: Inertia of its rotor, kg m² or kg.
         stiffness: Of its spring, N m/rad or N/m.
         rest: Coordinate at which its spring is relaxed, rad or m.
@@ -101,6 +102,7 @@ class FileJoint:
     axis: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
     limits: tuple[float, float] | None = None
     damping: float = 0.0
+    friction: float = 0.0
     armature: float = 0.0
     stiffness: float = 0.0
     rest: float = 0.0
@@ -163,15 +165,29 @@ class RobotTree:
     warnings: list[str] = field(default_factory=list)
     loops: list[FileLoop] = field(default_factory=list)
 
-    def refuse(self, where: str, value: object, reason: str) -> NoReturn:
-        """Raises a `ModelError` that names the file, the element and the value."""
-        refuse_in(self.path, where, value, reason)
+    def refuse(self, where: str, value: object, reason: str, *, row: str = "") -> NoReturn:
+        """Raises a `ModelError` that names the file, the element and the value.
 
-    def leave_out(self, kind: str, where: str, value: object, reason: str) -> None:
+        Args:
+            where: The element.
+            value: Its value.
+            reason: Why it is rejected.
+            row: The row of the page of robot files in the manual that lists the feature.
+        """
+        refuse_in(self.path, where, value, f"{reason} (robot files, row {row!r})" if row else reason)
+
+    def leave_out(self, kind: str, where: str, value: object, reason: str, *, row: str) -> None:
         """Lists an element as left out if its kind is in `ignore`, and rejects it otherwise."""
         if kind not in self.ignore:
-            self.refuse(where, value, f'{reason}; ignore=["{kind}"] leaves it out')
+            self.refuse(where, value, f'{reason}; ignore=["{kind}"] leaves it out', row=row)
         self.left_out.append(f"{where}: {reason} (left out because of `ignore`)")
+
+    def close(self, where: str, loop: FileLoop) -> None:
+        """Adds a closed loop, or lists it as left out if `ignore` says so."""
+        if "closed loops" in self.ignore:
+            self.left_out.append(f"{where}: {loop.name} (left out because of `ignore`)")
+        else:
+            self.loops.append(loop)
 
     def children(self, name: str) -> list[FileLink]:
         """The links that a link carries."""

@@ -47,7 +47,7 @@ def read_urdf_tree(path: Path, *, ignore: Collection[str], package_paths: tuple[
     _check_names(path, robot)
     for element in checked.root.findall("gazebo"):
         if any("joint" in str(one.tag) for one in element.iter()):
-            tree.leave_out("closed loops", "gazebo", element.get("reference"), "closes a loop by a joint")
+            tree.leave_out("closed loops", "gazebo", element.get("reference"), "closes a loop by a joint", row="gazebo")
     carriers = {joint.child: joint for joint in robot.joints}
     links = {link.name: link for link in robot.links}
     driven = {joint.name for transmission in robot.transmission for joint in transmission.joints}
@@ -115,7 +115,7 @@ def _joint(tree: RobotTree, source: Any) -> FileJoint:
     if source.type == "floating":
         return FileJoint(source.name, "free")
     if source.type not in KINDS:
-        tree.refuse(f"{at}.type", source.type, f"must be one of {', '.join(KINDS)}")
+        tree.refuse(f"{at}.type", source.type, f"must be one of {', '.join(KINDS)}", row="joint planar")
     joint = FileJoint(source.name, KINDS[source.type])
     if joint.kind == "fixed":
         return joint
@@ -139,13 +139,21 @@ def _joint(tree: RobotTree, source: Any) -> FileJoint:
             tree.left_out.append(f"{at}: a limit of its speed")
     if source.dynamics is not None:
         joint.damping = float(source.dynamics.damping or 0.0)
-        friction = float(source.dynamics.friction or 0.0)
-        if friction != 0.0:
-            tree.leave_out("friction", f"{at}.dynamics.friction", friction, "dry friction is not supported")
+        joint.friction = _friction(tree, at, float(source.dynamics.friction or 0.0))
     if source.mimic is not None:
         ratio, offset = source.mimic.multiplier, source.mimic.offset
         joint.follows = (source.mimic.joint, 1.0 if ratio is None else ratio, offset or 0.0)
     return joint
+
+
+def _friction(tree: RobotTree, at: str, stated: float) -> float:
+    """Dry friction of a joint, N m or N; 0 if the user ignores it."""
+    if stated < 0.0 or not np.isfinite(stated):
+        tree.refuse(f"{at}.dynamics.friction", stated, "must be finite and not negative")
+    if stated == 0.0 or "friction" not in tree.ignore:
+        return stated
+    tree.left_out.append(f"{at}.dynamics.friction: {stated:g} (left out as told)")
+    return 0.0
 
 
 def _add_body(path: Path, source: Any, link: FileLink) -> None:

@@ -69,12 +69,15 @@ fn frames<const D: usize>(rows: impl Iterator<Item = [[f64; D]; D]>) -> Array {
 pub struct Contacts {
     /// Name of the solid in each contact, or of the joint that is at its stop.
     bodies: Vec<String>,
-    /// Kind of each contact, "wheel", "box" or "sphere"; "limit" for a joint's stop.
+    /// Kind of each contact, "wheel", "box" or "sphere"; of a joint, "limit" or "friction".
     ///
-    /// For a stop, the contact point is the origin of the solid that the joint carries, and the
+    /// "limit" is a joint at its stop, "friction" the dry friction of a joint.
+    ///
+    /// For these, the contact point is the origin of the solid that the joint carries, and the
     /// normal is the joint's axis in the direction that opens the gap. At a revolute joint, gap,
     /// impulse and velocity along the normal are in rad, N m s and rad/s. Tangential entries are
-    /// zero.
+    /// zero. For dry friction, the entry along n of the impulse is its largest value, and the entry
+    /// along t its value, positive if it accelerates the joint.
     kinds: Vec<&'static str>,
     /// Index of the wheel in each contact, (n,); -1 for another solid or a joint's stop.
     wheels: Array<i64>,
@@ -102,6 +105,7 @@ impl Contacts {
             Part::Box(_) => ("box", -1),
             Part::Sphere(_) => ("sphere", -1),
             Part::Limit(..) => ("limit", -1),
+            Part::Friction(_) => ("friction", -1),
         };
         let (kinds, wheels): (_, Vec<i64>) = parts.clone().map(told).unzip();
         let columns = Columns::of(active);

@@ -317,7 +317,10 @@ impl From<CommandError> for BorderError {
                 ..
             } => (*field, Some(index), Value::Number(*value)),
             CommandError::Negative { field, value } => (*field, None, Value::Number(*value)),
-            CommandError::UnknownJoint { field, name } => (*field, None, Value::Text(name.clone())),
+            CommandError::UnknownJoint { field, name }
+            | CommandError::UnknownSolid { field, name } => {
+                (*field, None, Value::Text(name.clone()))
+            }
         };
         Kind::Command.of(&e, entry(field, index), value)
     }

@@ -29,7 +29,8 @@ pub fn list<'py>(py: Python<'py>, model: &Model) -> Result<Vec<Bound<'py, PyDict
     described.zip(rows).map(entry).collect()
 }
 
-/// The nearest coordinates (nv) that close all loops, and the velocity (nv) without what opens them.
+/// The nearest coordinates (nv) that close all loops, and the velocity (nv) without what opens
+/// them.
 pub fn closed(model: &Model, q: &[f64], v: &mut [f64]) -> Result<(Array, Array)> {
     let configuration = coordinates::from_public(model, q)?;
     let closed = loops::closed(model, &configuration, v)?;

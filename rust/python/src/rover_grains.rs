@@ -35,7 +35,9 @@ impl From<TogetherError> for BorderError {
                 field: Some("position".to_owned()),
                 value: Value::Number(depth),
             },
-            TogetherError::ClosedLoops => Kind::Option.error("rover", message, Value::Nothing),
+            TogetherError::Unsupported { .. } => {
+                Kind::Option.error("rover", message, Value::Nothing)
+            }
             TogetherError::Friction(e) => grain_error(&e),
         }
     }

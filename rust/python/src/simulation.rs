@@ -17,8 +17,8 @@ use rover_core::system::loops::check_closed;
 use std::sync::{Arc, MutexGuard};
 
 use crate::accuracy;
-use crate::arguments::{Given, Named, at_least_one, number, texts};
-use crate::arrays::{Array, at_most, fresh, fresh_matrix, fresh_rows, shaped, vector};
+use crate::arguments::{Given, Named, at_least_one, number, text, texts};
+use crate::arrays::{Array, at_most, fresh, fresh_matrix, fresh_rows, shaped, triple, vector};
 use crate::contacts::Contacts;
 use crate::errors::{BorderError, Kind, Result, Value};
 use crate::linearisation::{Linearisation, StepDerivatives, named_parameters, of_trajectory};
@@ -429,6 +429,43 @@ impl Simulation {
         let n_joints = self.model.n_joints();
         let torques = at_most(torques, n_joints, Kind::Command, "torques")?;
         Ok(self.open()?.set_joint_torques(&torques)?)
+    }
+
+    /// Applies a force and a moment to a solid in all further steps.
+    ///
+    /// Replaces the last wrench on this solid; one without force and moment removes it. Steps under
+    /// a wrench are general ones. A reset removes all wrenches, `set_state` keeps them.
+    ///
+    /// Args:
+    ///     solid: Name of the solid.
+    ///     force: Force in world axes, (3,), N; zero by default.
+    ///     moment: Moment in world axes, (3,), N m; zero by default.
+    ///     point: Where the force acts in the solid's frame, (3,), m; its origin by default.
+    ///
+    /// Raises:
+    ///     CommandError: There is no such solid, or an array has a wrong length or an entry that is
+    ///         not finite. Nothing has changed.
+    #[pyo3(signature = (solid, force = None, moment = None, *, point = None))]
+    fn apply_wrench(
+        &self,
+        solid: &Bound<'_, PyAny>,
+        force: Option<&Bound<'_, PyAny>>,
+        moment: Option<&Bound<'_, PyAny>>,
+        point: Option<&Bound<'_, PyAny>>,
+    ) -> Result<()> {
+        let solid = text(solid, Kind::Command, "solid")?;
+        let read = |given: Option<&Bound<'_, PyAny>>, field| {
+            given.map_or(Ok([0.0; 3]), |given| triple(given, Kind::Command, field))
+        };
+        let (force, moment) = (read(force, "force")?, read(moment, "moment")?);
+        let point = read(point, "point")?;
+        Ok(self.open()?.apply_wrench(&solid, force, moment, point)?)
+    }
+
+    /// Removes all wrenches.
+    fn clear_wrenches(&self) -> Result<()> {
+        self.open()?.clear_wrenches();
+        Ok(())
     }
 
     /// Holds joints at set-points by an implicit PD controller.

@@ -24,9 +24,9 @@ fn light(mut solid: SolidDescription) -> SolidDescription {
     solid
 }
 
-/// The open-source rover with a bar on the body that turns about the vertical, and a rod from either
-/// end of it to the rocker below: forward on the left, backward on the right, so that one side is
-/// the other turned by half a turn.
+/// The open-source rover with a bar on the body that turns about the vertical, and a rod from
+/// either end of it to the rocker below: forward on the left, backward on the right, so that one
+/// side is the other turned by half a turn.
 fn with_a_bar() -> ModelDescription {
     let mut rover = ModelDescription::named("open-rover").unwrap();
     let rockers = ["left_rocker", "right_rocker"];

@@ -7,8 +7,10 @@ use std::ops::Range;
 
 use super::body_motion::Still;
 use super::jacobian::{for_each_row, relative_velocity, write_rows};
+use super::joint_friction;
 use super::limit;
-use super::pair::{Contact, Opposite};
+use super::pair::Contact;
+use super::part::Part;
 use super::rows::{Path, Triple, add_product, add_scaled, along, close_stop, product, square};
 use crate::multibody::{Factor, Kinematics, Model};
 
@@ -79,13 +81,22 @@ impl ContactSystem {
                 }
             }
             let mut own = self.own_block(model, c);
-            if contact.key.opposite == Opposite::Stop {
-                close_stop(&mut own);
+            match contact.part {
+                Part::Limit(..) => close_stop(&mut own),
+                Part::Friction(_) => joint_friction::close(&mut own),
+                Part::Wheel(_) | Part::Box(_) | Part::Sphere(_) => {}
             }
             for (i, row) in own.chunks_exact(3).enumerate() {
                 self.W[(3 * c + i) * size + 3 * c..][..3].copy_from_slice(row);
             }
         }
+    }
+
+    /// The entry of W on the diagonal of a contact's normal.
+    #[must_use]
+    pub fn normal_entry(&self, c: usize) -> f64 {
+        let size = 3 * self.n_contacts();
+        self.W[3 * c * (size + 1)]
     }
 
     /// Adds a number for each contact (n_c), 1/kg, to the three entries on W's diagonal.
@@ -129,8 +140,8 @@ impl ContactSystem {
             } else {
                 let path = Path::of(model.mechanism(), contact.body);
                 let rows = &mut self.Z[c * self.stride..][..path.len()];
-                let u = match limit::row(model, contact) {
-                    Some((_, sign)) => path.write_stop(sign, v, rows),
+                let u = match limit::joint_row(model, contact) {
+                    Some((_, sign, row)) => path.write_joint(row, sign, v, rows),
                     None => write_rows(&motion, contact, v, rows),
                 };
                 factor.half_solve_path(model.mechanism(), contact.body, rows);
@@ -270,8 +281,8 @@ impl ContactSystem {
         out: &mut [f64],
     ) {
         for (contact, values) in contacts.iter().zip(out.chunks_exact_mut(3)) {
-            if let Some((k, sign)) = limit::row(model, contact) {
-                values[0] += sign * v[k];
+            if let Some((k, sign, row)) = limit::joint_row(model, contact) {
+                values[row] += sign * v[k];
                 continue;
             }
             let velocity = relative_velocity(

@@ -96,8 +96,8 @@ pub fn generalized_impulse(
     };
     out.fill(0.0);
     for (contact, p) in contacts.iter().zip(p.as_chunks().0) {
-        match limit::row(model, contact) {
-            Some((k, sign)) => out[k] += sign * p[0],
+        match limit::joint_row(model, contact) {
+            Some((k, sign, row)) => out[k] += sign * p[row],
             None => add_impulse(&motion, contact, *p, |k, x| out[k] += x),
         }
     }

@@ -50,6 +50,17 @@ pub(crate) fn row(model: &Model, contact: &Contact) -> Option<(usize, f64)> {
     }
 }
 
+/// The only row of a stop or of a joint's friction, if the contact is one: index of the joint's
+/// velocity, its entry, and which of n, t and b it is.
+#[inline]
+pub(super) fn joint_row(model: &Model, contact: &Contact) -> Option<(usize, f64, usize)> {
+    match contact.part {
+        Part::Limit(joint, side) => Some((model.joint_velocity(joint), side.sign(), 0)),
+        Part::Friction(joint) => Some((model.joint_velocity(joint), 1.0, 1)),
+        _ => None,
+    }
+}
+
 /// Adds to `out` the stops that a step must consider.
 ///
 /// `joints`: coordinates of all joints (n_joints) at the poses of `kinematics`, rad or m; `v`:

@@ -3,9 +3,9 @@
 //!
 //! A contact ([`pair`]) connects a part of a body to the ground or to a part of another body.
 //! [`detection`] finds contacts with the ground, [`pair_detection`] contacts between bodies, and
-//! [`limit`] joints at their stops. The broad phase selects candidates, [`crate::geometry::query`]
-//! computes gaps and normals of a machine with its `body_motion`, and [`activation`] decides which
-//! contacts enter the step.
+//! [`limit`] joints at their stops; [`joint_friction`] is the dry friction of joints. The broad
+//! phase selects candidates, [`crate::geometry::query`] computes gaps and normals of a machine with
+//! its `body_motion`, and [`activation`] decides which contacts enter the step.
 //! [`wheel_gaps`] measures how far the wheels are from the ground and nothing else,
 //! `box_clearance` how far a box is from a surface at least.
 //! [`relocation`] re-evaluates them in another configuration; `contact_slope` has their
@@ -42,6 +42,7 @@ pub mod delassus;
 pub mod detection;
 pub mod frame;
 pub mod jacobian;
+pub mod joint_friction;
 pub mod limit;
 pub mod pair;
 pub mod pair_detection;
@@ -56,6 +57,7 @@ pub use delassus::ContactSystem;
 pub use detection::detect;
 pub use frame::ContactFrame;
 pub use jacobian::generalized_impulse;
+pub use joint_friction::list_friction;
 pub use limit::{detect_limits, relocate_limit};
 pub use pair::{Contact, ContactKey, Opposite, OtherSide};
 pub use pair_detection::{PairSearch, detect_pairs};

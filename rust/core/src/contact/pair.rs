@@ -24,7 +24,8 @@ pub enum Opposite {
     Part(u16),
     /// A grain, by its number.
     Grain(u32),
-    /// None: a joint's stop ([`super::limit`]) has no shape.
+    /// None: a joint's stop ([`super::limit`]) and its dry friction ([`super::joint_friction`])
+    /// have no shape.
     Stop,
 }
 
@@ -36,7 +37,7 @@ pub struct ContactKey {
     /// On the ground, the rim point or corner, with [`ON_SURFACE`] on a surface; on a sphere of the
     /// ground, 0 for the nearest point and 1 for a part that passes the sphere within one step.
     /// Between bodies, the feature of [`crate::geometry::query::PairPoint`]. For a joint, 0 is the
-    /// lower stop and 1 the upper.
+    /// lower stop, 1 the upper and 2 its friction.
     pub feature: u16,
     /// The other side.
     pub opposite: Opposite,

@@ -19,6 +19,8 @@ pub enum Part {
     /// A joint at its stop, by its index. It has no shape, only a point: the origin of the body
     /// that the joint carries.
     Limit(usize, Side),
+    /// The dry friction of a joint, by its index ([`super::joint_friction`]). Without a shape, too.
+    Friction(usize),
 }
 
 /// The two stops of a joint.
@@ -52,7 +54,7 @@ impl Part {
             Self::Wheel(i) => narrow(i),
             Self::Sphere(i) => narrow(i) | SPHERES,
             Self::Box(i) => narrow(i) | BOXES,
-            Self::Limit(i, _) => narrow(i) | LIMITS,
+            Self::Limit(i, _) | Self::Friction(i) => narrow(i) | LIMITS,
         }
     }
 
@@ -72,6 +74,7 @@ impl Part {
             Self::Box(i) => i < model.boxes().len(),
             Self::Sphere(i) => i < model.spheres().len(),
             Self::Limit(i, _) => model.limited_joints().contains(&i),
+            Self::Friction(i) => model.rubbing_joints().contains(&i),
         }
     }
 
@@ -83,7 +86,7 @@ impl Part {
             Self::Wheel(i) => model.wheels()[i].body,
             Self::Box(i) => model.boxes()[i].body,
             Self::Sphere(i) => model.spheres()[i].body,
-            Self::Limit(i, _) => model.joints()[i].body,
+            Self::Limit(i, _) | Self::Friction(i) => model.joints()[i].body,
         }
     }
 
@@ -94,7 +97,7 @@ impl Part {
             Self::Wheel(i) => &model.description().wheels[i].solid,
             Self::Box(i) => &model.boxes()[i].name,
             Self::Sphere(i) => &model.spheres()[i].name,
-            Self::Limit(i, _) => &model.bodies()[model.joints()[i].body].name,
+            Self::Limit(i, _) | Self::Friction(i) => &model.bodies()[model.joints()[i].body].name,
         }
     }
 
@@ -104,18 +107,18 @@ impl Part {
     pub fn compliance(self, model: &Model) -> Option<Compliance> {
         match self {
             Self::Wheel(i) => model.wheels()[i].compliance,
-            Self::Box(_) | Self::Sphere(_) | Self::Limit(..) => None,
+            Self::Box(_) | Self::Sphere(_) | Self::Limit(..) | Self::Friction(_) => None,
         }
     }
 
-    /// Name of its material; empty for a joint at its stop.
+    /// Name of its material; empty for a joint.
     #[must_use]
     pub fn material(self, model: &Model) -> &str {
         match self {
             Self::Wheel(i) => &model.wheels()[i].material,
             Self::Box(i) => &model.boxes()[i].material,
             Self::Sphere(i) => &model.spheres()[i].material,
-            Self::Limit(..) => "",
+            Self::Limit(..) | Self::Friction(_) => "",
         }
     }
 
@@ -127,7 +130,7 @@ impl Part {
             Self::Wheel(i) => model.wheels()[i].centre,
             Self::Box(i) => model.boxes()[i].centre,
             Self::Sphere(i) => model.spheres()[i].centre,
-            Self::Limit(..) => Vector3::zeros(),
+            Self::Limit(..) | Self::Friction(_) => Vector3::zeros(),
         }
     }
 
@@ -138,7 +141,7 @@ impl Part {
             Self::Wheel(i) => model.wheels()[i].bound(),
             Self::Box(i) => model.boxes()[i].half_size.norm(),
             Self::Sphere(i) => model.spheres()[i].radius,
-            Self::Limit(..) => 0.0,
+            Self::Limit(..) | Self::Friction(_) => 0.0,
         }
     }
 
@@ -174,10 +177,12 @@ impl Part {
                     half_size: solid.half_size,
                 })
             }
-            Self::Wheel(_) | Self::Sphere(_) | Self::Limit(..) => PlacedShape::Sphere(Sphere {
-                centre,
-                radius: self.bound(model),
-            }),
+            Self::Wheel(_) | Self::Sphere(_) | Self::Limit(..) | Self::Friction(_) => {
+                PlacedShape::Sphere(Sphere {
+                    centre,
+                    radius: self.bound(model),
+                })
+            }
         }
     }
 }

@@ -148,13 +148,27 @@ impl<'a> Path<'a> {
         v: &[T],
         rows: &mut [Triple<T>],
     ) -> Triple<T> {
+        self.write_joint(0, sign, v, rows)
+    }
+
+    /// The same for one of n, t and b at the last joint of the path.
+    #[inline(always)]
+    pub(crate) fn write_joint<T: Lane>(
+        &self,
+        which: usize,
+        sign: T,
+        v: &[T],
+        rows: &mut [Triple<T>],
+    ) -> Triple<T> {
         let zero = sign.like(0.0);
         rows.fill([zero; 3]);
         let (Some(row), Some(mover)) = (rows.last_mut(), self.movers.last()) else {
             unreachable!("invariant: a joint with stops moves its body")
         };
-        row[0] = sign;
-        [sign * v[mover.velocity], zero, zero]
+        row[which] = sign;
+        let mut u = [zero; 3];
+        u[which] = sign * v[mover.velocity];
+        u
     }
 
     /// `sum + Zᵀ y`, or with rows of Hᵀ in place of Z.

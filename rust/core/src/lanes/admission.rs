@@ -18,6 +18,9 @@ pub enum FallbackReason {
     /// Wheels sink into the ground.
     #[error("the ground is soft")]
     SoftGround,
+    /// A wrench acts from outside.
+    #[error("a wrench is applied")]
+    Wrench,
     /// Contacts bounce.
     #[error("the restitution is {0}, not 0")]
     Restitution(f64),

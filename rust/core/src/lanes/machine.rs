@@ -31,6 +31,9 @@ pub enum Unsupported {
     /// Loops are closed.
     #[error("the machine has closed loops")]
     ClosedLoops,
+    /// Joints have dry friction.
+    #[error("joints of the machine have dry friction")]
+    JointFriction,
     /// Its wheels and stops can have more contacts than a problem.
     #[error("wheels with a width and stops can have {0} contacts, more than {MAX_CONTACTS}")]
     TooManyContacts(usize),
@@ -232,6 +235,9 @@ fn check(model: &Model) -> Result<(), Unsupported> {
     }
     if !model.loops().is_empty() {
         return Err(Unsupported::ClosedLoops);
+    }
+    if !model.rubbing_joints().is_empty() {
+        return Err(Unsupported::JointFriction);
     }
     let wheels: Vec<WheelDisc> = model.wheels().iter().map(WheelDisc::of).collect();
     let has_lines = wheels.iter().any(|wheel| wheel.n_circles() > 1);

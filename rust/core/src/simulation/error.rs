@@ -57,6 +57,14 @@ pub enum CommandError {
         /// What was given.
         name: String,
     },
+    /// A solid that the model does not have.
+    #[error("{field}: there is no solid named {name:?}")]
+    UnknownSolid {
+        /// Name of the argument.
+        field: &'static str,
+        /// What was given.
+        name: String,
+    },
 }
 
 /// A batch that cannot be built, or a command that it refuses.
@@ -135,6 +143,12 @@ pub enum LinearisationError {
     /// Loops are closed.
     #[error("model: steps of a machine with closed loops have no derivatives yet")]
     ClosedLoops,
+    /// A wrench acts from outside.
+    #[error("steps under a wrench have no derivatives yet: clear_wrenches removes it")]
+    Wrench,
+    /// Joints have dry friction.
+    #[error("model: steps of a machine with dry friction in its joints have no derivatives yet")]
+    JointFriction,
     /// A perturbation outside its range.
     #[error("perturbation: must be from 1e-9 to 1e-3, is {value}")]
     Perturbation {

@@ -162,10 +162,10 @@ impl Scene for RoverScene {
     }
 
     /// Most contacts on a plane: three rim points per wheel, or six if it has a width, four corners
-    /// per box, one point per ball, and both stops of a joint.
+    /// per box, one point per ball, both stops of a joint, and its dry friction.
     fn contact_capacity(&self) -> usize {
         let model = &self.model;
-        let stops = 2 * model.limited_joints().len();
+        let stops = 2 * model.limited_joints().len() + model.rubbing_joints().len();
         let rims = (model.wheels().iter()).map(|wheel| if wheel.is_wide() { 6 } else { 3 });
         rims.sum::<usize>() + 4 * model.boxes().len() + model.spheres().len() + stops
     }
@@ -255,7 +255,7 @@ impl Scene for RoverScene {
             let is_of_two = matches!(contact.key.opposite, Opposite::Part(_));
             let is_stop = matches!(contact.key.opposite, Opposite::Stop);
             is_part(contact.part, contact.body)
-                && is_stop == matches!(contact.part, Part::Limit(..))
+                && is_stop == matches!(contact.part, Part::Limit(..) | Part::Friction(_))
                 && is_of_two == contact.other.is_some()
                 && (contact.other).is_none_or(|other| is_part(other.part, other.body))
         };

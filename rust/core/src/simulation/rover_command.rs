@@ -58,6 +58,7 @@ impl RoverCommand {
             torque,
             drives,
             held,
+            wrenches,
         } = &self.actuators;
         let is_drive = |(theirs, own): (&Option<Drive>, &Option<Drive>)| {
             theirs.is_some() == own.is_some()
@@ -77,6 +78,7 @@ impl RoverCommand {
             && drives.iter().zip(&own.actuators.drives).all(is_drive)
             && torques.into_iter().flatten().all(|x| x.is_finite())
             && gains.into_iter().all(f64::is_finite)
+            && wrenches.iter().all(|wrench| wrench.is_of(model))
     }
 }
 

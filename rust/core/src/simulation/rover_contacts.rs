@@ -58,7 +58,7 @@ impl RoverSimulation {
         let boxes = self
             .active
             .iter()
-            .filter(|a| !matches!(a.contact.part, Part::Wheel(_) | Part::Limit(..)));
+            .filter(|a| matches!(a.contact.part, Part::Box(_) | Part::Sphere(_)));
         boxes.map(|a| a.impulse[0]).sum::<f64>() / self.options.time_step
     }
 }

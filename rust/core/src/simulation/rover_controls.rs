@@ -3,7 +3,7 @@
 use super::error::CommandError;
 use super::rover::RoverSimulation;
 use super::rover_command::check;
-use crate::system::{Command, HeldJoint};
+use crate::system::{Command, HeldJoint, Wrench};
 
 impl RoverSimulation {
     /// Commanded driving torque of each wheel, positive forward, within its limit (N m).
@@ -231,6 +231,46 @@ impl RoverSimulation {
                 });
             }
         }
+    }
+
+    /// Applies a force (N) at a point of a solid (m, in its frame) and a moment (N m), both in
+    /// world axes, in all further steps. Replaces the last wrench on this solid; one without force
+    /// and moment removes it.
+    ///
+    /// # Errors
+    /// An unknown solid, an entry that is not finite; nothing is changed then.
+    pub fn apply_wrench(
+        &mut self,
+        solid: &str,
+        force: [f64; 3],
+        moment: [f64; 3],
+        point: [f64; 3],
+    ) -> Result<(), CommandError> {
+        for (field, values) in [("force", force), ("moment", moment), ("point", point)] {
+            check(field, &values, 3)?;
+        }
+        let mut frames = self.scene.model.frames().iter();
+        let found = frames.position(|frame| frame.name == solid);
+        let solid = found.ok_or_else(|| CommandError::UnknownSolid {
+            field: "solid",
+            name: solid.to_owned(),
+        })?;
+        let wrenches = &mut self.command.actuators.wrenches;
+        wrenches.retain(|wrench| wrench.solid != solid);
+        if (force, moment) != ([0.0; 3], [0.0; 3]) {
+            wrenches.push(Wrench {
+                solid,
+                point,
+                force,
+                moment,
+            });
+        }
+        Ok(())
+    }
+
+    /// Removes all wrenches.
+    pub fn clear_wrenches(&mut self) {
+        self.command.actuators.wrenches.clear();
     }
 
     fn joint_indices(&self, joints: &[String]) -> Result<Vec<usize>, CommandError> {

@@ -47,9 +47,12 @@ pub enum TogetherError {
         /// m.
         depth: f64,
     },
-    /// The rover has closed loops, which are not solved together with grains.
-    #[error("rover: its model has closed loops, which are not simulated among grains")]
-    ClosedLoops,
+    /// The rover has something that is not solved together with grains.
+    #[error("rover: its model has {what}, which is not simulated among grains")]
+    Unsupported {
+        /// In words.
+        what: &'static str,
+    },
     /// μ.
     #[error(transparent)]
     Friction(#[from] GrainError),
@@ -69,8 +72,8 @@ impl RoverInGrains {
     ///
     /// # Errors
     /// Another time step or gravity of the two, a part of the rover deeper in a grain than
-    /// [`OVERLAP`] of the smallest radius, a rover with closed loops, a coefficient that is
-    /// negative or not finite.
+    /// [`OVERLAP`] of the smallest radius, a rover with closed loops or dry friction in joints, a
+    /// coefficient that is negative or not finite.
     pub fn new(
         rover: &RoverSimulation,
         bed: &GrainSimulation<3>,
@@ -96,8 +99,14 @@ impl RoverInGrains {
                 });
             }
         }
-        if !rover.model().loops().is_empty() {
-            return Err(TogetherError::ClosedLoops);
+        let model = rover.model();
+        for (is_there, what) in [
+            (!model.loops().is_empty(), "a closed loop"),
+            (!model.rubbing_joints().is_empty(), "dry friction in joints"),
+        ] {
+            if is_there {
+                return Err(TogetherError::Unsupported { what });
+            }
         }
         check_apart(rover, bed)?;
         let q = (bed.q().clone(), rover.q().clone());

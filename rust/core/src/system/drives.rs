@@ -358,6 +358,7 @@ impl<T: Lane> Joint<T> {
             rest: self.set_point.get(lane),
             damping: self.damping.get(lane),
             armature: 0.0,
+            friction: 0.0,
         };
         let both = held.with(passive);
         self.damping.set(lane, both.damping);

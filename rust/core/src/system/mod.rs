@@ -54,7 +54,7 @@ pub mod tree_scratch;
 pub use among_grains::{
     CompositeContact, CompositeKey, CompositeScratch, GrainTouch, TreeAmongGrains,
 };
-pub use command::{Command, Drive, HeldJoint};
+pub use command::{Command, Drive, HeldJoint, Wrench};
 pub use planar::{PlanarContact, PlanarKey, PlanarScratch, PlanarSystem};
 pub use tree::TreeSystem;
 pub use tree_scratch::TreeScratch;

@@ -13,7 +13,7 @@ use super::sand_patch::SandScene;
 use super::tree_scratch::TreeScratch;
 use crate::contact::{
     Activation, Contact, ContactKey, Opposite, detect, detect_limits, detect_pairs,
-    generalized_impulse, relocate, relocate_limit,
+    generalized_impulse, joint_friction, list_friction, relocate, relocate_limit,
 };
 use crate::geometry::Terrain;
 use crate::integrator::mechanical_system::MOST_REVISIONS;
@@ -117,6 +117,9 @@ impl TreeSystem<'_> {
         let velocities = [start.v, v_end];
         (self.parts.drives).add_impulse(mechanism, step(options), places, velocities, y);
         self.parts.add_sand(options.time_step, v_end, y);
+        for (y, force) in y.iter_mut().zip(&self.parts.applied) {
+            *y += options.time_step * force;
+        }
     }
 
     /// `y = h (τ − b)` with the bias b at a velocity, and the forces of joints and sand at the
@@ -213,6 +216,7 @@ impl MechanicalSystem for TreeSystem<'_> {
         } = &mut *self.parts;
         detect_pairs(self.model, kinematics, v, &activation, pairs, out);
         detect_limits(self.model, kinematics, joints_middle, v, &activation, out);
+        list_friction(self.model, kinematics, out);
     }
 
     fn unknown_ground(&self) -> Option<[f64; 2]> {
@@ -239,6 +243,7 @@ impl MechanicalSystem for TreeSystem<'_> {
     #[inline]
     fn friction_coefficient(&self, options: &StepOptions, contact: &Contact) -> f64 {
         match contact.key.opposite {
+            Opposite::Stop if joint_friction::joint_of(contact).is_some() => 1.0,
             Opposite::Stop => 0.0,
             Opposite::Ground(_) | Opposite::Part(_) | Opposite::Grain(_) => {
                 let of_pair = self.between_materials(options, contact);
@@ -249,6 +254,10 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn normal_shift(&self, options: &StepOptions, contact: &Contact, u_N_before: f64) -> f64 {
+        if let Some(joint) = joint_friction::joint_of(contact) {
+            let most = options.time_step * self.model.joints()[joint].passive.friction;
+            return -most * self.parts.friction_entry(joint);
+        }
         let of_pair = self.between_materials(options, contact);
         rebound(of_pair.map_or(options.restitution, |[_, e]| e), u_N_before)
     }
@@ -273,6 +282,7 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn update_mass_matrix(&mut self, options: &StepOptions) {
+        self.parts.apply(self.model, &self.command.wrenches);
         if let Some((sand, place, _)) = self.sand() {
             sand.linearise(place, options);
         }
@@ -425,7 +435,12 @@ impl MechanicalSystem for TreeSystem<'_> {
             (self.sand()).map_or(0.0, |(sand, place, _)| sand.work(place, start.v, v_end));
         let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
         let velocities = [start.v, v_end];
-        of_sand + (self.parts.drives).work(mechanism, step(options), places, velocities)
+        let applied = self.parts.applied.iter().zip(start.v.iter().zip(v_end));
+        let power = applied
+            .map(|(force, (v, end))| force * (options.theta * end + (1.0 - options.theta) * v));
+        let of_wrenches = options.time_step * power.sum::<f64>();
+        let of_drives = (self.parts.drives).work(mechanism, step(options), places, velocities);
+        of_sand + of_wrenches + of_drives
     }
 
     fn work_of_displacement(
@@ -437,7 +452,10 @@ impl MechanicalSystem for TreeSystem<'_> {
     ) -> f64 {
         let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
         let motion = [start.v, v_end, displacement];
-        (self.parts.drives).work_of_displacement(mechanism, step(options), places, motion)
+        let applied = self.parts.applied.iter().zip(displacement);
+        let of_wrenches = applied.map(|(force, way)| force * way).sum::<f64>();
+        of_wrenches
+            + (self.parts.drives).work_of_displacement(mechanism, step(options), places, motion)
     }
 
     #[inline]
@@ -498,6 +516,7 @@ impl MechanicalSystem for TreeSystem<'_> {
             v,
         );
         u.copy_from_slice(&parts.system.u);
+        parts.note_friction(contacts);
         if let Some(loops) = &mut parts.loops {
             loops.project_operator(self.model, &mut parts.system);
         }

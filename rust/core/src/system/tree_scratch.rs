@@ -2,13 +2,15 @@
 
 use nalgebra::Vector3;
 
+use super::command::Wrench;
 use super::drives::Drives;
 use super::gyroscopic::GyroscopicScratch;
 use super::loops::Loops;
 use super::momentum_balance::MomentumBalance;
 use super::sand::SandContact;
 use super::sand_patch::SandScene;
-use crate::contact::{ContactSystem, PairSearch};
+use crate::contact::joint_friction::joint_of;
+use crate::contact::{Contact, ContactSystem, PairSearch};
 use crate::geometry::SoftLayer;
 use crate::multibody::bias::BiasScratch;
 use crate::multibody::{
@@ -31,6 +33,8 @@ pub struct TreeScratch {
     pub(super) energy: EnergyScratch<f64>,
     pub(super) gyroscopic: GyroscopicScratch,
     pub(super) force: Vec<f64>,
+    /// Generalized force of the wrenches at the midpoint (nv); empty without any.
+    pub(super) applied: Vec<f64>,
     pub(super) pairs: PairSearch,
     /// Found by the last detection, x and z, m.
     pub(super) unknown_ground: Option<[f64; 2]>,
@@ -39,6 +43,8 @@ pub struct TreeScratch {
     pub(super) joints_middle: Vec<f64>,
     pub(super) joints_end: Vec<f64>,
     pub(super) system: ContactSystem,
+    /// Joints with dry friction, and W's entry of their normals.
+    pub(super) friction: Vec<(usize, f64)>,
     /// Of a machine on soft ground.
     pub(super) sand: Option<Box<SandContact>>,
     /// Of a machine with closed loops.
@@ -67,11 +73,13 @@ impl TreeScratch {
             energy: EnergyScratch::new(token, mechanism),
             gyroscopic: GyroscopicScratch::default(),
             force: vec![0.0; model.nv()],
+            applied: Vec::new(),
             pairs: PairSearch::new(model),
             unknown_ground: None,
             joints_middle: limited.clone(),
             joints_end: limited,
             system: ContactSystem::with_capacity(model, n),
+            friction: Vec::with_capacity(model.rubbing_joints().len()),
             sand: None,
             loops: Loops::of(model),
         }
@@ -172,6 +180,34 @@ impl TreeScratch {
             kinematics,
         };
         Some((sand.as_mut()?, place, factor))
+    }
+
+    /// Computes the generalized force of wrenches at the midpoint.
+    pub(super) fn apply(&mut self, model: &Model, wrenches: &[Wrench]) {
+        self.applied.clear();
+        if wrenches.is_empty() {
+            return;
+        }
+        self.applied.resize(model.nv(), 0.0);
+        for wrench in wrenches {
+            wrench.add_force(model, &self.kinematics, &mut self.applied);
+        }
+    }
+
+    /// Keeps W's entries of the joints with dry friction, once W is assembled.
+    pub(super) fn note_friction(&mut self, contacts: &[Contact]) {
+        self.friction.clear();
+        for (c, contact) in contacts.iter().enumerate() {
+            if let Some(joint) = joint_of(contact) {
+                self.friction.push((joint, self.system.normal_entry(c)));
+            }
+        }
+    }
+
+    /// W's entry of the normal of a joint's friction.
+    pub(super) fn friction_entry(&self, joint: usize) -> f64 {
+        let found = self.friction.iter().find(|(own, _)| *own == joint);
+        found.map_or(0.0, |(_, entry)| *entry)
     }
 
     /// Places the bodies at the midpoint of the step.

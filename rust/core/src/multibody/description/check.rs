@@ -78,6 +78,7 @@ fn check_joint(
         (solid.hold.is_some(), "hold", has_axis),
         (solid.spring.is_some(), "spring", has_axis),
         (solid.damping.is_some(), "damping", has_axis),
+        (solid.friction.is_some(), "friction", has_axis),
         (solid.armature.is_some(), "armature", has_axis),
         (solid.limits.is_some(), "limits", has_axis),
         (solid.drive.is_some(), "drive", kind == JointKind::Revolute),
@@ -137,6 +138,7 @@ fn check_properties(
         in_range(&at("spring.rest"), spring.rest, 1e9, "at most 1e9 rad or m")?;
     }
     moderate(&at("damping"), solid.damping.unwrap_or(0.0))?;
+    moderate(&at("friction"), solid.friction.unwrap_or(0.0))?;
     moderate(&at("armature"), solid.armature.unwrap_or(0.0))?;
     check_limits(i, solid)?;
     if let Some(drive) = solid.drive {

@@ -129,6 +129,10 @@ pub struct SolidDescription {
     /// Viscous damping of the joint, N m s/rad or N s/m; 0 by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub damping: Option<f64>,
+    /// Dry friction of the joint, N m or N: largest torque or force with which it resists; 0 by
+    /// default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction: Option<f64>,
     /// Rotor inertia reflected to the joint, kg m² or kg; 0 by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub armature: Option<f64>,

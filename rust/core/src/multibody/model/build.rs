@@ -85,6 +85,9 @@ impl Model {
         let limited = (0..joints.len())
             .filter(|&joint| joints[joint].limits.is_some())
             .collect();
+        let rubbing = (0..joints.len())
+            .filter(|&joint| joints[joint].passive.friction > 0.0)
+            .collect();
         let joint_velocities = joints.iter().map(|joint| joint.velocity).collect();
         let armatures = (joints.iter())
             .filter(|joint| joint.passive.armature > 0.0)
@@ -98,6 +101,7 @@ impl Model {
             has_slides,
             armatures,
             limited,
+            rubbing,
             joint_velocities,
             trees,
             mechanism,

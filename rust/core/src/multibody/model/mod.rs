@@ -54,6 +54,8 @@ pub struct Model {
     armatures: Vec<(usize, f64)>,
     /// Indices of the joints with stops.
     limited: Vec<usize>,
+    /// Indices of the joints with dry friction.
+    rubbing: Vec<usize>,
     loops: Vec<Loop>,
     has_slides: bool,
     mass: f64,
@@ -140,6 +142,13 @@ impl Model {
         let couplings = (self.mechanism.links.iter()).filter_map(|link| link.joint.coupling());
         let coupled: f64 = couplings.map(|coupling| coupling.ratio.abs()).sum();
         linear + turning * reach * (1.0 + coupled)
+    }
+
+    /// Indices of the joints with dry friction, ascending.
+    #[inline]
+    #[must_use]
+    pub fn rubbing_joints(&self) -> &[usize] {
+        &self.rubbing
     }
 
     /// Its closed loops, in description order; none for a tree.

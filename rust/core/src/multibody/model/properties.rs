@@ -13,7 +13,7 @@ pub struct JointProperties {
     pub velocity: usize,
     /// PD gains of its position control.
     pub hold: Hold,
-    /// Its spring, damper and rotor, including those of all joints that follow it.
+    /// Its spring, damper, rotor and dry friction, including those of all joints that follow it.
     pub passive: Passive,
     /// Its stops.
     pub limits: Option<Limits>,
@@ -23,7 +23,10 @@ pub struct JointProperties {
     pub is_passive: bool,
 }
 
-/// Spring, damper and rotor: `τ = −stiffness (q − rest) − damping q̇ − armature q̈`.
+/// Spring, damper, rotor and dry friction.
+///
+/// `τ = −stiffness (q − rest) − damping q̇ − armature q̈ − f`; in motion `f = friction sign q̇`, at
+/// rest `|f| ≤ friction`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Passive {
     /// N m/rad or N/m.
@@ -34,6 +37,8 @@ pub struct Passive {
     pub damping: f64,
     /// kg m² or kg.
     pub armature: f64,
+    /// N m or N.
+    pub friction: f64,
 }
 
 impl JointProperties {
@@ -61,6 +66,7 @@ impl Passive {
             rest: solid.spring.map_or(0.0, |spring| spring.rest),
             damping: solid.damping.unwrap_or(0.0),
             armature: solid.armature.unwrap_or(0.0),
+            friction: solid.friction.unwrap_or(0.0),
         }
     }
 
@@ -82,6 +88,7 @@ impl Passive {
             },
             damping: square * self.damping,
             armature: square * self.armature,
+            friction: ratio.abs() * self.friction,
         }
     }
 
@@ -98,6 +105,7 @@ impl Passive {
             },
             damping: self.damping + other.damping,
             armature: self.armature + other.armature,
+            friction: self.friction + other.friction,
         }
     }
 

@@ -1,0 +1,60 @@
+//! Dry friction of a joint: a torque or force f on its velocity with
+//!
+//! ```text
+//! |f| ≤ τ_f,     f = −τ_f sign q̇  where  q̇ ≠ 0
+//! ```
+//!
+//! It is an entry of the contact list, like a stop ([`super::limit`]), and solved together with
+//! all contacts: a joint sticks at zero velocity exactly. Its row t of H is 1 at the joint's
+//! velocity. Its normal row is zero, with a diagonal w of W and a free velocity `−w τ_f h`, so that
+//! `0 ≤ u_N ⊥ p_N ≥ 0` gives the normal impulse `p_N = τ_f h`; with μ = 1 Coulomb's law is the law
+//! above. The row b is zero, too, and its diagonal that of t.
+
+use nalgebra::Vector3;
+
+use super::frame::ContactFrame;
+use super::pair::{Contact, ContactKey, Opposite};
+use super::part::Part;
+use crate::multibody::{JointModel, Kinematics, Model};
+
+/// Adds to `out` the friction of all joints that have it.
+pub fn list_friction(model: &Model, kinematics: &Kinematics, out: &mut Vec<Contact>) {
+    let joints = model.rubbing_joints().iter();
+    out.extend(joints.map(|&joint| contact(model, kinematics, joint)));
+}
+
+/// Index of the joint, if the contact is the friction of one.
+#[inline]
+pub(crate) fn joint_of(contact: &Contact) -> Option<usize> {
+    match contact.part {
+        Part::Friction(joint) => Some(joint),
+        _ => None,
+    }
+}
+
+/// Its point is the origin of the body that the joint carries, its normal the joint's axis.
+fn contact(model: &Model, kinematics: &Kinematics, joint: usize) -> Contact {
+    let body = model.joints()[joint].body;
+    let motion = &kinematics.motions()[model.bodies()[body].motion];
+    let axis: Vector3<f64> = model.bodies()[body].joint.direction(motion).into();
+    let part = Part::Friction(joint);
+    Contact {
+        key: ContactKey {
+            part: part.code(),
+            feature: 2,
+            opposite: Opposite::Stop,
+        },
+        part,
+        body,
+        other: None,
+        point: kinematics.r(body),
+        frame: ContactFrame::of_normal(&axis),
+        gap: 0.0,
+        excess: 0.0,
+    }
+}
+
+/// Makes the own block of W of such a contact regular; its only entry is that of t.
+pub(super) fn close(own: &mut [f64; 9]) {
+    (own[0], own[8]) = (own[4], own[4]);
+}

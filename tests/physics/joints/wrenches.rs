@@ -1,0 +1,139 @@
+//! Forces and moments from outside on the solids of a machine.
+
+use std::sync::Arc;
+
+use rover_core::draw::resting_pose;
+use rover_core::geometry::Plane;
+use rover_core::integrator::Variant;
+use rover_core::multibody::{JointKind, Model, coordinates};
+use rover_core::simulation::{CommandError, LinearisationError, RoverSimulation};
+
+use super::machines::{energy, model, options, simulation, solid};
+
+const VARIANTS: [Variant; 2] = [Variant::Linearised, Variant::Newton];
+
+/// `v = F t / m − g t`, and about a principal axis `ω = M t / I`; the work is the kinetic energy.
+#[test]
+fn a_free_body_answers_by_mass_and_inertia() {
+    for variant in VARIANTS {
+        let mut body = solid("body", None, JointKind::Free);
+        body.mass = 2.0;
+        body.inertia = Some([0.1, 0.2, 0.3, 0.0, 0.0, 0.0]);
+        let mut run = simulation(model(vec![body]), options(1e-2, variant));
+        run.apply_wrench("body", [3.0, 2.0 * 9.81, 0.0], [0.0, 0.4, 0.0], [0.0; 3])
+            .unwrap();
+        let report = run.step(100).unwrap();
+        let expected = [1.5, 0.0, 0.0, 0.0, 2.0, 0.0];
+        for (v, expected) in run.v().iter().zip(expected) {
+            assert!((v - expected).abs() < 1e-12, "{variant:?} {:?}", run.v());
+        }
+        assert!(report.energy_removed.abs() < 1e-9 && report.energy_lost.abs() < 1e-9);
+        // Taken away, the body flies on.
+        run.apply_wrench("body", [0.0; 3], [0.0; 3], [0.0; 3])
+            .unwrap();
+        run.step(10).unwrap();
+        assert!((run.v()[1] + 0.981).abs() < 1e-12 && (run.v()[4] - 2.0).abs() < 1e-12);
+    }
+}
+
+/// A force at a point of an arm is the torque `x F_y − y F_x` about its axis.
+#[test]
+fn a_force_on_an_arm_turns_it_as_its_moment_does() {
+    let arm = || {
+        let mut arm = solid("arm", None, JointKind::Revolute);
+        let mut hand = solid("hand", Some("arm"), JointKind::Fixed);
+        hand.position = Some([0.5, 0.0, 0.0]);
+        hand.rotation = Some([0.0, 0.0, std::f64::consts::FRAC_PI_2]);
+        arm.centre_of_mass = Some([0.0, 0.0, 0.0]);
+        hand.mass = 0.5;
+        model(vec![arm, hand])
+    };
+    for variant in VARIANTS {
+        let mut pushed = simulation(arm(), options(5e-3, variant));
+        // The point lies 0.2 m along the hand's x, the arm's y.
+        pushed
+            .apply_wrench("hand", [0.0, 4.0, 1.0], [0.0, 0.0, 0.3], [0.2, 0.0, 0.0])
+            .unwrap();
+        let mut held = simulation(arm(), options(5e-3, variant));
+        held.set_joint_torques(&[4.0 * 0.5 + 0.3]).unwrap();
+        for run in [&mut pushed, &mut held] {
+            run.step(1).unwrap();
+        }
+        assert!((pushed.v()[0] - held.v()[0]).abs() < 1e-4, "{variant:?}");
+        let before = energy(&pushed);
+        let (mut work, mut q) = (0.0, pushed.q().joints[0]);
+        for _ in 0..200 {
+            pushed.step(1).unwrap();
+            let (next, middle) = (pushed.q().joints[0], 0.5 * (pushed.q().joints[0] + q));
+            let lever = 0.5 * middle.cos() - 0.2 * middle.sin();
+            work += (4.0 * lever + 0.3) * (next - q);
+            q = next;
+        }
+        let gained = energy(&pushed) - before;
+        assert!(
+            (gained - work).abs() < 1e-3 * work.abs().max(1.0),
+            "{gained} {work}"
+        );
+    }
+}
+
+/// Sideways, a parked rover holds what friction holds, and slides beyond.
+#[test]
+fn a_parked_rover_is_pushed_away_beyond_its_friction() {
+    let model = Arc::new(Model::rover());
+    let flat = || Plane::new([0.0, 1.0, 0.0], 0.0).unwrap();
+    let q = resting_pose(&model, &flat(), [0.0, 0.0], 0.0).unwrap();
+    let q = coordinates::from_public(&model, &q).unwrap();
+    for (share, moves) in [(0.9, false), (1.1, true)] {
+        let options = options(5e-3, Variant::Linearised);
+        let push = share * options.friction_coefficient * model.mass() * 9.81;
+        let mut run = RoverSimulation::new(model.clone(), Arc::new(flat()), options).unwrap();
+        run.set_state(q.clone(), vec![0.0; model.nv()]);
+        run.brake();
+        assert!(run.fallback_reason().is_none());
+        run.apply_wrench("trunk", [0.0, 0.0, push], [0.0; 3], [0.0; 3])
+            .unwrap();
+        let reason = run.fallback_reason().unwrap().to_string();
+        assert_eq!(reason, "a wrench is applied");
+        let report = run.step(100).unwrap();
+        assert!(report.is_converged() && report.fallbacks == 100);
+        assert_eq!(run.q().position.z > 1e-2, moves, "{}", run.q().position.z);
+        let snapshot = run.snapshot();
+        let mut again = run.clone();
+        again.clear_wrenches();
+        again.restore(&snapshot).unwrap();
+        run.step(5).unwrap();
+        again.step(5).unwrap();
+        assert_eq!(run.v(), again.v());
+        assert!(matches!(
+            run.linearise(&[], None),
+            Err(LinearisationError::Wrench)
+        ));
+        run.clear_wrenches();
+        assert!(run.fallback_reason().is_none());
+    }
+}
+
+#[test]
+fn a_wrench_on_nobody_or_without_numbers_is_refused() {
+    let mut run = simulation(
+        model(vec![solid("body", None, JointKind::Free)]),
+        options(1e-2, Variant::Linearised),
+    );
+    let zero = [0.0; 3];
+    assert_eq!(
+        run.apply_wrench("nobody", zero, zero, zero)
+            .unwrap_err()
+            .to_string(),
+        "solid: there is no solid named \"nobody\""
+    );
+    let infinite = [0.0, f64::INFINITY, 0.0];
+    assert!(matches!(
+        run.apply_wrench("body", zero, infinite, zero),
+        Err(CommandError::NotFinite {
+            field: "moment",
+            index: 1,
+            ..
+        })
+    ));
+}
