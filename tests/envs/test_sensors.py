@@ -14,6 +14,7 @@ from gymnasium.vector import AutoresetMode
 
 import rover_gym
 from rover_gym import OptionError, Plane, RoverEnv, RoverModel, Simulation, SphereField, StateError
+from rover_gym.rotations import rotation_matrix, rotation_vector
 from rover_gym.sensors import (
     DepthCamera,
     HeadingSensor,
@@ -26,7 +27,6 @@ from rover_gym.sensors import (
     SensorVectorObservation,
     WheelEncoders,
 )
-from rover_gym.sensors.inertial_unit import rotation_matrix, rotation_vector
 from rover_gym.sensors.sensor import Moment
 
 NOISY: list[Sensor] = [

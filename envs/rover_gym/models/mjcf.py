@@ -14,7 +14,6 @@ from typing import Any, NoReturn
 import numpy as np
 
 from rover_gym.extras import require
-from rover_gym.models.import_report import from_quaternion
 from rover_gym.models.robot_tree import (
     MAX_LINKS,
     FileJoint,
@@ -26,6 +25,7 @@ from rover_gym.models.robot_tree import (
     refuse_in,
     right_angle,
 )
+from rover_gym.rotations import from_quaternion
 
 
 def complete_right_angles(mujoco: Any, spec: Any) -> list[str]:
