@@ -15,6 +15,7 @@ from refusals import refused
 
 import rover_gym
 from rover_gym import OptionError, Plane, RoverEnv, RoverModel, Simulation, SphereField, StateError
+from rover_gym.rotations import rotation_matrix, rotation_vector
 from rover_gym.sensors import (
     DepthCamera,
     HeadingSensor,
@@ -27,7 +28,6 @@ from rover_gym.sensors import (
     SensorVectorObservation,
     WheelEncoders,
 )
-from rover_gym.sensors.inertial_unit import rotation_matrix, rotation_vector
 from rover_gym.sensors.sensor import Moment
 
 NOISY: list[Sensor] = [

@@ -200,4 +200,4 @@ def test_a_loop_is_left_out_by_word(tmp_path, what):
     path = write(tmp_path, linkage(what), "linkage.xml")
     model = RoverModel.from_mjcf(path, wheels=[], ignore=["closed loops"])
     assert model.loops == []
-    assert any("left out as told" in entry for entry in model.import_report.left_out)
+    assert any("left out because of `ignore`" in entry for entry in model.import_report.left_out)

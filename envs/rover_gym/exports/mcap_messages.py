@@ -23,7 +23,7 @@ from rover_gym.exports.axes import MAP_FROM_WORLD
 from rover_gym.extras import MissingExtraError, require
 from rover_gym.record.channels import RecordingError, file_path
 from rover_gym.record.steady_file import FileInUseError, SteadyFile
-from rover_gym.replay.rotations import quaternions
+from rover_gym.rotations import quaternions
 from rover_gym.validation import refuse
 
 if TYPE_CHECKING:

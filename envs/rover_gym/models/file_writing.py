@@ -10,8 +10,9 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from rover_gym.mechanics import ModelError, RoverModel
-from rover_gym.models.import_report import Z_UP_TO_Y_UP, Array, quaternion, roll_pitch_yaw, rotation_matrix, turn_z_to
+from rover_gym.models.import_report import Z_UP_TO_Y_UP, Array
 from rover_gym.models.robot_tree import THIN_DISC, FileShape, check_kinds, checked_path
+from rover_gym.rotations import quaternion, roll_pitch_yaw, rotation_matrix, turn_z_to
 from rover_gym.validation import refuse
 
 #: Width of the cylinder that represents a thin disc, relative to its radius.
@@ -92,7 +93,7 @@ def written_solids(model: RoverModel) -> list[WrittenSolid]:
 def _written(source: dict[str, Any]) -> FileShape:
     """A shape in the axes of robot files."""
     centre = np.zeros(3) if source.get("position") is None else _TO_FILE @ np.array(source["position"])
-    R = _TO_FILE @ rotation_matrix(np.array(source.get("rotation") or (0.0, 0.0, 0.0))) @ _TO_FILE.T
+    R = _TO_FILE @ rotation_matrix(source.get("rotation") or (0.0, 0.0, 0.0)) @ _TO_FILE.T
     made = FileShape("cylinder", (), centre, R, bool(source.get("collides")), bool(source.get("visible", True)))
     match source["kind"]:
         case "box":
@@ -140,7 +141,7 @@ def _mass_properties(solid: dict[str, Any]) -> tuple[Array, Array]:
     centre = sum((m * r for m, r in zip(masses, places, strict=True)), np.zeros(3)) / sum(masses)
     inertia = np.zeros((3, 3))
     for shape, m, place in zip(shapes, masses, places, strict=True):
-        R, r = rotation_matrix(np.array(shape.get("rotation") or (0.0, 0.0, 0.0))), place - centre
+        R, r = rotation_matrix(shape.get("rotation") or (0.0, 0.0, 0.0)), place - centre
         inertia += R @ np.diag(principal(shape, m)) @ R.T + m * (r @ r * np.eye(3) - np.outer(r, r))
     return centre, inertia
 

@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from rover_gym.extras import require
-from rover_gym.models.import_report import Array, from_quaternion
+from rover_gym.models.import_report import Array
 from rover_gym.models.loops import FileLoop, LoopEnd
 from rover_gym.models.robot_tree import (
     MAX_LINKS,
@@ -27,6 +27,7 @@ from rover_gym.models.robot_tree import (
     refuse_in,
     right_angle,
 )
+from rover_gym.rotations import from_quaternion
 
 
 def complete_right_angles(mujoco: Any, spec: Any) -> list[str]:
@@ -418,7 +419,7 @@ class _Reader:
             reason = "dry friction of free and ball joints is not simulated"
             self.tree.leave_out("friction", f"{at}.frictionloss", friction, reason, row="joint frictionloss")
         elif friction != 0.0 and "friction" in self.tree.ignore:
-            self.tree.left_out.append(f"{at}.frictionloss: {friction:g} (left out as told)")
+            self.tree.left_out.append(f"{at}.frictionloss: {friction:g} (left out because of `ignore`)")
             friction = 0.0
         damping, armature = np.array(m.dof_damping[dofs]), np.array(m.dof_armature[dofs])
         stiffness = float(np.ravel(m.jnt_stiffness[index])[0])

@@ -28,8 +28,9 @@ import numpy as np
 
 from rover_gym.extras import MissingExtraError, require
 from rover_gym.mechanics import ModelError
-from rover_gym.models.import_report import Array, turn_z_to
+from rover_gym.models.import_report import Array
 from rover_gym.models.loops import FileLoop, move_ends
+from rover_gym.rotations import turn_z_to
 from rover_gym.validation import refuse, shown
 
 #: Most links of a file: a model has at most 1000 solids, and links without mass are joined to others.

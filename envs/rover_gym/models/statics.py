@@ -26,8 +26,9 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import ModelError, Plane, RoverModel, Simulation
-from rover_gym.models.import_report import Array, rotation_matrix
+from rover_gym.models.import_report import Array
 from rover_gym.models.robot_tree import FileLink, RobotTree, round_radius
+from rover_gym.rotations import rotation_matrix
 from rover_gym.validation import number, refuse
 
 #: The rover has settled when nothing moves faster than this, m/s and rad/s.
@@ -190,7 +191,7 @@ def _lowest(shape: dict[str, Any], origin: Array, rotation: Array) -> float:
     centre = origin + rotation @ np.array(shape.get("position") or (0.0, 0.0, 0.0))
     if shape["kind"] == "sphere":
         return float(centre[1] - shape["radius"])
-    turn = rotation @ rotation_matrix(np.array(shape.get("rotation") or (0.0, 0.0, 0.0)))
+    turn = rotation @ rotation_matrix(shape.get("rotation") or (0.0, 0.0, 0.0))
     return float(centre[1] - np.abs(turn[1]) @ np.array(shape["size"]) / 2.0)
 
 

@@ -152,7 +152,7 @@ def _friction(tree: RobotTree, at: str, stated: float) -> float:
         tree.refuse(f"{at}.dynamics.friction", stated, "must be finite and not negative")
     if stated == 0.0 or "friction" not in tree.ignore:
         return stated
-    tree.left_out.append(f"{at}.dynamics.friction: {stated:g} (left out as told)")
+    tree.left_out.append(f"{at}.dynamics.friction: {stated:g} (left out because of `ignore`)")
     return 0.0
 
 

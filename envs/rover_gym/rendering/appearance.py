@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.rotations import rotation_matrix
+
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
@@ -261,7 +263,7 @@ def _placed_shapes(solid: Mapping[str, Any]) -> list[_PlacedShape]:
         _PlacedShape(
             shape,
             _vector(shape.get("position")),
-            _turn_by(_vector(shape.get("rotation"))),
+            rotation_matrix(_vector(shape.get("rotation"))),
             shape.get("visible", True),
         )
         for shape in solid.get("shapes", ())
@@ -384,17 +386,6 @@ def _fork_box(
 
 def _box(name: str, size: tuple[float, ...], centre: Vector, colour: Colour) -> Part:
     return Part(name, "box", size, centre, np.eye(3), colour)
-
-
-def _turn_by(vector: Vector) -> npt.NDArray[np.float64]:
-    """The rotation matrix of a rotation vector (axis times angle, rad)."""
-    angle = float(np.linalg.norm(vector))
-    if angle == 0.0:
-        return np.eye(3)
-    x, y, z = np.array(vector) / angle
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    turned: npt.NDArray[np.float64] = np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
-    return turned
 
 
 def _turn_to(axis: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

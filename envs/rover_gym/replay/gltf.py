@@ -16,8 +16,8 @@ import numpy.typing as npt
 from rover_gym.extras import require
 from rover_gym.mechanics import __version__
 from rover_gym.rendering.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR, Colour, Part, sphere_mesh
-from rover_gym.replay.rotations import continuous, quaternions
 from rover_gym.replay.scenery import coloured_meshes, goal_parts, ground_tiles, parts_by_solid, spheres, surfaces
+from rover_gym.rotations import continuous, quaternions
 from rover_gym.validation import checked
 
 if TYPE_CHECKING:

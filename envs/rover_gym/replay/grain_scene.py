@@ -21,7 +21,6 @@ from rover_gym.rendering.appearance import (
 )
 from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, moving_mean, panel_contents
 from rover_gym.replay.page_scene import FrameChannel, PageScene
-from rover_gym.replay.rotations import continuous, quaternions
 from rover_gym.replay.rover_scene import GRAVITY, add_ground, add_rover, add_surfaces
 from rover_gym.replay.scenery import (
     MARGIN,
@@ -31,6 +30,7 @@ from rover_gym.replay.scenery import (
     wall_polygons,
     wall_poses,
 )
+from rover_gym.rotations import continuous, quaternions
 
 if TYPE_CHECKING:
     from rover_gym.grains.grain_run import GrainRun

@@ -14,7 +14,6 @@ from rover_gym.record.channels import outcome_words
 from rover_gym.rendering.appearance import GROUND_COLOUR_2, WHEEL_COLOURS
 from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, moving_mean, panel_contents, with_ghost
 from rover_gym.replay.page_scene import FrameChannel, PageScene
-from rover_gym.replay.rotations import continuous, quaternions
 from rover_gym.replay.scenery import (
     MOST_HEIGHTS,
     coloured_meshes,
@@ -28,6 +27,7 @@ from rover_gym.replay.scenery import (
 )
 from rover_gym.replay.sights import recorded_sights
 from rover_gym.replay.wheel_marks import DrawnWheel, drawn_wheels, feet, marks, rut_edits, world_forces
+from rover_gym.rotations import continuous, quaternions
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -23,7 +23,7 @@ from rover_gym.rendering.appearance import (
     pennant,
     rover_parts,
 )
-from rover_gym.replay.rotations import quaternions
+from rover_gym.rotations import quaternions
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

@@ -22,7 +22,6 @@ from rover_gym.rendering.appearance import (
     Colour,
     Part,
 )
-from rover_gym.replay.rotations import axis_angles, continuous, quaternions
 from rover_gym.replay.scenery import (
     first_view,
     goal_parts,
@@ -32,6 +31,7 @@ from rover_gym.replay.scenery import (
     spheres,
     surfaces,
 )
+from rover_gym.rotations import axis_angles, continuous, quaternions
 from rover_gym.validation import checked
 
 if TYPE_CHECKING:

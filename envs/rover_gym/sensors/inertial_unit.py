@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rover_gym.mechanics import OptionError, RoverModel
+from rover_gym.rotations import rotation_matrix, rotation_vector
 from rover_gym.sensors.sensor import Array, Moment, Mount, Sensor, Values, gaussian, uniform
 from rover_gym.validation import Range, refuse
 
@@ -114,24 +115,3 @@ class InertialUnit(Sensor):
     @staticmethod
     def _noise(generator: np.random.Generator, accelerometer: float, gyroscope: float) -> Array:
         return np.concatenate([gaussian(generator, one, 3) for one in (accelerometer, gyroscope)])
-
-
-def rotation_vector(rotation: Array) -> Array:
-    """Axis times angle, (3,), rad, of a rotation matrix (3, 3) by less than half a turn."""
-    skew = np.array([rotation[2, 1], rotation[0, 2], rotation[1, 0]])
-    skew = 0.5 * (skew - np.array([rotation[1, 2], rotation[2, 0], rotation[0, 1]]))
-    sine = float(np.linalg.norm(skew))
-    angle = math.atan2(sine, 0.5 * (float(np.trace(rotation)) - 1.0))
-    vector: Array = skew * (angle / sine if sine > 0.0 else 1.0)
-    return vector
-
-
-def rotation_matrix(vector: Array) -> Array:
-    """Rotation matrix, (3, 3), about an axis by an angle, given as their product (3,), rad."""
-    angle = float(np.linalg.norm(vector))
-    if angle == 0.0:
-        return np.eye(3)
-    x, y, z = vector / angle
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    turned: Array = np.eye(3) + math.sin(angle) * skew + (1.0 - math.cos(angle)) * skew @ skew
-    return turned

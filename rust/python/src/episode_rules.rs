@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyTuple};
-use rover_core::episode::observation::{Field, Sizes, fields};
+use rover_core::episode::channels::{Field, Sizes, fields};
 use rover_core::episode::{Rules, Settings, TERMS, Weights};
 use rover_core::multibody::Model;
 

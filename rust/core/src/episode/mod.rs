@@ -3,9 +3,10 @@
 //!
 //! An agent chooses an action once a control period, which lasts several physics steps. The rover
 //! is given the action's commands ([`action`]), takes its steps and is read
-//! ([`crate::simulation::reading`]). From the reading follow the observation ([`observation`], with
-//! [`noise`]), its [`quantities`], the [`progress`] of the episode, the terms of the [`reward`] and
-//! whether and why the episode ends ([`ending`]); together they are the period's [`outcome`].
+//! ([`crate::simulation::reading`]). From the reading follow the [`observation`], whose fields
+//! [`channels`] declares (with [`noise`]), its [`quantities`], the [`progress`] of the episode, the
+//! terms of the [`reward`] and whether and why the episode ends ([`ending`]); together they are the
+//! period's [`outcome`].
 //!
 //! - [`rules`]: what all episodes of a task share; [`beginning`]: how one begins, in a scene that
 //!   is drawn ([`crate::draw`]); [`setting`]: what was drawn for it;
@@ -40,6 +41,7 @@
 pub mod action;
 pub mod batch;
 pub mod beginning;
+pub mod channels;
 mod control_period;
 pub mod ending;
 pub mod error;

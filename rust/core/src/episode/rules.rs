@@ -3,9 +3,9 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::channels::{Field, Sizes, fields};
 use super::ending::Ending;
 use super::error::{EpisodeError, check_lengths};
-use super::observation::{Field, Sizes, fields};
 use super::progress::Progress;
 use super::quantities::Quantities;
 use super::reward::Weights;
