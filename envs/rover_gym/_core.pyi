@@ -2270,6 +2270,8 @@ class EpisodeRules:
             from 0 to 1.
         free_distance: Distance from the start at which the rover is free, m; none by default. The
             episode then ends, and progress is measured from the start.
+        field_margin: How far the field reaches beyond the rectangle of start and goals, m: an episode
+            ends where the trunk's origin leaves it. No edge by default.
 
     Raises:
         ModelError: `model` is not a RoverModel.
@@ -2312,6 +2314,7 @@ class EpisodeRules:
         goals: int = 1,
         battery: float | None = None,
         free_distance: float | None = None,
+        field_margin: float | None = None,
     ) -> EpisodeRules: ...
     def __getnewargs_ex__(self) -> tuple[tuple[RoverModel], dict[str, Any]]: ...
 

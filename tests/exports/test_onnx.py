@@ -9,9 +9,10 @@ import pytest
 from commands import error_of, output_of
 
 from rover_gym.models import open_model
-from rover_gym.policy import Network, PolicyError, TrainedPolicy, policy_arguments, policy_folder
+from rover_gym.policy import ArcNetwork, Network, PolicyError, TrainedPolicy, policy_arguments, policy_folder
+from rover_gym.policy.arc_driver import observation_space
 from rover_gym.policy.arc_forecast import OUTPUTS
-from rover_gym.policy.policy_card import forecast_folder
+from rover_gym.policy.policy_card import FOLDER, forecast_folder
 
 pytest.importorskip("onnx")
 pytest.importorskip("onnxruntime")
@@ -92,3 +93,17 @@ def test_the_command_writes_a_file_that_the_checker_accepts(tmp_path: Path) -> N
         output_of("export", "onnx", "foresight", "--model", model, "--output", path)
         onnx.checker.check_model(str(path), full_check=True)
     assert (tmp_path / "rover" / "a.onnx").read_bytes() != (tmp_path / "open-rover" / "a.onnx").read_bytes()
+
+
+def test_the_network_for_any_rover_gives_the_same_logits() -> None:
+    network = ArcNetwork.read(FOLDER / "anywhere" / "arcs.npz")
+    space = observation_space()
+    space.seed(3)
+    rows = [space.sample() for _ in range(5)]
+    seen = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
+    model = onnx_policy("anywhere")
+    session = runtime.InferenceSession(model.SerializeToString(), providers=["CPUExecutionProvider"])
+    (logits,) = session.run(None, seen)
+    wanted = network(seen)
+    assert np.abs(logits - wanted).max() < 1e-5 * max(1.0, float(np.abs(wanted).max()))
+    assert facts(model)["kind"] == "arcs"

@@ -71,9 +71,7 @@ def onnx(
     *,
     policy: Annotated[
         str,
-        typer.Argument(
-            help="'trained' or 'foresight' for the package's, or the folder of a policy, a forecast or a raw run."
-        ),
+        typer.Argument(help="'trained', 'foresight', 'anywhere', or the folder of a policy, a forecast or a raw run."),
     ],
     output: Annotated[Path, typer.Option(dir_okay=False, help="File to write.")],
     terrain: Annotated[str, typer.Option(help="Of 'trained': 'plane' or 'rocks'; of 'foresight': 'hills'.")] = "plane",

@@ -56,7 +56,7 @@ def film_options(size: str, camera: str, *, forces: bool, antialiasing: bool) ->
 
 Completer = Callable[[str], list[str]]
 
-DRIVERS = ("pd", "sand", "scan", "foresight", "trained", "planner")
+DRIVERS = ("pd", "sand", "scan", "foresight", "anywhere", "trained", "planner")
 
 
 def complete_terrain(incomplete: str) -> list[str]:

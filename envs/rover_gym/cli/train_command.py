@@ -1,6 +1,8 @@
 """`rover train`: policies by reinforcement learning, one seed or several."""
 
+import os
 import re
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -36,7 +38,9 @@ class ManySeeds(TyperCommand):
 
 @plain_errors
 def train(
-    config: Annotated[str, typer.Argument(help="A configuration of the package, 'plane' or 'rocks', or a YAML file.")],
+    config: Annotated[
+        str, typer.Argument(help="A configuration of the package, 'anywhere', 'plane' or 'rocks', or a YAML file.")
+    ],
     seeds: Annotated[
         list[int] | None,
         typer.Option(
@@ -62,13 +66,20 @@ def train(
     films: Annotated[
         int, typer.Option(min=0, help="Number of fields of each evaluation that are also filmed (extra render).")
     ] = 0,
+    workers: Annotated[
+        int | None,
+        typer.Option(min=1, help="Processes that drive the rovers of 'anywhere'. Default: one per core."),
+    ] = None,
     progress: Annotated[bool, typer.Option(help="Show a progress bar.")] = True,
     show: Annotated[bool, typer.Option("--show", help="Print the configuration as YAML and end.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Train a policy by reinforcement learning.
+    """Train a policy with stable-baselines3 and print its figures.
 
-    The method is stable-baselines3's PPO. Needs the extra `train`.
+    'anywhere' imitates the planners and goes on with PPO: one network for all rovers and grounds. 'plane' and 'rocks'
+    are PPO alone, for one rover.
+
+    Needs the extra `train`.
 
     Checkpoints, TensorBoard's log (`tensorboard --logdir runs/train`), evaluations, the policy
     at the end (`policy`) and the one that did best in the evaluations (`best`) are in the run's folder. Several seeds
@@ -79,16 +90,21 @@ def train(
     if films:
         for package in ("imageio_ffmpeg", "vtkmodules"):
             require(package, "render")
+    from rover_gym.learning.arc_config import is_arc_config  # noqa: PLC0415
     from rover_gym.learning.ppo import Reporting, train_ppo  # noqa: PLC0415 - needs the extra, and slow to load
     from rover_gym.learning.several_seeds import read_seed, write_seeds  # noqa: PLC0415
     from rover_gym.learning.training_config import find_configuration, read_config  # noqa: PLC0415
 
     path = find_configuration(config)
-    settings = read_config(path)
+    of_arcs = is_arc_config(path)
+    settings = None if of_arcs else read_config(path)
     if show:
         typer.echo(path.read_text(encoding="utf-8"), nl=False)
         return
     check_folder("output", output)
+    if settings is None:
+        _train_arcs(path, seeds, output, resume=resume, steps=steps, workers=workers, as_json=as_json)
+        return
     folders, parent = _run_folders(list(dict.fromkeys(seeds or [1])), output, path.stem)
     is_alone = len(folders) == 1
     say = partial(typer.echo, err=as_json)
@@ -115,6 +131,37 @@ def train(
             results.show(plain_table(write_seeds(done, stem)))
             for ending in ("md", "json"):
                 results.path("written", stem.with_name(f"{stem.name}.{ending}"))
+
+
+def _train_arcs(
+    path: Path,
+    seeds: list[int] | None,
+    output: Path | None,
+    *,
+    resume: bool,
+    steps: int | None,
+    workers: int | None,
+    as_json: bool,
+) -> None:
+    """Trains a network that drives by arcs; `steps` are PPO's decisions."""
+    from rover_gym.learning.arc_config import read_arc_config  # noqa: PLC0415 - needs the extra
+    from rover_gym.learning.arc_recipe import train_arcs  # noqa: PLC0415
+
+    settings = read_arc_config(path)
+    if steps is not None and settings.ppo is not None:
+        settings = replace(settings, ppo=replace(settings.ppo, decisions=steps))
+    with Results(as_json=as_json) as results:
+        for seed, folder in _run_folders(list(dict.fromkeys(seeds or [1])), output, path.stem)[0].items():
+            train_arcs(
+                settings,
+                folder,
+                seed=seed,
+                workers=workers or len(os.sched_getaffinity(0)),
+                resume=resume,
+                say=partial(typer.echo, err=as_json),
+            )
+            results.path("policy", folder)
+            results.path("best policy in the evaluations", folder / "best")
 
 
 def _run_folders(seeds: list[int], output: Path | None, name: str) -> tuple[dict[int, Path], Path]:

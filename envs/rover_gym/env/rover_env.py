@@ -217,7 +217,9 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     `"roll_over"`, the trunk leans more than `max_tilt_deg` from the vertical;
     `"high_centred"`, for `stuck_time` seconds the trunk has carried more than a tenth of the weight
     while the rover moved slower than 0.05 m/s; `"step_failed"`, the physics could not take a step:
-    the observation is then the last finite one, and `info["solver"]` says what happened; `"battery_empty"`, see Battery.
+    the observation is then the last finite one, and `info["solver"]` says what happened; `"battery_empty"`, see Battery;
+    `"left_field"`, among rocks and on hills: the trunk's origin is more than 4 m, on hills 25 m, outside the rectangle
+    of start and goals along x or z, where the rocks or the map end.
     `truncated`: after 1200 steps (60 s), by Gymnasium's time limit. Change it with
     `gymnasium.make(..., max_episode_steps=...)`. The environment itself never truncates.
 

@@ -117,6 +117,12 @@ def onnx_model(network: Perceptron, name: str, inputs: str, outputs: str, facts:
         [ends(outputs, network.weights[-1].shape[0])],
         constants,
     )
+    return finished_model(graph, facts)
+
+
+def finished_model(graph: Any, facts: Mapping[str, Any]) -> Any:
+    """The checked model of a graph, with metadata as JSON texts."""
+    onnx = require("onnx", "onnx")
     model = onnx.helper.make_model(
         graph,
         opset_imports=[onnx.helper.make_opsetid("", OPSET)],

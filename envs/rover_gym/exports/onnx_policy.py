@@ -9,11 +9,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rover_gym.exports.onnx_arcs import arcs_model
 from rover_gym.exports.onnx_graph import Perceptron, onnx_model
 from rover_gym.extras import MissingExtraError, require
 from rover_gym.policy.arc_forecast import FORECAST_FILE, OUTPUTS
+from rover_gym.policy.arc_network import ArcNetwork
+from rover_gym.policy.arc_network_policy import ARCS_FILE
 from rover_gym.policy.features import LARGEST_FEATURE
-from rover_gym.policy.policy_card import Network, PolicyCard, PolicyError, find_policy, forecast_folder, is_there
+from rover_gym.policy.policy_card import (
+    ANYWHERE,
+    FOLDER,
+    Network,
+    PolicyCard,
+    PolicyError,
+    find_policy,
+    forecast_folder,
+    is_there,
+)
 from rover_gym.validation import checked, refuse
 
 if TYPE_CHECKING:
@@ -31,6 +43,7 @@ def write_onnx(policy: str | Path, path: str | Path, terrain: str = "plane", mod
     |---|---|---|
     | "trained", or the folder of a trained policy | `features` | `command`: three entries in [-1, 1] |
     | "foresight", or the folder of a forecast | `features` | `outcomes`: way, stuck, failed |
+    | "anywhere", or the folder of a run of it | `scan`, `features`, `command`, `clocks` | `logits` of the arcs |
     | the folder of a run of `RawPolicy.save` | `observation` | `action` |
 
     Args:
@@ -74,6 +87,9 @@ def onnx_policy(policy: str | Path, terrain: str = "plane", model: RoverModel | 
         )
     if is_there(folder / RAW_FILE):
         return _raw(folder)
+    network = FOLDER / ANYWHERE if policy == ANYWHERE else folder
+    if is_there(network / ARCS_FILE):
+        return arcs_model(ArcNetwork.read(network / ARCS_FILE))
     found = find_policy(str(policy), terrain)
     if found is None:
         refuse(PolicyError, "policy", str(policy), "has no network to export")

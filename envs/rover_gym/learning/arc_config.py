@@ -7,7 +7,7 @@ evaluation  scenes and fields of the evaluations
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -143,6 +143,7 @@ class ArcConfig:
 
     Attributes:
         scenes: Scenes by name, as `ArcScene` takes them.
+        environment: Arguments of `RoverArcs-v0` for all scenes; a scene's own go before them.
         rovers: Rovers that drive side by side.
         group: Rovers of a group, which share scene and model.
         imitation: Imitation of the teachers.
@@ -151,6 +152,7 @@ class ArcConfig:
     """
 
     scenes: Mapping[str, Any]
+    environment: Mapping[str, Any] = field(default_factory=dict)
     rovers: int = 64
     group: int = 8
     imitation: ImitationConfig = field(default_factory=ImitationConfig)
@@ -166,10 +168,12 @@ class ArcConfig:
 
     def parsed(self) -> dict[str, ArcScene]:
         """The checked scenes by name."""
-        return {
+        scenes = {
             name: build(ArcScene, mapping(f"scenes.{name}", one), f"scenes.{name}.")
             for name, one in self.scenes.items()
         }
+        common = self.environment
+        return {name: replace(scene, environment={**common, **scene.environment}) for name, scene in scenes.items()}
 
     def groups(self, offset: float = 0.5) -> list[str]:
         """The scene of each group: as many of each as its share says, spread evenly."""

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import gymnasium as gym
-import numpy as np
 import numpy.typing as npt
 import torch
 from stable_baselines3 import PPO
+from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.policies import MultiInputActorCriticPolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import VecEnv
@@ -18,6 +18,7 @@ from rover_gym.learning.arc_config import ArcPPOConfig, ImitationConfig
 from rover_gym.learning.arc_rovers import STEPS, Labels, Rovers
 from rover_gym.policy.arc_driver import SIZES, arc_space, observation_space
 from rover_gym.policy.arc_network import CONVOLUTIONS, DENSE, ArcNetwork
+from rover_gym.policy.scan_policy import SCAN
 
 
 class ArcExtractor(BaseFeaturesExtractor):
@@ -32,7 +33,7 @@ class ArcExtractor(BaseFeaturesExtractor):
             channels = outputs
         self.convolutions = torch.nn.Sequential(*parts, torch.nn.Flatten())
         with torch.no_grad():
-            found = self.convolutions(torch.zeros(1, 1, *space["scan"].shape)).shape[1]
+            found = self.convolutions(torch.zeros(1, 1, *SCAN[:2])).shape[1]
         self.dense = torch.nn.Linear(found + sum(SIZES.values()), DENSE[0])
 
     def forward(self, observations: dict[str, torch.Tensor]) -> torch.Tensor:
@@ -99,19 +100,26 @@ class ArcVecEnv(VecEnv):
         """The rovers are closed by whom made them."""
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """None of any attribute, since the rovers are elsewhere."""
+        """None where stable-baselines3 asks for the render mode: the rovers are elsewhere.
+
+        Raises:
+            AttributeError: Anything else is asked for.
+        """
+        if attr_name != "render_mode":
+            raise AttributeError(attr_name)
         return [None for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Does nothing."""
+        """Refuses: the rovers are elsewhere."""
+        raise NotImplementedError(f"{attr_name}, {value}, {indices}")
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Does nothing."""
-        return [None for _ in self._get_indices(indices)]
+        """Refuses: the rovers are elsewhere."""
+        raise NotImplementedError(f"{method_name}{args}, {indices}, {kwargs}")
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """False: infos of episodes are those of a monitor already."""
-        return [True for _ in self._get_indices(indices)]
+        """True for a monitor, whose infos the workers give."""
+        return [wrapper_class is Monitor for _ in self._get_indices(indices)]
 
 
 def make_model(settings: ArcPPOConfig, venv: VecEnv, seed: int, device: str) -> PPO:
@@ -160,16 +168,17 @@ def imitate(policy: Any, rounds: Sequence[Labels], settings: ImitationConfig, se
         The loss over the last pass, and the share of labels that were the most probable arc.
     """
     device = policy.device
-    # The last tenth of a graphics card's memory matters less than the copies: bytes stay bytes until a batch is drawn.
     data = {
-        name: torch.cat([torch.from_numpy(part[name]) for part in rounds]).to(device) for name in ("scan", *SIZES, "label")
+        name: torch.cat([torch.from_numpy(part[name]) for part in rounds]).to(device)
+        for name in ("scan", *SIZES, "label")
     }
     n, size = len(data["label"]), min(settings.batch_size, len(data["label"]))
     torch.manual_seed(seed)
     optimiser = torch.optim.AdamW(policy.parameters(), settings.learning_rate, weight_decay=1e-4)
     total = settings.epochs * (n // size)
     rate = torch.optim.lr_scheduler.LambdaLR(optimiser, lambda k: min(1.0, (k + 1) / 50) * (1.0 - 0.9 * k / total))
-    losses = hits = seen = 0.0
+    losses: list[torch.Tensor] = []
+    hits: list[torch.Tensor] = []
     policy.set_training_mode(True)
     for epoch in range(settings.epochs):
         order = torch.randperm(n, device=device)
@@ -186,10 +195,10 @@ def imitate(policy: Any, rounds: Sequence[Labels], settings: ImitationConfig, se
             optimiser.step()
             rate.step()
             if epoch == settings.epochs - 1:
-                losses, seen = losses + loss.detach() * size, seen + size
-                hits = hits + (logits.argmax(dim=1) == label).sum()
+                losses.append(loss.detach())
+                hits.append((logits.argmax(dim=1) == label).float().mean())
     policy.set_training_mode(False)
-    return float(losses) / seen, float(hits) / seen
+    return float(torch.stack(losses).mean()), float(torch.stack(hits).mean())
 
 
 def chosen_device(device: str) -> str:
@@ -201,4 +210,5 @@ def chosen_device(device: str) -> str:
 
 def leash_at(settings: ArcPPOConfig, passed: float) -> float:
     """Weight of the divergence where a share of the training has passed."""
-    return settings.leash * (settings.final_leash / max(settings.leash, 1e-12)) ** float(np.clip(passed, 0.0, 1.0))
+    ratio = settings.final_leash / max(settings.leash, 1e-12)
+    return float(settings.leash * ratio ** min(1.0, max(0.0, passed)))

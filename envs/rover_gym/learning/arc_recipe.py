@@ -4,14 +4,15 @@
    planners would have done in its place (dataset aggregation, Ross et al. 2011).
 2. PPO goes on from there. A penalty on the divergence from the imitating network fades.
 
-The run's folder receives `config.yaml`, `run.json`, `curve.csv`, checkpoints, `arcs.npz`, and in `best` the network that
-did best in the evaluations.
+The run's folder receives `config.yaml`, `run.json`, `curve.csv`, checkpoints, `arcs.npz`, and in `best` the network
+that did best in the evaluations.
 """
 
 import csv
 import json
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +21,10 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
-from rover_gym.learning.arc_config import ArcConfig, read_arc_config
+from rover_gym.learning.arc_config import ArcConfig, ArcPPOConfig, read_arc_config
 from rover_gym.learning.arc_learner import ArcVecEnv, chosen_device, imitate, leash_at, make_model, network_of
 from rover_gym.learning.arc_rovers import Labels, Rovers
-from rover_gym.learning.ppo import check_resumable, provenance
+from rover_gym.learning.ppo import provenance
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.arc_network_policy import ARCS_FILE
 from rover_gym.policy.evaluation import summarise
@@ -102,12 +103,14 @@ class ArcTraining:
         """The learner after the last round of imitation, or from a later checkpoint."""
         config, folder = self.config, self.folder
         settings = config.imitation
-        ppo = config.ppo or type(self).no_ppo()
-        n = len(config.groups()) * config.group
+        n, ppo = len(config.groups()) * config.group, config.ppo or ArcPPOConfig()
+        ppo = replace(ppo, batch_size=n * ppo.n_steps)  # nothing is drawn from this learner's buffer
         model = make_model(ppo, ArcVecEnv(None, n), self.seed, self.device)
         done = self.state["rounds"]
         if done:
-            model.policy.load_state_dict(torch.load(folder / "imitation.pt", map_location=self.device, weights_only=True))
+            model.policy.load_state_dict(
+                torch.load(folder / "imitation.pt", map_location=self.device, weights_only=True)
+            )
         if done >= settings.rounds:
             return model
         rounds: list[Labels] = [dict(np.load(folder / f"labels-{k}.npz")) for k in range(done)]
@@ -132,18 +135,11 @@ class ArcTraining:
         self._evaluate(model, "imitation", 0)
         return model
 
-    @staticmethod
-    def no_ppo() -> Any:
-        """Settings of a learner that is not used further."""
-        from rover_gym.learning.arc_config import ArcPPOConfig  # noqa: PLC0415
-
-        return ArcPPOConfig()
-
     # -- reinforcement
 
     def _reinforcement(self, imitated: PPO) -> PPO:
         """Goes on with PPO."""
-        config, settings = self.config, self.config.ppo
+        settings = self.config.ppo
         assert settings is not None  # noqa: S101 - the caller has looked
         n = self.rovers.found(self.seed * 100 + 50 + self.state["decisions"] % 37, 0.5)
         venv = ArcVecEnv(self.rovers, n, settings.reward_scale)
@@ -177,7 +173,11 @@ class ArcTraining:
         network.save(self.folder / ARCS_FILE)
         found = {name: summarise(name, drives) for name, drives in self.rovers.evaluate(network).items()}
         success = float(np.mean([row.success.value for row in found.values()])) if found else 0.0
-        row: dict[str, Any] = {"stage": stage, "decisions": decisions, "cpu_minutes": round(self.cpu_seconds() / 60.0, 2)}
+        row: dict[str, Any] = {
+            "stage": stage,
+            "decisions": decisions,
+            "cpu_minutes": round(self.cpu_seconds() / 60.0, 2),
+        }
         for name, summary in found.items():
             row[name], row[f"{name} J/m"] = summary.success.value, round(summary.energy_per_metre.value)
         is_first = not (self.folder / "curve.csv").exists()
@@ -192,7 +192,10 @@ class ArcTraining:
             network.save(self.folder / "best" / ARCS_FILE)
             self.state["best"] = success
             self._keep()
-        figures = ", ".join(f"{name} {100.0 * one.success.value:.0f}% {one.energy_per_metre.value:.0f} J/m" for name, one in found.items())
+        figures = ", ".join(
+            f"{name} {100.0 * one.success.value:.0f}% {one.energy_per_metre.value:.0f} J/m"
+            for name, one in found.items()
+        )
         self.say(f"{stage}, {decisions} decisions: {figures}{' (best)' if is_best else ''}")
 
     def _keep(self) -> None:
@@ -240,12 +243,10 @@ class _Progress(BaseCallback):
             self._next += settings.every
             training._checkpoint(model)
             training._evaluate(model, "ppo", self.num_timesteps)
-            ends = model.ep_success_buffer
-            kl = model.logger.name_to_value.get("train/entropy_loss", float("nan"))
+            logged, ends = model.logger.name_to_value, model.ep_success_buffer
             training.say(
-                f"  leash {model.ent_coef:.3f}, divergence {kl:.3f}, success while exploring {np.mean(ends or [0]):.0%}, "
-                f"explained {model.logger.name_to_value.get('train/explained_variance', float('nan')):.2f}, "
-                f"{self.num_timesteps / (time.monotonic() - self._clock):.0f} decisions/s"
+                f"  leash {model.ent_coef:.3f}, divergence {logged.get('train/entropy_loss', np.nan):.3f}, "
+                f"success while exploring {np.mean(ends or [0]):.0%}"
             )
 
     def _on_step(self) -> bool:
@@ -256,6 +257,3 @@ class _Progress(BaseCallback):
 def train_arcs(config: ArcConfig, folder: Path, **options: Any) -> Path:
     """Trains as `ArcTraining` does; returns the folder."""
     return ArcTraining(config, folder, **options).run()
-
-
-__all__ = ["ArcTraining", "check_resumable", "train_arcs"]

@@ -1,5 +1,6 @@
 """Groups of rovers that drive by arcs, spread over worker processes; no part of this needs PyTorch."""
 
+import contextlib
 import multiprocessing as mp
 import os
 import time
@@ -189,7 +190,7 @@ def _serve(pipe: Any, config: ArcConfig) -> None:
         name, arguments = asked
         try:
             pipe.send((True, getattr(worker, name)(*arguments)))
-        except Exception:  # noqa: BLE001 - the parent raises it
+        except Exception:
             pipe.send((False, traceback.format_exc()))
 
 
@@ -283,10 +284,8 @@ class Rovers:
     def close(self) -> None:
         """Ends the processes."""
         for pipe in self._pipes:
-            try:
+            with contextlib.suppress(OSError):
                 pipe.send(None)
-            except OSError:
-                pass
         for process in self._processes:
             process.join(5.0)
         self._pipes, self._processes = [], []

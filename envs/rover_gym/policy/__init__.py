@@ -1,6 +1,8 @@
 """Policies: the PD baseline, the scan planner, trained policies, their commands and features, and their evaluation."""
 
 from rover_gym.policy.arc_forecast import FORECAST_FILE, ForesightCosts
+from rover_gym.policy.arc_network import ArcNetwork
+from rover_gym.policy.arc_network_policy import ArcNetworkPolicy
 from rover_gym.policy.arc_search import PathCosts
 from rover_gym.policy.arcs_env import RoverArcsEnv, RoverArcsVectorEnv
 from rover_gym.policy.command import CommandController, CommandLimits
@@ -32,6 +34,8 @@ from rover_gym.policy.trap_env import RoverTrapEnv, RoverTrapVectorEnv, TrapBatc
 __all__ = [
     "ENDS",
     "FORECAST_FILE",
+    "ArcNetwork",
+    "ArcNetworkPolicy",
     "CommandController",
     "CommandLimits",
     "CommandVectorEnv",

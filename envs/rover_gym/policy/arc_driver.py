@@ -19,7 +19,7 @@ from rover_gym.env.start import drive_signs, wheel_centres
 from rover_gym.mechanics import CommandError, Plane, RoverModel, exp, sin_cos
 from rover_gym.policy.command import N_COMMANDS, CommandController
 from rover_gym.policy.features import ground_slope
-from rover_gym.policy.scan_policy import SCAN, ScanMemory, ScanPolicy
+from rover_gym.policy.scan_policy import SCAN, ScanMemory, ScanPolicy, scan_grid
 from rover_gym.validation import array, refuse
 
 #: Direction, curvature and sideways motion of the arcs, over their limits: those of a rover that steers all wheels.
@@ -106,7 +106,7 @@ class ArcDriver:
         self.commands = np.concatenate((ARCS, ARCS)) * np.concatenate((speeds, np.ones((N_ARCS, 2))), axis=1)
         layout, model = rover.observation_layout, rover.model
         self._layout, self._scale, self._shape = layout, layout.scale, SCAN[:2]
-        self._offsets = rover.task.scan
+        self._offsets = scan_grid(rover).offsets
         self._level = -float(model.resting_pose(Plane(), (0.0, 0.0), 0.0)[1])
         self._rover = _measures(rover, plan)
         self._wheels = _Wheels(rover, plan.cruise_speed)
@@ -153,7 +153,7 @@ class ArcDriver:
         return seen, rewards, terminated, truncated
 
     def expert(self, seen: Observations, rovers: Mask, teacher: ScanPolicy | None = None) -> npt.NDArray[np.int64]:
-        """`(n,)` the arcs that a planner would choose for rovers `(n,)`, 0 for the others; the own planner by default."""
+        """`(n,)` the arcs that a planner would choose for rovers `(n,)`, 0 for the others. By default its own."""
         plan = self.planner if teacher is None else teacher
         labels = np.zeros(len(seen), np.int64)
         slopes = ground_slope(self._layout, seen)

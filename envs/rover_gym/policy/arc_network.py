@@ -46,17 +46,17 @@ class ArcNetwork:
     def __call__(self, observation: ArcObservation) -> Single:
         """`(n, 64)` logits for observations of n rovers."""
         arrays = self.arrays
-        x = observation["scan"][:, None]
+        x: Single = observation["scan"][:, None]
         n = len(x)
         for i, (outputs, kernel, stride) in enumerate(CONVOLUTIONS):
             windows = np.lib.stride_tricks.sliding_window_view(x, (kernel, kernel), (2, 3))[:, :, ::stride, ::stride]
             rows, columns = windows.shape[2:4]
             patches = windows.transpose(0, 2, 3, 1, 4, 5).reshape(n * rows * columns, -1)
-            y = patches @ arrays[f"conv_{i}"].reshape(outputs, -1).T + arrays[f"conv_bias_{i}"]
-            x = np.maximum(y, 0.0).reshape(n, rows, columns, outputs).transpose(0, 3, 1, 2)
+            y: Single = patches @ arrays[f"conv_{i}"].reshape(outputs, -1).T + arrays[f"conv_bias_{i}"]
+            x = np.maximum(y, np.float32(0.0)).reshape(n, rows, columns, outputs).transpose(0, 3, 1, 2)
         y = np.concatenate((x.reshape(n, -1), *(observation[name] for name in SIZES)), axis=1)
         for i in range(len(DENSE)):
-            y = np.maximum(y @ arrays[f"dense_{i}"].T + arrays[f"dense_bias_{i}"], 0.0)
+            y = np.maximum(y @ arrays[f"dense_{i}"].T + arrays[f"dense_bias_{i}"], np.float32(0.0))
         last = len(DENSE)
         logits: Single = y @ arrays[f"dense_{last}"].T + arrays[f"dense_bias_{last}"]
         return logits

@@ -23,8 +23,8 @@ class ArcNetworkPolicy:
     """Drives a rover by a network of `rover train anywhere`; it has stable-baselines3's `predict`.
 
     Args:
-        env: A rover environment made with `ScanPolicy.arguments(model)`, wrapped or not, or a vector of them. It is read
-            once.
+        env: A rover environment made with `ScanPolicy.arguments(model)`, wrapped or not, or a vector of them. It is
+            read once.
         network: The network.
         seed: Of the arcs that are drawn with `deterministic=False`.
 
@@ -75,10 +75,9 @@ class ArcNetworkPolicy:
         given = array("observation", observation, error=StateError)
         check_observed(given, self._size)
         rows = np.atleast_2d(given).astype(np.float32)
-        *kept, since = (None, None) if state is None else state
+        kept, since = (None, np.zeros(len(rows), np.int64)) if state is None else (state[:-1], state[-1].copy())
         driver = self._driver
-        driver.memory = memory = ScanMemory.of(tuple(kept) if state is not None else None, len(rows))
-        since = np.zeros(len(rows), np.int64) if since is None else since.copy()
+        driver.memory = memory = ScanMemory.of(kept, len(rows))
         if episode_start is not None:
             begins = np.broadcast_to(episode_start, (len(rows),))
             memory.forget(begins)
@@ -87,7 +86,7 @@ class ArcNetworkPolicy:
         if due.any():
             driver.notice(rows, due)
             observed = {name: part[due] for name, part in driver.observe(rows).items()}
-            logits = self._network(observed)
+            logits: npt.NDArray[Any] = self._network(observed)
             if not deterministic:
                 logits = logits + self._random.gumbel(size=logits.shape)
             arcs = np.zeros(len(rows), np.int64)

@@ -57,7 +57,7 @@ def arc_arguments(arguments: Mapping[str, Any]) -> dict[str, Any]:
     return {**given, "model": model, **ScanPolicy.arguments(model)}
 
 
-class RoverArcsEnv(gym.Wrapper[ArcObservation, np.int64, Observations, Observations]):
+class RoverArcsEnv(gym.Wrapper[Any, Any, Observations, Observations]):
     """Drive any rover to a goal by choosing one of 64 arcs five times a second.
 
     Task, reward terms, ends and info are those of `Rover-v0`, whose card describes them. What differs:
@@ -65,9 +65,9 @@ class RoverArcsEnv(gym.Wrapper[ArcObservation, np.int64, Observations, Observati
     ## Action
 
     `Discrete(64)`, held for 0.2 s, or until the episode ends. Actions 0 to 31 are the arcs of
-    `rover_gym.policy.arc_driver.ARCS` at cruising speed: 25 forward, 7 backward. Actions 32 to 63 are the same arcs while
-    pushing, as the planner does where a rock stops the rover. Curvature and sideways motion are relative to what the
-    rover can steer; a rover that does not steer all wheels drives an arc without its sideways motion.
+    `rover_gym.policy.arc_driver.ARCS` at cruising speed: 25 forward, 7 backward. Actions 32 to 63 are the same arcs
+    while pushing, as the planner does where a rock stops the rover. Curvature and sideways motion are relative to what
+    the rover can steer; a rover that does not steer all wheels drives an arc without its sideways motion.
 
     ## Observation
 
@@ -80,7 +80,7 @@ class RoverArcsEnv(gym.Wrapper[ArcObservation, np.int64, Observations, Observati
     | command  | (3,)     | the last command                                                                         |
     | clocks   | (14,)    | time without movement, without progress, of backing off; the last places of being stuck  |
 
-    The clocks are the memory of `ScanPolicy`, kept up by the environment. The rover backs off after a backward arc, too.
+    The clocks are the memory of `ScanPolicy`, which the environment updates. A backward arc begins a retreat, too.
 
     ## Reward
 
@@ -143,7 +143,7 @@ class RoverArcsEnv(gym.Wrapper[ArcObservation, np.int64, Observations, Observati
     def expert_action(self, teacher: ScanPolicy | CommandPlanner | None = None) -> np.int64:
         """The arc that a planner would choose now; the planner of the driver by default."""
         if teacher is None or isinstance(teacher, ScanPolicy):
-            return self.driver.expert(self._seen, np.ones(1, np.bool_), teacher)[0]
+            return np.int64(self.driver.expert(self._seen, np.ones(1, np.bool_), teacher)[0])
         return np.int64(planned_arc(teacher, self._seen[0], self.driver))
 
     def _observe(self) -> ArcObservation:
@@ -157,7 +157,8 @@ class RoverArcsEnv(gym.Wrapper[ArcObservation, np.int64, Observations, Observati
             self.rover.has_scan = True
         if terminated and not has_scan:
             seen = self.rover.complete_observation()
-        return seen[None], np.array([reward]), np.array([terminated]), np.zeros(1, np.bool_)
+        ended: Mask = np.array([terminated])
+        return seen[None], np.array([reward]), ended, np.zeros_like(ended)
 
 
 def planned_arc(teacher: CommandPlanner, seen: Observations, driver: ArcDriver) -> int:
@@ -173,8 +174,8 @@ def planned_arc(teacher: CommandPlanner, seen: Observations, driver: ArcDriver) 
 class RoverArcsVectorEnv(VectorEnv[ArcObservation, Any, Any]):
     """A vector of `RoverArcsEnv` environments that the compiled core steps on several threads.
 
-    Observations, rewards and ends equal, bit for bit, those of a `SyncVectorEnv` of them with a `TimeLimit` and the same
-    arguments and seeds.
+    Observations, rewards and ends equal, bit for bit, those of a `SyncVectorEnv` of them with a `TimeLimit` and the
+    same arguments and seeds.
 
     Args:
         num_envs: Number of rovers.
@@ -214,7 +215,7 @@ class RoverArcsVectorEnv(VectorEnv[ArcObservation, Any, Any]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._over: Mask = np.zeros(num_envs, np.bool_)
-        self._seen = np.zeros((num_envs, self.rovers.single_observation_space.shape[0]), np.float32)
+        self._seen = np.zeros((num_envs, self.rovers.prototype.observation_layout.size), np.float32)
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
@@ -246,9 +247,6 @@ class RoverArcsVectorEnv(VectorEnv[ArcObservation, Any, Any]):
         )
         self.driver.notice(self._seen, moved)
         self._over = terminated | truncated
-        if truncated.any():
-            for i in np.flatnonzero(truncated).tolist():
-                self._seen[i] = batch.complete_observation(i)
         last, infos = self.driver.observe(self._seen), batch.infos()
         if self.rovers.autoreset_mode == AutoresetMode.SAME_STEP and self._over.any():
             over = self._over

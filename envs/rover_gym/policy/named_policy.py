@@ -11,8 +11,9 @@ import numpy.typing as npt
 
 from rover_gym.mechanics import RoverModel
 from rover_gym.policy.arc_forecast import FORECAST_FILE
+from rover_gym.policy.arc_network_policy import ARCS_FILE, ArcNetworkPolicy
 from rover_gym.policy.pd_policy import PDPolicy
-from rover_gym.policy.policy_card import find_policy, is_there, policy_arguments
+from rover_gym.policy.policy_card import ANYWHERE, FOLDER, find_policy, is_there, policy_arguments
 from rover_gym.policy.sand_policy import SandPolicy
 from rover_gym.policy.scan_policy import ScanPolicy
 from rover_gym.policy.trained_policy import TrainedPolicy
@@ -21,6 +22,7 @@ from rover_gym.policy.trained_policy import TrainedPolicy
 NAMES_HELP = (
     "'pd' for the baseline, 'sand' for the one that crawls on sand, 'scan' for the search on the height scan, "
     "'foresight' for the same with a learned prediction, "
+    "'anywhere' for the network that drives any rover without a planner, "
     "'trained' for the trained policy of the package, or the folder of a run, a trained policy or a forecast."
 )
 
@@ -32,6 +34,7 @@ _TITLES = {
     "sand": "the crawler on sand",
     "scan": "the search on the height scan",
     "foresight": "the search with foresight",
+    ANYWHERE: "the network for any rover",
 }
 
 
@@ -66,8 +69,8 @@ def named_policy(policy: str, terrain: str, model: RoverModel | None = None) -> 
     """The policy of a name, for a terrain and a rover; None is the built-in one.
 
     Args:
-        policy: "pd", "sand", "scan", "foresight", "trained" for the policy shipped for the terrain, or the folder of a
-            run, a trained policy or a forecast.
+        policy: "pd", "sand", "scan", "foresight", "anywhere", "trained" for the policy shipped for the terrain, or the
+            folder of a run, a trained policy or a forecast.
         terrain: The argument of the environment.
         model: The rover, to which the planner fits its height scan.
 
@@ -78,12 +81,19 @@ def named_policy(policy: str, terrain: str, model: RoverModel | None = None) -> 
     if policy == "foresight" or is_there(Path(policy) / FORECAST_FILE):
         forecast = True if policy == "foresight" else policy
         return NamedPolicy(ScanPolicy.arguments(model), partial(ScanPolicy, forecast=forecast))
+    network = FOLDER / ANYWHERE if policy == ANYWHERE else Path(policy)
+    if is_there(network / ARCS_FILE):
+        return NamedPolicy(ScanPolicy.arguments(model), partial(_load_network, network))
     folder = find_policy(policy, terrain)
     if folder is not None:
         return NamedPolicy(policy_arguments(folder), partial(_load, folder))
     if policy == "scan":
         return NamedPolicy(ScanPolicy.arguments(model), ScanPolicy)
     return NamedPolicy({}, SandPolicy if policy == "sand" else PDPolicy)
+
+
+def _load_network(folder: Path, env: Any) -> Policy:
+    return ArcNetworkPolicy.load(env, folder)
 
 
 def _load(folder: Any, env: Any) -> Policy:

@@ -284,6 +284,9 @@ FORECASTS: Mapping[str, str] = {"open-rover": "foresight-open-rover"}
 
 HILLS_FORECAST, ROCKS_FORECAST = "foresight-hills", "foresight"
 
+#: The shipped network for any rover: its name, and its folder's.
+ANYWHERE = "anywhere"
+
 FOLDER = Path(__file__).parents[1] / "data" / "policies"
 
 
@@ -328,8 +331,8 @@ def find_policy(policy: str, terrain: str) -> Path | None:
             PolicyError,
             "policy",
             policy,
-            "must be 'pd', 'sand', 'scan', 'foresight', 'trained' or the folder of a run, a trained policy or a "
-            "forecast",
+            "must be 'pd', 'sand', 'scan', 'foresight', 'anywhere', 'trained' or the folder of a run, a trained policy "
+            "or a forecast",
         )
     return folder
 

@@ -1,0 +1,208 @@
+"""`RoverArcs-v0`: arcs as actions, single and as a vector, its expert, and the network that drives by it."""
+
+import time
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from rover_gym import CommandError, OptionError, RoverEnv, RoverModel
+from rover_gym.planning import PlannerOptions, PlannerPolicy
+from rover_gym.policy import (
+    ArcNetwork,
+    ArcNetworkPolicy,
+    PolicyError,
+    RoverArcsEnv,
+    RoverArcsVectorEnv,
+    ScanPolicy,
+    named_policy,
+)
+from rover_gym.policy.arc_driver import ARCS, N_ARCS, arc_of
+from rover_gym.policy.arc_network import shapes
+from rover_gym.policy.evaluation import drive_all
+from rover_gym.policy.policy_card import FOLDER
+
+SHIPPED = FOLDER / "anywhere"
+
+
+def random_network(seed: int = 0) -> ArcNetwork:
+    rng = np.random.default_rng(seed)
+    return ArcNetwork({name: 0.05 * rng.normal(size=shape).astype(np.float32) for name, shape in shapes().items()})
+
+
+@pytest.mark.filterwarnings("ignore:.*is different from the unwrapped version")
+def test_it_keeps_gymnasiums_contract() -> None:
+    check_env(RoverArcsEnv(terrain="rocks"), skip_render_check=True)
+
+
+@pytest.mark.parametrize("name", RoverModel.names())
+def test_the_table_has_the_planners_arcs_of_every_rover(name: str) -> None:
+    model = RoverModel.named(name)
+    planner = ScanPolicy(RoverEnv(model=model, **ScanPolicy.arguments(model)))
+    table = {tuple(arc) for arc in ARCS.round(9).tolist()}
+    arcs = [tuple(arc) for arc in planner.commands.round(9).tolist()]
+    if name == "rover":
+        np.testing.assert_allclose(planner.commands, ARCS, atol=1e-12)
+    steered = [arc for arc in arcs if arc[2] == 0.0]
+    assert set(steered) <= table
+    assert len(ARCS) == 32
+    for arc in steered:
+        assert ARCS[arc_of(arc, pushes=False)].round(9).tolist() == list(arc)
+        assert arc_of(arc, pushes=True) == 32 + arc_of(arc, pushes=False)
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+@pytest.mark.parametrize("model", [None, "skid-steered"])
+def test_a_vector_gives_the_bits_of_single_environments(mode: str, model: str | None) -> None:
+    n, limit = 3, 12
+    arguments: dict[str, Any] = {"terrain": "rocks", "difficulty": (0.5, 2.0), "friction": (0.4, 0.7), "model": model}
+    vector = RoverArcsVectorEnv(n, threads=2, max_episode_steps=limit, autoreset_mode=mode, **arguments)
+    rule = gym.vector.AutoresetMode(mode)
+    single = gym.vector.SyncVectorEnv(
+        [lambda: gym.wrappers.TimeLimit(RoverArcsEnv(**arguments), limit)] * n, autoreset_mode=rule
+    )
+    seen, _ = vector.reset(seed=5)
+    alone, _ = single.reset(seed=5)
+    rng = np.random.default_rng(0)
+    ends = 0
+    for _ in range(30):
+        for key in seen:
+            np.testing.assert_array_equal(seen[key], alone[key], err_msg=key)
+        actions = rng.integers(0, N_ARCS, n)
+        seen, rewards, terminated, truncated, _ = vector.step(actions)
+        alone, *others, _ = single.step(actions)
+        for mine, theirs in zip((rewards, terminated, truncated), others, strict=True):
+            np.testing.assert_array_equal(mine, theirs)
+        ends += int((terminated | truncated).sum())
+    assert ends >= 2 * n
+
+
+def test_the_expert_drives_to_the_goal_as_the_planner_does() -> None:
+    env = RoverArcsEnv(terrain="rocks", difficulty=1.0)
+    seen, _ = env.reset(seed=4)
+    assert env.observation_space.contains(seen)
+    planner = ScanPolicy(env.unwrapped)
+    foresight = ScanPolicy(env.unwrapped, forecast=True)
+    assert 0 <= env.expert_action(foresight) < N_ARCS
+    info: dict[str, Any] = {}
+    for _ in range(300):
+        _, _, terminated, _, info = env.step(env.expert_action(planner))
+        if terminated:
+            break
+    assert info["termination"] == "goal"
+    alone = RoverEnv(terrain="rocks", difficulty=1.0, **ScanPolicy.arguments())
+    observation, _ = alone.reset(seed=4)
+    state, told = None, {}
+    for _ in range(1200):
+        action, state = planner.predict(observation, state)
+        observation, _, terminated, _, told = alone.step(action)
+        if terminated:
+            break
+    assert told["time"] == pytest.approx(info["time"])
+
+
+def test_a_planner_that_knows_the_field_is_a_teacher_too() -> None:
+    env = RoverArcsEnv(terrain="rocks", difficulty=0.5, goal_bearing_deg=0.0)
+    env.reset(seed=1)
+    teacher = PlannerPolicy(env.unwrapped, PlannerOptions(samples=40, iterations=1, horizon=1.2), threads=1)
+    arc = env.expert_action(teacher)
+    assert ARCS[arc % 32][0] == 1.0  # the goal lies ahead
+
+
+def test_bad_arcs_change_nothing() -> None:
+    env = RoverArcsEnv()
+    env.reset(seed=1)
+    before = env.unwrapped.simulation.q
+    for action in (-1, 64, 0.5, np.nan):
+        with pytest.raises(CommandError):
+            env.step(action)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(env.unwrapped.simulation.q, before)
+    with pytest.raises(OptionError) as caught:
+        RoverArcsEnv(height_scan=True)
+    assert caught.value.field == "height_scan"
+
+
+def test_a_rover_that_leaves_the_field_ends_its_episode() -> None:
+    env = RoverEnv(terrain="rocks", difficulty=0.0, heading_deg=0.0, slope_deg=0.0)
+    env.reset(seed=0, options={"position": (0.0, 0.0), "goal": (6.0, 0.0), "heading_deg": 180.0})
+    for _ in range(400):
+        _, reward, terminated, _, info = env.step(np.array([0.3] * 6 + [0.0] * 6, np.float32))
+        if terminated:
+            break
+    assert info["termination"] == "left_field"
+    assert -4.2 < env.simulation.q[0] < -4.0
+    assert reward < 0.0
+    margins = {terrain: RoverEnv(terrain=terrain).task.field_margin for terrain in ("plane", "rocks", "hills", "sand")}
+    assert margins == {"plane": None, "rocks": 4.0, "hills": 25.0, "sand": None}
+
+
+def test_the_planner_sees_a_fence_at_the_edge() -> None:
+    env = RoverArcsEnv(terrain="rocks", difficulty=0.0, slope_deg=0.0)
+    seen, _ = env.reset(seed=0, options={"goal": (6.0, 0.0), "heading_deg": 90.0})
+    assert seen["scan"].max() < 1.0  # 4 m to the edge, and the scan reaches 2.4 m
+    rows, layout = env.unwrapped.progress.observation[None].astype(np.float64), env.unwrapped.observation_layout
+    rows[:, layout["q"].start + 2] = -3.0  # as if it had driven 3 m ahead, to the left of the way to the goal
+    rows[:, layout["goal"].start] -= 3.0 / layout.scale[layout["goal"].start]
+    beyond = env.driver.planner.beyond_field(rows, np.zeros((1, 2)))
+    assert beyond is not None
+    grid = beyond.reshape(48, 40)
+    assert grid[0].all()  # ahead, beyond z = -4
+    assert not grid[24:].any()
+
+
+def test_the_shipped_network_loads_and_decides_in_time() -> None:
+    assert (SHIPPED / "arcs.npz").stat().st_size < 1_000_000
+    named = named_policy("anywhere", "rocks")
+    env = RoverEnv(terrain="rocks", difficulty=1.0, **named.arguments)
+    policy = named.make(env)
+    observation, _ = env.reset(seed=3)
+    times = []
+    for _ in range(30):
+        clock = time.process_time()
+        policy.predict(observation)
+        times.append(time.process_time() - clock)
+    assert np.median(times) < 0.01  # 2 ms on a quiet machine
+
+
+@pytest.mark.parametrize(("model", "least"), [(None, 6), ("open-rover", 5), ("skid-steered", 3)])
+def test_the_shipped_network_reaches_goals(model: str | None, least: int) -> None:
+    rover = None if model is None else RoverModel.named(model)
+    named = named_policy("anywhere", "rocks", rover)
+    arguments = {"terrain": "rocks", "difficulty": 0.5, "model": rover, **named.arguments}
+    drives = drive_all(named.make, range(1_000_000, 1_000_006), arguments=arguments)
+    assert sum(drive.success for drive in drives) >= least
+
+
+def test_a_batch_decides_as_single_rovers_do() -> None:
+    env = RoverEnv(terrain="rocks", difficulty=1.5, **ScanPolicy.arguments())
+    seen = np.stack([env.reset(seed=k)[0] for k in range(4)])
+    policy = ArcNetworkPolicy(env, random_network())
+    together, state = policy.predict(seen)
+    for k in range(4):
+        action, _ = policy.predict(seen[k])
+        np.testing.assert_allclose(action, together[k], atol=1e-5)
+    again, _ = policy.predict(seen, state)  # holds its arcs
+    np.testing.assert_allclose(again, together, atol=1e-5)
+    drawn = {policy.predict(seen[0], deterministic=False)[0].tobytes() for _ in range(40)}
+    assert len(drawn) > 3
+
+
+def test_damaged_networks_are_refused(tmp_path: Path) -> None:
+    network = random_network()
+    network.save(tmp_path / "arcs.npz")
+    read = ArcNetwork.read(tmp_path / "arcs.npz")
+    for name, values in network.arrays.items():
+        np.testing.assert_allclose(read.arrays[name], values, rtol=1e-3, atol=1e-6)
+    for change in ({"dense_0": np.zeros((2, 2), np.float16)}, {"dense_bias_0": np.full(256, np.inf, np.float16)}):
+        arrays = {name: values.astype(np.float16) for name, values in network.arrays.items()} | change
+        np.savez(tmp_path / "arcs.npz", **arrays)
+        with pytest.raises(PolicyError):
+            ArcNetwork.read(tmp_path / "arcs.npz")
+    (tmp_path / "arcs.npz").write_bytes(b"PK nothing")
+    with pytest.raises(PolicyError):
+        ArcNetwork.read(tmp_path / "arcs.npz")
+    with pytest.raises(PolicyError):
+        ArcNetworkPolicy.load(RoverEnv(**ScanPolicy.arguments()), tmp_path / "none")

@@ -1,0 +1,137 @@
+"""`rover train anywhere`: a training in seconds, its files, going on, and the network without PyTorch."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+import yaml
+
+from rover_gym import OptionError
+from rover_gym.learning.arc_config import ArcConfig, ArcPPOConfig, is_arc_config, read_arc_config
+from rover_gym.learning.arc_learner import ArcVecEnv, leash_at, make_model, network_of
+from rover_gym.learning.arc_recipe import train_arcs
+from rover_gym.learning.arc_rovers import Group, Rovers
+from rover_gym.learning.training_config import find_configuration
+from rover_gym.policy import ArcNetwork
+
+TINY: dict[str, Any] = {
+    "scenes": {
+        "rocks": {"environment": {"terrain": "rocks", "difficulty": [0.2, 0.6]}, "share": 2},
+        "small": {"environment": {"terrain": "rocks", "model": "open-rover"}, "vary": True},
+    },
+    "environment": {"reward_weights": {"energy": -1e-4}},
+    "rovers": 6,
+    "group": 2,
+    "imitation": {"rounds": 2, "decisions": 60, "epochs": 1, "batch_size": 32},
+    "ppo": {"decisions": 96, "n_steps": 8, "batch_size": 24, "n_epochs": 1, "every": 48},
+    "evaluation": {"scenes": {"easy": {"terrain": "plane"}}, "fields": 2},
+}
+
+
+def config(tmp_path: Path, **changes: Any) -> ArcConfig:
+    path = tmp_path / "tiny.yaml"
+    path.write_text(yaml.safe_dump({**TINY, **changes}), encoding="utf-8")
+    assert is_arc_config(path)
+    return read_arc_config(path)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_training_writes_a_network_and_goes_on(tmp_path: Path, workers: int) -> None:
+    settings, said = config(tmp_path), []
+    folder = train_arcs(settings, tmp_path / "run", workers=workers, threads=1, device="cpu", say=said.append)
+    ArcNetwork.read(folder / "arcs.npz")
+    ArcNetwork.read(folder / "best" / "arcs.npz")
+    facts = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    assert facts["rounds"] == 2
+    assert facts["decisions"] == 96
+    assert facts["cpu_seconds"] > 0.0
+    assert read_arc_config(folder / "config.yaml") == settings
+    assert any("round 2 of 2" in line for line in said)
+    lines = (folder / "curve.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0].startswith("stage,decisions,cpu_minutes,easy")
+    if workers == 1:
+        assert settings.ppo is not None
+        longer = replace(settings, ppo=replace(settings.ppo, decisions=144))
+        train_arcs(longer, folder, workers=1, threads=1, device="cpu", resume=True, say=said.append)
+        assert json.loads((folder / "run.json").read_text(encoding="utf-8"))["decisions"] == 144
+        other = config(tmp_path, scenes={"rocks": {"environment": {"terrain": "rocks"}}})
+        with pytest.raises(OptionError) as caught:
+            train_arcs(other, folder, resume=True)
+        assert caught.value.field == "scenes"
+
+
+def test_imitation_goes_on_after_a_round(tmp_path: Path) -> None:
+    one = config(tmp_path, ppo=None, imitation={**TINY["imitation"], "rounds": 1})
+    train_arcs(one, tmp_path / "run", threads=1, device="cpu", say=lambda _line: None)
+    said: list[str] = []
+    two = config(tmp_path, ppo=None)
+    train_arcs(two, tmp_path / "run", threads=1, device="cpu", resume=True, say=said.append)
+    assert not any("round 1 of" in line for line in said)
+    assert any("round 2 of 2: 12" in line for line in said)  # labels of both rounds
+
+
+def test_without_a_checkpoint_nothing_goes_on(tmp_path: Path) -> None:
+    with pytest.raises(OptionError) as caught:
+        train_arcs(config(tmp_path), tmp_path / "run", resume=True)
+    assert caught.value.field == "resume"
+
+
+def test_the_network_without_pytorch_is_the_same(tmp_path: Path) -> None:
+    settings = config(tmp_path)
+    model = make_model(ArcPPOConfig(batch_size=128), ArcVecEnv(None, 2), 1, "cpu")
+    group = Group(settings.parsed()["rocks"], 2, 1)
+    seen = group.begin()
+    with torch.no_grad():
+        tensors = {name: torch.from_numpy(part) for name, part in seen.items()}
+        distribution: Any = model.policy.get_distribution(tensors)
+        wanted = torch.log_softmax(torch.from_numpy(network_of(model.policy)(seen)), dim=1)
+    np.testing.assert_allclose(wanted, distribution.distribution.logits, atol=1e-5)
+
+
+def test_the_leash_is_zero_at_its_stake_and_grows(tmp_path: Path) -> None:
+    model = make_model(ArcPPOConfig(batch_size=128), ArcVecEnv(None, 2), 1, "cpu")
+    policy: Any = model.policy
+    seen = Group(config(tmp_path).parsed()["rocks"], 2, 1).begin()
+    tensors, actions = {name: torch.from_numpy(part) for name, part in seen.items()}, torch.zeros(2)
+    policy.tie()
+    assert float(policy.evaluate_actions(tensors, actions)[2].detach().abs().max()) < 1e-6
+    with torch.no_grad():
+        policy.action_net.bias[3] += 2.0
+    assert (policy.evaluate_actions(tensors, actions)[2] < -0.01).all()
+    settings = ArcPPOConfig(leash=0.4, final_leash=0.01)
+    assert [leash_at(settings, x) for x in (0.0, 0.5, 1.0, 2.0)] == pytest.approx([0.4, 0.4 * 0.025**0.5, 0.01, 0.01])
+
+
+def test_a_teachers_labels_are_its_drive(tmp_path: Path) -> None:
+    rovers = Rovers(config(tmp_path))
+    rovers.found(1, 0.5)
+    labels, _ = rovers.label(None, 30, 1.0, 0.0)
+    assert labels["scan"].dtype == np.int8
+    assert len(labels["label"]) >= 30
+    assert labels["label"].max() < 64
+
+
+def test_bad_configurations_are_refused(tmp_path: Path) -> None:
+    for changes, field in (
+        ({"scenes": {}}, "scenes"),
+        ({"scenes": {"a": {"environment": {"bumps": 1}}}}, "environment"),
+        ({"scenes": {"a": {"environment": {}, "teacher": "oracle"}}}, "teacher"),
+        ({"imitation": {"labelled": 0}}, "imitation.labelled"),
+        ({"ppo": {"n_steps": 0}}, "ppo.n_steps"),
+        ({"evaluation": {"seed": 3}}, "evaluation.seed"),
+        ({"horses": 3}, "horses"),
+    ):
+        with pytest.raises(OptionError) as caught:
+            config(tmp_path, **changes)
+        assert caught.value.field is not None
+        assert caught.value.field.startswith(field)
+
+
+def test_the_shipped_configuration_covers_all_scenes() -> None:
+    settings = read_arc_config(find_configuration("anywhere"))
+    assert set(settings.groups()) == set(settings.scenes)
+    assert all(scene.environment["reward_weights"] for scene in settings.parsed().values())
