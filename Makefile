@@ -95,13 +95,15 @@ same-bits: $(STAMPS)/test $(MODULE) ## compare the bits of the development build
 
 # zig links for TARGET against glibc 2.17 or musl 1.2, which any Linux of that kind has.
 CROSS  = $(if $(TARGET),--target $(TARGET)$(if $(findstring gnu,$(TARGET)),.2.17))
+# A library for musl is shared only if the C library is.
+SHARED = $(if $(findstring musl,$(TARGET)),RUSTFLAGS="-C target-feature=-crt-static")
 LINKED = $(if $(TARGET),--zig --target $(TARGET) --compatibility $(if $(findstring musl,$(TARGET)),musllinux_1_2,manylinux2014))
 
 wheel: $(STAMPS)/demo $(if $(TARGET),$(STAMPS)/cross) ## build the wheel, one for every Python from 3.11 on, and the archive of the sources, into dist/ (for another Linux: TARGET=aarch64-unknown-linux-gnu)
 	rm -rf dist envs/rover_gym/_fmu $(STAMPS)/fmu
-	PATH="$(abspath $(BIN)):$$PATH"; $(call unit,$(if $(TARGET),$(TARGET)/)release,--release -p rover-fmu $(CROSS))
+	PATH="$(abspath $(BIN)):$$PATH"; $(SHARED) $(call unit,$(if $(TARGET),$(TARGET)/)release,--release -p rover-fmu $(CROSS))
 	$(BIN)/python -m maturin sdist --out dist
-	PATH="$(abspath $(BIN)):$$PATH" CARGO_TARGET_DIR=$(abspath target) $(BIN)/python -m maturin build --release --quiet --out dist $(LINKED)
+	PATH="$(abspath $(BIN)):$$PATH" $(SHARED) CARGO_TARGET_DIR=$(abspath target) $(BIN)/python -m maturin build --release --quiet --out dist $(LINKED)
 	$(if $(TARGET),rm -rf envs/rover_gym/_fmu)
 	@ls dist/*
 

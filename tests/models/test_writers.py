@@ -154,7 +154,13 @@ PAGE = (ROOT / "docs" / "models.md").read_text(encoding="utf-8")
 SOURCES = ROOT / "rust" / "core" / "src" / "multibody"
 
 #: Structures that are written to a file, and their variants' fields.
-STRUCTURES = ("description/mod.rs", "description/closure.rs", "description/joint.rs", "description/shape.rs", "motor.rs")
+STRUCTURES = (
+    "description/mod.rs",
+    "description/closure.rs",
+    "description/joint.rs",
+    "description/shape.rs",
+    "motor.rs",
+)
 
 
 def fields() -> set[str]:
