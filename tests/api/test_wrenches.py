@@ -30,7 +30,7 @@ def test_a_push_beyond_friction_moves_a_parked_rover():
         snapshot = sim.snapshot()
         sim.clear_wrenches()
         assert sim.fallback_reason is None
-        sim.restore(pickle.loads(pickle.dumps(snapshot)))
+        sim.restore(pickle.loads(pickle.dumps(snapshot)))  # noqa: S301 - written a line above
         assert sim.fallback_reason == "a wrench is applied"
 
 
