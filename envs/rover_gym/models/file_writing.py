@@ -233,7 +233,7 @@ def _add_equality(equality: ET.Element, loop: dict[str, Any], bodies: dict[str |
         site = {"name": f"{loop['name']}_{index}", "pos": text_of((x, -z, y)), "quat": _quaternion(R)}
         ET.SubElement(bodies[body], "site", site)
     sites = {f"site{index}": f"{loop['name']}_{index}" for index in (1, 2)}
-    ET.SubElement(equality, loop["kind"], name=loop["name"], **sites)
+    ET.SubElement(equality, loop["kind"], {"name": loop["name"]} | sites)
 
 
 def _body(above: ET.Element, solid: WrittenSolid, wheel: dict[str, Any] | None) -> ET.Element:

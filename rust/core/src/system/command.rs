@@ -74,7 +74,6 @@ pub struct Command {
     /// Which joints are held (n_joints).
     pub held: Vec<Option<HeldJoint>>,
     /// From outside, at most one a solid.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub wrenches: Vec<Wrench>,
 }
 
