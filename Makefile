@@ -87,10 +87,7 @@ test-rust: $(STAMPS)/core ## the Rust tests only (of tier all with checks of ari
 test-python: $(STAMPS)/test $(STAMPS)/core $(STAMPS)/fmu $(STAMPS)/debian-demo $(STAMPS)/debian-test ## the Python tests only, and the longest ten
 	$(BIN)/pytest --numprocesses auto --tier $(TIER) --durations 10 $(SAME_DRAWS)
 
-same-pace: $(STAMPS)/test $(MODULE) ## how many pictures a second a page of the player draws without a graphics card
-	PYTHONPATH=tests $(BIN)/python -m browser.pace
-
-bits: $(STAMPS)/test $(MODULE) ## compare the bits of the development build and of the build that is shipped with the committed ones
+same-bits: $(STAMPS)/test $(MODULE) ## compare the bits of the development build and of the build that is shipped with the committed ones
 	$(MAKE) --no-print-directory $(STAMPS)/core
 	$(MAKE) --no-print-directory bits
 	$(MAKE) --no-print-directory $(STAMPS)/release
@@ -152,6 +149,9 @@ film: $(STAMPS)/test $(MODULE) ## the moving picture at the head of the manual, 
 	$(BIN)/rover drive --difficulty 1 --policy scan --seed 11 --output runs/film
 	$(BIN)/rover replay runs/film/episode-11.h5 --no-open
 	PYTHONPATH=tests $(BIN)/python -m browser.film runs/film/episode-11.html docs/pictures/rover.webp --begin 0.6
+
+pace: $(STAMPS)/test $(MODULE) ## how many pictures a second a page of the player draws without a graphics card
+	PYTHONPATH=tests $(BIN)/python -m browser.pace
 
 bits: $(STAMPS)/test $(MODULE) ## compare trajectories, bit by bit, with the committed hashes (BITS=--save commits new ones)
 	$(COMPARE).bits $(BITS)
