@@ -70,7 +70,7 @@ def test_several_seeds_end_with_their_mean_and_interval(seeds: tuple[Path, Resul
     assert mean["interval"] == pytest.approx([mean["value"] - half, mean["value"] + half], rel=1e-4)
     assert "| mean of 2 seeds |" in (folder / "tiny-seeds.md").read_text(encoding="utf-8")
     shown = result.stdout.splitlines()
-    assert any(line.startswith(" mean of 2 seeds") or line.startswith("mean of 2 seeds") for line in shown)
+    assert any(line.startswith((" mean of 2 seeds", "mean of 2 seeds")) for line in shown)
     assert "|" not in result.stdout  # a table, not Markdown
 
 
