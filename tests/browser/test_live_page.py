@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from browser.test_replay_page import PATIENCE, await_that, messages, picture, start_browser
+from browser.test_replay_page import PATIENCE, await_that, frames, messages, picture, start_browser
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 
@@ -162,6 +162,26 @@ def test_a_policy_drives_and_a_rock_falls_in_its_way(live: Live) -> None:
     await_that(lambda: live.loop.state.world > world, "the rock")
     choose(live.browser, "driver", "hand")
     await_that(lambda: live.loop.state.scene.driver == "hand", "the driver")
+
+
+@pytest.mark.takes_long("looks at nine pictures")
+def test_overlays_show_what_the_rover_sees_and_those_of_a_planner_wait_for_one(live: Live) -> None:
+    grey = "return [...document.querySelectorAll('#overlays button:disabled')].map((one) => one.dataset.name).sort();"
+    at_rest(live)
+    await_that(lambda: {"plan", "scan"} == set(live.browser.execute_script(grey)) - {"spheres"}, "what is grey by hand")
+    for letter in "cgzb":
+        bare = picture(live.browser)
+        key(live.browser, "keydown", letter)
+        frames(live.browser, 6)
+        assert (np.abs(picture(live.browser) - bare).max(axis=-1) > 20.0).sum() > 50, letter
+        key(live.browser, "keydown", letter)
+        frames(live.browser, 6)
+    key(live.browser, "keydown", "p")
+    await_that(lambda: "choose scan" in text(live.browser, "message"), "the reason")
+    choose(live.browser, "driver", "scan")
+    await_that(lambda: not {"plan", "scan"} & set(live.browser.execute_script(grey)), "plan and scan")
+    choose(live.browser, "driver", "hand")
+    await_that(lambda: "plan" in live.browser.execute_script(grey), "the wheel")
 
 
 def test_text_of_the_drive_is_shown_as_text(live: Live) -> None:

@@ -129,10 +129,15 @@ class GroundActors:
         colours = np.vstack((np.where(odd, dark, light), np.broadcast_to(mean, (len(beyond), 3))))
         colours = mean + np.clip(1.0 - distance / NEAR, 0.0, 1.0) * (colours - mean)
         colours *= brightness  # lit here, once, since haze is drawn unlit
-        haze = np.clip((distance - HAZE[0]) / (HAZE[1] - HAZE[0]), 0.0, 1.0)
-        colours += haze * (np.array(look.SKY_COLOUR) - colours)
+        colours += _haze(distance[:, 0]) * (np.array(look.SKY_COLOUR) - colours)
         vertices = flat @ self._along.T + self._foot
         return actor_of(mesh(vertices, faces, colours, smooth=False), lit=False)
+
+
+def _haze(distance: Array) -> Array:
+    """(n, 1) share of the horizon's colour that ground has at distances (n,), m."""
+    share: Array = np.clip((distance[:, None] - HAZE[0]) / (HAZE[1] - HAZE[0]), 0.0, 1.0)
+    return share
 
 
 class SurfaceActor:
@@ -163,7 +168,9 @@ class SurfaceActor:
         vertices, triangles = triangles_of(self._surface, low, high, MOST_HEIGHTS)
         light, dark = np.array(look.GROUND_COLOUR), np.array(look.GROUND_COLOUR_2)
         odd = np.floor(vertices[:, [0, 2]] / TILE).sum(axis=1) % 2.0 == 1.0
-        self._mapper.SetInputData(mesh(vertices, triangles, np.where(odd[:, None], dark, light)))
+        colours = np.where(odd[:, None], dark, light)
+        colours += _haze(np.linalg.norm(vertices[:, [0, 2]] - middle, axis=1)) * (np.array(look.SKY_COLOUR) - colours)
+        self._mapper.SetInputData(mesh(vertices, triangles, colours))
 
 
 def _tiled(surface: TriangleMesh) -> vtkPolyData:

@@ -21,7 +21,7 @@ from rover_gym.rendering.appearance import (
 )
 from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, moving_mean, panel_contents
 from rover_gym.replay.page_scene import FrameChannel, PageScene
-from rover_gym.replay.rover_scene import GRAVITY, add_ground, add_rover, add_surfaces
+from rover_gym.replay.rover_scene import GRAVITY, add_ground, add_rover, add_surfaces, mass_channel
 from rover_gym.replay.scenery import (
     MARGIN,
     first_view,
@@ -153,6 +153,12 @@ def grain_scene(run: GrainRun, *, follow: bool) -> PageScene:
         scene.channels.append(
             FrameChannel.fine("forces", np.concatenate((run.wheel_centres, run.wheel_forces / share), axis=2))
         )
+        scene.channels.append(mass_channel(rover))
+        scene.facts["missing"] = {
+            "cones": "many balls touch a wheel, each with a normal of its own",
+            "slope": "the ground is balls",
+            **dict.fromkeys(("plan", "scan", "laser", "depth"), "runs of balls do not record it"),
+        }
     return scene
 
 

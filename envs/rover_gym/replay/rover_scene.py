@@ -112,9 +112,10 @@ def bare_scene(run: RoverRun) -> tuple[PageScene, list[DrawnWheel]]:
     return scene, wheels
 
 
-def mass_channel(places: Array) -> FrameChannel:
-    """Mass centres (n, 3), m."""
-    return FrameChannel.fine("mass", places[:, None])
+def mass_channel(run: RoverRun) -> FrameChannel:
+    """The mass centre of a run's rover."""
+    centres = [run.model.tags(q)["centre_of_mass"] for q in run.trajectory["q"]]
+    return FrameChannel.fine("mass", np.array(centres)[:, None])
 
 
 def add_ghost(scene: PageScene, run: RoverRun, ghost: RoverRun) -> tuple[Array, Array]:
@@ -158,8 +159,7 @@ def rover_scene(run: RoverRun, *, follow: bool, ghost: RoverRun | None = None) -
     else:
         scene.facts["friction"] = friction
     if "q" in run.trajectory.data:
-        centres = [run.model.tags(q)["centre_of_mass"] for q in run.trajectory["q"]]
-        scene.channels.append(mass_channel(np.array(centres)))
+        scene.channels.append(mass_channel(run))
     scene.channels += sights.channels()
     sights.describe(scene, run.model)
     scene.arrays["trail"] = ("f4", marks(run, wheels, points).ravel())

@@ -4,6 +4,7 @@
 
 const PLAN_COLOURS = { arcs: 0xffffff, path: 0x2f8cff };
 const SIGHT_COLOURS = { scan: 0xf5d442, laser: 0xff4d3d, depth: 0x35d0ba };
+const DOTS = { scan: 0.014, laser: 0.024, depth: 0.015 }; // half an edge, of the rover's reach
 const BEARS = 0.01; // of a wheel's mean share: a wheel with less stands on nothing
 const SLIDES = 0.97; // of the cone's edge
 
@@ -18,7 +19,7 @@ class Dots {
     const corners = new Uint32Array(12 * count);
     for (let i = 0; i < count; i++) corners.set(Dots.FACES.map((k) => 4 * i + k), 12 * i);
     geometry.setIndex(new THREE.BufferAttribute(corners, 1));
-    const size = (name === "scan" ? 0.014 : 0.01) * view.scene.reach;
+    const size = DOTS[name] * view.scene.reach;
     this.offsets = Dots.CORNERS.map((corner) => corner.map((value) => size * value));
     this.mesh = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({ color: SIGHT_COLOURS[name], side: THREE.DoubleSide, fog: false }));
     this.mesh.frustumCulled = false;
