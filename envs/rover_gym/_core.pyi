@@ -1036,10 +1036,11 @@ class Contacts:
         """Name of the solid in each contact, or of the joint that is at its stop."""
     @property
     def kinds(self) -> list[str]:
-        """Kind of each contact, "wheel", "box" or "sphere"; "limit" for a joint's stop, "friction" for
-        the dry friction of a joint.
+        """Kind of each contact, "wheel", "box" or "sphere"; of a joint, "limit" or "friction".
 
-        For a stop, the contact point is the origin of the solid that the joint carries, and the
+        "limit" is a joint at its stop, "friction" the dry friction of a joint.
+
+        For these, the contact point is the origin of the solid that the joint carries, and the
         normal is the joint's axis in the direction that opens the gap. At a revolute joint, gap,
         impulse and velocity along the normal are in rad, N m s and rad/s. Tangential entries are
         zero. For dry friction, the entry along n of the impulse is its largest value, and the entry
