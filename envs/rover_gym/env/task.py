@@ -141,16 +141,8 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
         has_battery=given["battery"] is not None,
     )
     max_steering = _steering_limit(rover, steering, given["max_steering_deg"])
-    field_margin = FIELD_MARGINS.get(terrain) if isinstance(terrain, str) else None
     rules = _rules(
-        given,
-        rover,
-        layout,
-        substeps=substeps,
-        max_steering=max_steering,
-        scan=points,
-        free_distance=free_distance,
-        field_margin=field_margin,
+        given, rover, layout, substeps=substeps, max_steering=max_steering, scan=points, free_distance=free_distance
     )
     episodes = EpisodeDistribution(
         rules,
@@ -176,7 +168,7 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
         is_noisy=given["observation_noise"] > 0.0,
         goal_tolerance=given["goal_tolerance"],
         n_further=goals - 1,
-        field_margin=field_margin,
+        field_margin=_field_margin(terrain),
         gravity=gravity,
         substeps=substeps,
         dt=substeps * step,
@@ -238,7 +230,6 @@ def _rules(
     max_steering: float,
     scan: npt.NDArray[np.float64] | None,
     free_distance: float | None,
-    field_margin: float | None,
 ) -> EpisodeRules:
     """What the core needs to run an episode."""
     noise = given["observation_noise"]
@@ -258,8 +249,13 @@ def _rules(
         goals=given["waypoints"],
         battery=given["battery"],
         free_distance=free_distance,
-        field_margin=field_margin,
+        field_margin=_field_margin(given["terrain"]),
     )
+
+
+def _field_margin(terrain: object) -> float | None:
+    """How far the field of a terrain reaches beyond start and goals, m; None without an edge."""
+    return FIELD_MARGINS.get(terrain) if isinstance(terrain, str) else None
 
 
 def _hills(terrain: object, slope_deg: float | None) -> float | None:
