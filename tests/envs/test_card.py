@@ -240,7 +240,7 @@ VARIANTS = [
 ]
 
 #: They wrap a rover whose snapshot does not hold their last observation, and their vectors give further infos.
-WRAPPERS = ("RoverCommand-v0", "RoverGoal-v0")
+WRAPPERS = ("RoverArcs-v0", "RoverCommand-v0", "RoverGoal-v0")
 
 TRAP: dict[str, Any] = {"observation_noise": 0.01, "friction": (0.5, 0.8), "battery": 3000.0}
 
@@ -264,6 +264,7 @@ def test_gymnasiums_checker_has_nothing_else_to_say(name: str, arguments: dict[s
     check_env(env, skip_render_check=bool(arguments))
 
 
+@pytest.mark.filterwarnings("ignore:.*Your observation scan has an unconventional shape")
 @pytest.mark.parametrize(("name", "arguments"), SINGLE)
 def test_stable_baselines3s_checker_has_nothing_to_say(name: str, arguments: dict[str, Any]) -> None:
     checker = pytest.importorskip("stable_baselines3.common.env_checker")
@@ -280,12 +281,19 @@ def test_an_environment_is_made_again_from_its_spec(name: str) -> None:
     assert data_equivalence(one, other, exact=True)
 
 
+def drawn_action(space: gym.Space[Any], rng: np.random.Generator) -> Any:
+    """A random action."""
+    if isinstance(space, gym.spaces.Box):
+        return rng.uniform(-1.0, 1.0, space.shape).astype(np.float32)
+    return rng.integers(0, 64, space.shape)
+
+
 def rollout(env: gym.Env[Any, Any], n_steps: int, seed: int = 7) -> list[Any]:
     """Observations, rewards, ends and infos under random actions, across a reset."""
     rng = np.random.default_rng(seed)
     seen: list[Any] = []
     for i in range(n_steps):
-        seen.append(env.step(rng.uniform(-1.0, 1.0, env.action_space.shape).astype(np.float32)))
+        seen.append(env.step(drawn_action(env.action_space, rng)))
         if i == n_steps // 2:
             seen.append(env.reset())
     return [bits(one) for one in seen]
@@ -338,7 +346,7 @@ def test_the_vector_of_the_core_is_a_sync_vector_bit_for_bit(
     draws = np.random.default_rng(0)
     ended = 0
     for _ in range(2 * LIMIT + 3):
-        action = draws.uniform(-1.0, 1.0, ours.action_space.shape).astype(np.float32)
+        action = drawn_action(ours.action_space, draws)
         one, other = ours.step(action), theirs.step(action)
         assert_same(name, one, other)
         ended += int((one[2] | one[3]).sum())

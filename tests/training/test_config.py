@@ -16,7 +16,7 @@ from rover_gym.learning.training_config import SHIPPED_CONFIGURATIONS, find_conf
 SMALLEST: dict[str, Any] = {"environment": {"terrain": "plane"}, "total_steps": 100}
 
 
-@pytest.mark.parametrize("name", SHIPPED_CONFIGURATIONS)
+@pytest.mark.parametrize("name", [name for name in SHIPPED_CONFIGURATIONS if name != "anywhere"])
 def test_a_kept_configuration_survives_writing_and_reading(name: str, tmp_path: Path) -> None:
     config = read_config(find_configuration(name))
     copy = tmp_path / "copy.yaml"

@@ -70,7 +70,7 @@ def test_a_summary_counts_ends_and_takes_times_of_successes_only() -> None:
     assert summary.time.value == 5.0
     assert summary.energy_per_metre.value == pytest.approx(5.0)
     assert summary.tilt.value == pytest.approx(2.0)
-    assert summary.ends == {"goal": 2, "time": 1, "high_centred": 0, "roll_over": 0, "step_failed": 0}
+    assert summary.ends == {"goal": 2, "time": 1, "high_centred": 0, "roll_over": 0, "left_field": 0, "step_failed": 0}
 
 
 def test_many_episodes_at_a_time_are_the_single_ones() -> None:

@@ -90,14 +90,11 @@ def train(
     if films:
         for package in ("imageio_ffmpeg", "vtkmodules"):
             require(package, "render")
-    from rover_gym.learning.arc_config import is_arc_config  # noqa: PLC0415
-    from rover_gym.learning.ppo import Reporting, train_ppo  # noqa: PLC0415 - needs the extra, and slow to load
-    from rover_gym.learning.several_seeds import read_seed, write_seeds  # noqa: PLC0415
+    from rover_gym.learning.arc_config import is_arc_config  # noqa: PLC0415 - needs the extra
     from rover_gym.learning.training_config import find_configuration, read_config  # noqa: PLC0415
 
     path = find_configuration(config)
-    of_arcs = is_arc_config(path)
-    settings = None if of_arcs else read_config(path)
+    settings = None if is_arc_config(path) else read_config(path)
     if show:
         typer.echo(path.read_text(encoding="utf-8"), nl=False)
         return
@@ -106,6 +103,25 @@ def train(
         _train_arcs(path, seeds, output, resume=resume, steps=steps, workers=workers, as_json=as_json)
         return
     folders, parent = _run_folders(list(dict.fromkeys(seeds or [1])), output, path.stem)
+    options = {"resume": resume, "total_steps": steps}
+    _train_ppo(settings, path, folders, parent, options, progress=progress, films=films, as_json=as_json)
+
+
+def _train_ppo(
+    settings: Any,
+    path: Path,
+    folders: dict[int, Path],
+    parent: Path,
+    options: dict[str, Any],
+    *,
+    progress: bool,
+    films: int,
+    as_json: bool,
+) -> None:
+    """Trains a policy of commands for each seed."""
+    from rover_gym.learning.ppo import Reporting, train_ppo  # noqa: PLC0415 - needs the extra, and slow to load
+    from rover_gym.learning.several_seeds import read_seed, write_seeds  # noqa: PLC0415
+
     is_alone = len(folders) == 1
     say = partial(typer.echo, err=as_json)
     reporting = Reporting(say=say, progress=progress, films=films)
@@ -113,15 +129,9 @@ def train(
         for seed, folder in folders.items():
             if not is_alone:
                 say(f"seed {seed}:")
-            policy = train_ppo(
-                settings,
-                folder,
-                name=path.name,
-                seed=seed,
-                resume=resume and (is_alone or (folder / "checkpoints" / "latest.json").exists()),
-                total_steps=steps,
-                reporting=reporting,
-            )
+            resume = options["resume"] and (is_alone or (folder / "checkpoints" / "latest.json").exists())
+            given = {**options, "resume": resume}
+            policy = train_ppo(settings, folder, name=path.name, seed=seed, reporting=reporting, **given)
             results.path("policy", policy)
             results.path("best policy in the evaluations", folder / "best")
         done = [read_seed(folder) for folder in folders.values()] if as_json or not is_alone else []

@@ -132,15 +132,8 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
     simulation = Simulation(rover, Plane(), **options)  # the core validates the simulation options
     points = None if given["height_scan"] is None else given["height_scan"].offsets
     max_steering = _steering_limit(rover, steering, given["max_steering_deg"])
-    field_margin = FIELD_MARGINS.get(terrain) if isinstance(terrain, str) else None
     rules = _rules(
-        given,
-        rover,
-        substeps=substeps,
-        max_steering=max_steering,
-        scan=points,
-        free_distance=free_distance,
-        field_margin=field_margin,
+        given, rover, substeps=substeps, max_steering=max_steering, scan=points, free_distance=free_distance
     )
     episodes = EpisodeDistribution(
         rules,
@@ -166,7 +159,7 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
         is_noisy=given["observation_noise"] > 0.0,
         goal_tolerance=given["goal_tolerance"],
         n_further=given["waypoints"] - 1,
-        field_margin=field_margin,
+        field_margin=_field_margin(terrain),
         gravity=gravity,
         substeps=substeps,
         dt=substeps * step,
@@ -227,7 +220,6 @@ def _rules(
     max_steering: float,
     scan: npt.NDArray[np.float64] | None,
     free_distance: float | None,
-    field_margin: float | None,
 ) -> EpisodeRules:
     """What the core needs to run an episode."""
     return EpisodeRules(
@@ -246,8 +238,13 @@ def _rules(
         goals=given["waypoints"],
         battery=given["battery"],
         free_distance=free_distance,
-        field_margin=field_margin,
+        field_margin=_field_margin(given["terrain"]),
     )
+
+
+def _field_margin(terrain: object) -> float | None:
+    """How far the field of a terrain reaches beyond start and goals, m; None without an edge."""
+    return FIELD_MARGINS.get(terrain) if isinstance(terrain, str) else None
 
 
 def _hills(terrain: object, slope_deg: float | None) -> float | None:

@@ -278,9 +278,9 @@ class ArcSearch:
         costs: PathCosts,
     ) -> None:
         length = costs.length * reach
-        self._search = PathSearch(
-            scan=(scan.rows, scan.columns, scan.spacing),
-            outline={
+        self._settings: dict[str, Any] = {
+            "scan": (scan.rows, scan.columns, scan.spacing),
+            "outline": {
                 "wheels": outline.wheels,
                 "underside": outline.underside,
                 "clearance": outline.clearance,
@@ -288,12 +288,22 @@ class ArcSearch:
                 "x_c": x_c,
                 "radius": radius,
             },
-            costs=vars(costs),
-            first={"poses": first.poses(length, STEPS), "direction": first.direction, "commands": commands},
-            further={"poses": further.poses(length, STEPS), "direction": further.direction},
-            reach=reach,
-            arrival=arrival,
-        )
+            "costs": vars(costs),
+            "first": {"poses": first.poses(length, STEPS), "direction": first.direction, "commands": commands},
+            "further": {"poses": further.poses(length, STEPS), "direction": further.direction},
+            "reach": reach,
+            "arrival": arrival,
+        }
+        self._search = PathSearch(**self._settings)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What the search is made of."""
+        return self._settings
+
+    def __setstate__(self, settings: dict[str, Any]) -> None:
+        """Makes the search anew."""
+        self._settings = settings
+        self._search = PathSearch(**settings)
 
     def best(self, heights: Array, task: SearchTask) -> int:
         """The first arc of the cheapest path over heights `(rows * columns,)` of the scan, m."""

@@ -6,7 +6,7 @@ from typing import Any, Protocol, SupportsFloat, Unpack
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
-from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector import AutoresetMode, VectorWrapper
 from gymnasium.vector.utils import batch_space
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
@@ -157,7 +157,7 @@ class RoverArcsEnv(gym.Wrapper[Any, Any, Observations, Observations]):
             self.rover.has_scan = True
         if terminated and not has_scan:
             seen = self.rover.complete_observation()
-        ended: Mask = np.array([terminated])
+        ended: Mask = np.full(1, terminated, np.bool_)
         return seen[None], np.array([reward]), ended, np.zeros_like(ended)
 
 
@@ -171,7 +171,7 @@ def planned_arc(teacher: CommandPlanner, seen: Observations, driver: ArcDriver) 
     return arc_of((direction, curvature / limits.curvature, sideways / side), pushes=pushes)
 
 
-class RoverArcsVectorEnv(VectorEnv[ArcObservation, Any, Any]):
+class RoverArcsVectorEnv(VectorWrapper):
     """A vector of `RoverArcsEnv` environments that the compiled core steps on several threads.
 
     Observations, rewards and ends equal, bit for bit, those of a `SyncVectorEnv` of them with a `TimeLimit` and the
@@ -207,10 +207,9 @@ class RoverArcsVectorEnv(VectorEnv[ArcObservation, Any, Any]):
         )
         if self.rovers.autoreset_mode == AutoresetMode.DISABLED:
             refuse(OptionError, "autoreset_mode", autoreset_mode, "must be NextStep or SameStep")
+        super().__init__(self.rovers)
         self.driver = ArcDriver(self.rovers.prototype, num_envs)
-        self.num_envs = num_envs
-        self.metadata = self.rovers.metadata
-        self.render_mode = self.rovers.render_mode
+        self.repeat = self.driver.hold
         self.single_observation_space, self.single_action_space = observation_space(), arc_space()
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -247,20 +246,32 @@ class RoverArcsVectorEnv(VectorEnv[ArcObservation, Any, Any]):
         )
         self.driver.notice(self._seen, moved)
         self._over = terminated | truncated
-        last, infos = self.driver.observe(self._seen), batch.infos()
+        finals: dict[int, dict[str, Any]] = {}
+        seen = self.driver.observe(self._seen)
         if self.rovers.autoreset_mode == AutoresetMode.SAME_STEP and self._over.any():
-            over = self._over
-            for i in np.flatnonzero(over).tolist():
-                final = {name: part[i].copy() for name, part in last.items()}
-                infos = self._add_info(infos, {"final_obs": final, "final_info": batch.info(i)}, i)
-            try:
-                self._seen, _ = self.rovers.reset(options={"reset_mask": over})
-            except TerrainError:
-                return last, rewards, terminated, truncated, infos  # the next step refuses it
-            self._over = np.zeros(self.num_envs, np.bool_)
-            self._begin(over)
-            last = self.driver.observe(self._seen)
-        return last, rewards, terminated, truncated, infos
+            seen, finals = self._begin_next(seen)
+        infos = batch.infos()
+        for i, final in finals.items():
+            infos = self._add_info(infos, final, i)
+        return seen, rewards, terminated, truncated, infos
+
+    def _begin_next(self, last: ArcObservation) -> tuple[ArcObservation, dict[int, dict[str, Any]]]:
+        """Starts the next episodes; returns the observations, and what the last ones ended with.
+
+        If one cannot begin, none does, and the next step refuses it.
+        """
+        over, batch = self._over, self.rovers.batch
+        finals: dict[int, dict[str, Any]] = {
+            i: {"final_obs": {name: part[i].copy() for name, part in last.items()}, "final_info": batch.info(i)}
+            for i in np.flatnonzero(over).tolist()
+        }
+        try:
+            self._seen, _ = self.rovers.reset(options={"reset_mask": over})
+        except TerrainError:
+            return last, finals
+        self._over = np.zeros(self.num_envs, np.bool_)
+        self._begin(over)
+        return self.driver.observe(self._seen), finals
 
     def expert_actions(self, teacher: ScanPolicy | None = None, of: Mask | None = None) -> npt.NDArray[np.int64]:
         """`(num_envs,)` the arcs that a planner would choose now, 0 for rovers not in `of`.
@@ -271,14 +282,6 @@ class RoverArcsVectorEnv(VectorEnv[ArcObservation, Any, Any]):
         """
         chosen = np.ones(self.num_envs, np.bool_) if of is None else of
         return self.driver.expert(self._seen, chosen, teacher)
-
-    def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
-        """One frame per rover, as `RoverVectorEnv.render`."""
-        return self.rovers.render()
-
-    def close_extras(self, **kwargs: Any) -> None:
-        """Frees the renderers, if there are any."""
-        self.rovers.close_extras(**kwargs)
 
     def _begin(self, rovers: Mask) -> None:
         self.driver.begin(rovers)

@@ -441,8 +441,9 @@ class ScanPolicy:
             ways=self._ways(row, slope, memory, i),
         )
         arc = self.search.best(heights, task)
-        is_high = row[self._stuck] > HIGH
-        return arc, bool(memory.still[i] > PUSH_AFTER * self.pace or is_high or fast[arc])
+        turns_back = self.commands[arc, 0] < 0.0 and not task.retreat
+        is_held = memory.still[i] > PUSH_AFTER * self.pace and not turns_back
+        return arc, bool(is_held or row[self._stuck] > HIGH or fast[arc])
 
     def beyond_field(self, rows: Array, starts: Array) -> npt.NDArray[np.bool_] | None:
         """`(n, points)` whether points of the scan lie beyond the edge of the field; None where it has none.
