@@ -33,6 +33,7 @@ from rover_gym.sand import (
     with_wide_wheels,
 )
 from rover_gym.sand.convert import convert_runs
+from rover_gym.sand.trials import read_trial
 
 WHEEL = SingleWheel(0.058, 0.05)
 
@@ -59,6 +60,24 @@ def test_the_points_follow_the_accuracy() -> None:
     assert coarse.n_points < fine.n_points
     runs = drives([0.2, 0.5], [0.0, 0.5])
     assert coarse.steady(runs) == pytest.approx(fine.steady(runs), rel=0.1, abs=0.5)
+
+
+@pytest.mark.parametrize(("before", "after"), [(0.2, 0.5), (0.5, 0.2), (0.0, 0.8)])
+def test_sinkage_follows_a_step_of_slip_over_a_part_of_the_contact_at_any_speed(before: float, after: float) -> None:
+    """The pull overshoots within 8 mm, and comes back as the wheel sinks: sand has no inertia in the model."""
+    bed, load, spacing, n = WHEEL.on(named_soil("cmu-sand")), 20.0, 1e-3, 200
+    lengths = []
+    for speed in (0.01, 0.1):
+        drives = [[speed, speed / (1.0 - slip) / WHEEL.radius, 0.0, load, 9.81] for slip in (before, after)]
+        steady = bed.steady(drives)
+        found = bed.run([drives[0]] * n + [drives[1]] * n, load / 9.81, spacing / speed)[n - 1 :, :2]
+        assert found[-1] == pytest.approx(steady[1, :2], rel=2e-3)
+        sinkage, pull = ((found - found[0]) / (found[-1] - found[0])).T
+        lengths.append(spacing * int(np.argmax(sinkage > 1.0 - np.exp(-1.0))))
+        assert pull[:8].max() > 1.5
+        contact = np.sqrt(2.0 * WHEEL.radius * steady[0, 0])
+        assert 0.2 < lengths[-1] / contact < 0.7
+    assert lengths[0] == pytest.approx(lengths[1], abs=2.0 * spacing)
 
 
 def test_unknown_and_wrong_numbers_are_named() -> None:
@@ -188,6 +207,38 @@ def test_a_matlab_file_of_structs_is_converted_as_its_authors_store_runs(tmp_pat
     (tmp_path / "text.mat").write_text("beta,v\n" * 40)
     with pytest.raises(OptionError, match=r"text\.mat: is no MATLAB file"):
         convert_runs(tmp_path / "text.mat", tmp_path / "x.csv", columns, "smooth")
+
+
+def test_slip_and_slope_of_a_processed_trial_are_read(tmp_path: Path) -> None:
+    """Two seconds of rest, ten uphill at 0.06 m/s on rims at 0.08 m/s, and rest again."""
+    folder = tmp_path / "5.0_0.0_Straight_10.0" / "Trial_1"
+    folder.mkdir(parents=True)
+    header = "time_s,pos_x,pos_y,pos_z,quat_w,enc1_rad,vel1_rad_s,vel2_rad_s,vel3_rad_s,vel4_rad_s"
+    lines = [header]
+    for k in range(141):
+        time = 0.1 * k
+        way, rate = 0.06 * min(max(time - 2.0, 0.0), 10.0), 0.8 if 2.0 <= time <= 12.0 else 0.0
+        x, z = way * np.cos(np.radians(10.0)), way * np.sin(np.radians(10.0))
+        lines.append(f"{time},{0.6 * x},{-0.8 * x},{z},1,0,{rate},{-rate},{rate},{-rate}")
+    file = folder / "Processed_Data.csv"
+    file.write_text("\n".join(lines) + "\n")
+    trial = read_trial(file, 0.1)
+    assert trial.name == "5.0_0.0_Straight_10.0/Trial_1"
+    assert trial.seconds == pytest.approx(5.0)
+    assert trial.slope_deg == pytest.approx(10.0)
+    assert [trial.speed, trial.rim_speed, trial.slip] == pytest.approx([0.06, 0.08, 0.25])
+    with pytest.raises(OptionError, match="radius: must be above 0"):
+        read_trial(file, 0.0)
+    for lines_of, message in [
+        (["time_s,pos_x", "0,1"], "has no column pos_y"),
+        ([header], "has no rows"),
+        ([header, lines[1].replace("0.0", "?", 1)], "line 2: time_s must be a number"),
+        ([header, *lines[1:3], lines[1]], "time_s must increase"),
+        (lines[:40], "must turn for at least 2 s"),
+    ]:
+        file.write_text("\n".join(lines_of) + "\n")
+        with pytest.raises(OptionError, match=message):
+            read_trial(file, 0.1)
 
 
 def wide_rover() -> RoverModel:

@@ -1,5 +1,6 @@
-"""`rover sand soils|bed|slope|rovers|climb|convert`: soils, one wheel on a virtual test bed, and rovers on slopes."""
+"""`rover sand soils|bed|slope|rovers|climb|convert|trials`: soils, one wheel on a test bed, and rovers on slopes."""
 
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -16,6 +17,7 @@ from rover_gym.policy import PDPolicy, Policy, SandGains, SandPolicy, drive_all
 from rover_gym.policy.dug_in import DugIn
 from rover_gym.sand import SingleWheel, Soil, climbed_slope, named_soil, slip_on_slope, soil_names, with_wide_wheels
 from rover_gym.sand.convert import convert_runs
+from rover_gym.sand.trials import read_trial
 from rover_gym.validation import number, refuse
 
 sand = typer.Typer(help="Wheels and rovers on sand, and soils by name.", no_args_is_help=True)
@@ -243,3 +245,20 @@ def convert(
     """Rewrite a table of runs in the columns, units and signs that `read_runs` takes."""
     n = convert_runs(source, target, column, wheel)
     typer.echo(f"{target}: {n} runs")
+
+
+@sand.command()
+@plain_errors
+def trials(
+    sources: Annotated[
+        list[Path],
+        typer.Argument(
+            help="Files Processed_Data.csv of the RoSE Lab's mobility data set.", exists=True, dir_okay=False
+        ),
+    ],
+    *,
+    radius: Annotated[float, typer.Option(help="Radius of the wheels, m.")],
+    as_json: AsJson = False,
+) -> None:
+    """List slope, speed and slip of measured trials of a rover."""
+    _say("trials", [dataclasses.asdict(read_trial(source, radius)) for source in sources], as_json=as_json)

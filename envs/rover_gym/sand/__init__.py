@@ -6,6 +6,7 @@ from rover_gym.sand.measurements import Runs, SingleWheel, read_runs
 from rover_gym.sand.rovers import slip_on_slope, with_wide_wheels
 from rover_gym.sand.slopes import climbed_slope
 from rover_gym.sand.soils import Soil, named_soil, soil_names
+from rover_gym.sand.trials import Trial, read_trial
 
 __all__ = [
     "FittedSoil",
@@ -13,12 +14,14 @@ __all__ = [
     "SingleWheel",
     "SoftGround",
     "Soil",
+    "Trial",
     "WheelBed",
     "climbed_slope",
     "errors_of",
     "fit_soil",
     "named_soil",
     "read_runs",
+    "read_trial",
     "slip_on_slope",
     "soil_names",
     "with_wide_wheels",

@@ -4,8 +4,8 @@ use rover_core::nalgebra::Vector3;
 use rover_core::sand::patch::Heights;
 use rover_core::sand::test_bed::rules_within;
 use rover_core::sand::{
-    Bed, Derivatives, Drive, Law, Measured, Memory, Resistive, Rules, SandWheel, Soil, Sunk,
-    TestBed, Twist, WheelPose, react, react_with,
+    Bed, Derivatives, Drive, Law, Measured, Memory, Points, Resistive, Rules, SandWheel, Soil,
+    Sunk, TestBed, Twist, WheelPose, react, react_with,
 };
 use rover_core::scalar::Instructions;
 
@@ -18,6 +18,15 @@ const WHEEL: SandWheel = SandWheel {
     grouser_height: 0.0,
     grousers: 0,
 };
+
+/// 24 points along every arc, and these numbers across the drum and along the radius of a wall.
+fn fine_rules(across: usize, radial: usize) -> Rules {
+    Rules::new(Points {
+        drum: [24, across],
+        edge: 24,
+        wall: [24, radial],
+    })
+}
 
 fn bed_of(soil: Soil) -> TestBed {
     TestBed {
@@ -61,7 +70,7 @@ fn a_wheel_pressed_down_bears_as_a_plate_does() {
     let z = 1e-4;
     let force = TestBed {
         wheel,
-        rules: Rules::new([24, 4, 8]),
+        rules: fine_rules(4, 8),
         soil: soil.clone(),
     }
     .force(z, &pressed, &drive(0.0, 0.0, 1.0), Derivatives::Wrench);
@@ -218,7 +227,7 @@ fn the_slopes_of_a_wheel_are_its_derivatives() {
         (bekker_sand(), LEVEL, [0.03, 0.2]),
     ];
     for (soil, bed, [moved, left_out]) in cases {
-        let rules = Rules::new([24, 4, 8]);
+        let rules = fine_rules(4, 8);
         let force = |pose: &WheelPose, memory: &Memory, by_memory: f64, by_pose: f64| {
             let want = Derivatives::Slopes { by_memory, by_pose };
             react((&wheel, &rules), &soil, &bed, pose, memory, want)
@@ -263,7 +272,7 @@ fn the_number_of_points_follows_the_accuracy() {
         rules_within(&WHEEL, &soil, 0.005),
     );
     assert!(coarse.n_points() < fine.n_points());
-    let exact = Rules::new([24, 12, 24]);
+    let exact = fine_rules(12, 24);
     let at = |rules: &Rules| {
         let bed = TestBed {
             wheel: WHEEL,

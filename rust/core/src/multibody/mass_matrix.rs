@@ -43,25 +43,23 @@ impl MassMatrix<f64> {
     ) {
         let Some(&first) = path.first() else { return };
         let t = mechanism.tree_of[first];
-        let base = mechanism.trees[t].velocities.start;
-        let joints = base + mechanism.trees[t].lead();
-        for (p, &k) in path.iter().enumerate() {
-            if k < joints {
-                let i = k - base;
-                for (q, &j) in path.iter().enumerate().filter(|(_, j)| **j <= k) {
-                    self.rows.blocks[t][i * (i + 1) / 2 + (j - base)] += entry(p, q);
-                }
-                continue;
-            }
+        let lead = mechanism.trees[t].lead();
+        let joints = mechanism.trees[t].velocities.start + lead;
+        let block = self.rows.blocks[t].iter_mut();
+        let pairs = (0..lead).flat_map(|i| (0..=i).map(move |j| (i, j)));
+        for (sum, (i, j)) in block.zip(pairs) {
+            *sum += entry(i, j);
+        }
+        for (p, &k) in path.iter().enumerate().skip(lead) {
             let row = mechanism.row_of(k);
+            for (j, sum) in self.rows.base[row].iter_mut().enumerate().take(lead) {
+                *sum += entry(p, j);
+            }
             let own = mechanism.rows[row].clone();
-            for (q, &j) in path.iter().enumerate() {
-                if j < joints {
-                    self.rows.base[row][j - base] += entry(p, q);
-                    continue;
-                }
-                let mut columns = mechanism.columns[own.clone()].iter();
-                if let Some(at) = columns.position(|&column| joints + column == j) {
+            let columns = &mechanism.columns[own.clone()];
+            for (q, &j) in path.iter().enumerate().skip(lead) {
+                let at = columns.iter().position(|&column| joints + column == j);
+                if let Some(at) = at {
                     self.rows.joints[own.start + at] += entry(p, q);
                 }
             }

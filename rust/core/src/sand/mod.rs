@@ -16,7 +16,7 @@
 //! WheelPose, Twist ──► patch::react          Bed: tangent plane and relief under the wheel
 //!                         │
 //!                         ▼
-//!                      pieces of the rim     depth and velocity of each
+//!                      points, pieces        groups of eight; depth and velocity of each
 //!                         │   resistive_force::traction, or Bekker::stress
 //!                         ▼
 //!                      Reaction              force, moment and their derivatives
@@ -37,6 +37,7 @@ pub(crate) mod checks;
 pub mod memory;
 pub mod patch;
 pub mod piece;
+mod points;
 pub mod resistive_force;
 pub mod ruts;
 pub mod soil;
@@ -52,4 +53,4 @@ pub use ruts::{RutMap, Window};
 pub use soil::{Law, Resistive, Soil};
 pub use state::{SandState, WheelInSand};
 pub use test_bed::{Drive, Measured, Sunk, TestBed};
-pub use wheel::{Rules, SandWheel};
+pub use wheel::{Points, Rules, SandWheel};

@@ -1,10 +1,8 @@
 //! Force of sand on a wheel: the stress over what is under the surface, with its derivatives.
 //!
-//! The points of arcs lie side by side in lanes, eight at a time. A machine with fewer lanes takes
-//! them in turns and keeps a sum for each of the eight: the bits do not depend on the lanes.
-//!
-//! A surface that recedes feels nothing. Of a ring, only the part of the arc under the surface that
-//! may push is integrated. Angles on it are `θ = 4 atan u`, so that sine and cosine are rational.
+//! The points of the wheel that may be in the sand ([`super::points`]) lie side by side in lanes,
+//! eight at a time. A machine with fewer lanes takes them in turns and keeps a sum for each of the
+//! eight: the bits do not depend on the lanes.
 
 #[cfg(target_arch = "x86_64")]
 use fearless_simd::{f64x4, f64x8};
@@ -12,8 +10,9 @@ use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 use super::memory::Memory;
 use super::piece::{Piece, Setting};
+use super::points::{Feed, Group, Immersed, Motion};
 use super::soil::{Law, Soil};
-use super::wheel::{Gauss, Ring, Rules, SandWheel, Skin};
+use super::wheel::{Rules, SandWheel, Skin};
 use crate::scalar::elementary::{acos, atan2};
 use crate::scalar::{Instructions, Lane, LaneMask, MAX_LANES, Single, Vec3};
 
@@ -91,34 +90,41 @@ const ENTRY: f64 = 0.1;
 
 /// A wheel relative to the bed, in its own axes: down and forward in its plane, and its axle.
 struct Frame<'a> {
-    wheel: &'a SandWheel,
-    rules: &'a Rules,
-    soil: &'a Soil,
+    immersed: Immersed<'a>,
     bed: &'a Bed<'a>,
     pose: &'a WheelPose,
     want: Derivatives,
     setting: Setting,
     /// Columns: down, along and axle in world axes.
     axes: Matrix3<f64>,
-    /// Into the sand.
-    g: Vector3<f64>,
-    shift: Vector3<f64>,
-    turn: Vector3<f64>,
-    /// Height of the wheel's centre over the plane, m.
-    height: f64,
-    /// Radius from which on the side walls may be under the surface, m.
-    dry: f64,
     /// From −1 to 1: which end of an arc enters the sand.
     entry: f64,
 }
 
-/// Sums of a reaction in the wheel's axes: wrench, and its derivative column by column.
-#[derive(Clone, Copy)]
-struct Sums {
-    wrench: [f64; 6],
-    slope: [f64; 36],
+/// Sums of six components, column by column, of each of eight lanes.
+type Rows<const N: usize> = [[f64; MAX_LANES]; N];
+
+/// Sums of a reaction in the wheel's axes: the wrench, and its derivatives by a translation and by
+/// a rotation. The numbers of rows are rounded up to whole registers.
+struct Sums<'a> {
+    wrench: &'a mut Rows<WRENCH>,
+    by_shift: &'a mut Rows<SLOPE>,
+    by_turn: &'a mut Rows<SLOPE>,
     is_touching: bool,
 }
+
+const WRENCH: usize = 8;
+const SLOPE: usize = 24;
+
+/// The same, over all lanes.
+struct Totals {
+    wrench: [f64; WRENCH],
+    slopes: [[f64; SLOPE]; 2],
+    is_touching: bool,
+}
+
+/// Components of a wrench.
+const SIX: usize = 6;
 
 /// The force of a soil on a wheel in a pose, with what the sand remembers.
 #[must_use]
@@ -146,7 +152,8 @@ pub fn react_with(
 ) -> Reaction {
     let frame = Frame::new((wheel, rules), soil, bed, (pose, memory), want);
     let lean = pose.axle.dot(&bed.normal);
-    let sinkage = 0.5 * wheel.width * lean.abs() + wheel.drum() * frame.g.x - frame.height;
+    let g = frame.immersed.g;
+    let sinkage = 0.5 * wheel.width * lean.abs() + wheel.drum() * g.x - frame.immersed.height;
     let mut reaction = Reaction {
         wrench: Vector6::zeros(),
         slope: Matrix6::zeros(),
@@ -156,27 +163,21 @@ pub fn react_with(
     if sinkage + bed.highest <= 0.0 {
         return reaction;
     }
-    let mut sums = Sums {
-        wrench: [0.0; 6],
-        slope: [0.0; 36],
-        is_touching: false,
+    let total = match instructions {
+        Instructions::Baseline => frame.sum::<f64>(Single::Baseline),
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx2(token) => frame.sum::<f64x4<_>>(token),
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx512(token) => frame.sum::<f64x8<_>>(token),
     };
-    match instructions {
-        Instructions::Baseline => frame.sum::<f64>(Single::Baseline, &mut sums),
-        #[cfg(target_arch = "x86_64")]
-        Instructions::Avx2(token) => frame.sum::<f64x4<_>>(token, &mut sums),
-        #[cfg(target_arch = "x86_64")]
-        Instructions::Avx512(token) => frame.sum::<f64x8<_>>(token, &mut sums),
-    }
-    reaction.is_touching = sums.is_touching;
-    let of = |k: usize| Vector3::from_fn(|i, _| sums.wrench[3 * k + i]);
+    reaction.is_touching = total.is_touching;
     for k in 0..2 {
-        let part = frame.axes * of(k);
+        let part = frame.axes * Vector3::from_column_slice(&total.wrench[3 * k..3 * k + 3]);
         reaction.wrench.fixed_rows_mut::<3>(3 * k).copy_from(&part);
     }
     if want != Derivatives::Wrench {
         for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            let part = Matrix3::from_fn(|a, b| sums.slope[6 * (3 * j + b) + 3 * i + a]);
+            let part = Matrix3::from_fn(|a, b| total.slopes[j][SIX * b + 3 * i + a]);
             let turned = frame.axes * part * frame.axes.transpose();
             let mut place = reaction.slope.fixed_view_mut::<3, 3>(3 * i, 3 * j);
             place.copy_from(&turned);
@@ -193,13 +194,6 @@ fn perpendicular(axle: &Vector3<f64>) -> Vector3<f64> {
         Vector3::y()
     };
     (e - axle * axle.dot(&e)).normalize()
-}
-
-/// `tan(θ/4)` of the angle of a unit vector, −π < θ <= π.
-fn quarter(cos: f64, sin: f64) -> f64 {
-    let half_cos = (0.5 * (1.0 + cos)).max(0.0).sqrt();
-    let half_sin = (0.5 * (1.0 - cos)).max(0.0).sqrt();
-    half_sin.copysign(sin) / (1.0 + half_cos)
 }
 
 impl<'a> Frame<'a> {
@@ -220,12 +214,22 @@ impl<'a> Frame<'a> {
         };
         let axes = Matrix3::from_columns(&[down, pose.axle.cross(&down), pose.axle]);
         let shift = axes.tr_mul(&Vector3::from(memory.shift));
+        let turn = axes.tr_mul(&Vector3::from(memory.turn));
         let height = (pose.centre - bed.place).dot(&bed.normal);
         let beyond = height - 0.5 * wheel.width * lean.abs() - bed.highest;
         Self {
-            wheel,
-            rules,
-            soil,
+            immersed: Immersed {
+                wheel,
+                rules,
+                soil,
+                g: Vector3::new(sine, 0.0, -lean),
+                shift,
+                turn,
+                motion: Motion::of(&shift, &turn),
+                height,
+                highest: bed.highest,
+                dry: beyond / sine.max(FLAT),
+            },
             bed,
             pose,
             want,
@@ -235,139 +239,52 @@ impl<'a> Frame<'a> {
                 gravity: bed.gravity,
             },
             axes,
-            g: Vector3::new(sine, 0.0, -lean),
-            shift,
-            turn: axes.tr_mul(&Vector3::from(memory.turn)),
-            height,
-            dry: beyond / sine.max(FLAT),
             entry: shift.y / (shift.y * shift.y + ENTRY * ENTRY).sqrt(),
         }
     }
 
-    /// Adds the stresses over all rings.
+    /// Sums the stresses over all points.
     #[inline(always)]
-    fn sum<T: Lane>(&self, token: T::Token, sums: &mut Sums) {
+    fn sum<T: Lane>(&self, token: T::Token) -> Totals {
         T::vectorize(
             token,
             #[inline(always)]
             || {
-                for lanes in 0..MAX_LANES / T::LANES {
-                    let zero = T::splat(token, 0.0);
-                    let mut own = Own {
-                        wrench: [zero; 6],
-                        slope: [zero; 36],
-                        is_touching: false,
-                    };
-                    self.visit_groups(
-                        #[inline(always)]
-                        |group| self.add(group, (token, lanes * T::LANES), &mut own),
-                    );
-                    sums.is_touching |= own.is_touching;
-                    for (total, own) in sums.wrench.iter_mut().zip(own.wrench) {
-                        add_lanes(total, own);
+                let (mut wrench, mut by_shift) = (zeros(), zeros());
+                let mut by_turn = zeros();
+                let mut sums = Sums {
+                    wrench: &mut wrench,
+                    by_shift: &mut by_shift,
+                    by_turn: &mut by_turn,
+                    is_touching: false,
+                };
+                let (mut feed, mut group) = (Feed::of(&self.immersed), Group::default());
+                while feed.fill(&mut group) {
+                    for part in 0..MAX_LANES / T::LANES {
+                        self.add::<T>(&group, (token, part * T::LANES), &mut sums);
                     }
-                    if self.want != Derivatives::Wrench {
-                        for (total, own) in sums.slope.iter_mut().zip(own.slope) {
-                            add_lanes(total, own);
-                        }
-                    }
+                }
+                let is_touching = sums.is_touching;
+                let slopes = if self.want == Derivatives::Wrench {
+                    [[0.0; SLOPE]; 2]
+                } else {
+                    [
+                        total::<T, _>(token, &by_shift),
+                        total::<T, _>(token, &by_turn),
+                    ]
+                };
+                Totals {
+                    wrench: total::<T, _>(token, &wrench),
+                    slopes,
+                    is_touching,
                 }
             },
-        );
-    }
-
-    /// Visits the points of the wheel that may be in the sand, [`MAX_LANES`] at a time.
-    #[inline(always)]
-    fn visit_groups(&self, mut visit: impl FnMut(&Group)) {
-        let (strips, sides) = (self.rules.n_strips(), self.rules.n_of_a_side());
-        for index in 0..strips + sides {
-            let (pair, rule) = if index < strips {
-                let ring = self.rules.strip(self.wheel, index);
-                ([ring, None], &self.rules.arc)
-            } else {
-                let ring = self.rules.side(self.wheel, self.dry, index - strips);
-                (
-                    [ring, ring.map(|ring| ring.mirrored())],
-                    &self.rules.side_arc,
-                )
-            };
-            let pair = pair.map(|ring| ring.and_then(|ring| self.arc(ring)));
-            let n = rule.places.len();
-            let groups = if n < MAX_LANES { 1 } else { 2 * n / MAX_LANES };
-            for k in 0..groups {
-                let group = if n < MAX_LANES {
-                    Group::of_two(&pair, rule)
-                } else {
-                    let part = k % (n / MAX_LANES) * MAX_LANES;
-                    let one = &pair[usize::from(k >= n / MAX_LANES)];
-                    Group::of_one(one.as_ref(), rule, part)
-                };
-                if let Some(group) = group {
-                    visit(&group);
-                }
-            }
-        }
-    }
-
-    /// The part of a ring that may feel the sand; none if there is none.
-    #[inline]
-    fn arc(&self, ring: Ring) -> Option<(Ring, Arc)> {
-        let raised = self.bed.highest - self.height + ring.offset * self.g.z;
-        let swing = ring.radius * self.g.x;
-        if raised <= -swing {
-            return None;
-        }
-        let cos = if raised >= swing {
-            -1.0
-        } else {
-            -raised / swing
-        };
-        let end = quarter(cos, 1.0);
-        let [from, to] = self.pushing(&ring, end);
-        (from < to).then_some((ring, Arc { from, to, cos }))
-    }
-
-    /// The part of an arc up to `tan(θ/4) = end` on both sides of its lowest point on which the
-    /// surface may push: `x·n > −B`, where B is the most that leaves a stress.
-    #[inline]
-    fn pushing(&self, ring: &Ring, end: f64) -> [f64; 2] {
-        let whole = [-end, end];
-        let Law::Resistive(sand) = &self.soil.law else {
-            return whole;
-        };
-        let (x, w) = (&self.shift, &self.turn);
-        let (speed, tilt) = (
-            (x.x * x.x + x.y * x.y).sqrt(),
-            (w.x * w.x + w.y * w.y).sqrt(),
-        );
-        let [n_r, n_a] = ring.normal;
-        let largest = x.norm() + w.norm() * (ring.radius + ring.offset.abs());
-        let sideways = x.z.abs() + tilt * ring.radius;
-        let bound = sand.flow.grip * sand.flow.width * largest
-            + n_a.abs() * sideways
-            + n_r * tilt * ring.offset.abs();
-        if bound >= n_r * speed {
-            return whole;
-        }
-        // The directions at which it ends, on both sides of that of the motion.
-        let (cos, sin) = (x.x / speed, x.y / speed);
-        let far = -bound / (n_r * speed);
-        let across = (1.0 - far * far).max(0.0).sqrt();
-        let [low, high] = [-across, across].map(|s| [cos * far - sin * s, sin * far + cos * s]);
-        let [from, to] = [low, high].map(|[c, s]| quarter(c, s));
-        // An end beyond θ = ±π lies on the other side of the circle.
-        let is_over = [sin < 0.0 && low[1] > 0.0, sin > 0.0 && high[1] < 0.0];
-        match is_over {
-            [false, false] => [from.max(-end), to.min(end)],
-            [true, _] if from >= end => [-end, to.min(end)],
-            [_, true] if to <= -end => [from.max(-end), end],
-            _ => whole,
-        }
+        )
     }
 
     /// Adds the stress on a group of points: its lanes from `first` on.
     #[inline(always)]
-    fn add<T: Lane>(&self, group: &Group, (token, first): (T::Token, usize), own: &mut Own<T>) {
+    fn add<T: Lane>(&self, group: &Group, (token, first): (T::Token, usize), sums: &mut Sums<'_>) {
         let number = |value: f64| T::splat(token, value);
         let lanes = |values: &[f64; MAX_LANES]| T::load(token, &values[first..first + T::LANES]);
         let (zero, one, two) = (number(0.0), number(1.0), number(2.0));
@@ -375,7 +292,7 @@ impl<'a> Frame<'a> {
         let per = one / (one + u * u);
         let (p, q) = ((one - u * u) * per, two * u * per);
         let (cos, sin) = (p * p - q * q, two * p * q);
-        let (radius, radial) = (number(group.radius), number(group.radial));
+        let (radius, radial) = (lanes(&group.radius), lanes(&group.radial));
         let elements = Elements {
             r: Vec3::new(cos * radius, sin * radius, lanes(&group.offset)),
             normal: Vec3::new(cos * radial, sin * radial, lanes(&group.axial)),
@@ -384,80 +301,86 @@ impl<'a> Frame<'a> {
         let (depth, by_place) = self.depth(elements.r);
         let is_under = depth.gt(zero) & elements.area.gt(zero);
         if is_under.any() {
-            own.is_touching = true;
+            sums.is_touching = true;
             // What is not under counts for nothing, whatever lies beside it in a register.
             let area = T::select(is_under, elements.area, zero);
             let elements = Elements { area, ..elements };
             let depth = T::select(is_under, depth, zero);
             let ends = lanes(&group.end);
-            let way = self.way(group.radius, ends, (cos, sin));
-            self.add_pieces(group.skin, &elements, (depth, by_place, way), own);
+            let way = self.way(radius, ends, (cos, sin));
+            let at = (group.skin, first);
+            self.add_pieces(at, &elements, (depth, by_place, way), sums);
         }
     }
 
     /// Way from where pieces entered, m. Only Bekker's law needs it.
     #[inline(always)]
-    fn way<T: Lane>(&self, radius: f64, end: T, (cos, sin): (T, T)) -> T {
-        let mut way = cos;
-        if matches!(self.soil.law, Law::Bekker(_)) {
+    fn way<T: Lane>(&self, radius: T, end: T, (cos, sin): (T, T)) -> T {
+        let mut angle = cos;
+        if matches!(self.immersed.soil.law, Law::Bekker(_)) {
             for lane in 0..T::LANES {
                 let theta = atan2(sin.get(lane), cos.get(lane));
-                way.set(lane, radius * (acos(end.get(lane)) - self.entry * theta));
+                angle.set(lane, acos(end.get(lane)) - self.entry * theta);
             }
         }
-        way
+        radius * angle
     }
 
     /// Depth that counts of pieces at `r` from the centre, m, and its gradient.
     #[inline(always)]
     fn depth<T: Lane>(&self, r: Vec3<T>) -> (T, Vec3<T>) {
         let number = |value: f64| r.x.like(value);
-        let g = Vec3::splat(r.x.token(), self.g.into());
-        let mut below = r.dot(g) - number(self.height);
+        let g = Vec3::splat(r.x.token(), self.immersed.g.into());
+        let mut below = r.dot(g) - number(self.immersed.height);
         let mut gradient = g;
         let Some(relief) = self.bed.relief else {
             return (below, gradient);
         };
-        let reload = self.soil.reload;
+        let shared = |v: Vector3<f64>| Vec3::<T>::splat(below.token(), v.into());
+        let [down, along, axle] = [0, 1, 2].map(|k| shared(self.axes.column(k).into()));
+        let place = shared(self.pose.centre) + down * r.x + along * r.y + axle * r.z;
+        let (mut virgin, mut left, mut slope) = (below, below, place);
         for lane in 0..T::LANES {
-            let place = self.pose.centre + self.axes * Vector3::from(r.get(lane));
-            let heights = relief(&place);
-            let depth = below.get(lane);
-            let (virgin, left) = (depth + heights.virgin, (depth + heights.left) * reload);
-            if left < virgin {
-                below.set(lane, left);
-                let steep = (self.g + self.axes.tr_mul(&heights.slope)) * reload;
-                gradient.set(lane, steep.into());
-            } else {
-                below.set(lane, virgin);
-            }
+            let heights = relief(&place.get(lane).into());
+            virgin.set(lane, heights.virgin);
+            left.set(lane, heights.left);
+            slope.set(lane, heights.slope.into());
         }
+        let reload = number(self.immersed.soil.reload);
+        let (virgin, left) = (below + virgin, (below + left) * reload);
+        let rise = Vec3::new(down.dot(slope), along.dot(slope), axle.dot(slope));
+        let is_left = left.lt(virgin);
+        below = T::select(is_left, left, virgin);
+        gradient = Vec3::select(is_left, (g + rise) * reload, gradient);
         (below, gradient)
     }
 
     #[inline(always)]
     fn add_pieces<T: Lane>(
         &self,
-        skin: Skin,
+        (skin, first): (Skin, usize),
         elements: &Elements<T>,
         (depth, by_place, arc): (T, Vec3<T>, T),
-        own: &mut Own<T>,
+        sums: &mut Sums<'_>,
     ) {
         let (r, area, token) = (elements.r, elements.area, depth.token());
         let shared = |v: Vector3<f64>| Vec3::<T>::splat(token, v.into());
-        let g = shared(self.g);
+        let Immersed { g, shift, turn, .. } = self.immersed;
         let piece = Piece {
             normal: elements.normal,
-            x: shared(self.shift) + shared(self.turn).cross(r),
-            down: g,
+            x: shared(shift) + shared(turn).cross(r),
+            down: shared(g),
             depth,
             arc,
             skin,
         };
         let wants_slopes = self.want != Derivatives::Wrench;
-        let stress = self.soil.stress(&piece, &self.setting, wants_slopes);
+        let stress = self
+            .immersed
+            .soil
+            .stress(&piece, &self.setting, wants_slopes);
         let force = stress.value * area;
-        add_wrench(&mut own.wrench, r, force);
+        add_wrench((sums.wrench, first), r, force);
         let Derivatives::Slopes { by_memory, by_pose } = self.want else {
             return;
         };
@@ -471,95 +394,51 @@ impl<'a> Frame<'a> {
         ];
         // Displacements by a rotation: e × r. The wheel may turn about its axle without a change
         // of depth.
-        let columns = [
-            a,
-            b,
-            c,
+        let by_turn = [
             c * r.y - b * r.z,
             a * r.z - c * r.x,
             memory[1] * r.x - memory[0] * r.y,
         ];
-        for (slope, column) in own.slope.chunks_exact_mut(6).zip(columns) {
-            add_wrench(slope, r, column);
-        }
-    }
-}
-
-/// Part of a ring, by the tangents of a quarter of the angles at its ends.
-struct Arc {
-    from: f64,
-    to: f64,
-    /// Of the angle at which the ring leaves the sand.
-    cos: f64,
-}
-
-/// Points of one ring, or of two on both sides of a wheel.
-struct Group {
-    radius: f64,
-    /// Component of the normal along the radius, and of each point along the axle.
-    radial: f64,
-    axial: [f64; MAX_LANES],
-    skin: Skin,
-    /// Along the axle, m.
-    offset: [f64; MAX_LANES],
-    /// `tan(θ/4)`, and area per 1/(1 + u²), m².
-    u: [f64; MAX_LANES],
-    area: [f64; MAX_LANES],
-    /// Cosines of the angles at which the rings leave the sand.
-    end: [f64; MAX_LANES],
-}
-
-impl Group {
-    fn new(ring: &Ring) -> Self {
-        Self {
-            radius: ring.radius,
-            radial: ring.normal[0],
-            axial: [0.0; MAX_LANES],
-            skin: ring.skin,
-            offset: [0.0; MAX_LANES],
-            u: [0.0; MAX_LANES],
-            area: [0.0; MAX_LANES],
-            end: [1.0; MAX_LANES],
-        }
-    }
-
-    /// Writes points of an arc, from a lane on.
-    #[inline]
-    fn put(&mut self, (ring, arc): &(Ring, Arc), lane: usize, places: &[f64], weights: &[f64]) {
-        let (middle, half) = (0.5 * (arc.from + arc.to), 0.5 * (arc.to - arc.from));
-        let scale = 4.0 * half * ring.radius * ring.width;
-        for (k, (x, weight)) in places.iter().zip(weights).enumerate() {
-            let k = lane + k;
-            self.u[k] = middle + half * x;
-            self.area[k] = scale * weight;
-            self.offset[k] = ring.offset;
-            self.axial[k] = ring.normal[1];
-            self.end[k] = arc.cos;
-        }
-    }
-
-    /// Points of an arc from one of a rule on.
-    #[inline]
-    fn of_one(arc: Option<&(Ring, Arc)>, rule: &Gauss, first: usize) -> Option<Self> {
-        let arc = arc?;
-        let mut group = Self::new(&arc.0);
-        let at = first..first + MAX_LANES;
-        group.put(arc, 0, &rule.places[at.clone()], &rule.weights[at]);
-        Some(group)
-    }
-
-    /// All points of two arcs; one that there is none of has no area.
-    #[inline]
-    fn of_two(pair: &[Option<(Ring, Arc)>; 2], rule: &Gauss) -> Option<Self> {
-        let (first, _) = pair[0].as_ref().or(pair[1].as_ref())?;
-        let mut group = Self::new(first);
-        for (k, arc) in pair.iter().enumerate() {
-            if let Some(arc) = arc {
-                group.put(arc, k * MAX_LANES / 2, &rule.places, &rule.weights);
+        for (columns, rows) in [
+            ([a, b, c], &mut *sums.by_shift),
+            (by_turn, &mut *sums.by_turn),
+        ] {
+            for (rows, column) in rows.chunks_exact_mut(SIX).zip(columns) {
+                add_wrench((rows, first), r, column);
             }
         }
-        Some(group)
     }
+}
+
+/// No sums yet. Of one kind at a time: the compiler would clear more than two kilobytes at once by
+/// an instruction that starts slowly.
+#[inline(always)]
+fn zeros<const N: usize>() -> Rows<N> {
+    [[0.0; MAX_LANES]; N]
+}
+
+/// Sums over the lanes, from the first to the last for any number of them.
+#[inline(always)]
+fn total<T: Lane, const N: usize>(token: T::Token, rows: &Rows<N>) -> [f64; N] {
+    let mut totals = [0.0; N];
+    let blocks = rows.chunks_exact(MAX_LANES);
+    for (rows, totals) in blocks.zip(totals.chunks_exact_mut(MAX_LANES)) {
+        for part in 0..MAX_LANES / T::LANES {
+            let first = part * T::LANES;
+            let own = std::array::from_fn(
+                #[inline(always)]
+                |k: usize| T::load(token, &rows[k][first..first + T::LANES]),
+            );
+            let mut lanes = [[0.0; 8]; MAX_LANES];
+            T::transpose(&own, &mut lanes);
+            for lane in &lanes[..T::LANES] {
+                for (total, own) in totals.iter_mut().zip(lane) {
+                    *total += own;
+                }
+            }
+        }
+    }
+    totals
 }
 
 /// Elements of the surface, side by side in lanes: where they are, in the wheel's axes, and how
@@ -570,29 +449,17 @@ struct Elements<T> {
     area: T,
 }
 
-/// Sums of some lanes.
-struct Own<T> {
-    wrench: [T; 6],
-    slope: [T; 36],
-    is_touching: bool,
-}
-
-/// Adds the lanes of a sum one after the other, in the same order for any number of lanes.
+/// Adds a force at r and its moment to the lanes of six sums from one on.
 #[inline(always)]
-fn add_lanes<T: Lane>(total: &mut f64, own: T) {
-    let mut lanes = [0.0; MAX_LANES];
-    own.store(&mut lanes[..T::LANES]);
-    for lane in &lanes[..T::LANES] {
-        *total += lane;
-    }
-}
-
-/// Adds a force at r and its moment.
-#[inline(always)]
-fn add_wrench<T: Lane>(sum: &mut [T], r: Vec3<T>, force: Vec3<T>) {
+fn add_wrench<T: Lane>(
+    (sums, first): (&mut [[f64; MAX_LANES]], usize),
+    r: Vec3<T>,
+    force: Vec3<T>,
+) {
     let moment = r.cross(force);
     let parts = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
-    for (sum, part) in sum.iter_mut().zip(parts) {
-        *sum += part;
+    for (sum, part) in sums.iter_mut().zip(parts) {
+        let lanes = &mut sum[first..first + T::LANES];
+        (T::load(part.token(), lanes) + part).store(lanes);
     }
 }

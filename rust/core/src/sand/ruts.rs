@@ -304,7 +304,7 @@ impl RutMap {
         let [columns, rows] = around(place, reach, cell);
         window.clear([columns.clone(), rows.clone()]);
         let (first, width) = (*columns.start(), window.size[0]);
-        let mut is_rutted = false;
+        let mut deepest = 0.0_f64;
         for (k, row) in rows.zip(window.depths.chunks_exact_mut(width.max(1))) {
             // The cells of a row that share a tile lie side by side in it.
             let mut column = 0;
@@ -315,12 +315,12 @@ impl RutMap {
                 if let Some(tile) = self.tiles.get(&tile) {
                     let depths = &tile[at..at + n];
                     row[column..column + n].copy_from_slice(depths);
-                    is_rutted |= depths.iter().any(|depth| *depth > 0.0);
+                    deepest = depths.iter().fold(deepest, |most, depth| most.max(*depth));
                 }
                 column += n;
             }
         }
-        is_rutted
+        deepest > 0.0
     }
 
     /// Notes where a wheel is: `depth_at` gives the depth of its rim under the undisturbed surface

@@ -23,6 +23,9 @@ pub struct WheelInSand {
     pub velocity: [f64; 3],
     /// Depth of its lowest point under the undisturbed surface, m; negative where it is clear.
     pub sinkage: f64,
+    /// Centre, m, and axle of the wheel when its rut was last noted, world; zeros before that.
+    #[serde(default)]
+    pub noted: [f64; 6],
 }
 
 /// The sand under a machine.
@@ -57,7 +60,9 @@ impl SandState {
 impl WheelInSand {
     fn is_finite(&self) -> bool {
         let numbers = [self.stored, self.absorbed, self.sinkage];
-        let forces = self.force.iter().chain(&self.moment).chain(&self.velocity);
+        let forces = (self.force.iter().chain(&self.moment))
+            .chain(&self.velocity)
+            .chain(&self.noted);
         self.memory.is_finite() && numbers.iter().chain(forces).all(|x| x.is_finite())
     }
 }

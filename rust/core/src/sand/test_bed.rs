@@ -9,7 +9,7 @@ use nalgebra::{Vector3, Vector6};
 use super::memory::{Memory, Twist};
 use super::patch::{Bed, Derivatives, Reaction, WheelPose, react};
 use super::soil::Soil;
-use super::wheel::{Rules, SandWheel};
+use super::wheel::{Points, Rules, SandWheel};
 use crate::scalar::elementary::sin_cos;
 
 /// What a test bed prescribes.
@@ -64,21 +64,31 @@ pub struct Sunk {
     pub memory: Memory,
 }
 
-/// Points of the coarsest rules, and by how much each next trial has more.
-const TRIALS: [[usize; 3]; 9] = [
-    [4, 1, 1],
-    [4, 1, 2],
-    [8, 1, 2],
-    [8, 2, 2],
-    [8, 2, 3],
-    [16, 2, 3],
-    [16, 2, 4],
-    [16, 3, 6],
-    [24, 4, 8],
+/// Numbers of points, from the fewest on: along and across the drum, along an edge, along and
+/// across a side wall.
+const TRIALS: [[usize; 5]; 9] = [
+    [8, 1, 4, 2, 2],
+    [8, 1, 4, 4, 2],
+    [12, 1, 6, 4, 2],
+    [8, 1, 8, 8, 2],
+    [8, 2, 8, 8, 3],
+    [16, 2, 16, 16, 3],
+    [16, 2, 16, 16, 4],
+    [16, 3, 16, 16, 6],
+    [24, 4, 24, 24, 8],
 ];
 
 /// What the trials are compared with.
-const FINEST: [usize; 3] = [24, 12, 24];
+const FINEST: [usize; 5] = [24, 12, 24, 24, 24];
+
+/// Rules of a trial.
+fn rules_of([along, across, edge, wall, radial]: [usize; 5]) -> Rules {
+    Rules::new(Points {
+        drum: [along, across],
+        edge,
+        wall: [wall, radial],
+    })
+}
 
 impl Drive {
     fn twist(&self) -> Twist {
@@ -95,11 +105,11 @@ impl Drive {
 /// the finest trial if none is.
 #[must_use]
 pub fn rules_within(wheel: &SandWheel, soil: &Soil, tolerance: f64) -> Rules {
-    let forces = |points: [usize; 3]| -> Vec<Vector3<f64>> {
+    let forces = |points: [usize; 5]| -> Vec<Vector3<f64>> {
         let bed = TestBed {
             wheel: *wheel,
             soil: soil.clone(),
-            rules: Rules::new(points),
+            rules: rules_of(points),
         };
         let mut found = Vec::new();
         for share in [0.05, 0.15, 0.5] {
@@ -119,13 +129,13 @@ pub fn rules_within(wheel: &SandWheel, soil: &Soil, tolerance: f64) -> Rules {
         found
     };
     let exact = forces(FINEST);
-    let is_good = |points: &[usize; 3]| {
+    let is_good = |points: &[usize; 5]| {
         let pairs = forces(*points);
         let mut pairs = pairs.iter().zip(&exact);
         pairs.all(|(found, exact)| (found - exact).norm() <= tolerance * exact.norm())
     };
     let found = TRIALS.iter().find(|points| is_good(points));
-    Rules::new(*found.unwrap_or(&TRIALS[TRIALS.len() - 1]))
+    rules_of(*found.unwrap_or(&TRIALS[TRIALS.len() - 1]))
 }
 
 /// Most trials of a search for the sinkage.

@@ -9,7 +9,6 @@
 //! works as a drum of the radius of their tips, with the friction of sand on sand.
 
 use crate::multibody::Wheel;
-use crate::scalar::MAX_LANES;
 use crate::scalar::elementary::sin_cos;
 
 /// Length of rim over which a grouser holds sand, in heights of the grouser. Estimated from the
@@ -119,96 +118,103 @@ impl Gauss {
     }
 }
 
+/// Numbers of points of a wheel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Points {
+    /// Along an arc of the drum, and across the drum.
+    pub drum: [usize; 2],
+    /// Along an arc of an edge.
+    pub edge: usize,
+    /// Along an arc of a side wall, and along its radius.
+    pub wall: [usize; 2],
+}
+
 /// Gauss rules of a wheel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rules {
-    /// Along an arc of the drum.
-    pub arc: Gauss,
-    /// Along an arc of an edge or of a side wall.
-    pub side_arc: Gauss,
-    /// Across the drum.
-    pub across: Gauss,
-    /// Along the radius of a side wall.
-    pub radial: Gauss,
+    drum: [Gauss; 2],
+    edge: Gauss,
+    wall: [Gauss; 2],
 }
 
 impl Rules {
-    /// With these numbers of points. Those of arcs lie side by side in lanes, [`MAX_LANES`] at a
-    /// time: of one arc, or half of them of each of the two sides. Their number is rounded up.
+    /// With these numbers of points.
     #[must_use]
-    pub fn new([arc, across, radial]: [usize; 3]) -> Self {
-        let whole = arc.max(1).next_multiple_of(MAX_LANES);
-        let side = if arc <= MAX_LANES / 2 {
-            MAX_LANES / 2
-        } else {
-            whole
-        };
+    pub fn new(points: Points) -> Self {
         Self {
-            arc: Gauss::new(whole),
-            side_arc: Gauss::new(side),
-            across: Gauss::new(across),
-            radial: Gauss::new(radial),
+            drum: points.drum.map(Gauss::new),
+            edge: Gauss::new(points.edge),
+            wall: points.wall.map(Gauss::new),
         }
     }
 
-    /// Points of a wheel.
+    /// Points of a wheel with edges.
     #[must_use]
     pub fn n_points(&self) -> usize {
-        let [arc, side, across, radial] =
-            [&self.arc, &self.side_arc, &self.across, &self.radial].map(|rule| rule.places.len());
-        arc * across + 2 * side * radial
+        let number = |rules: &[Gauss; 2]| rules[0].places.len() * rules[1].places.len();
+        number(&self.drum) + 2 * (self.edge.places.len() + number(&self.wall))
     }
 
-    /// Rings of the drum.
+    /// Rings of a wheel, with those that are empty.
     #[must_use]
-    pub fn n_strips(&self) -> usize {
-        self.across.places.len()
+    pub fn n_rings(&self) -> usize {
+        let [drum, wall] = [&self.drum, &self.wall].map(|rules| rules[1].places.len());
+        drum + 2 * (1 + wall)
     }
 
-    /// Rings of a side, with those that are empty: the edge, and then the wall.
+    /// A ring, none if it is empty, and the rule along it: first those of the drum, then the edge
+    /// of each side, then those of the walls, side after side. Of a wall, a part may be under the
+    /// surface from the radius `dry` (m) on.
     #[must_use]
-    pub fn n_of_a_side(&self) -> usize {
-        1 + self.radial.places.len()
+    pub fn ring(&self, wheel: &SandWheel, dry: f64, index: usize) -> (Option<Ring>, &Gauss) {
+        let n_strips = self.drum[1].places.len();
+        let Some(beside) = index.checked_sub(n_strips) else {
+            return (self.strip(wheel, index), &self.drum[0]);
+        };
+        let (ring, rule) = match (beside / 2).checked_sub(1) {
+            None => (Self::edge(wheel), &self.edge),
+            Some(point) => (self.wall(wheel, dry, point), &self.wall[0]),
+        };
+        let is_left = beside % 2 == 1;
+        (
+            ring.map(|ring| if is_left { ring.mirrored() } else { ring }),
+            rule,
+        )
     }
 
-    /// A ring of the drum; none if it is empty.
-    #[inline]
-    #[must_use]
-    pub fn strip(&self, wheel: &SandWheel, index: usize) -> Option<Ring> {
+    fn strip(&self, wheel: &SandWheel, index: usize) -> Option<Ring> {
         let flat = 0.5 * wheel.width - wheel.rounding;
         (flat > 0.0).then(|| Ring {
-            offset: self.across.places[index] * flat,
+            offset: self.drum[1].places[index] * flat,
             radius: wheel.drum(),
             normal: [1.0, 0.0],
-            width: self.across.weights[index] * flat,
+            width: self.drum[1].weights[index] * flat,
             skin: Skin::Rim,
         })
     }
 
-    /// A ring of the right side, of which a part may be under the surface: `dry` is the radius (m)
-    /// from which on the wall may be. None if the ring is empty.
-    #[inline]
-    #[must_use]
-    pub fn side(&self, wheel: &SandWheel, dry: f64, index: usize) -> Option<Ring> {
+    /// The edge on the right.
+    fn edge(wheel: &SandWheel) -> Option<Ring> {
         let (half, edge) = (0.5 * wheel.width, wheel.rounding);
-        let inner = wheel.drum() - edge;
         let diagonal = std::f64::consts::FRAC_1_SQRT_2;
-        if index == 0 {
-            return (edge > 0.0).then_some(Ring {
-                offset: half - edge + diagonal * edge,
-                radius: inner + diagonal * edge,
-                normal: [diagonal, diagonal],
-                width: std::f64::consts::FRAC_PI_2 * edge,
-                skin: Skin::Rim,
-            });
-        }
+        (edge > 0.0).then(|| Ring {
+            offset: half - edge + diagonal * edge,
+            radius: wheel.drum() - edge + diagonal * edge,
+            normal: [diagonal, diagonal],
+            width: std::f64::consts::FRAC_PI_2 * edge,
+            skin: Skin::Rim,
+        })
+    }
+
+    /// A ring of the wall on the right.
+    fn wall(&self, wheel: &SandWheel, dry: f64, point: usize) -> Option<Ring> {
+        let inner = wheel.drum() - wheel.rounding;
         let depth = 0.5 * (inner - dry.max(0.0));
-        let point = index - 1;
         (depth > 0.0).then(|| Ring {
-            offset: half,
-            radius: inner - depth * (1.0 - self.radial.places[point]),
+            offset: 0.5 * wheel.width,
+            radius: inner - depth * (1.0 - self.wall[1].places[point]),
             normal: [0.0, 1.0],
-            width: self.radial.weights[point] * depth,
+            width: self.wall[1].weights[point] * depth,
             skin: Skin::Wall,
         })
     }
@@ -260,10 +266,12 @@ mod tests {
             grousers: 0,
         };
         let mut area = [0.0; 2];
-        let rules = Rules::new([4, 2, 3]);
-        let strips = (0..rules.n_strips()).filter_map(|k| rules.strip(&wheel, k));
-        let sides = (0..rules.n_of_a_side()).filter_map(|k| rules.side(&wheel, 0.0, k));
-        for ring in strips.chain(sides.flat_map(|ring| [ring, ring.mirrored()])) {
+        let rules = Rules::new(Points {
+            drum: [4, 2],
+            edge: 2,
+            wall: [2, 3],
+        });
+        for ring in (0..rules.n_rings()).filter_map(|k| rules.ring(&wheel, 0.0, k).0) {
             let of_ring = std::f64::consts::TAU * ring.radius * ring.width;
             area[usize::from(ring.skin == Skin::Wall)] += of_ring;
         }

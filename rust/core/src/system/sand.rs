@@ -39,6 +39,11 @@ const RESOLVED: f64 = 2.0;
 /// stored.
 const GIVES_WAY: f64 = 0.5;
 
+/// Ways, in cells of the ruts, along the ground and up or down, after which a wheel's place is
+/// noted again: a rut is known to 1% of a cell.
+const ALONG: f64 = 0.1;
+const DEEPER: f64 = 0.01;
+
 /// The sand of a step.
 #[derive(Clone, Debug)]
 pub(crate) struct SandContact {
@@ -96,6 +101,11 @@ impl SandContact {
             let pose = pose(model, kinematics, w);
             let cell = ground.cell;
             let (c, axle) = (pose.centre, pose.axle);
+            let noted = [c.x, c.y, c.z, axle.x, axle.y, axle.z];
+            if !is_elsewhere(&patch.begin.noted, &noted, &patch.wheel, cell) {
+                continue;
+            }
+            state.wheels[w].noted = noted;
             let radius = patch.wheel.drum();
             if patch.begin.sinkage < -cell {
                 state.ruts.pass(w, [c.x, c.z], ([0.0; 2], cell), |_| None);
@@ -208,6 +218,7 @@ impl SandContact {
                     absorbed: patch.begin.absorbed,
                     velocity: twist.linear.into(),
                     sinkage,
+                    noted: patch.begin.noted,
                     ..WheelInSand::default()
                 };
                 continue;
@@ -232,6 +243,7 @@ impl SandContact {
                 moment: [force[3], force[4], force[5]],
                 velocity: twist.linear.into(),
                 sinkage,
+                noted: patch.begin.noted,
             };
         }
         total
@@ -243,4 +255,13 @@ impl SandContact {
             patch.begin = patch.tried;
         }
     }
+}
+
+/// Whether a wheel has moved away from where it was last noted: centre and axle.
+fn is_elsewhere(before: &[f64; 6], now: &[f64; 6], wheel: &SandWheel, cell: f64) -> bool {
+    let moved = |k: usize| (now[k] - before[k]).abs();
+    let reach = wheel.drum() + 0.5 * wheel.width;
+    let turned = (moved(3) + moved(4) + moved(5)) * reach;
+    let along = moved(0) + moved(2) + turned;
+    along > ALONG * cell || moved(1) + turned > DEEPER * cell
 }
