@@ -50,6 +50,46 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// Whether every number is within its range; `is_free`: for a machine on a free base.
+    fn check(&self, is_free: bool) -> Result<(), EpisodeError> {
+        let positive = |field, value: f64| (field, value, value > 0.0, "a finite number above 0");
+        let not_negative =
+            |field, value: f64| (field, value, value >= 0.0, "a finite number from 0");
+        let any = |field, value: f64| (field, value, true, "a finite number");
+        let numbers = [
+            positive("dt", self.dt),
+            positive("battery", self.battery.unwrap_or(1.0)),
+            positive("free_distance", self.free_distance.unwrap_or(1.0)),
+            positive("field_margin", self.field_margin.unwrap_or(1.0)),
+            (
+                "goals",
+                self.goals as f64,
+                self.goals == 1 || self.has_course() && is_free,
+                "at least 1, and 1 for a machine on a fixed base",
+            ),
+            positive("gravity", self.gravity),
+            not_negative("noise", self.noise),
+            not_negative("max_steering", self.max_steering),
+            not_negative("goal_tolerance", self.goal_tolerance),
+            any("cos_max_tilt", self.cos_max_tilt),
+            positive("stuck_time", self.stuck_time),
+        ];
+        let lists = (self.torque_limits.iter())
+            .map(|&x| not_negative("torque_limits", x))
+            .chain(self.weights.iter().map(|&x| any("weights", x)))
+            .chain(self.scan.iter().flatten().map(|&x| any("scan", x)));
+        for (field, value, is_within, range) in numbers.into_iter().chain(lists) {
+            if !(is_within && value.is_finite()) {
+                return Err(EpisodeError::OutOfRange {
+                    field,
+                    range,
+                    value,
+                });
+            }
+        }
+        Ok(())
+    }
+
     /// Whether there is more than one goal.
     #[must_use]
     pub fn has_course(&self) -> bool {
@@ -164,41 +204,7 @@ impl Rules {
         };
         let n_actions = n_wheels + steering.n_entries;
         check_lengths([("torque_limits", settings.torque_limits.len(), n_wheels)])?;
-        let positive = |field, value: f64| (field, value, value > 0.0, "a finite number above 0");
-        let not_negative =
-            |field, value: f64| (field, value, value >= 0.0, "a finite number from 0");
-        let any = |field, value: f64| (field, value, true, "a finite number");
-        let numbers = [
-            positive("dt", settings.dt),
-            positive("battery", settings.battery.unwrap_or(1.0)),
-            positive("free_distance", settings.free_distance.unwrap_or(1.0)),
-            positive("field_margin", settings.field_margin.unwrap_or(1.0)),
-            (
-                "goals",
-                settings.goals as f64,
-                settings.goals == 1 || settings.has_course() && model.trees()[0].is_free,
-                "at least 1, and 1 for a machine on a fixed base",
-            ),
-            positive("gravity", settings.gravity),
-            not_negative("noise", settings.noise),
-            not_negative("max_steering", settings.max_steering),
-            not_negative("goal_tolerance", settings.goal_tolerance),
-            any("cos_max_tilt", settings.cos_max_tilt),
-            positive("stuck_time", settings.stuck_time),
-        ];
-        let lists = (settings.torque_limits.iter())
-            .map(|&x| not_negative("torque_limits", x))
-            .chain(settings.weights.iter().map(|&x| any("weights", x)))
-            .chain(settings.scan.iter().flatten().map(|&x| any("scan", x)));
-        for (field, value, is_within, range) in numbers.into_iter().chain(lists) {
-            if !(is_within && value.is_finite()) {
-                return Err(EpisodeError::OutOfRange {
-                    field,
-                    range,
-                    value,
-                });
-            }
-        }
+        settings.check(model.trees()[0].is_free)?;
         let mut rules = Self {
             inverse_scale: Vec::new(),
             noise: Vec::new(),
