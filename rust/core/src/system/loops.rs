@@ -129,7 +129,9 @@ impl Basis {
             self.R.truncate(begin);
             return false;
         }
-        own.iter_mut().for_each(|x| *x /= length);
+        for x in own {
+            *x /= length;
+        }
         self.R[begin + r] = length;
         true
     }
@@ -335,7 +337,8 @@ impl Loops {
         q: &mut Configuration,
     ) -> f64 {
         let mut last = f64::INFINITY;
-        for iteration in 0.. {
+        let mut iteration = 0;
+        loop {
             self.kinematics.update_for_step(model, q);
             (self.end).update(model, &self.kinematics, &q.joints, factor);
             let gap = model
@@ -346,6 +349,7 @@ impl Loops {
                 return gap;
             }
             last = gap;
+            iteration += 1;
             let (basis, z) = (&self.end, &mut self.z);
             z.clear();
             z.extend(basis.kept.iter().map(|&row| -basis.gaps[row]));
@@ -355,7 +359,6 @@ impl Loops {
             q.advance(model, &self.y, share);
             q.normalise();
         }
-        last
     }
 
     /// Removes from a velocity what would open the loops at the end of the step.
