@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 import torch
 import yaml
+from typer.testing import CliRunner
 
 from rover_gym import OptionError
+from rover_gym.cli import app
 from rover_gym.learning.arc_config import ArcConfig, ArcPPOConfig, is_arc_config, read_arc_config
 from rover_gym.learning.arc_learner import ArcVecEnv, leash_at, make_model, network_of
 from rover_gym.learning.arc_recipe import train_arcs
@@ -39,7 +41,7 @@ def config(tmp_path: Path, **changes: Any) -> ArcConfig:
     return read_arc_config(path)
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.takes_long("trains in two processes"))])
 def test_a_training_writes_a_network_and_goes_on(tmp_path: Path, workers: int) -> None:
     settings, said = config(tmp_path), []
     folder = train_arcs(settings, tmp_path / "run", workers=workers, threads=1, device="cpu", say=said.append)
@@ -62,6 +64,19 @@ def test_a_training_writes_a_network_and_goes_on(tmp_path: Path, workers: int) -
         with pytest.raises(OptionError) as caught:
             train_arcs(other, folder, resume=True)
         assert caught.value.field == "scenes"
+
+
+def test_the_command_trains_and_its_policy_drives(tmp_path: Path) -> None:
+    path, run = tmp_path / "tiny.yaml", tmp_path / "run"
+    path.write_text(yaml.safe_dump({**TINY, "ppo": None}), encoding="utf-8")
+    runner = CliRunner()
+    trained = runner.invoke(app, ["train", str(path), "--output", str(run), "--workers", "1"])
+    assert trained.exit_code == 0, trained.output
+    driven = runner.invoke(app, ["baseline", "--policy", str(run), "--difficulty", "0", "--episodes", "1"])
+    assert driven.exit_code == 0, driven.output
+    assert "scenes:" in runner.invoke(app, ["train", "anywhere", "--show"]).output
+    path.write_text("scenes: [", encoding="utf-8")
+    assert runner.invoke(app, ["train", str(path)]).exit_code != 0
 
 
 def test_imitation_goes_on_after_a_round(tmp_path: Path) -> None:

@@ -194,8 +194,11 @@ class ArcConfig:
 
 
 def is_arc_config(path: Path) -> bool:
-    """Whether a YAML file configures this training."""
-    given = yaml.safe_load(path.read_text(encoding="utf-8"))
+    """Whether a YAML file configures this training; False for a file that cannot be read as YAML."""
+    try:
+        given = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError):
+        return False
     return isinstance(given, Mapping) and "scenes" in given
 
 
