@@ -2201,8 +2201,8 @@ class EpisodeRules:
             from 0 to 1.
         free_distance: Distance from the start at which the rover is free, m; none by default. The
             episode then ends, and progress is measured from the start.
-        field_margin: How far the field reaches beyond the rectangle of start and goals, m: where the
-            trunk's origin leaves it, the episode ends. No edge by default.
+        field_margin: How far the field reaches beyond the rectangle of start and goals, m; without
+            an edge by default. An episode ends where the trunk's origin leaves it.
 
     Raises:
         ModelError: `model` is not a RoverModel.
