@@ -136,9 +136,9 @@ class RoverArcsEnv(gym.Wrapper[Any, Any, Observations, Observations]):
         """
         arcs, one = check_arcs(np.reshape(action, (1,)), 1), np.ones(1, np.bool_)
         self.driver.choose(self._seen, arcs, one)
-        self._seen, (reward,), (terminated,), _ = self.driver.drive(self._seen, one, self._step)
+        self._seen, rewards, ended, _ = self.driver.drive(self._seen, one, self._step)
         self.driver.notice(self._seen, one)
-        return self._observe(), float(reward), bool(terminated), False, self._info
+        return self._observe(), float(rewards[0]), bool(ended[0]), False, self._info
 
     def expert_action(self, teacher: ScanPolicy | CommandPlanner | None = None) -> np.int64:
         """The arc that a planner would choose now; the planner of the driver by default."""
@@ -149,7 +149,7 @@ class RoverArcsEnv(gym.Wrapper[Any, Any, Observations, Observations]):
     def _observe(self) -> ArcObservation:
         return {name: part[0] for name, part in self.driver.observe(self._seen).items()}
 
-    def _step(self, actions: Observations, _: Mask, has_scan: bool) -> tuple[Observations, Array, Mask, Mask]:
+    def _step(self, actions: Observations, _moved: Mask, has_scan: bool) -> tuple[Observations, Array, Mask, Mask]:
         self.rover.has_scan = has_scan
         try:
             seen, reward, terminated, _, self._info = self.rover.step(actions[0])
