@@ -29,7 +29,7 @@ from rover_gym.validation import refuse
 NO_FILE = "cannot be written"
 
 
-def one_line(result: Result, code: int) -> str:
+def one_line(result: Result, code: int = 2) -> str:
     assert result.exit_code == code, result.output
     assert len(result.stderr.splitlines()) == 1
     assert "Traceback" not in result.output
