@@ -4,12 +4,13 @@ import inspect
 
 from rover_gym import RoverEnv
 from rover_gym.env import RoverGrainsEnv
-from rover_gym.policy import RoverCommandEnv, RoverGoalEnv, RoverTrapEnv
+from rover_gym.policy import RoverArcsEnv, RoverCommandEnv, RoverGoalEnv, RoverTrapEnv
 
 #: Environments whose docstring is a card, by name.
 CARDS = {
     "Rover-v0": RoverEnv,
     "RoverGrains-v0": RoverGrainsEnv,
+    "RoverArcs-v0": RoverArcsEnv,
     "RoverCommand-v0": RoverCommandEnv,
     "RoverGoal-v0": RoverGoalEnv,
     "RoverTrap-v0": RoverTrapEnv,

@@ -26,8 +26,11 @@ def frame(name: str) -> np.ndarray:
     width, height = SIZE
     env = gym.make(name, render_mode="rgb_array", render_options={"width": width, "height": height})
     env.reset(seed=7)
-    action = np.zeros(env.action_space.shape, np.float32)
-    action[: len(action) if len(action) <= 3 else len(action) // 2] = 0.35
+    if env.action_space.shape:
+        action = np.zeros(env.action_space.shape, np.float32)
+        action[: len(action) if len(action) <= 3 else len(action) // 2] = 0.35
+    else:
+        action = env.get_wrapper_attr("get_keys_to_action")()[""]
     for k in range(round(SECONDS / env.unwrapped.dt)):
         terminated = env.step(action)[2]
         if k % 3 == 0 or terminated:  # frames on the way, so that the wheels leave their marks

@@ -17,6 +17,7 @@ from rover_gym.mechanics import OptionError, PathSearch, atan2, exp, sin_cos
 from rover_gym.policy import MapOptions, PathCosts, ScanPolicy
 from rover_gym.policy.arc_search import STEPS, Arcs, ArcSearch, RoverOutline, SearchTask, ways_by_price
 from rover_gym.policy.ground_map import GroundMap
+from rover_gym.policy.scan_policy import ScanMemory
 
 Array = npt.NDArray[np.float64]
 
@@ -485,11 +486,11 @@ def test_a_rover_remembers_the_ground_of_its_own_episode() -> None:
     twice = (np.concatenate((part, part)) for part in state)
     actions, state = policy.predict(both, tuple(twice), np.array([False, True]))
     assert actions.shape == (2, 12)
-    cells, corner = state[-4], state[-3]
-    x, z = ((corner[1, k] + np.arange(100)) * ScanPolicy.arguments()["height_scan"][2] for k in (0, 1))
+    memory = ScanMemory.of(state, 2, 100)
+    x, z = ((memory.corner[1, k] + np.arange(100)) * ScanPolicy.arguments()["height_scan"][2] for k in (0, 1))
     points = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
     truth = np.asarray(env.unwrapped.simulation.terrain.heights(points)).reshape(100, 100)  # type: ignore[union-attr]
-    off = np.abs(cells[1] - truth)
+    off = np.abs(memory.ground[1] - truth)
     assert np.nanmedian(off) < 0.01
     assert 1500 < np.isfinite(off).sum() < 2300
 

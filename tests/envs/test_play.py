@@ -64,7 +64,7 @@ def test_play_drives_by_keys(name: str) -> None:
     play(env, fps=1000, callback=on_step, seed=6)
     env.close()
     assert np.array_equal(actions[0], keys[""])
-    assert not np.array(actions[0]).any()
+    assert not np.array(actions[0]).any() or name == "RoverArcs-v0"  # no arc stands still
     assert np.array_equal(actions[2], keys["wsa"])
     assert np.array_equal(actions[3], keys["wa"])
 

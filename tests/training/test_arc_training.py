@@ -72,7 +72,9 @@ def test_the_command_trains_and_its_policy_drives(tmp_path: Path) -> None:
     runner = CliRunner()
     trained = runner.invoke(app, ["train", str(path), "--output", str(run), "--workers", "1"])
     assert trained.exit_code == 0, trained.output
-    driven = runner.invoke(app, ["baseline", "--policy", str(run), "--difficulty", "0", "--episodes", "1"])
+    driven = runner.invoke(
+        app, ["evaluate", str(run), "--difficulty", "0", "--episodes", "1", "--output", str(tmp_path)]
+    )
     assert driven.exit_code == 0, driven.output
     assert "scenes:" in runner.invoke(app, ["train", "anywhere", "--show"]).output
     path.write_text("scenes: [", encoding="utf-8")

@@ -149,5 +149,7 @@ def test_pipes_and_names_that_no_file_has_are_refused(folder: Path, env: RoverEn
     with pytest.raises(PolicyError, match="must be a regular file"):
         TrainedPolicy.load(env, folder)
     for name in ("x" * 5000, "a\0b"):
-        with pytest.raises(PolicyError, match="must be 'pd', 'sand', 'scan', 'foresight', 'trained' or the folder"):
+        with pytest.raises(
+            PolicyError, match="must be 'pd', 'sand', 'scan', 'foresight', 'anywhere', 'trained' or the folder"
+        ):
             find_policy(name, "plane")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import product
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -27,9 +27,10 @@ CURVATURE = 0.5
 KEYS = "wsad"
 
 Action: TypeAlias = npt.NDArray[np.float32]
+Made = TypeVar("Made")
 
 
-def keys_to_action(action: Callable[[float, float], Action]) -> dict[str, Action]:
+def keys_to_action(action: Callable[[float, float], Made]) -> dict[str, Made]:
     """Actions by the keys that are held together.
 
     Args:

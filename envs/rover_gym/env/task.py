@@ -132,9 +132,7 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
     simulation = Simulation(rover, Plane(), **options)  # the core validates the simulation options
     points = None if given["height_scan"] is None else given["height_scan"].offsets
     max_steering = _steering_limit(rover, steering, given["max_steering_deg"])
-    rules = _rules(
-        given, rover, substeps=substeps, max_steering=max_steering, scan=points, free_distance=free_distance
-    )
+    rules = _rules(given, rover, substeps=substeps, max_steering=max_steering, scan=points, free_distance=free_distance)
     episodes = EpisodeDistribution(
         rules,
         simulation,

@@ -11,6 +11,7 @@ from gymnasium.vector.utils import batch_space
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
 from rover_gym.env.observation import Array, Mask, Observations
+from rover_gym.env.play_keys import keys_to_action
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS
 from rover_gym.mechanics import OptionError, TerrainError
@@ -34,7 +35,7 @@ MAX_ARCS = MAX_EPISODE_STEPS // 4
 class CommandPlanner(Protocol):
     """A planner of commands: `PlannerPolicy`."""
 
-    def plan(self, observation: Observations) -> tuple[float, float, float]:
+    def plan_command(self, observation: Observations) -> tuple[float, float, float]:
         """Speed, m/s, curvature, 1/m, and sideways direction, rad, from an observation `(size,)` on."""
 
 
@@ -145,6 +146,15 @@ class RoverArcsEnv(gym.Wrapper[Any, Any, Observations, Observations]):
         if teacher is None or isinstance(teacher, ScanPolicy):
             return np.int64(self.driver.expert(self._seen, np.ones(1, np.bool_), teacher)[0])
         return np.int64(planned_arc(teacher, self._seen[0], self.driver))
+
+    def get_keys_to_action(self) -> dict[str, np.int64]:
+        """Arcs by keys held together, for `gymnasium.utils.play`: w pushes, s backs off, a and d turn.
+
+        "" is no key: straight ahead, since no arc stands still.
+        """
+        return keys_to_action(
+            lambda forward, left: np.int64(arc_of((-1.0 if forward < 0.0 else 1.0, left, 0.0), pushes=forward > 0.0))
+        )
 
     def _observe(self) -> ArcObservation:
         return {name: part[0] for name, part in self.driver.observe(self._seen).items()}

@@ -18,6 +18,7 @@ from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS
 from rover_gym.mechanics import RoverModel
 from rover_gym.policy.arc_forecast import FORECAST_FILE
+from rover_gym.policy.arc_network_policy import ARCS_FILE
 from rover_gym.policy.evaluation import (
     Episode,
     EvaluatedEpisode,
@@ -26,7 +27,7 @@ from rover_gym.policy.evaluation import (
     drive_all,
     run_episode,
 )
-from rover_gym.policy.named_policy import NAMES, Policy, named_policy
+from rover_gym.policy.named_policy import NAMES, Policy, named_policy, network_folder
 from rover_gym.policy.policy_card import PolicyCard, find_policy, is_there
 from rover_gym.policy.trained_policy import TrainedPolicy
 from rover_gym.record.channels import outcome_words
@@ -71,7 +72,10 @@ def named_contender(policy: str, terrain: str, model: RoverModel | None = None) 
         OSError: Its files may not be read.
     """
     chosen = named_policy(policy, terrain, model)
-    if policy == "foresight":
+    network = network_folder(policy)
+    if network is not None:
+        files = [network / ARCS_FILE]
+    elif policy == "foresight":
         files = sorted(POLICIES.glob("foresight*/*"))
     else:
         folder = find_policy(policy, terrain) if not is_there(Path(policy) / FORECAST_FILE) else Path(policy)

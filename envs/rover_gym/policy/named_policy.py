@@ -27,7 +27,7 @@ NAMES_HELP = (
 )
 
 #: Policies without a folder.
-NAMES = ("pd", "sand", "scan", "foresight", "trained")
+NAMES = ("pd", "sand", "scan", "foresight", ANYWHERE, "trained")
 
 _TITLES = {
     "pd": "the PD baseline",
@@ -81,8 +81,8 @@ def named_policy(policy: str, terrain: str, model: RoverModel | None = None) -> 
     if policy == "foresight" or is_there(Path(policy) / FORECAST_FILE):
         forecast = True if policy == "foresight" else policy
         return NamedPolicy(ScanPolicy.arguments(model), partial(ScanPolicy, forecast=forecast))
-    network = FOLDER / ANYWHERE if policy == ANYWHERE else Path(policy)
-    if is_there(network / ARCS_FILE):
+    network = network_folder(policy)
+    if network is not None:
         return NamedPolicy(ScanPolicy.arguments(model), partial(_load_network, network))
     folder = find_policy(policy, terrain)
     if folder is not None:
@@ -90,6 +90,12 @@ def named_policy(policy: str, terrain: str, model: RoverModel | None = None) -> 
     if policy == "scan":
         return NamedPolicy(ScanPolicy.arguments(model), ScanPolicy)
     return NamedPolicy({}, SandPolicy if policy == "sand" else PDPolicy)
+
+
+def network_folder(policy: str) -> Path | None:
+    """The folder of the network that a policy's name or folder stands for; None of other policies."""
+    folder = FOLDER / ANYWHERE if policy == ANYWHERE else Path(policy)
+    return folder if is_there(folder / ARCS_FILE) else None
 
 
 def _load_network(folder: Path, env: Any) -> Policy:
