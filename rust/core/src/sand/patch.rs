@@ -1,6 +1,6 @@
 //! Force of sand on a wheel: the stress over what is under the surface, with its derivatives.
 //!
-//! The points of the wheel that may be in the sand ([`super::points`]) lie side by side in lanes,
+//! The points of the wheel that may be in the sand (`points`) lie side by side in lanes,
 //! eight at a time. A machine with fewer lanes takes them in turns and keeps a sum for each of the
 //! eight: the bits do not depend on the lanes.
 

@@ -15,7 +15,7 @@
 //! which the energy audit gives back to free motion.
 //!
 //! Rows that follow from earlier ones, such as those across the plane of a planar linkage, are left
-//! out: their part outside the span is below [`DEPENDENT`] of the loop's longest row. Their
+//! out: their part outside the span is below `DEPENDENT` of the loop's longest row. Their
 //! reactions count as zero.
 //!
 //! Source: Gear et al. 1985, for constraints on both levels; Featherstone 2008, ch. 8, for loops
