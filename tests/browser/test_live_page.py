@@ -173,7 +173,8 @@ def test_overlays_show_what_the_rover_sees_and_those_of_a_planner_wait_for_one(l
         bare = picture(live.browser)
         key(live.browser, "keydown", letter)
         frames(live.browser, 6)
-        assert (np.abs(picture(live.browser) - bare).max(axis=-1) > 20.0).sum() > 50, letter
+        # A sensor is asked for with the key, and its picture comes when it comes.
+        await_that(lambda: (np.abs(picture(live.browser) - bare).max(axis=-1) > 20.0).sum() > 50, letter)  # noqa: B023
         key(live.browser, "keydown", letter)
         frames(live.browser, 6)
     key(live.browser, "keydown", "p")
