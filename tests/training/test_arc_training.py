@@ -152,3 +152,13 @@ def test_the_shipped_configuration_covers_all_scenes() -> None:
     settings = read_arc_config(find_configuration("anywhere"))
     assert set(settings.groups()) == set(settings.scenes)
     assert all(scene.environment["reward_weights"] for scene in settings.parsed().values())
+
+
+def test_rovers_of_other_processes_are_neither_changed_nor_called() -> None:
+    vector = ArcVecEnv(None, 2)
+    with pytest.raises(AttributeError, match="difficulty"):
+        vector.set_attr("difficulty", 1.0)
+    with pytest.raises(AttributeError, match="set_difficulty"):
+        vector.env_method("set_difficulty", 1.0)
+    with pytest.raises(AttributeError, match="difficulty"):
+        vector.get_attr("difficulty")

@@ -97,7 +97,7 @@ class ArcVecEnv(VecEnv):
         return dict(seen), rewards, dones, infos
 
     def close(self) -> None:
-        """The rovers are closed by whom made them."""
+        """Does nothing: whoever made the rovers closes them."""
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """None where stable-baselines3 asks for the render mode: the rovers are elsewhere.
@@ -110,12 +110,22 @@ class ArcVecEnv(VecEnv):
         return [None for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Refuses: the rovers are elsewhere."""
-        raise NotImplementedError(f"{attr_name}, {value}, {indices}")
+        """Refuses, since worker processes have the rovers; stable-baselines3 demands the method, PPO never calls it.
+
+        Raises:
+            AttributeError: Always.
+        """
+        raise AttributeError(f"{attr_name}: rovers {indices} of worker processes cannot be given {value!r}")
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Refuses: the rovers are elsewhere."""
-        raise NotImplementedError(f"{method_name}{args}, {indices}, {kwargs}")
+        """Refuses, as `set_attr` does.
+
+        Raises:
+            AttributeError: Always.
+        """
+        raise AttributeError(
+            f"{method_name}: rovers {indices} of worker processes are not called with {args}, {kwargs}"
+        )
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
         """True for a monitor, whose infos the workers give."""
