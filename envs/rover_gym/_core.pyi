@@ -626,7 +626,7 @@ class SoftGround(Terrain):
     """Sand, into which wheels sink. All other parts of a machine touch its surface as rigid ground.
 
     The ruts belong to a simulation and are part of its snapshots. For rocks on sand, use a `Union`
-    of both. On soft ground a simulation always uses the general step, see
+    of both. Beside firm ground other than spheres a simulation always uses the general step, see
     `Simulation.fallback_reason`.
 
     Args:

@@ -13,6 +13,7 @@ use rover_core::scalar::{Instructions, Lane, Single};
 mod contacts;
 mod lane_batch;
 mod machines;
+mod on_sand;
 mod rigid_bodies;
 mod solver;
 mod surfaces;

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // numbers of steps
 
-mod sand_scenes;
+pub(crate) mod sand_scenes;
 
 mod driving;
 mod forces;

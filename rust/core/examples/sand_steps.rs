@@ -1,6 +1,7 @@
-//! What a step in sand costs: `sand_steps [STEPS] [rest|drive|explore]` prints microseconds a step
-//! of a rover alone and of each of 8 in a batch on one thread. With a scene it steps that alone,
-//! for counting instructions: `valgrind --tool=callgrind --toggle-collect='*counted*'`.
+//! What a step in sand costs: `sand_steps [STEPS] [rest|drive|explore] [batch]` prints microseconds
+//! a step of a rover alone and of each of 8 in a batch on one thread. With a scene it steps that
+//! alone, one rover or the batch, for counting instructions:
+//! `valgrind --tool=callgrind --toggle-collect='*counted*'`.
 //!
 //! The rover is `open-rover` on wheels 0.08 m wide with grousers, in dry sand, at 5 ms: parked,
 //! driven by a constant torque, or by torques and steering that change every ten steps.
@@ -74,13 +75,14 @@ fn counted(sim: &mut RoverSimulation, scene: &str, steps: usize) -> StepReport {
     report
 }
 
-/// Microseconds a step and rover of a batch.
-fn in_batch(scene: &str, steps: usize) -> f64 {
-    let start = start();
-    let model = start.model().clone();
-    let mut batch = Batch::new(vec![start; ROVERS], Vec::new(), Some(1)).unwrap();
+fn batch() -> Batch {
+    Batch::new(vec![start(); ROVERS], Vec::new(), Some(1)).unwrap()
+}
+
+#[inline(never)]
+fn counted_batch(batch: &mut Batch, scene: &str, steps: usize) {
+    let model = wide("open-rover", 0.08, 1.0);
     let mut rows = vec![0.0; ROVERS * batch.layout().size()];
-    let begin = Instant::now();
     for k in 0..steps / STEPS_A_COMMAND {
         let (mut torques, mut angles) = (Vec::new(), Vec::new());
         for i in 0..ROVERS {
@@ -92,6 +94,13 @@ fn in_batch(scene: &str, steps: usize) -> f64 {
             .step(&torques, &angles, STEPS_A_COMMAND, None, &mut rows)
             .unwrap();
     }
+}
+
+/// Microseconds a step and rover of a batch.
+fn in_batch(scene: &str, steps: usize) -> f64 {
+    let mut batch = batch();
+    let begin = Instant::now();
+    counted_batch(&mut batch, scene, steps);
     1e6 * begin.elapsed().as_secs_f64() / (ROVERS * steps) as f64
 }
 
@@ -99,7 +108,11 @@ fn main() {
     let arguments: Vec<String> = std::env::args().collect();
     let steps = arguments.get(1).and_then(|n| n.parse().ok()).unwrap_or(500);
     if let Some(scene) = arguments.get(2) {
-        counted(&mut start(), scene, steps);
+        if arguments.len() > 3 {
+            counted_batch(&mut batch(), scene, steps);
+        } else {
+            counted(&mut start(), scene, steps);
+        }
         return;
     }
     println!(

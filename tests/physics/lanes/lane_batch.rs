@@ -58,7 +58,7 @@ fn command(rover: &mut RoverSimulation, torque: f64, numbers: &mut Random) {
     rover.set_commands(&torques, &steering).unwrap();
 }
 
-fn assert_alike(a: &RoverSimulation, b: &RoverSimulation) {
+pub fn assert_alike(a: &RoverSimulation, b: &RoverSimulation) {
     let bits = |x: &[f64]| x.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
     assert_eq!(bits(a.v()), bits(b.v()));
     assert_eq!(bits(&a.q().joints), bits(&b.q().joints));

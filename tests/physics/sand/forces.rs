@@ -1,11 +1,12 @@
 //! The force of sand on one wheel: closed forms, continuity, points, scaling.
 
 use rover_core::nalgebra::Vector3;
-use rover_core::sand::patch::Heights;
+use rover_core::sand::patch::Relief;
+use rover_core::sand::ruts::RutsNear;
 use rover_core::sand::test_bed::rules_within;
 use rover_core::sand::{
-    Bed, Derivatives, Drive, Law, Measured, Memory, Points, Resistive, Rules, SandWheel, Soil,
-    Sunk, TestBed, Twist, WheelPose, react, react_with,
+    Bed, Derivatives, Drive, Law, Measured, Memory, Points, Resistive, Rules, RutMap, SandWheel,
+    Soil, Sunk, TestBed, Twist, WheelPose, Window, react, react_with,
 };
 use rover_core::scalar::Instructions;
 
@@ -162,6 +163,18 @@ const LEVEL: Bed<'static> = Bed {
     gravity: 9.81,
 };
 
+/// Size of a cell of ruts, m.
+const CELL: f64 = 0.01;
+
+/// A rut around a wheel, of a depth (m) that depends on the way from its centre along x, m.
+fn rut(pose: &WheelPose, depth: impl Fn(f64) -> f64) -> RutMap {
+    let (mut ruts, c) = (RutMap::new(1), pose.centre);
+    let noted = |[x, _]: [f64; 2]| Some(depth(x - c.x).max(0.0));
+    ruts.pass(0, [c.x, c.z], ([0.2; 2], CELL), noted);
+    ruts.pass(0, [c.x + 1.0, c.z], ([0.0; 2], CELL), |_| None);
+    ruts
+}
+
 /// The points of a wheel lie side by side in lanes. How many lanes a machine has does not matter.
 ///
 /// On a bed with relief some points of a group are not in the sand. Their slopes counted where a
@@ -174,16 +187,17 @@ fn the_force_has_the_same_bits_with_any_number_of_lanes() {
         by_memory: 0.7,
         by_pose: 0.002,
     };
-    let ripples = |place: &Vector3<f64>| {
-        let height = 0.01 * (40.0 * place.x).sin() * (70.0 * place.z).cos();
-        Heights {
-            virgin: height,
-            left: height - 0.002,
-            ..Heights::default()
-        }
-    };
+    let ripples = |x: f64, z: f64| Some(0.01 * (40.0 * x).sin() * (70.0 * z).cos());
+    let (ruts, window) = (rut(&pose, |_| 0.002), Window::default());
     let rippled = Bed {
-        relief: Some(&ripples),
+        relief: Some(Relief {
+            height: Some(&ripples),
+            ruts: Some(RutsNear {
+                map: &ruts,
+                window: &window,
+                cell: CELL,
+            }),
+        }),
         highest: 0.01,
         ..LEVEL
     };
@@ -211,13 +225,16 @@ fn the_force_has_the_same_bits_with_any_number_of_lanes() {
 fn the_slopes_of_a_wheel_are_its_derivatives() {
     let (wheel, pose, memory) = askew();
     // A rut that becomes deeper along its way.
-    let sloping = |place: &Vector3<f64>| Heights {
-        virgin: 0.0,
-        left: -0.02 - 0.2 * (place.x - pose.centre.x),
-        slope: Vector3::new(-0.2, 0.0, 0.0),
-    };
+    let (ruts, window) = (rut(&pose, |x| 0.02 + 0.2 * x), Window::default());
     let rutted = Bed {
-        relief: Some(&sloping),
+        relief: Some(Relief {
+            height: None,
+            ruts: Some(RutsNear {
+                map: &ruts,
+                window: &window,
+                cell: CELL,
+            }),
+        }),
         ..LEVEL
     };
     let cases = [

@@ -15,9 +15,9 @@ pub enum FallbackReason {
     /// The variant is not [`Variant::Linearised`].
     #[error("variant is \"newton\"")]
     Variant,
-    /// Wheels sink into the ground.
-    #[error("the ground is soft")]
-    SoftGround,
+    /// Wheels sink into the ground and meet planes, surfaces or spheres of another kind there.
+    #[error("wheels meet a firm plane or surface beside the soft ground, or spheres under it")]
+    FirmBesideSoft,
     /// A wrench acts from outside.
     #[error("a wrench is applied")]
     Wrench,

@@ -373,10 +373,11 @@ impl<T: Lane> Contacts<T> {
         self.parts.find_twists(middle, v, &mut self.twists);
         self.by_lane.clear();
         let height = ground.height(middle.origin);
+        let for_wheels = ground.height_for_wheels(middle.origin);
         self.used.clear();
         let height_at_end = ground.height(end.origin);
         for w in 0..self.parts.wheels.len() {
-            let (mut rest, reach) = self.look_at_wheel(w, height, ground, sight);
+            let (mut rest, reach) = self.look_at_wheel(w, for_wheels, ground, sight);
             let slots = self.parts.wheels[w].slots.clone();
             if self.slots[slots.clone()].iter().any(|own| own.active.any()) {
                 let pose = &end.bodies[self.parts.wheels[w].body];

@@ -113,6 +113,9 @@ pub struct Ground<T: Lane> {
     /// Those with a surface.
     surfaces: Vec<Option<Arc<dyn Terrain>>>,
     has_surfaces: bool,
+    /// Those of them that are firm, and rovers on soft ground, whose wheels meet spheres alone.
+    under_wheels: Vec<Option<Arc<dyn Terrain>>>,
+    soft: T::Mask,
     /// Rovers on a surface and a plane.
     mixed: T::Mask,
     planes: Vec<ContactPlane<T>>,
@@ -157,6 +160,8 @@ impl<T: Lane> Ground<T> {
             has_spheres: false,
             surfaces: vec![None; T::LANES],
             has_surfaces: false,
+            under_wheels: vec![None; T::LANES],
+            soft: T::mask(token, 0),
             mixed: T::mask(token, 0),
             planes: vec![ContactPlane::new(token); n_wheels],
             pieces: vec![Pieces::new(token); n_wheels],
@@ -179,17 +184,26 @@ impl<T: Lane> Ground<T> {
         };
         self.normal.set(lane, normal);
         self.offset.set(lane, offset);
-        let is_plane = terrain.is_plane();
+        let soft = terrain.soft();
+        let is_plane = match &soft {
+            Some(layer) => layer.surface.is_plane() && !terrain.can_be_passed(),
+            None => terrain.is_plane(),
+        };
         self.fields[lane] = (!is_plane).then(|| Arc::clone(terrain));
         self.has_spheres = self.fields.iter().any(Option::is_some);
         let own = T::mask(self.offset.token(), 1 << lane);
         let has_surface = terrain.has_surface();
         self.surfaces[lane] = has_surface.then(|| Arc::clone(terrain));
         self.has_surfaces = self.surfaces.iter().any(Option::is_some);
-        self.mixed = self.mixed & !own;
-        if has_surface && plane.is_some() {
+        let is_firm = soft.is_none();
+        self.under_wheels[lane] = (has_surface && is_firm).then(|| Arc::clone(terrain));
+        (self.soft, self.mixed) = (self.soft & !own, self.mixed & !own);
+        if !is_firm {
+            self.soft = self.soft | own;
+        } else if has_surface && plane.is_some() {
             self.mixed = self.mixed | own;
         }
+        let offset = if is_firm { offset } else { f64::INFINITY };
         for plane in &mut self.planes {
             plane.set_lane(lane, normal, offset);
         }
@@ -239,7 +253,21 @@ impl<T: Lane> Ground<T> {
         bound: f64,
         reach: T,
     ) -> T::Mask {
-        self.planes[wheel].find(&self.surfaces, centre, bound, reach) | self.mixed
+        let found = self.planes[wheel].find(&self.under_wheels, centre, bound, reach);
+        found | self.mixed | self.unknown(centre, bound)
+    }
+
+    /// Rovers on soft ground that is not known as near as `bound` (m) to a place.
+    #[inline(always)]
+    fn unknown(&self, centre: Vec3<T>, bound: f64) -> T::Mask {
+        let mut unknown = 0;
+        for (lane, terrain) in self.surfaces.iter().enumerate() {
+            if let Some(terrain) = terrain.as_ref().filter(|_| self.soft.get(lane)) {
+                let coverage = terrain.coverage(&Vector3::from(centre.get(lane)), bound);
+                unknown |= u32::from(matches!(coverage, Coverage::Unknown(_))) << lane;
+            }
+        }
+        T::mask(self.offset.token(), unknown)
     }
 
     /// The plane under a wheel.
@@ -259,7 +287,7 @@ impl<T: Lane> Ground<T> {
         rim: &Rim<T>,
     ) -> Option<(&Pieces<T>, T::Mask)> {
         let pieces = &mut self.pieces[wheel];
-        let known = pieces.find(&self.surfaces, lanes & !self.mixed, rim);
+        let known = pieces.find(&self.under_wheels, lanes & !self.mixed, rim);
         known.any().then_some((pieces, known))
     }
 
@@ -274,9 +302,9 @@ impl<T: Lane> Ground<T> {
         self.surfaces[lane].is_some()
     }
 
-    /// Rovers whose ground is a surface.
+    /// Rovers whose wheels stand on a surface.
     pub(super) fn on_surface(&self) -> T::Mask {
-        let bits = (self.surfaces.iter().enumerate()).fold(0, |bits, (lane, own)| {
+        let bits = (self.under_wheels.iter().enumerate()).fold(0, |bits, (lane, own)| {
             bits | u32::from(own.is_some()) << lane
         });
         T::mask(self.offset.token(), bits)
@@ -286,6 +314,13 @@ impl<T: Lane> Ground<T> {
     #[inline(always)]
     pub(super) fn height(&self, x: Vec3<T>) -> T {
         self.normal.dot(x) + self.offset
+    }
+
+    /// Height of a point over the plane that wheels stand on, m; ∞ on soft ground.
+    #[inline(always)]
+    pub(super) fn height_for_wheels(&self, x: Vec3<T>) -> T {
+        let height = self.height(x);
+        T::select(self.soft, height.like(f64::INFINITY), height)
     }
 
     /// Spheres near a wheel, for the rover that has most; see [`Self::look_around_wheel`].

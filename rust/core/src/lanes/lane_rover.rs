@@ -5,6 +5,7 @@ use std::sync::Arc;
 use crate::geometry::Terrain;
 use crate::integrator::{StepOptions, WarmStart};
 use crate::multibody::{Configuration, Model};
+use crate::sand::SandState;
 use crate::system::Command;
 
 /// A rover by its parts.
@@ -29,4 +30,7 @@ pub struct LaneRover<'a> {
     pub drive_work: &'a mut [f64],
     /// Mean torque of each wheel's drive in the last step, positive forward, N m.
     pub wheel_torque: &'a mut [f64],
+    /// The sand under its wheels, if its ground is soft. The block keeps its ruts until the rover
+    /// is stored.
+    pub sand: Option<&'a mut SandState>,
 }

@@ -18,6 +18,7 @@ use crate::law::compliance::Compliance;
 use crate::multibody::description::Limits;
 use crate::multibody::{Mechanism, Model, Wheel};
 use crate::scalar::elementary::hypot;
+use crate::system::sand_wheel::PlacedWheel;
 
 /// Most wheels and joints with stops: the operator of a block has room for contacts of all of them.
 pub const MOST_PARTS: usize = 32;
@@ -48,6 +49,8 @@ pub struct Machine {
     mechanism: Mechanism,
     /// Wheels, in the model's order.
     pub wheels: Vec<WheelDisc>,
+    /// The same as sand meets them.
+    pub(super) in_sand: Vec<PlacedWheel>,
     /// Boxes and balls that collide with the ground, in the model's order.
     pub boxes: Vec<BodyBox>,
     /// Joints with stops, ascending.
@@ -126,6 +129,7 @@ impl Machine {
         let mut machine = Self {
             mechanism: model.mechanism().clone(),
             wheels: (model.wheels().iter()).map(WheelDisc::of).collect(),
+            in_sand: (model.wheels().iter()).map(PlacedWheel::of).collect(),
             boxes: (Part::all(model).skip(model.wheels().len()))
                 .map(|part| BodyBox::of(model, part))
                 .collect(),

@@ -44,7 +44,7 @@
 //!
 //! # May use
 //!
-//! [`crate::scalar`], [`crate::law`], [`crate::multibody`], [`crate::geometry`],
+//! [`crate::scalar`], [`crate::law`], [`crate::multibody`], [`crate::sand`], [`crate::geometry`],
 //! [`crate::contact`], [`crate::problem`], [`crate::solver`], [`crate::integrator`],
 //! [`crate::system`].
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for

@@ -31,42 +31,6 @@ pub struct MassMatrix<T: Lane> {
     coupled: Vec<Momentum<T>>,
 }
 
-impl MassMatrix<f64> {
-    /// Adds a symmetric matrix over the velocities of a body's path: `entry` gives that of two
-    /// places on the path. Entries between velocities of which none moves the other's body are left
-    /// out.
-    pub(crate) fn add_quadratic(
-        &mut self,
-        mechanism: &Mechanism,
-        path: &[usize],
-        entry: impl Fn(usize, usize) -> f64,
-    ) {
-        let Some(&first) = path.first() else { return };
-        let t = mechanism.tree_of[first];
-        let lead = mechanism.trees[t].lead();
-        let joints = mechanism.trees[t].velocities.start + lead;
-        let block = self.rows.blocks[t].iter_mut();
-        let pairs = (0..lead).flat_map(|i| (0..=i).map(move |j| (i, j)));
-        for (sum, (i, j)) in block.zip(pairs) {
-            *sum += entry(i, j);
-        }
-        for (p, &k) in path.iter().enumerate().skip(lead) {
-            let row = mechanism.row_of(k);
-            for (j, sum) in self.rows.base[row].iter_mut().enumerate().take(lead) {
-                *sum += entry(p, j);
-            }
-            let own = mechanism.rows[row].clone();
-            let columns = &mechanism.columns[own.clone()];
-            for (q, &j) in path.iter().enumerate().skip(lead) {
-                let at = columns.iter().position(|&column| joints + column == j);
-                if let Some(at) = at {
-                    self.rows.joints[own.start + at] += entry(p, q);
-                }
-            }
-        }
-    }
-}
-
 impl<T: Lane> MassMatrix<T> {
     /// Room for a mechanism.
     #[must_use]
@@ -209,6 +173,41 @@ impl<T: Lane> MassMatrix<T> {
     #[inline(always)]
     pub fn add_to_diagonal(&mut self, mechanism: &Mechanism, velocity: usize, value: T) {
         self.rows.joints[mechanism.diagonals[velocity]] += value;
+    }
+
+    /// Adds a symmetric matrix over the velocities of a body's path: `entry` gives that of two
+    /// places on the path. Entries between velocities of which none moves the other's body are left
+    /// out.
+    #[inline(always)]
+    pub(crate) fn add_quadratic(
+        &mut self,
+        mechanism: &Mechanism,
+        path: &[usize],
+        entry: impl Fn(usize, usize) -> T,
+    ) {
+        let Some(&first) = path.first() else { return };
+        let t = mechanism.tree_of[first];
+        let lead = mechanism.trees[t].lead();
+        let joints = mechanism.trees[t].velocities.start + lead;
+        let block = self.rows.blocks[t].iter_mut();
+        let pairs = (0..lead).flat_map(|i| (0..=i).map(move |j| (i, j)));
+        for (sum, (i, j)) in block.zip(pairs) {
+            *sum += entry(i, j);
+        }
+        for (p, &k) in path.iter().enumerate().skip(lead) {
+            let row = mechanism.row_of(k);
+            for (j, sum) in self.rows.base[row].iter_mut().enumerate().take(lead) {
+                *sum += entry(p, j);
+            }
+            let own = mechanism.rows[row].clone();
+            let columns = &mechanism.columns[own.clone()];
+            for (q, &j) in path.iter().enumerate().skip(lead) {
+                let at = columns.iter().position(|&column| joints + column == j);
+                if let Some(at) = at {
+                    self.rows.joints[own.start + at] += entry(p, q);
+                }
+            }
+        }
     }
 
     /// Calls `entry(i, j, x)` for the entries of the lower triangle, `i >= j`.

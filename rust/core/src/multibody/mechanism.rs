@@ -176,6 +176,13 @@ impl Mechanism {
         self.n_motions
     }
 
+    /// Index of a body's tree.
+    #[inline]
+    #[must_use]
+    pub(crate) fn tree_of_body(&self, b: usize) -> usize {
+        self.links[b].tree
+    }
+
     /// The rows of the velocities that move body `b`, in order, counted from the first row of its
     /// tree; empty for a free root.
     #[inline(always)]

@@ -17,6 +17,8 @@
 use nalgebra::{Matrix6, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
+use crate::scalar::Lane;
+
 /// Velocity of a wheel: of its centre, m/s, and angular, rad/s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Twist {
@@ -74,7 +76,9 @@ impl Memory {
         Vector6::new(a, b, c, d, e, f)
     }
 
-    fn of(six: &Vector6<f64>) -> Self {
+    /// Of the six numbers.
+    #[must_use]
+    pub fn of(six: &Vector6<f64>) -> Self {
         Self {
             shift: [six[0], six[1], six[2]],
             turn: [six[3], six[4], six[5]],
@@ -84,7 +88,7 @@ impl Memory {
     /// That of steady motion of a wheel of this radius, m; none at rest.
     #[must_use]
     pub fn steady(twist: &Twist, radius: f64) -> Self {
-        let rate = rate(twist, radius);
+        let rate = rate(&twist.six().into(), radius);
         if rate > 0.0 {
             Self::of(&(twist.six() / rate))
         } else {
@@ -97,21 +101,21 @@ impl Memory {
     #[must_use]
     pub fn after(&self, twist: &Twist, radius: f64, (h, length): (f64, f64)) -> Recalled {
         let six = twist.six();
-        let rate = rate(twist, radius);
-        let kept = 1.0 / (1.0 + h * rate / length);
-        let end = (self.six() + six * (h / length)) * kept;
-        let mut slope = Matrix6::from_diagonal_element(h / length * kept);
+        let rate = rate(&six.into(), radius);
+        let (end, fresh) = after_step::<f64>(&self.six().into(), &six.into(), radius, (h, length));
+        let end = Vector6::from(end);
+        let mut slope = Matrix6::from_diagonal_element(fresh);
         if rate > 0.0 {
             let mut by_rate = six / rate;
             for k in 3..6 {
                 by_rate[k] *= radius * radius;
             }
-            slope -= end * by_rate.transpose() * (h / length * kept);
+            slope -= end * by_rate.transpose() * fresh;
         }
         Recalled {
             memory: Self::of(&end),
             slope,
-            fresh: h / length * kept,
+            fresh,
         }
     }
 
@@ -143,10 +147,32 @@ impl Memory {
     }
 }
 
+/// The six numbers of memories after a step of h with a twist ([`Memory::after`]), over lanes, and
+/// the multiple of the identity in their derivative by the twist, s/m.
+#[inline(always)]
+#[must_use]
+pub fn after_step<T: Lane>(
+    memory: &[T; 6],
+    twist: &[T; 6],
+    radius: f64,
+    (h, length): (T, T),
+) -> ([T; 6], T) {
+    let one = h.like(1.0);
+    let (share, rate) = (h / length, rate(twist, radius));
+    let kept = one / (one + h * rate / length);
+    let mut end = *memory;
+    for (own, x) in end.iter_mut().zip(twist) {
+        *own = (*own + *x * share) * kept;
+    }
+    (end, share * kept)
+}
+
 /// Speed of a wheel relative to the sand, m/s.
-fn rate(twist: &Twist, radius: f64) -> f64 {
-    let rim = radius * radius * twist.angular.norm_squared();
-    (twist.linear.norm_squared() + rim).sqrt()
+#[inline(always)]
+fn rate<T: Lane>(twist: &[T; 6], radius: f64) -> T {
+    let [a, b, c, d, e, f] = *twist;
+    let rim = (d * d + e * e + f * f) * a.like(radius * radius);
+    (a * a + b * b + c * c + rim).sqrt()
 }
 
 #[cfg(test)]

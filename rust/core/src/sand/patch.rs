@@ -12,6 +12,7 @@ use super::bekker::mobilised;
 use super::memory::Memory;
 use super::piece::{Piece, Setting};
 use super::points::{Feed, Group, Immersed, Motion};
+use super::ruts::RutsNear;
 use super::soil::{Law, Soil};
 use super::wheel::{Rules, SandWheel, Skin};
 use crate::scalar::elementary::{acos, atan2};
@@ -26,19 +27,17 @@ pub struct WheelPose {
     pub axle: Vector3<f64>,
 }
 
-/// The surface over the plane of a [`Bed`] at a place.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Heights {
-    /// Undisturbed, m.
-    pub virgin: f64,
-    /// As wheels have left it, m.
-    pub left: f64,
-    /// Gradient of `left` against `virgin`, world.
-    pub slope: Vector3<f64>,
-}
+/// Height of the undisturbed surface over x and z, world, m; none where there is no ground.
+pub type Height<'a> = &'a dyn Fn(f64, f64) -> Option<f64>;
 
-/// Heights at a place in the world.
-pub type Relief<'a> = &'a dyn Fn(&Vector3<f64>) -> Heights;
+/// What the surface has beside the plane of a [`Bed`].
+#[derive(Clone, Copy)]
+pub struct Relief<'a> {
+    /// The undisturbed surface; none if it is the plane.
+    pub height: Option<Height<'a>>,
+    /// What wheels have left.
+    pub ruts: Option<RutsNear<'a>>,
+}
 
 /// The surface of the sand near a wheel.
 #[derive(Clone, Copy)]
@@ -47,7 +46,7 @@ pub struct Bed<'a> {
     pub place: Vector3<f64>,
     /// Unit normal of that plane, out of the sand.
     pub normal: Vector3<f64>,
-    /// Heights over the plane; none of a plane bed.
+    /// None of a plane bed.
     pub relief: Option<Relief<'a>>,
     /// What no height near the wheel exceeds, m.
     pub highest: f64,
@@ -382,26 +381,40 @@ impl<'a> Frame<'a> {
         let g = Vec3::splat(r.x.token(), self.immersed.g.into());
         let mut below = r.dot(g) - number(self.immersed.height);
         let mut gradient = g;
-        let Some(relief) = self.bed.relief else {
+        let Some(Relief { height, ruts }) = self.bed.relief else {
             return (below, gradient);
         };
         let shared = |v: Vector3<f64>| Vec3::<T>::splat(below.token(), v.into());
         let [down, along, axle] = [0, 1, 2].map(|k| shared(self.axes.column(k).into()));
         let place = shared(self.pose.centre) + down * r.x + along * r.y + axle * r.z;
-        let (mut virgin, mut left, mut slope) = (below, below, place);
-        for lane in 0..T::LANES {
-            let heights = relief(&place.get(lane).into());
-            virgin.set(lane, heights.virgin);
-            left.set(lane, heights.left);
-            slope.set(lane, heights.slope.into());
+        if let Some(height) = height {
+            below += self.over(place, height);
         }
-        let reload = number(self.immersed.soil.reload);
-        let (virgin, left) = (below + virgin, (below + left) * reload);
-        let rise = Vec3::new(down.dot(slope), along.dot(slope), axle.dot(slope));
-        let is_left = left.lt(virgin);
-        below = T::select(is_left, left, virgin);
-        gradient = Vec3::select(is_left, (g + rise) * reload, gradient);
+        if let Some(ruts) = ruts {
+            let rut = ruts.at([place.x, place.z]);
+            let (reload, up) = (number(self.immersed.soil.reload), number(self.bed.normal.y));
+            let left = (below - up * rut.depth) * reload;
+            let [by_x, by_z] = rut.slope.map(|slope| slope * up);
+            let rise = |axis: Vec3<T>| axis.x * by_x + axis.z * by_z;
+            let rise = Vec3::new(rise(down), rise(along), rise(axle));
+            let is_left = left.lt(below);
+            below = T::select(is_left, left, below);
+            gradient = Vec3::select(is_left, (g - rise) * reload, gradient);
+        }
         (below, gradient)
+    }
+
+    /// Height of the undisturbed surface over the plane at places, m.
+    #[inline(always)]
+    fn over<T: Lane>(&self, place: Vec3<T>, height: Height<'_>) -> T {
+        let (n, mut over) = (&self.bed.normal, place.x);
+        for lane in 0..T::LANES {
+            let x = Vector3::from(place.get(lane));
+            let plane = n.dot(&(x - self.bed.place));
+            let own = height(x.x, x.z).map_or(0.0, |y| plane + n.y * (y - x.y));
+            over.set(lane, own);
+        }
+        over
     }
 
     #[inline(always)]

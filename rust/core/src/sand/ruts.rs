@@ -13,6 +13,8 @@ use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 
+use crate::scalar::Lane;
+
 /// Cells along the side of a tile.
 const SIDE: usize = 16;
 
@@ -167,27 +169,59 @@ impl Window {
     }
 }
 
-/// Depth of a rut at a place, m, and its derivatives along x and z.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Rut {
+/// Depths of ruts at places, m, and their derivatives along x and z.
+#[derive(Clone, Copy, Debug)]
+pub struct Rut<T> {
     /// m.
-    pub depth: f64,
+    pub depth: T,
     /// Along x and along z.
-    pub slope: [f64; 2],
+    pub slope: [T; 2],
 }
 
-impl Rut {
-    /// Between the centres of four cells.
-    #[inline]
-    fn between([near, near_next, far, far_next]: [f64; 4], (a, b): (f64, f64), cell: f64) -> Self {
+/// The ruts near a wheel, with a window read before.
+#[derive(Clone, Copy, Debug)]
+pub struct RutsNear<'a> {
+    /// All ruts.
+    pub map: &'a RutMap,
+    /// Those near the wheel.
+    pub window: &'a Window,
+    /// Size of a cell, m.
+    pub cell: f64,
+}
+
+impl RutsNear<'_> {
+    /// The ruts at places, between the centres of four cells.
+    #[inline(always)]
+    #[must_use]
+    pub fn at<T: Lane>(&self, [x, z]: [T; 2]) -> Rut<T> {
+        let (cell, half) = (x.like(self.cell), x.like(0.5));
+        let (x, z) = (x / cell - half, z / cell - half);
+        let (i, k) = (floor(x), floor(z));
+        let mut corners = [x; 4];
+        for lane in 0..T::LANES {
+            let at = (index(i.get(lane)), index(k.get(lane)));
+            let own = self.window.corners(at);
+            let own = own.unwrap_or_else(|| self.map.corners(at));
+            for (corner, own) in corners.iter_mut().zip(own) {
+                corner.set(lane, own);
+            }
+        }
+        let (a, b, [near, near_next, far, far_next]) = (x - i, z - k, corners);
         let (on_near, on_far) = (near_next - near, far_next - far);
         let (near, far) = (near + a * on_near, far + a * on_far);
         let along_x = on_near + b * (on_far - on_near);
-        Self {
+        Rut {
             depth: near + b * (far - near),
             slope: [along_x / cell, (far - near) / cell],
         }
     }
+}
+
+/// The largest whole number that is not larger.
+#[inline(always)]
+fn floor<T: Lane>(x: T) -> T {
+    let whole = x.nearest_whole();
+    T::select(x.lt(whole), whole - x.like(1.0), whole)
 }
 
 /// Indices of a cell's tile, and of the cell in it.
@@ -198,14 +232,6 @@ fn tile_of([i, k]: [i32; 2]) -> ((i32, i32), usize) {
         (i.div_euclid(side), k.div_euclid(side)),
         place(k) * SIDE + place(i),
     )
-}
-
-/// Cell and parts of a cell of a place, relative to the centres of cells.
-#[inline]
-fn between([x, z]: [f64; 2], cell: f64) -> ((i32, i32), (f64, f64)) {
-    let (x, z) = (x / cell - 0.5, z / cell - 0.5);
-    let (i, k) = (index(x), index(z));
-    ((i, k), (x - f64::from(i), z - f64::from(k)))
 }
 
 /// Cells of which a centre is within a rectangle around a place, with a margin.
@@ -278,21 +304,16 @@ impl RutMap {
     /// Depth at a place, m, on a grid with cells of this size, m.
     #[must_use]
     pub fn depth(&self, place: [f64; 2], cell: f64) -> f64 {
-        let (at, part) = between(place, cell);
-        Rut::between(self.corners(at), part, cell).depth
+        let near = RutsNear {
+            map: self,
+            window: &Window::default(),
+            cell,
+        };
+        near.at(place).depth
     }
 
     fn corners(&self, (i, k): (i32, i32)) -> [f64; 4] {
         [[i, k], [i + 1, k], [i, k + 1], [i + 1, k + 1]].map(|cell| self.at(cell))
-    }
-
-    /// The rut at a place, with a window read before.
-    #[inline]
-    #[must_use]
-    pub fn rut_in(&self, window: &Window, place: [f64; 2], cell: f64) -> Rut {
-        let (at, part) = between(place, cell);
-        let corners = window.corners(at);
-        Rut::between(corners.unwrap_or_else(|| self.corners(at)), part, cell)
     }
 
     /// Reads the depths within `reach` (m, along x and z) of a place into a window; whether there
@@ -407,7 +428,12 @@ mod tests {
             [0.5, 0.0],
             [0.7, 0.01],
         ] {
-            let found = ruts.rut_in(&window, place, 0.01);
+            let near = RutsNear {
+                map: &ruts,
+                window: &window,
+                cell: 0.01,
+            };
+            let found = near.at(place);
             assert!((found.depth - ruts.depth(place, 0.01)).abs() < 1e-15);
             for (d, slope) in found.slope.into_iter().enumerate() {
                 let depth_at = |step: f64| {

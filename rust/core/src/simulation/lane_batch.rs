@@ -164,6 +164,7 @@ impl<T: Lane> Lanes<T> {
                 if let Some(slot) = slot.filter(|slot| !slot.has_failed) {
                     let rover = &mut *rovers[slot.index].rover;
                     if slot.is_general {
+                        rover.leave(block, lane);
                         rover.list_active();
                     } else {
                         rover.store(block, lane);

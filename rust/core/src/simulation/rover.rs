@@ -209,9 +209,8 @@ impl Scene for RoverScene {
             let impulse = wheel.joint.map_or(0.0, |j| drives.impulse(0, j));
             *torque = wheel.drive_sign * impulse / taken.options.time_step;
         }
-        let (ground, q) = (self.terrain.soft(), &taken.state.configuration);
-        let tree = &mut taken.parts.tree;
-        tree.end_sand(&self.model, ground, q, sand.as_mut());
+        let ground = self.terrain.soft();
+        taken.parts.tree.end_sand(ground, sand.as_mut());
     }
 
     fn quick_step(

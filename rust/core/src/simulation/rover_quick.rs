@@ -26,8 +26,8 @@ impl RoverScene {
     /// Why with these options it has no fast steps.
     #[inline]
     pub(super) fn fallback_reason(&self, options: &StepOptions) -> Option<FallbackReason> {
-        if self.terrain.soft().is_some() {
-            return Some(FallbackReason::SoftGround);
+        if self.terrain.soft().is_some_and(|layer| !layer.is_alone) {
+            return Some(FallbackReason::FirmBesideSoft);
         }
         match (admit(options), &self.machine) {
             (Err(why), _) => Some(why),
@@ -66,8 +66,9 @@ impl RoverScene {
             warm_start: step.warm_start,
             drive_work: &mut step.parts.drive_work,
             wheel_torque: &mut step.memory.wheel_torque,
+            sand: step.memory.sand.as_mut(),
         };
-        block.load_rover(0, &lane_rover);
+        block.load_rover(0, &mut lane_rover);
         block.begin();
         let problem = &mut *quick.problem;
         block.prepare(problem, probe);
@@ -87,6 +88,7 @@ impl RoverScene {
         }
         block.finish(is_deep.then_some(&gap_problem[..]), probe);
         if block.fallback(0).is_some() {
+            block.return_ruts(0, &mut lane_rover);
             return None;
         }
         block.store_rover(0, &mut lane_rover);
@@ -120,12 +122,17 @@ impl RoverSimulation {
 
     /// Takes a lane of a block. [`Block::begin`] follows.
     pub(super) fn load<T: Lane>(&mut self, block: &mut Block<T>, lane: usize) {
-        block.load_rover(lane, &self.lane_rover());
+        block.load_rover(lane, &mut self.lane_rover());
     }
 
     /// Takes back what the block has made of it.
-    pub(super) fn store<T: Lane>(&mut self, block: &Block<T>, lane: usize) {
+    pub(super) fn store<T: Lane>(&mut self, block: &mut Block<T>, lane: usize) {
         block.store_rover(lane, &mut self.lane_rover());
+    }
+
+    /// Leaves a block that has made nothing of it since it was loaded.
+    pub(super) fn leave<T: Lane>(&mut self, block: &mut Block<T>, lane: usize) {
+        block.return_ruts(lane, &mut self.lane_rover());
     }
 
     /// Lists the contacts of its last step in a block.
@@ -160,6 +167,7 @@ impl RoverSimulation {
             warm_start: &mut self.warm_start,
             drive_work: &mut self.parts.drive_work,
             wheel_torque: &mut self.memory.wheel_torque,
+            sand: self.memory.sand.as_mut(),
         }
     }
 }

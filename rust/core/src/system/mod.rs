@@ -4,7 +4,8 @@
 //!   [scratch](tree_scratch); [`drives`]: torques, motors, held joints, springs and dampers,
 //!   implicit with [`fitted_theta`]; `extent`: how far a step turns and displaces it;
 //!   `momentum_balance`: the balance of the Newton variant; [`gyroscopic`]: when gyroscopic terms
-//!   are implicit, and how; [`loops`]: its closed loops; `sand`, `sand_patch`: its wheels in sand;
+//!   are implicit, and how; [`loops`]: its closed loops; `sand`: its wheels in sand, also
+//!   several machines over lanes; `sand_patch`, `sand_wheel`, `sand_tangent`, `six`: one of them;
 //!   `tangent`: derivatives of a step;
 //! - [`planar`]: a planar machine on a ground, with its matrices;
 //! - [`grains`]: thousands of free disks or balls, and a planar machine among them;
@@ -45,8 +46,11 @@ pub mod loops;
 mod momentum_balance;
 pub mod planar;
 mod planar_matrices;
-mod sand;
-mod sand_patch;
+pub(crate) mod sand;
+pub(crate) mod sand_patch;
+mod sand_tangent;
+pub(crate) mod sand_wheel;
+mod six;
 pub(crate) mod tangent;
 pub mod tree;
 pub mod tree_scratch;

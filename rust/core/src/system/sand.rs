@@ -1,4 +1,5 @@
-//! Sand under the wheels of a tree, implicit in the velocity at the end of the step.
+//! Sand under the wheels of a tree, implicit in the velocity at the end of the step; of one machine
+//! or of several, over lanes.
 //!
 //! The force of the sand on a wheel at the end of the step is taken along its tangent there,
 //!
@@ -22,11 +23,14 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::sand_patch::{Patch, SandScene, SandStep, depth, moved, pose};
+use super::sand_patch::{Layers, Patch, SandScene, SandStep, depth, each};
+use super::sand_wheel::{LaneWheel, PlacedWheel};
+use super::six::{self, Six};
 use crate::geometry::SoftLayer;
-use crate::integrator::StepOptions;
-use crate::multibody::{Factor, Kinematics, MassMatrix, Model};
-use crate::sand::{Memory, SandState, SandWheel, Soil, Twist, WheelInSand};
+use crate::multibody::{Factor, MassMatrix, Mechanism};
+use crate::sand::memory::after_step;
+use crate::sand::{RutMap, SandState, Soil};
+use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 
 /// Way in a step under gravity, in units of `|g| h²`, below which memory is not resolved.
 ///
@@ -44,112 +48,121 @@ const GIVES_WAY: f64 = 0.5;
 const ALONG: f64 = 0.1;
 const DEEPER: f64 = 0.01;
 
+/// Most repetitions of a step in sand. Wheels that fall and come to rest in a long step need them.
+pub(crate) const MOST_REVISIONS_IN_SAND: usize = 24;
+
 /// The sand of a step.
 #[derive(Clone, Debug)]
-pub(crate) struct SandContact {
-    patches: Vec<Patch>,
+pub(crate) struct SandContact<T: Lane> {
+    token: T::Token,
+    patches: Vec<Patch<T>>,
     /// Velocity at which the forces are taken (nv).
-    guess: Vec<f64>,
-    soil: Arc<Soil>,
-    step: SandStep,
+    guess: Vec<T>,
+    /// Soil of each lane; none on firm ground.
+    soils: [Option<Arc<Soil>>; MAX_LANES],
+    /// Length over which it forgets, m.
+    memory: T,
+    /// Lanes on soft ground.
+    lanes: T::Mask,
+    step: SandStep<T>,
 }
 
-impl SandContact {
-    /// Of a machine on soft ground.
-    pub(crate) fn new(model: &Model, ground: SoftLayer<'_>) -> Self {
-        let patches = model.wheels().iter().map(|wheel| {
-            let in_sand = SandWheel::of(wheel);
-            Patch::new(model, wheel.body, in_sand, ground.rules(&in_sand))
-        });
+impl<T: Lane> SandContact<T> {
+    /// Of a machine on firm ground.
+    pub(crate) fn new(
+        token: T::Token,
+        mechanism: &Mechanism,
+        wheels: impl Iterator<Item = PlacedWheel>,
+    ) -> Self {
+        let (zero, one) = (T::splat(token, 0.0), T::splat(token, 1.0));
         Self {
-            patches: patches.collect(),
-            guess: vec![0.0; model.nv()],
-            soil: ground.soil.clone(),
+            token,
+            patches: wheels
+                .map(|wheel| Patch::new(token, mechanism, wheel))
+                .collect(),
+            guess: vec![zero; mechanism.nv()],
+            soils: std::array::from_fn(|_| None),
+            memory: one,
+            lanes: T::mask(token, 0),
             step: SandStep {
                 h: 0.0,
                 theta: 0.5,
-                gravity: Vector3::zeros(),
-                length: 1.0,
+                gravity: Vec3::new(zero, zero, zero),
+                length: one,
             },
         }
     }
 
-    /// Takes over the state at the start of a step.
-    pub(crate) fn begin(&mut self, state: &SandState) {
-        for (patch, wheel) in self.patches.iter_mut().zip(&state.wheels) {
-            patch.begin = *wheel;
-            patch.tried = *wheel;
+    /// Lanes on soft ground.
+    pub(crate) fn lanes(&self) -> T::Mask {
+        self.lanes
+    }
+
+    /// Gives a lane its ground and what the sand remembers; none on firm ground.
+    pub(crate) fn load(&mut self, lane: usize, ground: Option<(SoftLayer<'_>, &SandState)>) {
+        let own = T::mask(self.token, 1 << lane);
+        let Some((layer, state)) = ground else {
+            self.lanes = self.lanes & !own;
+            self.soils[lane] = None;
+            for patch in &mut self.patches {
+                patch.force.clear(lane);
+            }
+            return;
+        };
+        let is_known =
+            (self.soils[lane].as_ref()).is_some_and(|soil| Arc::ptr_eq(soil, layer.soil));
+        if !is_known {
+            self.soils[lane] = Some(Arc::clone(layer.soil));
+            self.memory.set(lane, layer.soil.memory);
+            for patch in &mut self.patches {
+                patch.rules[lane] = Some(layer.rules(&patch.wheel.shape));
+            }
         }
-        self.guess.fill(0.0);
+        self.lanes = self.lanes | own;
+        for (patch, wheel) in self.patches.iter_mut().zip(&state.wheels) {
+            patch.begin.set(lane, wheel);
+            patch.tried.set(lane, wheel);
+        }
     }
 
-    /// Whether it was made for the soil of a ground.
-    pub(crate) fn is_of(&self, ground: SoftLayer<'_>) -> bool {
-        Arc::ptr_eq(&self.soil, ground.soil)
-    }
-
-    /// Writes the state at the end of a step; the wheels' poses are those of `kinematics`.
-    pub(crate) fn end(
-        &self,
-        model: &Model,
-        ground: SoftLayer<'_>,
-        kinematics: &Kinematics,
-        state: &mut SandState,
-    ) {
-        for (w, patch) in self.patches.iter().enumerate() {
-            state.wheels[w] = patch.begin;
-            let pose = pose(model, kinematics, w);
-            let cell = ground.cell;
-            let (c, axle) = (pose.centre, pose.axle);
-            let noted = [c.x, c.y, c.z, axle.x, axle.y, axle.z];
-            if !is_elsewhere(&patch.begin.noted, &noted, &patch.wheel, cell) {
-                continue;
-            }
-            state.wheels[w].noted = noted;
-            let radius = patch.wheel.drum();
-            if patch.begin.sinkage < -cell {
-                state.ruts.pass(w, [c.x, c.z], ([0.0; 2], cell), |_| None);
-                continue;
-            }
-            let flat = Vector3::new(axle.x, 0.0, axle.z);
-            let flat = flat / flat.norm().max(f64::MIN_POSITIVE);
-            let reach = patch.reach(ground, &pose);
-            state.ruts.pass(w, [c.x, c.z], (reach, cell), |[x, z]| {
-                let r = Vector3::new(x - c.x, 0.0, z - c.z);
-                let (s, t) = (r.dot(&flat), (r.z * flat.x - r.x * flat.z));
-                let inside = radius * radius - t * t;
-                let is_over = s.abs() <= 0.5 * patch.wheel.width.max(cell) && inside > 0.0;
-                let surface = ground.surface;
-                is_over.then(|| surface.height(x, z).unwrap_or(c.y) - (c.y - inside.sqrt()))
-            });
+    /// Writes what the sand of a lane remembers of the wheels.
+    pub(crate) fn store(&self, lane: usize, state: &mut SandState) {
+        for (wheel, patch) in state.wheels.iter_mut().zip(&self.patches) {
+            *wheel = patch.begin.get(lane);
         }
     }
 
     /// The next solution starts from the velocity before the step.
-    pub(crate) fn start_from(&mut self, v: &[f64]) {
+    pub(crate) fn start_from(&mut self, v: &[T]) {
         self.guess.copy_from_slice(v);
         for patch in &mut self.patches {
-            patch.last = None;
-            patch.is_stale = true;
-            patch.is_empty = false;
+            patch.force.begin();
+            patch.is_stale = self.lanes;
+            patch.is_empty = patch.is_empty & !patch.is_empty;
         }
     }
 
-    /// Evaluates the forces and their tangents at the velocity before the step, unless that was
-    /// done: a repetition has its own.
-    pub(crate) fn linearise(&mut self, place: SandScene<'_>, options: &StepOptions) {
-        let (h, gravity) = (options.time_step, options.gravity);
+    /// Evaluates the forces and their tangents at the velocity before the step in some lanes,
+    /// unless that was done: a repetition has its own. `times`: h and θ.
+    pub(crate) fn linearise(
+        &mut self,
+        scene: &SandScene<'_, T>,
+        lanes: T::Mask,
+        (h, theta): (f64, f64),
+        gravity: Vec3<T>,
+    ) {
+        let resolved = gravity.x.like(RESOLVED * h * h);
         self.step = SandStep {
             h,
-            theta: options.theta,
+            theta,
             gravity,
-            length: self.soil.memory + RESOLVED * gravity.norm() * h * h,
+            length: self.memory + gravity.norm() * resolved,
         };
-        for (w, patch) in self.patches.iter_mut().enumerate() {
-            if std::mem::take(&mut patch.is_stale) {
-                patch.place(place, w);
-                let at = patch.twist(&self.guess);
-                patch.linearise(&self.step, place, &at);
+        for patch in &mut self.patches {
+            let lanes = patch.is_stale & lanes;
+            if lanes.any() {
+                patch.is_stale = patch.is_stale & !lanes;
+                patch.linearise(&self.step, scene, lanes, &self.guess);
             }
         }
     }
@@ -157,111 +170,180 @@ impl SandContact {
     /// Takes the forces as they are, without their tangents.
     pub(crate) fn drop_tangents(&mut self) {
         for patch in &mut self.patches {
-            patch.tangent.fill(0.0);
+            patch.force.drop_tangent();
         }
     }
 
     /// `M += h Σ Jᵀ C J`.
-    pub(crate) fn add_to_mass(&mut self, model: &Model, h: f64, mass: &mut MassMatrix<f64>) {
-        for patch in self.patches.iter_mut().filter(|patch| patch.is_touching) {
-            patch.add_to_mass(model, h, mass);
+    pub(crate) fn add_to_mass(&mut self, mechanism: &Mechanism, mass: &mut MassMatrix<T>) {
+        let h = self.step.h;
+        for patch in &mut self.patches {
+            if (patch.force.is_touching & self.lanes).any() {
+                let (map, tangent) = (&mut patch.map, &patch.force.tangent);
+                T::vectorize(
+                    self.token,
+                    #[inline(always)]
+                    || map.add_to_mass(tangent, h, mechanism, mass),
+                );
+            }
         }
     }
 
     /// Adds the impulse over a step of h that ends with the velocity `v`.
-    pub(crate) fn add_impulse(&self, h: f64, v: &[f64], y: &mut [f64]) {
-        for patch in self.patches.iter().filter(|patch| patch.is_touching) {
-            let force = patch.applied(&patch.twist(v));
-            for (&k, column) in patch.path.iter().zip(&patch.columns) {
-                y[k] += h * column.dot(&force);
+    #[inline(always)]
+    pub(crate) fn add_impulse(&self, h: f64, v: &[T], y: &mut [T]) {
+        for patch in &self.patches {
+            if (patch.force.is_touching & self.lanes).any() {
+                let force = patch.force.applied(&patch.map.twist(v));
+                patch.map.add_impulse(&force, h, y);
             }
         }
     }
 
-    /// Whether the forces at a solution differ from those of the step, which are then linearised
-    /// anew. `factor`: of M̂.
+    /// Where the forces at a solution differ from those of the step, of some lanes; they are then
+    /// linearised anew. `factor`: of M̂.
     pub(crate) fn revise(
         &mut self,
-        place: SandScene<'_>,
-        factor: &Factor<f64>,
-        v_end: &[f64],
-    ) -> bool {
-        let mut is_new = false;
+        scene: &SandScene<'_, T>,
+        lanes: T::Mask,
+        factor: &Factor<T>,
+        v_end: &[T],
+    ) -> T::Mask {
+        let mut is_new = T::mask(self.token, 0);
         for patch in &mut self.patches {
-            let six = patch.twist(v_end);
-            is_new |= patch.revise(&self.step, place, factor, &six);
+            let lanes = lanes & self.lanes;
+            is_new = is_new | patch.revise(&self.step, scene, lanes, factor, v_end);
         }
         is_new
     }
 
-    /// Work of the sand on the machine over a step between two velocities, J.
-    pub(crate) fn work(&mut self, place: SandScene<'_>, v: &[f64], v_end: &[f64]) -> f64 {
-        let SandStep {
-            h, theta, length, ..
-        } = self.step;
-        let mut total = 0.0;
+    /// Work of the sand on the machines over a step between two velocities, J.
+    pub(crate) fn work(&mut self, layers: &Layers<'_>, v: &[T], v_end: &[T]) -> T {
+        let mut total = T::splat(self.token, 0.0);
         for patch in &mut self.patches {
-            let six = patch.twist(v_end);
-            let twist = Twist::of(&six);
-            let times = (h, length);
-            let after = patch.begin.memory.after(&twist, patch.wheel.drum(), times);
-            let end = moved(&patch.pose, &twist, theta * h);
-            let tangent = place.ground.tangent(&end.centre, patch.wheel.radius);
-            let sinkage = tangent.map_or(-patch.wheel.radius, |t| depth(&patch.wheel, &end, &t));
-            if !patch.is_touching {
-                patch.tried = WheelInSand {
-                    memory: if sinkage > 0.0 {
-                        after.memory
-                    } else {
-                        Memory::default()
-                    },
-                    absorbed: patch.begin.absorbed,
-                    velocity: twist.linear.into(),
-                    sinkage,
-                    noted: patch.begin.noted,
-                    ..WheelInSand::default()
-                };
-                continue;
-            }
-            let force = patch.applied(&six);
-            let mean = six * theta + patch.twist(v) * (1.0 - theta);
-            let wanted = h * force.dot(&mean);
-            let given = wanted.min(patch.begin.stored);
-            let most = length * force.fixed_rows::<3>(0).norm();
-            total += given;
-            patch.is_empty |= wanted > given;
-            let memory = if patch.is_empty {
-                after.memory.scaled(GIVES_WAY)
-            } else {
-                after.memory
-            };
-            patch.tried = WheelInSand {
-                memory,
-                stored: (patch.begin.stored - given).min(most),
-                absorbed: patch.begin.absorbed - given,
-                force: [force[0], force[1], force[2]],
-                moment: [force[3], force[4], force[5]],
-                velocity: twist.linear.into(),
-                sinkage,
-                noted: patch.begin.noted,
-            };
+            let (step, lanes) = (&self.step, self.lanes);
+            let twist = T::vectorize(
+                self.token,
+                #[inline(always)]
+                || {
+                    let twist = patch.map.twist(v_end);
+                    patch.end = patch.pose.moved(&twist, step.theta * step.h);
+                    twist
+                },
+            );
+            let sinkage = patch.sinkage(layers, lanes);
+            T::vectorize(
+                self.token,
+                #[inline(always)]
+                || total += patch.weigh(step, lanes, v, (&twist, sinkage)),
+            );
         }
         total
     }
 
-    /// The step whose work was last computed becomes the state.
-    pub(crate) fn accept(&mut self) {
+    /// The step whose work was last computed becomes the state of some lanes.
+    #[inline(always)]
+    pub(crate) fn accept(&mut self, lanes: T::Mask) {
+        let lanes = lanes & self.lanes;
         for patch in &mut self.patches {
-            patch.begin = patch.tried;
+            patch.begin = LaneWheel::select(lanes, &patch.tried, &patch.begin);
+        }
+    }
+
+    /// Notes in the ruts of some lanes where wheels are that have moved.
+    pub(crate) fn note(&mut self, layers: &Layers<'_>, lanes: T::Mask, ruts: &mut [RutMap]) {
+        for (w, patch) in self.patches.iter_mut().enumerate() {
+            for lane in each(lanes & self.lanes) {
+                if let Some(layer) = &layers[lane] {
+                    patch.note(w, lane, layer, &mut ruts[lane]);
+                }
+            }
         }
     }
 }
 
-/// Whether a wheel has moved away from where it was last noted: centre and axle.
-fn is_elsewhere(before: &[f64; 6], now: &[f64; 6], wheel: &SandWheel, cell: f64) -> bool {
-    let moved = |k: usize| (now[k] - before[k]).abs();
-    let reach = wheel.drum() + 0.5 * wheel.width;
-    let turned = (moved(3) + moved(4) + moved(5)) * reach;
-    let along = moved(0) + moved(2) + turned;
-    along > ALONG * cell || moved(1) + turned > DEEPER * cell
+impl<T: Lane> Patch<T> {
+    /// Depth of the lowest point at the end of a trial, m.
+    fn sinkage(&self, layers: &Layers<'_>, lanes: T::Mask) -> T {
+        let radius = self.wheel.shape.radius;
+        let mut sinkage = self.begin.sinkage;
+        for lane in each(lanes) {
+            let end = self.end.get(lane);
+            let tangent = layers[lane].and_then(|layer| layer.tangent(&end.centre, radius));
+            let own = tangent.map_or(-radius, |tangent| depth(&self.wheel.shape, &end, &tangent));
+            sinkage.set(lane, own);
+        }
+        sinkage
+    }
+
+    /// Work over a step from the velocity `v` to one with a twist, J; it is then tried. The wheel's
+    /// sinkage there in m.
+    #[inline(always)]
+    fn weigh(
+        &mut self,
+        step: &SandStep<T>,
+        lanes: T::Mask,
+        v: &[T],
+        (twist, sinkage): (&Six<T>, T),
+    ) -> T {
+        let zero = sinkage.like(0.0);
+        let (h, theta) = (zero.like(step.h), zero.like(step.theta));
+        let touching = self.force.is_touching & lanes;
+        let drum = self.wheel.shape.drum();
+        let (after, _) = after_step(&self.begin.memory, twist, drum, (h, step.length));
+        let applied = self.force.applied(twist);
+        let force = six::select(touching, &applied, &[zero; six::SIX]);
+        let before = self.map.twist(v);
+        let rest = zero.like(1.0) - theta;
+        let mean = six::plus(&twist.map(|x| x * theta), rest, &before);
+        let wanted = h * six::dot(&force, &mean);
+        let given = T::select(touching, wanted.min(self.begin.stored), zero);
+        self.is_empty = self.is_empty | (touching & given.lt(wanted));
+        let most = step.length * six::linear(&force).norm();
+        let part = T::select(
+            touching,
+            T::select(self.is_empty, zero.like(GIVES_WAY), zero.like(1.0)),
+            T::select(zero.lt(sinkage), zero.like(1.0), zero),
+        );
+        self.tried = LaneWheel {
+            memory: after.map(|x| x * part),
+            stored: T::select(touching, (self.begin.stored - given).min(most), zero),
+            absorbed: self.begin.absorbed - given,
+            wrench: force,
+            velocity: six::linear(twist),
+            sinkage,
+            noted: self.begin.noted,
+        };
+        given
+    }
+
+    /// Notes where the wheel of a lane is, if it has moved.
+    fn note(&mut self, w: usize, lane: usize, layer: &SoftLayer<'_>, ruts: &mut RutMap) {
+        let (numbers, before) = (self.end.numbers(), &mut self.begin.noted);
+        let noted = six::get(&numbers, lane);
+        let (shape, cell) = (&self.wheel.shape, layer.cell);
+        let moved = (noted - six::get(before, lane)).abs();
+        let turned = (moved[3] + moved[4] + moved[5]) * (shape.drum() + 0.5 * shape.width);
+        let along = moved[0] + moved[2] + turned;
+        if along <= ALONG * cell && moved[1] + turned <= DEEPER * cell {
+            return;
+        }
+        six::set(before, lane, &noted);
+        let end = self.end.get(lane);
+        let (c, axle) = (end.centre, end.axle);
+        if self.begin.sinkage.get(lane) < -cell {
+            ruts.pass(w, [c.x, c.z], ([0.0; 2], cell), |_| None);
+            return;
+        }
+        let flat = Vector3::new(axle.x, 0.0, axle.z);
+        let flat = flat / flat.norm().max(f64::MIN_POSITIVE);
+        let (reach, radius) = (self.reach(layer, &end), self.wheel.shape.drum());
+        ruts.pass(w, [c.x, c.z], (reach, cell), |[x, z]| {
+            let r = Vector3::new(x - c.x, 0.0, z - c.z);
+            let (s, t) = (r.dot(&flat), (r.z * flat.x - r.x * flat.z));
+            let inside = radius * radius - t * t;
+            let is_over = s.abs() <= 0.5 * self.wheel.shape.width.max(cell) && inside > 0.0;
+            is_over.then(|| layer.surface.height(x, z).unwrap_or(c.y) - (c.y - inside.sqrt()))
+        });
+    }
 }

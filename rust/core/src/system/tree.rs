@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use super::command::Command;
 use super::extent::{Turning, displacement};
 use super::momentum_balance::BalanceScene;
-use super::sand::SandContact;
+use super::sand::{MOST_REVISIONS_IN_SAND, SandContact};
 use super::sand_patch::SandScene;
 use super::tree_scratch::TreeScratch;
 use crate::contact::{
@@ -73,7 +73,7 @@ impl TreeSystem<'_> {
 
 impl TreeSystem<'_> {
     /// The sand with its ground and poses, and the factor of M̂.
-    fn sand(&mut self) -> Option<(&mut SandContact, SandScene<'_>, &Factor<f64>)> {
+    fn sand(&mut self) -> Option<(&mut SandContact<f64>, SandScene<'_, f64>, &Factor<f64>)> {
         (self.parts).sand(self.model, self.terrain.soft(), self.ruts)
     }
 
@@ -84,7 +84,7 @@ impl TreeSystem<'_> {
         let add = |k, a| mass_matrix.add_to_diagonal(mechanism, k, a);
         (parts.drives).add_implicit(mechanism, step(options), add);
         if let Some(sand) = &mut parts.sand {
-            sand.add_to_mass(self.model, options.time_step, mass_matrix);
+            sand.add_to_mass(mechanism, mass_matrix);
         }
         mass_matrix.factorise(mechanism, &mut parts.factor)
     }
@@ -283,8 +283,8 @@ impl MechanicalSystem for TreeSystem<'_> {
     #[inline]
     fn update_mass_matrix(&mut self, options: &StepOptions) {
         self.parts.apply(self.model, &self.command.wrenches);
-        if let Some((sand, place, _)) = self.sand() {
-            sand.linearise(place, options);
+        if let Some((sand, scene, _)) = self.sand() {
+            sand.linearise(&scene, true, step(options), options.gravity.into());
         }
         let (mechanism, parts) = (self.model.mechanism(), &mut *self.parts);
         let mass_matrix = &mut parts.mass_matrix;
@@ -392,8 +392,8 @@ impl MechanicalSystem for TreeSystem<'_> {
     fn revise(&mut self, start: Start<'_, Configuration>, v_end: &[f64]) -> bool {
         let mechanism = self.model.mechanism();
         let is_new = (self.parts.drives).revise(mechanism, true, start.v, v_end);
-        let is_new_in_sand =
-            (self.sand()).is_some_and(|(sand, place, factor)| sand.revise(place, factor, v_end));
+        let is_new_in_sand = (self.sand())
+            .is_some_and(|(sand, scene, factor)| sand.revise(&scene, true, factor, v_end));
         is_new | is_new_in_sand
     }
 
@@ -431,8 +431,9 @@ impl MechanicalSystem for TreeSystem<'_> {
         start: Start<'_, Configuration>,
         v_end: &[f64],
     ) -> f64 {
-        let of_sand =
-            (self.sand()).map_or(0.0, |(sand, place, _)| sand.work(place, start.v, v_end));
+        let of_sand = (self.sand()).map_or(0.0, |(sand, scene, _)| {
+            sand.work(&scene.layers, start.v, v_end)
+        });
         let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
         let velocities = [start.v, v_end];
         let applied = self.parts.applied.iter().zip(start.v.iter().zip(v_end));
@@ -463,7 +464,7 @@ impl MechanicalSystem for TreeSystem<'_> {
         let parts = &mut *self.parts;
         parts.drives.accept_part();
         if let Some(sand) = &mut parts.sand {
-            sand.accept();
+            sand.accept(true);
         }
     }
 
@@ -585,6 +586,3 @@ impl MechanicalSystem for TreeSystem<'_> {
 fn step(options: &StepOptions) -> (f64, f64) {
     (options.time_step, options.theta)
 }
-
-/// Most repetitions of a step in sand. Wheels that fall and come to rest in a long step need them.
-const MOST_REVISIONS_IN_SAND: usize = 24;

@@ -8,7 +8,8 @@ use super::gyroscopic::GyroscopicScratch;
 use super::loops::Loops;
 use super::momentum_balance::MomentumBalance;
 use super::sand::SandContact;
-use super::sand_patch::SandScene;
+use super::sand_patch::{Layers, SandScene};
+use super::sand_wheel::PlacedWheel;
 use crate::contact::joint_friction::joint_of;
 use crate::contact::{Contact, ContactSystem, PairSearch};
 use crate::geometry::SoftLayer;
@@ -17,7 +18,7 @@ use crate::multibody::{
     Configuration, EnergyScratch, Factor, Kinematics, LaneConfiguration, MassMatrix, Model,
 };
 use crate::sand::{RutMap, SandState};
-use crate::scalar::Single;
+use crate::scalar::{MAX_LANES, Single};
 
 /// Poses, matrices and momenta of a tree: scratch, allocated once.
 #[derive(Clone, Debug)]
@@ -46,7 +47,7 @@ pub struct TreeScratch {
     /// Joints with dry friction, and W's entry of their normals.
     pub(super) friction: Vec<(usize, f64)>,
     /// Of a machine on soft ground.
-    pub(super) sand: Option<Box<SandContact>>,
+    pub(super) sand: Option<Box<SandContact<f64>>>,
     /// Of a machine with closed loops.
     pub(super) loops: Option<Box<Loops>>,
 }
@@ -103,10 +104,11 @@ impl TreeScratch {
             self.sand = None;
             return;
         };
-        let known = self.sand.take().filter(|sand| sand.is_of(ground));
-        let mut sand = known.unwrap_or_else(|| Box::new(SandContact::new(model, ground)));
-        sand.begin(state);
-        self.sand = Some(sand);
+        let sand = self.sand.get_or_insert_with(|| {
+            let wheels = model.wheels().iter().map(PlacedWheel::of);
+            Box::new(SandContact::new(Single::best(), model.mechanism(), wheels))
+        });
+        sand.load(0, Some((ground, state)));
     }
 
     /// Adds the impulse of the sand over a step of h that ends with the velocity `v`.
@@ -116,17 +118,16 @@ impl TreeScratch {
         }
     }
 
-    /// Writes the sand at the end of a step that led to a configuration.
+    /// Writes the sand at the end of a step.
     pub(crate) fn end_sand(
         &mut self,
-        model: &Model,
         ground: Option<SoftLayer<'_>>,
-        q: &Configuration,
         state: Option<&mut SandState>,
     ) {
-        if let (Some(sand), Some(ground), Some(state)) = (&self.sand, ground, state) {
-            self.kinematics.update_for_step(model, q);
-            sand.end(model, ground, &self.kinematics, state);
+        if let (Some(sand), Some(ground), Some(state)) = (&mut self.sand, ground, state) {
+            let ruts = std::slice::from_mut(&mut state.ruts);
+            sand.note(&alone(ground), true, ruts);
+            sand.store(0, state);
         }
     }
 
@@ -166,20 +167,24 @@ impl TreeScratch {
         model: &'a Model,
         ground: Option<SoftLayer<'a>>,
         ruts: Option<&'a RutMap>,
-    ) -> Option<(&'a mut SandContact, SandScene<'a>, &'a Factor<f64>)> {
+    ) -> Option<(
+        &'a mut SandContact<f64>,
+        SandScene<'a, f64>,
+        &'a Factor<f64>,
+    )> {
         let Self {
             sand,
             kinematics,
             factor,
             ..
         } = self;
-        let place = SandScene {
-            model,
-            ground: ground?,
-            ruts: ruts?,
-            kinematics,
+        let scene = SandScene {
+            mechanism: model.mechanism(),
+            poses: kinematics.poses(),
+            layers: alone(ground?),
+            ruts: std::slice::from_ref(ruts?),
         };
-        Some((sand.as_mut()?, place, factor))
+        Some((sand.as_mut()?, scene, factor))
     }
 
     /// Computes the generalized force of wrenches at the midpoint.
@@ -223,6 +228,13 @@ impl TreeScratch {
         self.kinematics_end.update_for_step(model, q);
         keep(&mut self.joints_end, &q.joints);
     }
+}
+
+/// The ground of the only lane.
+fn alone(ground: SoftLayer<'_>) -> Layers<'_> {
+    let mut layers = [None; MAX_LANES];
+    layers[0] = Some(ground);
+    layers
 }
 
 /// Copies the joint coordinates; `kept` is empty if nothing reads them.

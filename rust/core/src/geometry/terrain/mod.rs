@@ -187,6 +187,8 @@ pub struct SoftLayer<'a> {
     pub cell: f64,
     /// Where points lie on wheels.
     pub known: &'a KnownRules,
+    /// Whether wheels meet nothing else but spheres.
+    pub is_alone: bool,
 }
 
 /// Gauss rules of wheels in a soil, found once for all rovers on a ground.

@@ -154,6 +154,7 @@ impl Terrain for SoftGround {
             soil: &self.soil,
             cell: self.cell,
             known: &self.known,
+            is_alone: !self.surface.can_be_passed(),
         })
     }
 }

@@ -190,6 +190,13 @@ impl Terrain for Union {
     }
 
     fn soft(&self) -> Option<SoftLayer<'_>> {
-        self.parts.iter().find_map(|part| part.soft())
+        let (own, layer) =
+            (self.parts.iter().enumerate()).find_map(|(own, part)| Some((own, part.soft()?)))?;
+        let mut others = self.parts.iter().enumerate().filter(|(k, _)| *k != own);
+        let is_firm = others.any(|(_, part)| part.has_surface() || part.ground().is_some());
+        Some(SoftLayer {
+            is_alone: layer.is_alone && !is_firm,
+            ..layer
+        })
     }
 }

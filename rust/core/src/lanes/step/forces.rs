@@ -70,6 +70,9 @@ impl<T: Lane> Block<T> {
             [&self.v, &self.v],
             &mut self.torque,
         );
+        if let Some(sand) = &self.sand {
+            sand.add_impulse(self.options.time_step, &self.v, &mut self.torque);
+        }
     }
 
     /// `y` = the bias at the velocity v, or at the mean velocity.

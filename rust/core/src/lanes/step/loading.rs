@@ -10,7 +10,7 @@ use crate::scalar::{Lane, LaneMask};
 impl<T: Lane> Block<T> {
     /// Gives a lane to a rover of this machine, with options alike those of the others.
     /// [`Self::begin`] follows.
-    pub fn load_rover(&mut self, lane: usize, rover: &LaneRover<'_>) {
+    pub fn load_rover(&mut self, lane: usize, rover: &mut LaneRover<'_>) {
         let own = T::mask(self.token, 1 << lane);
         self.occupied = self.occupied | own;
         if !self.holds(lane, rover) {
@@ -20,6 +20,7 @@ impl<T: Lane> Block<T> {
         self.options.clone_from(rover.options);
         self.friction.set(lane, rover.options.friction_coefficient);
         self.ground.set_lane(lane, rover.terrain);
+        self.load_sand(lane, rover);
         let joints = rover.model.joints();
         self.drives.set_lane(lane, joints, rover.command);
         self.drives.set_work(lane, rover.drive_work);
@@ -60,7 +61,8 @@ impl<T: Lane> Block<T> {
     }
 
     /// Writes a lane's state back, without its contacts.
-    pub fn store_rover(&self, lane: usize, rover: &mut LaneRover<'_>) {
+    pub fn store_rover(&mut self, lane: usize, rover: &mut LaneRover<'_>) {
+        self.store_sand(lane, rover);
         self.start.to_lane(lane, rover.configuration);
         for (x, own) in rover.v.iter_mut().zip(&self.v) {
             *x = own.get(lane);

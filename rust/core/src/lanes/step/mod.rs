@@ -13,7 +13,7 @@
 //! A lane whose step cannot be taken falls back to the general one: its state stays as it was.
 //!
 //! `loading`: rovers come and go; `phases`: the three parts, and what they are made of:
-//! `contact_list`, `forces`, `impacts`, `balance`, `projection`.
+//! `contact_list`, `forces`, `sinking`, `impacts`, `balance`, `projection`.
 
 mod balance;
 mod contact_list;
@@ -22,6 +22,7 @@ mod impacts;
 mod loading;
 mod phases;
 mod projection;
+mod sinking;
 
 use std::sync::Arc;
 
@@ -38,8 +39,10 @@ use crate::multibody::energy::energy;
 use crate::multibody::{
     Energy, EnergyScratch, Factor, Inertias, LaneConfiguration, MassMatrix, Model, Poses,
 };
+use crate::sand::RutMap;
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 use crate::system::drives::Drives;
+use crate::system::sand::SandContact;
 
 /// Why a lane fell back in its last step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,6 +99,10 @@ pub struct Block<T: Lane> {
     mu: Vec<T>,
     ground: Ground<T>,
     drives: Drives<T>,
+    /// The sand under the wheels, once a rover stands on soft ground, and the ruts of each lane's
+    /// rover.
+    sand: Option<Box<SandContact<T>>>,
+    ruts: Vec<RutMap>,
     /// Impulses of each lane's last step, and their generalized impulse (nv) where the contacts
     /// persisted.
     memories: [WarmStart; MAX_LANES],
@@ -176,6 +183,8 @@ impl<T: Lane> Block<T> {
             friction: zero,
             ground: Ground::new(token, machine.wheels.len(), machine.boxes.len()),
             drives: Drives::new(token, machine),
+            sand: None,
+            ruts: vec![RutMap::default(); T::LANES],
             memories: std::array::from_fn(|_| WarmStart::with_capacity(MAX_CONTACTS, machine.nv())),
             next_memories: std::array::from_fn(|_| WarmStart::with_capacity(MAX_CONTACTS, 0)),
             persistent: vector(),

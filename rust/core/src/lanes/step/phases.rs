@@ -2,7 +2,6 @@
 
 use super::balance::{Conditions, select_both};
 use super::{Block, Fallback, Next, State};
-use crate::integrator::mechanical_system::MOST_REVISIONS;
 use crate::integrator::{Phase, Probe, StepReport};
 use crate::lanes::problem::ContactProblem;
 use crate::lanes::rows::Answer;
@@ -52,6 +51,7 @@ impl<T: Lane> Block<T> {
             #[inline(always)]
             || self.add_implicit(is_first),
         );
+        self.sink(is_first);
         probe.end(Phase::MassMatrix);
         let is_definite = self
             .mass_matrix
@@ -176,16 +176,17 @@ impl<T: Lane> Block<T> {
             #[inline(always)]
             || self.move_on(problems),
         );
-        if self.drives.has_motors() && self.revise(problems, probe) {
+        if (self.drives.has_motors() || self.sand.is_some()) && self.revise(problems, probe) {
             return Next::Retake;
         }
         let (after, momentum) = self.energy(State::End);
         self.balance.after = after.kinetic_and_potential();
         self.balance.momentum = momentum;
+        let of_sand = self.work_of_sand();
         T::vectorize(
             token,
             #[inline(always)]
-            || self.audit(),
+            || self.audit(of_sand),
         );
         if self.balance.is_corrected.any() {
             self.weigh_again();
@@ -206,12 +207,12 @@ impl<T: Lane> Block<T> {
         if is_deep { Next::Project } else { Next::Finish }
     }
 
-    /// Where a motor has left its branch, sets up the step with the next branch; true if any has.
-    /// The other lanes keep their answers.
+    /// Where a motor has left its branch, or the force of the sand is another, sets up the step
+    /// anew; true if there is such a lane. The other lanes keep their answers.
     fn revise(&mut self, problems: &mut [ContactProblem], probe: &mut dyn Probe) -> bool {
         let mut may_revise = 0;
         for (lane, n) in self.n_retaken[..T::LANES].iter().enumerate() {
-            may_revise |= u32::from(*n < MOST_REVISIONS) << lane;
+            may_revise |= u32::from(*n < self.most_revisions(lane)) << lane;
         }
         let lanes = self.going & T::mask(self.token, may_revise);
         let (drives, machine) = (&mut self.drives, &*self.machine);
@@ -221,6 +222,7 @@ impl<T: Lane> Block<T> {
             #[inline(always)]
             || drives.revise(machine, lanes, v, v_end),
         );
+        self.retaken = self.retaken | self.revise_sand(lanes);
         if !self.retaken.any() {
             return false;
         }
@@ -256,12 +258,12 @@ impl<T: Lane> Block<T> {
     /// Lets lanes whose step does not balance fall back, and corrects the velocity of those with a
     /// little too much energy.
     #[inline(always)]
-    fn audit(&mut self) {
+    fn audit(&mut self, of_sand: T) {
         let (h, theta) = self.time_step();
         let places = &self.start.joints;
-        let work = self
-            .drives
-            .work(&self.machine, (h, theta), places, [&self.v, &self.v_end]);
+        let of_drives =
+            (self.drives).work(&self.machine, (h, theta), places, [&self.v, &self.v_end]);
+        let work = of_sand + of_drives;
         let mut released = h.like(0.0);
         if !self.yields.is_empty() {
             let (contacts, before) = (&self.contacts, &self.rows.u_before);
@@ -311,6 +313,7 @@ impl<T: Lane> Block<T> {
             #[inline(always)]
             || self.accept(),
         );
+        self.note_ruts();
         let going = self.going.bits();
         for lane in 0..T::LANES {
             if going >> lane & 1 == 1 {
@@ -350,5 +353,8 @@ impl<T: Lane> Block<T> {
         self.balance.before = select_both(going, self.balance.after, self.balance.before);
         self.time = T::select(going, self.time + h, self.time);
         self.drives.accept(going);
+        if let Some(sand) = &mut self.sand {
+            sand.accept(going);
+        }
     }
 }

@@ -1,0 +1,152 @@
+//! Rovers on sand in a batch: they move as they would alone, to the last bit, and as the general
+//! step moves them.
+
+use std::sync::Arc;
+
+use rover_core::geometry::{Plane, SoftGround, SphereField, Terrain, Union};
+use rover_core::integrator::moreau_jean::MoreauJean;
+use rover_core::integrator::{StepError, StepOptions};
+use rover_core::lanes::admission::FallbackReason;
+use rover_core::multibody::Model;
+use rover_core::sand::Soil;
+use rover_core::scalar::Instructions;
+use rover_core::simulation::RoverSimulation;
+use rover_core::simulation::lane_batch::{BatchRover, LaneBatch};
+
+use super::Random;
+use super::lane_batch::assert_alike;
+use super::surfaces::hills;
+use crate::sand::sand_scenes::{bekker_sand, dry_sand, placed, wide};
+
+fn soft(surface: Arc<dyn Terrain>, soil: Soil) -> Arc<dyn Terrain> {
+    Arc::new(SoftGround::new(surface, Arc::new(soil), 0.02).unwrap())
+}
+
+/// Dry sand, with rocks, on hills, or on a slope; Bekker's sand; firm ground.
+fn terrains() -> Vec<Arc<dyn Terrain>> {
+    let plane = |normal| Arc::new(Plane::new(normal, 0.0).unwrap());
+    let flat = || soft(plane([0.0, 1.0, 0.0]), dry_sand());
+    let rocks: Vec<[f64; 3]> = (0..40)
+        .map(|k| {
+            [
+                f64::from(k % 8) * 0.4 - 1.4,
+                -0.02,
+                f64::from(k / 8) * 0.35 - 0.7,
+            ]
+        })
+        .collect();
+    let rocks = SphereField::new(&rocks, &[0.06; 40], None).unwrap();
+    vec![
+        flat(),
+        Arc::new(Union::new(vec![flat(), Arc::new(rocks)]).unwrap()),
+        soft(hills(0.2, 5), dry_sand()),
+        soft(plane([-0.1_f64.sin(), 0.1_f64.cos(), 0.0]), dry_sand()),
+        soft(plane([0.0, 1.0, 0.0]), bekker_sand()),
+        plane([0.0, 1.0, 0.0]),
+    ]
+}
+
+fn rovers(model: &Arc<Model>, n: usize, numbers: &mut Random) -> Vec<RoverSimulation> {
+    let (terrains, start) = (terrains(), placed(model, dry_sand(), 0.0, 0.005));
+    let rovers = (0..n).map(|i| {
+        let terrain = Arc::clone(&terrains[i % terrains.len()]);
+        let options = StepOptions {
+            time_step: 0.005,
+            ..StepOptions::default()
+        };
+        let mut rover = RoverSimulation::new(Arc::clone(model), terrain, options).unwrap();
+        let mut q = start.q().clone();
+        q.position.y += 0.05 + 0.05 * numbers.next();
+        rover.set_state(q, (0..model.nv()).map(|_| 0.1 * numbers.next()).collect());
+        rover
+    });
+    rovers.collect()
+}
+
+fn command(rover: &mut RoverSimulation, torque: f64, numbers: &mut Random) {
+    let torques: Vec<f64> = (0..6).map(|_| torque * numbers.next()).collect();
+    let model = Arc::clone(rover.model());
+    let limits = model.wheels().iter().map(|wheel| wheel.steering_limit);
+    let steering: Vec<f64> = limits.map(|limit| limit * numbers.next()).collect();
+    rover.set_commands(&torques, &steering).unwrap();
+}
+
+fn advance(batch: &mut LaneBatch, rovers: &mut [RoverSimulation], steps: usize) {
+    let mut errors: Vec<Option<StepError>> = vec![None; rovers.len()];
+    let mut entries: Vec<BatchRover<'_>> = (rovers.iter_mut().zip(&mut errors))
+        .map(|(rover, error)| BatchRover { rover, error })
+        .collect();
+    batch.advance(&mut entries, steps, &mut || true);
+    assert!(errors.iter().all(Option::is_none), "{errors:?}");
+}
+
+/// Torques that jump, on wheels with rounded edges, beside a rover on firm ground. In the middle of
+/// the drive each rover of the batch is replaced by one that continues from its snapshot.
+#[test]
+fn a_rover_moves_as_it_would_alone() {
+    let model = wide("open-rover", 0.08, 1.0);
+    for instructions in Instructions::all_of_this_machine() {
+        for (n, torque) in [(8, 2.0), (13, 0.5)] {
+            let mut numbers = Random(n as u64);
+            let mut together = rovers(&model, n, &mut numbers);
+            let mut alone = together.clone();
+            let mut batch = LaneBatch::new(instructions);
+            for k in 0..8 {
+                for (a, b) in together.iter_mut().zip(&mut alone) {
+                    let mut same = Random(numbers.0);
+                    command(a, torque, &mut numbers);
+                    command(b, torque, &mut same);
+                }
+                advance(&mut batch, &mut together, 10);
+                for (a, b) in together.iter_mut().zip(&mut alone) {
+                    b.step(10).unwrap();
+                    assert_alike(a, b);
+                }
+                if k == 4 {
+                    for own in &mut together {
+                        let text = serde_json::to_string(&own.snapshot()).unwrap();
+                        own.set_state(own.q().clone(), vec![0.0; model.nv()]);
+                        own.restore(&serde_json::from_str(&text).unwrap()).unwrap();
+                    }
+                }
+            }
+            let in_ruts =
+                |rover: &&RoverSimulation| rover.sand().is_some_and(|sand| !sand.ruts.is_empty());
+            assert!(together.iter().filter(in_ruts).count() > n / 2);
+        }
+    }
+}
+
+/// Wheels of the fast step meet spheres on sand, and no other ground.
+#[test]
+fn firm_hills_beside_sand_take_the_general_step() {
+    let model = wide("open-rover", 0.08, 1.0);
+    let union = Union::new(vec![terrains()[0].clone(), hills(0.2, 5)]).unwrap();
+    let options = StepOptions::default();
+    let rover = RoverSimulation::new(model, Arc::new(union), options).unwrap();
+    assert_eq!(
+        rover.fallback_reason(),
+        Some(FallbackReason::FirmBesideSoft)
+    );
+}
+
+/// In a steady drive on sand no step is left to the general one. Each is what the general step
+/// makes of the same state, up to what the sand is allowed to be off.
+#[test]
+fn the_quick_step_obeys_the_law_of_the_general_one() {
+    let mut own = placed(&wide("open-rover", 0.08, 1.0), dry_sand(), 0.0, 0.005);
+    own.set_wheel_torques(&[1.0; 6]).unwrap();
+    assert!(own.fallback_reason().is_none());
+    let mut differences = Vec::new();
+    for _ in 0..300 {
+        let mut general = own.clone();
+        general.step_with(&MoreauJean, 1).unwrap();
+        let report = own.step(1).unwrap();
+        assert!(report.is_converged());
+        assert_eq!(report.fallbacks, 0);
+        let changes = own.v().iter().zip(general.v()).map(|(a, b)| (a - b).abs());
+        differences.push(changes.fold(0.0, f64::max));
+    }
+    let n_other = differences.iter().filter(|x| **x >= 1e-9).count();
+    assert!(n_other <= 3, "{n_other}: {differences:?}");
+}
