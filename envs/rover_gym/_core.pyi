@@ -52,6 +52,7 @@ __all__: list[str] = [
     "HeightField",
     "Line",
     "Linearisation",
+    "Machine",
     "MirroredRoverSimulation",
     "ModelError",
     "Motor",
@@ -184,11 +185,32 @@ class Motor:
     def __hash__(self) -> int: ...
 
 @final
+class Machine:
+    """One of the machines of a model, as parts of arrays."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+    @property
+    def solids(self) -> list[str]:
+        """Names of its solids."""
+    @property
+    def coordinates(self) -> slice:
+        """Its part of coordinates and velocities, such as `Simulation.q`."""
+    @property
+    def joints(self) -> slice:
+        """Its part of arrays with one entry a joint."""
+    @property
+    def wheels(self) -> slice:
+        """Its part of arrays with one entry a wheel, such as `Simulation.wheel_forces`."""
+
+@final
 class RoverModel:
     """A machine: a tree of solids under a free base, read from data. Immutable.
 
     `RoverModel()` is the built-in six-wheel rover. The other constructors are `named`, `from_text`
-    and `from_dict`, and those that read files: `from_file`, `from_urdf` and `from_mjcf`.
+    and `from_dict`, those that read files, `from_file`, `from_urdf` and `from_mjcf`, and `join` for
+    several machines.
 
     Methods that take coordinates have an argument `coordinates`: "state" for the `q` and `v` of
     `Simulation`, "report" for the Cardan angles of the 2010 report and their rates. They raise
@@ -223,6 +245,30 @@ class RoverModel:
         """The description as TOML text, for `from_text`."""
     def to_dict(self) -> dict[str, Any]:
         """The description as nested dictionaries and lists, for `from_dict`."""
+    @staticmethod
+    def join(
+        models: Mapping[str, RoverModel], *, loops: Sequence[Mapping[str, Any]] | None = None, name: str | None = None
+    ) -> RoverModel:
+        """Joins several machines to one model, in which they meet, push and tow each other.
+
+        The names of their solids, joints, wheels, tags and loops get the machine's name and a slash
+        in front, such as "tug/trunk". Coordinates, joints and wheels are those of the machines, one
+        machine after another: a state is `numpy.concatenate` of the states of all machines, a
+        command likewise, and `machines` has the part of each.
+
+        Args:
+            models: Machines by name.
+            loops: Constraints between machines, dictionaries with the fields of a closed loop in a
+                model file. Between free machines `other_position` is required, and in a weld
+                `other_rotation`. None by default.
+            name: Name of the model; by default the machines' names.
+
+        Raises:
+            ModelError: `models` are not RoverModels by name, or a loop is invalid.
+        """
+    @property
+    def machines(self) -> dict[str, Machine]:
+        """Its machines by name; one, of the model's own name, unless several were joined."""
     @staticmethod
     def named(name: str) -> RoverModel:
         """Returns a model of the gallery by name.
@@ -472,6 +518,7 @@ class RoverModel:
             TerrainError: `terrain` is not a terrain, or the ground under the trunk or a wheel is
                 unknown.
             StateError: A number is not finite, or the plane is vertical.
+            ModelError: The model has no wheels, or several machines: place each by its own model.
         """
     def wheel_contact_points(
         self, q: npt.ArrayLike, terrain: Terrain | _Terrains, coordinates: _Coordinates = "state"
@@ -1034,6 +1081,9 @@ class Contacts:
     @property
     def bodies(self) -> list[str]:
         """Name of the solid in each contact, or of the joint that is at its stop."""
+    @property
+    def others(self) -> list[str | None]:
+        """Name of the other solid in each contact; None for the ground, a grain or a joint."""
     @property
     def kinds(self) -> list[str]:
         """Kind of each contact, "wheel", "box" or "sphere"; of a joint, "limit" or "friction".

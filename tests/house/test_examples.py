@@ -29,6 +29,7 @@ PAGES = (
     "docs/vector.md",
     "docs/watching.md",
     "docs/your-map.md",
+    "docs/several-machines.md",
     "docs/your-rover.md",
 )
 #: Packages of extras that a block needs if it holds these words.

@@ -4,6 +4,7 @@ from rover_gym.env.arguments import ARGUMENTS, Argument, RoverArguments
 from rover_gym.env.env_snapshot import EnvSnapshot
 from rover_gym.env.grains_env import BedDraw, GrainsEnvSnapshot, RoverGrainsEnv
 from rover_gym.env.observation import ObservationField, ObservationLayout
+from rover_gym.env.pushes import PushOptions, RandomPushes
 from rover_gym.env.reward_terms import RewardTerm
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.start import Domain, HeightScan, Rocks, Start, drive_signs, wheel_centres
@@ -19,6 +20,8 @@ __all__ = [
     "HeightScan",
     "ObservationField",
     "ObservationLayout",
+    "PushOptions",
+    "RandomPushes",
     "RewardTerm",
     "Rocks",
     "RoverArguments",

@@ -280,6 +280,8 @@ def _rover(model: RoverModel | None, *, steered: bool, on_sand: bool) -> RoverMo
         rover = sand_rover() if on_sand else RoverModel()
     else:
         rover = model
+        if len(machines := rover.machines) > 1:
+            refuse(OptionError, "model", list(machines), "must be one machine")
         if on_sand:
             check_wheels_for_sand(rover)
     if steered:

@@ -81,7 +81,7 @@ class ArcFeatures:
         q, velocity = layout["q"].start, layout["velocity"].start
         wheels = set(model.wheel_joint_indices)
         taken = [q + 3, q + 5, *(q + i for i in range(6, model.nq) if i not in wheels)]
-        taken += range(velocity, velocity + model.nv)
+        taken += range(velocity, layout["velocity"].stop)
         for name in ("wheel_contact", "normal_force", "stuck"):
             taken += range(layout[name].start, layout[name].stop)
         self._taken = np.array(taken)

@@ -43,7 +43,7 @@ class Features:
         self._distance = layout["goal_distance"].start
         self._goal_scale = float(layout.scale[self._distance])
         taken = [q + i for i in (3, 5, *joints)]
-        taken += list(range(velocity, velocity + rover.model.nv))
+        taken += list(range(velocity, layout["velocity"].stop))
         for name in ("wheel_gap", "wheel_contact", "normal_force", "tangential_force", "previous_action", "stuck"):
             taken += list(range(layout[name].start, layout[name].stop))
         self._taken = np.array(taken)

@@ -5,12 +5,14 @@ library.
 """
 
 from rover_gym.env.batch import BatchSnapshot, RoverBatch
+from rover_gym.vector.pushed_vector import RandomPushesVector
 from rover_gym.vector.throughput import ExploringSpeed, VectorSpeed, measure_exploring, measure_speed
 from rover_gym.vector.vector_env import RoverVectorEnv
 
 __all__ = [
     "BatchSnapshot",
     "ExploringSpeed",
+    "RandomPushesVector",
     "RoverBatch",
     "RoverVectorEnv",
     "VectorSpeed",

@@ -69,6 +69,8 @@ fn frames<const D: usize>(rows: impl Iterator<Item = [[f64; D]; D]>) -> Array {
 pub struct Contacts {
     /// Name of the solid in each contact, or of the joint that is at its stop.
     bodies: Vec<String>,
+    /// Name of the other solid in each contact; None for the ground, a grain or a joint.
+    others: Vec<Option<String>>,
     /// Kind of each contact, "wheel", "box" or "sphere"; of a joint, "limit" or "friction".
     ///
     /// "limit" is a joint at its stop, "friction" the dry friction of a joint.
@@ -111,6 +113,13 @@ impl Contacts {
         let columns = Columns::of(active);
         Self {
             bodies: parts.map(|part| part.name(model).to_owned()).collect(),
+            others: (active.iter())
+                .map(|a| {
+                    a.contact
+                        .other
+                        .map(|other| other.part.name(model).to_owned())
+                })
+                .collect(),
             kinds,
             wheels: wheels.into(),
             points: columns.points,

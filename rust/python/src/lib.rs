@@ -23,6 +23,7 @@ mod height_field;
 mod infos;
 mod linearisation;
 mod loops;
+mod machines;
 mod materials;
 mod model;
 mod motor;
@@ -79,6 +80,7 @@ pub fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
     errors::register(module)?;
     choose_instructions()?;
     module.add_class::<model::RoverModel>()?;
+    module.add_class::<machines::Machine>()?;
     module.add_class::<motor::Motor>()?;
     module.add_class::<terrain::Terrain>()?;
     module.add_class::<plane::Plane>()?;

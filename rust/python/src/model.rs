@@ -17,6 +17,7 @@ use crate::arguments::{Named, number, refused, text, texts};
 use crate::arrays::{Array, fresh, fresh_matrix, fresh_rows, triple, two, vector};
 use crate::errors::{Kind, Result, Value};
 use crate::loops;
+use crate::machines;
 use crate::motor::{self, Motor};
 use crate::terrain::parse;
 
@@ -26,7 +27,8 @@ pub type Pair = (Array, Array);
 /// A machine: a tree of solids under a free base, read from data. Immutable.
 ///
 /// `RoverModel()` is the built-in six-wheel rover. The other constructors are `named`, `from_text`
-/// and `from_dict`, and those that read files: `from_file`, `from_urdf` and `from_mjcf`.
+/// and `from_dict`, those that read files, `from_file`, `from_urdf` and `from_mjcf`, and `join` for
+/// several machines.
 ///
 /// Methods that take coordinates have an argument `coordinates`: "state" for the `q` and `v` of
 /// `Simulation`, "report" for the Cardan angles of the 2010 report and their rates. They raise
@@ -236,6 +238,45 @@ impl RoverModel {
     /// The description as nested dictionaries and lists, for `from_dict`.
     fn to_dict<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
         Ok(py.import("json")?.call_method1("loads", (self.json()?,))?)
+    }
+
+    /// Joins several machines to one model, in which they meet, push and tow each other.
+    ///
+    /// The names of their solids, joints, wheels, tags and loops get the machine's name and a slash
+    /// in front, such as "tug/trunk". Coordinates, joints and wheels are those of the machines, one
+    /// machine after another: a state is `numpy.concatenate` of the states of all machines, a
+    /// command likewise, and `machines` has the part of each.
+    ///
+    /// Args:
+    ///     models: Machines by name.
+    ///     loops: Constraints between machines, dictionaries with the fields of a closed loop in a
+    ///         model file. Between free machines `other_position` is required, and in a weld
+    ///         `other_rotation`. None by default.
+    ///     name: Name of the model; by default the machines' names.
+    ///
+    /// Raises:
+    ///     ModelError: `models` are not RoverModels by name, or a loop is invalid.
+    #[staticmethod]
+    #[pyo3(signature = (models, *, loops = None, name = None))]
+    fn join(
+        models: &Bound<'_, PyAny>,
+        loops: Option<&Bound<'_, PyAny>>,
+        name: Option<&Bound<'_, PyAny>>,
+    ) -> Result<Self> {
+        let machines = machines_by_name(models)?;
+        let names = || machines.iter().map(|(name, _)| name.as_str());
+        let name = name.map_or_else(
+            || Ok(names().collect::<Vec<_>>().join(" and ")),
+            |name| text(name, Kind::Model, "name"),
+        )?;
+        let loops = loops.map_or_else(|| Ok(Vec::new()), machines::read_loops)?;
+        Self::wrap(Model::joined(&name, machines, loops))
+    }
+
+    /// Its machines by name; one, of the model's own name, unless several were joined.
+    #[getter]
+    fn machines<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
+        machines::by_name(py, &self.inner)
     }
 
     /// Returns a model of the gallery by name.
@@ -633,6 +674,7 @@ impl RoverModel {
     ///     TerrainError: `terrain` is not a terrain, or the ground under the trunk or a wheel is
     ///         unknown.
     ///     StateError: A number is not finite, or the plane is vertical.
+    ///     ModelError: The model has no wheels, or several machines: place each by its own model.
     fn resting_pose(
         &self,
         terrain: &Bound<'_, PyAny>,
@@ -642,6 +684,7 @@ impl RoverModel {
         let ground = parse(terrain)?;
         let place = two(position, Kind::State, "position")?;
         let heading = number(heading, Kind::State, "heading")?;
+        machines::check_standing(&self.inner)?;
         if let DrawnGround::Plane(plane) = &ground {
             return Ok(resting_pose(&self.inner, plane, place, heading)?.into());
         }
@@ -780,6 +823,28 @@ impl RoverModel {
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Result<(Bound<'py, PyAny>, (String,))> {
         Ok((slf.get_type().getattr("_restore")?, (slf.get().json()?,)))
     }
+}
+
+/// Descriptions of machines by their names.
+fn machines_by_name(models: &Bound<'_, PyAny>) -> Result<Vec<(String, ModelDescription)>> {
+    let Ok(given) = models.cast::<PyMapping>() else {
+        return Err(refused(
+            models,
+            Kind::Model,
+            "models",
+            "RoverModels by name",
+        ));
+    };
+    let read = |item: Bound<'_, PyAny>| {
+        let (name, model): (Bound<'_, PyAny>, Bound<'_, PyAny>) = item.extract()?;
+        let name = text(&name, Kind::Model, "models")?;
+        let Ok(given) = model.extract::<RoverModel>() else {
+            let field = format!("models[{name}]");
+            return Err(refused(&model, Kind::Model, &field, "a RoverModel"));
+        };
+        Ok((name, given.inner.description().clone()))
+    };
+    given.items()?.iter().map(read).collect()
 }
 
 /// Numbers by names.

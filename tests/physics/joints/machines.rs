@@ -35,6 +35,7 @@ pub fn machine(solids: Vec<SolidDescription>) -> ModelDescription {
         wheels: Vec::new(),
         tags: Vec::new(),
         loops: Vec::new(),
+        machines: Vec::new(),
     }
 }
 

@@ -140,7 +140,7 @@ impl Machine {
                 })
                 .collect(),
             spares: Vec::new(),
-            has_pairs: model.description().self_contact,
+            has_pairs: model.trees()[0].self_contact,
             pattern: None,
         };
         machine.spares = machine.find_free_slots(machine.has_pairs);

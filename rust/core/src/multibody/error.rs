@@ -113,6 +113,32 @@ pub enum ModelError {
         /// The root of the tree that it belongs to.
         name: String,
     },
+    /// A machine that does not begin at a root, in the order of the solids.
+    #[error(
+        "{field}: {name:?} must be a solid without a parent, after those of the machines before; the first machine begins at the first solid"
+    )]
+    NotAFirstSolid {
+        /// Path of the field.
+        field: String,
+        /// What was given.
+        name: String,
+    },
+    /// A wheel that is listed among those of another machine.
+    #[error(
+        "{field}: the wheels of the machine {name:?} must be listed together, in the order of the machines"
+    )]
+    OtherMachine {
+        /// Path of the field.
+        field: String,
+        /// The wheel's machine.
+        name: String,
+    },
+    /// A field that each of several machines has.
+    #[error("{field}: a model with machines has this field in each of them")]
+    OfAMachine {
+        /// Path of the field.
+        field: String,
+    },
     /// A joint that follows one on another branch, or one that has no coordinate of its own.
     #[error(
         "{field}: the joint {name:?} must have a coordinate, and be an ancestor of this joint or hang on the same solid"
@@ -305,6 +331,9 @@ impl ModelError {
             | Self::LoopInOneBody { field, .. }
             | Self::LoopOpen { field, .. }
             | Self::OtherTree { field, .. }
+            | Self::NotAFirstSolid { field, .. }
+            | Self::OtherMachine { field, .. }
+            | Self::OfAMachine { field }
             | Self::CoupledApart { field, .. }
             | Self::NotFinite { field, .. }
             | Self::NotPositive { field, .. }

@@ -67,8 +67,8 @@ pub mod state;
 pub use chart::Chart;
 pub use description::{
     CouplingDescription, DriveDescription, FORMAT, Hold, JointKind, Limits, LoopDescription,
-    LoopKind, MAX_SHAPES, MAX_SOLIDS, MassProperties, ModelDescription, Shape, ShapeDescription,
-    SolidDescription, Spring, TagDescription, WheelDescription,
+    LoopKind, MAX_SHAPES, MAX_SOLIDS, MachineDescription, MassProperties, ModelDescription, Shape,
+    ShapeDescription, SolidDescription, Spring, TagDescription, WheelDescription,
 };
 pub use energy::{Energy, EnergyScratch};
 pub use error::{ModelError, StateError};
@@ -82,7 +82,7 @@ pub use mechanism::Mechanism;
 pub(crate) use model::fingerprint;
 pub use model::{
     BASE, Body, BodyPose, Changes, CollisionBox, CollisionSphere, Frame, JointProperties, Loop,
-    LoopGap, Model, Passive, Tree, Wheel,
+    LoopGap, MachineSpan, Model, Passive, Tree, Wheel,
 };
 pub use momentum::Momentum;
 pub use motor::{Motor, MotorLine};

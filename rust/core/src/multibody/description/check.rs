@@ -7,6 +7,7 @@ use super::check_shapes::check_shapes;
 use super::check_values::{
     direction, finite, in_range, length, material, moderate, not_negative, place, positive,
 };
+use super::join::check_machines;
 use super::joint::{JointKind, Limits};
 use super::masses::mass_left;
 use super::{MAX_SHAPES, MAX_SOLIDS, ModelDescription, SolidDescription, WheelDescription};
@@ -49,7 +50,8 @@ pub(in crate::multibody) fn check(description: &ModelDescription) -> Result<(), 
     check_trees(description)?;
     check_wheels(description, &solids)?;
     check_tags(description, &solids)?;
-    check_loops(description, &solids)
+    check_loops(description, &solids)?;
+    check_machines(description, &solids)
 }
 
 /// Checks the joint of a solid. `before`: the solids listed before it.

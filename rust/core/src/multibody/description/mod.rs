@@ -10,7 +10,9 @@ mod check_shapes;
 pub(super) mod check_values;
 pub mod closure;
 mod gallery;
+mod join;
 pub mod joint;
+mod machines;
 mod masses;
 pub mod shape;
 mod yielding;
@@ -19,6 +21,7 @@ use super::error::ModelError;
 use super::motor::Motor;
 pub use closure::{LoopDescription, LoopKind};
 pub use joint::{CouplingDescription, DriveDescription, Hold, JointKind, Limits, Spring};
+pub use machines::MachineDescription;
 pub use masses::MassProperties;
 pub use shape::{Shape, ShapeDescription};
 
@@ -57,6 +60,10 @@ pub struct ModelDescription {
     /// always collide.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub self_contact: bool,
+    /// Machines of which it consists, in the order of their solids and wheels; none for a single
+    /// machine.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub machines: Vec<MachineDescription>,
 }
 
 /// A point fixed to a solid.
@@ -323,7 +330,12 @@ impl ModelDescription {
     pub fn rover() -> Self {
         let parsed = Self::from_toml(ROVER);
         assert!(parsed.is_ok(), "the built-in rover is readable");
-        parsed.unwrap_or_else(|_| Self {
+        parsed.unwrap_or_else(|_| Self::empty())
+    }
+
+    /// A description of nothing.
+    fn empty() -> Self {
+        Self {
             format: FORMAT,
             name: String::new(),
             solids: Vec::new(),
@@ -331,7 +343,8 @@ impl ModelDescription {
             tags: Vec::new(),
             loops: Vec::new(),
             self_contact: false,
-        })
+            machines: Vec::new(),
+        }
     }
 
     /// Reads TOML.

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::links::{inertias_of, mechanism_of};
+use super::machines::machines_of;
 use super::parts::{CollisionBox, CollisionSphere, Frame, Wheel};
 use super::properties::{JointProperties, Passive};
 use super::spinners::mark_spinners;
@@ -74,7 +75,8 @@ impl Model {
             ends.into_iter().flatten().filter_map(frame)
         });
         mark_spinners(&mut bodies, &wheels, carriers.chain(looped));
-        let trees: Vec<Tree> = (0..n_trees).map(|t| tree(t, &bodies, &paths)).collect();
+        let mut trees: Vec<Tree> = (0..n_trees).map(|t| tree(t, &bodies, &paths)).collect();
+        let machines = machines_of(&description, &solid_of_body, &mut trees, &joints);
         for joint in &mut joints {
             joint.velocity = bodies[joint.body].velocity;
             joint.is_passive = joint.passive.stiffness > 0.0 || joint.passive.damping > 0.0;
@@ -116,6 +118,7 @@ impl Model {
             common,
             body_of_velocity: paths.body_of_velocity,
             loops: Vec::new(),
+            machines,
         };
         model.build_loops()?;
         Ok(model)
@@ -389,6 +392,7 @@ fn tree(t: usize, bodies: &[Body], paths: &Paths) -> Tree {
     Tree {
         velocities: from..from + n,
         is_free: matches!(bodies[first].joint, Joint::Free(_)),
+        self_contact: false,
         mass: bodies[range.clone()].iter().map(|b| b.mass).sum(),
         reach: (bodies[range.clone()].iter().filter(|b| b.parent.is_some()))
             .map(|b| b.position.norm())

@@ -1,8 +1,8 @@
-//! Copies of a machine with some of its data changed.
+//! Copies of a machine with some of its data changed, and several machines as one model.
 
 use super::Model;
-use crate::multibody::description::WheelDescription;
 use crate::multibody::description::check_values::{in_range, length};
+use crate::multibody::description::{LoopDescription, ModelDescription, WheelDescription};
 use crate::multibody::error::ModelError;
 use crate::multibody::motor::Motor;
 
@@ -46,6 +46,21 @@ impl Changes {
 }
 
 impl Model {
+    /// Machines side by side in one model, each on its own trees, perhaps with loops between them.
+    ///
+    /// A machine's name and a slash come before the names of its solids, wheels, tags and loops.
+    /// The descriptions are those of models.
+    ///
+    /// # Errors
+    /// The first invalid entry, named by its field; `NoSolids` without any machine.
+    pub fn joined(
+        name: &str,
+        machines: Vec<(String, ModelDescription)>,
+        loops: Vec<LoopDescription>,
+    ) -> Result<Self, ModelError> {
+        Self::from_description(ModelDescription::joined(name, machines, loops))
+    }
+
     /// A copy with changes.
     ///
     /// # Errors

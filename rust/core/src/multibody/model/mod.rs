@@ -10,6 +10,7 @@ mod close;
 pub(in crate::multibody) mod closed_loop;
 mod edit;
 mod links;
+mod machines;
 mod parts;
 mod properties;
 mod spinners;
@@ -20,6 +21,7 @@ use nalgebra::Vector3;
 pub use body::Body;
 pub use closed_loop::{BodyPose, Loop, LoopGap};
 pub use edit::Changes;
+pub use machines::MachineSpan;
 pub use parts::{CollisionBox, CollisionSphere, Frame, Wheel};
 pub use properties::{JointProperties, Passive};
 pub use tree::Tree;
@@ -57,6 +59,7 @@ pub struct Model {
     /// Indices of the joints with dry friction.
     rubbing: Vec<usize>,
     loops: Vec<Loop>,
+    machines: Vec<MachineSpan>,
     has_slides: bool,
     mass: f64,
     fingerprint: u64,
@@ -164,6 +167,12 @@ impl Model {
         self.loops.iter().any(Loop::holds_the_world)
     }
 
+    /// Its machines, in description order; one if the description names none.
+    #[must_use]
+    pub fn machines(&self) -> &[MachineSpan] {
+        &self.machines
+    }
+
     /// Frames of all solids, in description order.
     #[must_use]
     pub fn frames(&self) -> &[Frame] {
@@ -194,7 +203,8 @@ impl Model {
     pub fn can_touch(&self, a: usize, b: usize) -> bool {
         let (first, second) = (&self.bodies[a], &self.bodies[b]);
         let is_joined = first.parent == Some(b) || second.parent == Some(a);
-        first.tree != second.tree || (self.description.self_contact && a != b && !is_joined)
+        let collides = self.trees[first.tree].self_contact && a != b && !is_joined;
+        first.tree != second.tree || collides
     }
 
     /// Number of velocities.

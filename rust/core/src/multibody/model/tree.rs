@@ -15,6 +15,8 @@ pub struct Tree {
     /// Whether its root is free. Positions in the tree are then relative to the root's origin,
     /// otherwise to the world's.
     pub is_free: bool,
+    /// Whether its parts collide with each other, except across a joint.
+    pub self_contact: bool,
     /// kg.
     pub mass: f64,
     /// Largest distance of a joint from the root, m, without the displacements of prismatic joints.

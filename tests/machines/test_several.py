@@ -1,0 +1,258 @@
+"""Several machines in one simulation meet, push and tow each other, as closed forms say."""
+
+import math
+import pickle
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from machines import FOUR, RADIUS, machine
+from rover_gym import Plane, RoverModel, Simulation
+from rover_gym.mechanics import ModelError, OptionError
+from rover_gym.record import Recorder, RoverSampler, describe, read_run
+from rover_gym.replay import write_page
+from rover_gym.replay.rover_scene import bare_scene
+
+GRAVITY = 9.81
+#: Height of a cart's chassis over the ground, m.
+HEIGHT = 2 * RADIUS
+#: Mass of a cart, and what its wheels add to it while they roll, kg.
+CART, ROLLING = 48.0, 4 * 2.0 / 2
+
+
+def cart(tyres: str = "wheel") -> RoverModel:
+    """A cart on four wheels of a material, with a chassis that is longer than the wheels reach."""
+    description = machine("cart", FOUR).to_dict()
+    description["solids"][0]["shape"]["size"] = [1.0, 0.1, 0.4]
+    for wheel in description["wheels"]:
+        wheel["material"] = tyres
+    return RoverModel.from_dict(description)
+
+
+def ball(mass: float) -> RoverModel:
+    shape = {"kind": "sphere", "radius": 0.2}
+    return RoverModel.from_dict(
+        {"name": "ball", "solids": [{"name": "ball", "mass": mass, "shape": shape, "collides": True}]}
+    )
+
+
+def rod(length: float) -> RoverModel:
+    """A bar along x, with a name for each end."""
+    shape = {"kind": "box", "size": [length, 0.03, 0.03]}
+    return RoverModel.from_dict({"name": "rod", "solids": [{"name": "rod", "mass": 1.0, "shape": shape}]})
+
+
+def on_slope(models: dict[str, RoverModel], places: list[float], slope: float = 0.0, **arguments) -> Simulation:
+    """The machines behind each other, facing up a slope (rad)."""
+    joined = RoverModel.join(models, **arguments.pop("join", {}))
+    ground = Plane([-math.sin(slope), math.cos(slope), 0.0], 0.0)
+    sim = Simulation(joined, ground, **arguments)
+    q = []
+    for model, x in zip(models.values(), places, strict=True):
+        along, height = x * math.cos(slope), x * math.sin(slope) + HEIGHT / math.cos(slope)
+        hanging = np.array([along, height, 0.0, 0.0, 0.0, slope])
+        q.append(model.resting_pose(ground, (along, 0.0), 0.0) if model.wheel_names else hanging)
+    sim.set_state(joined.close_loops(np.concatenate(q))[0])
+    return sim
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
+def test_two_machines_collide_as_newtons_law_says(restitution):
+    pair = RoverModel.join({"a": ball(1.0), "b": ball(3.0)})
+    sim = Simulation(pair, gravity=(0, 0, 0), restitution=restitution, friction=0.0)
+    q, v = np.zeros(12), np.zeros(12)
+    q[[0, 1, 6, 7]] = -0.5, 5.0, 0.5, 5.0
+    v[[0, 6]] = 2.0, -1.0
+    sim.set_state(q, v)
+    sim.step(80)
+    # Common velocity -1/4, approach 3: u+ = -e u-.
+    expected = np.array([-0.25 - restitution * 0.75 * 3, -0.25 + restitution * 0.25 * 3])
+    np.testing.assert_allclose(sim.v[[0, 6]], expected, atol=1e-12)
+    lost = 0.5 * (1.0 * 3.0 / 4.0) * 3.0**2 * (1 - restitution**2)
+    assert sim.energy().kinetic == pytest.approx(0.5 * (1 * 4.0 + 3 * 1.0) - lost, abs=1e-12)
+
+
+def test_a_glancing_blow_with_friction_conserves_both_momenta():
+    errors = []
+    for step in (2e-3, 1e-3):
+        sim = Simulation(RoverModel.join({"a": ball(1.0), "b": ball(3.0)}), gravity=(0, 0, 0), time_step=step)
+        q, v = np.zeros(12), np.zeros(12)
+        q[[0, 1, 6, 7]] = -0.5, 5.0, 0.5, 5.2
+        v[[0, 6, 3, 10]] = 2.0, -1.0, 8.0, 5.0
+        sim.set_state(q, v)
+        before = np.concatenate(sim.momentum())
+        for _ in range(round(0.4 / step)):
+            sim.step()
+            if len(sim.contacts):
+                assert (sim.contacts.bodies, sim.contacts.others) in (
+                    (["a/ball"], ["b/ball"]),
+                    (["b/ball"], ["a/ball"]),
+                )
+        after = np.concatenate(sim.momentum())
+        assert np.abs(sim.v[[2, 8]]).min() > 1e-3  # friction turned the spin into a sideways motion
+        np.testing.assert_allclose(after[:3], before[:3], atol=1e-12)
+        errors.append(np.abs(after[3:] - before[3:]).max())
+    assert errors[0] < 0.05
+    assert errors[1] < 0.7 * errors[0]
+
+
+def test_machines_that_never_meet_move_as_each_alone():
+    models = {name: RoverModel.named(name) for name in ("skid-steered", "open-rover")}
+    torques = {"skid-steered": np.full(4, 3.0), "open-rover": np.full(6, 0.5)}
+    both, ground = RoverModel.join(models), Plane()
+    starts = [model.resting_pose(ground, (0.0, 2.0 * i), 0.3 * i) for i, model in enumerate(models.values())]
+    sim = Simulation(both)
+    sim.set_state(np.concatenate(starts))
+    sim.set_wheel_torques(np.concatenate(list(torques.values())))
+    assert sim.step(400).is_converged
+    for (name, model), start in zip(models.items(), starts, strict=True):
+        alone, own = Simulation(model), both.machines[name]
+        alone.set_state(start)
+        alone.set_wheel_torques(torques[name])
+        alone.step(400)
+        np.testing.assert_allclose(sim.q[own.coordinates], alone.q, atol=1e-11)
+        np.testing.assert_allclose(sim.motor_torques[own.wheels], alone.motor_torques, atol=1e-11)
+        np.testing.assert_allclose(sim.wheel_forces[own.wheels], alone.wheel_forces, atol=1e-2)
+        assert own.solids == [f"{name}/{solid}" for solid in model.solid_names]
+        assert both.joint_names[own.joints] == [f"{name}/{joint}" for joint in model.joint_names]
+        assert np.abs(alone.q[:3] - start[:3]).max() > 0.3
+
+
+def test_a_rover_pushes_one_that_stands_on_ice():
+    models = {"tug": cart(), "sledge": cart("skate")}
+    laws = {("skate", "ground"): (0.0, 0.0), ("body", "body"): (0.0, 0.0)}
+    sim = on_slope(models, [0.0, 1.0 + 1e-9], materials=laws)
+    torque = 4.0
+    sim.set_wheel_torques([torque] * 4 + [0.0] * 4)
+    assert sim.step(100).is_converged
+    # The sledge's wheels do not turn.
+    acceleration = 4 * torque / RADIUS / (2 * CART + ROLLING)
+    assert sim.v[[0, 10]] == pytest.approx(acceleration * 0.5, rel=1e-9)
+    contacts = sim.contacts
+    push = [k for k, other in enumerate(contacts.others) if other is not None]
+    assert {*(contacts.bodies[k] for k in push), *(contacts.others[k] for k in push)} == {"tug/trunk", "sledge/trunk"}
+    assert sum(contacts.impulses[push, 0]) / 0.005 == pytest.approx(CART * acceleration, rel=1e-9)
+
+
+@pytest.mark.parametrize("hitch", ["ball joint", "bar"])
+def test_a_rover_tows_one_without_power_up_a_slope(hitch):
+    slope, torque, long = 0.1, 6.0, 0.6
+    if hitch == "bar":
+        models, places = {"tug": cart(), "load": cart(), "bar": rod(long)}, [0.0, -1.6, -0.8]
+        ends = [("tug", [-0.5, 0.0, 0.0], [long / 2, 0.0, 0.0]), ("load", [0.5, 0.0, 0.0], [-long / 2, 0.0, 0.0])]
+        loops = [
+            {"name": f"{name} pin", "kind": "connect", "solid": f"{name}/trunk", "other": "bar/rod"}
+            | {"position": own, "other_position": other}
+            for name, own, other in ends
+        ]
+        names, mass = ("tug pin", "load pin"), 1.0
+    else:
+        models, places = {"tug": cart(), "load": cart()}, [0.0, -1.2]
+        pin = {"name": "pin", "kind": "connect", "solid": "tug/trunk", "position": [-0.6, 0.0, 0.0]}
+        loops = [pin | {"other": "load/trunk", "other_position": [0.6, 0.0, 0.0]}]
+        names, mass = ("pin", "pin"), 0.0
+    sim = on_slope(models, places, slope, join={"loops": loops}, friction=0.9)
+    sim.set_wheel_torques([torque] * 4 + [0.0] * 4)
+    assert sim.step(100).is_converged
+    up = np.array([math.cos(slope), math.sin(slope), 0.0])
+    pull = 4 * torque / RADIUS
+    acceleration = (pull - (2 * CART + mass) * GRAVITY * math.sin(slope)) / (2 * (CART + ROLLING) + mass)
+    machines = sim.model.machines
+    for name in ("tug", "load"):
+        velocity = sim.v[machines[name].coordinates][:3]
+        np.testing.assert_allclose(velocity, acceleration * 0.5 * up, atol=1e-6)
+    forces = sim.loop_forces
+    on_load = CART * GRAVITY * math.sin(slope) + (CART + ROLLING) * acceleration
+    on_tug = on_load + mass * (GRAVITY * math.sin(slope) + acceleration)
+    assert forces[names[0]] @ up == pytest.approx(-on_tug, rel=1e-6)
+    assert abs(forces[names[1]] @ up) == pytest.approx(on_load if hitch == "bar" else on_tug, rel=1e-6)
+
+
+def test_a_run_of_several_machines_is_recorded_and_drawn(tmp_path):
+    sim = on_slope({"tug": cart(), "load": cart()}, [0.0, -1.3])
+    sim.set_wheel_torques([8.0, -8.0, 8.0, -8.0, 2.0, 2.0, 2.0, 2.0])
+    sampler, path = RoverSampler(sim.model), tmp_path / "meet.h5"
+    with Recorder(path, sampler.channels, describe(sim, "two carts"), terrain=sim.terrain) as recorder:
+        for _ in range(20):
+            sim.step(5)
+            recorder.append(sampler.row(sim))
+    run = read_run(path)
+    assert run.model == sim.model
+    last = sim.poses()
+    for solid, place in zip(run.model.solid_names, run.positions[-1], strict=True):
+        np.testing.assert_allclose(place, last[solid][0], atol=1e-12)
+    scene, _ = bare_scene(run)
+    assert scene.frames == len(run.model.solid_names) == 10
+    assert [wheel["name"] for wheel in scene.facts["wheels"]] == run.model.wheel_names
+    assert write_page(run, tmp_path / "meet.html").stat().st_size > 10_000
+
+
+def test_a_joined_model_survives_files_pickles_and_another_join():
+    skid = RoverModel.named("skid-steered").to_dict() | {"self_contact": True}
+    pair = RoverModel.join({"a": RoverModel.from_dict(skid), "b": cart()}, name="pair")
+    for copy in (RoverModel.from_text(pair.to_text()), pickle.loads(pickle.dumps(pair))):  # noqa: S301 - written here
+        assert copy == pair
+    fleet = RoverModel.join({"first": pair, "last": cart()})
+    assert list(fleet.machines) == ["first/a", "first/b", "last"]
+    assert [own["self_contact"] for own in fleet.to_dict()["machines"] if "self_contact" in own] == [True]
+    assert list(cart().machines) == ["cart"]
+    assert fleet.machines["first/b"].wheels == slice(4, 8, 1)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda own: own["machines"][1].update(name="a"), r"machines\[1\].name: the name .a. is used twice"),
+        (lambda own: own["machines"][1].update(first="b/wheel_FL"), r"machines\[1\].first: .b/wheel_FL. must be"),
+        (lambda own: own["machines"][0].update(first="b/trunk"), r"machines\[0\].first"),
+        (lambda own: own["machines"].reverse(), r"machines\[0\].first"),
+        (
+            lambda own: own["wheels"].reverse(),
+            r"wheels\[4\].solid: the wheels of the machine .a. must be listed together",
+        ),
+        (lambda own: own.update(self_contact=True), "self_contact: a model with machines"),
+    ],
+)
+def test_wrong_machines_are_refused(change, message):
+    description = RoverModel.join({"a": cart(), "b": cart()}).to_dict()
+    change(description)
+    with pytest.raises(ModelError, match=message):
+        RoverModel.from_dict(description)
+
+
+@pytest.mark.parametrize(
+    ("models", "loops", "message"),
+    [
+        ([cart()], [], "models: must be RoverModels by name"),
+        ({"a": "cart"}, [], r"models\[a\]: must be a RoverModel"),
+        ({}, [], "solids: a model needs at least one solid"),
+        ({"a": cart()}, [{"name": "pin"}], "missing field `kind`"),
+        ({"a": cart()}, 3, "loops: must be a list of dictionaries"),
+        (
+            {"a": cart(), "b": cart()},
+            [{"name": "pin", "kind": "connect", "solid": "a/trunk", "other": "b/trunk"}],
+            r"loops\[0\].other_position: is missing",
+        ),
+    ],
+)
+def test_wrong_joins_are_refused(models, loops, message):
+    with pytest.raises(ModelError, match=message):
+        RoverModel.join(models, loops=loops)
+
+
+@pytest.mark.parametrize(
+    ("model", "message"),
+    [
+        (RoverModel.join({"a": cart(), "b": cart()}), "machines: places one machine, the model has 2"),
+        (rod(1.0), "wheels: a model without wheels cannot stand"),
+    ],
+)
+def test_only_one_machine_with_wheels_is_placed(model, message):
+    with pytest.raises(ModelError, match=message):
+        model.resting_pose(Plane(), (0.0, 0.0), 0.0)
+
+
+def test_an_environment_has_one_machine():
+    with pytest.raises(OptionError, match=r"model: must be one machine, got \['a', 'b'\]"):
+        gym.make("Rover-v0", model=RoverModel.join({"a": cart(), "b": cart()}))
