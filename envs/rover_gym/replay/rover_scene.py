@@ -154,7 +154,10 @@ def rover_scene(run: RoverRun, *, follow: bool, ghost: RoverRun | None = None) -
     ]
     attributes = run.trajectory.attributes
     sights = recorded_sights(run.trajectory.data, attributes.get("scene", {}), run.terrain)
-    if (friction := _friction(attributes)) is None:
+    told = run.trajectory.data.get("friction")
+    if told is not None and told.ndim == 1:  # a live drive may change it
+        scene.channels.append(FrameChannel.fine("friction", told[:, None, None]))
+    elif (friction := _friction(attributes)) is None:
         sights.missing["cones"] = "this run does not say its friction"
     else:
         scene.facts["friction"] = friction

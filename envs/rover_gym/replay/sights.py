@@ -1,4 +1,4 @@
-"""What a rover sees and intends, for the player's overlays: height scan, laser, depth camera and planned path."""
+"""What a rover sees and intends, recorded and shown: height scan, laser, depth camera and planned path."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ import numpy.typing as npt
 from rover_gym.env.start import check_scan, scan_points
 from rover_gym.ground import heights_of
 from rover_gym.policy.scan_policy import PLAN_POINTS
+from rover_gym.record.channels import Channel
 from rover_gym.replay.page_scene import FrameChannel
 from rover_gym.sensors import DepthCamera, LaserScanner, Mount
 from rover_gym.sensors.sensor import Moment
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from rover_gym.env.rover_env import RoverEnv
     from rover_gym.mechanics import RoverModel, Simulation, Terrain
@@ -90,6 +91,26 @@ class Sights:
             found.append(FrameChannel.fine("path", np.nan_to_num(self.path, nan=-1e5)))
         return found
 
+    def tracks(self) -> list[Channel]:
+        """The channels of a recording. The height scan has none: it follows from ground and pose."""
+        found = [
+            Channel(name, "m", f"distances that the {name} sensor measures", (values.shape[1],))
+            for name, values in self.readings.items()
+        ]
+        if self.path is not None:
+            what = "planned path, ahead and to the right of the trunk"
+            found.append(Channel(PATH, "m", what, (self.path[0].size,)))
+        return found
+
+    def row(self) -> dict[str, Array]:
+        """The values of `tracks`, of the first sample."""
+        row = {name: values[0] for name, values in self.readings.items()}
+        return row if self.path is None else row | {PATH: self.path[0].ravel()}
+
+    def facts(self) -> dict[str, Any]:
+        """What does not change, for the scene of a recording."""
+        return {} if self.arcs is None else {"arcs": np.round(self.arcs, 4).tolist()}
+
     def describe(self, scene: PageScene, model: RoverModel) -> None:
         """Adds what does not change: grid, rays and arcs, and why something is missing."""
         scene.facts["missing"] = self.missing
@@ -105,15 +126,22 @@ class Sights:
             scene.facts["arcs"] = self.arcs.shape[1]
 
 
-def sights_now(env: RoverEnv, driver: Policy | None, state: Any) -> Sights:
-    """What a rover sees now, and what its driver intends; None is driven by hand."""
+def sights_now(env: RoverEnv, driver: Policy | None, state: Any, sensors: Sequence[str] = SENSORS) -> Sights:
+    """What a rover sees now, and what its driver intends.
+
+    Args:
+        env: The rover's environment.
+        driver: Who drives; None by hand.
+        state: What the driver carries from one prediction to the next.
+        sensors: Names of the sensors that the rover carries.
+    """
     simulation = env.simulation
     sights = Sights(scan=env.task.scan)
     if sights.scan is None:
         sights.missing["scan"] = NO_LIVE_SCAN
     else:
         sights.heights = scan_heights(sights.scan, simulation.terrain, simulation.q[None])
-    sights.readings = {name: distances(name, simulation)[None] for name in SENSORS}
+    sights.readings = {name: distances(name, simulation)[None] for name in sensors}
     if driver is None or not hasattr(driver, "plan"):
         sights.missing["plan"] = NO_LIVE_PLAN
     else:
