@@ -197,7 +197,7 @@ def test_a_recording_holds_what_the_page_shows_of_plan_and_sensors(tmp_path: Pat
         assert channels[name][20, :, 0] == pytest.approx(seen.readings[name][0])
     assert seen.path is not None and seen.heights is not None
     assert np.isfinite(seen.path).all()
-    assert channels["path"][20] == pytest.approx(seen.path[0])
+    assert channels["path"][20, :, :2] == pytest.approx(seen.path[0])
     assert channels["scan"][20, :, 0] == pytest.approx(seen.heights[0])
     assert channels["friction"][20].tolist() == [[0.7]]
 
