@@ -87,7 +87,10 @@ def test_the_plan_lies_on_the_heights_of_the_ground(tmp_path: Path) -> None:
             (channels["path"][row, :, :2], channels["path"][row, :, 2]),
             (arcs, channels["arc-heights"][row, :, 0]),
         ):
-            x, z = q[0] + cosine * points[:, 0] + sine * points[:, 1], q[2] - sine * points[:, 0] + cosine * points[:, 1]
+            x, z = (
+                q[0] + cosine * points[:, 0] + sine * points[:, 1],
+                q[2] - sine * points[:, 0] + cosine * points[:, 1],
+            )
             assert heights == pytest.approx(field.heights(np.column_stack((x, z))))
             assert np.ptp(heights) > 0.02
     assert channels["path"][0].tolist() == [[-1e5, -1e5, pytest.approx(run.trajectory["q"][0, 1])]] * 13

@@ -1,7 +1,7 @@
 """The recording of a live drive, in files that `rover replay` and `rover plot` read, and as logs for robotics viewers.
 
-A file holds one ground, one rover and one driver, and its time runs forward. Where a rock is thrown, another driver takes
-over, another drive begins or the drive goes back, the recording goes on in the next file.
+A file holds one ground, one rover and one driver, and its time runs forward. Where a rock is thrown, another driver
+takes over, another drive begins or the drive goes back, the recording goes on in the next file.
 """
 
 from __future__ import annotations

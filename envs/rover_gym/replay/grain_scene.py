@@ -20,6 +20,7 @@ from rover_gym.rendering.appearance import (
     WHEEL_COLOURS,
 )
 from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, moving_mean, panel_contents
+from rover_gym.replay.flat_scene import CHAIN_COLOUR
 from rover_gym.replay.page_scene import FrameChannel, PageScene
 from rover_gym.replay.rover_scene import GRAVITY, add_ground, add_rover, add_surfaces, mass_channel
 from rover_gym.replay.scenery import (
@@ -38,6 +39,8 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 COLOURS = ("#332288", "#CC6677")
+
+LEAST_WIDTH = 0.05  # of the widest bar
 
 MANY = 300  # spheres of the ground, above which each gets fewer triangles
 
@@ -148,18 +151,55 @@ def grain_scene(run: GrainRun, *, follow: bool) -> PageScene:
         FrameChannel.within("balls", run.positions, low, high),
     ]
     scene.arrays |= {"radii": ("f4", run.radius), "fixed": ("u1", run.kinematic)}
-    if rover is not None:
+    if run.force_chains.size:
+        chains = _chains(run)
+        flat = chains.reshape(-1, 7)
+        scene.channels.append(FrameChannel.within("chains", chains, flat.min(axis=0), flat.max(axis=0)))
+        scene.facts["chain"] = CHAIN_COLOUR
+    if rover is None:
+        scene.channels.append(FrameChannel.fine("mass", mass_centres(run)[:, None]))
+    else:
         share = rover.model.mass * GRAVITY / max(1, run.wheel_centres.shape[1])
         scene.channels.append(
             FrameChannel.fine("forces", np.concatenate((run.wheel_centres, run.wheel_forces / share), axis=2))
         )
         scene.channels.append(mass_channel(rover))
+        scene.arrays["trail"] = ("f4", _wheel_paths(run).ravel())
         scene.facts["missing"] = {
+            "marks": "balls keep no marks",
             "cones": "many balls touch a wheel, each with a normal of its own",
             "slope": "the ground is balls",
             **dict.fromkeys(("plan", "scan", "laser", "depth"), "runs of balls do not record it"),
         }
     return scene
+
+
+def _chains(run: GrainRun) -> Array:
+    """(n, n_chains, 7) ends and width of the strongest contacts as bars, m."""
+    chains = run.force_chains.copy()
+    strongest = chains[..., 6].max(axis=1)
+    full = max(1e-9, float(np.median(strongest[strongest > 0.0])) if (strongest > 0.0).any() else 0.0)
+    # Most of the contacts are weak: what would be thinner than a twentieth is not drawn.
+    width = np.minimum(1.0, np.sqrt(chains[..., 6] / full))
+    chains[..., 6] = np.where(width < LEAST_WIDTH, 0.0, width) * float(run.radius.mean())
+    return chains
+
+
+def mass_centres(run: GrainRun) -> Array:
+    """(n, 3) mass centre of the balls that forces move, m."""
+    free = ~run.kinematic if (~run.kinematic).any() else np.ones(len(run.mass), dtype=bool)
+    weights = run.mass[free] / run.mass[free].sum()
+    result: Array = np.einsum("nbk,b->nk", run.positions[:, free].astype(np.float64), weights)
+    return result
+
+
+def _wheel_paths(run: GrainRun) -> npt.NDArray[np.float32]:
+    """(n, n_wheels, 3) lowest points of the wheels, m; nan where a wheel bears nothing."""
+    radii = np.zeros(0) if run.model is None else np.asarray(run.model.wheel_radii)
+    points = run.wheel_centres.astype(np.float32)
+    bears = np.linalg.norm(run.wheel_forces, axis=2) > 0.0
+    points[..., 1] = np.where(bears, points[..., 1] - radii, np.nan)
+    return points
 
 
 def floor_of(run: GrainRun) -> tuple[Array, Array] | None:

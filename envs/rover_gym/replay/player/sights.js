@@ -196,7 +196,7 @@ class MassCentre {
     this.ball.scale.setScalar(0.045 * reach);
     this.foot.position.copy(below);
     this.foot.scale.setScalar(0.025 * reach);
-    this.ball.material.color.set(isInside(corners, below) ? 0x3d7bff : 0xff8c1a);
+    this.ball.material.color.set(!corners.length || isInside(corners, below) ? 0x3d7bff : 0xff8c1a);
   }
 }
 
@@ -230,6 +230,7 @@ class Sights {
       const place = new THREE.Vector3(...[0, 1, 2].map((c) => before.mass.value(0, c, after.mass, share)));
       this.mass.show(on.has("mass"), place, feet, reach);
     }
+    if (!scene.rover) return;
     const ahead = new THREE.Vector3(1, 0, 0).applyQuaternion(trunk.quaternion);
     const [c, s] = [ahead.x, -ahead.z].map((part) => part / (Math.hypot(ahead.x, ahead.z) || 1)); // of the heading
     const at = (x, z) => [trunk.position.x + c * x + s * z, trunk.position.z - s * x + c * z];
