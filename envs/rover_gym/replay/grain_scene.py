@@ -15,8 +15,10 @@ from rover_gym.ground import plane_of, spheres_of
 from rover_gym.rendering.appearance import (
     FIXED_BALL_COLOUR,
     GROUND_COLOUR,
+    HAZE,
     ROCK_COLOUR,
     SAND_COLOUR,
+    TILE,
     WHEEL_COLOURS,
 )
 from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, moving_mean, panel_contents
@@ -135,7 +137,7 @@ def grain_scene(run: GrainRun, *, follow: bool) -> PageScene:
     plane = floor_of(run)
     if plane is not None:
         scene.facts["plane"] = {"point": plane[0].tolist(), "normal": plane[1].tolist(), "half": 40.0 * reach}
-        scene.facts |= {"haze": 24.0 * reach, "tile": 0.5 if rover is not None else 0.25 * reach}
+        scene.facts |= {"haze": HAZE[1] if rover is not None else 24.0 * reach, "tile": tile_of(run)}
     of_walls = wall_polygons(run, GROUND_COLOUR, ROCK_COLOUR)
     for i, mesh in enumerate(of_walls):
         if plane is None or (i < run.walls.shape[1] and not _is_level(run, i, plane[0])):
@@ -200,6 +202,11 @@ def _wheel_paths(run: GrainRun) -> npt.NDArray[np.float32]:
     bears = np.linalg.norm(run.wheel_forces, axis=2) > 0.0
     points[..., 1] = np.where(bears, points[..., 1] - radii, np.nan)
     return points
+
+
+def tile_of(run: GrainRun) -> float:
+    """Edge of the ground's tiles, m: a heap stands on smaller ones than a rover."""
+    return TILE if run.rover is not None else 0.25 * float(np.linalg.norm(start_extent(run)))
 
 
 def floor_of(run: GrainRun) -> tuple[Array, Array] | None:
