@@ -91,6 +91,20 @@ def test_the_strongest_contacts_carry_what_lies_on_them(tmp_path: Path) -> None:
     assert channels["mass"][-1, 0] == pytest.approx([0.0, (0.3 * 0.02 + 0.2 * 0.06 + 0.1 * 0.1) / 0.6, 0.0], abs=1e-3)
 
 
+def test_a_ball_that_rolls_far_is_shown_where_it_is(tmp_path: Path) -> None:
+    """On the page, a heap that spread stopped at a square about it, twice as wide as at the start."""
+    places = np.array([[0.0, 0.02, 0.0], [0.1, 0.02, 0.0]])
+    sim = GrainSimulation(np.full(2, 0.02), np.full(2, 0.1), places, walls=FLOOR, time_step=0.005)
+    sim.set_state(places, np.array([[0.0, 0.0, 0.0], [8.0, 0.0, 0.0]]), np.zeros((2, 3)))
+    path = tmp_path / "far.h5"
+    record_run(sim, 0.5, path, 20.0)
+    run = open_run(path)
+    assert run.positions[-1, 1, 0] > 1.0
+    (balls,) = (channel for channel in grain_scene(run, follow=True).channels if channel.name == "balls")
+    shown = balls.low + balls.step * balls.levels(slice(0, run.n_frames))
+    assert np.abs(shown - run.positions).max() < 0.02 / 20.0
+
+
 def test_a_recording_without_contacts_has_a_page(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     record_run(falling(), 0.1, path, 50.0)

@@ -22,8 +22,8 @@ def _rgb(colour: look.Colour) -> str:
 
 
 #: The sky's light from above, the ground's from below, and the Sun's. A scene's first light shines from the Sun and the
-#: second from the zenith; only their directions count. `albedo` is a surface's colour, `facing` its normal, `sunlit` the
-#: share of the Sun that reaches it.
+#: second from the zenith; only their directions count. `albedo` is a surface's colour, `facing` its normal and `sunlit`
+#: the share of the Sun that reaches it.
 LIT = f"""
   vec3 skylight = mix({_rgb(BOUNCE_LIGHT)}, {_rgb(SKY_LIGHT)}, 0.5 + 0.5 * dot(facing, -lightDirectionVC1));
   vec3 light = skylight + sunlit * {_rgb(SUN_LIGHT)} * max(0.0, dot(facing, -lightDirectionVC0));
