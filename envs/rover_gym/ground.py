@@ -68,6 +68,13 @@ def surface_heights(terrain: Terrain, points: npt.ArrayLike) -> Array:
     return np.asarray(np.fmax.reduce(found)) if found else np.full(len(places), np.nan)
 
 
+def bare_heights(terrain: Terrain, points: npt.ArrayLike) -> Array:
+    """`(n,)` height of the ground without its spheres at (x, z), m; nan where there is none."""
+    places = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+    plane, fields = plane_of(terrain), surface_heights(terrain, places)
+    return fields if plane is None else np.fmax(fields, heights_of(plane, places))
+
+
 def triangles_of(
     surface: HeightField | TriangleMesh, low: npt.ArrayLike, high: npt.ArrayLike, most: int
 ) -> tuple[Array, npt.NDArray[np.int64]]:

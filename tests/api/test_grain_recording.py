@@ -1,5 +1,6 @@
 """Recordings of balls in space: what is stored is what was there, a killed run keeps what it had, damage is told."""
 
+import json
 import multiprocessing
 import os
 import pickle
@@ -26,6 +27,7 @@ from rover_gym.grains import (
 from rover_gym.grains.grain_surface import Footprint, Parts
 from rover_gym.mechanics import GrainSimulation, Plane, RoverGrainSimulation, Simulation, ball_packing
 from rover_gym.record import RecordingError, read_frames
+from rover_gym.replay.grain_scene import grain_scene
 from rover_gym.runs import open_run, record_run
 
 FLOOR = [[0.0, 0.0, 0.0, 0.0, 1.0, 0.0]]
@@ -63,6 +65,57 @@ def test_places_are_stored_within_the_resolution_and_facts_beside_them(tmp_path:
     assert data["n_contacts"].max() > 0
     assert run.model is None
     assert run.rover is None
+
+
+def test_the_strongest_contacts_carry_what_lies_on_them(tmp_path: Path) -> None:
+    """Three balls stand on each other in a narrow tube."""
+    walls = [*FLOOR, [0.02, 0, 0, -1, 0, 0], [-0.02, 0, 0, 1, 0, 0], [0, 0, 0.02, 0, 0, -1], [0, 0, -0.02, 0, 0, 1]]
+    radius, mass = np.full(3, 0.02), np.array([0.3, 0.2, 0.1])
+    tower = np.array([[0.0, 0.02 + 0.04 * k, 0.0] for k in range(3)])
+    sim = GrainSimulation(radius, mass, tower, walls=np.array(walls, dtype=float), friction=0.0, time_step=0.005)
+    path = tmp_path / "tower.h5"
+    record_run(sim, 0.1, path, 50.0)
+    run = open_run(path)
+    chains = run.force_chains
+    assert chains.shape == (6, 12, 7)
+    assert not chains[0].any()  # no step was taken before the first row
+    strong = chains[-1][chains[-1, :, 6] > 0.01]
+    assert strong[:, 6] == pytest.approx(9.81 * np.array([0.6, 0.3, 0.1]), rel=1e-3)
+    ends = strong[:, :6].reshape(-1, 2, 3)
+    assert ends[0, :, 1] == pytest.approx([0.02, 0.0], abs=1e-3)  # on the floor
+    assert sorted(ends[1, :, 1]) == pytest.approx([0.02, 0.06], abs=1e-3)
+    assert sorted(ends[2, :, 1]) == pytest.approx([0.06, 0.10], abs=1e-3)
+    scene = grain_scene(run, follow=True)
+    channels = {channel.name: channel.values for channel in scene.channels}
+    assert channels["chains"][-1, 0, 6] == pytest.approx(0.02)  # the strongest is as wide as a ball's radius
+    assert channels["mass"][-1, 0] == pytest.approx([0.0, (0.3 * 0.02 + 0.2 * 0.06 + 0.1 * 0.1) / 0.6, 0.0], abs=1e-3)
+
+
+def test_a_ball_that_rolls_far_is_shown_where_it_is(tmp_path: Path) -> None:
+    """On the page, a heap that spread stopped at a square about it, twice as wide as at the start."""
+    places = np.array([[0.0, 0.02, 0.0], [0.1, 0.02, 0.0]])
+    sim = GrainSimulation(np.full(2, 0.02), np.full(2, 0.1), places, walls=FLOOR, time_step=0.005)
+    sim.set_state(places, np.array([[0.0, 0.0, 0.0], [8.0, 0.0, 0.0]]), np.zeros((2, 3)))
+    path = tmp_path / "far.h5"
+    record_run(sim, 0.5, path, 20.0)
+    run = open_run(path)
+    assert run.positions[-1, 1, 0] > 1.0
+    (balls,) = (channel for channel in grain_scene(run, follow=True).channels if channel.name == "balls")
+    shown = balls.low + balls.step * balls.levels(slice(0, run.n_frames))
+    assert np.abs(shown - run.positions).max() < 0.02 / 20.0
+
+
+def test_a_recording_without_contacts_has_a_page(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    record_run(falling(), 0.1, path, 50.0)
+    with h5py.File(path, "r+") as file:
+        del file["frames/force_chains"]
+        scene = json.loads(file.attrs["scene"])
+        del scene["chains"]
+        file.attrs["scene"] = np.bytes_(json.dumps(scene))
+    run = open_run(path)
+    assert run.force_chains.shape == (6, 0, 7)
+    assert "chains" not in {channel.name for channel in grain_scene(run, follow=True).channels}
 
 
 def test_a_bed_at_rest_takes_little_room(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Balls that move by formulas: what a recording asks of a simulation, at no cost."""
 
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -75,6 +76,14 @@ class MovingBalls:
                 [0.0, 0.0, z, 0.0, 0.0, -1.0],
             ]
         )
+
+    @property
+    def contacts(self) -> SimpleNamespace:
+        """Every ball presses on the next one, the last on a wall; the force grows with the number."""
+        n = len(self.radius)
+        bodies = np.column_stack((np.arange(n), [*range(1, n), -1]))
+        impulses = self.time_step * np.outer(np.arange(1.0, n + 1.0), [0.0, 1.0, 0.0])
+        return SimpleNamespace(bodies=bodies, points=self.position - [0.0, 0.01, 0.0], world_impulses=impulses)
 
     def step(self, n: int = 1) -> Report:
         """Moves on in time."""

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from balls import MovingBalls, RoverOnMovingBalls
+from browser.test_overlays import KEYS, after
 from browser.test_replay_page import (
     Shown,
     assert_alone,
@@ -100,6 +101,28 @@ def test_the_timeline_moves_balls_and_rover_and_comes_back(shown: Shown[GrainRun
     changed = (np.abs(later - first).max(axis=-1) > 15.0).mean()
     assert changed > 0.03
     assert (np.abs(back - first).max(axis=-1) > 15.0).mean() < 0.05 * changed
+
+
+@pytest.mark.parametrize("name", ["forces", "mass", "trails", "loads"])
+def test_a_key_shows_an_overlay_among_balls_and_takes_it_away(name: str, shown: Shown[GrainRun]) -> None:
+    go_to(shown.browser, 1.0)
+    bare = still(shown.browser)
+    with_it = after(shown.browser, KEYS[name])
+    without = after(shown.browser, KEYS[name])
+    changed = (np.abs(coarse(with_it) - bare).max(axis=-1) > 10.0).sum()
+    assert changed > 3
+    assert (np.abs(coarse(without) - bare).max(axis=-1) > 10.0).sum() < 0.2 * changed
+
+
+def test_what_means_nothing_among_balls_is_grey_and_says_why(shown: Shown[GrainRun]) -> None:
+    buttons = shown.browser.find_elements(By.CSS_SELECTOR, "#overlays button")
+    grey = {
+        button.get_attribute("data-name"): button.get_attribute("title")
+        for button in buttons
+        if not button.is_enabled()
+    }
+    assert grey.keys() == {"marks", "cones", "plan", "scan", "laser", "depth", "slope", "spheres"}
+    assert "balls" in str(grey["marks"])
 
 
 def still(browser: webdriver.Chrome) -> np.ndarray:

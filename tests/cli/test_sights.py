@@ -10,7 +10,7 @@ from typer.testing import CliRunner, Result
 
 from rover_gym import Plane
 from rover_gym.cli import app
-from rover_gym.ground import heights_of
+from rover_gym.ground import heights_of, surfaces_of
 from rover_gym.policy import ScanPolicy
 from rover_gym.record import RoverRun, read_run
 from rover_gym.replay.rover_scene import rover_scene
@@ -70,6 +70,30 @@ def test_the_scans_points_lie_on_the_ground_and_the_plan_is_one_of_the_arcs(tmp_
     levels = np.array([channel.levels(slice(10, 11)) for channel in page.channels if channel.name == "mass"])
     (mass,) = (channel for channel in page.channels if channel.name == "mass")
     assert levels.reshape(3) * mass.step + mass.low == pytest.approx(run.model.tags(q)["centre_of_mass"], abs=1e-4)
+
+
+def test_the_plan_lies_on_the_heights_of_the_ground(tmp_path: Path) -> None:
+    """It was drawn in the plane of the trunk, under hills and above hollows."""
+    run = driven(tmp_path, "--terrain", "hills", "--difficulty", "1", "--policy", "scan")
+    page = rover_scene(run, follow=True)
+    channels = {channel.name: channel.values for channel in page.channels}
+    arcs = np.reshape(page.arrays["arcs"][1], (-1, 2))
+    assert channels["arc-heights"].shape == (run.n_frames, len(arcs), 1)
+    (field,) = surfaces_of(run.terrain)
+    for row in (1, 20):
+        q = run.trajectory["q"][row]
+        sine, cosine = math.sin(q[4]), math.cos(q[4])
+        for points, heights in (
+            (channels["path"][row, :, :2], channels["path"][row, :, 2]),
+            (arcs, channels["arc-heights"][row, :, 0]),
+        ):
+            x, z = (
+                q[0] + cosine * points[:, 0] + sine * points[:, 1],
+                q[2] - sine * points[:, 0] + cosine * points[:, 1],
+            )
+            assert heights == pytest.approx(field.heights(np.column_stack((x, z))))
+            assert np.ptp(heights) > 0.02
+    assert channels["path"][0].tolist() == [[-1e5, -1e5, pytest.approx(run.trajectory["q"][0, 1])]] * 13
 
 
 @pytest.mark.takes_long("the planner drives a second")

@@ -7,6 +7,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from mcap.reader import make_reader
 
@@ -26,10 +27,12 @@ from rover_gym.live import (
 )
 from rover_gym.live.live_commands import command_of, read_message
 from rover_gym.live.live_loop import HOLD, MOST_WAITING
+from rover_gym.live.live_view import HEAD, LiveView
 from rover_gym.mechanics import CommandError, OptionError
 from rover_gym.record import RecordingError, read_run
 from rover_gym.record.steady_file import SteadyFile
 from rover_gym.replay import write_vrml
+from rover_gym.replay.rover_scene import rover_scene
 
 
 class Clock:
@@ -166,6 +169,45 @@ def test_a_recording_goes_on_in_another_file_where_time_or_ground_change(tmp_pat
     assert all(run.trajectory.attributes["complete"] for run in runs)
     assert runs[1].time[0] == runs[0].time[-1]
     assert not (tmp_path / "live-7.h5").exists()
+
+
+def test_a_recording_holds_what_the_page_shows_of_plan_and_sensors(tmp_path: Path) -> None:
+    """A live drive showed plan, scan, laser and depth, and its recording held none of them."""
+    loop, clock = paused(tmp_path, LiveScene(ground="rocks", driver="scan"))
+    view = LiveView()
+    loop.send(Record())
+    stepped(loop, clock, 20)
+    view.follow(loop.state)
+    seen = loop.state.sights
+    loop.send(Drive(1.0))  # the hand takes over, and intends nothing that can be drawn
+    stepped(loop, clock, 5)
+    by_hand = LiveView()
+    by_hand.follow(loop.state)
+    loop.stop()
+    runs = [read_run(tmp_path / f"live-{number}.h5") for number in (1, 2)]
+    assert [run.trajectory.attributes["scene"]["driver"] for run in runs] == ["scan", "hand"]
+    assert [run.n_frames for run in runs] == [21, 6]
+    for run, live in zip(runs, (view, by_hand), strict=True):
+        recorded = rover_scene(run, follow=True)
+        watched = openings(live.scene)
+        assert {channel.name for channel in recorded.channels} == {channel["name"] for channel in watched["channels"]}
+        assert recorded.facts["missing"].keys() == watched["missing"].keys()
+    channels = {channel.name: channel.values for channel in rover_scene(runs[0], follow=True).channels}
+    for name in ("laser", "depth"):
+        assert channels[name][20, :, 0] == pytest.approx(seen.readings[name][0])
+    assert seen.path is not None
+    assert seen.heights is not None
+    assert np.isfinite(seen.path).all()
+    assert channels["path"][20, :, :2] == pytest.approx(seen.path[0])
+    assert channels["scan"][20, :, 0] == pytest.approx(seen.heights[0])
+    assert channels["friction"][20].tolist() == [[0.7]]
+
+
+def openings(message: bytes) -> dict[str, Any]:
+    """The header of a scene that a page gets."""
+    size = int.from_bytes(message[HEAD.size : HEAD.size + 4], "little")
+    header: dict[str, Any] = json.loads(message[HEAD.size + 4 : HEAD.size + 4 + size])
+    return header
 
 
 def rows_logged(path: Path) -> dict[str, list[Any]]:

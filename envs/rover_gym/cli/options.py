@@ -30,7 +30,8 @@ FilmCamera = Annotated[
 FilmForces = Annotated[bool, typer.Option("--forces/--no-forces", help="Draw contact forces in the film.")]
 
 FilmAntialiasing = Annotated[
-    bool, typer.Option("--antialiasing/--no-antialiasing", help="Smooth the film's edges; takes twice the time.")
+    bool,
+    typer.Option("--antialiasing/--no-antialiasing", help="Smooth the film's edges; takes two to three times as long."),
 ]
 
 

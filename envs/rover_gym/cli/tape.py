@@ -9,11 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.reward_terms import WEIGHTS
-from rover_gym.policy.scan_policy import PLAN_POINTS
 from rover_gym.record.channels import Channel, RoverSampler, describe
 from rover_gym.record.recorder import Recorder
 from rover_gym.record.rover_run import OF_EPISODES
-from rover_gym.replay.sights import PATH, distances, sensor_of
+from rover_gym.replay.sights import Sights, sights_now
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -24,34 +23,26 @@ if TYPE_CHECKING:
 
 
 class Watched:
-    """A policy that can be asked for the path which it follows, where it plans one.
+    """A policy, with what it carries from one prediction to the next.
 
     Attributes:
-        arcs: (n, points, 2) what it chooses from, ahead and to the right of the trunk, m; None where it does not say.
-        plans: Whether it plans a path.
+        policy: The policy.
+        state: What it carries; None before its first prediction of an episode.
     """
 
     def __init__(self, policy: Policy) -> None:
-        self._policy, self._state = policy, None
-        self.plans = hasattr(policy, "plan")
-        choices = getattr(policy, "choices", None)
-        self.arcs: npt.NDArray[np.float64] | None = None if choices is None else choices()
+        self.policy, self.state = policy, None
 
     def predict(
         self, observation: npt.NDArray[np.float32], state: Any = None, episode_start: Any = None
     ) -> tuple[npt.NDArray[np.float32], Any]:
         """As the policy's; keeps the state."""
-        action, self._state = self._policy.predict(observation, state, episode_start)
-        return action, self._state
+        action, self.state = self.policy.predict(observation, state, episode_start)
+        return action, self.state
 
     def begin(self) -> None:
         """Forgets the last episode."""
-        self._state = None
-
-    def path(self) -> npt.NDArray[np.float64]:
-        """(points, 2) the path that it follows, m; nan where it has none."""
-        found = self._policy.plan(self._state) if self.plans else None  # type: ignore[attr-defined]
-        return np.full((PLAN_POINTS, 2), np.nan) if found is None else found
+        self.state = None
 
 
 class Tape:
@@ -78,23 +69,20 @@ class Tape:
         sensors: Sequence[str] = (),
     ) -> None:
         self._sampler, self._driver, self._sensors = RoverSampler(rover.model), driver, sensors
+        sights = self._sights(rover)
         channels = [
             *self._sampler.channels,
             *OF_EPISODES,
             Channel("reward_terms", "1", "terms of the step's reward", (len(WEIGHTS),), tuple(WEIGHTS)),
+            *sights.tracks(),
         ]
-        for name in sensors:
-            n = int(np.prod(sensor_of(name, rover.model).bounds(rover.model)[0].shape))
-            channels.append(Channel(name, "m", f"distances that the {name} sensor measures", (n,)))
-        if driver.plans:
-            what = "planned path, ahead and to the right of the trunk"
-            channels.append(Channel(PATH, "m", what, (2 * PLAN_POINTS,)))
         scene = {**arguments, **asdict(rover.start), **_rocks(rover), "control_period": rover.dt}
-        scene["goal_tolerance"] = rover.goal_tolerance
-        if driver.arcs is not None:
-            scene["arcs"] = np.round(driver.arcs, 4).tolist()
+        scene |= {"goal_tolerance": rover.goal_tolerance, **sights.facts()}
         attributes = describe(rover.simulation, f"an episode of {title}", scene, seed=seed)
         self.recorder = Recorder(path, channels, attributes, terrain=rover.simulation.terrain)
+
+    def _sights(self, rover: RoverEnv) -> Sights:
+        return sights_now(rover, self._driver.policy, self._driver.state, self._sensors)
 
     def append(self, rover: RoverEnv, info: Mapping[str, Any]) -> None:
         """Adds the environment's current state."""
@@ -105,9 +93,9 @@ class Tape:
             "slip_ratio": info["slip_ratio"],
             "motor_energy": info["energy"],
             "reward_terms": [info["reward_terms"][name] for name in WEIGHTS],
-            **{name: distances(name, rover.simulation) for name in self._sensors},
+            **self._sights(rover).row(),
         }
-        self.recorder.append(row | {PATH: self._driver.path().ravel()} if self._driver.plans else row)
+        self.recorder.append(row)
 
 
 def _rocks(rover: RoverEnv) -> dict[str, Any]:

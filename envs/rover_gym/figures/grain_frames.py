@@ -12,7 +12,7 @@ from rover_gym.extras import MissingExtraError, require
 from rover_gym.mechanics import Plane
 from rover_gym.rendering import FrameRenderer, VideoWriter
 from rover_gym.rendering.appearance import GROUND_COLOUR, ROCK_COLOUR
-from rover_gym.replay.grain_scene import eye_path, floor_of, start_view
+from rover_gym.replay.grain_scene import eye_path, floor_of, start_view, tile_of
 from rover_gym.replay.scenery import vessel_meshes, vessel_poses, wall_polygons, wall_poses
 
 if TYPE_CHECKING:
@@ -61,6 +61,7 @@ class GrainFilm:
         try:
             from rover_gym.rendering.frames import BedRenderer  # noqa: PLC0415 - an extra
             from rover_gym.rendering.scenery_actors import BallsActor, GroundActors  # noqa: PLC0415 - an extra
+            from rover_gym.rendering.shading import Soil  # noqa: PLC0415 - an extra
             from rover_gym.rendering.vtk_actors import actor_of, mesh, set_pose  # noqa: PLC0415 - an extra
         except ModuleNotFoundError as error:
             raise MissingExtraError("vtk", "render") from error
@@ -79,11 +80,11 @@ class GrainFilm:
         actors = [self._balls.actor, *self._walls]
         width, height = size
         if run.rover is None:
-            floor = floor_of(run)
+            floor, soil = floor_of(run), Soil(tile_of(run))
             if floor is not None:
                 point, normal = floor
-                actors.append(GroundActors(Plane(normal.tolist(), -float(point @ normal))).actor)
-            self._renderer: Any = BedRenderer(actors, width=width, height=height)
+                actors.append(GroundActors(Plane(normal.tolist(), -float(point @ normal)), soil).actor)
+            self._renderer: Any = BedRenderer(actors, soil, width=width, height=height)
             return
         self._renderer = FrameRenderer(run.rover.model, run.rover.terrain, width=width, height=height)
         self._renderer.shade(self._balls)

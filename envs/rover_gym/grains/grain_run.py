@@ -95,6 +95,8 @@ Array = npt.NDArray[np.float64]
 Recordable: TypeAlias = GrainSimulation | RoverGrainSimulation | MovingWindow
 
 KIND = "GrainSimulation"
+#: Most contacts of a row that are recorded: the strongest ones, which carry a wheel or hold a heap.
+MOST_CHAINS = 128
 #: Share of the smallest radius by which a stored position may be off.
 RESOLUTION = 1.0 / 250.0
 
@@ -129,8 +131,9 @@ class StoredPlaces:
         return rounded
 
 
-def grain_channels(balls: int, walls: int, model: RoverModel | None) -> tuple[Channel, ...]:
-    """The channels of so many balls and walls, with a rover among them or without."""
+def grain_channels(balls: int, walls: int, model: RoverModel | None, chains: int) -> tuple[Channel, ...]:
+    """The channels of so many balls, walls and strongest contacts, with a rover among them or without."""
+    strongest = "strongest contacts of the last step: from x, y, z to x, y, z (m), force (N); zeros where none are"
     forces = "force of balls and ground on each wheel, world x, y, z, mean since the last row"
     centres = "centre of each ball: x forward, y up, z right"
     normals = "a point of each wall and the normal to its free side"
@@ -142,6 +145,7 @@ def grain_channels(balls: int, walls: int, model: RoverModel | None) -> tuple[Ch
         *energy_channels(" of all", "all mass centres at height 0"),
         Channel("n_contacts", "1", "most contacts of a step since the last row", read="n_contacts"),
         Channel("penetration", "m", "deepest overlap", read="sim.penetration"),
+        Channel("force_chains", "m, N", strongest, (chains, 7), packed=True, read="force_chains"),
         RESIDUAL,
         ITERATIONS,
         *(() if model is None else rover_channels(model, "wheel_forces", forces)),
@@ -162,8 +166,10 @@ class GrainSampler(Sampler):
         model = None if self.rover is None else self.rover.model
         self._stored = StoredPlaces(self.grains.radius)
         self._solids = [] if model is None else wheel_solids(model)
+        self._contacts = sim if isinstance(sim, GrainSimulation) else sim.grains
+        self._n_chains = min(MOST_CHAINS, 4 * len(self.grains.radius))
         super().__init__(sim)
-        self.channels = grain_channels(len(self.grains.radius), len(self.grains.walls), model)
+        self.channels = grain_channels(len(self.grains.radius), len(self.grains.walls), model, self._n_chains)
 
     def clear(self) -> None:
         """Resets what is gathered from row to row."""
@@ -193,6 +199,24 @@ class GrainSampler(Sampler):
         """Number of balls that sleep."""
         return int(np.count_nonzero(self.grains.asleep))
 
+    def force_chains(self) -> Array:
+        """(n_chains, 7) the strongest contacts of the last step: ends, m, and force, N; zeros where there are fewer.
+
+        A contact of two balls joins their centres, any other a ball's centre and the point that it touches.
+        """
+        grains = self._contacts
+        contacts, chains = grains.contacts, np.zeros((self._n_chains, 7))
+        strengths = np.linalg.norm(contacts.world_impulses.reshape(-1, 3), axis=1) / grains.time_step
+        kept = np.argsort(-strengths, kind="stable")[: self._n_chains]
+        kept = kept[strengths[kept] > 0.0]
+        centres, points = grains.position, contacts.points.reshape(-1, 3)[kept]
+        for side, bodies in enumerate(contacts.bodies.reshape(-1, 2)[kept].T):
+            is_ball = (bodies >= 0) & (bodies < len(centres))
+            ends = np.where(is_ball[:, None], centres[np.where(is_ball, bodies, 0)], points)
+            chains[: len(kept), 3 * side : 3 * side + 3] = ends
+        chains[: len(kept), 6] = strengths[kept]
+        return chains
+
     def wheel_forces(self) -> Array:
         """(n_wheels, 3) mean force on each wheel since the last row, N."""
         mean: Array = self._impulses / (max(self.steps, 1) * self.grains.time_step)
@@ -216,6 +240,7 @@ class GrainSampler(Sampler):
                 **scene,
                 "kind": KIND,
                 "resolution": self._stored.resolution,
+                "chains": self._n_chains,
                 "vessel": stored_vessel(grains.vessel),
                 **({} if self.rover is None else {"model": self.rover.model.to_dict()}),
             },
@@ -323,6 +348,21 @@ class GrainRun(Run):
         return self.trajectory["wheel_forces"]
 
     @cached_property
+    def force_chains(self) -> Array:
+        """(n, n_chains, 7) the strongest contacts as lines x, y, z to x, y, z, m, with their force, N.
+
+        Raises:
+            RecordingError: The file is damaged or has changed.
+        """
+        if "chains" not in self.trajectory.attributes["scene"]:
+            return np.zeros((len(self.rows), 0, 7))
+        chains = read_frames(self.path, "force_chains", self.rows).astype(np.float64)
+        if chains.ndim != 3 or chains.shape[2] != 7 or not (np.abs(chains) <= LARGEST).all():
+            reason = f"must have 7 finite numbers for each contact, within {LARGEST:g}"
+            refuse(RecordingError, f"{self.path}: frames/force_chains", chains.shape, reason)
+        return chains
+
+    @cached_property
     def first_surface(self) -> SurfaceMap:
         """The surface of the balls at the file's first sample."""
         return surface_map(self.positions_of([0])[0], self.radius)
@@ -374,7 +414,7 @@ def grain_run_of(trajectory: Trajectory, path: str | Path) -> GrainRun:
     with sound(path, "scene.vessel"):
         vessel = checked_vessel(scene.get("vessel"))
     walls = trajectory["walls"].shape[1] if trajectory["walls"].ndim == 3 else 0
-    channels = grain_channels(len(radius), walls, model)
+    channels = grain_channels(len(radius), walls, model, 0)
     check_rows(trajectory, path, channels, bounded=("walls", "q", "v", "wheel_centres"), needed=True)
     return GrainRun(
         path=Path(path),

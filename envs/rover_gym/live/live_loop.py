@@ -105,6 +105,7 @@ class LiveLoop:
         self.failure: Exception | None = None
         self.recorded: list[Path] = []
         self._past.keep(rover)
+        self._look()
         self.state = self._current()
 
     def send(self, command: Command) -> None:
@@ -158,7 +159,8 @@ class LiveLoop:
             self._world += 1
             self.tell("the goal is reached: back to where it came from")
         self._past.keep(self._rover)
-        self._guard(lambda recording: recording.append(self._rover))
+        self._look()
+        self._guard(lambda recording: recording.append(self._rover, self._sights))
         if self._rover.ended:
             self._is_paused = True
             self.tell(f"{ENDINGS.get(self._rover.ended, self._rover.ended)}: rewind or restart")
@@ -209,7 +211,7 @@ class LiveLoop:
             case Drive():
                 self._hand, self._hand_until = command, self._clock() + HOLD
                 if self._rover.scene.driver != BY_HAND and (command.forward or command.turn):
-                    self._rover.change("driver", BY_HAND)
+                    self._change("driver", BY_HAND)
             case Pause(on):
                 self._is_paused = on or bool(self._rover.ended)
             case SingleStep():
@@ -223,15 +225,20 @@ class LiveLoop:
                 self._rover.throw_rock(radius)
                 self._next_world()
             case Change(name, value):
-                drives = self._rover.drives
-                self._rover.change(name, value)
-                if self._rover.drives > drives:
-                    self._new_drive()
+                self._change(name, value)
             case Restart():
                 self._rover.restart()
                 self._new_drive()
             case Record(on):
                 self._record(on=on)
+
+    def _change(self, name: str, value: object) -> None:
+        drives, driver = self._rover.drives, self._rover.driver
+        self._rover.change(name, value)
+        if self._rover.drives > drives:
+            self._new_drive()
+        elif self._rover.driver is not driver:  # another one sees and intends other things
+            self._next_file()
 
     def _new_drive(self) -> None:
         self._past.forget()
@@ -243,14 +250,18 @@ class LiveLoop:
         """The ground, the rover, or the time has changed: views are built anew, and so is the recording's file."""
         self._world += 1
         self._pace.clear()
-        self._guard(lambda recording: recording.next_file(self._rover))
+        self._next_file()
+
+    def _next_file(self) -> None:
+        self._look()
+        self._guard(lambda recording: recording.next_file(self._rover, self._sights))
         self._note_file()
 
     def _record(self, *, on: bool) -> None:
         if not on:
             self._end_recording()
         elif self._recording is None:
-            self._recording = LiveRecording(self._folder, self._rover, mcap=self._mcap)
+            self._recording = LiveRecording(self._folder, self._rover, self._sights, mcap=self._mcap)
             self._note_file()
             self.tell(f"recording {self._recording.path.name}")
 
@@ -274,6 +285,10 @@ class LiveLoop:
             except EXPECTED as error:
                 self._recording = None
                 self.tell(str(error))
+
+    def _look(self) -> None:
+        """Notes what the rover sees now, and what its driver intends."""
+        self._sights = sights_now(self._rover.env, self._rover.driver, self._rover.driver_state)
 
     def _measure(self) -> None:
         """Keeps pairs of wall and simulated time, of the last seconds."""
@@ -308,7 +323,7 @@ class LiveLoop:
             speed=math.hypot(velocity[0], velocity[2]),
             wheel_forces=forces,
             mass_centre=simulation.centre_of_mass(),
-            sights=sights_now(env, rover.driver, rover.driver_state),
+            sights=self._sights,
             ruts=np.zeros((0, 3)) if sand is None else sand["ruts"],
             loads=forces[:, 0],
             slip=info["slip_ratio"],

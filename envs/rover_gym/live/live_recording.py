@@ -1,7 +1,7 @@
 """The recording of a live drive, in files that `rover replay` and `rover plot` read, and as logs for robotics viewers.
 
-A file holds one ground and one rover, and its time runs forward. Where a rock is thrown, another drive begins or the
-drive goes back, the recording goes on in the next file.
+A file holds one ground, one rover and one driver, and its time runs forward. Where a rock is thrown, another driver
+takes over, another drive begins or the drive goes back, the recording goes on in the next file.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from rover_gym.live.live_rover import LiveRover
+    from rover_gym.replay.sights import Sights
 
 #: Rows that a kill may lose: two and a half seconds.
 ROWS_PER_FLUSH = 50
@@ -31,6 +32,7 @@ class LiveRecording:
     Args:
         folder: The folder; it is created.
         rover: The rover, recorded from its present state on.
+        sights: What it sees now, and what its driver intends.
         mcap: Whether `live-1.mcap`, ... get the same rows.
 
     Attributes:
@@ -43,11 +45,11 @@ class LiveRecording:
         MissingExtraError: What writes MCAP is not installed.
     """
 
-    def __init__(self, folder: Path, rover: LiveRover, *, mcap: bool = False) -> None:
+    def __init__(self, folder: Path, rover: LiveRover, sights: Sights, *, mcap: bool = False) -> None:
         self._folder, self._mcap = folder, mcap
-        self._begin(rover)
+        self._begin(rover, sights)
 
-    def _begin(self, rover: LiveRover) -> None:
+    def _begin(self, rover: LiveRover, sights: Sights) -> None:
         self.path = _free_path(self._folder)
         self._sampler = RoverSampler(rover.env.model)
         channels = (
@@ -55,9 +57,11 @@ class LiveRecording:
             *OF_EPISODES,
             Channel("friction", "1", "friction coefficient"),
             Channel("gravity", "m/s2", "magnitude of gravity"),
+            *sights.tracks(),
         )
         simulation, scene = rover.env.simulation, rover.scene
-        facts = {**asdict(scene), "goal": rover.env.goal, "control_period": rover.dt}
+        facts = {**asdict(scene), "goal": rover.env.goal, "goal_tolerance": rover.env.goal_tolerance}
+        facts |= {"control_period": rover.dt, "height_scan": rover.height_scan, **sights.facts()}
         attributes = describe(simulation, "a live drive", facts, seed=scene.seed)
         terrain = simulation.terrain
         with ExitStack() as opened:
@@ -69,15 +73,15 @@ class LiveRecording:
                 self._files.append(McapWriter(log, rover.env.model, terrain, goal=goal, attributes=attributes))
             opened.pop_all()
         self.rows = 0
-        self.append(rover)
+        self.append(rover, sights)
 
     @property
     def paths(self) -> list[Path]:
         """All files that are being written."""
         return [file.path for file in self._files]
 
-    def append(self, rover: LiveRover) -> None:
-        """Adds the present state.
+    def append(self, rover: LiveRover, sights: Sights) -> None:
+        """Adds the present state, with what is seen and intended.
 
         Raises:
             RecordingError: The rows cannot be written; the recording has ended, and what was written stays.
@@ -92,7 +96,7 @@ class LiveRecording:
             "friction": scene.friction,
             "gravity": scene.gravity,
         }
-        row |= more
+        row |= more | sights.row()
         with ExitStack() as failing:  # one file that fails ends the other
             failing.callback(self.close)
             for file in self._files:
@@ -100,7 +104,7 @@ class LiveRecording:
             failing.pop_all()
         self.rows += 1
 
-    def next_file(self, rover: LiveRover) -> None:
+    def next_file(self, rover: LiveRover, sights: Sights) -> None:
         """Ends the file and goes on in the next one.
 
         Raises:
@@ -108,7 +112,7 @@ class LiveRecording:
             OSError: The next file cannot be created.
         """
         self.close()
-        self._begin(rover)
+        self._begin(rover, sights)
 
     def close(self) -> None:
         """Writes what is left and ends the file; a second call does nothing.

@@ -146,6 +146,12 @@ class LiveRover:
         return self._wheel.state
 
     @property
+    def height_scan(self) -> Any:
+        """The argument `height_scan` of the environment; None where the driver observes no heights."""
+        policy = self._wheel.policy
+        return None if policy is None else policy.arguments.get("height_scan")
+
+    @property
     def time(self) -> float:
         """Simulated time since the start, s."""
         return self.env.simulation.time

@@ -28,9 +28,14 @@ Vector: TypeAlias = tuple[float, float, float]
 #: Direction to the Sun, fixed: x forward, y up, z right. Frames, films and pages share it.
 SUN = np.array([-0.35, 0.80, 0.50]) / np.linalg.norm([0.35, 0.80, 0.50])
 
-SHADOW = 0.55  # brightness of shadowed ground
+#: Light of the sky from above, of the ground from below, and of the Sun: red, green, blue, over a surface's colour.
+SKY_LIGHT, BOUNCE_LIGHT, SUN_LIGHT = (0.52, 0.53, 0.57), (0.26, 0.21, 0.18), (0.68, 0.64, 0.58)
 
-HAZE = 27.0, 90.0  # m, where the haze begins and where the ground has the horizon's colour
+SHADOW = 0.51  # brightness of level ground that the sky alone lights
+
+HAZE = 27.0, 90.0  # m, where the haze begins and where all has the horizon's colour
+
+TILE = 0.5  # m, of the checkered ground
 
 #: Colours, red, green, blue from 0 to 1: warm ground, cool rover.
 GROUND_COLOUR: Colour = (0.72, 0.45, 0.30)
@@ -46,6 +51,9 @@ FIXED_BALL_COLOUR: Colour = (0.52, 0.52, 0.52)  # of balls that no force moves
 SKY_COLOUR: Colour = (0.89, 0.77, 0.65)  # at the horizon
 
 SKY_COLOUR_2: Colour = (0.50, 0.58, 0.68)  # overhead
+
+#: Share of the colour overhead that the sky has at elevations, degrees.
+SKY_BANDS = ((-90.0, 0.0), (0.0, 0.0), (2.0, 0.12), (5.0, 0.3), (10.0, 0.52), (20.0, 0.75), (45.0, 0.92), (90.0, 1.0))
 
 GOAL_COLOUR: Colour = (0.10, 0.62, 0.36)
 

@@ -13,6 +13,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - what draws: it registers itself when imported
+from PIL import Image
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkLogger, vtkUnsignedCharArray
 from vtkmodules.vtkCommonDataModel import vtkPolyData
@@ -33,11 +34,11 @@ from rover_gym.rendering.scenery_actors import (
     RockActors,
     SurfaceActor,
     flag,
-    headlight,
+    lights,
     shadow_of,
     sky,
-    sun,
 )
+from rover_gym.rendering.shading import Soil
 from rover_gym.rendering.tyre_marks import TyreMarks
 from rover_gym.rendering.vtk_actors import Array, Faces, actor_of, actor_with, level, mesh, set_points, set_pose
 
@@ -59,20 +60,28 @@ FOLLOW_TIME = 0.25, 0.8  # s, time constants of the view's centre and heading
 EYE_HEIGHT = 0.4  # m, minimum height above the ground
 
 
+FINER = 2  # pixels drawn along an edge, to one of a smooth frame
+
+FINEST = 4096  # pixels: a larger frame is not smoothed, since its window would be too large for OpenGL
+
+
 class Picture:
     """A window that is never shown, and its first scene; a context manager.
 
     Args:
         width: Pixels, even.
         height: Pixels, even.
+        antialiasing: Smooths edges.
 
     Raises:
         OSError: No OpenGL library works on this machine; the message names the packages that provide one.
     """
 
-    def __init__(self, width: int, height: int) -> None:
-        self._size, self._process = (width, height), os.getpid()
-        self._window = open_window(width, height)
+    def __init__(self, width: int, height: int, *, antialiasing: bool = True) -> None:
+        # In software this is cheaper than VTK's multisampling and its own supersampling, and nearer to the truth.
+        self._finer = FINER if antialiasing and max(width, height) <= FINEST else 1
+        self._size, self._process = (self._finer * width, self._finer * height), os.getpid()
+        self._window = open_window(*self._size)
         _OPEN.add(self)
         self._scene = vtkRenderer()
         self._pixels = vtkUnsignedCharArray()
@@ -83,8 +92,9 @@ class Picture:
             self._window.Render()
         width, height = self._size
         self._window.GetPixelData(0, 0, width - 1, height - 1, 0, self._pixels, 0)
-        pixels: npt.NDArray[np.uint8] = vtk_to_numpy(self._pixels)
-        return pixels.reshape(height, width, 3)[::-1].copy()  # VTK's first row is the bottom one
+        pixels: npt.NDArray[np.uint8] = vtk_to_numpy(self._pixels).reshape(height, width, 3)
+        fine = pixels[::-1]  # VTK's first row is the bottom one
+        return fine.copy() if self._finer == 1 else np.array(Image.fromarray(fine).reduce(self._finer))
 
     def close(self) -> None:
         """Frees the window and its memory; the renderer is unusable afterwards.
@@ -145,8 +155,7 @@ class FrameRenderer(Picture):
         self.options = check_render_options("", options)
         self._model, self._fit = model, float(model.clear_radius) / FITTED
         self._wheel_mass = model.mass / len(model.wheel_radii)
-        super().__init__(self.options.width, self.options.height)
-        self._scene.SetUseFXAA(self.options.antialiasing)
+        super().__init__(self.options.width, self.options.height, antialiasing=self.options.antialiasing)
         # Arrows begin inside wheels: a second layer draws them in front of everything.
         self._overlay = vtkRenderer()
         self._overlay.SetLayer(1)
@@ -154,8 +163,8 @@ class FrameRenderer(Picture):
         self._window.SetNumberOfLayers(2)
         for renderer in (self._scene, self._overlay):
             renderer.AutomaticLightCreationOff()
-            renderer.AddLight(sun(0.85))
-            renderer.AddLight(headlight(0.1))
+            for light in lights():
+                renderer.AddLight(light)
             self._window.AddRenderer(renderer)
         self._sky = sky()
         self._scene.AddActor(self._sky)
@@ -180,9 +189,10 @@ class FrameRenderer(Picture):
             self._scene.RemoveActor(actor)
         plane, (centres, radii) = plane_of(terrain), spheres_of(terrain)
         self._plane = plane
-        self._ground = None if plane is None else GroundActors(plane)
+        self._soil = Soil()
+        self._ground = None if plane is None else GroundActors(plane, self._soil)
         self._rocks = RockActors(centres, radii, self._ground) if len(radii) else None
-        self._surfaces = [SurfaceActor(surface) for surface in surfaces_of(terrain)]
+        self._surfaces = [SurfaceActor(surface, self._soil) for surface in surfaces_of(terrain)]
         self._shadows: dict[str, vtkActor] = {}
         sand = sand_of(terrain)
         self._ruts = None if sand is None else RutActor(sand)
@@ -287,6 +297,7 @@ class FrameRenderer(Picture):
         dome = np.eye(4)
         dome[:3] = np.column_stack((ahead, up, np.cross(ahead, up), eye))
         set_pose(self._sky, dome)
+        self._soil.see(camera)
 
     def _follow(self, simulation: Simulation, position: Array, up: Array) -> tuple[Array, float]:
         """Centre and heading of the view: they follow the rover's over time, and jump when its state is set."""
@@ -365,7 +376,7 @@ def open_window(width: int, height: int) -> vtkRenderWindow:
                 "no OpenGL library works here: install Mesa's, on Debian with apt-get install libegl1 libgl1-mesa-dri"
             )
         window.SetOffScreenRendering(True)
-        window.SetMultiSamples(0)  # in software, multisampling costs several times the rest of a frame
+        window.SetMultiSamples(0)
         window.SetSize(width, height)
     return window
 
@@ -434,7 +445,8 @@ class BedRenderer(Picture):
     """Draws frames of actors that stand still or are moved by their owner; a context manager.
 
     Args:
-        actors: What to draw, besides sun and sky.
+        actors: What to draw, besides Sun and sky.
+        soil: What looks like soil among them.
         width: Pixels, even.
         height: Pixels, even.
 
@@ -442,11 +454,12 @@ class BedRenderer(Picture):
         OSError: No OpenGL library works on this machine; the message names the packages that provide one.
     """
 
-    def __init__(self, actors: Iterable[vtkActor], *, width: int = 960, height: int = 540) -> None:
+    def __init__(self, actors: Iterable[vtkActor], soil: Soil, *, width: int = 960, height: int = 540) -> None:
         super().__init__(width, height)
+        self._soil = soil
         self._scene.AutomaticLightCreationOff()
-        self._scene.AddLight(sun(0.85))
-        self._scene.AddLight(headlight(0.25))
+        for light in lights():
+            self._scene.AddLight(light)
         self._window.AddRenderer(self._scene)
         self._sky = sky()
         for actor in (self._sky, *actors):
@@ -471,4 +484,5 @@ class BedRenderer(Picture):
         dome = np.eye(4)
         dome[:3, 3] = at
         set_pose(self._sky, dome)
+        self._soil.see(camera)
         return self._shot()

@@ -58,8 +58,7 @@ class RutActor:
         self._ground = ground
         self._drawn = np.zeros((0, 3))
         self._mapper = vtkPolyDataMapper()
-        self.actor: vtkActor = actor_with(self._mapper)
-        self.actor.GetProperty().LightingOff()
+        self.actor: vtkActor = actor_with(self._mapper, lit=False)
         self.actor.VisibilityOff()
 
     def follow(self, ruts: Array) -> None:

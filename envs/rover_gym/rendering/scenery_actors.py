@@ -1,18 +1,19 @@
-"""The rover's surroundings: sun and sky, checkered ground, rocks, shadows and the goal's flag."""
+"""The rover's surroundings: Sun and sky, checkered ground, rocks, shadows and the goal's flag."""
 
 import math
 
 import numpy as np
 import numpy.typing as npt
 from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
-from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkImageData, vtkPolyData
-from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkLight, vtkPolyDataMapper, vtkTexture
+from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkLight, vtkPolyDataMapper
 from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLSphereMapper
 
-from rover_gym.ground import heights_of, plane_of, triangles_of
+from rover_gym.ground import heights_of, triangles_of
 from rover_gym.mechanics import HeightField, Plane, Terrain, TriangleMesh
 from rover_gym.rendering import appearance as look
-from rover_gym.rendering.appearance import FIXED_BALL_COLOUR, HAZE, SAND_COLOUR, SHADOW, SUN
+from rover_gym.rendering.appearance import FIXED_BALL_COLOUR, SAND_COLOUR, SUN
+from rover_gym.rendering.shading import Soil
 from rover_gym.rendering.vtk_actors import (
     Array,
     actor_of,
@@ -25,21 +26,15 @@ from rover_gym.rendering.vtk_actors import (
     set_pose,
 )
 
-LIFT = 0.004  # m, offset of shadows above the ground and of the goal's ring above shadows, against flicker
+LIFT = 0.004  # m, offset of shadows above the ground, against flicker
 
-TILE = 0.5  # m, of the checkered ground
+RING_LIFT = 0.015  # m, of the goal's ring
 
-NEAR, FAR = 20.0, 160.0  # m, half edges of the checkered ground and of the ground beyond
-
-LEVEL = 0.7  # upward part of the normal of a mesh's faces that show tiles
-DARK = (0.75, 0.25)  # a place on a dark tile, in the picture of the tiles
+FAR = 160.0  # m, half an edge of a plane, which the haze hides before
 
 # The number of facets of a stone depends on its size in the picture, since most of a frame's time goes into facets:
 # (within this many radii of the rover, but at most so many m; detail; with a shadow).
 STONE_RANGES = ((40.0, 6.0, 2, True), (250.0, 12.0, 1, True), (math.inf, math.inf, 0, False))
-
-# Light from above and all around, and from the Sun, as on pages.
-AROUND, FROM_SUN = 0.52, 0.54
 
 Goal = tuple[float, float]
 
@@ -47,31 +42,24 @@ Goal = tuple[float, float]
 SURFACE_REACH, MOST_HEIGHTS, SURFACE_STEP = 60.0, 90_000, 8.0
 
 
-def sun(intensity: float) -> vtkLight:
-    """The light that casts the shadows."""
-    light = vtkLight()
-    light.SetLightTypeToSceneLight()
-    light.PositionalOff()
-    light.SetPosition(*SUN)
-    light.SetFocalPoint(0.0, 0.0, 0.0)
-    light.SetColor(1.0, 0.96, 0.90)
-    light.SetIntensity(intensity)
-    return light
-
-
-def headlight(intensity: float) -> vtkLight:
-    """A weak light from the eye, so that no side is black."""
-    light = vtkLight()
-    light.SetLightTypeToHeadlight()
-    light.SetIntensity(intensity)
-    return light
+def lights() -> list[vtkLight]:
+    """The Sun and the zenith: of both, the shading takes the direction."""
+    made = []
+    for place in (SUN, (0.0, 1.0, 0.0)):
+        light = vtkLight()
+        light.SetLightTypeToSceneLight()
+        light.PositionalOff()
+        light.SetPosition(*place)
+        light.SetFocalPoint(0.0, 0.0, 0.0)
+        made.append(light)
+    return made
 
 
 def sky() -> vtkActor:
     """A dome around the origin, y up, coloured by elevation; below the horizon it is haze."""
-    elevation = np.radians([-90.0, 0.0, 2.0, 5.0, 10.0, 20.0, 45.0, 90.0])
-    share = np.array([0.0, 0.0, 0.12, 0.3, 0.52, 0.75, 0.92, 1.0])[:, None]
-    bands = np.array(look.SKY_COLOUR) + share * (np.array(look.SKY_COLOUR_2) - look.SKY_COLOUR)
+    degrees, share = np.array(look.SKY_BANDS).T
+    elevation = np.radians(degrees)
+    bands = np.array(look.SKY_COLOUR) + share[:, None] * (np.array(look.SKY_COLOUR_2) - look.SKY_COLOUR)
     around = 24
     a, e = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, around, endpoint=False), elevation)
     vertices = np.column_stack(((np.cos(e) * np.cos(a)).ravel(), np.sin(e).ravel(), (np.cos(e) * np.sin(a)).ravel()))
@@ -81,14 +69,15 @@ def sky() -> vtkActor:
 
 
 class GroundActors:
-    """A checkered plane that fades into the horizon's colour.
+    """A plane of soil.
 
     Attributes:
         actor: What VTK draws.
         flatten: (4, 4) projection along the sun's rays onto a plane just above the ground; it makes the shadows.
+        soil: What it looks like.
     """
 
-    def __init__(self, plane: Plane) -> None:
+    def __init__(self, plane: Plane, soil: Soil) -> None:
         n = plane.normal
         ahead = level(np.array([1.0, 0.0, 0.0]), n)
         self._along = np.column_stack((ahead, np.cross(ahead, n)))
@@ -97,65 +86,43 @@ class GroundActors:
         self.flatten = np.eye(4)
         self.flatten[:3, :3] -= np.outer(SUN, n) / across
         self.flatten[:3, 3] = -(plane.offset - LIFT) / across * SUN
-        self.actor = self._draw(brightness=AROUND + FROM_SUN * across / float(SUN[1]))
+        self.soil = soil
+        square = FAR * np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, 1.0], [1.0, -1.0]])
+        vertices = square @ self._along.T + self._foot
+        data = mesh(vertices, np.arange(4)[None], np.ones_like(vertices), smooth=False)
+        data.GetPointData().SetNormals(numpy_to_vtk(np.tile(n, (4, 1)), deep=True))
+        self.actor = actor_of(data)
+        soil.dress(self.actor)
 
     def follow(self, position: Array) -> None:
-        """Moves the mesh towards a position by whole pairs of tiles, so that the checkers stay fixed in the world."""
-        pairs = np.round((position - self._foot) @ self._along / (2.0 * TILE))
+        """Moves the plane's middle to a position: its soil stays fixed in the world."""
         shift = np.eye(4)
-        shift[:3, 3] = self._along @ (2.0 * TILE * pairs)
+        shift[:3, 3] = self._along @ ((position - self._foot) @ self._along)
         set_pose(self.actor, shift)
-
-    def _draw(self, brightness: float) -> vtkActor:
-        count = round(2.0 * NEAR / TILE)
-        column, row = (index.ravel() for index in np.meshgrid(np.arange(count), np.arange(count)))
-        corners = np.array([[0, 0], [0, 1], [1, 1], [1, 0]])
-        tiles = ((np.column_stack((column, row))[:, None, :] + corners) * TILE - NEAR).reshape(-1, 2)
-        # Beyond: rings of squares, coarser with distance.
-        edges = np.array([NEAR, 30.0, 45.0, 70.0, FAR])
-        square = np.array([[-1, -1], [-1, 1], [1, 1], [1, -1]])
-        steps = np.linspace(0.0, 1.0, 8, endpoint=False)[:, None]
-        rim = np.vstack([square[i] + steps * (square[(i + 1) % 4] - square[i]) for i in range(4)])
-        beyond = (edges[:, None, None] * rim).reshape(-1, 2)
-        flat = np.vstack((tiles, beyond))
-        faces = np.vstack(
-            (np.arange(len(tiles)).reshape(-1, 4), len(tiles) + lattice(len(edges) - 1, len(rim))),
-        )
-
-        light, dark = np.array(look.GROUND_COLOUR), np.array(look.GROUND_COLOUR_2)
-        mean = 0.5 * (light + dark)
-        distance = np.linalg.norm(flat, axis=1)[:, None]
-        odd = np.repeat((column + row) % 2, 4)[:, None] == 1
-        colours = np.vstack((np.where(odd, dark, light), np.broadcast_to(mean, (len(beyond), 3))))
-        colours = mean + np.clip(1.0 - distance / NEAR, 0.0, 1.0) * (colours - mean)
-        colours *= brightness  # lit here, once, since haze is drawn unlit
-        colours += _haze(distance[:, 0]) * (np.array(look.SKY_COLOUR) - colours)
-        vertices = flat @ self._along.T + self._foot
-        return actor_of(mesh(vertices, faces, colours, smooth=False), lit=False)
-
-
-def _haze(distance: Array) -> Array:
-    """(n, 1) share of the horizon's colour that ground has at distances (n,), m."""
-    share: Array = np.clip((distance[:, None] - HAZE[0]) / (HAZE[1] - HAZE[0]), 0.0, 1.0)
-    return share
 
 
 class SurfaceActor:
-    """A height field or a mesh: the piece around the rover, with checkers that show its shape.
+    """A height field or a mesh of soil: the piece around the rover.
 
     Attributes:
         actor: What VTK draws.
     """
 
-    def __init__(self, surface: HeightField | TriangleMesh) -> None:
+    def __init__(self, surface: HeightField | TriangleMesh, soil: Soil) -> None:
         self._surface = surface
         self._place: tuple[float, ...] | None = None
         self._mapper = vtkPolyDataMapper()
         self.actor = actor_with(self._mapper)
+        soil.dress(self.actor, steep=isinstance(surface, TriangleMesh))
         if isinstance(surface, TriangleMesh):
-            self._mapper.SetInputData(_tiled(surface))
-            self._mapper.ScalarVisibilityOff()
-            self.actor.SetTexture(_tiles())
+            corners = np.asarray(surface.vertices)[surface.triangles]
+            normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+            vertices = corners.reshape(-1, 3)
+            faces = np.arange(len(vertices)).reshape(-1, 3)
+            data = mesh(vertices, faces, np.ones_like(vertices), smooth=False)
+            data.GetPointData().SetNormals(numpy_to_vtk(np.repeat(normals, 3, axis=0), deep=True))
+            self._mapper.SetInputData(data)
 
     def follow(self, position: Array) -> None:
         """Draws the piece of a height field around a position anew when it has moved far."""
@@ -166,44 +133,7 @@ class SurfaceActor:
         middle = SURFACE_STEP * np.array(place)
         low, high = middle - SURFACE_REACH, middle + SURFACE_REACH
         vertices, triangles = triangles_of(self._surface, low, high, MOST_HEIGHTS)
-        light, dark = np.array(look.GROUND_COLOUR), np.array(look.GROUND_COLOUR_2)
-        odd = np.floor(vertices[:, [0, 2]] / TILE).sum(axis=1) % 2.0 == 1.0
-        colours = np.where(odd[:, None], dark, light)
-        colours += _haze(np.linalg.norm(vertices[:, [0, 2]] - middle, axis=1)) * (np.array(look.SKY_COLOUR) - colours)
-        self._mapper.SetInputData(mesh(vertices, triangles, colours))
-
-
-def _tiled(surface: TriangleMesh) -> vtkPolyData:
-    """A mesh with places on the tiles, which its level faces show; the others have the colour of the dark ones."""
-    corners = np.asarray(surface.vertices)[surface.triangles]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    vertices = corners.reshape(-1, 3)
-    data = mesh(vertices, np.arange(len(vertices)).reshape(-1, 3), np.ones_like(vertices), smooth=False)
-    across, along = vertices[:, 0] / (2.0 * TILE), vertices[:, 2] / (2.0 * TILE)
-    is_level = np.repeat(normals[:, 1] > LEVEL, 3)
-    places = np.where(is_level[:, None], np.column_stack((across, along)), np.array(DARK))
-    coordinates = numpy_to_vtk(places.astype(np.float32), deep=True)
-    data.GetPointData().SetTCoords(coordinates)
-    data.GetPointData().SetNormals(numpy_to_vtk(np.repeat(normals, 3, axis=0), deep=True))
-    return data
-
-
-def _tiles() -> vtkTexture:
-    """Two by two tiles, which repeat."""
-    n = 64
-    odd = (np.arange(n)[:, None] // (n // 2) + np.arange(n) // (n // 2)) % 2 == 1
-    picture = np.where(odd[..., None], np.array(look.GROUND_COLOUR_2), np.array(look.GROUND_COLOUR))
-    image = vtkImageData()
-    image.SetDimensions(n, n, 1)
-    pixels = np.round(255.0 * picture).astype(np.uint8).reshape(-1, 3)
-    image.GetPointData().SetScalars(numpy_to_vtk(pixels, deep=True))
-    texture = vtkTexture()
-    texture.SetInputData(image)
-    texture.RepeatOn()
-    texture.InterpolateOn()
-    texture.MipmapOn()
-    return texture
+        self._mapper.SetInputData(mesh(vertices, triangles, np.ones_like(vertices)))
 
 
 class RockActors:
@@ -255,7 +185,7 @@ def shadow_of(actor: vtkActor, ground: GroundActors) -> vtkActor:
 
 
 def flag(goal: Goal, tolerance: float, terrain: Terrain, ground: GroundActors | None) -> list[vtkActor]:
-    """A pole with a pennant and, on a plane, the ring within which the goal counts as reached."""
+    """A pole with a pennant, and the ring within which the goal counts as reached."""
     x, z = goal
     height = float(heights_of(terrain, [[x, z]])[0])
     foot = np.array([x, 0.0 if math.isnan(height) else height, z])
@@ -271,22 +201,19 @@ def flag(goal: Goal, tolerance: float, terrain: Terrain, ground: GroundActors | 
         ),
     )
     standing = actor_of(surface)
-    plane = plane_of(terrain)
-    if plane is None or ground is None:
-        return [standing]
-    return [standing, shadow_of(standing, ground), _ring(foot, tolerance, plane)]
+    shadow = [] if ground is None else [shadow_of(standing, ground)]
+    return [standing, *shadow, _ring(foot, tolerance, terrain)]
 
 
-def _ring(centre: Array, radius: float, plane: Plane) -> vtkActor:
-    """The circle on the plane at a given horizontal radius."""
-    n, around = plane.normal, 64
+def _ring(centre: Array, radius: float, terrain: Terrain) -> vtkActor:
+    """The circle on the ground at a given horizontal radius."""
+    around = 64
     angle = np.linspace(0.0, 2.0 * np.pi, around, endpoint=False)
-    circle = np.column_stack((np.cos(angle), np.zeros(around), np.sin(angle)))
-    circle[:, 1] = -(circle @ n) / n[1]
-    outer = centre + 2.0 * LIFT * n + radius * circle
-    inner = outer - 0.1 * radius * circle
-    colours = np.broadcast_to(np.array(look.GOAL_COLOUR), (2 * around, 3))
-    return actor_of(mesh(np.vstack((outer, inner)), lattice(1, around), colours, smooth=False), lit=False)
+    circle = np.column_stack((np.cos(angle), np.sin(angle)))
+    places = centre[[0, 2]] + np.vstack((radius * circle, 0.9 * radius * circle))
+    heights = np.nan_to_num(heights_of(terrain, places), nan=float(centre[1])) + RING_LIFT
+    vertices = np.column_stack((places[:, 0], heights, places[:, 1]))
+    return actor_of(mesh(vertices, lattice(1, around)[:, ::-1], np.broadcast_to(look.GOAL_COLOUR, vertices.shape)))
 
 
 def _stones(points: vtkPolyData, detail: int, *, coloured: bool) -> vtkGlyph3DMapper:
@@ -308,9 +235,7 @@ def _stones(points: vtkPolyData, detail: int, *, coloured: bool) -> vtkGlyph3DMa
 
 
 def _shadow(actor: vtkActor, ground: GroundActors) -> vtkActor:
-    actor.GetProperty().LightingOff()
-    colour = SHADOW * 0.5 * (np.array(look.GROUND_COLOUR) + look.GROUND_COLOUR_2)
-    actor.GetProperty().SetColor(*colour)
+    ground.soil.dress(actor, sunlit=False)
     set_pose(actor, ground.flatten)
     return actor
 

@@ -12,6 +12,8 @@ from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 from vtkmodules.vtkCommonMath import vtkMatrix4x4
 from vtkmodules.vtkRenderingCore import vtkActor, vtkMapper, vtkPolyDataMapper
 
+from rover_gym.rendering.shading import dress
+
 Array: TypeAlias = npt.NDArray[np.float64]
 
 Faces: TypeAlias = npt.NDArray[np.integer[Any]]
@@ -88,10 +90,12 @@ def actor_with(mapper: vtkMapper, *, lit: bool = True) -> vtkActor:
     actor = vtkActor()
     actor.SetMapper(mapper)
     surface = actor.GetProperty()
-    surface.SetAmbient(0.52 if lit else 1.0)
-    surface.SetDiffuse(0.74 if lit else 0.0)
+    surface.SetAmbient(0.0 if lit else 1.0)
+    surface.SetDiffuse(1.0 if lit else 0.0)
     surface.SetInterpolationToGouraud()
     surface.SetLighting(lit)
+    if lit:
+        dress(actor)
     return actor
 
 

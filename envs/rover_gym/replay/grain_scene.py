@@ -15,13 +15,16 @@ from rover_gym.ground import plane_of, spheres_of
 from rover_gym.rendering.appearance import (
     FIXED_BALL_COLOUR,
     GROUND_COLOUR,
+    HAZE,
     ROCK_COLOUR,
     SAND_COLOUR,
+    TILE,
     WHEEL_COLOURS,
 )
 from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, moving_mean, panel_contents
+from rover_gym.replay.flat_scene import CHAIN_COLOUR
 from rover_gym.replay.page_scene import FrameChannel, PageScene
-from rover_gym.replay.rover_scene import GRAVITY, add_ground, add_rover, add_surfaces, mass_channel
+from rover_gym.replay.rover_scene import ABOVE, GRAVITY, PLANE, add_ground, add_rover, add_surfaces, mass_channel
 from rover_gym.replay.scenery import (
     MARGIN,
     first_view,
@@ -38,6 +41,10 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 COLOURS = ("#332288", "#CC6677")
+
+SHOWN_CHAINS = 96  # of the strongest contacts
+
+LEAST_WIDTH = 0.05  # of the widest bar
 
 MANY = 300  # spheres of the ground, above which each gets fewer triangles
 
@@ -81,7 +88,8 @@ def start_view(run: GrainRun) -> StartView:
     """The view at the start: beside the rover, or so that all balls are in it."""
     if run.rover is not None:
         view = first_view(run.rover)
-        return StartView(view.eye.tolist(), view.target.tolist(), view.field_of_view)
+        target = view.target + np.array([0.0, ABOVE * run.rover.model.clear_radius, 0.0])
+        return StartView(view.eye.tolist(), target.tolist(), view.field_of_view)
     shown = run.positions_of(np.unique(run.rows[[0, run.n_frames // 2, -1]])).astype(np.float64)
     ends = np.quantile(shown, 0.01, axis=1), np.quantile(shown, 0.99, axis=1)
     low, high = ends[0].min(axis=0), ends[1].max(axis=0)
@@ -102,7 +110,8 @@ def eye_path(run: GrainRun, *, follow: bool = True) -> Array:
     return result
 
 
-MAX_SIZE = 2.0  # bounds of the places: this many sizes of the first sample to each side of it
+MAX_SIZE = 2.0  # bounds of the places: at least this many sizes of the first sample to each side of it
+MAX_RADII = 1600.0  # and this many radii, which levels of 16 bits resolve to a twentieth of a radius
 
 
 def grain_scene(run: GrainRun, *, follow: bool) -> PageScene:
@@ -120,7 +129,7 @@ def grain_scene(run: GrainRun, *, follow: bool) -> PageScene:
         "shadow": rover is not None,
         "radius": float(run.radius.mean()),
         "sand": [SAND_COLOUR, FIXED_BALL_COLOUR],
-        "far": 60.0 * reach,
+        "far": 60.0 * reach if rover is None else 2.0 * PLANE,
         "curves": grain_curves(run),
     }
     n = run.n_frames
@@ -131,8 +140,9 @@ def grain_scene(run: GrainRun, *, follow: bool) -> PageScene:
     _add_ground(scene, run)
     plane = floor_of(run)
     if plane is not None:
-        scene.facts["plane"] = {"point": plane[0].tolist(), "normal": plane[1].tolist(), "half": 40.0 * reach}
-        scene.facts |= {"haze": 24.0 * reach, "tile": 0.5 if rover is not None else 0.25 * reach}
+        scene.facts["plane"] = {"point": plane[0].tolist(), "normal": plane[1].tolist()}
+        scene.facts["plane"] |= {"half": 40.0 * reach if rover is None else PLANE}
+        scene.facts |= {"haze": HAZE[1] if rover is not None else 24.0 * reach, "tile": tile_of(run)}
     of_walls = wall_polygons(run, GROUND_COLOUR, ROCK_COLOUR)
     for i, mesh in enumerate(of_walls):
         if plane is None or (i < run.walls.shape[1] and not _is_level(run, i, plane[0])):
@@ -148,18 +158,60 @@ def grain_scene(run: GrainRun, *, follow: bool) -> PageScene:
         FrameChannel.within("balls", run.positions, low, high),
     ]
     scene.arrays |= {"radii": ("f4", run.radius), "fixed": ("u1", run.kinematic)}
-    if rover is not None:
+    if run.force_chains.size:
+        chains = _chains(run)
+        flat = chains.reshape(-1, 7)
+        scene.channels.append(FrameChannel.within("chains", chains, flat.min(axis=0), flat.max(axis=0)))
+        scene.facts["chain"] = CHAIN_COLOUR
+    if rover is None:
+        scene.channels.append(FrameChannel.fine("mass", mass_centres(run)[:, None]))
+    else:
         share = rover.model.mass * GRAVITY / max(1, run.wheel_centres.shape[1])
         scene.channels.append(
             FrameChannel.fine("forces", np.concatenate((run.wheel_centres, run.wheel_forces / share), axis=2))
         )
         scene.channels.append(mass_channel(rover))
+        scene.arrays["trail"] = ("f4", _wheel_paths(run).ravel())
         scene.facts["missing"] = {
+            "marks": "balls keep no marks",
             "cones": "many balls touch a wheel, each with a normal of its own",
             "slope": "the ground is balls",
             **dict.fromkeys(("plan", "scan", "laser", "depth"), "runs of balls do not record it"),
         }
     return scene
+
+
+def _chains(run: GrainRun) -> Array:
+    """(n, n_chains, 7) ends and width of the strongest contacts as bars, m."""
+    chains = run.force_chains[:, :SHOWN_CHAINS].copy()
+    strongest = chains[..., 6].max(axis=1)
+    full = max(1e-9, float(np.median(strongest[strongest > 0.0])) if (strongest > 0.0).any() else 0.0)
+    # Most of the contacts are weak: what would be thinner than a twentieth is not drawn.
+    width = np.minimum(1.0, np.sqrt(chains[..., 6] / full))
+    chains[..., 6] = np.where(width < LEAST_WIDTH, 0.0, width) * float(run.radius.mean())
+    return chains
+
+
+def mass_centres(run: GrainRun) -> Array:
+    """(n, 3) mass centre of the balls that forces move, m."""
+    free = ~run.kinematic if (~run.kinematic).any() else np.ones(len(run.mass), dtype=bool)
+    weights = run.mass[free] / run.mass[free].sum()
+    result: Array = np.einsum("nbk,b->nk", run.positions[:, free].astype(np.float64), weights)
+    return result
+
+
+def _wheel_paths(run: GrainRun) -> npt.NDArray[np.float32]:
+    """(n, n_wheels, 3) lowest points of the wheels, m; nan where a wheel bears nothing."""
+    radii = np.zeros(0) if run.model is None else np.asarray(run.model.wheel_radii)
+    points = run.wheel_centres.astype(np.float32)
+    bears = np.linalg.norm(run.wheel_forces, axis=2) > 0.0
+    points[..., 1] = np.where(bears, points[..., 1] - radii, np.nan)
+    return points
+
+
+def tile_of(run: GrainRun) -> float:
+    """Edge of the ground's tiles, m: a heap stands on smaller ones than a rover."""
+    return TILE if run.rover is not None else 0.25 * float(np.linalg.norm(start_extent(run)))
 
 
 def floor_of(run: GrainRun) -> tuple[Array, Array] | None:
@@ -192,7 +244,8 @@ def _bounds(run: GrainRun) -> tuple[Array, Array]:
     places = run.positions
     low, high = places.min(axis=(0, 1)).astype(np.float64), places.max(axis=(0, 1)).astype(np.float64)
     first = places[0].astype(np.float64)
-    size = MAX_SIZE * float((first.max(axis=0) - first.min(axis=0)).max()) + 4.0 * float(run.radius.max())
+    extent, radius = float((first.max(axis=0) - first.min(axis=0)).max()), float(run.radius.mean())
+    size = max(MAX_SIZE * extent + 4.0 * radius, MAX_RADII * radius)
     return np.maximum(low, first.min(axis=0) - size), np.minimum(high, first.max(axis=0) + size)
 
 

@@ -19,6 +19,7 @@ from rover_gym.rendering.appearance import (
     GROUND_COLOUR,
     GROUND_COLOUR_2,
     ROCK_COLOUR,
+    SKY_BANDS,
     SKY_COLOUR,
     SKY_COLOUR_2,
     Colour,
@@ -33,6 +34,7 @@ Mesh = tuple[Colour, Array, npt.NDArray[np.int32]]
 
 SAMPLES = 25  # of a piece: each begins with a whole frame
 FINE = 2.0**-14  # m or a part of a turn, step of places and quaternions: 0.06 mm
+COARSE = 2.0**-8  # m, step of what is many and need not be finer: 4 mm
 TYPES = {"f4": "<f4", "u4": "<u4", "u2": "<u2", "u1": "u1"}
 
 
@@ -53,6 +55,12 @@ class FrameChannel(NamedTuple):
         """Places, m, or what else lies within 100 km of zero."""
         width = values.shape[-1]
         return cls(name, values, np.full(width, -(2.0**31) * FINE), np.full(width, FINE), 4)
+
+    @classmethod
+    def coarse(cls, name: str, values: Array) -> FrameChannel:
+        """Places as those of `fine`, to 4 mm."""
+        width = values.shape[-1]
+        return cls(name, values, np.full(width, -(2.0**31) * COARSE), np.full(width, COARSE), 4)
 
     @classmethod
     def turns(cls, name: str, values: Array) -> FrameChannel:
@@ -162,6 +170,7 @@ class PageScene:
             "far": 500.0,
             "tile": 0.5,
             "sky": [SKY_COLOUR_2, SKY_COLOUR],
+            "bands": SKY_BANDS,
             "soil": [GROUND_COLOUR, GROUND_COLOUR_2],
             "rock": ROCK_COLOUR,
             "force": FORCE_COLOUR,

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from rover_gym.ground import map_of, surfaces_of
 from rover_gym.mechanics import HeightField
 from rover_gym.record.channels import outcome_words
-from rover_gym.rendering.appearance import GROUND_COLOUR_2, WHEEL_COLOURS
+from rover_gym.rendering.appearance import GROUND_COLOUR_2, HAZE, WHEEL_COLOURS
 from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, moving_mean, panel_contents, with_ghost
 from rover_gym.replay.page_scene import FrameChannel, PageScene
 from rover_gym.replay.scenery import (
@@ -46,7 +46,8 @@ WHEEL_NAMES = {
     "BR": "back right",
 }
 LONGEST_FACT = 100
-HAZE = 90.0  # m, distance at which the ground has the colour of the sky
+BEYOND = 45.0  # m of a map that are shown around the piece with all its detail
+MOST_AROUND, DIP = 10_000, 0.15  # heights of it, and how far it lies under the edge of that piece, of its cells
 PLANE = 400.0  # m, half of the edge of a plane
 ABOVE = 0.45  # of the rover's reach: so far above it the eye looks, and the horizon is in the picture
 GHOST_COLOUR = (0.55, 0.72, 1.0)
@@ -75,7 +76,7 @@ def add_ground(scene: PageScene, run: RoverRun) -> None:
         point = middle - (middle @ plane.normal + plane.offset) * plane.normal
         scene.facts["plane"] = {"point": point.tolist(), "normal": plane.normal.tolist(), "half": PLANE}
     add_surfaces(scene, run.terrain, *surroundings(run))
-    centres, radii = spheres(run)
+    centres, radii = spheres(run, BEYOND)
     scene.arrays["rocks"] = ("f4", np.column_stack((centres, radii)).ravel())
     scene.put_mesh(goal_meshes(run), role="solid")
 
@@ -85,9 +86,23 @@ def add_surfaces(scene: PageScene, terrain: Terrain, low: Array, high: Array) ->
     for surface in surfaces_of(terrain):
         if isinstance(surface, HeightField):
             scene.put_map(*map_of(surface, low, high, MOST_HEIGHTS))
+            if (around := map_around(surface, low, high)) is not None:
+                scene.put_map(*around)
         else:
             faces = surface.triangles.astype(np.int32)
             scene.put_mesh([(GROUND_COLOUR_2, np.asarray(surface.vertices), faces)], role="soil")
+
+
+def map_around(surface: HeightField, low: Array, high: Array) -> tuple[Array, Array, Array] | None:
+    """The country about a piece of a height field, in less detail, as `map_of`; None where there is no more of it."""
+    x, z, heights = map_of(surface, low - BEYOND, high + BEYOND, MOST_AROUND)
+    cell = max(float(np.diff(x).max()), float(np.diff(z).max()))
+    if (x[[0, -1]] >= low[0]).all() and (x[[0, -1]] <= high[0]).all() and z[0] >= low[1] and z[-1] <= high[1]:
+        return None
+    # Under the edge of the piece the country dips a little, so that it does not show through; farther in, it ends.
+    depth = np.minimum.outer(np.minimum(z - low[1], high[1] - z), np.minimum(x - low[0], high[0] - x))
+    heights = np.where(depth > 0.0, heights - DIP * cell, heights)
+    return x, z, np.where(depth > 2.0 * cell, np.nan, heights)
 
 
 def poses_of(positions: Array, rotations: Array) -> list[FrameChannel]:
@@ -106,7 +121,7 @@ def bare_scene(run: RoverRun) -> tuple[PageScene, list[DrawnWheel]]:
         "angle": view.field_of_view,
     }
     scene = PageScene("rover", seen, float(run.model.clear_radius))
-    scene.facts |= {"title": run.title, "rover": True, "shadow": True, "haze": HAZE, "far": 2.0 * PLANE}
+    scene.facts |= {"title": run.title, "rover": True, "shadow": True, "haze": HAZE[1], "far": 2.0 * PLANE}
     wheels = add_rover(scene, run)
     add_ground(scene, run)
     return scene, wheels
@@ -154,7 +169,10 @@ def rover_scene(run: RoverRun, *, follow: bool, ghost: RoverRun | None = None) -
     ]
     attributes = run.trajectory.attributes
     sights = recorded_sights(run.trajectory.data, attributes.get("scene", {}), run.terrain)
-    if (friction := _friction(attributes)) is None:
+    told = run.trajectory.data.get("friction")
+    if told is not None and told.ndim == 1:  # a live drive may change it
+        scene.channels.append(FrameChannel.fine("friction", told[:, None, None]))
+    elif (friction := _friction(attributes)) is None:
         sights.missing["cones"] = "this run does not say its friction"
     else:
         scene.facts["friction"] = friction

@@ -41,6 +41,8 @@ SQUARE = 1.0  # m, edge of the squares that are painted on a height field
 
 MOST_HEIGHTS = 40_000  # shown of a height field
 
+LARGE = 0.12  # m, radius of a rock that is seen from afar
+
 MARGIN = 5.0  # m of ground around the path
 
 LONGEST_NAME = 60
@@ -101,14 +103,20 @@ def ground_plane(run: RoverRun) -> Plane | None:
     return plane_of(run.terrain)
 
 
-def spheres(run: RoverRun) -> tuple[Array, Array]:
-    """Centres (n, 3) and radii (n,) of the ground's spheres, m: on a map those of the piece that is shown."""
+def spheres(run: RoverRun, beyond: float = 0.0) -> tuple[Array, Array]:
+    """Centres (n, 3) and radii (n,) of the ground's spheres, m: on a map those of the piece that is shown.
+
+    Args:
+        run: The run.
+        beyond: How far around the piece large ones are shown too, m.
+    """
     centres, radii = spheres_of(run.terrain)
     if ground_plane(run) is None and any(isinstance(surface, HeightField) for surface in surfaces_of(run.terrain)):
         low, high = surroundings(run)
         places = centres[:, [0, 2]]
         near = ((low <= places) & (places <= high)).all(axis=1)
-        return centres[near], radii[near]
+        far = ((low - beyond <= places) & (places <= high + beyond)).all(axis=1) & (radii > LARGE)
+        return centres[near | far], radii[near | far]
     return centres, radii
 
 
@@ -204,8 +212,7 @@ def _ring(run: RoverRun, centre: tuple[float, float], radius: float) -> tuple[Ar
     heights = np.nan_to_num(heights_of(run.terrain, places.tolist())) + RING_LIFT
     k, after = np.arange(RING), (np.arange(RING) + 1) % RING
     quads = np.vstack((np.column_stack((k, k + RING, after)), np.column_stack((after, k + RING, after + RING))))
-    both_sides = np.vstack((quads, quads[:, ::-1])).astype(np.int32)
-    return np.column_stack((places[:, 0], heights, places[:, 1])), both_sides
+    return np.column_stack((places[:, 0], heights, places[:, 1])), quads.astype(np.int32)
 
 
 def coloured_meshes(parts: tuple[Part, ...]) -> Iterator[tuple[Colour, Array, Triangles]]:

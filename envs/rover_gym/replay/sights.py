@@ -1,4 +1,4 @@
-"""What a rover sees and intends, for the player's overlays: height scan, laser, depth camera and planned path."""
+"""What a rover sees and intends, recorded and shown: height scan, laser, depth camera and planned path."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.start import check_scan, scan_points
-from rover_gym.ground import heights_of
+from rover_gym.ground import bare_heights, heights_of
 from rover_gym.policy.scan_policy import PLAN_POINTS
+from rover_gym.record.channels import Channel
 from rover_gym.replay.page_scene import FrameChannel
 from rover_gym.sensors import DepthCamera, LaserScanner, Mount
 from rover_gym.sensors.sensor import Moment
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from rover_gym.env.rover_env import RoverEnv
     from rover_gym.mechanics import RoverModel, Simulation, Terrain
@@ -69,6 +70,8 @@ class Sights:
         readings: (n, n_rays) distances by sensor, m.
         path: (n, n_points, 2) the planned path, ahead and to the right of the trunk, m; nan without.
         arcs: (n_arcs, n_points, 2) what the planner chooses from, in the same frame.
+        path_heights: (n, n_points) heights of the ground under the path, m.
+        arc_heights: (n, n_arcs, n_points) under the arcs, m.
         missing: Why an overlay has nothing to show, by its name.
     """
 
@@ -77,6 +80,8 @@ class Sights:
     readings: dict[str, Array] = field(default_factory=dict)
     path: Array | None = None
     arcs: Array | None = None
+    path_heights: Array | None = None
+    arc_heights: Array | None = None
     missing: dict[str, str] = field(default_factory=dict)
 
     def channels(self) -> list[FrameChannel]:
@@ -86,9 +91,41 @@ class Sights:
             found.append(FrameChannel.fine("scan", np.nan_to_num(self.heights, nan=-1e5)[..., None]))
         for name, values in self.readings.items():
             found.append(FrameChannel.within(name, values[..., None], np.zeros(1), np.full(1, 65.535)))
-        if self.path is not None:
-            found.append(FrameChannel.fine("path", np.nan_to_num(self.path, nan=-1e5)))
+        if self.path is not None and self.path_heights is not None:
+            path = np.concatenate((self.path, self.path_heights[..., None]), axis=2)
+            found.append(FrameChannel.coarse("path", np.nan_to_num(path, nan=-1e5)))
+        if self.arc_heights is not None:
+            flat = self.arc_heights.reshape(len(self.arc_heights), -1, 1)
+            found.append(FrameChannel.coarse("arc-heights", flat))
         return found
+
+    def lay(self, terrain: Terrain, q: Array) -> None:
+        """Lays path and arcs on the ground, for coordinates (n, nq)."""
+        if self.path is not None:
+            self.path_heights = draped(self.path, terrain, q)
+        if self.arcs is not None:
+            flat = draped(self.arcs.reshape(1, -1, 2), terrain, q)
+            self.arc_heights = flat.reshape(len(q), *self.arcs.shape[:2])
+
+    def tracks(self) -> list[Channel]:
+        """The channels of a recording. The height scan has none: it follows from ground and pose."""
+        found = [
+            Channel(name, "m", f"distances that the {name} sensor measures", (values.shape[1],))
+            for name, values in self.readings.items()
+        ]
+        if self.path is not None:
+            what = "planned path, ahead and to the right of the trunk"
+            found.append(Channel(PATH, "m", what, (self.path[0].size,)))
+        return found
+
+    def row(self) -> dict[str, Array]:
+        """The values of `tracks`, of the first sample."""
+        row = {name: values[0] for name, values in self.readings.items()}
+        return row if self.path is None else row | {PATH: self.path[0].ravel()}
+
+    def facts(self) -> dict[str, Any]:
+        """What does not change, for the scene of a recording."""
+        return {} if self.arcs is None else {"arcs": np.round(self.arcs, 4).tolist()}
 
     def describe(self, scene: PageScene, model: RoverModel) -> None:
         """Adds what does not change: grid, rays and arcs, and why something is missing."""
@@ -105,15 +142,22 @@ class Sights:
             scene.facts["arcs"] = self.arcs.shape[1]
 
 
-def sights_now(env: RoverEnv, driver: Policy | None, state: Any) -> Sights:
-    """What a rover sees now, and what its driver intends; None is driven by hand."""
+def sights_now(env: RoverEnv, driver: Policy | None, state: Any, sensors: Sequence[str] = SENSORS) -> Sights:
+    """What a rover sees now, and what its driver intends.
+
+    Args:
+        env: The rover's environment.
+        driver: Who drives; None by hand.
+        state: What the driver carries from one prediction to the next.
+        sensors: Names of the sensors that the rover carries.
+    """
     simulation = env.simulation
     sights = Sights(scan=env.task.scan)
     if sights.scan is None:
         sights.missing["scan"] = NO_LIVE_SCAN
     else:
         sights.heights = scan_heights(sights.scan, simulation.terrain, simulation.q[None])
-    sights.readings = {name: distances(name, simulation)[None] for name in SENSORS}
+    sights.readings = {name: distances(name, simulation)[None] for name in sensors}
     if driver is None or not hasattr(driver, "plan"):
         sights.missing["plan"] = NO_LIVE_PLAN
     else:
@@ -121,6 +165,7 @@ def sights_now(env: RoverEnv, driver: Policy | None, state: Any) -> Sights:
         sights.path = np.full((1, PLAN_POINTS, 2), np.nan) if path is None else path[None]
         choices = getattr(driver, "choices", None)
         sights.arcs = None if choices is None else choices()
+        sights.lay(simulation.terrain, simulation.q[None])
     return sights
 
 
@@ -128,6 +173,18 @@ def scan_heights(scan: Array, terrain: Terrain, q: Array) -> Array:
     """(n, n_points) heights, m, of the ground at a scan's points for coordinates (n, nq); nan where it is unknown."""
     places = [scan_points(scan, (float(row[0]), float(row[2])), float(row[4])) for row in q]
     return heights_of(terrain, np.concatenate(places)).reshape(len(q), -1)
+
+
+def draped(points: Array, terrain: Terrain, q: Array) -> Array:
+    """(n, k) heights of the ground, m, without its rocks, at points (n, k, 2) ahead and to the right of the trunk.
+
+    Where the ground is unknown, they are the trunk's.
+    """
+    sine, cosine = np.sin(q[:, 4, None]), np.cos(q[:, 4, None])
+    ahead, right = points[..., 0], points[..., 1]
+    x, z = q[:, 0, None] + cosine * ahead + sine * right, q[:, 2, None] - sine * ahead + cosine * right
+    heights = bare_heights(terrain, np.stack((x, z), axis=-1)).reshape(x.shape)
+    return np.where(np.isfinite(heights), heights, q[:, 1, None])
 
 
 def recorded_sights(data: Mapping[str, Array], scene: Mapping[str, Any], terrain: Terrain) -> Sights:
@@ -154,6 +211,8 @@ def recorded_sights(data: Mapping[str, Array], scene: Mapping[str, Any], terrain
         sights.path = data[PATH].reshape(len(data[PATH]), -1, 2)
         if isinstance(scene.get("arcs"), list):
             sights.arcs = np.asarray(scene["arcs"], dtype=np.float64)
+        if "q" in data:
+            sights.lay(terrain, data["q"])
     else:
         sights.missing["plan"] = NO_PLAN
     return sights

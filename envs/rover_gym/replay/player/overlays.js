@@ -120,7 +120,7 @@ class Chains {
     view.world.add(this.mesh);
   }
 
-  show(chains) {
+  show(_, chains) {
     if (this.shown === chains) return;
     this.shown = chains;
     const at = this.mesh.geometry.attributes.position;
@@ -131,6 +131,51 @@ class Chains {
       const [a, b] = [(-0.5 * wide * (v - y)) / length, (0.5 * wide * (u - x)) / length];
       const z = 0.004;
       at.array.set([x + a, y + b, z, x - a, y - b, z, u + a, v + b, z, u + a, v + b, z, x - a, y - b, z, u - a, v - b, z], 18 * i);
+    }
+    at.needsUpdate = true;
+  }
+}
+
+// The strongest contacts among balls as bars in front of them: three-sided, wider where the force is larger.
+class Beams {
+  static SIDES = 3;
+
+  constructor(view, channel) {
+    this.shown = null;
+    const corners = 2 * Beams.SIDES;
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(3 * corners * channel.count), 3));
+    const faces = [0, 1, 2].flatMap((k) => [k, k + 3, (k + 1) % 3, (k + 1) % 3, k + 3, (k + 1) % 3 + 3]);
+    geometry.setIndex(Array.from({ length: channel.count }, (_, i) => faces.map((corner) => corners * i + corner)).flat());
+    const paint = { color: colourOf(view.scene.chain), side: THREE.DoubleSide, fog: false, depthTest: false, transparent: true };
+    this.mesh = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial(paint));
+    this.mesh.frustumCulled = false;
+    this.mesh.renderOrder = 4;
+    view.world.add(this.mesh);
+  }
+
+  show(visible, chains) {
+    this.mesh.visible = visible;
+    if (!visible || this.shown === chains) return;
+    this.shown = chains;
+    const at = this.mesh.geometry.attributes.position;
+    const [from, to, way, side, up] = Array.from({ length: 5 }, () => new THREE.Vector3());
+    let k = 0;
+    for (let i = 0; i < chains.channel.count; i++) {
+      from.set(...[0, 1, 2].map((c) => chains.value(i, c)));
+      to.set(...[3, 4, 5].map((c) => chains.value(i, c)));
+      way.subVectors(to, from).normalize();
+      side.set(1, 0, 0).cross(way);
+      if (side.lengthSq() < 0.1) side.set(0, 0, 1).cross(way);
+      up.crossVectors(way, side.normalize());
+      const half = 0.5 * chains.value(i, 6);
+      for (const end of [from, to]) {
+        for (let turn = 0; turn < Beams.SIDES; turn++, k += 3) {
+          const angle = (2 * Math.PI * turn) / Beams.SIDES;
+          const [c, s] = [half * Math.cos(angle), half * Math.sin(angle)];
+          at.array.set([end.x + c * side.x + s * up.x, end.y + c * side.y + s * up.y, end.z + c * side.z + s * up.z], k);
+        }
+      }
     }
     at.needsUpdate = true;
   }
@@ -149,7 +194,7 @@ class Overlays {
       for (let i = 0; i < n; i++) this.bands.add(i, ...trail.subarray(3 * (k * n + i), 3 * (k * n + i) + 3));
     }
     this.arrows = channel("forces") ? new Arrows(view, n, colourOf(scene.force)) : null;
-    this.chains = channel("chains") ? new Chains(view, channel("chains")) : null;
+    this.chains = channel("chains") ? new (view.balls ? Beams : Chains)(view, channel("chains")) : null;
     this.sights = new Sights(view);
     this.tyres = scene.wheels.map(({ frame }) => (frame === undefined ? [] : view.frames[frame].children));
   }
@@ -158,16 +203,20 @@ class Overlays {
   // without a rover names only what it has.
   offers() {
     const { scene, rocks } = this.view;
-    const all = [["marks", "m", this.bands], ["trails", "v", this.bands], ["forces", "f", this.arrows], ...this.sights.offers(),
-      ["loads", "l", this.arrows], ["slope", "h", scene.rover && !this.view.balls], ["spheres", "k", rocks.children.length]];
+    const { balls } = this.view;
+    const all = [["marks", "m", this.bands && !balls], ["trails", "v", this.bands], ["forces", "f", this.arrows || (balls && this.chains)],
+      ...this.sights.offers(),
+      ["loads", "l", this.arrows], ["slope", "h", scene.rover && !balls], ["spheres", "k", rocks.children.length]];
     const reason = (name) => scene.missing?.[name] ?? (name === "spheres" ? "no rocks lie here" : "this run does not hold it");
     return all.filter(([, , there]) => there || scene.rover).map(([name, key, there]) => [name, key, there ? "" : reason(name)]);
   }
 
   show({ before, after, share, k }) {
     const { on, scene } = this.view;
-    this.bands?.draw(this.live ? Infinity : k + 1, on.has("trails"), on.has("trails") || (on.has("marks") && !scene.ruts), scene.wheels);
-    this.chains?.show(before.chains);
+    const marked = on.has("marks") && !scene.ruts && !this.view.balls;
+    this.bands?.draw(this.live ? Infinity : k + 1, on.has("trails"), on.has("trails") || marked, scene.wheels);
+    this.chains?.show(on.has("forces"), before.chains);
+    if (!this.arrows) this.sights.show({ before, after, share }, []);
     if (!this.arrows) return;
     const value = (i, c) => before.forces.value(i, c, after.forces, share);
     const forces = scene.wheels.map((_, i) => ({

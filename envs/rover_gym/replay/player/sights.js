@@ -41,58 +41,63 @@ class Dots {
   }
 }
 
-// A ribbon along points (ahead, right) in a level frame, as triangles.
-const ribbon = (points, half) => {
-  const quads = [];
+// Writes a ribbon along points [x, y, z] into an array of triangles, from index `at` on; returns where it ends.
+const ribbon = (points, half, places, at) => {
   for (let k = 0; k + 1 < points.length; k++) {
-    const [[x, z], [u, w]] = [points[k], points[k + 1]];
+    const [[x, y, z], [u, v, w]] = [points[k], points[k + 1]];
     const length = Math.hypot(u - x, w - z);
     if (!(length > 1e-4)) continue;
     const [a, b] = [(-half * (w - z)) / length, (half * (u - x)) / length];
-    quads.push(x + a, 0, z + b, x - a, 0, z - b, u + a, 0, w + b, u + a, 0, w + b, x - a, 0, z - b, u - a, 0, w - b);
+    for (const value of [x + a, y, z + b, x - a, y, z - b, u + a, v, w + b, u + a, v, w + b, x - a, y, z - b, u - a, v, w - b])
+      places[at++] = value;
   }
-  return new Float32Array(quads);
+  return at;
 };
 
-// The path that the driver follows, and the arcs that it chose from, on the ground under the rover.
+// The path that the driver follows, and the arcs that it chose from, on the ground's heights.
 class Plan {
   constructor(view) {
-    const { scene } = view;
-    this.group = new THREE.Group();
-    view.world.add(this.group);
-    const paint = (color, opacity) =>
-      new THREE.MeshBasicMaterial({ color, opacity, transparent: true, depthTest: false, side: THREE.DoubleSide, fog: false });
-    const add = (places, material) => {
+    this.scene = view.scene;
+    const add = (ribbons, points, color, opacity) => {
       const geometry = new THREE.BufferGeometry();
-      geometry.setAttribute("position", new THREE.BufferAttribute(places, 3));
-      const mesh = new THREE.Mesh(geometry, material);
+      geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(18 * ribbons * (points - 1)), 3));
+      const paint = { color, opacity, transparent: true, depthTest: false, side: THREE.DoubleSide, fog: false };
+      const mesh = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial(paint));
       mesh.frustumCulled = false;
       mesh.renderOrder = 4;
-      this.group.add(mesh);
+      view.world.add(mesh);
       return mesh;
     };
-    const { arcs } = scene.arrays;
-    const quads = [];
-    for (let at = 0; arcs && at < arcs.length; at += 2 * scene.arcs) {
-      const points = Array.from({ length: scene.arcs }, (_, k) => [arcs[at + 2 * k], arcs[at + 2 * k + 1]]);
-      quads.push(...ribbon(points, 0.008 * scene.reach));
-    }
-    add(new Float32Array(quads), paint(PLAN_COLOURS.arcs, 0.35));
-    this.path = add(new Float32Array(0), paint(PLAN_COLOURS.path, 0.9));
-    this.shown = null;
+    const { arcs } = this.scene.arrays;
+    const count = (name) => this.scene.channels.find((one) => one.name === name)?.count;
+    this.arcs = arcs && count("arc-heights") ? add(arcs.length / (2 * this.scene.arcs), this.scene.arcs, PLAN_COLOURS.arcs, 0.35) : null;
+    this.path = add(1, count("path"), PLAN_COLOURS.path, 0.9);
   }
 
-  show(visible, { path }, trunk, ground, reach) {
-    this.group.visible = visible;
-    if (!visible) return;
-    this.group.position.copy(trunk.position);
-    this.group.quaternion.copy(trunk.quaternion);
-    this.group.translateY(ground);
-    if (this.shown === path) return;
-    this.shown = path;
-    const points = Array.from({ length: path.channel.count }, (_, i) => [path.value(i, 0), path.value(i, 1)]);
-    const places = points[0][0] < -9e4 ? new Float32Array(0) : ribbon(points, 0.035 * reach);
-    this.path.geometry.setAttribute("position", new THREE.BufferAttribute(places, 3));
+  // `at` turns ahead and right into x and z.
+  show(visible, frame, at) {
+    const { reach, arcs: n, arrays: { arcs } } = this.scene;
+    const lift = 0.02 * reach;
+    const draw = (mesh, ribbons, half) => {
+      if (!mesh) return;
+      mesh.visible = visible;
+      if (!visible) return;
+      const { position } = mesh.geometry.attributes;
+      mesh.geometry.setDrawRange(0, ribbons.reduce((end, points) => ribbon(points, half, position.array, end), 0) / 3);
+      position.needsUpdate = true;
+    };
+    const point = (ahead, right, height) => {
+      const [x, z] = at(ahead, right);
+      return [x, height + lift, z];
+    };
+    const path = frame.path.value(0, 0) < -9e4 ? [] // nothing is planned yet
+      : Array.from({ length: frame.path.channel.count }, (_, i) => point(...[0, 1, 2].map((c) => frame.path.value(i, c))));
+    draw(this.path, [path], 0.035 * reach);
+    const heights = frame["arc-heights"];
+    if (visible && this.arcs) {
+      const all = Array.from({ length: heights.channel.count }, (_, i) => point(arcs[2 * i], arcs[2 * i + 1], heights.value(i, 0)));
+      draw(this.arcs, Array.from({ length: all.length / n }, (_, i) => all.slice(n * i, n * (i + 1))), 0.008 * reach);
+    } else draw(this.arcs, [], 0);
   }
 }
 
@@ -191,7 +196,7 @@ class MassCentre {
     this.ball.scale.setScalar(0.045 * reach);
     this.foot.position.copy(below);
     this.foot.scale.setScalar(0.025 * reach);
-    this.ball.material.color.set(isInside(corners, below) ? 0x3d7bff : 0xff8c1a);
+    this.ball.material.color.set(!corners.length || isInside(corners, below) ? 0x3d7bff : 0xff8c1a);
   }
 }
 
@@ -225,28 +230,26 @@ class Sights {
       const place = new THREE.Vector3(...[0, 1, 2].map((c) => before.mass.value(0, c, after.mass, share)));
       this.mass.show(on.has("mass"), place, feet, reach);
     }
-    if (this.plan) {
-      const under = contacts.map(({ foot }) => trunk.worldToLocal(foot.clone()).y);
-      const ground = under.reduce((sum, y) => sum + y, 0) / Math.max(1, under.length);
-      this.plan.show(on.has("plan"), before, trunk, ground + 0.03 * reach, reach);
-    }
-    this.showScan(before, after, share, trunk);
+    if (!scene.rover) return;
+    const ahead = new THREE.Vector3(1, 0, 0).applyQuaternion(trunk.quaternion);
+    const [c, s] = [ahead.x, -ahead.z].map((part) => part / (Math.hypot(ahead.x, ahead.z) || 1)); // of the heading
+    const at = (x, z) => [trunk.position.x + c * x + s * z, trunk.position.z - s * x + c * z];
+    this.plan?.show(on.has("plan"), before, at);
+    this.showScan(before, after, share, at);
     for (const name of ["laser", "depth"]) this.showRays(name, before[name], trunk);
   }
 
-  showScan(before, after, share, trunk) {
+  // `at` turns ahead and right into x and z.
+  showScan(before, after, share, at) {
     const { "scan-grid": grid } = this.view.scene.arrays;
-    const ahead = new THREE.Vector3(1, 0, 0).applyQuaternion(trunk.quaternion);
-    const yaw = Math.atan2(-ahead.z, ahead.x);
-    const [c, s] = [Math.cos(yaw), Math.sin(yaw)];
     this.dots.scan?.draw(this.view.on.has("scan"), (places) => {
       let n = 0;
       for (let i = 0; 2 * i < grid.length; i++) {
         const y = before.scan.value(i, 0);
         if (y < -9e4) continue;
-        const [x, z] = [grid[2 * i], grid[2 * i + 1]];
+        const [x, z] = at(grid[2 * i], grid[2 * i + 1]);
         const level = after.scan.value(i, 0) < -9e4 ? y : before.scan.value(i, 0, after.scan, share);
-        places.set([trunk.position.x + c * x + s * z, level + 0.01, trunk.position.z - s * x + c * z], 3 * n++);
+        places.set([x, level + 0.01, z], 3 * n++);
       }
       return n;
     });

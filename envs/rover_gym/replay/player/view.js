@@ -140,8 +140,17 @@ class View {
   }
 
   addSky() {
-    const dome = new THREE.SphereGeometry(1, 24, 24);
-    dome.setAttribute("color", new THREE.BufferAttribute(new Float32Array(dome.attributes.position.array.length), 3));
+    const { bands } = this.scene; // [elevation, share of the colour overhead]
+    const dome = new THREE.SphereGeometry(1, 24, bands.length - 1);
+    const { position } = dome.attributes;
+    this.shares = Float32Array.from({ length: position.count }, (_, i) => {
+      const [degrees, share] = bands[bands.length - 1 - Math.floor(i / 25)]; // rows of 25, from the top
+      const [elevation, around] = [(Math.PI * degrees) / 180, (2 * Math.PI * (i % 25)) / 24];
+      const wide = Math.cos(elevation);
+      position.setXYZ(i, -wide * Math.cos(around), Math.sin(elevation), wide * Math.sin(around));
+      return share;
+    });
+    dome.setAttribute("color", new THREE.BufferAttribute(new Float32Array(3 * position.count), 3));
     const material = new THREE.MeshBasicMaterial({ vertexColors: true, side: THREE.BackSide, fog: false, depthWrite: false });
     this.dome = new THREE.Mesh(dome, material);
     this.dome.renderOrder = -1;
@@ -155,13 +164,12 @@ class View {
     const [overhead, horizon] = dark
       ? [new THREE.Color(NIGHT.overhead), new THREE.Color(NIGHT.horizon)]
       : flat ? [new THREE.Color(0xf4f4f4), new THREE.Color(0xf4f4f4)] : [colourOf(sky[0]), colourOf(sky[1])];
-    const { position, color } = this.dome.geometry.attributes;
+    const { color } = this.dome.geometry.attributes;
     const shade = new THREE.Color();
-    for (let i = 0; i < position.count; i++) {
-      const up = Math.max(0, position.getY(i));
-      shade.copy(horizon).lerp(overhead, Math.min(1, 1.6 * up));
+    this.shares.forEach((share, i) => {
+      shade.copy(horizon).lerp(overhead, share);
       color.setXYZ(i, shade.r, shade.g, shade.b);
-    }
+    });
     color.needsUpdate = true;
     const far = this.scene.haze;
     this.world.fog = far ? new THREE.Fog(horizon, 0.3 * far, far) : null;
@@ -217,15 +225,14 @@ class View {
   addGroup({ frame, first, count, role }) {
     const { vertices, colours, triangles } = this.scene.arrays;
     const used = triangles.subarray(first, first + count);
-    const [places, paints] = [new Float32Array(3 * count), new Uint8Array(4 * count)];
-    used.forEach((corner, i) => {
-      places.set(vertices.subarray(3 * corner, 3 * corner + 3), 3 * i);
-      paints.set(colours.subarray(4 * corner, 4 * corner + 4), 4 * i);
-    });
+    const least = used.reduce((a, b) => Math.min(a, b), Infinity);
+    const most = used.reduce((a, b) => Math.max(a, b), 0) + 1;
     const geometry = new THREE.BufferGeometry();
-    geometry.setAttribute("position", new THREE.BufferAttribute(places, 3));
-    geometry.setAttribute("color", new THREE.BufferAttribute(paints, 4, true));
-    const material = role === "soil" ? this.ground({ side: THREE.DoubleSide }, true) : this.lit({ vertexColors: true });
+    geometry.setAttribute("position", new THREE.BufferAttribute(vertices.slice(3 * least, 3 * most), 3));
+    geometry.setAttribute("color", new THREE.BufferAttribute(colours.slice(4 * least, 4 * most), 4, true));
+    geometry.setIndex(new THREE.BufferAttribute(used.map((corner) => corner - least), 1));
+    geometry.computeVertexNormals(); // flat sides share no corners
+    const material = role === "soil" ? this.ground({ side: THREE.DoubleSide }, true) : this.lit({ vertexColors: true, flatShading: false });
     if (role === "ghost") Object.assign(material, { transparent: true, opacity: 0.45, depthWrite: false });
     const mesh = new THREE.Mesh(geometry, material);
     mesh.castShadow = role === "solid";
