@@ -292,7 +292,7 @@ impl<'a> Frame<'a> {
                     is_touching: false,
                 };
                 let (mut feed, mut group) = (Feed::of(&self.immersed), Group::default());
-                while feed.fill(&mut group) {
+                while feed.fill::<T>(token, &mut group) {
                     for part in 0..MAX_LANES / T::LANES {
                         self.add::<T>(&group, (token, part * T::LANES), &mut sums);
                     }

@@ -7,9 +7,9 @@
 
 use nalgebra::Vector3;
 
-use super::soil::{Law, Soil};
+use super::soil::{Law, Resistive, Soil};
 use super::wheel::{Gauss, Ring, Rules, SandWheel, Skin};
-use crate::scalar::MAX_LANES;
+use crate::scalar::{Lane, LaneMask, MAX_LANES};
 
 /// A wheel in the sand, in its own axes: down and forward in its plane, and its axle.
 pub(super) struct Immersed<'a> {
@@ -40,11 +40,22 @@ pub(super) struct Motion {
     tilt: f64,
 }
 
-/// Part of a ring, by the tangents of a quarter of the angles at its ends.
+/// Parts of eight rings, by the tangents of a quarter of the angles at their ends; empty where
+/// `from` is not less than `to`.
+struct Arcs {
+    rings: [Option<Ring>; MAX_LANES],
+    from: [f64; MAX_LANES],
+    to: [f64; MAX_LANES],
+    /// Of the angles at which the rings leave the sand.
+    cos: [f64; MAX_LANES],
+}
+
+/// Part of a ring.
+#[derive(Clone, Copy)]
 struct Arc {
+    ring: Ring,
     from: f64,
     to: f64,
-    /// Of the angle at which the ring leaves the sand.
     cos: f64,
 }
 
@@ -67,10 +78,11 @@ pub(super) struct Group {
 /// Fills one group after the other.
 pub(super) struct Feed<'a> {
     wheel: &'a Immersed<'a>,
-    /// The next ring.
+    /// The next ring, and the eight with the last one.
     ring: usize,
+    arcs: Arcs,
     /// The arc of which points were taken, with its rule.
-    now: Option<(Ring, Arc, &'a Gauss)>,
+    now: Option<(Arc, &'a Gauss)>,
     /// Number of its points that were taken.
     taken: usize,
 }
@@ -109,29 +121,37 @@ impl<'a> Feed<'a> {
         Self {
             wheel,
             ring: 0,
+            arcs: Arcs {
+                rings: [None; MAX_LANES],
+                from: [0.0; MAX_LANES],
+                to: [0.0; MAX_LANES],
+                cos: [1.0; MAX_LANES],
+            },
             now: None,
             taken: 0,
         }
     }
 
     /// The next points. False if there are none.
-    pub fn fill(&mut self, group: &mut Group) -> bool {
+    #[inline(always)]
+    pub fn fill<T: Lane>(&mut self, token: T::Token, group: &mut Group) -> bool {
         let mut n = 0;
         while n < MAX_LANES {
             if self.now.is_none() {
-                (self.now, self.taken) = (self.next_arc(), 0);
+                (self.now, self.taken) = (self.next_arc::<T>(token), 0);
             }
-            let Some((ring, arc, rule)) = &self.now else {
+            let Some((arc, rule)) = &self.now else {
                 break;
             };
+            let skin = arc.ring.skin;
             if n == 0 {
-                group.skin = ring.skin;
-            } else if group.skin != ring.skin {
+                group.skin = skin;
+            } else if group.skin != skin {
                 break;
             }
             let left = rule.places.len() - self.taken;
             let more = left.min(MAX_LANES - n);
-            group.put((ring, arc), n, (rule, self.taken..self.taken + more));
+            group.put(arc, n, (rule, self.taken..self.taken + more));
             n += more;
             self.taken += more;
             if more == left {
@@ -142,15 +162,35 @@ impl<'a> Feed<'a> {
         n > 0
     }
 
-    fn next_arc(&mut self) -> Option<(Ring, Arc, &'a Gauss)> {
+    #[inline(always)]
+    fn next_arc<T: Lane>(&mut self, token: T::Token) -> Option<(Arc, &'a Gauss)> {
         let Immersed {
             wheel, rules, dry, ..
         } = *self.wheel;
-        while self.ring < rules.n_rings() {
-            let (ring, rule) = rules.ring(wheel, dry, self.ring);
+        let n_rings = rules.n_rings();
+        while self.ring < n_rings {
+            let at = self.ring % MAX_LANES;
+            if at == 0 {
+                for (ring, index) in self.arcs.rings.iter_mut().zip(self.ring..) {
+                    *ring = (index < n_rings)
+                        .then(|| rules.ring(wheel, dry, index))
+                        .flatten();
+                }
+                for part in 0..MAX_LANES / T::LANES {
+                    self.arcs.find::<T>(self.wheel, (token, part * T::LANES));
+                }
+            }
+            let (from, to) = (self.arcs.from[at], self.arcs.to[at]);
             self.ring += 1;
-            if let Some((ring, arc)) = ring.and_then(|ring| Some((ring, self.wheel.arc(&ring)?))) {
-                return Some((ring, arc, rule));
+            if let Some(ring) = self.arcs.rings[at].filter(|_| from < to) {
+                let cos = self.arcs.cos[at];
+                let arc = Arc {
+                    ring,
+                    from,
+                    to,
+                    cos,
+                };
+                return Some((arc, rules.along(self.ring - 1)));
             }
         }
         None
@@ -159,13 +199,9 @@ impl<'a> Feed<'a> {
 
 impl Group {
     /// Writes some points of an arc, from a lane on.
-    #[inline]
-    fn put(
-        &mut self,
-        (ring, arc): (&Ring, &Arc),
-        lane: usize,
-        (rule, points): (&Gauss, std::ops::Range<usize>),
-    ) {
+    #[inline(always)]
+    fn put(&mut self, arc: &Arc, lane: usize, (rule, points): (&Gauss, std::ops::Range<usize>)) {
+        let ring = &arc.ring;
         let (middle, half) = (0.5 * (arc.from + arc.to), 0.5 * (arc.to - arc.from));
         let scale = 4.0 * half * ring.radius * ring.width;
         let lanes = lane..lane + points.len();
@@ -184,68 +220,104 @@ impl Group {
     }
 }
 
-impl Immersed<'_> {
-    /// The part of a ring that may feel the sand; none if there is none.
-    #[inline]
-    fn arc(&self, ring: &Ring) -> Option<Arc> {
-        let raised = self.highest - self.height + ring.offset * self.g.z;
-        let swing = ring.radius * self.g.x;
-        if raised <= -swing {
-            return None;
+impl Arcs {
+    /// The parts of rings that may feel the sand, from a lane on.
+    #[inline(always)]
+    fn find<T: Lane>(&mut self, wheel: &Immersed<'_>, (token, first): (T::Token, usize)) {
+        let lanes = first..first + T::LANES;
+        let mut numbers = [[0.0; MAX_LANES]; 4];
+        for (lane, ring) in self.rings[lanes.clone()].iter().enumerate() {
+            if let Some(ring) = ring {
+                let [n_r, n_a] = ring.normal;
+                for (own, x) in numbers.iter_mut().zip([ring.radius, ring.offset, n_r, n_a]) {
+                    own[lane] = x;
+                }
+            }
         }
-        let cos = if raised >= swing {
-            -1.0
-        } else {
-            -raised / swing
+        let [radius, offset, n_r, n_a] = numbers.map(|own| T::load(token, &own[..T::LANES]));
+        let rings = LaneRings {
+            radius,
+            offset,
+            n_r,
+            n_a,
         };
-        let end = quarter(cos, 1.0);
-        let [from, to] = self.pushing(ring, end);
-        (from < to).then_some(Arc { from, to, cos })
+        let (zero, one) = (radius.like(0.0), radius.like(1.0));
+        let raised = radius.like(wheel.highest - wheel.height) + offset * radius.like(wheel.g.z);
+        let swing = radius * radius.like(wheel.g.x);
+        let is_clear = raised.le(-swing);
+        let cos = T::select(raised.ge(swing), -one, -(raised / swing));
+        let end = quarter(cos, one);
+        let whole = [-end, end];
+        let [from, to] = match &wheel.soil.law {
+            Law::Resistive(sand) => rings.pushing(wheel, sand, whole),
+            Law::Bekker(_) => whole,
+        };
+        T::select(is_clear, zero, from).store(&mut self.from[lanes.clone()]);
+        T::select(is_clear, zero, to).store(&mut self.to[lanes.clone()]);
+        cos.store(&mut self.cos[lanes]);
     }
+}
 
+/// Rings side by side.
+struct LaneRings<T> {
+    radius: T,
+    offset: T,
+    n_r: T,
+    n_a: T,
+}
+
+impl<T: Lane> LaneRings<T> {
     /// The part of an arc up to `tan(θ/4) = end` on both sides of its lowest point on which the
     /// surface may push: `x·n > −B`, where B is the most that leaves a stress.
-    #[inline]
-    fn pushing(&self, ring: &Ring, end: f64) -> [f64; 2] {
-        let whole = [-end, end];
-        let Law::Resistive(sand) = &self.soil.law else {
-            return whole;
-        };
-        let [n_r, n_a] = ring.normal;
+    #[inline(always)]
+    fn pushing(&self, wheel: &Immersed<'_>, sand: &Resistive, whole: [T; 2]) -> [T; 2] {
+        let number = |value: f64| self.radius.like(value);
+        let (zero, one) = (number(0.0), number(1.0));
         let Motion {
             size,
             spin,
             speed,
             tilt,
-        } = self.motion;
-        let largest = size + spin * (ring.radius + ring.offset.abs());
-        let sideways = self.shift.z.abs() + tilt * ring.radius;
-        let bound = sand.flow.grip * sand.flow.width * largest
-            + n_a.abs() * sideways
-            + n_r * tilt * ring.offset.abs();
-        if bound >= n_r * speed {
+        } = wheel.motion;
+        let reach = self.radius + self.offset.abs();
+        let largest = number(size) + number(spin) * reach;
+        let sideways = number(wheel.shift.z.abs()) + number(tilt) * self.radius;
+        let bound = number(sand.flow.grip * sand.flow.width) * largest
+            + self.n_a.abs() * sideways
+            + self.n_r * number(tilt) * self.offset.abs();
+        let normal = self.n_r * number(speed);
+        let all_push = bound.ge(normal);
+        if all_push.all() {
             return whole;
         }
         // The directions at which it ends, on both sides of that of the motion.
-        let (cos, sin) = (self.shift.x / speed, self.shift.y / speed);
-        let far = -bound / (n_r * speed);
-        let across = (1.0 - far * far).max(0.0).sqrt();
-        let [low, high] = [-across, across].map(|s| [cos * far - sin * s, sin * far + cos * s]);
-        let [from, to] = [low, high].map(|[c, s]| quarter(c, s));
+        let (cos, sin) = (wheel.shift.x / speed, wheel.shift.y / speed);
+        let (c, s) = (number(cos), number(sin));
+        let far = -(bound / normal);
+        let across = (one - far * far).max(zero).sqrt();
+        let low = [c * far + s * across, s * far - c * across];
+        let high = [c * far - s * across, s * far + c * across];
+        let [from, to] = [low, high].map(|[cos, sin]| quarter(cos, sin));
+        let [start, end] = whole;
+        let (later, sooner) = (from.max(start), to.min(end));
         // An end beyond θ = ±π lies on the other side of the circle.
-        let is_over = [sin < 0.0 && low[1] > 0.0, sin > 0.0 && high[1] < 0.0];
-        match is_over {
-            [false, false] => [from.max(-end), to.min(end)],
-            [true, _] if from >= end => [-end, to.min(end)],
-            [_, true] if to <= -end => [from.max(-end), end],
-            _ => whole,
-        }
+        let none = all_push & !all_push;
+        let before = if sin < 0.0 { low[1].gt(zero) } else { none };
+        let behind = if sin > 0.0 { high[1].lt(zero) } else { none };
+        let (only_end, only_start) = (before & from.ge(end), behind & to.le(start));
+        let is_whole = all_push | (before & !only_end) | (behind & !only_start);
+        [
+            T::select(is_whole | only_end, start, later),
+            T::select(is_whole | only_start, end, sooner),
+        ]
     }
 }
 
 /// `tan(θ/4)` of the angle of a unit vector, −π < θ <= π.
-fn quarter(cos: f64, sin: f64) -> f64 {
-    let half_cos = (0.5 * (1.0 + cos)).max(0.0).sqrt();
-    let half_sin = (0.5 * (1.0 - cos)).max(0.0).sqrt();
-    half_sin.copysign(sin) / (1.0 + half_cos)
+#[inline(always)]
+fn quarter<T: Lane>(cos: T, sin: T) -> T {
+    let (zero, one, half) = (cos.like(0.0), cos.like(1.0), cos.like(0.5));
+    let half_cos = (half * (one + cos)).max(zero).sqrt();
+    let half_sin = (half * (one - cos)).max(zero).sqrt();
+    T::select(sin.lt(zero), -half_sin, half_sin) / (one + half_cos)
 }

@@ -17,6 +17,7 @@ use crate::scalar::Lane;
 
 /// Cells along the side of a tile.
 const SIDE: usize = 16;
+const WIDE: i32 = 16;
 
 /// Depths of a tile's cells, m, row by row.
 type Tile = Box<[f64]>;
@@ -144,6 +145,29 @@ impl Window {
         self
     }
 
+    /// Copies the cells of a tile that it covers; whether any has a depth.
+    fn copy_tile(&mut self, tile: &Tile, place: [i32; 2]) -> bool {
+        // Of the tile's cells along each axis: the first in the window, where it stands there, and
+        // how many follow.
+        let [(left, to, n), (top, down, rows)] = std::array::from_fn(|d| {
+            let start = place[d].saturating_mul(WIDE);
+            let before = usize::try_from(self.first[d].saturating_sub(start)).unwrap_or(0);
+            let after = usize::try_from(start.saturating_sub(self.first[d])).unwrap_or(0);
+            let n = SIDE.saturating_sub(before);
+            (before, after, n.min(self.size[d].saturating_sub(after)))
+        });
+        let (width, mut sum) = (self.size[0], 0.0);
+        for k in 0..rows {
+            let from = &tile[(top + k) * SIDE + left..][..n];
+            let row = &mut self.depths[(down + k) * width + to..][..n];
+            for (own, depth) in row.iter_mut().zip(from) {
+                *own = *depth;
+                sum += *depth;
+            }
+        }
+        sum > 0.0
+    }
+
     #[inline]
     fn index(&self, i: i32, k: i32) -> Option<usize> {
         let column = usize::try_from(i.wrapping_sub(self.first[0])).ok()?;
@@ -226,10 +250,9 @@ fn floor<T: Lane>(x: T) -> T {
 
 /// Indices of a cell's tile, and of the cell in it.
 fn tile_of([i, k]: [i32; 2]) -> ((i32, i32), usize) {
-    let side = i32::try_from(SIDE).unwrap_or(i32::MAX);
-    let place = |n: i32| usize::try_from(n.rem_euclid(side)).unwrap_or(0);
+    let place = |n: i32| usize::try_from(n.rem_euclid(WIDE)).unwrap_or(0);
     (
-        (i.div_euclid(side), k.div_euclid(side)),
+        (i.div_euclid(WIDE), k.div_euclid(WIDE)),
         place(k) * SIDE + place(i),
     )
 }
@@ -267,12 +290,11 @@ impl RutMap {
     /// Cells with a rut: column along x, row along z, and depth, m.
     #[must_use]
     pub fn cells(&self) -> Vec<(i32, i32, f64)> {
-        let side = i32::try_from(SIDE).unwrap_or(i32::MAX);
         let cells = self.tiles.iter().flat_map(|(&(column, row), tile)| {
             let cells = tile.iter().enumerate();
             cells.map(move |(at, depth)| {
                 let [i, k] = [at % SIDE, at / SIDE].map(|n| i32::try_from(n).unwrap_or(0));
-                (column * side + i, row * side + k, *depth)
+                (column * WIDE + i, row * WIDE + k, *depth)
             })
         });
         let mut cells: Vec<_> = cells.filter(|(.., depth)| *depth > 0.0).collect();
@@ -322,26 +344,24 @@ impl RutMap {
         if self.tiles.is_empty() {
             return false;
         }
-        let [columns, rows] = around(place, reach, cell);
-        window.clear([columns.clone(), rows.clone()]);
-        let (first, width) = (*columns.start(), window.size[0]);
-        let mut deepest = 0.0_f64;
-        for (k, row) in rows.zip(window.depths.chunks_exact_mut(width.max(1))) {
-            // The cells of a row that share a tile lie side by side in it.
-            let mut column = 0;
-            while column < width {
-                let offset = i32::try_from(column).unwrap_or(0);
-                let (tile, at) = tile_of([first + offset, k]);
-                let n = (SIDE - at % SIDE).min(width - column);
-                if let Some(tile) = self.tiles.get(&tile) {
-                    let depths = &tile[at..at + n];
-                    row[column..column + n].copy_from_slice(depths);
-                    deepest = depths.iter().fold(deepest, |most, depth| most.max(*depth));
+        window.clear(around(place, reach, cell));
+        let ([first, below], [width, height]) = (window.first, window.size);
+        let along = |start: i32, n: usize| {
+            let end = start.saturating_add(i32::try_from(n).unwrap_or(0));
+            start.div_euclid(WIDE)..=end.saturating_sub(1).div_euclid(WIDE)
+        };
+        let mut is_rutted = false;
+        if window.depths.is_empty() {
+            return false;
+        }
+        for row in along(below, height) {
+            for column in along(first, width) {
+                if let Some(tile) = self.tiles.get(&(column, row)) {
+                    is_rutted |= window.copy_tile(tile, [column, row]);
                 }
-                column += n;
             }
         }
-        deepest > 0.0
+        is_rutted
     }
 
     /// Notes where a wheel is: `depth_at` gives the depth of its rim under the undisturbed surface

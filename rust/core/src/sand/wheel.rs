@@ -162,24 +162,31 @@ impl Rules {
         drum + 2 * (1 + wall)
     }
 
-    /// A ring, none if it is empty, and the rule along it: first those of the drum, then the edge
-    /// of each side, then those of the walls, side after side. Of a wall, a part may be under the
-    /// surface from the radius `dry` (m) on.
+    /// A ring, none if it is empty: first those of the drum, then the edge of each side, then those
+    /// of the walls, side after side. Of a wall, a part may be under the surface from the radius
+    /// `dry` (m) on.
     #[must_use]
-    pub fn ring(&self, wheel: &SandWheel, dry: f64, index: usize) -> (Option<Ring>, &Gauss) {
+    pub fn ring(&self, wheel: &SandWheel, dry: f64, index: usize) -> Option<Ring> {
         let n_strips = self.drum[1].places.len();
         let Some(beside) = index.checked_sub(n_strips) else {
-            return (self.strip(wheel, index), &self.drum[0]);
+            return self.strip(wheel, index);
         };
-        let (ring, rule) = match (beside / 2).checked_sub(1) {
-            None => (Self::edge(wheel), &self.edge),
-            Some(point) => (self.wall(wheel, dry, point), &self.wall[0]),
+        let ring = match (beside / 2).checked_sub(1) {
+            None => Self::edge(wheel),
+            Some(point) => self.wall(wheel, dry, point),
         };
         let is_left = beside % 2 == 1;
-        (
-            ring.map(|ring| if is_left { ring.mirrored() } else { ring }),
-            rule,
-        )
+        ring.map(|ring| if is_left { ring.mirrored() } else { ring })
+    }
+
+    /// The rule along a ring.
+    #[must_use]
+    pub fn along(&self, index: usize) -> &Gauss {
+        match index.checked_sub(self.drum[1].places.len()) {
+            None => &self.drum[0],
+            Some(0 | 1) => &self.edge,
+            Some(_) => &self.wall[0],
+        }
     }
 
     fn strip(&self, wheel: &SandWheel, index: usize) -> Option<Ring> {
@@ -271,7 +278,7 @@ mod tests {
             edge: 2,
             wall: [2, 3],
         });
-        for ring in (0..rules.n_rings()).filter_map(|k| rules.ring(&wheel, 0.0, k).0) {
+        for ring in (0..rules.n_rings()).filter_map(|k| rules.ring(&wheel, 0.0, k)) {
             let of_ring = std::f64::consts::TAU * ring.radius * ring.width;
             area[usize::from(ring.skin == Skin::Wall)] += of_ring;
         }
