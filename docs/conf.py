@@ -27,12 +27,13 @@ extensions = [
     "sphinx.ext.napoleon",
     "extensions.contents",
     "extensions.docstrings",
+    "extensions.gallery",
 ]
 exclude_patterns = ["_build", "_generated/names.md", "_generated/other-rooms.md", "_generated/pages", "extensions"]
 html_theme = "furo"
 html_title = f"rover-gym {release}"
 html_static_path = ["_static"]
-html_extra_path = ["_generated/pages"]  # the gallery's page of the player
+html_extra_path = ["_generated/pages"]  # the gallery's frames and pages
 (HERE / "_generated" / "pages").mkdir(parents=True, exist_ok=True)
 html_css_files = ["manual.css"]
 default_role = "literal"  # docstrings write `code` as Markdown does
@@ -50,7 +51,7 @@ autodoc_default_options = {"members": True, "undoc-members": True}
 
 def _write_generated(_app: Sphinx) -> None:
     folder = HERE / "_generated"
-    gallery.write_gallery(folder / "gallery", folder / "pages")
+    gallery.write_gallery(folder / "pages")
     pages = {
         **cards.pages(),
         "command-line.md": command_line.page(),

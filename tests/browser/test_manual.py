@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from browser.manual_pages import DOCS, build, printed
-from browser.test_replay_page import await_that, start_browser
+from browser.test_replay_page import await_that, messages, start_browser
 from PIL import Image
 from selenium import webdriver
 
@@ -170,17 +170,29 @@ def test_the_start_page_has_four_ways_in(manual: Path, browser: webdriver.Chrome
     assert all(width > 0 and Path(link.removeprefix("file://")).is_file() for link, width in links)
 
 
-def test_the_gallery_shows_every_environment_and_a_page_that_draws(manual: Path, browser: webdriver.Chrome) -> None:
+def test_the_gallery_shows_every_environment_and_plays_a_drive_when_it_is_opened(
+    manual: Path, browser: webdriver.Chrome
+) -> None:
     browser.get((manual / "gallery.html").as_uri())
-    shown = browser.execute_script("return [...document.querySelectorAll('article img')].map((one) => one.src);")
+    assert asked_for(browser) == set()  # no page is loaded before it is opened
     for name in ENVIRONMENTS:
-        (place,) = [address for address in shown if address.endswith(f"/{name.lower()}.webp")]
-        image = np.asarray(Image.open(manual / place.rpartition("/html/")[2]))
+        shown = f"article img[src$='{name.lower()}.webp']"
+        assert len(browser.find_elements("css selector", shown)) == 1
+        image = np.asarray(Image.open(manual / f"{name.lower()}.webp"))
         assert image.std(axis=(0, 1)).min() > 10.0
-    assert sum(path.stat().st_size for path in (manual / "_images").glob("rover*-v0.webp")) < 300_000
-    frame = browser.find_element("css selector", "iframe.player")
-    browser.execute_script("arguments[0].loading = 'eager'; arguments[0].scrollIntoView();", frame)
+        assert (manual / f"{name.lower()}.webp").stat().st_size < 60_000
+        assert 300_000 < (manual / f"gallery-{name.lower()}.html").stat().st_size < 2_000_000
+    (summary,) = browser.find_elements("css selector", "details:has(iframe[data-page$='roverrocks-v0.html']) summary")
+    browser.execute_script("arguments[0].scrollIntoView(); arguments[0].click();", summary)
+    frame = browser.find_element("css selector", "iframe[data-page$='roverrocks-v0.html']")
     browser.switch_to.frame(frame)
     drawn = "return Number(document.querySelector('#root canvas')?.dataset.drawn || 0);"
     await_that(lambda: browser.execute_script(drawn) > 2, "the page in the gallery")
     browser.switch_to.default_content()
+    assert asked_for(browser) == {"gallery-roverrocks-v0.html"}
+
+
+def asked_for(browser: webdriver.Chrome) -> set[str]:
+    """The gallery's pages that the browser has asked for since the last call."""
+    names = {told["request"]["url"].rpartition("/")[2] for told in messages(browser, "Network.requestWillBeSent")}
+    return {name for name in names if name.startswith("gallery-")}

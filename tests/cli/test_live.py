@@ -65,7 +65,8 @@ def test_it_serves_its_page_and_keeps_the_recording_when_it_is_ended(tmp_path: P
         process.kill()
         process.wait()
     assert process.returncode == 0, errors
-    assert output.splitlines() == [f"recorded: {tmp_path / 'live-1.h5'}"]
+    path = tmp_path / "live-1.h5"
+    assert output.splitlines() == [f"recorded: {path}", f"watch it: rover replay {path}"]
     assert errors == ""
     run = read_run(tmp_path / "live-1.h5")
     assert run.n_frames >= 10

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from rover_gym.cli.console import check_folder, plain_errors
+from rover_gym.cli.newest import say_how_to_watch
 from rover_gym.cli.options import (
     BUILT_IN,
     DRIVERS_HELP,
@@ -28,6 +29,7 @@ from rover_gym.live import LiveChoices, LiveLoop, LiveRover, LiveScene, LiveServ
 from rover_gym.live.live_scene import BY_HAND
 from rover_gym.mechanics import Terrain
 
+FOLDER = Path("runs/live")  # of the recordings
 #: How often the command looks whether the drive still runs, s.
 LOOK = 0.2
 
@@ -52,7 +54,7 @@ def live(
     seed: Annotated[int, typer.Option(min=0, help="Seed of ground, start and goal.")] = 0,
     output: Annotated[
         Path, typer.Option(file_okay=False, help="Folder of the recordings that the page asks for.")
-    ] = Path(),
+    ] = FOLDER,
     mcap: Annotated[
         bool, typer.Option("--mcap", help="Write each recording as an MCAP log, too (extra logs).")
     ] = False,
@@ -110,5 +112,6 @@ def live(
         server.stop()
     if loop.recorded:
         typer.echo(f"recorded: {', '.join(map(str, loop.recorded))}")
+        say_how_to_watch([path for path in loop.recorded if path.suffix == ".h5"][-1])
     if loop.failure is not None:
         raise loop.failure

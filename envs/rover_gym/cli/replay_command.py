@@ -25,6 +25,7 @@ def replay(
     run: Annotated[
         Path | None,
         typer.Argument(
+            metavar="RUN",
             help="What `rover drive`, `rover report`, `rover planar` or `rover grains` saved, or a folder of such runs,"
             " of which the newest is taken. Default: the newest in runs.",
             autocompletion=complete_recording,
@@ -121,8 +122,9 @@ def plot(
 
     Of a ball or a two-wheel rover: the path over the ground, speed, loads, gaps, energy.
 
-    Of a run on a soil: speed, slip and sinkage; forces on the wheels; energy, contacts and overlap. Of balls in space
-    also the ruts: the surface before and after, with sections along and across a track.
+    Of a run on a soil: speed, slip and sinkage; forces on the wheels; energy, contacts and overlap.
+
+    Of balls: the same, and the ruts: the surface before and after, with sections along and across a track.
     """
     recording = newest_run(recording)
     folder = recording.with_name(f"{recording.stem}-plots") if output is None else output

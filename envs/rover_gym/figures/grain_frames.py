@@ -61,7 +61,7 @@ class GrainFilm:
         try:
             from rover_gym.rendering.frames import BedRenderer  # noqa: PLC0415 - an extra
             from rover_gym.rendering.scenery_actors import BallsActor, GroundActors  # noqa: PLC0415 - an extra
-            from rover_gym.rendering.shading import Soil  # noqa: PLC0415 - an extra
+            from rover_gym.rendering.shading import SoilShading  # noqa: PLC0415 - an extra
             from rover_gym.rendering.vtk_actors import actor_of, mesh, set_pose  # noqa: PLC0415 - an extra
         except ModuleNotFoundError as error:
             raise MissingExtraError("vtk", "render") from error
@@ -80,7 +80,7 @@ class GrainFilm:
         actors = [self._balls.actor, *self._walls]
         width, height = size
         if run.rover is None:
-            floor, soil = floor_of(run), Soil(tile_of(run))
+            floor, soil = floor_of(run), SoilShading(tile_of(run))
             if floor is not None:
                 point, normal = floor
                 actors.append(GroundActors(Plane(normal.tolist(), -float(point @ normal)), soil).actor)

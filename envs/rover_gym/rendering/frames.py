@@ -38,7 +38,7 @@ from rover_gym.rendering.scenery_actors import (
     shadow_of,
     sky,
 )
-from rover_gym.rendering.shading import Soil
+from rover_gym.rendering.shading import SoilShading
 from rover_gym.rendering.tyre_marks import TyreMarks
 from rover_gym.rendering.vtk_actors import Array, Faces, actor_of, actor_with, level, mesh, set_points, set_pose
 
@@ -189,7 +189,7 @@ class FrameRenderer(Picture):
             self._scene.RemoveActor(actor)
         plane, (centres, radii) = plane_of(terrain), spheres_of(terrain)
         self._plane = plane
-        self._soil = Soil()
+        self._soil = SoilShading()
         self._ground = None if plane is None else GroundActors(plane, self._soil)
         self._rocks = RockActors(centres, radii, self._ground) if len(radii) else None
         self._surfaces = [SurfaceActor(surface, self._soil) for surface in surfaces_of(terrain)]
@@ -454,7 +454,7 @@ class BedRenderer(Picture):
         OSError: No OpenGL library works on this machine; the message names the packages that provide one.
     """
 
-    def __init__(self, actors: Iterable[vtkActor], soil: Soil, *, width: int = 960, height: int = 540) -> None:
+    def __init__(self, actors: Iterable[vtkActor], soil: SoilShading, *, width: int = 960, height: int = 540) -> None:
         super().__init__(width, height)
         self._soil = soil
         self._scene.AutomaticLightCreationOff()

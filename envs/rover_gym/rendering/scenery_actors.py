@@ -13,7 +13,7 @@ from rover_gym.ground import heights_of, triangles_of
 from rover_gym.mechanics import HeightField, Plane, Terrain, TriangleMesh
 from rover_gym.rendering import appearance as look
 from rover_gym.rendering.appearance import FIXED_BALL_COLOUR, SAND_COLOUR, SUN
-from rover_gym.rendering.shading import Soil
+from rover_gym.rendering.shading import SoilShading
 from rover_gym.rendering.vtk_actors import (
     Array,
     actor_of,
@@ -77,7 +77,7 @@ class GroundActors:
         soil: What it looks like.
     """
 
-    def __init__(self, plane: Plane, soil: Soil) -> None:
+    def __init__(self, plane: Plane, soil: SoilShading) -> None:
         n = plane.normal
         ahead = level(np.array([1.0, 0.0, 0.0]), n)
         self._along = np.column_stack((ahead, np.cross(ahead, n)))
@@ -108,7 +108,7 @@ class SurfaceActor:
         actor: What VTK draws.
     """
 
-    def __init__(self, surface: HeightField | TriangleMesh, soil: Soil) -> None:
+    def __init__(self, surface: HeightField | TriangleMesh, soil: SoilShading) -> None:
         self._surface = surface
         self._place: tuple[float, ...] | None = None
         self._mapper = vtkPolyDataMapper()

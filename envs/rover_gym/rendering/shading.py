@@ -52,7 +52,7 @@ def _replace(actor: vtkActor, code: str) -> None:
     actor.GetShaderProperty().AddFragmentShaderReplacement("//VTK::Light::Impl", True, code, False)
 
 
-class Soil:
+class SoilShading:
     """The look of the ground, for all surfaces of a scene that show it.
 
     Args:

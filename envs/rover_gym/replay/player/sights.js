@@ -2,7 +2,7 @@
 // laser and depth camera.
 "use strict";
 
-const PLAN_COLOURS = { arcs: 0xffffff, path: 0x2f8cff };
+const PLAN_COLOURS = { arcs: 0xffffff, path: 0x39ff88 };
 const SIGHT_COLOURS = { scan: 0xf5d442, laser: 0xff4d3d, depth: 0x35d0ba };
 const DOTS = { scan: 0.014, laser: 0.024, depth: 0.015 }; // half an edge, of the rover's reach
 const BEARS = 0.01; // of a wheel's mean share: a wheel with less stands on nothing
