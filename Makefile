@@ -123,8 +123,8 @@ bench: $(STAMPS)/release ## time a step and tell where the time goes, MuJoCo's b
 	cargo run --locked --quiet --profile bench -p rover-core --example sand_steps
 	-$(COMPARE).instructions
 
-train: $(STAMPS)/test $(STAMPS)/release ## train a policy for the rocks (about half an hour of one core) and compare it with the baseline, under runs/
-	$(BIN)/python training/train_ppo.py --config rocks --seed 1
+train: $(STAMPS)/test $(STAMPS)/release ## train a network for the rocks (minutes) and compare it with the baseline, under runs/
+	$(BIN)/rover train rocks
 	$(BIN)/python training/evaluate.py runs/train/rocks-seed1 pd scan --difficulty 1
 
 train-rllib: ## train Rover-v0 on a local Ray with 2 workers; Ray wants a virtual environment of its own

@@ -19,7 +19,7 @@ import typer
 from rover_gym.cli.console import plain_errors, progress_bar, say_path
 from rover_gym.cli.options import BUILT_IN, ModelName, named_model
 from rover_gym.learning.fit_forecast import fit_forecast, try_arcs
-from rover_gym.learning.ppo import provenance
+from rover_gym.learning.provenance import provenance
 from rover_gym.policy import FORECAST_FILE, ScanPolicy
 
 #: What the forecast foretells.

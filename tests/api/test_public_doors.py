@@ -142,8 +142,8 @@ def arguments(name: str, w: World) -> dict[str, Any]:
         "LiveLoop": {"rover": w.rover, "recordings": out},
         "LiveServer": {"loop": w.loop, "choices": LiveChoices()},
         "McapWriter": {"path": out / "a.mcap", "model": RoverModel(), "terrain": Plane()},
-        "onnx_policy": {"policy": "trained"},
-        "write_onnx": {"policy": "trained", "path": out / "a.onnx"},
+        "onnx_policy": {"policy": "anywhere"},
+        "write_onnx": {"policy": "anywhere", "path": out / "a.onnx"},
         "write_dataset": {
             "name": "rover/test-v0",
             "environment": "Rover-v0",

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from machines import MACHINES, axle, machine
+from pursuit import pursuit
 from refusals import refused
 
 from rover_gym import ModelError, PDPolicy, RoverEnv, RoverModel, StateError
@@ -60,13 +61,13 @@ def test_policies_reach_the_goal_on_the_plane(name: str, kind: str) -> None:
     n_episodes = 10
     envs = RoverVectorEnv(n_episodes, model=MACHINES[name][1])
     observation, _ = envs.reset(seed=20)
-    baseline, controller = PDPolicy(envs), CommandController(envs.prototype, guided=True)
+    baseline, controller = PDPolicy(envs), CommandController(envs.prototype)
     reached = np.zeros(n_episodes, bool)
     for _ in range(600):
         if kind == "baseline":
             actions = baseline.predict(observation)[0]
         else:
-            actions = controller.act(observation, np.zeros((n_episodes, 3)))
+            actions = controller.act(observation, pursuit(envs.prototype, controller, observation))
         observation, _, terminated, _, info = envs.step(actions)
         reached |= terminated & info.get("success", np.zeros(n_episodes, bool))
         if reached.all():

@@ -23,7 +23,7 @@ from rover_gym.policy import (
 from rover_gym.policy.arc_driver import ARCS, N_ARCS, arc_of
 from rover_gym.policy.arc_network import shapes
 from rover_gym.policy.evaluation import drive_all
-from rover_gym.policy.policy_card import FOLDER
+from rover_gym.policy.network_files import FOLDER
 
 SHIPPED = FOLDER / "anywhere"
 
@@ -155,7 +155,7 @@ def test_the_planner_sees_a_fence_at_the_edge() -> None:
 
 def test_the_shipped_network_loads_and_decides_in_time() -> None:
     assert (SHIPPED / "arcs.npz").stat().st_size < 1_000_000
-    named = named_policy("anywhere", "rocks")
+    named = named_policy("anywhere")
     env = RoverEnv(terrain="rocks", difficulty=1.0, **named.arguments)
     policy = named.make(env)
     observation, _ = env.reset(seed=3)
@@ -170,7 +170,7 @@ def test_the_shipped_network_loads_and_decides_in_time() -> None:
 @pytest.mark.parametrize(("model", "least"), [(None, 6), ("open-rover", 5), ("skid-steered", 3)])
 def test_the_shipped_network_reaches_goals(model: str | None, least: int) -> None:
     rover = None if model is None else RoverModel.named(model)
-    named = named_policy("anywhere", "rocks", rover)
+    named = named_policy("anywhere", rover)
     arguments = {"terrain": "rocks", "difficulty": 0.5, "model": rover, **named.arguments}
     drives = drive_all(named.make, range(1_000_000, 1_000_006), arguments=arguments)
     assert sum(drive.success for drive in drives) >= least

@@ -453,7 +453,6 @@ def test_policies_and_what_they_see() -> None:
     assert throw(env.observation_layout.split) > 70
     assert throw(lambda value: Features(env, value)) > 70
     assert throw(lambda value: CommandController(env, value)) > 70
-    assert throw(lambda value: CommandController(env, guided=value)) > 70
 
     def gains(name: str, value: Any) -> None:
         action, _ = PDPolicy(env, PDGains(**{name: value})).predict(seen)
@@ -480,7 +479,7 @@ def test_arguments_of_the_rover_under_commands() -> None:
             make(friction=-1.0)
 
 
-COMMAND = ("repeat", "guided", "pool", "speed", "curvature", "sideways_deg", "response")
+COMMAND = ("repeat", "pool", "speed", "curvature", "sideways_deg", "response")
 
 
 @pytest.mark.parametrize("make", [lambda **given: DriveByCommand(RoverEnv(), **given), RoverCommandEnv, one_commanded])
@@ -490,7 +489,7 @@ def test_environments_of_commands(make: Any) -> None:
         env.reset(seed=0)
         env.step(np.zeros(env.action_space.shape, np.float32))
 
-    never: dict[str, tuple[Any, ...]] = {"repeat": (0, 2.5), "speed": (-1.0,), "guided": (3,)}
+    never: dict[str, tuple[Any, ...]] = {"repeat": (0, 2.5), "speed": (-1.0,)}
     for name in COMMAND:
         fields = (name, f"command.{name}")
         assert (

@@ -3,6 +3,7 @@
 import gymnasium as gym
 import numpy as np
 import pytest
+from pursuit import pursuit
 
 from rover_gym import HeightField, OptionError, Plane, RoverModel, SphereField, StateError
 from rover_gym.env.rover_env import RoverEnv
@@ -62,7 +63,7 @@ def planar() -> RoverEnv:
 
 def test_a_future_ends_where_the_rover_would() -> None:
     env = planar()
-    controller = CommandController(env, guided=False)
+    controller = CommandController(env)
     commands = np.array([[[0.8, 0.5, 0.0], [0.8, -0.5, 0.3]], [[-0.5, 0.0, 0.0], [-0.5, 0.5, 0.0]]])
     hold = 10
     ends = Futures(env, 2, threads=1).drive(controller, commands, hold)
@@ -81,8 +82,9 @@ def test_a_future_ends_where_the_rover_would() -> None:
 
 def test_a_future_that_reaches_the_goal_ends_there() -> None:
     env = planar()
-    controller = CommandController(env, guided=True)
-    ends = Futures(env, 1, threads=1).drive(controller, np.zeros((1, 1, 3)), 400)
+    controller = CommandController(env)
+    circle = pursuit(env, controller, env.progress.observation[None])
+    ends = Futures(env, 1, threads=1).drive(controller, circle[None], 400)
     assert ends.reached.all()
     assert ends.time[0] < 400 * env.dt
 

@@ -157,7 +157,7 @@ def test_wheels_in_the_air_turn_as_commanded_after_one_period() -> None:
     q = env.simulation.q
     q[1] += 5.0
     seen, _ = env.reset(seed=0, options={"q": q})
-    controller = CommandController(env, CommandLimits(speed=1.0), guided=False)
+    controller = CommandController(env, CommandLimits(speed=1.0))
     scale = env.observation_layout.scale
     rates = env.observation_layout["velocity"].start + np.asarray(env.model.wheel_joint_indices)
     for _ in range(5):

@@ -66,7 +66,7 @@ def drives() -> dict[str, list[str]]:
     }
     for name, env in environments.items():
         policy = PDPolicy(env)
-        commanded = DriveByCommand(env, guided=True)
+        commanded = DriveByCommand(env)
         for seed in SEEDS:
             draws = np.random.default_rng(seed)
             found[f"{name} at random {seed}"] = drive(

@@ -12,7 +12,7 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnvWrapper, VecMonitor, VecNormalize
 
 from rover_gym import OptionError, PDPolicy, RoverEnv
-from rover_gym.learning.build import CommandVecEnv
+from rover_gym.learning.command_vec_env import CommandVecEnv
 from rover_gym.policy import CommandController, Features
 from rover_gym.vector.sb3 import RoverVecEnv
 
@@ -182,7 +182,7 @@ class Opaque(VecEnvWrapper):
 def test_training_takes_a_scan_once_a_command() -> None:
     rovers = [RoverVecEnv(2, threads=1, max_episode_steps=10, **SCANNED) for _ in range(2)]
     prototype = rovers[0].prototype
-    features, controller = Features(prototype), CommandController(prototype, guided=False)
+    features, controller = Features(prototype), CommandController(prototype)
     commands = np.array([[1.0, 0.2, 0.0], [0.8, -0.2, 0.0]], np.float32)
     rare = CommandVecEnv(VecMonitor(rovers[0]), features, controller, 3)
     often = CommandVecEnv(Opaque(rovers[1]), features, controller, 3)

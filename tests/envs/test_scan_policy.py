@@ -26,7 +26,7 @@ from rover_gym.policy.arc_forecast import OUTPUTS, ArcFeatures, ArcForecast, Out
 from rover_gym.policy.arc_search import Arcs, RoverOutline
 from rover_gym.policy.evaluation import drive_all
 from rover_gym.policy.named_policy import named_policy
-from rover_gym.policy.policy_card import FOLDER
+from rover_gym.policy.network_files import FOLDER
 from rover_gym.policy.scan_policy import TRAPS, ScanMemory
 
 ARGUMENTS = ScanPolicy.arguments()
@@ -372,10 +372,10 @@ def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
 
 def test_a_name_and_a_folder_lead_to_it(tmp_path: Path) -> None:
     env, _ = in_front_of_a_rock(0.1)
-    named = named_policy("foresight", "rocks")
+    named = named_policy("foresight")
     assert getattr(named.make(env), "forecast", None) is not None
     size = ArcFeatures(env, ScanPolicy(env)).size + 1
     constant(size, [0.0, 0.0, 0.0]).save(tmp_path / FORECAST_FILE)
-    own = named_policy(str(tmp_path), "rocks")
+    own = named_policy(str(tmp_path))
     assert own.arguments == ARGUMENTS
     assert getattr(own.make(env), "forecast", None) is not None

@@ -47,7 +47,7 @@ def test_the_baseline_stays_in_the_trap(env: RoverTrapEnv) -> None:
 
 
 def test_who_backs_out_comes_free(env: RoverTrapEnv) -> None:
-    controller = CommandController(env, guided=False)
+    controller = CommandController(env)
     ends = []
     for seed in (1, 3, 4):
         observation, info = env.reset(seed=seed)
@@ -145,8 +145,8 @@ def test_the_card_is_the_signature() -> None:
 
 def test_it_is_the_wrapper_around_the_rover() -> None:
     arguments: dict[str, Any] = {"terrain": "rocks", "difficulty": 0.3, "height_scan": (8, 4, 0.2)}
-    ours = gym.make("RoverCommand-v0", repeat=3, guided=True, pool=2, speed=0.8, **arguments)
-    theirs = DriveByCommand(gym.make("Rover-v0", **arguments), repeat=3, guided=True, pool=2, speed=0.8)
+    ours = gym.make("RoverCommand-v0", repeat=3, pool=2, speed=0.8, **arguments)
+    theirs = DriveByCommand(gym.make("Rover-v0", **arguments), repeat=3, pool=2, speed=0.8)
     assert ours.observation_space == theirs.observation_space
     assert ours.reset(seed=3)[0].tobytes() == theirs.reset(seed=3)[0].tobytes()
     for _ in range(5):

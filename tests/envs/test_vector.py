@@ -361,7 +361,7 @@ def test_commands_go_on_alike() -> None:
 
 def test_the_vector_of_stable_baselines3_goes_on_alike() -> None:
     pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
-    from rover_gym.learning.build import CommandVecEnv  # noqa: PLC0415 - needs the extra
+    from rover_gym.learning.command_vec_env import CommandVecEnv  # noqa: PLC0415 - needs the extra
     from rover_gym.policy import CommandController, Features  # noqa: PLC0415
     from rover_gym.vector.sb3 import RoverVecEnv  # noqa: PLC0415
 

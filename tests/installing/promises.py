@@ -57,7 +57,7 @@ assert Path("rover.fmu").stat().st_size > 100_000
 envs = gym.make_vec("RoverRocks-v0", num_envs=3)
 envs.reset(seed=0)
 assert envs.step(envs.action_space.sample())[1].shape == (3,)
-for driver in ("trained", "scan", "foresight"):
+for driver in ("anywhere", "scan", "foresight"):
     rover("drive", "--difficulty", "1", "--policy", driver, "--time-limit", "1")
 """,
     "replay": """
@@ -152,11 +152,11 @@ rover("dataset", "rover/random-v0", "--policy", "random", "--episodes", "1", "--
 assert list(Path("sets/rover/random-v0").rglob("*.hdf5"))
 """,
     "onnx": """
-rover("export", "onnx", "trained", "--output", "plane.onnx")
+rover("export", "onnx", "anywhere", "--output", "arcs.onnx")
 rover("export", "onnx", "foresight", "--output", "forecast.onnx")
 import onnx
 
-onnx.checker.check_model("plane.onnx", full_check=True)
+onnx.checker.check_model("arcs.onnx", full_check=True)
 """,
     "logs": """
 rover(*RECORDED)
@@ -171,11 +171,14 @@ with log.open("rb") as stream:
 rover(*RECORDED, "--film", "film.mp4")
 rover("plot", "run/episode-0.h5", "--output", "plots")
 rover("export", "mcap", "run/episode-0.h5")
-rover("export", "onnx", "trained", "--output", "plane.onnx")
+rover("export", "onnx", "anywhere", "--output", "arcs.onnx")
 import jax, lxml, minari, mujoco, rasterio, stable_baselines3, websockets
 """,
     "train": """
-rover("train", "plane", "--steps", "2000", "--no-progress", "--output", "run")
+scene = "scenes: {plane: {environment: {terrain: plane, goal_distance: 2}}}"
+imitation = "imitation: {rounds: 1, decisions: 100, epochs: 1}"
+Path("tiny.yaml").write_text(f"{scene}\nrovers: 4\n{imitation}\nppo: null\n", encoding="utf-8")
+rover("train", "tiny.yaml", "--workers", "1", "--output", "run")
 rover("drive", "--policy", "run", "--time-limit", "0.2")
 rover("evaluate", "run", "pd", "--terrain", "plane", "--episodes", "2", "--output", "evaluation")
 """,

@@ -25,8 +25,9 @@ from rover_gym import (
 from rover_gym.mechanics import Snapshot
 from rover_gym.models import RobotFileWarning
 from rover_gym.planar import BallSimulation, Sine
-from rover_gym.policy import PolicyError, TrainedPolicy
-from rover_gym.policy.policy_card import FOLDER
+from rover_gym.policy import ArcNetworkPolicy, PolicyError, ScanPolicy
+from rover_gym.policy.arc_network_policy import ARCS_FILE
+from rover_gym.policy.network_files import ANYWHERE, FOLDER
 from rover_gym.record import Recorder, RecordingError, RoverSampler, describe, read_run
 from rover_gym.runs import open_run
 from rover_gym.soil import SoilRun, SoilSimulation, soil_packing
@@ -34,7 +35,6 @@ from torture.ledger import Bounds, Ledger, Regime
 from torture.mutate import (
     mutate_bytes,
     mutate_hdf5,
-    mutate_json,
     mutate_npz,
     mutate_value,
     mutate_xml,
@@ -148,22 +148,18 @@ def runs(random: Random, ledger: Ledger) -> None:
 
 @cache
 def _env() -> RoverEnv:
-    return RoverEnv()
+    return RoverEnv(**ScanPolicy.arguments())
 
 
 def policies(random: Random, ledger: Ledger) -> None:
-    """Cards and networks of the shipped policy changed."""
-    card = (FOLDER / "plane" / "policy.json").read_text(encoding="utf-8")
-    network = (FOLDER / "plane" / "policy.npz").read_bytes()
+    """The shipped network changed."""
+    network = (FOLDER / ANYWHERE / ARCS_FILE).read_bytes()
     folder = _folder() / "policy"
     folder.mkdir(exist_ok=True)
-    for _ in range(15):
-        damage = random.integers(3)
-        text = mutate_json(random, card) if damage == 0 else card
-        (folder / "policy.json").write_bytes(text.encode("utf-8", errors="surrogatepass"))
-        change = {1: mutate_bytes, 2: mutate_npz}.get(int(damage))
-        (folder / "policy.npz").write_bytes(network if change is None else change(random, network))
-        policy = attempt(ledger, "TrainedPolicy.load", lambda: TrainedPolicy.load(_env(), folder), PolicyError)
+    for k in range(15):
+        change = mutate_npz if k % 2 else mutate_bytes
+        (folder / ARCS_FILE).write_bytes(change(random, network))
+        policy = attempt(ledger, "ArcNetworkPolicy.load", lambda: ArcNetworkPolicy.load(_env(), folder), PolicyError)
         if policy is not None:
             observation, _ = _env().reset(seed=0)
             action, _ = policy.predict(observation)

@@ -26,26 +26,6 @@ def script(name: str, function: str) -> Script:
 
 
 @pytest.fixture(scope="session")
-def train() -> Script:
-    """`train_ppo.py`."""
-    pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
-    return script("train_ppo", "train")
-
-
-@pytest.fixture(scope="session")
 def evaluate() -> Script:
     """`evaluate.py`."""
     return script("evaluate", "evaluate")
-
-
-@pytest.fixture(scope="session")
-def enjoy() -> Script:
-    """`enjoy.py`."""
-    return script("enjoy", "enjoy")
-
-
-@pytest.fixture(scope="session")
-def tune() -> Script:
-    """`examples/tune.py`."""
-    pytest.importorskip("optuna", reason="the extra train is not installed")
-    return script("examples/tune", "tune")

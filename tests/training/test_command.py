@@ -1,7 +1,6 @@
-"""Commands, features and the numpy network: what a trained policy is made of."""
+"""Commands and features."""
 
 import math
-from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -9,21 +8,17 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from rover_gym import CommandError, OptionError, PDPolicy, Plane, RoverEnv, SphereField, StateError
+from rover_gym import CommandError, OptionError, PDPolicy, Plane, RoverEnv, SphereField
 from rover_gym.policy import (
     CommandController,
     CommandLimits,
     CommandVectorEnv,
     DriveByCommand,
     Features,
-    Network,
-    PolicyCard,
-    TrainedPolicy,
 )
 
 ROVER = RoverEnv()
 RNG = np.random.default_rng(0)
-CARD = PolicyCard(environment={}, pool=1, hold=0.1, command=CommandLimits(), guided=True, source={})
 
 
 def observations(n: int) -> np.ndarray[Any, np.dtype[np.float32]]:
@@ -40,7 +35,7 @@ def observations(n: int) -> np.ndarray[Any, np.dtype[np.float32]]:
 
 
 def test_without_sideways_motion_the_wheels_stand_as_the_baselines() -> None:
-    controller, baseline = CommandController(ROVER, guided=False), PDPolicy(ROVER)
+    controller, baseline = CommandController(ROVER), PDPolicy(ROVER)
     seen = observations(1)
     for entry in (-1.0, -0.3, 0.0, 0.6, 1.0):
         action = controller.act(seen, np.array([[0.5, entry, 0.0]]))[0]
@@ -49,7 +44,7 @@ def test_without_sideways_motion_the_wheels_stand_as_the_baselines() -> None:
 
 
 def test_sideways_alone_turns_all_wheels_alike() -> None:
-    controller = CommandController(ROVER, guided=False)
+    controller = CommandController(ROVER)
     action = controller.act(observations(1), np.array([[0.5, 0.0, -0.4]]))[0]
     np.testing.assert_allclose(action[6:] * ROVER.max_steering, -0.4 * math.radians(35.0), atol=1e-6)
 
@@ -60,7 +55,7 @@ def test_torques_follow_the_regulator() -> None:
     env.reset(seed=0)
     seen = env.step(np.zeros(12, np.float32))[0][None]
     limits = CommandLimits(speed=1.0, response=2.0)
-    action = CommandController(env, limits, guided=False).act(seen, np.array([[0.3, 0.0, 0.0]]))[0]
+    action = CommandController(env, limits).act(seen, np.array([[0.3, 0.0, 0.0]]))[0]
     torque = env.model.wheel_radii * env.model.mass / 6.0 * 0.3 / 2.0
     np.testing.assert_allclose(action[:6], torque / env.model.wheel_torque_limits, rtol=1e-5)
 
@@ -72,15 +67,6 @@ def test_actions_are_in_the_action_space_and_batches_equal_single_ones() -> None
     for i in range(6):
         assert actions[i] in ROVER.action_space
         np.testing.assert_array_equal(controller.act(seen[i : i + 1], commands[i : i + 1])[0], actions[i])
-
-
-def test_the_guide_follows_the_circle_through_the_goal() -> None:
-    env = RoverEnv()
-    controller = CommandController(env)
-    # Goal 4 m ahead and 2 m to the left (towards -z): kappa = 2 y / (x^2 + y^2) = 0.2 per metre.
-    seen = env.reset(seed=0, options={"position": (0.0, 0.0), "heading_deg": 0.0, "goal": (4.0, -2.0)})[0][None]
-    (command,) = controller.guide(seen.astype(np.float64))
-    np.testing.assert_allclose(command, (1.0, 0.2 / controller.limits.curvature, 0.0), atol=1e-6)
 
 
 def test_features_know_neither_place_nor_heading() -> None:
@@ -118,63 +104,8 @@ def test_pool_must_divide_the_scan() -> None:
         Features(RoverEnv(height_scan=(5, 4, 0.2)), pool=2)
 
 
-def test_a_policy_is_saved_and_read_back(tmp_path: Path) -> None:
-    size = Features(ROVER).size
-    network = Network(
-        mean=RNG.normal(size=size).astype(np.float32),
-        deviation=np.ones(size, np.float32),
-        weights=tuple(RNG.normal(size=shape).astype(np.float32) for shape in ((8, size), (3, 8))),
-        biases=(np.zeros(8, np.float32), np.zeros(3, np.float32)),
-    )
-    network.save(tmp_path / "policy.npz")
-    CARD.save(tmp_path / "policy.json")
-    seen = observations(4)
-    actions, state = TrainedPolicy.load(ROVER, tmp_path).predict(seen)
-    np.testing.assert_array_equal(state[1], 1)
-    np.testing.assert_array_equal(actions, TrainedPolicy(ROVER, network, CARD).predict(seen)[0])
-    np.testing.assert_allclose(TrainedPolicy.load(ROVER, tmp_path).predict(seen[0])[0], actions[0], atol=1e-4)
-
-
-def test_the_guide_alone_drives_on_the_plane() -> None:
-    env: Any = gym.make("Rover-v0", max_episode_steps=600)
-    policy = TrainedPolicy.untrained(env, CARD)
-    observation, _ = env.reset(seed=3, options={"goal": (5.0, 1.0), "heading_deg": 0.0})
-    ended = False
-    while not ended:
-        observation, _, terminated, truncated, info = env.step(policy.predict(observation)[0])
-        ended = terminated or truncated
-    assert info["is_success"]
-
-
-def test_a_command_holds_as_long_as_it_says() -> None:
-    size = Features(ROVER).size
-    weights = (RNG.normal(size=(3, size)).astype(np.float32),)
-    policy = TrainedPolicy(ROVER, Network(np.zeros(size), np.ones(size), weights, (np.zeros(3, np.float32),)), CARD)
-    rows, state, held = observations(4), None, []
-    # 0.1 s are two control periods; the second rover's episode begins anew at the second step.
-    for row in range(3):
-        _, state = policy.predict(rows[[row, row]], state, np.array([row == 0, row <= 1]))
-        held.append(state[0])
-    np.testing.assert_array_equal(held[1][0], held[0][0])
-    assert not np.array_equal(held[2][0], held[0][0])
-    assert not np.array_equal(held[1][1], held[0][1])
-    np.testing.assert_array_equal(held[2][1], held[1][1])
-
-
-@pytest.mark.parametrize("bad", [np.zeros(3, np.float32), np.full(91, np.nan, np.float32)])
-def test_a_policy_refuses_what_is_no_observation(bad: np.ndarray[Any, Any]) -> None:
-    with refused(StateError, "observation"):
-        TrainedPolicy.untrained(ROVER, CARD).predict(bad)
-
-
-def test_a_policy_refuses_an_environment_that_it_was_not_made_for() -> None:
-    policy = TrainedPolicy.untrained(ROVER, CARD)
-    with refused(OptionError, "policy"):
-        TrainedPolicy(RoverEnv(height_scan=True), policy._network, CARD)
-
-
 def test_the_wrapper_sums_the_rewards_of_the_steps_it_holds() -> None:
-    wrapped = DriveByCommand(gym.make("Rover-v0"), repeat=3, guided=True)
+    wrapped = DriveByCommand(gym.make("Rover-v0"), repeat=3)
     plain: Any = gym.make("Rover-v0")
     features, _ = wrapped.reset(seed=5)
     seen, _ = plain.reset(seed=5)
@@ -197,7 +128,7 @@ def test_a_scan_once_a_command_is_the_scan_where_it_counts(limit: int) -> None:
     # The limit of 10 steps cuts the fourth command short: its features, too, have the heights of their place.
     wrapped = DriveByCommand(gym.wrappers.TimeLimit(RoverEnv(**SCANNED), limit), repeat=3)
     plain = RoverEnv(**SCANNED)
-    features, controller = Features(plain), CommandController(plain, guided=False)
+    features, controller = Features(plain), CommandController(plain)
     command = np.array([1.0, 0.2, 0.0], np.float32)
     wrapped.reset(seed=5)
     seen, _ = plain.reset(seed=5)

@@ -13,12 +13,9 @@ from rover_gym import OptionError, PDPolicy
 from rover_gym.env.batch import RoverBatch
 from rover_gym.policy import (
     EvaluatedEpisode,
-    PolicyCard,
-    TrainedPolicy,
+    ScanPolicy,
     drive_all,
     mean_estimate,
-    policy_arguments,
-    policy_folder,
     ratio_estimate,
     run_episode,
     summarise,
@@ -110,20 +107,11 @@ def test_what_cannot_be_evaluated_is_refused_by_name(call: Callable[[], object],
         call()
 
 
-@pytest.mark.parametrize(("learned", "num_envs"), [(True, 1), (False, 2)])
-def test_a_held_command_drives_in_a_batch_as_alone(learned: bool, num_envs: int) -> None:
-    """Episodes of a batch begin where commands do, and the scan is taken once a command.
-
-    The guide alone multiplies no matrices, whose products round differently in a batch.
-    """
-    folder = policy_folder("rocks")
-    card = PolicyCard.read(folder / "policy.json")
-    arguments = {"terrain": "rocks", "difficulty": 1.0, "goal_distance": 3.0, **policy_arguments(folder)}
+def test_a_held_command_drives_in_a_batch_as_alone() -> None:
+    """Episodes of a batch begin where commands do, and the scan is taken once a command."""
+    arguments = {"terrain": "rocks", "difficulty": 1.0, "goal_distance": 3.0, **ScanPolicy.arguments()}
     scans: list[bool] = []
     step = RoverBatch.step
-
-    def make(env: Any) -> TrainedPolicy:
-        return TrainedPolicy.load(env, folder) if learned else TrainedPolicy.untrained(env, card)
 
     def counted(batch: RoverBatch, *given: Any, has_scan: bool = True) -> Any:
         scans.append(has_scan)
@@ -131,10 +119,10 @@ def test_a_held_command_drives_in_a_batch_as_alone(learned: bool, num_envs: int)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(RoverBatch, "step", counted)
-        drives = drive_all(make, range(5), arguments=arguments, num_envs=num_envs)
-    assert scans[:12] == 2 * [False, False, False, False, False, True]
+        drives = drive_all(ScanPolicy, range(5), arguments=arguments, num_envs=2)
+    assert scans[:8] == 2 * [False, False, False, True]
     env = gym.make("Rover-v0", **arguments)
-    policy = make(env)
+    policy = ScanPolicy(env)
     for drive in drives:
         episode = run_episode(env, policy, drive.seed)
         assert (drive.end, drive.time, drive.energy) == (episode.end, episode.time, episode.energy)

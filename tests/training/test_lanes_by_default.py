@@ -22,20 +22,6 @@ def test_make_vec_makes_the_vector_of_the_core(name: str) -> None:
     assert envs.prototype.simulation.fallback_reason is None
 
 
-@pytest.mark.parametrize("name", ["plane", "rocks"])
-def test_train_ppo_trains_on_the_vector_of_the_core(name: str) -> None:
-    pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
-    from rover_gym.learning.build import build_env  # noqa: PLC0415 - needs the extra
-    from rover_gym.learning.training_config import find_configuration, read_config  # noqa: PLC0415
-    from rover_gym.vector.sb3 import RoverVecEnv  # noqa: PLC0415
-
-    config = read_config(find_configuration(name))
-    rovers = build_env(config).unwrapped
-    assert type(rovers) is RoverVecEnv
-    assert rovers.num_envs == config.num_envs
-    assert rovers.prototype.simulation.fallback_reason is None
-
-
 def test_an_env_runner_of_rllib_has_one_vector_of_the_core(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("ray.rllib", reason="the extra rllib has an environment of its own")
     monkeypatch.syspath_prepend(str(TRAINING / "examples"))

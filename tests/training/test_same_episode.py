@@ -8,51 +8,49 @@ import pytest
 
 pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
 
-from rover_gym.learning.build import build_env
-from rover_gym.learning.training_config import TrainingConfig, environment_arguments, parse_config
-from rover_gym.policy import CommandVectorEnv, DriveByCommand
+from stable_baselines3.common.vec_env import VecMonitor
+
+from rover_gym.learning.command_vec_env import CommandVecEnv
+from rover_gym.policy import CommandController, CommandLimits, CommandVectorEnv, DriveByCommand, Features
+from rover_gym.vector.sb3 import RoverVecEnv
 
 ROVERS, SEED, LIMIT, REPEAT = 3, 70, 100, 3
 GROUNDS: dict[str, dict[str, Any]] = {
-    "plane": {"terrain": "plane", "goal_distance": [2.0, 4.0], "control_frequency": 10},
+    "plane": {"terrain": "plane", "goal_distance": (2.0, 4.0), "control_frequency": 10},
     "rocks": {
         "terrain": "rocks",
-        "goal_distance": [2.0, 4.0],
+        "goal_distance": (2.0, 4.0),
         "difficulty": 1.0,
-        "height_scan": [8, 6, 0.2],
-        "friction": [0.5, 0.8],
+        "height_scan": (8, 6, 0.2),
+        "friction": (0.5, 0.8),
         "observation_noise": 0.01,
     },
 }
 
 
-def config_of(ground: str) -> TrainingConfig:
-    return parse_config(
-        {
-            "environment": GROUNDS[ground],
-            "total_steps": 1,
-            "num_envs": ROVERS,
-            "max_episode_steps": LIMIT,
-            "repeat": REPEAT,
-            "pool": 2 if ground == "rocks" else 1,
-            "command": {"response": 0.2},
-        }
-    )
+def pool_of(ground: str) -> int:
+    return 2 if ground == "rocks" else 1
+
+
+def stable_baselines3_vector(ground: str) -> CommandVecEnv:
+    rovers = RoverVecEnv(ROVERS, threads=1, max_episode_steps=LIMIT, **GROUNDS[ground])
+    rovers.seed(SEED)
+    one = rovers.prototype
+    controller = CommandController(one, CommandLimits(response=0.2))
+    return CommandVecEnv(VecMonitor(rovers), Features(one, pool_of(ground)), controller, REPEAT)
 
 
 def commands(i: int) -> Any:
-    """The commands of rover i: offsets to the guide, the same in every run."""
+    """The commands of rover i, the same in every run."""
     rng = np.random.default_rng(i)
     while True:
-        yield rng.uniform(-0.4, 0.4, 3).astype(np.float32)
+        yield np.array([0.8, 0.0, 0.0], np.float32) + rng.uniform(-0.2, 0.2, 3).astype(np.float32)
 
 
 def alone(ground: str, i: int) -> list[tuple[bytes, float]]:
     """Features and reward of each decision of an episode of `DriveByCommand`."""
-    config = config_of(ground)
-    arguments = environment_arguments(config.environment)
-    made = gym.make("Rover-v0", max_episode_steps=LIMIT, **arguments)
-    env = DriveByCommand(made, repeat=REPEAT, guided=True, pool=config.pool, response=0.2)
+    made = gym.make("Rover-v0", max_episode_steps=LIMIT, **GROUNDS[ground])
+    env = DriveByCommand(made, repeat=REPEAT, pool=pool_of(ground), response=0.2)
     features, _ = env.reset(seed=SEED + i)
     episode = [(features.tobytes(), 0.0)]
     for command in commands(i):
@@ -66,14 +64,12 @@ def alone(ground: str, i: int) -> list[tuple[bytes, float]]:
 @pytest.mark.parametrize("ground", list(GROUNDS))
 @pytest.mark.parametrize("kind", ["gymnasium", "stable-baselines3"])
 def test_the_batch_gives_the_episodes_of_single_rovers(kind: str, ground: str) -> None:
-    config = config_of(ground)
     if kind == "gymnasium":
-        arguments = environment_arguments(config.environment)
-        rovers: Any = gym.make_vec("Rover-v0", ROVERS, threads=1, max_episode_steps=LIMIT, **arguments)
-        envs: Any = CommandVectorEnv(rovers, repeat=REPEAT, guided=True, pool=config.pool, response=0.2)
+        rovers: Any = gym.make_vec("Rover-v0", ROVERS, threads=1, max_episode_steps=LIMIT, **GROUNDS[ground])
+        envs: Any = CommandVectorEnv(rovers, repeat=REPEAT, pool=pool_of(ground), response=0.2)
         features = envs.reset(seed=SEED)[0]
     else:
-        envs = build_env(config, seed=SEED)
+        envs = stable_baselines3_vector(ground)
         features = envs.reset()
     expected = [alone(ground, i) for i in range(ROVERS)]
     given = [commands(i) for i in range(ROVERS)]

@@ -52,6 +52,7 @@ SET_BY = {
     "ground": ("terrain", "--terrain"),
     "driver": ("policy", "--policy"),
     "count": ("balls", "--balls"),
+    "begin": ("begin", "--from"),
     "radius_min": ("radius", "--radius"),
     "radius_max": ("radius", "--radius"),
     "options.position": ("start", "--start"),

@@ -143,7 +143,7 @@ def drive(
     options = _given({"position": start, "goal": goal})
     named = _given({"model": None if model == BUILT_IN else model, "spacing": spacing, "height_range": height_range})
     rover, ground = named_model(model), named_ground(terrain, spacing, height_range)
-    chosen = named_driver(policy, terrain, rover)
+    chosen = named_driver(policy, rover)
     as_given = {**scene, **named, **chosen.arguments}
     arguments = {**scene, **_given({"model": rover, "terrain": ground}), **chosen.arguments}
     if film is not None:

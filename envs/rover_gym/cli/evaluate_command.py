@@ -32,7 +32,6 @@ from rover_gym.policy.comparison import (
     comparison_table,
     drive_or_reuse,
     film_episode,
-    guide_contender,
     in_markdown,
     named_contender,
 )
@@ -67,9 +66,6 @@ def evaluate(
     output: Annotated[Path, typer.Option(file_okay=False, help="Folder of table, data and plot.")] = Path(
         "runs/evaluation"
     ),
-    guide: Annotated[
-        bool, typer.Option(help="Also drive the guide alone, whose commands the first trained policy offsets.")
-    ] = True,
     films: Annotated[int, typer.Option(min=0, help="Number of fields that are also filmed (extra render).")] = 0,
     threads: Annotated[int, typer.Option(min=1, help="Threads that step the rovers.")] = 1,
     as_json: AsJson = False,
@@ -96,7 +92,7 @@ def evaluate(
         scenes = [(level, {**arguments, "difficulty": level}) for level in levels]
     for package in ("imageio_ffmpeg", "vtkmodules") if films else ():
         require(package, "render")
-    contenders = _contenders(policies or ["pd"], terrain, model, guide=guide)
+    contenders = _contenders(policies or ["pd"], model)
     check_folder("output", output)
     output.mkdir(parents=True, exist_ok=True)
     seeds = range(seed, seed + episodes)
@@ -196,18 +192,15 @@ def _write(
     return written
 
 
-def _contenders(policies: Sequence[str], terrain: str, model: str, *, guide: bool) -> list[Contender]:
-    """All who drive, in the order of the table: the package's policies, the guide, trained policies.
+def _contenders(policies: Sequence[str], model: str) -> list[Contender]:
+    """All who drive, in the order of the table: the package's policies, trained networks.
 
     Raises:
         OptionError: Two policies have the same name.
     """
     rover = named_model(model)
-    named = [named_contender(policy, terrain, rover) for policy in policies]
-    trained = [contender for contender in named if contender.is_trained]
-    alone = guide_contender(trained[0]) if guide and trained else None
-    ours = [contender for contender in named if not contender.is_trained]
-    contenders = [*ours, *([] if alone is None else [alone]), *trained]
+    contenders = [named_contender(policy, rover) for policy in policies]
+    contenders.sort(key=lambda contender: contender.is_trained)
     names = [contender.name for contender in contenders]
     for i, name in enumerate(names):
         if name in names[:i]:

@@ -33,7 +33,7 @@ from rover_gym.extras import require
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.named_policy import Policy
 from rover_gym.policy.pd_policy import find_rover_env
-from rover_gym.policy.trained_policy import RandomPolicy
+from rover_gym.policy.random_policy import RandomPolicy
 from rover_gym.record.rover_run import read_run
 from rover_gym.registration import ENVIRONMENTS
 from rover_gym.validation import refuse
@@ -71,10 +71,10 @@ def onnx(
     *,
     policy: Annotated[
         str,
-        typer.Argument(help="'trained', 'foresight', 'anywhere', or the folder of a policy, a forecast or a raw run."),
+        typer.Argument(help="'anywhere', 'foresight', or the folder of a run, a forecast or a raw run."),
     ],
     output: Annotated[Path, typer.Option(dir_okay=False, help="File to write.")],
-    terrain: Annotated[str, typer.Option(help="Of 'trained': 'plane' or 'rocks'; of 'foresight': 'hills'.")] = "plane",
+    terrain: Annotated[str, typer.Option(help="Of 'foresight': 'rocks' or 'hills'.")] = "rocks",
     model: Annotated[str, typer.Option(help="Of 'foresight': the rover, a name of the gallery or a file.")] = BUILT_IN,
 ) -> None:
     """Write a policy's network as ONNX, with the normalisation of its inputs."""
@@ -158,8 +158,7 @@ def dataset(
     arguments: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
     make: Callable[[gym.Env[Any, Any]], Policy] = partial(RandomPolicy, seed=seed)
     if policy != RANDOM:
-        ground = arguments.get("terrain", ENVIRONMENTS[environment].arguments.get("terrain", "plane"))
-        chosen = named_driver(policy, ground, named_model(model))
+        chosen = named_driver(policy, named_model(model))
         arguments |= chosen.arguments
         make = partial(_made, chosen.make)
     with progress_bar() as bar:

@@ -55,7 +55,7 @@ def film_options(size: str, camera: str, *, forces: bool, antialiasing: bool) ->
 
 Completer = Callable[[str], list[str]]
 
-DRIVERS = ("pd", "sand", "scan", "foresight", "anywhere", "trained", "planner")
+DRIVERS = ("pd", "sand", "scan", "foresight", "anywhere", "planner")
 
 
 def complete_terrain(incomplete: str) -> list[str]:
@@ -195,14 +195,14 @@ def named_ground(
 DRIVERS_HELP = f"{NAMES_HELP[:-1]}; 'planner' tries out futures in the simulator, see the manual's page on policies."
 
 
-def named_driver(name: str, terrain: str, model: RoverModel | None = None) -> NamedPolicy:
+def named_driver(name: str, model: RoverModel | None = None) -> NamedPolicy:
     """The policy of a name, as `named_policy` takes it, or "planner".
 
     Raises:
         PolicyError: There is no such policy.
         OSError: A file may not be read.
     """
-    return NamedPolicy({}, PlannerPolicy) if name == "planner" else named_policy(name, terrain, model)
+    return NamedPolicy({}, PlannerPolicy) if name == "planner" else named_policy(name, model)
 
 
 def driver_title(name: str) -> str:

@@ -1,10 +1,13 @@
-"""`rover train`: policies by reinforcement learning, one seed or several."""
+"""`rover train`: networks that drive by arcs, one seed or several."""
 
+import csv
 import os
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from statistics import mean
 from typing import Annotated, Any
 
 import typer
@@ -12,6 +15,11 @@ from typer.core import TyperCommand
 
 from rover_gym.cli.console import AsJson, Results, check_folder, plain_errors, plain_table
 from rover_gym.extras import require
+from rover_gym.policy.arc_network import ArcNetwork
+from rover_gym.policy.arc_network_policy import ARCS_FILE
+from rover_gym.policy.named_policy import network_folder
+from rover_gym.policy.network_files import PolicyError
+from rover_gym.validation import refuse
 
 LARGEST = 498  # the largest seed: the fields of all seeds stay below the evaluations'
 
@@ -39,8 +47,8 @@ class ManySeeds(TyperCommand):
 @plain_errors
 def train(
     config: Annotated[
-        str, typer.Argument(help="A configuration of the package, 'anywhere', 'plane' or 'rocks', or a YAML file.")
-    ],
+        str, typer.Argument(help="A configuration of the package, 'anywhere' or 'rocks', or a YAML file.")
+    ] = "anywhere",
     seeds: Annotated[
         list[int] | None,
         typer.Option(
@@ -60,123 +68,89 @@ def train(
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on from the latest checkpoint; of several seeds, where there is one.")
     ] = False,
-    steps: Annotated[
-        int | None, typer.Option(min=1, help="Decisions in total, instead of the configuration's.")
+    begin: Annotated[
+        str | None, typer.Option("--from", help="Begin with a network: 'anywhere', or the folder of a run.")
     ] = None,
-    films: Annotated[
-        int, typer.Option(min=0, help="Number of fields of each evaluation that are also filmed (extra render).")
-    ] = 0,
+    steps: Annotated[int | None, typer.Option(min=1, help="Decisions of PPO, instead of the configuration's.")] = None,
     workers: Annotated[
-        int | None,
-        typer.Option(min=1, help="Processes that drive the rovers of 'anywhere'. Default: one per core."),
+        int | None, typer.Option(min=1, help="Processes that drive the rovers. Default: one per core.")
     ] = None,
-    progress: Annotated[bool, typer.Option(help="Show a progress bar.")] = True,
     show: Annotated[bool, typer.Option("--show", help="Print the configuration as YAML and end.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Train a policy with stable-baselines3 and print its figures.
+    """Train a network that drives by arcs: imitation of the planners, then PPO.
 
-    'anywhere' imitates the planners and goes on with PPO: one network for all rovers and grounds. 'plane' and 'rocks'
-    are PPO alone, for one rover.
+    'anywhere' trains for all rovers and grounds, 'rocks' for the built-in rover among rocks in two CPU minutes.
 
     Needs the extra `train`.
 
-    Checkpoints, TensorBoard's log (`tensorboard --logdir runs/train`), evaluations, the policy
-    at the end (`policy`) and the one that did best in the evaluations (`best`) are in the run's folder. Several seeds
-    end with a table: mean over the seeds with its 95% interval.
+    Checkpoints, the learning curve (`curve.csv`), the network at the end (`arcs.npz`) and the one that did best in the
+    evaluations (`best`) are in the run's folder. Several seeds end with a table.
     """
-    for package in ("yaml", "stable_baselines3", "tensorboard"):
+    for package in ("yaml", "stable_baselines3"):
         require(package, "train")
-    if films:
-        for package in ("imageio_ffmpeg", "vtkmodules"):
-            require(package, "render")
-    from rover_gym.learning.arc_config import is_arc_config  # noqa: PLC0415 - needs the extra
-    from rover_gym.learning.training_config import find_configuration, read_config  # noqa: PLC0415
+    from rover_gym.learning.arc_config import read_arc_config  # noqa: PLC0415 - needs the extra
+    from rover_gym.learning.arc_recipe import train_arcs  # noqa: PLC0415
+    from rover_gym.learning.configuration import find_configuration  # noqa: PLC0415
 
     path = find_configuration(config)
-    settings = None if is_arc_config(path) else read_config(path)
+    settings = read_arc_config(path)
     if show:
         typer.echo(path.read_text(encoding="utf-8"), nl=False)
         return
     check_folder("output", output)
-    if settings is None:
-        _train_arcs(path, seeds, output, resume=resume, steps=steps, workers=workers, as_json=as_json)
-        return
-    folders, parent = _run_folders(list(dict.fromkeys(seeds or [1])), output, path.stem)
-    options = {"resume": resume, "total_steps": steps}
-    _train_ppo(settings, path, folders, parent, options, progress=progress, films=films, as_json=as_json)
-
-
-def _train_ppo(
-    settings: Any,
-    path: Path,
-    folders: dict[int, Path],
-    parent: Path,
-    options: dict[str, Any],
-    *,
-    progress: bool,
-    films: int,
-    as_json: bool,
-) -> None:
-    """Trains a policy of commands for each seed."""
-    from rover_gym.learning.ppo import Reporting, train_ppo  # noqa: PLC0415 - needs the extra, and slow to load
-    from rover_gym.learning.several_seeds import read_seed, write_seeds  # noqa: PLC0415
-
-    is_alone = len(folders) == 1
-    say = partial(typer.echo, err=as_json)
-    reporting = Reporting(say=say, progress=progress, films=films)
-    with Results(as_json=as_json) as results:
-        for seed, folder in folders.items():
-            if not is_alone:
-                say(f"seed {seed}:")
-            resume = options["resume"] and (is_alone or (folder / "checkpoints" / "latest.json").exists())
-            given = {**options, "resume": resume}
-            policy = train_ppo(settings, folder, name=path.name, seed=seed, reporting=reporting, **given)
-            results.path("policy", policy)
-            results.path("best policy in the evaluations", folder / "best")
-        done = [read_seed(folder) for folder in folders.values()] if as_json or not is_alone else []
-        results.add(seeds=done)
-        if not is_alone:
-            stem = parent / f"{path.stem}-seeds"
-            results.show(plain_table(write_seeds(done, stem)))
-            for ending in ("md", "json"):
-                results.path("written", stem.with_name(f"{stem.name}.{ending}"))
-
-
-def _train_arcs(
-    path: Path,
-    seeds: list[int] | None,
-    output: Path | None,
-    *,
-    resume: bool,
-    steps: int | None,
-    workers: int | None,
-    as_json: bool,
-) -> None:
-    """Trains a network that drives by arcs; `steps` are PPO's decisions."""
-    from rover_gym.learning.arc_config import read_arc_config  # noqa: PLC0415 - needs the extra
-    from rover_gym.learning.arc_recipe import train_arcs  # noqa: PLC0415
-
-    settings = read_arc_config(path)
     if steps is not None and settings.ppo is not None:
         settings = replace(settings, ppo=replace(settings.ppo, decisions=steps))
+    network = None if begin is None else _network(begin)
+    folders = _run_folders(list(dict.fromkeys(seeds or [1])), output, path.stem)
     with Results(as_json=as_json) as results:
-        for seed, folder in _run_folders(list(dict.fromkeys(seeds or [1])), output, path.stem)[0].items():
+        for seed, folder in folders.items():
             train_arcs(
                 settings,
                 folder,
                 seed=seed,
                 workers=workers or len(os.sched_getaffinity(0)),
-                resume=resume,
+                resume=resume and (len(folders) == 1 or (folder / "state.json").exists()),
+                begin=network,
                 say=partial(typer.echo, err=as_json),
             )
             results.path("policy", folder)
             results.path("best policy in the evaluations", folder / "best")
+        rows = [_last_row(folder) for folder in folders.values()]
+        results.add(seeds=[{"seed": seed, **row} for seed, row in zip(folders, rows, strict=True)])
+        if len(folders) > 1:
+            results.show(plain_table(_seed_table(list(folders), rows)))
 
 
-def _run_folders(seeds: list[int], output: Path | None, name: str) -> tuple[dict[int, Path], Path]:
-    """The run's folder by seed, and the folder of their summary: the output is a single run's own folder."""
+def _network(policy: str) -> ArcNetwork:
+    """The network of a name or a run's folder.
+
+    Raises:
+        PolicyError: There is none.
+    """
+    folder = network_folder(policy)
+    if folder is None:
+        refuse(PolicyError, "begin", policy, "must be 'anywhere' or the folder of a run")
+    return ArcNetwork.read(folder / ARCS_FILE)
+
+
+def _last_row(folder: Path) -> dict[str, str]:
+    """The last row of a run's learning curve."""
+    with (folder / "curve.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))[-1]
+
+
+def _seed_table(seeds: Sequence[int], rows: Sequence[Mapping[str, str]]) -> list[list[str]]:
+    """The last evaluations of several seeds and their mean."""
+    heads = [name for name in rows[0] if name not in ("stage", "decisions")]
+    table = [["seed", *heads]]
+    table += [[str(seed), *(row[name] for name in heads)] for seed, row in zip(seeds, rows, strict=True)]
+    return [*table, ["mean", *(f"{mean(float(row[name]) for row in rows):.3g}" for name in heads)]]
+
+
+def _run_folders(seeds: list[int], output: Path | None, name: str) -> dict[int, Path]:
+    """The run's folder by seed: the output is a single run's own folder."""
     if output is not None and len(seeds) == 1:
-        return {seeds[0]: output}, output.parent
+        return {seeds[0]: output}
     parent = Path("runs") / "train" if output is None else output
-    return {seed: parent / f"{name}-seed{seed}" for seed in seeds}, parent
+    return {seed: parent / f"{name}-seed{seed}" for seed in seeds}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,13 +15,11 @@ from rover_gym.policy.arc_forecast import FORECAST_FILE, OUTPUTS
 from rover_gym.policy.arc_network import ArcNetwork
 from rover_gym.policy.arc_network_policy import ARCS_FILE
 from rover_gym.policy.features import LARGEST_FEATURE
-from rover_gym.policy.policy_card import (
+from rover_gym.policy.network_files import (
     ANYWHERE,
     FOLDER,
     Network,
-    PolicyCard,
     PolicyError,
-    find_policy,
     forecast_folder,
     is_there,
 )
@@ -36,12 +33,11 @@ RAW_FILE = "model.zip"
 
 
 @checked(policy=Path, path=Path, terrain=str, model=("RoverModel", None))
-def write_onnx(policy: str | Path, path: str | Path, terrain: str = "plane", model: RoverModel | None = None) -> Path:
+def write_onnx(policy: str | Path, path: str | Path, terrain: str = "rocks", model: RoverModel | None = None) -> Path:
     """Writes a policy's network as ONNX, with the normalisation of its inputs.
 
     | policy | input | output |
     |---|---|---|
-    | "trained", or the folder of a trained policy | `features` | `command`: three entries in [-1, 1] |
     | "foresight", or the folder of a forecast | `features` | `outcomes`: way, stuck, failed |
     | "anywhere", or the folder of a run of it | `scan`, `features`, `command`, `clocks` | `logits` of the arcs |
     | the folder of a run of `RawPolicy.save` | `observation` | `action` |
@@ -49,7 +45,7 @@ def write_onnx(policy: str | Path, path: str | Path, terrain: str = "plane", mod
     Args:
         policy: The policy.
         path: The file to write, with its folder.
-        terrain: Ground of the policy "trained" or "foresight".
+        terrain: Ground of the policy "foresight".
         model: Rover of the policy "foresight"; the built-in one by default.
 
     Raises:
@@ -66,7 +62,7 @@ def write_onnx(policy: str | Path, path: str | Path, terrain: str = "plane", mod
 
 
 @checked(policy=Path, terrain=str, model=("RoverModel", None))
-def onnx_policy(policy: str | Path, terrain: str = "plane", model: RoverModel | None = None) -> Any:
+def onnx_policy(policy: str | Path, terrain: str = "rocks", model: RoverModel | None = None) -> Any:
     """The `onnx.ModelProto` of a policy, as `write_onnx` writes it.
 
     Raises:
@@ -88,27 +84,9 @@ def onnx_policy(policy: str | Path, terrain: str = "plane", model: RoverModel | 
     if is_there(folder / RAW_FILE):
         return _raw(folder)
     network = FOLDER / ANYWHERE if policy == ANYWHERE else folder
-    if is_there(network / ARCS_FILE):
-        return arcs_model(ArcNetwork.read(network / ARCS_FILE))
-    found = find_policy(str(policy), terrain)
-    if found is None:
+    if not is_there(network / ARCS_FILE):
         refuse(PolicyError, "policy", str(policy), "has no network to export")
-    card = PolicyCard.read(found / "policy.json")
-    facts = {
-        "kind": "trained",
-        "features": f"rover_gym.policy.features.Features with pool={card.pool}",
-        "command": "rover_gym.policy.command.CommandController"
-        + (": offsets from the guide's command" if card.guided else ""),
-        "card": asdict(card),
-    }
-    return onnx_model(command_network(Network.read(found / "policy.npz")), "policy", "features", "command", facts)
-
-
-def command_network(network: Network) -> Perceptron:
-    """A policy's network: outputs clipped to [-1, 1]."""
-    return Perceptron(
-        network.weights, network.biases, "Tanh", network.mean, network.deviation, LARGEST_FEATURE, squash="Clip"
-    )
+    return arcs_model(ArcNetwork.read(network / ARCS_FILE))
 
 
 def forecast_network(network: Network) -> Perceptron:

@@ -11,7 +11,7 @@ from stable_baselines3.sac.policies import SACPolicy
 
 from rover_gym.exports.onnx_graph import Array, Perceptron
 from rover_gym.learning.raw_policy import RawPolicy
-from rover_gym.policy.policy_card import PolicyError
+from rover_gym.policy.network_files import PolicyError
 from rover_gym.validation import refuse
 
 #: Activations by their module, with the attributes that stable-baselines3 leaves as they are.

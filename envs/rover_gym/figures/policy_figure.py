@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from rover_gym.extras import require
-from rover_gym.policy.comparison import GUIDE
 from rover_gym.policy.evaluation import IntervalEstimate, PolicySummary
 from rover_gym.policy.named_policy import NAMES
 
@@ -33,7 +32,7 @@ def draw_policies(rows: Sequence[PolicySummary], path: Path) -> None:
         for place, row in zip(places, rows, strict=True):
             estimate = quantity(row)
             low, high = estimate.interval
-            colour = "tab:grey" if row.policy in (*NAMES[:-1], GUIDE) else "tab:blue"
+            colour = "tab:grey" if row.policy in NAMES else "tab:blue"
             axis.plot([factor * low, factor * high], [place, place], color=colour, linewidth=3, alpha=0.5)
             axis.plot([factor * estimate.value], [place], "o", color=colour)
         axis.set_xlabel(label)

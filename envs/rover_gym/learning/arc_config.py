@@ -1,4 +1,4 @@
-"""The configuration of `rover train anywhere`: a YAML file whose keys and values are all checked.
+"""The configuration of `rover train`: a YAML file whose keys and values are all checked.
 
 scenes      rovers and grounds, by a name each: arguments of `RoverArcs-v0`, a teacher, and a share of the rovers
 imitation   rounds in which the network learns the teacher's choices on the states that it visits (DAgger)
@@ -14,7 +14,7 @@ from typing import Any
 import yaml
 
 from rover_gym.env.arguments import ARGUMENTS
-from rover_gym.learning.training_config import build, plain
+from rover_gym.learning.configuration import build, plain
 from rover_gym.mechanics import OptionError
 from rover_gym.validation import known_keys, mapping, number, refuse
 
@@ -50,7 +50,8 @@ class ImitationConfig:
     """Dataset aggregation (Ross et al. 2011).
 
     Attributes:
-        rounds: Rounds; in the first the teacher drives, then the network.
+        rounds: Rounds; in the first the teacher drives, unless the training begins with a network, then the network.
+            0 for PPO alone.
         decisions: Labelled decisions a round.
         labelled: Share of the decisions that are labelled.
         stray: Share of the decisions of the teacher that are replaced by a random arc.
@@ -68,7 +69,8 @@ class ImitationConfig:
     learning_rate: float = 1e-3
 
     def __post_init__(self) -> None:
-        for name in ("rounds", "decisions", "epochs", "batch_size"):
+        number("imitation.rounds", self.rounds, at_least=0)
+        for name in ("decisions", "epochs", "batch_size"):
             number(f"imitation.{name}", getattr(self, name), at_least=1)
         number("imitation.labelled", self.labelled, above=0.0, at_most=1.0)
         number("imitation.stray", self.stray, at_least=0.0, at_most=1.0)
@@ -93,6 +95,7 @@ class ArcPPOConfig:
         leash: Weight of the divergence at the beginning.
         final_leash: At the end; it falls geometrically.
         reward_scale: Factor on rewards.
+        warm_up: Decisions at the beginning in which only the critic learns: a network of the package has none.
         every: Decisions between two evaluations and checkpoints.
     """
 
@@ -109,6 +112,7 @@ class ArcPPOConfig:
     leash: float = 0.3
     final_leash: float = 0.01
     reward_scale: float = 0.2
+    warm_up: int = 0
     every: int = 100_000
 
     def __post_init__(self) -> None:
@@ -191,15 +195,6 @@ class ArcConfig:
         """The configuration as YAML."""
         text: str = yaml.safe_dump(plain(asdict(self)), sort_keys=False)
         return text
-
-
-def is_arc_config(path: Path) -> bool:
-    """Whether a YAML file configures this training; False for a file that cannot be read as YAML."""
-    try:
-        given = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError, RecursionError):
-        return False
-    return isinstance(given, Mapping) and "scenes" in given
 
 
 def read_arc_config(path: str | Path) -> ArcConfig:

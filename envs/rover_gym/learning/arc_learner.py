@@ -1,4 +1,4 @@
-"""What PyTorch and stable-baselines3 learn in `rover train anywhere`: the network, and PPO on a leash."""
+"""What PyTorch and stable-baselines3 learn in `rover train`: the network, and PPO on a leash."""
 
 import copy
 from collections.abc import Sequence
@@ -71,6 +71,12 @@ class LeashedPolicy(MultiInputActorCriticPolicy):
         for parameter in kept.parameters():
             parameter.requires_grad_(False)
         self.reference = (kept,)
+
+    def hold_actor(self, is_held: bool) -> None:
+        """Whether only the critic learns: the features and the actor keep their weights."""
+        for part in (self.features_extractor, self.mlp_extractor.policy_net, self.action_net):
+            for parameter in part.parameters():
+                parameter.requires_grad_(not is_held)
 
 
 class ArcVecEnv(VecEnv):
@@ -157,18 +163,29 @@ def make_model(settings: ArcPPOConfig, venv: VecEnv, seed: int, device: str) -> 
     )
 
 
-def network_of(policy: Any) -> ArcNetwork:
-    """The actor as a network that needs NumPy alone."""
+def _actor(policy: Any) -> dict[str, torch.Tensor]:
+    """The actor's weights and biases, by their names in an `ArcNetwork`."""
     extractor = policy.features_extractor
     convolutions = [layer for layer in extractor.convolutions if isinstance(layer, torch.nn.Conv2d)]
     dense = [extractor.dense, *(x for x in policy.mlp_extractor.policy_net if isinstance(x, torch.nn.Linear))]
     dense.append(policy.action_net)
-    arrays = {}
+    found: dict[str, torch.Tensor] = {}
     for kind, layers in (("conv", convolutions), ("dense", dense)):
         for i, layer in enumerate(layers):
-            arrays[f"{kind}_{i}"] = layer.weight.detach().cpu().numpy().copy()
-            arrays[f"{kind}_bias_{i}"] = layer.bias.detach().cpu().numpy().copy()
-    return ArcNetwork(arrays)
+            found[f"{kind}_{i}"], found[f"{kind}_bias_{i}"] = layer.weight, layer.bias
+    return found
+
+
+def network_of(policy: Any) -> ArcNetwork:
+    """The actor as a network that needs NumPy alone."""
+    return ArcNetwork({name: values.detach().cpu().numpy().copy() for name, values in _actor(policy).items()})
+
+
+def begin_with(policy: Any, network: ArcNetwork) -> None:
+    """Gives the actor a network's weights."""
+    with torch.no_grad():
+        for name, values in _actor(policy).items():
+            values.copy_(torch.from_numpy(network.arrays[name].copy()))
 
 
 def imitate(policy: Any, rounds: Sequence[Labels], settings: ImitationConfig, seed: int) -> tuple[float, float]:

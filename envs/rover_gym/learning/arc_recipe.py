@@ -1,4 +1,4 @@
-"""`rover train anywhere`: a network learns to drive any rover by imitation of planners, then by PPO.
+"""`rover train`: a network learns to drive any rover by imitation of planners, then by PPO.
 
 1. Imitation. The planners drive and label their choices; the network learns them, drives itself, and learns what the
    planners would have done in its place (dataset aggregation, Ross et al. 2011).
@@ -22,10 +22,19 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
 from rover_gym.learning.arc_config import ArcConfig, ArcPPOConfig, read_arc_config
-from rover_gym.learning.arc_learner import ArcVecEnv, chosen_device, imitate, leash_at, make_model, network_of
+from rover_gym.learning.arc_learner import (
+    ArcVecEnv,
+    begin_with,
+    chosen_device,
+    imitate,
+    leash_at,
+    make_model,
+    network_of,
+)
 from rover_gym.learning.arc_rovers import Labels, Rovers
-from rover_gym.learning.ppo import provenance
+from rover_gym.learning.provenance import provenance
 from rover_gym.mechanics import OptionError
+from rover_gym.policy.arc_network import ArcNetwork
 from rover_gym.policy.arc_network_policy import ARCS_FILE
 from rover_gym.policy.evaluation import summarise
 from rover_gym.validation import refuse
@@ -44,6 +53,7 @@ class ArcTraining:
         threads: Threads of PyTorch; None for its own choice.
         device: Of PyTorch: "auto", "cpu", "cuda".
         resume: Whether to go on.
+        begin: The network that the training begins with; None for a new one.
         until: Time of `time.monotonic` at which PPO ends early; None without such an end.
         say: Takes each line of figures.
 
@@ -61,10 +71,12 @@ class ArcTraining:
         threads: int | None = None,
         device: str = "auto",
         resume: bool = False,
+        begin: ArcNetwork | None = None,
         until: float | None = None,
         say: Say = print,
     ) -> None:
         self.config, self.folder, self.seed, self.say, self.until = config, folder, seed, say, until
+        self.begin, self.resume = begin, resume
         state_file = folder / "state.json"
         self.state: dict[str, Any] = {"rounds": 0, "decisions": 0, "cpu_seconds": 0.0, "best": -1.0}
         if resume:
@@ -106,24 +118,26 @@ class ArcTraining:
         n, ppo = len(config.groups()) * config.group, config.ppo or ArcPPOConfig()
         ppo = replace(ppo, batch_size=n * ppo.n_steps)  # nothing is drawn from this learner's buffer
         model = make_model(ppo, ArcVecEnv(None, n), self.seed, self.device)
-        done = self.state["rounds"]
-        if done:
-            model.policy.load_state_dict(
-                torch.load(folder / "imitation.pt", map_location=self.device, weights_only=True)
-            )
+        done, kept = self.state["rounds"], folder / "imitation.pt"
+        if self.resume and kept.is_file():
+            model.policy.load_state_dict(torch.load(kept, map_location=self.device, weights_only=True))
+        else:
+            if self.begin is not None:
+                begin_with(model.policy, self.begin)
+            torch.save(model.policy.state_dict(), kept)
         if done >= settings.rounds:
             return model
         rounds: list[Labels] = [dict(np.load(folder / f"labels-{k}.npz")) for k in range(done)]
         for k in range(done, settings.rounds):
             self.rovers.found(self.seed * 100 + k, (k + 0.5) / settings.rounds)
-            network = None if k == 0 else network_of(model.policy)
+            network = None if k == 0 and self.begin is None else network_of(model.policy)
             clock = time.monotonic()
             labels, success = self.rovers.label(network, settings.decisions, settings.labelled, settings.stray)
             drove = time.monotonic() - clock
             np.savez(folder / f"labels-{k}.npz", **labels)  # type: ignore[arg-type]
             rounds.append(labels)
             loss, hits = imitate(model.policy, rounds, settings, 100 * self.seed + k)
-            torch.save(model.policy.state_dict(), folder / "imitation.pt")
+            torch.save(model.policy.state_dict(), kept)
             self.state |= {"rounds": k + 1, "cpu_seconds": self.cpu_seconds()}
             self._keep()
             driver = "the teachers" if network is None else "the network"
@@ -216,7 +230,7 @@ class ArcTraining:
 
 
 class _Progress(BaseCallback):
-    """Lengthens the leash, evaluates, writes checkpoints, and ends a training whose time is over."""
+    """Frees the actor, lengthens the leash, evaluates, writes checkpoints, and ends a training whose time is over."""
 
     def __init__(self, training: ArcTraining) -> None:
         super().__init__()
@@ -229,9 +243,15 @@ class _Progress(BaseCallback):
         assert settings is not None  # noqa: S101
         self._settings = settings
         self._next = self.num_timesteps + settings.every
+        self._hold_actor()
+
+    def _hold_actor(self) -> None:
+        policy: Any = self.model.policy
+        policy.hold_actor(self.num_timesteps <= self._settings.warm_up)
 
     def _on_rollout_end(self) -> None:
         training, settings = self._training, self._settings
+        self._hold_actor()
         passed = self.num_timesteps / settings.decisions
         if training.until is not None:
             now = time.monotonic()

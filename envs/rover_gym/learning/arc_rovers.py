@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.learning.arc_config import ArcConfig, ArcScene
-from rover_gym.learning.training_config import environment_arguments
+from rover_gym.learning.configuration import environment_arguments
 from rover_gym.mechanics import RoverModel
 from rover_gym.models.lookup import open_model
 from rover_gym.policy.arc_driver import LARGEST, N_ARCS, ArcObservation

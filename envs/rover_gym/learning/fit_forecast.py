@@ -19,7 +19,7 @@ from rover_gym.mechanics import OptionError, sin_cos
 from rover_gym.planning.futures import Futures
 from rover_gym.policy.arc_forecast import HORIZON, OUTPUTS, ArcFeatures, with_speed
 from rover_gym.policy.features import LARGEST_FEATURE
-from rover_gym.policy.policy_card import Network
+from rover_gym.policy.network_files import Network
 from rover_gym.policy.scan_policy import ScanPolicy
 from rover_gym.validation import refuse, whole
 

@@ -12,8 +12,8 @@ from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
 
-from rover_gym.learning.ppo import provenance
-from rover_gym.learning.training_config import environment_arguments
+from rover_gym.learning.configuration import environment_arguments
+from rover_gym.learning.provenance import provenance
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.features import check_observed
 from rover_gym.validation import refuse

@@ -128,7 +128,7 @@ class LiveRover:
 
     def _take(self, wheel: _Wheel) -> None:
         self._wheel = wheel
-        self._hand = CommandController(wheel.env, guided=False)
+        self._hand = CommandController(wheel.env)
 
     @property
     def env(self) -> RoverEnv:

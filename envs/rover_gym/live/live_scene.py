@@ -21,8 +21,8 @@ GRAVITY = (0.1, 30.0)
 GOAL_DISTANCES = (1.0, 100.0)
 LARGEST_SEED = 2**31 - 1
 
-#: Finds a policy by name, terrain's name and rover.
-FindPolicy: TypeAlias = Callable[[str, str, RoverModel | None], NamedPolicy]
+#: Finds a policy by name and rover.
+FindPolicy: TypeAlias = Callable[[str, RoverModel | None], NamedPolicy]
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class LiveChoices:
             name: None if name == "rover" else RoverModel.named(name) for name in RoverModel.names()
         }
     )
-    drivers: tuple[str, ...] = (BY_HAND, "pd", "scan", "foresight", "trained")
+    drivers: tuple[str, ...] = (BY_HAND, "pd", "scan", "foresight", "anywhere")
     find_policy: FindPolicy = named_policy
 
 
@@ -94,13 +94,12 @@ class LiveScene:
         """The driver, yet to be made for its environment; None by hand.
 
         Raises:
-            PolicyError: There is no such policy for this ground.
+            PolicyError: There is no such policy.
             OSError: A file of the policy may not be read.
         """
         if self.driver == BY_HAND:
             return None
-        ground = choices.grounds[self.ground]
-        return choices.find_policy(self.driver, ground if isinstance(ground, str) else "", choices.models[self.model])
+        return choices.find_policy(self.driver, choices.models[self.model])
 
     def arguments(self, choices: LiveChoices) -> dict[str, Any]:
         """The arguments of `RoverEnv`, but for those that the driver needs."""

@@ -212,7 +212,7 @@ class PlannerPolicy:
             refuse(OptionError, "terrain", terrain, "must not be given with sees='scan'")
         self.options = PlannerOptions() if options is None else options
         self._env: RoverEnv = find_rover_env(env)
-        commands = CommandController(self._env, limits, guided=False)
+        commands = CommandController(self._env, limits)
         self._controller: CommandController | RawActions = commands
         self._spread = np.array(self.options.spread)
         if self.options.actions == "raw":

@@ -1,4 +1,4 @@
-"""Policies: the PD baseline, the scan planner, trained policies, their commands and features, and their evaluation."""
+"""Policies: the PD baseline, the scan planner, trained networks, their commands, and their evaluation."""
 
 from rover_gym.policy.arc_forecast import FORECAST_FILE, ForesightCosts
 from rover_gym.policy.arc_network import ArcNetwork
@@ -24,11 +24,10 @@ from rover_gym.policy.features import Features
 from rover_gym.policy.goal_env import GoalObservation, RoverGoalEnv, RoverGoalVectorEnv
 from rover_gym.policy.ground_map import MapOptions
 from rover_gym.policy.named_policy import NamedPolicy, Policy, named_policy
+from rover_gym.policy.network_files import Network, PolicyError
 from rover_gym.policy.pd_policy import PDGains, PDPolicy
-from rover_gym.policy.policy_card import Network, PolicyCard, PolicyError, find_policy, policy_arguments, policy_folder
 from rover_gym.policy.sand_policy import SandGains, SandPolicy
 from rover_gym.policy.scan_policy import ScanGains, ScanPolicy
-from rover_gym.policy.trained_policy import TrainedPolicy
 from rover_gym.policy.trap_env import RoverTrapEnv, RoverTrapVectorEnv, TrapBatch
 
 __all__ = [
@@ -53,7 +52,6 @@ __all__ = [
     "PDPolicy",
     "PathCosts",
     "Policy",
-    "PolicyCard",
     "PolicyError",
     "PolicySummary",
     "RoverArcsEnv",
@@ -68,14 +66,10 @@ __all__ = [
     "SandPolicy",
     "ScanGains",
     "ScanPolicy",
-    "TrainedPolicy",
     "TrapBatch",
     "drive_all",
-    "find_policy",
     "mean_estimate",
     "named_policy",
-    "policy_arguments",
-    "policy_folder",
     "ratio_estimate",
     "run_episode",
     "summarise",

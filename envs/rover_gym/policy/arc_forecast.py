@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.policy.arc_search import Arcs, ArcSearch
-from rover_gym.policy.policy_card import Network, PolicyError
+from rover_gym.policy.network_files import Network, PolicyError
 from rover_gym.validation import number, refuse
 
 Array = npt.NDArray[np.float64]

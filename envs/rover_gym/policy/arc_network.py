@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.policy.arc_driver import N_ARCS, SIZES, ArcObservation
-from rover_gym.policy.policy_card import LARGEST_WEIGHT, PolicyError, read_arrays
+from rover_gym.policy.network_files import LARGEST_WEIGHT, PolicyError, read_arrays
 from rover_gym.policy.scan_policy import SCAN
 from rover_gym.validation import refuse
 

@@ -10,8 +10,8 @@ from rover_gym.mechanics import StateError
 from rover_gym.policy.arc_driver import ArcDriver
 from rover_gym.policy.arc_network import ArcNetwork
 from rover_gym.policy.features import check_observed
+from rover_gym.policy.network_files import PolicyError, is_there
 from rover_gym.policy.pd_policy import find_rover_env
-from rover_gym.policy.policy_card import PolicyError, is_there
 from rover_gym.policy.scan_policy import ScanMemory
 from rover_gym.validation import array, refuse
 

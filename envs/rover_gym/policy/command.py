@@ -11,9 +11,6 @@ The wheel is steered to `delta = atan2(l, a)`, within the steering limit, and it
 `v (a cos(delta) + l sin(delta))`. A wheel that does not steer has delta = 0. With beta = 0 these are `PDPolicy`'s
 formulas. The torques come from the same wheel regulator (`policy.regulator`), with a feedforward of the force that
 holds the rover on a slope.
-
-A policy's action is the command itself, or an offset from the command of a guide that ignores rocks: full speed along
-the circle that is tangential to the heading and passes through the goal (pure pursuit).
 """
 
 import math
@@ -28,7 +25,7 @@ from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError, atan2, sin_cos
 from rover_gym.policy.pd_policy import SCRUB_RATE, WIDENING, YAW, Turning
 from rover_gym.policy.regulator import WheelRegulator
-from rover_gym.validation import flag, number, refuse
+from rover_gym.validation import number, refuse
 
 Array = npt.NDArray[np.float64]
 
@@ -39,10 +36,6 @@ N_COMMANDS = 3
 def command_space() -> "gym.spaces.Box[np.float32]":
     """The space of the commands of one rover."""
     return gym.spaces.Box(-1.0, 1.0, (N_COMMANDS,), np.float32)
-
-
-#: Offset from the guide's command that an action of 1 adds.
-OFFSET = np.array([2.0, 2.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -72,19 +65,15 @@ class CommandController:
     Args:
         rover: The environment, read once for the layout and the rover's constants.
         limits: The values of a command of 1.
-        guided: Whether actions are offsets from the guide's command.
     """
 
-    def __init__(self, rover: RoverEnv, limits: CommandLimits | None = None, *, guided: bool = True) -> None:
+    def __init__(self, rover: RoverEnv, limits: CommandLimits | None = None) -> None:
         if limits is not None and not isinstance(limits, CommandLimits):
             refuse(OptionError, "limits", limits, "must be CommandLimits")
         self.limits = CommandLimits() if limits is None else limits
-        self.guided = flag("guided", guided)
         layout, model = rover.observation_layout, rover.model
         q, velocity = layout["q"].start, layout["velocity"].start
         self._pitch = q + 5
-        self._goal = layout["goal"]
-        self._goal_scale = layout.scale[self._goal]
         weight = model.mass * math.hypot(*rover.gravity)
         turning = Turning.of(model, weight)
         self._entries = np.array(turning.steering.entries)
@@ -106,8 +95,6 @@ class CommandController:
         """The actions `(n, n_actions)` for observations `(n, size)`, scaled as the environment returns them."""
         seen = observations.astype(np.float64, copy=False)
         command = np.clip(commands.astype(np.float64, copy=False), -1.0, 1.0)
-        if self.guided:
-            command = np.clip(self.guide(seen) + OFFSET * command, -1.0, 1.0)
         speed = self.limits.speed * command[:, :1]
         curvature = self.limits.curvature * command[:, 1:2]
         sideways = math.radians(self.limits.sideways_deg) * command[:, 2:3]
@@ -141,10 +128,3 @@ class CommandController:
         stacked = np.stack(means, axis=1) if means else np.zeros((len(angles), 0))
         within: Array = np.clip(stacked, -self._max_steering, self._max_steering)
         return within
-
-    def guide(self, seen: Array) -> Array:
-        """The guide's commands `(n, 3)`: pure pursuit of the goal, at the largest curvature if the goal lies behind."""
-        ahead, right = (seen[:, self._goal] * self._goal_scale).T
-        curvature = -2.0 * right / np.maximum(ahead * ahead + right * right, 1e-6) / self.limits.curvature
-        curvature = np.where(ahead > 0.0, np.clip(curvature, -1.0, 1.0), np.where(right > 0.0, -1.0, 1.0))
-        return np.stack((np.ones_like(curvature), curvature, np.zeros_like(curvature)), axis=1)

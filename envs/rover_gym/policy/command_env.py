@@ -45,7 +45,6 @@ class HeldCommands:
         rover: The environment, read once for the layout and the rover's constants.
         n: Number of rovers.
         repeat: Steps that a command is held.
-        guided: Whether actions are offsets from the guide's command.
         pool: Height-scan points per pooling cell, lengthwise and crosswise.
         limits: Fields of `CommandLimits`.
 
@@ -58,13 +57,11 @@ class HeldCommands:
         OptionError: An argument is out of range.
     """
 
-    def __init__(
-        self, rover: RoverEnv, n: int, *, repeat: int, guided: bool, pool: int, limits: Mapping[str, float]
-    ) -> None:
+    def __init__(self, rover: RoverEnv, n: int, *, repeat: int, pool: int, limits: Mapping[str, float]) -> None:
         self.repeat = check_repeat(repeat)
         known_keys("limits", limits, [field.name for field in fields(CommandLimits)])
         self.features = Features(rover, pool)
-        self._controller = CommandController(rover, CommandLimits(**limits), guided=guided)
+        self._controller = CommandController(rover, CommandLimits(**limits))
         self.seen: Observations = np.zeros((n, rover.observation_layout.size), np.float32)
         self.observation_space = self.features.space
         self.action_space = command_space()
@@ -114,7 +111,6 @@ class DriveByCommand(gym.Wrapper[Observations, Observations, Observations, Obser
     Args:
         env: A `Rover-v0`, wrapped or not.
         repeat: Steps that a command is held.
-        guided: Whether actions are offsets from the guide's command.
         pool: Height-scan points per pooling cell, lengthwise and crosswise.
         **limits: Fields of `CommandLimits`.
 
@@ -126,12 +122,11 @@ class DriveByCommand(gym.Wrapper[Observations, Observations, Observations, Obser
         self,
         env: gym.Env[Observations, Observations],
         repeat: int = 4,
-        guided: bool = False,
         pool: int = 1,
         **limits: float,
     ) -> None:
         self._rover = find_rover_env(env)
-        self._held = HeldCommands(self._rover, 1, repeat=repeat, guided=guided, pool=pool, limits=limits)
+        self._held = HeldCommands(self._rover, 1, repeat=repeat, pool=pool, limits=limits)
         super().__init__(env)
         self.features = self._held.features
         self.observation_space, self.action_space = self._held.observation_space, self._held.action_space
@@ -186,7 +181,6 @@ class CommandVectorEnv(VectorWrapper):
     Args:
         env: A `RoverVectorEnv` with autoreset in the next or in the same step; wrappers go around this one.
         repeat: Steps that a command is held.
-        guided: Whether actions are offsets from the guide's command.
         pool: Height-scan points per pooling cell, lengthwise and crosswise.
         **limits: Fields of `CommandLimits`.
 
@@ -194,16 +188,14 @@ class CommandVectorEnv(VectorWrapper):
         OptionError: An argument is out of range, or `env` is another environment.
     """
 
-    def __init__(
-        self, env: RoverVectorEnv, repeat: int = 4, *, guided: bool = False, pool: int = 1, **limits: float
-    ) -> None:
+    def __init__(self, env: RoverVectorEnv, repeat: int = 4, *, pool: int = 1, **limits: float) -> None:
         if not isinstance(env, RoverVectorEnv):
             refuse(OptionError, "env", env, "must be a RoverVectorEnv, as gymnasium.make_vec makes it")
         if env.autoreset_mode == AutoresetMode.DISABLED:
             refuse(OptionError, "env.autoreset_mode", env.autoreset_mode.value, "must be NextStep or SameStep")
         super().__init__(env)
         self.rovers = env
-        self.held = HeldCommands(env.prototype, env.num_envs, repeat=repeat, guided=guided, pool=pool, limits=limits)
+        self.held = HeldCommands(env.prototype, env.num_envs, repeat=repeat, pool=pool, limits=limits)
         self.repeat = self.held.repeat
         self._over: Mask = np.zeros(self.num_envs, np.bool_)
         self.single_action_space = self.held.action_space
@@ -308,14 +300,13 @@ REPEAT = 6
 MAX_COMMANDS = MAX_EPISODE_STEPS // REPEAT
 
 #: Arguments of `RoverCommand-v0` in addition to those of `Rover-v0`, with their defaults.
-COMMAND_ARGUMENTS: Mapping[str, Any] = {"repeat": REPEAT, "guided": False, "pool": 1, **vars(CommandLimits())}
+COMMAND_ARGUMENTS: Mapping[str, Any] = {"repeat": REPEAT, "pool": 1, **vars(CommandLimits())}
 
 
 class CommandArguments(RoverArguments, total=False):
     """The keyword arguments of `RoverCommandEnv`."""
 
     repeat: int
-    guided: bool
     pool: int
     speed: float
     curvature: float
@@ -355,8 +346,7 @@ class RoverCommandEnv(DriveByCommand):
     | 1     | curvature of its path, positive to the left    | `curvature`    | 1/m  |
     | 2     | direction off the trunk's x axis, to the left  | `sideways_deg` | deg  |
 
-    The steering follows from the geometry, the torques from a regulator of the wheels' speeds. With `guided=True` an
-    action is an offset to pure pursuit of the goal at full speed.
+    The steering follows from the geometry, the torques from a regulator of the wheels' speeds.
 
     ## Observation
 
@@ -379,7 +369,6 @@ class RoverCommandEnv(DriveByCommand):
     | name         | default | unit | meaning                                                                     |
     |--------------|---------|------|-----------------------------------------------------------------------------|
     | repeat       | 6       |      | control periods that a command is held                                      |
-    | guided       | False   |      | whether actions are offsets to the command of a guide                       |
     | pool         | 1       |      | scan points of a pooling cell, lengthwise and crosswise                     |
     | speed        | 1.2     | m/s  | speed of an action of 1                                                     |
     | curvature    | 0.75    | 1/m  | curvature of an action of 1                                                 |

@@ -5,7 +5,6 @@ import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -28,18 +27,12 @@ from rover_gym.policy.evaluation import (
     run_episode,
 )
 from rover_gym.policy.named_policy import NAMES, Policy, named_policy, network_folder
-from rover_gym.policy.policy_card import PolicyCard, find_policy, is_there
-from rover_gym.policy.trained_policy import TrainedPolicy
 from rover_gym.record.channels import outcome_words
 from rover_gym.rendering.caption import captioned
 from rover_gym.rendering.render_options import VideoWriter
 
-#: The package's own policies, and the files of one without their endings.
+#: The package's own policies.
 POLICIES = Path(__file__).parents[1] / "data" / "policies"
-FILES = ("policy", "forecast")
-
-#: Name of the row of a policy's guide without the policy.
-GUIDE = "guide alone"
 
 
 @dataclass(frozen=True)
@@ -60,38 +53,27 @@ class Contender:
 
     @property
     def is_trained(self) -> bool:
-        """Whether it is a policy of `rover train`."""
-        return self.name != GUIDE and any(path.name == "policy.json" for path in self.files)
+        """Whether it is a network of a run of `rover train`."""
+        return self.name not in NAMES and any(path.name == ARCS_FILE for path in self.files)
 
 
-def named_contender(policy: str, terrain: str, model: RoverModel | None = None) -> Contender:
+def named_contender(policy: str, model: RoverModel | None = None) -> Contender:
     """A policy by its name or folder, as `named_policy` takes it.
 
     Raises:
         PolicyError: There is none.
         OSError: Its files may not be read.
     """
-    chosen = named_policy(policy, terrain, model)
+    chosen = named_policy(policy, model)
     network = network_folder(policy)
+    files: list[Path] = []
     if network is not None:
         files = [network / ARCS_FILE]
     elif policy == "foresight":
         files = sorted(POLICIES.glob("foresight*/*"))
-    else:
-        folder = find_policy(policy, terrain) if not is_there(Path(policy) / FORECAST_FILE) else Path(policy)
-        files = [] if folder is None else [path for path in sorted(folder.iterdir()) if path.stem in FILES]
+    elif policy not in NAMES:
+        files = [Path(policy) / FORECAST_FILE]
     return Contender(policy if policy in NAMES else Path(policy).name, chosen.make, chosen.arguments, tuple(files))
-
-
-def guide_contender(trained: Contender) -> Contender | None:
-    """The guide whose commands a trained policy offsets, alone; None if it has no guide."""
-    (path,) = (path for path in trained.files if path.name == "policy.json")
-    card = PolicyCard.read(path)
-    return Contender(GUIDE, partial(_untrained, card), trained.arguments, (path,)) if card.guided else None
-
-
-def _untrained(card: PolicyCard, env: Any) -> Policy:
-    return TrainedPolicy.untrained(env, card)
 
 
 def drive_or_reuse(

@@ -1,4 +1,4 @@
-"""Policies by name: the baseline, the policies for sand and rocks, and trained policies."""
+"""Policies by name: the baseline, the policies for sand and rocks, and networks."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -12,22 +12,27 @@ import numpy.typing as npt
 from rover_gym.mechanics import RoverModel
 from rover_gym.policy.arc_forecast import FORECAST_FILE
 from rover_gym.policy.arc_network_policy import ARCS_FILE, ArcNetworkPolicy
+from rover_gym.policy.network_files import ANYWHERE, FOLDER, PolicyError, is_there
 from rover_gym.policy.pd_policy import PDPolicy
-from rover_gym.policy.policy_card import ANYWHERE, FOLDER, find_policy, is_there, policy_arguments
 from rover_gym.policy.sand_policy import SandPolicy
 from rover_gym.policy.scan_policy import ScanPolicy
-from rover_gym.policy.trained_policy import TrainedPolicy
+from rover_gym.validation import refuse
 
 #: Help text of the command line about the names.
 NAMES_HELP = (
     "'pd' for the baseline, 'sand' for the one that crawls on sand, 'scan' for the search on the height scan, "
     "'foresight' for the same with a learned prediction, "
     "'anywhere' for the network that drives any rover without a planner, "
-    "'trained' for the trained policy of the package, or the folder of a run, a trained policy or a forecast."
+    "or the folder of a run of `rover train` or of a forecast."
+)
+
+#: Why a policy is refused that is none.
+UNKNOWN = (
+    "must be 'pd', 'sand', 'scan', 'foresight', 'anywhere' or the folder of a run of `rover train` or of a forecast"
 )
 
 #: Policies without a folder.
-NAMES = ("pd", "sand", "scan", "foresight", ANYWHERE, "trained")
+NAMES = ("pd", "sand", "scan", "foresight", ANYWHERE)
 
 _TITLES = {
     "pd": "the PD baseline",
@@ -40,7 +45,7 @@ _TITLES = {
 
 def policy_title(policy: str) -> str:
     """Title of a policy, by its name or folder, for headings."""
-    return _TITLES.get(policy, "a trained policy")
+    return _TITLES.get(policy, "a trained network")
 
 
 class Policy(Protocol):
@@ -65,31 +70,28 @@ class NamedPolicy:
     make: Callable[[Any], Policy]
 
 
-def named_policy(policy: str, terrain: str, model: RoverModel | None = None) -> NamedPolicy:
-    """The policy of a name, for a terrain and a rover; None is the built-in one.
+def named_policy(policy: str, model: RoverModel | None = None) -> NamedPolicy:
+    """The policy of a name.
 
     Args:
-        policy: "pd", "sand", "scan", "foresight", "anywhere", "trained" for the policy shipped for the terrain, or the
-            folder of a run, a trained policy or a forecast.
-        terrain: The argument of the environment.
-        model: The rover, to which the planner fits its height scan.
+        policy: "pd", "sand", "scan", "foresight", "anywhere", or the folder of a run of `rover train` or of a forecast.
+        model: The rover, to which the height scan is fitted; None for the built-in one.
 
     Raises:
         PolicyError: There is no such policy.
         OSError: A file may not be read.
     """
-    if policy == "foresight" or is_there(Path(policy) / FORECAST_FILE):
-        forecast = True if policy == "foresight" else policy
-        return NamedPolicy(ScanPolicy.arguments(model), partial(ScanPolicy, forecast=forecast))
-    network = network_folder(policy)
-    if network is not None:
-        return NamedPolicy(ScanPolicy.arguments(model), partial(_load_network, network))
-    folder = find_policy(policy, terrain)
-    if folder is not None:
-        return NamedPolicy(policy_arguments(folder), partial(_load, folder))
+    if policy in ("pd", "sand"):
+        return NamedPolicy({}, SandPolicy if policy == "sand" else PDPolicy)
+    seen = ScanPolicy.arguments(model)
     if policy == "scan":
-        return NamedPolicy(ScanPolicy.arguments(model), ScanPolicy)
-    return NamedPolicy({}, SandPolicy if policy == "sand" else PDPolicy)
+        return NamedPolicy(seen, ScanPolicy)
+    if policy == "foresight" or is_there(Path(policy) / FORECAST_FILE):
+        return NamedPolicy(seen, partial(ScanPolicy, forecast=True if policy == "foresight" else policy))
+    network = network_folder(policy)
+    if network is None:
+        refuse(PolicyError, "policy", policy, UNKNOWN)
+    return NamedPolicy(seen, partial(_load_network, network))
 
 
 def network_folder(policy: str) -> Path | None:
@@ -100,7 +102,3 @@ def network_folder(policy: str) -> Path | None:
 
 def _load_network(folder: Path, env: Any) -> Policy:
     return ArcNetworkPolicy.load(env, folder)
-
-
-def _load(folder: Any, env: Any) -> Policy:
-    return TrainedPolicy.load(env, folder)

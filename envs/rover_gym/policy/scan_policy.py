@@ -16,8 +16,8 @@ from rover_gym.policy.arc_search import Arcs, ArcSearch, PathCosts, RoverOutline
 from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimits
 from rover_gym.policy.features import check_observed, ground_slope
 from rover_gym.policy.ground_map import GroundMap, MapOptions
+from rover_gym.policy.network_files import Network, PolicyError, forecast_folder, is_there
 from rover_gym.policy.pd_policy import Turning, find_rover_env
-from rover_gym.policy.policy_card import Network, PolicyError, forecast_folder, is_there
 from rover_gym.validation import array, number, refuse
 
 Array = npt.NDArray[np.float64]
@@ -328,7 +328,7 @@ class ScanPolicy:
             self._length = features.length
             self.forecast = ArcForecast(features, Network.read(folder / FORECAST_FILE))
             self._caution = self.foresight.caution
-        self.controller = CommandController(rover, limits, guided=False)
+        self.controller = CommandController(rover, limits)
         self.hold_periods = hold_periods(self.gains.period, rover.dt)
         self._period = self.hold_periods * rover.dt
 

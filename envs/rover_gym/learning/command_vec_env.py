@@ -1,16 +1,12 @@
-"""The vector environment of a training: commands as actions, features as observations, and the clock around it."""
+"""Stable-Baselines3's vector of rovers that are driven by commands."""
 
-import time
-from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor, VecNormalize
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
-from rover_gym.learning.training_config import TrainingConfig, environment_arguments
 from rover_gym.mechanics import StateError
 from rover_gym.policy.command import N_COMMANDS, CommandController, command_space
 from rover_gym.policy.features import Features
@@ -84,64 +80,3 @@ class CommandVecEnv(VecEnvWrapper):
         for i, info in final.items():
             infos[i] = info
         return self.features(self._seen), rewards, ended, infos
-
-
-def build_env(
-    config: TrainingConfig,
-    *,
-    num_envs: int | None = None,
-    environment: Mapping[str, Any] | None = None,
-    seed: int = 0,
-    monitor: Path | None = None,
-) -> VecEnv:
-    """Builds a vector of rovers with commands as actions and features as observations, not yet normalised.
-
-    Args:
-        config: The configuration.
-        num_envs: Number of rovers; None for the configuration's.
-        environment: Arguments that override the configuration's.
-        seed: Seed of the environments.
-        monitor: File for the learning curve: reward, length (control periods) and success of every episode.
-    """
-    arguments = {**config.environment, **(environment or {})}
-    rovers = RoverVecEnv(
-        num_envs or config.num_envs,
-        threads=config.threads,
-        max_episode_steps=config.max_episode_steps,
-        **environment_arguments(arguments),
-    )
-    rovers.seed(seed)
-    one = rovers.prototype
-    venv = VecMonitor(rovers, None if monitor is None else str(monitor), info_keywords=("is_success", "termination"))
-    return CommandVecEnv(
-        venv, Features(one, config.pool), CommandController(one, config.command, guided=config.guided), config.repeat
-    )
-
-
-def normalised(venv: VecEnv, config: TrainingConfig, *, training: bool = True) -> VecNormalize:
-    """Adds running normalisation of features and, in training, of rewards."""
-    return VecNormalize(venv, training=training, norm_reward=training, clip_obs=5.0, gamma=config.ppo.gamma)
-
-
-class Stopwatch(VecEnvWrapper):
-    """Sums the CPU time of all threads while the wrapped environments step and reset.
-
-    Attributes:
-        cpu_seconds: CPU time so far, s.
-    """
-
-    cpu_seconds = 0.0
-
-    def reset(self) -> VecEnvObs:
-        """Resets all environments."""
-        start = time.process_time()
-        seen = self.venv.reset()
-        self.cpu_seconds += time.process_time() - start
-        return seen
-
-    def step_wait(self) -> VecEnvStepReturn:
-        """Steps all environments."""
-        start = time.process_time()
-        result = self.venv.step_wait()
-        self.cpu_seconds += time.process_time() - start
-        return result

@@ -1,31 +1,25 @@
-"""The files of a trained policy: its card, its network, and the policies that the package ships."""
+"""The files of networks, read with care, and those that the package ships."""
 
 import io
-import json
 import math
 import stat
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.env.arguments import ARGUMENTS, terrain_name
 from rover_gym.mechanics import OptionError, RoverGymError, RoverModel
-from rover_gym.policy.command import CommandLimits
 from rover_gym.policy.features import LARGEST_FEATURE
-from rover_gym.validation import number, refuse
-
-# Format version of a policy's files; other versions are refused.
-FORMAT = 1
+from rover_gym.validation import refuse
 
 
 class PolicyError(OptionError):
-    """A folder holds no valid policy, or a policy for another environment."""
+    """There is no such policy, its files are damaged, or it is for another rover."""
 
 
 def refuse_field(path: Path, field: str, value: object, reason: str) -> NoReturn:
@@ -68,8 +62,8 @@ def is_there(path: Path) -> bool:
         return False
 
 
-#: Limits of a policy's files: bytes of the card, bytes of all arrays, and layers.
-LARGEST_CARD, LARGEST_NETWORK, MOST_LAYERS = 1 << 20, 1 << 26, 16
+#: Limits of a network's file: bytes of all arrays, and layers.
+LARGEST_NETWORK, MOST_LAYERS = 1 << 26, 16
 
 #: Limits within which sums and quotients stay finite in single precision.
 LARGEST_WEIGHT, SMALLEST_DEVIATION = 1e6, 1e-6
@@ -190,94 +184,6 @@ def _read_array(path: Path, name: str, data: bytes, expected: np.dtype[Any]) -> 
     return np.frombuffer(body, dtype=kind).astype(np.float32).reshape(shape)
 
 
-#: Arguments of the environment that the caller chooses, not the policy.
-NOT_A_POLICYS = ("model", "render_mode", "render_options")
-
-
-@dataclass(frozen=True)
-class PolicyCard:
-    """The settings that a policy needs to run, and its provenance.
-
-    Attributes:
-        environment: Arguments of the environment that the policy's observation needs.
-        pool: Height-scan points per pooling cell, lengthwise and crosswise.
-        hold: Time that a command is held, s.
-        command: The values of a command of 1.
-        guided: Whether actions are offsets from the guide's command.
-        source: Provenance, for information: seed, steps, versions, revision.
-    """
-
-    environment: Mapping[str, Any]
-    pool: int
-    hold: float
-    command: CommandLimits
-    guided: bool
-    source: Mapping[str, Any]
-
-    def save(self, path: Path) -> None:
-        """Writes the card as JSON."""
-        plain = {"format": FORMAT, **asdict(self)}
-        path.write_text(json.dumps(plain, indent=2) + "\n", encoding="utf-8")
-
-    @classmethod
-    def read(cls, path: Path) -> "PolicyCard":
-        """Reads what `save` wrote.
-
-        Raises:
-            PolicyError: The file has another format, or a field is missing, unknown or invalid.
-            OSError: The file does not exist or may not be read.
-        """
-        plain = _read_object(path)
-        if plain.get("format") != FORMAT:
-            refuse(PolicyError, "policy", str(path), f"must be a policy of format {FORMAT}")
-        names = {"format", *(field.name for field in fields(cls))}
-        if plain.keys() != names:
-            refuse_field(path, "fields", sorted(plain.keys() ^ names), "must be those of a policy's card; these differ")
-        for name in ("environment", "command", "source"):
-            if not isinstance(plain[name], dict):
-                refuse_field(path, name, plain[name], "must be an object")
-        if not isinstance(plain["guided"], bool):
-            refuse_field(path, "guided", plain["guided"], "must be true or false")
-        check_arguments(path, plain["environment"])
-        hold = number(f"{path}: hold", plain["hold"], above=0.0, at_most=60.0, error=PolicyError)
-        pool = number(f"{path}: pool", plain["pool"], at_least=1.0, at_most=1000.0, error=PolicyError)
-        try:
-            command = CommandLimits(**plain["command"])
-        except (RoverGymError, TypeError) as error:
-            refuse_field(path, "command", plain["command"], f"cannot be ({error})")
-        if pool != round(pool):
-            refuse_field(path, "pool", plain["pool"], "must be a whole number")
-        return cls(
-            environment=plain["environment"],
-            pool=round(pool),
-            hold=hold,
-            command=command,
-            guided=plain["guided"],
-            source=plain["source"],
-        )
-
-
-def _read_object(path: Path) -> dict[str, Any]:
-    text = read_bytes(path, LARGEST_CARD)
-    with intact(path):
-        plain = json.loads(text)
-        json.dumps(plain, ensure_ascii=False).encode()  # refuse lone surrogates
-    if not isinstance(plain, dict):
-        refuse(PolicyError, "policy", str(path), f"must be a policy of format {FORMAT}")
-    return plain
-
-
-def check_arguments(path: Path, arguments: Mapping[str, Any]) -> None:
-    """Refuses unknown arguments; the environment checks the values."""
-    known = [name for name in ARGUMENTS if name not in NOT_A_POLICYS]
-    for name in arguments:
-        if name not in known:
-            refuse_field(path, f"environment.{name}", arguments[name], f"unknown; known are {', '.join(known)}")
-
-
-#: Folder names of the shipped policies, by terrain.
-SHIPPED: Mapping[str, str] = {"plane": "plane", "rocks": "rocks"}
-
 #: Folder names of the shipped forecasts: by the name of the rover's model, of the built-in one on hills, and of it
 #: on all other ground.
 FORECASTS: Mapping[str, str] = {"open-rover": "foresight-open-rover"}
@@ -290,61 +196,7 @@ ANYWHERE = "anywhere"
 FOLDER = Path(__file__).parents[1] / "data" / "policies"
 
 
-def policy_folder(terrain: str) -> Path:
-    """The folder of the policy shipped for a terrain.
-
-    Raises:
-        PolicyError: No policy is shipped for this terrain.
-    """
-    terrain = terrain_name(terrain)
-    if terrain not in SHIPPED:
-        refuse(
-            PolicyError,
-            "policy",
-            terrain,
-            f"no trained policy is included for it; there are policies for {', '.join(SHIPPED)}",
-        )
-    return FOLDER / SHIPPED[terrain]
-
-
 def forecast_folder(model: RoverModel | None = None, *, hills: bool = False) -> Path:
     """The folder of the forecast shipped for a rover, None for the built-in one, among rocks or on hills."""
     of_terrain = HILLS_FORECAST if hills else ROCKS_FORECAST
     return FOLDER / (of_terrain if model is None else FORECASTS.get(model.name, of_terrain))
-
-
-def find_policy(policy: str, terrain: str) -> Path | None:
-    """The folder of a policy: the shipped one for "trained", otherwise the given path; None for those without one.
-
-    For the folder of a run of `rover train`, the final policy.
-
-    Raises:
-        PolicyError: There is no such policy.
-    """
-    if policy in ("pd", "scan", "sand"):
-        return None
-    folder = policy_folder(terrain) if policy == "trained" else Path(policy)
-    if is_there(folder / "policy" / "policy.json"):
-        folder = folder / "policy"
-    if not is_there(folder / "policy.json"):
-        refuse(
-            PolicyError,
-            "policy",
-            policy,
-            "must be 'pd', 'sand', 'scan', 'foresight', 'anywhere', 'trained' or the folder of a run, a trained policy "
-            "or a forecast",
-        )
-    return folder
-
-
-def policy_arguments(folder: Path) -> dict[str, Any]:
-    """The arguments that a policy's environment must be made with.
-
-    Raises:
-        PolicyError: The folder does not contain a valid policy.
-        OSError: The file may not be read.
-    """
-    arguments = dict(PolicyCard.read(folder / "policy.json").environment)
-    if isinstance(arguments.get("height_scan"), list):
-        arguments["height_scan"] = tuple(arguments["height_scan"])
-    return arguments
