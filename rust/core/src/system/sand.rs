@@ -44,8 +44,7 @@ const RESOLVED: f64 = 2.0;
 const GIVES_WAY: f64 = 0.5;
 
 /// Ways, in cells of the ruts, along the ground and up or down, after which a wheel's place is
-/// noted again: a rut is known to 1% of a cell, unless the rim is more curved than one of a radius
-/// of a cell.
+/// noted again: a rut is known to 1% of a cell.
 const ALONG: f64 = 0.25;
 const DEEPER: f64 = 0.01;
 
