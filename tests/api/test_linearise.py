@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from rover_gym import OptionError, Simulation, StateError
+from rover_gym import OptionError, RoverModel, Simulation, StateError
 from rover_gym.mechanics import Linearisation, SphereField
 
 NV = 21
@@ -112,6 +112,33 @@ def test_columns_that_hold_are_the_differences_of_real_steps(scene, modes, least
     assert linear.b.shape == (2 * NV, 12)
     assert linear.holds.sum() >= least
     assert difference_error(sim, linear).max() < 2e-6  # the differences' own error
+
+
+def test_dry_friction_in_joints_is_a_contact_that_sticks_or_slips():
+    description = RoverModel.named("open-rover").to_dict()
+    for solid in description["solids"]:
+        if solid["name"] in ("left_bogie", "right_bogie"):
+            solid["friction"] = 30.0
+        elif solid["name"].startswith("wheel"):
+            solid["friction"] = 0.2
+    model = RoverModel.from_dict(description)
+    sim = Simulation(model)
+    q, v = model.resting_pose(sim.terrain, (0.0, 0.0), 0.0), np.zeros(model.nv)
+    v[0] = 0.3
+    v[model.wheel_joint_indices] = -0.3 / model.wheel_radii
+    sim.set_state(q, v)
+    sim.step(20)
+    linear = sim.linearise(check=True)
+    kinds = dict(zip(linear.bodies[-8:], linear.modes[-8:], strict=True))
+    assert kinds["left_bogie"] == kinds["right_bogie"] == "stick"
+    assert all(kinds[f"wheel_{name}"] == "slip" for name in model.wheel_names)
+    held = dict(zip(model.dof_names, linear.holds[model.nv : 2 * model.nv], strict=True))
+    assert all(held[name] for name in ("x", "pitch", "left_bogie", "wheel_FL"))
+    assert linear.holds.mean() > 0.6
+    assert linear.errors[linear.holds].max() < 1e-4
+    # A wheel whose bearing slips takes its friction from any torque; a bogie that sticks stays.
+    bogie = model.nv + model.dof_names.index("left_bogie")
+    np.testing.assert_allclose(linear.a[bogie], 0.0, atol=1e-12)
 
 
 def test_a_projection_is_differentiated():

@@ -87,7 +87,8 @@ pub struct Contacts {
     points: Array,
     /// Contact frames, world frame, (n, 3, 3).
     ///
-    /// Rows are the unit vectors n (normal), t (rolling direction) and b (lateral).
+    /// Rows are the unit vectors n (normal), t (rolling direction) and b (lateral). On rollers, t
+    /// is the axis of the roller, and b is zero.
     frames: Array,
     /// Gaps, (n,), m, at the configuration in which the step detected the contacts.
     gaps: Array,

@@ -499,6 +499,9 @@ impl RoverModel {
     }
 
     /// Index in q of each wheel's rotation; -1 where it is locked.
+    ///
+    /// A wheel that is coupled with a ratio of 1 has the index of the joint that it follows, and
+    /// shares its drive.
     #[getter]
     fn wheel_joint_indices(&self) -> Vec<i64> {
         self.velocity_indices(self.inner.wheels().iter().map(|w| w.joint))

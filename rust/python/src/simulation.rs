@@ -349,7 +349,8 @@ impl Simulation {
 
     /// Mean torques of the drives over the last step, (n_wheels,), N m, positive forward.
     ///
-    /// Each is the command after the limit of the wheel's `Motor`; 0 before the first step.
+    /// Each is the command after the limit of the wheel's `Motor`; 0 before the first step. Wheels
+    /// that share a drive have equal parts of its torque.
     #[getter]
     fn motor_torques(&self) -> Result<Array> {
         Ok(fresh(self.open()?.motor_torques()))
@@ -537,7 +538,8 @@ impl Simulation {
 
     /// Mean contact force on each wheel over the last step, (n_wheels, 3), N.
     ///
-    /// Sums over its contacts, each along its own normal, rolling and lateral direction.
+    /// Sums over its contacts, each along its own normal, rolling and lateral direction; with
+    /// rollers along the normal, along the roller's axis, and 0.
     #[getter]
     fn wheel_forces(&self) -> Result<Array> {
         Ok(fresh_rows(self.open()?.wheel_forces()))

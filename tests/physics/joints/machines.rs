@@ -33,6 +33,7 @@ pub fn machine(solids: Vec<SolidDescription>) -> ModelDescription {
         name: "machine".into(),
         solids,
         wheels: Vec::new(),
+        tracks: Vec::new(),
         tags: Vec::new(),
         loops: Vec::new(),
         machines: Vec::new(),

@@ -11,6 +11,7 @@ use super::joint_friction;
 use super::limit;
 use super::pair::Contact;
 use super::part::Part;
+use super::rollers;
 use super::rows::{Path, Triple, add_product, add_scaled, along, close_stop, product, square};
 use crate::multibody::{Factor, Kinematics, Model};
 
@@ -84,6 +85,9 @@ impl ContactSystem {
             match contact.part {
                 Part::Limit(..) => close_stop(&mut own),
                 Part::Friction(_) => joint_friction::close(&mut own),
+                Part::Wheel(_) if rollers::rollers_of(model, contact).is_some() => {
+                    rollers::close(&mut own);
+                }
                 Part::Wheel(_) | Part::Box(_) | Part::Sphere(_) => {}
             }
             for (i, row) in own.chunks_exact(3).enumerate() {

@@ -14,7 +14,7 @@ pub struct ContactFrame {
     pub n: Vector3<f64>,
     /// Rolling direction: forward if the axle points to the right.
     pub t: Vector3<f64>,
-    /// `t × n`.
+    /// `t × n`; zero where rollers turn freely.
     pub b: Vector3<f64>,
 }
 

@@ -41,19 +41,10 @@ impl ContactKey {
     }
 }
 
-/// Index of the joint's velocity and the gap rate per unit of it, if the contact is a stop.
-#[inline]
-pub(crate) fn row(model: &Model, contact: &Contact) -> Option<(usize, f64)> {
-    match contact.part {
-        Part::Limit(joint, side) => Some((model.joint_velocity(joint), side.sign())),
-        _ => None,
-    }
-}
-
 /// The only row of a stop or of a joint's friction, if the contact is one: index of the joint's
 /// velocity, its entry, and which of n, t and b it is.
 #[inline]
-pub(super) fn joint_row(model: &Model, contact: &Contact) -> Option<(usize, f64, usize)> {
+pub(crate) fn joint_row(model: &Model, contact: &Contact) -> Option<(usize, f64, usize)> {
     match contact.part {
         Part::Limit(joint, side) => Some((model.joint_velocity(joint), side.sign(), 0)),
         Part::Friction(joint) => Some((model.joint_velocity(joint), 1.0, 1)),

@@ -7,6 +7,7 @@
 //! phase selects candidates, [`crate::geometry::query`] computes gaps and normals of a machine with
 //! its `body_motion`, and [`activation`] decides which contacts enter the step.
 //! [`wheel_gaps`] measures how far the wheels are from the ground and nothing else,
+//! `rollers` frees wheels across their rollers,
 //! `box_clearance` how far a box is from a surface at least.
 //! [`relocation`] re-evaluates them in another configuration; `contact_slope` has their
 //! derivatives by the poses. `rows` has the rows of the contact
@@ -48,6 +49,7 @@ pub mod pair;
 pub mod pair_detection;
 pub mod part;
 pub mod relocation;
+pub(crate) mod rollers;
 pub(crate) mod rows;
 pub(crate) mod ways_out;
 pub mod wheel_gaps;

@@ -7,6 +7,7 @@ use super::detection::PASSING;
 use super::frame::ContactFrame;
 use super::pair::{Contact, ON_SURFACE, Opposite, OtherSide};
 use super::part::Part;
+use super::rollers::turn_to_rollers;
 use crate::geometry::query::dispatch;
 use crate::geometry::{PlacedShape, Primitive, Sphere, Terrain};
 use crate::multibody::{Kinematics, Model};
@@ -60,6 +61,7 @@ pub(crate) fn relocate_to(
         Primitive::Vertex(vertex) => dispatch::point_at_vertex(&shape, &vertex, base),
     };
     contact.frame = ContactFrame::on_ground(&shape, &point);
+    turn_to_rollers(model, contact);
     (contact.point, contact.gap) = (point.point, point.gap + contact.excess);
 }
 

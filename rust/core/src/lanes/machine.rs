@@ -35,6 +35,9 @@ pub enum Unsupported {
     /// Joints have dry friction.
     #[error("joints of the machine have dry friction")]
     JointFriction,
+    /// Wheels have rollers.
+    #[error("wheels of the machine have rollers")]
+    Rollers,
     /// Its wheels and stops can have more contacts than a problem.
     #[error("wheels with a width and stops can have {0} contacts, more than {MAX_CONTACTS}")]
     TooManyContacts(usize),
@@ -242,6 +245,9 @@ fn check(model: &Model) -> Result<(), Unsupported> {
     }
     if !model.rubbing_joints().is_empty() {
         return Err(Unsupported::JointFriction);
+    }
+    if model.has_rollers() {
+        return Err(Unsupported::Rollers);
     }
     let wheels: Vec<WheelDisc> = model.wheels().iter().map(WheelDisc::of).collect();
     let has_lines = wheels.iter().any(|wheel| wheel.n_circles() > 1);

@@ -68,7 +68,7 @@ pub use chart::Chart;
 pub use description::{
     CouplingDescription, DriveDescription, FORMAT, Hold, JointKind, Limits, LoopDescription,
     LoopKind, MAX_SHAPES, MAX_SOLIDS, MachineDescription, MassProperties, ModelDescription, Shape,
-    ShapeDescription, SolidDescription, Spring, TagDescription, WheelDescription,
+    ShapeDescription, SolidDescription, Spring, TagDescription, TrackDescription, WheelDescription,
 };
 pub use energy::{Energy, EnergyScratch};
 pub use error::{ModelError, StateError};

@@ -96,7 +96,7 @@ impl Differentiator {
     /// Of a simulation with its command, for this machine's instructions.
     ///
     /// # Errors
-    /// `Variant`, `ClosedLoops`, `JointFriction`, `Wrench`.
+    /// `Variant`, `ClosedLoops`, `Wrench`.
     pub fn new(of: &RoverSimulation) -> Result<Self, LinearisationError> {
         Self::with(of, Instructions::of_this_machine())
     }
@@ -104,7 +104,7 @@ impl Differentiator {
     /// The same for other instructions.
     ///
     /// # Errors
-    /// `Variant`, `ClosedLoops`, `JointFriction`, `Wrench`.
+    /// `Variant`, `ClosedLoops`, `Wrench`.
     pub fn with(
         of: &RoverSimulation,
         instructions: Instructions,
@@ -114,9 +114,6 @@ impl Differentiator {
         }
         if !of.model().loops().is_empty() {
             return Err(LinearisationError::ClosedLoops);
-        }
-        if !of.model().rubbing_joints().is_empty() {
-            return Err(LinearisationError::JointFriction);
         }
         if !of.command().actuators.wrenches.is_empty() {
             return Err(LinearisationError::Wrench);

@@ -146,9 +146,6 @@ pub enum LinearisationError {
     /// A wrench acts from outside.
     #[error("steps under a wrench have no derivatives yet: clear_wrenches removes it")]
     Wrench,
-    /// Joints have dry friction.
-    #[error("model: steps of a machine with dry friction in its joints have no derivatives yet")]
-    JointFriction,
     /// A perturbation outside its range.
     #[error("perturbation: must be from 1e-9 to 1e-3, is {value}")]
     Perturbation {

@@ -207,7 +207,7 @@ impl Scene for RoverScene {
         let RoverMemory { wheel_torque, sand } = taken.memory;
         for (torque, wheel) in wheel_torque.iter_mut().zip(self.model.wheels()) {
             let impulse = wheel.joint.map_or(0.0, |j| drives.impulse(0, j));
-            *torque = wheel.drive_sign * impulse / taken.options.time_step;
+            *torque = wheel.drive_sign * impulse * wheel.share / taken.options.time_step;
         }
         let ground = self.terrain.soft();
         taken.parts.tree.end_sand(ground, sand.as_mut());

@@ -72,8 +72,8 @@ impl RoverInGrains {
     ///
     /// # Errors
     /// Another time step or gravity of the two, a part of the rover deeper in a grain than
-    /// [`OVERLAP`] of the smallest radius, a rover with closed loops or dry friction in joints, a
-    /// coefficient that is negative or not finite.
+    /// [`OVERLAP`] of the smallest radius, a rover with closed loops, dry friction in joints or
+    /// wheels with rollers, a coefficient that is negative or not finite.
     pub fn new(
         rover: &RoverSimulation,
         bed: &GrainSimulation<3>,
@@ -103,6 +103,7 @@ impl RoverInGrains {
         for (is_there, what) in [
             (!model.loops().is_empty(), "a closed loop"),
             (!model.rubbing_joints().is_empty(), "dry friction in joints"),
+            (model.has_rollers(), "wheels with rollers"),
         ] {
             if is_there {
                 return Err(TogetherError::Unsupported { what });

@@ -11,6 +11,7 @@ use super::momentum_balance::BalanceScene;
 use super::sand::{MOST_REVISIONS_IN_SAND, SandContact};
 use super::sand_patch::SandScene;
 use super::tree_scratch::TreeScratch;
+use crate::contact::rollers::turn_to_rollers;
 use crate::contact::{
     Activation, Contact, ContactKey, Opposite, detect, detect_limits, detect_pairs,
     generalized_impulse, joint_friction, list_friction, relocate, relocate_limit,
@@ -208,6 +209,9 @@ impl MechanicalSystem for TreeSystem<'_> {
             &activation,
             out,
         );
+        for contact in out.iter_mut() {
+            turn_to_rollers(self.model, contact);
+        }
         let TreeScratch {
             kinematics,
             pairs,

@@ -81,7 +81,7 @@ impl<T: Lane> Block<T> {
         self.drives.to_lane(lane, rover.drive_work);
         for (torque, wheel) in rover.wheel_torque.iter_mut().zip(rover.model.wheels()) {
             let impulse = wheel.joint.map_or(0.0, |j| self.drives.impulse(lane, j));
-            *torque = wheel.drive_sign * impulse / h;
+            *torque = wheel.drive_sign * impulse * wheel.share / h;
         }
     }
 

@@ -1,6 +1,7 @@
 //! Checks of a description, in the order of its text.
 
 use std::collections::{HashMap, HashSet};
+use std::f64::consts::FRAC_PI_2;
 
 use super::check_loops::check_loops;
 use super::check_shapes::check_shapes;
@@ -12,6 +13,9 @@ use super::joint::{JointKind, Limits};
 use super::masses::mass_left;
 use super::{MAX_SHAPES, MAX_SOLIDS, ModelDescription, SolidDescription, WheelDescription};
 use crate::multibody::error::ModelError;
+
+/// Least angle of rollers from the axle, rad. At 0 they would turn in place of the wheel.
+const LEAST_ROLLER_ANGLE: f64 = 0.01;
 
 /// Checks the whole description, in the order of its text.
 pub(in crate::multibody) fn check(description: &ModelDescription) -> Result<(), ModelError> {
@@ -285,7 +289,7 @@ fn check_tags(
     Ok(())
 }
 
-/// Checks width and rounding of a wheel; `at` gives the path of its fields.
+/// Checks width, rounding, grousers and rollers of a wheel; `at` gives the path of its fields.
 fn check_width(at: &impl Fn(&str) -> String, wheel: &WheelDescription) -> Result<(), ModelError> {
     let (width, rounding) = (wheel.width.unwrap_or(0.0), wheel.rounding.unwrap_or(0.0));
     if width != 0.0 {
@@ -317,7 +321,21 @@ fn check_width(at: &impl Fn(&str) -> String, wheel: &WheelDescription) -> Result
             value: height,
         });
     }
-    Ok(())
+    check_rollers(at, wheel)
+}
+
+/// Checks the angle of a wheel's rollers; `at` gives the path of its fields.
+fn check_rollers(at: &impl Fn(&str) -> String, wheel: &WheelDescription) -> Result<(), ModelError> {
+    match wheel.rollers {
+        Some(angle) if !(LEAST_ROLLER_ANGLE..=FRAC_PI_2).contains(&angle.abs()) => {
+            Err(ModelError::OutOfRange {
+                field: at("rollers"),
+                range: "from 0.01 to π/2 rad either way",
+                value: angle,
+            })
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Checks stiffness and damping of a wheel; `at` gives the path of its fields.

@@ -12,9 +12,11 @@ pub mod closure;
 mod gallery;
 mod join;
 pub mod joint;
+mod laying;
 mod machines;
 mod masses;
 pub mod shape;
+mod tracks;
 mod yielding;
 
 use super::error::ModelError;
@@ -24,6 +26,7 @@ pub use joint::{CouplingDescription, DriveDescription, Hold, JointKind, Limits, 
 pub use machines::MachineDescription;
 pub use masses::MassProperties;
 pub use shape::{Shape, ShapeDescription};
+pub use tracks::TrackDescription;
 
 /// The built-in rover: Table 4.1 and Fig. 4.5 of the report, in SI units.
 const ROVER: &str = include_str!("../../../models/rover.toml");
@@ -50,6 +53,9 @@ pub struct ModelDescription {
     /// Wheels in the order of every public array.
     #[serde(default)]
     pub wheels: Vec<WheelDescription>,
+    /// Tracks. A model has their wheels instead.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tracks: Vec<TrackDescription>,
     /// Named points.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tags: Vec<TagDescription>,
@@ -79,7 +85,7 @@ pub struct TagDescription {
 }
 
 /// One solid and the joint that carries it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SolidDescription {
     /// Name of the solid and of its joint.
@@ -159,7 +165,7 @@ pub struct SolidDescription {
 }
 
 /// A wheel, fixed to a solid: a thin disc, or a cylinder with rounded edges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WheelDescription {
     /// Short name, such as `FL`.
@@ -193,6 +199,11 @@ pub struct WheelDescription {
     /// Normal damping beside the stiffness, N s/m; 0 by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub damping: Option<f64>,
+    /// Free rollers around its rim, as on a mecanum wheel: angle of the roller that touches the
+    /// ground from the axle, rad, positive if its axis points forward on the right side. π/2 for an
+    /// omni wheel; no rollers by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rollers: Option<f64>,
     /// Name of its material; `wheel` by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,
@@ -340,6 +351,7 @@ impl ModelDescription {
             name: String::new(),
             solids: Vec::new(),
             wheels: Vec::new(),
+            tracks: Vec::new(),
             tags: Vec::new(),
             loops: Vec::new(),
             self_contact: false,

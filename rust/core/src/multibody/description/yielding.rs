@@ -25,17 +25,24 @@ impl ModelDescription {
     /// and state none.
     pub(in crate::multibody) fn state_yielding(&mut self) {
         let mass: f64 = self.solids.iter().map(|solid| solid.mass).sum();
-        let stiffness = two_digits(mass * GRAVITY / (self.wheels.len() as f64 * DEFLECTION));
-        let time = 2.0 * (DEFLECTION / GRAVITY).sqrt();
+        let [stiffness, damping] = yielding(mass, self.wheels.len());
         let lines = self
             .wheels
             .iter_mut()
             .filter(|wheel| wheel.stands_on_a_line());
         for wheel in lines.filter(|wheel| wheel.stiffness.is_none()) {
-            wheel.stiffness = Some(stiffness.min(1e12));
-            wheel.damping = Some(two_digits(time * stiffness).min(1e12));
+            wheel.stiffness = Some(stiffness);
+            wheel.damping = Some(damping);
         }
     }
+}
+
+/// Stiffness (N/m) and critical damping (N s/m), to two digits, of each of `n` wheels that carry a
+/// mass (kg).
+pub(super) fn yielding(mass: f64, n: usize) -> [f64; 2] {
+    let stiffness = two_digits(mass * GRAVITY / (n as f64 * DEFLECTION));
+    let time = 2.0 * (DEFLECTION / GRAVITY).sqrt();
+    [stiffness.min(1e12), two_digits(time * stiffness).min(1e12)]
 }
 
 /// A positive number to two significant digits.

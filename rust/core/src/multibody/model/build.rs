@@ -21,6 +21,7 @@ use crate::multibody::joint::{
     Coupled, Coupling, Fixed, Free, Joint, JointAxis, JointModel, Prismatic, Revolute, SingleJoint,
     Spherical,
 };
+use crate::scalar::elementary::sin_cos;
 use crate::spatial::{SymmetricMatrix3, exp_rotation};
 
 /// Mass, first moment, and inertia about the body frame's origin, accumulated while solids are
@@ -67,7 +68,7 @@ impl Model {
             let i = solid_of_body[b];
             coupled_apart(i, &description.solids[i])
         })?;
-        let wheels = wheels(&description.wheels, &index_of, &frames, &bodies);
+        let wheels = wheels(&description.wheels, &index_of, &frames, &bodies, &joints);
         let carriers = (boxes.iter().map(|x| x.body)).chain(spheres.iter().map(|x| x.body));
         let looped = description.loops.iter().flat_map(|closure| {
             let ends = [Some(&closure.solid), closure.other.as_ref()];
@@ -406,16 +407,20 @@ fn wheels(
     index_of: &HashMap<&str, usize>,
     frames: &[Frame],
     bodies: &[Body],
+    joints: &[JointProperties],
 ) -> Vec<Wheel> {
-    // A coupled joint has no torque of its own.
-    let own = |body: &Body| {
-        let coordinate = body.joint.coordinate();
-        coordinate.filter(|_| !body.is_coupled)
+    let own = |name: &str| bodies.iter().find(|body| body.name == name);
+    let joint_of = |name: &str| {
+        let body = own(name).filter(|body| !body.is_coupled)?;
+        body.joint.coordinate()
     };
-    let joints: HashMap<&str, usize> = (bodies.iter())
-        .filter_map(|body| own(body).map(|joint| (body.name.as_str(), joint)))
-        .collect();
-    let joint_of = |name: &str| joints.get(name).copied();
+    // Wheels that turn as one share the drive of one joint.
+    let driving = |name: &str| {
+        let body = own(name)?;
+        let turns_alike = (body.joint.coupling()).is_none_or(|own| (own.ratio - 1.0).abs() <= 0.0);
+        let coordinate = body.joint.coordinate().filter(|_| turns_alike)?;
+        (!body.is_coupled || joints[coordinate].drive.is_none()).then_some(coordinate)
+    };
     let mut wheels = Vec::new();
     for wheel in described {
         let Some(frame) = index_of.get(wheel.solid.as_str()).map(|&k| &frames[k]) else {
@@ -431,6 +436,7 @@ fn wheels(
             radius: wheel.contact_radius.unwrap_or(wheel.radius),
             width: wheel.width.unwrap_or(0.0),
             rounding: wheel.rounding.unwrap_or(0.0),
+            rollers: wheel.rollers.map(|angle| sin_cos(angle).into()),
             grouser_height: wheel.grouser_height.unwrap_or(0.0),
             grousers: wheel.grousers.unwrap_or(0),
             compliance: (wheel.stiffness.filter(|stiffness| *stiffness > 0.0)).map(|stiffness| {
@@ -443,10 +449,15 @@ fn wheels(
             torque_limit: wheel.torque_limit,
             drive_sign: wheel.drive_sign,
             motor: wheel.motor,
-            joint: joint_of(&wheel.solid),
+            joint: driving(&wheel.solid),
+            share: 1.0,
             steering: wheel.steering.as_deref().and_then(joint_of),
             steering_limit: wheel.steering_limit.unwrap_or(0.0),
         });
+    }
+    for i in 0..wheels.len() {
+        let alike = wheels.iter().filter(|other| other.joint == wheels[i].joint);
+        wheels[i].share = 1.0 / alike.count() as f64;
     }
     wheels
 }

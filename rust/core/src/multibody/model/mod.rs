@@ -71,6 +71,7 @@ impl Model {
     /// # Errors
     /// The first invalid entry, named by its field.
     pub fn from_description(mut description: ModelDescription) -> Result<Self, ModelError> {
+        description.lay_tracks()?;
         check(&description)?;
         description.state_yielding();
         Self::build(description)
@@ -271,6 +272,13 @@ impl Model {
     #[must_use]
     pub fn has_slides(&self) -> bool {
         self.has_slides
+    }
+
+    /// Whether any wheel has rollers.
+    #[inline]
+    #[must_use]
+    pub fn has_rollers(&self) -> bool {
+        self.wheels.iter().any(|wheel| wheel.rollers.is_some())
     }
 
     /// Whether any wheel yields where it touches.

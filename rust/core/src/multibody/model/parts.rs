@@ -39,6 +39,8 @@ pub struct Wheel {
     pub width: f64,
     /// Radius of its edges, m: at most half the width.
     pub rounding: f64,
+    /// Sine and cosine of the angle of its rollers from the axle, if it has any.
+    pub rollers: Option<[f64; 2]>,
     /// Height of the grousers over the rim, m. Only sand feels them.
     pub grouser_height: f64,
     /// Number of grousers around the rim.
@@ -53,9 +55,11 @@ pub struct Wheel {
     pub drive_sign: f64,
     /// Torque–speed line of its motor, if any.
     pub motor: Option<Motor>,
-    /// Index of its own joint ([`Model::joint_index`](super::Model::joint_index)); `None` if it is
-    /// locked.
+    /// Index of its own joint ([`Model::joint_index`](super::Model::joint_index)), or of the one
+    /// that it follows at the same rate; `None` if it is locked or follows otherwise.
     pub joint: Option<usize>,
+    /// One over the number of wheels with the same joint.
+    pub share: f64,
     /// Index of its steering joint; `None` if it has none or the joint is locked.
     pub steering: Option<usize>,
     /// Largest steering set-point in either direction, rad.

@@ -46,7 +46,7 @@ impl<T: Lane> Tangent<T> {
         x.y.slope -= origin.y.slope;
         x.z.slope -= origin.z.slope;
         let mut gap = Dual::new(T::splat(token, contact.gap), slopes[12]);
-        if let (Some(joint), Some((_, sign))) = (held.joint, limit::row(model, contact)) {
+        if let (Some(joint), Some((_, sign, 0))) = (held.joint, limit::joint_row(model, contact)) {
             gap.slope = T::splat(token, sign) * self.end.joints[joint].slope;
         }
         let [n, t, b] = contact.frame.rows();
@@ -72,8 +72,8 @@ impl<T: Lane> Tangent<T> {
         let contact = &scene.held.step.contacts[i];
         let zero = Dual::splat(self.token, 0.0);
         let mut sum = [zero; 3];
-        if let Some((k, sign)) = limit::row(scene.model, contact) {
-            sum[0] = zero.like(sign) * x[k];
+        if let Some((k, sign, row)) = limit::joint_row(scene.model, contact) {
+            sum[row] = zero.like(sign) * x[k];
             return sum;
         }
         let poses = &self.poses_end;
@@ -96,8 +96,8 @@ impl<T: Lane> Tangent<T> {
     pub(super) fn push(&mut self, scene: &TangentScene<'_>, i: usize, p: [f64; 3]) {
         let contact = &scene.held.step.contacts[i];
         let number = |x: f64| Dual::splat(self.token, x);
-        if let Some((k, sign)) = limit::row(scene.model, contact) {
-            self.y[k] += number(sign * p[0]);
+        if let Some((k, sign, row)) = limit::joint_row(scene.model, contact) {
+            self.y[k] += number(sign * p[row]);
             return;
         }
         for (body, sign, path) in sides(scene.model.mechanism(), contact) {

@@ -1,7 +1,7 @@
 //! What a step of a tree held, and how its contacts change with the poses.
 
 use crate::contact::contact_slope::ContactSlope;
-use crate::contact::{Contact, Opposite};
+use crate::contact::{Contact, Opposite, Part};
 use crate::geometry::Terrain;
 use crate::integrator::held_step::HeldStep;
 use crate::integrator::{MechanicalSystem, ScratchOf, Start, StepOptions};
@@ -26,7 +26,7 @@ pub(super) struct HeldContact {
     pub restitution: f64,
     /// Where it yields.
     pub compliance: Option<Compliance>,
-    /// Index of the joint, of a stop.
+    /// Index of the joint, of a stop or of dry friction.
     pub joint: Option<usize>,
 }
 
@@ -62,7 +62,7 @@ impl TreeSystem<'_> {
         self.place_end(&q);
         let contacts = step.contacts.iter().enumerate().map(|(i, contact)| {
             let joint = match contact.part {
-                crate::contact::Part::Limit(joint, _) => Some(joint),
+                Part::Limit(joint, _) | Part::Friction(joint) => Some(joint),
                 _ => None,
             };
             let yields = step.yields.get(i).is_some_and(|yields| *yields);

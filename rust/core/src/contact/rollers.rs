@@ -1,0 +1,40 @@
+//! Wheels with free rollers, such as mecanum wheels: friction along the axis of the roller that
+//! touches, none across it.
+//!
+//! The frame of such a contact has t along the roller's axis and no b:
+//!
+//! ```text
+//! t = b₀ cos γ + t₀ sin γ,     b = 0
+//! ```
+//!
+//! with the frame (n, t₀, b₀) of the wheel and the angle γ of the roller from the axle. The row b
+//! of H is then zero, and so is the impulse along it once W has a diagonal there: Coulomb's law in
+//! the plane of n and t. Rollers have no inertia.
+
+use super::pair::{Contact, Opposite};
+use super::part::Part;
+use crate::multibody::Model;
+
+/// Turns the frame of a wheel's contact with the ground to the wheel's rollers, if it has any.
+#[inline]
+pub(crate) fn turn_to_rollers(model: &Model, contact: &mut Contact) {
+    if let Some([sine, cosine]) = rollers_of(model, contact) {
+        let frame = &mut contact.frame;
+        frame.t = frame.b * cosine + frame.t * sine;
+        frame.b.fill(0.0);
+    }
+}
+
+/// Sine and cosine of the angle of the rollers on which a contact stands.
+#[inline]
+pub(super) fn rollers_of(model: &Model, contact: &Contact) -> Option<[f64; 2]> {
+    match (contact.part, contact.key.opposite) {
+        (Part::Wheel(i), Opposite::Ground(_)) => model.wheels()[i].rollers,
+        _ => None,
+    }
+}
+
+/// Makes the own block of W of such a contact regular; its row b is zero.
+pub(super) fn close(own: &mut [f64; 9]) {
+    own[8] = own[4];
+}
