@@ -136,7 +136,7 @@ def test_a_recorded_drive_is_filmed_afterwards_as_it_was_filmed_while_it_drove(t
     assert f"film: {after}" in output_of("replay", tmp_path, "--film", after, "--fps", "20")
     frames, _ = imageio_ffmpeg.count_frames_and_secs(str(after))
     assert frames == 11  # the start and ten steps
-    one, other = (last_frame(path, 960, 540)[60:].astype(int) for path in (during, after))  # below the caption
+    one, other = (last_frame(path, 960, 540)[90:].astype(int) for path in (during, after))  # below the caption
     assert one.std() > 20.0
     assert np.abs(one - other).mean() < 2.0
     assert (np.abs(one - other).max(axis=2) > 40).mean() < 0.002
