@@ -129,6 +129,19 @@ def test_a_film_has_the_size_and_the_camera_that_are_asked_for(tmp_path: Path) -
     assert (caption.min(axis=2) > 230).sum() > 100  # white letters: the seed, the outcome and the time
 
 
+def test_a_recorded_drive_is_filmed_afterwards_as_it_was_filmed_while_it_drove(tmp_path: Path) -> None:
+    during, after = tmp_path / "during.mp4", tmp_path / "after.mp4"
+    given = ("--difficulty", "0.5", "--time-limit", "0.5", "--output", str(tmp_path), "--size", "960x540")
+    output_of("drive", *given, "--film", during)
+    assert f"film: {after}" in output_of("replay", tmp_path, "--film", after, "--fps", "20")
+    frames, _ = imageio_ffmpeg.count_frames_and_secs(str(after))
+    assert frames == 11  # the start and ten steps
+    one, other = (last_frame(path, 960, 540)[90:].astype(int) for path in (during, after))  # below the caption
+    assert one.std() > 20.0
+    assert np.abs(one - other).mean() < 2.0
+    assert (np.abs(one - other).max(axis=2) > 40).mean() < 0.002
+
+
 def last_frame(path: Path, width: int = 320, height: int = 180) -> np.ndarray:
     command = [imageio_ffmpeg.get_ffmpeg_exe(), "-loglevel", "error", "-i", path, "-f", "rawvideo", "-pix_fmt", "rgb24"]
     pixels = subprocess.run([*command, "-"], capture_output=True, check=True).stdout

@@ -92,6 +92,25 @@ def test_the_goal_sends_it_back_to_the_start() -> None:
     assert rover.ended == ""
 
 
+def test_among_rocks_the_goal_sends_it_back_too_and_the_rocks_may_be_left() -> None:
+    """Where start and goal lay apart, the drive ended at its goal: the rover had left the field about the start."""
+    rover = LiveRover(LiveScene(ground="rocks", driver="scan", goal_distance=8.0))
+    energy = [0.0]
+    while rover.goals_reached < 2:
+        rover.step()
+        energy.append(rover.info["energy"])
+        assert rover.ended == ""
+        assert rover.time < 40.0
+    assert np.abs(np.diff(energy)).max() < 0.1 * energy[-1]  # it is counted on
+    rover.change("driver", "hand")
+    far = LiveRover(LiveScene(ground="rocks", goal_distance=2.0))
+    for _ in range(300):
+        far.step(1.0)
+    assert far.ended == ""
+    assert np.hypot(*far.env.simulation.q[[0, 2]]) > 8.0
+    assert far.env.goal == LiveRover(LiveScene(ground="rocks", goal_distance=2.0)).env.goal
+
+
 def test_a_rock_lies_in_the_way_and_the_rover_meets_it() -> None:
     rover = driven(LiveRover(), 20)
     way = rover.env.simulation.v[[0, 2]]

@@ -80,10 +80,10 @@ def recorded(
     run = results.record(sim, given.duration, path, GrainRun, given.fps, until=until, **facts)
     results.path("trajectory", path)
     if given.film:
-        from rover_gym.figures.grain_frames import film_grains  # noqa: PLC0415 - VTK is slow to load
+        from rover_gym.figures.grain_frames import film_run  # noqa: PLC0415 - VTK is slow to load
 
         with status("drawing the film"):
-            results.path("film", film_grains(run, path.with_suffix(".mp4")))
+            results.path("film", film_run(run, path.with_suffix(".mp4")))
     return run
 
 

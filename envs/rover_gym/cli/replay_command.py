@@ -39,7 +39,7 @@ def replay(
     gltf: Annotated[Path | None, typer.Option(dir_okay=False, help="Binary glTF 2.0 file, usually .glb.")] = None,
     film: Annotated[
         Path | None,
-        typer.Option(dir_okay=False, help="Film of a run of `rover grains`, .mp4; needs no browser."),
+        typer.Option(dir_okay=False, help="Film of a rover's run or of balls, .mp4; needs no browser."),
     ] = None,
     ghost: Annotated[
         Path | None,
@@ -78,20 +78,17 @@ def replay(
         say_path("VRML", write_vrml(frames, vrml))
     if gltf is not None and isinstance(frames, RoverRun):
         say_path("glTF", write_gltf(frames, gltf))
-    if film is not None and isinstance(frames, GrainRun):
-        from rover_gym.figures.grain_frames import film_grains  # noqa: PLC0415 - VTK is slow to load
+    if film is not None and isinstance(frames, (RoverRun, GrainRun)):
+        from rover_gym.figures.grain_frames import film_run  # noqa: PLC0415 - VTK is slow to load
 
         with progress_bar() as bar:
             task = bar.add_task("film", total=frames.n_frames, state="")
-            say_path("film", film_grains(frames, film, fps, progress=lambda n: bar.update(task, completed=n)))
+            say_path("film", film_run(frames, film, fps, progress=lambda n: bar.update(task, completed=n)))
 
 
 #: As what each kind of run is replayed, and what is said of the rest.
 _KINDS: dict[type, tuple[tuple[str, ...], str]] = {
-    RoverRun: (
-        ("html", "vrml", "gltf"),
-        "only runs of `rover grains` are filmed here: `rover drive --film` films a drive",
-    ),
+    RoverRun: (("html", "vrml", "gltf", "film"), ""),
     PlanarRun: (("html",), "a ball or a two-wheel rover is replayed as a page, with --html"),
     SoilRun: (("html",), "a run on a soil is replayed as a page, with --html"),
     GrainRun: (("html", "film"), "a run of balls is replayed as a page or a film, with --html or --film"),

@@ -1,15 +1,17 @@
-"""Pictures of a run of balls in space: one sample, or the whole run as a film."""
+"""Pictures of a run of balls in space or of a drive: one sample, or the whole run as a film."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.extras import MissingExtraError, require
+from rover_gym.figures.rover_film import RoverFilm, ShownSample
 from rover_gym.mechanics import Plane
+from rover_gym.record.rover_run import RoverRun
 from rover_gym.rendering import FrameRenderer, VideoWriter
 from rover_gym.rendering.appearance import GROUND_COLOUR, ROCK_COLOUR
 from rover_gym.replay.grain_scene import eye_path, floor_of, start_view, tile_of
@@ -25,24 +27,11 @@ if TYPE_CHECKING:
     from rover_gym.soil.soil_run import SoilRun
 
 
-__all__ = ["draw_grains", "draw_soil", "film_grains", "film_soil"]
+__all__ = ["draw_grains", "draw_soil", "film_run", "film_soil"]
 
 SIZE = 960, 540  # pixels
 
 Array = npt.NDArray[np.float64]
-
-
-class _Shown(NamedTuple):
-    """A sample of a run in the words of a simulation, for the renderer of rovers."""
-
-    time: float
-    q: Array
-    gravity: Array
-    rotation: Array
-    solids: dict[str, tuple[Array, Array]]
-
-    def poses(self) -> dict[str, tuple[Array, Array]]:
-        return self.solids
 
 
 class GrainFilm:
@@ -100,13 +89,7 @@ class GrainFilm:
         if run.rover is None:
             eye, target = (np.array(place) + self._path[row] for place in self._view[:2])
             return np.asarray(self._renderer.render(eye, target, self._view.angle))
-        rover, solver = run.rover, run.trajectory.attributes.get("solver", {})
-        names = rover.model.solid_names
-        solids = dict(zip(names, zip(rover.positions[row], rover.rotations[row], strict=True), strict=True))
-        gravity = np.array(solver.get("gravity", (0.0, -9.81, 0.0)))
-        turn = rover.rotations[row, names.index("trunk") if "trunk" in names else 0]
-        shown = _Shown(float(run.time[row]), run.trajectory["q"][row], gravity, turn, solids)
-        return np.asarray(self._renderer.render(shown))
+        return np.asarray(self._renderer.render(ShownSample.of(run.rover, row)))
 
     def __enter__(self) -> GrainFilm:
         return self
@@ -135,15 +118,15 @@ def draw_grains(run: GrainRun, path: str | Path, *, row: int = -1, size: tuple[i
     return path
 
 
-def film_grains(
-    run: GrainRun,
+def film_run(
+    run: GrainRun | RoverRun,
     path: str | Path,
     fps: float = 25.0,
     *,
     size: tuple[int, int] = SIZE,
     progress: Callable[[int], None] = lambda _: None,
 ) -> Path:
-    """Writes a run as an MP4 video (H.264) in its own time.
+    """Writes a run of balls or a drive as an MP4 video (H.264) in its own time.
 
     Args:
         run: The run; of samples that come faster than the frames some are left out.
@@ -159,7 +142,8 @@ def film_grains(
     shown = run.resample(fps)
     # A run that was sampled more coarsely plays at the rate of its samples.
     rate = min(fps, (shown.n_frames - 1) / float(shown.time[-1] - shown.time[0])) if shown.n_frames > 1 else fps
-    with VideoWriter(path, rate) as video, GrainFilm(shown, size) as film:
+    drawn = RoverFilm(shown, size) if isinstance(shown, RoverRun) else GrainFilm(shown, size)
+    with VideoWriter(path, rate) as video, drawn as film:
         for row in range(shown.n_frames):
             video.append(film.frame(row))
             progress(row + 1)

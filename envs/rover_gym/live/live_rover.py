@@ -13,7 +13,7 @@ import numpy.typing as npt
 from rover_gym.env.env_snapshot import EnvSnapshot
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import TRUNK_LOAD
-from rover_gym.ground import heights_of
+from rover_gym.ground import heights_of, plane_of
 from rover_gym.live.live_scene import LiveChoices, LiveScene
 from rover_gym.mechanics import EpisodeRun, OptionError, SphereField, TerrainError, Union, sin_cos
 from rover_gym.policy.command import CommandController
@@ -30,6 +30,8 @@ MOST_ROCKS = 200
 ROCK_AHEAD = 0.3
 #: Speed beyond which the rover's way is where it moves, not where it looks, m/s.
 MOVING = 0.1
+#: Entries of `info` that an episode counts from its start; a drive is several, one to each goal.
+ENERGIES = ("energy", "energy_positive")
 #: Choices that change the world under the moving rover.
 PROPERTIES = ("friction", "gravity")
 
@@ -67,6 +69,7 @@ class LiveMoment:
         snapshot: The environment's state.
         home: Where the drive turns to from its goal, (x, z), m.
         goals_reached: How many goals had been reached.
+        spent: Energies of the legs before this one, J.
         info: The `info` of the last control period.
     """
 
@@ -77,6 +80,7 @@ class LiveMoment:
     snapshot: EnvSnapshot
     home: tuple[float, float]
     goals_reached: int
+    spent: Mapping[str, float]
     info: Mapping[str, Any]
 
 
@@ -93,7 +97,7 @@ class LiveRover:
         scene: What is chosen at present.
         info: The `info` of the last control period.
         ended: Why the drive cannot go on: the environment's termination; "" while it runs. A goal ends nothing: the
-            start becomes the goal, and the goal the start.
+            start becomes the goal, and the goal the start. Nor does the edge of the rocks, behind which is a plane.
         goals_reached: How many goals have been reached since the start.
         drives: How many drives have begun.
 
@@ -120,6 +124,7 @@ class LiveRover:
         self._rocks: Array = np.empty((0, 4))
         self._bare = env.simulation.terrain
         self._home = env.start.position
+        self._spent = dict.fromkeys(ENERGIES, 0.0)
         self.ended, self.goals_reached = "", 0
         self.drives += 1
 
@@ -188,18 +193,44 @@ class LiveRover:
             action = self.env.progress.previous_action.astype(np.float32)
         else:
             action, state = wheel.driver.predict(wheel.seen, state)
-        seen, _, terminated, _, self.info = self.env.step(action)
+        seen, _, terminated, _, info = self.env.step(action)
+        self.info = {**info, **{name: info[name] + self._spent[name] for name in ENERGIES}}
         self._wheel = replace(wheel, state=state, seen=seen)
-        if terminated and self.info["termination"] == "goal":
+        if terminated and info["termination"] == "goal":
             self._turn_back()
+        elif terminated and info["termination"] == "left_field" and plane_of(self._bare) is not None:
+            self._begin_leg(self.env.goal)  # only the rocks end there
         elif terminated:
-            self.ended = self.info["termination"]
+            self.ended = info["termination"]
 
     def _turn_back(self) -> None:
         """The start becomes the goal, and the goal the start."""
         goal, self._home = self._home, self.env.goal
-        self._replace(goal=goal)
+        self._begin_leg(goal)
         self.goals_reached += 1
+
+    def _begin_leg(self, goal: tuple[float, float]) -> None:
+        """Begins an episode where the rover is, as it is: the field then spans this place and the goal."""
+        now, simulation = self.env.snapshot(), self.env.simulation
+        domain = now.scene.domain
+        limit = TRUNK_LOAD * self.env.model.mass * domain.mass_scale * math.hypot(*simulation.gravity)
+        leg = EpisodeRun.begin(
+            self.env.task.rules,
+            simulation,
+            goal=goal,
+            domain=list(domain.as_info().values()),
+            trunk_load_limit=limit,
+            difficulty=self.info["difficulty"],
+        )
+        if leg is None:
+            self.ended = "step_failed"
+            return
+        self._spent = {name: self.info[name] for name in ENERGIES}
+        scene = replace(now.scene, start=replace(now.scene.start, goal=goal))
+        self.env.restore(replace(now, scene=scene, progress=leg.to_bytes()))
+        policy = self._wheel.policy
+        if policy is not None:  # its plan of the ground, or to the goal, is out of date
+            self._wheel = _Wheel(self.env, policy, policy.make(self.env))
 
     def restart(self, seed: int | None = None) -> None:
         """Begins again, with another seed if one is given.
@@ -268,6 +299,7 @@ class LiveRover:
             snapshot=self.env.snapshot(),
             home=self._home,
             goals_reached=self.goals_reached,
+            spent=self._spent,
             info=self.info,
         )
 
@@ -277,6 +309,7 @@ class LiveRover:
         self._take(moment.wheel)
         self.scene, self._rocks, self._home = moment.scene, moment.rocks, moment.home
         self.ended, self.goals_reached, self.info = "", moment.goals_reached, moment.info
+        self._spent = dict(moment.spent)
 
     def _hand_over(self, scene: LiveScene) -> None:
         """Gives the wheel to another driver, in an environment with what it observes."""
@@ -295,24 +328,18 @@ class LiveRover:
         *,
         friction: float | None = None,
         gravity: float | None = None,
-        goal: tuple[float, float] | None = None,
         rocks: Array | None = None,
     ) -> None:
-        """Continues in a world with other properties, another goal or other rocks."""
+        """Continues in a world with other properties or other rocks."""
         now = self.env.snapshot()
         scene, progress = now.scene, self.env.progress
         if friction is not None and gravity is not None:
             scene, progress = _with_properties(self.env, scene, progress, friction, gravity)
         if rocks is not None:
             scene = replace(scene, terrain=Union([self._bare, SphereField(rocks[:, :3], rocks[:, 3])]))
-        if goal is not None:
-            q = self.env.simulation.q
-            away = math.dist(goal, (q[0], q[2]))
-            scene = replace(scene, start=replace(scene.start, goal=goal))
-            progress = progress.changed(goal=goal, distance=away)
         self.env.restore(replace(now, scene=scene, progress=progress.to_bytes()))
         policy = self._wheel.policy
-        if policy is not None and friction is None:  # its plan of the ground, or to the goal, is out of date
+        if policy is not None and friction is None:  # its plan of the ground is out of date
             self._wheel = _Wheel(self.env, policy, policy.make(self.env))
 
 
