@@ -66,8 +66,7 @@ pub struct Sunk {
 
 /// Numbers of points, from the fewest on: along and across the drum, along an edge, along and
 /// across a side wall.
-const TRIALS: [[usize; 5]; 10] = [
-    [4, 1, 2, 2, 2],
+const TRIALS: [[usize; 5]; 9] = [
     [8, 1, 4, 2, 2],
     [8, 1, 4, 4, 2],
     [12, 1, 6, 4, 2],

@@ -18,6 +18,7 @@
 //! The sand gives back no more energy than it has taken: [`SandContact::work`] counts what it gives
 //! only up to what is stored, and the energy audit removes the rest from the motion. Sand that has
 //! nothing left to give gives way: its memory, and with it its force, becomes smaller.
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use std::sync::Arc;
 

@@ -1,6 +1,7 @@
 //! A wheel of a tree in sand, over lanes: its force along a tangent, and where that is taken.
 //!
 //! Forces are evaluated lane by lane, since their points fill the registers.
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use std::sync::Arc;
 

@@ -5,6 +5,7 @@
 //! ```
 //!
 //! x is the twist of the wheel.
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use nalgebra::{Matrix6, Vector6};
 

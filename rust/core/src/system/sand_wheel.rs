@@ -1,4 +1,5 @@
 //! A wheel in sand over lanes: its place on a tree, its pose, and what the sand remembers of it.
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use nalgebra::Vector3;
 

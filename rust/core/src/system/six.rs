@@ -2,6 +2,7 @@
 //!
 //! The first three components are a velocity or a force, the others an angular velocity or a
 //! moment.
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use nalgebra::{Matrix6, Vector6};
 

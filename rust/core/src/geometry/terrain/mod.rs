@@ -197,7 +197,7 @@ pub struct KnownRules(Mutex<Vec<(SandWheel, Arc<Rules>)>>);
 
 /// Accuracy of the forces on a wheel, in the worst of several motions, for which the number of its
 /// points is chosen. Soils are not known better.
-const ACCURACY: f64 = 0.06;
+const ACCURACY: f64 = 0.05;
 
 /// The plane that touches a surface at a place.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -213,7 +213,7 @@ pub struct Tangent {
 }
 
 impl SoftLayer<'_> {
-    /// Where the points lie on a wheel whose forces are within 6%.
+    /// Where the points lie on a wheel whose forces are within 5%.
     #[must_use]
     pub fn rules(&self, wheel: &SandWheel) -> Arc<Rules> {
         let mut known = self.known.0.lock().unwrap_or_else(PoisonError::into_inner);
