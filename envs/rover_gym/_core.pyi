@@ -408,7 +408,11 @@ class RoverModel:
         """The motor of each wheel; None for a wheel whose torque follows the command at any speed."""
     @property
     def wheel_joint_indices(self) -> list[int]:
-        """Index in q of each wheel's rotation; -1 where it is locked."""
+        """Index in q of each wheel's rotation; -1 where it is locked.
+
+        A wheel that is coupled with a ratio of 1 has the index of the joint that it follows, and
+        shares its drive.
+        """
     @property
     def steering_joint_indices(self) -> list[int]:
         """Index in q of each wheel's steering joint; -1 where there is none or it is locked."""
@@ -1106,7 +1110,8 @@ class Contacts:
     def frames(self) -> _Array:
         """Contact frames, world frame, (n, 3, 3).
 
-        Rows are the unit vectors n (normal), t (rolling direction) and b (lateral).
+        Rows are the unit vectors n (normal), t (rolling direction) and b (lateral). On rollers, t
+        is the axis of the roller, and b is zero.
         """
     @property
     def gaps(self) -> _Array:
@@ -1566,7 +1571,8 @@ class Simulation(AnySimulation):
     def motor_torques(self) -> _Array:
         """Mean torques of the drives over the last step, (n_wheels,), N m, positive forward.
 
-        Each is the command after the limit of the wheel's `Motor`; 0 before the first step.
+        Each is the command after the limit of the wheel's `Motor`; 0 before the first step. Wheels
+        that share a drive have equal parts of its torque.
         """
     @property
     def loop_forces(self) -> dict[str, _Array]:
@@ -1686,7 +1692,8 @@ class Simulation(AnySimulation):
     def wheel_forces(self) -> _Array:
         """Mean contact force on each wheel over the last step, (n_wheels, 3), N.
 
-        Sums over its contacts, each along its own normal, rolling and lateral direction.
+        Sums over its contacts, each along its own normal, rolling and lateral direction; with
+        rollers along the normal, along the roller's axis, and 0.
         """
     @property
     def trunk_force(self) -> float:

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use nalgebra::Vector3;
 use rover_core::draw::resting_pose;
 use rover_core::geometry::Plane;
-use rover_core::integrator::Variant;
+use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::{JointKind, Model, coordinates};
 use rover_core::simulation::{CommandError, LinearisationError, RoverSimulation};
 
@@ -136,4 +137,36 @@ fn a_wrench_on_nobody_or_without_numbers_is_refused() {
             ..
         })
     ));
+}
+
+/// A force at a point of a wheel's rim did not turn with the wheel: a step leaves the rotation of
+/// wheels about their axles out of their poses.
+#[test]
+fn a_force_at_a_rim_turns_with_its_wheel() {
+    let rover = Model::rover();
+    let wheel = &rover.wheels()[0];
+    let joint = wheel.joint.unwrap();
+    let k = rover.joint_velocity(joint);
+    let rate = |angle: f64| {
+        let options = StepOptions {
+            gravity: Vector3::zeros(),
+            ..options(1e-3, Variant::Linearised)
+        };
+        let mut run = simulation(rover.clone(), options);
+        let mut q = run.state().configuration.clone();
+        q.joints[joint] = angle;
+        run.set_state(q, vec![0.0; rover.nv()]);
+        run.apply_wrench("wheel_FL", [0.0, 1.0, 0.0], [0.0; 3], [0.1, 0.0, 0.0])
+            .unwrap();
+        run.step(1).unwrap();
+        run.v()[k]
+    };
+    // The rover turns under the force at the wheel's centre, too.
+    let common = 0.5 * (rate(0.0) + rate(std::f64::consts::PI));
+    let most = rate(0.0) - common;
+    assert!(most > 1e-5);
+    for angle in [0.7, 2.0, 3.1, -1.0_f64] {
+        let off = rate(angle) - common - most * angle.cos();
+        assert!(off.abs() < 1e-6 * most, "{angle}: {off}");
+    }
 }

@@ -70,6 +70,12 @@ impl Kinematics {
         }
     }
 
+    /// `R_WB` of body `b` with its own rotation, after [`Self::update_for_step`].
+    #[must_use]
+    pub(crate) fn spun(&self, model: &Model, b: usize) -> Matrix3<f64> {
+        self.poses.spun(model.mechanism(), &self.q, b).into()
+    }
+
     /// The poses as the sources of the dynamics read them.
     #[inline]
     #[must_use]

@@ -136,15 +136,27 @@ impl<T: Lane> Poses<T> {
     /// # Panics
     /// If an argument is of another mechanism.
     pub fn spin(&mut self, mechanism: &Mechanism, q: &LaneConfiguration<T>) {
-        for (link, pose) in mechanism.links.iter().zip(&mut self.bodies) {
-            if link.is_spinner
-                && let Some((joint, coupling)) = link.joint.angle()
-            {
+        for b in 0..self.bodies.len() {
+            self.bodies[b].R = self.spun(mechanism, q, b);
+        }
+    }
+
+    /// Attitude of a body with its own rotation, which [`Self::update`] leaves out of a spinner's.
+    pub(crate) fn spun(
+        &self,
+        mechanism: &Mechanism,
+        q: &LaneConfiguration<T>,
+        b: usize,
+    ) -> Mat3<T> {
+        let (link, pose) = (&mechanism.links[b], &self.bodies[b]);
+        match link.joint.angle().filter(|_| link.is_spinner) {
+            Some((joint, coupling)) => {
                 let number = q.joints[joint];
                 let angle = coupling.map_or(number, |coupling| coupling.value(number));
                 let turn = || Some(sin_cos(angle));
-                pose.R = link.joint.place(&pose.R, q, turn).R;
+                link.joint.place(&pose.R, q, turn).R
             }
+            None => pose.R,
         }
     }
 }

@@ -47,12 +47,12 @@ impl Wrench {
         self.solid < model.frames().len() && numbers.as_flattened().iter().all(|x| x.is_finite())
     }
 
-    /// Adds its generalized force (nv), N and N m, at the poses of `kinematics`.
+    /// Adds its generalized force (nv), N and N m, at the poses of `kinematics` for a step.
     pub(super) fn add_force(&self, model: &Model, kinematics: &Kinematics, out: &mut [f64]) {
         let frame = &model.frames()[self.solid];
         let (force, body) = (Vector3::from(self.force), frame.body);
         let point = frame.position + frame.rotation * Vector3::from(self.point);
-        let x = kinematics.point(body, &point);
+        let x = kinematics.r(body) + kinematics.spun(model, body) * point;
         let moment = x.cross(&force) + Vector3::from(self.moment);
         let lead = model.path(body)[..model.lead(body)].iter();
         for (&k, value) in lead.zip(force.iter().chain(&moment)) {
