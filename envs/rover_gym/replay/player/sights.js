@@ -4,6 +4,7 @@
 
 const PLAN_COLOURS = { arcs: 0xffffff, path: 0x39ff88 };
 const SIGHT_COLOURS = { scan: 0xf5d442, laser: 0xff4d3d, depth: 0x35d0ba };
+const SMALLEST = 0.0028; // half an edge of a dot, of its distance from the eye: what is farther away stays visible
 const DOTS = { scan: 0.014, laser: 0.024, depth: 0.015 }; // half an edge, of the rover's reach
 const BEARS = 0.01; // of a wheel's mean share: a wheel with less stands on nothing
 const SLIDES = 0.97; // of the cone's edge
@@ -19,8 +20,8 @@ class Dots {
     const corners = new Uint32Array(12 * count);
     for (let i = 0; i < count; i++) corners.set(Dots.FACES.map((k) => 4 * i + k), 12 * i);
     geometry.setIndex(new THREE.BufferAttribute(corners, 1));
-    const size = DOTS[name] * view.scene.reach;
-    this.offsets = Dots.CORNERS.map((corner) => corner.map((value) => size * value));
+    this.size = DOTS[name] * view.scene.reach;
+    this.eye = view.camera.position;
     this.mesh = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({ color: SIGHT_COLOURS[name], side: THREE.DoubleSide, fog: false }));
     this.mesh.frustumCulled = false;
     view.world.add(this.mesh);
@@ -31,11 +32,18 @@ class Dots {
   draw(visible, put) {
     this.mesh.visible = visible;
     if (!visible) return;
-    const { places, offsets } = this;
+    const { places, size, eye } = this;
     const { position } = this.mesh.geometry.attributes;
     const n = put(places);
-    for (let i = 0, at = 0; i < n; i++)
-      for (const offset of offsets) for (let c = 0; c < 3; c++) position.array[at++] = places[3 * i + c] + offset[c];
+    for (let i = 0, at = 0; i < n; i++) {
+      const [x, y, z] = [places[3 * i], places[3 * i + 1], places[3 * i + 2]];
+      const half = Math.max(size, SMALLEST * Math.hypot(x - eye.x, y - eye.y, z - eye.z));
+      for (const [a, b, c] of Dots.CORNERS) {
+        position.array[at++] = x + half * a;
+        position.array[at++] = y + half * b;
+        position.array[at++] = z + half * c;
+      }
+    }
     this.mesh.geometry.setDrawRange(0, 12 * n);
     position.needsUpdate = true;
   }
