@@ -69,7 +69,8 @@ fn frames<const D: usize>(rows: impl Iterator<Item = [[f64; D]; D]>) -> Array {
 pub struct Contacts {
     /// Name of the solid in each contact, or of the joint that is at its stop.
     bodies: Vec<String>,
-    /// Kind of each contact, "wheel", "box" or "sphere"; of a joint, "limit" or "friction".
+    /// Kind of each contact, "wheel", "box", "sphere" or "collider"; of a joint, "limit" or
+    /// "friction".
     ///
     /// "limit" is a joint at its stop, "friction" the dry friction of a joint.
     ///
@@ -104,6 +105,7 @@ impl Contacts {
             Part::Wheel(i) => ("wheel", i64::try_from(*i).unwrap_or(-1)),
             Part::Box(_) => ("box", -1),
             Part::Sphere(_) => ("sphere", -1),
+            Part::Collider(_) => ("collider", -1),
             Part::Limit(..) => ("limit", -1),
             Part::Friction(_) => ("friction", -1),
         };

@@ -84,7 +84,7 @@ impl ContactSystem {
             match contact.part {
                 Part::Limit(..) => close_stop(&mut own),
                 Part::Friction(_) => joint_friction::close(&mut own),
-                Part::Wheel(_) | Part::Box(_) | Part::Sphere(_) => {}
+                Part::Wheel(_) | Part::Box(_) | Part::Sphere(_) | Part::Collider(_) => {}
             }
             for (i, row) in own.chunks_exact(3).enumerate() {
                 self.W[(3 * c + i) * size + 3 * c..][..3].copy_from_slice(row);
