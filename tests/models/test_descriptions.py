@@ -34,6 +34,9 @@ SHAPES = [
     },
     {"kind": "sphere", "radius": 0.1, "mass": 0.5, "collides": True, "visible": False},
 ]
+CAPSULE = {"kind": "capsule", "radius": 0.1, "height": 0.2, "collides": True}
+CORNERS = [[x, y, z] for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (-0.1, 0.1)]
+HULL = {"kind": "hull", "points": CORNERS}
 DISC = {"kind": "disc", "radius": 0.1}
 FOLLOWS_ARM = {"joint": "arm", "ratio": 1.0, "offset": 0.0}
 
@@ -188,12 +191,24 @@ CASES: list[tuple[Any, ...]] = [
     ("shapes", "solids[0].shapes[0].rotation", [0.0, INFINITE, 0.0]),
     ("shapes", "solids[0].shapes[1].mass", 0.0),
     ("shapes", "solids[0].shapes[1]", DISC | {"mass": 0.5, "collides": True}, "solids[0].shapes[1].collides"),
+    ("shapes", "solids[0].shapes[1]", CAPSULE | {"height": 0.0}, "solids[0].shapes[1].height"),
+    ("shapes", "solids[0].shapes[1]", CAPSULE | {"radius": INFINITE}, "solids[0].shapes[1].radius"),
+    ("shapes", "solids[0].shapes[1]", {"kind": "ellipsoid", "radii": [1.0, -1.0, 1.0]}, "solids[0].shapes[1].radii"),
+    ("shapes", "solids[0].shapes[1]", HULL | {"points": CORNERS[:3]}, "solids[0].shapes[1].points"),
+    ("shapes", "solids[0].shapes[1]", HULL | {"points": CORNERS * 9}, "solids[0].shapes[1].points"),
     (
         "shapes",
-        "solids[0].shapes[0]",
-        {"kind": "cylinder", "radius": 0.1, "height": 0.1, "collides": True},
-        "solids[0].shapes[0].collides",
+        "solids[0].shapes[1]",
+        HULL | {"points": [[x, y, 0.1] for x, y, _ in CORNERS]},
+        "solids[0].shapes[1].points",
     ),
+    (
+        "shapes",
+        "solids[0].shapes[1]",
+        HULL | {"points": [*CORNERS[1:], [0.0, NAN, 0.0]]},
+        "solids[0].shapes[1].points[7]",
+    ),
+    ("shapes", "solids[0]", {"name": "a", "mass": 1.0, "shape": HULL}, "solids[0].shape"),
     ("shapes", "solids[0].shapes[1].mass", 3.0, "solids[0].mass"),
     ("shapes", "solids[0].shapes[0].mass", 2.0, "solids[0].mass"),
     ("shapes", "solids[0].shapes[1]", DISC, "solids[0].shapes[1].mass"),

@@ -52,8 +52,10 @@ def test_joints_drives_and_gains_are_the_files(tmp_path):
     assert arm["hold"] == {"stiffness": 7.0, "damping": 0.5}
     assert (arm["damping"], arm["armature"]) == (0.1, 0.02)
     report = "\n".join([*model.import_report.assumed, *model.import_report.left_out])
-    for what in ("ref", "gravity", "worldbody", "a capsule that touches"):
+    for what in ("ref", "gravity", "worldbody"):
         assert what in report
+    capsule = arm["shapes"][0]
+    assert (capsule["kind"], capsule["radius"], capsule["height"], capsule["collides"]) == ("capsule", 0.05, 0.4, True)
 
 
 REFUSED = {

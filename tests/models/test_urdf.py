@@ -186,7 +186,8 @@ def test_what_is_not_simulated_is_listed(tmp_path):
     for what in (
         "<gazebo> of <robot>",
         "<sensor> of <robot>",
-        "a mesh that touches",
+        "a shape that touches is the mesh",
+        "hull.dae, which cannot be read",
         "chassis",
         "a limit of its speed",
     ):

@@ -6,6 +6,7 @@ use rover_core::integrator::{StepOptions, Variant};
 use rover_core::simulation::RoverSimulation;
 
 mod among_grains;
+mod colliders;
 mod contacts;
 mod exploring_scenes;
 mod grains;

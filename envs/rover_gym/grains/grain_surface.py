@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import OptionError
+from rover_gym.polytopes import box_around
 from rover_gym.rotations import rotation_matrix
 from rover_gym.validation import array, number, refuse, vector
 
@@ -215,8 +216,8 @@ class Parts:
                 if shape.get("collides") and solid["name"] not in on_wheels:
                     position = np.array(shape.get("position") or (0.0, 0.0, 0.0), dtype=np.float64)
                     turn = rotation_matrix(shape.get("rotation") or (0.0, 0.0, 0.0))
-                    size = shape["size"] if shape["kind"] == "box" else [2.0 * shape["radius"]] * 3
-                    half = 0.5 * np.array(size, dtype=np.float64)
+                    middle, half = box_around(shape)
+                    position = position + turn @ middle
                     self._shapes.append((f"{solid['name']}/{k}", solid["name"], position, turn, half))
 
     def footprint(self, rover: Simulation, below: float) -> Footprint:

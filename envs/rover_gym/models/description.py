@@ -10,7 +10,8 @@ import numpy as np
 
 from rover_gym.models.import_report import Z_UP_TO_Y_UP, Array
 from rover_gym.models.loop_description import describe_loops
-from rover_gym.models.robot_tree import THIN_DISC, FileJoint, FileLink, FileShape, RobotTree
+from rover_gym.models.meshes import MeshOptions, hulls_of
+from rover_gym.models.robot_tree import THIN_DISC, FileJoint, FileLink, FileShape, RobotTree, mesh_of
 from rover_gym.models.roles import WheelRole
 from rover_gym.rotations import rotation_vector, turn_z_to
 
@@ -25,8 +26,8 @@ STEERING_LIMIT = 0.7  # rad, where the file states none
 #: share.
 YIELD = 3e-5
 YIELDING_TIME = 2.0 * math.sqrt(YIELD / GRAVITY)
-#: Kinds of shapes that touch the ground; cylinders touch as wheels only.
-TOUCHING = ("box", "sphere")
+#: Kinds of shapes that are drawn and collide as they are; meshes collide as their hulls.
+SOLID = ("box", "sphere", "cylinder", "capsule", "ellipsoid")
 UNLIMITED = 1e9  # N m, the torque limit of a motor for which the file states none
 
 
@@ -51,7 +52,9 @@ class WheelOptions:
     wheel_stiffness: float | None = None
 
 
-def describe(tree: RobotTree, roles: list[WheelRole], P: Array, options: WheelOptions) -> dict[str, Any]:
+def describe(
+    tree: RobotTree, roles: list[WheelRole], P: Array, options: WheelOptions, meshes: MeshOptions
+) -> dict[str, Any]:
     """The description of a robot.
 
     Args:
@@ -59,6 +62,7 @@ def describe(tree: RobotTree, roles: list[WheelRole], P: Array, options: WheelOp
         roles: Its wheels.
         P: Rotation from the file's axes to those of this package, (3, 3).
         options: What the user gave.
+        meshes: How meshes collide.
 
     Raises:
         ModelError: The file contains elements that a description cannot express.
@@ -76,7 +80,10 @@ def describe(tree: RobotTree, roles: list[WheelRole], P: Array, options: WheelOp
     steering = {role.steering: role for role in roles if role.steering is not None}
     solids, tags = [], []
     for link in _followed_first(tree):
-        solids.append(_solid(tree, link, anchors, axes, P, wheels.get(link.name)))
+        solids.append(_solid(tree, link, anchors, axes, P))
+        shapes = _shapes(tree, link, axes[link.name], anchors[link.name], wheels.get(link.name), meshes)
+        if shapes:
+            solids[-1]["shapes"] = shapes
         _add_control(tree, link, solids[-1], steering.get(link.name), weight, options, is_wheel=link.name in wheels)
         for name, point in link.points:
             place = _numbers(axes[link.name] @ (point - anchors[link.name]))
@@ -91,7 +98,7 @@ def describe(tree: RobotTree, roles: list[WheelRole], P: Array, options: WheelOp
 
 
 def _solid(
-    tree: RobotTree, link: FileLink, anchors: dict[str, Array], axes: dict[str, Array], P: Array, role: WheelRole | None
+    tree: RobotTree, link: FileLink, anchors: dict[str, Array], axes: dict[str, Array], P: Array
 ) -> dict[str, Any]:
     A, anchor, joint = axes[link.name], anchors[link.name], link.joint
     solid: dict[str, Any] = {"name": link.name}
@@ -111,9 +118,6 @@ def _solid(
     solid["centre_of_mass"] = _numbers(A @ (link.centre - anchor))
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = A @ link.inertia @ A.T
     solid["inertia"] = _numbers(np.array([xx, yy, zz, xy, xz, yz]))
-    shapes = _shapes(tree, link, A, anchor, role)
-    if shapes:
-        solid["shapes"] = shapes
     return solid
 
 
@@ -232,8 +236,10 @@ def _yielding(tree: RobotTree, role: WheelRole, weight: float, options: WheelOpt
     return {"stiffness": stiffness, "damping": float(f"{YIELDING_TIME * stiffness:.2g}")}
 
 
-def _shapes(tree: RobotTree, link: FileLink, A: Array, anchor: Array, role: WheelRole | None) -> list[dict[str, Any]]:
-    """The shapes of a link. Boxes and spheres collide, cylinders are drawn; wheels collide as discs with a width."""
+def _shapes(
+    tree: RobotTree, link: FileLink, A: Array, anchor: Array, role: WheelRole | None, meshes: MeshOptions
+) -> list[dict[str, Any]]:
+    """The shapes of a link. Wheels collide as discs with a width, and meshes as convex hulls."""
     found: list[dict[str, Any]] = []
     is_drawn = any(shape.visible and shape.mesh is None for shape in link.shapes)
     for shape in link.shapes:
@@ -241,10 +247,12 @@ def _shapes(tree: RobotTree, link: FileLink, A: Array, anchor: Array, role: Whee
             continue  # the disc below stands for it
         if reason := _left_out(shape, role):
             tree.left_out.append(f"link[{link.name}]: a {shape.kind} {reason}")
-        collides = shape.collides and shape.kind in TOUCHING and role is None
+        collides = shape.collides and role is None
         visible = shape.visible or not is_drawn
-        if shape.kind in (*TOUCHING, "cylinder") and (collides or visible):
+        if shape.kind in SOLID and (collides or visible):
             found.append(_shape(shape, A, anchor, collides=collides, visible=visible))
+        elif shape.mesh is not None and collides:
+            found += _hulls(tree, link, shape, A, anchor, meshes, visible=not is_drawn)
     if role is not None:
         turn = rotation_vector(turn_z_to(A @ link.joint.axis))
         disc: dict[str, Any] = {"kind": "disc", "radius": float(role.radius)}
@@ -253,26 +261,52 @@ def _shapes(tree: RobotTree, link: FileLink, A: Array, anchor: Array, role: Whee
 
 
 def _left_out(shape: FileShape, role: WheelRole | None) -> str | None:
-    """The properties of a shape that are not simulated, in words, or None."""
+    """The properties of a shape that are not simulated, in words, or None. Of meshes that touch, `_hulls` tells."""
     if shape.collides and role is not None:
         rim = f"cylinder {role.width:g} m wide" if role.width else "thin disc"
         is_rim = shape.kind == "cylinder" and shape.size == (role.radius, role.width)
         return None if is_rim else f"of a wheel, which touches as a {rim}"
-    if shape.collides and shape.kind not in TOUCHING:
-        is_drawn = "; it is drawn" if shape.kind == "cylinder" else ""
-        return f"that touches, since only boxes and spheres can{is_drawn}"
-    return "that is drawn" if shape.visible and shape.kind not in (*TOUCHING, "cylinder") else None
+    if shape.kind in SOLID or (shape.collides and shape.mesh is not None):
+        return None
+    if shape.collides:
+        return "that touches, since this kind cannot"
+    return "that is drawn" if shape.visible else None
+
+
+def _hulls(
+    tree: RobotTree, link: FileLink, shape: FileShape, A: Array, anchor: Array, options: MeshOptions, *, visible: bool
+) -> list[dict[str, Any]]:
+    """The convex hulls of a mesh that touches."""
+    if options.parts == 0:
+        tree.left_out.append(f"link[{link.name}]: a mesh that touches (left out because of `mesh_parts`)")
+        return []
+    mesh, reason = mesh_of(shape)
+    if mesh is None:
+        tree.left_out.append(f"link[{link.name}]: a shape that touches {reason}")
+        return []
+    hulls, what = hulls_of(mesh, options)
+    if not hulls:
+        tree.left_out.append(f"link[{link.name}]: {what}, although it touches")
+        return []
+    tree.assumed.append(f"link[{link.name}]: a mesh collides as {what}")
+    made = []
+    for hull in hulls:
+        points = (hull @ shape.rotation.T + shape.position - anchor) @ A.T
+        own: dict[str, Any] = {"kind": "hull", "points": [_numbers(point) for point in points], "collides": True}
+        made.append(own if visible else own | {"visible": False})
+    return made
 
 
 def _shape(shape: FileShape, A: Array, anchor: Array, *, collides: bool, visible: bool) -> dict[str, Any]:
     made: dict[str, Any] = {"kind": shape.kind}
-    if shape.kind == "box":
-        x, y, z = shape.size  # our y is the file's z
-        made["size"] = [float(x), float(z), float(y)]
-    elif shape.kind == "cylinder":
-        made["radius"], made["height"] = (float(size) for size in shape.size)
-    else:
-        made["radius"] = float(shape.size[0])
+    match shape.kind:
+        case "box" | "ellipsoid":
+            x, y, z = shape.size  # our y is the file's z
+            made["size" if shape.kind == "box" else "radii"] = [float(x), float(z), float(y)]
+        case "cylinder" | "capsule":
+            made["radius"], made["height"] = (float(size) for size in shape.size)
+        case _:
+            made["radius"] = float(shape.size[0])
     position = _numbers(A @ (shape.position - anchor))
     if any(position):
         made["position"] = position

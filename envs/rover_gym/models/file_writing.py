@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Iterable
+from dataclasses import replace
 from typing import Any, NoReturn
 from xml.etree import ElementTree as ET
 
@@ -12,6 +13,7 @@ import numpy as np
 from rover_gym.mechanics import ModelError, RoverModel
 from rover_gym.models.import_report import Z_UP_TO_Y_UP, Array
 from rover_gym.models.robot_tree import THIN_DISC, FileShape, check_kinds, checked_path
+from rover_gym.polytopes import hull_properties
 from rover_gym.rotations import quaternion, roll_pitch_yaw, rotation_matrix, turn_z_to
 from rover_gym.validation import refuse
 
@@ -61,7 +63,7 @@ class WrittenSolid:
             self.kind = "fixed"
 
     def shapes(self, wheel: dict[str, Any] | None) -> list[FileShape]:
-        """Its shapes as boxes, cylinders and spheres. A wheel's disc becomes its collision cylinder.
+        """Its shapes in the file's axes. A wheel's disc becomes its collision cylinder.
 
         Args:
             wheel: The description of the wheel if the solid is one, or None.
@@ -101,23 +103,43 @@ def _written(source: dict[str, Any]) -> FileShape:
             made.kind, made.size = "box", (x, z, y)
         case "sphere":
             made.kind, made.size = "sphere", (source["radius"],)
-        case "cylinder":
-            made.size = (source["radius"], source["height"])
+        case "cylinder" | "capsule":
+            made.kind, made.size = source["kind"], (source["radius"], source["height"])
+        case "ellipsoid":
+            x, y, z = source["radii"]
+            made.kind, made.size = "ellipsoid", (x, z, y)
+        case "hull":
+            made.kind, made.mesh = "hull", np.array(source["points"]) @ _TO_FILE.T
         case _:  # a disc about our z, which is the file's -y
             made.size = (source["radius"], DISC_WIDTH * source["radius"])
             made.rotation = R @ turn_z_to(np.array([0.0, -1.0, 0.0]))
     return made
 
 
-def principal(shape: dict[str, Any], mass: float) -> Array:
+def inertia_of(shape: dict[str, Any], mass: float) -> tuple[Array, Array]:
+    """Mass centre of a shape in its own axes (3,), m, and inertia about it (3, 3), kg m²."""
+    if shape["kind"] == "hull":
+        _, centre, about = hull_properties(shape["points"])
+        return centre, mass * about
+    return np.zeros(3), np.diag(_principal(shape, mass))
+
+
+def _principal(shape: dict[str, Any], mass: float) -> Array:
     """Principal inertias (3,) of a shape about its centre, kg m²."""
-    if shape["kind"] == "box":
-        a, b, c = shape["size"]
-        return np.array([b * b + c * c, a * a + c * c, a * a + b * b]) * float(mass / 12.0)
+    if shape["kind"] in ("box", "ellipsoid"):
+        a, b, c = shape.get("size") or shape["radii"]
+        share = mass / 12.0 if shape["kind"] == "box" else mass / 5.0
+        return np.array([b * b + c * c, a * a + c * c, a * a + b * b]) * float(share)
     r = shape["radius"]
     if shape["kind"] == "cylinder":
         across = mass / 12.0 * (3.0 * r * r + shape["height"] ** 2)
         return np.array([across, mass * r * r / 2.0, across])
+    if shape["kind"] == "capsule":
+        h = shape["height"]
+        balls = mass * 4.0 * r / (4.0 * r + 3.0 * h)
+        cylinder = mass - balls
+        across = balls * (0.4 * r * r + h * h / 4.0 + 0.375 * h * r) + cylinder / 12.0 * (3.0 * r * r + h * h)
+        return np.array([across, 0.4 * balls * r * r + 0.5 * cylinder * r * r, across])
     if shape["kind"] == "disc":
         return np.array([0.25, 0.25, 0.5]) * float(mass * r * r)
     return np.full(3, 0.4 * mass * r * r)
@@ -130,19 +152,24 @@ def _mass_properties(solid: dict[str, Any]) -> tuple[Array, Array]:
         xx, yy, zz, xy, xz, yz = solid["inertia"]
         return centre, np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if solid.get("shape") is not None:
-        return centre, np.diag(principal(solid["shape"], solid["mass"]))
+        return centre, inertia_of(solid["shape"], solid["mass"])[1]
     shapes = solid["shapes"]
     rest = solid["mass"] - sum(shape.get("mass") or 0.0 for shape in shapes)
     others = [shape for shape in shapes if shape.get("mass") is None]
     contents = {id(shape): _content(shape) for shape in others}
     whole = sum(contents.values())
     masses = [shape.get("mass") or rest * contents[id(shape)] / whole for shape in shapes]
-    places = [np.array(shape.get("position") or (0.0, 0.0, 0.0)) for shape in shapes]
+    turns = [rotation_matrix(shape.get("rotation") or (0.0, 0.0, 0.0)) for shape in shapes]
+    own = [inertia_of(shape, m) for shape, m in zip(shapes, masses, strict=True)]
+    places = [
+        np.array(shape.get("position") or (0.0, 0.0, 0.0)) + R @ place
+        for shape, R, (place, _) in zip(shapes, turns, own, strict=True)
+    ]
     centre = sum((m * r for m, r in zip(masses, places, strict=True)), np.zeros(3)) / sum(masses)
     inertia = np.zeros((3, 3))
-    for shape, m, place in zip(shapes, masses, places, strict=True):
-        R, r = rotation_matrix(shape.get("rotation") or (0.0, 0.0, 0.0)), place - centre
-        inertia += R @ np.diag(principal(shape, m)) @ R.T + m * (r @ r * np.eye(3) - np.outer(r, r))
+    for R, (_, about), m, place in zip(turns, own, masses, places, strict=True):
+        r = place - centre
+        inertia += R @ about @ R.T + m * (r @ r * np.eye(3) - np.outer(r, r))
     return centre, inertia
 
 
@@ -155,6 +182,12 @@ def _content(shape: dict[str, Any]) -> float:
             return float(np.pi * shape["radius"] ** 2 * shape["height"])
         case "disc":
             return float(shape["radius"] ** 2)
+        case "capsule":
+            return float(np.pi * shape["radius"] ** 2 * (shape["height"] + 4.0 / 3.0 * shape["radius"]))
+        case "ellipsoid":
+            return float(4.0 / 3.0 * np.pi * np.prod(shape["radii"]))
+        case "hull":
+            return hull_properties(shape["points"])[0]
         case _:
             return float(4.0 / 3.0 * np.pi * shape["radius"] ** 3)
 
@@ -200,11 +233,11 @@ def write_mjcf(model: RoverModel, path: str | os.PathLike[str]) -> None:
     steering = {wheel["steering"]: wheel for wheel in description["wheels"] if wheel.get("steering")}
     root = ET.Element("mujoco", model=description["name"] or "robot")
     ET.SubElement(root, "compiler", angle="radian", autolimits="true", balanceinertia="false")
-    world = ET.SubElement(root, "worldbody")
+    asset, world = ET.SubElement(root, "asset"), ET.SubElement(root, "worldbody")
     equality, actuator = ET.SubElement(root, "equality"), ET.SubElement(root, "actuator")
     bodies: dict[str | None, ET.Element] = {None: world}
     for solid in written_solids(model):
-        bodies[solid.name] = _body(bodies[solid.parent], solid, wheels.get(solid.name))
+        bodies[solid.name] = _body(bodies[solid.parent], asset, solid, wheels.get(solid.name))
         _add_control(actuator, solid, wheels.get(solid.name), solid.name in steering)
         coupled = solid.source.get("coupled")
         if coupled is not None:
@@ -215,6 +248,8 @@ def write_mjcf(model: RoverModel, path: str | os.PathLike[str]) -> None:
     for tag in description.get("tags") or ():
         x, y, z = tag["position"]
         ET.SubElement(bodies[tag["solid"]], "site", name=tag["name"], pos=text_of((x, -z, y)))
+    if not len(asset):
+        root.remove(asset)
     write_xml(root, path)
 
 
@@ -236,7 +271,7 @@ def _add_equality(equality: ET.Element, loop: dict[str, Any], bodies: dict[str |
     ET.SubElement(equality, loop["kind"], {"name": loop["name"]} | sites)
 
 
-def _body(above: ET.Element, solid: WrittenSolid, wheel: dict[str, Any] | None) -> ET.Element:
+def _body(above: ET.Element, asset: ET.Element, solid: WrittenSolid, wheel: dict[str, Any] | None) -> ET.Element:
     pose = {"pos": text_of(solid.position), "quat": _quaternion(solid.rotation)}
     body = ET.SubElement(above, "body", {"name": solid.name, **pose})
     source = solid.source
@@ -257,21 +292,32 @@ def _body(above: ET.Element, solid: WrittenSolid, wheel: dict[str, Any] | None) 
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = solid.inertia
     inertia = text_of((xx, yy, zz, xy, xz, yz))
     ET.SubElement(body, "inertial", pos=text_of(solid.centre), mass=text_of(solid.mass), fullinertia=inertia)
-    for shape in solid.shapes(wheel):
-        _add_geom(body, shape)
+    for index, shape in enumerate(solid.shapes(wheel)):
+        _add_geom(body, asset, shape, f"{solid.name}_hull{index}")
     return body
 
 
-def _add_geom(body: ET.Element, shape: FileShape) -> None:
+def _add_geom(body: ET.Element, asset: ET.Element, shape: FileShape, hull: str) -> None:
+    """Adds a shape; MuJoCo makes the hull of a mesh's vertices, whose name is `hull`."""
     geom = {"name": shape.name} if shape.name else {}
-    geom |= {"type": shape.kind, "pos": text_of(shape.position), "quat": _quaternion(shape.rotation), "mass": "0"}
+    if isinstance(shape.mesh, np.ndarray):
+        ET.SubElement(asset, "mesh", name=hull, vertex=text_of(shape.mesh.ravel()))
+        geom["mesh"] = hull
+    geom |= {
+        "type": "mesh" if shape.kind == "hull" else shape.kind,
+        "pos": text_of(shape.position),
+        "quat": _quaternion(shape.rotation),
+        "mass": "0",
+    }
     match shape.kind:
         case "box":
             x, y, z = shape.size
             geom["size"] = text_of((x / 2.0, y / 2.0, z / 2.0))
-        case "cylinder":
+        case "cylinder" | "capsule":
             radius, length = shape.size
             geom["size"] = text_of((radius, length / 2.0))
+        case "hull":
+            pass
         case _:
             geom["size"] = text_of(shape.size)
     if not shape.collides:
@@ -302,7 +348,7 @@ def _quaternion(R: Array) -> str:
 
 
 #: Elements that URDF cannot express and that `ignore` may name.
-IGNORABLE = ("springs", "armature", "closed loops")
+IGNORABLE = ("springs", "armature", "closed loops", "ellipsoids", "hulls")
 
 FAST = 1e3  # rad/s, the velocity limit of a joint whose speed no motor limits: URDF wants one
 
@@ -312,13 +358,14 @@ WORLD = "world"
 def write_urdf(model: RoverModel, path: str | os.PathLike[str], *, ignore: Collection[str] = ()) -> None:
     """Writes a URDF file, for other programs: x forward, y left, z up.
 
-    Wheels are written as cylinders; a thin disc is a tenth of its radius wide and named so.
+    Wheels are written as cylinders; a thin disc is a tenth of its radius wide and named so. A capsule becomes a
+    cylinder and two spheres.
 
     Args:
         model: The model.
         path: Path of the file.
         ignore: Kinds of elements to leave out because the format cannot express them: "springs", "armature",
-            "closed loops".
+            "closed loops", "ellipsoids", "hulls".
 
     Raises:
         ModelError: The model has a spherical joint or several trees, or contains elements that the format cannot
@@ -367,6 +414,10 @@ def _check(solid: WrittenSolid, ignore: Collection[str]) -> None:
     for field, kind in (("spring", "springs"), ("armature", "armature")):
         if solid.source.get(field) and kind not in ignore:
             solid.refuse(field, solid.source[field], f'URDF has no {kind}; to_mjcf has, or ignore=["{kind}"]')
+    for shape in solid.shapes(None):
+        kind = f"{shape.kind}s"
+        if kind in IGNORABLE and kind not in ignore:
+            solid.refuse("shapes", shape.kind, f'URDF has no {kind}; to_mjcf has, or ignore=["{kind}"]')
 
 
 def _link(solid: WrittenSolid, wheel: dict[str, Any] | None) -> ET.Element:
@@ -377,12 +428,23 @@ def _link(solid: WrittenSolid, wheel: dict[str, Any] | None) -> ET.Element:
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = solid.inertia
     entries = {"ixx": xx, "iyy": yy, "izz": zz, "ixy": xy, "ixz": xz, "iyz": yz}
     ET.SubElement(inertial, "inertia", {name: text_of(float(value)) for name, value in entries.items()})
-    for shape in solid.shapes(wheel):
+    shapes = [piece for shape in solid.shapes(wheel) for piece in _pieces(shape)]
+    for shape in shapes:
         if shape.visible:
             _add_shape(link, "visual", shape)
         if shape.collides:
             _add_shape(link, "collision", shape)
     return link
+
+
+def _pieces(shape: FileShape) -> list[FileShape]:
+    """A shape as boxes, cylinders and spheres; none for those that URDF does not have."""
+    if shape.kind == "capsule":
+        radius, length = shape.size
+        ends = [shape.position + shape.rotation[:, 2] * end * length for end in (-0.5, 0.5)]
+        balls = [replace(shape, kind="sphere", size=(radius,), position=end, name="") for end in ends]
+        return [replace(shape, kind="cylinder"), *balls]
+    return [] if f"{shape.kind}s" in IGNORABLE else [shape]
 
 
 def _add_shape(link: ET.Element, role: str, shape: FileShape) -> None:

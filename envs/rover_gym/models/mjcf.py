@@ -486,10 +486,14 @@ class _Reader:
                 made.kind, made.size = "capsule", (size[0], 2.0 * size[1])
             case kinds.mjGEOM_SPHERE:
                 made.kind, made.size = "sphere", (size[0],)
+            case kinds.mjGEOM_ELLIPSOID:
+                made.kind, made.size = "ellipsoid", (size[0], size[1], size[2])
             case kinds.mjGEOM_MESH:
                 mesh = int(m.geom_dataid[geom])
                 first = int(m.mesh_vertadr[mesh])
                 made.mesh = np.array(m.mesh_vert[first : first + int(m.mesh_vertnum[mesh])], dtype=np.float64)
+                first = int(m.mesh_faceadr[mesh])
+                made.faces = np.array(m.mesh_face[first : first + int(m.mesh_facenum[mesh])], dtype=np.int64)
             case other:
                 made.kind = kinds(other).name.removeprefix("mjGEOM_").lower()
         return made

@@ -65,6 +65,8 @@ def from_urdf(
     steering_limit: float | None = None,
     wheel_width: float | None = None,
     wheel_stiffness: float | None = None,
+    mesh_parts: int = 8,
+    mesh_vertices: int = 32,
     ignore: Collection[str] = (),
     package_paths: Collection[str | os.PathLike[str]] = (),
 ) -> RoverModel:
@@ -89,6 +91,9 @@ def from_urdf(
             wheel's collision cylinder in the file, or 0.
         wheel_stiffness: Normal contact stiffness of every wheel, N/m; 0 for rigid wheels. By default a wheel is
             compressed by 0.03 mm under its share of the weight, which determines the wheel loads of a rigid chassis.
+        mesh_parts: Most convex parts into which a concave collision mesh is divided. With 1 a mesh collides as its
+            convex hull, with 0 not at all. `import_report` states the error in volume.
+        mesh_vertices: Largest number of vertices of a part, from 4 to 64.
         ignore: Kinds of elements to leave out although they change the motion: "friction", "actuators", "closed loops",
             "tendons", "springs", "fluid".
         package_paths: Folders to search for `package://` names, before the folders above the file and those of the
@@ -116,6 +121,8 @@ def from_mjcf(
     steering_limit: float | None = None,
     wheel_width: float | None = None,
     wheel_stiffness: float | None = None,
+    mesh_parts: int = 8,
+    mesh_vertices: int = 32,
     ignore: Collection[str] = (),
 ) -> RoverModel:
     """Reads an MJCF file, which MuJoCo compiles.
@@ -139,6 +146,9 @@ def from_mjcf(
             wheel's collision cylinder in the file, or 0.
         wheel_stiffness: Normal contact stiffness of every wheel, N/m; 0 for rigid wheels. By default a wheel is
             compressed by 0.03 mm under its share of the weight, which determines the wheel loads of a rigid chassis.
+        mesh_parts: Most convex parts into which a concave collision mesh is divided. With 1 a mesh collides as its
+            convex hull, with 0 not at all. `import_report` states the error in volume.
+        mesh_vertices: Largest number of vertices of a part, from 4 to 64.
         ignore: Kinds of elements to leave out although they change the motion: "friction", "actuators", "closed loops",
             "tendons", "springs", "fluid".
 

@@ -13,6 +13,7 @@ from rover_gym.mechanics import ModelError, RoverModel
 from rover_gym.models.description import WheelOptions, describe
 from rover_gym.models.import_report import ImportReport, RobotFileWarning, axes_of, check_folders, solid_rows, together
 from rover_gym.models.loop_description import close_distant_couplings
+from rover_gym.models.meshes import MOST_PARTS, MOST_VERTICES, MeshOptions
 from rover_gym.models.mjcf import read_mjcf_tree
 from rover_gym.models.robot_tree import (
     IGNORABLE,
@@ -26,7 +27,7 @@ from rover_gym.models.robot_tree import (
 )
 from rover_gym.models.roles import Steering, Wheels, find_wheels
 from rover_gym.models.urdf import read_urdf_tree
-from rover_gym.validation import number, refuse
+from rover_gym.validation import number, refuse, whole
 
 SOLID = re.compile(r"(solids|wheels|tags|loops)\[(\d+)\]")
 
@@ -53,6 +54,8 @@ def _read(
     steering: Steering = None,
     forward: str = "x",
     ignore: Collection[str] = (),
+    mesh_parts: int = MeshOptions.parts,
+    mesh_vertices: int = MeshOptions.vertices,
     frames: int = 3,
     **limits: float | None,
 ) -> tuple[RoverModel, ImportReport]:
@@ -64,6 +67,10 @@ def _read(
     ignored = check_kinds(ignore, IGNORABLE)
     options = WheelOptions(
         **{k: None if x is None else number(k, x, at_least=0.0, error=ModelError) for k, x in limits.items()}
+    )
+    meshes = MeshOptions(
+        whole("mesh_parts", mesh_parts, at_least=0, at_most=MOST_PARTS, error=ModelError),
+        whole("mesh_vertices", mesh_vertices, at_least=4, at_most=MOST_VERTICES, error=ModelError),
     )
     tree = reader(place, ignore=ignored)
     drop_distant_limits(tree)
@@ -82,7 +89,7 @@ def _read(
     turn_steering_axes_up(tree, {role.steering for role in roles if role.steering}, P)
     close_distant_couplings(tree)
     move_limits_to_followed_joints(tree)
-    description = describe(tree, roles, P, options)
+    description = describe(tree, roles, P, options, meshes)
     try:
         model = RoverModel.from_dict(description)
     except ModelError as error:

@@ -25,11 +25,12 @@ from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
+import numpy.typing as npt
 
-from rover_gym.extras import MissingExtraError, require
 from rover_gym.mechanics import ModelError
 from rover_gym.models.import_report import Array
 from rover_gym.models.loops import FileLoop, move_ends
+from rover_gym.models.meshes import Mesh, load_mesh
 from rover_gym.rotations import turn_z_to
 from rover_gym.validation import refuse, shown
 
@@ -53,13 +54,14 @@ class FileShape:
     Attributes:
         kind: "box", "cylinder", "sphere", or what else the file calls it.
         size: Edge lengths of a box (3), radius and length of a cylinder or of a capsule between the centres of its
-            caps, radius of a sphere, m.
+            caps, radius of a sphere, semi-axes of an ellipsoid (3), m.
         position: Centre in the link's frame (3,), m.
         rotation: From the shape's axes to the link's frame (3, 3). A cylinder is about its z.
         collides: Whether the file lets it touch others.
         visible: Whether the file draws it.
         name: Its name in the file, or "".
         mesh: The mesh's file, or its vertices (n, 3) in the shape's axes, m.
+        faces: Triangles (m, 3) of a mesh that is given by its vertices.
         scale: Factors of the mesh's coordinates.
         searched: Folders in which there is no such file.
     """
@@ -74,6 +76,7 @@ class FileShape:
     mesh: Path | Array | None = None
     scale: Array | None = None
     searched: tuple[str, ...] = ()
+    faces: npt.NDArray[np.int64] | None = None
 
 
 @dataclass
@@ -562,6 +565,8 @@ def _reach(link: FileLink, shape: FileShape) -> float:
             corners = np.array(list(itertools.product((-0.5, 0.5), repeat=3))) * shape.size
         case "sphere":
             corners, margin = np.zeros((1, 3)), shape.size[0]
+        case "ellipsoid":
+            corners, margin = np.zeros((1, 3)), max(shape.size)
         case "capsule":
             corners, margin = np.array([[0.0, 0.0, z * shape.size[1]] for z in (-0.5, 0.5)]), shape.size[0]
         case "cylinder":
@@ -582,21 +587,14 @@ def _farthest(link: FileLink, points: Array) -> float:
 
 def _points(link: FileLink, shape: FileShape) -> tuple[Array | None, str]:
     """Vertices of a mesh (n, 3), m, relative to the joint's anchor; or None and the reason."""
-    points: Array
-    if isinstance(shape.mesh, np.ndarray):
-        points = shape.mesh
-    elif shape.searched:
-        return None, f"is the mesh {shape.mesh}, which cannot be read: it is in none of {', '.join(shape.searched)}"
-    else:
-        try:
-            loader = require("trimesh", "models")
-        except MissingExtraError as error:
-            return None, f"is a mesh, and {error}"
-        try:
-            points = np.asarray(loader.load_mesh(shape.mesh).vertices, dtype=np.float64)
-        except Exception as error:  # whatever a parser of meshes makes of a damaged file
-            return None, f"is the mesh {shape.mesh}, which cannot be read ({type(error).__name__}: {error})"
-    if len(points) < 3:
-        return None, f"is the mesh {shape.mesh}, which has no surface"
-    scale = np.ones(3) if shape.scale is None else shape.scale
-    return (points * scale) @ shape.rotation.T + shape.position - link.joint.anchor, ""
+    mesh, reason = mesh_of(shape)
+    if mesh is None:
+        return None, reason
+    return mesh.vertices @ shape.rotation.T + shape.position - link.joint.anchor, ""
+
+
+def mesh_of(shape: FileShape) -> tuple[Mesh | None, str]:
+    """The mesh of a shape in its axes; or None and the reason."""
+    if shape.mesh is None:
+        return None, "has no mesh"
+    return load_mesh(shape.mesh, shape.faces, shape.scale, shape.searched)

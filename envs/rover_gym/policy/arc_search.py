@@ -22,6 +22,7 @@ import numpy.typing as npt
 
 from rover_gym.env.start import HeightScan, wheel_centres
 from rover_gym.mechanics import OptionError, PathSearch, Plane, RoverModel, atan2, sin_cos
+from rover_gym.polytopes import box_around
 from rover_gym.validation import number, refuse
 
 Array = npt.NDArray[np.float64]
@@ -68,7 +69,7 @@ class RoverOutline:
 
 
 def _colliding(solid: Mapping[str, Any], spacing: float) -> Iterator[Array]:
-    """Points `(m, 3)` on each box and sphere of a solid that collides, in the solid's frame, m."""
+    """Points `(m, 3)` on each shape of a solid that collides, or on the box around it, in the solid's frame, m."""
     alone = {"shape", "collides"} <= solid.keys()
     shapes = [solid["shape"] | {"collides": solid["collides"]}] if alone else solid.get("shapes", ())
     for shape in shapes:
@@ -76,10 +77,11 @@ def _colliding(solid: Mapping[str, Any], spacing: float) -> Iterator[Array]:
             continue
         centre = np.array(solid.get("centre_of_mass", (0.0,) * 3) if alone else shape.get("position", (0.0,) * 3))
         turn = np.eye(3) if alone else _rotation(shape.get("rotation", (0.0,) * 3))
-        if shape["kind"] == "box":
-            yield _box(shape["size"], spacing) @ turn.T + centre
-        elif shape["kind"] == "sphere":
+        if shape["kind"] == "sphere":
             yield _sphere(shape["radius"], spacing) + centre
+        else:
+            middle, half = box_around(shape)
+            yield (_box(2.0 * half, spacing) + middle) @ turn.T + centre
 
 
 def _box(size: Any, spacing: float) -> Array:

@@ -1,4 +1,4 @@
-"""The rover's appearance: boxes, cylinders and spheres on its solids, made from the model's shapes.
+"""The rover's appearance: boxes, cylinders, spheres and meshes on its solids, made from the model's shapes.
 
 This module imports no renderer, so that frames, the browser page and the exported scenes all show the same rover. Each
 part is fixed to one solid: the world position of a point `x` of the part is `o + R (position + rotation x)`, with
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.polytopes import hull_mesh
 from rover_gym.rotations import rotation_matrix
 
 if TYPE_CHECKING:
@@ -94,20 +95,21 @@ PLATE = 0.012  # m, thickness of what is laid on a surface, and of the forks' pl
 
 @dataclass(frozen=True)
 class Part:
-    """A box, a cylinder or a sphere on a solid.
+    """A box, a cylinder, a sphere, an ellipsoid or a convex hull on a solid.
 
     Attributes:
         solid: The solid it is fixed to, a key of `RoverModel.poses`.
-        kind: "box", "cylinder" or "sphere".
+        kind: "box", "cylinder", "sphere", "ellipsoid" or "hull".
         size: m. A box: edge lengths along the part's x, y, z. A cylinder: radius, and height along the part's y. A
-            ball: radius.
+            ball: radius. An ellipsoid: semi-axes along x, y, z. A hull: the coordinates of its points, one after the
+            other.
         position: Centre in the solid's frame, m.
         rotation: (3, 3), columns are the part's axes in the solid's frame.
         colour: Red, green, blue, 0 to 1.
     """
 
     solid: str
-    kind: Literal["box", "cylinder", "sphere"]
+    kind: Literal["box", "cylinder", "sphere", "ellipsoid", "hull"]
     size: tuple[float, ...]
     position: Vector
     rotation: npt.NDArray[np.float64]
@@ -143,7 +145,7 @@ def part_mesh(part: Part, resolution: int = 24) -> tuple[npt.NDArray[np.float64]
     """The part's surface as triangles, with separate vertices on each flat side, so that edges stay sharp.
 
     Args:
-        part: A box, a cylinder or a sphere.
+        part: The part.
         resolution: Number of facets around a cylinder or along a sphere's equator, at least 3.
 
     Returns:
@@ -155,6 +157,11 @@ def part_mesh(part: Part, resolution: int = 24) -> tuple[npt.NDArray[np.float64]
     if part.kind == "sphere":
         vertices, triangles = sphere_mesh(resolution // 2)
         return part.size[0] * vertices, triangles
+    if part.kind == "ellipsoid":
+        vertices, triangles = sphere_mesh(resolution // 2)
+        return vertices * part.size, triangles
+    if part.kind == "hull":
+        return hull_mesh(np.reshape(part.size, (-1, 3)))
     radius, height = part.size
     return _cylinder_mesh(radius, height, resolution)
 
@@ -308,6 +315,18 @@ def _shape_parts(solid: Mapping[str, Any], placed: _PlacedShape) -> Iterator[Par
         yield Part(name, "cylinder", size, centre, rotation, COLUMN_COLOUR)
     elif shape["kind"] == "sphere":
         yield Part(name, "sphere", (shape["radius"],), centre, rotation, COLUMN_COLOUR)
+    elif shape["kind"] == "capsule":
+        radius, height = shape["radius"], shape["height"]
+        yield Part(name, "cylinder", (radius, height), centre, rotation, COLUMN_COLOUR)
+        for end in (-0.5, 0.5):
+            x, y, z = np.array(centre) + rotation[:, 1] * end * height
+            yield Part(name, "sphere", (radius,), (float(x), float(y), float(z)), rotation, COLUMN_COLOUR)
+    elif shape["kind"] == "ellipsoid":
+        yield Part(name, "ellipsoid", tuple(shape["radii"]), centre, rotation, COLUMN_COLOUR)
+    elif shape["kind"] == "hull":
+        size = tuple(float(x) for point in shape["points"] for x in point)
+        colour = BOGIE_COLOUR if "parent" in solid else TRUNK_COLOUR
+        yield Part(name, "hull", size, centre, rotation, colour)
     else:  # a thin disc about z that is not a wheel
         turn = rotation @ _turn_to(np.array([0.0, 0.0, 1.0]))
         yield Part(name, "cylinder", (shape["radius"], PLATE), centre, turn, HUB_COLOUR)

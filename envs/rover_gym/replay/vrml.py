@@ -21,6 +21,7 @@ from rover_gym.rendering.appearance import (
     SKY_COLOUR_2,
     Colour,
     Part,
+    part_mesh,
 )
 from rover_gym.replay.scenery import (
     first_view,
@@ -144,6 +145,11 @@ def _part(part: Part) -> str:
         geometry = f"Box {{ size {_numbers(part.size)} }}"
     elif part.kind == "sphere":
         geometry = f"Sphere {{ radius {_numbers(part.size)} }}"
+    elif part.kind in ("ellipsoid", "hull"):
+        vertices, triangles = part_mesh(part)
+        points = ", ".join(_numbers(vertex) for vertex in vertices)
+        corners = ", ".join(f"{a} {b} {c} -1" for a, b, c in triangles)
+        geometry = f"IndexedFaceSet {{ coord Coordinate {{ point [ {points} ] }} coordIndex [ {corners} ] }}"
     else:
         radius, height = part.size
         geometry = f"Cylinder {{ radius {_numbers([radius])} height {_numbers([height])} }}"  # about y, as in the model

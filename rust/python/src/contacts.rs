@@ -71,7 +71,8 @@ pub struct Contacts {
     bodies: Vec<String>,
     /// Name of the other solid in each contact; None for the ground, a grain or a joint.
     others: Vec<Option<String>>,
-    /// Kind of each contact, "wheel", "box" or "sphere"; of a joint, "limit" or "friction".
+    /// Kind of each contact, "wheel", "box", "sphere" or "collider"; of a joint, "limit" or
+    /// "friction".
     ///
     /// "limit" is a joint at its stop, "friction" the dry friction of a joint.
     ///
@@ -107,6 +108,7 @@ impl Contacts {
             Part::Wheel(i) => ("wheel", i64::try_from(*i).unwrap_or(-1)),
             Part::Box(_) => ("box", -1),
             Part::Sphere(_) => ("sphere", -1),
+            Part::Collider(_) => ("collider", -1),
             Part::Limit(..) => ("limit", -1),
             Part::Friction(_) => ("friction", -1),
         };

@@ -76,6 +76,6 @@ pub fn surface(roller: &Roller, around: u32, across: u32) -> Vec<(Vector3<f64>, 
 }
 
 /// The shape that contacts see.
-pub fn shape(roller: &Roller) -> PlacedShape {
+pub fn shape(roller: &Roller) -> PlacedShape<'static> {
     PlacedShape::Roller(*roller)
 }

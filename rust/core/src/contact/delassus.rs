@@ -88,7 +88,7 @@ impl ContactSystem {
                 Part::Wheel(_) if rollers::rollers_of(model, contact).is_some() => {
                     rollers::close(&mut own);
                 }
-                Part::Wheel(_) | Part::Box(_) | Part::Sphere(_) => {}
+                Part::Wheel(_) | Part::Box(_) | Part::Sphere(_) | Part::Collider(_) => {}
             }
             for (i, row) in own.chunks_exact(3).enumerate() {
                 self.W[(3 * c + i) * size + 3 * c..][..3].copy_from_slice(row);

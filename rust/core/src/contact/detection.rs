@@ -22,7 +22,7 @@ const NEAREST: usize = 0;
 
 /// On a sphere: the point over the tangent plane at first contact, for a part that passes the
 /// sphere within this step.
-pub(super) const PASSING: u16 = 1;
+pub(super) const PASSING: u32 = 1;
 
 /// Collects the ground contacts of a configuration with velocity `v` (nv) into `out`, which is
 /// cleared first.
@@ -51,15 +51,7 @@ pub fn detect(
         middle: &at(kinematics, v),
         end: &at(end, v),
     };
-    let parts = (0..model.wheels().len()).map(Part::Wheel);
-    let parts = parts.chain((0..model.boxes().len()).map(Part::Box));
-    detect_parts(
-        parts.chain((0..model.spheres().len()).map(Part::Sphere)),
-        &machine,
-        terrain,
-        activation,
-        out,
-    )
+    detect_parts(Part::all(model), &machine, terrain, activation, out)
 }
 
 /// A machine in a step: at its midpoint, where gaps and velocities are measured, and at its
@@ -125,13 +117,13 @@ struct Gate<'a, S> {
 }
 
 /// A part and its placement.
-struct Placed {
+struct Placed<'a> {
     part: Part,
     body: usize,
-    shape: PlacedShape,
+    shape: PlacedShape<'a>,
 }
 
-impl Placed {
+impl Placed<'_> {
     /// Its contact at a point of the ground.
     #[inline]
     fn contact(&self, point: &SurfacePoint, primitive: u32) -> Contact {
@@ -150,7 +142,7 @@ impl Placed {
 
 impl<S: BodyMotion> Gate<'_, S> {
     #[inline]
-    fn offer(&mut self, placed: &Placed, point: &SurfacePoint, primitive: u32) {
+    fn offer(&mut self, placed: &Placed<'_>, point: &SurfacePoint, primitive: u32) {
         let u_N = || {
             let middle = self.machine.middle;
             point
@@ -172,7 +164,7 @@ impl<S: BodyMotion> Gate<'_, S> {
         for k in first..out.len() {
             let mut contact = out[k];
             let counts = match contact.key.opposite {
-                Opposite::Ground(id) if usize::from(contact.key.feature) & ON_SURFACE != 0 => {
+                Opposite::Ground(id) if contact.key.feature as usize & ON_SURFACE != 0 => {
                     let (x, n) = (contact.point, &contact.frame.n);
                     let point = SurfacePoint::of_normal(NEAREST, x, n, contact.gap);
                     let piece = part.terrain.primitive(id);
@@ -196,7 +188,7 @@ impl<S: BodyMotion> Gate<'_, S> {
     #[inline]
     fn offer_sphere(
         &mut self,
-        placed: &Placed,
+        placed: &Placed<'_>,
         (primitive, sphere): (u32, &Sphere),
         near: &SurfacePoint,
         motion: f64,
@@ -227,19 +219,14 @@ fn candidates<S: BodyMotion>(part: Part, terrain: &dyn Terrain, gate: &mut Gate<
         body,
         shape: part.place_at(model, (&R, &r)),
     };
-    let (centre, bound) = match &placed.shape {
-        PlacedShape::Disc(disc) => (disc.centre, disc.radius),
-        PlacedShape::Roller(roller) => (roller.core.centre, roller.bound()),
-        PlacedShape::Box(solid) => (solid.centre, solid.half_size.norm()),
-        PlacedShape::Sphere(sphere) => (sphere.centre, sphere.radius),
-    };
+    let (centre, bound) = (placed.shape.centre(), placed.shape.bound());
     let (half_way, motion) = if gate.can_be_passed {
         let (R_end, r_end) = end.pose(body);
         let half_way = end.origin(body) - base + (r_end + R_end * part.centre(model)) - centre;
         let turning = match &placed.shape {
-            // The sweep of a box includes its rotation; the other shapes are treated as round.
-            PlacedShape::Box(_) => (R_end - R).norm() * bound,
+            // Wheels and balls are treated as round; the sweep of others includes their rotation.
             PlacedShape::Disc(_) | PlacedShape::Roller(_) | PlacedShape::Sphere(_) => 0.0,
+            _ => (R_end - R).norm() * bound,
         };
         (half_way, half_way.norm() + turning)
     } else {
@@ -296,7 +283,7 @@ fn candidates<S: BodyMotion>(part: Part, terrain: &dyn Terrain, gate: &mut Gate<
 /// or a rock.
 #[inline]
 pub(crate) fn visit_on_surface(
-    shape: &PlacedShape,
+    shape: &PlacedShape<'_>,
     (terrain, id, piece): (&dyn Terrain, u32, &Primitive),
     base: &Vector3<f64>,
     reach: f64,
@@ -347,10 +334,10 @@ fn on_surface(point: &SurfacePoint) -> SurfacePoint {
 /// Whether a sphere's centre, relative to a shape's centre, is further than `within` from the
 /// shape, by an inexpensive bound.
 #[inline]
-fn is_far(shape: &PlacedShape, between: &Vector3<f64>, within: f64) -> bool {
+fn is_far(shape: &PlacedShape<'_>, between: &Vector3<f64>, within: f64) -> bool {
     match shape {
         PlacedShape::Disc(disc) => disc.axle.dot(between).abs() > within,
-        PlacedShape::Roller(roller) => {
+        PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => {
             let beside = roller.core.axle.dot(between).abs();
             beside > within + roller.half + roller.rounding
         }
@@ -360,13 +347,17 @@ fn is_far(shape: &PlacedShape, between: &Vector3<f64>, within: f64) -> bool {
             outside.norm_squared() > within * within
         }
         PlacedShape::Sphere(_) => false,
+        PlacedShape::Ellipsoid(_) | PlacedShape::Hull(_) => {
+            let reach = within + shape.bound();
+            between.norm_squared() > reach * reach
+        }
     }
 }
 
 /// Normal from a sphere of the ground to a part at their first contact in this step, if the part
 /// passes the sphere.
 fn touch<S: BodyMotion>(
-    placed: &Placed,
+    placed: &Placed<'_>,
     machine: &Moving<'_, S>,
     ground: &Sphere,
     base: &Vector3<f64>,
@@ -404,6 +395,25 @@ fn touch<S: BodyMotion>(
                 (near.n, near.gap)
             };
             first_touch(distance, &middle, &(middle - half_way), ground.radius)
+        }
+        shape => {
+            // The sphere's centre as the body at its midpoint sees it.
+            let ((R, r), (R_end, r_end)) = (
+                machine.middle.pose(placed.body),
+                machine.end.pose(placed.body),
+            );
+            let middle = ground.centre - base;
+            let from_end = ground.centre - machine.end.origin(placed.body) - r_end;
+            let last = r + R * R_end.tr_mul(&from_end);
+            let distance = |x: &Vector3<f64>| {
+                let place = Sphere {
+                    centre: *x,
+                    radius: 0.0,
+                };
+                let near = dispatch::point_on_sphere(shape, &place, &Vector3::zeros());
+                (near.n, near.gap)
+            };
+            first_touch(distance, &middle, &last, ground.radius)
         }
     }
 }
@@ -499,7 +509,7 @@ pub fn disc_gap(disc: &Disc, base: &Vector3<f64>, terrain: &dyn Terrain) -> f64 
 
 /// The same of a wheel's shape, with a width or without.
 #[must_use]
-pub fn wheel_gap(shape: &PlacedShape, base: &Vector3<f64>, terrain: &dyn Terrain) -> f64 {
+pub fn wheel_gap(shape: &PlacedShape<'_>, base: &Vector3<f64>, terrain: &dyn Terrain) -> f64 {
     // Only a surface, and no sphere or plane that may be nearer.
     if terrain.has_surface() && !terrain.can_be_passed() && terrain.ground().is_none() {
         let (centre, radius) = (base + shape.centre(), shape.bound());
@@ -521,7 +531,7 @@ pub fn wheel_gap(shape: &PlacedShape, base: &Vector3<f64>, terrain: &dyn Terrain
 /// nearest. `base` as for [`disc_gap`].
 #[inline]
 fn visit_nearer(
-    shape: &PlacedShape,
+    shape: &PlacedShape<'_>,
     base: &Vector3<f64>,
     terrain: &dyn Terrain,
     visit: &mut impl FnMut(u32, &SurfacePoint),

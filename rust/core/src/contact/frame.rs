@@ -60,7 +60,7 @@ impl ContactFrame {
     /// Frame of a shape at a point of the ground; a disc has a rolling direction.
     #[inline]
     #[must_use]
-    pub fn on_ground(shape: &PlacedShape, point: &SurfacePoint) -> Self {
+    pub fn on_ground(shape: &PlacedShape<'_>, point: &SurfacePoint) -> Self {
         match shape {
             PlacedShape::Disc(disc) => Self::of_wheel(&point.n, &disc.axle, &point.rolling),
             PlacedShape::Roller(roller) => {
@@ -72,11 +72,11 @@ impl ContactFrame {
 
     /// Frame of a shape, the second of its pair, in contact with another.
     #[must_use]
-    pub fn of_pair(shape: &PlacedShape, point: &PairPoint) -> Self {
+    pub fn of_pair(shape: &PlacedShape<'_>, point: &PairPoint) -> Self {
         let disc = match shape {
             PlacedShape::Disc(disc) => disc,
             PlacedShape::Roller(roller) => &roller.core,
-            PlacedShape::Box(_) | PlacedShape::Sphere(_) => return Self::of_normal(&point.n),
+            _ => return Self::of_normal(&point.n),
         };
         // A disc in contact on its face rolls along its rim.
         let along_rim = disc.axle.cross(&(point.point - disc.centre));

@@ -38,7 +38,7 @@ pub struct ContactKey {
     /// ground, 0 for the nearest point and 1 for a part that passes the sphere within one step.
     /// Between bodies, the feature of [`crate::geometry::query::PairPoint`]. For a joint, 0 is the
     /// lower stop, 1 the upper and 2 its friction.
-    pub feature: u16,
+    pub feature: u32,
     /// The other side.
     pub opposite: Opposite,
 }
@@ -55,7 +55,7 @@ impl ContactKey {
     #[inline]
     #[must_use]
     pub fn lasting(self) -> Self {
-        if usize::from(self.feature) & ON_SURFACE == 0 {
+        if self.feature as usize & ON_SURFACE == 0 {
             return self;
         }
         Self {
@@ -67,7 +67,7 @@ impl ContactKey {
     /// Key of a part's feature on a primitive of the ground.
     ///
     /// # Panics
-    /// If a part has more than 2^16 features.
+    /// If a part has more than 2^32 features.
     #[inline]
     #[must_use]
     pub fn on_ground(part: Part, feature: usize, primitive: u32) -> Self {
@@ -91,7 +91,7 @@ impl ContactKey {
     /// Key of a part's feature on a grain.
     ///
     /// # Panics
-    /// If a part has more than 2^16 features.
+    /// If a part has more than 2^32 features.
     #[must_use]
     pub fn on_grain(part: Part, feature: usize, grain: u32) -> Self {
         Self {
@@ -104,7 +104,7 @@ impl ContactKey {
     /// Key of a feature of two parts.
     ///
     /// # Panics
-    /// If a pair has more than 2^16 features.
+    /// If a pair has more than 2^32 features.
     #[inline]
     #[must_use]
     pub fn between(part: Part, feature: usize, other: Part) -> Self {
@@ -117,8 +117,8 @@ impl ContactKey {
 }
 
 #[inline]
-fn narrow(feature: usize) -> u16 {
-    u16::try_from(feature).unwrap_or_else(|_| panic!("invariant: feature {feature} fits 16 bits"))
+fn narrow(feature: usize) -> u32 {
+    u32::try_from(feature).unwrap_or_else(|_| panic!("invariant: feature {feature} fits 32 bits"))
 }
 
 /// The other body of a contact.

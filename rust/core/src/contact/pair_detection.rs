@@ -14,7 +14,7 @@ use super::part::Part;
 use super::relocation::place_pair;
 use crate::geometry::Sphere;
 use crate::geometry::broad_phase::IntervalSweep;
-use crate::geometry::query::dispatch;
+use crate::geometry::query::pairs;
 use crate::multibody::{Kinematics, Model};
 
 /// Scratch of the search, allocated once for a model.
@@ -105,7 +105,7 @@ pub(crate) fn detect_pairs_of(
             body: other.body(model),
         };
         let (first, second) = place_pair(model, motion, other.part, part);
-        dispatch::visit_pair(&first, &second, reach, |point| {
+        pairs::visit_pair(&first, &second, reach, |point| {
             let contact = Contact {
                 key: ContactKey::between(part, point.feature, other.part),
                 part,

@@ -3,9 +3,9 @@
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::{Disc, OrientedBox, PlacedShape, Roller, Sphere};
+use crate::geometry::{Disc, Ellipsoid, Hull, OrientedBox, PlacedShape, Roller, Sphere};
 use crate::law::compliance::Compliance;
-use crate::multibody::{Kinematics, Model, Wheel};
+use crate::multibody::{Collider, ColliderForm, Kinematics, Model, Wheel};
 
 /// A part of the machine that can be in contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -16,6 +16,8 @@ pub enum Part {
     Box(usize),
     /// A ball, by its index in the model.
     Sphere(usize),
+    /// A cylinder, a capsule, an ellipsoid or a convex hull, by its index in the model.
+    Collider(usize),
     /// A joint at its stop, by its index. It has no shape, only a point: the origin of the body
     /// that the joint carries.
     Limit(usize, Side),
@@ -32,38 +34,41 @@ pub enum Side {
     Upper,
 }
 
-/// First codes of balls, boxes and joints.
+/// First codes of balls, colliders, boxes and joints.
 const SPHERES: u16 = 0x4000;
+const COLLIDERS: u16 = 0x6000;
 const BOXES: u16 = 0x8000;
 const LIMITS: u16 = 0xC000;
 
 impl Part {
-    /// A 16-bit code of the part: wheels start at 0, balls at 2^14, boxes at 2^15, joints at 3 ·
-    /// 2^14.
+    /// A 16-bit code of the part: wheels start at 0, balls at 2^14, colliders at 3 · 2^13, boxes at
+    /// 2^15, joints at 3 · 2^14.
     ///
     /// # Panics
-    /// If a model has more than 2^14 wheels, balls, boxes or joints.
+    /// If a model has more than 2^13 wheels, balls, colliders, boxes or joints.
     #[inline]
     #[must_use]
     pub fn code(self) -> u16 {
         let narrow = |i: usize| match u16::try_from(i) {
-            Ok(code) if code < SPHERES => code,
-            _ => panic!("invariant: part {i} fits 14 bits"),
+            Ok(code) if code < COLLIDERS - SPHERES => code,
+            _ => panic!("invariant: part {i} fits 13 bits"),
         };
         match self {
             Self::Wheel(i) => narrow(i),
             Self::Sphere(i) => narrow(i) | SPHERES,
+            Self::Collider(i) => narrow(i) | COLLIDERS,
             Self::Box(i) => narrow(i) | BOXES,
             Self::Limit(i, _) | Self::Friction(i) => narrow(i) | LIMITS,
         }
     }
 
-    /// All parts of a model that have a shape: wheels, boxes, balls.
+    /// All parts of a model that have a shape: wheels, boxes, balls, colliders.
     pub fn all(model: &Model) -> impl Iterator<Item = Self> {
         let wheels = (0..model.wheels().len()).map(Self::Wheel);
         let boxes = (0..model.boxes().len()).map(Self::Box);
         let spheres = (0..model.spheres().len()).map(Self::Sphere);
-        wheels.chain(boxes).chain(spheres)
+        let colliders = (0..model.colliders().len()).map(Self::Collider);
+        wheels.chain(boxes).chain(spheres).chain(colliders)
     }
 
     /// Whether the model contains it.
@@ -73,6 +78,7 @@ impl Part {
             Self::Wheel(i) => i < model.wheels().len(),
             Self::Box(i) => i < model.boxes().len(),
             Self::Sphere(i) => i < model.spheres().len(),
+            Self::Collider(i) => i < model.colliders().len(),
             Self::Limit(i, _) => model.limited_joints().contains(&i),
             Self::Friction(i) => model.rubbing_joints().contains(&i),
         }
@@ -86,6 +92,7 @@ impl Part {
             Self::Wheel(i) => model.wheels()[i].body,
             Self::Box(i) => model.boxes()[i].body,
             Self::Sphere(i) => model.spheres()[i].body,
+            Self::Collider(i) => model.colliders()[i].body,
             Self::Limit(i, _) | Self::Friction(i) => model.joints()[i].body,
         }
     }
@@ -97,6 +104,7 @@ impl Part {
             Self::Wheel(i) => &model.description().wheels[i].solid,
             Self::Box(i) => &model.boxes()[i].name,
             Self::Sphere(i) => &model.spheres()[i].name,
+            Self::Collider(i) => &model.colliders()[i].name,
             Self::Limit(i, _) | Self::Friction(i) => &model.bodies()[model.joints()[i].body].name,
         }
     }
@@ -107,7 +115,7 @@ impl Part {
     pub fn compliance(self, model: &Model) -> Option<Compliance> {
         match self {
             Self::Wheel(i) => model.wheels()[i].compliance,
-            Self::Box(_) | Self::Sphere(_) | Self::Limit(..) | Self::Friction(_) => None,
+            _ => None,
         }
     }
 
@@ -118,6 +126,7 @@ impl Part {
             Self::Wheel(i) => &model.wheels()[i].material,
             Self::Box(i) => &model.boxes()[i].material,
             Self::Sphere(i) => &model.spheres()[i].material,
+            Self::Collider(i) => &model.colliders()[i].material,
             Self::Limit(..) | Self::Friction(_) => "",
         }
     }
@@ -130,6 +139,7 @@ impl Part {
             Self::Wheel(i) => model.wheels()[i].centre,
             Self::Box(i) => model.boxes()[i].centre,
             Self::Sphere(i) => model.spheres()[i].centre,
+            Self::Collider(i) => model.colliders()[i].centre,
             Self::Limit(..) | Self::Friction(_) => Vector3::zeros(),
         }
     }
@@ -141,6 +151,7 @@ impl Part {
             Self::Wheel(i) => model.wheels()[i].bound(),
             Self::Box(i) => model.boxes()[i].half_size.norm(),
             Self::Sphere(i) => model.spheres()[i].radius,
+            Self::Collider(i) => model.colliders()[i].bound(),
             Self::Limit(..) | Self::Friction(_) => 0.0,
         }
     }
@@ -148,7 +159,7 @@ impl Part {
     /// Its shape at the poses of `kinematics`, relative to the origin of its body's tree.
     #[inline]
     #[must_use]
-    pub fn place(self, model: &Model, kinematics: &Kinematics) -> PlacedShape {
+    pub fn place<'a>(self, model: &'a Model, kinematics: &Kinematics) -> PlacedShape<'a> {
         let body = self.body(model);
         self.place_at(model, (&kinematics.R(body), &kinematics.r(body)))
     }
@@ -156,7 +167,11 @@ impl Part {
     /// The same where its body has an attitude and an origin, m.
     #[inline]
     #[must_use]
-    pub fn place_at(self, model: &Model, pose: (&Matrix3<f64>, &Vector3<f64>)) -> PlacedShape {
+    pub fn place_at<'a>(
+        self,
+        model: &'a Model,
+        pose: (&Matrix3<f64>, &Vector3<f64>),
+    ) -> PlacedShape<'a> {
         if let Self::Wheel(i) = self {
             let wheel = &model.wheels()[i];
             shape_about(wheel, disc_at(wheel, pose))
@@ -165,8 +180,12 @@ impl Part {
         }
     }
 
-    /// The same for balls and boxes, kept separate so that the short code for wheels is inlined.
-    fn place_solid(self, model: &Model, (R, r): (&Matrix3<f64>, &Vector3<f64>)) -> PlacedShape {
+    /// The same for what is no wheel, kept separate so that the short code for wheels is inlined.
+    fn place_solid<'a>(
+        self,
+        model: &'a Model,
+        (R, r): (&Matrix3<f64>, &Vector3<f64>),
+    ) -> PlacedShape<'a> {
         let centre = r + R * self.centre(model);
         match self {
             Self::Box(i) => {
@@ -177,6 +196,7 @@ impl Part {
                     half_size: solid.half_size,
                 })
             }
+            Self::Collider(i) => place_collider(&model.colliders()[i], centre, R),
             Self::Wheel(_) | Self::Sphere(_) | Self::Limit(..) | Self::Friction(_) => {
                 PlacedShape::Sphere(Sphere {
                     centre,
@@ -187,17 +207,53 @@ impl Part {
     }
 }
 
+/// The shape of a collider with its centre (m) at a place of a body with the attitude R.
+fn place_collider<'a>(
+    solid: &'a Collider,
+    centre: Vector3<f64>,
+    R: &Matrix3<f64>,
+) -> PlacedShape<'a> {
+    let R = R * solid.rotation;
+    let round = |radius: f64, half: f64, rounding: f64| {
+        let core = Disc {
+            centre,
+            axle: R.column(1).into(),
+            spoke: R.column(0).into(),
+            radius,
+        };
+        PlacedShape::Cylinder(Roller {
+            core,
+            half,
+            rounding,
+        })
+    };
+    match &solid.form {
+        ColliderForm::Cylinder { radius, half } => round(*radius, *half, 0.0),
+        ColliderForm::Capsule { radius, half } => round(0.0, *half, *radius),
+        ColliderForm::Ellipsoid { radii } => PlacedShape::Ellipsoid(Ellipsoid {
+            centre,
+            R,
+            radii: *radii,
+        }),
+        ColliderForm::Hull { polytope } => PlacedShape::Hull(Hull {
+            centre,
+            R,
+            polytope,
+        }),
+    }
+}
+
 /// A wheel's shape at the poses of `kinematics`, relative to the origin of its body's tree.
 #[inline]
 #[must_use]
-pub fn wheel_shape(wheel: &Wheel, kinematics: &Kinematics) -> PlacedShape {
+pub fn wheel_shape(wheel: &Wheel, kinematics: &Kinematics) -> PlacedShape<'static> {
     shape_about(wheel, place_wheel(wheel, kinematics))
 }
 
 /// The shape of a wheel with this disc midway along its axle.
 #[inline]
 #[must_use]
-pub fn shape_about(wheel: &Wheel, disc: Disc) -> PlacedShape {
+pub fn shape_about(wheel: &Wheel, disc: Disc) -> PlacedShape<'static> {
     if wheel.is_wide() {
         PlacedShape::Roller(Roller::new(disc, wheel.width, wheel.rounding))
     } else {

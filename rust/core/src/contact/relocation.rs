@@ -8,7 +8,7 @@ use super::frame::ContactFrame;
 use super::pair::{Contact, ON_SURFACE, Opposite, OtherSide};
 use super::part::Part;
 use super::rollers::turn_to_rollers;
-use crate::geometry::query::dispatch;
+use crate::geometry::query::{dispatch, pairs};
 use crate::geometry::{PlacedShape, Primitive, Sphere, Terrain};
 use crate::multibody::{Kinematics, Model};
 
@@ -46,7 +46,7 @@ pub(crate) fn relocate_to(
         (Opposite::Part(_), None) | (Opposite::Grain(_) | Opposite::Stop, _) => return,
     };
     let base = &motion.origin(contact.body);
-    let feature = usize::from(contact.key.feature) & !ON_SURFACE;
+    let feature = contact.key.feature as usize & !ON_SURFACE;
     let (R, r) = motion.pose(contact.body);
     let shape = contact.part.place_at(model, (&R, &r));
     let point = match terrain.primitive(primitive) {
@@ -67,32 +67,25 @@ pub(crate) fn relocate_to(
 
 fn relocate_pair(model: &Model, motion: &impl BodyMotion, other: OtherSide, contact: &mut Contact) {
     let (first, second) = place_pair(model, motion, other.part, contact.part);
-    let feature = usize::from(contact.key.feature);
-    let point = dispatch::point_of_pair(&first, &second, feature);
+    let feature = contact.key.feature as usize;
+    let point = pairs::point_of_pair(&first, &second, feature);
     contact.frame = ContactFrame::of_pair(&second, &point);
     (contact.point, contact.gap) = (point.point, point.gap);
 }
 
 /// Two parts, both relative to the origin of the second one's tree.
-pub(super) fn place_pair(
-    model: &Model,
+pub(super) fn place_pair<'a>(
+    model: &'a Model,
     motion: &impl BodyMotion,
     first: Part,
     second: Part,
-) -> (PlacedShape, PlacedShape) {
+) -> (PlacedShape<'a>, PlacedShape<'a>) {
     let place = |part: Part| {
         let (R, r) = motion.pose(part.body(model));
         part.place_at(model, (&R, &r))
     };
     let shift = motion.origin(first.body(model)) - motion.origin(second.body(model));
-    let mut shape = place(first);
-    match &mut shape {
-        PlacedShape::Disc(disc) => disc.centre += shift,
-        PlacedShape::Roller(roller) => roller.core.centre += shift,
-        PlacedShape::Box(solid) => solid.centre += shift,
-        PlacedShape::Sphere(sphere) => sphere.centre += shift,
-    }
-    (shape, place(second))
+    (place(first).moved(&shift), place(second))
 }
 
 /// The sphere's point with the outward normal n, relative to `base`.

@@ -48,7 +48,7 @@ const BISECTIONS: usize = 30;
 /// A part near the surfaces of a terrain.
 #[derive(Clone, Copy)]
 pub(crate) struct OverSurfaces<'a> {
-    pub shape: &'a PlacedShape,
+    pub shape: &'a PlacedShape<'a>,
     pub terrain: &'a dyn Terrain,
     /// Where the shape's coordinates have their origin, world, m.
     pub base: &'a Vector3<f64>,
@@ -126,7 +126,7 @@ impl OverSurfaces<'_> {
     /// Depth up to which every point behind a piece's plane counts, m: ground that is thinner, as
     /// near a sharp ridge, is pierced and still pushes.
     #[inline]
-    pub fn shallow(shape: &PlacedShape) -> f64 {
+    pub fn shallow(shape: &PlacedShape<'_>) -> f64 {
         SHALLOW * crate::geometry::SupportMap::bound(shape)
     }
 }

@@ -107,7 +107,7 @@ pub struct WheelDisc {
     pub compliance: Option<Compliance>,
 }
 
-/// A box that collides with the ground, or that has a ball in it which does.
+/// A box that collides with the ground, or around a ball or another collider which does.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyBox {
     /// The model's part.
@@ -176,6 +176,12 @@ impl BodyBox {
     fn of(model: &Model, part: Part) -> Self {
         let (rotation, half_size) = match part {
             Part::Box(i) => (model.boxes()[i].rotation, model.boxes()[i].half_size),
+            Part::Collider(i) => {
+                let solid = &model.colliders()[i];
+                let (middle, half_size) = solid.bounding_box();
+                // About the centre, on which the poses of the part are based.
+                (solid.rotation, half_size + middle.abs())
+            }
             _ => (Matrix3::identity(), Vector3::repeat(part.bound(model))),
         };
         Self {

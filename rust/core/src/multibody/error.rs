@@ -209,9 +209,25 @@ pub enum ModelError {
         /// Principal moments, kg m².
         principal: [f64; 3],
     },
-    /// `collides` on something that is neither a box nor a ball.
-    #[error("{field}: only boxes and spheres can collide; for a disc, add a wheel")]
+    /// `collides` on a disc.
+    #[error("{field}: a disc cannot collide; add a wheel")]
     CannotCollide {
+        /// Path of the field.
+        field: String,
+    },
+    /// Points without a hull.
+    #[error(
+        "{field}: {count} points: a hull needs from 4 to 64 points that are not all in one plane"
+    )]
+    NoHull {
+        /// Path of the field.
+        field: String,
+        /// Number of points.
+        count: usize,
+    },
+    /// A hull as the only shape of a solid, whose origin would be its mass centre.
+    #[error("{field}: a hull must be one of the solid's `shapes`")]
+    HullAlone {
         /// Path of the field.
         field: String,
     },
@@ -343,6 +359,8 @@ impl ModelError {
             | Self::NotASign { field, .. }
             | Self::ImpossibleInertia { field, .. }
             | Self::CannotCollide { field }
+            | Self::NoHull { field, .. }
+            | Self::HullAlone { field }
             | Self::NotWithShapes { field, .. }
             | Self::HalfGiven { field }
             | Self::MassesContradict { field, .. }

@@ -81,8 +81,8 @@ pub use mass_matrix::MassMatrix;
 pub use mechanism::Mechanism;
 pub(crate) use model::fingerprint;
 pub use model::{
-    BASE, Body, BodyPose, Changes, CollisionBox, CollisionSphere, Frame, JointProperties, Loop,
-    LoopGap, MachineSpan, Model, Passive, Tree, Wheel,
+    BASE, Body, BodyPose, Changes, Collider, ColliderForm, CollisionBox, CollisionSphere, Frame,
+    JointProperties, Loop, LoopGap, MachineSpan, Model, Passive, Tree, Wheel,
 };
 pub use momentum::Momentum;
 pub use motor::{Motor, MotorLine};

@@ -162,12 +162,13 @@ impl Scene for RoverScene {
     }
 
     /// Most contacts on a plane: three rim points per wheel, or six if it has a width, four corners
-    /// per box, one point per ball, both stops of a joint, and its dry friction.
+    /// per box, one point per ball, four per collider, both stops of a joint, and its dry friction.
     fn contact_capacity(&self) -> usize {
         let model = &self.model;
         let stops = 2 * model.limited_joints().len() + model.rubbing_joints().len();
         let rims = (model.wheels().iter()).map(|wheel| if wheel.is_wide() { 6 } else { 3 });
-        rims.sum::<usize>() + 4 * model.boxes().len() + model.spheres().len() + stops
+        let solids = 4 * (model.boxes().len() + model.colliders().len()) + model.spheres().len();
+        rims.sum::<usize>() + solids + stops
     }
 
     #[inline]

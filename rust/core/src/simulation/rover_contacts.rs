@@ -55,10 +55,12 @@ impl RoverSimulation {
     /// Mean normal force of the last step on all parts except wheels, N, without joints' stops.
     #[must_use]
     pub fn body_force(&self) -> f64 {
-        let boxes = self
-            .active
-            .iter()
-            .filter(|a| matches!(a.contact.part, Part::Box(_) | Part::Sphere(_)));
+        let boxes = self.active.iter().filter(|a| {
+            matches!(
+                a.contact.part,
+                Part::Box(_) | Part::Sphere(_) | Part::Collider(_)
+            )
+        });
         boxes.map(|a| a.impulse[0]).sum::<f64>() / self.options.time_step
     }
 }

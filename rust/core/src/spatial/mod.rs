@@ -1,5 +1,5 @@
 //! Rotations and symmetric inertias, on which the multibody chapter is built, and formulas that the
-//! plane and space share ([`space`]).
+//! plane and space share ([`space`]). [`polytope`] is the convex hull of a few points.
 //!
 //! # One call
 //!
@@ -11,10 +11,12 @@
 //!
 //! [`crate::scalar`].
 
+pub mod polytope;
 pub mod rotation;
 pub mod space;
 pub mod symmetric;
 
+pub use polytope::{MAX_VERTICES, Polytope, PolytopeEdge, PolytopeFace};
 pub use rotation::{
     CardanReport, HeadingPitchRoll, exp_rotation, quaternion_about, rotation_about,
 };

@@ -1,23 +1,25 @@
-//! Chooses the module that measures a pair of shapes. No other place knows all pairs.
+//! Chooses the module that measures a shape against the ground, and the nearest points of two
+//! shapes. No other place but [`super::pairs`] knows all pairs.
 //!
 //! A new shape adds its arms here; see "add a shape" in `CONTRIBUTING.md`.
 
 use nalgebra::Vector3;
 
 use super::{
-    NEAREST, PairPoint, SurfacePoint, box_box, box_plane, box_sphere, box_triangle, convex,
-    disc_box, disc_disc, disc_plane, disc_sphere, disc_triangle, roller_plane, roller_sphere,
-    roller_triangle, sphere_plane, sphere_sphere, sphere_triangle,
+    NEAREST, PairPoint, SurfacePoint, box_plane, box_sphere, box_triangle, convex, disc_disc,
+    disc_plane, disc_sphere, disc_triangle, ellipsoid_plane, ellipsoid_sphere, ellipsoid_triangle,
+    hull_plane, hull_sphere, hull_triangle, roller_plane, roller_sphere, roller_triangle,
+    sphere_plane, sphere_sphere, sphere_triangle,
 };
 use crate::geometry::terrain::surface::{Edge, Face, Vertex};
-use crate::geometry::{PlacedShape, Plane, Sphere};
+use crate::geometry::{PlacedShape, Plane, Roller, Sphere};
 
 /// Visits the points of a shape over a plane of the ground whose gap is at most `reach`, m.
 ///
 /// `base` (m, world) is where the shape's coordinates have their origin, here and below.
 #[inline]
 pub fn visit_on_plane(
-    shape: &PlacedShape,
+    shape: &PlacedShape<'_>,
     plane: &Plane,
     base: &Vector3<f64>,
     reach: f64,
@@ -25,7 +27,7 @@ pub fn visit_on_plane(
 ) {
     match shape {
         PlacedShape::Disc(disc) => disc_plane::rim_points(disc, plane, base, reach, visit),
-        PlacedShape::Roller(roller) => {
+        PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => {
             roller_plane::rim_points(roller, plane, base, reach, visit);
         }
         PlacedShape::Box(solid) => box_plane::corners(solid, plane, base, reach, visit),
@@ -35,6 +37,13 @@ pub fn visit_on_plane(
                 visit(&low);
             }
         }
+        PlacedShape::Ellipsoid(solid) => {
+            let low = ellipsoid_plane::lowest_point(solid, plane, base);
+            if low.gap <= reach {
+                visit(&low);
+            }
+        }
+        PlacedShape::Hull(hull) => hull_plane::vertices(hull, plane, base, reach, visit),
     }
 }
 
@@ -42,25 +51,36 @@ pub fn visit_on_plane(
 #[inline]
 #[must_use]
 pub fn point_on_plane(
-    shape: &PlacedShape,
+    shape: &PlacedShape<'_>,
     plane: &Plane,
     base: &Vector3<f64>,
     feature: usize,
 ) -> SurfacePoint {
     match shape {
         PlacedShape::Disc(disc) => disc_plane::rim_point(disc, plane, base, feature),
-        PlacedShape::Roller(roller) => roller_plane::rim_point(roller, plane, base, feature),
+        PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => {
+            roller_plane::rim_point(roller, plane, base, feature)
+        }
         PlacedShape::Box(solid) => box_plane::corner(solid, plane, base, feature),
         PlacedShape::Sphere(sphere) => sphere_plane::lowest_point(sphere, plane, base),
+        PlacedShape::Ellipsoid(solid) => ellipsoid_plane::lowest_point(solid, plane, base),
+        PlacedShape::Hull(hull) => hull_plane::vertex(hull, plane, base, feature),
     }
 }
 
 /// The lowest point of a wheel over a plane of the ground.
 #[inline]
 #[must_use]
-pub fn lowest_on_plane(shape: &PlacedShape, plane: &Plane, base: &Vector3<f64>) -> SurfacePoint {
+pub fn lowest_on_plane(
+    shape: &PlacedShape<'_>,
+    plane: &Plane,
+    base: &Vector3<f64>,
+) -> SurfacePoint {
     match shape {
-        PlacedShape::Roller(roller) => roller_plane::lowest_point(roller, plane, base),
+        PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => {
+            roller_plane::lowest_point(roller, plane, base)
+        }
+        PlacedShape::Hull(hull) => hull_plane::lowest_vertex(hull, plane, base),
         _ => point_on_plane(shape, plane, base, NEAREST),
     }
 }
@@ -68,19 +88,27 @@ pub fn lowest_on_plane(shape: &PlacedShape, plane: &Plane, base: &Vector3<f64>) 
 /// Nearest point of a shape to a sphere of the ground.
 #[inline]
 #[must_use]
-pub fn point_on_sphere(shape: &PlacedShape, ground: &Sphere, base: &Vector3<f64>) -> SurfacePoint {
+pub fn point_on_sphere(
+    shape: &PlacedShape<'_>,
+    ground: &Sphere,
+    base: &Vector3<f64>,
+) -> SurfacePoint {
     match shape {
         PlacedShape::Disc(disc) => disc_sphere::nearest_point(disc, ground, base),
-        PlacedShape::Roller(roller) => roller_sphere::nearest_point(roller, ground, base),
+        PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => {
+            roller_sphere::nearest_point(roller, ground, base)
+        }
         PlacedShape::Box(solid) => box_sphere::nearest_point(solid, ground, base),
         PlacedShape::Sphere(sphere) => sphere_sphere::nearest_point(sphere, ground, base),
+        PlacedShape::Ellipsoid(solid) => ellipsoid_sphere::nearest_point(solid, ground, base),
+        PlacedShape::Hull(hull) => hull_sphere::nearest_point(hull, ground, base),
     }
 }
 
 /// Visits the points of a shape over a face of a surface whose gap is at most `reach`, m.
 #[inline]
 pub fn visit_on_face(
-    shape: &PlacedShape,
+    shape: &PlacedShape<'_>,
     face: &Face,
     base: &Vector3<f64>,
     reach: f64,
@@ -90,7 +118,7 @@ pub fn visit_on_face(
         PlacedShape::Disc(disc) => {
             disc_triangle::rim_points_over_face(disc, face, base, reach, visit);
         }
-        PlacedShape::Roller(roller) => {
+        PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => {
             roller_triangle::rim_points_over_face(roller, face, base, reach, visit);
         }
         PlacedShape::Box(solid) => {
@@ -102,13 +130,22 @@ pub fn visit_on_face(
                 visit(&low);
             }
         }
+        PlacedShape::Ellipsoid(solid) => {
+            let low = ellipsoid_triangle::lowest_over_face(solid, face, base);
+            if let Some(low) = low.filter(|low| low.gap <= reach) {
+                visit(&low);
+            }
+        }
+        PlacedShape::Hull(hull) => {
+            hull_triangle::vertices_over_face(hull, face, base, reach, visit);
+        }
     }
 }
 
 /// Visits the points of a shape at a convex edge of a surface whose gap is at most `reach`, m.
 #[inline]
 pub fn visit_at_edge(
-    shape: &PlacedShape,
+    shape: &PlacedShape<'_>,
     edge: &Edge,
     base: &Vector3<f64>,
     reach: f64,
@@ -116,7 +153,7 @@ pub fn visit_at_edge(
 ) {
     let point = match shape {
         PlacedShape::Disc(disc) => disc_triangle::rim_point_at_edge(disc, edge, base),
-        PlacedShape::Roller(roller) => {
+        PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => {
             roller_triangle::points_at_edge(roller, edge, base, reach, visit);
             return;
         }
@@ -125,6 +162,11 @@ pub fn visit_at_edge(
             return;
         }
         PlacedShape::Sphere(sphere) => sphere_triangle::point_at_edge(sphere, edge, base),
+        PlacedShape::Ellipsoid(solid) => ellipsoid_triangle::point_at_edge(solid, edge, base),
+        PlacedShape::Hull(hull) => {
+            hull_triangle::points_at_edge(hull, edge, base, reach, visit);
+            return;
+        }
     };
     if let Some(point) = point.filter(|point| point.gap <= reach) {
         visit(&point);
@@ -135,28 +177,40 @@ pub fn visit_at_edge(
 #[inline]
 #[must_use]
 pub fn point_at_edge(
-    shape: &PlacedShape,
+    shape: &PlacedShape<'_>,
     edge: &Edge,
     base: &Vector3<f64>,
     feature: usize,
 ) -> SurfacePoint {
     match shape {
         PlacedShape::Disc(disc) => disc_triangle::nearest_at_edge(disc, edge, base),
-        PlacedShape::Roller(roller) => roller_triangle::point_at_edge(roller, edge, base, feature),
+        PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => {
+            roller_triangle::point_at_edge(roller, edge, base, feature)
+        }
         PlacedShape::Box(solid) => box_triangle::point_at_edge(solid, edge, base, feature),
         PlacedShape::Sphere(sphere) => sphere_triangle::nearest_at_edge(sphere, edge, base),
+        PlacedShape::Ellipsoid(solid) => ellipsoid_triangle::nearest_at_edge(solid, edge, base),
+        PlacedShape::Hull(hull) => hull_triangle::point_at_edge(hull, edge, base, feature),
     }
 }
 
 /// The point of a shape at a convex vertex of a surface, wherever it is.
 #[inline]
 #[must_use]
-pub fn point_at_vertex(shape: &PlacedShape, vertex: &Vertex, base: &Vector3<f64>) -> SurfacePoint {
+pub fn point_at_vertex(
+    shape: &PlacedShape<'_>,
+    vertex: &Vertex,
+    base: &Vector3<f64>,
+) -> SurfacePoint {
     match shape {
         PlacedShape::Disc(disc) => disc_triangle::nearest_at_vertex(disc, vertex, base),
-        PlacedShape::Roller(roller) => roller_triangle::nearest_at_vertex(roller, vertex, base),
+        PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => {
+            roller_triangle::nearest_at_vertex(roller, vertex, base)
+        }
         PlacedShape::Box(solid) => box_triangle::nearest_at_vertex(solid, vertex, base),
         PlacedShape::Sphere(sphere) => sphere_triangle::nearest_at_vertex(sphere, vertex, base),
+        PlacedShape::Ellipsoid(solid) => ellipsoid_triangle::nearest_at_vertex(solid, vertex, base),
+        PlacedShape::Hull(hull) => hull_triangle::nearest_at_vertex(hull, vertex, base),
     }
 }
 
@@ -165,81 +219,73 @@ pub fn point_at_vertex(shape: &PlacedShape, vertex: &Vertex, base: &Vector3<f64>
 #[inline]
 #[must_use]
 pub fn point_over_tangent(
-    shape: &PlacedShape,
+    shape: &PlacedShape<'_>,
     n: &Vector3<f64>,
     touch: &Vector3<f64>,
 ) -> SurfacePoint {
     match shape {
         PlacedShape::Disc(disc) => disc_sphere::point_over_tangent(disc, n, touch),
-        PlacedShape::Roller(roller) => roller_sphere::point_over_tangent(roller, n, touch),
+        PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => {
+            roller_sphere::point_over_tangent(roller, n, touch)
+        }
         PlacedShape::Box(solid) => box_sphere::point_over_tangent(solid, n, touch),
         PlacedShape::Sphere(sphere) => sphere_sphere::point_over_tangent(sphere, n, touch),
+        PlacedShape::Ellipsoid(solid) => ellipsoid_sphere::point_over_tangent(solid, n, touch),
+        PlacedShape::Hull(hull) => hull_sphere::point_over_tangent(hull, n, touch),
     }
-}
-
-/// Visits the points of two moving shapes whose gap is at most `reach`, m;
-/// n from the first to the second.
-pub fn visit_pair(
-    first: &PlacedShape,
-    second: &PlacedShape,
-    reach: f64,
-    mut visit: impl FnMut(&PairPoint),
-) {
-    let (first, second) = thinned(first, second);
-    match (&first, &second) {
-        (PlacedShape::Box(a), PlacedShape::Box(b)) => box_box::points(a, b, reach, visit),
-        (PlacedShape::Disc(a), PlacedShape::Box(b)) => disc_box::points(a, b, reach, visit),
-        (PlacedShape::Box(a), PlacedShape::Disc(b)) => {
-            disc_box::points(b, a, reach, |point| visit(&point.swapped()));
-        }
-        (first, second) => {
-            let near = nearest_points(first, second);
-            if near.gap <= reach {
-                visit(&near);
-            }
-        }
-    }
-}
-
-/// The point of a feature of two moving shapes, wherever it is; n from the first to the second.
-#[must_use]
-pub fn point_of_pair(first: &PlacedShape, second: &PlacedShape, feature: usize) -> PairPoint {
-    let (first, second) = thinned(first, second);
-    match (&first, &second) {
-        (PlacedShape::Box(a), PlacedShape::Box(b)) => box_box::point(a, b, feature),
-        (PlacedShape::Disc(a), PlacedShape::Box(b)) => disc_box::point(a, b, feature),
-        (PlacedShape::Box(a), PlacedShape::Disc(b)) => disc_box::point(b, a, feature).swapped(),
-        (first, second) => nearest_points(first, second),
-    }
-}
-
-/// Two shapes as their pair is measured: unless the other one is a ball, a wheel with a width is
-/// the disc midway along its axle.
-fn thinned(first: &PlacedShape, second: &PlacedShape) -> (PlacedShape, PlacedShape) {
-    let beside = |shape: &PlacedShape, other: &PlacedShape| match (shape, other) {
-        (PlacedShape::Roller(_), PlacedShape::Sphere(_)) => *shape,
-        (PlacedShape::Roller(roller), _) => PlacedShape::Disc(roller.middle()),
-        _ => *shape,
-    };
-    (beside(first, second), beside(second, first))
 }
 
 /// Nearest points of two moving shapes.
 #[must_use]
-pub fn nearest_points(first: &PlacedShape, second: &PlacedShape) -> PairPoint {
-    match (first, second) {
-        (PlacedShape::Sphere(a), PlacedShape::Sphere(b)) => sphere_sphere::nearest_points(a, b),
-        (PlacedShape::Disc(a), PlacedShape::Sphere(b)) => disc_sphere::nearest_points(a, b),
-        (PlacedShape::Sphere(a), PlacedShape::Disc(b)) => {
-            disc_sphere::nearest_points(b, a).swapped()
+pub fn nearest_points(first: &PlacedShape<'_>, second: &PlacedShape<'_>) -> PairPoint {
+    if let PlacedShape::Sphere(ball) = second {
+        return nearest_to_ball(first, ball);
+    }
+    if let PlacedShape::Sphere(ball) = first {
+        return nearest_to_ball(second, ball).swapped();
+    }
+    if let (PlacedShape::Disc(a), PlacedShape::Disc(b)) = (first, second) {
+        return disc_disc::nearest_points(a, b);
+    }
+    let is_own =
+        |shape: &PlacedShape<'_>| matches!(shape, PlacedShape::Disc(_) | PlacedShape::Box(_));
+    if is_own(first) && is_own(second) {
+        return convex::nearest_points(first, second);
+    }
+    // Without their rounding, shapes that touch are still apart.
+    let ((a, r_a), (b, r_b)) = (core(first), core(second));
+    let near = convex::refined(&a, &b);
+    if r_a + r_b > 0.0 {
+        let x = near.on_first() + near.n * r_a;
+        return PairPoint::from_first(NEAREST, &x, &near.n, near.gap - r_a - r_b);
+    }
+    near
+}
+
+/// Nearest points of a shape and a ball; n from the shape to the ball.
+fn nearest_to_ball(shape: &PlacedShape<'_>, ball: &Sphere) -> PairPoint {
+    match shape {
+        PlacedShape::Disc(disc) => disc_sphere::nearest_points(disc, ball),
+        PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => {
+            roller_sphere::nearest_points(roller, ball)
         }
-        (PlacedShape::Roller(a), PlacedShape::Sphere(b)) => roller_sphere::nearest_points(a, b),
-        (PlacedShape::Sphere(a), PlacedShape::Roller(b)) => {
-            roller_sphere::nearest_points(b, a).swapped()
+        PlacedShape::Box(solid) => box_sphere::nearest_points(solid, ball),
+        PlacedShape::Sphere(own) => sphere_sphere::nearest_points(own, ball),
+        PlacedShape::Ellipsoid(solid) => ellipsoid_sphere::nearest_points(solid, ball),
+        PlacedShape::Hull(hull) => hull_sphere::nearest_points(hull, ball),
+    }
+}
+
+/// A shape without its rounding, and the rounding, m.
+fn core<'a>(shape: &PlacedShape<'a>) -> (PlacedShape<'a>, f64) {
+    match shape {
+        PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => {
+            let core = Roller {
+                rounding: 0.0,
+                ..*roller
+            };
+            (PlacedShape::Cylinder(core), roller.rounding)
         }
-        (PlacedShape::Box(a), PlacedShape::Sphere(b)) => box_sphere::nearest_points(a, b),
-        (PlacedShape::Sphere(a), PlacedShape::Box(b)) => box_sphere::nearest_points(b, a).swapped(),
-        (PlacedShape::Disc(a), PlacedShape::Disc(b)) => disc_disc::nearest_points(a, b),
-        _ => convex::nearest_points(first, second),
+        _ => (*shape, 0.0),
     }
 }

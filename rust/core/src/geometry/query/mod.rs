@@ -6,15 +6,22 @@
 //! | wheel with a width | [`roller_plane`] | [`roller_sphere`] | [`roller_triangle`] | as a disc | as a disc | [`roller_sphere`] |
 //! | box | [`box_plane`] | [`box_sphere`] | [`box_triangle`] | | [`box_box`] | [`box_sphere`] |
 //! | sphere | [`sphere_plane`] | [`sphere_sphere`] | [`sphere_triangle`] | | | [`sphere_sphere`] |
+//! | cylinder, capsule | [`roller_plane`] | [`roller_sphere`] | [`roller_triangle`] | [`flats`] | [`flats`] | [`roller_sphere`] |
+//! | ellipsoid | [`ellipsoid_plane`] | [`ellipsoid_sphere`] | [`ellipsoid_triangle`] | [`flats`] | [`flats`] | [`ellipsoid_sphere`] |
+//! | polytope | [`hull_plane`] | [`hull_sphere`] | [`hull_triangle`] | [`flats`] | [`flats`] | [`hull_sphere`] |
+//!
+//! [`flats`] measures cylinders, capsules, ellipsoids and polytopes against each other and against
+//! wheels and boxes.
 //!
 //! The gap is positive where the shapes are apart. Its rate is the normal part of the relative
 //! velocity of the two *material* points, exactly unless a module states the error. [`convex`]
 //! measures any two shapes by their support maps, for pairs without a formula of their own;
 //! [`sweep`] finds the normal for a part that passes a sphere within one step.
 //!
-//! Against boxes and other wheels a wheel with a width is the disc midway along its axle.
+//! Against boxes and other wheels, but not against the other shapes, a wheel with a width is the
+//! disc midway along its axle.
 //!
-//! Only [`dispatch`] knows all pairs.
+//! Only [`dispatch`] and [`pairs`] know all pairs.
 
 pub mod box_box;
 pub mod box_plane;
@@ -27,6 +34,14 @@ pub mod disc_plane;
 pub mod disc_sphere;
 pub mod disc_triangle;
 pub mod dispatch;
+pub mod ellipsoid_plane;
+pub mod ellipsoid_sphere;
+pub mod ellipsoid_triangle;
+pub mod flats;
+pub mod hull_plane;
+pub mod hull_sphere;
+pub mod hull_triangle;
+pub mod pairs;
 pub mod roller_plane;
 pub mod roller_sphere;
 pub mod roller_triangle;

@@ -5,11 +5,14 @@
 //! points as far apart as its tread is wide, and a torus on one. As the wheel leans one gap grows
 //! and the other shrinks, both continuously.
 //!
+//! The same holds for a cylinder. The circles of a capsule have no radius and one point each: it
+//! lies on the lowest points of its two ends.
+//!
 //! The feature is [`CIRCLE`] times the circle's number plus the number of its rim point.
 
 use nalgebra::Vector3;
 
-use super::{CIRCLE, SurfacePoint, disc_plane};
+use super::{CIRCLE, NEAREST, SurfacePoint, disc_plane};
 use crate::geometry::{Plane, Roller};
 
 /// Points whose gap is at most `reach`; `base` as in [`super::dispatch`].
@@ -23,8 +26,11 @@ pub fn rim_points(
 ) {
     for k in 0..roller.n_circles() {
         let (circle, reach) = (roller.circle(k), reach + roller.rounding);
+        let is_point = circle.radius <= 0.0; // the end of a capsule
         disc_plane::rim_points(&circle, plane, base, reach, |point| {
-            visit(&swept(roller, k, *point));
+            if point.feature == NEAREST || !is_point {
+                visit(&swept(roller, k, *point));
+            }
         });
     }
 }

@@ -174,7 +174,7 @@ pub fn point_over_tangent(roller: &Roller, n: &Vector3<f64>, touch: &Vector3<f64
     let out = if length > FLAT {
         w * (-core.radius / length)
     } else {
-        across * (core.radius / across.norm().max(core.radius))
+        across * (core.radius / across.norm().max(core.radius).max(f64::MIN_POSITIVE))
     };
     let along = if lean.abs() > FLAT {
         -half.copysign(lean)

@@ -2,10 +2,10 @@
 //!
 //! Over a face its points are those over a plane ([`super::roller_plane`]) that lie over the face.
 //! At a convex edge each circle touches like a disc's rim ([`super::disc_triangle`]), lowered along
-//! the normal by the rounding. Where the edge crosses the tread between the circles, it touches
-//! there too: the normal is `n ∝ s × e`, of axle and edge, and the gap `n · (c − a) − R` with a
-//! point a of the edge. A vertex is a ball of radius zero; one inside the wheel leaves it through
-//! the side that the surface lets it, the tread or a side face.
+//! the normal by the rounding; the ends of a capsule are balls. Where the edge crosses the tread
+//! between the circles, it touches there too: the normal is `n ∝ s × e`, of axle and edge, and the
+//! gap `n · (c − a) − R` with a point a of the edge. A vertex is a ball of radius zero; one inside
+//! the wheel leaves it through the side that the surface lets it, the tread or a side face.
 //!
 //! Features at an edge are those of [`super::roller_plane`], and [`TREAD`].
 
@@ -14,9 +14,9 @@ use nalgebra::Vector3;
 use super::CIRCLE;
 use super::roller_plane::{rim_points, swept};
 use super::roller_sphere::{Seen, Side};
-use super::{SurfacePoint, disc_triangle};
-use crate::geometry::Roller;
+use super::{SurfacePoint, disc_triangle, sphere_triangle};
 use crate::geometry::terrain::surface::{Edge, Face, Vertex};
+use crate::geometry::{Roller, Sphere};
 
 /// Feature of the tread at an edge.
 pub const TREAD: usize = 2 * CIRCLE;
@@ -53,8 +53,13 @@ pub fn points_at_edge(
         point.gap <= reach && edge.has(place, -point.gap)
     };
     for k in 0..roller.n_circles() {
-        let point = disc_triangle::rim_point_between(&roller.circle(k), edge, base);
-        let point = point.map(|point| swept(roller, k, point));
+        let point = if roller.core.radius > 0.0 {
+            let point = disc_triangle::rim_point_between(&roller.circle(k), edge, base);
+            point.map(|point| swept(roller, k, point))
+        } else {
+            let end = sphere_triangle::point_at_edge(&end_of_capsule(roller, k), edge, base);
+            end.map(|point| of_end(k, point))
+        };
         if let Some(point) = point.filter(is_on) {
             visit(&point);
         }
@@ -80,11 +85,30 @@ pub fn point_at_edge(
     tread().map_or_else(
         || {
             let k = feature / CIRCLE % 2;
+            if roller.core.radius <= 0.0 {
+                let end = end_of_capsule(roller, k);
+                return of_end(k, sphere_triangle::nearest_at_edge(&end, edge, base));
+            }
             let point = disc_triangle::nearest_at_edge(&roller.circle(k), edge, base);
             swept(roller, k, point)
         },
         |(point, _)| point,
     )
+}
+
+/// The ball at an end of a capsule.
+fn end_of_capsule(roller: &Roller, k: usize) -> Sphere {
+    Sphere {
+        centre: roller.circle(k).centre,
+        radius: roller.rounding,
+    }
+}
+
+fn of_end(k: usize, point: SurfacePoint) -> SurfacePoint {
+    SurfacePoint {
+        feature: CIRCLE * k,
+        ..point
+    }
 }
 
 /// The point where an edge crosses the tread, held between the circles, and its place along the

@@ -3,7 +3,8 @@
 //! | | method |
 //! |---|---|
 //! | plane, sphere, box, disc | closed form: [`plane`], [`sphere`], [`oriented_box`], [`disc`] |
-//! | wheel with a width | Newton's method on a convex distance: [`roller`] |
+//! | ellipsoid, polytope | closed form: [`ellipsoid`], [`hull`] |
+//! | wheel with a width, cylinder, capsule | Newton's method on a convex distance: [`roller`] |
 //! | many spheres | descent of the ball tree, near halves first |
 //! | height field | walk from cell to cell, past tiles that lie below the ray: [`height_field`] |
 //! | mesh | descent of a tree of boxes, near ones first: [`triangle`] |
@@ -15,8 +16,10 @@
 
 pub mod cast;
 pub mod disc;
+pub mod ellipsoid;
 pub mod error;
 pub mod height_field;
+pub mod hull;
 pub mod oriented_box;
 pub mod plane;
 pub mod roller;

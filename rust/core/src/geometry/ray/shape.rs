@@ -1,11 +1,11 @@
 //! A ray and the shape of a part.
 
-use super::{Hit, Ray, disc, oriented_box, roller, sphere};
+use super::{Hit, Ray, disc, ellipsoid, hull, oriented_box, roller, sphere};
 use crate::geometry::shape::{PlacedShape, SupportMap};
 
 /// What a ray meets first of a part, within `reach` (m).
 #[must_use]
-pub fn hit(ray: &Ray, shape: &PlacedShape, reach: f64) -> Option<Hit> {
+pub fn hit(ray: &Ray, shape: &PlacedShape<'_>, reach: f64) -> Option<Hit> {
     let to_centre = shape.centre() - ray.origin;
     let across = to_centre - ray.direction * to_centre.dot(&ray.direction);
     let bound = shape.bound();
@@ -14,21 +14,25 @@ pub fn hit(ray: &Ray, shape: &PlacedShape, reach: f64) -> Option<Hit> {
     }
     match shape {
         PlacedShape::Disc(wheel) => disc::hit(ray, wheel, reach),
-        PlacedShape::Roller(wheel) => roller::hit(ray, wheel, reach),
+        PlacedShape::Roller(wheel) | PlacedShape::Cylinder(wheel) => roller::hit(ray, wheel, reach),
         PlacedShape::Box(solid) => oriented_box::hit(ray, solid, reach),
         PlacedShape::Sphere(ball) => sphere::hit(ray, ball, reach),
+        PlacedShape::Ellipsoid(solid) => ellipsoid::hit(ray, solid, reach),
+        PlacedShape::Hull(solid) => hull::hit(ray, solid, reach),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::shape::{Disc, OrientedBox, Roller, Sphere};
+    use crate::geometry::query::ellipsoid_sphere;
+    use crate::geometry::shape::{Disc, Ellipsoid, Hull, OrientedBox, Roller, Sphere};
+    use crate::spatial::Polytope;
     use nalgebra::{Rotation3, Vector3};
     use proptest::prelude::*;
 
     /// How far a place lies from a shape, or in it (negative), m. In a box, how far from its faces.
-    fn distance(shape: &PlacedShape, x: &Vector3<f64>) -> f64 {
+    fn distance(shape: &PlacedShape<'_>, x: &Vector3<f64>) -> f64 {
         let outside = |along: &[f64]| {
             let beyond = along.iter().map(|s| s.max(0.0).powi(2)).sum::<f64>().sqrt();
             let depth = along.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -40,12 +44,20 @@ mod tests {
                 let local = solid.R.transpose() * (x - solid.centre);
                 outside((local.abs() - solid.half_size).as_slice())
             }
-            PlacedShape::Roller(wheel) => {
+            PlacedShape::Roller(wheel) | PlacedShape::Cylinder(wheel) => {
                 let from = x - wheel.core.centre;
                 let axial = from.dot(&wheel.core.axle);
                 let radial = (from - wheel.core.axle * axial).norm();
                 outside(&[axial.abs() - wheel.half, radial - wheel.core.radius]) - wheel.rounding
             }
+            PlacedShape::Ellipsoid(solid) => {
+                let place = Sphere {
+                    centre: *x,
+                    radius: 0.0,
+                };
+                ellipsoid_sphere::nearest_point(solid, &place, &Vector3::zeros()).gap
+            }
+            PlacedShape::Hull(solid) => solid.outermost(&solid.local(x)).1,
             PlacedShape::Disc(_) => unreachable!("a disc has no inside"),
         }
     }
@@ -60,10 +72,15 @@ mod tests {
             let R = *Rotation3::from_euler_angles(angles[0], angles[1], angles[2]).matrix();
             let centre = Vector3::new(0.05, -0.1, 0.1);
             let wheel = Disc { centre, axle: R.column(2).into(), spoke: R.column(0).into(), radius: 0.35 };
+            let points = [[0.3, 0.0, 0.0], [-0.3, 0.1, 0.2], [0.0, -0.3, 0.1], [0.1, 0.2, -0.3], [0.0, 0.3, 0.3]];
+            let polytope = Polytope::hull_of(&points.map(Vector3::from)).unwrap();
             let shapes = [
                 PlacedShape::Roller(Roller::new(wheel, 0.2, rounding)),
                 PlacedShape::Box(OrientedBox { centre, R, half_size: Vector3::new(0.4, 0.2, 0.1) }),
                 PlacedShape::Sphere(Sphere { centre, radius: 0.3 }),
+                PlacedShape::Cylinder(Roller::new(Disc { radius: 0.1, ..wheel }, 0.6, 0.1)),
+                PlacedShape::Ellipsoid(Ellipsoid { centre, R, radii: Vector3::new(0.4, 0.2, 0.3) }),
+                PlacedShape::Hull(Hull { centre, R, polytope: &polytope }),
             ];
             let origin = Vector3::from(origin);
             let Some(ray) = Ray::new(origin, Vector3::from(target) - origin) else { return Ok(()) };

@@ -5,6 +5,8 @@
 //! trunk's. A machine far from the world's origin then loses no precision.
 
 pub mod disc;
+pub mod ellipsoid;
+pub mod hull;
 pub mod oriented_box;
 pub mod roller;
 pub mod sphere;
@@ -13,6 +15,8 @@ pub mod support_map;
 use nalgebra::{Matrix3, Vector3};
 
 pub use disc::Disc;
+pub use ellipsoid::Ellipsoid;
+pub use hull::Hull;
 pub use oriented_box::OrientedBox;
 pub use roller::Roller;
 pub use sphere::Sphere;
@@ -20,7 +24,7 @@ pub use support_map::SupportMap;
 
 /// The shape of a part.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum PlacedShape {
+pub enum PlacedShape<'a> {
     /// A wheel of zero width.
     Disc(Disc),
     /// A wheel with a width.
@@ -29,9 +33,15 @@ pub enum PlacedShape {
     Box(OrientedBox),
     /// A ball.
     Sphere(Sphere),
+    /// A cylinder, with rounded edges or without; a capsule if its circles have no radius.
+    Cylinder(Roller),
+    /// An ellipsoid.
+    Ellipsoid(Ellipsoid),
+    /// A convex polytope of a model.
+    Hull(Hull<'a>),
 }
 
-impl PlacedShape {
+impl PlacedShape<'_> {
     /// A box around it; `base` (m) is added to its place.
     #[inline]
     #[must_use]
@@ -46,7 +56,7 @@ impl PlacedShape {
         };
         match self {
             Self::Disc(disc) => round(disc, disc.radius, 0.0),
-            Self::Roller(roller) => {
+            Self::Roller(roller) | Self::Cylinder(roller) => {
                 let half = roller.half + roller.rounding;
                 round(&roller.core, roller.radius(), half)
             }
@@ -59,7 +69,34 @@ impl PlacedShape {
                 R: Matrix3::identity(),
                 half_size: Vector3::repeat(sphere.radius),
             },
+            Self::Ellipsoid(solid) => OrientedBox {
+                centre: base + solid.centre,
+                R: solid.R,
+                half_size: solid.radii,
+            },
+            Self::Hull(hull) => {
+                let (middle, half_size) = hull.polytope.bounding_box();
+                OrientedBox {
+                    centre: base + hull.place(&middle),
+                    R: hull.R,
+                    half_size,
+                }
+            }
         }
+    }
+
+    /// The same shape moved by `shift`, m.
+    #[must_use]
+    pub fn moved(mut self, shift: &Vector3<f64>) -> Self {
+        *match &mut self {
+            Self::Disc(disc) => &mut disc.centre,
+            Self::Roller(roller) | Self::Cylinder(roller) => &mut roller.core.centre,
+            Self::Box(solid) => &mut solid.centre,
+            Self::Sphere(sphere) => &mut sphere.centre,
+            Self::Ellipsoid(solid) => &mut solid.centre,
+            Self::Hull(hull) => &mut hull.centre,
+        } += shift;
+        self
     }
 
     /// Whether a point (m) is in the shape; a disc has no volume, and none is.
@@ -67,48 +104,58 @@ impl PlacedShape {
     pub fn holds(&self, x: &Vector3<f64>) -> bool {
         match self {
             Self::Disc(_) => false,
-            Self::Roller(roller) => roller.holds(x),
+            Self::Roller(roller) | Self::Cylinder(roller) => roller.holds(x),
             Self::Box(solid) => {
                 let local = solid.R.tr_mul(&(x - solid.centre));
                 (local.abs() - solid.half_size).max() <= 0.0
             }
             Self::Sphere(sphere) => sphere.distance(x) <= 0.0,
+            Self::Ellipsoid(solid) => solid.holds(x),
+            Self::Hull(hull) => hull.holds(x),
         }
     }
 }
 
-impl SupportMap for PlacedShape {
+impl SupportMap for PlacedShape<'_> {
     fn support(&self, direction: &Vector3<f64>) -> Vector3<f64> {
         match self {
             Self::Disc(disc) => disc.support(direction),
-            Self::Roller(roller) => roller.support(direction),
+            Self::Roller(roller) | Self::Cylinder(roller) => roller.support(direction),
             Self::Box(solid) => solid.support(direction),
             Self::Sphere(sphere) => sphere.support(direction),
+            Self::Ellipsoid(solid) => solid.support(direction),
+            Self::Hull(hull) => hull.support(direction),
         }
     }
 
     fn centre(&self) -> Vector3<f64> {
         match self {
             Self::Disc(disc) => disc.centre,
-            Self::Roller(roller) => roller.core.centre,
+            Self::Roller(roller) | Self::Cylinder(roller) => roller.core.centre,
             Self::Box(solid) => solid.centre,
             Self::Sphere(sphere) => sphere.centre,
+            Self::Ellipsoid(solid) => solid.centre,
+            Self::Hull(hull) => hull.centre,
         }
     }
 
     fn bound(&self) -> f64 {
         match self {
             Self::Disc(disc) => disc.bound(),
-            Self::Roller(roller) => roller.bound(),
+            Self::Roller(roller) | Self::Cylinder(roller) => roller.bound(),
             Self::Box(solid) => solid.bound(),
             Self::Sphere(sphere) => sphere.bound(),
+            Self::Ellipsoid(solid) => solid.bound(),
+            Self::Hull(hull) => hull.bound(),
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::oriented_box::signs;
     use super::*;
+    use crate::spatial::Polytope;
     use nalgebra::Rotation3;
     use proptest::prelude::*;
 
@@ -131,7 +178,25 @@ mod tests {
             for k in 0..8 {
                 prop_assert!(d.dot(&solid.corner(k)) <= d.dot(&solid.support(&d)) + 1e-12);
             }
-            for shape in [PlacedShape::Disc(disc), PlacedShape::Box(solid), PlacedShape::Sphere(Sphere { centre, radius: 0.2 })] {
+            let points: Vec<_> = (0..8).map(|k| solid.half_size.component_mul(&signs(k)) * (1.0 + 0.1 * k as f64)).collect();
+            let polytope = Polytope::hull_of(&points).unwrap();
+            let hull = Hull { centre, R, polytope: &polytope };
+            for k in 0..polytope.vertices().len() {
+                prop_assert!(d.dot(&hull.vertex(k)) <= d.dot(&hull.support(&d)) + 1e-12);
+                prop_assert!(hull.holds(&(centre + (hull.vertex(k) - centre) * 0.999)));
+            }
+            let ellipsoid = Ellipsoid { centre, R, radii: Vector3::new(0.4, 0.2, 0.1) };
+            let along = Vector3::new(f64::cos(phi) * 0.6, f64::sin(phi) * 0.6, 0.8).component_mul(&ellipsoid.radii);
+            prop_assert!(d.dot(&(centre + R * along)) <= d.dot(&ellipsoid.support(&d)) + 1e-12);
+            prop_assert!((d.dot(&(ellipsoid.support(&d) - centre)) - ellipsoid.extent(&d)).abs() < 1e-12);
+            for shape in [
+                PlacedShape::Disc(disc), PlacedShape::Box(solid), PlacedShape::Sphere(Sphere { centre, radius: 0.2 }),
+                PlacedShape::Cylinder(Roller::new(disc, 0.5, 0.0)), PlacedShape::Cylinder(Roller::new(disc, 0.9, 0.3)),
+                PlacedShape::Ellipsoid(ellipsoid), PlacedShape::Hull(hull),
+            ] {
+                let around = shape.bounding_box(&Vector3::zeros());
+                let beyond = around.R.tr_mul(&(shape.support(&d) - around.centre)).abs() - around.half_size;
+                prop_assert!(beyond.max() < 1e-12);
                 prop_assert!((shape.support(&d) - shape.centre()).norm() <= shape.bound() + 1e-12);
             }
         }

@@ -11,7 +11,7 @@ const ROUNDING: f64 = 1e-6;
 #[derive(Clone, Copy, Debug)]
 pub struct Neighbourhood<'a> {
     /// Its shape.
-    pub shape: &'a PlacedShape,
+    pub shape: &'a PlacedShape<'a>,
     /// Centre of the shape, world, m.
     pub centre: Vector3<f64>,
     /// Largest gap of a contact, m.
@@ -25,7 +25,7 @@ pub struct Neighbourhood<'a> {
 impl<'a> Neighbourhood<'a> {
     /// Of a shape whose coordinates have their origin at `base` (world, m), at rest.
     #[must_use]
-    pub fn new(shape: &'a PlacedShape, base: &'a Vector3<f64>, reach: f64) -> Self {
+    pub fn new(shape: &'a PlacedShape<'a>, base: &'a Vector3<f64>, reach: f64) -> Self {
         Self {
             shape,
             centre: base + shape.centre(),
@@ -49,7 +49,7 @@ impl<'a> Neighbourhood<'a> {
         self.shape.bounding_box(self.base).grown(self.reach)
     }
 
-    /// How far the shape extends from its centre along a unit vector, m.
+    /// How far the shape extends from its centre along a unit vector, either way, m.
     #[inline]
     pub(super) fn extent(&self, d: &Vector3<f64>) -> f64 {
         let beside = |axle: &Vector3<f64>| {
@@ -65,6 +65,11 @@ impl<'a> Neighbourhood<'a> {
             }
             PlacedShape::Box(solid) => (solid.R.tr_mul(d).abs()).dot(&solid.half_size),
             PlacedShape::Sphere(sphere) => sphere.radius,
+            PlacedShape::Cylinder(_) | PlacedShape::Ellipsoid(_) | PlacedShape::Hull(_) => {
+                let along =
+                    |d: &Vector3<f64>| d.dot(&(self.shape.support(d) - self.shape.centre()));
+                along(d).max(along(&-d))
+            }
         }
     }
 
@@ -91,6 +96,9 @@ impl<'a> Neighbourhood<'a> {
             }
             PlacedShape::Box(solid) => rest > (solid.R.tr_mul(m).abs()).dot(&solid.half_size),
             PlacedShape::Sphere(sphere) => rest > sphere.radius * length,
+            PlacedShape::Cylinder(_) | PlacedShape::Ellipsoid(_) | PlacedShape::Hull(_) => {
+                rest > m.dot(&(self.shape.centre() - self.shape.support(&-m)))
+            }
         }
     }
 
@@ -103,8 +111,13 @@ impl<'a> Neighbourhood<'a> {
     #[inline]
     pub(super) fn is_beyond_edge(&self, [first, second]: [bool; 2]) -> bool {
         match self.shape {
-            PlacedShape::Disc(_) | PlacedShape::Sphere(_) => first || second,
-            PlacedShape::Roller(_) | PlacedShape::Box(_) => first && second,
+            PlacedShape::Disc(_) | PlacedShape::Sphere(_) | PlacedShape::Ellipsoid(_) => {
+                first || second
+            }
+            PlacedShape::Roller(_)
+            | PlacedShape::Box(_)
+            | PlacedShape::Cylinder(_)
+            | PlacedShape::Hull(_) => first && second,
         }
     }
 }

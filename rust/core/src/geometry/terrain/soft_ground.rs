@@ -91,7 +91,7 @@ impl Terrain for SoftGround {
     fn visit_around(&self, part: &Neighbourhood<'_>, visit: &mut dyn FnMut(u32, &Primitive)) {
         match part.shape {
             PlacedShape::Disc(_) | PlacedShape::Roller(_) => {}
-            PlacedShape::Box(_) | PlacedShape::Sphere(_) => self.surface.visit_around(part, visit),
+            _ => self.surface.visit_around(part, visit),
         }
     }
 

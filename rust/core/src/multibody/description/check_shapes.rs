@@ -7,10 +7,13 @@ use crate::multibody::error::ModelError;
 /// Checks each shape of a solid, and that the solid uses only one of the two forms.
 pub(super) fn check_shapes(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
     let at = |what: &str| format!("solids[{i}].{what}");
-    if let Some(shape) = solid.shape {
-        check_lengths(&at("shape"), &shape)?;
+    if let Some(shape) = &solid.shape {
+        if matches!(shape, Shape::Hull { .. }) {
+            return Err(ModelError::HullAlone { field: at("shape") });
+        }
+        check_lengths(&at("shape"), shape)?;
     }
-    let can_collide = solid.shapes.is_empty() && solid.shape.is_some_and(|shape| collides(&shape));
+    let can_collide = solid.shapes.is_empty() && solid.shape.as_ref().is_some_and(collides);
     for (is_given, what) in [
         (solid.shape.is_some(), "shape"),
         (solid.collides, "collides"),
@@ -70,17 +73,31 @@ fn check_placed_shape(at: &str, shape: &ShapeDescription) -> Result<(), ModelErr
 
 fn check_lengths(at: &str, shape: &Shape) -> Result<(), ModelError> {
     let field = |what: &str| format!("{at}.{what}");
-    match *shape {
-        Shape::Box { size } => (size.iter()).try_for_each(|&s| length(&field("size"), s)),
-        Shape::Cylinder { radius, height } => {
-            length(&field("radius"), radius)?;
-            length(&field("height"), height)
+    let lengths = |what: &str, of: &[f64; 3]| of.iter().try_for_each(|&s| length(&field(what), s));
+    match shape {
+        Shape::Box { size } => lengths("size", size),
+        Shape::Cylinder { radius, height } | Shape::Capsule { radius, height } => {
+            length(&field("radius"), *radius)?;
+            length(&field("height"), *height)
         }
-        Shape::Disc { radius } | Shape::Sphere { radius } => length(&field("radius"), radius),
+        Shape::Disc { radius } | Shape::Sphere { radius } => length(&field("radius"), *radius),
+        Shape::Ellipsoid { radii } => lengths("radii", radii),
+        Shape::Hull { points } => {
+            for (k, x) in points.iter().enumerate() {
+                place(&format!("{at}.points[{k}]"), x)?;
+            }
+            shape
+                .polytope()
+                .map(|_| ())
+                .ok_or_else(|| ModelError::NoHull {
+                    field: field("points"),
+                    count: points.len(),
+                })
+        }
     }
 }
 
 /// Whether a shape can collide; a disc does so as a wheel.
 fn collides(shape: &Shape) -> bool {
-    matches!(shape, Shape::Box { .. } | Shape::Sphere { .. })
+    !matches!(shape, Shape::Disc { .. })
 }

@@ -40,8 +40,8 @@ impl SolidDescription {
                 inertia: inertia.to_matrix(),
             });
         }
-        if let Some(shape) = self.shape {
-            let inertia = Matrix3::from_diagonal(&shape.inertia(self.mass).into());
+        if let Some(shape) = &self.shape {
+            let (_, inertia) = shape.mass_properties(self.mass);
             return Ok(MassProperties { centre, inertia });
         }
         if self.shapes.is_empty() {
@@ -58,7 +58,7 @@ fn shape_masses(solid: &SolidDescription) -> Result<Vec<f64>, ModelError> {
     let rest = mass_left(solid)?;
     let mut others = shapes.iter().filter(|shape| shape.mass.is_none());
     let are_discs = others.all(|shape| shape.shape.volume().is_none());
-    let content = |(k, shape): (usize, &ShapeDescription)| match (shape.mass, shape.shape) {
+    let content = |(k, shape): (usize, &ShapeDescription)| match (shape.mass, &shape.shape) {
         (Some(_), _) => Ok(0.0),
         (None, Shape::Disc { radius }) if are_discs => Ok(radius * radius),
         (None, shape) => shape.volume().ok_or_else(|| ModelError::NoVolume {
@@ -97,17 +97,23 @@ pub(super) fn mass_left(solid: &SolidDescription) -> Result<f64, ModelError> {
 
 /// Mass centre of the shapes, and their inertia about it by the parallel axis theorem.
 fn together(shapes: &[ShapeDescription], masses: &[f64]) -> MassProperties {
-    let parts = || shapes.iter().zip(masses.iter().copied());
+    let placed = shapes.iter().zip(masses).map(|(shape, &m)| {
+        let (own, about) = shape.shape.mass_properties(m);
+        let (own, about) = match shape.turn() {
+            Some(R) => (R * own, R * about * R.transpose()),
+            None => (own, about),
+        };
+        (m, shape.centre() + own, about)
+    });
+    let placed: Vec<_> = placed.collect();
     let mass: f64 = masses.iter().sum();
-    let moment: Vector3<f64> = parts().map(|(shape, m)| shape.centre() * m).sum();
+    let moment: Vector3<f64> = placed.iter().map(|(m, own, _)| own * *m).sum();
     let centre = moment / mass;
-    let about_centre = |(shape, m): (&ShapeDescription, f64)| {
-        let own = Matrix3::from_diagonal(&shape.shape.inertia(m).into());
-        let turned = shape.turn().map_or(own, |R| R * own * R.transpose());
-        turned + SymmetricMatrix3::point_mass(m, &(shape.centre() - centre)).to_matrix()
-    };
+    let about_centre = placed.iter().map(|(m, own, about)| {
+        about + SymmetricMatrix3::point_mass(*m, &(own - centre)).to_matrix()
+    });
     MassProperties {
         centre,
-        inertia: parts().map(about_centre).sum(),
+        inertia: about_centre.sum(),
     }
 }

@@ -1,12 +1,13 @@
 //! Builds bodies, frames, wheels and boxes from a description.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::links::{inertias_of, mechanism_of};
 use super::machines::machines_of;
-use super::parts::{CollisionBox, CollisionSphere, Frame, Wheel};
+use super::parts::{Collider, ColliderForm, CollisionBox, CollisionSphere, Frame, Wheel};
 use super::properties::{JointProperties, Passive};
 use super::spinners::mark_spinners;
 use super::tree::{Paths, Tree};
@@ -41,6 +42,7 @@ struct Builder {
     frames: Vec<Frame>,
     boxes: Vec<CollisionBox>,
     spheres: Vec<CollisionSphere>,
+    colliders: Vec<Collider>,
     joints: Vec<JointProperties>,
     n_trees: usize,
     n_poses: usize,
@@ -58,6 +60,7 @@ impl Model {
             frames,
             boxes,
             spheres,
+            colliders,
             mut joints,
             n_trees,
             n_poses,
@@ -69,7 +72,9 @@ impl Model {
             coupled_apart(i, &description.solids[i])
         })?;
         let wheels = wheels(&description.wheels, &index_of, &frames, &bodies, &joints);
-        let carriers = (boxes.iter().map(|x| x.body)).chain(spheres.iter().map(|x| x.body));
+        let carriers = (boxes.iter().map(|x| x.body))
+            .chain(spheres.iter().map(|x| x.body))
+            .chain(colliders.iter().map(|x| x.body));
         let looped = description.loops.iter().flat_map(|closure| {
             let ends = [Some(&closure.solid), closure.other.as_ref()];
             let frame = |name: &String| Some(frames[*index_of.get(name.as_str())?].body);
@@ -116,6 +121,7 @@ impl Model {
             wheels,
             boxes,
             spheres,
+            colliders,
             common,
             body_of_velocity: paths.body_of_velocity,
             loops: Vec::new(),
@@ -325,24 +331,59 @@ impl Builder {
         rotation: Matrix3<f64>,
     ) {
         let (body, name) = (frame.body, frame.name.clone());
-        match *shape {
-            Shape::Box { size } => self.boxes.push(CollisionBox {
-                body,
-                name,
-                material,
-                centre,
-                rotation,
-                half_size: Vector3::from(size) * 0.5,
-            }),
-            Shape::Sphere { radius } => self.spheres.push(CollisionSphere {
-                body,
-                name,
-                material,
-                centre,
-                radius,
-            }),
-            Shape::Cylinder { .. } | Shape::Disc { .. } => {}
-        }
+        let mut about = centre;
+        let form = match shape {
+            Shape::Box { size } => {
+                self.boxes.push(CollisionBox {
+                    body,
+                    name,
+                    material,
+                    centre,
+                    rotation,
+                    half_size: Vector3::from(*size) * 0.5,
+                });
+                return;
+            }
+            Shape::Sphere { radius } => {
+                self.spheres.push(CollisionSphere {
+                    body,
+                    name,
+                    material,
+                    centre,
+                    radius: *radius,
+                });
+                return;
+            }
+            Shape::Disc { .. } => return,
+            Shape::Cylinder { radius, height } => ColliderForm::Cylinder {
+                radius: *radius,
+                half: 0.5 * height,
+            },
+            Shape::Capsule { radius, height } => ColliderForm::Capsule {
+                radius: *radius,
+                half: 0.5 * height,
+            },
+            Shape::Ellipsoid { radii } => ColliderForm::Ellipsoid {
+                radii: Vector3::from(*radii),
+            },
+            Shape::Hull { .. } => {
+                let Some(polytope) = shape.polytope() else {
+                    return; // refused by the checks
+                };
+                about += rotation * polytope.centroid();
+                ColliderForm::Hull {
+                    polytope: Arc::new(polytope),
+                }
+            }
+        };
+        self.colliders.push(Collider {
+            body,
+            name,
+            material,
+            centre: about,
+            rotation,
+            form,
+        });
     }
 
     fn settle_masses(&mut self) {

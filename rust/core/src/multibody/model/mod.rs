@@ -22,7 +22,7 @@ pub use body::Body;
 pub use closed_loop::{BodyPose, Loop, LoopGap};
 pub use edit::Changes;
 pub use machines::MachineSpan;
-pub use parts::{CollisionBox, CollisionSphere, Frame, Wheel};
+pub use parts::{Collider, ColliderForm, CollisionBox, CollisionSphere, Frame, Wheel};
 pub use properties::{JointProperties, Passive};
 pub use tree::Tree;
 
@@ -47,6 +47,7 @@ pub struct Model {
     wheels: Vec<Wheel>,
     boxes: Vec<CollisionBox>,
     spheres: Vec<CollisionSphere>,
+    colliders: Vec<Collider>,
     body_of_velocity: Vec<usize>,
     /// Number of leading path entries that bodies `a` and `b` share: `common[a * n_bodies + b]`.
     common: Vec<usize>,
@@ -196,6 +197,13 @@ impl Model {
     #[must_use]
     pub fn spheres(&self) -> &[CollisionSphere] {
         &self.spheres
+    }
+
+    /// Cylinders, capsules, ellipsoids and hulls that collide, in the order of the solids and their
+    /// shapes.
+    #[must_use]
+    pub fn colliders(&self) -> &[Collider] {
+        &self.colliders
     }
 
     /// Whether parts of two bodies can touch. Within one tree this requires self-contact, and

@@ -1,10 +1,13 @@
-//! Parts carried by the bodies: frames of the solids, wheels, boxes and balls.
+//! Parts carried by the bodies: frames of the solids, wheels, boxes, balls and other colliders.
+
+use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::law::compliance::Compliance;
 use crate::multibody::motor::Motor;
 use crate::scalar::elementary::hypot;
+use crate::spatial::Polytope;
 
 /// The frame of a solid, fixed to a moving body.
 #[derive(Clone, Debug)]
@@ -117,4 +120,78 @@ pub struct CollisionSphere {
     pub centre: Vector3<f64>,
     /// Radius, m.
     pub radius: f64,
+}
+
+/// A cylinder, a capsule, an ellipsoid or a convex hull that collides with the ground and with
+/// other bodies.
+#[derive(Clone, Debug)]
+pub struct Collider {
+    /// Body that carries it.
+    pub body: usize,
+    /// Name of its solid.
+    pub name: String,
+    /// Name of its material.
+    pub material: String,
+    /// Centre in the body's frame, m; of a hull its centroid.
+    pub centre: Vector3<f64>,
+    /// Rotation from the collider's axes to the body's.
+    pub rotation: Matrix3<f64>,
+    /// Its shape.
+    pub form: ColliderForm,
+}
+
+/// The shape of a [`Collider`]; cylinders and capsules are about their y axis.
+#[derive(Clone, Debug)]
+pub enum ColliderForm {
+    /// Radius and half height, m.
+    Cylinder {
+        /// m.
+        radius: f64,
+        /// m.
+        half: f64,
+    },
+    /// Two half balls, and a cylinder between their centres.
+    Capsule {
+        /// m.
+        radius: f64,
+        /// Distance of each centre from the middle, m.
+        half: f64,
+    },
+    /// Semi-axes, m.
+    Ellipsoid {
+        /// m.
+        radii: Vector3<f64>,
+    },
+    /// The hull of some points.
+    Hull {
+        /// About its centroid.
+        polytope: Arc<Polytope>,
+    },
+}
+
+impl Collider {
+    /// Radius of a bounding ball about the centre, m.
+    #[must_use]
+    pub fn bound(&self) -> f64 {
+        match &self.form {
+            ColliderForm::Cylinder { radius, half } => hypot(*radius, *half),
+            ColliderForm::Capsule { radius, half } => radius + half,
+            ColliderForm::Ellipsoid { radii } => radii.max(),
+            ColliderForm::Hull { polytope } => polytope.bound(),
+        }
+    }
+
+    /// Middle and half edge lengths of a box around it with its axes, m, relative to the centre.
+    #[must_use]
+    pub fn bounding_box(&self) -> (Vector3<f64>, Vector3<f64>) {
+        let about = |half_size| (Vector3::zeros(), half_size);
+        match &self.form {
+            ColliderForm::Cylinder { radius, half } => about(Vector3::new(*radius, *half, *radius)),
+            ColliderForm::Capsule { radius, half } => {
+                about(Vector3::new(*radius, radius + half, *radius))
+            }
+            ColliderForm::Ellipsoid { radii } => about(*radii),
+            ColliderForm::Hull { polytope } => polytope.bounding_box(),
+        }
+    }
 }

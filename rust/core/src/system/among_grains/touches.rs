@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 
 use super::contact::GrainTouch;
 use crate::contact::{Activation, Contact, ContactFrame, ContactKey, Part};
-use crate::geometry::query::dispatch;
+use crate::geometry::query::{dispatch, pairs};
 use crate::geometry::{PlacedShape, Sphere, SupportMap};
 use crate::system::grains::search::Search;
 use crate::system::grains::{COORDINATES, GrainKey, GrainSystem};
@@ -46,7 +46,7 @@ pub(super) fn find(
         gather(bed, (&centre, &extent(&shape)), search.reach, near);
         for grain in &*near {
             let ball = ball(grain.centre - origin, grain.radius);
-            dispatch::visit_pair(&ball, &shape, search.reach, |point| {
+            pairs::visit_pair(&ball, &shape, search.reach, |point| {
                 let touch = GrainTouch {
                     key: GrainKey {
                         a: n + u32::from(part.code()),
@@ -87,7 +87,7 @@ pub(super) fn gap_at_end(
     dispatch::nearest_points(&ball, &part.place(model, kinematics)).gap
 }
 
-fn ball(centre: Vector3<f64>, radius: f64) -> PlacedShape {
+fn ball(centre: Vector3<f64>, radius: f64) -> PlacedShape<'static> {
     PlacedShape::Sphere(Sphere { centre, radius })
 }
 
@@ -109,7 +109,7 @@ fn approach_of(
 
 /// Upper bound on the speed at which a point of a part's surface approaches anything, m/s. The spin
 /// of a wheel about its axle moves its surface within itself.
-fn approach(tree: &TreeSystem<'_>, part: Part, shape: &PlacedShape, v: &[f64]) -> f64 {
+fn approach(tree: &TreeSystem<'_>, part: Part, shape: &PlacedShape<'_>, v: &[f64]) -> f64 {
     let (model, kinematics) = (tree.model, &tree.parts.kinematics);
     let (body, centre) = (part.body(model), shape.centre());
     let velocity = |x: &Vector3<f64>| kinematics.point_velocity(model, body, x, v);
@@ -119,7 +119,7 @@ fn approach(tree: &TreeSystem<'_>, part: Part, shape: &PlacedShape, v: &[f64]) -
         PlacedShape::Sphere(_) => 0.0,
         PlacedShape::Disc(disc) => turning(&disc.axle),
         PlacedShape::Roller(roller) => turning(&roller.core.axle),
-        PlacedShape::Box(_) => [Vector3::x(), Vector3::y(), Vector3::z()]
+        _ => [Vector3::x(), Vector3::y(), Vector3::z()]
             .iter()
             .map(turning)
             .sum(),
@@ -128,7 +128,7 @@ fn approach(tree: &TreeSystem<'_>, part: Part, shape: &PlacedShape, v: &[f64]) -
 }
 
 /// Half sides of a box with the world's axes about a shape, m.
-fn extent(shape: &PlacedShape) -> Vector3<f64> {
+fn extent(shape: &PlacedShape<'_>) -> Vector3<f64> {
     let centre = shape.centre();
     let along = |e: &Vector3<f64>| (shape.support(e) - centre).dot(e);
     Vector3::new(

@@ -32,7 +32,7 @@ impl HeightField {
         match part.shape {
             PlacedShape::Disc(disc) => self.visit_under_disc(part, disc, visit),
             PlacedShape::Roller(roller) => self.visit_under_roller(part, roller, visit),
-            PlacedShape::Box(_) | PlacedShape::Sphere(_) => match Instructions::of_this_machine() {
+            _ => match Instructions::of_this_machine() {
                 Instructions::Baseline => {
                     self.visit_around_solid::<f64>(Single::Baseline, part, visit);
                 }
@@ -218,7 +218,8 @@ impl HeightField {
 mod tests {
     use super::*;
     use crate::geometry::query::dispatch;
-    use crate::geometry::{Disc, Roller, Sphere, SupportMap, Terrain};
+    use crate::geometry::{Disc, Ellipsoid, Hull, Roller, Sphere, SupportMap, Terrain};
+    use crate::spatial::Polytope;
     use nalgebra::Rotation3;
     use proptest::prelude::*;
 
@@ -243,7 +244,7 @@ mod tests {
         gap
     }
 
-    fn shapes(angles: [f64; 3]) -> [PlacedShape; 6] {
+    fn shapes(angles: [f64; 3], polytope: &Polytope) -> [PlacedShape<'_>; 10] {
         let R = *Rotation3::from_euler_angles(angles[0], angles[1], angles[2]).matrix();
         let centre = Vector3::new(0.02, -0.01, 0.03);
         let disc = |radius: f64| Disc {
@@ -266,6 +267,18 @@ mod tests {
                 centre,
                 radius: 0.12,
             }),
+            PlacedShape::Cylinder(Roller::new(disc(0.15), 0.2, 0.0)),
+            PlacedShape::Cylinder(Roller::new(disc(0.06), 0.3, 0.06)),
+            PlacedShape::Ellipsoid(Ellipsoid {
+                centre,
+                R,
+                radii: Vector3::new(0.2, 0.06, 0.12),
+            }),
+            PlacedShape::Hull(Hull {
+                centre,
+                R,
+                polytope,
+            }),
         ]
     }
 
@@ -287,7 +300,12 @@ mod tests {
             let heights = heights.iter().map(|h: &f64| (h * 0.5 * steepness * spacing) as f32);
             let origin = [-10.0 * spacing; 2];
             let field = HeightField::new(heights.collect(), [21, 21], [spacing; 2], origin).unwrap();
-            for shape in shapes([turn[0] * lean, turn[1], turn[2] * lean]) {
+            let points = [
+                [0.2, 0.0, 0.0], [-0.15, 0.05, 0.1], [-0.1, 0.05, -0.1],
+                [0.0, -0.1, 0.05], [0.0, 0.15, 0.0], [0.1, -0.08, -0.1],
+            ];
+            let polytope = Polytope::hull_of(&points.map(Vector3::from)).unwrap();
+            for shape in shapes([turn[0] * lean, turn[1], turn[2] * lean], &polytope) {
                 let low = shape.support(&-Vector3::y());
                 let under = field.height(x + low.x, z + low.z).unwrap();
                 let above = under + height + 0.8 * reach;

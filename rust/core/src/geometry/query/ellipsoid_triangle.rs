@@ -1,0 +1,115 @@
+//! Ellipsoid on a triangulated surface.
+//!
+//! Over a face it touches with its lowest point, if that is over the face. At a convex edge with
+//! the start a and the direction e the normal is the one between the faces' that separates most,
+//! `max n · (E(n) − a)` with the lowest point E(n) over the plane of normal n: there
+//! `(n × e) · (E(n) − a) = 0`, found by a safeguarded secant iteration as for a disc
+//! ([`super::disc_triangle`]). A vertex is a ball of radius zero. The gap is a maximum over
+//! normals, so its gradient is nᵀ times the Jacobian of the material point.
+
+use nalgebra::Vector3;
+
+use super::{NEAREST, SurfacePoint, ellipsoid_plane, ellipsoid_sphere};
+use crate::geometry::terrain::surface::{Edge, Face, OVERLAP, Vertex};
+use crate::geometry::{Ellipsoid, Sphere, SupportMap};
+
+/// Most iterations for the normal at an edge; the mean is 8.
+const MAX_ITERATIONS: usize = 60;
+
+/// Every how many-th of them halves.
+const HALVED: usize = 8;
+
+/// The lowest point, if it lies over the face; `base` as in [`super::dispatch`].
+#[must_use]
+pub fn lowest_over_face(
+    solid: &Ellipsoid,
+    face: &Face,
+    base: &Vector3<f64>,
+) -> Option<SurfacePoint> {
+    let low = ellipsoid_plane::lowest_point(solid, &face.plane, base);
+    face.admits(&(base + low.point)).then_some(low)
+}
+
+/// The point at an edge, if its normal lies strictly between the faces'.
+#[must_use]
+pub fn point_at_edge(solid: &Ellipsoid, edge: &Edge, base: &Vector3<f64>) -> Option<SurfacePoint> {
+    let start = edge.start - base;
+    let [first, second] = &edge.normals;
+    let is_between =
+        lean(solid, edge, &start, first) < OVERLAP && lean(solid, edge, &start, second) > -OVERLAP;
+    let point = is_between.then(|| nearest_at_edge(solid, edge, base))?;
+    let place = (point.point - start).dot(&edge.along);
+    edge.has(place, -point.gap).then_some(point)
+}
+
+/// The point that an edge's line pushes, with the admissible normal that separates most.
+#[must_use]
+pub fn nearest_at_edge(solid: &Ellipsoid, edge: &Edge, base: &Vector3<f64>) -> SurfacePoint {
+    let start = edge.start - base;
+    let [first, second] = &edge.normals;
+    let (low, high) = (
+        lean(solid, edge, &start, first),
+        lean(solid, edge, &start, second),
+    );
+    let n = if low >= 0.0 {
+        *first
+    } else if high <= 0.0 {
+        *second
+    } else {
+        normal_between(solid, edge, &start, [low, high])
+    };
+    let point = solid.support(&-n);
+    SurfacePoint::of_normal(NEAREST, point, &n, n.dot(&(point - start)))
+}
+
+/// Derivative of the gap along the edge's normals, with the sign reversed.
+fn lean(solid: &Ellipsoid, edge: &Edge, start: &Vector3<f64>, n: &Vector3<f64>) -> f64 {
+    edge.lean(n, &(solid.support(&-n) - start))
+}
+
+/// The normal where the lean vanishes; `[low, high]`: at the normals of the two faces.
+fn normal_between(
+    solid: &Ellipsoid,
+    edge: &Edge,
+    start: &Vector3<f64>,
+    [low, high]: [f64; 2],
+) -> Vector3<f64> {
+    let [first, second] = &edge.normals;
+    let (mut a, mut fa, mut b, mut fb) = (0.0, low, 1.0, high);
+    let (mut n, mut last) = (*first, 0.0);
+    for k in 0..MAX_ITERATIONS {
+        // By Illinois' rule an end that stays twice counts half, so that both ends move.
+        let secant = (a * fb - b * fa) / (fb - fa);
+        let is_halved = k % HALVED == HALVED - 1 || !(secant > a && secant < b);
+        let tau = if is_halved { 0.5 * (a + b) } else { secant };
+        n = (first * (1.0 - tau) + second * tau).normalize();
+        let f = lean(solid, edge, start, &n);
+        let is_done = f.abs() <= 2e-15 * solid.bound() || b - a <= f64::EPSILON;
+        if is_done || !(tau > a && tau < b) {
+            break;
+        }
+        if f < 0.0 {
+            if last < 0.0 {
+                fb *= 0.5;
+            }
+            (a, fa) = (tau, f);
+        } else {
+            if last > 0.0 {
+                fa *= 0.5;
+            }
+            (b, fb) = (tau, f);
+        }
+        last = f;
+    }
+    n
+}
+
+/// The point nearest to a vertex, wherever it is.
+#[must_use]
+pub fn nearest_at_vertex(solid: &Ellipsoid, vertex: &Vertex, base: &Vector3<f64>) -> SurfacePoint {
+    let point = Sphere {
+        centre: vertex.place,
+        radius: 0.0,
+    };
+    ellipsoid_sphere::nearest_point(solid, &point, base)
+}

@@ -1,0 +1,111 @@
+//! Heaps of hulls, capsules, cylinders, ellipsoids, boxes and balls.
+
+use std::sync::Arc;
+
+use rover_core::contact::{Activation, PairSearch, detect_pairs};
+use rover_core::geometry::{Plane, Terrain};
+use rover_core::integrator::StepOptions;
+use rover_core::multibody::{Configuration, Model, ModelDescription};
+use rover_core::nalgebra::{UnitQuaternion, Vector3};
+use rover_core::simulation::RoverSimulation;
+
+use super::collider_scenes::prism;
+use crate::spheres::sphere_scenes::Random;
+use crate::surfaces::surface_scenes::map;
+
+/// A stone: the hull of twelve random points.
+fn stone(random: &mut Random) -> String {
+    let points: Vec<String> = (0..12)
+        .map(|_| {
+            let mut x = || random.between(-1.0, 1.0);
+            let x = Vector3::new(x(), x(), x()).normalize();
+            format!("[{}, {}, {}]", 0.13 * x.x, 0.1 * x.y, 0.12 * x.z)
+        })
+        .collect();
+    format!("kind = 'hull', points = [{}]", points.join(", "))
+}
+
+fn heap(n: usize, seed: u64, ground: Arc<dyn Terrain>) -> RoverSimulation {
+    let mut random = Random(seed);
+    let solids: Vec<String> = (0..n)
+        .map(|i| {
+            let shape = match i % 7 {
+                0 | 1 => stone(&mut random),
+                2 => prism(),
+                3 => "kind = 'capsule', radius = 0.07, height = 0.2".to_owned(),
+                4 => "kind = 'cylinder', radius = 0.1, height = 0.15".to_owned(),
+                5 => "kind = 'ellipsoid', radii = [0.15, 0.08, 0.1]".to_owned(),
+                _ if i % 2 == 0 => "kind = 'box', size = [0.2, 0.16, 0.24]".to_owned(),
+                _ => "kind = 'sphere', radius = 0.1".to_owned(),
+            };
+            format!(
+                "[[solids]]\nname = 'b{i}'\njoint = 'free'\nmass = {}\n\
+                 shapes = [{{ {shape}, collides = true }}]\n",
+                random.between(4.0, 8.0)
+            )
+        })
+        .collect();
+    let text = format!("name = 'heap'\n{}", solids.concat());
+    let description = ModelDescription::from_toml(&text).unwrap();
+    let model = Arc::new(Model::from_description(description).unwrap());
+    let mut q = Configuration::zero(&model);
+    for i in 0..n {
+        let grid = Vector3::new((i % 2) as f64, (i / 4) as f64, (i / 2 % 2) as f64);
+        let mut x = || random.between(-1.0, 1.0);
+        let position = 0.45 * grid + Vector3::new(0.02 * x(), 0.35 + 0.02 * x(), 0.02 * x());
+        let attitude = UnitQuaternion::from_scaled_axis(Vector3::new(x(), x(), x()) * 2.0);
+        if i == 0 {
+            (q.position, q.attitude) = (position, attitude);
+        } else {
+            let other = &mut q.others[i - 1];
+            (other.position, other.attitude) = (position, attitude);
+        }
+    }
+    let v = vec![0.0; model.nv()];
+    let options = StepOptions {
+        time_step: 2e-3,
+        ..StepOptions::default()
+    };
+    let mut simulation = RoverSimulation::new(model, ground, options).unwrap();
+    simulation.set_state(q, v);
+    simulation
+}
+
+/// Deepest overlap of two bodies, m.
+fn overlap(simulation: &RoverSimulation) -> f64 {
+    let model = simulation.model();
+    let (rest, mut found) = (vec![0.0; model.nv()], Vec::new());
+    let mut search = PairSearch::new(model);
+    let activation = Activation::default();
+    let poses = simulation.kinematics();
+    detect_pairs(model, &poses, &rest, &activation, &mut search, &mut found);
+    found.iter().fold(0.0, |deepest, c| deepest.min(c.gap))
+}
+
+#[test]
+fn a_heap_of_all_shapes_falls_and_lies_without_gaining_energy() {
+    let rough = map(30, 0.15, |x, z| 0.05 * ((7.0 * x).sin() + (5.0 * z).cos()));
+    let grounds: [Arc<dyn Terrain>; 2] = [Arc::new(Plane::ground()), Arc::new(rough)];
+    for (seed, ground) in grounds.into_iter().enumerate() {
+        let mut simulation = heap(14, 3 + seed as u64, ground);
+        let mut before = simulation.energy();
+        let start = before.potential;
+        let (mut deepest, mut most) = (0.0_f64, 0);
+        for step in 0..900 {
+            let report = simulation.step(1).unwrap();
+            assert!(report.is_converged(), "{seed} {step}: {report:?}");
+            let energy = simulation.energy();
+            let gain = energy.kinetic + energy.potential - before.kinetic - before.potential;
+            assert!(gain < 1e-4 + report.energy_lifted, "{seed} {step}: {gain}");
+            before = energy;
+            most = most.max(report.n_contacts);
+            if step % 50 == 0 {
+                deepest = deepest.min(overlap(&simulation));
+            }
+        }
+        assert!(most > 25, "{seed}: {most} contacts");
+        assert!(deepest > -0.01, "{seed}: {deepest}");
+        // What is round rolls on.
+        assert!(before.kinetic < 0.03 * start, "{seed}: {before:?}");
+    }
+}
