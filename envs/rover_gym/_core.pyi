@@ -1036,7 +1036,7 @@ class Contacts:
         """Name of the solid in each contact, or of the joint that is at its stop."""
     @property
     def kinds(self) -> list[str]:
-        """Kind of each contact, "wheel", "box" or "sphere"; of a joint, "limit" or "friction".
+        """Kind of each contact: "wheel", "box", "sphere", "collider", "limit" or "friction".
 
         "limit" is a joint at its stop, "friction" the dry friction of a joint.
 

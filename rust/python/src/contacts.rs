@@ -69,8 +69,7 @@ fn frames<const D: usize>(rows: impl Iterator<Item = [[f64; D]; D]>) -> Array {
 pub struct Contacts {
     /// Name of the solid in each contact, or of the joint that is at its stop.
     bodies: Vec<String>,
-    /// Kind of each contact, "wheel", "box", "sphere" or "collider"; of a joint, "limit" or
-    /// "friction".
+    /// Kind of each contact: "wheel", "box", "sphere", "collider", "limit" or "friction".
     ///
     /// "limit" is a joint at its stop, "friction" the dry friction of a joint.
     ///
