@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from refusals import refused
 
+from rover_gym.env.arguments import check_terrain
 from rover_gym.maps import read_map
 from rover_gym.mechanics import (
     HeightField,
@@ -324,6 +325,7 @@ def test_meshes_are_read_from_files(tmp_path: Path) -> None:
         mesh = TriangleMesh.from_file(path, scale=2.0, position=(1.0, 0.0, 2.0))
         assert mesh.is_closed
         assert mesh.heights([[1.0, 2.0]])[0] == pytest.approx(1.0, abs=1e-6)
+        assert isinstance(check_terrain("terrain", str(path)), TriangleMesh)
 
 
 @pytest.mark.parametrize("ending", ["npy", "png", "tif", "obj", "stl", "ply", "glb"])

@@ -89,7 +89,7 @@ import pygame
     "demo": """
 rover(*RECORDED, "--film", "film.mp4")
 rover("plot", "run/episode-0.h5", "--output", "plots")
-assert len(list(Path("plots").glob("*.png"))) == 8
+assert len(list(Path("plots").glob("*.png"))) == 7
 rover("replay", "run/episode-0.h5", "--html", "page.html")
 rover("planar", "rover", "--duration", "0.5", "--output", "planar")
 rover("planar", "soil", "--duration", "0.05", "--output", "planar")

@@ -12,9 +12,7 @@ from typing import Annotated, Any, get_type_hints
 import typer
 
 from rover_gym.env.arguments import ARGUMENTS, TERRAINS, terrain_name
-from rover_gym.maps.map_files import ENDINGS, is_terrain_file, open_terrain
-from rover_gym.maps.map_files import ENDINGS as MAPS
-from rover_gym.maps.map_files import ENDINGS as MESHES
+from rover_gym.maps.map_files import MAP_ENDINGS, MESH_ENDINGS, is_terrain_file, open_terrain
 from rover_gym.mechanics import HeightField, OptionError, RoverModel, TriangleMesh
 from rover_gym.models import open_model
 from rover_gym.models.lookup import KINDS
@@ -61,7 +59,7 @@ DRIVERS = ("pd", "sand", "scan", "foresight", "anywhere", "trained", "planner")
 
 def complete_terrain(incomplete: str) -> list[str]:
     """Names of grounds, and files of maps and meshes."""
-    return _named(incomplete, TERRAINS) + _files(incomplete, (*MAPS, *MESHES))
+    return _named(incomplete, TERRAINS) + _files(incomplete, (*MAP_ENDINGS, *MESH_ENDINGS))
 
 
 def complete_model(incomplete: str) -> list[str]:
@@ -187,7 +185,7 @@ def named_ground(
     """
     given: dict[str, Any] = {"spacing": spacing, "height_range": height_range}
     given = {name: value for name, value in given.items() if value is not None}
-    if not terrain.lower().endswith(ENDINGS):
+    if not terrain.lower().endswith(MAP_ENDINGS):
         for name, value in given.items():
             refuse(OptionError, name, value, "needs a map's file as terrain")
     return open_terrain(terrain, **given) if is_terrain_file(terrain) else None

@@ -65,7 +65,7 @@ Heights: TypeAlias = npt.NDArray[np.float32]
 Pair: TypeAlias = tuple[float, float]
 
 #: Endings of the formats.
-ENDINGS = (".tif", ".tiff", ".png", ".npy")
+MAP_ENDINGS = (".tif", ".tiff", ".png", ".npy")
 
 #: Most heights of a file, 400 MB as a terrain.
 MOST_HEIGHTS = 10**8
@@ -190,8 +190,8 @@ def read_map(
     if factor == 0.0:
         refuse(TerrainError, "scale", scale, "must not be 0")
     file = GroundFile.at(path)
-    if file.ending not in ENDINGS:
-        file.refuse(f"a map's file ends in {', '.join(ENDINGS)}")
+    if file.ending not in MAP_ENDINGS:
+        file.refuse(f"a map's file ends in {', '.join(MAP_ENDINGS)}")
     _check_suited(file, height_range=height_range, scale=scale, datum=datum, band=band)
     if file.ending == ".npy":
         heights, own = _read_npy(file, factor, zero), None
@@ -452,23 +452,18 @@ def _joined(
     return vertices, triangles
 
 
-MAPS = ENDINGS
-
-MESHES = ENDINGS
-
-
 def is_terrain_file(name: object) -> bool:
     """Whether this is a path that ends like a map's or a mesh's."""
     if not isinstance(name, (str, os.PathLike)):
         return False
-    return Path(os.fsdecode(name)).suffix.lower() in (*MAPS, *MESHES)
+    return Path(os.fsdecode(name)).suffix.lower() in (*MAP_ENDINGS, *MESH_ENDINGS)
 
 
 def open_terrain(path: str | os.PathLike[str], **options: Any) -> HeightField | TriangleMesh:
     """The map or mesh in a file.
 
     Args:
-        path: A path that ends in one of `MAPS` or `MESHES`.
+        path: A path that ends in one of `MAP_ENDINGS` or `MESH_ENDINGS`.
         **options: Those of `HeightField.from_file` or `TriangleMesh.from_file`.
 
     Raises:
@@ -476,7 +471,7 @@ def open_terrain(path: str | os.PathLike[str], **options: Any) -> HeightField | 
         OSError: The file cannot be read.
     """
     if not is_terrain_file(path):
-        refuse(TerrainError, "terrain", os.fsdecode(path), f"must end in {', '.join((*MAPS, *MESHES))}")
-    if Path(path).suffix.lower() in MAPS:
+        refuse(TerrainError, "terrain", os.fsdecode(path), f"must end in {', '.join((*MAP_ENDINGS, *MESH_ENDINGS))}")
+    if Path(path).suffix.lower() in MAP_ENDINGS:
         return HeightField.from_file(path, **options)
     return TriangleMesh.from_file(path, **options)

@@ -38,3 +38,30 @@ fn a_rover_rests_without_creep() {
         }
     }
 }
+
+/// A heavy rover that falls into Bekker's soil sinks deeper than its weight needs. It comes to rest
+/// there all the same.
+#[test]
+fn a_heavy_rover_comes_to_rest_in_bekkers_soil_after_a_fall() {
+    let model = wide("mars-rover", 0.4, 1.0);
+    let weight = 9.81 * model.mass();
+    for (h, angle) in [(0.005, 0.0), (0.02, 0.0), (0.005, 10.0_f64.to_radians())] {
+        let mut sim = placed(&model, bekker_sand(), angle, h);
+        let (mut q, v) = (sim.q().clone(), sim.v().to_vec());
+        q.position.y += 0.5;
+        sim.set_state(q, v);
+        sim.brake();
+        let settle = (1.5 / h) as usize;
+        assert!(sim.step(settle).unwrap().is_converged());
+        let before = sim.q().position;
+        let mut mean = Vector3::zeros();
+        for _ in 0..settle {
+            sim.step(1).unwrap();
+            mean += total_force(&sim) / settle as f64;
+        }
+        let creep = (sim.q().position - before).norm() / 1.5;
+        assert!(creep < 1e-3, "{h} {angle}: {creep} m/s");
+        let error = (mean - Vector3::new(0.0, weight, 0.0)).norm();
+        assert!(error < 0.01 * weight, "{h} {angle}: {mean}, {weight}");
+    }
+}

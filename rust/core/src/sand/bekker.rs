@@ -6,7 +6,8 @@
 //!
 //! z is the depth, b the width of the wheel, and j the way that a piece has sheared the soil since
 //! it entered. Pressure acts on the part of the rim that pushes into the soil, and shear against
-//! its sliding. A piece with the displacement x of [`super::memory`] at the arc l from where it
+//! its sliding, both times the part that the wheel's memory mobilises ([`mobilised`]). A piece with
+//! the displacement x of [`super::memory`] at the arc l from where it
 //! entered has `j = |x_t| l`, with x at the middle of that arc. Side walls bear nothing.
 //!
 //! Source: Bekker 1969, *Introduction to Terrain–Vehicle Systems*; Janosi and Hanamoto 1961,
@@ -36,12 +37,28 @@ pub struct Bekker {
     pub shear_modulus: f64,
 }
 
-/// Displacement along the normal, relative to its size, below which the pressure fades, and
-/// displacement that mobilises it.
+/// Displacement along the normal, relative to its size, below which the pressure fades.
 const FADE: f64 = 0.05;
+
+/// Size of a wheel's memory that mobilises the stress of the sand.
+///
+/// It is one number for all pieces, since a piece at the bottom of a rolling wheel hardly moves and
+/// yet bears its pressure. With less, a heavy wheel that has sunk deeper than its weight needs
+/// never comes to rest: its pressure then changes faster with its place than its shear can hold it.
+const MOBILISED: f64 = 0.3;
 
 /// Length below which a vector has no direction.
 const TINY: f64 = 1e-12;
+
+/// The part of the stress that a memory of a size mobilises, and its derivative; 1 in steady
+/// motion.
+#[must_use]
+pub fn mobilised(stirred: f64) -> (f64, f64) {
+    let rest = MOBILISED * MOBILISED;
+    let per = 1.0 / (stirred * stirred + rest).sqrt();
+    let steady = (1.0 + rest).sqrt();
+    (steady * stirred * per, steady * rest * per * per * per)
+}
 
 impl Bekker {
     /// Stress on pieces; its derivatives if they are wanted.
@@ -58,20 +75,18 @@ impl Bekker {
         let (zero, one, tiny) = (number(0.0), number(1.0), number(TINY));
         let mut found = Stress::none(n.x.token());
         let length = x.norm();
-        let size = length.max(tiny);
         let x_n = x.dot(n);
-        let per_size = one / size;
+        let least = number((FADE * setting.stirred).max(TINY));
+        let per_size = one / (length * length + least * least).sqrt();
         let gate = number(0.5) + x_n * per_size * number(1.0 / FADE);
         let is_felt = piece.depth.gt(zero) & length.ge(tiny) & gate.gt(zero);
         if piece.skin == Skin::Wall || !is_felt.any() {
             return found;
         }
-        let per_root = one / (size * size + number(FADE * FADE)).sqrt();
         let along = x * per_size;
-        let mobilised = size * per_root;
         let is_partial = gate.lt(one);
         let limited = T::select(is_partial, gate, one);
-        let share = T::select(is_felt, mobilised * limited, zero);
+        let share = T::select(is_felt, limited, zero);
         let modulus = self.cohesive_modulus / setting.width.max(TINY) + self.frictional_modulus;
         let depth = T::select(is_felt, piece.depth, one);
         let sigma = number(modulus) * power(depth, self.exponent);
@@ -79,7 +94,9 @@ impl Bekker {
         let t = x_t.norm();
         let per_t = one / t.max(tiny);
         let slide = x_t * per_t;
-        let rate = piece.arc * number(1.0 / self.shear_modulus);
+        let [arc, arc_by_depth] = piece.arc;
+        let per_modulus = number(1.0 / self.shear_modulus);
+        let rate = arc * per_modulus;
         let risen = -exp_m1(-(t * rate));
         let tan = number(self.internal_friction);
         let limit = number(self.cohesion) + sigma * tan;
@@ -90,12 +107,12 @@ impl Bekker {
             return found;
         }
         let by_depth = number(self.exponent) * sigma / depth * share;
-        found.by_depth = -(n + slide * (tan * risen)) * by_depth;
-        let by_size = number(FADE * FADE) * per_root * per_root * per_root * limited;
-        let by_gate = mobilised * per_size * number(1.0 / FADE);
-        let by_gate = T::select(is_partial, by_gate, zero);
-        let share_by_x = along * by_size + (n - along * (x_n * per_size)) * by_gate;
-        let by_t = -(limit * rate * (one - risen));
+        let left = limit * (one - risen);
+        found.by_arc = -slide * (left * t * per_modulus * share);
+        found.by_depth = found.by_arc * arc_by_depth - (n + slide * (tan * risen)) * by_depth;
+        let by_gate = T::select(is_partial, per_size * number(1.0 / FADE), zero);
+        let share_by_x = (n - along * (x_n * per_size)) * by_gate;
+        let by_t = -(left * rate);
         let turning = shear * per_t;
         let parts = [share_by_x.x, share_by_x.y, share_by_x.z];
         let units = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -160,6 +177,7 @@ mod tests {
         held: 0.0,
         width: 0.1,
         gravity: 9.81,
+        stirred: 1.0,
     };
 
     /// Stress on a piece of a plate that faces down, and its derivative by the displacement.
@@ -170,7 +188,7 @@ mod tests {
             x: x.into(),
             down: down.into(),
             depth: 0.03,
-            arc: 0.05,
+            arc: [0.05, 0.0],
             skin: Skin::Rim,
         };
         let found = SOIL.stress(&piece, &SETTING, true);

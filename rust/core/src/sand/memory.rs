@@ -115,6 +115,14 @@ impl Memory {
         }
     }
 
+    /// Size of the displacement of a wheel of this radius, m: 1 in steady motion.
+    #[must_use]
+    pub fn size(&self, radius: f64) -> f64 {
+        let six = self.six();
+        let turned = six.fixed_rows::<3>(3).norm_squared() * (radius * radius);
+        (six.fixed_rows::<3>(0).norm_squared() + turned).sqrt()
+    }
+
     /// Multiplied by a factor.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {

@@ -8,6 +8,7 @@
 use fearless_simd::{f64x4, f64x8};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
+use super::bekker::mobilised;
 use super::memory::Memory;
 use super::piece::{Piece, Setting};
 use super::points::{Feed, Group, Immersed, Motion};
@@ -88,6 +89,10 @@ const FLAT: f64 = 1e-9;
 /// How fast the side at which the rim enters changes with the direction of travel.
 const ENTRY: f64 = 0.1;
 
+/// Least sine of the angle at which a rim enters the sand, for the change of that angle with the
+/// depth.
+const STEEP: f64 = 0.05;
+
 /// A wheel relative to the bed, in its own axes: down and forward in its plane, and its axle.
 struct Frame<'a> {
     immersed: Immersed<'a>,
@@ -97,8 +102,9 @@ struct Frame<'a> {
     setting: Setting,
     /// Columns: down, along and axle in world axes.
     axes: Matrix3<f64>,
-    /// From −1 to 1: which end of an arc enters the sand.
-    entry: f64,
+    /// From −1 to 1: which end of an arc enters the sand; and its derivative by the displacement
+    /// along the wheel.
+    entry: [f64; 2],
 }
 
 /// Sums of six components, column by column, of each of eight lanes.
@@ -183,7 +189,27 @@ pub fn react_with(
             place.copy_from(&turned);
         }
     }
+    if let Law::Bekker(_) = soil.law {
+        reaction.mobilise(wheel, memory, want);
+    }
     reaction
+}
+
+impl Reaction {
+    /// Takes the part of the force that a memory mobilises.
+    fn mobilise(&mut self, wheel: &SandWheel, memory: &Memory, want: Derivatives) {
+        let radius = wheel.drum();
+        let size = memory.size(radius);
+        let (part, by_size) = mobilised(size);
+        if let Derivatives::Slopes { by_memory, .. } = want {
+            let mut rise = memory.six() * (by_size * by_memory / size.max(f64::MIN_POSITIVE));
+            for k in 3..6 {
+                rise[k] *= radius * radius;
+            }
+            self.slope = self.slope * part + self.wrench * rise.transpose();
+        }
+        self.wrench *= part;
+    }
 }
 
 /// A unit vector perpendicular to a given one.
@@ -194,6 +220,12 @@ fn perpendicular(axle: &Vector3<f64>) -> Vector3<f64> {
         Vector3::y()
     };
     (e - axle * axle.dot(&e)).normalize()
+}
+
+/// Which end of an arc enters the sand, with its derivative.
+fn entry(along: f64) -> [f64; 2] {
+    let per = 1.0 / (along * along + ENTRY * ENTRY).sqrt();
+    [along * per, ENTRY * ENTRY * per * per * per]
 }
 
 impl<'a> Frame<'a> {
@@ -215,6 +247,7 @@ impl<'a> Frame<'a> {
         let axes = Matrix3::from_columns(&[down, pose.axle.cross(&down), pose.axle]);
         let shift = axes.tr_mul(&Vector3::from(memory.shift));
         let turn = axes.tr_mul(&Vector3::from(memory.turn));
+        let stirred = memory.size(wheel.drum());
         let height = (pose.centre - bed.place).dot(&bed.normal);
         let beyond = height - 0.5 * wheel.width * lean.abs() - bed.highest;
         Self {
@@ -237,9 +270,10 @@ impl<'a> Frame<'a> {
                 held: wheel.held(),
                 width: wheel.width,
                 gravity: bed.gravity,
+                stirred,
             },
             axes,
-            entry: shift.y / (shift.y * shift.y + ENTRY * ENTRY).sqrt(),
+            entry: entry(shift.y),
         }
     }
 
@@ -313,17 +347,32 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// Way from where pieces entered, m. Only Bekker's law needs it.
+    /// Way from where pieces entered. Only Bekker's law needs it.
     #[inline(always)]
-    fn way<T: Lane>(&self, radius: T, end: T, (cos, sin): (T, T)) -> T {
-        let mut angle = cos;
-        if matches!(self.immersed.soil.law, Law::Bekker(_)) {
-            for lane in 0..T::LANES {
-                let theta = atan2(sin.get(lane), cos.get(lane));
-                angle.set(lane, acos(end.get(lane)) - self.entry * theta);
-            }
+    fn way<T: Lane>(&self, radius: T, end: T, (cos, sin): (T, T)) -> Way<T> {
+        let zero = radius.like(0.0);
+        let Law::Bekker(_) = &self.immersed.soil.law else {
+            return Way {
+                from_entry: zero,
+                by_depth: zero,
+                by_along: zero,
+            };
+        };
+        let [entry, by_along] = self.entry;
+        let (mut angle, mut from_lowest, mut steep) = (zero, zero, zero);
+        for lane in 0..T::LANES {
+            let end = end.get(lane);
+            let theta = atan2(sin.get(lane), cos.get(lane));
+            angle.set(lane, acos(end) - entry * theta);
+            from_lowest.set(lane, theta);
+            steep.set(lane, (1.0 - end * end).max(STEEP * STEEP).sqrt());
         }
-        radius * angle
+        let level = radius.like(self.immersed.g.x.max(FLAT));
+        Way {
+            from_entry: radius * angle,
+            by_depth: radius.like(1.0) / (steep * level),
+            by_along: -(radius * from_lowest * radius.like(by_along)),
+        }
     }
 
     /// Depth that counts of pieces at `r` from the centre, m, and its gradient.
@@ -360,7 +409,7 @@ impl<'a> Frame<'a> {
         &self,
         (skin, first): (Skin, usize),
         elements: &Elements<T>,
-        (depth, by_place, arc): (T, Vec3<T>, T),
+        (depth, by_place, way): (T, Vec3<T>, Way<T>),
         sums: &mut Sums<'_>,
     ) {
         let (r, area, token) = (elements.r, elements.area, depth.token());
@@ -371,7 +420,7 @@ impl<'a> Frame<'a> {
             x: shared(shift) + shared(turn).cross(r),
             down: shared(g),
             depth,
-            arc,
+            arc: [way.from_entry, way.by_depth],
             skin,
         };
         let wants_slopes = self.want != Derivatives::Wrench;
@@ -399,6 +448,10 @@ impl<'a> Frame<'a> {
             a * r.z - c * r.x,
             memory[1] * r.x - memory[0] * r.y,
         ];
+        let b = match &self.immersed.soil.law {
+            Law::Bekker(_) => b + stress.by_arc * (way.by_along * fresh),
+            Law::Resistive(_) => b,
+        };
         for (columns, rows) in [
             ([a, b, c], &mut *sums.by_shift),
             (by_turn, &mut *sums.by_turn),
@@ -439,6 +492,14 @@ fn total<T: Lane, const N: usize>(token: T::Token, rows: &Rows<N>) -> [f64; N] {
         }
     }
     totals
+}
+
+/// Way of pieces from where they entered the sand, m, and its derivatives by the depth and by the
+/// displacement along the wheel.
+struct Way<T> {
+    from_entry: T,
+    by_depth: T,
+    by_along: T,
 }
 
 /// Elements of the surface, side by side in lanes: where they are, in the wheel's axes, and how

@@ -15,8 +15,8 @@ pub struct Piece<T: Lane> {
     pub down: Vec3<T>,
     /// Under the surface, m.
     pub depth: T,
-    /// Along the rim from where it enters the sand, m.
-    pub arc: T,
+    /// Along the rim from where it enters the sand, m, and its derivative by the depth.
+    pub arc: [T; 2],
     /// What it is part of.
     pub skin: Skin,
 }
@@ -30,6 +30,8 @@ pub struct Setting {
     pub width: f64,
     /// m/s², into the sand.
     pub gravity: f64,
+    /// Size of what the sand remembers of the wheel, 1 in steady motion.
+    pub stirred: f64,
 }
 
 /// Stress of the sand on a piece, N/m², and its derivatives.
@@ -41,6 +43,8 @@ pub struct Stress<T> {
     pub by_x: [Vec3<T>; 3],
     /// By the depth, N/m³.
     pub by_depth: Vec3<T>,
+    /// By the way from where the piece entered, N/m³.
+    pub by_arc: Vec3<T>,
 }
 
 impl<T: Lane> Stress<T> {
@@ -53,6 +57,7 @@ impl<T: Lane> Stress<T> {
             value: zero,
             by_x: [zero; 3],
             by_depth: zero,
+            by_arc: zero,
         }
     }
 }

@@ -83,6 +83,7 @@ impl Soil {
                     value: found.alpha * pressure,
                     by_x: found.slope.map(|column| column * pressure),
                     by_depth: found.alpha * xi,
+                    ..Stress::none(n.x.token())
                 }
             }
             Law::Bekker(soil) => soil.stress(piece, setting, wants_slopes),
