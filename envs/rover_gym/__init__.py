@@ -6,6 +6,7 @@ The package consists of the subpackages below. Each one may import those above i
     validation     argument checks, with errors that name the field
     extras         optional packages
     rotations      rotations as matrices, vectors, quaternions
+    polytopes      convex hulls of a few points, boxes around shapes
     derivatives    products with the derivatives of trajectories, also in PyTorch and JAX
     ground         what a terrain is made of
     maps           grounds from files, and made by a seed

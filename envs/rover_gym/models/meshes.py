@@ -128,7 +128,8 @@ def _as_hull(hull: Array) -> str:
 def _error(spatial: Any, hulls: list[Array], volume: float) -> str:
     """By how much the volume of the hulls differs from that of a mesh."""
     sum_of_parts = sum(float(spatial.ConvexHull(hull).volume) for hull in hulls)
-    return f"volume {100.0 * (sum_of_parts / volume - 1.0):+.1f} %"
+    error = round(100.0 * (sum_of_parts / volume - 1.0), 1) + 0.0  # no minus before a zero
+    return f"volume {error:+.1f} %"
 
 
 def _divided(trimesh: Any, solid: Any, options: MeshOptions) -> tuple[list[Array], str]:

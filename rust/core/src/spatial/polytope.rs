@@ -415,7 +415,7 @@ mod tests {
         let flat: Vec<_> = prism(8).into_iter().filter(|x| x.y > 0.0).collect();
         assert!(Polytope::hull_of(&flat).is_none());
         assert!(Polytope::hull_of(&corners([1.0; 3])[..3]).is_none());
-        assert!(Polytope::hull_of(&vec![Vector3::x(); 5]).is_none());
+        assert!(Polytope::hull_of(&[Vector3::x(); 5]).is_none());
         assert!(Polytope::hull_of(&[Vector3::repeat(f64::NAN); 4]).is_none());
         let mut many = prism(32);
         many.push(Vector3::y() * 3.0);
@@ -450,8 +450,8 @@ mod tests {
             // Moments by a sum over the same hull from another origin.
             let C = hull.inertia(1.0);
             prop_assert!(C.symmetric_eigenvalues().min() > 0.0);
-            let low = hull.vertices().iter().map(|x| x.norm()).fold(0.0, f64::max);
-            prop_assert!((hull.bound() - low).abs() < 1e-15);
+            let furthest = hull.vertices().iter().fold(0.0_f64, |most, x| most.max(x.norm()));
+            prop_assert!((hull.bound() - furthest).abs() < 1e-15);
         }
     }
 }

@@ -24,7 +24,7 @@ pub fn hit(ray: &Ray, solid: &Ellipsoid, reach: f64) -> Option<Hit> {
     let distance = if near >= 0.0 { near } else { middle + half };
     let place = from + along * distance;
     let out = solid.R * place.component_div(&solid.radii).normalize();
-    (distance >= 0.0 && distance <= reach).then(|| Hit {
+    (distance >= 0.0 && distance <= reach).then_some(Hit {
         distance,
         normal: out,
     })

@@ -213,6 +213,7 @@ mod tests {
     /// Points on a grid that are in a shape, as the mean of their second moments.
     #[test]
     fn mass_centre_inertia_and_volume_are_those_of_a_sum_over_small_cells() {
+        type Test<'a> = &'a dyn Fn(Vector3<f64>) -> bool;
         let is_in_capsule = |x: Vector3<f64>| {
             let y = x.y.clamp(-0.3, 0.3);
             (x - Vector3::y() * y).norm() <= 0.2
@@ -239,7 +240,7 @@ mod tests {
         let hull = Shape::Hull {
             points: wedge.to_vec(),
         };
-        let cases: [(Shape, &dyn Fn(Vector3<f64>) -> bool); 3] = [
+        let cases: [(Shape, Test<'_>); 3] = [
             (capsule, &is_in_capsule),
             (ellipsoid, &is_in_ellipsoid),
             (hull, &is_in_wedge),
