@@ -11,6 +11,7 @@ A field that nobody crossed may still have a way, so the share is a lower bound 
 
 import json
 from collections import Counter
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -42,9 +43,16 @@ class Drawing(ArcNetworkPolicy):
 
 
 def crossed(
-    arguments: dict[str, Any], fields: list[int], model: Any, *, tries: int, planned: int, patience: float
+    arguments: dict[str, Any],
+    fields: list[int],
+    model: Any,
+    *,
+    tries: int,
+    planned: int,
+    patience: float,
+    say: Callable[[str], None] = lambda _line: None,
 ) -> dict[int, str]:
-    """Who crossed each field first, by its seed; "" where nobody did."""
+    """Who crossed each field first, by its seed; "" where nobody did. `say` takes a line for each try."""
     found: dict[int, str] = dict.fromkeys(fields, "")
     periods = round(patience * 20.0)
 
@@ -53,6 +61,7 @@ def crossed(
         if left:
             drives = drive_all(make, left, arguments={**arguments, **needs}, max_episode_steps=periods)
             found.update({drive.seed: name for drive in drives if drive.success})
+            say(f"{name}: {sum(map(bool, found.values()))} of {len(found)} fields crossed")
 
     for name in ONCE:
         policy = named_policy(name, model)
@@ -98,18 +107,19 @@ def passable(
     rover = named_model(model)
     table = [("difficulty", "fields with a way", "95% interval", "crossed first by")]
     told: dict[str, dict[int, str]] = {}
+    say = partial(typer.echo, err=True)
     for level in difficulty or [1.0, 1.5, 2.0]:
         arguments: dict[str, Any] = {"terrain": terrain, "difficulty": level}
         arguments |= {} if model == BUILT_IN else {"model": model}
         seeds = list(range(seed, seed + fields))
-        found = crossed(arguments, seeds, rover, tries=tries, planned=planned, patience=patience)
+        found = crossed(arguments, seeds, rover, tries=tries, planned=planned, patience=patience, say=say)
         told[f"{level:g}"] = found
         n = sum(map(bool, found.values()))
         low, high = wilson_interval(n, fields)
         who = ", ".join(f"{name} {count}" for name, count in Counter(filter(None, found.values())).most_common())
+        if output is not None:
+            output.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
         table.append((f"{level:g}", f"{n} of {fields}", f"{100.0 * low:.1f} to {high:.1%}", who))
-    if output is not None:
-        output.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
     Console().print(plain_table(table))
 
 

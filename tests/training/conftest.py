@@ -29,3 +29,9 @@ def script(name: str, function: str) -> Script:
 def evaluate() -> Script:
     """`evaluate.py`."""
     return script("evaluate", "evaluate")
+
+
+@pytest.fixture(scope="session")
+def passable() -> Script:
+    """`passable.py`."""
+    return script("passable", "passable")
