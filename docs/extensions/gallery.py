@@ -73,9 +73,7 @@ def frame(name: str) -> np.ndarray:
 
 def record(name: str, path: Path) -> None:
     """Records a drive in an environment."""
-    known = (
-        named_policy(DRIVERS[name], name.removeprefix("Rover").removesuffix("-v0").lower()) if name in DRIVERS else None
-    )
+    known = named_policy(DRIVERS[name]) if name in DRIVERS else None
     env = gym.make(name, **({} if known is None else known.arguments))
     rover = env.unwrapped
     assert isinstance(rover, RoverEnv)  # noqa: S101 - all of them are

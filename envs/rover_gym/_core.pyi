@@ -1090,7 +1090,7 @@ class Contacts:
         """Name of the other solid in each contact; None for the ground, a grain or a joint."""
     @property
     def kinds(self) -> list[str]:
-        """Kind of each contact: "wheel", "box", "sphere", "collider", "limit" or "friction".
+        """Kind of each contact, "wheel", "box", "sphere", "collider", "limit" or "friction".
 
         "limit" is a joint at its stop, "friction" the dry friction of a joint.
 

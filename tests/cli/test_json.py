@@ -17,7 +17,7 @@ LAB = "--balls 250 --ball-radius 0.008 --width 0.14 --depth 0.14 --samples 6 --s
 TABLES = {
     "drive --time-limit 0.2 --episodes 2": ("environment", "policy", "episodes"),
     "drive --time-limit 0.2 --output {to}": ("episodes", "written"),
-    "evaluate trained --terrain plane --episodes 1 --output {to}": ("rows", "written"),
+    "evaluate scan --terrain plane --episodes 1 --output {to}": ("rows", "written"),
     "report --duration 0.2 --output {to}": ("section_6_1", "section_6_2", "written"),
     "scene --explain": ("model", "dofs", "parts"),
     "model show rover": ("name", "mass", "solids"),

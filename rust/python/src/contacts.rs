@@ -71,7 +71,7 @@ pub struct Contacts {
     bodies: Vec<String>,
     /// Name of the other solid in each contact; None for the ground, a grain or a joint.
     others: Vec<Option<String>>,
-    /// Kind of each contact: "wheel", "box", "sphere", "collider", "limit" or "friction".
+    /// Kind of each contact, "wheel", "box", "sphere", "collider", "limit" or "friction".
     ///
     /// "limit" is a joint at its stop, "friction" the dry friction of a joint.
     ///
