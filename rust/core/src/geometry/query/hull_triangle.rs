@@ -4,7 +4,7 @@
 //! An edge f of the polytope and an edge e of the surface touch along the normal `n ∝ e × f`, where
 //! n is between the normals of the surface's faces and −n between those of the polytope's. A vertex
 //! of the polytope that has not yet come down to an edge is met too. The feature at an edge is the
-//! polytope's edge, or [`VERTICES`] and the vertex's number.
+//! polytope's edge, or `VERTICES` and the vertex's number.
 
 use nalgebra::Vector3;
 

@@ -21,7 +21,7 @@ pub struct TrackDescription {
     pub from: [f64; 3],
     /// Centre of the last wheel, m.
     pub to: [f64; 3],
-    /// Number of wheels, from 2 to [`MOST_TRACK_WHEELS`].
+    /// Number of wheels, from 2 to `MOST_TRACK_WHEELS`.
     pub wheels: usize,
     /// Radius of the wheels with the belt, m.
     pub radius: f64,
