@@ -65,3 +65,27 @@ fn a_heavy_rover_comes_to_rest_in_bekkers_soil_after_a_fall() {
         assert!(error < 0.01 * weight, "{h} {angle}: {mean}, {weight}");
     }
 }
+
+/// Deep in Bekker's soil, which could bear thirty times the weight, a small displacement changes
+/// the force by much. Steps are divided until the force is that at the solution.
+#[test]
+fn a_rover_that_is_placed_deep_in_bekkers_soil_rests() {
+    let model = wide("mars-rover", 0.4, 1.0);
+    let weight = 9.81 * model.mass();
+    for h in [0.005, 0.02] {
+        let mut sim = placed(&model, bekker_sand(), 10.0_f64.to_radians(), h);
+        let (mut q, v) = (sim.q().clone(), sim.v().to_vec());
+        q.position.y -= 0.2;
+        sim.set_state(q, v);
+        sim.brake();
+        let steps = (0.5 / h) as usize;
+        assert!(sim.step(steps).unwrap().is_converged());
+        let mut mean = Vector3::zeros();
+        for _ in 0..steps {
+            sim.step(1).unwrap();
+            mean += total_force(&sim) / steps as f64;
+        }
+        let error = (mean - Vector3::new(0.0, weight, 0.0)).norm();
+        assert!(error < 0.02 * weight, "{h}: {mean}, {weight}");
+    }
+}

@@ -209,6 +209,12 @@ pub trait MechanicalSystem {
         false
     }
 
+    /// Whether the forces of a step whose repetitions are used up are those at its solution. By
+    /// default they are.
+    fn is_settled(&mut self, _v_end: &[f64]) -> bool {
+        true
+    }
+
     /// Most repetitions of a step that [`Self::revise`] asks for.
     fn most_revisions(&self) -> usize {
         MOST_REVISIONS

@@ -34,7 +34,7 @@ use super::mechanical_system::{KeyOf, MechanicalSystem, Start};
 use super::options::StepOptions;
 use super::position_projection;
 use super::probe::{Phase, Probe};
-use super::report::StepReport;
+use super::report::{StepReport, StepStatus};
 use super::scheme::{Integrator, StateMut};
 use super::scratch::{Scratch, ScratchOf};
 use super::step_contacts::{
@@ -70,7 +70,8 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJean {
     }
 }
 
-/// Most attempts at a step with all its parts, beyond the parts that fast turning asks for.
+/// Most attempts at a step with all its parts, beyond repetitions for another branch and the parts
+/// that fast turning asks for.
 const MOST_ATTEMPTS: usize = 16;
 
 /// Most times that a step is halved.
@@ -132,8 +133,13 @@ impl Part<'_> {
             };
             report.retaken += retaken;
             retaken += 1;
-            if retaken <= system.most_revisions() && system.revise(start, &ws.v) {
-                continue;
+            if retaken <= system.most_revisions() {
+                if system.revise(start, &ws.v) {
+                    *self.attempts += 1;
+                    continue;
+                }
+            } else if !system.is_settled(&ws.v) {
+                report.status = StepStatus::NotConverged;
             }
             let is_solved = report.is_converged();
             if before.is_some() || warm_start.is_of(&ws.contacts) {

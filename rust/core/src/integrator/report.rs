@@ -8,8 +8,8 @@ pub enum StepStatus {
     /// They were.
     #[default]
     Converged,
-    /// The contact solver or Newton's iteration stopped above its tolerance, or a loop stayed open;
-    /// the state is the best one found.
+    /// The contact solver or Newton's iteration stopped above its tolerance, a loop stayed open, or
+    /// the force of the sand is not that at the solution; the state is the best one found.
     NotConverged,
 }
 

@@ -393,6 +393,14 @@ impl MechanicalSystem for TreeSystem<'_> {
         }
     }
 
+    fn is_settled(&mut self, v_end: &[f64]) -> bool {
+        let tried = self.parts.sand.clone();
+        let is_new = (self.sand())
+            .is_some_and(|(sand, scene, factor)| sand.revise(&scene, true, factor, v_end));
+        self.parts.sand = tried;
+        !is_new
+    }
+
     fn revise(&mut self, start: Start<'_, Configuration>, v_end: &[f64]) -> bool {
         let mechanism = self.model.mechanism();
         let is_new = (self.parts.drives).revise(mechanism, true, start.v, v_end);

@@ -55,6 +55,8 @@ pub enum Fallback {
     MassMatrix,
     /// The contact problem was not solved.
     Solver,
+    /// The force of the sand is still another one after all repetitions.
+    Sand,
     /// The energy audit asks for a safer step.
     Energy,
     /// The position projection was not solved, or moves too far.

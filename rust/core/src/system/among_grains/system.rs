@@ -270,6 +270,11 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
         self.tree.most_revisions()
     }
 
+    fn is_settled(&mut self, v_end: &[f64]) -> bool {
+        let (_, v_end) = self.halves(v_end);
+        self.tree.is_settled(v_end)
+    }
+
     fn revise(&mut self, start: Start<'_, Both>, v_end: &[f64]) -> bool {
         let (_, start) = self.starts(start);
         let (_, v_end) = self.halves(v_end);
