@@ -151,6 +151,7 @@ class DriveDirective(SphinxDirective):
         return [held]
 
 
-def setup(app: Sphinx) -> None:
+def setup(app: Sphinx) -> dict[str, bool]:
     """Called by Sphinx."""
     app.add_directive("drive", DriveDirective)
+    return {"parallel_read_safe": True}
