@@ -80,7 +80,7 @@ def test_one_wheel_serves_every_python_and_the_archive_holds_the_sources() -> No
     with zipfile.ZipFile(wheel()) as inside:
         names = inside.namelist()
     assert "rover_gym/_core.abi3.so" in names or any(name.endswith("_core.pyd") for name in names)
-    assert any(re.fullmatch(r"rover_gym/data/policies/rocks/policy\.npz", name) for name in names)
+    assert any(re.fullmatch(r"rover_gym/data/policies/anywhere/arcs\.npz", name) for name in names)
     (archive,) = wheel().parent.glob("rover_gym-*.tar.gz")
     with tarfile.open(archive) as sources:
         held = {name.partition("/")[2] for name in sources.getnames()}
