@@ -177,7 +177,7 @@ import jax, lxml, minari, mujoco, rasterio, stable_baselines3, websockets
     "train": """
 scene = "scenes: {plane: {environment: {terrain: plane, goal_distance: 2}}}"
 imitation = "imitation: {rounds: 1, decisions: 100, epochs: 1}"
-Path("tiny.yaml").write_text(f"{scene}\nrovers: 4\n{imitation}\nppo: null\n", encoding="utf-8")
+Path("tiny.yaml").write_text(f"{scene}\\nrovers: 4\\n{imitation}\\nppo: null\\n", encoding="utf-8")
 rover("train", "tiny.yaml", "--workers", "1", "--output", "run")
 rover("drive", "--policy", "run", "--time-limit", "0.2")
 rover("evaluate", "run", "pd", "--terrain", "plane", "--episodes", "2", "--output", "evaluation")
