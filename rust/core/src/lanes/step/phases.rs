@@ -215,8 +215,11 @@ impl<T: Lane> Block<T> {
             may_revise |= u32::from(*n < self.most_revisions(lane)) << lane;
         }
         let lanes = self.going & T::mask(self.token, may_revise);
-        let unsettled = self.revise_sand(self.going & !T::mask(self.token, may_revise));
-        self.fall_back(Fallback::Sand, unsettled);
+        let spent = self.going & !T::mask(self.token, may_revise);
+        if spent.any() {
+            let unsettled = self.revise_sand(spent);
+            self.fall_back(Fallback::Sand, unsettled);
+        }
         let (drives, machine) = (&mut self.drives, &*self.machine);
         let (v, v_end) = (&self.v, &self.v_end);
         self.retaken = T::vectorize(
