@@ -153,6 +153,21 @@ def test_the_planner_sees_a_fence_at_the_edge() -> None:
     assert not grid[24:].any()
 
 
+def test_arcs_through_the_fence_cost_more_than_any_detour() -> None:
+    env = RoverArcsEnv(terrain="rocks", difficulty=0.0, slope_deg=0.0)
+    env.reset(seed=0, options={"goal": (6.0, 0.0), "heading_deg": 90.0})
+    row, layout = env.unwrapped.progress.observation.astype(np.float64), env.unwrapped.observation_layout
+    planner, start = env.driver.planner, np.zeros(2)
+    assert planner._through_fence(row, start) is None
+    row[layout["q"].start + 2] = -3.6  # 0.4 m before the edge, which lies ahead
+    row[layout["goal"].start] -= 3.6 / layout.scale[layout["goal"].start]
+    costs = planner._through_fence(row, start)
+    assert costs is not None
+    ahead = planner.arcs.poses(0.6 * planner.reach, 1)[:, 0, 0]
+    np.testing.assert_array_equal(costs > 0.0, ahead > 0.4)
+    assert costs.max() > 40.0
+
+
 def test_the_shipped_network_loads_and_decides_in_time() -> None:
     assert (SHIPPED / "arcs.npz").stat().st_size < 1_000_000
     named = named_policy("anywhere")

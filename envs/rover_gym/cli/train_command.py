@@ -47,7 +47,7 @@ class ManySeeds(TyperCommand):
 @plain_errors
 def train(
     config: Annotated[
-        str, typer.Argument(help="A configuration of the package, 'anywhere' or 'rocks', or a YAML file.")
+        str, typer.Argument(help="A configuration of the package, 'anywhere', 'longer' or 'rocks', or a YAML file.")
     ] = "anywhere",
     seeds: Annotated[
         list[int] | None,
@@ -80,7 +80,8 @@ def train(
 ) -> None:
     """Train a network that drives by arcs: imitation of the planners, then PPO.
 
-    'anywhere' trains for all rovers and grounds, 'rocks' for the built-in rover among rocks in two CPU minutes.
+    'anywhere' trains for all rovers and grounds, 'longer' goes on with four million decisions, 'rocks' trains for the
+    built-in rover among rocks in two CPU minutes.
 
     Needs the extra `train`.
 

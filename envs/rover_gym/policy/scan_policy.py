@@ -175,8 +175,8 @@ TRAP_AHEAD = 0.3
 #: Time without movement after which the rover pushes, s.
 PUSH_AFTER = 0.3
 
-#: Height of a fence at the field's edge, in wheel radii: the policy does not drive through it.
-FENCE = 8.0
+#: Height of a fence at the field's edge, in wheel radii, and the cost of an arc that leads through it, in reaches.
+FENCE, THROUGH_FENCE = 8.0, 50.0
 
 #: Fraction of the time to high-centring after which the rover backs off.
 HIGH = 0.05
@@ -316,6 +316,7 @@ class ScanPolicy:
             costs=PathCosts() if costs is None else costs,
         )
         self._ahead = (PathCosts() if costs is None else costs).length * self.reach
+        self._ends = first.poses(self._ahead, 1)[:, 0, :2]
         self._map = None if map is None else GroundMap(scan, map, TRAP_AHEAD * self.reach)
         self._cells = 0 if map is None else map.cells
         self._caution, self.foresight = 1.0, ForesightCosts() if foresight is None else foresight
@@ -434,15 +435,14 @@ class ScanPolicy:
             heights[beyond[0]] = FENCE * self.radius
         boldness = self._boldness(memory.fruitless[i])
         extra, fast = self._outlook(row, slope, heights, boldness)
-        if further is not None:
-            extra = further if extra is None else extra + further
+        costs = [cost for cost in (extra, further, self._through_fence(row, memory.start[i])) if cost is not None]
         task = SearchTask(
             goal=(float(goal[0]) - self._x_c, float(goal[1])),
             command=memory.command[i].copy(),
             boldness=self._caution * boldness,
             traps=np.column_stack((ahead * cosine - right * sine, ahead * sine + right * cosine, turned)),
             retreat=float(memory.away[i]) if memory.retreat[i] > 0.0 else 0.0,
-            extra=extra,
+            extra=sum(costs[1:], costs[0]) if costs else None,
             ways=self._ways(row, slope, memory, i),
         )
         arc = self.search.best(heights, task)
@@ -457,6 +457,10 @@ class ScanPolicy:
             rows: `(n, size)` observations.
             starts: `(n, 2)` where the episodes began, m.
         """
+        return self._beyond(rows, starts, self._offsets)
+
+    def _beyond(self, rows: Array, starts: Array, points: Array) -> npt.NDArray[np.bool_] | None:
+        """`(n, m)` whether points `(m, 2)` ahead and to the right of each trunk, m, lie beyond the field's edge."""
         if self._margin is None:
             return None
         places, headings = rows[:, [self._q, self._q + 2]], rows[:, self._q + 4, None]
@@ -465,15 +469,19 @@ class ScanPolicy:
         turn = np.concatenate((cosine, -sine), axis=1), np.concatenate((sine, cosine), axis=1)
         goals = places + goals[:, :1] * turn[0] + goals[:, 1:] * turn[1]
         low, high = np.minimum(starts, goals) - self._margin, np.maximum(starts, goals) + self._margin
-        beyond = np.zeros((len(rows), len(self._offsets)), np.bool_)
+        beyond = np.zeros((len(rows), len(points)), np.bool_)
         for k in (0, 1):
-            at = (
-                places[:, k, None]
-                + self._offsets[:, 0] * turn[0][:, k, None]
-                + self._offsets[:, 1] * turn[1][:, k, None]
-            )
+            at = places[:, k, None] + points[:, 0] * turn[0][:, k, None] + points[:, 1] * turn[1][:, k, None]
             beyond |= (at < low[:, k, None]) | (at > high[:, k, None])
         return beyond
+
+    def _through_fence(self, row: Array, start: Array) -> Array | None:
+        """`(n_arcs,)` further costs, m, of the first arcs that end beyond the field's edge; None if none does."""
+        beyond = self._beyond(row[None], start[None], self._ends)
+        if beyond is None or not beyond.any():
+            return None
+        costs: Array = THROUGH_FENCE * self.reach * beyond[0]
+        return costs
 
     def begin_arc(self, row: Array, command: Array, memory: ScanMemory, i: int) -> None:
         """Rover i begins to drive by a command: if it leads backward of its own accord, it backs off for a while."""
