@@ -5,7 +5,6 @@ import pytest
 from models.robot_files import rover, write
 
 from rover_gym import ModelError, RoverModel, Simulation, StateError
-from rover_gym.mechanics import OptionError
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -188,11 +187,15 @@ def test_a_urdf_joint_that_follows_one_on_another_branch_is_a_loop(tmp_path):
     assert abs(left) > 1e-3
 
 
-def test_derivatives_are_refused(tmp_path):
-    model = RoverModel.from_mjcf(write(tmp_path, linkage("a connection"), "linkage.xml"), wheels=[])
-    run = Simulation(model)
-    with pytest.raises(OptionError, match="closed loops have no derivatives"):
-        run.linearise()
+@pytest.mark.parametrize("what", EQUALITIES)
+def test_every_kind_of_loop_has_derivatives(tmp_path, what):
+    model = RoverModel.from_mjcf(write(tmp_path, linkage(what), "linkage.xml"), wheels=[])
+    run = Simulation(model, time_step=2e-3)
+    run.set_state(*model.close_loops([0.3, 0.0, 0.0, 0.2], [2.0, 0.0, 0.5, 1.0]))
+    run.step(2)
+    linear = run.linearise(check=True)
+    assert linear.holds.all()
+    assert linear.errors.max() < 1e-4, "the error of the differences"
 
 
 @pytest.mark.parametrize("what", EQUALITIES)

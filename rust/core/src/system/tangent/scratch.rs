@@ -7,6 +7,7 @@ use crate::multibody::{
 };
 use crate::scalar::{Dual, Lane};
 use crate::system::drives::Drives;
+use crate::system::loops::Loops;
 
 /// What the energy audit did to the velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,6 +62,14 @@ pub(crate) struct Tangent<T: Lane> {
     pub(super) d_stiffness: T,
     pub(super) d_damping: T,
     pub(super) correction: Correction,
+    /// Of a machine with closed loops.
+    pub(super) loops: Option<VaryingLoops<T>>,
+}
+
+/// Closed loops with their derivatives, and the factor of M̂ with its own.
+pub(super) struct VaryingLoops<T: Lane> {
+    pub loops: Box<Loops<Dual<T>>>,
+    pub factor: Factor<Dual<T>>,
 }
 
 impl<T: Lane> Tangent<T> {
@@ -104,6 +113,10 @@ impl<T: Lane> Tangent<T> {
             d_stiffness: zero,
             d_damping: zero,
             correction: Correction::None,
+            loops: Loops::of(token, model, 1).map(|loops| VaryingLoops {
+                loops,
+                factor: Factor::new(token, mechanism),
+            }),
         }
     }
 }
