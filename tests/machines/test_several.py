@@ -135,6 +135,54 @@ def test_a_rover_pushes_one_that_stands_on_ice():
     assert sum(contacts.impulses[push, 0]) / 0.005 == pytest.approx(CART * acceleration, rel=1e-9)
 
 
+def short(name: str) -> RoverModel:
+    """A cart whose wheels reach beyond its chassis."""
+    return machine(name, FOUR)
+
+
+def meeting_wheels(friction: float) -> Simulation:
+    """Two carts without weight: the front wheels of the first, which spin, meet the back wheels of the other."""
+    pair = RoverModel.join({"a": short("a"), "b": short("b")})
+    sim = Simulation(pair, gravity=(0, 0, 0), friction=friction)
+    q, v, first, second = np.zeros(pair.nv), np.zeros(pair.nv), *(pair.machines[name].coordinates for name in "ab")
+    q[first.start + 1] = q[second.start + 1] = 5.0
+    q[second.start] = 0.6 + 2 * RADIUS + 2e-3
+    v[first.start] = 1.0
+    v[[first.start + 6, first.start + 7]] = -4.0
+    sim.set_state(q, v)
+    return sim
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.4])
+def test_a_wheel_that_is_met_feels_the_force_of_the_one_that_meets_it(friction):
+    sim = meeting_wheels(friction)
+    for _ in range(10):
+        sim.step()
+        if len(sim.contacts):
+            break
+    others = [other for other in sim.contacts.others if other is not None]
+    assert len(others) == 2
+    forces = sim.wheel_forces
+    names = sim.model.wheel_names
+    hit = [names.index(name) for name in ("a/FL", "a/FR", "b/BL", "b/BR")]
+    front, back = forces[hit[:2]], forces[hit[2:]]
+    assert (front[:, 0] > 100.0).all()
+    # Opposite normals and axles that agree: forces along the normal and the rolling direction are the same.
+    np.testing.assert_allclose(back[:, :2], front[:, :2], rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(back[:, 2], -front[:, 2], rtol=0.0, atol=1e-9)
+    assert (np.abs(front[:, 1]) > 1.0).all() == (friction > 0.0)
+    assert not forces[[k for k in range(8) if k not in hit]].any()
+    assert back[:, 0].sum() * 0.005 == pytest.approx(sim.contacts.impulses[:, 0].sum())
+
+
+def test_a_chassis_that_is_met_by_a_chassis_counts_as_pressed_on_both_sides():
+    sim = on_slope({"tug": cart(), "sledge": cart("skate")}, [0.0, 1.0 + 1e-9], materials={("skate", "ground"): (0, 0)})
+    sim.set_wheel_torques([4.0] * 4 + [0.0] * 4)
+    sim.step(20)
+    push = [k for k, other in enumerate(sim.contacts.others) if other is not None]
+    assert sim.trunk_force == pytest.approx(2.0 * sim.contacts.impulses[push, 0].sum() / 0.005)
+
+
 @pytest.mark.parametrize("hitch", ["ball joint", "bar"])
 def test_a_rover_tows_one_without_power_up_a_slope(hitch):
     slope, torque, long = 0.1, 6.0, 0.6
