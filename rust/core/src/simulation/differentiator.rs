@@ -97,7 +97,7 @@ impl Differentiator {
     /// Of a simulation with its command, for this machine's instructions.
     ///
     /// # Errors
-    /// `Variant`, `Wrench`.
+    /// `Variant`.
     pub fn new(of: &RoverSimulation) -> Result<Self, LinearisationError> {
         Self::with(of, Instructions::of_this_machine())
     }
@@ -105,16 +105,13 @@ impl Differentiator {
     /// The same for other instructions.
     ///
     /// # Errors
-    /// `Variant`, `Wrench`.
+    /// `Variant`.
     pub fn with(
         of: &RoverSimulation,
         instructions: Instructions,
     ) -> Result<Self, LinearisationError> {
         if of.options.variant != Variant::Linearised {
             return Err(LinearisationError::Variant);
-        }
-        if !of.command().actuators.wrenches.is_empty() {
-            return Err(LinearisationError::Wrench);
         }
         Ok(Self {
             sim: of.clone(),

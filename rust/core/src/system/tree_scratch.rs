@@ -195,7 +195,8 @@ impl TreeScratch {
         }
         self.applied.resize(model.nv(), 0.0);
         for wrench in wrenches {
-            wrench.add_force(model, &self.kinematics, &mut self.applied);
+            let R = self.kinematics.spun(model, wrench.body(model)).into();
+            wrench.add_force(model, self.kinematics.poses(), &R, &mut self.applied);
         }
     }
 

@@ -101,7 +101,7 @@ impl<T: Lane> Tangent<T> {
         self.end.set_moved(mechanism, &self.start, &self.v, h);
     }
 
-    /// Implicit terms, branches and torques of the drives.
+    /// Implicit terms, branches and torques of the drives, and the wrenches.
     #[inline(always)]
     fn drive(&mut self, scene: &TangentScene<'_>) {
         let step = self.step(scene);
@@ -130,6 +130,15 @@ impl<T: Lane> Tangent<T> {
             [&self.v, &self.v],
             &mut self.torque,
         );
+        self.applied.fill(Dual::splat(self.token, 0.0));
+        for wrench in &scene.command.wrenches {
+            let (poses, body) = (&self.poses_middle, wrench.body(scene.model));
+            let R = poses.spun(mechanism, &self.middle, body);
+            wrench.add_force(scene.model, poses, &R, &mut self.applied);
+        }
+        for (torque, force) in self.torque.iter_mut().zip(&self.applied) {
+            *torque += step.0 * *force;
+        }
     }
 
     /// `y` = the bias at the velocity v, or at the mean velocity.
@@ -383,7 +392,11 @@ impl<T: Lane> Tangent<T> {
             scratch,
         );
         let places = &self.start.joints;
-        let work = (self.drives).work(mechanism, step, places, [&self.v, &self.v_end]);
+        let mut work = (self.drives).work(mechanism, step, places, [&self.v, &self.v_end]);
+        let (h, theta) = step;
+        for (force, (v, end)) in self.applied.iter().zip(self.v.iter().zip(&self.v_end)) {
+            work += h * *force * (theta * *end + (h.like(1.0) - theta) * *v);
+        }
         let excess = (after.kinetic - before.kinetic) + (after.potential - before.potential) - work;
         let (zero, one) = (mass.like(0.0), mass.like(1.0));
         let is_free = scene.model.is_free() && !scene.model.holds_the_world();

@@ -46,6 +46,8 @@ pub(crate) struct Tangent<T: Lane> {
     pub(super) v_end: Vec<Dual<T>>,
     pub(super) displacement: Vec<Dual<T>>,
     pub(super) torque: Vec<Dual<T>>,
+    /// Generalized force of the wrenches (nv).
+    pub(super) applied: Vec<Dual<T>>,
     pub(super) y: Vec<Dual<T>>,
     pub(super) product: Vec<Dual<T>>,
     pub(super) solved: [Vec<T>; 2],
@@ -97,6 +99,7 @@ impl<T: Lane> Tangent<T> {
             v_end: vector(),
             displacement: vector(),
             torque: vector(),
+            applied: vector(),
             y: vector(),
             product: vector(),
             solved: [vec![zero; model.nv()], vec![zero; model.nv()]],
