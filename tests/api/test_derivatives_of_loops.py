@@ -216,7 +216,7 @@ def test_a_rover_with_a_bar_differential_is_differentiated(depth):
     assert linear.is_projected == (depth > 0.0)
     names = sim.model.dof_names
     held = dict(zip([*names, *(f"rate of {name}" for name in names)], linear.holds, strict=False))
-    assert all(held[name] for name in ("x", "z", "heading", "rate of bar"))
+    assert all(held[name] for name in ("x", "z", "heading", "rate of roll"))
     assert linear.holds.mean() > 0.5
     columns = np.flatnonzero(linear.holds)
     # The differences' own error: with light rods the solver's rounding counts, and modes change beyond 1e-5.
