@@ -9,7 +9,7 @@ from pursuit import pursuit
 from refusals import refused
 
 from rover_gym import ModelError, PDPolicy, RoverEnv, RoverModel, StateError
-from rover_gym.policy import CommandController
+from rover_gym.policy import CommandController, ScanPolicy
 from rover_gym.policy.pd_policy import Turning
 from rover_gym.vector import RoverVectorEnv
 
@@ -73,6 +73,33 @@ def test_policies_reach_the_goal_on_the_plane(name: str, kind: str) -> None:
         if reached.all():
             break
     assert reached.all()
+
+
+def test_a_heavy_body_on_skidding_wheels_turns_as_told() -> None:
+    described = MACHINES["skid"][1].to_dict()
+    trunk = described["solids"][0]
+    trunk |= {"centre_of_mass": [0.0, 0.0, 0.0], "inertia": [30.0, 120.0, 120.0, 0.0, 0.0, 0.0]}
+    env = RoverEnv(model=RoverModel.from_dict(described))
+    controller, turning = CommandController(env), Turning.of(env.model, env.model.mass * 9.81)
+    curvature = turning.max_curvature_at(1.2)
+    assert curvature < 0.5 * turning.max_curvature(env.max_steering)
+    seen = RoverEnv(model=env.model, **ScanPolicy.arguments(env.model))
+    assert ScanPolicy(seen).controller.limits.curvature == pytest.approx(curvature)
+    observation, _ = env.reset(seed=1)
+    command = np.array([[1.0 / controller.limits.speed, curvature / controller.limits.curvature, 0.0]])
+    rims, rates = [], []
+    for k in range(100):
+        # It turns for three seconds, then it stops the turn.
+        turns = command * [1.0, k < 60, 1.0]
+        observation, *_ = env.step(controller.act(observation[None], turns)[0])
+        fields = env.observation_layout.split(observation)
+        rims.append(np.abs(fields["velocity"][6:] * env.model.wheel_radii).max())
+        rates.append(fields["velocity"][4])
+    # With the curvature of other rovers the wheels would spin at 6 m/s, first one way, then the other.
+    assert max(rims[10:60]) < 2.0
+    assert np.mean(rates[40:60]) == pytest.approx(curvature, rel=0.6)
+    assert np.ptp(rates[40:60]) < 0.1
+    assert abs(rates[-1]) < 0.1
 
 
 def test_axles_meet_in_the_turning_centre_of_the_wheels_that_do_not_steer() -> None:

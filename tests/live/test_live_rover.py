@@ -61,7 +61,7 @@ def test_ice_lets_the_wheels_slip() -> None:
     assert slips[1] > slips[0] + 0.3
 
 
-@pytest.mark.parametrize("driver", ["pd", "scan", "foresight", "anywhere"])
+@pytest.mark.parametrize("driver", ["pd", "scan", "foresight", "anywhere", "guided"])
 def test_a_policy_takes_over_a_rover_that_moves(driver: str) -> None:
     rover = driven(LiveRover(LiveScene(ground="rocks", difficulty=0.3)), 20)
     before = rover.env.simulation.q, rover.time, rover.info["distance_to_goal"]

@@ -55,7 +55,7 @@ def film_options(size: str, camera: str, *, forces: bool, antialiasing: bool) ->
 
 Completer = Callable[[str], list[str]]
 
-DRIVERS = ("pd", "sand", "scan", "foresight", "anywhere", "planner")
+DRIVERS = ("pd", "sand", "scan", "foresight", "anywhere", "guided", "planner")
 
 
 def complete_terrain(incomplete: str) -> list[str]:

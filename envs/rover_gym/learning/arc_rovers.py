@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from rover_gym.learning.arc_config import ArcConfig, ArcScene
 from rover_gym.learning.configuration import environment_arguments
+from rover_gym.learning.varied_rover import varied
 from rover_gym.mechanics import RoverModel
 from rover_gym.models.lookup import open_model
 from rover_gym.policy.arc_driver import LARGEST, N_ARCS, ArcObservation
@@ -25,20 +26,7 @@ from rover_gym.policy.scan_policy import ScanPolicy
 #: Of a scan in a byte.
 STEPS = 127.0 / LARGEST
 
-#: Ranges of the factors on wheel radius, masses and torques of varied rovers.
-VARIED = {"wheel_radius": (0.85, 1.2), "mass_scale": (0.7, 1.4), "torque": (0.7, 1.4)}
-
 Labels = dict[str, npt.NDArray[Any]]
-
-
-def varied(model: RoverModel, random: np.random.Generator) -> RoverModel:
-    """A rover like a model, with other wheels, masses and torques."""
-    radius, mass, torque = (random.uniform(*span) for span in VARIED.values())
-    return model.replace(
-        wheel_radius=float(model.wheel_radii.max()) * radius,
-        mass_scale=mass,
-        wheel_torque_limit=float(model.wheel_torque_limits.max()) * torque * mass,
-    )
 
 
 class Group:

@@ -42,7 +42,7 @@ class LiveChoices:
             name: None if name == "rover" else RoverModel.named(name) for name in RoverModel.names()
         }
     )
-    drivers: tuple[str, ...] = (BY_HAND, "pd", "scan", "foresight", "anywhere")
+    drivers: tuple[str, ...] = (BY_HAND, "pd", "scan", "foresight", "anywhere", "guided")
     find_policy: FindPolicy = named_policy
 
 

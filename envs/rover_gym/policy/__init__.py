@@ -23,6 +23,7 @@ from rover_gym.policy.evaluation import (
 from rover_gym.policy.features import Features
 from rover_gym.policy.goal_env import GoalObservation, RoverGoalEnv, RoverGoalVectorEnv
 from rover_gym.policy.ground_map import MapOptions
+from rover_gym.policy.guided_policy import GuidedPolicy
 from rover_gym.policy.named_policy import NamedPolicy, Policy, named_policy
 from rover_gym.policy.network_files import Network, PolicyError
 from rover_gym.policy.pd_policy import PDGains, PDPolicy
@@ -44,6 +45,7 @@ __all__ = [
     "Features",
     "ForesightCosts",
     "GoalObservation",
+    "GuidedPolicy",
     "IntervalEstimate",
     "MapOptions",
     "NamedPolicy",

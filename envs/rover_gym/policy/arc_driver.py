@@ -58,7 +58,7 @@ Step = Callable[[Observations, Mask, bool], tuple[Observations, Array, Mask, Mas
 ArcObservation = dict[str, npt.NDArray[np.float32]]
 
 #: Sizes of the observation's parts beside the scan.
-SIZES = {"features": 28 + PLACES * OF_A_WHEEL, "command": N_COMMANDS, "clocks": 5 + 3 * SEEN_TRAPS}
+SIZES = {"features": 29 + PLACES * OF_A_WHEEL, "command": N_COMMANDS, "clocks": 5 + 3 * SEEN_TRAPS}
 
 
 def observation_space() -> gym.spaces.Dict:
@@ -108,7 +108,7 @@ class ArcDriver:
         self._layout, self._scale, self._shape = layout, layout.scale, SCAN[:2]
         self._offsets = scan_grid(rover).offsets
         self._level = -float(model.resting_pose(Plane(), (0.0, 0.0), 0.0)[1])
-        self._rover = _measures(rover, plan)
+        self._rover = _measures(rover, plan, self._level)
         self._wheels = _Wheels(rover, plan.cruise_speed)
 
     # -- memory
@@ -237,8 +237,8 @@ def check_arcs(actions: object, n: int) -> npt.NDArray[np.int64]:
     return arcs.astype(np.int64)
 
 
-def _measures(rover: RoverEnv, plan: ScanPolicy) -> Array:
-    """The rover itself: its measures over its reach, its speed, traction and mass."""
+def _measures(rover: RoverEnv, plan: ScanPolicy, level: float) -> Array:
+    """The rover itself: its measures over its reach, its speed, traction, mass and the height of its mass centre."""
     model: RoverModel = rover.model
     centres, reach = wheel_centres(model), plan.reach
     weight = model.mass * math.hypot(*rover.gravity)
@@ -259,6 +259,7 @@ def _measures(rover: RoverEnv, plan: ScanPolicy) -> Array:
             math.log10(model.mass) - 2.0,
             math.log(pull),
             math.log(reach),
+            float(model.tags(np.zeros(model.nq))["centre_of_mass"][1] - level) / reach,
         ]
     )
 

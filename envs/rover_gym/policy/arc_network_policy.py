@@ -90,7 +90,23 @@ class ArcNetworkPolicy:
             if not deterministic:
                 logits = logits + self._random.gumbel(size=logits.shape)
             arcs = np.zeros(len(rows), np.int64)
-            arcs[due] = logits.argmax(axis=1)
+            arcs[due] = self._choice(logits, rows, np.flatnonzero(due))
             driver.choose(rows, arcs, due)
         actions = driver.controller.act(rows, memory.command)
         return (actions[0] if given.ndim == 1 else actions), (*memory.state, since + 1)
+
+    def _choice(
+        self,
+        logits: npt.NDArray[Any],
+        rows: npt.NDArray[np.float32],  # noqa: ARG002 - for policies that plan
+        which: npt.NDArray[np.intp],  # noqa: ARG002
+    ) -> npt.NDArray[np.int64]:
+        """The arcs `(m,)` of some rovers, from the network's outputs for them `(m, 64)`.
+
+        Args:
+            logits: The outputs.
+            rows: Observations of all rovers.
+            which: `(m,)` numbers of the rovers.
+        """
+        best: npt.NDArray[np.int64] = logits.argmax(axis=1)
+        return best

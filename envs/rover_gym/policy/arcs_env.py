@@ -77,7 +77,7 @@ class RoverArcsEnv(gym.Wrapper[Any, Any, Observations, Observations]):
     | key      | shape    | meaning                                                                                  |
     |----------|----------|------------------------------------------------------------------------------------------|
     | scan     | (48, 40) | heights over the plane of the ground, in wheel radii; rows from the front, from the left |
-    | features | (58,)    | attitude, slope, speeds, `stuck`, goal; the rover's measures; the wheels at six places   |
+    | features | (59,)    | attitude, slope, speeds, `stuck`, goal; the rover's measures; the wheels at six places   |
     | command  | (3,)     | the last command                                                                         |
     | clocks   | (14,)    | time without movement, without progress, of backing off; the last places of being stuck  |
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from rover_gym.mechanics import RoverModel
 from rover_gym.policy.arc_forecast import FORECAST_FILE
 from rover_gym.policy.arc_network_policy import ARCS_FILE, ArcNetworkPolicy
+from rover_gym.policy.guided_policy import GuidedPolicy
 from rover_gym.policy.network_files import ANYWHERE, FOLDER, PolicyError, is_there
 from rover_gym.policy.pd_policy import PDPolicy
 from rover_gym.policy.sand_policy import SandPolicy
@@ -22,17 +23,18 @@ from rover_gym.validation import refuse
 NAMES_HELP = (
     "'pd' for the baseline, 'sand' for the one that crawls on sand, 'scan' for the search on the height scan, "
     "'foresight' for the same with a learned prediction, "
-    "'anywhere' for the network that drives any rover without a planner, "
+    "'anywhere' for the network that drives any rover without a planner, 'guided' for both together, "
     "or the folder of a run of `rover train` or of a forecast."
 )
 
 #: Why a policy is refused that is none.
 UNKNOWN = (
-    "must be 'pd', 'sand', 'scan', 'foresight', 'anywhere' or the folder of a run of `rover train` or of a forecast"
+    "must be 'pd', 'sand', 'scan', 'foresight', 'anywhere', 'guided' or the folder of a run of `rover train` or of a "
+    "forecast"
 )
 
 #: Policies without a folder.
-NAMES = ("pd", "sand", "scan", "foresight", ANYWHERE)
+NAMES = ("pd", "sand", "scan", "foresight", ANYWHERE, "guided")
 
 _TITLES = {
     "pd": "the PD baseline",
@@ -40,6 +42,7 @@ _TITLES = {
     "scan": "the search on the height scan",
     "foresight": "the search with foresight",
     ANYWHERE: "the network for any rover",
+    "guided": "the search guided by the network",
 }
 
 
@@ -74,7 +77,8 @@ def named_policy(policy: str, model: RoverModel | None = None) -> NamedPolicy:
     """The policy of a name.
 
     Args:
-        policy: "pd", "sand", "scan", "foresight", "anywhere", or the folder of a run of `rover train` or of a forecast.
+        policy: "pd", "sand", "scan", "foresight", "anywhere", "guided", or the folder of a run of `rover train` or of a
+            forecast.
         model: The rover, to which the height scan is fitted; None for the built-in one.
 
     Raises:
@@ -86,6 +90,8 @@ def named_policy(policy: str, model: RoverModel | None = None) -> NamedPolicy:
     seen = ScanPolicy.arguments(model)
     if policy == "scan":
         return NamedPolicy(seen, ScanPolicy)
+    if policy == "guided":
+        return NamedPolicy(seen, GuidedPolicy)
     if policy == "foresight" or is_there(Path(policy) / FORECAST_FILE):
         return NamedPolicy(seen, partial(ScanPolicy, forecast=True if policy == "foresight" else policy))
     network = network_folder(policy)

@@ -43,6 +43,12 @@ SCRUB_RATE = 0.2
 #: Time constant of the yaw rate of a rover that skids, s.
 YAW_RESPONSE = 0.1
 
+#: Friction that a rover which skids is sure to have: what its wheels may need to start or to stop a turn.
+SURE_FRICTION = 0.5
+
+#: Time within which such a rover shall stop a turn, s.
+YAW_STOP = 0.3
+
 #: Distance below which two lengths of a rover count as equal, m.
 TINY = 1e-6
 
@@ -61,6 +67,7 @@ class Turning:
         yaw_gain: Force of each wheel for the yaw rate that is missing, N s/rad: 0 unless the rover skids, positive on
             the right, negative on the left.
         scrub: Force of each wheel against the sideways friction of a left turn, N, with the same signs.
+        yaw_acceleration: Largest that the wheels' friction gives a rover that skids, rad/s2; infinite for others.
     """
 
     x_c: float
@@ -68,6 +75,7 @@ class Turning:
     steering: Steering
     yaw_gain: tuple[float, ...]
     scrub: tuple[float, ...]
+    yaw_acceleration: float = math.inf
 
     @classmethod
     def of(cls, model: RoverModel, weight: float) -> "Turning":
@@ -80,19 +88,25 @@ class Turning:
             x_c = 0.5 * float(centres[:, 0].min() + centres[:, 0].max())
         wheels = tuple((float(x - x_c), float(z)) for x, z in centres)
         width = sum(abs(z) for _, z in wheels)
-        gain = scrub = 0.0
+        gain, scrub, acceleration = 0.0, 0.0, math.inf
         if not steering.joints and width > TINY:
             mass_matrix = model.mass_matrix(np.zeros(model.nq), coordinates="state")
-            gain = float(mass_matrix[YAW, YAW]) / YAW_RESPONSE / width
+            inertia = float(mass_matrix[YAW, YAW])
+            gain = inertia / YAW_RESPONSE / width
+            acceleration = SURE_FRICTION * weight / len(wheels) * width / inertia
             scrub = SCRUB * weight / len(wheels) * sum(abs(x) for x, _ in wheels) / width
         sides = [math.copysign(1.0, z) if abs(z) > TINY else 0.0 for _, z in wheels]
         yaw_gain, scrubs = (tuple(side * force for side in sides) for force in (gain, scrub))
-        return cls(x_c, wheels, steering, yaw_gain, scrubs)
+        return cls(x_c, wheels, steering, yaw_gain, scrubs, acceleration)
 
     @property
     def skids(self) -> bool:
         """Whether the rover has no steering."""
         return not self.steering.joints
+
+    def max_curvature_at(self, speed: float) -> float:
+        """The largest curvature at a speed, m/s, out of which friction stops the turn in `YAW_STOP`, 1/m."""
+        return self.yaw_acceleration * YAW_STOP / speed
 
     def max_curvature(self, max_steering: float) -> float:
         """The largest curvature that keeps every wheel within the steering limit and rolling forward, 1/m.

@@ -416,10 +416,13 @@ class ScanPolicy:
         if memory.age[i] > 0 and (memory.still[i] > patience or (is_high and memory.retreat[i] == 0.0)):
             self._back_off(memory, i, x, z, heading)
 
-    def choose(self, row: Array, slope: list[float], memory: ScanMemory, i: int) -> tuple[int, bool]:
+    def choose(
+        self, row: Array, slope: list[float], memory: ScanMemory, i: int, further: Array | None = None
+    ) -> tuple[int, bool]:
         """The first arc of the cheapest path from an observation of rover i, and whether to push on it.
 
-        What is remembered changes only by the map, where there is one.
+        What is remembered changes only by the map, where there is one. `further` `(n_arcs,)` are costs of the first
+        arcs beside the policy's own, m.
         """
         x, z, heading = (float(row[self._q + k]) for k in (0, 2, 4))
         goal = row[self._goal] * self._scale[self._goal]
@@ -431,6 +434,8 @@ class ScanPolicy:
             heights[beyond[0]] = FENCE * self.radius
         boldness = self._boldness(memory.fruitless[i])
         extra, fast = self._outlook(row, slope, heights, boldness)
+        if further is not None:
+            extra = further if extra is None else extra + further
         task = SearchTask(
             goal=(float(goal[0]) - self._x_c, float(goal[1])),
             command=memory.command[i].copy(),
@@ -559,7 +564,7 @@ def _limits(rover: RoverEnv, turning: Turning, gains: ScanGains) -> CommandLimit
     """The commands' limits: what the motors and the steering can follow."""
     return CommandLimits(
         speed=max(gains.push, gains.speed),
-        curvature=min(turning.max_curvature(rover.max_steering), MAX_CURVATURE),
+        curvature=min(turning.max_curvature(rover.max_steering), turning.max_curvature_at(gains.speed), MAX_CURVATURE),
         sideways_deg=max(1.0, min(MAX_SIDEWAYS_DEG, 0.9 * math.degrees(rover.max_steering))),
         response=gains.response,
     )
