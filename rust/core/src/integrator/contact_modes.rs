@@ -34,8 +34,8 @@ pub enum ContactMode {
 /// Velocity, relative to the largest at play, that counts as rounding.
 ///
 /// A closed contact sticks if it slides no faster and its impulse is within its cone. At the edge
-/// of the cone it slips, along its friction: redundant contacts leave wheels there that cannot move,
-/// and their impulse stays at the edge with the load.
+/// of the cone it slips, along its friction: redundant contacts leave wheels there that cannot
+/// move, and their impulse stays at the edge with the load.
 const ROUNDING: f64 = 1e-9;
 
 /// Pivots below this fraction of the largest count as zero.
